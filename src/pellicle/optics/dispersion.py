@@ -1,0 +1,141 @@
+"""Refractive index n + ik against wavelength (nm), each model a small pytree of its parameters.
+
+A dispersion answers `index(wavelength)` with a real array where it cannot absorb and a `Pair`
+where it can: that type is what tells the rest of the code whether there is absorption to compute.
+"""
+
+from __future__ import annotations
+
+import abc
+from typing import Any, final
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Complex
+
+from pellicle.optics.number import Number, Pair, imag, is_real, real, to_complex
+
+
+class AbstractDispersion(eqx.Module):
+    """n + ik as a function of wavelength. Subclasses are final."""
+
+    @abc.abstractmethod
+    def index(self, wavelength: Any) -> Number:
+        """Index at `wavelength` (nm, any shape): a real array, or a Pair where it may absorb."""
+
+    def __call__(self, wavelength: Any) -> Complex[Array, "..."]:
+        """n + ik as a complex array at `wavelength` (nm, any shape)."""
+        return to_complex(self.index(jnp.asarray(wavelength, dtype=jnp.result_type(float, wavelength))))
+
+
+def _like(values: Any, wavelength: Any):
+    """A table's column in the precision of the wavelengths, so that float32 stays float32."""
+    return jnp.asarray(values, dtype=jnp.result_type(wavelength, jnp.float32))
+
+
+@final
+class Constant(AbstractDispersion):
+    """The same index at every wavelength; `k=None` means that the medium cannot absorb."""
+
+    n: Any
+    k: Any = None
+
+    def index(self, wavelength):
+        one = jnp.ones_like(wavelength)
+        return self.n * one if self.k is None else Pair(self.n * one, self.k * one)
+
+
+@final
+class Table(AbstractDispersion):
+    """Linear interpolation between measured points; NaN outside them, never an extrapolation.
+
+    `wavelength` (nm) rises strictly; `n` and `k` have its length, and `k=None` says that the
+    source gives no extinction.
+    """
+
+    wavelength: Any
+    n: Any
+    k: Any = None
+
+    def index(self, wavelength):
+        def column(values):
+            at = _like(self.wavelength, wavelength)
+            return jnp.interp(wavelength, at, _like(values, wavelength), left=jnp.nan, right=jnp.nan)
+
+        return column(self.n) if self.k is None else Pair(column(self.n), column(self.k))
+
+
+@final
+class Cauchy(AbstractDispersion):
+    """n = A + B/λ² + C/λ⁴ with λ in nm, B in nm² and C in nm⁴ (A. Cauchy, 1836); no absorption."""
+
+    A: Any
+    B: Any = 0.0
+    C: Any = 0.0
+
+    def index(self, wavelength):
+        u = 1 / (wavelength * wavelength)
+        return self.A + u * (self.B + u * self.C)
+
+
+@final
+class Sellmeier(AbstractDispersion):
+    """n² = 1 + Σ Bᵢ λ²/(λ² − Cᵢ) with λ in nm and Cᵢ in nm² (W. Sellmeier, 1871); no absorption.
+
+    `B` and `C` are tuples of the same length. Between the resonances √Cᵢ the formula has poles;
+    a negative n² gives NaN.
+    """
+
+    B: tuple[Any, ...]
+    C: tuple[Any, ...]
+
+    def index(self, wavelength):
+        square = wavelength * wavelength
+        return jnp.sqrt(1 + sum(b * square / (square - c) for b, c in zip(self.B, self.C, strict=True)))
+
+
+@final
+class WithExtinction(AbstractDispersion):
+    """The real index of one model with the extinction coefficient of another (its imaginary part)."""
+
+    base: AbstractDispersion
+    extinction: AbstractDispersion
+
+    def index(self, wavelength):
+        return Pair(real(self.base.index(wavelength)), imag(self.extinction.index(wavelength)))
+
+
+@final
+class Shifted(AbstractDispersion):
+    """A known dispersion plus a constant: what is fitted when a table is nearly right.
+
+    `n` and `k` are added; None adds nothing.
+    """
+
+    base: AbstractDispersion
+    n: Any = None
+    k: Any = None
+
+    def index(self, wavelength):
+        known = self.base.index(wavelength)
+        n = real(known) if self.n is None else real(known) + self.n
+        if self.k is None and is_real(known):
+            return n
+        return Pair(n, imag(known) if self.k is None else imag(known) + self.k)
+
+
+@final
+class Sampled(AbstractDispersion):
+    """Another dispersion known at the very wavelengths of a measurement, with its slope there.
+
+    A medium without free parameters is evaluated once, before a fit, and stands for itself as this.
+    The first-order expansion returns the samples exactly and hands their slope (1/nm) to whoever
+    differentiates in wavelength: the group index needs it.
+    """
+
+    wavelength: Any
+    value: Number
+    slope: Number
+
+    def index(self, wavelength):
+        return self.value + self.slope * (wavelength - self.wavelength)
