@@ -130,12 +130,14 @@ class Sampled(AbstractDispersion):
 
     A medium without free parameters is evaluated once, before a fit, and stands for itself as this.
     The first-order expansion returns the samples exactly and hands their slope (1/nm) to whoever
-    differentiates in wavelength: the group index needs it.
+    differentiates in wavelength: the group index needs it. `slope=None` says that nobody does.
     """
 
     wavelength: Any
     value: Number
-    slope: Number
+    slope: Number | None
 
     def index(self, wavelength):
+        if self.slope is None:
+            return self.value
         return self.value + self.slope * (wavelength - self.wavelength)

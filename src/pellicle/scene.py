@@ -1,0 +1,257 @@
+"""A scene: what is there and how it is looked at.
+
+Scenes are pytrees of numbers. Wherever a number may stand, a `Free` may stand instead: a
+parameter to be fitted. What is absent is None, and costs nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, final
+
+import equinox as eqx
+import jax
+import numpy as np
+
+from pellicle.materials import lookup
+from pellicle.optics.dispersion import AbstractDispersion, Constant
+from pellicle.optics.number import is_real
+
+SIGNALS = ("R", "T")
+POLARISATIONS = ("unpolarised", "s", "p")
+
+
+@final
+class Normal(eqx.Module):
+    """A normal prior on a free parameter, in the parameter's unit."""
+
+    mean: float = eqx.field(static=True)
+    sd: float = eqx.field(static=True)
+
+    def __check_init__(self):
+        if not self.sd > 0:
+            raise ValueError(f"a prior's standard deviation must be positive, not {self.sd}")
+
+
+@final
+class Free(eqx.Module):
+    """A parameter to be fitted, standing where its number would.
+
+    **Arguments:** `value` to start from (the middle of the bounds if None), `lower` and `upper`
+    bounds, and an optional `prior`; all in the parameter's own unit. Raises ValueError where the
+    bounds are reversed or the value is outside them.
+    """
+
+    value: float = eqx.field(static=True)
+    lower: float = eqx.field(static=True)
+    upper: float = eqx.field(static=True)
+    prior: Normal | None
+
+    def __init__(
+        self,
+        value: float | None = None,
+        lower: float = -math.inf,
+        upper: float = math.inf,
+        prior: Normal | None = None,
+    ):
+        if not lower < upper:
+            raise ValueError(f"bounds are reversed or equal: lower {lower:g} is not below upper {upper:g}")
+        if not (math.isfinite(lower) and math.isfinite(upper)):
+            raise ValueError("a free parameter needs two finite bounds: give lower and upper")
+        value = 0.5 * (lower + upper) if value is None else value
+        if not lower <= value <= upper:
+            raise ValueError(f"the start value {value:g} is outside its bounds {lower:g} to {upper:g}")
+        self.value, self.lower, self.upper, self.prior = float(value), float(lower), float(upper), prior
+
+
+def is_free(leaf: Any) -> bool:
+    return isinstance(leaf, Free)
+
+
+def free_leaves(tree: Any) -> list[tuple[Any, Free]]:
+    """(path, Free) for every free parameter in a pytree, in the pytree's own order."""
+    leaves = jax.tree_util.tree_leaves_with_path(tree, is_leaf=is_free)
+    return [(path, leaf) for path, leaf in leaves if is_free(leaf)]
+
+
+def insert(tree: Any, values: Any) -> Any:
+    """The pytree with its free parameters replaced by `values`, in the order of `free_leaves`."""
+    leaves, structure = jax.tree_util.tree_flatten(tree, is_leaf=is_free)
+    numbers = iter(values)
+    return jax.tree_util.tree_unflatten(structure, [next(numbers) if is_free(x) else x for x in leaves])
+
+
+def start_values(tree: Any) -> np.ndarray:
+    """The value of each free parameter, shape (parameters,)."""
+    return np.array([free.value for _, free in free_leaves(tree)])
+
+
+def medium(what: Any) -> AbstractDispersion:
+    """A medium from a material, a catalogue name or path, a number (n + ik), or a `Free` index.
+
+    Raises ValueError for an absorbing index with k < 0 (gain) and for an unknown name.
+    """
+    if isinstance(what, AbstractDispersion):
+        return what
+    if isinstance(what, str):
+        return lookup(what)
+    if is_free(what):
+        return Constant(what)
+    if isinstance(what, complex | np.complexfloating):
+        if what.imag < 0:
+            raise ValueError(
+                f"index {what} has a negative imaginary part, which is gain: absorption is n + ik with k ≥ 0"
+            )
+        return Constant(float(what.real), float(what.imag))
+    return Constant(what)
+
+
+@final
+class Layer(eqx.Module):
+    """A coherent layer: its material (anything `medium` takes) and its thickness in nm."""
+
+    material: AbstractDispersion = eqx.field(converter=medium)
+    thickness: float | Free
+    name: str | None = eqx.field(static=True, default=None)
+
+    def __check_init__(self):
+        lowest = self.thickness.lower if isinstance(self.thickness, Free) else self.thickness
+        if isinstance(lowest, int | float) and lowest < 0:
+            raise ValueError(f"thickness must not be negative, got {lowest:g} nm")
+
+
+def _medium_or_none(what: Any) -> AbstractDispersion | None:
+    return None if what is None else medium(what)
+
+
+@final
+class Substrate(eqx.Module):
+    """What the layer lies on: a half space, or, with `back`, a plate with an incoherent back face.
+
+    `back` is the medium behind the plate and `plate_mm` the plate's thickness in mm.
+    """
+
+    material: AbstractDispersion = eqx.field(converter=medium)
+    back: AbstractDispersion | None = eqx.field(converter=_medium_or_none, default=None)
+    plate_mm: float | Free = 1.0
+
+
+@final
+class Light(eqx.Module):
+    """How the scene is looked at: signal "R" or "T", polarisation, angle of incidence (degrees)
+    and wavelengths (nm; None leaves them to the data)."""
+
+    wavelength: Any = None
+    angle: float | Free = 0.0
+    signal: str = eqx.field(static=True, default="R")
+    polarisation: str = eqx.field(static=True, default="unpolarised")
+
+    def __check_init__(self):
+        if self.signal not in SIGNALS:
+            raise ValueError(f"signal must be one of {', '.join(SIGNALS)}, not {self.signal!r}")
+        check_polarisation(self.polarisation)
+        if isinstance(self.angle, int | float) and not 0 <= self.angle <= 90:
+            raise ValueError(f"the angle of incidence must lie in 0 to 90 degrees, got {self.angle:g}")
+
+
+def check_polarisation(polarisation: str) -> None:
+    """ValueError unless the word is one that we know."""
+    if polarisation not in POLARISATIONS:
+        raise ValueError(f"polarisation must be one of {', '.join(POLARISATIONS)}, not {polarisation!r}")
+
+
+@final
+class Drift(eqx.Module):
+    """A linear nuisance solved exactly in each evaluation: a polynomial in wavelength of a degree.
+
+    Degree 0 is one free number. The coefficients of higher degree shrink under Gaussian priors:
+    of degree j, standard deviation `width`·2^(1−j) of the signal's own level.
+    """
+
+    degree: int = eqx.field(static=True, default=0)
+    width: float = eqx.field(static=True, default=0.3)
+
+
+SLOW_SCALE, SLOW_OFFSET, ONE_NUMBER = Drift(3), Drift(2), Drift(0)
+
+
+def scale_word(what: float | str | Drift) -> float | Drift:
+    """'free', 'slow' or a number, for the scale."""
+    return _word(what, SLOW_SCALE, "scale")
+
+
+def offset_word(what: float | str | Drift) -> float | Drift:
+    """'free', 'slow' or a number, for the offset."""
+    return _word(what, SLOW_OFFSET, "offset")
+
+
+def _word(what, slow, name):
+    if what in ("free", "slow"):
+        return ONE_NUMBER if what == "free" else slow
+    if isinstance(what, str):
+        raise ValueError(f"{name} must be 'free', 'slow' or a number, not {what!r}")
+    return what
+
+
+@final
+class Instrument(eqx.Module):
+    """What the instrument does to the signal.
+
+    `scale` and `offset` are numbers, "free" or "slow"; `bandwidth` is the full width at half maximum
+    in nm and `thickness_spread` the standard deviation of the thickness over the spot in nm, None or
+    0 being absent.
+    """
+
+    scale: float | Drift = eqx.field(converter=scale_word, default=1.0)
+    offset: float | Drift = eqx.field(converter=offset_word, default=0.0)
+    bandwidth: float | Free | None = None
+    thickness_spread: float | Free | None = None
+
+
+def _layers(what: Layer | Sequence[Layer]) -> tuple[Layer, ...]:
+    return (what,) if isinstance(what, Layer) else tuple(what)
+
+
+@final
+class Scene(eqx.Module):
+    """A layer on a substrate, the medium it is seen from, the light and the instrument.
+
+    ```python
+    pl.Scene(pl.Layer("SiO2", thickness=pl.Free(lower=10, upper=3000)), substrate="Si")
+    ```
+
+    Raises ValueError where the ambient absorbs, or where there is not exactly one layer.
+    """
+
+    layers: tuple[Layer, ...] = eqx.field(converter=_layers)
+    substrate: Substrate = eqx.field(converter=lambda s: s if isinstance(s, Substrate) else Substrate(s))
+    ambient: AbstractDispersion = eqx.field(converter=medium, default=1.0)
+    light: Light = Light()
+    instrument: Instrument = Instrument()
+
+    def __check_init__(self):
+        if len(self.layers) != 1:
+            raise ValueError(f"a scene holds exactly one layer for now, got {len(self.layers)}")
+        if isinstance(self.ambient, Constant) and self.ambient.k is not None:
+            raise ValueError("the ambient must not absorb: give it a real index")
+
+    @property
+    def layer(self) -> Layer:
+        return self.layers[0]
+
+
+def with_wavelength(scene: Scene, wavelength: Any) -> Scene:
+    """The same scene looked at at other wavelengths (nm)."""
+    light = scene.light
+    return eqx.tree_at(
+        lambda s: s.light, scene, Light(wavelength, light.angle, light.signal, light.polarisation)
+    )
+
+
+def absorbs(dispersion: AbstractDispersion) -> bool:
+    """False where the type of the index, or an extinction fixed at exactly 0, rules absorption out."""
+    if isinstance(dispersion, Constant) and isinstance(dispersion.k, int | float) and dispersion.k == 0:
+        return False
+    numbers = insert(dispersion, start_values(dispersion))
+    return not is_real(jax.eval_shape(numbers.index, jax.ShapeDtypeStruct((1,), np.float32)))

@@ -1,0 +1,126 @@
+"""What a film does to light, as functions of numbers: the library's front door.
+
+Every argument broadcasts and may be traced: `jit`, `vmap`, `grad` and `jacfwd` work through all of
+them. The precision follows the input, float32 or float64.
+"""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from pellicle.optics import film, interface
+from pellicle.optics.dispersion import AbstractDispersion
+from pellicle.optics.number import Number, is_real, sincos_poly, to_pair
+from pellicle.scene import check_polarisation, medium
+
+Medium = Any
+"""A number (n + ik), an array of them, a material, or a material's name."""
+
+
+def reflectance(
+    wavelength: Any,
+    thickness: Any,
+    layer: Medium,
+    substrate: Medium,
+    *,
+    ambient: Medium = 1.0,
+    angle: Any = 0.0,
+    polarisation: str = "unpolarised",
+) -> Float[Array, "..."]:
+    """Power reflectance of a layer on a half space, as a fraction.
+
+    **Arguments:** `wavelength` and `thickness` in nm, `angle` of incidence in degrees, all of any
+    shape; `layer` and `substrate` as numbers n + ik (k ≥ 0 absorbs), arrays, materials or names;
+    `ambient` real; `polarisation` "s", "p" or "unpolarised" (the mean of both).
+
+    **Raises:** ValueError for an absorbing ambient, an unknown polarisation or material, and
+    wavelengths outside a material's data. Under `jit`, where wavelengths are unknown, the result is
+    NaN there.
+
+    **Source:** Gerardin et al. 2019, eqs. 11-17, in the form of `pellicle.optics.film`.
+
+    ```python
+    >>> round(float(reflectance(550.0, 100.0, 1.46, 4.07 + 0.03j)), 4)
+    0.1003
+
+    ```
+    """
+    waves = _waves(wavelength, thickness, layer, substrate, ambient, angle, polarisation)
+    return _mean([film.reflectance(w) for w in waves])
+
+
+def transmittance(
+    wavelength: Any,
+    thickness: Any,
+    layer: Medium,
+    substrate: Medium,
+    *,
+    ambient: Medium = 1.0,
+    angle: Any = 0.0,
+    polarisation: str = "unpolarised",
+) -> Float[Array, "..."]:
+    """Power transmittance of a layer into its substrate, as a fraction; arguments as `reflectance`.
+
+    With an absorbing substrate this is the power that enters it. Seed paper 001 (eq. 21) weights
+    both polarisations alike, which is wrong for p there; here each has its own factor.
+    """
+    waves = _waves(wavelength, thickness, layer, substrate, ambient, angle, polarisation)
+    return _mean([film.transmittance(w) for w in waves])
+
+
+def _mean(signals):
+    return signals[0] if len(signals) == 1 else 0.5 * (signals[0] + signals[1])
+
+
+def _waves(wavelength, thickness, layer, substrate, ambient, angle, polarisation):
+    check_polarisation(polarisation)
+    _warn_of_lost_precision(wavelength, thickness, layer, substrate, ambient, angle)
+    wavelength = _floating(wavelength)
+    normal = isinstance(angle, int | float) and angle == 0
+    layer, substrate, ambient = (_index(m, wavelength) for m in (layer, substrate, ambient))
+    if not is_real(ambient):
+        raise ValueError("the ambient must not absorb: give it a real index")
+    if not normal:
+        substrate = interface.allow_tunnelling(substrate)
+    return film.film(
+        ambient,
+        layer,
+        substrate,
+        2 * jnp.pi / wavelength * thickness,
+        None if normal else jnp.deg2rad(_floating(angle)),
+        "sp" if polarisation == "unpolarised" else polarisation,
+        through=film.through_wave if normal and is_real(layer) else film.through,
+        sincos=sincos_poly,
+    )
+
+
+def _floating(x: Any):
+    return jnp.asarray(x) * 1.0
+
+
+def _index(what: Medium, wavelength) -> Number:
+    """The index at the wavelengths: arrays and numbers as they are, materials evaluated."""
+    if isinstance(what, str | AbstractDispersion):
+        material = medium(what)
+        check = getattr(material, "check_range", None)
+        if check is not None and not isinstance(wavelength, jax.core.Tracer):
+            check(np.asarray(wavelength))
+        return material.index(wavelength)
+    return to_pair(_floating(what))
+
+
+def _warn_of_lost_precision(*arguments: Any) -> None:
+    if jax.config.jax_enable_x64:  # pyright: ignore[reportAttributeAccessIssue]
+        return
+    double = (np.float64, np.complex128)
+    if any(isinstance(a, np.ndarray | np.generic) and a.dtype in double for a in arguments):
+        warnings.warn(
+            "float64 input is computed in float32: jax.config.update('jax_enable_x64', True) keeps it",
+            stacklevel=4,
+        )
