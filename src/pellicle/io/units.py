@@ -1,0 +1,63 @@
+"""Units at the edge of a file: whatever an instrument writes becomes nm, degrees and fractions.
+
+Plain constants instead of a unit library: importing one would cost more than the whole reading.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+#: h c / e in eV nm, exact in the SI of 2019 (h = 6.62607015e-34, c = 299792458, e = 1.602176634e-19).
+HC_EV_NM = 6.62607015e-34 * 299792458 / 1.602176634e-19 * 1e9
+
+WAVELENGTH_UNITS = ("nm", "um", "A", "eV", "cm-1")
+SIGNAL_UNITS = ("fraction", "percent")
+
+_WAVELENGTH_SPELLINGS = {
+    "nm": ("nm", "nanometer", "nanometers", "nanometre", "nanometres"),
+    "um": ("um", "micron", "microns", "micrometer", "micrometers", "micrometre", "micrometres"),
+    "A": ("a", "å", "ang", "angstrom", "angstroms", "ångström", "ångstrom"),
+    "eV": ("ev",),
+    "cm-1": ("cm-1", "1/cm", "cm^-1", "cm**-1", "cm⁻¹", "cm−1", "/cm", "cm^{-1}", "percm"),
+}
+_SIGNAL_SPELLINGS = {
+    "percent": ("%", "percent", "pct", "perc"),
+    "fraction": ("fraction", "frac", "1", "-", "", "0-1", "0..1", "abs", "unitless", "dimensionless"),
+}
+_ANGLE_SPELLINGS = {"deg": ("deg", "degree", "degrees", "°", "º")}
+
+
+def _lookup(spellings: dict[str, tuple[str, ...]], text: str) -> str | None:
+    plain = text.strip().lower().replace(" ", "").replace("µ", "u").replace("μ", "u")
+    return next((unit for unit, known in spellings.items() if plain in known), None)
+
+
+def wavelength_unit(text: str) -> str | None:
+    """The member of `WAVELENGTH_UNITS` that `text` spells (`µm`, `1/cm`, `Angstrom`, ...), or None."""
+    return _lookup(_WAVELENGTH_SPELLINGS, text)
+
+
+def signal_unit(text: str) -> str | None:
+    """`percent` or `fraction` as `text` spells it (`%`, `-`, ...), or None."""
+    return _lookup(_SIGNAL_SPELLINGS, text)
+
+
+def angle_unit(text: str) -> str | None:
+    """`deg` if `text` spells degrees, else None."""
+    return _lookup(_ANGLE_SPELLINGS, text)
+
+
+def to_nm(values: np.ndarray, unit: str) -> np.ndarray:
+    """Wavelengths in nm from positive `values` in one of `WAVELENGTH_UNITS`."""
+    match unit:
+        case "nm":
+            return values
+        case "um":
+            return values * 1e3
+        case "A":
+            return values / 10
+        case "eV":
+            return HC_EV_NM / values
+        case "cm-1":
+            return 1e7 / values
+    raise ValueError(f"unit: expected one of {', '.join(WAVELENGTH_UNITS)}, got {unit!r}")
