@@ -1,0 +1,88 @@
+"""Write src/pellicle/materials/data/pages.csv: one line per vendored page, read instead of the pages.
+
+Run after adding a page: python scripts/index_materials.py
+"""
+
+import csv
+from pathlib import Path
+
+from pellicle.materials.citation import plain_text, short_citation
+from pellicle.materials.database_page import contents, load_yaml
+from pellicle.materials.user_table import read_table
+
+DATA = Path(__file__).parents[1] / "src/pellicle/materials/data"
+SHELVES = ("glass", "main", "other", "popular_glass")
+SOPRA = {
+    "CU2O": "Cu2O",
+    "CUO": "CuO",
+    "HFO2": "HfO2",
+    "ITO2": "In2O3-SnO2",
+    "SIO": "SiO",
+    "TIO2": "TiO2",
+    "TIO2B": "TiO2",
+    "Y2O3": "Y2O3",
+}
+SOPRA_CITATION = "SOPRA n,k database, SOPRA S.A., Bois-Colombes (tables as carried by solcore 5.10.1)"
+MODEL_CITATION = (
+    "Model, not measured (scripts/make_hgs_model.py): Tauc-Lorentz band, G. E. Jellison and F. A. Modine, "
+    "Appl. Phys. Lett. 69, 371 (1996), with the index above 620 nm of W. L. Bond et al., "
+    "J. Appl. Phys. 38, 4090 (1967)"
+)
+
+
+def database_rows():
+    for file in sorted((DATA / "refractiveindex.info").glob("*.yml")):
+        shelf = next(s for s in SHELVES if file.stem.startswith(s + "_"))
+        book, page = file.stem.removeprefix(shelf + "_").split("_", 1)
+        content = load_yaml(file.read_text(encoding="utf-8"))
+        found = contents(content)
+        references = content["REFERENCES"]
+        yield {
+            "shelf": shelf,
+            "book": book,
+            "page": page,
+            "file": file.relative_to(DATA).as_posix(),
+            "low": f"{found.wavelength_range[0]:.10g}",
+            "high": f"{found.wavelength_range[1]:.10g}",
+            "has_extinction": "yes" if found.has_extinction else "no",
+            "short": short_citation(references),
+            "citation": plain_text(references),
+            "comments": plain_text(content.get("COMMENTS")),
+        }
+
+
+def table_row(file, shelf, book, page, short, citation, comments):
+    found = read_table(file)
+    return {
+        "shelf": shelf,
+        "book": book,
+        "page": page,
+        "file": file.relative_to(DATA).as_posix(),
+        "low": f"{found.wavelength_range[0]:.10g}",
+        "high": f"{found.wavelength_range[1]:.10g}",
+        "has_extinction": "yes",
+        "short": short,
+        "citation": citation,
+        "comments": comments,
+    }
+
+
+def table_rows():
+    yield table_row(
+        DATA / "model/HgS.csv", "model", "HgS", "edge", "model, not measured", MODEL_CITATION, "Cinnabar."
+    )
+    for page, book in SOPRA.items():
+        file = DATA / "sopra" / f"{page}.csv"
+        yield table_row(file, "sopra", book, page, "SOPRA", SOPRA_CITATION, f"SOPRA's material {page}.")
+
+
+def main():
+    rows = sorted([*database_rows(), *table_rows()], key=lambda r: (r["shelf"], r["book"], r["page"]))
+    with (DATA / "pages.csv").open("w", encoding="utf-8", newline="") as target:
+        writer = csv.DictWriter(target, rows[0], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,131 @@
+"""What is on the shelves: the vendored pages and the short names, without opening any page.
+
+`data/pages.csv` is written by scripts/index_materials.py; `data/catalogue.toml` by hand.
+"""
+
+from __future__ import annotations
+
+import csv
+import functools
+import re
+import tomllib
+from dataclasses import dataclass
+from importlib.resources import files
+from typing import Any
+
+DATA = files("pellicle.materials") / "data"
+
+
+@dataclass(frozen=True)
+class Page:
+    """One source: where it is, its range (nm), and what it says of itself."""
+
+    shelf: str
+    book: str
+    page: str
+    file: str
+    low: float
+    high: float
+    has_extinction: bool
+    short: str
+    citation: str
+    comments: str
+
+    @property
+    def path(self) -> str:
+        return f"{self.shelf}/{self.book}/{self.page}"
+
+
+@dataclass(frozen=True)
+class Name:
+    """A short name, the page it stands for (None for vacuum), and why that page."""
+
+    name: str
+    page: Page | None
+    reason: str
+    aliases: tuple[str, ...] = ()
+    caution: str = ""
+
+
+def key(name: str) -> str:
+    """Names differ neither by case nor by how their words are joined."""
+    return re.sub(r"[\s_-]+", "-", name.strip()).lower()
+
+
+@functools.cache
+def pages() -> tuple[Page, ...]:
+    """Every page that ships with the package, by shelf, book and page."""
+    text = (DATA / "pages.csv").read_text(encoding="utf-8")
+    return tuple(_page(row) for row in csv.DictReader(text.splitlines()))
+
+
+def _page(row: dict[str, str]) -> Page:
+    fields: dict[str, Any] = dict(row)
+    fields.update(
+        low=float(row["low"]), high=float(row["high"]), has_extinction=row["has_extinction"] == "yes"
+    )
+    return Page(**fields)
+
+
+@functools.cache
+def names() -> tuple[Name, ...]:
+    """Every short name with its default page and the reason for it."""
+    catalogue = tomllib.loads((DATA / "catalogue.toml").read_text(encoding="utf-8"))
+    by_path = {page.path: page for page in pages()}
+    return tuple(
+        Name(
+            name,
+            by_path[entry["page"]] if "page" in entry else None,
+            entry["reason"],
+            tuple(entry.get("aliases", ())),
+            entry.get("caution", ""),
+        )
+        for name, entry in catalogue.items()
+    )
+
+
+@functools.cache
+def _by_key() -> dict[str, Name]:
+    return {key(word): entry for entry in names() for word in (entry.name, *entry.aliases)}
+
+
+def find_name(name: str) -> Name | None:
+    """The short name or alias that `name` is, whatever its case."""
+    return _by_key().get(key(name))
+
+
+def find_pages(path: str) -> list[Page]:
+    """The vendored pages that shelf/book/page or book/page means; a book may be called by any short name."""
+    parts = [key(part) for part in path.split("/")]
+    if len(parts) not in (2, 3):
+        return []
+    entry = find_name(path.split("/")[-2])
+    books = {parts[-2], key(entry.page.book) if entry and entry.page else parts[-2]}
+    return [
+        page
+        for page in pages()
+        if key(page.page) == parts[-1]
+        and key(page.book) in books
+        and (len(parts) == 2 or key(page.shelf) == parts[0])
+    ]
+
+
+def pages_of_book(book: str) -> list[Page]:
+    """The vendored pages of a book, on any shelf."""
+    return [page for page in pages() if page.book == book]
+
+
+def covering(path: str, low: float, high: float) -> list[str]:
+    """The pages of the same book that cover `low` to `high` nm, as book/page."""
+    book = path.split("/")[-2] if path.count("/") == 2 else None
+    return [
+        page.path if book is None else f"{page.book}/{page.page}"
+        for page in pages()
+        if page.book == book and page.path != path and page.low <= low and page.high >= high
+    ]
+
+
+def known_words() -> list[str]:
+    """Everything that can be asked for by name, for suggestions."""
+    words = [word for entry in names() for word in (entry.name, *entry.aliases)]
+    return words + [f"{page.book}/{page.page}" for page in pages()] + [page.path for page in pages()]
