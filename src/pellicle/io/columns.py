@@ -40,7 +40,9 @@ _UNIT_OF = {
     "counts": lambda text: None,
     "intensity": lambda text: None,
 }
-_ALIASES = sorted(((name, role) for role, names in _NAMES.items() for name in names), key=lambda a: -len(a[0]))
+_ALIASES = sorted(
+    ((name, role) for role, names in _NAMES.items() for name in names), key=lambda a: -len(a[0])
+)
 _TAIL = re.compile(r"\s*(?:(?P<open>[(\[])\s*(?P<inside>.*?)\s*[)\]]|[_\s/,:-]+(?P<after>.+?))\s*")
 
 SKIP = "_"

@@ -21,12 +21,16 @@ _SAMPLE = 60  # lines that decide, spread over the file so that a preamble canno
 
 @dataclass(frozen=True)
 class Layout:
-    """Delimiter and decimal mark, column names or None, number of columns, and the rows."""
+    """Delimiter and decimal mark, column names or None, number of columns, and the rows.
+
+    `raw_width` also counts empty cells at the end of a row, after a closing delimiter.
+    """
 
     delimiter: str
     decimal: str
     names: tuple[str, ...] | None
     width: int
+    raw_width: int
     rows: Sequence[Line]
     notes: tuple[str, ...]
 
@@ -47,7 +51,9 @@ def find_layout(lines: Sequence[Line], comments: Sequence[Line], path: str) -> L
         names = _header_cells(lines[header].text, delimiter, width)
         if header + 1 < start:  # a row of units below the names
             written = split(lines[header + 1].text, delimiter)
-            names = [f"{n} ({u})" if u else n for n, u in zip(names, written, strict=False)] + names[len(written) :]
+            names = [f"{n} ({u})" if u else n for n, u in zip(names, written, strict=False)] + names[
+                len(written) :
+            ]
     else:
         names = _commented_header(lines[start], comments, delimiter, width)
         if names:
@@ -66,7 +72,8 @@ def find_layout(lines: Sequence[Line], comments: Sequence[Line], path: str) -> L
         delimiter,
         decimal,
         tuple(names) if names else None,
-        max(width, trailing, len(names or ())),
+        max(width, len(names or ())),
+        max(width, len(names or ()), trailing),
         rows,
         tuple(notes),
     )
@@ -100,8 +107,8 @@ def _dialect(lines: Sequence[Line], path: str) -> tuple[str, str]:
     point = next((cell for cell in cells if "." in cell), None)
     if comma and point:
         raise DataError(
-            f"{path}: writes {comma!r} with a comma and {point!r} with a point, so the decimal mark is unclear; "
-            "export it again with one of them and no thousands separators"
+            f"{path}: writes {comma!r} with a comma and {point!r} with a point, so the "
+            "decimal mark is unclear; export it again with one of them and no thousands separators"
         )
     return delimiter, "," if comma else "."
 

@@ -52,7 +52,7 @@ class Table:
                 StringIO("\n".join(line.bare for line in self.layout.rows)),
                 sep=r"\s+" if self.layout.delimiter == " " else self.layout.delimiter,
                 header=None,
-                names=list(range(self.layout.width)),
+                names=list(range(self.layout.raw_width)),
                 index_col=False,
                 decimal=self.layout.decimal,
                 skipinitialspace=True,

@@ -11,7 +11,9 @@ from pathlib import Path
 
 from pellicle.errors import DataError
 
-_NUMBER = re.compile(r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|nan|inf(?:inity)?)", re.IGNORECASE | re.ASCII)
+_NUMBER = re.compile(
+    r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|nan|inf(?:inity)?)", re.IGNORECASE | re.ASCII
+)
 _COMMA_NUMBER = re.compile(r"[+-]?\d+,\d+(?:e[+-]?\d+)?", re.IGNORECASE | re.ASCII)
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
 
@@ -37,7 +39,9 @@ def read_text(path: str | os.PathLike[str]) -> tuple[str, str]:
     except IsADirectoryError:
         raise DataError(f"{path}: is a folder, not a file; name the file in it") from None
     except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror}); check its name and permissions") from None
+        raise DataError(
+            f"{path}: cannot be read ({error.strerror}); check its name and permissions"
+        ) from None
     digest = hashlib.sha256(content).hexdigest()
     marked = content.startswith((b"\xff\xfe", b"\xfe\xff"))
     try:

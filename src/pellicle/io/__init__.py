@@ -1,0 +1,9 @@
+"""Files: measured spectra in, results out. Errors are one sentence with the remedy in it."""
+
+from pellicle.io.atomic import new_folder as new_folder, replacing as replacing, write_text as write_text
+from pellicle.io.reference import (
+    read_counts as read_counts,
+    reflectance_from_counts as reflectance_from_counts,
+)
+from pellicle.io.spectra import read_spectrum as read_spectrum
+from pellicle.io.spectrum import Spectrum as Spectrum

@@ -1,0 +1,83 @@
+"""Reading a measured spectrum: reflectance or transmittance against wavelength."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import os
+from collections.abc import Sequence
+
+import numpy as np
+
+from pellicle.errors import UsageError
+from pellicle.io.axis import axis_note, axis_unit, read_columns
+from pellicle.io.checks import check_signal, scale_note, signal_scale
+from pellicle.io.choose import POLARISATIONS, SIGNALS, choose_spectrum
+from pellicle.io.spectrum import Spectrum
+from pellicle.io.table import read_table
+
+
+def read_spectrum(
+    path: str | os.PathLike[str],
+    *,
+    signal: str | None = None,
+    columns: str | Sequence[str] | None = None,
+    wavelength_unit: str | None = None,
+    signal_unit: str | None = None,
+    range: tuple[float, float] | None = None,
+    noise: float | None = None,
+    polarisation: str | None = None,
+    calibrated: bool | None = None,
+) -> Spectrum:
+    """Reads a text file of reflectance or transmittance: CSV, or an instrument's export as it is.
+
+    - `signal`: "R" or "T"; needed without a header, for an `intensity` column, or if both are there.
+    - `columns`: names in the order of the file's columns, `_` to skip one; overrides the header.
+    - `wavelength_unit`: nm, um, A, eV or cm-1, where the file does not say (nm if nobody does).
+    - `signal_unit`: "fraction" or "percent", where the file does not say.
+    - `range`: wavelengths in nm to keep. It cuts before values are judged, so noisy ends may go.
+    - `noise`: standard deviation of every point as a fraction; replaces a sigma column.
+    - `polarisation`: "s", "p" or "unpolarised", where the column's name does not say.
+    - `calibrated`: false lifts the limits on the values; by default only for an `intensity` column.
+
+    Returns a `Spectrum`. Raises DataError (unreadable or impossible data) or UsageError (an
+    argument missing or wrong), one sentence with file, line and remedy.
+    """
+    _check_choice("--signal", signal, SIGNALS)
+    _check_choice("--polarisation", polarisation, POLARISATIONS)
+    if noise is not None and not (0 < noise < math.inf):
+        raise UsageError(f"--noise {noise:g} must be a standard deviation above zero, e.g. --noise 0.005")
+    table = read_table(path)
+    chosen = choose_spectrum(table, columns, signal, polarisation)
+    axis = axis_unit(table, chosen.wavelength, wavelength_unit)
+    scale = signal_scale(table, chosen, signal_unit)
+    wavelength, values, sigma, angle = read_columns(table, chosen, axis)
+    if calibrated is None:
+        calibrated = chosen.signal.role != "intensity"
+    spectrum = Spectrum(
+        wavelength=wavelength,
+        values=values / scale.signal,
+        signal=signal or chosen.signal.role,
+        sigma=None if sigma is None else sigma / scale.sigma,
+        polarisation=chosen.signal.polarisation or polarisation or "unpolarised",
+        angle=angle,
+        calibrated=calibrated,
+        path=table.path,
+        sha256=table.sha256,
+        notes=(*table.notes, *chosen.notes, axis_note(axis), scale_note(scale, calibrated)),
+        lines=table.lines,
+    )
+    if noise is not None:
+        replaced = ("the sigma column gives way to --noise",) if sigma is not None else ()
+        spectrum = dataclasses.replace(
+            spectrum, sigma=np.full(len(spectrum), noise), notes=(*spectrum.notes, *replaced)
+        )
+    if range is not None:
+        spectrum = spectrum.cut(*range)
+    check_signal(spectrum, table.label(chosen.signal.position), stated=scale.stated)
+    return spectrum
+
+
+def _check_choice(flag: str, given: str | None, known: Sequence[str]) -> None:
+    if given is not None and given not in known:
+        raise UsageError(f"{flag} {given!r} is not known; use one of {', '.join(known)}")

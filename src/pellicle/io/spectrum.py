@@ -1,0 +1,85 @@
+"""A measured spectrum as arrays, wherever it came from."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+
+from pellicle.errors import DataError, UsageError
+
+FEWEST_POINTS = 5  # a cut that leaves less is a mistake in the range
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """One measured signal against wavelength, points in rising order of wavelength (nm).
+
+    `values` are fractions (any scale where `calibrated` is false) and `sigma` their standard
+    deviations in the same unit, or None. `angle` is the angle of incidence of each point in
+    degrees, or None where the file does not say: then it is for the scene to say. `lines` are the
+    source line numbers of the points, `notes` sentences on what was detected. `signal` is "R",
+    "T", or "counts" for raw detector counts. Given in any order, points are sorted here.
+    """
+
+    wavelength: np.ndarray
+    values: np.ndarray
+    signal: str
+    sigma: np.ndarray | None = None
+    polarisation: str = "unpolarised"
+    angle: np.ndarray | None = None
+    calibrated: bool = True
+    path: str = ""
+    sha256: str = ""
+    notes: tuple[str, ...] = ()
+    lines: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        size = np.size(self.wavelength)
+        order = np.lexsort((np.zeros(size) if self.angle is None else self.angle, self.wavelength))
+        for name, dtype in (
+            ("wavelength", np.float64),
+            ("values", np.float64),
+            ("sigma", np.float64),
+            ("angle", np.float64),
+            ("lines", np.int64),
+        ):
+            given = getattr(self, name)
+            if given is None:
+                continue
+            if np.shape(given) != (size,):
+                raise ValueError(
+                    f"{name}: expected one number per wavelength ({size}), got {np.shape(given)}"
+                )
+            array = np.asarray(given, dtype=dtype)[order]
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+
+    def __len__(self) -> int:
+        return self.wavelength.size
+
+    def __str__(self) -> str:
+        span = f"{self.wavelength[0]:g} to {self.wavelength[-1]:g} nm" if len(self) else "empty"
+        return f"{self.path or 'spectrum'}: {len(self)} points of {self.signal}, {span}"
+
+    def cut(self, lo: float, hi: float) -> Spectrum:
+        """The points with lo ≤ wavelength ≤ hi (nm).
+
+        Raises UsageError for a range that is no range, DataError if fewer than 5 points remain.
+        """
+        if not (0 <= lo < hi):
+            raise UsageError(f"--range {lo:g}:{hi:g} is no range; give the lower wavelength in nm first")
+        inside = (self.wavelength >= lo) & (self.wavelength <= hi)
+        if inside.sum() < FEWEST_POINTS:
+            raise DataError(
+                f"{self.path or 'spectrum'}: only {inside.sum()} of {len(self)} points, which cover "
+                f"{self.wavelength[0]:g} to {self.wavelength[-1]:g} nm, lie in --range {lo:g}:{hi:g}; "
+                f"widen it to keep at least {FEWEST_POINTS}"
+            )
+        kept = {
+            name: None if getattr(self, name) is None else getattr(self, name)[inside]
+            for name in ("wavelength", "values", "sigma", "angle", "lines")
+        }
+        note = f"{inside.sum()} of {len(self)} points kept, {lo:g} to {hi:g} nm"
+        return dataclasses.replace(self, **kept, notes=(*self.notes, note))
