@@ -7,8 +7,7 @@ import csv
 from pathlib import Path
 
 from pellicle.materials.citation import plain_text, short_citation
-from pellicle.materials.database_page import contents, load_yaml
-from pellicle.materials.user_table import read_table
+from pellicle.materials.database_page import contents, csv_contents, load_yaml
 
 DATA = Path(__file__).parents[1] / "src/pellicle/materials/data"
 SHELVES = ("glass", "main", "other", "popular_glass")
@@ -52,7 +51,7 @@ def database_rows():
 
 
 def table_row(file, shelf, book, page, short, citation, comments):
-    found = read_table(file)
+    found = csv_contents(file.read_text(encoding="utf-8"))
     return {
         "shelf": shelf,
         "book": book,

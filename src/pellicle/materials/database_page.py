@@ -1,6 +1,6 @@
-"""Pages of the refractiveindex.info database (YAML) as dispersions in nm.
+"""Pages that ship with the package, those of refractiveindex.info (YAML) and plain tables, in nm.
 
-A page holds formulas and tables against wavelength in µm; tables are interpolated linearly, as the
+A database page holds formulas and tables against wavelength in µm; tables are interpolated linearly, as the
 database does.
 """
 
@@ -120,3 +120,10 @@ def contents(page: dict[str, Any]) -> Contents:
     if n is None:
         raise DataError("the page gives k without n, which is not an index: choose another page")
     return combine(n, k)
+
+
+def csv_contents(text: str) -> Contents:
+    """The dispersion in a vendored table: `wavelength_nm,n,k` under a header, comments marked by #."""
+    lines = [line for line in text.splitlines() if line and not line.startswith("#")]
+    found = table(*np.array([line.split(",") for line in lines[1:]], dtype=float).T)
+    return Contents(found.dispersion, (found.low, found.high), True)

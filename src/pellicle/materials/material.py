@@ -52,18 +52,19 @@ class Material(AbstractDispersion):
         outside = at[~((at >= low) & (at <= high))]
         if not outside.size:
             return
-        first, last = float(np.min(outside)), float(np.max(outside))
+        first, last = float(outside.min()), float(outside.max())
         which = f"{first:g} nm" if first == last else f"{first:g} to {last:g} nm"
-        inside = at[(at >= low) & (at <= high)]
-        keep = (
-            f"{max(low, inside.min()):g}:{min(high, inside.max()):g}" if inside.size else f"{low:g}:{high:g}"
-        )
-        others = [p for p in covering(self.page, float(at.min()), float(at.max())) if p != self.page]
-        pages = f"use a page that covers them all ({', '.join(others)})" if others else "another page"
         source = "" if self.page == self.name else f" ({self.page})"
+        remedies = []
+        if at.min() < high and at.max() > low:
+            remedies.append(f"cut the data with --range {max(low, at.min()):g}:{min(high, at.max()):g}")
+        others = covering(self.page, float(at.min()), float(at.max()))
+        remedies.append(
+            f"use a page that covers them all ({', '.join(others)})" if others else "use another page"
+        )
         raise DataError(
             f"{self.name}{source} is known from {low:g} to {high:g} nm, not at {which}: "
-            f"cut the data with --range {keep} or {pages}"
+            f"{' or '.join(remedies)}"
         )
 
     def warnings(self) -> list[str]:

@@ -1,0 +1,154 @@
+"""What the catalogue holds, as text for people and as a figure of n and k."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import textwrap
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pellicle.errors import UsageError
+from pellicle.materials import Material, index, lookup
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+HEADINGS = ("name", "page", "range (nm)", "k data", "source")
+SHOWN_NM = (190.0, 2500.0)
+POINTS = 1200
+FORMATS = (".png", ".pdf", ".svg")
+
+
+def _range(low: float, high: float) -> str:
+    return f"{low:.5g}-{high:.6g}"
+
+
+def _row(name: str, page: index.Page | None) -> tuple[str, ...]:
+    if page is None:
+        return name, "n = 1 exactly", "all", "yes", ""
+    return name, page.path, _range(page.low, page.high), "yes" if page.has_extinction else "no", page.short
+
+
+def _align(rows: Iterable[tuple[str, ...]]) -> str:
+    rows = list(rows)
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = ("  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)) for row in rows)
+    return "\n".join(line.rstrip() for line in lines) + "\n"
+
+
+def table(pattern: str | None = None) -> str:
+    """The catalogue, one line per short name and per other page, as aligned text.
+
+    `pattern` keeps the lines that hold it in name, alias, page or source, whatever the case.
+    """
+    default = {entry.page for entry in index.names()}
+    entries = [(_row(e.name, e.page), e.aliases) for e in index.names()]
+    entries += [(_row(f"{p.book}/{p.page}", p), ()) for p in index.pages() if p not in default]
+    entries.sort(key=lambda entry: entry[0][0].lower())
+    if pattern:
+        wanted = pattern.lower()
+        entries = [e for e in entries if any(wanted in text.lower() for text in (*e[0], *e[1]))]
+        if not entries:
+            return f"nothing in the catalogue matches {pattern!r}\n"
+    return _align([HEADINGS, *(row for row, _ in entries)])
+
+
+def describe(name: str) -> str:
+    """One material in full: which page the name stands for, why, its reference, the book's other pages.
+
+    Raises what `lookup` raises.
+    """
+    material = lookup(name)
+    if not isinstance(material, Material):
+        return f"{name}\n"
+    low, high = material.wavelength_range
+    facts = [
+        ("page", material.page),
+        ("range", "all wavelengths" if high == np.inf else f"{_range(low, high)} nm"),
+        ("k data", "yes" if material.has_extinction else "no: taken as transparent"),
+        ("caution", material.caution),
+        ("why" if index.find_name(name) else "sample", material.note),
+        ("reference", material.citation),
+        ("aliases", ", ".join(_aliases(name))),
+        ("pages", ""),
+    ]
+    text = [material.name, *(_fact(label, value) for label, value in facts if value)]
+    parts = material.page.split("/")
+    others = index.pages_of_book(parts[1]) if len(parts) == 3 else []
+    if others:
+        rows = (_row(f"{p.book}/{p.page}", p)[:1] + _row("", p)[2:] + (p.comments[:60],) for p in others)
+        text += ["", f"pages of {parts[1]} that ship:", textwrap.indent(_align(rows), "  ").rstrip()]
+    return "\n".join(text) + "\n"
+
+
+def _aliases(name: str) -> tuple[str, ...]:
+    entry = index.find_name(name)
+    return entry.aliases if entry else ()
+
+
+def _fact(label: str, value: str) -> str:
+    indent = " " * 13
+    return textwrap.fill(
+        value, 100, initial_indent=f"  {label:<11}", subsequent_indent=indent, break_on_hyphens=False
+    )
+
+
+def shown_range(material: Material) -> tuple[float, float]:
+    """The wavelengths (nm) of a figure: the material's own, within 190-2500 nm where it has any there."""
+    low, high = material.wavelength_range
+    if low < SHOWN_NM[1] and high > SHOWN_NM[0]:
+        return max(low, SHOWN_NM[0]), min(high, SHOWN_NM[1])
+    return low, high
+
+
+def figure(name: str, path: str | os.PathLike[str]) -> Path:
+    """Draw n and k of a material against wavelength into `path` (.png, .pdf or .svg), which is returned.
+
+    The file appears complete or not at all. Raises what `lookup` raises, and UsageError for a file
+    type that is none of these or a folder that is missing.
+    """
+    target = Path(path)
+    if target.suffix.lower() not in FORMATS:
+        raise UsageError(f"--out {target}: expected a name ending in {', '.join(FORMATS)}")
+    if not target.parent.is_dir():
+        raise UsageError(f"--out {target}: the folder {target.parent} does not exist, make it first")
+    drawn = _draw(name)
+    handle, draft = tempfile.mkstemp(suffix=target.suffix, prefix=f".{target.stem}-", dir=target.parent)
+    os.close(handle)
+    try:
+        drawn.savefig(draft, dpi=150)
+        os.chmod(draft, 0o644)  # mkstemp's own mode keeps everyone else out
+        os.replace(draft, target)
+    except BaseException:
+        Path(draft).unlink(missing_ok=True)
+        raise
+    return target
+
+
+def _draw(name: str) -> Figure:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    material = lookup(name)
+    low, high = shown_range(material) if isinstance(material, Material) else SHOWN_NM
+    nm = np.clip(np.linspace(low, high, POINTS), low, high)
+    index_values = np.asarray(material(nm))
+    drawn = Figure(figsize=(7, 4), layout="constrained")
+    FigureCanvasAgg(drawn)
+    axes = drawn.add_subplot()
+    lines = axes.plot(nm, index_values.real, color="C0", label="n")
+    axes.set(xlabel="wavelength (nm)", ylabel="n", xlim=(low, high))
+    if index_values.imag.any():
+        beside = axes.twinx()
+        lines += beside.plot(nm, index_values.imag, color="C3", linestyle="--", label="k")
+        beside.set(ylabel="k", ylim=(0, None))
+    axes.legend(handles=lines, frameon=False)
+    if isinstance(material, Material):
+        axes.set_title(f"{material.name}   {material.page}", loc="left")
+        if material.caution:
+            drawn.supxlabel("\n".join(textwrap.wrap(material.caution, 90)), fontsize="small", color="C3")
+    return drawn
