@@ -73,7 +73,8 @@ def _slopes(fn, sincos, primal, tangent):
     taylor = 1.0 + 0.0 * small  # (k cos − sin/√Q)/2Q = −k³/6 (1 − w/10 (1 − w/28 (...)))
     for j in range(5, 0, -1):
         taylor = 1 - small * taylor * ((j + 1) / (j * (2 * j + 2) * (2 * j + 3)))
-    slope = where(near, taylor * (k * k * k * (-1 / 6)), (k * c - f) * (0.5 / far))
+    taylor = taylor * (k * k * k * (-1 / 6) * jnp.sqrt(where(near, scale, 1.0)))  # scaled as c and f are
+    slope = where(near, taylor, (k * c - f) * (0.5 / far))
     return (c, f, scale), (-f * (Q * dk + 0.5 * k * dQ), c * dk + slope * dQ, jnp.zeros_like(scale))
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 
 from pellicle.optics.number import Number, Pair, abs2, conj, is_real, real, sqrt, where
@@ -18,7 +19,13 @@ def transverse(ambient: Any, angle: Any) -> tuple[Any, Any]:
 
     With None the transverse index is the literal 0.0, so nothing oblique is computed.
     """
-    return (0.0, ambient) if angle is None else (ambient * jnp.sin(angle), ambient * jnp.cos(angle))
+    if angle is None:
+        return 0.0, ambient
+    # the cosine of a float32 π/2 is negative, and would turn T below 0 and R above 1
+    cosine = jnp.cos(angle)
+    least = jnp.finfo(cosine.dtype).eps ** 1.25
+    cosine = cosine + jax.lax.stop_gradient(jnp.maximum(least - cosine, 0.0))
+    return ambient * jnp.sin(angle), ambient * cosine
 
 
 def normal_square(index: Number, a: Any) -> Number:

@@ -1,0 +1,34 @@
+"""What every test runs under: float64, runtime type checks, and a compilation cache of its own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import hypothesis
+import jax
+import jaxtyping
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+
+jax.config.update("jax_enable_x64", True)
+# programs compiled by one run serve the next, without touching the user's own cache
+jax.config.update("jax_compilation_cache_dir", str(ROOT / ".pytest_cache" / "jax"))
+jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
+
+# before anything imports the package: every annotated argument and result is checked at run time
+jaxtyping.install_import_hook("pellicle", "beartype.beartype")
+
+# the same examples in every run: a failure is a finding, not a draw of luck
+hypothesis.settings.register_profile("tests", deadline=None, derandomize=True, database=None, max_examples=50)
+hypothesis.settings.load_profile("tests")
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """Measurements that are kept beside the repository and not in it."""
+    folder = ROOT.parent / "shared" / "data"
+    if not folder.is_dir():
+        pytest.skip(f"no measurements at {folder.relative_to(ROOT.parent)} beside the repository")
+    return folder

@@ -1,0 +1,163 @@
+"""Hard cases against 50 digits (table.json, written by make_table.py): values and every derivative.
+
+An error of a derivative is measured against |derivative| + 1e-3, for many derivatives are 0.
+"""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+
+import jax
+import numpy as np
+import pytest
+
+import pellicle as pl
+
+TABLE = json.loads(Path(__file__).with_name("table.json").read_text(encoding="utf-8"))
+CASES = TABLE["cases"]
+PARAMETERS = TABLE["parameters"]
+POINTS = np.array([case["at"] for case in CASES.values()])
+SMOOTH = [name for name, case in CASES.items() if case["smooth"]]
+CRITICAL = "substrate exactly critical"
+
+VALUE, GRADIENT = 3e-15, 3e-12
+# case: (value, gradient), where the defaults do not hold in float64
+LOOSER = {
+    # k₀d of 1e4: the derivatives of c and f are that large, and cancel in R, which has no thickness left
+    "1 mm of k = 3": (VALUE, 1e-9),
+    # the round trip is 3e4 rad: its rounding alone is 4e-12
+    "1 mm transparent": (4e-12, 1e-11),
+    # κd of 170: again derivatives that large cancel in R
+    "total reflection, 20 µm gap": (VALUE, 1e-9),
+    # k₀d of 860
+    "wavelength 1 nm": (VALUE, 1e-10),
+    # the root of n² − a², a difference of 1e-16 that sin 30° brings, is 1e-8: the truth is singular here
+    CRITICAL: (5e-7, np.nan),
+}
+
+VALUE32, GRADIENT32 = 1.5e-6, 6e-4
+LOOSER32 = {
+    "1 mm of k = 3": (VALUE32, 0.3),  # as above: 1e4 times float32's rounding, floor 1e-3
+    "1 mm transparent": (2e-3, 5e-3),  # 3e4 rad
+    "total reflection, 20 µm gap": (VALUE32, 0.2),
+    "wavelength 1 nm": (1e-5, 2e-2),
+    "89.999 degrees": (VALUE32, 3e-3),  # the angle itself rounds to 89.9990005
+    "89.999 degrees, transparent": (VALUE32, 3e-3),
+    "exactly 90 degrees": (VALUE32, 3e-3),
+    "exactly 90 degrees, transparent": (VALUE32, 3e-3),
+    CRITICAL: (VALUE32, np.nan),
+}
+
+SIGNALS = [(signal, letter) for signal in "RT" for letter in "sp"]
+
+
+@cache
+def compiled(signal, letter, transparent):
+    """value, forward and reverse derivatives for rows of PARAMETERS; `transparent` ignores k."""
+    function = pl.reflectance if signal == "R" else pl.transmittance
+
+    def one(row):
+        d, n1, k1, n2, k2, ambient, angle, wavelength = row
+        layer, substrate = (n1, n2) if transparent else (jax.lax.complex(n1, k1), jax.lax.complex(n2, k2))
+        return function(wavelength, d, layer, substrate, ambient=ambient, angle=angle, polarisation=letter)
+
+    return jax.jit(jax.vmap(lambda row: (one(row), jax.jacfwd(one)(row), jax.grad(one)(row))))
+
+
+@cache
+def computed(signal, letter, dtype, transparent=False):
+    """The same by name of case."""
+    columns = map(np.asarray, compiled(signal, letter, transparent)(POINTS.astype(dtype)))
+    return {name: row for name, *row in zip(CASES, *columns, strict=True)}
+
+
+def alone(signal, letter, row):
+    """The same of a row that is not in the table, in the shape that is compiled already."""
+    return [np.asarray(x)[0] for x in compiled(signal, letter, False)(np.tile(row, (len(POINTS), 1)))]
+
+
+def slope_error(found, truth):
+    return np.abs(found - truth) / (np.abs(truth) + 1e-3)
+
+
+def check(name, signal, letter, dtype, tolerances, transparent=False):
+    value, *slopes = computed(signal, letter, dtype, transparent)[name]
+    case, (loose_value, loose_slope) = CASES[name], tolerances
+    assert value.dtype == dtype
+    assert abs(value - case["value"][signal + letter]) <= loose_value
+    if not case["smooth"]:
+        return
+    kept = [i for i, p in enumerate(PARAMETERS) if not (transparent and p.endswith("_k"))]
+    truth = np.array(case["gradient"][signal + letter])[kept]
+    for found in slopes:
+        worst = slope_error(found[kept], truth)
+        assert np.all(worst <= loose_slope), dict(zip(np.take(PARAMETERS, kept), worst, strict=True))
+
+
+@pytest.mark.parametrize(("signal", "letter"), SIGNALS)
+@pytest.mark.parametrize("name", CASES)
+def test_float64(name, signal, letter):
+    check(name, signal, letter, np.float64, LOOSER.get(name, (VALUE, GRADIENT)))
+
+
+TRANSPARENT = [name for name, case in CASES.items() if case["at"][2] == 0 and case["at"][4] == 0]
+
+
+@pytest.mark.parametrize(("signal", "letter"), SIGNALS)
+@pytest.mark.parametrize("name", TRANSPARENT)
+def test_float64_of_real_indices(name, signal, letter):
+    check(name, signal, letter, np.float64, LOOSER.get(name, (VALUE, GRADIENT)), transparent=True)
+
+
+@pytest.mark.parametrize(("signal", "letter"), SIGNALS)
+@pytest.mark.parametrize("name", CASES)
+def test_float32(name, signal, letter):
+    check(name, signal, letter, np.float32, LOOSER32.get(name, (VALUE32, GRADIENT32)))
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize(("signal", "letter"), SIGNALS)
+def test_everything_is_finite(signal, letter, dtype):
+    """At a critical substrate too, where the true derivatives in n₂, n₀ and angle are infinite."""
+    for transparent in (False, True):
+        for name, row in computed(signal, letter, dtype, transparent).items():
+            assert all(np.all(np.isfinite(part)) for part in row), name
+
+
+def test_nothing_leaves_the_unit_interval_by_more_than_rounding():
+    """float32's cosine of 90° is negative: T once came out below 0 there, and R above 1."""
+    for dtype, unit in ((np.float32, 5e-7), (np.float64, 1e-14)):
+        for signal, letter in SIGNALS:
+            for name, (value, *_) in computed(signal, letter, dtype).items():
+                assert -1e-20 <= value <= 1 + unit, (name, signal, letter, dtype)
+
+
+@pytest.mark.parametrize("letter", "sp")
+def test_a_faint_transmittance_keeps_its_relative_accuracy(letter):
+    """κd of 23 in a gap of 2.7 µm: T is 1e-20, far under the rounding of 1 − R."""
+    name = "total reflection, 20 µm gap"
+    row = np.array(CASES[name]["at"])
+    row[0] = 2700.0
+    d, n1, _, n2, _, n0, angle, wavelength = row
+    q0 = n0 * np.cos(np.deg2rad(angle))
+    q1 = 1j * np.sqrt(complex((n0 * np.sin(np.deg2rad(angle))) ** 2 - n1**2)).real
+    u, v = (q0, q1) if letter == "s" else (n1**2 * q0, n0**2 * q1)
+    # so deep that one passage is all: |t₁₂ t₂₃|² e^{−2κk₀d}, and r₂₃ = −r₁₂
+    truth = abs(4 * u * v / (u + v) ** 2) ** 2 * np.exp(-4 * np.pi / wavelength * d * q1.imag)
+    found = alone("T", letter, row)[0]
+    assert 1e-25 < truth < 1e-15
+    assert found == pytest.approx(truth, rel=1e-12)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("letter", "sp")
+def test_no_film_between_equal_media_at_90_degrees_reflects_everything(letter, dtype):
+    """Truly 0/0: the limit is 0 when the thickness goes first and 1 when the angle does. We give 1."""
+    row = np.array([0.0, 2.1, 0.0, 1.0, 0.0, 1.0, 90.0, 550.0], dtype=dtype)
+    for signal, truth in (("R", 1.0), ("T", 0.0)):
+        value, forward, reverse = alone(signal, letter, row)
+        assert value == truth
+        assert np.all(np.isfinite(forward))
+        assert np.all(np.isfinite(reverse))
