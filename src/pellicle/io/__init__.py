@@ -1,8 +1,12 @@
 """Files: measured spectra in, results out. Errors are one sentence with the remedy in it."""
 
-from pellicle.io.atomic import new_folder as new_folder, replacing as replacing, write_text as write_text
+from pellicle.io.atomic import new_folder as new_folder
+from pellicle.io.atomic import replacing as replacing
+from pellicle.io.atomic import write_text as write_text
 from pellicle.io.reference import (
     read_counts as read_counts,
+)
+from pellicle.io.reference import (
     reflectance_from_counts as reflectance_from_counts,
 )
 from pellicle.io.spectra import read_spectrum as read_spectrum

@@ -69,7 +69,8 @@ def check_signal(spectrum: Spectrum, label: str, *, stated: bool) -> None:
 
     Calibrated values are at most 1.5 and at least -0.05, or where sigma is known at least -5 sigma
     or -0.01, whichever is lower: an offset of the dark current reaches that. Uncalibrated values
-    need only be positive somewhere. `label` names the column; `stated` says that its unit was given. Raises DataError.
+    need only be positive somewhere. `label` names the column; `stated` says that its unit was
+    given. Raises DataError.
     """
     values, sigma = spectrum.values, spectrum.sigma
     if sigma is not None and sigma.min() <= 0:
@@ -84,7 +85,7 @@ def check_signal(spectrum: Spectrum, label: str, *, stated: bool) -> None:
     if values[high] > HIGHEST:
         remedy = "cut it off with --range or correct that row"
         if not stated:
-            remedy = f"if the file is in percent, say --signal-unit percent or write {spectrum.signal} (%) above it"
+            remedy = "if the file is in percent, say so with --signal-unit percent or in its header"
         _refuse(spectrum, label, high, values, f"is above {HIGHEST} for a {_noun(spectrum)}; {remedy}")
     limit = np.full(values.shape, LOWEST) if sigma is None else np.minimum(LOWEST_WITH_SIGMA, -5 * sigma)
     low = int(np.argmin(values - limit))

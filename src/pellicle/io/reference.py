@@ -67,8 +67,8 @@ def reflectance_from_counts(
     known = np.asarray(reference_reflectance, dtype=np.float64)
     if known.shape != sample.wavelength.shape:
         raise ValueError(
-            f"reference_reflectance: expected one number per wavelength of the sample {sample.wavelength.shape}, "
-            f"got {known.shape}"
+            f"reference_reflectance: expected one number per wavelength of the sample "
+            f"{sample.wavelength.shape}, got {known.shape}"
         )
     if noise is not None and not (0 < noise < np.inf):
         raise UsageError(f"--noise {noise:g} must be a standard deviation above zero, e.g. --noise 0.005")
@@ -78,8 +78,8 @@ def reflectance_from_counts(
         first = sample.wavelength[np.argmax(full <= 0)]
         above = "" if dark is None else " above the dark"
         raise DataError(
-            f"{reference.path}: the reference has no counts{above} at {first:g} nm; leave those wavelengths out "
-            "with --range"
+            f"{reference.path}: the reference has no counts{above} at {first:g} nm; "
+            "leave those wavelengths out with --range"
         )
     spectrum = Spectrum(
         wavelength=sample.wavelength,
