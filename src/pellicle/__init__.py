@@ -1,12 +1,57 @@
-"""Pellicle looks at a thin layer and says what it is."""
+"""Pellicle looks at a thin layer and says what it is.
 
-from pellicle.scene import Drift as Drift
-from pellicle.scene import Free as Free
-from pellicle.scene import Instrument as Instrument
-from pellicle.scene import Layer as Layer
-from pellicle.scene import Light as Light
-from pellicle.scene import Normal as Normal
-from pellicle.scene import Scene as Scene
-from pellicle.scene import Substrate as Substrate
-from pellicle.signals import reflectance as reflectance
-from pellicle.signals import transmittance as transmittance
+Names are loaded when first used, so that the command line answers before JAX is imported.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pellicle.fitting.fit import fit as fit
+    from pellicle.fitting.result import Fit as Fit
+    from pellicle.fitting.result import Status as Status
+    from pellicle.io.spectra import read_spectrum as read_spectrum
+    from pellicle.io.spectrum import Spectrum as Spectrum
+    from pellicle.materials import lookup as material
+    from pellicle.optics.dispersion import Cauchy as Cauchy
+    from pellicle.optics.dispersion import Constant as Constant
+    from pellicle.optics.dispersion import Sellmeier as Sellmeier
+    from pellicle.optics.dispersion import Shifted as Shifted
+    from pellicle.optics.dispersion import Table as Table
+    from pellicle.planning import plan as plan
+    from pellicle.scene import Free as Free
+    from pellicle.scene import Instrument as Instrument
+    from pellicle.scene import Layer as Layer
+    from pellicle.scene import Light as Light
+    from pellicle.scene import Normal as Normal
+    from pellicle.scene import Scene as Scene
+    from pellicle.scene import Substrate as Substrate
+    from pellicle.signals import reflectance as reflectance
+    from pellicle.signals import transmittance as transmittance
+
+_HOME = {
+    "pellicle.fitting.fit": ("fit",),
+    "pellicle.fitting.result": ("Fit", "Status"),
+    "pellicle.io.spectra": ("read_spectrum",),
+    "pellicle.io.spectrum": ("Spectrum",),
+    "pellicle.materials": ("material",),
+    "pellicle.optics.dispersion": ("Cauchy", "Constant", "Sellmeier", "Shifted", "Table"),
+    "pellicle.planning": ("plan",),
+    "pellicle.scene": ("Free", "Instrument", "Layer", "Light", "Normal", "Scene", "Substrate"),
+    "pellicle.signals": ("reflectance", "transmittance"),
+}
+_MODULE = {name: module for module, names in _HOME.items() for name in names}
+_RENAMED = {"material": "lookup"}
+
+__all__ = sorted(_MODULE)  # pyright: ignore[reportUnsupportedDunderAll]
+__version__ = "0.1.0"
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULE:
+        raise AttributeError(f"module 'pellicle' has no attribute {name!r}")
+    return getattr(import_module(_MODULE[name]), _RENAMED.get(name, name))
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]

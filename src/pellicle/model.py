@@ -14,7 +14,7 @@ import numpy as np
 from pellicle.optics import film, interface, orders, plate
 from pellicle.optics.dispersion import AbstractDispersion, Sampled
 from pellicle.optics.number import Number, imag, real, sincos_poly
-from pellicle.plan import Plan
+from pellicle.planning import Plan
 from pellicle.scene import Scene, free_leaves
 
 Simulate = Callable[[Scene], Any]

@@ -1,0 +1,45 @@
+"""How noisy a spectrum is, and how many of its points count."""
+
+from __future__ import annotations
+
+import numpy as np
+
+MODEL_ERROR = 0.12
+"""Relative error of an uncalibrated spectrum's model: lamp, detector and film drift along it."""
+DRIFT_CORRELATION = 10.0
+"""Points that count as one where scale and offset drift slowly: the drift's own polynomials hide the
+correlation from the residuals of a short or featureless spectrum, so fewer is never assumed."""
+
+
+def local_noise(values: np.ndarray, window: int = 51) -> np.ndarray:
+    """White noise at each point, from second differences, by a running median of their size."""
+    if len(values) < 5:
+        return np.full(len(values), max(float(np.ptp(values)), 1e-12))
+    rough = np.abs(values[:-2] - 2 * values[1:-1] + values[2:]) / np.sqrt(6)
+    rough = np.concatenate([rough[:1], rough, rough[-1:]])
+    reach = min(window, len(rough)) // 2
+    padded = np.pad(rough, reach, mode="reflect")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)
+    return 1.4826 * np.maximum(np.median(windows, axis=1), np.median(rough) / 3)
+
+
+def drifting_sigma(values: np.ndarray) -> np.ndarray:
+    """Weights of an uncalibrated spectrum: a share of the local signal, plus the local noise."""
+    smooth = np.convolve(np.pad(np.abs(values), 2, mode="edge"), np.full(5, 0.2), mode="valid")
+    return MODEL_ERROR * smooth + local_noise(values) + 1e-12
+
+
+def correlation_length(residual: np.ndarray) -> float:
+    """How many neighbouring residuals count as one: the integrated autocorrelation time, at least 1.
+
+    The window closes at five times the estimate (A. Sokal, 1997, Monte Carlo methods in statistical
+    mechanics).
+    """
+    size = len(residual)
+    spectrum = np.fft.rfft(residual, 2 * size)
+    covariance = np.fft.irfft(np.abs(spectrum) ** 2)[:size]
+    if not covariance[0] > 0:
+        return 1.0
+    times = 2 * np.cumsum(covariance / covariance[0]) - 1
+    closed = np.flatnonzero(np.arange(size) >= 5 * times)
+    return float(max(times[closed[0]] if len(closed) else size / 5, 1.0))

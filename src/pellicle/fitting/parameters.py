@@ -1,0 +1,89 @@
+"""The free parameters of a scene: their names, units and bounds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import numpy as np
+
+from pellicle.scene import Free, Normal, Scene, free_leaves, insert
+
+_UNITS = {"thickness": "nm", "bandwidth": "nm", "thickness_spread": "nm", "plate_mm": "mm", "angle": "deg"}
+_CAUCHY_UNITS = {"B": "nm^2", "C": "nm^4"}
+_NATURAL_ZERO = ("k", "bandwidth", "thickness_spread", "offset")
+_SEARCHED = ("n", "A", "B", "k")
+"""Parameters that change where the fringes lie, or whether there are any: a start in the middle fails."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One nonlinear parameter; `key` is its last name (`thickness`, `n`, `A`), `name` its full one."""
+
+    name: str
+    key: str
+    unit: str
+    value: float
+    lower: float
+    upper: float
+    prior: Normal | None
+
+    @property
+    def natural_lower(self) -> bool:
+        """A lower bound that physics sets: resting on it gives a one-sided limit, not a warning."""
+        return self.key in _NATURAL_ZERO and self.lower == 0
+
+    @property
+    def searched(self) -> bool:
+        return self.key in _SEARCHED
+
+
+def parameters(scene: Scene) -> tuple[Parameter, ...]:
+    """Every free parameter, in the order of the scene's pytree."""
+    return tuple(_parameter(scene, path, free) for path, free in free_leaves(scene))
+
+
+def _parameter(scene: Scene, path: tuple, free: Free) -> Parameter:
+    steps = [_step(key) for key in path]
+    key = steps[-1]
+    return Parameter(
+        name=".".join([*_owner(scene, steps), _key(steps)]),
+        key=key,
+        unit=_UNITS.get(key, _CAUCHY_UNITS.get(key, "")),
+        value=free.value,
+        lower=free.lower,
+        upper=free.upper,
+        prior=free.prior,
+    )
+
+
+def _step(key: Any) -> str:
+    if isinstance(key, jax.tree_util.GetAttrKey):
+        return key.name
+    return str(getattr(key, "idx", getattr(key, "key", key)))
+
+
+def _key(steps: list[str]) -> str:
+    """`A`, or `B.0` for a number in a tuple."""
+    return ".".join(steps[-2:]) if steps[-1].isdigit() else steps[-1]
+
+
+def _owner(scene: Scene, steps: list[str]) -> list[str]:
+    """The part of the name before the last dot: nothing for the only layer of a scene."""
+    if steps[0] != "layers":
+        return [] if steps[0] == "light" else [steps[0]]
+    if len(scene.layers) == 1:
+        return []
+    position = int(steps[1])
+    return [scene.layers[position].name or f"layer{position + 1}"]
+
+
+def bounds(parameters: tuple[Parameter, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper bounds, each of shape (parameters,)."""
+    return np.array([p.lower for p in parameters]), np.array([p.upper for p in parameters])
+
+
+def anonymous(scene: Scene) -> Scene:
+    """The scene with every `Free` replaced by one and the same: bounds must not make a new program."""
+    return insert(scene, [Free(0.5, 0.0, 1.0)] * len(free_leaves(scene)))

@@ -1,0 +1,164 @@
+"""A spectrum and a scene as numbers: what the search and the solver evaluate."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from pellicle.fit import nuisance
+from pellicle.fitting.nuisance import Data
+from pellicle.fitting.parameters import Parameter, anonymous, bounds, parameters
+from pellicle.fitting.solve import least_squares
+from pellicle.model import build, sampled
+from pellicle.planning import Plan, plan
+from pellicle.scene import Scene, insert, with_wavelength
+
+_ROUND = 64
+"""Spectra are padded to a multiple of this, so that files of nearly one length share a program."""
+
+
+class Box(NamedTuple):
+    """Bounds and normal priors; the search lives in the unit cube between the bounds."""
+
+    lower: Any
+    upper: Any
+    prior_mean: Any
+    prior_weight: Any  # 1/sd, 0 for none
+
+    def values(self, unit):
+        return self.lower + unit * (self.upper - self.lower)
+
+
+class Problem(NamedTuple):
+    """Everything about one fit. `scene` has anonymous free parameters and sampled media."""
+
+    plan: Plan
+    scene: Scene
+    data: Data
+    box: Box
+    parameters: tuple[Parameter, ...]
+    points: int
+
+    @property
+    def program(self) -> tuple[Any, ...]:
+        """The arguments that the compiled functions take, the plan first (static)."""
+        return self.plan, self.scene, self.data, self.box
+
+
+def make(scene: Scene, wavelength, values, sigma, temper: float) -> Problem:
+    """The problem of fitting `values` (fractions) with weights 1/`sigma` at `wavelength` (nm).
+
+    Raises ValueError where a material has no data at a wavelength.
+    """
+    points = len(wavelength)
+    extra = -points % _ROUND
+    wavelength, values = _pad(wavelength, extra), _pad(values, extra)
+    scene = with_wavelength(scene, wavelength, _pad_angle(scene.light.angle, extra))
+    chosen = plan(scene)
+    free = parameters(scene)
+    span = wavelength.max() - wavelength.min()
+    data = Data(
+        values=values,
+        weight=np.concatenate([1 / np.broadcast_to(sigma, points), np.zeros(extra)]),
+        position=2 * (wavelength - wavelength.min()) / span - 1,
+        temper=np.float64(temper),
+        level=np.float64(max(float(np.median(np.abs(values[:points]))), 1e-12)),
+    )
+    lower, upper = bounds(free)
+    box = Box(
+        lower,
+        upper,
+        np.array([p.prior.mean if p.prior else 0.0 for p in free]),
+        np.array([1 / p.prior.sd if p.prior else 0.0 for p in free]),
+    )
+    return Problem(chosen, anonymous(sampled(scene, chosen.on("coherence"))), data, box, free, points)
+
+
+def _pad(x: np.ndarray, extra: int) -> np.ndarray:
+    return np.concatenate([x, np.full(extra, x[-1])])
+
+
+def _pad_angle(angle: Any, extra: int) -> Any:
+    return _pad(angle, extra) if np.ndim(angle) else angle
+
+
+def thin(problem: Problem, most: int) -> Problem:
+    """Every so-many-th point, at most about `most`, with the weight of those left out."""
+    stride = -(-problem.points // most)
+    if stride <= 1:
+        return problem
+    size = len(problem.data.values)
+    take = np.arange(0, problem.points, stride)
+    take = np.concatenate([take, np.full(-len(take) % _ROUND, size - 1)])
+    kept = np.where(np.arange(len(take)) < -(-problem.points // stride), 1.0, 0.0)
+
+    def pick(x):
+        return x[take] if np.ndim(x) == 1 and len(x) == size else x
+
+    scene, data = jax.tree_util.tree_map(pick, (problem.scene, problem.data))
+    data = data._replace(weight=data.weight * kept, temper=data.temper * stride)
+    return problem._replace(scene=scene, data=data, points=-(-problem.points // stride))
+
+
+def _solve(plan: Plan, scene: Scene, data: Data, box: Box, unit) -> nuisance.Solved:
+    signal = build(plan)(insert(scene, list(box.values(unit))))
+    solved = nuisance.solve(signal, data, scene.instrument)
+    prior = (box.values(unit) - box.prior_mean) * box.prior_weight
+    return solved._replace(
+        residual=jnp.concatenate([solved.residual, prior]), evidence=solved.evidence + jnp.sum(prior**2)
+    )
+
+
+@partial(jax.jit, static_argnums=0)
+def evidences(plan: Plan, scene: Scene, data: Data, box: Box, units):
+    """−2 log evidence of candidates `units` (candidates, parameters) in the unit cube."""
+    return jax.vmap(lambda unit: _solve(plan, scene, data, box, unit).evidence)(units)
+
+
+@partial(jax.jit, static_argnums=0)
+def polish(plan: Plan, scene: Scene, data: Data, box: Box, units):
+    """Local minima from each start: positions (starts, parameters), evidence, converged."""
+
+    def one(unit):
+        best, converged = least_squares(lambda u: _solve(plan, scene, data, box, u).residual, unit)
+        return best, _solve(plan, scene, data, box, best).evidence, converged
+
+    return jax.vmap(one)(units)
+
+
+class Local(NamedTuple):
+    """The model around one point of the box, for errors and reports."""
+
+    signal: Any  # simulated, without scale and offset
+    slope: Any  # ∂ signal / ∂ parameter in its own unit, (points, parameters)
+    model: Any
+    gain: Any
+    offset: Any
+    layer: Any  # n and k of the layer at each wavelength
+    layer_slope: Any  # their derivatives, (2, points, parameters)
+
+
+@partial(jax.jit, static_argnums=0)
+def local(plan: Plan, scene: Scene, data: Data, box: Box, unit) -> Local:
+    """Signal, its Jacobian, and the layer's index at one point of the box."""
+    simulate = build(plan)
+
+    def both(values):
+        numbers = insert(scene, list(values))
+        index = numbers.layer.material(numbers.light.wavelength)
+        return simulate(numbers), jnp.stack([index.real, index.imag])
+
+    values = box.values(unit)
+    (signal, layer), push = jax.linearize(both, values)
+    slope, layer_slope = jax.vmap(push, out_axes=-1)(jnp.eye(len(values)))
+    solved = nuisance.solve(signal, data, scene.instrument)
+    return Local(signal, slope, solved.model, solved.gain, solved.offset, layer, layer_slope)
+
+
+def linear_width(scene: Scene) -> int:
+    """How many linear nuisances the scene leaves free."""
+    return nuisance.width(scene.instrument)

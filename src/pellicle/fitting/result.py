@@ -1,0 +1,104 @@
+"""What a fit returns: small frozen records with plain numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+
+from pellicle.planning import Plan
+
+
+class Status(StrEnum):
+    """How far a fit can be trusted; the first that holds, in this order, is given."""
+
+    FAILED = "failed"
+    NOT_CONVERGED = "not-converged"
+    MISFIT = "misfit"
+    NOT_IDENTIFIABLE = "not-identifiable"
+    AMBIGUOUS = "ambiguous"
+    AT_BOUND = "at-bound"
+    CONVERGED = "converged"
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A parameter's value and standard error (infinite where the data see nothing).
+
+    `lower_limit` and `upper_limit` are one-sided 95 % limits, where only one side is bounded.
+    """
+
+    name: str
+    value: float
+    stderr: float
+    unit: str
+    lower: float
+    upper: float
+    free: bool
+    at_bound: bool = False
+    lower_limit: float | None = None
+    upper_limit: float | None = None
+
+
+@dataclass(frozen=True)
+class Rival:
+    """Another minimum: its parameters and how much worse it is, in χ² on the effective points."""
+
+    parameters: dict[str, float]
+    delta_chi2: float
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Data and model at each wavelength (nm), and the layer's index with standard errors."""
+
+    wavelength: np.ndarray
+    data: np.ndarray
+    sigma: np.ndarray
+    model: np.ndarray
+    n: np.ndarray
+    k: np.ndarray
+    n_stderr: np.ndarray
+    k_stderr: np.ndarray
+
+    @property
+    def residual(self) -> np.ndarray:
+        return self.data - self.model
+
+
+@dataclass(frozen=True)
+class Profile:
+    """χ² above the best against thickness (nm): what the search saw."""
+
+    thickness: np.ndarray
+    delta_chi2: np.ndarray
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The outcome of fitting one spectrum; `print(fit.report())` reads like lmfit's report."""
+
+    spectrum: Any
+    status: Status
+    verdict: str
+    parameters: dict[str, Estimate]
+    rivals: tuple[Rival, ...]
+    chi2_reduced: float
+    rms: float
+    effective_points: float
+    correlation_names: tuple[str, ...]
+    correlation: np.ndarray
+    plan: Plan
+    warnings: tuple[str, ...]
+    curve: Curve
+    profile: Profile | None
+    seconds: float
+
+    def __getitem__(self, name: str) -> Estimate:
+        return self.parameters[name]
+
+    @property
+    def free(self) -> tuple[Estimate, ...]:
+        return tuple(p for p in self.parameters.values() if p.free)

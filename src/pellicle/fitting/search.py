@@ -1,0 +1,160 @@
+"""Where to start: interference makes the misfit multi-modal, so the whole range is scanned first.
+
+A single start finds the right thickness in one case of ten. The scan's thickness step resolves the
+shortest fringe, the other parameters take a few values each, and only *local minima in thickness*
+go on to the solver: otherwise the best starts are all neighbours.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import jax
+import numpy as np
+
+from pellicle.fitting.parameters import Parameter
+from pellicle.fitting.problem import Problem, evidences, polish, thin
+from pellicle.scene import free_leaves, insert
+
+Progress = Callable[[str, int, int], None]
+"""Called with what is being done, how much is done and how much there is."""
+
+SCAN_POINTS = 448
+"""Wavelengths used while scanning: enough for four samples in a fringe of 5 µm at index 2."""
+_CHUNK = 256
+_LANES = 16
+_MOST_STEPS = 4000
+
+
+@dataclass(frozen=True)
+class Scan:
+    """The misfit against thickness: the best over the other parameters' coarse design."""
+
+    thickness: np.ndarray
+    evidence: np.ndarray
+
+
+@dataclass(frozen=True)
+class Minima:
+    """Polished local minima, best first, in the unit cube."""
+
+    units: np.ndarray
+    evidence: np.ndarray
+    converged: np.ndarray
+    scan: Scan | None
+
+
+def search(problem: Problem, progress: Progress) -> Minima:
+    """Scan the box, polish the best distinct local minima, sort them."""
+    thinned = thin(problem, SCAN_POINTS)
+    depth = _thickness_axis(problem)
+    grid = _thickness_grid(problem, depth)
+    design = _design(problem, depth)
+    units = np.repeat(design, max(len(grid), 1), axis=0)
+    if depth is not None:
+        units[:, depth] = np.tile(grid, len(design))
+    scanned = _scan(thinned, units, progress)
+    table = scanned.reshape(len(design), -1)
+    starts = units[_local_minima(table, most=_LANES if len(design) == 1 else 3 * _LANES)]
+    units, evidence, converged = _polish(problem, starts, progress)
+    order = np.argsort(evidence)
+    scan = None
+    if depth is not None:
+        p = problem.parameters[depth]
+        scan = Scan(p.lower + grid * (p.upper - p.lower), table.min(axis=0))
+    return Minima(units[order], evidence[order], converged[order], scan)
+
+
+def _thickness_axis(problem: Problem) -> int | None:
+    keys = [p.key for p in problem.parameters]
+    return keys.index("thickness") if "thickness" in keys else None
+
+
+def _thickness_grid(problem: Problem, depth: int | None) -> np.ndarray:
+    """Positions in 0..1 no further apart than λ_min/(8 n_max): an eighth of the shortest fringe's period
+    in optical thickness, as n_max is the largest that the bounds allow."""
+    if depth is None:
+        return np.zeros(0)
+    p = problem.parameters[depth]
+    step = problem.scene.light.wavelength.min() / (8 * _largest_index(problem))
+    count = int(np.clip(np.ceil((p.upper - p.lower) / step) + 1, 9, _MOST_STEPS))
+    return np.linspace(0.0, 1.0, count)
+
+
+@jax.jit
+def _index(material, wavelength):
+    return material(wavelength).real
+
+
+def _largest_index(problem: Problem) -> float:
+    """The layer's largest real index over the corners of its bounds (at most 64)."""
+    material, wavelength = problem.scene.layer.material, problem.scene.light.wavelength
+    own = [
+        p for p in problem.parameters if p.name.split(".")[0] not in ("substrate", "instrument", "ambient")
+    ]
+    own = [p for p in own if p.key not in ("thickness", "angle")]
+    if not free_leaves(material):
+        return float(np.max(_index(material, wavelength)))
+    corners = itertools.islice(itertools.product(*[(p.lower, p.upper) for p in own]), 64)
+    return max(float(np.max(_index(insert(material, c), wavelength))) for c in corners)
+
+
+def _design(problem: Problem, depth: int | None) -> np.ndarray:
+    """A few values of every other parameter, as points of the unit cube."""
+    levels = [np.zeros(1) if i == depth else _levels(p, problem) for i, p in enumerate(problem.parameters)]
+    return np.array(list(itertools.product(*levels))).reshape(-1, len(levels))
+
+
+def _levels(p: Parameter, problem: Problem) -> np.ndarray:
+    start = np.array([(p.value - p.lower) / (p.upper - p.lower)])
+    if not p.searched:
+        return start
+    if p.key == "k":
+        return np.array([0.002, 0.05, 0.4])
+    count = int(np.clip(np.ceil((p.upper - p.lower) / 0.2), 3, 8)) if p.key in ("n", "A") else 0
+    if p.key == "B":
+        count = int(np.clip(np.ceil(_dispersion_fringes(p, problem)), 3, 8))
+    return (np.arange(count) + 0.5) / count
+
+
+def _dispersion_fringes(p: Parameter, problem: Problem) -> float:
+    """By how many fringes the ends of the spectrum part over the bounds of Cauchy's B."""
+    thickest = max([q.upper for q in problem.parameters if q.key == "thickness"], default=1000.0)
+    wavelength = problem.scene.light.wavelength
+    blue, red = wavelength.min(), wavelength.max()
+    return 2 * min(thickest, 2000.0) / blue * (p.upper - p.lower) * (1 / blue**2 - 1 / red**2)
+
+
+def _scan(problem: Problem, units: np.ndarray, progress: Progress) -> np.ndarray:
+    """Evidence of every candidate, in chunks of one shape: one program, and room for Ctrl-C."""
+    plan, *arguments = problem.program
+    found = np.empty(len(units))
+    for first in range(0, len(units), _CHUNK):
+        chunk = units[first : first + _CHUNK]
+        padded = np.concatenate([chunk, np.repeat(chunk[-1:], _CHUNK - len(chunk), axis=0)])
+        found[first : first + _CHUNK] = np.asarray(evidences(plan, *arguments, padded))[: len(chunk)]
+        progress("scan", min(first + _CHUNK, len(units)), len(units))
+    return np.where(np.isfinite(found), found, np.inf)
+
+
+def _local_minima(table: np.ndarray, most: int) -> np.ndarray:
+    """Flat indices of the lowest local minima along the thickness axis of (design, thickness)."""
+    wall = np.full((len(table), 1), np.inf)
+    left, right = np.hstack([wall, table[:, :-1]]), np.hstack([table[:, 1:], wall])
+    lowest = np.flatnonzero(((table <= left) & (table <= right)).ravel())
+    return lowest[np.argsort(table.ravel()[lowest])][:most]
+
+
+def _polish(problem: Problem, starts: np.ndarray, progress: Progress):
+    plan, *arguments = problem.program
+    pieces = []
+    for first in range(0, len(starts), _LANES):
+        lanes = starts[first : first + _LANES]
+        padded = np.concatenate([lanes, np.repeat(lanes[-1:], _LANES - len(lanes), axis=0)])
+        result = jax.device_get(polish(plan, *arguments, padded))
+        pieces.append([column[: len(lanes)] for column in result])
+        progress("polish", min(first + _LANES, len(starts)), len(starts))
+    units, evidence, converged = (np.concatenate(column) for column in zip(*pieces, strict=True))
+    return units, np.where(np.isfinite(evidence), evidence, np.inf), converged

@@ -1,0 +1,101 @@
+"""Errors from the Jacobian: covariance, correlations, and what the data do not see."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pellicle.fitting.problem import Local, Problem
+from pellicle.scene import Drift
+
+UNSEEN = 0.5
+"""A standard error above this share of a parameter's range: the data add nothing to the bounds."""
+
+
+@dataclass(frozen=True)
+class Linear:
+    """One coefficient of the scale or the offset, in physical units."""
+
+    name: str
+    value: float
+    basis: np.ndarray  # what it multiplies at each point
+    prior_sd: float
+    on_signal: bool
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Covariance of nonlinear then linear parameters; `names` in the same order."""
+
+    names: tuple[str, ...]
+    covariance: np.ndarray
+
+    @property
+    def stderr(self) -> np.ndarray:
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def correlation(self) -> np.ndarray:
+        sd = np.where(self.stderr > 0, self.stderr, 1.0)
+        return self.covariance / np.outer(sd, sd)
+
+
+def linear_coefficients(problem: Problem, at: Local) -> list[Linear]:
+    """Scale and offset as Chebyshev coefficients in wavelength, recovered from their curves."""
+    instrument, position = problem.scene.instrument, np.asarray(problem.data.position)[: problem.points]
+    level = float(problem.data.level)
+    found: list[Linear] = []
+    for name, drift, curve in (
+        ("scale", instrument.scale, at.gain),
+        ("offset", instrument.offset, at.offset),
+    ):
+        if isinstance(drift, Drift):
+            coefficients = np.polynomial.chebyshev.chebfit(
+                position, np.asarray(curve)[: problem.points], drift.degree
+            )
+            size = abs(coefficients[0]) if name == "scale" else level
+            found += _named(name, coefficients, drift, position, size)
+    return found
+
+
+def _named(name: str, coefficients, drift: Drift, position, size: float) -> list[Linear]:
+    basis = np.polynomial.chebyshev.chebvander(position, drift.degree).T
+    first = 10.0 if drift.degree == 0 else (1.0 if name == "scale" else drift.width)
+    shrink = 0 if name == "offset" else 1
+    sds = [first] + [drift.width * 0.5 ** (j - shrink) for j in range(1, drift.degree + 1)]
+    return [
+        Linear(f"instrument.{name}" + (f"_{j}" if j else ""), float(c), basis[j], size * sds[j], name == "scale")
+        for j, c in enumerate(coefficients)
+    ]
+
+
+def errors(problem: Problem, at: Local, variance: float) -> Errors:
+    """Covariance by a singular value decomposition of the Jacobian in units of each parameter's range.
+
+    `variance` multiplies σ²: what the residuals say of the noise, and of its correlation. Nothing is
+    inverted that is not there: a direction that the data do not see keeps its huge variance (a
+    pseudo-inverse would call it 0, and an opaque gold film known to ± 0.00 nm).
+    """
+    points, linear = problem.points, linear_coefficients(problem, at)
+    weight = (np.asarray(problem.data.weight)[:points] / np.sqrt(variance))[:, None]
+    span = problem.box.upper - problem.box.lower
+    gain, signal = np.asarray(at.gain)[:points, None], np.asarray(at.signal)[:points]
+    steep = gain * np.asarray(at.slope)[:points] * span
+    flat = [c.basis * (signal if c.on_signal else 1.0) * c.prior_sd for c in linear]
+    jacobian = weight * np.column_stack([steep, *flat])
+    priors = np.diag(np.concatenate([problem.box.prior_weight * span, np.ones(len(linear))]))
+    _, values, rows = np.linalg.svd(np.vstack([jacobian, priors]), full_matrices=False)
+    floor = np.finfo(float).eps * len(jacobian) * max(values.max(initial=0.0), 1e-300)
+    unit = np.concatenate([span, [c.prior_sd for c in linear]])
+    spread = rows.T / np.maximum(values, floor)
+    covariance = (spread @ spread.T) * np.outer(unit, unit)
+    return Errors((*(p.name for p in problem.parameters), *(c.name for c in linear)), covariance)
+
+
+def layer_errors(at: Local, covariance: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray]:
+    """Standard errors of the layer's n and k at each wavelength, from the nonlinear covariance."""
+    slope = np.asarray(at.layer_slope)[:, :points]
+    variance = np.einsum("cip,pq,ciq->ci", slope, covariance, slope)
+    n, k = np.sqrt(np.maximum(variance, 0.0))
+    return n, k
