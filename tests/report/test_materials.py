@@ -1,0 +1,73 @@
+"""The catalogue as text and as a figure."""
+
+import subprocess
+import sys
+
+import pytest
+
+from pellicle.errors import UsageError
+from pellicle.materials import UnknownMaterial, names, pages
+from pellicle.report.materials import describe, figure, table
+
+
+def test_the_table_lists_every_name_and_every_page():
+    text = table()
+    lines = text.splitlines()
+    assert len(lines) == 1 + len(names()) + sum(
+        page not in {entry.page for entry in names()} for page in pages()
+    )
+    assert "SiO2                      main/SiO2/Malitson" in text
+    [line] = [line for line in lines if line.startswith("HgS ")]
+    assert line.endswith("model, not measured")
+
+
+def test_a_pattern_keeps_what_it_matches_in_name_alias_or_source():
+    assert [line.split()[0] for line in table("hematite").splitlines()] == ["name", "Fe2O3"]
+    assert "Yakubovsky" in table("yakubovsky")
+    assert "nothing" in table("unobtainium")
+
+
+def test_a_description_gives_page_reason_citation_and_the_other_pages():
+    text = describe("gold")
+    for words in ("main/Au/Johnson", "187.9-1937 nm", "Phys. Rev. B", "Au/Rosenblatt-11nm", "taken as bulk"):
+        assert words in text
+    assert "model, not measured" in describe("HgS")
+    assert "taken as transparent" in describe("SiO2")
+    assert "all wavelengths" in describe("air")
+    with pytest.raises(UnknownMaterial):
+        describe("unobtainium")
+
+
+@pytest.mark.parametrize(("name", "suffix"), [("HgS", ".png"), ("SiO2", ".pdf"), ("CuO/Brimhall", ".svg")])
+def test_a_figure_is_written_whole_and_alone(tmp_path, name, suffix):
+    path = figure(name, tmp_path / f"nk{suffix}")
+    assert path.stat().st_size > 5000
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("name", ["nk", "nk.doc", "missing/nk.png"])
+def test_a_figure_that_cannot_be_written_leaves_nothing(tmp_path, name):
+    with pytest.raises(UsageError, match="--out"):
+        figure("Au", tmp_path / name)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_failed_figure_leaves_nothing(tmp_path, monkeypatch):
+    from matplotlib.figure import Figure
+
+    def full(self, draft, **_):
+        raise OSError("no space left")
+
+    monkeypatch.setattr(Figure, "savefig", full)
+    with pytest.raises(OSError, match="space"):
+        figure("Au", tmp_path / "nk.png")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_text_needs_no_plotting_library():
+    program = (
+        "import sys; from pellicle.report.materials import table, describe; table(); describe('HfO2');"
+        "print('matplotlib' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
