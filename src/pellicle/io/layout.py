@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pellicle.errors import DataError
-from pellicle.io.columns import is_header, is_unit_row
+from pellicle.io.columns import is_header, is_unit_row, recognise_all
 from pellicle.io.text import Line, is_number, split
 
 DELIMITERS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}
@@ -136,8 +136,10 @@ def _rows_begin(
     while start and _is_faulty_row(lines[start - 1], width, delimiter, decimal):
         start -= 1
     if start and not lines[start - 1].text.startswith(">"):
-        cells = _header_cells(lines[start - 1].text, delimiter, width)
-        if len(cells) >= width and not any(is_number(cell, decimal) for cell in cells):
+        cells = split(lines[start - 1].text, delimiter)
+        # two words of free text are as many as two names; only a name of ours tells them apart
+        words = delimiter == " " and not any(column.role != "other" for column in recognise_all(cells))
+        if len(cells) >= width and not words and not any(is_number(cell, decimal) for cell in cells):
             return start, start - 1
     return start, None
 

@@ -20,7 +20,7 @@ def read_counts(
     *,
     columns: str | Sequence[str] | None = None,
     wavelength_unit: str | None = None,
-    range: tuple[float, float] | None = None,
+    range: tuple[float | int, float | int] | None = None,
 ) -> Spectrum:
     """Reads raw detector counts: a wavelength column and one other, of any name and any values.
 
@@ -51,7 +51,7 @@ def reflectance_from_counts(
     reference_reflectance: np.ndarray,
     dark: Spectrum | None = None,
     *,
-    noise: float | None = None,
+    noise: float | int | None = None,
 ) -> Spectrum:
     """Calibrated reflectance (S - D) / (Ref - D) R_ref at the wavelengths of `sample`.
 

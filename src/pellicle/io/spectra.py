@@ -24,8 +24,8 @@ def read_spectrum(
     columns: str | Sequence[str] | None = None,
     wavelength_unit: str | None = None,
     signal_unit: str | None = None,
-    range: tuple[float, float] | None = None,
-    noise: float | None = None,
+    range: tuple[float | int, float | int] | None = None,
+    noise: float | int | None = None,
     polarisation: str | None = None,
     calibrated: bool | None = None,
 ) -> Spectrum:

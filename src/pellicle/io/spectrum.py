@@ -63,7 +63,7 @@ class Spectrum:
         span = f"{self.wavelength[0]:g} to {self.wavelength[-1]:g} nm" if len(self) else "empty"
         return f"{self.path or 'spectrum'}: {len(self)} points of {self.signal}, {span}"
 
-    def cut(self, lo: float, hi: float) -> Spectrum:
+    def cut(self, lo: float | int, hi: float | int) -> Spectrum:
         """The points with lo ≤ wavelength ≤ hi (nm).
 
         Raises UsageError for a range that is no range, DataError if fewer than 5 points remain.

@@ -57,7 +57,6 @@ class Table:
                 decimal=self.layout.decimal,
                 skipinitialspace=True,
                 skip_blank_lines=False,
-                float_precision="round_trip",
                 low_memory=False,
             )
         except ValueError:  # pandas' ParserError is one: a row is too long
