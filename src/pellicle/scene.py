@@ -241,12 +241,11 @@ class Scene(eqx.Module):
         return self.layers[0]
 
 
-def with_wavelength(scene: Scene, wavelength: Any) -> Scene:
-    """The same scene looked at at other wavelengths (nm)."""
-    light = scene.light
-    return eqx.tree_at(
-        lambda s: s.light, scene, Light(wavelength, light.angle, light.signal, light.polarisation)
-    )
+def with_wavelength(scene: Scene, wavelength: Any, angle: Any = None) -> Scene:
+    """The same scene looked at at other wavelengths (nm), and angles (degrees) if given."""
+    angle = scene.light.angle if angle is None else angle
+    light = Light(wavelength, angle, scene.light.signal, scene.light.polarisation)
+    return eqx.tree_at(lambda s: s.light, scene, light)
 
 
 def absorbs(dispersion: AbstractDispersion) -> bool:

@@ -45,11 +45,6 @@ class Solved(NamedTuple):
     evidence: Any  # −2 log of the marginal likelihood, up to a constant
 
 
-def width(instrument: Instrument) -> int:
-    """How many linear coefficients there are."""
-    return sum(n.degree + 1 for n in (instrument.scale, instrument.offset) if isinstance(n, Drift))
-
-
 def chebyshev(position, degree: int) -> list:
     """T₀ ... T_degree at `position` in −1..1."""
     terms = [jnp.ones_like(position), position]
@@ -103,25 +98,30 @@ class _Series(NamedTuple):
     sd: np.ndarray
 
 
+def scale_prior(drift: Drift) -> tuple[np.ndarray, np.ndarray]:
+    """Means and standard deviations of the gain's coefficients, in units of the plain scale."""
+    first = _LOOSE if drift.degree == 0 else 1.0
+    shrinking = [drift.width * 0.5**j for j in range(drift.degree)]
+    return np.array([1.0] + [0.0] * drift.degree), np.array([first, *shrinking])
+
+
+def offset_prior(drift: Drift) -> tuple[np.ndarray, np.ndarray]:
+    """The same for the offset, in units of the signal's level."""
+    count = drift.degree + 1
+    sd = [_LOOSE] if drift.degree == 0 else [drift.width * 0.5**j for j in range(count)]
+    return np.zeros(count), np.array(sd)
+
+
 def _gains(signal, weight, data: Data, drift: Drift) -> _Series:
     """Chebyshev terms in units of the plain scale, which a single free number would have."""
     square = weight * weight
     plain = jnp.sum(square * data.values * signal) / (jnp.sum(square * signal * signal) + 1e-30)
-    first = _LOOSE if drift.degree == 0 else 1.0
-    return _Series(
-        [plain * t for t in chebyshev(data.position, drift.degree)],
-        np.array([1.0] + [0.0] * drift.degree),
-        np.array([first] + [drift.width * 0.5**j for j in range(drift.degree)]),
-    )
+    return _Series([plain * t for t in chebyshev(data.position, drift.degree)], *scale_prior(drift))
 
 
 def _shifts(data: Data, drift: Drift) -> _Series:
     """Chebyshev terms in units of the signal's level."""
-    count = drift.degree + 1
-    sd = [_LOOSE] if drift.degree == 0 else [drift.width * 0.5**j for j in range(count)]
-    return _Series(
-        [data.level * t for t in chebyshev(data.position, drift.degree)], np.zeros(count), np.array(sd)
-    )
+    return _Series([data.level * t for t in chebyshev(data.position, drift.degree)], *offset_prior(drift))
 
 
 def _join(*series: _Series | None) -> _Series:

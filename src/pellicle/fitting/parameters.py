@@ -8,7 +8,7 @@ from typing import Any
 import jax
 import numpy as np
 
-from pellicle.scene import Free, Normal, Scene, free_leaves, insert
+from pellicle.scene import Free, Normal, Scene, free_leaves, insert, is_free
 
 _UNITS = {"thickness": "nm", "bandwidth": "nm", "thickness_spread": "nm", "plate_mm": "mm", "angle": "deg"}
 _CAUCHY_UNITS = {"B": "nm^2", "C": "nm^4"}
@@ -87,3 +87,16 @@ def bounds(parameters: tuple[Parameter, ...]) -> tuple[np.ndarray, np.ndarray]:
 def anonymous(scene: Scene) -> Scene:
     """The scene with every `Free` replaced by one and the same: bounds must not make a new program."""
     return insert(scene, [Free(0.5, 0.0, 1.0)] * len(free_leaves(scene)))
+
+
+def fixed_numbers(scene: Scene) -> list[tuple[str, float, str]]:
+    """(name, value, unit) of the layer's numbers and the instrument's that are not free."""
+    leaves = jax.tree_util.tree_leaves_with_path((scene.layers, scene.instrument), is_leaf=is_free)
+    found = []
+    for path, leaf in leaves:
+        if is_free(leaf) or np.ndim(leaf) or not isinstance(leaf, int | float):
+            continue
+        steps = ["layers" if path[0].idx == 0 else "instrument", *(_step(key) for key in path[1:])]
+        unit = _UNITS.get(steps[-1], _CAUCHY_UNITS.get(steps[-1], ""))
+        found.append((".".join([*_owner(scene, steps), _key(steps)]), float(leaf), unit))
+    return found

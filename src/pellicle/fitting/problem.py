@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.fit import nuisance
+from pellicle.fitting import nuisance
 from pellicle.fitting.nuisance import Data
 from pellicle.fitting.parameters import Parameter, anonymous, bounds, parameters
 from pellicle.fitting.solve import least_squares
@@ -42,6 +42,12 @@ class Problem(NamedTuple):
     box: Box
     parameters: tuple[Parameter, ...]
     points: int
+
+    @property
+    def thickness_axis(self) -> int | None:
+        """Which parameter is the thickness, None where it is fixed."""
+        keys = [p.key for p in self.parameters]
+        return keys.index("thickness") if "thickness" in keys else None
 
     @property
     def program(self) -> tuple[Any, ...]:
@@ -157,8 +163,3 @@ def local(plan: Plan, scene: Scene, data: Data, box: Box, unit) -> Local:
     slope, layer_slope = jax.vmap(push, out_axes=-1)(jnp.eye(len(values)))
     solved = nuisance.solve(signal, data, scene.instrument)
     return Local(signal, slope, solved.model, solved.gain, solved.offset, layer, layer_slope)
-
-
-def linear_width(scene: Scene) -> int:
-    """How many linear nuisances the scene leaves free."""
-    return nuisance.width(scene.instrument)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import jax
 import numpy as np
@@ -21,16 +21,22 @@ from pellicle.scene import free_leaves, insert
 Progress = Callable[[str, int, int], None]
 """Called with what is being done, how much is done and how much there is."""
 
+
+def quiet(what: str, done: int, total: int) -> None:
+    """Progress that nobody watches."""
+
+
 SCAN_POINTS = 448
 """Wavelengths used while scanning: enough for four samples in a fringe of 5 µm at index 2."""
 _CHUNK = 256
-_LANES = 16
+LANES = 16
 _MOST_STEPS = 4000
 
 
 @dataclass(frozen=True)
 class Scan:
-    """The misfit against thickness: the best over the other parameters' coarse design."""
+    """The misfit against thickness (nm): the best over the other parameters' coarse design, above the
+    evidence at the best minimum."""
 
     thickness: np.ndarray
     evidence: np.ndarray
@@ -49,35 +55,52 @@ class Minima:
 def search(problem: Problem, progress: Progress) -> Minima:
     """Scan the box, polish the best distinct local minima, sort them."""
     thinned = thin(problem, SCAN_POINTS)
-    depth = _thickness_axis(problem)
-    grid = _thickness_grid(problem, depth)
-    design = _design(problem, depth)
+    depth = problem.thickness_axis
+    grid = _thickness_grid(problem)
+    design = _design(problem)
     units = np.repeat(design, max(len(grid), 1), axis=0)
     if depth is not None:
         units[:, depth] = np.tile(grid, len(design))
-    scanned = _scan(thinned, units, progress)
-    table = scanned.reshape(len(design), -1)
-    starts = units[_local_minima(table, most=_LANES if len(design) == 1 else 3 * _LANES)]
+    table = _scan(thinned, units, progress).reshape(len(design), -1)
+    starts = units[_local_minima(table, most=LANES if len(design) == 1 else 3 * LANES)]
+    minima = polished(problem, starts, progress)
+    if depth is None:
+        return minima
+    p = problem.parameters[depth]
+    best = _scan(thinned, minima.units[:1], quiet)
+    scan = Scan(p.lower + grid * (p.upper - p.lower), table.min(axis=0) - min(best[0], table.min()))
+    return replace(minima, scan=scan)
+
+
+def polished(problem: Problem, starts: np.ndarray, progress: Progress) -> Minima:
+    """The distinct local minima reached from `starts`, best first."""
     units, evidence, converged = _polish(problem, starts, progress)
-    order = np.argsort(evidence)
-    scan = None
-    if depth is not None:
-        p = problem.parameters[depth]
-        scan = Scan(p.lower + grid * (p.upper - p.lower), table.min(axis=0))
-    return Minima(units[order], evidence[order], converged[order], scan)
+    order = np.argsort(evidence, kind="stable")
+    kept: list[int] = []
+    for i in order:
+        if np.isfinite(evidence[i]) and all(_apart(problem, units[i], units[j]) for j in kept):
+            kept.append(int(i))
+    kept = (kept or [int(order[0])])[:LANES]
+    return Minima(units[kept], evidence[kept], converged[kept], None)
 
 
-def _thickness_axis(problem: Problem) -> int | None:
-    keys = [p.key for p in problem.parameters]
-    return keys.index("thickness") if "thickness" in keys else None
+def _apart(problem: Problem, a: np.ndarray, b: np.ndarray) -> bool:
+    """Two minima, not one: thickness by half a nanometre and 0.2 %, or others by 2 % of their range."""
+    for p, x, y in zip(problem.parameters, a, b, strict=True):
+        span = p.upper - p.lower
+        value = abs(p.lower + x * span)
+        tolerance = max(0.5, 0.002 * value) / span if p.key == "thickness" else 0.02
+        if abs(x - y) > tolerance:
+            return True
+    return False
 
 
-def _thickness_grid(problem: Problem, depth: int | None) -> np.ndarray:
+def _thickness_grid(problem: Problem) -> np.ndarray:
     """Positions in 0..1 no further apart than λ_min/(8 n_max): an eighth of the shortest fringe's period
     in optical thickness, as n_max is the largest that the bounds allow."""
-    if depth is None:
+    if problem.thickness_axis is None:
         return np.zeros(0)
-    p = problem.parameters[depth]
+    p = problem.parameters[problem.thickness_axis]
     step = problem.scene.light.wavelength.min() / (8 * _largest_index(problem))
     count = int(np.clip(np.ceil((p.upper - p.lower) / step) + 1, 9, _MOST_STEPS))
     return np.linspace(0.0, 1.0, count)
@@ -101,9 +124,12 @@ def _largest_index(problem: Problem) -> float:
     return max(float(np.max(_index(insert(material, c), wavelength))) for c in corners)
 
 
-def _design(problem: Problem, depth: int | None) -> np.ndarray:
+def _design(problem: Problem) -> np.ndarray:
     """A few values of every other parameter, as points of the unit cube."""
-    levels = [np.zeros(1) if i == depth else _levels(p, problem) for i, p in enumerate(problem.parameters)]
+    levels = [
+        np.zeros(1) if i == problem.thickness_axis else _levels(p, problem)
+        for i, p in enumerate(problem.parameters)
+    ]
     return np.array(list(itertools.product(*levels))).reshape(-1, len(levels))
 
 
@@ -150,11 +176,11 @@ def _local_minima(table: np.ndarray, most: int) -> np.ndarray:
 def _polish(problem: Problem, starts: np.ndarray, progress: Progress):
     plan, *arguments = problem.program
     pieces = []
-    for first in range(0, len(starts), _LANES):
-        lanes = starts[first : first + _LANES]
-        padded = np.concatenate([lanes, np.repeat(lanes[-1:], _LANES - len(lanes), axis=0)])
+    for first in range(0, len(starts), LANES):
+        lanes = starts[first : first + LANES]
+        padded = np.concatenate([lanes, np.repeat(lanes[-1:], LANES - len(lanes), axis=0)])
         result = jax.device_get(polish(plan, *arguments, padded))
         pieces.append([column[: len(lanes)] for column in result])
-        progress("polish", min(first + _LANES, len(starts)), len(starts))
+        progress("polish", min(first + LANES, len(starts)), len(starts))
     units, evidence, converged = (np.concatenate(column) for column in zip(*pieces, strict=True))
     return units, np.where(np.isfinite(evidence), evidence, np.inf), converged

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pellicle.fitting.nuisance import offset_prior, scale_prior
 from pellicle.fitting.problem import Local, Problem
 from pellicle.scene import Drift
 
@@ -43,30 +44,27 @@ class Errors:
 
 def linear_coefficients(problem: Problem, at: Local) -> list[Linear]:
     """Scale and offset as Chebyshev coefficients in wavelength, recovered from their curves."""
-    instrument, position = problem.scene.instrument, np.asarray(problem.data.position)[: problem.points]
-    level = float(problem.data.level)
+    instrument = problem.scene.instrument
     found: list[Linear] = []
-    for name, drift, curve in (
-        ("scale", instrument.scale, at.gain),
-        ("offset", instrument.offset, at.offset),
-    ):
-        if isinstance(drift, Drift):
-            coefficients = np.polynomial.chebyshev.chebfit(
-                position, np.asarray(curve)[: problem.points], drift.degree
-            )
-            size = abs(coefficients[0]) if name == "scale" else level
-            found += _named(name, coefficients, drift, position, size)
+    if isinstance(instrument.scale, Drift):
+        _, sd = scale_prior(instrument.scale)
+        found += _series("scale", problem, at.gain, sd, size=None)
+    if isinstance(instrument.offset, Drift):
+        _, sd = offset_prior(instrument.offset)
+        found += _series("offset", problem, at.offset, sd, size=float(problem.data.level))
     return found
 
 
-def _named(name: str, coefficients, drift: Drift, position, size: float) -> list[Linear]:
-    basis = np.polynomial.chebyshev.chebvander(position, drift.degree).T
-    first = 10.0 if drift.degree == 0 else (1.0 if name == "scale" else drift.width)
-    shrink = 0 if name == "offset" else 1
-    sds = [first] + [drift.width * 0.5 ** (j - shrink) for j in range(1, drift.degree + 1)]
+def _series(name: str, problem: Problem, curve, sd: np.ndarray, size: float | None) -> list[Linear]:
+    """The coefficients of one curve; a gain's priors are in units of its own mean (`size=None`)."""
+    position, degree = np.asarray(problem.data.position)[: problem.points], len(sd) - 1
+    coefficients = np.polynomial.chebyshev.chebfit(position, np.asarray(curve)[: problem.points], degree)
+    basis = np.polynomial.chebyshev.chebvander(position, degree).T
+    prior_sd = sd * (abs(coefficients[0]) if size is None else size)
+    names = [f"instrument.{name}" + (f"_{j}" if j else "") for j in range(degree + 1)]
     return [
-        Linear(f"instrument.{name}" + (f"_{j}" if j else ""), float(c), basis[j], size * sds[j], name == "scale")
-        for j, c in enumerate(coefficients)
+        Linear(*row, name == "scale")
+        for row in zip(names, coefficients.tolist(), basis, prior_sd, strict=True)
     ]
 
 

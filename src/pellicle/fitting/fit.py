@@ -1,0 +1,122 @@
+"""Fit a scene to a spectrum: scan, polish, compare, and say how sure the answer is."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import equinox as eqx
+import jax
+import numpy as np
+
+from pellicle.errors import UsageError
+from pellicle.fitting import noise, summary
+from pellicle.fitting.problem import make
+from pellicle.fitting.result import Fit
+from pellicle.fitting.search import Progress, quiet, search
+from pellicle.fitting.status import judge, misfits, verdict
+from pellicle.fitting.uncertainty import errors
+from pellicle.fitting.weigh import Noise, Weighed, weigh
+from pellicle.io.spectrum import Spectrum
+from pellicle.scene import Drift, Light, Scene, free_leaves
+
+
+def fit(data: Spectrum, scene: Scene, *, progress: Progress = quiet) -> Fit:
+    """Fit the free parameters of `scene` to one spectrum, in float64 whatever the caller's setting.
+
+    The signal, and the polarisation and angle where the file has them, come from the spectrum.
+    `progress` is called with a stage's name, how much is done and how much there is. Returns a
+    `Fit`: best parameters with errors, rivals, a status and what was simulated.
+
+    **Raises:** UsageError where nothing is free, or an uncalibrated signal is given a fixed scale;
+    ValueError where a material has no data at a wavelength, naming it.
+    """
+    drifts = [x for x in (scene.instrument.scale, scene.instrument.offset) if isinstance(x, Drift)]
+    if not free_leaves(scene):
+        raise UsageError("nothing is free to fit: give bounds to the thickness, as in --thickness 10:3000")
+    if not data.calibrated and scene.instrument.scale not in drifts:
+        raise UsageError(
+            f"{data.path}: an uncalibrated intensity needs a free scale: add --scale slow, or --scale free"
+        )
+    with jax.enable_x64(True):
+        return _fit(data, seen_as(scene, data), progress)
+
+
+def seen_as(scene: Scene, data: Spectrum) -> Scene:
+    """The scene looked at as the spectrum was: its signal, wavelengths, polarisation and angles."""
+    angle: Any = scene.light.angle
+    if data.angle is not None:
+        angle = float(data.angle[0]) if np.ptp(data.angle) == 0 else data.angle
+    stated = data.polarisation != "unpolarised"
+    polarisation = data.polarisation if stated else scene.light.polarisation
+    return eqx.tree_at(lambda s: s.light, scene, Light(data.wavelength, angle, data.signal, polarisation))
+
+
+def _fit(data: Spectrum, scene: Scene, progress: Progress) -> Fit:
+    began = time.perf_counter()
+    source = Noise(given=data.sigma is not None, drifting=data.sigma is None and _slow(scene))
+    problem = make(
+        scene,
+        data.wavelength,
+        data.values,
+        _sigma(data, source),
+        1 / noise.DRIFT_CORRELATION if source.drifting else 1.0,
+    )
+    weighed = weigh(problem, search(problem, progress), source)
+    return _report(data, scene, weighed, summary.profile(problem, weighed), source, began)
+
+
+def _slow(scene: Scene) -> bool:
+    return isinstance(scene.instrument.scale, Drift) and scene.instrument.scale.degree > 0
+
+
+def _sigma(data: Spectrum, source: Noise) -> np.ndarray:
+    """σ of each point: given, the model's own error, or a guess that the residuals will replace."""
+    if data.sigma is not None:
+        return data.sigma
+    if source.drifting:
+        return noise.drifting_sigma(data.values)
+    guess = max(0.01 * float(np.ptp(data.values)), float(np.median(noise.local_noise(data.values))), 1e-12)
+    return np.full(len(data), guess)
+
+
+def _report(data: Spectrum, scene: Scene, weighed: Weighed, profile, source: Noise, began: float) -> Fit:
+    problem = weighed.problem
+    found = errors(problem, weighed.at, weighed.variance)
+    parameters = summary.estimates(scene, weighed, found, profile)
+    others = summary.rivals(weighed)
+    curve = summary.curve(problem, weighed, found)
+    rms = float(np.sqrt(np.mean(curve.residual**2)))
+    misfit = misfits(
+        chi2_reduced=weighed.chi2_reduced,
+        sigma_known=source.given,
+        effective_share=1 / weighed.length,
+        rms=rms,
+        span=float(np.ptp(data.values)),
+        calibrated=data.calibrated,
+    )
+    natural = frozenset(p.name for p in problem.parameters if p.natural_lower)
+    status = judge(
+        converged=bool(weighed.minima.converged[0]),
+        misfit=misfit,
+        parameters=parameters,
+        rivals=others,
+        natural=natural,
+    )
+    return Fit(
+        spectrum=data,
+        status=status,
+        verdict=verdict(status, parameters, others, rms),
+        parameters=parameters,
+        rivals=others,
+        chi2_reduced=weighed.chi2_reduced,
+        rms=rms,
+        effective_points=summary.effective_points(problem, weighed),
+        correlation_names=found.names,
+        correlation=found.correlation,
+        plan=problem.plan,
+        warnings=summary.warnings(scene, weighed, found),
+        curve=curve,
+        profile=profile,
+        seconds=time.perf_counter() - began,
+    )

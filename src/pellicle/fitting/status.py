@@ -1,0 +1,115 @@
+"""The verdict on a fit: the first status that holds, and one or two plain sentences."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from pellicle.fitting.result import Estimate, Rival, Status
+
+RIVAL = 6.0
+"""A distinct rival closer than this in χ² on the effective points leaves the answer open."""
+MISFIT_CHI2 = 4.0
+MISFIT_RMS, MISFIT_SPAN = 0.02, 0.05
+
+
+def misfits(
+    *,
+    chi2_reduced: float,
+    sigma_known: bool,
+    effective_share: float,
+    rms: float,
+    span: float,
+    calibrated: bool,
+) -> bool:
+    """Whether the model misses the data: by χ² where σ is known, else by structured, large residuals."""
+    if sigma_known:
+        return chi2_reduced > MISFIT_CHI2
+    large = rms > MISFIT_SPAN * span or (calibrated and rms > MISFIT_RMS)
+    return effective_share < 0.1 and large
+
+
+def judge(
+    *,
+    converged: bool,
+    misfit: bool,
+    parameters: Mapping[str, Estimate],
+    rivals: tuple[Rival, ...],
+    natural: frozenset[str],
+) -> Status:
+    """The first status that holds. `natural` names parameters whose lower bound physics sets."""
+    free = [p for p in parameters.values() if p.free and not p.name.startswith("instrument.")]
+    depths = [p for p in free if p.name.split(".")[-1] == "thickness"]
+    unseen = [p for p in (depths or free) if not math.isfinite(p.stderr)]
+    at_bound = [p for p in free if p.at_bound and p.name not in natural]
+    if not converged:
+        return Status.NOT_CONVERGED
+    if misfit:
+        return Status.MISFIT
+    if unseen and (depths or len(unseen) == len(free)):
+        return Status.NOT_IDENTIFIABLE
+    if distinct_rivals(parameters, rivals):
+        return Status.AMBIGUOUS
+    return Status.AT_BOUND if at_bound else Status.CONVERGED
+
+
+def distinct_rivals(parameters: Mapping[str, Estimate], rivals: tuple[Rival, ...]) -> list[Rival]:
+    """Rivals that fit nearly as well and lie outside the errors of the answer."""
+    return [r for r in rivals if r.delta_chi2 < RIVAL and _outside(parameters, r)]
+
+
+def _outside(parameters: Mapping[str, Estimate], rival: Rival) -> bool:
+    return any(
+        abs(value - parameters[name].value) > 3 * parameters[name].stderr
+        for name, value in rival.parameters.items()
+        if math.isfinite(parameters[name].stderr)
+    )
+
+
+def verdict(status: Status, parameters: Mapping[str, Estimate], rivals: tuple[Rival, ...], rms: float) -> str:
+    """One or two sentences for a reader who is no statistician."""
+    lead = next((p for p in parameters.values() if p.free), None)
+    if lead is None:
+        return "Nothing was free to fit."
+    told = describe(lead)
+    if status is Status.CONVERGED:
+        return f"The data decide: {told}."
+    if status is Status.AT_BOUND:
+        resting = [p for p in parameters.values() if p.free and p.at_bound]
+        names = " and ".join(f"{p.name} ({p.value:.6g}{_unit(p)})" for p in resting)
+        return f"{told} fits best, but {names} rests on a bound: widen it, or the scene is another."
+    if status is Status.AMBIGUOUS:
+        other = distinct_rivals(parameters, rivals)[0]
+        value = other.parameters.get(lead.name, math.nan)
+        return (
+            f"The data do not decide: {lead.name} {lead.value:.6g}{_unit(lead)} fits best, but"
+            f" {value:.6g}{_unit(lead)} fits nearly as well (Δχ² {other.delta_chi2:.1f})."
+        )
+    if status is Status.NOT_IDENTIFIABLE:
+        return f"The data do not determine {lead.name}: {_limits(lead)}."
+    if status is Status.MISFIT:
+        return (
+            f"The scene does not explain the data (rms {rms:.4f} with structured residuals): the best fit,"
+            f" {told}, should not be used."
+        )
+    return f"The solver did not settle; its best point, {told}, should not be used."
+
+
+def describe(p: Estimate) -> str:
+    """`thickness 751.66 ± 0.12 nm`."""
+    if not math.isfinite(p.stderr):
+        return f"{p.name} {p.value:.6g}{_unit(p)}"
+    digits = 2 if p.stderr == 0 else max(0, min(12, 1 - math.floor(math.log10(p.stderr))))
+    return f"{p.name} {p.value:.{digits}f} ± {p.stderr:.{digits}f}{_unit(p)}"
+
+
+def _unit(p: Estimate) -> str:
+    return f" {p.unit}" if p.unit else ""
+
+
+def _limits(p: Estimate) -> str:
+    if p.lower_limit is not None and p.upper_limit is None:
+        return f"it is at least {p.lower_limit:.4g}{_unit(p)} (95 %)"
+    if p.upper_limit is not None and p.lower_limit is None:
+        return f"it is at most {p.upper_limit:.4g}{_unit(p)} (95 %)"
+    return f"any value between {p.lower:.6g} and {p.upper:.6g}{_unit(p)} fits about as well"

@@ -1,0 +1,166 @@
+"""From ranked minima to the numbers that a fit reports."""
+
+from __future__ import annotations
+
+import math
+
+import jax
+import numpy as np
+
+from pellicle.fitting.parameters import Parameter, fixed_numbers
+from pellicle.fitting.problem import Problem
+from pellicle.fitting.result import Curve, Estimate, Profile, Rival
+from pellicle.fitting.uncertainty import UNSEEN, Errors, layer_errors, linear_coefficients
+from pellicle.fitting.weigh import Weighed
+from pellicle.scene import Scene
+
+_RULED_OUT = 1e8
+_ONE_SIDED = 2.71
+"""χ² above the best at a one-sided 95 % limit."""
+_ON_BOUND = 1e-6
+_MOST_RIVALS = 10
+
+
+def estimates(scene: Scene, weighed: Weighed, found: Errors, profile: Profile | None) -> dict[str, Estimate]:
+    """Every parameter, free ones first, the thickness before all."""
+    problem, unit = weighed.problem, weighed.minima.units[0]
+    values = problem.box.values(unit)
+    free = [
+        _estimate(p, value, sd, position, profile)
+        for p, value, sd, position in zip(problem.parameters, values, found.stderr, unit, strict=False)
+    ]
+    free.sort(key=lambda e: e.name.split(".")[-1] != "thickness")
+    linear = [
+        Estimate(c.name, c.value, float(sd), "", -math.inf, math.inf, True)
+        for c, sd in zip(
+            linear_coefficients(problem, weighed.at), found.stderr[len(problem.parameters) :], strict=True
+        )
+    ]
+    fixed = [
+        Estimate(name, value, 0.0, unit_, value, value, False) for name, value, unit_ in fixed_numbers(scene)
+    ]
+    return {e.name: e for e in [*free, *linear, *fixed]}
+
+
+def _estimate(
+    p: Parameter, value: float, stderr: float, position: float, profile: Profile | None
+) -> Estimate:
+    at_low, at_high = position <= _ON_BOUND, position >= 1 - _ON_BOUND
+    lower_limit = upper_limit = None
+    if p.key == "thickness" and profile is not None:
+        lower_limit, upper_limit, bounded = _limits(profile, float(value))
+        stderr = stderr if bounded else math.inf
+    elif at_low and p.natural_lower:
+        upper_limit = float(min(value + 1.645 * stderr, p.upper))
+    if stderr > UNSEEN * (p.upper - p.lower):
+        stderr = math.inf
+    return Estimate(
+        p.name,
+        float(value),
+        float(stderr),
+        p.unit,
+        p.lower,
+        p.upper,
+        True,
+        at_low or at_high,
+        lower_limit,
+        upper_limit,
+    )
+
+
+def _limits(profile: Profile, best: float) -> tuple[float | None, float | None, bool]:
+    """One-sided limits where the misfit never rises between the best thickness and a bound.
+
+    Returns (lower, upper, bounded): both None and True where both sides are bounded.
+    """
+    close = profile.delta_chi2 < _ONE_SIDED
+    left, right = profile.thickness < best, profile.thickness > best
+    open_left, open_right = bool(left.any() and close[left].all()), bool(right.any() and close[right].all())
+    if not (open_left or open_right):
+        return None, None, True
+    inside = profile.thickness[close] if close.any() else np.array([best])
+    lower = None if open_left else float(min(inside.min(), best))
+    upper = None if open_right else float(max(inside.max(), best))
+    return lower, upper, False
+
+
+def rivals(weighed: Weighed) -> tuple[Rival, ...]:
+    """Every other minimum with its Δχ² on the effective points, best first."""
+    problem, minima = weighed.problem, weighed.minima
+    above = minima.evidence - minima.evidence[0]
+    return tuple(
+        Rival(
+            {p.name: float(v) for p, v in zip(problem.parameters, problem.box.values(unit), strict=True)},
+            float(delta),
+        )
+        for unit, delta in zip(minima.units[1 : _MOST_RIVALS + 1], above[1:], strict=False)
+        if delta < _RULED_OUT
+    )
+
+
+def profile(problem: Problem, weighed: Weighed) -> Profile | None:
+    """The scan against thickness, in χ² on the effective points."""
+    scan = weighed.minima.scan
+    if scan is None:
+        return None
+    before, after = problem.data, weighed.problem.data
+    ratio = (after.weight[0] / before.weight[0]) ** 2 * after.temper / before.temper
+    return Profile(scan.thickness, np.minimum(scan.evidence * ratio, _RULED_OUT))
+
+
+def curve(problem: Problem, weighed: Weighed, found: Errors) -> Curve:
+    """Data, model and the layer's index with errors, at the real points."""
+    keep, at = slice(problem.points), weighed.at
+    count = len(problem.parameters)
+    n_stderr, k_stderr = layer_errors(at, found.covariance[:count, :count], problem.points)
+    n, k = np.asarray(at.layer)[:, keep]
+    return Curve(
+        wavelength=np.asarray(problem.scene.light.wavelength)[keep],
+        data=problem.data.values[keep],
+        sigma=1 / weighed.problem.data.weight[keep],
+        model=np.asarray(at.model)[keep],
+        n=n,
+        k=k,
+        n_stderr=n_stderr,
+        k_stderr=k_stderr,
+    )
+
+
+def effective_points(problem: Problem, weighed: Weighed) -> float:
+    """How many independent points the spectrum is worth."""
+    return problem.points / weighed.length
+
+
+def warnings(scene: Scene, weighed: Weighed, found: Errors) -> tuple[str, ...]:
+    """What the reader should know before using the numbers."""
+    told = [w for material in _materials(scene) for w in material.warnings()]
+    orders = weighed.problem.plan.row("orders")
+    if orders.on and orders.error_bound > 1e-4:
+        told.append(f"{orders.count} orders leave an error of up to {orders.error_bound:.1g}: |q| is near 1")
+    if weighed.length >= 10:
+        told.append(
+            f"residuals are correlated over {weighed.length:.0f} points: {weighed.problem.points} points"
+            f" count as {weighed.problem.points / weighed.length:.0f}"
+        )
+    if scene.light.signal == "T" and scene.substrate.back is None:
+        told.append(
+            "transmittance into the substrate, as if the detector were inside it: add --back air for a plate"
+        )
+    return tuple(dict.fromkeys([*told, *_trades(weighed, found)]))
+
+
+def _trades(weighed: Weighed, found: Errors) -> list[str]:
+    names, matrix = found.names[: len(weighed.problem.parameters)], found.correlation
+    return [
+        f"{names[i]} and {names[j]} trade against each other (correlation {matrix[i, j]:+.3f})"
+        for i in range(len(names))
+        for j in range(i)
+        if abs(matrix[i, j]) > 0.99
+    ]
+
+
+def _materials(scene: Scene) -> list:
+    media = (scene.layer.material, scene.substrate.material, scene.ambient, scene.substrate.back)
+    is_material = lambda x: hasattr(x, "warnings")  # noqa: E731
+    leaves = [leaf for m in media for leaf in jax.tree_util.tree_leaves(m, is_leaf=is_material)]
+    return [leaf for leaf in leaves if is_material(leaf)]
