@@ -4,7 +4,8 @@ from pellicle.materials.citation import plain_text, short_citation
 
 REFERENCE = (
     'P. B. Johnson and R. W. Christy.\nOptical constants of the noble metals.\n<a href="https://doi.org/10.1/x">'
-    '<i>Phys. Rev. B</i> <b>6</b>, 4370&ndash;4379 (1972)</a><br>\n[<a href="https://a.b/c">Calculation script</a>]'
+    "<i>Phys. Rev. B</i> <b>6</b>, 4370&ndash;4379 (1972)</a><br>\n"
+    '[<a href="https://a.b/c">Calculation script</a>]'
 )
 
 

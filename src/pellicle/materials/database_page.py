@@ -14,6 +14,8 @@ from pellicle.errors import DataError
 from pellicle.optics.dispersion import AbstractDispersion, Table, WithExtinction
 from pellicle.optics.formulas import Formula
 
+FORMULAS = {f"formula {number}": number for number in range(1, 10)}
+
 NOISE_IN_K = 1e-4
 """A k between this much below zero and zero is noise about zero."""
 
@@ -105,9 +107,9 @@ def contents(page: dict[str, Any]) -> Contents:
     n = k = None
     for block in page["DATA"]:
         kind = block["type"]
-        if kind.startswith("formula"):
+        if kind in FORMULAS:
             low, high = (float(word) for word in str(block["wavelength_range"]).split())
-            n = formula(int(kind.split()[1]), str(block["coefficients"]).split(), (low, high))
+            n = formula(FORMULAS[kind], str(block["coefficients"]).split(), (low, high))
         elif kind == "tabulated nk":
             n = table(*_numbers(block))
             return Contents(n.dispersion, (n.low, n.high), True)

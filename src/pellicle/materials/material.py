@@ -36,6 +36,8 @@ class Material(AbstractDispersion):
 
     def index(self, wavelength):
         """Index at `wavelength` (nm): real where the source has no absorption; NaN outside the range."""
+        # a Python number or whole ones would let a table fall back to float32
+        wavelength = jnp.asarray(wavelength, dtype=jnp.result_type(float, wavelength))
         value = self.dispersion.index(wavelength)
         low, high = self.wavelength_range
         if low <= 0 and high == np.inf:
@@ -53,7 +55,7 @@ class Material(AbstractDispersion):
         if not outside.size:
             return
         first, last = float(outside.min()), float(outside.max())
-        which = f"{first:g} nm" if first == last else f"{first:g} to {last:g} nm"
+        which = f"{first:g} nm" if not last > first else f"{first:g} to {last:g} nm"
         source = "" if self.page == self.name else f" ({self.page})"
         remedies = []
         if at.min() < high and at.max() > low:

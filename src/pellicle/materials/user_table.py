@@ -97,9 +97,10 @@ def _check_limits(found: Table, column: Column, what: str, values: np.ndarray) -
     limit, expected, remedy = _LIMITS[what]
     wrong = np.flatnonzero(values < limit if what == "k" else values <= limit)
     if wrong.size:
+        row = int(wrong[0])
         raise DataError(
-            f"{found.where(wrong[0], column.position)}: expected {what} {expected}, "
-            f"found {values[wrong[0]]:g}; {remedy}"
+            f"{found.where(row, column.position)}: expected {what} {expected}, "
+            f"found {values[row]:g}; {remedy}"
         )
 
 
@@ -109,7 +110,7 @@ def _check_order(found: Table, column: Column, values: np.ndarray) -> None:
         raise DataError(f"{found.path}: expected at least two rows, found one; add the others")
     wrong = np.flatnonzero(steps * np.sign(steps[0]) <= 0)
     if wrong.size:
-        row = wrong[0] + 1
+        row = int(wrong[0]) + 1
         raise DataError(
             f"{found.where(row, column.position)}: expected wavelengths that only rise or only fall, found "
             f"{values[row]:g} after {values[row - 1]:g}; sort the rows and delete repeated ones"
