@@ -140,7 +140,7 @@ def test_a_faint_transmittance_keeps_its_relative_accuracy(letter):
     name = "total reflection, 20 µm gap"
     row = np.array(CASES[name]["at"])
     row[0] = 2700.0
-    d, n1, _, n2, _, n0, angle, wavelength = row
+    d, n1, _, _, _, n0, angle, wavelength = row
     q0 = n0 * np.cos(np.deg2rad(angle))
     q1 = 1j * np.sqrt(complex((n0 * np.sin(np.deg2rad(angle))) ** 2 - n1**2)).real
     u, v = (q0, q1) if letter == "s" else (n1**2 * q0, n0**2 * q1)

@@ -1,0 +1,170 @@
+"""The two entire functions and what is built from them, over every number type."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pellicle.optics import film, interface
+from pellicle.optics.number import Pair, sincos, sincos_poly, to_pair
+
+SINES = pytest.mark.parametrize("sines", [sincos, sincos_poly])
+
+
+def exact(Q, k):
+    """c, f and their derivatives in Q, unscaled."""
+    Q, k = mpmath.mpc(Q), mpmath.mpf(k)
+    if abs(k * k * Q) < 1e-16:
+        return 1, k, -k * k / 2, -(k**3) / 6
+    root = mpmath.sqrt(Q)
+    c, f = mpmath.cos(k * root), mpmath.sin(k * root) / root
+    return c, f, -k * f / 2, (k * c - f) / (2 * Q)
+
+
+@jax.jit
+def pair_jvp(re, im, k):
+    one, none = jnp.ones_like(re), jnp.zeros_like(re)
+    return jax.jvp(film.through, (Pair(re, im), k), (Pair(one, none), none))
+
+
+@jax.jit
+def complex_jvp(re, im, k):
+    Q = jax.lax.complex(re, im)
+    return jax.jvp(film.through, (Q, k), (jnp.ones_like(Q), jnp.zeros_like(k)))
+
+
+@jax.jit
+def real_jvp(re, k):
+    return jax.jvp(film.through, (re, k), (jnp.ones_like(re), jnp.zeros_like(k)))
+
+
+def as_complex(z):
+    return complex(z.re, z.im) if isinstance(z, Pair) else complex(z)
+
+
+@mpmath.workdps(40)
+def check_through(Q, k, computed):
+    (c, f, scale_square), (dc, df, dscale) = computed
+    scale = mpmath.sqrt(mpmath.mpf(float(scale_square)))
+    truth = [scale * x for x in exact(Q, k)]
+    assert dscale == 0
+    # against the largest that each can be: near a zero of the sine only the absolute error is small
+    size = 1 + float(abs(mpmath.mpf(k) * mpmath.sqrt(mpmath.mpc(Q))))
+    bounds = [1, k, k * k, k**3]
+    for found, x, bound in zip(map(as_complex, (c, f, dc, df)), truth, bounds, strict=True):
+        assert abs(found - complex(x)) <= 4e-15 * size * bound + 1e-300
+
+
+parts_of_q = st.floats(-30, 30, allow_subnormal=False)
+k0d = st.floats(0, 10, allow_subnormal=False)
+
+
+@given(re=parts_of_q, im=st.floats(0, 30, allow_subnormal=False), k=k0d)
+def test_through_and_its_slope(re, im, k):
+    for jvp in (pair_jvp, complex_jvp):
+        check_through(complex(re, im), k, jvp(np.float64(re), np.float64(im), np.float64(k)))
+
+
+@given(re=parts_of_q, k=k0d)
+def test_through_of_a_real_square(re, k):
+    check_through(re, k, real_jvp(np.float64(re), np.float64(k)))
+
+
+@pytest.mark.parametrize("phase", [0.05, 0.12, 0.17, 0.1778, 0.1779, 0.2])
+@pytest.mark.parametrize("turn", [0.0, 0.5, 1.0])
+def test_the_taylor_branch_carries_the_scale_too(phase, turn):
+    """Thin absorbing films: the slope near w = 0 must be scaled like c and f (once it was not)."""
+    Q = 4 * np.exp(1j * np.pi * turn)
+    k = np.float64(phase / 2)
+    (_, _, scale_square), (_, _df, _) = computed = pair_jvp(Q.real, abs(Q.imag), k)
+    check_through(complex(Q.real, abs(Q.imag)), k, computed)
+    slope = -(k**3) / 6 * np.sqrt(float(scale_square))
+    assert as_complex(_df) == pytest.approx(slope, rel=5e-3)
+
+
+def test_through_at_zero():
+    """Exactly critical (Q = 0) and no thickness (k = 0): c = 1, f = k, and finite slopes."""
+    for Q, k in ((0.0, 2.0), (2.0, 0.0), (0.0, 0.0)):
+        check_through(Q, k, pair_jvp(np.float64(Q), np.float64(0), np.float64(k)))
+        check_through(Q, k, real_jvp(np.float64(Q), np.float64(k)))
+
+
+def test_second_derivatives_are_finite_at_zero():
+    def c_and_f(Q, k):
+        c, f, _ = film.through(Q, k)
+        return jnp.stack([c, f])
+
+    for Q, k in ((0.0, 2.0), (2.0, 0.0), (-1e4, 100.0)):
+        assert np.all(np.isfinite(jax.jacfwd(jax.jacfwd(c_and_f))(Q, k)))
+
+
+@SINES
+def test_through_wave_is_through_where_the_wave_propagates(sines):
+    Q, k = np.linspace(0.1, 6, 50), np.linspace(0, 40, 50)
+
+    def both(fn):
+        return jax.jvp(lambda Q, k: fn(Q, k, sines), (Q, k), (np.ones_like(Q), np.full_like(k, 0.3)))
+
+    for one, two in zip(
+        jax.tree.leaves(both(film.through_wave)), jax.tree.leaves(both(film.through)), strict=True
+    ):
+        np.testing.assert_allclose(one, two, rtol=1e-13, atol=1e-12)
+
+
+RNG = np.random.default_rng(3)
+N = 200
+AMBIENT = RNG.uniform(1, 1.7, N)
+REAL_LAYER, REAL_SUBSTRATE = RNG.uniform(1.7, 3, (2, N))
+PHASE, ANGLE = RNG.uniform(0, 8, N), RNG.uniform(0, np.pi / 2 - 0.05, N)
+
+
+def signals(layer, substrate, angle=ANGLE, through=film.through, ambient=AMBIENT):
+    waves = film.film(ambient, layer, substrate, PHASE, angle, through=through, sincos=sincos_poly)
+    functions = (film.reflectance, film.transmittance, film.reflectance_below)
+    return np.array([f(w) for w in waves for f in functions])
+
+
+@pytest.mark.parametrize("k", [0.0, 0.3])
+@pytest.mark.parametrize("angle", [ANGLE, None], ids=["oblique", "normal"])
+def test_number_types_agree(k, angle):
+    """No independent check of the formula: they share it (tests/hard has the 50 digits)."""
+    layer, substrate = REAL_LAYER + 1j * k, REAL_SUBSTRATE + 2j * k
+    versions = [signals(layer, substrate, angle), signals(to_pair(layer), to_pair(substrate), angle)]
+    if k == 0:
+        versions.append(signals(REAL_LAYER, REAL_SUBSTRATE, angle))
+        versions.append(signals(REAL_LAYER, REAL_SUBSTRATE, angle, film.through_wave))
+        versions.append(signals(REAL_LAYER, interface.allow_tunnelling(REAL_SUBSTRATE), angle))
+    for version in versions[1:]:
+        np.testing.assert_allclose(version, versions[0], rtol=1e-11, atol=1e-13)
+
+
+def test_normal_incidence_computes_one_polarisation():
+    assert len(film.film(1.0, REAL_LAYER, REAL_SUBSTRATE, PHASE)) == 1
+    assert len(film.film(1.0, REAL_LAYER, REAL_SUBSTRATE, PHASE, ANGLE)) == 2
+    assert len(film.film(1.0, REAL_LAYER, REAL_SUBSTRATE, PHASE, ANGLE, "p")) == 1
+
+
+def test_from_below_is_the_film_turned_over():
+    """R′ seen from the substrate is R of the reversed order of media, at the refracted angle."""
+    layer = to_pair(REAL_LAYER + 0.2j)
+    refracted = np.arcsin(AMBIENT * np.sin(ANGLE) / REAL_SUBSTRATE)
+    forward = film.film(AMBIENT, layer, REAL_SUBSTRATE, PHASE, ANGLE)
+    turned = film.film(REAL_SUBSTRATE, layer, AMBIENT, PHASE, refracted)
+    for one, two in zip(forward, turned, strict=True):
+        np.testing.assert_allclose(film.reflectance_below(one), film.reflectance(two), rtol=1e-10, atol=1e-13)
+        np.testing.assert_allclose(film.transmittance(one), film.transmittance(two), rtol=1e-10)
+
+
+def test_a_layer_that_turns_evanescent_is_smooth():
+    """Across the critical angle of the film the real type follows the complex one."""
+    angle = np.linspace(0.6, 0.9, 101)
+    real = film.film(1.5, 1.1 + 0 * angle, 1.6 + 0 * angle, 3.0, angle)
+    full = film.film(1.5, 1.1 + 0j * angle, 1.6 + 0 * angle, 3.0, angle)
+    for one, two in zip(real, full, strict=True):
+        np.testing.assert_allclose(film.reflectance(one), film.reflectance(two), atol=1e-13)
+    assert np.max(np.abs(np.diff(film.reflectance(real[0])))) < 0.05

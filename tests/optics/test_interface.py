@@ -1,0 +1,92 @@
+"""One boundary: Fresnel's coefficients, energy, and the branch of the root."""
+
+from __future__ import annotations
+
+import jax
+import numpy as np
+import pytest
+
+from pellicle.optics import interface
+from pellicle.optics.number import Pair, imag, is_real, real, to_complex, to_pair
+
+TYPES = {"real": np.real, "pair": to_pair, "complex": lambda z: z}
+
+
+def boundary(n1, n2, degrees, letter, kind=to_pair):
+    a, q1 = interface.transverse(np.float64(n1), np.deg2rad(np.float64(degrees)))
+    n2 = kind(np.complex128(n2))
+    arguments = np.float64(n1), q1, n2, interface.normal(n2, a), letter
+    return [float(f(*arguments)) for f in (interface.reflectance, interface.transmittance)]
+
+
+def test_normal_incidence_computes_nothing_oblique():
+    a, q0 = interface.transverse(1.5, None)
+    assert (a, q0) == (0.0, 1.5)
+    layer = Pair(1.46, 0.1)
+    assert interface.normal(layer, a) is layer
+
+
+@pytest.mark.parametrize("letter", "sp")
+def test_glass_at_normal_incidence(letter):
+    assert boundary(1.0, 1.5, 0.0, letter) == pytest.approx([0.04, 0.96])
+
+
+def test_brewster():
+    degrees = np.rad2deg(np.arctan(1.52))
+    assert boundary(1.0, 1.52, degrees, "p")[0] == pytest.approx(0, abs=1e-30)
+    assert boundary(1.0, 1.52, degrees, "s")[0] == pytest.approx(((1.52**2 - 1) / (1.52**2 + 1)) ** 2)
+
+
+@pytest.mark.parametrize("letter", "sp")
+@pytest.mark.parametrize("n2", [1.5, 0.2 + 3.4j, 2 + 0.1j, 0.7])
+@pytest.mark.parametrize("degrees", [0.0, 30.0, 75.0, 90.0])
+def test_energy(n2, degrees, letter):
+    """With an absorbing second medium too, where one power factor for s and p would be 1 % wrong."""
+    reflected, passed = boundary(1.0, n2, degrees, letter)
+    assert reflected + passed == pytest.approx(1, abs=1e-15)
+    assert 0 <= passed <= 1
+
+
+@pytest.mark.parametrize("letter", "sp")
+def test_total_reflection(letter):
+    reflected, passed = boundary(1.52, 1.0, 60.0, letter)
+    assert (reflected, passed) == (pytest.approx(1, abs=1e-15), 0)
+
+
+@pytest.mark.parametrize("letter", "sp")
+def test_number_types_agree(letter):
+    one = [boundary(1.0, 1.7, 50.0, letter, kind) for kind in TYPES.values()]
+    np.testing.assert_allclose(one, one[0] * np.ones((3, 1)), rtol=1e-14)
+
+
+@pytest.mark.parametrize("letter", "sp")
+def test_no_light_leaves_an_evanescent_wave(letter):
+    """Incident waves that carry no power: T is 0, not 0/0, and the derivative stays finite."""
+    q = Pair(np.float64(0.0), np.float64(0.8))
+    assert interface.transmittance(np.float64(1.0), q, np.float64(1.5), np.float64(1.2), letter) == 0
+
+
+def test_root_decays():
+    q = interface.normal(Pair(np.float64(1.0), np.float64(0.0)), np.float64(1.2))
+    assert complex(to_complex(q)) == pytest.approx(1j * np.sqrt(0.44))
+    assert imag(interface.normal(Pair(np.float64(1.0), np.float64(-0.0)), np.float64(1.2))) > 0
+
+
+def test_allow_tunnelling_only_widens_a_real_index():
+    wide = interface.allow_tunnelling(1.5)
+    assert not is_real(wide)
+    assert (float(real(wide)), float(imag(wide))) == (1.5, 0.0)
+    absorbing = Pair(1.5, 0.1)
+    assert interface.allow_tunnelling(absorbing) is absorbing
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_cosine_of_90_degrees_is_not_negative(dtype):
+    """Its slope stays that of the cosine."""
+
+    def q0(angle):
+        return interface.transverse(dtype(1.5), angle)[1]
+
+    value, slope = jax.jvp(q0, (np.deg2rad(dtype(90)),), (dtype(1),))
+    assert 0 < value < 1e-8
+    assert slope == pytest.approx(-1.5)
