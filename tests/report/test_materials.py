@@ -52,6 +52,14 @@ def test_a_figure_that_cannot_be_written_leaves_nothing(tmp_path, name):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_figure_overwrites_nothing(tmp_path):
+    kept = tmp_path / "nk.png"
+    kept.write_text("mine")
+    with pytest.raises(UsageError, match="not overwritten"):
+        figure("Au", kept)
+    assert kept.read_text() == "mine"
+
+
 def test_a_failed_figure_leaves_nothing(tmp_path, monkeypatch):
     from matplotlib.figure import Figure
 

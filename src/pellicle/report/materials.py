@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 import textwrap
 from collections.abc import Iterable
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pellicle.errors import UsageError
+from pellicle.io.atomic import replacing
 from pellicle.materials import Material, index, lookup
 
 if TYPE_CHECKING:
@@ -108,24 +108,14 @@ def shown_range(material: Material) -> tuple[float, float]:
 def figure(name: str, path: str | os.PathLike[str]) -> Path:
     """Draw n and k of a material against wavelength into `path` (.png, .pdf or .svg), which is returned.
 
-    The file appears complete or not at all. Raises what `lookup` raises, and UsageError for a file
-    type that is none of these or a folder that is missing.
+    The file appears complete or not at all, and none is overwritten. Raises what `lookup` raises, and
+    UsageError for a file type that is none of these or a place that cannot be written.
     """
     target = Path(path)
     if target.suffix.lower() not in FORMATS:
         raise UsageError(f"--out {target}: expected a name ending in {', '.join(FORMATS)}")
-    if not target.parent.is_dir():
-        raise UsageError(f"--out {target}: the folder {target.parent} does not exist, make it first")
-    drawn = _draw(name)
-    handle, draft = tempfile.mkstemp(suffix=target.suffix, prefix=f".{target.stem}-", dir=target.parent)
-    os.close(handle)
-    try:
-        drawn.savefig(draft, dpi=150)
-        os.chmod(draft, 0o644)  # mkstemp's own mode keeps everyone else out
-        os.replace(draft, target)
-    except BaseException:
-        Path(draft).unlink(missing_ok=True)
-        raise
+    with replacing(target) as draft:
+        _draw(name).savefig(draft, dpi=150)
     return target
 
 
