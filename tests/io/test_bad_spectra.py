@@ -55,7 +55,9 @@ def test_comments_only(write):
     refused(write("# nothing\n# here\n"), DataError, "only comments", "expected rows")
 
 
-@pytest.mark.parametrize("text", ["wavelength,R\n", "some words\nand more\n", "400\n500\n600\n"])
+@pytest.mark.parametrize(
+    "text", ["wavelength,R\n", "some words\nand more\n", "400\n500\n600\n", ">>>>>Begin\t1\t2\n"]
+)
 def test_no_row_of_two_numbers(write, text):
     refused(write(text), DataError, "line", "without any row of two numbers", "expected rows")
 
@@ -106,6 +108,7 @@ def test_too_many_values_in_a_row(write):
     refused(
         write("wavelength,R\n400,0.1\n500,0,2\n600,0.3\n"), DataError, "line 3 has 3 values", "decimal comma"
     )
+    refused(write("wavelength,R\n400,0.1,nan?\n500,0.2\n600,0.3\n"), DataError, "line 2 has 3 values")
     refused(write("wavelength,R\n400,0,1\n500,0,2\n"), DataError, "line 2 has 3 values", "header on line 1")
 
 

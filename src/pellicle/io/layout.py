@@ -16,6 +16,7 @@ from pellicle.io.text import Line, is_number, split
 
 DELIMITERS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}
 _BLANK_NAMES = re.compile(r"[^\s(\[]+(?:\s*[(\[][^)\]]*[)\]])?|\S+")  # keeps `R (%)` one name
+_MARKER = ">>>>>"  # Ocean Optics puts such lines around the rows
 _SAMPLE = 60  # lines that decide, spread over the file so that a preamble cannot outvote the rows
 
 
@@ -66,7 +67,7 @@ def find_layout(lines: Sequence[Line], comments: Sequence[Line], path: str) -> L
     skipped = start if header is None else header
     if skipped:
         notes.insert(0, f"{skipped} line{'s' * (skipped > 1)} of preamble skipped")
-    rows = [line for line in lines[start:] if not line.text.startswith(">>>>>")]
+    rows = [line for line in lines[start:] if not line.text.startswith(_MARKER)]
     trailing = len(lines[first].bare.split(delimiter)) if delimiter != " " else width
     return Layout(
         delimiter,
@@ -81,6 +82,8 @@ def find_layout(lines: Sequence[Line], comments: Sequence[Line], path: str) -> L
 
 def _numbers_in(line: Line, delimiter: str, decimal: str = ",") -> tuple[int, int]:
     """How many cells of a line are numbers, and how many cells it has."""
+    if line.text.startswith(_MARKER):
+        return 0, 0
     decimal = "." if delimiter == "," else decimal
     cells = split(line.bare, delimiter)
     return sum(is_number(cell, decimal) for cell in cells), len(cells)
@@ -135,7 +138,7 @@ def _rows_begin(
     start = first
     while start and _is_faulty_row(lines[start - 1], width, delimiter, decimal):
         start -= 1
-    if start and not lines[start - 1].text.startswith(">"):
+    if start and not lines[start - 1].text.startswith(_MARKER):
         cells = split(lines[start - 1].text, delimiter)
         # two words of free text are as many as two names; only a name of ours tells them apart
         words = delimiter == " " and not any(column.role != "other" for column in recognise_all(cells))

@@ -7,6 +7,7 @@ gone through cell by cell to name the line and column at fault.
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from io import StringIO
@@ -48,18 +49,23 @@ class Table:
         import pandas as pd  # takes 0.3 s to import, and only a reader needs it
 
         try:
-            frame = pd.read_csv(
-                StringIO("\n".join(line.bare for line in self.layout.rows)),
-                sep=r"\s+" if self.layout.delimiter == " " else self.layout.delimiter,
-                header=None,
-                names=list(range(self.layout.raw_width)),
-                index_col=False,
-                decimal=self.layout.decimal,
-                skipinitialspace=True,
-                skip_blank_lines=False,
-                low_memory=False,
-            )
-        except ValueError:  # pandas' ParserError is one: a row is too long
+            with warnings.catch_warnings():
+                warnings.simplefilter("error", pd.errors.ParserWarning)  # the first row is too long
+                frame = pd.read_csv(
+                    StringIO("\n".join(line.bare for line in self.layout.rows)),
+                    sep=r"\s+" if self.layout.delimiter == " " else self.layout.delimiter,
+                    header=None,
+                    names=list(range(self.layout.raw_width)),
+                    index_col=False,
+                    decimal=self.layout.decimal,
+                    skipinitialspace=True,
+                    skip_blank_lines=False,
+                    low_memory=False,
+                )
+        except (
+            ValueError,
+            pd.errors.ParserWarning,
+        ):  # a ParserError is a ValueError: a later row is too long
             return self._numbers_by_cell(positions)
         found = [frame[position].to_numpy() for position in positions]
         if len(frame) == len(self.lines) and all(_is_finite(values) for values in found):
