@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from pellicle.fitting.result import Status as Status
     from pellicle.io.spectra import read_spectrum as read_spectrum
     from pellicle.io.spectrum import Spectrum as Spectrum
-    from pellicle.materials import lookup as material
+    from pellicle.materials import lookup as material  # noqa: F401
     from pellicle.optics.dispersion import Cauchy as Cauchy
     from pellicle.optics.dispersion import Constant as Constant
     from pellicle.optics.dispersion import Sellmeier as Sellmeier

@@ -10,7 +10,7 @@ import jax
 import numpy as np
 
 from pellicle.errors import UsageError
-from pellicle.fitting import noise, summary
+from pellicle.fitting import backface, noise, summary
 from pellicle.fitting.problem import make
 from pellicle.fitting.result import Fit
 from pellicle.fitting.search import Progress, quiet, search
@@ -90,11 +90,13 @@ def _report(data: Spectrum, scene: Scene, weighed: Weighed, profile, source: Noi
     misfit = misfits(
         chi2_reduced=weighed.chi2_reduced,
         sigma_known=source.given,
+        drifting=source.drifting,
         effective_share=1 / weighed.length,
         rms=rms,
         span=float(np.ptp(data.values)),
         calibrated=data.calibrated,
     )
+    plate = backface.rms_without(scene, weighed) if problem.plan.on("back-face") else None
     natural = frozenset(p.name for p in problem.parameters if p.natural_lower)
     status = judge(
         converged=bool(weighed.minima.converged[0]),
@@ -106,7 +108,7 @@ def _report(data: Spectrum, scene: Scene, weighed: Weighed, profile, source: Noi
     return Fit(
         spectrum=data,
         status=status,
-        verdict=verdict(status, parameters, others, rms),
+        verdict=verdict(status, parameters, others, rms) + backface.told(rms, plate),
         parameters=parameters,
         rivals=others,
         chi2_reduced=weighed.chi2_reduced,

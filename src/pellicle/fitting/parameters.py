@@ -11,9 +11,9 @@ import numpy as np
 from pellicle.scene import Free, Normal, Scene, free_leaves, insert, is_free
 
 _UNITS = {"thickness": "nm", "bandwidth": "nm", "thickness_spread": "nm", "plate_mm": "mm", "angle": "deg"}
-_CAUCHY_UNITS = {"B": "nm^2", "C": "nm^4"}
+_MODEL_UNITS = {"B": "nm^2", "C": "nm^4", "C1": "nm^2", "C2": "nm^2", "C3": "nm^2"}
 _NATURAL_ZERO = ("k", "bandwidth", "thickness_spread", "offset")
-_SEARCHED = ("n", "A", "B", "k")
+_SEARCHED = ("n", "A", "B", "k", "B1")
 """Parameters that change where the fringes lie, or whether there are any: a start in the middle fails."""
 
 
@@ -46,16 +46,20 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
 
 def _parameter(scene: Scene, path: tuple, free: Free) -> Parameter:
     steps = [_step(key) for key in path]
-    key = steps[-1]
+    key = _key(steps)
     return Parameter(
-        name=".".join([*_owner(scene, steps), _key(steps)]),
+        name=".".join([*_owner(scene, steps), key]),
         key=key,
-        unit=_UNITS.get(key, _CAUCHY_UNITS.get(key, "")),
+        unit=_unit(key),
         value=free.value,
         lower=free.lower,
         upper=free.upper,
         prior=free.prior,
     )
+
+
+def _unit(key: str) -> str:
+    return _UNITS.get(key, _MODEL_UNITS.get(key, ""))
 
 
 def _step(key: Any) -> str:
@@ -65,8 +69,8 @@ def _step(key: Any) -> str:
 
 
 def _key(steps: list[str]) -> str:
-    """`A`, or `B.0` for a number in a tuple."""
-    return ".".join(steps[-2:]) if steps[-1].isdigit() else steps[-1]
+    """`A`, or `B1` for the first number of a tuple B."""
+    return f"{steps[-2]}{int(steps[-1]) + 1}" if steps[-1].isdigit() else steps[-1]
 
 
 def _owner(scene: Scene, steps: list[str]) -> list[str]:
@@ -97,6 +101,6 @@ def fixed_numbers(scene: Scene) -> list[tuple[str, float, str]]:
         if is_free(leaf) or np.ndim(leaf) or not isinstance(leaf, int | float):
             continue
         steps = ["layers" if path[0].idx == 0 else "instrument", *(_step(key) for key in path[1:])]
-        unit = _UNITS.get(steps[-1], _CAUCHY_UNITS.get(steps[-1], ""))
-        found.append((".".join([*_owner(scene, steps), _key(steps)]), float(leaf), unit))
+        key = _key(steps)
+        found.append((".".join([*_owner(scene, steps), key]), float(leaf), _unit(key)))
     return found

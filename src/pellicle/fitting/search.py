@@ -139,7 +139,7 @@ def _levels(p: Parameter, problem: Problem) -> np.ndarray:
         return start
     if p.key == "k":
         return np.array([0.002, 0.05, 0.4])
-    count = int(np.clip(np.ceil((p.upper - p.lower) / 0.2), 3, 8)) if p.key in ("n", "A") else 0
+    count = int(np.clip(np.ceil((p.upper - p.lower) / 0.2), 3, 8))
     if p.key == "B":
         count = int(np.clip(np.ceil(_dispersion_fringes(p, problem)), 3, 8))
     return (np.arange(count) + 0.5) / count

@@ -17,14 +17,21 @@ def misfits(
     *,
     chi2_reduced: float,
     sigma_known: bool,
+    drifting: bool,
     effective_share: float,
     rms: float,
     span: float,
     calibrated: bool,
 ) -> bool:
-    """Whether the model misses the data: by χ² where σ is known, else by structured, large residuals."""
+    """Whether the model misses the data: by χ² where σ is known, else by structured, large residuals.
+
+    Where scale and offset drift, the weights are the model's own error, and residuals within it
+    (reduced χ² below 1) are no misfit however structured: the lamp is.
+    """
     if sigma_known:
         return chi2_reduced > MISFIT_CHI2
+    if drifting and chi2_reduced < 1:
+        return False
     large = rms > MISFIT_SPAN * span or (calibrated and rms > MISFIT_RMS)
     return effective_share < 0.1 and large
 

@@ -1,0 +1,261 @@
+"""Recipes: a TOML file that says what is there, how it was looked at and what to fit."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from pellicle.errors import DataError, UsageError
+from pellicle.io import words
+from pellicle.io.words import nearest
+from pellicle.optics.dispersion import AbstractDispersion
+from pellicle.scene import Free, Instrument, Layer, Light, Normal, Scene, Substrate
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=False)
+
+
+class PriorTable(_Table):
+    """A normal prior: mean and standard deviation in the parameter's unit."""
+
+    mean: float
+    sd: float = Field(gt=0)
+
+
+class FreeTable(_Table):
+    """A number that may be free: bounds, and optionally a start value and a prior; or fixed."""
+
+    value: float | None = None
+    lower: float | None = None
+    upper: float | None = None
+    prior: PriorTable | None = None
+
+
+Number = float | FreeTable
+
+
+class MediumTable(BaseModel):
+    """`{ model = "cauchy", A = ..., B = ... }`: what else it holds are the model's parameters."""
+
+    model_config = ConfigDict(extra="allow")
+    model: str
+
+
+Medium = str | float | MediumTable
+
+
+class PlateTable(_Table):
+    """A substrate that is a plate with an incoherent back face."""
+
+    material: Medium
+    back: Medium | None = None
+    plate_mm: Number = 1.0
+
+
+class LayerTable(_Table):
+    """One `[[scene.layer]]`."""
+
+    name: str | None = None
+    material: Medium
+    thickness: Number
+    free: list[str] = []
+
+
+class GridTable(_Table):
+    """Evenly spaced wavelengths in nm."""
+
+    start: float = Field(gt=0)
+    stop: float
+    step: float = Field(gt=0)
+
+
+class DataTable(_Table):
+    """`[data]`."""
+
+    files: list[str] = []
+    signal: Literal["R", "T"] | None = None
+    angle: float | None = Field(default=None, ge=0, le=90)
+    polarisation: Literal["unpolarised", "s", "p"] | None = None
+    noise: float | None = Field(default=None, gt=0)
+    range: tuple[float, float] | None = None
+    wavelengths: GridTable | list[float] | None = None
+    joint: bool = False
+
+
+class SceneTable(_Table):
+    """`[scene]`."""
+
+    ambient: Medium = 1.0
+    substrate: Medium | PlateTable
+    layer: list[LayerTable] = Field(min_length=1)
+
+
+class InstrumentTable(_Table):
+    """`[instrument]`."""
+
+    scale: Literal["free", "slow"] | float = 1.0
+    offset: Literal["free", "slow"] | float = 0.0
+    bandwidth: Number | None = None
+    thickness_spread: Number | None = None
+
+
+class RecipeTable(_Table):
+    """A whole recipe."""
+
+    data: DataTable = DataTable()
+    scene: SceneTable
+    instrument: InstrumentTable = InstrumentTable()
+
+
+class Recipe(BaseModel):
+    """A recipe that was read: its tables and where it lies."""
+
+    path: str
+    tables: RecipeTable
+
+    @property
+    def files(self) -> list[str]:
+        """Data files, relative to the recipe."""
+        return [str(Path(self.path).parent / name) for name in self.tables.data.files]
+
+    def scene(self) -> Scene:
+        """The scene it describes. Raises DataError with the recipe's name in front."""
+        try:
+            return _scene(self.tables, Path(self.path).parent)
+        except ValueError as error:
+            raise DataError(f"{self.path}: {error}") from None
+
+
+def read_recipe(path: str | os.PathLike[str]) -> Recipe:
+    """Read and check a recipe. Raises DataError: which key, what was expected, the nearest known one."""
+    name = str(path)
+    try:
+        raw = Path(path).read_bytes()
+    except IsADirectoryError:
+        raise DataError(f"{name}: is a folder; give the recipe's TOML file") from None
+    except OSError as error:
+        raise DataError(f"{name}: cannot be read ({error.strerror}); check the recipe's path") from None
+    try:
+        loaded = tomllib.loads(raw.decode("utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise DataError(f"{name}: is not TOML: {error}") from None
+    try:
+        return Recipe(path=name, tables=RecipeTable.model_validate(loaded))
+    except ValidationError as error:
+        raise DataError(f"{name}: {_first(error)}") from None
+
+
+_KEYS: dict[str, type[BaseModel]] = {
+    "": RecipeTable,
+    "data": DataTable,
+    "wavelengths": GridTable,
+    "scene": SceneTable,
+    "layer": LayerTable,
+    "substrate": PlateTable,
+    "instrument": InstrumentTable,
+    "thickness": FreeTable,
+    "plate_mm": FreeTable,
+    "bandwidth": FreeTable,
+    "thickness_spread": FreeTable,
+    "prior": PriorTable,
+}
+
+
+def _first(error: ValidationError) -> str:
+    """The most telling error in one sentence: an unknown key before what a union made of it."""
+    found = error.errors(include_url=False)
+    chosen = next((e for e in found if e["type"] == "extra_forbidden"), found[0])
+    # unions put the name of the branch they tried into the location
+    where = [
+        str(part) for part in chosen["loc"] if not str(part)[:1].isupper() and part not in ("str", "float")
+    ]
+    key = ".".join(where)
+    if chosen["type"] == "extra_forbidden":
+        owner = next((part for part in reversed(where[:-1]) if not part.isdigit()), "")
+        known = list(_KEYS.get(owner, RecipeTable).model_fields)
+        return f"unknown key {key!r}{nearest(where[-1], known)}; known here: {', '.join(known)}"
+    if chosen["type"] == "missing":
+        return f"{key} is missing"
+    return f"{key}: {chosen['msg'][0].lower()}{chosen['msg'][1:]}, got {chosen['input']!r}"
+
+
+def _scene(tables: RecipeTable, folder: Path) -> Scene:
+    scene, data = tables.scene, tables.data
+    layers = [
+        Layer(
+            words.freed(_medium(layer.material, folder), layer.free),
+            number(layer.thickness, "thickness", natural=0.0),
+            layer.name,
+        )
+        for layer in scene.layer
+    ]
+    instrument = tables.instrument
+    return Scene(
+        layers,
+        _substrate(scene.substrate, folder),
+        ambient=_medium(scene.ambient, folder),
+        light=Light(None, data.angle or 0.0, data.signal or "R", data.polarisation or "unpolarised"),
+        instrument=Instrument(
+            instrument.scale,
+            instrument.offset,
+            optional(instrument.bandwidth, "bandwidth"),
+            optional(instrument.thickness_spread, "thickness_spread"),
+        ),
+    )
+
+
+def _substrate(given: Medium | PlateTable, folder: Path) -> Substrate:
+    if not isinstance(given, PlateTable):
+        return Substrate(_medium(given, folder))
+    back = None if given.back is None else _medium(given.back, folder)
+    return Substrate(_medium(given.material, folder), back, number(given.plate_mm, "plate_mm", natural=0.0))
+
+
+def optional(given: Number | None, what: str) -> float | Free | None:
+    """A number that may be absent."""
+    return None if given is None else number(given, what, natural=0.0)
+
+
+def number(given: Number, what: str, natural: float | None = None) -> float | Free:
+    """A fixed number or a `Free`; ValueError where it is neither, or below what nature allows."""
+    if isinstance(given, float | int):
+        lowest, result = float(given), float(given)
+    elif given.lower is None and given.upper is None and given.value is not None:
+        lowest, result = given.value, given.value
+    elif given.lower is None or given.upper is None:
+        raise UsageError(f"{what}: give lower and upper, or one plain number")
+    else:
+        prior = None if given.prior is None else Normal(given.prior.mean, given.prior.sd)
+        try:
+            result = Free(given.value, given.lower, given.upper, prior)
+        except ValueError as error:
+            raise UsageError(f"{what}: {error}") from None
+        lowest = given.lower
+    if natural is not None and lowest < natural:
+        raise UsageError(f"{what} must not be below {natural:g}, got {lowest:g}")
+    return result
+
+
+def _medium(given: Medium, folder: Path) -> AbstractDispersion:
+    if isinstance(given, MediumTable):
+        extras = given.model_extra or {}
+        return words.model(given.model, {key: _parameter(key, value) for key, value in extras.items()})
+    if isinstance(given, str) and given.lower().endswith((".csv", ".txt", ".dat")):
+        given = str(folder / given)
+    return words.medium(str(given), what="material")
+
+
+def _parameter(key: str, value: Any) -> float | Free:
+    """A model's parameter; without bounds of its own it is fixed."""
+    try:
+        table = FreeTable.model_validate(value) if isinstance(value, dict) else float(value)
+    except (ValidationError, TypeError, ValueError):
+        raise UsageError(
+            f"{key} must be a number or a table of value, lower and upper, got {value!r}"
+        ) from None
+    return number(table, key)

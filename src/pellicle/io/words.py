@@ -1,0 +1,202 @@
+"""Words of the command line and of recipes: media, models, ranges, numbers that may be free."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pellicle.errors import UsageError
+from pellicle.materials import lookup
+from pellicle.optics.dispersion import AbstractDispersion, Cauchy, Constant, Sellmeier, Shifted
+from pellicle.scene import Free
+
+
+class Own(NamedTuple):
+    """A model's own parameter: default bounds, default value, and whether the bare name frees it."""
+
+    lower: float
+    upper: float
+    value: float
+    free: bool = True
+
+
+MODELS: dict[str, dict[str, Own]] = {
+    "cauchy": {"A": Own(1.2, 3.0, 1.5), "B": Own(0.0, 1e5, 0.0), "C": Own(-1e10, 1e10, 0.0, False)},
+    "sellmeier": {"B1": Own(0.1, 6.0, 1.1), "C1": Own(0.0, 6e4, 8e3)},
+}
+"""Dispersion models by name. Cauchy: λ in nm, B in nm², C in nm⁴. Sellmeier, one term: C1 in nm²."""
+
+_CALL = re.compile(r"\s*([A-Za-z][\w-]*)\s*(?:\((.*)\))?\s*")
+
+
+def number(text: str, what: str) -> float:
+    """A finite number, or a UsageError that says what it is for."""
+    try:
+        value = float(text)
+    except ValueError:
+        raise UsageError(f"{what} must be a number, not {text!r}") from None
+    if not np.isfinite(value):
+        raise UsageError(f"{what} must be a finite number, not {text!r}")
+    return value
+
+
+def span(text: str, what: str) -> tuple[float, float]:
+    """`LO:HI` as two rising numbers, or a UsageError."""
+    parts = text.split(":")
+    if len(parts) != 2:
+        raise UsageError(f"{what} must be LO:HI, as in 10:3000, not {text!r}")
+    low, high = number(parts[0], what), number(parts[1], what)
+    if not low < high:
+        raise UsageError(f"{what} is reversed or empty: {text!r}; write the smaller number first")
+    return low, high
+
+
+def thickness(text: str) -> Free | float:
+    """`LO:HI` in nm as a free thickness, or one number as a fixed one."""
+    if ":" not in text:
+        fixed = number(text, "--thickness")
+        if fixed < 0:
+            raise UsageError(f"--thickness must not be negative, got {text} nm")
+        return fixed
+    low, high = span(text, "--thickness")
+    if low < 0:
+        raise UsageError(f"--thickness must not be negative: its lower bound is {low:g} nm")
+    return Free(lower=low, upper=high)
+
+
+def free_or_number(text: str, what: str, lower: float, upper: float, start: float) -> Free | float:
+    """`free`, `LO:HI` or a number."""
+    if text == "free":
+        return Free(start, lower, upper)
+    if ":" in text:
+        return Free(None, *span(text, what))
+    return number(text, what)
+
+
+def drift(text: str, what: str) -> str | float:
+    """`free`, `slow` or a number, for scale and offset."""
+    return text if text in ("free", "slow") else number(text, what)
+
+
+def medium(text: str, free: Iterable[str] = (), what: str = "--layer") -> AbstractDispersion:
+    """A medium from a word: a name, a number (`1.46`, `2.9+0.1j`), a model or an n,k table.
+
+    `cauchy` leaves its parameters free within the default bounds of `MODELS`; `cauchy(1.46,3000)`
+    fixes them. `free` holds items `n`, `k`, `A` or `n=1.3:1.7`: see `freed`. Raises UsageError.
+    """
+    return freed(_known(text.strip(), what), list(free))
+
+
+def _known(text: str, what: str) -> AbstractDispersion:
+    try:
+        value = complex(text.replace(" ", "").replace("i", "j"))
+    except ValueError:
+        return _named(text, what)
+    if not np.isfinite(value) or value.real < 0 or value.imag < 0:
+        raise UsageError(f"{what} {text}: an index is n + ik with n and k not negative")
+    return Constant(value.real, value.imag if value.imag else None)
+
+
+def _named(text: str, what: str) -> AbstractDispersion:
+    match = _CALL.fullmatch(text)
+    if match is None or match[1].lower() not in MODELS:
+        return lookup(text)
+    name, given = match[1].lower(), match[2]
+    if given is None:
+        free = {key: Free(None, own.lower, own.upper) for key, own in MODELS[name].items() if own.free}
+        return model(name, free)
+    keys = list(MODELS[name])
+    values = [number(v, f"{what} {name}") for v in given.split(",") if v.strip()]
+    if not 0 < len(values) <= len(keys):
+        raise UsageError(
+            f"{what} {text}: {name} takes 1 to {len(keys)} numbers ({', '.join(keys)}), got {len(values)}"
+        )
+    return model(name, dict(zip(keys, values, strict=False)))
+
+
+def model(name: str, given: dict[str, Any]) -> AbstractDispersion:
+    """A dispersion model: `given` numbers or `Free`s, the rest fixed at their defaults.
+
+    Raises UsageError for a name or a parameter that is none, with the nearest.
+    """
+    if name not in MODELS:
+        raise UsageError(f"no dispersion model {name!r}{nearest(name, MODELS)}; known: {', '.join(MODELS)}")
+    known = MODELS[name]
+    for key in given:
+        if key not in known:
+            raise UsageError(
+                f"{name} has no parameter {key!r}{nearest(key, known)}; it has {', '.join(known)}"
+            )
+    values = {key: given.get(key, own.value) for key, own in known.items()}
+    if name == "cauchy":
+        return Cauchy(**values)
+    return Sellmeier((values["B1"],), (values["C1"],))
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """` (did you mean ...?)`, or nothing."""
+    close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.5)
+    return f" (did you mean {close[0]!r}?)" if close else ""
+
+
+def freed(dispersion: AbstractDispersion, items: list[str]) -> AbstractDispersion:
+    """The dispersion with the named numbers freed: `n`, `k`, or a model's own, each with optional bounds.
+
+    A plain number is replaced: n ± 0.5 but at least 1, k from 0 to 1. To anything else an added
+    constant is freed: n within ± 0.5 as long as the sum stays at least 1 (or a tenth of its least
+    value, for a metal), k from 0 to 1.
+    """
+    for item in items:
+        name, _, bounds = item.partition("=")
+        limits = span(bounds, f"--free {name}") if bounds else None
+        if name in ("n", "k"):
+            dispersion = _free_index(dispersion, name, limits)
+        else:
+            dispersion = _free_own(dispersion, name, limits)
+    return dispersion
+
+
+def _free_own(dispersion: AbstractDispersion, name: str, limits: tuple[float, float] | None):
+    if not isinstance(dispersion, Cauchy):
+        raise UsageError(
+            f"--free {name}: the layer has no such number; n and k can be freed for any material"
+        )
+    own = {"A": dispersion.A, "B": dispersion.B, "C": dispersion.C}
+    if name not in own:
+        raise UsageError(f"--free {name}: a Cauchy layer has A, B and C, and n and k can be added")
+    usual = MODELS["cauchy"][name]
+    return Cauchy(**(own | {name: Free(None, *(limits or (usual.lower, usual.upper)))}))
+
+
+def _free_index(dispersion: AbstractDispersion, name: str, limits: tuple[float, float] | None):
+    if isinstance(dispersion, Constant):
+        if name == "k":
+            return Constant(dispersion.n, _free_k(dispersion.k or 0.0, limits))
+        n = float(dispersion.n)
+        low, high = limits or (max(1.0, n - 0.5), max(1.0, n) + 0.5)
+        return Constant(Free(min(max(n, low), high), low, high), dispersion.k)
+    shifted = dispersion if isinstance(dispersion, Shifted) else Shifted(dispersion)
+    if name == "k":
+        return Shifted(shifted.base, shifted.n, _free_k(0.0, limits))
+    low, high = limits or _room(dispersion)
+    return Shifted(shifted.base, Free(min(max(0.0, low), high), low, high), shifted.k)
+
+
+def _free_k(value: float, limits: tuple[float, float] | None) -> Free:
+    low, high = limits or (0.0, 1.0)
+    if low < 0:
+        raise UsageError(f"--free k: an extinction coefficient must not be negative, got {low:g}")
+    start = value if value > low else low + 0.05 * (high - low)
+    return Free(min(start, high), low, high)
+
+
+def _room(dispersion: AbstractDispersion) -> tuple[float, float]:
+    """How far a constant may be added to n."""
+    low, high = getattr(dispersion, "wavelength_range", (380.0, 780.0))
+    at = np.linspace(max(low, 250.0), min(high, 1700.0), 64)
+    least = float(np.nanmin(np.real(dispersion(at)))) if at[0] < at[-1] else 1.0
+    return (max(-0.5, 1.0 - least) if least >= 1 else -0.9 * least, 0.5)
