@@ -21,7 +21,9 @@ jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
 jaxtyping.install_import_hook("pellicle", "beartype.beartype")
 
 # the same examples in every run: a failure is a finding, not a draw of luck
-hypothesis.settings.register_profile("tests", deadline=None, derandomize=True, database=None, max_examples=50)
+hypothesis.settings.register_profile(
+    "tests", deadline=None, derandomize=True, database=None, max_examples=100
+)
 hypothesis.settings.load_profile("tests")
 
 

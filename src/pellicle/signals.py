@@ -47,7 +47,7 @@ def reflectance(
 
     ```python
     >>> round(float(reflectance(550.0, 100.0, 1.46, 4.07 + 0.03j)), 4)
-    0.1003
+    0.1015
 
     ```
     """

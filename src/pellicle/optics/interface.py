@@ -23,7 +23,7 @@ def transverse(ambient: Any, angle: Any) -> tuple[Any, Any]:
         return 0.0, ambient
     # the cosine of a float32 π/2 is negative, and would turn T below 0 and R above 1
     cosine = jnp.cos(angle)
-    least = jnp.finfo(cosine.dtype).eps ** 1.25
+    least = float(jnp.finfo(cosine.dtype).eps) ** 1.25
     cosine = cosine + jax.lax.stop_gradient(jnp.maximum(least - cosine, 0.0))
     return ambient * jnp.sin(angle), ambient * cosine
 
