@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pellicle.errors import UsageError
+from pellicle.io.span import number, span
 from pellicle.materials import lookup
 from pellicle.optics.dispersion import AbstractDispersion, Cauchy, Constant, Sellmeier, Shifted
 from pellicle.scene import Free
@@ -31,28 +32,6 @@ MODELS: dict[str, dict[str, Own]] = {
 """Dispersion models by name. Cauchy: λ in nm, B in nm², C in nm⁴. Sellmeier, one term: C1 in nm²."""
 
 _CALL = re.compile(r"\s*([A-Za-z][\w-]*)\s*(?:\((.*)\))?\s*")
-
-
-def number(text: str, what: str) -> float:
-    """A finite number, or a UsageError that says what it is for."""
-    try:
-        value = float(text)
-    except ValueError:
-        raise UsageError(f"{what} must be a number, not {text!r}") from None
-    if not np.isfinite(value):
-        raise UsageError(f"{what} must be a finite number, not {text!r}")
-    return value
-
-
-def span(text: str, what: str) -> tuple[float, float]:
-    """`LO:HI` as two rising numbers, or a UsageError."""
-    parts = text.split(":")
-    if len(parts) != 2:
-        raise UsageError(f"{what} must be LO:HI, as in 10:3000, not {text!r}")
-    low, high = number(parts[0], what), number(parts[1], what)
-    if not low < high:
-        raise UsageError(f"{what} is reversed or empty: {text!r}; write the smaller number first")
-    return low, high
 
 
 def thickness(text: str) -> Free | float:

@@ -1,0 +1,48 @@
+"""The `pellicle` command. stdout is the result, stderr is talk."""
+
+from __future__ import annotations
+
+import sys
+
+from cyclopts import App
+
+from pellicle.cli.fit import fit
+from pellicle.cli.materials import materials
+from pellicle.cli.simulate import simulate
+from pellicle.errors import DataError, UsageError
+
+INTERRUPTED = 130
+
+app = App(
+    name="pellicle",
+    help="Look at a thin layer and say what it is: thickness and index from a measured spectrum.",
+    help_format="plaintext",
+    version_flags=["--version"],
+    exit_on_error=False,
+    print_error=True,
+    result_action="return_value",
+)
+app.command(fit)
+app.command(simulate)
+app.command(materials)
+
+
+def main() -> int:
+    """Run the command line and return its exit code: 0 good, 2 wrong usage, 3 bad data, 4 no clear answer."""
+    from cyclopts import CycloptsError
+
+    try:
+        return int(app(sys.argv[1:]) or 0)
+    except CycloptsError:
+        return 2  # cyclopts has said what is wrong
+    except UsageError as error:
+        print(f"pellicle: {error}", file=sys.stderr)
+        return 2
+    except (DataError, ValueError) as error:
+        print(f"pellicle: {error}", file=sys.stderr)
+        return 3
+    except KeyboardInterrupt:
+        print("pellicle: interrupted", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:
+        return 0

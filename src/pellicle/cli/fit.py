@@ -1,0 +1,195 @@
+"""`pellicle fit`: measured spectra in, a report out."""
+
+from __future__ import annotations
+
+import json as json_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Group, Parameter
+
+from pellicle.cli.options import ReadWords, SceneWords, merged, read, scene_from_words
+from pellicle.cli.session import Progress, say, start
+from pellicle.errors import UsageError
+
+if TYPE_CHECKING:
+    from pellicle.fitting.result import Fit
+
+_scene = Group("Scene", sort_key=1)
+_instrument = Group("Instrument", sort_key=2)
+_reading = Group("Reading", sort_key=3)
+_output = Group("Output", sort_key=4)
+
+
+def _flag(group: Group, help: str, name: str | None = None) -> Parameter:
+    return Parameter(group=group, help=help, **({"name": name} if name else {}))
+
+
+def fit(
+    *data: Annotated[str, Parameter(help="Files to fit, one by one.")],
+    recipe: Annotated[str | None, _flag(_scene, "A TOML file that describes the scene.")] = None,
+    layer: Annotated[
+        str | None,
+        _flag(_scene, "The layer: a material (SiO2), an index (1.46, 2.9+0.1j), cauchy, or an n,k CSV."),
+    ] = None,
+    substrate: Annotated[str | None, _flag(_scene, "What it lies on; the same words.")] = None,
+    ambient: Annotated[str | None, _flag(_scene, "What it is seen from (air).")] = None,
+    thickness: Annotated[str | None, _flag(_scene, "LO:HI in nm (1:5000), or one number to fix it.")] = None,
+    free: Annotated[str | None, _flag(_scene, "Numbers of the layer to free: n,k or n=1.3:1.7.")] = None,
+    back: Annotated[str | None, _flag(_scene, "The substrate is a plate; the medium behind it.")] = None,
+    plate_mm: Annotated[float | None, _flag(_scene, "The plate's thickness in mm (1).")] = None,
+    scale: Annotated[str | None, _flag(_instrument, "free, slow or a number (1).")] = None,
+    offset: Annotated[str | None, _flag(_instrument, "free, slow or a number (0).")] = None,
+    bandwidth: Annotated[
+        str | None, _flag(_instrument, "Full width at half maximum in nm, free, or LO:HI.")
+    ] = None,
+    signal: Annotated[str | None, _flag(_reading, "R or T, where the file does not say.")] = None,
+    angle: Annotated[float | None, _flag(_reading, "Angle of incidence in degrees (0).")] = None,
+    polarisation: Annotated[str | None, _flag(_reading, "s, p or unpolarised.")] = None,
+    range: Annotated[str | None, _flag(_reading, "Wavelengths to keep, LO:HI in nm.")] = None,
+    noise: Annotated[float | None, _flag(_reading, "Standard deviation of every point.")] = None,
+    columns: Annotated[str | None, _flag(_reading, "Names of the columns in order, _ to skip.")] = None,
+    wavelength_unit: Annotated[str | None, _flag(_reading, "nm, um, A, eV or cm-1.")] = None,
+    signal_unit: Annotated[str | None, _flag(_reading, "fraction or percent.")] = None,
+    reference: Annotated[
+        str | None, _flag(_reading, "Raw counts of a bare reference: DATA are raw counts too.")
+    ] = None,
+    reference_material: Annotated[str, _flag(_reading, "What the reference is.")] = "Si",
+    dark: Annotated[str | None, _flag(_reading, "Raw counts without light.")] = None,
+    out: Annotated[str | None, _flag(_output, "A folder for report, figure and tables.")] = None,
+    json: Annotated[bool, Parameter(group=_output, help="One JSON object a line.", negative="")] = False,
+) -> int:
+    """Fit a layer to measured reflectance or transmittance.
+
+    Example: pellicle fit oxide.csv --layer SiO2 --substrate Si --thickness 10:3000
+    """
+    scene_words = SceneWords(
+        layer, substrate, ambient, thickness, free, back, plate_mm, scale, offset, bandwidth
+    )
+    reading = ReadWords(
+        signal,
+        angle,
+        polarisation,
+        _range(range),
+        noise,
+        columns,
+        wavelength_unit,
+        signal_unit,
+        reference,
+        reference_material,
+        dark,
+    )
+    _check(reading)
+    scene, files, reading = _what(list(data), recipe, scene_words, reading)
+    start()
+    return _Run(scene, reading, out, json, several=len(files) > 1)(files)
+
+
+def _range(text: str | None) -> tuple[float, float] | None:
+    if text is None:
+        return None
+    from pellicle.io.span import span
+
+    return span(text, "--range")
+
+
+def _check(reading: ReadWords) -> None:
+    if reading.signal not in (None, "R", "T"):
+        raise UsageError(f"--signal must be R or T, not {reading.signal!r}")
+    if reading.angle is not None and not 0 <= reading.angle <= 90:
+        raise UsageError(f"--angle must lie in 0 to 90 degrees, got {reading.angle:g}")
+    if reading.polarisation not in (None, "s", "p", "unpolarised"):
+        raise UsageError(f"--polarisation must be s, p or unpolarised, not {reading.polarisation!r}")
+
+
+def _what(files: list[str], recipe: str | None, words: SceneWords, reading: ReadWords):
+    """The scene, the files and how to read them, from a recipe or from flags."""
+    if recipe is None:
+        if not files:
+            raise UsageError("no data: name the file to fit, as in pellicle fit oxide.csv --layer SiO2 ...")
+        scene, assumed = scene_from_words(words, reading)
+        say(*assumed)
+        return scene, files, reading
+    from pellicle.io.recipe import read_recipe
+
+    if words.given():
+        raise UsageError(f"{', '.join(words.given())} and --recipe exclude each other: put it in the recipe")
+    found = read_recipe(recipe)
+    if found.tables.data.joint:
+        raise UsageError(f"{recipe}: joint fits are not available yet; set joint = false")
+    files = files or found.files
+    if not files:
+        raise UsageError(f"{recipe}: names no data files: give them on the command line or in [data] files")
+    return found.scene(), files, merged(reading, found)
+
+
+class _Run:
+    """Fits file after file; a file that fails does not stop the others."""
+
+    def __init__(self, scene: Any, reading: ReadWords, out: str | None, as_json: bool, several: bool):
+        self.scene, self.reading, self.out, self.as_json, self.several = scene, reading, out, as_json, several
+        self.done: list[Any] = []
+
+    def __call__(self, files: list[str]) -> int:
+        from pellicle.io.atomic import new_folder
+        from pellicle.io.results import several
+
+        folders = [None] * len(files)
+        if self.out is not None:
+            root = Path(self.out)
+            folders = several(root, files) if self.several else [root]
+            if not self.several:
+                new_folder(root)
+        worst = 0
+        try:
+            for path, folder in zip(files, folders, strict=True):
+                worst = max(worst, self._one(path, folder))
+        except KeyboardInterrupt:
+            say(f"interrupted after {len(self.done)} of {len(files)} files; what is done is kept")
+            worst = 130
+        self._summarise()
+        return worst
+
+    def _one(self, path: str, folder: Path | None) -> int:
+        from pellicle.io.results import failure
+
+        progress = Progress(path)
+        try:
+            found = self._fit(path, progress)
+        except ValueError as error:
+            progress.clear()
+            message = str(error) if path in str(error) else f"{path}: {error}"
+            say(f"pellicle: {message}")
+            self.done.append(failure(path, message))
+            if self.as_json:
+                print(json_module.dumps(self.done[-1], allow_nan=False), flush=True)
+            return 2 if isinstance(error, UsageError) else 3
+        progress.clear()
+        self.done.append(found)
+        self._show(found, folder)
+        return 0 if found.status == "converged" else 4
+
+    def _fit(self, path: str, progress: Progress) -> Fit:
+        from pellicle.fitting.fit import fit as run
+
+        spectrum = read(path, self.reading)
+        say(*(f"{path}: {note}" for note in spectrum.notes))
+        return run(spectrum, self.scene, progress=progress)
+
+    def _show(self, found: Fit, folder: Path | None) -> None:
+        from pellicle.io.results import to_json, write_fit
+        from pellicle.report.text import report
+
+        print(
+            json_module.dumps(to_json(found), allow_nan=False) if self.as_json else report(found), flush=True
+        )
+        if folder is not None:
+            write_fit(folder, found, figure=True)
+            say(f"{folder}: report, figure and tables written")
+
+    def _summarise(self) -> None:
+        if self.out is None or not self.several or not self.done:
+            return
+        from pellicle.io.results import write_summary
+
+        write_summary(Path(self.out) / "summary.csv", self.done)

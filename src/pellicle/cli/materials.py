@@ -1,0 +1,33 @@
+"""`pellicle materials`: what the catalogue holds."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from pellicle.cli.session import say
+
+
+def materials(
+    name: Annotated[str | None, Parameter(help="A material, or a part of its name.")] = None,
+    *,
+    out: Annotated[str | None, Parameter(help="A file for the figure of n and k (PNG, PDF, SVG).")] = None,
+) -> int:
+    """List the catalogue, or tell all about one material and draw its n and k.
+
+    Example: pellicle materials Au --out gold.png
+    """
+    from pellicle.errors import UsageError
+    from pellicle.report import materials as catalogue
+
+    if name is None:
+        if out is not None:
+            raise UsageError("--out draws one material: name it, as in pellicle materials Au --out gold.png")
+        print(catalogue.table(), end="")
+        return 0
+    print(catalogue.describe(name), end="")
+    if out is not None:
+        catalogue.figure(name, out)
+        say(f"{out}: figure written")
+    return 0

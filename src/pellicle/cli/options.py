@@ -1,0 +1,144 @@
+"""From the words of `pellicle fit` to a scene, and to how files are read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from pellicle.errors import UsageError
+
+if TYPE_CHECKING:
+    from pellicle.io.recipe import Recipe
+    from pellicle.scene import Scene
+
+DEFAULT_THICKNESS = "1:5000"
+
+
+@dataclass(frozen=True)
+class SceneWords:
+    """The flags that describe a scene, None where not given."""
+
+    layer: str | None = None
+    substrate: str | None = None
+    ambient: str | None = None
+    thickness: str | None = None
+    free: str | None = None
+    back: str | None = None
+    plate_mm: float | None = None
+    scale: str | None = None
+    offset: str | None = None
+    bandwidth: str | None = None
+
+    def given(self) -> list[str]:
+        """The flags that were used."""
+        return [f"--{name.replace('_', '-')}" for name, value in vars(self).items() if value is not None]
+
+
+@dataclass(frozen=True)
+class ReadWords:
+    """The flags that say how a file is read; a recipe's [data] fills what was not given."""
+
+    signal: str | None = None
+    angle: float | None = None
+    polarisation: str | None = None
+    range: tuple[float, float] | None = None
+    noise: float | None = None
+    columns: str | None = None
+    wavelength_unit: str | None = None
+    signal_unit: str | None = None
+    reference: str | None = None
+    reference_material: str = "Si"
+    dark: str | None = None
+
+
+def scene_from_words(words: SceneWords, read: ReadWords) -> tuple[Scene, list[str]]:
+    """The scene that the flags describe, and what was assumed. Raises UsageError."""
+    from pellicle.io import words as w
+    from pellicle.scene import Instrument, Layer, Light, Scene, Substrate
+
+    if words.layer is None or words.substrate is None:
+        missing = "--layer" if words.layer is None else "--substrate"
+        raise UsageError(f"{missing} is missing: give --layer and --substrate, or a --recipe")
+    if words.plate_mm is not None and words.back is None:
+        raise UsageError("--plate-mm needs --back: which medium lies behind the plate, as in --back air")
+    if words.plate_mm is not None and not words.plate_mm > 0:
+        raise UsageError(f"--plate-mm must be above zero, got {words.plate_mm:g}")
+    free = [item.strip() for item in (words.free or "").split(",") if item.strip()]
+    assumed = [] if words.thickness else ["thickness: 1 to 5000 nm, since no --thickness was given"]
+    layer = Layer(w.medium(words.layer, free), w.thickness(words.thickness or DEFAULT_THICKNESS))
+    back = None if words.back is None else w.medium(words.back, what="--back")
+    bandwidth = words.bandwidth
+    scene = Scene(
+        layer,
+        Substrate(w.medium(words.substrate, what="--substrate"), back, words.plate_mm or 1.0),
+        ambient=w.medium(words.ambient or "air", what="--ambient"),
+        light=Light(None, read.angle or 0.0, read.signal or "R", read.polarisation or "unpolarised"),
+        instrument=Instrument(
+            w.drift(words.scale or "1", "--scale"),
+            w.drift(words.offset or "0", "--offset"),
+            None if bandwidth is None else w.free_or_number(bandwidth, "--bandwidth", 0.0, 20.0, 2.0),
+        ),
+    )
+    return scene, assumed
+
+
+def merged(read: ReadWords, recipe: Recipe | None) -> ReadWords:
+    """What the flags say, and else the recipe."""
+    if recipe is None:
+        return read
+    data = recipe.tables.data
+    kept: dict[str, Any] = {k: v for k, v in vars(read).items() if v is not None}
+    from_recipe = {
+        "signal": data.signal,
+        "angle": data.angle,
+        "polarisation": data.polarisation,
+        "range": data.range,
+        "noise": data.noise,
+    }
+    return ReadWords(**({k: v for k, v in from_recipe.items() if v is not None} | kept))
+
+
+def read(path: str, words: ReadWords) -> Any:
+    """One spectrum as the flags say. Raises DataError or UsageError."""
+    from pellicle.io.spectra import read_spectrum
+
+    if words.reference is not None:
+        return _from_counts(path, words)
+    if words.dark is not None:
+        raise UsageError("--dark needs --reference: the counts of a sample of known reflectance")
+    return read_spectrum(
+        path,
+        signal=words.signal,
+        columns=words.columns,
+        wavelength_unit=words.wavelength_unit,
+        signal_unit=words.signal_unit,
+        range=words.range,
+        noise=words.noise,
+        polarisation=words.polarisation,
+    )
+
+
+def _from_counts(path: str, words: ReadWords) -> Any:
+    """Reflectance from raw counts of a sample and of a bare reference (a polished surface)."""
+    import numpy as np
+
+    from pellicle.io.reference import read_counts, reflectance_from_counts
+    from pellicle.io.words import medium
+    from pellicle.signals import reflectance
+
+    if words.signal not in (None, "R"):
+        raise UsageError("--reference turns counts into reflectance: leave --signal out, or give R")
+    options: dict[str, Any] = {"columns": words.columns, "wavelength_unit": words.wavelength_unit}
+    sample = read_counts(path, range=words.range, **options)
+    reference = read_counts(str(words.reference), **options)
+    dark = None if words.dark is None else read_counts(words.dark, **options)
+    material = medium(words.reference_material, what="--reference-material")
+    known = reflectance(
+        sample.wavelength,
+        0.0,
+        1.0,
+        material,
+        angle=words.angle or 0.0,
+        polarisation=words.polarisation or "unpolarised",
+    )
+    return reflectance_from_counts(sample, reference, np.asarray(known), dark, noise=words.noise)

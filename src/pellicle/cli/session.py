@@ -1,0 +1,66 @@
+"""What every command that computes needs first: float64 and a compilation cache."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+CACHE_VARIABLE = "PELLICLE_CACHE"
+"""A folder for compiled programs, or `off`."""
+
+
+def start() -> None:
+    """Set JAX up for the command line: float64, and compiled programs kept between runs.
+
+    The cache lies in the user's cache folder; the variable PELLICLE_CACHE names another one, or is
+    `off`. A folder that cannot be made means no cache, not a failure.
+    """
+    import jax
+
+    jax.config.update("jax_enable_x64", True)
+    folder = _cache_folder()
+    if folder is None:
+        return
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return
+    jax.config.update("jax_compilation_cache_dir", str(folder))
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0)
+    jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
+
+
+def _cache_folder() -> Path | None:
+    chosen = os.environ.get(CACHE_VARIABLE, "")
+    if chosen.lower() == "off":
+        return None
+    if chosen:
+        return Path(chosen).expanduser()
+    if sys.platform == "darwin":
+        return Path("~/Library/Caches/pellicle").expanduser()
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA", "~")).expanduser() / "pellicle" / "cache"
+    return Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "pellicle"
+
+
+def say(*sentences: str) -> None:
+    """Talk goes to stderr."""
+    for sentence in sentences:
+        print(sentence, file=sys.stderr)
+
+
+class Progress:
+    """One line on stderr that is written over; silent where nobody watches."""
+
+    def __init__(self, label: str):
+        self.label, self.shown = label, False
+
+    def __call__(self, what: str, done: int, total: int) -> None:
+        if sys.stderr.isatty():
+            print(f"\r{self.label}: {what} {done}/{total}\033[K", end="", file=sys.stderr, flush=True)
+            self.shown = True
+
+    def clear(self) -> None:
+        if self.shown:
+            print("\r\033[K", end="", file=sys.stderr, flush=True)

@@ -1,0 +1,96 @@
+"""`pellicle simulate`: a synthetic spectrum from a recipe, with noise and the truth in its header."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from pellicle.cli.session import say, start
+from pellicle.errors import DataError, UsageError
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from pellicle.io.recipe import Recipe
+
+
+def simulate(
+    recipe: Annotated[str, Parameter(help="A TOML file that describes the scene.")],
+    *,
+    out: Annotated[str, Parameter(help="The CSV file to write; an existing one is not overwritten.")],
+    noise: Annotated[
+        float | None, Parameter(help="Standard deviation of the noise (the recipe's, or 0).")
+    ] = None,
+    seed: Annotated[int, Parameter(help="Seed of the noise.")] = 0,
+) -> int:
+    """Write the spectrum that a recipe's scene would give.
+
+    Example: pellicle simulate film.toml --out film.csv --noise 0.002 --seed 1
+    """
+    from pellicle.io.atomic import write_text
+    from pellicle.io.recipe import read_recipe
+
+    if noise is not None and not noise >= 0:
+        raise UsageError(f"--noise must not be negative, got {noise:g}")
+    found = read_recipe(recipe)
+    scene = found.scene()
+    start()
+    from pellicle.synthetic import synthesise
+
+    noise = (found.tables.data.noise or 0.0) if noise is None else noise
+    wavelength = _wavelengths(found, scene)
+    result = synthesise(scene, wavelength, noise, seed)
+    write_text(out, _csv(found, scene, result, noise, seed))
+    say(f"{out}: {len(wavelength)} points, {wavelength[0]:g} to {wavelength[-1]:g} nm", str(result.plan))
+    return 0
+
+
+def _wavelengths(recipe: Recipe, scene: Any) -> np.ndarray:
+    """The recipe's wavelengths, or the visible ones that every material has data for."""
+    import numpy as np
+
+    from pellicle.synthetic import VISIBLE, default_wavelengths
+
+    given = recipe.tables.data.wavelengths
+    if given is None:
+        grid = default_wavelengths(scene)
+        if len(grid) < 2:
+            raise DataError(
+                f"{recipe.path}: the materials share no wavelengths in {VISIBLE[0]:g} to {VISIBLE[1]:g} nm: give"
+                " [data] wavelengths = { start, stop, step }"
+            )
+        say(f"wavelengths: {grid[0]:g} to {grid[-1]:g} nm every {VISIBLE[2]:g} nm (the recipe gives none)")
+        return grid
+    if isinstance(given, list):
+        grid = np.array(given)
+    else:
+        grid = np.arange(given.start, given.stop + given.step / 2, given.step)
+    if len(grid) < 2 or not np.all(np.diff(grid) > 0) or grid[0] <= 0:
+        raise DataError(f"{recipe.path}: [data] wavelengths must be at least two rising positive numbers")
+    return grid
+
+
+def _csv(recipe: Recipe, scene: Any, result: Any, noise: float, seed: int) -> str:
+    """The file's text: what it is, from which recipe and seed, the truth, then the numbers."""
+    from pellicle import __version__
+    from pellicle.fitting.parameters import fixed_numbers, parameters
+
+    light = scene.light
+    truth = [(p.name, p.value, p.unit) for p in parameters(scene)] + fixed_numbers(scene)
+    head = [
+        "SYNTHETIC: simulated, not measured",
+        f"recipe {Path(recipe.path).name}, seed {seed}, noise {noise:g}, pellicle {__version__}",
+        f"signal {light.signal}, angle {_angle(light.angle)} degrees, {light.polarisation}",
+        "truth: "
+        + ", ".join(f"{name} = {value:.10g}{' ' + unit if unit else ''}" for name, value, unit in truth),
+    ]
+    columns = f"wavelength_nm,{light.signal}" + (",sigma" if noise else "")
+    end = f",{noise:g}" if noise else ""
+    rows = [f"{w:.10g},{v:.8f}{end}" for w, v in zip(result.wavelength, result.values, strict=True)]
+    return "\n".join([*(f"# {line}" for line in head), columns, *rows, ""])
+
+
+def _angle(angle: Any) -> str:
+    return f"{getattr(angle, 'value', angle):g}"

@@ -1,0 +1,69 @@
+"""Synthetic measurements: a scene's signal with noise, and the truth written beside it."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import numpy as np
+
+from pellicle.model import build, sampled
+from pellicle.optics.dispersion import AbstractDispersion
+from pellicle.planning import Plan, plan
+from pellicle.scene import Drift, Instrument, Scene, insert, is_free, start_values, with_wavelength
+
+VISIBLE = (380.0, 780.0, 2.0)
+"""Default wavelengths: start, stop and step in nm."""
+
+
+class Synthetic(NamedTuple):
+    """What was simulated: the signal with and without noise, and the plan it went through."""
+
+    wavelength: np.ndarray
+    values: np.ndarray
+    clean: np.ndarray
+    plan: Plan
+
+
+def synthesise(scene: Scene, wavelength: Any, noise: float = 0.0, seed: int = 0) -> Synthetic:
+    """The signal of a scene at `wavelength` (nm) with normal noise of standard deviation `noise`.
+
+    Free parameters take their values, scale and offset that are free are 1 and 0. Raises ValueError
+    where a material has no data at a wavelength.
+    """
+    wavelength = np.asarray(wavelength, dtype=float)
+    with jax.enable_x64(True):
+        fixed = with_wavelength(insert(scene, start_values(scene)), wavelength)
+        fixed = eqx.tree_at(lambda s: s.instrument, fixed, _settled(fixed.instrument))
+        chosen = plan(fixed)
+        signal = np.asarray(jax.jit(build(chosen))(sampled(fixed, chosen.on("coherence"))))
+    clean = float(fixed.instrument.scale) * signal + float(fixed.instrument.offset)
+    random = np.random.default_rng(seed).normal(0.0, 1.0, clean.shape)
+    return Synthetic(wavelength, clean + noise * random, clean, chosen)
+
+
+def _settled(instrument: Instrument) -> Instrument:
+    return Instrument(
+        1.0 if isinstance(instrument.scale, Drift) else instrument.scale,
+        0.0 if isinstance(instrument.offset, Drift) else instrument.offset,
+        instrument.bandwidth,
+        instrument.thickness_spread,
+    )
+
+
+def default_wavelengths(scene: Scene) -> np.ndarray:
+    """380 to 780 nm every 2 nm, clipped to where every material has data."""
+    low, high, step = VISIBLE
+    for material in _media(scene):
+        first, last = getattr(material, "wavelength_range", (0.0, np.inf))
+        low, high = max(low, first), min(high, last)
+    grid = np.arange(VISIBLE[0], VISIBLE[1] + step / 2, step)
+    return grid[(grid >= low) & (grid <= high)]
+
+
+def _media(scene: Scene) -> list[AbstractDispersion]:
+    """Every material with a range of its own, however deep it lies."""
+    has_range = lambda x: hasattr(x, "wavelength_range")  # noqa: E731
+    leaves = jax.tree_util.tree_leaves(scene, is_leaf=lambda x: has_range(x) or is_free(x))
+    return [leaf for leaf in leaves if has_range(leaf)]
