@@ -1,0 +1,1 @@
+"""What is told of a result: text, figures, tables of materials."""

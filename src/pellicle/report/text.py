@@ -1,0 +1,192 @@
+"""The report of a fit as plain text: the verdict first, then the numbers it rests on."""
+
+from __future__ import annotations
+
+import math
+import re
+import textwrap
+from collections.abc import Iterable, Sequence
+
+from pellicle.fitting.result import Estimate, Fit, Rival, Status
+from pellicle.fitting.status import RIVAL, describe
+
+COLUMNS = 100
+LEAST_CORRELATION = 0.5
+MOST_CORRELATIONS = 10
+MOST_RIVALS = 6
+SUMMARY_PARAMETERS = 3
+
+ADVICE = {
+    Status.FAILED: "There is no result: the error says what to change.",
+    Status.NOT_CONVERGED: "Do not use the numbers: narrow the bounds or free fewer parameters.",
+    Status.MISFIT: "Do not use the numbers: look at the residuals for what the scene lacks.",
+    Status.NOT_IDENTIFIABLE: "Use the limits, not the value; fix what is known or measure a wider range.",
+    Status.AMBIGUOUS: "Choose among the rivals by what else is known, or measure a wider range.",
+    Status.AT_BOUND: "Widen that bound, or give it the value that is known.",
+    Status.CONVERGED: "Use the numbers within their errors.",
+}
+"""What to do next, for every status."""
+
+_INDENT = "    "
+_NUISANCE = re.compile(r"instrument\.(scale|offset)(_\d+)?")
+
+
+def report(fit: Fit) -> str:
+    """Everything a fit found, as text of at most 100 columns without colour codes."""
+    blocks = [
+        ("Verdict", _verdict(fit)),
+        ("Fit statistics", _statistics(fit)),
+        ("Parameters", _parameters(fit)),
+        (f"Correlations above {LEAST_CORRELATION:g}", _correlations(fit)),
+        (f"Rivals: other minima and how much worse they fit (Δχ² below {RIVAL:g}: about as well)", _rivals(fit)),
+        ("Plan: what was simulated", _plan(fit)),
+        ("Warnings", [line for warning in fit.warnings for line in _wrap(warning, "- ", "  ")]),
+    ]
+    return "\n".join("\n".join([f"[[{title}]]", *lines]) for title, lines in blocks if lines) + "\n"
+
+
+def summary_line(fit: Fit) -> str:
+    """One line for one of several files: name, status, the leading parameters and the rms."""
+    leading = [p for p in fit.free if not _NUISANCE.fullmatch(p.name)] or list(fit.free)
+    told = [_value(p, named=True) for p in leading[:SUMMARY_PARAMETERS]]
+    more = ["..."] if len(leading) > SUMMARY_PARAMETERS else []
+    name = fit.spectrum.path.replace("\\", "/").rsplit("/", 1)[-1] or "spectrum"
+    return f"{name}: {fit.status}, {', '.join([*told, *more, f'rms {fit.rms:.3g}'])}"
+
+
+def _wrap(text: str, first: str = "", rest: str = "") -> list[str]:
+    return textwrap.wrap(
+        text,
+        COLUMNS,
+        initial_indent=_INDENT + first,
+        subsequent_indent=_INDENT + rest,
+        break_on_hyphens=False,
+    )
+
+
+def _facts(rows: Iterable[tuple[str, str]]) -> list[str]:
+    rows = list(rows)
+    width = max((len(label) for label, _ in rows), default=0)
+    return [line for label, text in rows for line in _wrap(text, f"{label:<{width}}  ", " " * (width + 2))]
+
+
+def _verdict(fit: Fit) -> list[str]:
+    data, nm = fit.spectrum, fit.curve.wavelength
+    points = f"{data.signal}, {nm.size} points"
+    if nm.size:
+        points += f" from {nm.min():g} to {nm.max():g} nm"
+    if fit.effective_points < 0.95 * nm.size:
+        points += f", worth {fit.effective_points:.3g} independent ones"
+    file = [("file", _shortened(data.path))] if data.path else []
+    status = f"{fit.status}. {ADVICE[fit.status]}"
+    return [*_wrap(fit.verdict), *_facts([("status", status), *file, ("data", points)])]
+
+
+def _shortened(path: str) -> str:
+    """The end of a long path, with an ellipsis for what is left out."""
+    room = COLUMNS - 2 * len(_INDENT) - len("status")
+    return path if len(path) <= room else "…" + path[1 - room :]
+
+
+def _statistics(fit: Fit) -> list[str]:
+    return _facts(
+        [
+            ("rms residual", f"{fit.rms:.4g}"),
+            ("reduced chi-square", f"{fit.chi2_reduced:.4g}"),
+            ("seconds", f"{fit.seconds:.2f}"),
+        ]
+    )
+
+
+def _parameters(fit: Fit) -> list[str]:
+    width = max((len(name) for name in fit.parameters), default=0) + 1
+    rows = [(f"{p.name + ':':<{width}}", _value(p) if p.free else _fixed(p), _bounds(p)) for p in _all(fit)]
+    middle = max((len(value) for _, value, bounds in rows if bounds), default=0)
+    return [f"{_INDENT}{name}  {value:<{middle}}  {bounds}".rstrip() for name, value, bounds in rows]
+
+
+def _all(fit: Fit) -> list[Estimate]:
+    """Free parameters before fixed ones, each in the fit's own order."""
+    return sorted(fit.parameters.values(), key=lambda p: not p.free)
+
+
+def _unit(p: Estimate) -> str:
+    return f" {p.unit}" if p.unit else ""
+
+
+def _fixed(p: Estimate) -> str:
+    return f"{p.value:.6g}{_unit(p)} (fixed)"
+
+
+def _value(p: Estimate, named: bool = False) -> str:
+    """`751.66 ± 0.12 nm (0.016 %)`, or what is known where there is no error; `named` is shorter."""
+    name = f"{p.name} " if named else ""
+    if not math.isfinite(p.stderr):
+        limits = "".join(f", {limit}" for limit in _limits(p))
+        return f"{name}not determined (best {p.value:.6g}{_unit(p)}{limits})"
+    text = describe(p).removeprefix("" if named else f"{p.name} ")
+    if named:
+        return text
+    relative = 100 * p.stderr / abs(p.value) if p.value else math.inf
+    share = [f"{relative:.2g} %"] if relative < 100 else []
+    notes = ", ".join([*share, *_limits(p)])
+    return f"{text} ({notes})" if notes else text
+
+
+def _limits(p: Estimate) -> list[str]:
+    sides = (("at least", p.lower_limit), ("at most", p.upper_limit))
+    return [f"{side} {limit:.4g}{_unit(p)} at 95 %" for side, limit in sides if limit is not None]
+
+
+def _bounds(p: Estimate) -> str:
+    if not p.free or not (math.isfinite(p.lower) and math.isfinite(p.upper)):
+        return ""
+    side = "lower" if p.value - p.lower <= p.upper - p.value else "upper"
+    return f"[{p.lower:g}, {p.upper:g}]" + (f"  AT ITS {side.upper()} BOUND" if p.at_bound else "")
+
+
+def _correlations(fit: Fit) -> list[str]:
+    """The largest ones.
+
+    The coefficients of the scale's and the offset's polynomials are left out among themselves: they
+    follow from the basis that was chosen, and say nothing of the layer. result.json has them all.
+    """
+    names, matrix = fit.correlation_names, fit.correlation
+    pairs = [
+        (float(matrix[i, j]), names[i], names[j])
+        for j in range(len(names))
+        for i in range(j)
+        if abs(matrix[i, j]) > LEAST_CORRELATION
+        and not (_NUISANCE.fullmatch(names[i]) and _NUISANCE.fullmatch(names[j]))
+    ]
+    pairs.sort(key=lambda pair: -abs(pair[0]))
+    shown = pairs[:MOST_CORRELATIONS]
+    lines = _table([(f"C({one}, {other})", f"{value:+.3f}") for value, one, other in shown])
+    return lines + _left_out(len(pairs) - len(shown))
+
+
+def _rivals(fit: Fit) -> list[str]:
+    shown = sorted(fit.rivals, key=lambda rival: rival.delta_chi2)[:MOST_RIVALS]
+    rows = [(f"Δχ² {rival.delta_chi2:.3g}", *_of_rival(fit, rival)) for rival in shown]
+    return _table(rows) + _left_out(len(fit.rivals) - len(shown))
+
+
+def _of_rival(fit: Fit, rival: Rival) -> list[str]:
+    """The rival's parameters, the thickness first as in the table of parameters."""
+    names = [name for name in fit.parameters if name in rival.parameters]
+    return [f"{name} {rival.parameters[name]:.5g}{_unit(fit.parameters[name])}" for name in names]
+
+
+def _table(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Aligned columns; a row that is too long goes on below itself."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows]
+    return [part for line in lines for part in _wrap(line, "", _INDENT)]
+
+
+def _left_out(count: int) -> list[str]:
+    return [f"{_INDENT}... and {count} more in result.json"] if count > 0 else []
+
+
+def _plan(fit: Fit) -> list[str]:
+    return _facts((f"{row.effect:<13} {'on' if row.on else 'off':<3}", row.why) for row in fit.plan.rows)
