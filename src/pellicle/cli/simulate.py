@@ -58,8 +58,8 @@ def _wavelengths(recipe: Recipe, scene: Any) -> np.ndarray:
         grid = default_wavelengths(scene)
         if len(grid) < 2:
             raise DataError(
-                f"{recipe.path}: the materials share no wavelengths in {VISIBLE[0]:g} to {VISIBLE[1]:g} nm: give"
-                " [data] wavelengths = { start, stop, step }"
+                f"{recipe.path}: the materials share no wavelengths in {VISIBLE[0]:g} to {VISIBLE[1]:g} nm:"
+                " give [data] wavelengths = { start, stop, step }"
             )
         say(f"wavelengths: {grid[0]:g} to {grid[-1]:g} nm every {VISIBLE[2]:g} nm (the recipe gives none)")
         return grid
