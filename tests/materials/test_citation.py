@@ -16,6 +16,10 @@ def test_tags_go_and_dois_stay():
     )
 
 
+def test_other_links_leave_their_text():
+    assert plain_text('<a href="https://a.b/c">data sheet</a>, 2017') == "data sheet, 2017"
+
+
 def test_orientations_are_no_tags():
     assert plain_text("Orientation: <111>; H<sub>2</sub>O") == "Orientation: <111>; H2O"
 

@@ -33,6 +33,12 @@ def test_inside_the_range_nothing_happens():
             "--range 250:500 or use a page that covers them all (Si/Franta-25C)",
         ),
         (
+            "Si",
+            [300, 2000],
+            "Si (main/Si/Green-2008) is known from 250 to 1450 nm, not at 2000 nm: cut the data with "
+            "--range 300:1450 or use a page that covers them all (Si/Franta-25C)",
+        ),
+        (
             "Au",
             [50],
             "Au (main/Au/Johnson) is known from 187.9 to 1937 nm, not at 50 nm: use another page",
@@ -43,6 +49,12 @@ def test_outside_it_says_what_where_and_what_to_do(name, nm, sentence):
     with pytest.raises(ValueError, match="is known from") as caught:
         lookup(name).check_range(nm)
     assert str(caught.value) == sentence
+
+
+def test_both_parts_are_nan_outside_whatever_the_dispersion():
+    material = Material(Constant(1.5, 0.1), "X", "a/X/b", "", (400.0, 500.0), True)
+    value = material.index(np.array([399.0, 450.0, 501.0]))
+    assert np.isnan(value.re).tolist() == np.isnan(value.im).tolist() == [True, False, True]
 
 
 def test_a_wavelength_that_is_not_a_number_is_outside():

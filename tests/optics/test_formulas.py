@@ -92,6 +92,19 @@ def test_agrees_with_an_independent_evaluation(number):
     np.testing.assert_allclose(formula.index(micrometres * 1e3), expected, rtol=0, atol=3e-6)
 
 
+def test_both_ratios_of_formula_4_and_their_exponents():
+    c = (2.0, 0.3, 1.5, 0.2, 2.0, 0.1, 2.0, 0.25, 0.5, 0.01, 4.0, -0.02, -1.0)
+    x = 0.8
+    ratios = 0.3 * x**1.5 / (x**2 - 0.2**2) + 0.1 * x**2 / (x**2 - 0.5)
+    expected = np.sqrt(2.0 + ratios + 0.01 * x**4 - 0.02 / x)
+    assert float(Formula(4, c).index(1e3 * x)) == pytest.approx(expected, rel=1e-14)
+
+
+def test_the_decimals_behind_single_precision_come_back():
+    _, formula = example(1)
+    assert formula == FUSED_SILICA
+
+
 @pytest.mark.parametrize("number", EXAMPLES)
 def test_slope_agrees_with_differences_under_jit(number):
     model, formula = example(number)

@@ -121,7 +121,7 @@ def covering(path: str, low: float, high: float) -> list[str]:
     return [
         page.path if book is None else f"{page.book}/{page.page}"
         for page in pages()
-        if page.book == book and page.path != path and page.low <= low and page.high >= high
+        if page.book == book and page.low <= low and page.high >= high
     ]
 
 
