@@ -3,11 +3,7 @@
 from pellicle.io.atomic import new_folder as new_folder
 from pellicle.io.atomic import replacing as replacing
 from pellicle.io.atomic import write_text as write_text
-from pellicle.io.reference import (
-    read_counts as read_counts,
-)
-from pellicle.io.reference import (
-    reflectance_from_counts as reflectance_from_counts,
-)
+from pellicle.io.reference import read_counts as read_counts
+from pellicle.io.reference import reflectance_from_counts as reflectance_from_counts
 from pellicle.io.spectra import read_spectrum as read_spectrum
 from pellicle.io.spectrum import Spectrum as Spectrum
