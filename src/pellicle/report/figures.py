@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 import textwrap
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,10 +23,23 @@ BLACK, ORANGE, BLUE, GREEN, GREY = "#000000", "#D55E00", "#0072B2", "#009E73", "
 FITTED = {"color": ORANGE, "linewidth": 1.4}
 DPI = 150
 WIDTH_INCHES = 8.0
-MOST_LABELS = 5
-ROOM_FOR_LABEL = 0.09
+MOST_LABELS = 6
+ROOM_FOR_LABEL = 0.025
 """Least distance between two labels, as a share of the axis."""
+HOPELESS = 1e7
+"""Δχ² from which nothing is worth showing: the search caps it above."""
+GAP = 10
+"""A step this many times the usual one is a gap in the data, which no line crosses."""
 
+_LABEL: dict[str, Any] = {
+    "rotation": 90,
+    "xytext": (0, 6),
+    "textcoords": "offset points",
+    "ha": "center",
+    "va": "bottom",
+    "fontsize": "small",
+    "bbox": {"facecolor": "white", "alpha": 0.8, "edgecolor": "none", "pad": 0.5},
+}
 _SIGNALS = {"R": "reflectance", "T": "transmittance"}
 
 
@@ -65,19 +78,21 @@ def draw(fit: Fit) -> Figure:
 
 def _title(fit: Fit) -> str:
     name = fit.spectrum.path.replace("\\", "/").rsplit("/", 1)[-1]
-    verdict = textwrap.wrap(fit.verdict, 100, break_on_hyphens=False)
+    verdict = textwrap.wrap(fit.verdict.replace(" ± ", "\u00a0±\u00a0"), 108, break_on_hyphens=False)
     text = "\n".join([f"{textwrap.shorten(name, 70) or 'spectrum'}: {fit.status}", *verdict])
     return text.replace("$", r"\$")  # no mathematics in a file's name
 
 
-def _series(fit: Fit) -> Iterator[slice | np.ndarray]:
-    """The points of each angle of incidence: one line each."""
-    angle = fit.spectrum.angle
-    if angle is None:
-        yield slice(None)
-        return
-    for value in np.unique(angle):
-        yield np.flatnonzero(angle == value)
+def _series(fit: Fit) -> list[np.ndarray]:
+    """The points that one line joins: of one angle of incidence, without a wide gap."""
+    nm, angle = fit.curve.wavelength, fit.spectrum.angle
+    parts = []
+    for value in [None] if angle is None else np.unique(angle):
+        points = np.arange(nm.size) if value is None else np.flatnonzero(angle == value)
+        steps = np.diff(nm[points])
+        gaps = np.flatnonzero(steps > GAP * np.median(steps)) if steps.size else []
+        parts += np.split(points, np.asarray(gaps, dtype=int) + 1)
+    return parts
 
 
 def _data(axes: Axes, fit: Fit) -> None:
@@ -86,7 +101,7 @@ def _data(axes: Axes, fit: Fit) -> None:
     axes.plot(curve.wavelength, curve.data, ".", color=GREY, markersize=size, label="data")
     for i, part in enumerate(_series(fit)):
         axes.plot(curve.wavelength[part], curve.model[part], **FITTED, label="_" if i else "fit")
-    kind: str = _SIGNALS.get(fit.spectrum.signal, fit.spectrum.signal)
+    kind = _SIGNALS.get(fit.spectrum.signal) or str(fit.spectrum.signal)
     axes.set_ylabel(kind if fit.spectrum.calibrated else f"{kind} × unknown scale")
     axes.tick_params(labelbottom=False)
     axes.legend(frameon=False, markerscale=3)
@@ -101,25 +116,26 @@ def _residuals(axes: Axes, fit: Fit) -> None:
         axes.plot(nm, curve.residual[part], color=BLACK, linewidth=0.8)
     axes.axhline(0, color=GREY, linewidth=0.6)
     axes.set(xlabel="wavelength (nm)", ylabel="data − fit")
-    axes.legend(frameon=False, loc="upper right")
+    axes.legend(loc="upper right", edgecolor="none")
 
 
 def _misfit(axes: Axes, fit: Fit) -> None:
     """Δχ² against thickness, logarithmic above the threshold that calls a fit ambiguous."""
-    profile = fit.profile
-    assert profile is not None
-    axes.plot(profile.thickness, np.maximum(profile.delta_chi2, 0), color=GREY, linewidth=0.9)
-    axes.axhline(RIVAL, color=BLUE, linewidth=0.8, linestyle=":", label=f"ambiguous below {RIVAL:g}")
+    assert fit.profile is not None
     minima = _minima(fit)
-    axes.plot(*np.transpose(minima[:1]), "o", color=ORANGE, label="best")
+    thickness, misfit = _completed(fit.profile, minima)
+    left, right = _span(thickness, misfit)
+    axes.plot(thickness, misfit, color=GREY, linewidth=0.9)
+    axes.axhline(RIVAL, color=BLUE, linewidth=0.8, linestyle=":", label=f"ambiguous below {RIVAL:g}")
+    if minima:
+        axes.plot(*minima[0], "o", color=ORANGE, label="best")
     if minima[1:]:
-        axes.plot(*np.transpose(minima[1:]), "D", color=BLUE, markersize=5, label="rivals")
-    low, high = profile.thickness.min(), profile.thickness.max()
-    for thickness, delta in _labelled(minima, low, high):
-        _label(axes, thickness, delta, (thickness - low) / (high - low))
-    axes.set_yscale("symlog", linthresh=RIVAL, linscale=0.8)
-    axes.set(xlabel="thickness (nm)", ylabel="Δχ² (effective points)", ylim=(-2, _top(profile, minima)))
-    axes.margins(x=0.01)
+        axes.plot(*np.transpose(minima[1:]), "D", color=BLUE, markersize=4, label="rivals")
+    for minimum in _labelled(minima, ROOM_FOR_LABEL * (right - left)):
+        axes.annotate(f"{minimum[0]:.5g}", minimum, **_LABEL)
+    _scale(axes, misfit, minima)
+    searched = f"searched {thickness.min():.5g} to {thickness.max():.5g}"
+    axes.set(xlabel=f"thickness (nm; {searched})", ylabel="misfit Δχ²", xlim=(left, right))
     axes.legend(frameon=False, ncols=3, loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0)
 
 
@@ -132,34 +148,47 @@ def _minima(fit: Fit) -> list[tuple[float, float]]:
     return [(fit[name].value, 0.0), *sorted(rivals, key=lambda rival: rival[1])]
 
 
-def _labelled(minima: list[tuple[float, float]], low: float, high: float) -> list[tuple[float, float]]:
+def _completed(profile: Profile, minima: list[tuple[float, float]]) -> tuple[np.ndarray, np.ndarray]:
+    """The scan with the minima that lie below it: its grid seldom meets the bottom of a valley."""
+    thickness, misfit = profile.thickness, np.maximum(profile.delta_chi2, 0.0)
+    below = [(t, delta) for t, delta in minima if delta < np.interp(t, thickness, misfit)]
+    thickness = np.concatenate([thickness, [t for t, _ in below]])
+    order = np.argsort(thickness, kind="stable")
+    return thickness[order], np.concatenate([misfit, [delta for _, delta in below]])[order]
+
+
+def _span(thickness: np.ndarray, misfit: np.ndarray) -> tuple[float, float]:
+    """The thicknesses worth showing: all but hopeless ends."""
+    shown = thickness[misfit < HOPELESS] if np.any(misfit < HOPELESS) else thickness
+    margin = 0.03 * float(np.ptp(shown)) or 1.0
+    return float(shown.min()) - margin, float(shown.max()) + margin
+
+
+def _labelled(minima: list[tuple[float, float]], room: float) -> list[tuple[float, float]]:
     """The best minima, as many as leave room for each other's labels."""
     chosen: list[tuple[float, float]] = []
     for minimum in minima:
-        near = (abs(minimum[0] - other[0]) for other in chosen)
-        if len(chosen) < MOST_LABELS and all(gap > ROOM_FOR_LABEL * (high - low) for gap in near):
+        if len(chosen) < MOST_LABELS and all(abs(minimum[0] - other[0]) > room for other in chosen):
             chosen.append(minimum)
     return chosen
 
 
-def _label(axes: Axes, thickness: float, delta: float, place: float) -> None:
-    side = "right" if place > 0.9 else "left"
-    axes.annotate(
-        f"{thickness:.5g}",
-        (thickness, delta),
-        xytext=(-6 if side == "right" else 6, 0),
-        textcoords="offset points",
-        ha=side,
-        va="center",
-        fontsize="small",
-        bbox={"facecolor": "white", "alpha": 0.8, "edgecolor": "none", "pad": 0.5},
-    )
+def _scale(axes: Axes, misfit: np.ndarray, minima: list[tuple[float, float]]) -> None:
+    """A logarithmic axis from the threshold up, linear below, with room for labels over the markers."""
+    hopeful = misfit[misfit < HOPELESS]
+    heights = [float(np.percentile(hopeful, 95)) if hopeful.size else 0.0, *(delta for _, delta in minima)]
+    top = max(10 * RIVAL, *heights)
+    ceiling = top * (top / RIVAL) ** 0.6
+    decades = int(np.log10(ceiling))
+    powers = range(1, decades + 1, 1 + decades // 5)
+    axes.set_yscale("symlog", linthresh=RIVAL, linscale=0.8)
+    axes.set_yticks([0, *(10.0**i for i in powers)], ["0", *(_power(i) for i in powers)])
+    axes.set_yticks([], minor=True)
+    axes.set_ylim(-2, ceiling)
 
 
-def _top(profile: Profile, minima: list[tuple[float, float]]) -> float:
-    """The top of the axis: above the walls between the minima, not at the few hopeless thicknesses."""
-    heights = [float(np.percentile(profile.delta_chi2, 95)), *(delta for _, delta in minima)]
-    return 3 * max(2 * RIVAL, *heights)
+def _power(exponent: int) -> str:
+    return str(10**exponent) if exponent < 4 else f"$10^{{{exponent}}}$"
 
 
 def _index_is_free(fit: Fit) -> bool:
@@ -167,15 +196,25 @@ def _index_is_free(fit: Fit) -> bool:
 
 
 def _index(axes: Axes, fit: Fit) -> None:
+    """n on the left; k, if there is any, on the right and below n, so that their bands stay apart."""
     curve = fit.curve
     _band(axes, curve.wavelength, curve.n, curve.n_stderr, BLUE, "-")
     axes.set(xlabel="wavelength (nm)")
+    axes.margins(x=0.01)
     axes.set_ylabel("n", color=BLUE)
     if np.any(curve.k) or np.any(curve.k_stderr > 0):
         beside = axes.twinx()
         _band(beside, curve.wavelength, curve.k, curve.k_stderr, ORANGE, "--")
+        beside.margins(x=0.01)
         beside.set_ylabel("k (dashed)", color=ORANGE)
-    axes.margins(x=0.01)
+        _stretch(axes, below=1.0)
+        _stretch(beside, above=1.0)
+
+
+def _stretch(axes: Axes, below: float = 0.0, above: float = 0.0) -> None:
+    """Add empty room, as a share of what is shown."""
+    low, high = axes.get_ylim()
+    axes.set_ylim(low - below * (high - low), high + above * (high - low))
 
 
 def _band(axes: Axes, nm: np.ndarray, value: np.ndarray, stderr: np.ndarray, color: str, style: str) -> None:
