@@ -17,8 +17,11 @@ jax.config.update("jax_compilation_cache_dir", str(ROOT / ".pytest_cache" / "jax
 jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
 jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
 
-# before anything imports the package: every annotated argument and result is checked at run time
-jaxtyping.install_import_hook("pellicle", "beartype.beartype")
+# before anything imports the package: every annotated argument and result is checked at run time;
+# an int is a float, as everywhere else in Python's typing
+jaxtyping.install_import_hook(
+    "pellicle", "beartype.beartype(conf=beartype.BeartypeConf(is_pep484_tower=True))"
+)
 
 # the same examples in every run: a failure is a finding, not a draw of luck
 hypothesis.settings.register_profile(

@@ -54,8 +54,10 @@ def _oblique(scene: Scene) -> Row:
     angle = scene.light.angle
     if _zero(angle):
         return Row("oblique", False, "normal incidence, and the angle is not free")
-    why = "the angle of incidence is free" if isinstance(angle, Free) else f"incidence at {angle:g}°"
-    return Row("oblique", True, why)
+    if isinstance(angle, Free):
+        return Row("oblique", True, "the angle of incidence is free")
+    span = " to ".join(f"{x:g}" for x in sorted({np.min(angle), np.max(angle)}))
+    return Row("oblique", True, f"incidence at {span}°")
 
 
 def _tunnelling(scene: Scene) -> Row:
@@ -115,6 +117,8 @@ ORDERS_ERROR = 1e-6
 def _orders(scene: Scene) -> Row:
     if not _coherence(scene).on:
         return Row("orders", False, "the closed form sums all orders")
+    if scene.light.wavelength is None:
+        raise ValueError("the number of orders depends on the wavelengths: give the light its wavelengths")
     ratio = float(np.clip(largest_ratio(scene), 1e-12, 0.999))
     count = int(np.clip(np.ceil(np.log(ORDERS_ERROR * (1 - ratio)) / np.log(ratio)), 1, MOST_ORDERS))
     left = 2 * ratio**count / (1 - ratio)

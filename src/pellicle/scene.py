@@ -107,6 +107,12 @@ def medium(what: Any) -> AbstractDispersion:
     return Constant(what)
 
 
+def _not_negative(name: str, number: Any, unit: str) -> None:
+    lowest = number.lower if isinstance(number, Free) else number
+    if isinstance(lowest, int | float) and lowest < 0:
+        raise ValueError(f"{name} must not be negative, got {lowest:g} {unit}")
+
+
 @final
 class Layer(eqx.Module):
     """A coherent layer: its material (anything `medium` takes) and its thickness in nm."""
@@ -116,9 +122,7 @@ class Layer(eqx.Module):
     name: str | None = eqx.field(static=True, default=None)
 
     def __check_init__(self):
-        lowest = self.thickness.lower if isinstance(self.thickness, Free) else self.thickness
-        if isinstance(lowest, int | float) and lowest < 0:
-            raise ValueError(f"thickness must not be negative, got {lowest:g} nm")
+        _not_negative("thickness", self.thickness, "nm")
 
 
 def _medium_or_none(what: Any) -> AbstractDispersion | None:
@@ -136,14 +140,17 @@ class Substrate(eqx.Module):
     back: AbstractDispersion | None = eqx.field(converter=_medium_or_none, default=None)
     plate_mm: float | Free = 1.0
 
+    def __check_init__(self):
+        _not_negative("plate_mm", self.plate_mm, "mm")
+
 
 @final
 class Light(eqx.Module):
-    """How the scene is looked at: signal "R" or "T", polarisation, angle of incidence (degrees)
-    and wavelengths (nm; None leaves them to the data)."""
+    """How the scene is looked at: signal "R" or "T", polarisation, angle of incidence (degrees; one
+    for all or one per wavelength) and wavelengths (nm; None leaves them to the data)."""
 
     wavelength: Any = None
-    angle: float | Free = 0.0
+    angle: Any = 0.0
     signal: str = eqx.field(static=True, default="R")
     polarisation: str = eqx.field(static=True, default="unpolarised")
 
@@ -151,8 +158,11 @@ class Light(eqx.Module):
         if self.signal not in SIGNALS:
             raise ValueError(f"signal must be one of {', '.join(SIGNALS)}, not {self.signal!r}")
         check_polarisation(self.polarisation)
-        if isinstance(self.angle, int | float) and not 0 <= self.angle <= 90:
-            raise ValueError(f"the angle of incidence must lie in 0 to 90 degrees, got {self.angle:g}")
+        angle = [self.angle.lower, self.angle.upper] if isinstance(self.angle, Free) else self.angle
+        if isinstance(angle, int | float | list | np.ndarray):
+            wrong = [x for x in np.ravel(angle) if not 0 <= x <= 90]
+            if wrong:
+                raise ValueError(f"the angle of incidence must lie in 0 to 90 degrees, got {wrong[0]:g}")
 
 
 def check_polarisation(polarisation: str) -> None:
@@ -208,6 +218,10 @@ class Instrument(eqx.Module):
     bandwidth: float | Free | None = None
     thickness_spread: float | Free | None = None
 
+    def __check_init__(self):
+        _not_negative("bandwidth", self.bandwidth, "nm")
+        _not_negative("thickness_spread", self.thickness_spread, "nm")
+
 
 def _layers(what: Layer | Sequence[Layer]) -> tuple[Layer, ...]:
     return (what,) if isinstance(what, Layer) else tuple(what)
@@ -233,7 +247,7 @@ class Scene(eqx.Module):
     def __check_init__(self):
         if len(self.layers) != 1:
             raise ValueError(f"a scene holds exactly one layer for now, got {len(self.layers)}")
-        if isinstance(self.ambient, Constant) and self.ambient.k is not None:
+        if absorbs(self.ambient):
             raise ValueError("the ambient must not absorb: give it a real index")
 
     @property

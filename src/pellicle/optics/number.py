@@ -113,7 +113,7 @@ def imag(z: Number):
 
 def is_real(z: Number) -> bool:
     """True where the number's type says that it has no imaginary part."""
-    return parts(z)[1] is None
+    return z.im is None if isinstance(z, Pair) else not jnp.iscomplexobj(z)
 
 
 def conj(z: Number) -> Number:
