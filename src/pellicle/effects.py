@@ -138,9 +138,12 @@ def largest_ratio(scene: Scene) -> float:
 def _ratio(scene: Scene) -> float:
     at = jnp.asarray(scene.light.wavelength, dtype=float)
     angle = None if _zero(scene.light.angle) else jnp.deg2rad(scene.light.angle)
-    media = [m(at) for m in (scene.layer.material, scene.substrate.material)]
+    layer, substrate = scene.layer.material(at), scene.substrate.material(at)
     ambient = scene.ambient.index(at)
-    series = [orders.bounces(ambient, *media, 0.0 * at, angle, p) for p in ("s" if angle is None else "sp")]
+    series = [
+        orders.bounces(ambient, layer, substrate, 0.0 * at, angle, p)
+        for p in ("s" if angle is None else "sp")
+    ]
     return float(np.sqrt(np.nanmax(np.stack([np.asarray(abs2(b.upper * b.lower)) for b in series]))))
 
 
@@ -155,4 +158,3 @@ EFFECTS = (
     Effect("orders", _orders),
 )
 """Every effect there is, in the order that a plan lists them."""
-

@@ -160,7 +160,8 @@ def _half_space(plan: Plan, optics: _Optics, polarisation: str, faces: dict[str,
 def _with_back(plan: Plan, optics: _Optics, polarisation: str, faces: dict[str, Any]):
     """The plate under the layer: both faces and what is lost between them."""
     scene, a = optics.scene, interface.transverse(optics.ambient, optics.angle)[0]
-    back = interface.allow_tunnelling(scene.substrate.back.index(optics.wavelength))
+    behind: Any = scene.substrate.back  # the plan has seen that there is one
+    back = interface.allow_tunnelling(behind.index(optics.wavelength))
     inside, outside = optics.substrate, back
     q_in, q_out = interface.normal(inside, a), interface.normal(outside, a)
     internal = plate.internal_transmittance(imag(q_in), scene.substrate.plate_mm, optics.wavelength)

@@ -12,6 +12,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from pellicle.optics import film, interface
@@ -74,7 +75,7 @@ def transmittance(
     return _mean([film.transmittance(w) for w in waves])
 
 
-def _mean(signals):
+def _mean(signals: list[Any]) -> Any:
     return signals[0] if len(signals) == 1 else 0.5 * (signals[0] + signals[1])
 
 
@@ -109,7 +110,7 @@ def _index(what: Medium, wavelength) -> Number:
     if isinstance(what, str | AbstractDispersion):
         material = medium(what)
         check = getattr(material, "check_range", None)
-        if check is not None and not isinstance(wavelength, jax.core.Tracer):
+        if check is not None and not isinstance(wavelength, Tracer):
             check(np.asarray(wavelength))
         return material.index(wavelength)
     return to_pair(_floating(what))

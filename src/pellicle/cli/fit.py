@@ -21,8 +21,8 @@ _reading = Group("Reading", sort_key=3)
 _output = Group("Output", sort_key=4)
 
 
-def _flag(group: Group, help: str, name: str | None = None) -> Parameter:
-    return Parameter(group=group, help=help, **({"name": name} if name else {}))
+def _flag(group: Group, help: str) -> Parameter:
+    return Parameter(group=group, help=help)
 
 
 def fit(
@@ -171,8 +171,10 @@ class _Run:
 
     def _fit(self, path: str, progress: Progress) -> Fit:
         from pellicle.fitting.fit import fit as run
+        from pellicle.scene import Drift
 
-        spectrum = read(path, self.reading)
+        scaled = isinstance(self.scene.instrument.scale, Drift)
+        spectrum = read(path, self.reading, scaled=scaled)
         say(*(f"{path}: {note}" for note in spectrum.notes))
         return run(spectrum, self.scene, progress=progress)
 

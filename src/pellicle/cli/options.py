@@ -98,8 +98,11 @@ def merged(read: ReadWords, recipe: Recipe | None) -> ReadWords:
     return ReadWords(**({k: v for k, v in from_recipe.items() if v is not None} | kept))
 
 
-def read(path: str, words: ReadWords) -> Any:
-    """One spectrum as the flags say. Raises DataError or UsageError."""
+def read(path: str, words: ReadWords, *, scaled: bool) -> Any:
+    """One spectrum as the flags say; `scaled` where a free scale makes any level acceptable.
+
+    Raises DataError or UsageError.
+    """
     from pellicle.io.spectra import read_spectrum
 
     if words.reference is not None:
@@ -115,6 +118,7 @@ def read(path: str, words: ReadWords) -> Any:
         range=words.range,
         noise=words.noise,
         polarisation=words.polarisation,
+        calibrated=False if scaled else None,
     )
 
 

@@ -46,6 +46,8 @@ def told(rms: float, without: float | None) -> str:
     """A sentence for the verdict."""
     if without is None:
         return ""
-    if without > rms:
+    if without > 1.05 * rms:
         return f" The back face matters: rms {rms:.4f} with it, {without:.4f} without."
-    return f" The back face does not help: rms {rms:.4f} with it, {without:.4f} without."
+    if rms > 1.05 * without:
+        return f" The back face does harm: rms {rms:.4f} with it, {without:.4f} without."
+    return f" The back face makes no difference here: rms {rms:.4f} with it, {without:.4f} without."

@@ -8,6 +8,7 @@ Gaussian model: Bishop 2006, section 3.5). Physical signs: o ≥ 0 is imposed, g
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import jax
@@ -68,12 +69,11 @@ def _offset_prior(drift: Drift) -> tuple[list[float], list[float]]:
 
 def solve(signal, data: Data, instrument: Instrument) -> Solved:
     """The best scale and offset for a simulated signal, and the evidence left."""
-    scale, offset = instrument.scale, instrument.offset
     weight = data.weight * jnp.sqrt(data.temper)
-    gains = _gains(signal, weight, data, scale) if isinstance(scale, Drift) else None
-    shifts = _shifts(data, offset) if isinstance(offset, Drift) else None
+    gains, scale = _split(instrument.scale, lambda drift: _gains(signal, weight, data, drift))
+    shifts, offset = _split(instrument.offset, lambda drift: _shifts(data, drift))
     one = jnp.ones_like(signal)
-    known = (0.0 if gains else scale * signal) + (0.0 if shifts else offset) * one
+    known = scale * signal + offset * one
     columns = [g * signal for g in gains.basis] if gains else []
     columns = jnp.stack([*columns, *(shifts.basis if shifts else [])]) if gains or shifts else None
     if columns is None:
@@ -96,6 +96,11 @@ class _Series(NamedTuple):
     basis: list
     mean: np.ndarray
     sd: np.ndarray
+
+
+def _split(given: float | Drift, series: Callable[[Drift], _Series]) -> tuple[_Series | None, Any]:
+    """A nuisance as a series to solve for and nothing known, or no series and the known number."""
+    return (series(given), 0.0) if isinstance(given, Drift) else (None, given)
 
 
 def scale_prior(drift: Drift) -> tuple[np.ndarray, np.ndarray]:

@@ -14,6 +14,7 @@ from typing import Any, final
 import equinox as eqx
 import jax.numpy as jnp
 import optimistix as optx
+from jaxtyping import ScalarLike
 
 from pellicle.fitting.cholesky import solve_positive
 
@@ -76,10 +77,10 @@ class Trust(optx.ClassicalTrustRegion):
     """Optimistix's trust region in y's own dtype, starting near Gauss-Newton, bounded above, and
     never accepting an increase (a clipped step may predict one)."""
 
-    high_cutoff: float = 0.5
-    low_cutoff: float = 1e-4
-    high_constant: float = 8.0
-    low_constant: float = 0.15
+    high_cutoff: ScalarLike = 0.5
+    low_cutoff: ScalarLike = 1e-4
+    high_constant: ScalarLike = 8.0
+    low_constant: ScalarLike = 0.15
     start: float = 1e3
     limit: float = 1e9
 
@@ -108,8 +109,8 @@ class BoundedLevenbergMarquardt(optx.AbstractGaussNewton):
     rtol: float
     atol: float
     norm: Callable = optx.two_norm
-    descent: ProjectedDampedNewtonDescent = ProjectedDampedNewtonDescent()
-    search: Trust = Trust()
+    descent: optx.AbstractDescent = ProjectedDampedNewtonDescent()
+    search: optx.AbstractSearch = Trust()
     verbose: Callable = lambda **_: None
 
     def init(self, fn, y, args, options, f_struct, aux_struct, tags):

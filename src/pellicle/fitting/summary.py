@@ -10,6 +10,7 @@ import numpy as np
 from pellicle.fitting.parameters import Parameter, fixed_numbers
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.result import Curve, Estimate, Profile, Rival
+from pellicle.fitting.status import RIVAL
 from pellicle.fitting.uncertainty import UNSEEN, Errors, layer_errors, linear_coefficients
 from pellicle.fitting.weigh import Weighed
 from pellicle.scene import Scene
@@ -17,6 +18,8 @@ from pellicle.scene import Scene
 _RULED_OUT = 1e8
 _ONE_SIDED = 2.71
 """χ² above the best at a one-sided 95 % limit."""
+_OPEN = RIVAL
+"""A side where the misfit never rises by as much as would rule a rival out is open."""
 _ON_BOUND = 1e-6
 _MOST_RIVALS = 10
 
@@ -73,15 +76,22 @@ def _limits(profile: Profile, best: float) -> tuple[float | None, float | None, 
 
     Returns (lower, upper, bounded): both None and True where both sides are bounded.
     """
-    close = profile.delta_chi2 < _ONE_SIDED
+    close, level = profile.delta_chi2 < _ONE_SIDED, profile.delta_chi2 < _OPEN
     left, right = profile.thickness < best, profile.thickness > best
-    open_left, open_right = bool(left.any() and close[left].all()), bool(right.any() and close[right].all())
+    open_left, open_right = bool(left.any() and level[left].all()), bool(right.any() and level[right].all())
     if not (open_left or open_right):
         return None, None, True
-    inside = profile.thickness[close] if close.any() else np.array([best])
-    lower = None if open_left else float(min(inside.min(), best))
-    upper = None if open_right else float(max(inside.max(), best))
+    lower = None if open_left else _crossing(profile, best, left & ~close, -1)
+    upper = None if open_right else _crossing(profile, best, right & ~close, 0)
     return lower, upper, False
+
+
+def _crossing(profile: Profile, best: float, beyond: np.ndarray, nearest: int) -> float:
+    """Where Δχ² reaches the limit, between the best and the nearest point beyond it (as a parabola)."""
+    if not beyond.any():
+        return best
+    far, delta = profile.thickness[beyond][nearest], profile.delta_chi2[beyond][nearest]
+    return float(best + (far - best) * math.sqrt(_ONE_SIDED / delta))
 
 
 def rivals(weighed: Weighed) -> tuple[Rival, ...]:

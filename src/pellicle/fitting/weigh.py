@@ -50,23 +50,29 @@ def weigh(problem: Problem, minima: Minima, source: Noise) -> Weighed:
     A given σ stays. An unknown one becomes the rms of the residuals. Where scale and offset drift,
     the weights stay too: the residuals of so flexible a model understate its error.
     """
+    chi2, length = _residual_noise(problem, minima.units[0])
     for _ in range(_ROUNDS):
-        best = minima.units[0]
-        at = jax.device_get(local(*problem.program, best))
-        residual = weighted_residual(problem, at)
-        used = len(problem.parameters) + len(linear_coefficients(problem, at))
-        chi2 = float(residual @ residual) / max(problem.points - used, 1)
-        length = noise.correlation_length(residual)
+        best, scan = minima.units[0], minima.scan
         ranked = _reweighted(problem, chi2, length, source)
-        scan, minima = minima.scan, polished(ranked, minima.units, quiet)
-        minima = replace(minima, scan=scan)
+        minima = replace(polished(ranked, minima.units, quiet), scan=scan)
         if np.allclose(minima.units[0], best, atol=1e-3):
             break
+        chi2, length = _residual_noise(problem, minima.units[0])
+    ranked = _reweighted(problem, chi2, length, source)
     at = jax.device_get(local(*ranked.program, minima.units[0]))
     reduced = chi2 if source.given or source.drifting else 1.0
     # the ranked weights hold the rms already, so only the correlation is left to count
     variance = 1.0 if source.given else length * (max(chi2, 1e-12) if source.drifting else 1.0)
     return Weighed(ranked, minima, at, variance, length, reduced)
+
+
+def _residual_noise(problem: Problem, unit: np.ndarray) -> tuple[float, float]:
+    """Reduced χ² and correlation length of the residuals at one point of the box."""
+    at = jax.device_get(local(*problem.program, unit))
+    residual = ((problem.data.values - np.asarray(at.model)) * problem.data.weight)[: problem.points]
+    used = len(problem.parameters) + len(linear_coefficients(problem, at))
+    chi2 = float(residual @ residual) / max(problem.points - used, 1)
+    return chi2, noise.correlation_length(residual)
 
 
 def _reweighted(problem: Problem, chi2: float, length: float, source: Noise) -> Problem:
@@ -76,8 +82,3 @@ def _reweighted(problem: Problem, chi2: float, length: float, source: Noise) -> 
         weight=problem.data.weight * rescale, temper=np.float64(1 / max(length, least))
     )
     return problem._replace(data=data)
-
-
-def weighted_residual(problem: Problem, at: Local) -> np.ndarray:
-    """(data − model)/σ at each real point."""
-    return ((problem.data.values - np.asarray(at.model)) * problem.data.weight)[: problem.points]

@@ -121,7 +121,7 @@ class Recipe(BaseModel):
     @property
     def files(self) -> list[str]:
         """Data files, relative to the recipe."""
-        return [str(Path(self.path).parent / name) for name in self.tables.data.files]
+        return [os.path.normpath(Path(self.path).parent / name) for name in self.tables.data.files]
 
     def scene(self) -> Scene:
         """The scene it describes. Raises DataError with the recipe's name in front."""

@@ -30,7 +30,7 @@ class AbstractDispersion(eqx.Module):
 
 def _like(values: Any, wavelength: Any):
     """A table's column in the precision of the wavelengths, so that float32 stays float32."""
-    return jnp.asarray(values, dtype=jnp.result_type(wavelength, jnp.float32))
+    return jnp.asarray(values, dtype=jnp.result_type(float, wavelength))
 
 
 @final

@@ -38,7 +38,10 @@ def report(fit: Fit) -> str:
         ("Fit statistics", _statistics(fit)),
         ("Parameters", _parameters(fit)),
         (f"Correlations above {LEAST_CORRELATION:g}", _correlations(fit)),
-        (f"Rivals: other minima and how much worse they fit (Δχ² below {RIVAL:g}: about as well)", _rivals(fit)),
+        (
+            f"Rivals: other minima and how much worse they fit (Δχ² below {RIVAL:g}: about as well)",
+            _rivals(fit),
+        ),
         ("Plan: what was simulated", _plan(fit)),
         ("Warnings", [line for warning in fit.warnings for line in _wrap(warning, "- ", "  ")]),
     ]

@@ -1,0 +1,50 @@
+# Everything a newcomer types. Each target sets up what it needs.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+EXAMPLE := measurements/recipes/hematite_on_glass_140nm.toml
+
+.PHONY: fit test lint bench measurements slow clean
+
+# Debian splits venv's pip into a package of its own: without it, the system's pip does
+$(VENV)/bin/python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo "pellicle needs Python 3.11 or newer: name one with make PYTHON=python3.12"; exit 1; }
+	@$(PYTHON) -m venv $(VENV) 2>/dev/null || \
+	  { rm -rf $(VENV); $(PYTHON) -m venv --without-pip $(VENV) && \
+	    $(PYTHON) -m pip --python $(VENV)/bin/python install --quiet pip; } || \
+	  { rm -rf $(VENV); echo "no virtual environment could be made: install python3-venv"; exit 1; }
+
+$(VENV)/.fit: pyproject.toml | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet --editable .
+	@touch $@
+
+$(VENV)/.dev: pyproject.toml | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet --editable ".[dev]"
+	@touch $@ $(VENV)/.fit
+
+fit: $(VENV)/.fit
+	$(BIN)/pellicle fit --recipe $(EXAMPLE) --out results/hematite_on_glass_140nm
+
+test: $(VENV)/.dev lint
+	$(BIN)/python -m pytest --cov --cov-report=term -m "not slow"
+
+slow: $(VENV)/.dev
+	$(BIN)/python -m pytest -m slow
+
+lint: $(VENV)/.dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/lint-imports
+	$(BIN)/pyright
+
+bench: $(VENV)/.dev
+	$(BIN)/python benchmarks/film.py
+	$(BIN)/python benchmarks/cold_start.py
+
+measurements: $(VENV)/.fit
+	$(BIN)/python scripts/make_measurements.py
+
+clean:
+	rm -rf $(VENV) results .pytest_cache .ruff_cache .hypothesis .coverage

@@ -1,0 +1,54 @@
+"""Write the synthetic spectra of `measurements/` from their recipes, and their index.
+
+Run `python scripts/make_measurements.py FOLDER` (default: measurements). Files that exist are left
+alone: remove one to have it made again.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import sys
+import tomllib
+from pathlib import Path
+
+from pellicle.cli.simulate import simulate
+from pellicle.io.atomic import write_text
+
+ROOT = Path(__file__).resolve().parents[1]
+COLUMNS = ("file", "kind", "recipe", "seed", "truth", "sample", "source", "licence")
+
+
+def main(folder: Path) -> None:
+    """One spectrum for each recipe; the seed is the recipe's place in the alphabet, from 1."""
+    rows = []
+    for seed, recipe in enumerate(sorted((ROOT / "measurements" / "recipes").glob("*.toml")), start=1):
+        target = folder / f"{recipe.stem}.csv"
+        if not target.exists():
+            simulate(str(recipe), out=str(target), seed=seed)
+        rows.append(_row(recipe, target, seed))
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerows([COLUMNS, *rows])
+    write_text(folder / "INDEX.csv", text.getvalue(), overwrite=True)
+
+
+def _row(recipe: Path, target: Path, seed: int) -> tuple[str, ...]:
+    text = recipe.read_text(encoding="utf-8")
+    (layer,) = tomllib.loads(text)["scene"]["layer"]
+    about = text.splitlines()[0].lstrip("# ")
+    truth = f"thickness {layer['thickness']['value']} nm"
+    return (
+        target.name,
+        "synthetic",
+        f"recipes/{recipe.name}",
+        str(seed),
+        truth,
+        about,
+        "pellicle simulate",
+        "MIT",
+    )
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "measurements")
