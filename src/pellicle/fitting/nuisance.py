@@ -54,19 +54,6 @@ def chebyshev(position, degree: int) -> list:
     return terms[: degree + 1]
 
 
-def _scale_prior(drift: Drift) -> tuple[list[float], list[float]]:
-    """Means and standard deviations of the scale's coefficients, in units of the plain scale."""
-    first = _LOOSE if drift.degree == 0 else 1.0
-    return [1.0] + [0.0] * drift.degree, [first] + [drift.width * 0.5**j for j in range(drift.degree)]
-
-
-def _offset_prior(drift: Drift) -> tuple[list[float], list[float]]:
-    """The same for the offset, in units of the signal's level."""
-    if drift.degree == 0:
-        return [0.0], [_LOOSE]
-    return [0.0] * (drift.degree + 1), [drift.width * 0.5**j for j in range(drift.degree + 1)]
-
-
 def solve(signal, data: Data, instrument: Instrument) -> Solved:
     """The best scale and offset for a simulated signal, and the evidence left."""
     weight = data.weight * jnp.sqrt(data.temper)
