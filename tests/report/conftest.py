@@ -1,0 +1,70 @@
+"""A fit written down by hand: what reports and figures are made of."""
+
+import math
+
+import numpy as np
+import pytest
+
+from pellicle.effects import Row
+from pellicle.fitting.result import Curve, Estimate, Fit, Profile, Rival, Status
+from pellicle.io.spectrum import Spectrum
+from pellicle.planning import Plan
+
+
+@pytest.fixture
+def fit() -> Fit:
+    """A free thickness and index, a fixed B, a drifting scale and an offset; one near rival."""
+    nm = np.linspace(400.0, 800.0, 41)
+    model = 0.3 + 0.1 * np.cos(nm / 30)
+    noise = 0.002 * np.sin(nm)
+    return Fit(
+        spectrum=Spectrum(nm, model + noise, "R", path="/data/film.csv", sha256="ab" * 32),
+        status=Status.AMBIGUOUS,
+        verdict="The data do not decide: thickness 486.28 nm fits best, but 242.87 nm fits nearly as well.",
+        parameters={
+            "thickness": Estimate("thickness", 486.28, 3.6, "nm", 10.0, 3000.0, True),
+            "A": Estimate("A", 1.324, 0.0012, "", 1.2, 2.8, True),
+            "instrument.scale": Estimate("instrument.scale", 4.5, 0.4, "", -math.inf, math.inf, True),
+            "instrument.scale_1": Estimate("instrument.scale_1", 1.5, 0.6, "", -math.inf, math.inf, True),
+            "instrument.offset": Estimate("instrument.offset", 0.3, 0.02, "", -math.inf, math.inf, True),
+            "B": Estimate("B", 3102.06, 0.0, "nm^2", 3102.06, 3102.06, False),
+        },
+        rivals=(
+            Rival({"A": 1.33, "thickness": 242.87}, 0.69),
+            Rival({"A": 1.4, "thickness": 963.57}, 14.2),
+        ),
+        chi2_reduced=1.02,
+        rms=0.00141,
+        effective_points=12.0,
+        correlation_names=("thickness", "A", "instrument.scale", "instrument.scale_1", "instrument.offset"),
+        correlation=np.array(
+            [
+                [1.0, -0.62, 0.49, 0.97, 0.1],
+                [-0.62, 1.0, 0.2, 0.3, 0.0],
+                [0.49, 0.2, 1.0, -0.88, 0.93],
+                [0.97, 0.3, -0.88, 1.0, 0.4],
+                [0.1, 0.0, 0.93, 0.4, 1.0],
+            ]
+        ),
+        plan=Plan(
+            (
+                Row("absorption", False, "the layer has no extinction, and none is free"),
+                Row("back-face", True, "the substrate is a plate; its back face adds incoherently"),
+            ),
+            "R",
+            "unpolarised",
+        ),
+        warnings=("SiO2 has no data for k: it is taken as transparent, which its source does not say.",),
+        curve=Curve(
+            wavelength=nm,
+            data=model + noise,
+            sigma=np.full(41, 0.002),
+            model=model,
+            n=np.full(41, 1.33),
+            k=np.zeros(41),
+            n_stderr=np.full(41, 0.0012),
+            k_stderr=np.zeros(41),
+        ),
+        profile=Profile(np.linspace(10.0, 3000.0, 60), np.linspace(5.0, 400.0, 60)),
+        seconds=0.42,
+    )

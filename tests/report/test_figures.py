@@ -1,0 +1,136 @@
+"""Figures of fits: the right panels with the right things in them, and a file that is a PNG."""
+
+import os
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pellicle.errors import UsageError
+from pellicle.fitting.result import Profile
+from pellicle.report.figures import draw, figure
+
+
+def labels(drawn) -> list[str]:
+    return [axes.get_ylabel() for axes in drawn.axes]
+
+
+def png_size(path) -> tuple[int, int]:
+    head = path.read_bytes()[:24]
+    assert head[:8] == b"\x89PNG\r\n\x1a\n"
+    return int.from_bytes(head[16:20], "big"), int.from_bytes(head[20:24], "big")
+
+
+def test_a_png_of_a_readable_size_and_nothing_else(fit, tmp_path):
+    assert figure(fit, tmp_path / "figure.png") == tmp_path / "figure.png"
+    width, height = png_size(tmp_path / "figure.png")
+    assert 1000 <= width <= 1600
+    assert 900 <= height <= 1800
+    assert 20_000 < (tmp_path / "figure.png").stat().st_size < 1_000_000
+    assert os.listdir(tmp_path) == ["figure.png"]
+
+
+def test_an_existing_figure_is_kept_unless_told_otherwise(fit, tmp_path):
+    target = tmp_path / "figure.png"
+    target.write_text("mine")
+    with pytest.raises(UsageError, match="exists"):
+        figure(fit, target)
+    assert target.read_text() == "mine"
+    figure(fit, target, overwrite=True)
+    png_size(target)
+
+
+def test_panels_and_what_they_show(fit):
+    drawn = draw(fit)
+    assert labels(drawn) == ["reflectance", "data − fit", "misfit Δχ²", "n"]
+    assert [axes.get_xlabel() for axes in drawn.axes] == [
+        "",
+        "wavelength (nm)",
+        "thickness (nm; searched 10 to 3000)",
+        "wavelength (nm)",
+    ]
+    data, _, misfit, _ = drawn.axes
+    shown = {line.get_label(): line for line in data.lines}
+    np.testing.assert_array_equal(shown["data"].get_ydata(), fit.curve.data)
+    np.testing.assert_array_equal(shown["fit"].get_ydata(), fit.curve.model)
+    assert [text.get_text() for text in misfit.texts] == ["486.28", "242.87", "963.57"]
+    marked = {line.get_label(): line for line in misfit.lines}
+    np.testing.assert_array_equal(marked["rivals"].get_xydata(), [[242.87, 0.69], [963.57, 14.2]])
+    np.testing.assert_array_equal(marked["best"].get_xydata(), [[486.28, 0.0]])
+    title = drawn.get_suptitle()
+    assert title.startswith("film.csv: ambiguous\nThe data do not decide")
+
+
+def test_the_misfit_reaches_the_bottom_of_valleys_that_the_grid_missed(fit):
+    curve = draw(fit).axes[2].lines[0]
+    assert [486.28, 0.0] in curve.get_xydata().tolist()
+    assert np.all(np.diff(curve.get_xdata()) > 0)
+
+
+def test_hopeless_thicknesses_are_left_out(fit):
+    profile = Profile(np.linspace(10.0, 3000.0, 60), np.where(np.arange(60) < 20, 5.0, 1e8))
+    _, right = draw(replace(fit, profile=profile)).axes[2].get_xlim()
+    assert 963.57 < right < 1100
+
+
+def test_without_a_scan_or_a_free_index_there_is_no_panel_for_it(fit):
+    assert labels(draw(replace(fit, profile=None))) == ["reflectance", "data − fit", "n"]
+    curve = replace(fit.curve, n_stderr=np.zeros(41))
+    assert labels(draw(replace(fit, profile=None, curve=curve))) == ["reflectance", "data − fit"]
+
+
+def test_n_and_k_do_not_lie_on_each_other(fit):
+    curve = replace(fit.curve, k=np.full(41, 0.01), k_stderr=np.full(41, 0.002))
+    drawn = draw(replace(fit, curve=curve))
+    n, k = drawn.axes[3:]
+    assert k.get_ylabel() == "k (dashed)"
+    lowest_n = n.transData.transform((600, 1.33 - 0.0012))[1]
+    highest_k = k.transData.transform((600, 0.012))[1]
+    assert highest_k < lowest_n
+
+
+def test_an_infinite_error_leaves_a_gap_in_the_band(fit, tmp_path):
+    curve = replace(fit.curve, n_stderr=np.where(np.arange(41) < 9, np.inf, 0.001))
+    figure(replace(fit, curve=curve), tmp_path / "figure.png")
+
+
+def test_lines_cross_neither_gaps_nor_angles(fit):
+    half = np.flatnonzero((fit.curve.wavelength < 500) | (fit.curve.wavelength > 700))
+    curve = replace(fit.curve, **{name: getattr(fit.curve, name)[half] for name in vars(fit.curve)})
+    spectrum = replace(fit.spectrum, wavelength=curve.wavelength, values=curve.data)
+    gapped = draw(replace(fit, curve=curve, spectrum=spectrum)).axes[0]
+    assert [line.get_xdata().size for line in gapped.lines] == [20, 10, 10]
+    angled = replace(fit.spectrum, angle=np.where(np.arange(41) % 2, 30.0, 60.0))
+    assert [line.get_xdata().size for line in draw(replace(fit, spectrum=angled)).axes[0].lines] == [
+        41,
+        20,
+        21,
+    ]
+
+
+def test_odd_fits_are_drawn_too(fit, tmp_path):
+    odd = replace(
+        fit,
+        spectrum=replace(fit.spectrum, path="a$b_1$.csv", calibrated=False, signal="T"),
+        rivals=(),
+        parameters={"A": fit["A"]},
+        profile=Profile(np.linspace(1.0, 9.0, 5), np.full(5, 1e8)),
+    )
+    figure(odd, tmp_path / "figure.png")
+    assert labels(draw(odd))[0] == "transmittance × unknown scale"
+
+
+def test_matplotlib_waits_until_a_figure_is_drawn():
+    code = (
+        "import sys, pellicle.report.figures, pellicle.report.text, pellicle.io.results;"
+        "sys.exit('matplotlib' in sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_a_figure_belongs_to_no_window(fit):
+    drawn = draw(fit)
+    assert drawn.canvas.manager is None  # pyplot would have given it one
+    assert type(drawn.canvas).__name__ == "FigureCanvasAgg"

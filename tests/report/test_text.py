@@ -1,0 +1,146 @@
+"""The text of a report, as a user reads it."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pellicle.fitting.result import Estimate, Rival, Status
+from pellicle.report.text import ADVICE, report, summary_line
+
+
+def block(text: str, title: str) -> list[str]:
+    """The lines under `[[title...]]`, without their indent."""
+    [found] = [part for part in text.split("[[") if part.startswith(title)]
+    return [line.strip() for line in found.splitlines()[1:]]
+
+
+def words(line: str) -> str:
+    """A line without its alignment."""
+    return " ".join(line.split())
+
+
+def with_parameter(fit, name="thickness", **changes):
+    return replace(fit, parameters=fit.parameters | {name: replace(fit[name], **changes)})
+
+
+def test_the_verdict_comes_first_with_status_advice_file_and_points(fit):
+    text = report(fit)
+    assert text.startswith("[[Verdict]]\n    The data do not decide: thickness 486.28 nm fits best")
+    lines = block(text, "Verdict")
+    assert f"status  ambiguous. {ADVICE[Status.AMBIGUOUS]}" in lines
+    assert "file    /data/film.csv" in lines
+    assert "data    R, 41 points from 400 to 800 nm, worth 12 independent ones" in lines
+
+
+def test_independent_points_are_not_counted_twice(fit):
+    assert "independent" not in report(replace(fit, effective_points=41.0))
+
+
+def test_every_status_has_one_sentence_of_advice():
+    assert set(ADVICE) == set(Status)
+    assert all(text.endswith(".") and len(text) < 90 for text in ADVICE.values())
+
+
+def test_parameters_with_errors_bounds_and_what_is_fixed(fit):
+    lines = block(report(fit), "Parameters")
+    assert words(lines[0]) == "thickness: 486.3 ± 3.6 nm (0.74 %) [10, 3000]"
+    assert words(lines[1]) == "A: 1.3240 ± 0.0012 (0.091 %) [1.2, 2.8]"
+    assert words(lines[2]) == "instrument.scale: 4.50 ± 0.40 (8.9 %)"  # infinite bounds are none
+    assert words(lines[-1]) == "B: 3102.06 nm^2 (fixed)"
+
+
+@pytest.mark.parametrize(("value", "side"), [(10.0, "LOWER"), (3000.0, "UPPER")])
+def test_a_parameter_on_a_bound_is_marked(fit, value, side):
+    lines = block(report(with_parameter(fit, value=value, at_bound=True)), "Parameters")
+    assert lines[0].endswith(f"[10, 3000]  AT ITS {side} BOUND")
+    assert sum("BOUND" in line for line in lines) == 1
+
+
+def test_an_infinite_error_is_said_in_words_with_the_limits_there_are(fit):
+    unseen = with_parameter(fit, stderr=math.inf, upper_limit=143.83)
+    lines = block(report(unseen), "Parameters")
+    assert "not determined (best 486.28 nm, at most 143.8 nm at 95 %)" in lines[0]
+    assert "inf" not in report(unseen)
+    lines = block(report(with_parameter(fit, stderr=math.nan, lower_limit=99.0)), "Parameters")
+    assert "at least 99 nm at 95 %" in lines[0]
+
+
+def test_a_one_sided_limit_stands_beside_a_finite_error(fit):
+    k = Estimate("k", 0.0, 0.002, "", 0.0, 1.0, True, True, None, 0.0033)
+    lines = block(report(replace(fit, parameters={"k": k})), "Parameters")
+    assert lines == ["k:  0.0000 ± 0.0020 (at most 0.0033 at 95 %)  [0, 1]  AT ITS LOWER BOUND"]
+
+
+def test_correlations_above_a_half_largest_first_without_pairs_of_nuisances(fit):
+    lines = block(report(fit), "Correlations")
+    assert [line.split() for line in lines] == [
+        ["C(thickness,", "instrument.scale_1)", "+0.970"],
+        ["C(thickness,", "A)", "-0.620"],
+    ]
+
+
+def test_at_most_ten_correlations(fit):
+    names = tuple(f"p{i}" for i in range(6))
+    text = report(replace(fit, correlation_names=names, correlation=np.full((6, 6), 0.7)))
+    lines = block(text, "Correlations")
+    assert len(lines) == 11
+    assert lines[-1] == "... and 5 more in result.json"
+
+
+def test_no_correlations_no_block(fit):
+    assert "Correlations" not in report(replace(fit, correlation=np.eye(5)))
+    assert "Correlations" not in report(replace(fit, correlation=np.full((5, 5), np.nan)))
+
+
+def test_rivals_nearest_first_at_most_six(fit):
+    lines = block(report(fit), "Rivals")
+    assert words(lines[0]) == "Δχ² 0.69 thickness 242.87 nm A 1.33"
+    assert words(lines[1]) == "Δχ² 14.2 thickness 963.57 nm A 1.4"
+    many = tuple(Rival({"thickness": 100.0 * i}, float(i)) for i in range(9, 0, -1))
+    lines = block(report(replace(fit, rivals=many)), "Rivals")
+    assert [line.split()[1] for line in lines[:6]] == list("123456")
+    assert lines[6:] == ["... and 3 more in result.json"]
+
+
+def test_plan_warnings_and_statistics(fit):
+    text = report(fit)
+    assert block(text, "Plan")[1] == (
+        "back-face     on   the substrate is a plate; its back face adds incoherently"
+    )
+    assert block(text, "Warnings")[0].startswith("- SiO2 has no data for k")
+    assert block(text, "Fit statistics") == [
+        "rms residual        0.00141",
+        "reduced chi-square  1.02",
+        "seconds             0.42",
+    ]
+    assert "Warnings" not in report(replace(fit, warnings=()))
+
+
+def test_no_line_is_longer_than_100_columns(fit):
+    spectrum = replace(fit.spectrum, path="/a folder/" + 30 * "long/" + "film.csv")
+    rival = Rival({f"parameter_{i}": 1.0 for i in range(9)}, 3.0)
+    parameters = {name: Estimate(name, 1.0, 0.1, "", 0.0, 2.0, True) for name in rival.parameters}
+    long = replace(
+        fit,
+        spectrum=spectrum,
+        verdict=40 * "words ",
+        warnings=(60 * "and ",),
+        rivals=(rival,),
+        parameters=parameters,
+    )
+    text = report(long)
+    assert max(map(len, text.splitlines())) <= 100
+    assert "long/film.csv" in text
+    assert "\x1b" not in text
+
+
+def test_a_line_per_file(fit):
+    line = "film.csv: ambiguous, thickness 486.3 ± 3.6 nm, A 1.3240 ± 0.0012, rms 0.00141"
+    assert summary_line(fit) == line
+    assert "thickness not determined" in summary_line(with_parameter(fit, stderr=math.inf))
+    many = {f"p{i}": Estimate(f"p{i}", 1.0, 0.1, "", 0.0, 2.0, True) for i in range(5)}
+    assert ", ..., rms" in summary_line(replace(fit, parameters=many))
+    only_scale = {"instrument.scale": fit["instrument.scale"]}
+    assert "instrument.scale 4.50" in summary_line(replace(fit, parameters=only_scale))
