@@ -94,6 +94,10 @@ def test_n_and_k_do_not_lie_on_each_other(fit):
 def test_an_infinite_error_leaves_a_gap_in_the_band(fit, tmp_path):
     curve = replace(fit.curve, n_stderr=np.where(np.arange(41) < 9, np.inf, 0.001))
     figure(replace(fit, curve=curve), tmp_path / "figure.png")
+    [band] = draw(replace(fit, curve=curve)).axes[3].collections
+    vertices = np.concatenate([path.vertices for path in band.get_paths()])
+    assert np.isfinite(vertices).all()
+    assert vertices[:, 0].min() == fit.curve.wavelength[9]
 
 
 def test_lines_cross_neither_gaps_nor_angles(fit):
@@ -113,7 +117,7 @@ def test_lines_cross_neither_gaps_nor_angles(fit):
 def test_odd_fits_are_drawn_too(fit, tmp_path):
     odd = replace(
         fit,
-        spectrum=replace(fit.spectrum, path="a$b_1$.csv", calibrated=False, signal="T"),
+        spectrum=replace(fit.spectrum, path="a$b_{$.csv", calibrated=False, signal="T"),
         rivals=(),
         parameters={"A": fit["A"]},
         profile=Profile(np.linspace(1.0, 9.0, 5), np.full(5, 1e8)),

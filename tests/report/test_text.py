@@ -64,7 +64,7 @@ def test_an_infinite_error_is_said_in_words_with_the_limits_there_are(fit):
     assert "not determined (best 486.28 nm, at most 143.8 nm at 95 %)" in lines[0]
     assert "inf" not in report(unseen)
     lines = block(report(with_parameter(fit, stderr=math.nan, lower_limit=99.0)), "Parameters")
-    assert "at least 99 nm at 95 %" in lines[0]
+    assert "not determined (best 486.28 nm, at least 99 nm at 95 %)" in lines[0]
 
 
 def test_a_one_sided_limit_stands_beside_a_finite_error(fit):
@@ -76,8 +76,8 @@ def test_a_one_sided_limit_stands_beside_a_finite_error(fit):
 def test_correlations_above_a_half_largest_first_without_pairs_of_nuisances(fit):
     lines = block(report(fit), "Correlations")
     assert [line.split() for line in lines] == [
-        ["C(thickness,", "instrument.scale_1)", "+0.970"],
-        ["C(thickness,", "A)", "-0.620"],
+        ["C(thickness,", "instrument.scale_1)", "-0.970"],
+        ["C(thickness,", "A)", "+0.620"],
     ]
 
 
@@ -132,7 +132,9 @@ def test_no_line_is_longer_than_100_columns(fit):
     )
     text = report(long)
     assert max(map(len, text.splitlines())) <= 100
-    assert "long/film.csv" in text
+    assert any(
+        line.startswith("file    …") and line.endswith("long/film.csv") for line in block(text, "Verdict")
+    )
     assert "\x1b" not in text
 
 

@@ -218,9 +218,8 @@ def _stretch(axes: Axes, below: float = 0.0, above: float = 0.0) -> None:
 
 
 def _band(axes: Axes, nm: np.ndarray, value: np.ndarray, stderr: np.ndarray, color: str, style: str) -> None:
-    """A line and ± its standard error, where that is finite."""
+    """A line and ± its standard error; fill_between leaves out what is not finite."""
     order = np.argsort(nm, kind="stable")
     nm, value, stderr = nm[order], value[order], stderr[order]
-    error = np.where(np.isfinite(stderr), stderr, np.nan)
-    axes.fill_between(nm, value - error, value + error, color=color, alpha=0.25, lw=0)
+    axes.fill_between(nm, value - stderr, value + stderr, color=color, alpha=0.25, lw=0)
     axes.plot(nm, value, color=color, linestyle=style, linewidth=1.2)
