@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import equinox as eqx
 import jax
 import numpy as np
 
-from pellicle.scene import Free, Normal, Scene, free_leaves, insert, is_free
+from pellicle.scene import Free, Layer, Normal, Scene, free_leaves, insert, is_free
 
 _UNITS = {"thickness": "nm", "bandwidth": "nm", "thickness_spread": "nm", "plate_mm": "mm", "angle": "deg"}
 _MODEL_UNITS = {"B": "nm^2", "C": "nm^4", "C1": "nm^2", "C2": "nm^2", "C3": "nm^2"}
@@ -89,8 +90,9 @@ def bounds(parameters: tuple[Parameter, ...]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def anonymous(scene: Scene) -> Scene:
-    """The scene with every `Free` replaced by one and the same: bounds must not make a new program."""
-    return insert(scene, [Free(0.5, 0.0, 1.0)] * len(free_leaves(scene)))
+    """The scene without bounds and layers' names: neither may make a new program."""
+    scene = insert(scene, [Free(0.5, 0.0, 1.0)] * len(free_leaves(scene)))
+    return eqx.tree_at(lambda s: s.layers, scene, tuple(Layer(x.material, x.thickness) for x in scene.layers))
 
 
 def fixed_numbers(scene: Scene) -> list[tuple[str, float, str]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -12,7 +11,7 @@ import numpy as np
 from pellicle.fitting import nuisance
 from pellicle.fitting.nuisance import Data
 from pellicle.fitting.parameters import Parameter, anonymous, bounds, parameters
-from pellicle.fitting.solve import least_squares
+from pellicle.fitting.programs import kept
 from pellicle.model import build, sampled
 from pellicle.planning import Plan, plan
 from pellicle.scene import Scene, insert, with_wavelength
@@ -119,19 +118,34 @@ def _solve(plan: Plan, scene: Scene, data: Data, box: Box, unit) -> nuisance.Sol
     )
 
 
-@partial(jax.jit, static_argnums=0)
-def evidences(plan: Plan, scene: Scene, data: Data, box: Box, units):
+class Scanned(NamedTuple):
+    """−2 log evidence of each candidate."""
+
+    evidence: Any
+
+
+@kept
+def evidences(plan: Plan, scene: Scene, data: Data, box: Box, units: Any) -> Scanned:
     """−2 log evidence of candidates `units` (candidates, parameters) in the unit cube."""
-    return jax.vmap(lambda unit: _solve(plan, scene, data, box, unit).evidence)(units)
+    return Scanned(jax.vmap(lambda unit: _solve(plan, scene, data, box, unit).evidence)(units))
 
 
-@partial(jax.jit, static_argnums=0)
-def polish(plan: Plan, scene: Scene, data: Data, box: Box, units):
-    """Local minima from each start: positions (starts, parameters), evidence, converged."""
+class Polished(NamedTuple):
+    """Local minima in the unit cube, (starts, parameters), their evidence, and whether they settled."""
+
+    units: Any
+    evidence: Any
+    converged: Any
+
+
+@kept
+def polish(plan: Plan, scene: Scene, data: Data, box: Box, units: Any) -> Polished:
+    """The local minimum below each start (starts, parameters)."""
+    from pellicle.fitting.solve import least_squares  # a kept program needs no solver
 
     def one(unit):
         best, converged = least_squares(lambda u: _solve(plan, scene, data, box, u).residual, unit)
-        return best, _solve(plan, scene, data, box, best).evidence, converged
+        return Polished(best, _solve(plan, scene, data, box, best).evidence, converged)
 
     return jax.vmap(one)(units)
 
@@ -148,8 +162,8 @@ class Local(NamedTuple):
     layer_slope: Any  # their derivatives, (2, points, parameters)
 
 
-@partial(jax.jit, static_argnums=0)
-def local(plan: Plan, scene: Scene, data: Data, box: Box, unit) -> Local:
+@kept
+def local(plan: Plan, scene: Scene, data: Data, box: Box, unit: Any) -> Local:
     """Signal, its Jacobian, and the layer's index at one point of the box."""
     simulate = build(plan)
 

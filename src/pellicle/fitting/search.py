@@ -10,13 +10,16 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import jax
 import numpy as np
 
 from pellicle.fitting.parameters import Parameter
 from pellicle.fitting.problem import Problem, evidences, polish, thin
-from pellicle.scene import free_leaves, insert
+from pellicle.optics.dispersion import AbstractDispersion, Sampled
+from pellicle.optics.number import real
+from pellicle.scene import insert
 
 Progress = Callable[[str, int, int], None]
 """Called with what is being done, how much is done and how much there is."""
@@ -107,8 +110,8 @@ def _thickness_grid(problem: Problem) -> np.ndarray:
 
 
 @jax.jit
-def _index(material, wavelength):
-    return material(wavelength).real
+def _index(material: AbstractDispersion, wavelength: Any) -> Any:
+    return real(material.index(wavelength))
 
 
 def _largest_index(problem: Problem) -> float:
@@ -118,8 +121,8 @@ def _largest_index(problem: Problem) -> float:
         p for p in problem.parameters if p.name.split(".")[0] not in ("substrate", "instrument", "ambient")
     ]
     own = [p for p in own if p.key not in ("thickness", "angle")]
-    if not free_leaves(material):
-        return float(np.max(_index(material, wavelength)))
+    if isinstance(material, Sampled):
+        return float(np.max(np.asarray(real(material.value))))
     corners = itertools.islice(itertools.product(*[(p.lower, p.upper) for p in own]), 64)
     return max(float(np.max(_index(insert(material, c), wavelength))) for c in corners)
 
@@ -160,7 +163,7 @@ def _scan(problem: Problem, units: np.ndarray, progress: Progress) -> np.ndarray
     for first in range(0, len(units), _CHUNK):
         chunk = units[first : first + _CHUNK]
         padded = np.concatenate([chunk, np.repeat(chunk[-1:], _CHUNK - len(chunk), axis=0)])
-        found[first : first + _CHUNK] = np.asarray(evidences(plan, *arguments, padded))[: len(chunk)]
+        found[first : first + _CHUNK] = np.asarray(evidences(plan, *arguments, padded).evidence)[: len(chunk)]
         progress("scan", min(first + _CHUNK, len(units)), len(units))
     return np.where(np.isfinite(found), found, np.inf)
 

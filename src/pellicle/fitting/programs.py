@@ -1,0 +1,109 @@
+"""Compiled programs that outlive the process.
+
+XLA's own cache saves the compilation; what is left of a cold start is Python tracing the solver.
+Where a session has a compilation cache, the traced program is kept beside it, keyed by everything
+that it depends on, and the next process neither traces it nor imports the solver.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable
+from functools import lru_cache, wraps
+from pathlib import Path
+from typing import Any, get_type_hints
+
+import jax
+import numpy as np
+
+from pellicle.planning import Plan
+
+Program = Callable[..., Any]
+
+
+def kept(function: Program) -> Program:
+    """`jax.jit` with the plan (the first argument) static, kept on disk where there is a cache.
+
+    `function(plan, *pytrees)` must be pure and return arrays or named tuples of them.
+    """
+    jitted = jax.jit(function, static_argnums=0)
+
+    @wraps(function)
+    def call(plan: Plan, *arguments: Any) -> Any:
+        folder = jax.config.jax_compilation_cache_dir  # pyright: ignore[reportAttributeAccessIssue]
+        if not folder:
+            return jitted(plan, *arguments)
+        leaves, structure = jax.tree_util.tree_flatten(arguments)
+        arrays = [np.asarray(leaf) for leaf in leaves]
+        shapes = tuple((a.shape, a.dtype.str) for a in arrays)
+        run, output = _load(function, plan, structure, shapes, folder)
+        return jax.tree_util.tree_unflatten(output, run(*arrays))
+
+    return call
+
+
+@lru_cache(maxsize=128)
+def _load(function: Program, plan: Plan, structure: Any, shapes: tuple, folder: str) -> tuple[Program, Any]:
+    """The program as a function of flat arrays, and the structure of what it returns."""
+    from jax import export
+
+    path = Path(folder) / "programs" / f"{_key(function, plan, structure, shapes)}.bin"
+    try:
+        found = export.deserialize(bytearray(path.read_bytes()))
+    except (OSError, ValueError, KeyError):  # absent, or cut short: made again
+        found = export.export(jax.jit(_flat(function, plan, structure)))(
+            *[jax.ShapeDtypeStruct(shape, np.dtype(dtype)) for shape, dtype in shapes]
+        )
+        _keep(path, found.serialize())
+    return jax.jit(found.call), _output(function)
+
+
+def _flat(function: Program, plan: Plan, structure: Any) -> Program:
+    def run(*arrays: Any) -> Any:
+        return jax.tree_util.tree_leaves(function(plan, *jax.tree_util.tree_unflatten(structure, arrays)))
+
+    return run
+
+
+def _output(function: Program) -> Any:
+    """How the flat results are put together again: the named tuple of the return annotation."""
+    kind = get_type_hints(function)["return"]
+    return jax.tree_util.tree_structure(kind(*range(len(kind._fields))))
+
+
+def _key(function: Program, plan: Plan, structure: Any, shapes: tuple) -> str:
+    effects = tuple((row.effect, row.on, row.count) for row in plan.rows)
+    parts = (
+        function.__qualname__,
+        effects,
+        plan.signal,
+        plan.polarisation,
+        str(structure),
+        shapes,
+        jax.__version__,
+        jax.default_backend(),
+        _sources(),
+    )
+    return hashlib.sha256(repr(parts).encode()).hexdigest()
+
+
+@lru_cache(maxsize=1)
+def _sources() -> str:
+    """Size and time of every source file: an edited package keeps no stale program."""
+    root = Path(__file__).resolve().parents[1]
+    stats = [(p.relative_to(root).as_posix(), p.stat()) for p in sorted(root.rglob("*.py"))]
+    return repr([(name, s.st_size, s.st_mtime_ns) for name, s in stats])
+
+
+def _keep(path: Path, program: bytes | bytearray) -> None:
+    """Write whole or not at all; a cache that cannot be written is no failure."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(dir=path.parent)
+        with os.fdopen(handle, "wb") as file:
+            file.write(program)
+        os.replace(name, path)
+    except OSError:
+        return
