@@ -86,7 +86,7 @@ def test_at_most_ten_correlations(fit):
     text = report(replace(fit, correlation_names=names, correlation=np.full((6, 6), 0.7)))
     lines = block(text, "Correlations")
     assert len(lines) == 11
-    assert lines[-1] == "... and 5 more in result.json"
+    assert lines[-1] == "... and 5 more in the JSON"
 
 
 def test_no_correlations_no_block(fit):
@@ -101,7 +101,7 @@ def test_rivals_nearest_first_at_most_six(fit):
     many = tuple(Rival({"thickness": 100.0 * i}, float(i)) for i in range(9, 0, -1))
     lines = block(report(replace(fit, rivals=many)), "Rivals")
     assert [line.split()[1] for line in lines[:6]] == list("123456")
-    assert lines[6:] == ["... and 3 more in result.json"]
+    assert lines[6:] == ["... and 3 more in the JSON"]
 
 
 def test_plan_warnings_and_statistics(fit):

@@ -152,7 +152,7 @@ def _correlations(fit: Fit) -> list[str]:
     """The largest ones.
 
     The coefficients of the scale's and the offset's polynomials are left out among themselves: they
-    follow from the basis that was chosen, and say nothing of the layer. result.json has them all.
+    follow from the basis that was chosen, and say nothing of the layer. the JSON has them all.
     """
     names, matrix = fit.correlation_names, fit.correlation
     pairs = [
@@ -188,7 +188,7 @@ def _table(rows: Sequence[Sequence[str]]) -> list[str]:
 
 
 def _left_out(count: int) -> list[str]:
-    return [f"{_INDENT}... and {count} more in result.json"] if count > 0 else []
+    return [f"{_INDENT}... and {count} more in the JSON"] if count > 0 else []
 
 
 def _plan(fit: Fit) -> list[str]:
