@@ -138,8 +138,8 @@ class _Run:
         if self.out is not None:
             root = Path(self.out)
             folders = several(root, files) if self.several else [root]
-            if not self.several:
-                new_folder(root)
+            if root.exists():
+                new_folder(root)  # refuses a stranger's folder before the work, not after
         worst = 0
         try:
             for path, folder in zip(files, folders, strict=True):

@@ -78,7 +78,10 @@ class Profile:
 
 @dataclass(frozen=True)
 class Fit:
-    """The outcome of fitting one spectrum; `print(fit.report())` reads like lmfit's report."""
+    """The outcome of fitting one spectrum.
+
+    `print(fit)` gives the verdict and the parameters; `pellicle.report.text.report(fit)` everything.
+    """
 
     spectrum: Any
     status: Status
@@ -98,6 +101,11 @@ class Fit:
 
     def __getitem__(self, name: str) -> Estimate:
         return self.parameters[name]
+
+    def __str__(self) -> str:
+        lines = [f"{self.status}: {self.verdict}"]
+        lines += [f"  {p.name} = {p.value:.8g} ± {p.stderr:.2g} {p.unit}".rstrip() for p in self.free]
+        return "\n".join(lines)
 
     @property
     def free(self) -> tuple[Estimate, ...]:

@@ -89,8 +89,8 @@ def verdict(status: Status, parameters: Mapping[str, Estimate], rivals: tuple[Ri
         other = distinct_rivals(parameters, rivals)[0]
         value = other.parameters.get(lead.name, math.nan)
         return (
-            f"The data do not decide: {lead.name} {lead.value:.6g}{_unit(lead)} fits best, but"
-            f" {value:.6g}{_unit(lead)} fits nearly as well (Δχ² {other.delta_chi2:.1f})."
+            f"The data do not decide: {told} fits best, but"
+            f" {value:.4g}{_unit(lead)} fits nearly as well (Δχ² {other.delta_chi2:.1f})."
         )
     if status is Status.NOT_IDENTIFIABLE:
         return f"The data do not determine {lead.name}: {_limits(lead)}."
