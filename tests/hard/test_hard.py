@@ -73,9 +73,9 @@ def computed(signal, letter, dtype, transparent=False):
     return {name: row for name, *row in zip(CASES, *columns, strict=True)}
 
 
-def alone(signal, letter, row):
+def alone(signal, letter, row, transparent=False):
     """The same of a row that is not in the table, in the shape that is compiled already."""
-    return [np.asarray(x)[0] for x in compiled(signal, letter, False)(np.tile(row, (len(POINTS), 1)))]
+    return [np.asarray(x)[0] for x in compiled(signal, letter, transparent)(np.tile(row, (len(POINTS), 1)))]
 
 
 def slope_error(found, truth):
@@ -134,8 +134,9 @@ def test_nothing_leaves_the_unit_interval_by_more_than_rounding():
                 assert -1e-20 <= value <= 1 + unit, (name, signal, letter, dtype)
 
 
+@pytest.mark.parametrize("transparent", [False, True])
 @pytest.mark.parametrize("letter", "sp")
-def test_a_faint_transmittance_keeps_its_relative_accuracy(letter):
+def test_a_faint_transmittance_keeps_its_relative_accuracy(letter, transparent):
     """κd of 23 in a gap of 2.7 µm: T is 1e-20, far under the rounding of 1 − R."""
     name = "total reflection, 20 µm gap"
     row = np.array(CASES[name]["at"])
@@ -146,7 +147,7 @@ def test_a_faint_transmittance_keeps_its_relative_accuracy(letter):
     u, v = (q0, q1) if letter == "s" else (n1**2 * q0, n0**2 * q1)
     # so deep that one passage is all: |t₁₂ t₂₃|² e^{−2κk₀d}, and r₂₃ = −r₁₂
     truth = abs(4 * u * v / (u + v) ** 2) ** 2 * np.exp(-4 * np.pi / wavelength * d * q1.imag)
-    found = alone("T", letter, row)[0]
+    found = alone("T", letter, row, transparent)[0]
     assert 1e-25 < truth < 1e-15
     assert found == pytest.approx(truth, rel=1e-12, abs=0)
 
