@@ -8,7 +8,9 @@ Gaussian model: Bishop 2006, section 3.5). Physical signs: o ≥ 0 is imposed, g
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
+from math import comb
 from typing import Any, NamedTuple
 
 import jax
@@ -22,8 +24,8 @@ _LOOSE = 10.0
 """Prior standard deviation of a single free number, in units of its own expected size: no prior."""
 _STIFF = 1e8
 """Weight that holds an offset at zero where it would turn negative."""
-_CHECKS = 9
-"""Points over the spectrum at which the offset's sign is watched."""
+_SLACK = 1e-6
+"""How far below zero, in units of the signal's level, an offset held at zero may come out."""
 
 
 class Data(NamedTuple):
@@ -136,23 +138,36 @@ def _project(rows, values, prior: _Series, shifts: _Series | None):
 
 
 def _stiffness(matrix, target, shifts: _Series | None):
-    """What to add to the matrix to hold the offset at zero wherever it would turn negative.
+    """What to add to the matrix so that the offset's solution is nowhere negative.
 
-    The points where it does are found in a few rounds; once held, a point stays held.
+    The offset is held nonnegative through its Bernstein coefficients (enough, and for so low a degree
+    little more than needed). There are few of them, so every set that could be zero is tried and the
+    best feasible one is the exact solution of this convex problem: it moves continuously with the
+    data, as a solver needs. Which set it is counts as a constant.
     """
     if shifts is None:
         return jnp.zeros_like(matrix)
     count = len(shifts.basis)
-    points = np.cos(np.pi * (np.arange(_CHECKS) + 0.5) / _CHECKS) if count > 1 else np.zeros(1)
-    basis = np.stack([np.cos(j * np.arccos(points)) for j in range(count)], -1)
-    weight = _STIFF * jnp.trace(matrix)
+    bernstein = _to_bernstein(count)
+    rows = jnp.zeros((count, matrix.shape[0])).at[:, -count:].set(bernstein)
+    held = np.array(list(itertools.product((0.0, 1.0), repeat=count)))
+    stiff = _STIFF * jnp.trace(matrix) * jnp.einsum("si,ip,iq->spq", held, rows, rows)
 
-    def hold(_, stiffness):
-        offset = basis @ cho_solve(cho_factor(matrix + stiffness), target)[-count:]
-        negative = jnp.where(offset < -1e-9, weight, 0.0)
-        return stiffness.at[-count:, -count:].add(basis.T @ (negative[:, None] * basis))
+    def trial(stiffness):
+        found = cho_solve(cho_factor(matrix + stiffness), target)
+        feasible = jnp.all(rows @ found >= -_SLACK)
+        return jnp.where(feasible, found @ (matrix @ found) - 2 * target @ found, jnp.inf)
 
-    return jax.lax.fori_loop(0, 3 if count > 1 else 1, hold, jnp.zeros_like(matrix))
+    return stiff[jnp.argmin(jax.vmap(trial)(stiff))]
+
+
+def _to_bernstein(count: int) -> np.ndarray:
+    """Matrix from Chebyshev coefficients on −1..1 to Bernstein coefficients of the same degree."""
+    degree, points = count - 1, np.linspace(0.0, 1.0, count)
+    values = np.array(
+        [[comb(degree, i) * t**i * (1 - t) ** (degree - i) for i in range(count)] for t in points]
+    )
+    return np.linalg.solve(values, np.polynomial.chebyshev.chebvander(2 * points - 1, degree))
 
 
 def _penalty(gain, weight):

@@ -65,7 +65,8 @@ def search(problem: Problem, progress: Progress) -> Minima:
     if depth is not None:
         units[:, depth] = np.tile(grid, len(design))
     table = _scan(thinned, units, progress).reshape(len(design), -1)
-    starts = units[_local_minima(table, most=LANES if len(design) == 1 else 3 * LANES)]
+    batches = 1 if len(design) == 1 else 3 if len(problem.parameters) < 4 else 6
+    starts = units[_local_minima(table, most=batches * LANES)]
     minima = polished(problem, starts, progress)
     if depth is None:
         return minima
@@ -141,7 +142,7 @@ def _levels(p: Parameter, problem: Problem) -> np.ndarray:
     if not p.searched:
         return start
     if p.key == "k":
-        return np.array([0.002, 0.05, 0.4])
+        return np.array([0.001, 0.01, 0.05, 0.15, 0.4])
     count = int(np.clip(np.ceil((p.upper - p.lower) / 0.2), 3, 8))
     if p.key == "B":
         count = int(np.clip(np.ceil(_dispersion_fringes(p, problem)), 3, 8))

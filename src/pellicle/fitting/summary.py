@@ -13,7 +13,7 @@ from pellicle.fitting.result import Curve, Estimate, Profile, Rival
 from pellicle.fitting.status import RIVAL
 from pellicle.fitting.uncertainty import UNSEEN, Errors, layer_errors, linear_coefficients
 from pellicle.fitting.weigh import Weighed
-from pellicle.scene import Scene
+from pellicle.scene import Drift, Scene
 
 _RULED_OUT = 1e8
 _ONE_SIDED = 2.71
@@ -21,15 +21,21 @@ _ONE_SIDED = 2.71
 _OPEN = RIVAL
 """A side where the misfit never rises by as much as would rule a rival out is open."""
 _ON_BOUND = 1e-6
+_NEAR = 1e-3
+"""A best thickness this close (nm) to a bound rests on it; the side is open if the misfit is flat there."""
 _MOST_RIVALS = 10
+FEWEST_FRINGES = 0.75
+"""Fringes that a spectrum must span where scale and offset drift: with fewer, drift can imitate the film.
+On real soap films from 510 to 910 nm this is 330 nm, below which no single spectrum was decided."""
 
 
 def estimates(scene: Scene, weighed: Weighed, found: Errors, profile: Profile | None) -> dict[str, Estimate]:
     """Every parameter, free ones first, the thickness before all."""
     problem, unit = weighed.problem, weighed.minima.units[0]
     values = problem.box.values(unit)
+    least = thinnest(weighed) if _drifts(scene) else 0.0
     free = [
-        _estimate(p, value, sd, position, profile)
+        _estimate(p, value, sd, position, profile, least)
         for p, value, sd, position in zip(problem.parameters, values, found.stderr, unit, strict=False)
     ]
     free.sort(key=lambda e: e.name.split(".")[-1] != "thickness")
@@ -45,13 +51,30 @@ def estimates(scene: Scene, weighed: Weighed, found: Errors, profile: Profile | 
     return {e.name: e for e in [*free, *linear, *fixed]}
 
 
+def _drifts(scene: Scene) -> bool:
+    return isinstance(scene.instrument.scale, Drift) and scene.instrument.scale.degree > 0
+
+
+def thinnest(weighed: Weighed) -> float:
+    """The thickness (nm) of which the spectrum spans `FEWEST_FRINGES`."""
+    keep = slice(weighed.problem.points)
+    wavelength, n = (
+        np.asarray(weighed.problem.scene.light.wavelength)[keep],
+        np.asarray(weighed.at.layer)[0, keep],
+    )
+    order = 2 * n / wavelength
+    return float(FEWEST_FRINGES / max(np.ptp(order), 1e-12))
+
+
 def _estimate(
-    p: Parameter, value: float, stderr: float, position: float, profile: Profile | None
+    p: Parameter, value: float, stderr: float, position: float, profile: Profile | None, least: float
 ) -> Estimate:
     at_low, at_high = position <= _ON_BOUND, position >= 1 - _ON_BOUND
     lower_limit = upper_limit = None
     if p.key == "thickness" and profile is not None:
         lower_limit, upper_limit, bounded = _limits(profile, float(value))
+        if bounded and value < least:
+            upper_limit, bounded = least, False
         stderr = stderr if bounded else math.inf
     elif at_low and p.natural_lower:
         upper_limit = float(min(value + 1.645 * stderr, p.upper))
@@ -77,13 +100,18 @@ def _limits(profile: Profile, best: float) -> tuple[float | None, float | None, 
     Returns (lower, upper, bounded): both None and True where both sides are bounded.
     """
     close, level = profile.delta_chi2 < _ONE_SIDED, profile.delta_chi2 < _OPEN
-    left, right = profile.thickness < best, profile.thickness > best
-    open_left, open_right = bool(left.any() and level[left].all()), bool(right.any() and level[right].all())
+    left, right = profile.thickness < best - _NEAR, profile.thickness > best + _NEAR
+    open_left = _stays(level, left) if left.any() else bool(close[right][:1].all())
+    open_right = _stays(level, right) if right.any() else bool(close[left][-1:].all())
     if not (open_left or open_right):
         return None, None, True
     lower = None if open_left else _crossing(profile, best, left & ~close, -1)
     upper = None if open_right else _crossing(profile, best, right & ~close, 0)
     return lower, upper, False
+
+
+def _stays(level: np.ndarray, side: np.ndarray) -> bool:
+    return bool(level[side].all())
 
 
 def _crossing(profile: Profile, best: float, beyond: np.ndarray, nearest: int) -> float:
