@@ -5,12 +5,13 @@ from typing import NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import lineax
 import numpy as np
 import optimistix as optx
 import pytest
 from scipy.optimize import least_squares as scipy_least_squares
 
-from pellicle.fitting.solve import BoundedLevenbergMarquardt, least_squares
+from pellicle.fitting.solve import BoundedLevenbergMarquardt, Trust, least_squares
 from pellicle.signals import reflectance
 
 WAVELENGTH = np.linspace(400.0, 900.0, 64)
@@ -135,6 +136,14 @@ def test_never_an_increase(films):
     assert (np.diff(chi2, axis=1) <= 1e-9 * chi2[:, :-1]).all()
     assert (chi2[:, -1] < chi2[:, 0]).all()
     assert (np.diff(chi2, axis=1) == 0).any()  # some steps were rejected
+
+
+def test_a_step_that_the_box_has_bent_uphill_promises_nothing():
+    """Optimistix would accept a small increase where the linear model predicts a larger one."""
+    jacobian = lineax.MatrixLinearOperator(jnp.eye(2))
+    info = optx.FunctionInfo.ResidualJac(jnp.array([1.0, 1.0]), jacobian)
+    assert Trust().predict_reduction(jnp.array([0.5, 0.5]), info) == 0
+    assert Trust().predict_reduction(jnp.array([-0.5, -0.5]), info) < 0
 
 
 def test_a_start_outside_the_box_is_brought_in():

@@ -17,6 +17,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.scipy.linalg import cho_factor, cho_solve
+from jaxtyping import ScalarLike
 
 from pellicle.scene import Drift, Instrument
 
@@ -87,7 +88,7 @@ class _Series(NamedTuple):
     sd: np.ndarray
 
 
-def _split(given: float | Drift, series: Callable[[Drift], _Series]) -> tuple[_Series | None, Any]:
+def _split(given: ScalarLike | Drift, series: Callable[[Drift], _Series]) -> tuple[_Series | None, Any]:
     """A nuisance as a series to solve for and nothing known, or no series and the known number."""
     return (series(given), 0.0) if isinstance(given, Drift) else (None, given)
 

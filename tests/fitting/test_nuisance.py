@@ -1,0 +1,204 @@
+"""Scale and offset by variable projection, against dense algebra written a second time in NumPy."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import lsq_linear
+
+from pellicle.fitting.nuisance import Data, solve
+from pellicle.scene import Instrument
+
+POINTS, LEVEL, TEMPER = 64, 0.4, 0.5
+POSITION = np.linspace(-1.0, 1.0, POINTS)
+SIGNAL = 0.3 + 0.2 * np.cos(9 * POSITION + 1)
+WEIGHT = 1 / (0.01 + 0.005 * (1 + POSITION))
+NOISE = 0.01 * np.random.default_rng(3).normal(size=POINTS)
+DEGREES = {"free": (0, 0), "slow": (3, 2)}
+"""Degrees of scale and offset by the contract's words."""
+
+
+def data(values, weight=WEIGHT) -> Data:
+    return Data(np.asarray(values), weight, POSITION, np.float64(TEMPER), np.float64(LEVEL))
+
+
+solved = jax.jit(solve)
+
+
+class Dense:
+    """The linear model y = X c with prior c ~ N(mean, diag sd²), whitened; written down once more.
+
+    The gain's columns are in units of the plain least-squares scale, the offset's in units of the
+    level; standard deviations are 10 for a single number, else 1, 0.3, 0.15, 0.075 for the gain and
+    0.3, 0.15, 0.075 for the offset.
+    """
+
+    def __init__(self, values, scale: str | None, offset: str | None):
+        root = WEIGHT * np.sqrt(TEMPER)
+        plain = np.sum(root**2 * values * SIGNAL) / np.sum(root**2 * SIGNAL**2)
+        blocks, mean, sd = [], [], []
+        if scale:
+            degree = DEGREES[scale][0]
+            blocks.append(plain * SIGNAL[:, None] * np.polynomial.chebyshev.chebvander(POSITION, degree))
+            mean += [1.0] + [0.0] * degree
+            sd += [10.0] if degree == 0 else [1.0, 0.3, 0.15, 0.075]
+        self.first = len(mean)
+        if offset:
+            degree = DEGREES[offset][1]
+            blocks.append(LEVEL * np.polynomial.chebyshev.chebvander(POSITION, degree))
+            mean += [0.0] * (degree + 1)
+            sd += [10.0] if degree == 0 else [0.3, 0.15, 0.075]
+        known = (0.0 if scale else SIGNAL) + np.zeros(POINTS)
+        self.columns, self.known = np.hstack(blocks), known
+        self.x, self.y = self.columns * root[:, None], root * (values - known)
+        self.mean, self.sd = np.array(mean), np.array(sd)
+
+    def least_squares(self):
+        rows = np.vstack([self.x, np.diag(1 / self.sd)])
+        return np.linalg.lstsq(rows, np.concatenate([self.y, self.mean / self.sd]), rcond=None)[0]
+
+    def held(self):
+        """The same with the offset's Bernstein coefficients not below zero."""
+        count = len(self.mean) - self.first
+        change = np.eye(len(self.mean))
+        if count == 3:  # Chebyshev from the Bernstein coefficients of a parabola on −1..1
+            change[self.first :, self.first :] = [
+                [3 / 8, 1 / 4, 3 / 8],
+                [-1 / 2, 0, 1 / 2],
+                [1 / 8, -1 / 4, 1 / 8],
+            ]
+        rows = np.vstack([self.x, np.diag(1 / self.sd)]) @ change
+        lower = np.full(len(self.mean), -np.inf)
+        lower[self.first :] = 0.0
+        target = np.concatenate([self.y, self.mean / self.sd])
+        return change @ lsq_linear(rows, target, (lower, np.inf), method="bvls", tol=1e-14).x
+
+    def evidence(self):
+        """−2 log of the marginal likelihood of the whitened data, without the 2π's."""
+        covariance = np.eye(POINTS) + (self.x * self.sd**2) @ self.x.T
+        residual = self.y - self.x @ self.mean
+        return residual @ np.linalg.solve(covariance, residual) + np.linalg.slogdet(covariance)[1]
+
+
+CASES = [("free", None), (None, "free"), ("free", "free"), ("slow", None), ("slow", "free"), ("slow", "slow")]
+
+
+def instrument(scale, offset) -> Instrument:
+    return Instrument(scale or 1.0, offset or 0.0)
+
+
+def lifted(scale):
+    """Data whose offset is well above zero everywhere."""
+    gain = (1.7 + 0.2 * POSITION) if scale else 1.0
+    return gain * SIGNAL + 0.2 + 0.03 * POSITION + NOISE
+
+
+@pytest.mark.parametrize(("scale", "offset"), CASES)
+def test_equal_to_dense_least_squares(scale, offset):
+    values = lifted(scale)
+    dense = Dense(values, scale, offset)
+    best = dense.least_squares()
+    found = solved(SIGNAL, data(values), instrument(scale, offset))
+    np.testing.assert_allclose(found.model, dense.known + dense.columns @ best, rtol=1e-10)
+    if offset:
+        shift = dense.columns[:, dense.first :] @ best[dense.first :]
+        np.testing.assert_allclose(found.offset, shift, rtol=1e-8)
+    if scale:
+        gain = dense.columns[:, : dense.first] @ best[: dense.first] / SIGNAL
+        np.testing.assert_allclose(found.gain, gain, rtol=1e-9)
+    np.testing.assert_allclose(found.model, found.gain * SIGNAL + found.offset, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("scale", "offset"), CASES)
+def test_evidence_is_the_gaussian_marginal(scale, offset):
+    values = lifted(scale)
+    found = solved(SIGNAL, data(values), instrument(scale, offset))
+    np.testing.assert_allclose(found.evidence, Dense(values, scale, offset).evidence(), rtol=1e-9)
+
+
+def test_without_nuisances_the_evidence_is_chi2():
+    values = 0.9 * SIGNAL + 0.1 + NOISE
+    found = solved(SIGNAL, data(values), Instrument(0.9, 0.1))
+    np.testing.assert_allclose(found.evidence, np.sum((WEIGHT * NOISE) ** 2) * TEMPER, rtol=1e-10)
+    np.testing.assert_allclose(found.residual, WEIGHT * np.sqrt(TEMPER) * NOISE, atol=1e-12)
+
+
+@pytest.mark.parametrize(("scale", "offset"), CASES)
+def test_the_residual_holds_the_priors_too(scale, offset):
+    """Its square is what the coefficients minimise, so that a solver that sees it sees all."""
+    values = lifted(scale)
+    dense = Dense(values, scale, offset)
+    best = dense.least_squares()
+    expected = np.sum((dense.y - dense.x @ best) ** 2) + np.sum(((best - dense.mean) / dense.sd) ** 2)
+    found = solved(SIGNAL, data(values), instrument(scale, offset))
+    np.testing.assert_allclose(jnp.sum(found.residual**2), expected, rtol=1e-9)
+
+
+tilts = st.floats(-0.3, 0.3)
+
+
+@settings(max_examples=60)
+@given(level=tilts, tilt=tilts, bend=tilts, scale=st.sampled_from(["free", "slow"]))
+def test_the_offset_is_never_negative_and_the_rest_is_the_best_under_that(level, tilt, bend, scale):
+    values = 1.5 * SIGNAL + level + tilt * POSITION + bend * POSITION**2 + NOISE
+    found = solved(SIGNAL, data(values), instrument(scale, "slow"))
+    assert np.min(found.offset) >= -1e-5 * LEVEL
+    dense = Dense(values, scale, "slow")
+    expected = dense.known + dense.columns @ dense.held()
+    np.testing.assert_allclose(found.model, expected, atol=2e-5)
+
+
+def test_a_single_offset_below_zero_is_zero():
+    values = 1.5 * SIGNAL - 0.1
+    found = solved(SIGNAL, data(values), instrument("free", "free"))
+    alone = solved(SIGNAL, data(values), instrument("free", None))
+    np.testing.assert_allclose(found.offset, 0.0, atol=1e-6)
+    np.testing.assert_allclose(found.gain, alone.gain, rtol=1e-5)
+
+
+@pytest.mark.parametrize("scale", ["free", "slow"])
+def test_a_negative_gain_is_ruled_out(scale):
+    values = 0.5 - SIGNAL  # the fringes upside down
+    found = solved(SIGNAL, data(values), instrument(scale, "free"))
+    right = solved(0.5 - SIGNAL, data(values), instrument(scale, "free"))
+    assert found.evidence > right.evidence + 100
+    if np.min(found.gain) <= 0:
+        assert found.evidence > 1e8
+
+
+def test_a_gain_that_turns_negative_at_one_end_is_ruled_out():
+    falling = solved(SIGNAL, data((0.3 - POSITION) * SIGNAL), instrument("slow", None))
+    assert np.min(falling.gain) < 0
+    assert falling.evidence > 1e8
+
+
+@pytest.mark.parametrize("level", [0.2, -0.2], ids=["offset free", "offset held at zero"])
+@pytest.mark.parametrize(("scale", "offset"), [("free", "free"), ("slow", "slow")])
+def test_derivative_of_the_residual(scale, offset, level):
+    """What the solver steps by, against central differences: no factorisation is differentiated."""
+    values = 1.7 * SIGNAL + level + NOISE
+    direction = np.sin(5 * POSITION)
+
+    def residual(t):
+        return solved(SIGNAL + t * direction, data(values), instrument(scale, offset)).residual
+
+    _, slope = jax.jvp(residual, (0.0,), (1.0,))
+    step = 1e-5
+    differences = (residual(step) - residual(-step)) / (2 * step)
+    np.testing.assert_allclose(slope, differences, atol=1e-5 * np.max(np.abs(slope)))
+
+
+@pytest.mark.parametrize(("scale", "offset"), [("free", "free"), ("slow", "slow")])
+def test_points_of_zero_weight_change_nothing(scale, offset):
+    """Spectra are padded to round lengths with such points."""
+    values, off = lifted(scale), np.arange(POINTS) >= 50
+    weight = np.where(off, 0.0, WEIGHT)
+    found = solved(SIGNAL, data(values, weight), instrument(scale, offset))
+    other = solved(
+        np.where(off, 0.9, SIGNAL), data(np.where(off, 5.0, values), weight), instrument(scale, offset)
+    )
+    np.testing.assert_allclose(found.evidence, other.evidence, rtol=1e-12)
+    np.testing.assert_allclose(found.offset, other.offset, rtol=1e-9)
+    np.testing.assert_allclose(found.gain, other.gain, rtol=1e-9)
