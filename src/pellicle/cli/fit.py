@@ -81,6 +81,9 @@ def fit(
     )
     _check(reading)
     scene, files, reading = _what(list(data), recipe, scene_words, reading)
+    from pellicle.fitting.fit import check_free
+
+    check_free(scene)
     start()
     return _Run(scene, reading, out, json, several=len(files) > 1)(files)
 
@@ -163,7 +166,7 @@ class _Run:
             self.done.append(failure(path, message))
             if self.as_json:
                 print(json_module.dumps(self.done[-1], allow_nan=False), flush=True)
-            return 2 if isinstance(error, UsageError) else 3
+            return 3  # a failed file is 3, whatever would mend it
         progress.clear()
         self.done.append(found)
         self._show(found, folder)

@@ -32,14 +32,19 @@ def fit(data: Spectrum, scene: Scene, *, progress: Progress = quiet) -> Fit:
     ValueError where a material has no data at a wavelength, naming it.
     """
     drifts = [x for x in (scene.instrument.scale, scene.instrument.offset) if isinstance(x, Drift)]
-    if not free_leaves(scene):
-        raise UsageError("nothing is free to fit: give bounds to the thickness, as in --thickness 10:3000")
+    check_free(scene)
     if not data.calibrated and scene.instrument.scale not in drifts:
         raise UsageError(
             f"{data.path}: an uncalibrated intensity needs a free scale: add --scale slow, or --scale free"
         )
     with jax.enable_x64(True):
         return _fit(data, seen_as(scene, data), progress)
+
+
+def check_free(scene: Scene) -> None:
+    """UsageError where a scene has nothing to fit."""
+    if not free_leaves(scene):
+        raise UsageError("nothing is free to fit: give bounds to the thickness, as in --thickness 10:3000")
 
 
 def seen_as(scene: Scene, data: Spectrum) -> Scene:
