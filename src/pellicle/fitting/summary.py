@@ -69,7 +69,7 @@ def thinnest(weighed: Weighed) -> float:
 def _estimate(
     p: Parameter, value: float, stderr: float, position: float, profile: Profile | None, least: float
 ) -> Estimate:
-    at_low, at_high = position <= _ON_BOUND, position >= 1 - _ON_BOUND
+    at_low, at_high = bool(position <= _ON_BOUND), bool(position >= 1 - _ON_BOUND)
     lower_limit = upper_limit = None
     if p.key == "thickness" and profile is not None:
         lower_limit, upper_limit, bounded = _limits(profile, float(value))

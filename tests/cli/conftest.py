@@ -1,0 +1,73 @@
+"""The command line in this process: quick, with its two streams and its exit code."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pellicle import Constant
+from pellicle.cli import main
+from pellicle.signals import reflectance
+
+
+@dataclass(frozen=True)
+class Ran:
+    """What a command left behind."""
+
+    code: int
+    out: str
+    err: str
+
+    @property
+    def objects(self) -> list[dict[str, Any]]:
+        """stdout as strict JSON, one object a line."""
+
+        def refuse(constant):
+            raise ValueError(f"{constant} is not JSON")
+
+        return [json.loads(line, parse_constant=refuse) for line in self.out.splitlines()]
+
+
+@pytest.fixture
+def pellicle(monkeypatch, capsys) -> Callable[..., Ran]:
+    """Runs `pellicle ARGUMENTS` without touching the user's cache of programs."""
+    monkeypatch.setenv("PELLICLE_CACHE", "off")
+
+    def run(*arguments: Any) -> Ran:
+        monkeypatch.setattr(sys, "argv", ["pellicle", *map(str, arguments)])
+        capsys.readouterr()
+        code = main()
+        return Ran(code, *capsys.readouterr())
+
+    return run
+
+
+@pytest.fixture
+def spectrum_file(tmp_path) -> Callable[..., Any]:
+    """Writes a spectrum of 1.46 on 3.9 + 0.02i: 100 points with noise of 0.002, so 128 once padded."""
+
+    def write(name: str = "oxide.csv", thickness: float = 300.0, seed: int = 0):
+        nm = np.linspace(400.0, 796.0, 100)
+        clean = np.asarray(reflectance(nm, thickness, Constant(1.46), Constant(3.9, 0.02)))
+        values = clean + np.random.default_rng(seed).normal(0, 0.002, nm.size)
+        path = tmp_path / name
+        rows = "".join(f"{w:g},{r:.6f}\n" for w, r in zip(nm, values, strict=True))
+        path.write_text("wavelength_nm,R\n" + rows)
+        return path
+
+    return write
+
+
+SCENE = ("--layer", "1.46", "--substrate", "3.9+0.02j", "--thickness", "10:800")
+
+
+@pytest.fixture
+def scene() -> tuple[str, ...]:
+    """The flags of the scene that `spectrum_file` was simulated from."""
+    return SCENE

@@ -1,0 +1,78 @@
+"""The measurements that come with the repository: made as they say, and their fits find the truth."""
+
+from __future__ import annotations
+
+import csv
+import tomllib
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+
+import pytest
+
+import pellicle as pl
+from pellicle.io.recipe import read_recipe
+
+ROOT = Path(__file__).parents[1]
+FOLDER = ROOT / "measurements"
+RECIPES = sorted((FOLDER / "recipes").glob("*.toml"))
+
+
+@pytest.fixture(scope="module")
+def script():
+    spec = spec_from_file_location("make_measurements", ROOT / "scripts" / "make_measurements.py")
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_there_are_hematite_cadmium_sulfide_and_gold():
+    assert {recipe.stem.split("_")[0] for recipe in RECIPES} >= {"hematite", "cds", "gold"}
+
+
+def test_every_file_is_what_its_recipe_and_seed_give(script, tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv("PELLICLE_CACHE", "off")
+    script.main(tmp_path)
+    made = {path.name: path.read_text() for path in tmp_path.iterdir()}
+    kept = {path.name: path.read_text() for path in FOLDER.glob("*.csv")}
+    assert made == kept
+
+
+def test_the_index_lists_every_file():
+    with (FOLDER / "INDEX.csv").open() as text:
+        rows = list(csv.DictReader(text))
+    assert {row["file"] for row in rows} == {p.name for p in FOLDER.glob("*.csv")} - {"INDEX.csv"}
+    for row in rows:
+        assert (FOLDER / row["recipe"]).is_file()
+        head = (FOLDER / row["file"]).read_text().split("wavelength_nm")[0]
+        assert "SYNTHETIC" in head
+        assert f"recipe {Path(row['recipe']).name}, seed {row['seed']}" in head
+        assert row["truth"].replace("thickness", "thickness =") in head
+
+
+def fitted(recipe: Path):
+    """The recipe's fit of its own file, and the true thickness."""
+    found = read_recipe(recipe)
+    (layer,) = tomllib.loads(recipe.read_text())["scene"]["layer"]
+    noise = found.tables.data.noise
+    (file,) = found.files
+    return pl.fit(pl.read_spectrum(file, noise=noise), found.scene()), layer["thickness"]["value"]
+
+
+@pytest.mark.parametrize(
+    "recipe", [r for r in RECIPES if r.stem != "gold_on_glass_300nm"], ids=lambda r: r.stem
+)
+def test_the_fit_finds_the_truth(recipe):
+    found, truth = fitted(recipe)
+    assert found.status == "converged"
+    assert abs(found["thickness"].value - truth) < 4 * found["thickness"].stderr
+    assert found["thickness"].stderr < 0.02 * truth
+    assert 0.5 < found.chi2_reduced < 1.5
+
+
+def test_opaque_gold_gets_a_lower_limit_and_no_error():
+    found, truth = fitted(FOLDER / "recipes" / "gold_on_glass_300nm.toml")
+    thickness = found["thickness"]
+    assert found.status == "not-identifiable"
+    assert thickness.stderr == float("inf")
+    assert 50 < thickness.lower_limit < truth
+    assert thickness.upper_limit is None
