@@ -155,7 +155,9 @@ def test_certified_standard_deviations(name):
     box = Box(np.zeros(free), np.abs(found), np.zeros(free), np.zeros(free))
     numbers = tuple(Parameter(f"b{i + 1}", f"b{i + 1}", "", 0.0, 0.0, 1.0, None) for i in range(free))
     # the scene matters only for its instrument: no scale and no offset to solve for
-    whole = FitProblem(None, Scene(Layer(1.5, 100.0), 1.5), data, box, numbers, points)
+    known = {"scene": Scene(Layer(1.5, 100.0), 1.5), "data": data, "box": box}
+    known |= {"parameters": numbers, "points": points}
+    whole = FitProblem(**(dict.fromkeys(FitProblem._fields) | known))
     slope = np.asarray(jax.jacfwd(lambda b: model(b, problem.x))(jnp.asarray(found)))
     one = np.ones(points)
     at = Local(problem.y, slope, problem.y, one, 0 * one, None, None)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json as json_module
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -103,6 +104,22 @@ def _check(reading: ReadWords) -> None:
         raise UsageError(f"--angle must lie in 0 to 90 degrees, got {reading.angle:g}")
     if reading.polarisation not in (None, "s", "p", "unpolarised"):
         raise UsageError(f"--polarisation must be s, p or unpolarised, not {reading.polarisation!r}")
+    if reading.noise is not None and not 0 < reading.noise < inf:
+        raise UsageError(f"--noise must be a standard deviation above zero, got {reading.noise:g}")
+    if reading.dark is not None and reading.reference is None:
+        raise UsageError("--dark needs --reference: the counts of a sample of known reflectance")
+    _check_units(reading)
+
+
+def _check_units(reading: ReadWords) -> None:
+    from pellicle.io.units import SIGNAL_UNITS, WAVELENGTH_UNITS, signal_unit, wavelength_unit
+
+    for flag, given, known, find in (
+        ("--wavelength-unit", reading.wavelength_unit, WAVELENGTH_UNITS, wavelength_unit),
+        ("--signal-unit", reading.signal_unit, SIGNAL_UNITS, signal_unit),
+    ):
+        if given is not None and find(given) is None:
+            raise UsageError(f"{flag} must be one of {', '.join(known)}, not {given!r}")
 
 
 def _what(files: list[str], recipe: str | None, words: SceneWords, reading: ReadWords):

@@ -19,6 +19,7 @@ def materials(
     Example: pellicle materials Au --out gold.png
     """
     from pellicle.errors import UsageError
+    from pellicle.materials import UnknownMaterial
     from pellicle.report import materials as catalogue
 
     if name is None:
@@ -26,7 +27,10 @@ def materials(
             raise UsageError("--out draws one material: name it, as in pellicle materials Au --out gold.png")
         print(catalogue.table(), end="")
         return 0
-    print(catalogue.describe(name), end="")
+    try:
+        print(catalogue.describe(name), end="")
+    except UnknownMaterial as error:
+        raise UsageError(str(error)) from None
     if out is not None:
         catalogue.figure(name, out)
         say(f"{out}: figure written")

@@ -107,8 +107,6 @@ def read(path: str, words: ReadWords, *, scaled: bool) -> Any:
 
     if words.reference is not None:
         return _from_counts(path, words)
-    if words.dark is not None:
-        raise UsageError("--dark needs --reference: the counts of a sample of known reflectance")
     return read_spectrum(
         path,
         signal=words.signal,

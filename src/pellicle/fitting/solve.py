@@ -133,7 +133,11 @@ class BoundedLevenbergMarquardt(optx.AbstractGaussNewton):
         gauss_newton = model.solve(10 * model.y.size * eps)
         promised = jnp.sqrt(jnp.maximum(-gauss_newton @ model.gradient, 0))  # ‖J δ‖
         rounding = eps * jnp.max(model.scale * jnp.abs(model.y))
-        done = promised <= self.atol + self.rtol * size + rounding
+        enough = self.atol + self.rtol * size + rounding
+        # where the data see next to nothing the step is huge, and only what the box leaves of it counts;
+        # as the scaled columns have unit length, its sum bounds ‖J δ‖
+        inside = jnp.clip(model.y + gauss_newton / model.scale, model.lower, model.upper) - model.y
+        done = (promised <= enough) | (jnp.sum(jnp.abs(inside) * model.scale) <= enough)
         stuck = ~done & jnp.all(jnp.abs(state.y_eval - model.y) <= eps * jnp.abs(model.y))
         results = optx.RESULTS
         result = results.where(

@@ -11,7 +11,7 @@ import numpy as np
 
 from pellicle.errors import UsageError
 from pellicle.io.span import number, span
-from pellicle.materials import lookup
+from pellicle.materials import UnknownMaterial, lookup
 from pellicle.optics.dispersion import AbstractDispersion, Cauchy, Constant, Sellmeier, Shifted
 from pellicle.scene import Free
 
@@ -83,7 +83,7 @@ def _known(text: str, what: str) -> AbstractDispersion:
 def _named(text: str, what: str) -> AbstractDispersion:
     match = _CALL.fullmatch(text)
     if match is None or match[1].lower() not in MODELS:
-        return lookup(text)
+        return _catalogued(text)
     name, given = match[1].lower(), match[2]
     if given is None:
         free = {key: Free(None, own.lower, own.upper) for key, own in MODELS[name].items() if own.free}
@@ -95,6 +95,13 @@ def _named(text: str, what: str) -> AbstractDispersion:
             f"{what} {text}: {name} takes 1 to {len(keys)} numbers ({', '.join(keys)}), got {len(values)}"
         )
     return model(name, dict(zip(keys, values, strict=False)))
+
+
+def _catalogued(name: str) -> AbstractDispersion:
+    try:
+        return lookup(name)
+    except UnknownMaterial as error:
+        raise UsageError(str(error)) from None
 
 
 def model(name: str, given: dict[str, Any]) -> AbstractDispersion:

@@ -1,0 +1,235 @@
+"""`pellicle fit`: the result on stdout, talk on stderr, exit codes, folders, several files, Ctrl-C."""
+
+import csv
+import hashlib
+import json
+
+import pytest
+
+from pellicle.fitting import fit as fitting
+
+RESULT_KEYS = [
+    "schema",
+    "data",
+    "status",
+    "verdict",
+    "parameters",
+    "rivals",
+    "chi2_reduced",
+    "rms",
+    "correlation",
+    "plan",
+    "warnings",
+    "versions",
+    "seconds",
+]
+
+
+def test_stdout_is_the_report_and_stderr_the_talk(pellicle, spectrum_file, scene):
+    ran = pellicle("fit", spectrum_file(), *scene)
+    assert ran.code == 0
+    assert "thickness" in ran.out
+    assert "converged" in ran.out
+    assert "unit" not in ran.out.split("[[")[0]
+    assert "signal unit: fraction, assumed" in ran.err
+    assert "±" not in ran.err
+
+
+def test_json_is_one_strict_object_a_line_with_the_contracts_keys(pellicle, spectrum_file, scene):
+    file = spectrum_file()
+    ran = pellicle("fit", file, *scene, "--json")
+    (found,) = ran.objects
+    assert set(RESULT_KEYS) <= set(found)
+    assert found["schema"] == "pellicle.fit/1"
+    assert found["status"] == "converged"
+    assert found["data"] == {
+        "path": str(file),
+        "sha256": hashlib.sha256(file.read_bytes()).hexdigest(),
+        "signal": "R",
+        "points": 100,
+    }
+    thickness = found["parameters"]["thickness"]
+    assert abs(thickness["value"] - 300) < 4 * thickness["stderr"] < 4
+    assert {"value", "stderr", "unit", "lower", "upper", "free"} <= set(thickness)
+    assert (thickness["unit"], thickness["lower"], thickness["upper"]) == ("nm", 10, 800)
+    assert {"effect", "on", "why", "error_bound"} <= set(found["plan"][0])
+    assert found["correlation"]["names"] == ["thickness"]
+    assert all({"parameters", "delta_chi2"} <= set(rival) for rival in found["rivals"])
+    assert {"pellicle", "jax"} <= set(found["versions"])
+
+
+def test_an_infinite_error_is_null(pellicle, spectrum_file):
+    """20 µm of an absorber: no light comes back from below."""
+    flags = ("--layer", "1.46+0.9j", "--substrate", "3.9", "--thickness", "2000:4000", "--noise", "1")
+    (found,) = pellicle("fit", spectrum_file(), *flags, "--json").objects
+    assert found["status"] == "not-identifiable"
+    assert found["parameters"]["thickness"]["stderr"] is None
+
+
+def test_several_files_in_order_and_one_that_cannot_be_read(pellicle, spectrum_file, scene, tmp_path):
+    bad = tmp_path / "bad.csv"
+    bad.write_text("wavelength_nm,R\n400,0.1\n401,much\n")
+    one, two = spectrum_file("one.csv", 250.0), spectrum_file("two.csv", 420.0)
+    ran = pellicle("fit", one, bad, two, *scene, "--json")
+    assert ran.code == 3
+    found = ran.objects
+    assert [f["data"]["path"] for f in found] == [str(one), str(bad), str(two)]
+    assert [f["status"] for f in found] == ["converged", "failed", "converged"]
+    assert "line 3" in found[1]["error"]
+    assert set(RESULT_KEYS) <= set(found[1])
+    assert "line 3" in ran.err
+    assert "Traceback" not in ran.err
+    thickness = [f["parameters"]["thickness"]["value"] for f in (found[0], found[2])]
+    assert abs(thickness[0] - 250) < 1
+    assert abs(thickness[1] - 420) < 1
+
+
+def test_no_clear_answer_is_4(pellicle, spectrum_file):
+    ran = pellicle(
+        "fit", spectrum_file(), "--layer", "1.46", "--substrate", "3.9+0.02j", "--thickness", "10:250"
+    )
+    assert ran.code == 4
+    assert "converged" not in ran.out
+
+
+def test_the_assumed_thickness_is_said(pellicle, spectrum_file):
+    ran = pellicle("fit", spectrum_file(), "--layer", "1.46", "--substrate", "3.9+0.02j", "--json")
+    assert "1 to 5000 nm" in ran.err
+    assert ran.objects[0]["parameters"]["thickness"]["upper"] == 5000
+
+
+FILES = {"report.txt", "result.json", "figure.png", "fit.csv", "nk.csv"}
+
+
+def test_out_writes_the_five_files(pellicle, spectrum_file, scene, tmp_path):
+    out = tmp_path / "results" / "oxide"
+    ran = pellicle("fit", spectrum_file(), *scene, "--out", out)
+    assert ran.code == 0
+    assert {p.name for p in out.iterdir()} == FILES
+    assert json.loads((out / "result.json").read_text())["status"] == "converged"
+    assert (out / "report.txt").read_text().strip() == ran.out.strip()
+    assert (out / "figure.png").read_bytes().startswith(b"\x89PNG")
+    assert str(out) in ran.err
+    again = pellicle("fit", spectrum_file(), *scene, "--out", out)
+    assert again.code == 0  # a folder of pellicle's own is written anew
+
+
+def test_several_files_get_a_folder_each_and_a_summary(pellicle, spectrum_file, scene, tmp_path):
+    out = tmp_path / "all"
+    files = spectrum_file("one.csv", 250.0), spectrum_file("two.csv", 420.0), tmp_path / "gone.csv"
+    assert pellicle("fit", *files, *scene, "--out", out).code == 3
+    assert {p.name for p in (out / "one").iterdir()} == FILES
+    assert {p.name for p in (out / "two").iterdir()} == FILES
+    assert not (out / "gone").exists()
+    lines = (out / "summary.csv").read_text().splitlines()
+    rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+    assert [row["path"] for row in rows] == [str(f) for f in files]
+    assert [row["status"] for row in rows] == ["converged", "converged", "failed"]
+    assert abs(float(rows[1]["thickness"]) - 420) < 1
+    assert "no such file" in rows[2]["error"]
+
+
+def test_a_folder_with_a_users_files_is_refused_before_anything_is_fitted(
+    pellicle, spectrum_file, scene, tmp_path, monkeypatch
+):
+    out = tmp_path / "mine"
+    out.mkdir()
+    (out / "thesis.txt").write_text("years of work")
+
+    def never(*_, **__):
+        raise AssertionError("fitted for nothing")
+
+    monkeypatch.setattr(fitting, "fit", never)
+    for files in ([spectrum_file()], [spectrum_file("a.csv"), spectrum_file("b.csv")]):
+        ran = pellicle("fit", *files, *scene, "--out", out)
+        assert ran.code == 2
+        assert "pellicle did not write" in ran.err
+        assert [p.name for p in out.iterdir()] == ["thesis.txt"]
+
+
+def test_nothing_is_written_where_the_fit_fails(pellicle, scene, tmp_path):
+    bad = tmp_path / "bad.csv"
+    bad.write_text("wavelength_nm,R\n400,0.1\n401,much\n")
+    out = tmp_path / "out"
+    assert pellicle("fit", bad, *scene, "--out", out).code == 3
+    assert not out.exists() or not list(out.iterdir())
+
+
+def test_ctrl_c_keeps_what_is_done(pellicle, spectrum_file, scene, tmp_path, monkeypatch):
+    real, calls = fitting.fit, []
+
+    def interrupted(*arguments, **options):
+        calls.append(arguments)
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+        return real(*arguments, **options)
+
+    monkeypatch.setattr(fitting, "fit", interrupted)
+    files = [spectrum_file(f"{name}.csv") for name in ("one", "two", "three")]
+    ran = pellicle("fit", *files, *scene, "--json", "--out", tmp_path / "out")
+    assert ran.code == 130
+    assert "interrupted after 1 of 3" in ran.err
+    assert [f["status"] for f in ran.objects] == ["converged"]
+    assert {p.name for p in (tmp_path / "out" / "one").iterdir()} == FILES
+    assert not (tmp_path / "out" / "two").exists()
+    assert "one.csv" in (tmp_path / "out" / "summary.csv").read_text()
+
+
+RECIPE = """
+[data]
+files = ["oxide.csv"]
+
+[scene]
+substrate = "3.9+0.02j"
+
+[[scene.layer]]
+name = "oxide"
+material = 1.46
+thickness = { lower = 10, upper = 800 }
+"""
+
+
+def test_a_recipe_gives_what_the_flags_give(pellicle, spectrum_file, scene, tmp_path):
+    file, recipe = spectrum_file(), tmp_path / "film.toml"
+    recipe.write_text(RECIPE)
+    (by_recipe,) = pellicle("fit", "--recipe", recipe, "--json").objects
+    (by_flags,) = pellicle("fit", file, *scene, "--json").objects
+    (named,) = pellicle("fit", file, "--recipe", recipe, "--json").objects
+    for found in (by_recipe, by_flags, named):
+        found.pop("seconds")
+    assert by_recipe == by_flags == named
+
+
+def test_flags_that_describe_the_scene_are_refused_beside_a_recipe(pellicle, tmp_path):
+    recipe = tmp_path / "film.toml"
+    recipe.write_text(RECIPE)
+    ran = pellicle("fit", "--recipe", recipe, "--layer", "SiO2")
+    assert ran.code == 2
+    assert "--layer" in ran.err
+
+
+@pytest.mark.parametrize("noise", [0.002, 0.004])
+def test_noise_is_absolute(pellicle, spectrum_file, scene, noise):
+    (found,) = pellicle("fit", spectrum_file(), *scene, "--noise", noise, "--json").objects
+    assert found["chi2_reduced"] == pytest.approx((0.002 / noise) ** 2, rel=0.3)
+
+
+def test_flags_reach_the_scene(pellicle, spectrum_file):
+    """Angle, polarisation, range, ambient: each changes what is simulated, or it would be a decoration."""
+    base = ("--layer", "1.46", "--substrate", "3.9+0.02j", "--thickness", "280:320", "--json")
+    file = spectrum_file()
+    plain = pellicle("fit", file, *base).objects[0]["parameters"]["thickness"]["value"]
+    for flags in (
+        ("--angle", "30", "--polarisation", "s"),
+        ("--ambient", "1.1"),
+        ("--range", "450:700"),
+    ):
+        (found,) = pellicle("fit", file, *base, *flags).objects
+        assert found["parameters"]["thickness"]["value"] != plain, flags
+    (plate,) = pellicle("fit", file, *base, "--back", "air", "--plate-mm", "0.5").objects
+    assert "The back face" in plate["verdict"]
+    freed = pellicle("fit", file, *base, "--free", "n=1.4:1.5", "--scale", "free", "--offset", "free")
+    p = freed.objects[0]["parameters"]
+    assert (p["n"]["lower"], p["n"]["upper"], p["n"]["free"]) == (1.4, 1.5, True)
+    assert p["instrument.scale"]["free"]
+    assert p["instrument.offset"]["free"]

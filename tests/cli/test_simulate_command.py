@@ -1,0 +1,94 @@
+"""`pellicle simulate`: a file that says what it is, and whose fit finds the truth."""
+
+import numpy as np
+import pytest
+
+RECIPE = """
+[data]
+signal = "R"
+noise = 0.002
+wavelengths = { start = 400, stop = 796, step = 4 }
+
+[scene]
+substrate = "3.9+0.02j"
+
+[[scene.layer]]
+name = "oxide"
+material = 1.46
+thickness = { value = 321.5, lower = 10, upper = 800 }
+"""
+
+
+@pytest.fixture
+def recipe(tmp_path):
+    path = tmp_path / "film.toml"
+    path.write_text(RECIPE)
+    return path
+
+
+def numbers(path):
+    return np.loadtxt(path, delimiter=",", skiprows=5)
+
+
+def test_the_file_says_what_it_is_and_its_fit_finds_the_truth(pellicle, recipe, tmp_path):
+    out = tmp_path / "film.csv"
+    ran = pellicle("simulate", recipe, "--out", out, "--seed", 7)
+    assert (ran.code, ran.out) == (0, "")
+    text = out.read_text()
+    head = [line for line in text.splitlines() if line.startswith("#")]
+    assert "SYNTHETIC" in head[0]
+    assert "recipe film.toml, seed 7, noise 0.002" in head[1]
+    assert "thickness = 321.5 nm" in head[3]
+    assert numbers(out).shape == (100, 3)
+    (found,) = pellicle("fit", out, "--recipe", recipe, "--json").objects
+    thickness = found["parameters"]["thickness"]
+    assert found["status"] == "converged"
+    assert abs(thickness["value"] - 321.5) < 4 * thickness["stderr"] < 2
+
+
+def test_noise_and_seed(pellicle, recipe, tmp_path):
+    def made(name, *flags):
+        pellicle("simulate", recipe, "--out", tmp_path / name, *flags)
+        return numbers(tmp_path / name)
+
+    clean = made("clean.csv", "--noise", 0)
+    assert clean.shape == (100, 2)
+    one, same, other = made("a.csv", "--seed", 1), made("b.csv", "--seed", 1), made("c.csv", "--seed", 2)
+    np.testing.assert_array_equal(one, same)
+    assert np.std((one - other)[:, 1]) > 0.001
+    assert 0.0015 < np.std(one[:, 1] - clean[:, 1]) < 0.0025
+    loud = made("d.csv", "--noise", 0.02)
+    assert 0.015 < np.std(loud[:, 1] - clean[:, 1]) < 0.025
+
+
+def test_an_existing_file_is_kept(pellicle, recipe, tmp_path):
+    (tmp_path / "film.csv").write_text("mine")
+    ran = pellicle("simulate", recipe, "--out", tmp_path / "film.csv")
+    assert ran.code == 2
+    assert "not overwritten" in ran.err
+    assert (tmp_path / "film.csv").read_text() == "mine"
+
+
+def test_default_wavelengths_are_said(pellicle, recipe, tmp_path):
+    recipe.write_text(RECIPE.replace("wavelengths = { start = 400, stop = 796, step = 4 }\n", ""))
+    ran = pellicle("simulate", recipe, "--out", tmp_path / "film.csv")
+    assert "380 to 780 nm every 2 nm" in ran.err
+    assert len(numbers(tmp_path / "film.csv")) == 201
+
+
+@pytest.mark.parametrize(
+    ("grid", "said"),
+    [("[500, 400]", "rising"), ("{ start = 700, stop = 400, step = 2 }", "wavelengths"), ("[400]", "two")],
+)
+def test_bad_wavelengths(pellicle, recipe, tmp_path, grid, said):
+    recipe.write_text(RECIPE.replace("{ start = 400, stop = 796, step = 4 }", grid))
+    ran = pellicle("simulate", recipe, "--out", tmp_path / "film.csv")
+    assert ran.code == 3
+    assert said in ran.err
+    assert not (tmp_path / "film.csv").exists()
+
+
+def test_negative_noise(pellicle, recipe, tmp_path):
+    ran = pellicle("simulate", recipe, "--out", tmp_path / "film.csv", "--noise", -1)
+    assert ran.code == 2
+    assert "--noise" in ran.err
