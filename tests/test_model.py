@@ -75,8 +75,8 @@ def test_a_model_is_the_front_door(name):
     function = pl.reflectance if thing.light.signal == "R" else pl.transmittance
     direct = function(
         WAVELENGTH,
-        thing.layer.thickness,
-        thing.layer.material,
+        thing.layers[0].thickness,
+        thing.layers[0].material,
         thing.substrate.material,
         ambient=thing.ambient,
         angle=thing.light.angle,

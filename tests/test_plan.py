@@ -27,10 +27,12 @@ def scene(layer=1.46, substrate=3.9 + 0.02j, thickness=300.0, ambient=1.0, instr
 
 BANDWIDTH = pl.Instrument(bandwidth=5.0)
 TABLE = [
-    ("absorption", False, "no extinction", scene()),
-    ("absorption", False, "no extinction", scene(pl.Constant(1.46, 0.0))),
-    ("absorption", False, "no extinction", scene(pl.Cauchy(pl.Free(lower=1.4, upper=1.6)))),
+    ("absorption", False, "no layer has any extinction", scene()),
+    ("absorption", False, "no layer has any extinction", scene(pl.Constant(1.46, 0.0))),
+    ("absorption", False, "no layer has any extinction", scene(pl.Cauchy(pl.Free(lower=1.4, upper=1.6)))),
     ("absorption", True, "extinction is free, or not zero", scene(1.46 + 0.1j)),
+    ("stack", False, "one layer", scene()),
+    ("stack", True, "2 coherent layers", pl.Scene([pl.Layer(1.46, 10.0), pl.Layer(2.0, 20.0)], 1.5)),
     ("absorption", True, "extinction is free, or not zero", scene(pl.Constant(1.46, FREE_K))),
     ("absorption", True, "extinction is free, or not zero", scene(pl.Shifted(pl.Constant(1.46), k=FREE_K))),
     ("tunnelling", False, "normal incidence", scene()),

@@ -11,11 +11,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
 from pellicle.optics import orders
-from pellicle.optics.number import abs2
+from pellicle.optics.dispersion import AbstractDispersion, Sampled
+from pellicle.optics.number import abs2, real
 from pellicle.scene import Free, Scene, absorbs, free_leaves, insert, start_values
 
 
@@ -45,9 +47,16 @@ def _zero(number: Any) -> bool:
 
 
 def _absorption(scene: Scene) -> Row:
-    if absorbs(scene.layer.material):
-        return Row("absorption", True, "the layer's extinction is free, or not zero")
-    return Row("absorption", False, "the layer has no extinction, and none is free")
+    if any(absorbs(layer.material) for layer in scene.layers):
+        return Row("absorption", True, "a layer's extinction is free, or not zero")
+    return Row("absorption", False, "no layer has any extinction, and none is free")
+
+
+def _stack(scene: Scene) -> Row:
+    count = len(scene.layers)
+    if count > 1:
+        return Row("stack", True, f"{count} coherent layers: a product of characteristic matrices")
+    return Row("stack", False, "one layer: its closed form")
 
 
 def _oblique(scene: Scene) -> Row:
@@ -64,11 +73,16 @@ def _tunnelling(scene: Scene) -> Row:
     """Off where every real index is provably above n₀ sin θ: then its root needs no branch."""
     if _zero(scene.light.angle):
         return Row("tunnelling", False, "normal incidence: every wave propagates")
-    media = {"layer": scene.layer.material, "substrate": scene.substrate.material}
+    media = {_name(scene, i): layer.material for i, layer in enumerate(scene.layers)}
+    media["substrate"] = scene.substrate.material
     unsure = [name for name, m in media.items() if not absorbs(m) and not _propagates(m, scene)]
     if unsure:
         return Row("tunnelling", True, f"total reflection in the {' and '.join(unsure)} is not ruled out")
     return Row("tunnelling", False, "no real index can fall below n₀ sin θ")
+
+
+def _name(scene: Scene, position: int) -> str:
+    return "layer" if len(scene.layers) == 1 else scene.layers[position].name or f"layer{position + 1}"
 
 
 def _propagates(material, scene: Scene) -> bool:
@@ -119,10 +133,47 @@ def _orders(scene: Scene) -> Row:
         return Row("orders", False, "the closed form sums all orders")
     if scene.light.wavelength is None:
         raise ValueError("the number of orders depends on the wavelengths: give the light its wavelengths")
+    if len(scene.layers) > 1:
+        return _quadrature(scene)
     ratio = float(np.clip(largest_ratio(scene), 1e-12, 0.999))
     count = int(np.clip(np.ceil(np.log(ORDERS_ERROR * (1 - ratio)) / np.log(ratio)), 1, MOST_ORDERS))
     left = 2 * ratio**count / (1 - ratio)
     return Row("orders", True, f"|q| ≤ {ratio:.2g} over the bounds: {count} orders", min(left, 1.0), count)
+
+
+NODES = 15
+"""Wavelengths that stand for the bandwidth where a stack has no series to damp."""
+
+
+def _quadrature(scene: Scene) -> Row:
+    """The error on a fringe of the thickest stack the bounds allow, for every blur up to theirs."""
+    wavelength = float(np.min(scene.light.wavelength))
+    at = np.asarray(scene.light.wavelength, dtype=float)
+    thickness = sum(_upper(layer.thickness) * largest_index(layer.material, at) for layer in scene.layers)
+    blur = 4 * np.pi * thickness / wavelength**2 * _upper(scene.instrument.bandwidth) / orders.FWHM
+    nodes, weights = np.polynomial.hermite.hermgauss(NODES)
+    sigma = np.linspace(0.0, blur, 200)
+    kept = np.cos(np.sqrt(2) * sigma[:, None] * nodes) @ weights / np.sqrt(np.pi)
+    error = float(np.max(np.abs(kept - np.exp(-0.5 * sigma**2))))
+    return Row("orders", True, f"a stack is averaged over {NODES} wavelengths of the bandwidth", error, NODES)
+
+
+def _upper(number: Any) -> float:
+    return float(number.upper if isinstance(number, Free) else number or 0.0)
+
+
+@jax.jit
+def _real_index(material: AbstractDispersion, wavelength: Any) -> Any:
+    return real(material.index(wavelength))
+
+
+def largest_index(material: AbstractDispersion, wavelength: np.ndarray) -> float:
+    """The largest real index at these wavelengths (nm) over the corners of the bounds (at most 64)."""
+    if isinstance(material, Sampled):
+        return float(np.max(np.asarray(real(material.value))))
+    free = [leaf for _, leaf in free_leaves(material)]
+    corners = itertools.islice(itertools.product(*[(f.lower, f.upper) for f in free]), 64)
+    return max(float(np.nanmax(_real_index(insert(material, c), wavelength))) for c in corners)
 
 
 def largest_ratio(scene: Scene) -> float:
@@ -138,7 +189,7 @@ def largest_ratio(scene: Scene) -> float:
 def _ratio(scene: Scene) -> float:
     at = jnp.asarray(scene.light.wavelength, dtype=float)
     angle = None if _zero(scene.light.angle) else jnp.deg2rad(scene.light.angle)
-    layer, substrate = scene.layer.material(at), scene.substrate.material(at)
+    layer, substrate = scene.layers[0].material(at), scene.substrate.material(at)
     ambient = scene.ambient.index(at)
     series = [
         orders.bounces(ambient, layer, substrate, 0.0 * at, angle, p)
@@ -149,6 +200,7 @@ def _ratio(scene: Scene) -> float:
 
 EFFECTS = (
     Effect("absorption", _absorption),
+    Effect("stack", _stack),
     Effect("tunnelling", _tunnelling),
     Effect("oblique", _oblique),
     Effect("polarisation", _polarisation),

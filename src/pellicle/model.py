@@ -11,11 +11,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.optics import film, interface, orders, plate
+from pellicle.materials import materials_in
+from pellicle.optics import film, interface, orders, plate, stack
 from pellicle.optics.dispersion import AbstractDispersion, Sampled
 from pellicle.optics.number import Number, imag, real, sincos_poly
 from pellicle.planning import Plan
-from pellicle.scene import Scene, free_leaves
+from pellicle.scene import Layer, Scene, free_leaves
 
 Simulate = Callable[[Scene], Any]
 
@@ -30,9 +31,8 @@ def sample(dispersion: AbstractDispersion, wavelength: np.ndarray, slope: bool =
 
     Raises ValueError where a material has no data, naming it and the wavelengths.
     """
-    check = getattr(dispersion, "check_range", None)
-    if check is not None:
-        check(wavelength)
+    for material in materials_in(dispersion):
+        material.check_range(wavelength)
     if free_leaves(dispersion):
         return dispersion
     index, rate = jax.device_get(_index_and_slope(dispersion, wavelength))
@@ -45,15 +45,12 @@ def sampled(scene: Scene, slope: bool = True) -> Scene:
     A fit then compiles one program for all tables, and evaluates them once.
     """
     wavelength = np.asarray(scene.light.wavelength, dtype=float)
-    media = [scene.layer.material, scene.substrate.material, scene.ambient]
-    scene = eqx.tree_at(
-        lambda s: [s.layer.material, s.substrate.material, s.ambient],
-        scene,
-        [sample(m, wavelength, slope) for m in media],
-    )
-    if scene.substrate.back is None:
-        return scene
-    return eqx.tree_at(lambda s: s.substrate.back, scene, sample(scene.substrate.back, wavelength, slope))
+
+    def media(s: Scene) -> list[AbstractDispersion]:
+        back = [] if s.substrate.back is None else [s.substrate.back]
+        return [*(layer.material for layer in s.layers), s.substrate.material, s.ambient, *back]
+
+    return eqx.tree_at(media, scene, [sample(m, wavelength, slope) for m in media(scene)])
 
 
 @lru_cache(maxsize=64)
@@ -62,7 +59,7 @@ def build(plan: Plan) -> Simulate:
 
     `scene` holds numbers only (see `scene.insert`). The function is pure and can be traced.
     """
-    faces = _windowed_faces if plan.on("coherence") else _coherent_faces
+    faces = _windowed_faces if plan.on("coherence") and not plan.on("stack") else _coherent_faces
     finish = _with_back if plan.on("back-face") else _half_space
 
     def simulate(scene: Scene):
@@ -70,7 +67,25 @@ def build(plan: Plan) -> Simulate:
         signals = [finish(plan, optics, p, faces(plan, optics, p)) for p in _polarisations(plan)]
         return signals[0] if len(signals) == 1 else 0.5 * (signals[0] + signals[1])
 
-    return simulate
+    averaged = plan.on("coherence") and plan.on("stack")
+    return _averaged(simulate, plan.row("orders").count) if averaged else simulate
+
+
+def _averaged(simulate: Simulate, count: int) -> Simulate:
+    """The same over the spectrometer's bandwidth, by Gauss-Hermite quadrature in wavelength."""
+    nodes, weights = np.polynomial.hermite.hermgauss(count)
+
+    def average(scene: Scene):
+        bandwidth: Any = scene.instrument.bandwidth
+        width = bandwidth / orders.FWHM * np.sqrt(2)
+
+        def at(node):
+            shifted = scene.light.wavelength + node * width
+            return simulate(eqx.tree_at(lambda s: s.light.wavelength, scene, shifted))
+
+        return jnp.asarray(weights / np.sqrt(np.pi)) @ jax.vmap(at)(jnp.asarray(nodes))
+
+    return average
 
 
 def _polarisations(plan: Plan) -> str:
@@ -86,13 +101,13 @@ class _Optics:
         self.scene, self.wavelength = scene, scene.light.wavelength
         self.angle = jnp.deg2rad(scene.light.angle) if plan.on("oblique") else None
         self.ambient = scene.ambient.index(self.wavelength)
-        self.layer = self.layer_at(plan, self.wavelength)
+        self.layers = [self.layer_at(plan, layer, self.wavelength) for layer in scene.layers]
         free_root = interface.allow_tunnelling if plan.on("tunnelling") else _unchanged
         self.substrate = free_root(scene.substrate.material.index(self.wavelength))
-        self.phase = 2 * jnp.pi / self.wavelength * scene.layer.thickness
+        self.phases = [2 * jnp.pi / self.wavelength * layer.thickness for layer in scene.layers]
 
-    def layer_at(self, plan: Plan, wavelength) -> Number:
-        index = self.scene.layer.material.index(wavelength)
+    def layer_at(self, plan: Plan, layer: Layer, wavelength) -> Number:
+        index = layer.material.index(wavelength)
         return index if plan.on("absorption") else real(index)
 
 
@@ -101,18 +116,8 @@ def _unchanged(index: Number) -> Number:
 
 
 def _coherent_faces(plan: Plan, optics: _Optics, polarisation: str) -> dict[str, Any]:
-    """Functions that give the layer's power coefficients; one that is not called costs nothing."""
-    real_wave = not plan.on("absorption") and not plan.on("tunnelling")
-    (wave,) = film.film(
-        optics.ambient,
-        optics.layer,
-        optics.substrate,
-        optics.phase,
-        optics.angle,
-        polarisation,
-        through=film.through_wave if real_wave else film.through,
-        sincos=sincos_poly,
-    )
+    """Functions that give the layers' power coefficients; one that is not called costs nothing."""
+    wave = _wave(plan, optics, polarisation)
     return {
         "R": partial(film.reflectance, wave),
         "T": partial(film.transmittance, wave),
@@ -120,10 +125,36 @@ def _coherent_faces(plan: Plan, optics: _Optics, polarisation: str) -> dict[str,
     }
 
 
+def _wave(plan: Plan, optics: _Optics, polarisation: str) -> film.Wave:
+    if plan.on("stack"):
+        (wave,) = stack.stack(
+            optics.ambient,
+            optics.layers,
+            optics.substrate,
+            optics.phases,
+            optics.angle,
+            polarisation,
+            sincos=sincos_poly,
+        )
+        return wave
+    real_wave = not plan.on("absorption") and not plan.on("tunnelling")
+    (wave,) = film.film(
+        optics.ambient,
+        optics.layers[0],
+        optics.substrate,
+        optics.phases[0],
+        optics.angle,
+        polarisation,
+        through=film.through_wave if real_wave else film.through,
+        sincos=sincos_poly,
+    )
+    return wave
+
+
 def _windowed_faces(plan: Plan, optics: _Optics, polarisation: str) -> dict[str, Any]:
     """The same, order by order through the instrument's window."""
-    layer = interface.allow_tunnelling(optics.layer) if plan.on("tunnelling") else optics.layer
-    b = orders.bounces(optics.ambient, layer, optics.substrate, optics.phase, optics.angle, polarisation)
+    layer = interface.allow_tunnelling(optics.layers[0]) if plan.on("tunnelling") else optics.layers[0]
+    b = orders.bounces(optics.ambient, layer, optics.substrate, optics.phases[0], optics.angle, polarisation)
     window = orders.gaussian(_blur(plan, optics))
     count = plan.row("orders").count
     back = orders.reversed_bounces(b)
@@ -140,12 +171,12 @@ def _blur(plan: Plan, optics: _Optics):
 
     def cosine_index(wavelength):
         a, _ = interface.transverse(scene.ambient.index(wavelength), optics.angle)
-        layer = optics.layer_at(plan, wavelength)
+        layer = optics.layer_at(plan, scene.layers[0], wavelength)
         layer = interface.allow_tunnelling(layer) if plan.on("tunnelling") else layer
         return real(interface.normal(layer, a))
 
     def phase(wavelength):
-        return 4 * jnp.pi / wavelength * cosine_index(wavelength) * scene.layer.thickness
+        return 4 * jnp.pi / wavelength * cosine_index(wavelength) * scene.layers[0].thickness
 
     _, slope = jax.jvp(phase, (optics.wavelength,), (jnp.ones_like(optics.wavelength),))
     bandwidth = 0.0 if instrument.bandwidth is None else instrument.bandwidth

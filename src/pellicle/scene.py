@@ -229,13 +229,15 @@ def _layers(what: Layer | Sequence[Layer]) -> tuple[Layer, ...]:
 
 @final
 class Scene(eqx.Module):
-    """A layer on a substrate, the medium it is seen from, the light and the instrument.
+    """Layers on a substrate, the medium they are seen from, the light and the instrument.
+
+    `layers` is one `Layer`, or several from the ambient down.
 
     ```python
     pl.Scene(pl.Layer("SiO2", thickness=pl.Free(lower=10, upper=3000)), substrate="Si")
     ```
 
-    Raises ValueError where the ambient absorbs, or where there is not exactly one layer.
+    Raises ValueError where the ambient absorbs, or where there is no layer.
     """
 
     layers: tuple[Layer, ...] = eqx.field(converter=_layers)
@@ -245,14 +247,12 @@ class Scene(eqx.Module):
     instrument: Instrument = Instrument()
 
     def __check_init__(self):
-        if len(self.layers) != 1:
-            raise ValueError(f"a scene holds exactly one layer for now, got {len(self.layers)}")
+        if not self.layers:
+            raise ValueError("a scene needs at least one layer; a bare surface is a layer of thickness 0")
+        if len(self.layers) > 1 and self.instrument.thickness_spread is not None:
+            raise ValueError("thickness_spread is known for one layer only: leave it out of a stack")
         if absorbs(self.ambient):
             raise ValueError("the ambient must not absorb: give it a real index")
-
-    @property
-    def layer(self) -> Layer:
-        return self.layers[0]
 
 
 def with_wavelength(scene: Scene, wavelength: Any, angle: Any = None) -> Scene:

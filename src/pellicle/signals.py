@@ -15,7 +15,7 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Float
 
-from pellicle.optics import film, interface
+from pellicle.optics import film, interface, stack
 from pellicle.optics.dispersion import AbstractDispersion
 from pellicle.optics.number import Number, is_real, sincos_poly, to_pair
 from pellicle.scene import check_polarisation, medium
@@ -38,7 +38,8 @@ def reflectance(
 
     **Arguments:** `wavelength` and `thickness` in nm, `angle` of incidence in degrees, all of any
     shape; `layer` and `substrate` as numbers n + ik (k ≥ 0 absorbs), arrays, materials or names;
-    `ambient` real; `polarisation` "s", "p" or "unpolarised" (the mean of both).
+    `ambient` real; `polarisation` "s", "p" or "unpolarised" (the mean of both). For several coherent
+    layers `layer` is a list from the ambient down and `thickness` a list as long.
 
     **Raises:** ValueError for an absorbing ambient, an unknown polarisation or material, and
     wavelengths outside a material's data. Under `jit`, where wavelengths are unknown, the result is
@@ -84,21 +85,35 @@ def _waves(wavelength, thickness, layer, substrate, ambient, angle, polarisation
     _warn_of_lost_precision(wavelength, thickness, layer, substrate, ambient, angle)
     wavelength = _floating(wavelength)
     normal = isinstance(angle, int | float) and angle == 0
-    layer, substrate, ambient = (_index(m, wavelength) for m in (layer, substrate, ambient))
+    substrate, ambient = _index(substrate, wavelength), _index(ambient, wavelength)
     if not is_real(ambient):
         raise ValueError("the ambient must not absorb: give it a real index")
     if not normal:
         substrate = interface.allow_tunnelling(substrate)
+    theta = None if normal else jnp.deg2rad(_floating(angle))
+    letters = "sp" if polarisation == "unpolarised" else polarisation
+    if isinstance(layer, list | tuple):
+        return _stack_waves(wavelength, thickness, layer, substrate, ambient, theta, letters)
+    layer = _index(layer, wavelength)
     return film.film(
         ambient,
         layer,
         substrate,
         2 * jnp.pi / wavelength * thickness,
-        None if normal else jnp.deg2rad(_floating(angle)),
-        "sp" if polarisation == "unpolarised" else polarisation,
+        theta,
+        letters,
         through=film.through_wave if normal and is_real(layer) else film.through,
         sincos=sincos_poly,
     )
+
+
+def _stack_waves(wavelength, thickness, layers, substrate, ambient, theta, letters):
+    count = len(thickness) if isinstance(thickness, list | tuple) else np.shape(thickness)[:1]
+    if count not in (len(layers), (len(layers),)):
+        raise ValueError(f"thickness: expected one for each of {len(layers)} layers, got {count}")
+    phases = [2 * jnp.pi / wavelength * thickness[i] for i in range(len(layers))]
+    indices = [_index(n, wavelength) for n in layers]
+    return stack.stack(ambient, indices, substrate, phases, theta, letters, sincos=sincos_poly)
 
 
 def _floating(x: Any):

@@ -14,7 +14,7 @@ from pellicle.scene import Free, Layer, Normal, Scene, free_leaves, insert, is_f
 _UNITS = {"thickness": "nm", "bandwidth": "nm", "thickness_spread": "nm", "plate_mm": "mm", "angle": "deg"}
 _MODEL_UNITS = {"B": "nm^2", "C": "nm^4", "C1": "nm^2", "C2": "nm^2", "C3": "nm^2"}
 _NATURAL_ZERO = ("k", "bandwidth", "thickness_spread", "offset")
-_SEARCHED = ("n", "A", "B", "k", "B1")
+_SEARCHED = ("thickness", "n", "A", "B", "k", "B1")
 """Parameters that change where the fringes lie, or whether there are any: a start in the middle fails."""
 
 

@@ -8,13 +8,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from pellicle.effects import largest_index
 from pellicle.fitting import nuisance
 from pellicle.fitting.nuisance import Data
 from pellicle.fitting.parameters import Parameter, anonymous, bounds, parameters
 from pellicle.fitting.programs import kept
 from pellicle.model import build, sampled
 from pellicle.planning import Plan, plan
-from pellicle.scene import Scene, insert, with_wavelength
+from pellicle.scene import Scene, free_leaves, insert, with_wavelength
 
 _ROUND = 64
 """Spectra are padded to a multiple of this, so that files of nearly one length share a program."""
@@ -41,12 +42,13 @@ class Problem(NamedTuple):
     box: Box
     parameters: tuple[Parameter, ...]
     points: int
+    largest_index: float
 
     @property
     def thickness_axis(self) -> int | None:
-        """Which parameter is the thickness, None where it is fixed."""
-        keys = [p.key for p in self.parameters]
-        return keys.index("thickness") if "thickness" in keys else None
+        """Which thickness is scanned finely: the one with the widest bounds, None where all are fixed."""
+        spans = {i: p.upper - p.lower for i, p in enumerate(self.parameters) if p.key == "thickness"}
+        return max(spans, key=lambda i: spans[i]) if spans else None
 
     @property
     def program(self) -> tuple[Any, ...]:
@@ -80,7 +82,9 @@ def make(scene: Scene, wavelength, values, sigma, temper: float) -> Problem:
         np.array([p.prior.mean if p.prior else 0.0 for p in free]),
         np.array([1 / p.prior.sd if p.prior else 0.0 for p in free]),
     )
-    return Problem(chosen, anonymous(sampled(scene, chosen.on("coherence"))), data, box, free, points)
+    scene = sampled(scene, chosen.on("coherence"))
+    steepest = max(largest_index(layer.material, wavelength) for layer in scene.layers)
+    return Problem(chosen, anonymous(scene), data, box, free, points, steepest)
 
 
 def _pad(x: np.ndarray, extra: int) -> np.ndarray:
@@ -162,14 +166,20 @@ class Local(NamedTuple):
     layer_slope: Any  # their derivatives, (2, points, parameters)
 
 
+def shown_layer(scene: Scene) -> int:
+    """Which layer's n and k are reported: the first with free numbers of its own, else the uppermost."""
+    free = [i for i, layer in enumerate(scene.layers) if free_leaves(layer.material)]
+    return free[0] if free else 0
+
+
 @kept
 def local(plan: Plan, scene: Scene, data: Data, box: Box, unit: Any) -> Local:
     """Signal, its Jacobian, and the layer's index at one point of the box."""
-    simulate = build(plan)
+    simulate, shown = build(plan), shown_layer(scene)
 
     def both(values):
         numbers = insert(scene, list(values))
-        index = numbers.layer.material(numbers.light.wavelength)
+        index = numbers.layers[shown].material(numbers.light.wavelength)
         return simulate(numbers), jnp.stack([index.real, index.imag])
 
     values = box.values(unit)

@@ -10,16 +10,12 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import jax
 import numpy as np
 
 from pellicle.fitting.parameters import Parameter
 from pellicle.fitting.problem import Problem, evidences, polish, thin
-from pellicle.optics.dispersion import AbstractDispersion, Sampled
-from pellicle.optics.number import real
-from pellicle.scene import insert
 
 Progress = Callable[[str, int, int], None]
 """Called with what is being done, how much is done and how much there is."""
@@ -34,6 +30,7 @@ SCAN_POINTS = 448
 _CHUNK = 256
 LANES = 16
 _MOST_STEPS = 4000
+_MOST_DESIGNS = 1200
 
 
 @dataclass(frozen=True)
@@ -105,48 +102,38 @@ def _thickness_grid(problem: Problem) -> np.ndarray:
     if problem.thickness_axis is None:
         return np.zeros(0)
     p = problem.parameters[problem.thickness_axis]
-    step = problem.scene.light.wavelength.min() / (8 * _largest_index(problem))
+    step = problem.scene.light.wavelength.min() / (8 * problem.largest_index)
     count = int(np.clip(np.ceil((p.upper - p.lower) / step) + 1, 9, _MOST_STEPS))
     return np.linspace(0.0, 1.0, count)
 
 
-@jax.jit
-def _index(material: AbstractDispersion, wavelength: Any) -> Any:
-    return real(material.index(wavelength))
-
-
-def _largest_index(problem: Problem) -> float:
-    """The layer's largest real index over the corners of its bounds (at most 64)."""
-    material, wavelength = problem.scene.layer.material, problem.scene.light.wavelength
-    own = [
-        p for p in problem.parameters if p.name.split(".")[0] not in ("substrate", "instrument", "ambient")
-    ]
-    own = [p for p in own if p.key not in ("thickness", "angle")]
-    if isinstance(material, Sampled):
-        return float(np.max(np.asarray(real(material.value))))
-    corners = itertools.islice(itertools.product(*[(p.lower, p.upper) for p in own]), 64)
-    return max(float(np.max(_index(insert(material, c), wavelength))) for c in corners)
-
-
 def _design(problem: Problem) -> np.ndarray:
-    """A few values of every other parameter, as points of the unit cube."""
-    levels = [
-        np.zeros(1) if i == problem.thickness_axis else _levels(p, problem)
-        for i, p in enumerate(problem.parameters)
-    ]
+    """A few values of every parameter but the scanned thickness, as points of the unit cube."""
+    levels = [_levels(p, problem) for p in problem.parameters]
+    if problem.thickness_axis is not None:
+        levels[problem.thickness_axis] = np.zeros(1)
+    while np.prod([len(level) for level in levels]) > _MOST_DESIGNS:
+        longest = max(range(len(levels)), key=lambda i: len(levels[i]))
+        levels[longest] = _even(len(levels[longest]) - 1)
     return np.array(list(itertools.product(*levels))).reshape(-1, len(levels))
 
 
+def _even(count: int) -> np.ndarray:
+    return (np.arange(count) + 0.5) / count
+
+
 def _levels(p: Parameter, problem: Problem) -> np.ndarray:
-    start = np.array([(p.value - p.lower) / (p.upper - p.lower)])
     if not p.searched:
-        return start
+        return np.array([(p.value - p.lower) / (p.upper - p.lower)])
     if p.key == "k":
         return np.array([0.001, 0.01, 0.05, 0.15, 0.4])
-    count = int(np.clip(np.ceil((p.upper - p.lower) / 0.2), 3, 8))
+    count = np.ceil((p.upper - p.lower) / 0.2)
     if p.key == "B":
-        count = int(np.clip(np.ceil(_dispersion_fringes(p, problem)), 3, 8))
-    return (np.arange(count) + 0.5) / count
+        count = np.ceil(_dispersion_fringes(p, problem))
+    if p.key == "thickness":
+        step = problem.scene.light.wavelength.min() / (4 * problem.largest_index)
+        return _even(int(np.clip(np.ceil((p.upper - p.lower) / step), 3, 24)))
+    return _even(int(np.clip(count, 3, 8)))
 
 
 def _dispersion_fringes(p: Parameter, problem: Problem) -> float:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-import jax
 import numpy as np
 
 from pellicle.fitting.parameters import Parameter, fixed_numbers
@@ -13,6 +12,7 @@ from pellicle.fitting.result import Curve, Estimate, Profile, Rival
 from pellicle.fitting.status import RIVAL
 from pellicle.fitting.uncertainty import UNSEEN, Errors, layer_errors, linear_coefficients
 from pellicle.fitting.weigh import Weighed
+from pellicle.materials import materials_in
 from pellicle.scene import Drift, Scene
 
 _RULED_OUT = 1e8
@@ -33,10 +33,11 @@ def estimates(scene: Scene, weighed: Weighed, found: Errors, profile: Profile | 
     """Every parameter, free ones first, the thickness before all."""
     problem, unit = weighed.problem, weighed.minima.units[0]
     values = problem.box.values(unit)
-    least = thinnest(weighed) if _drifts(scene) else 0.0
+    least = thinnest(weighed) if _drifts(scene) and len(scene.layers) == 1 else 0.0
+    scanned = problem.thickness_axis
     free = [
-        _estimate(p, value, sd, position, profile, least)
-        for p, value, sd, position in zip(problem.parameters, values, found.stderr, unit, strict=False)
+        _estimate(p, values[i], found.stderr[i], unit[i], profile if i == scanned else None, least)
+        for i, p in enumerate(problem.parameters)
     ]
     free.sort(key=lambda e: e.name.split(".")[-1] != "thickness")
     linear = [
@@ -171,7 +172,7 @@ def effective_points(problem: Problem, weighed: Weighed) -> float:
 
 def warnings(scene: Scene, weighed: Weighed, found: Errors) -> tuple[str, ...]:
     """What the reader should know before using the numbers."""
-    told = [w for material in _materials(scene) for w in material.warnings()]
+    told = [w for material in materials_in(scene) for w in material.warnings()]
     orders = weighed.problem.plan.row("orders")
     if orders.on and orders.error_bound > 1e-4:
         told.append(f"{orders.count} orders leave an error of up to {orders.error_bound:.1g}: |q| is near 1")
@@ -195,10 +196,3 @@ def _trades(weighed: Weighed, found: Errors) -> list[str]:
         for j in range(i)
         if abs(matrix[i, j]) > 0.99
     ]
-
-
-def _materials(scene: Scene) -> list:
-    media = (scene.layer.material, scene.substrate.material, scene.ambient, scene.substrate.back)
-    is_material = lambda x: hasattr(x, "warnings")  # noqa: E731
-    leaves = [leaf for m in media for leaf in jax.tree_util.tree_leaves(m, is_leaf=is_material)]
-    return [leaf for leaf in leaves if is_material(leaf)]

@@ -143,7 +143,7 @@ def to_pair(z: Number) -> Number:
 def to_complex(z: Number):
     """Any number as one complex array, for the public border."""
     re, im = parts(z)
-    dtype = jnp.result_type(_some(re), _some(im), jnp.float32)
+    dtype = jnp.promote_types(jnp.result_type(_some(re), _some(im)), jnp.float32)
     re, im = jnp.broadcast_arrays(jnp.asarray(_some(re)), jnp.asarray(_some(im)))
     return jax.lax.complex(re.astype(dtype), im.astype(dtype))
 

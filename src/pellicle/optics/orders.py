@@ -24,6 +24,10 @@ Window = Callable[[int], Any]
 """m → W_m, the factor that order m keeps."""
 
 
+FWHM = 2.3548200450309493
+"""Full width at half maximum of a normal distribution, in standard deviations: 2√(2 ln 2)."""
+
+
 class Bounces(NamedTuple):
     """What one polarisation's series is made of."""
 
@@ -97,6 +101,6 @@ def blur(phase_slope, bandwidth, cosine_index, thickness_spread, wavelength):
     wrong by 0.01 in R for 2 µm of a dispersive film at 5 nm); `bandwidth` is the full width at half
     maximum (nm); `cosine_index` is Re q₁; `thickness_spread` a standard deviation (nm).
     """
-    over_wavelength = phase_slope * (bandwidth / 2.3548200450309493)
+    over_wavelength = phase_slope * (bandwidth / FWHM)
     over_thickness = 4 * jnp.pi / wavelength * cosine_index * thickness_spread
     return over_wavelength**2 + over_thickness**2

@@ -1,0 +1,43 @@
+"""Two layers from one spectrum."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pellicle as pl
+from pellicle.synthetic import synthesise
+
+WAVELENGTH = np.linspace(400.0, 900.0, 192)
+NOISE = 0.003
+
+
+def scene(oxide, nitride, **options) -> pl.Scene:
+    layers = [pl.Layer("SiO2", oxide, "oxide"), pl.Layer("Si3N4/Vogt-2.09", nitride, "nitride")]
+    return pl.Scene(layers, "Si", **options)
+
+
+@pytest.mark.parametrize("bandwidth", [None, 4.0])
+def test_both_thicknesses_come_out(bandwidth):
+    """Also through a spectrometer's window, which a stack takes by quadrature."""
+    instrument = pl.Instrument(bandwidth=bandwidth)
+    truth = {"oxide.thickness": 350.0, "nitride.thickness": 120.0}
+    values = synthesise(scene(350.0, 120.0, instrument=instrument), WAVELENGTH, NOISE, 1).values
+    spectrum = pl.Spectrum(WAVELENGTH, values, "R", sigma=np.full(WAVELENGTH.size, NOISE))
+    free = scene(pl.Free(lower=10, upper=1000), pl.Free(lower=10, upper=400), instrument=instrument)
+    found = pl.fit(spectrum, free)
+    assert found.status == "converged"
+    for name, value in truth.items():
+        assert abs(found[name].value - value) < 4 * found[name].stderr < 1.0
+    assert found.plan.on("stack")
+
+
+def test_quadrature_equals_the_series_for_a_layer_split_in_two():
+    """Two halves of one layer are a stack; the whole of it is a series. The window must be the same."""
+    instrument = pl.Instrument(bandwidth=5.0)
+    whole = pl.Scene(pl.Layer("SiO2", 1500.0), "Si", instrument=instrument)
+    halves = pl.Scene([pl.Layer("SiO2", 700.0), pl.Layer("SiO2", 800.0)], "Si", instrument=instrument)
+    a, b = synthesise(whole, WAVELENGTH).clean, synthesise(halves, WAVELENGTH).clean
+    none = synthesise(pl.Scene(pl.Layer("SiO2", 1500.0), "Si"), WAVELENGTH).clean
+    # the series takes the amplitudes at the centre of the window, the quadrature across it
+    assert np.max(np.abs(a - b)) < 1e-3 < 0.01 < np.max(np.abs(none - b))
