@@ -52,7 +52,10 @@ class Rival:
 
 @dataclass(frozen=True)
 class Curve:
-    """Data and model at each wavelength (nm), and the layer's index with standard errors."""
+    """Data and model at each wavelength (nm), and the layer's index with standard errors.
+
+    For ellipsometry `data`, `model` and `sigma` are Ψ, and `delta_data` and `delta_model` Δ, in degrees.
+    """
 
     wavelength: np.ndarray
     data: np.ndarray
@@ -62,10 +65,19 @@ class Curve:
     k: np.ndarray
     n_stderr: np.ndarray
     k_stderr: np.ndarray
+    delta_data: np.ndarray | None = None
+    delta_model: np.ndarray | None = None
 
     @property
     def residual(self) -> np.ndarray:
         return self.data - self.model
+
+    @property
+    def delta_residual(self) -> np.ndarray:
+        """Δ of the data less that of the model, in −180 to 180 degrees."""
+        if self.delta_data is None or self.delta_model is None:
+            raise ValueError("only ellipsometry has a Δ")
+        return (self.delta_data - self.delta_model + 180.0) % 360.0 - 180.0
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,9 @@ class Spectrum:
     deviations in the same unit, or None. `angle` is the angle of incidence of each point in
     degrees, or None where the file does not say: then it is for the scene to say. `lines` are the
     source line numbers of the points, `notes` sentences on what was detected. `signal` is "R",
-    "T", or "counts" for raw detector counts. Given in any order, points are sorted here.
+    "T", "counts" for raw detector counts, or "psi-delta": then `values` is Ψ and `delta` Δ, both in
+    degrees, and `sigma` and `delta_sigma` their standard deviations. Given in any order, points are
+    sorted here.
     """
 
     wavelength: np.ndarray
@@ -34,6 +36,8 @@ class Spectrum:
     sha256: str = ""
     notes: tuple[str, ...] = ()
     lines: np.ndarray | None = None
+    delta: np.ndarray | None = None
+    delta_sigma: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         size = np.size(self.wavelength)
@@ -44,6 +48,8 @@ class Spectrum:
             ("sigma", np.float64),
             ("angle", np.float64),
             ("lines", np.int64),
+            ("delta", np.float64),
+            ("delta_sigma", np.float64),
         ):
             given = getattr(self, name)
             if given is None:

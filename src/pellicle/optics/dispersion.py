@@ -7,7 +7,7 @@ where it can: that type is what tells the rest of the code whether there is abso
 from __future__ import annotations
 
 import abc
-from typing import Any, final
+from typing import Any, ClassVar, final
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -16,8 +16,17 @@ from jaxtyping import Array, Complex
 from pellicle.optics.number import Number, Pair, imag, is_real, real, to_complex
 
 
+HC = 1239.841984
+"""Photon energy times wavelength, in eV nm (CODATA 2018): models in eV convert here, and only here."""
+
+
 class AbstractDispersion(eqx.Module):
-    """n + ik as a function of wavelength. Subclasses are final."""
+    """n + ik as a function of wavelength. Subclasses are final.
+
+    `units` names the unit of each parameter that has one.
+    """
+
+    units: ClassVar[dict[str, str]] = {}
 
     @abc.abstractmethod
     def index(self, wavelength: Any) -> Number:
@@ -28,7 +37,24 @@ class AbstractDispersion(eqx.Module):
         return to_complex(self.index(jnp.asarray(wavelength, dtype=jnp.result_type(float, wavelength))))
 
 
-def _like(values: Any, wavelength: Any):
+def bounds_of(number: Any) -> tuple[float, float] | None:
+    """The least and the largest value of a parameter, free or fixed; None for an array or a tracer."""
+    if isinstance(number, int | float):
+        return number, number
+    if hasattr(number, "lower") and hasattr(number, "upper"):
+        return number.lower, number.upper
+    return None
+
+
+def not_negative(model: str, **parameters: Any) -> None:
+    """ValueError for a parameter that can be below zero."""
+    for name, number in parameters.items():
+        found = bounds_of(number)
+        if found is not None and found[0] < 0:
+            raise ValueError(f"{model}: {name} must not be negative, got {found[0]:g}")
+
+
+def like(values: Any, wavelength: Any):
     """A table's column in the precision of the wavelengths, so that float32 stays float32."""
     return jnp.asarray(values, dtype=jnp.result_type(float, wavelength))
 
@@ -59,8 +85,8 @@ class Table(AbstractDispersion):
 
     def index(self, wavelength):
         def column(values):
-            at = _like(self.wavelength, wavelength)
-            return jnp.interp(wavelength, at, _like(values, wavelength), left=jnp.nan, right=jnp.nan)
+            at = like(self.wavelength, wavelength)
+            return jnp.interp(wavelength, at, like(values, wavelength), left=jnp.nan, right=jnp.nan)
 
         return column(self.n) if self.k is None else Pair(column(self.n), column(self.k))
 
@@ -69,6 +95,7 @@ class Table(AbstractDispersion):
 class Cauchy(AbstractDispersion):
     """n = A + B/λ² + C/λ⁴ with λ in nm, B in nm² and C in nm⁴ (A. Cauchy, 1836); no absorption."""
 
+    units: ClassVar = {"B": "nm^2", "C": "nm^4"}
     A: Any
     B: Any = 0.0
     C: Any = 0.0
@@ -79,6 +106,36 @@ class Cauchy(AbstractDispersion):
 
 
 @final
+class CauchyUrbach(AbstractDispersion):
+    """Cauchy's n = A + B/λ² + C/λ⁴ with an absorption edge k = k0 exp((E − Eb)/Eu).
+
+    λ in nm, B in nm², C in nm⁴; E = hc/λ, Eb and Eu in eV: k is `k0` at the photon energy `Eb`
+    and grows by e with every `Eu` (F. Urbach, Phys. Rev. 92, 1324 (1953)). `Eb` only says where
+    `k0` is meant: fix it. Not Kramers-Kronig consistent. Elsewhere the exponent is written
+    β·12400(1/λ − 1/γ) with λ and γ in Å: β = 1/Eu and 12400/γ = Eb.
+    """
+
+    units: ClassVar = {"B": "nm^2", "C": "nm^4", "Eu": "eV", "Eb": "eV"}
+    A: Any
+    B: Any = 0.0
+    C: Any = 0.0
+    k0: Any = 0.01
+    Eu: Any = 0.5
+    Eb: Any = 3.1
+
+    def __check_init__(self):
+        not_negative("cauchy-urbach", k0=self.k0)
+        found = bounds_of(self.Eu)
+        if found is not None and not found[0] > 0:
+            raise ValueError(f"cauchy-urbach: the Urbach energy Eu must be positive, got {found[0]:g} eV")
+
+    def index(self, wavelength):
+        u = 1 / (wavelength * wavelength)
+        edge = self.k0 * jnp.exp((HC / wavelength - self.Eb) / self.Eu)
+        return Pair(self.A + u * (self.B + u * self.C), edge)
+
+
+@final
 class Sellmeier(AbstractDispersion):
     """n² = 1 + Σ Bᵢ λ²/(λ² − Cᵢ) with λ in nm and Cᵢ in nm² (W. Sellmeier, 1871); no absorption.
 
@@ -86,6 +143,7 @@ class Sellmeier(AbstractDispersion):
     a negative n² gives NaN.
     """
 
+    units: ClassVar = {"C": "nm^2"}
     B: tuple[Any, ...]
     C: tuple[Any, ...]
 
