@@ -1,0 +1,66 @@
+"""Noise and its correlation, estimated from spectra and residuals whose noise is known."""
+
+import numpy as np
+import pytest
+
+from pellicle.fitting.noise import MODEL_ERROR, correlation_length, drifting_sigma, local_noise
+
+RANDOM = np.random.default_rng(8)
+POSITION = np.linspace(0.0, 1.0, 1000)
+FRINGES = 0.3 + 0.2 * np.cos(2 * np.pi * 12 * POSITION)
+
+
+def test_white_noise_counts_every_point():
+    lengths = [correlation_length(RANDOM.normal(size=500)) for _ in range(40)]
+    assert min(lengths) >= 1
+    assert np.mean(lengths) < 1.3
+
+
+@pytest.mark.parametrize("phi", [0.5, 0.8, 0.9])
+def test_autoregressive_noise(phi):
+    """Of an AR(1) process the integrated time is (1 + φ)/(1 − φ)."""
+    lengths = []
+    for _ in range(20):
+        x = np.zeros(4000)
+        steps = RANDOM.normal(size=x.size)
+        for i in range(1, x.size):
+            x[i] = phi * x[i - 1] + steps[i]
+        lengths.append(correlation_length(x))
+    assert np.mean(lengths) == pytest.approx((1 + phi) / (1 - phi), rel=0.2)
+
+
+def test_a_residual_of_one_sign_is_worth_few_points():
+    assert correlation_length(0.01 + 0.0 * POSITION) > 100
+    assert correlation_length(np.zeros(100)) == 1.0
+
+
+@pytest.mark.parametrize("sigma", [0.002, 0.02])
+def test_local_noise_finds_sigma_under_fringes(sigma):
+    found = local_noise(FRINGES + RANDOM.normal(0, sigma, POSITION.size))
+    assert found.shape == POSITION.shape
+    assert np.median(found) == pytest.approx(sigma, rel=0.15)
+
+
+def test_local_noise_is_local():
+    sigma = np.where(POSITION < 0.5, 0.002, 0.02)
+    found = local_noise(FRINGES + sigma * RANDOM.normal(size=POSITION.size))
+    assert np.median(found[:400]) == pytest.approx(0.002, rel=0.3)
+    assert np.median(found[600:]) == pytest.approx(0.02, rel=0.3)
+
+
+def test_smooth_spectra_hardly_look_noisy():
+    assert np.max(local_noise(FRINGES)) < 2e-3 * np.ptp(FRINGES)
+
+
+@pytest.mark.parametrize("values", [np.array([0.1, 0.3, 0.2]), np.full(50, 0.3), np.zeros(50)])
+def test_always_a_positive_weight(values):
+    assert (drifting_sigma(values) > 0).all()
+    assert np.isfinite(drifting_sigma(values)).all()
+
+
+def test_drifting_sigma_is_a_share_of_the_signal_plus_the_noise():
+    noise = 0.01
+    found = drifting_sigma(10 * FRINGES + RANDOM.normal(0, noise, POSITION.size))
+    expected = MODEL_ERROR * 10 * FRINGES + noise
+    assert 0.10 <= MODEL_ERROR <= 0.15
+    assert np.median(np.abs(found / expected - 1)) < 0.02

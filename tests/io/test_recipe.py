@@ -1,0 +1,200 @@
+"""Recipes: every form that the contract allows, and one telling sentence for what it does not."""
+
+import numpy as np
+import pytest
+
+from pellicle.errors import DataError
+from pellicle.io.recipe import read_recipe
+from pellicle.optics.dispersion import Cauchy, Constant
+from pellicle.scene import Drift, Free
+
+AT = np.array([500.0, 700.0])
+LAYER = '[[scene.layer]]\nmaterial = "SiO2"\nthickness = { lower = 10, upper = 3000 }\n'
+BASE = f'[scene]\nsubstrate = "Si"\n{LAYER}'
+
+
+@pytest.fixture
+def read(tmp_path):
+    def read(text: str):
+        path = tmp_path / "film.toml"
+        path.write_text(text)
+        return read_recipe(path)
+
+    return read
+
+
+@pytest.fixture
+def scene(read):
+    return lambda text: read(text).scene()
+
+
+@pytest.fixture
+def refused(read, tmp_path):
+    def refused(text: str, *said: str):
+        with pytest.raises(DataError) as caught:
+            read(text).scene()
+        message = str(caught.value)
+        assert message.startswith(f"{tmp_path / 'film.toml'}: ")
+        assert "\n" not in message
+        for words in said:
+            assert words in message, message
+
+    return refused
+
+
+def test_the_contracts_recipe(read):
+    """All of DESIGN's example that exists by now."""
+    recipe = read(
+        """
+        [data]
+        files = ["quartz.csv", "deep/../oxide.csv"]
+        signal = "R"
+        angle = 20.0
+        polarisation = "s"
+        noise = 0.005
+        range = [400, 900]
+        wavelengths = { start = 380, stop = 780, step = 2 }
+        joint = false
+        [scene]
+        ambient = "air"
+        substrate = { material = "SiO2", back = "air", plate_mm = 0.5 }
+        [[scene.layer]]
+        name = "oxide"
+        material = { model = "cauchy", A = { value = 1.45, lower = 1.3, upper = 1.7 }, B = 3000.0 }
+        thickness = { lower = 10, upper = 3000 }
+        [instrument]
+        scale = "slow"
+        offset = "free"
+        bandwidth = { lower = 0, upper = 20 }
+        thickness_spread = 1.5
+        """
+    )
+    data, scene = recipe.tables.data, recipe.scene()
+    assert (data.noise, data.range, data.joint) == (0.005, (400, 900), False)
+    assert (scene.light.signal, scene.light.angle, scene.light.polarisation) == ("R", 20, "s")
+    assert scene.substrate.plate_mm == 0.5
+    np.testing.assert_allclose(scene.substrate.back(AT), 1)
+    layer = scene.layers[0]
+    assert layer.name == "oxide"
+    assert isinstance(layer.material, Cauchy)
+    assert (layer.material.A.value, layer.material.A.lower, layer.material.A.upper) == (1.45, 1.3, 1.7)
+    assert (layer.material.B, layer.material.C) == (3000, 0)
+    assert (layer.thickness.value, layer.thickness.lower, layer.thickness.upper) == (1505, 10, 3000)
+    assert scene.instrument.scale == Drift(3)
+    assert scene.instrument.offset == Drift(0)
+    assert scene.instrument.bandwidth.upper == 20
+    assert scene.instrument.thickness_spread == 1.5
+
+
+def test_defaults(read):
+    recipe = read(BASE)
+    scene = recipe.scene()
+    assert recipe.files == []
+    assert (scene.instrument.scale, scene.instrument.offset) == (1, 0)
+    assert scene.instrument.bandwidth is None
+    assert scene.substrate.back is None
+    assert (scene.light.signal, scene.light.angle) == ("R", 0)
+    np.testing.assert_allclose(scene.ambient(AT), 1)
+
+
+def test_files_are_relative_to_the_recipe(read, tmp_path):
+    recipe = read('[data]\nfiles = ["a.csv", "../b.csv"]\n' + BASE)
+    assert recipe.files == [str(tmp_path / "a.csv"), str(tmp_path.parent / "b.csv")]
+
+
+def test_tables_are_relative_to_the_recipe(scene, tmp_path):
+    (tmp_path / "resin.csv").write_text("wavelength_nm,n,k\n400,1.6,0.1\n900,1.6,0.1\n")
+    found = scene(BASE.replace('"SiO2"', '"resin.csv"'))
+    np.testing.assert_allclose(found.layers[0].material(AT), 1.6 + 0.1j)
+
+
+@pytest.mark.parametrize(
+    ("material", "index"),
+    [("1.46", 1.46), ("2", 2.0), ('"2.9+0.1j"', 2.9 + 0.1j), ('{ model = "cauchy", A = 1.4 }', 1.4)],
+)
+def test_media(scene, material, index):
+    for text in (BASE.replace('"SiO2"', material), BASE.replace('"Si"', material)):
+        found = scene(text)
+        medium = found.layers[0].material if '"Si"' in text else found.substrate.material
+        np.testing.assert_allclose(medium(AT), index)
+
+
+def test_a_thickness_may_be_a_number_or_a_value(scene):
+    thickness = lambda text: scene(BASE.replace("{ lower = 10, upper = 3000 }", text)).layers[0].thickness  # noqa: E731
+    assert thickness("120") == 120
+    assert thickness("{ value = 120 }") == 120
+    free = thickness("{ value = 120, lower = 10, upper = 300, prior = { mean = 100, sd = 5 } }")
+    assert isinstance(free, Free)
+    assert (free.value, free.lower, free.upper) == (120, 10, 300)
+    assert (free.prior.mean, free.prior.sd) == (100, 5)
+
+
+def test_free_words_in_a_layer(scene):
+    layer = scene(BASE + 'free = ["n", "k=0:0.1"]\n').layers[0]
+    assert layer.material.n.lower < 0 < layer.material.n.upper
+    assert layer.material.k.upper == 0.1
+    assert isinstance(scene(BASE.replace('"SiO2"', "1.46") + 'free = ["n"]\n').layers[0].material, Constant)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[dat]\n" + BASE, ("'dat'", "'data'")),
+        ("[data]\nfile = ['a.csv']\n" + BASE, ("'data.file'", "'files'")),
+        (BASE.replace("substrate", "substrat"), ("'scene.substrat'", "'substrate'")),
+        (BASE.replace("thickness", "thicknes"), ("thicknes", "'thickness'")),
+        (BASE.replace("upper", "uper"), ("uper", "'upper'")),
+        (BASE + "[instrument]\nbandwith = 3\n", ("'instrument.bandwith'", "'bandwidth'")),
+        (BASE.replace('"Si"', '{ material = "Si", plate = 1 }'), ("plate", "'plate_mm'")),
+        ("[data]\nwavelengths = { start = 1, stop = 2, stepp = 1 }\n" + BASE, ("stepp", "'step'")),
+    ],
+)
+def test_an_unknown_key_names_the_nearest(refused, text, said):
+    refused(text, "unknown key", *said)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[data]\nsignal = 'X'\n" + BASE, ("data.signal", "'X'")),
+        ("[data]\nangle = 95\n" + BASE, ("data.angle", "90")),
+        ("[data]\nnoise = 0\n" + BASE, ("data.noise", "greater than 0")),
+        ("[data]\nnoise = 'low'\n" + BASE, ("data.noise", "'low'")),
+        ("[data]\nrange = [400]\n" + BASE, ("data.range",)),
+        ("[data]\njoint = 'maybe'\n" + BASE, ("data.joint",)),
+        (BASE.replace("{ lower = 10, upper = 3000 }", "'thick'"), ("thickness", "'thick'")),
+        (BASE.replace("lower = 10", "lower = -10"), ("thickness", "-10")),
+        (BASE.replace("lower = 10", "lower = 5000"), ("thickness", "reversed")),
+        (BASE.replace("lower = 10, ", ""), ("thickness", "lower and upper")),
+        (BASE.replace("lower = 10", "value = 5, lower = 10"), ("thickness", "start value 5")),
+        (BASE.replace('"SiO2"', '"SiO3"'), ("SiO3", "SiO2")),
+        (BASE.replace('"SiO2"', '{ model = "cauchi" }'), ("cauchi", "'cauchy'")),
+        (BASE.replace('"SiO2"', '{ model = "cauchy", D = 3 }'), ("'D'", "A, B, C")),
+        (BASE.replace('"SiO2"', '{ model = "cauchy", A = "high" }'), ("A must be", "'high'")),
+        (BASE.replace('"SiO2"', "-1.5"), ("-1.5",)),
+        (BASE.replace('"SiO2"', '"gone.csv"'), ("gone.csv",)),
+        (BASE + "[instrument]\nscale = 'loose'\n", ("instrument.scale", "'loose'")),
+        (BASE + "[instrument]\nbandwidth = -1\n", ("bandwidth", "-1")),
+        ('[scene]\nsubstrate = "Si"\nlayer = []\n', ("scene.layer",)),
+        ("[scene\n", ("is not TOML", "line 1")),
+    ],
+)
+def test_refused_in_one_sentence(refused, text, said):
+    refused(text, *said)
+
+
+def test_missing_keys(refused):
+    refused("", "scene is missing")
+    refused(LAYER, "scene.substrate is missing")
+    refused('[scene]\nsubstrate = "Si"\n', "scene.layer is missing")
+    refused(BASE.replace('material = "SiO2"\n', ""), "scene.layer.0.material is missing")
+
+
+def test_files_that_are_no_recipe(tmp_path):
+    with pytest.raises(DataError, match="is a folder"):
+        read_recipe(tmp_path)
+    with pytest.raises(DataError, match="No such file"):
+        read_recipe(tmp_path / "gone.toml")
+    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(DataError, match="is not TOML"):
+        read_recipe(tmp_path / "binary.toml")
