@@ -84,7 +84,7 @@ def errors(problem: Problem, at: Local, variance: float) -> Errors:
     jacobian = weight * np.column_stack([steep, *flat])
     priors = np.diag(np.concatenate([problem.box.prior_weight * span, np.ones(len(linear))]))
     _, values, rows = np.linalg.svd(np.vstack([jacobian, priors]), full_matrices=False)
-    floor = np.finfo(float).eps * len(jacobian) * max(values.max(initial=0.0), 1e-300)
+    floor = np.finfo(float).eps * len(jacobian) * max(values.max(initial=0.0), 1e-100)
     unit = np.concatenate([span, [c.prior_sd for c in linear]])
     spread = rows.T / np.maximum(values, floor)
     covariance = (spread @ spread.T) * np.outer(unit, unit)

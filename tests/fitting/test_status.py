@@ -1,0 +1,215 @@
+"""Every status by a real fit, their order, and the sentences that go with them."""
+
+import math
+
+import numpy as np
+import pytest
+
+import pellicle as pl
+from pellicle.fitting.result import Estimate, Rival, Status
+from pellicle.fitting.status import describe, judge, misfits, verdict
+
+
+def test_converged(film, measured):
+    scene = film()
+    fit = pl.fit(measured(scene, 430.0), scene)
+    assert fit.status is pl.Status.CONVERGED
+    assert fit.verdict.startswith("The data decide: thickness 4")
+    assert " ± " in fit.verdict
+    assert " nm." in fit.verdict
+
+
+def test_at_a_bound_that_the_user_set(film, measured):
+    data = measured(film(), 430.0)
+    fit = pl.fit(data, film(pl.Free(None, 10, 429)))
+    assert fit.status is pl.Status.AT_BOUND
+    assert fit["thickness"].value == 429
+    assert "thickness (429 nm) rests on a bound" in fit.verdict
+    index = pl.fit(data, film(material=pl.Constant(pl.Free(None, 1.47, 1.6))))
+    assert index.status is pl.Status.AT_BOUND
+    assert "n (1.47) rests on a bound" in index.verdict
+
+
+def test_a_natural_bound_gives_an_upper_limit_and_stays_converged(film, measured):
+    scene = film(material=pl.Constant(1.46, pl.Free(None, 0.0, 1.0)))
+    for seed in range(1, 9):
+        fit = pl.fit(measured(scene, 0.0, 430.0, seed=seed), scene)
+        assert fit.status is pl.Status.CONVERGED
+        if fit["k"].value == 0:
+            break
+    else:
+        pytest.fail("k never came to rest on zero in eight noises")
+    assert 0 < fit["k"].upper_limit < 0.01
+    assert fit["k"].lower_limit is None
+    assert fit["k"].upper_limit == pytest.approx(1.645 * fit["k"].stderr)
+
+
+def test_bounds_that_only_look_natural_are_the_users(film, measured):
+    """k ≥ 0.02 is somebody's opinion."""
+    scene = film(material=pl.Constant(1.46, pl.Free(None, 0.02, 1.0)))
+    fit = pl.fit(measured(film(), 430.0), scene)
+    assert fit.status in (pl.Status.AT_BOUND, pl.Status.MISFIT)
+    assert fit["k"].value == 0.02
+    assert fit["k"].upper_limit is None
+
+
+def test_ambiguous_n_and_its_mirror(film, measured):
+    """At normal incidence on a substrate s, n d at index n and at s/n reflect alike."""
+    scene = film(material=pl.Constant(pl.Free(None, 1.3, 2.8)))
+    fit = pl.fit(measured(scene, 1.6, 430.0), scene)
+    assert fit.status is pl.Status.AMBIGUOUS
+    both = sorted([fit["n"].value, fit.rivals[0].parameters["n"]])
+    assert both == pytest.approx([1.6, 3.9 / 1.6], abs=0.02)
+    assert fit.rivals[0].delta_chi2 < 6
+    assert "The data do not decide" in fit.verdict
+    assert f"but {fit.rivals[0].parameters['thickness']:.0f}" in fit.verdict
+    assert "nm fits nearly as well" in fit.verdict
+
+
+def test_misfit_where_sigma_is_known(film, measured):
+    data = measured(film(), 430.0, sigma=True)
+    fit = pl.fit(data, film(material=1.6))
+    assert fit.chi2_reduced > 4
+    assert fit.status is pl.Status.MISFIT
+    assert "does not explain the data" in fit.verdict
+    assert "should not be used" in fit.verdict
+
+
+def test_misfit_where_sigma_is_not_known(film, measured):
+    """Large residuals with a structure: a slope that no film has."""
+    nm = np.linspace(400.0, 900.0, 128)
+    thin = measured(film(), 60.0, noise=0.001)
+    tilted = pl.Spectrum(nm, thin.values + 0.15 * np.sin((nm - 400) / 150), "R")
+    fit = pl.fit(tilted, film(pl.Free(None, 10, 100)))
+    assert fit.effective_points < 0.1 * 128
+    assert fit.rms > 0.02
+    assert fit.status is pl.Status.MISFIT
+
+
+def test_not_identifiable(film, measured):
+    scene = film(pl.Free(None, 1, 1000), "Au")
+    fit = pl.fit(measured(scene, 500.0), scene)
+    assert fit.status is pl.Status.NOT_IDENTIFIABLE
+    limit = fit["thickness"].lower_limit
+    assert fit.verdict == f"The data do not determine thickness: it is at least {limit:.4g} nm (95 %)."
+
+
+def test_not_converged(film, measured, monkeypatch):
+    """A solver that may take no step has not arrived."""
+    from pellicle.fitting import search
+
+    real = search.polish
+
+    def stopped(*arguments):
+        units, evidence, converged = real(*arguments)
+        return units, evidence, np.zeros_like(np.asarray(converged))
+
+    monkeypatch.setattr(search, "polish", stopped)
+    scene = film()
+    fit = pl.fit(measured(scene, 430.0), scene)
+    assert fit.status is pl.Status.NOT_CONVERGED
+    assert "did not settle" in fit.verdict
+
+
+def estimate(name="thickness", value=300.0, stderr=1.0, at_bound=False, **more):
+    return Estimate(name, value, stderr, "nm", 0.0, 1000.0, True, at_bound, **more)
+
+
+EVERYTHING_WRONG = {
+    "converged": False,
+    "misfit": True,
+    "parameters": {"thickness": estimate(stderr=math.inf, at_bound=True), "n": estimate("n", 1.5, 0.1)},
+    "rivals": (Rival({"thickness": 500.0, "n": 2.5}, 1.0),),
+    "natural": frozenset(),
+}
+
+
+def test_the_first_that_holds():
+    """Everything is wrong; then one thing after the other is put right, in the contract's order."""
+    wrong = dict(EVERYTHING_WRONG)
+    assert judge(**wrong) is Status.NOT_CONVERGED
+    wrong["converged"] = True
+    assert judge(**wrong) is Status.MISFIT
+    wrong["misfit"] = False
+    assert judge(**wrong) is Status.NOT_IDENTIFIABLE
+    wrong["parameters"] = {"thickness": estimate(at_bound=True), "n": estimate("n", 1.5, 0.1)}
+    assert judge(**wrong) is Status.AMBIGUOUS
+    wrong["rivals"] = (Rival({"thickness": 500.0, "n": 2.5}, 6.1),)
+    assert judge(**wrong) is Status.AT_BOUND
+    wrong["parameters"] = {"thickness": estimate(), "n": estimate("n", 1.5, 0.1)}
+    assert judge(**wrong) is Status.CONVERGED
+
+
+def test_a_rival_within_the_errors_is_no_other_answer():
+    right = dict(EVERYTHING_WRONG) | {"converged": True, "misfit": False}
+    right["parameters"] = {"thickness": estimate(stderr=10.0)}
+    assert judge(**(right | {"rivals": (Rival({"thickness": 325.0}, 1.0),)})) is Status.CONVERGED
+    assert judge(**(right | {"rivals": (Rival({"thickness": 335.0}, 1.0),)})) is Status.AMBIGUOUS
+
+
+def test_natural_bounds_and_instrument_bounds_do_not_count():
+    right = dict(EVERYTHING_WRONG) | {"converged": True, "misfit": False, "rivals": ()}
+    right["parameters"] = {"k": estimate("k", 0.0, 0.1, True), "thickness": estimate()}
+    assert judge(**right) is Status.AT_BOUND
+    assert judge(**(right | {"natural": frozenset({"k"})})) is Status.CONVERGED
+
+
+def test_without_a_thickness_every_free_parameter_must_be_unseen():
+    right = dict(EVERYTHING_WRONG) | {"converged": True, "misfit": False, "rivals": ()}
+    one = {"n": estimate("n", 1.5, math.inf), "k": estimate("k", 0.1, 0.01)}
+    none = {"n": estimate("n", 1.5, math.inf), "k": estimate("k", 0.1, math.inf)}
+    assert judge(**(right | {"parameters": one})) is Status.CONVERGED
+    assert judge(**(right | {"parameters": none})) is Status.NOT_IDENTIFIABLE
+
+
+KNOWN = {
+    "chi2_reduced": 1.0,
+    "sigma_known": False,
+    "drifting": False,
+    "effective_share": 0.05,
+    "rms": 0.03,
+    "span": 1.0,
+    "calibrated": True,
+}
+
+
+@pytest.mark.parametrize(
+    ("changed", "misfit"),
+    [
+        ({}, True),
+        ({"effective_share": 0.11}, False),
+        ({"rms": 0.019}, False),
+        ({"rms": 0.019, "span": 0.3}, True),  # above 5 % of the span
+        ({"calibrated": False}, False),  # then only the span counts
+        ({"calibrated": False, "rms": 0.06}, True),
+        ({"sigma_known": True}, False),
+        ({"sigma_known": True, "chi2_reduced": 4.1, "rms": 0.001}, True),
+        ({"drifting": True, "chi2_reduced": 0.5}, False),
+        ({"drifting": True, "chi2_reduced": 1.5}, True),
+    ],
+)
+def test_what_is_a_misfit(changed, misfit):
+    assert misfits(**(KNOWN | changed)) is misfit
+
+
+def test_sentences_of_limits():
+    def told(**limits):
+        parameters = {"thickness": estimate(stderr=math.inf, **limits)}
+        return verdict(Status.NOT_IDENTIFIABLE, parameters, (), 0.01)
+
+    assert told(lower_limit=145.37).endswith("it is at least 145.4 nm (95 %).")
+    assert told(upper_limit=161.6).endswith("it is at most 161.6 nm (95 %).")
+    assert told().endswith("any value between 0 and 1000 nm fits about as well.")
+
+
+@pytest.mark.parametrize(
+    ("value", "stderr", "text"),
+    [
+        (751.6647, 0.2149, "thickness 751.66 ± 0.21 nm"),
+        (3026.8, 216.7, "thickness 3027 ± 217 nm"),
+        (300.0, 0.0, "thickness 300.00 ± 0.00 nm"),
+        (300.0, math.inf, "thickness 300 nm"),
+    ],
+)
+def test_values_with_two_digits_of_their_errors(value, stderr, text):
+    assert describe(estimate(value=value, stderr=stderr)) == text
