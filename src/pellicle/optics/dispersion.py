@@ -15,7 +15,6 @@ from jaxtyping import Array, Complex
 
 from pellicle.optics.number import Number, Pair, imag, is_real, real, to_complex
 
-
 HC = 1239.841984
 """Photon energy times wavelength, in eV nm (CODATA 2018): models in eV convert here, and only here."""
 

@@ -1,0 +1,44 @@
+"""What a number inside a dispersion is called: `A`, `B1`, `fraction`, `host.E0`, `term2.gamma`."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+_BRANCHES = ("host", "inclusion")
+
+
+class Place(NamedTuple):
+    """A number's full name in its dispersion, its last part, the field that holds it, and whose it is."""
+
+    name: str
+    key: str
+    field: str
+    owner: Any
+
+    @property
+    def unit(self) -> str:
+        """The unit that the model gives it, empty for none."""
+        return getattr(self.owner, "units", {}).get(self.field, "")
+
+
+def place(tree: Any, path: tuple) -> Place:
+    """Where the leaf at `path` (as of `jax.tree_util`) stands in a dispersion.
+
+    The numbers of a tuple are counted from 1 (`B1`); a mixture's components and, where there are
+    several, the terms of a sum go in front.
+    """
+    node, owner, field, count, words = tree, tree, "", "", []
+    for depth, step in enumerate(path):
+        if hasattr(step, "name"):
+            owner, field, count = node, step.name, ""
+            node = getattr(node, field)
+            if field in _BRANCHES:
+                words.append(field)
+            continue
+        index = step.idx if hasattr(step, "idx") else step.key
+        if depth == len(path) - 1:
+            count = str(index + 1)
+        elif len(node) > 1:
+            words.append(f"term{index + 1}")
+        node = node[index]
+    return Place(".".join([*words, field + count]), field + count, field, owner)
