@@ -62,7 +62,7 @@ def test_ambiguous_n_and_its_mirror(film, measured):
     assert both == pytest.approx([1.6, 3.9 / 1.6], abs=0.02)
     assert fit.rivals[0].delta_chi2 < 6
     assert "The data do not decide" in fit.verdict
-    assert f"but {fit.rivals[0].parameters['thickness']:.0f}" in fit.verdict
+    assert f"but {fit.rivals[0].parameters['thickness']:.4g}" in fit.verdict
     assert "nm fits nearly as well" in fit.verdict
 
 

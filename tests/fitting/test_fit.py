@@ -1,0 +1,226 @@
+"""Simulated and fitted again: the truth comes back within its errors, for every kind of scene."""
+
+import jax
+import numpy as np
+import pytest
+
+import pellicle as pl
+from pellicle.errors import UsageError
+from pellicle.scene import free_leaves
+from pellicle.synthetic import synthesise
+
+NM = np.linspace(400.0, 900.0, 128)
+N, K = pl.Free(None, 1.3, 1.9), pl.Free(None, 0.0, 0.5)
+THICKNESS = pl.Free(None, 10, 1000)
+
+
+def agrees(fit, truth, sigmas=4.0):
+    """Every free parameter within so many of its own errors, and these are not useless."""
+    assert fit.status == "converged", fit.verdict
+    for name, value in truth.items():
+        estimate = fit[name]
+        assert abs(estimate.value - value) <= sigmas * estimate.stderr, (name, estimate)
+        assert estimate.stderr < 0.1 * (estimate.upper - estimate.lower), (name, estimate)
+
+
+@pytest.mark.parametrize("signal", ["R", "T"])
+def test_thickness_n_and_k(film, measured, signal):
+    scene = film(material=pl.Constant(N, K), substrate=pl.Constant(1.5), light=pl.Light(signal=signal))
+    fit = pl.fit(measured(scene, 1.72, 0.03, 480.0, noise=0.002), scene)
+    agrees(fit, {"n": 1.72, "k": 0.03, "thickness": 480.0})
+    assert fit.rms == pytest.approx(0.002, rel=0.2)
+    assert fit["thickness"].unit == "nm"
+    assert fit.plan.on("transmission") == (signal == "T")
+
+
+@pytest.mark.parametrize(("polarisation", "sees"), [("s", "p"), ("p", "s")])
+def test_at_an_angle_in_either_polarisation(film, measured, polarisation, sees):
+    light = pl.Light(angle=60.0, polarisation=polarisation)
+    data = measured(film(light=light), 480.0)
+    agrees(pl.fit(data, film(light=pl.Light(angle=60.0))), {"thickness": 480.0})  # the spectrum says which
+    wrong = pl.Spectrum(data.wavelength, data.values, "R", polarisation=sees)
+    assert pl.fit(wrong, film(light=pl.Light(angle=60.0))).rms > 0.05
+
+
+def test_angles_of_the_spectrum_go_before_those_of_the_scene(film, measured):
+    data = measured(film(light=pl.Light(angle=40.0)), 480.0)
+    stated = pl.Spectrum(data.wavelength, data.values, "R", angle=np.full(len(data), 40.0))
+    agrees(pl.fit(stated, film()), {"thickness": 480.0})
+
+
+def test_two_angles_in_one_spectrum(film):
+    both = [synthesise(film(480.0, light=pl.Light(angle=a)), NM[::2], 0.003, 1).values for a in (20.0, 60.0)]
+    angle = np.repeat([20.0, 60.0], 64)
+    data = pl.Spectrum(np.tile(NM[::2], 2), np.concatenate(both), "R", angle=angle)
+    agrees(pl.fit(data, film()), {"thickness": 480.0})
+
+
+def test_a_free_angle(film, measured):
+    scene = film(light=pl.Light(angle=pl.Free(None, 0.0, 60.0), polarisation="s"))
+    agrees(pl.fit(measured(scene, 480.0, 35.0), scene), {"thickness": 480.0, "angle": 35.0})
+
+
+def test_a_plate_with_its_back_face(film, measured):
+    plate = pl.Substrate(pl.Constant(1.5), "air", 1.0)
+    scene = film(material=2.1, substrate=plate, light=pl.Light(signal="T"))
+    fit = pl.fit(measured(scene, 480.0, noise=0.002), scene)
+    agrees(fit, {"thickness": 480.0})
+    assert "The back face matters: rms 0.00" in fit.verdict
+    dark = film(substrate=pl.Substrate(pl.Constant(3.9, 0.02), "air", 1.0))
+    opaque = pl.fit(measured(dark, 480.0), dark)
+    assert "The back face makes no difference here" in opaque.verdict
+
+
+def test_bandwidth(film, measured):
+    scene = film(instrument=pl.Instrument(bandwidth=pl.Free(None, 0.0, 40.0)))
+    fit = pl.fit(measured(scene, 900.0, 25.0), scene)
+    agrees(fit, {"thickness": 900.0, "instrument.bandwidth": 25.0})
+    sharp = pl.fit(measured(film(), 900.0), film())
+    assert fit.plan.on("coherence")
+    assert not sharp.plan.on("coherence")
+
+
+def test_uneven_thickness(film, measured):
+    scene = film(instrument=pl.Instrument(thickness_spread=pl.Free(None, 0.0, 60.0)))
+    fit = pl.fit(measured(scene, 900.0, 30.0), scene)
+    agrees(fit, {"thickness": 900.0, "instrument.thickness_spread": 30.0})
+
+
+@pytest.mark.parametrize("words", [("free", "free"), (1.0, "free")])
+def test_free_scale_and_offset(film, measured, words):
+    """Reported in physical units with errors, beside what is fixed."""
+    scale = 1.3 if words[0] == "free" else 1.0
+    offset = 0.05 if words[1] == "free" else 0.0
+    data = measured(film(instrument=pl.Instrument(scale, offset)), 480.0)
+    fit = pl.fit(data, film(instrument=pl.Instrument(*words)))
+    agrees(fit, {"thickness": 480.0})
+    for name, value, word in zip(("scale", "offset"), (scale, offset), words, strict=True):
+        estimate = fit[f"instrument.{name}"]
+        assert estimate.free == (word == "free")
+        assert abs(estimate.value - value) <= 4 * estimate.stderr
+
+
+def test_a_prior_pulls_and_sharpens(film, measured):
+    """As another measurement would: on a parameter that the data leave open, the prior is the answer."""
+    data = measured(film(12.0, 1.46), noise=0.003, sigma=True)
+
+    def fit(prior):
+        index = pl.Constant(pl.Free(None, 1.2, 1.9, prior))
+        return pl.fit(data, film(pl.Free(None, 1, 60), index))
+
+    free, held = fit(None), fit(pl.Normal(1.46, 0.01))
+    assert free["n"].stderr > 0.03
+    assert held["n"].stderr == pytest.approx(0.01, rel=0.1)
+    assert abs(held["n"].value - 1.46) < 0.01
+    assert held["thickness"].stderr < free["thickness"].stderr
+    pulled = fit(pl.Normal(1.6, 0.01))
+    assert abs(pulled["n"].value - 1.6) < 0.02
+
+
+def test_float32_and_the_callers_setting(film, measured):
+    """Whatever the caller has, the fit is in float64 and leaves the setting as it was."""
+    data = measured(film(), 480.0)
+    wide = pl.fit(data, film())
+    with jax.enable_x64(False):
+        narrow = pl.fit(data, film())
+        assert jax.numpy.zeros(1).dtype == np.float32
+    assert narrow["thickness"].value == wide["thickness"].value
+    assert narrow.curve.model.dtype == np.float64
+    assert jax.numpy.zeros(1).dtype == np.float64
+    single = pl.Spectrum(data.wavelength.astype(np.float32), data.values.astype(np.float32), "R")
+    assert pl.fit(single, film())["thickness"].value == pytest.approx(480, abs=0.5)
+
+
+@pytest.fixture
+def compilations():
+    """Programs that JAX builds, by the event that it reports for each."""
+    events, listening = [], [True]
+
+    def listen(event, *_, **__):
+        if listening[0] and "backend_compile" in event:
+            events.append(event)
+
+    jax.monitoring.register_event_duration_secs_listener(listen)
+    yield events
+    listening[0] = False
+
+
+def test_a_second_file_compiles_nothing(film, measured, compilations):
+    scene = film(material=pl.Cauchy(pl.Free(None, 1.3, 1.7), pl.Free(None, 0.0, 3e4)))
+    jax.clear_caches()
+    pl.fit(measured(scene, 1.46, 3000.0, 480.0), scene)
+    assert compilations
+    other = measured(scene, 1.5, 9000.0, 210.0, seed=5)
+    shorter = measured(scene, 1.5, 9000.0, 210.0, wavelength=np.linspace(420.0, 880.0, 120))
+    compilations.clear()
+    pl.fit(other, scene)
+    assert not compilations
+    pl.fit(shorter, scene)
+    assert not compilations
+    bounds = film(pl.Free(None, 50, 900), pl.Cauchy(pl.Free(1.4, 1.2, 1.8), pl.Free(None, 0.0, 2e4)))
+    pl.fit(other, bounds)
+    assert not compilations
+
+
+def test_nothing_free(film, measured):
+    with pytest.raises(UsageError, match="nothing is free"):
+        pl.fit(measured(film(), 480.0), film(480.0))
+
+
+def test_an_uncalibrated_intensity_needs_a_scale(film, measured):
+    data = measured(film(), 480.0)
+    counts = pl.Spectrum(data.wavelength, 900 * data.values, "R", calibrated=False, path="lamp.csv")
+    with pytest.raises(UsageError, match=r"lamp\.csv: .*--scale slow"):
+        pl.fit(counts, film())
+    fit = pl.fit(counts, film(instrument=pl.Instrument("free")))
+    agrees(fit, {"thickness": 480.0})
+    assert fit["instrument.scale"].value == pytest.approx(900, rel=0.02)
+
+
+def test_outside_a_table(measured, film):
+    data = measured(film(), 480.0, wavelength=np.linspace(700.0, 1200.0, 128))
+    with pytest.raises(ValueError, match=r"HfO2 .* from 250 to 900 nm"):
+        pl.fit(data, film(material="HfO2"))
+
+
+def test_a_scene_without_a_free_thickness(film, measured):
+    scene = film(480.0, pl.Constant(N, K))
+    fit = pl.fit(measured(scene, 1.6, 0.02), scene)
+    agrees(fit, {"n": 1.6, "k": 0.02})
+    assert fit.profile is None
+    assert not fit["thickness"].free
+    assert fit["thickness"].value == 480
+
+
+def test_the_record(film, measured):
+    """What a fit returns beside the parameters."""
+    scene = film(material=pl.Constant(N))
+    data = measured(scene, 1.5, 480.0, sigma=True)
+    fit = pl.fit(data, scene)
+    assert fit.free[0].name == "thickness"
+    assert len(free_leaves(scene)) == len(fit.free)
+    assert fit.curve.wavelength.shape == fit.curve.model.shape == (128,)
+    np.testing.assert_array_equal(fit.curve.data, data.values)
+    np.testing.assert_allclose(fit.curve.sigma, 0.003)
+    np.testing.assert_allclose(fit.curve.residual, data.values - fit.curve.model)
+    assert fit.rms == pytest.approx(np.sqrt(np.mean(fit.curve.residual**2)))
+    chi2 = np.sum((fit.curve.residual / 0.003) ** 2) / (128 - 2)
+    assert fit.chi2_reduced == pytest.approx(chi2)
+    assert [r.delta_chi2 for r in fit.rivals] == sorted(r.delta_chi2 for r in fit.rivals)
+    best = fit.profile.delta_chi2.argmin()
+    assert abs(fit.profile.thickness[best] - 480) < 40
+    assert fit.spectrum is data
+    assert 0 < fit.seconds < 300
+
+
+def test_rivals_cost_what_a_fit_there_costs(film, measured):
+    """Δχ² of a rival against a fit that is allowed nothing else."""
+    scene = film()
+    data = measured(scene, 480.0, sigma=True)
+    fit = pl.fit(data, scene)
+    rival = fit.rivals[0]
+    at = rival.parameters["thickness"]
+    there = pl.fit(data, film(pl.Free(None, at - 20, at + 20)))
+    expected = (there.chi2_reduced - fit.chi2_reduced) * (128 - 1)
+    share = fit.effective_points / 128
+    assert rival.delta_chi2 == pytest.approx(expected * share, rel=1e-3)
