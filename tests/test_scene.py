@@ -61,7 +61,7 @@ def test_impossible_bounds_are_refused(arguments, message):
         (lambda: pl.Layer(1.46 - 0.1j, 5), "negative imaginary part, which is gain"),
         (lambda: pl.Layer("Unobtainium", 5), "Unobtainium"),
         (lambda: pl.Substrate(1.5, "air", -1), "plate_mm must not be negative, got -1 mm"),
-        (lambda: pl.Light(signal="A"), "signal must be one of R, T, not 'A'"),
+        (lambda: pl.Light(signal="A"), "signal must be one of R, T, psi-delta, not 'A'"),
         (lambda: pl.Light(polarisation="TE"), "polarisation must be one of unpolarised, s, p, not 'TE'"),
         (lambda: pl.Light(angle=95), "the angle of incidence must lie in 0 to 90 degrees, got 95"),
         (lambda: pl.Light(angle=np.array([0.0, -5.0])), "must lie in 0 to 90 degrees, got -5"),
@@ -73,7 +73,7 @@ def test_impossible_bounds_are_refused(arguments, message):
         (lambda: scene(layers=[]), "a scene needs at least one layer"),
         (
             lambda: scene(layers=[pl.Layer(1.5, 1)] * 2, instrument=pl.Instrument(thickness_spread=1.0)),
-            "thickness_spread is known for one layer only",
+            "thickness_spread is known for R and T of one layer only",
         ),
         (lambda: scene(ambient=1.33 + 0.1j), "the ambient must not absorb: give it a real index"),
         (lambda: scene(ambient="Au"), "the ambient must not absorb: give it a real index"),

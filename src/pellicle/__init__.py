@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from pellicle.scene import Normal as Normal
     from pellicle.scene import Scene as Scene
     from pellicle.scene import Substrate as Substrate
+    from pellicle.signals import ellipsometry as ellipsometry
     from pellicle.signals import reflectance as reflectance
     from pellicle.signals import transmittance as transmittance
 
@@ -38,7 +39,7 @@ _HOME = {
     "pellicle.optics.dispersion": ("Cauchy", "Constant", "Sellmeier", "Shifted", "Table"),
     "pellicle.planning": ("plan",),
     "pellicle.scene": ("Free", "Instrument", "Layer", "Light", "Normal", "Scene", "Substrate"),
-    "pellicle.signals": ("reflectance", "transmittance"),
+    "pellicle.signals": ("ellipsometry", "reflectance", "transmittance"),
 }
 _MODULE = {name: module for module, names in _HOME.items() for name in names}
 _RENAMED = {"material": "lookup"}

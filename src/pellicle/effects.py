@@ -95,6 +95,8 @@ def _propagates(material, scene: Scene) -> bool:
 
 
 def _polarisation(scene: Scene) -> Row:
+    if scene.light.signal == "psi-delta":
+        return Row("polarisation", True, "ellipsometry compares p with s")
     if _zero(scene.light.angle):
         return Row("polarisation", False, "s and p are one at normal incidence")
     if scene.light.polarisation != "unpolarised":
@@ -133,7 +135,7 @@ def _orders(scene: Scene) -> Row:
         return Row("orders", False, "the closed form sums all orders")
     if scene.light.wavelength is None:
         raise ValueError("the number of orders depends on the wavelengths: give the light its wavelengths")
-    if len(scene.layers) > 1:
+    if len(scene.layers) > 1 or scene.light.signal == "psi-delta":
         return _quadrature(scene)
     ratio = float(np.clip(largest_ratio(scene), 1e-12, 0.999))
     count = int(np.clip(np.ceil(np.log(ORDERS_ERROR * (1 - ratio)) / np.log(ratio)), 1, MOST_ORDERS))
@@ -155,7 +157,7 @@ def _quadrature(scene: Scene) -> Row:
     sigma = np.linspace(0.0, blur, 200)
     kept = np.cos(np.sqrt(2) * sigma[:, None] * nodes) @ weights / np.sqrt(np.pi)
     error = float(np.max(np.abs(kept - np.exp(-0.5 * sigma**2))))
-    return Row("orders", True, f"a stack is averaged over {NODES} wavelengths of the bandwidth", error, NODES)
+    return Row("orders", True, f"averaged over {NODES} wavelengths of the bandwidth", error, NODES)
 
 
 def _upper(number: Any) -> float:

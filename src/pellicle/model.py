@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from pellicle.materials import materials_in
-from pellicle.optics import film, interface, orders, plate, stack
+from pellicle.optics import ellipsometry, film, interface, orders, plate, stack
 from pellicle.optics.dispersion import AbstractDispersion, Sampled
 from pellicle.optics.number import Number, imag, real, sincos_poly
 from pellicle.planning import Plan
@@ -57,9 +57,16 @@ def sampled(scene: Scene, slope: bool = True) -> Scene:
 def build(plan: Plan) -> Simulate:
     """simulate(scene) → the signal at `scene.light.wavelength`, as a fraction, without scale or offset.
 
-    `scene` holds numbers only (see `scene.insert`). The function is pure and can be traced.
+    For ellipsometry it is N, C, S of the first wavelength, then of the next, in one array. `scene`
+    holds numbers only (see `scene.insert`). The function is pure and can be traced.
     """
-    faces = _windowed_faces if plan.on("coherence") and not plan.on("stack") else _coherent_faces
+    simulate = _ellipsometer(plan) if plan.signal == "psi-delta" else _photometer(plan)
+    averaged = _averaged(simulate, plan.row("orders").count) if plan.quadrature else simulate
+    return _on_sphere(averaged) if plan.signal == "psi-delta" else averaged
+
+
+def _photometer(plan: Plan) -> Simulate:
+    faces = _windowed_faces if plan.on("coherence") and not plan.quadrature else _coherent_faces
     finish = _with_back if plan.on("back-face") else _half_space
 
     def simulate(scene: Scene):
@@ -67,8 +74,24 @@ def build(plan: Plan) -> Simulate:
         signals = [finish(plan, optics, p, faces(plan, optics, p)) for p in _polarisations(plan)]
         return signals[0] if len(signals) == 1 else 0.5 * (signals[0] + signals[1])
 
-    averaged = plan.on("coherence") and plan.on("stack")
-    return _averaged(simulate, plan.row("orders").count) if averaged else simulate
+    return simulate
+
+
+def _ellipsometer(plan: Plan) -> Simulate:
+    """Sums of intensities, (4, wavelengths): what a bandwidth averages."""
+
+    def simulate(scene: Scene):
+        optics = _Optics(plan, scene)
+        return jnp.stack(ellipsometry.stokes(_wave(plan, optics, "s"), _wave(plan, optics, "p")))
+
+    return simulate
+
+
+def _on_sphere(simulate: Simulate) -> Simulate:
+    def point(scene: Scene):
+        return jnp.stack(ellipsometry.normalised(ellipsometry.Stokes(*simulate(scene))), -1).reshape(-1)
+
+    return point
 
 
 def _averaged(simulate: Simulate, count: int) -> Simulate:
@@ -83,7 +106,7 @@ def _averaged(simulate: Simulate, count: int) -> Simulate:
             shifted = scene.light.wavelength + node * width
             return simulate(eqx.tree_at(lambda s: s.light.wavelength, scene, shifted))
 
-        return jnp.asarray(weights / np.sqrt(np.pi)) @ jax.vmap(at)(jnp.asarray(nodes))
+        return jnp.tensordot(jnp.asarray(weights / np.sqrt(np.pi)), jax.vmap(at)(jnp.asarray(nodes)), 1)
 
     return average
 

@@ -26,6 +26,11 @@ class Plan:
     def on(self, effect: str) -> bool:
         return self.row(effect).on
 
+    @property
+    def quadrature(self) -> bool:
+        """Whether the bandwidth is averaged over wavelengths, for want of a series that it could damp."""
+        return self.on("coherence") and (self.on("stack") or self.signal == "psi-delta")
+
     def __str__(self) -> str:
         width = max(len(row.effect) for row in self.rows)
         lines = [f"{row.effect:<{width}}  {'on ' if row.on else 'off'}  {row.why}" for row in self.rows]

@@ -18,7 +18,7 @@ from pellicle.materials import lookup
 from pellicle.optics.dispersion import AbstractDispersion, Constant
 from pellicle.optics.number import is_real
 
-SIGNALS = ("R", "T")
+SIGNALS = ("R", "T", "psi-delta")
 POLARISATIONS = ("unpolarised", "s", "p")
 
 
@@ -146,8 +146,8 @@ class Substrate(eqx.Module):
 
 @final
 class Light(eqx.Module):
-    """How the scene is looked at: signal "R" or "T", polarisation, angle of incidence (degrees; one
-    for all or one per wavelength) and wavelengths (nm; None leaves them to the data)."""
+    """How the scene is looked at: signal "R", "T" or "psi-delta", polarisation, angle of incidence
+    (degrees; one for all or one per wavelength) and wavelengths (nm; None leaves them to the data)."""
 
     wavelength: Any = None
     angle: Any = 0.0
@@ -249,8 +249,11 @@ class Scene(eqx.Module):
     def __check_init__(self):
         if not self.layers:
             raise ValueError("a scene needs at least one layer; a bare surface is a layer of thickness 0")
-        if len(self.layers) > 1 and self.instrument.thickness_spread is not None:
-            raise ValueError("thickness_spread is known for one layer only: leave it out of a stack")
+        ellipsometric = self.light.signal == "psi-delta"
+        if (len(self.layers) > 1 or ellipsometric) and self.instrument.thickness_spread is not None:
+            raise ValueError("thickness_spread is known for R and T of one layer only: leave it out here")
+        if ellipsometric and self.substrate.back is not None:
+            raise ValueError("ellipsometry of a plate's back face is not simulated: leave back out")
         if absorbs(self.ambient):
             raise ValueError("the ambient must not absorb: give it a real index")
 

@@ -17,6 +17,7 @@ from jaxtyping import Array, Float
 
 from pellicle.optics import film, interface, stack
 from pellicle.optics.dispersion import AbstractDispersion
+from pellicle.optics.ellipsometry import angles, normalised, stokes
 from pellicle.optics.number import Number, is_real, sincos_poly, to_pair
 from pellicle.scene import check_polarisation, medium
 
@@ -74,6 +75,25 @@ def transmittance(
     """
     waves = _waves(wavelength, thickness, layer, substrate, ambient, angle, polarisation)
     return _mean([film.transmittance(w) for w in waves])
+
+
+def ellipsometry(
+    wavelength: Any,
+    thickness: Any,
+    layer: Medium,
+    substrate: Medium,
+    *,
+    ambient: Medium = 1.0,
+    angle: Any,
+) -> tuple[Float[Array, "..."], Float[Array, "..."]]:
+    """Ψ (0 to 90) and Δ (0 to 360) in degrees; arguments as `reflectance`, the angle in degrees.
+
+    tan(Ψ) exp(iΔ) = conj(r_p / r_s) for n + ik, as instruments write it: Δ is near 180 for bare
+    silicon at small angles. Δ wraps around: fit N, C, S instead (`pellicle.optics.ellipsometry`).
+    """
+    angle = _floating(angle)  # also at 0 both polarisations are needed
+    s, p = _waves(wavelength, thickness, layer, substrate, ambient, angle, "unpolarised")
+    return angles(*normalised(stokes(s, p)))
 
 
 def _mean(signals: list[Any]) -> Any:

@@ -44,11 +44,11 @@ def fit(
     bandwidth: Annotated[
         str | None, _flag(_instrument, "Full width at half maximum in nm, free, or LO:HI.")
     ] = None,
-    signal: Annotated[str | None, _flag(_reading, "R or T, where the file does not say.")] = None,
+    signal: Annotated[str | None, _flag(_reading, "R, T or psi-delta, where the file does not say.")] = None,
     angle: Annotated[float | None, _flag(_reading, "Angle of incidence in degrees (0).")] = None,
     polarisation: Annotated[str | None, _flag(_reading, "s, p or unpolarised.")] = None,
     range: Annotated[str | None, _flag(_reading, "Wavelengths to keep, LO:HI in nm.")] = None,
-    noise: Annotated[float | None, _flag(_reading, "Standard deviation of every point.")] = None,
+    noise: Annotated[float | None, _flag(_reading, "Standard deviation of every point (a fraction; degrees for psi-delta).")] = None,
     columns: Annotated[str | None, _flag(_reading, "Names of the columns in order, _ to skip.")] = None,
     wavelength_unit: Annotated[str | None, _flag(_reading, "nm, um, A, eV or cm-1.")] = None,
     signal_unit: Annotated[str | None, _flag(_reading, "fraction or percent.")] = None,
@@ -98,8 +98,8 @@ def _range(text: str | None) -> tuple[float, float] | None:
 
 
 def _check(reading: ReadWords) -> None:
-    if reading.signal not in (None, "R", "T"):
-        raise UsageError(f"--signal must be R or T, not {reading.signal!r}")
+    if reading.signal not in (None, "R", "T", "psi-delta"):
+        raise UsageError(f"--signal must be R, T or psi-delta, not {reading.signal!r}")
     if reading.angle is not None and not 0 <= reading.angle <= 90:
         raise UsageError(f"--angle must lie in 0 to 90 degrees, got {reading.angle:g}")
     if reading.polarisation not in (None, "s", "p", "unpolarised"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy as np
 
 from pellicle.errors import UsageError
 from pellicle.fitting import backface, noise, summary
-from pellicle.fitting.problem import make
+from pellicle.fitting.problem import Problem, make
 from pellicle.fitting.result import Fit
 from pellicle.fitting.search import Progress, quiet, search
 from pellicle.fitting.status import judge, misfits, verdict
@@ -37,8 +38,17 @@ def fit(data: Spectrum, scene: Scene, *, progress: Progress = quiet) -> Fit:
         raise UsageError(
             f"{data.path}: an uncalibrated intensity needs a free scale: add --scale slow, or --scale free"
         )
+    if data.delta is not None:
+        _check_ellipsometry(data, scene, drifts)
     with jax.enable_x64(True):
         return _fit(data, seen_as(scene, data), progress)
+
+
+def _check_ellipsometry(data: Spectrum, scene: Scene, drifts: list[Drift]) -> None:
+    if drifts or scene.instrument.scale != 1.0 or scene.instrument.offset != 0.0:
+        raise UsageError(f"{data.path}: Ψ and Δ have no scale and no offset: leave both out")
+    if data.angle is None and not free_leaves(scene.light) and not np.any(scene.light.angle):
+        raise UsageError(f"{data.path}: ellipsometry needs its angle of incidence: add --angle 70, say")
 
 
 def check_free(scene: Scene) -> None:
@@ -63,7 +73,7 @@ def _fit(data: Spectrum, scene: Scene, progress: Progress) -> Fit:
     problem = make(
         scene,
         data.wavelength,
-        data.values,
+        _values(data),
         _sigma(data, source),
         1 / noise.DRIFT_CORRELATION if source.drifting else 1.0,
     )
@@ -75,14 +85,43 @@ def _slow(scene: Scene) -> bool:
     return isinstance(scene.instrument.scale, Drift) and scene.instrument.scale.degree > 0
 
 
+def _values(data: Spectrum) -> np.ndarray:
+    """What is fitted: fractions, or N, C, S (points, 3) for ellipsometry, which have no wrap-around."""
+    if data.delta is None:
+        return data.values
+    psi, delta = 2 * np.deg2rad(data.values), np.deg2rad(data.delta)
+    return np.stack([np.cos(psi), np.sin(psi) * np.cos(delta), np.sin(psi) * np.sin(delta)], -1)
+
+
 def _sigma(data: Spectrum, source: Noise) -> np.ndarray:
-    """σ of each point: given, the model's own error, or a guess that the residuals will replace."""
+    """σ of each point: given, the model's own error, or a guess that the residuals will replace.
+
+    On the sphere of N, C, S an error of Ψ moves a point by 2σ_Ψ and one of Δ by sin(2Ψ) σ_Δ; their
+    mean square serves for all directions.
+    """
+    if data.sigma is not None and data.delta is not None:
+        across = data.sigma if data.delta_sigma is None else data.delta_sigma
+        along = np.sin(2 * np.deg2rad(data.values)) * across
+        return np.deg2rad(np.sqrt(0.5 * ((2 * data.sigma) ** 2 + along**2)))
     if data.sigma is not None:
         return data.sigma
+    if data.delta is not None:
+        return np.full(len(data), 0.01)
     if source.drifting:
         return noise.drifting_sigma(data.values)
     guess = max(0.01 * float(np.ptp(data.values)), float(np.median(noise.local_noise(data.values))), 1e-12)
     return np.full(len(data), guess)
+
+
+def _size(data: Spectrum, problem: Problem, weighed: Weighed) -> tuple[float, float]:
+    """rms of the residuals, and the signal's span. For ellipsometry the rms is in degrees of Ψ: half the
+    distance on the sphere, in each of its two directions."""
+    residual = (problem.data.values - np.asarray(weighed.at.model))[: problem.points]
+    values = problem.data.values[: problem.points].reshape(problem.rows, problem.channels)
+    span = float(np.max(np.ptp(values, axis=0)))
+    if data.delta is None:
+        return float(np.sqrt(np.mean(residual**2))), span
+    return float(np.rad2deg(np.sqrt(residual @ residual / (2 * problem.rows))) / 2), span
 
 
 def _report(data: Spectrum, scene: Scene, weighed: Weighed, profile, source: Noise, began: float) -> Fit:
@@ -91,14 +130,14 @@ def _report(data: Spectrum, scene: Scene, weighed: Weighed, profile, source: Noi
     parameters = summary.estimates(scene, weighed, found, profile)
     others = summary.rivals(weighed)
     curve = summary.curve(problem, weighed, found)
-    rms = float(np.sqrt(np.mean(curve.residual**2)))
+    rms, span = _size(data, problem, weighed)
     misfit = misfits(
         chi2_reduced=weighed.chi2_reduced,
         sigma_known=source.given,
         drifting=source.drifting,
         effective_share=1 / weighed.length,
-        rms=rms,
-        span=float(np.ptp(data.values)),
+        rms=rms if data.delta is None else math.radians(2 * rms),
+        span=span,
         calibrated=data.calibrated,
     )
     plate = backface.rms_without(scene, weighed) if problem.plan.on("back-face") else None

@@ -41,8 +41,18 @@ class Problem(NamedTuple):
     data: Data
     box: Box
     parameters: tuple[Parameter, ...]
-    points: int
+    points: int  # data values: three for each wavelength in ellipsometry
     largest_index: float
+
+    @property
+    def channels(self) -> int:
+        """Data values at each wavelength."""
+        return len(self.data.values) // len(self.scene.light.wavelength)
+
+    @property
+    def rows(self) -> int:
+        """Wavelengths that are real, not padding."""
+        return self.points // self.channels
 
     @property
     def thickness_axis(self) -> int | None:
@@ -57,21 +67,23 @@ class Problem(NamedTuple):
 
 
 def make(scene: Scene, wavelength, values, sigma, temper: float) -> Problem:
-    """The problem of fitting `values` (fractions) with weights 1/`sigma` at `wavelength` (nm).
+    """The problem of fitting `values` with weights 1/`sigma` at `wavelength` (nm).
 
+    `values` are fractions (points,), or N, C, S (points, 3) for ellipsometry; `sigma` is (points,).
     Raises ValueError where a material has no data at a wavelength.
     """
-    points = len(wavelength)
+    points, channels = len(wavelength), values.size // len(wavelength)
     extra = -points % _ROUND
     wavelength, values = _pad(wavelength, extra), _pad(values, extra)
     scene = with_wavelength(scene, wavelength, _pad_angle(scene.light.angle, extra))
     chosen = plan(scene)
     free = parameters(scene)
-    span = wavelength.max() - wavelength.min()
+    span = max(wavelength.max() - wavelength.min(), 1e-9)  # one wavelength at many angles has none
+    weight = np.concatenate([1 / np.broadcast_to(sigma, points), np.zeros(extra)])
     data = Data(
-        values=values,
-        weight=np.concatenate([1 / np.broadcast_to(sigma, points), np.zeros(extra)]),
-        position=2 * (wavelength - wavelength.min()) / span - 1,
+        values=values.reshape(-1),
+        weight=np.repeat(weight, channels),
+        position=np.repeat(2 * (wavelength - wavelength.min()) / span - 1, channels),
         temper=np.float64(temper),
         level=np.float64(max(float(np.median(np.abs(values[:points]))), 1e-12)),
     )
@@ -84,11 +96,11 @@ def make(scene: Scene, wavelength, values, sigma, temper: float) -> Problem:
     )
     scene = sampled(scene, chosen.on("coherence"))
     steepest = max(largest_index(layer.material, wavelength) for layer in scene.layers)
-    return Problem(chosen, anonymous(scene), data, box, free, points, steepest)
+    return Problem(chosen, anonymous(scene), data, box, free, points * channels, steepest)
 
 
 def _pad(x: np.ndarray, extra: int) -> np.ndarray:
-    return np.concatenate([x, np.full(extra, x[-1])])
+    return np.concatenate([x, np.repeat(x[-1:], extra, axis=0)])
 
 
 def _pad_angle(angle: Any, extra: int) -> Any:
@@ -96,21 +108,24 @@ def _pad_angle(angle: Any, extra: int) -> Any:
 
 
 def thin(problem: Problem, most: int) -> Problem:
-    """Every so-many-th point, at most about `most`, with the weight of those left out."""
-    stride = -(-problem.points // most)
+    """Every so-many-th wavelength, at most about `most`, with the weight of those left out."""
+    stride = -(-problem.rows // most)
     if stride <= 1:
         return problem
-    size = len(problem.data.values)
-    take = np.arange(0, problem.points, stride)
-    take = np.concatenate([take, np.full(-len(take) % _ROUND, size - 1)])
-    kept = np.where(np.arange(len(take)) < -(-problem.points // stride), 1.0, 0.0)
+    size, channels = len(problem.scene.light.wavelength), problem.channels
+    kept = np.arange(0, problem.rows, stride)
+    padding = -len(kept) % _ROUND
+    take = np.concatenate([kept, np.full(padding, size - 1)])
 
     def pick(x):
-        return x[take] if np.ndim(x) == 1 and len(x) == size else x
+        if np.ndim(x) != 1 or len(x) not in (size, size * channels):
+            return x
+        return x.reshape(size, -1)[take].reshape(-1)
 
     scene, data = jax.tree_util.tree_map(pick, (problem.scene, problem.data))
-    data = data._replace(weight=data.weight * kept, temper=data.temper * stride)
-    return problem._replace(scene=scene, data=data, points=-(-problem.points // stride))
+    real = np.repeat(np.concatenate([np.ones(len(kept)), np.zeros(padding)]), channels)
+    data = data._replace(weight=data.weight * real, temper=data.temper * stride)
+    return problem._replace(scene=scene, data=data, points=len(kept) * channels)
 
 
 def _solve(plan: Plan, scene: Scene, data: Data, box: Box, unit) -> nuisance.Solved:

@@ -58,7 +58,7 @@ def _drifts(scene: Scene) -> bool:
 
 def thinnest(weighed: Weighed) -> float:
     """The thickness (nm) of which the spectrum spans `FEWEST_FRINGES`."""
-    keep = slice(weighed.problem.points)
+    keep = slice(weighed.problem.rows)
     wavelength, n = (
         np.asarray(weighed.problem.scene.light.wavelength)[keep],
         np.asarray(weighed.at.layer)[0, keep],
@@ -149,25 +149,38 @@ def profile(problem: Problem, weighed: Weighed) -> Profile | None:
 
 def curve(problem: Problem, weighed: Weighed, found: Errors) -> Curve:
     """Data, model and the layer's index with errors, at the real points."""
-    keep, at = slice(problem.points), weighed.at
-    count = len(problem.parameters)
-    n_stderr, k_stderr = layer_errors(at, found.covariance[:count, :count], problem.points)
-    n, k = np.asarray(at.layer)[:, keep]
+    at, rows, count = weighed.at, problem.rows, len(problem.parameters)
+    n_stderr, k_stderr = layer_errors(at, found.covariance[:count, :count], rows)
+    n, k = np.asarray(at.layer)[:, :rows]
+    keep, shape = slice(problem.points), (rows, problem.channels)
+    data, model = problem.data.values[keep].reshape(shape), np.asarray(at.model)[keep].reshape(shape)
+    sigma = 1 / weighed.problem.data.weight[keep].reshape(shape)[:, 0]
+    angles = {}
+    if problem.channels == 3:
+        (data, delta_data), (model, delta_model) = _psi_delta(data), _psi_delta(model)
+        sigma, angles = np.rad2deg(sigma) / 2, {"delta_data": delta_data, "delta_model": delta_model}
     return Curve(
-        wavelength=np.asarray(problem.scene.light.wavelength)[keep],
-        data=problem.data.values[keep],
-        sigma=1 / weighed.problem.data.weight[keep],
-        model=np.asarray(at.model)[keep],
+        wavelength=np.asarray(problem.scene.light.wavelength)[:rows],
+        data=np.ravel(data),
+        sigma=sigma,
+        model=np.ravel(model),
         n=n,
         k=k,
         n_stderr=n_stderr,
         k_stderr=k_stderr,
+        **angles,
     )
+
+
+def _psi_delta(sphere: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Ψ and Δ in degrees from N, C, S (points, 3)."""
+    n, c, s = sphere.T
+    return np.rad2deg(np.arctan2(np.hypot(c, s), n)) / 2, np.rad2deg(np.arctan2(s, c)) % 360.0
 
 
 def effective_points(problem: Problem, weighed: Weighed) -> float:
     """How many independent points the spectrum is worth."""
-    return problem.points / weighed.length
+    return problem.rows / weighed.length
 
 
 def warnings(scene: Scene, weighed: Weighed, found: Errors) -> tuple[str, ...]:
@@ -178,8 +191,8 @@ def warnings(scene: Scene, weighed: Weighed, found: Errors) -> tuple[str, ...]:
         told.append(f"{orders.count} orders leave an error of up to {orders.error_bound:.1g}: |q| is near 1")
     if weighed.length >= 10:
         told.append(
-            f"residuals are correlated over {weighed.length:.0f} points: {weighed.problem.points} points"
-            f" count as {weighed.problem.points / weighed.length:.0f}"
+            f"residuals are correlated over {weighed.length:.0f} points: {weighed.problem.rows} points"
+            f" count as {weighed.problem.rows / weighed.length:.0f}"
         )
     if scene.light.signal == "T" and scene.substrate.back is None:
         told.append(

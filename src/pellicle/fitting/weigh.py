@@ -71,8 +71,11 @@ def _residual_noise(problem: Problem, unit: np.ndarray) -> tuple[float, float]:
     at = jax.device_get(local(*problem.program, unit))
     residual = ((problem.data.values - np.asarray(at.model)) * problem.data.weight)[: problem.points]
     used = len(problem.parameters) + len(linear_coefficients(problem, at))
-    chi2 = float(residual @ residual) / max(problem.points - used, 1)
-    return chi2, noise.correlation_length(residual)
+    # N, C and S lie on a sphere: two of the three are independent
+    independent = problem.points if problem.channels == 1 else 2 * problem.rows
+    chi2 = float(residual @ residual) / max(independent - used, 1)
+    columns = residual.reshape(-1, problem.channels).T
+    return chi2, float(np.mean([noise.correlation_length(column) for column in columns]))
 
 
 def _reweighted(problem: Problem, chi2: float, length: float, source: Noise) -> Problem:

@@ -78,7 +78,7 @@ class DataTable(_Table):
     """`[data]`."""
 
     files: list[str] = []
-    signal: Literal["R", "T"] | None = None
+    signal: Literal["R", "T", "psi-delta"] | None = None
     angle: float | None = Field(default=None, ge=0, le=90)
     polarisation: Literal["unpolarised", "s", "p"] | None = None
     noise: float | None = Field(default=None, gt=0)

@@ -1,0 +1,51 @@
+"""Ellipsometry: the ratio of the two polarisations' reflection, as angles and as a point on a sphere.
+
+Convention, with n + ik and the time factor exp(−iωt): tan(Ψ) exp(iΔ) = conj(r_p / r_s), which is what
+instruments write; Δ is near 180° for bare silicon at small angles. N = cos 2Ψ, C = sin 2Ψ cos Δ and
+S = sin 2Ψ sin Δ lie on a unit sphere, have no wrap-around, and are what is fitted (Jellison and Modine
+1990, Appl. Opt. 29, 959).
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+
+from pellicle.optics.film import Wave
+from pellicle.optics.number import abs2, conj, imag, real
+
+
+class Stokes(NamedTuple):
+    """N, C and S, each times the intensity, and the intensity |r_s|² + |r_p|².
+
+    They are sums of intensities: what an instrument averages is averaged here, before the division.
+    """
+
+    n: Any
+    c: Any
+    s: Any
+    intensity: Any
+
+
+def stokes(s: Wave, p: Wave) -> Stokes:
+    """From the waves of both polarisations around the same layers."""
+    rs, rp = s.reflected / s.denominator, p.reflected / p.denominator
+    both = 2 * (conj(rp) * rs)
+    return Stokes(abs2(rs) - abs2(rp), real(both), imag(both), abs2(rs) + abs2(rp))
+
+
+def normalised(given: Stokes) -> tuple[Any, Any, Any]:
+    """N, C, S on the unit sphere; all 0 where nothing is reflected, so that Ψ and Δ have no meaning."""
+    dark = given.intensity == 0
+    over = jnp.where(dark, 0.0, 1 / jnp.where(dark, 1.0, given.intensity))
+    return given.n * over, given.c * over, given.s * over
+
+
+def angles(n: Any, c: Any, s: Any) -> tuple[Any, Any]:
+    """Ψ in 0 to 90 and Δ in 0 to 360 degrees. Where Ψ is 0 or 90, Δ is 0 and its derivatives are 0."""
+    square = c * c + s * s
+    pole = square == 0
+    psi = 0.5 * jnp.arctan2(jnp.sqrt(jnp.where(pole, 1.0, square)) * jnp.where(pole, 0.0, 1.0), n)
+    delta = jnp.arctan2(jnp.where(pole, 0.0, s), jnp.where(pole, 1.0, c))
+    return jnp.rad2deg(psi), jnp.mod(jnp.rad2deg(delta), 360.0)

@@ -1,0 +1,85 @@
+"""Thicknesses from Ψ and Δ."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pellicle as pl
+from pellicle.errors import UsageError
+
+WAVELENGTH = np.linspace(300.0, 900.0, 64)
+PSI_SIGMA, DELTA_SIGMA = 0.02, 0.05
+
+
+def measured(thickness: float, angles=(70.0,), seed: int = 0) -> pl.Spectrum:
+    """Noisy Ψ and Δ of an oxide on silicon at one or several angles."""
+    rng = np.random.default_rng(seed)
+    wavelength, angle = np.tile(WAVELENGTH, len(angles)), np.repeat(angles, WAVELENGTH.size)
+    psi, delta = pl.ellipsometry(wavelength, thickness, "SiO2", "Si", angle=angle)
+    size = wavelength.size
+    return pl.Spectrum(
+        wavelength,
+        np.asarray(psi) + rng.normal(0, PSI_SIGMA, size),
+        "psi-delta",
+        sigma=np.full(size, PSI_SIGMA),
+        angle=angle,
+        path="oxide.csv",
+        delta=(np.asarray(delta) + rng.normal(0, DELTA_SIGMA, size)) % 360,
+        delta_sigma=np.full(size, DELTA_SIGMA),
+    )
+
+
+def scene(**options) -> pl.Scene:
+    return pl.Scene(pl.Layer("SiO2", pl.Free(lower=0, upper=1000)), "Si", **options)
+
+
+@pytest.mark.parametrize("thickness", [2.0, 100.0])
+def test_oxides_thin_and_thick(thickness):
+    found = pl.fit(measured(thickness), scene())
+    assert found.status == "converged"
+    assert found["thickness"].value == pytest.approx(thickness, abs=0.2)
+    assert abs(found["thickness"].value - thickness) < 4 * found["thickness"].stderr
+    assert 0.7 < found.chi2_reduced < 1.4
+    assert found.rms < 0.05  # degrees
+    assert np.max(np.abs(found.curve.delta_residual)) < 6 * DELTA_SIGMA
+
+
+def test_several_angles_in_one_file():
+    found = pl.fit(measured(100.0, angles=(65.0, 70.0, 75.0)), scene())
+    assert found.status == "converged"
+    assert abs(found["thickness"].value - 100.0) < 4 * found["thickness"].stderr < 0.01
+
+
+def test_wrap_around_does_not_matter():
+    """Δ of 359.9 and 0.1 are neighbours."""
+    spectrum = measured(140.0, angles=(75.0,))
+    assert np.ptp(spectrum.delta) > 300
+    assert pl.fit(spectrum, scene()).status == "converged"
+
+
+def test_what_ellipsometry_cannot_have():
+    spectrum = measured(100.0)
+    with pytest.raises(UsageError, match="no scale and no offset"):
+        pl.fit(spectrum, scene(instrument=pl.Instrument("free")))
+    bare = pl.Spectrum(
+        spectrum.wavelength, spectrum.values, "psi-delta", delta=spectrum.delta, path="oxide.csv"
+    )
+    with pytest.raises(UsageError, match=r"oxide.csv: ellipsometry needs its angle of incidence"):
+        pl.fit(bare, scene())
+    with pytest.raises(ValueError, match="leave back out"):
+        pl.Scene(pl.Layer(1.5, 1.0), pl.Substrate(1.5, back=1.0), light=pl.Light(signal="psi-delta"))
+
+
+def test_hafnia(shared_data):
+    """109 nm with its index free, as an independent fit found (../shared/data, SOURCE.md)."""
+    path = shared_data / "thinfilmstools_oxides" / "hafnia_psi_delta.csv"
+    wavelength, angle, psi, delta = np.loadtxt(path, delimiter=",", skiprows=1).T
+    keep = (wavelength > 300) & (wavelength < 2000)
+    spectrum = pl.Spectrum(
+        wavelength[keep], psi[keep], "psi-delta", angle=angle[keep], delta=delta[keep], path=path.name
+    )
+    layer = pl.Cauchy(pl.Free(lower=1.2, upper=3.0), pl.Free(lower=0, upper=1e5))
+    found = pl.fit(spectrum, pl.Scene(pl.Layer(layer, pl.Free(lower=1, upper=1000)), "SiO2"))
+    assert found.status == "converged"
+    assert found["thickness"].value == pytest.approx(109.0, abs=2.0)
