@@ -233,7 +233,8 @@ def test_no_wavelength_column(write):
 
 
 def test_psi_and_delta_are_not_read_as_something_else(write):
-    refused(write("wl,psi,delta\n400,20,170\n500,21,171\n"), DataError, "psi and delta", "file of R or T")
+    path = write("wl,psi,delta\n400,20,170\n500,21,171\n")
+    refused(path, UsageError, "psi and delta", "--signal says R", signal="R")
 
 
 @pytest.mark.parametrize("header", ["wavelength,R,R", "wavelength,R,r", "wavelength,wavelength,R"])

@@ -50,9 +50,18 @@ def test_wavelengths_rounded_until_they_repeat_are_refused(shared_data):
         read_spectrum(file)
 
 
-def test_ellipsometry_is_not_taken_for_a_reflectance(shared_data):
-    with pytest.raises(DataError, match="psi and delta"):
-        read_spectrum(shared_data / "thinfilmstools_oxides" / "hafnia_psi_delta.csv")
+def test_ellipsometry_of_hafnia(shared_data):
+    path = shared_data / "thinfilmstools_oxides" / "hafnia_psi_delta.csv"
+    spectrum = read_spectrum(path)
+    expected = np.loadtxt(path, delimiter=",", skiprows=1)
+    expected = expected[np.argsort(expected[:, 0])]
+    assert spectrum.signal == "psi-delta"
+    np.testing.assert_array_equal(spectrum.wavelength, expected[:, 0])
+    np.testing.assert_array_equal(spectrum.angle, expected[:, 1])
+    np.testing.assert_array_equal(spectrum.values, expected[:, 2])
+    np.testing.assert_allclose(spectrum.delta, expected[:, 3] % 360, rtol=1e-15)
+    with pytest.raises(UsageError, match=r"holds psi and delta but --signal says R"):
+        read_spectrum(path, signal="R")
 
 
 @pytest.mark.parametrize("pair", ["SL1", "SL2"])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pellicle.errors import DataError, UsageError
@@ -46,27 +48,37 @@ def read_columns(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray | None, np.ndarray | None]:
     """Wavelength (nm), signal, sigma and angle (degrees) in file order; None for what is not there.
 
+    As `read_axis`.
+    """
+    others = [chosen.signal, *([chosen.sigma] if chosen.sigma else [])]
+    wavelength, angle, read = read_axis(table, chosen.wavelength, chosen.angle, others, unit)
+    return wavelength, read[0], read[1] if chosen.sigma else None, angle
+
+
+def read_axis(
+    table: Table, wavelength: Column, angle: Column | None, others: Sequence[Column], unit: str | None
+) -> tuple[np.ndarray, np.ndarray | None, list[np.ndarray]]:
+    """Wavelength (nm), angle (degrees; None if there is no such column) and other columns, in file order.
+
     `unit` is what `axis_unit` settled; None means nm, assumed. Raises DataError for a cell that is
     no finite number, an impossible wavelength or angle, or an axis that is not strictly monotone
     within one angle.
     """
-    columns = table.numbers([column.position for column in chosen.present])
-    read = dict(zip(chosen.present, columns, strict=True))
-    angle = read[chosen.angle] if chosen.angle else None
-    if chosen.angle and angle is not None:
-        _refuse(table, chosen.angle, angle, (angle < 0) | (angle >= 90), "is not from 0 to below 90 degrees")
-    values = read[chosen.wavelength]
-    _refuse(table, chosen.wavelength, values, values <= 0, "is not above zero")
+    present = [wavelength, *others, *([angle] if angle else [])]
+    values, *read = table.numbers([column.position for column in present])
+    angles = read.pop() if angle else None
+    if angle and angles is not None:
+        _refuse(table, angle, angles, (angles < 0) | (angles >= 90), "is not from 0 to below 90 degrees")
+    _refuse(table, wavelength, values, values <= 0, "is not above zero")
     if unit is None and values.max() < SHORTEST_ASSUMED:
         raise DataError(
-            f"{table.path}: {table.label(chosen.wavelength.position)} runs from {values.min():g} to "
+            f"{table.path}: {table.label(wavelength.position)} runs from {values.min():g} to "
             f"{values.max():g}, which looks unlike nm; state its unit with --wavelength-unit um, eV or nm"
         )
-    groups = np.zeros(values.size) if angle is None else angle
+    groups = np.zeros(values.size) if angles is None else angles
     for group in np.unique(groups):
-        _check_monotone(table, chosen.wavelength, values, np.flatnonzero(groups == group))
-    sigma = read[chosen.sigma] if chosen.sigma else None
-    return to_nm(values, unit or "nm"), read[chosen.signal], sigma, angle
+        _check_monotone(table, wavelength, values, np.flatnonzero(groups == group))
+    return to_nm(values, unit or "nm"), angles, read
 
 
 def _refuse(table: Table, column: Column, values: np.ndarray, wrong: np.ndarray, why: str) -> None:

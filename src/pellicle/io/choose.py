@@ -9,7 +9,7 @@ from pellicle.errors import DataError, UsageError
 from pellicle.io.columns import Column, recognise_all, requested
 from pellicle.io.table import Table
 
-SIGNALS = ("R", "T")
+SIGNALS = ("R", "T")  # beside psi-delta, which is two columns
 POLARISATIONS = ("s", "p", "unpolarised")
 
 
@@ -54,7 +54,7 @@ def choose_counts(table: Table, spec: str | Sequence[str] | None) -> Chosen:
     if len(others) != 1:
         raise UsageError(
             f"{table.path}: expected one column of counts beside the wavelength, found "
-            f"{_listed(others) or 'none'}; say which with --columns wavelength,counts"
+            f"{listed(others) or 'none'}; say which with --columns wavelength,counts"
         )
     return _complete(table, columns, others[0])
 
@@ -92,35 +92,44 @@ def _by_position(table: Table, role: str) -> Chosen:
 
 
 def _complete(table: Table, columns: Sequence[Column], signal: Column) -> Chosen:
-    wavelength = _only(table, columns, "wavelength")
+    wavelength, angle = wavelength_and_angle(table, columns, "wavelength,R")
+    sigma = only(table, columns, "sigma")
+    used = {c.position for c in (wavelength, signal, sigma, angle) if c}
+    ignored = [c for c in columns if c.position not in used and c.name not in ("_", "")]
+    said = [f"{listed([wavelength])} read as the wavelength, {listed([signal])} as the signal"]
+    if sigma:
+        said.append(f"{listed([sigma])} read as the standard deviation of the signal")
+    if angle:
+        said.append(f"{listed([angle])} read as the angle of incidence in degrees")
+    if ignored:
+        said.append(f"ignored: {listed(ignored)}")
+    return Chosen(wavelength, signal, sigma, angle, tuple(said))
+
+
+def wavelength_and_angle(
+    table: Table, columns: Sequence[Column], example: str
+) -> tuple[Column, Column | None]:
+    """The columns of the wavelength and, if there is one, of the angle of incidence. Raises DataError."""
+    wavelength, angle = only(table, columns, "wavelength"), only(table, columns, "angle")
     if wavelength is None:
         raise DataError(
-            f"{table.path}: no column is a wavelength, energy or wavenumber among {_listed(columns)}; "
-            "name the columns in order with --columns, e.g. --columns wavelength,R"
+            f"{table.path}: no column is a wavelength, energy or wavenumber among {listed(columns)}; "
+            f"name the columns in order with --columns, e.g. --columns {example}"
         )
-    sigma, angle = _only(table, columns, "sigma"), _only(table, columns, "angle")
     if angle and angle.unknown_unit:
         raise DataError(
             f"{table.path}: {table.label(angle.position)} is in {angle.unknown_unit!r}; "
             "write angles in degrees"
         )
-    used = {c.position for c in (wavelength, signal, sigma, angle) if c}
-    ignored = [c for c in columns if c.position not in used and c.name not in ("_", "")]
-    said = [f"{_listed([wavelength])} read as the wavelength, {_listed([signal])} as the signal"]
-    if sigma:
-        said.append(f"{_listed([sigma])} read as the standard deviation of the signal")
-    if angle:
-        said.append(f"{_listed([angle])} read as the angle of incidence in degrees")
-    if ignored:
-        said.append(f"ignored: {_listed(ignored)}")
-    return Chosen(wavelength, signal, sigma, angle, tuple(said))
+    return wavelength, angle
 
 
-def _only(table: Table, columns: Sequence[Column], role: str) -> Column | None:
+def only(table: Table, columns: Sequence[Column], role: str) -> Column | None:
+    """The one column of a role, or None. Raises DataError where several could be it."""
     found = [c for c in columns if c.role == role]
     if len(found) > 1:
         raise DataError(
-            f"{table.path}: {_listed(found)} could each be the {role}; say which with --columns, "
+            f"{table.path}: {listed(found)} could each be the {role}; say which with --columns, "
             "_ for the others"
         )
     return found[0] if found else None
@@ -139,28 +148,28 @@ def _signal_column(
         wanted = [c for c in measured if polarisation and (c.polarisation or "unpolarised") == polarisation]
         if not wanted and len({c.polarisation for c in measured}) > 1:
             raise UsageError(
-                f"{table.path}: holds {_listed(measured)}; say which to read with --polarisation s, "
+                f"{table.path}: holds {listed(measured)}; say which to read with --polarisation s, "
                 "--polarisation p or --polarisation unpolarised"
             )
         measured = wanted or measured
     if len(measured) > 1:
         raise DataError(
-            f"{table.path}: {_listed(measured)} could each be the signal; say which with --columns, "
+            f"{table.path}: {listed(measured)} could each be the signal; say which with --columns, "
             "_ for the others"
         )
     if polarisation and measured[0].polarisation and measured[0].polarisation != polarisation:
         raise UsageError(
-            f"{table.path}: {_listed(measured)} is measured in {measured[0].polarisation} light but "
+            f"{table.path}: {listed(measured)} is measured in {measured[0].polarisation} light but "
             f"--polarisation says {polarisation}; leave the flag out"
         )
     return measured[0]
 
 
 def _intensity_column(table: Table, columns: Sequence[Column], signal: str | None) -> Column:
-    intensity = _only(table, columns, "intensity")
+    intensity = only(table, columns, "intensity")
     if intensity and signal is None:
         raise UsageError(
-            f"{table.path}: {_listed([intensity])} is uncalibrated; say what was measured with --signal R or "
+            f"{table.path}: {listed([intensity])} is uncalibrated; say what was measured with --signal R or "
             "--signal T"
         )
     if intensity:
@@ -169,12 +178,13 @@ def _intensity_column(table: Table, columns: Sequence[Column], signal: str | Non
     if other:
         raise UsageError(f"{table.path}: holds {other.pop()} but --signal says {signal}; correct the flag")
     if {"psi", "delta"} & {c.role for c in columns}:
-        raise DataError(f"{table.path}: holds psi and delta, which are not read yet; give a file of R or T")
+        raise UsageError(f"{table.path}: holds psi and delta but --signal says {signal}; leave the flag out")
     raise DataError(
-        f"{table.path}: no column is a signal (R, T, Rs, Rp, Ts, Tp or intensity) among {_listed(columns)}; "
+        f"{table.path}: no column is a signal (R, T, Rs, Rp, Ts, Tp or intensity) among {listed(columns)}; "
         "name the columns in order with --columns, e.g. --columns wavelength,R"
     )
 
 
-def _listed(columns: Sequence[Column]) -> str:
+def listed(columns: Sequence[Column]) -> str:
+    """The names of columns, for a message."""
     return ", ".join(repr(c.name) for c in columns)

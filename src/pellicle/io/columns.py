@@ -30,6 +30,11 @@ _NAMES = {
     "angle": ("angle", "aoi", "angle of incidence", "angle_of_incidence"),
     "psi": ("psi", "ψ"),
     "delta": ("delta", "δ"),
+    "sigma_psi": ("sigma_psi", "psi_sigma", "psi_err", "psi_error", "err_psi"),
+    "sigma_delta": ("sigma_delta", "delta_sigma", "delta_err", "delta_error", "err_delta"),
+    "N": ("n",),
+    "C": ("c",),
+    "S": ("s",),
 }
 _IMPLIED_UNIT = {"energy": "eV", "wavenumber": "cm-1", "angle": "deg"}
 _UNIT_OF = {
@@ -37,6 +42,8 @@ _UNIT_OF = {
     "angle": units.angle_unit,
     "psi": units.angle_unit,
     "delta": units.angle_unit,
+    "sigma_psi": units.angle_unit,
+    "sigma_delta": units.angle_unit,
     "counts": lambda text: None,
     "intensity": lambda text: None,
 }
@@ -52,7 +59,8 @@ SKIP = "_"
 class Column:
     """One column: where it is, what it holds and in which unit.
 
-    `role` is wavelength, R, T, intensity, counts, sigma, angle, psi, delta or other; energies and
+    `role` is wavelength, R, T, intensity, counts, sigma, angle, psi, delta, sigma_psi, sigma_delta,
+    N, C, S or other; energies and
     wavenumbers are wavelengths in another unit. `unit` is None where the name does not say, and
     `unknown_unit` keeps a unit that was written but not understood.
     """
@@ -110,7 +118,9 @@ def recognise_all(names: Sequence[str]) -> tuple[Column, ...]:
 def is_header(names: Sequence[str]) -> bool:
     """True if `names` announce a wavelength and something measured: no free text does both."""
     roles = {column.role for column in recognise_all(names)}
-    return "wavelength" in roles and bool(roles & {"R", "T", "intensity", "counts", "psi"})
+    return "wavelength" in roles and (
+        bool(roles & {"R", "T", "intensity", "counts", "psi"}) or {"N", "C", "S"} <= roles
+    )
 
 
 def is_unit_row(names: Sequence[str]) -> bool:
@@ -139,6 +149,7 @@ def requested(spec: str | Sequence[str], path: str, width: int) -> tuple[Column,
         if column.role == "other" and column.name not in (SKIP, ""):
             raise UsageError(
                 f"{path}: --columns does not know {column.name!r}; use wavelength, energy, wavenumber, R, T, "
-                "Rs, Rp, Ts, Tp, intensity, counts, sigma, angle, or _ to skip a column"
+                "Rs, Rp, Ts, Tp, intensity, counts, sigma, angle, psi, delta, sigma_psi, sigma_delta, "
+                "N, C, S, or _ to skip a column"
             )
     return columns

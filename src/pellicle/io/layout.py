@@ -36,6 +36,15 @@ class Layout:
     notes: tuple[str, ...]
 
 
+def plain_columns(
+    names: Sequence[str], rows: Sequence[tuple[Line, Sequence[str]]], notes: Sequence[str]
+) -> Layout:
+    """The layout of columns that a reader has picked out: cells with the lines they came from."""
+    width = len(names)
+    written = [Line(line.number, line.text, "\t".join(cells)) for line, cells in rows]
+    return Layout("\t", ".", tuple(names), width, width, written, tuple(notes))
+
+
 def find_layout(lines: Sequence[Line], comments: Sequence[Line], path: str) -> Layout:
     """The layout of a file's lines. Raises DataError if no line holds two numbers."""
     delimiter, decimal = _dialect(lines, path)

@@ -1,4 +1,4 @@
-"""Reading a measured spectrum: reflectance or transmittance against wavelength."""
+"""Reading a measured spectrum: reflectance, transmittance or Ψ and Δ against wavelength."""
 
 from __future__ import annotations
 
@@ -12,7 +12,9 @@ import numpy as np
 from pellicle.errors import UsageError
 from pellicle.io.axis import axis_note, axis_unit, read_columns
 from pellicle.io.checks import check_signal, scale_note, signal_scale
-from pellicle.io.choose import POLARISATIONS, SIGNALS, choose_spectrum
+from pellicle.io.choose import POLARISATIONS, SIGNALS, choose_spectrum, named_columns
+from pellicle.io.ellipsometry import SIGNAL, is_ellipsometry, read_ellipsometry
+from pellicle.io.exports import find_export
 from pellicle.io.spectrum import Spectrum
 from pellicle.io.table import read_table
 
@@ -29,25 +31,29 @@ def read_spectrum(
     polarisation: str | None = None,
     calibrated: bool | None = None,
 ) -> Spectrum:
-    """Reads a text file of reflectance or transmittance: CSV, or an instrument's export as it is.
+    """Reads a text file of reflectance, transmittance or ellipsometry: CSV, or an instrument's export.
 
-    - `signal`: "R" or "T"; needed without a header, for an `intensity` column, or if both are there.
+    - `signal`: "R", "T" or "psi-delta"; needed without a header, for an `intensity` column, or if
+      several are there.
     - `columns`: names in the order of the file's columns, `_` to skip one; overrides the header.
     - `wavelength_unit`: nm, um, A, eV or cm-1, where the file does not say (nm if nobody does).
     - `signal_unit`: "fraction" or "percent", where the file does not say.
     - `range`: wavelengths in nm to keep. It cuts before values are judged, so noisy ends may go.
-    - `noise`: standard deviation of every point as a fraction; replaces a sigma column.
+    - `noise`: standard deviation of every point as a fraction, or of Ψ and Δ in degrees; replaces the file's.
     - `polarisation`: "s", "p" or "unpolarised", where the column's name does not say.
     - `calibrated`: false lifts the limits on the values; by default only for an `intensity` column.
 
     Returns a `Spectrum`. Raises DataError (unreadable or impossible data) or UsageError (an
     argument missing or wrong), one sentence with file, line and remedy.
     """
-    _check_choice("--signal", signal, SIGNALS)
+    _check_choice("--signal", signal, (*SIGNALS, SIGNAL))
     _check_choice("--polarisation", polarisation, POLARISATIONS)
     if noise is not None and not (0 < noise < math.inf):
         raise UsageError(f"--noise {noise:g} must be a standard deviation above zero, e.g. --noise 0.005")
-    table = read_table(path)
+    table = read_table(path, find_export)
+    if is_ellipsometry(table, named_columns(table, columns), signal):
+        _refuse_flags(table.path, signal_unit, polarisation)
+        return read_ellipsometry(table, columns, wavelength_unit, noise, range)
     chosen = choose_spectrum(table, columns, signal, polarisation)
     axis = axis_unit(table, chosen.wavelength, wavelength_unit)
     scale = signal_scale(table, chosen, signal_unit)
@@ -81,3 +87,11 @@ def read_spectrum(
 def _check_choice(flag: str, given: str | None, known: Sequence[str]) -> None:
     if given is not None and given not in known:
         raise UsageError(f"{flag} {given!r} is not known; use one of {', '.join(known)}")
+
+
+def _refuse_flags(path: str, signal_unit: str | None, polarisation: str | None) -> None:
+    """What has no meaning for Ψ and Δ."""
+    if signal_unit is not None:
+        raise UsageError(f"{path}: psi and delta are in degrees; leave --signal-unit out")
+    if polarisation in ("s", "p"):
+        raise UsageError(f"{path}: psi and delta compare p with s light; leave --polarisation out")

@@ -10,6 +10,7 @@ import numpy as np
 from pellicle.errors import DataError, UsageError
 
 FEWEST_POINTS = 5  # a cut that leaves less is a mistake in the range
+_ARRAYS = ("wavelength", "values", "sigma", "angle", "lines", "delta", "delta_sigma")
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,15 +43,7 @@ class Spectrum:
     def __post_init__(self) -> None:
         size = np.size(self.wavelength)
         order = np.lexsort((np.zeros(size) if self.angle is None else self.angle, self.wavelength))
-        for name, dtype in (
-            ("wavelength", np.float64),
-            ("values", np.float64),
-            ("sigma", np.float64),
-            ("angle", np.float64),
-            ("lines", np.int64),
-            ("delta", np.float64),
-            ("delta_sigma", np.float64),
-        ):
+        for name in _ARRAYS:
             given = getattr(self, name)
             if given is None:
                 continue
@@ -58,7 +51,7 @@ class Spectrum:
                 raise ValueError(
                     f"{name}: expected one number per wavelength ({size}), got {np.shape(given)}"
                 )
-            array = np.asarray(given, dtype=dtype)[order]
+            array = np.asarray(given, dtype=np.int64 if name == "lines" else np.float64)[order]
             array.flags.writeable = False
             object.__setattr__(self, name, array)
 
@@ -66,7 +59,10 @@ class Spectrum:
         return self.wavelength.size
 
     def __str__(self) -> str:
-        span = f"{self.wavelength[0]:g} to {self.wavelength[-1]:g} nm" if len(self) else "empty"
+        span = "empty"
+        if len(self):
+            lo, hi = self.wavelength[0], self.wavelength[-1]
+            span = f"{lo:g} to {hi:g} nm" if lo < hi else f"{lo:g} nm"
         return f"{self.path or 'spectrum'}: {len(self)} points of {self.signal}, {span}"
 
     def cut(self, lo: float | int, hi: float | int) -> Spectrum:
@@ -84,8 +80,7 @@ class Spectrum:
                 f"widen it to keep at least {FEWEST_POINTS}"
             )
         kept = {
-            name: None if getattr(self, name) is None else getattr(self, name)[inside]
-            for name in ("wavelength", "values", "sigma", "angle", "lines")
+            name: None if getattr(self, name) is None else getattr(self, name)[inside] for name in _ARRAYS
         }
         note = f"{inside.sum()} of {len(self)} points kept, {lo:g} to {hi:g} nm"
         return dataclasses.replace(self, **kept, notes=(*self.notes, note))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from io import StringIO
 
@@ -16,7 +16,7 @@ import numpy as np
 
 from pellicle.errors import DataError
 from pellicle.io.layout import DELIMITERS, Layout, find_layout
-from pellicle.io.text import content_lines, is_number, read_text, split
+from pellicle.io.text import Line, content_lines, is_number, read_text, split
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,14 +102,19 @@ def _is_finite(values: np.ndarray) -> bool:
     return values.dtype.kind in "fiu" and bool(np.isfinite(values).all())
 
 
-def read_table(path: str | os.PathLike[str]) -> Table:
+Finder = Callable[[Sequence[Line], Sequence[Line], str], Layout | None]
+
+
+def read_table(path: str | os.PathLike[str], export: Finder | None = None) -> Table:
     """Layout of the text file at `path`; no cell is read yet.
 
+    `export` is asked first: it returns the layout of a format of its own, or None.
     Raises DataError for a file that cannot be read or holds no rows of numbers.
     """
     text, digest = read_text(path)
     lines, comments = content_lines(text)
     if not lines:
         raise DataError(f"{path}: holds only comments; expected rows of wavelength and signal")
-    layout = find_layout(lines, comments, str(path))
+    known = export(lines, comments, str(path)) if export else None
+    layout = known or find_layout(lines, comments, str(path))
     return Table(str(path), digest, layout, np.array([line.number for line in layout.rows]))
