@@ -222,7 +222,7 @@ def test_flags_reach_the_scene(pellicle, spectrum_file):
     for flags in (
         ("--angle", "30", "--polarisation", "s"),
         ("--ambient", "1.1"),
-        ("--range", "450:700"),
+        ("--range", "410:750"),
     ):
         (found,) = pellicle("fit", file, *base, *flags).objects
         assert found["parameters"]["thickness"]["value"] != plain, flags

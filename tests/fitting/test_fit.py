@@ -43,8 +43,9 @@ def test_at_an_angle_in_either_polarisation(film, measured, polarisation, sees):
 
 
 def test_angles_of_the_spectrum_go_before_those_of_the_scene(film, measured):
-    data = measured(film(light=pl.Light(angle=40.0)), 480.0)
-    stated = pl.Spectrum(data.wavelength, data.values, "R", angle=np.full(len(data), 40.0))
+    data = measured(film(light=pl.Light(angle=60.0, polarisation="s")), 480.0)
+    angle = np.full(len(data), 60.0)
+    stated = pl.Spectrum(data.wavelength, data.values, "R", polarisation="s", angle=angle)
     agrees(pl.fit(stated, film()), {"thickness": 480.0})
 
 
@@ -86,18 +87,15 @@ def test_uneven_thickness(film, measured):
     agrees(fit, {"thickness": 900.0, "instrument.thickness_spread": 30.0})
 
 
-@pytest.mark.parametrize("words", [("free", "free"), (1.0, "free")])
-def test_free_scale_and_offset(film, measured, words):
-    """Reported in physical units with errors, beside what is fixed."""
-    scale = 1.3 if words[0] == "free" else 1.0
-    offset = 0.05 if words[1] == "free" else 0.0
-    data = measured(film(instrument=pl.Instrument(scale, offset)), 480.0)
-    fit = pl.fit(data, film(instrument=pl.Instrument(*words)))
-    agrees(fit, {"thickness": 480.0})
-    for name, value, word in zip(("scale", "offset"), (scale, offset), words, strict=True):
-        estimate = fit[f"instrument.{name}"]
-        assert estimate.free == (word == "free")
-        assert abs(estimate.value - value) <= 4 * estimate.stderr
+def test_free_scale_and_offset(film, measured):
+    """Reported in physical units with errors."""
+    data = measured(film(instrument=pl.Instrument(1.3, 0.05)), 480.0)
+    fit = pl.fit(data, film(instrument=pl.Instrument("free", "free")))
+    truth = {"thickness": 480.0, "instrument.scale": 1.3, "instrument.offset": 0.05}
+    assert fit.status == "converged"
+    for name, value in truth.items():
+        assert fit[name].free
+        assert abs(fit[name].value - value) <= 4 * fit[name].stderr < 0.2 * value
 
 
 def test_a_prior_pulls_and_sharpens(film, measured):
@@ -147,11 +145,11 @@ def compilations():
 
 def test_a_second_file_compiles_nothing(film, measured, compilations):
     scene = film(material=pl.Cauchy(pl.Free(None, 1.3, 1.7), pl.Free(None, 0.0, 3e4)))
-    jax.clear_caches()
-    pl.fit(measured(scene, 1.46, 3000.0, 480.0), scene)
+    nm = np.linspace(400.0, 900.0, 192)  # a length of its own: programs of other tests do not serve
+    pl.fit(measured(scene, 1.46, 3000.0, 480.0, wavelength=nm), scene)
     assert compilations
-    other = measured(scene, 1.5, 9000.0, 210.0, seed=5)
-    shorter = measured(scene, 1.5, 9000.0, 210.0, wavelength=np.linspace(420.0, 880.0, 120))
+    other = measured(scene, 1.5, 9000.0, 210.0, seed=5, wavelength=nm)
+    shorter = measured(scene, 1.5, 9000.0, 210.0, wavelength=np.linspace(420.0, 880.0, 180))
     compilations.clear()
     pl.fit(other, scene)
     assert not compilations
@@ -172,7 +170,7 @@ def test_an_uncalibrated_intensity_needs_a_scale(film, measured):
     counts = pl.Spectrum(data.wavelength, 900 * data.values, "R", calibrated=False, path="lamp.csv")
     with pytest.raises(UsageError, match=r"lamp\.csv: .*--scale slow"):
         pl.fit(counts, film())
-    fit = pl.fit(counts, film(instrument=pl.Instrument("free")))
+    fit = pl.fit(counts, film(instrument=pl.Instrument("free", "free")))
     agrees(fit, {"thickness": 480.0})
     assert fit["instrument.scale"].value == pytest.approx(900, rel=0.02)
 
