@@ -1,5 +1,7 @@
 """Write the synthetic spectra of `measurements/` from their recipes, and their index.
 
+The index keeps its rows of kind "measured".
+
 Run `python scripts/make_measurements.py FOLDER` (default: measurements). Files that exist are left
 alone: remove one to have it made again.
 """
@@ -21,16 +23,26 @@ COLUMNS = ("file", "kind", "recipe", "seed", "truth", "sample", "source", "licen
 
 def main(folder: Path) -> None:
     """One spectrum for each recipe; the seed is the recipe's place in the alphabet, from 1."""
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for seed, recipe in enumerate(sorted((ROOT / "measurements" / "recipes").glob("*.toml")), start=1):
         target = folder / f"{recipe.stem}.csv"
         if not target.exists():
             simulate(str(recipe), out=str(target), seed=seed)
         rows.append(_row(recipe, target, seed))
+    rows += _measured(folder / "INDEX.csv")
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerows([COLUMNS, *rows])
     write_text(folder / "INDEX.csv", text.getvalue(), overwrite=True)
+
+
+def _measured(index: Path) -> list[tuple[str, ...]]:
+    """The rows of what was measured, which only people write."""
+    if not index.exists():
+        return []
+    with index.open(encoding="utf-8", newline="") as file:
+        found = [row for row in csv.DictReader(file) if row["kind"] == "measured"]
+    return [tuple(row[name] for name in COLUMNS) for row in found]
 
 
 def _row(recipe: Path, target: Path, seed: int) -> tuple[str, ...]:

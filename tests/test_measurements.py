@@ -31,6 +31,7 @@ def test_there_are_hematite_cadmium_sulfide_and_gold():
 
 def test_every_file_is_what_its_recipe_and_seed_give(script, tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("PELLICLE_CACHE", "off")
+    (tmp_path / "INDEX.csv").write_text((FOLDER / "INDEX.csv").read_text())
     script.main(tmp_path)
     made = {path.name: path.read_text() for path in tmp_path.iterdir()}
     kept = {path.name: path.read_text() for path in FOLDER.glob("*.csv")}
@@ -40,8 +41,14 @@ def test_every_file_is_what_its_recipe_and_seed_give(script, tmp_path, capsys, m
 def test_the_index_lists_every_file():
     with (FOLDER / "INDEX.csv").open() as text:
         rows = list(csv.DictReader(text))
-    assert {row["file"] for row in rows} == {p.name for p in FOLDER.glob("*.csv")} - {"INDEX.csv"}
+    files = {*FOLDER.glob("*.csv"), *FOLDER.glob("ellipsometry/*.dat")} - {FOLDER / "INDEX.csv"}
+    assert {row["file"] for row in rows} == {path.relative_to(FOLDER).as_posix() for path in files}
     for row in rows:
+        if row["kind"] == "measured":
+            assert row["source"].startswith("refellips 0.0.6")
+            assert row["licence"] == "BSD-3-Clause"
+            continue
+        assert row["kind"] == "synthetic"
         assert (FOLDER / row["recipe"]).is_file()
         head = (FOLDER / row["file"]).read_text().split("wavelength_nm")[0]
         assert "SYNTHETIC" in head
