@@ -48,7 +48,9 @@ def fit(
     angle: Annotated[float | None, _flag(_reading, "Angle of incidence in degrees (0).")] = None,
     polarisation: Annotated[str | None, _flag(_reading, "s, p or unpolarised.")] = None,
     range: Annotated[str | None, _flag(_reading, "Wavelengths to keep, LO:HI in nm.")] = None,
-    noise: Annotated[float | None, _flag(_reading, "Standard deviation of every point (a fraction; degrees for psi-delta).")] = None,
+    noise: Annotated[
+        float | None, _flag(_reading, "Standard deviation of every point; degrees for psi-delta.")
+    ] = None,
     columns: Annotated[str | None, _flag(_reading, "Names of the columns in order, _ to skip.")] = None,
     wavelength_unit: Annotated[str | None, _flag(_reading, "nm, um, A, eV or cm-1.")] = None,
     signal_unit: Annotated[str | None, _flag(_reading, "fraction or percent.")] = None,
