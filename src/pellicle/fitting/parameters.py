@@ -9,18 +9,28 @@ import equinox as eqx
 import jax
 import numpy as np
 
+from pellicle.optics.cody_lorentz import CodyLorentz
+from pellicle.optics.dispersion import AbstractDispersion
+from pellicle.optics.naming import Place, place
+from pellicle.optics.oscillators import AbstractOscillator, Gaussian, Lorentz, Oscillators, TaucLorentz
 from pellicle.scene import Free, Layer, Normal, Scene, free_leaves, insert, is_free
 
 _UNITS = {"thickness": "nm", "bandwidth": "nm", "thickness_spread": "nm", "plate_mm": "mm", "angle": "deg"}
-_MODEL_UNITS = {"B": "nm^2", "C": "nm^4", "C1": "nm^2", "C2": "nm^2", "C3": "nm^2"}
-_NATURAL_ZERO = ("k", "bandwidth", "thickness_spread", "offset")
-_SEARCHED = ("thickness", "n", "A", "B", "k", "B1")
+_NATURAL_ZERO = ("k", "k0", "fraction", "bandwidth", "thickness_spread", "offset")
+_STRENGTHS = (Lorentz, Gaussian, TaucLorentz, CodyLorentz)
+"""Their A is a strength, which cannot be negative; the A of Cauchy is an index."""
+_SEARCHED = ("thickness", "n", "A", "B", "k", "B1", "Ep", "E0", "Eg", "eps_inf", "fraction")
 """Parameters that change where the fringes lie, or whether there are any: a start in the middle fails."""
+_FEW = 3
+"""Levels of an oscillator's parameter, of which there are many at once."""
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One nonlinear parameter; `key` is its last name (`thickness`, `n`, `A`), `name` its full one."""
+    """One nonlinear parameter; `key` is its last name (`thickness`, `n`, `A`), `name` its full one.
+
+    `field` is the key without the number of a tuple (`k` for `k2`), `owner` whose number it is.
+    """
 
     name: str
     key: str
@@ -29,15 +39,25 @@ class Parameter:
     lower: float
     upper: float
     prior: Normal | None
+    field: str = ""
+    owner: type = object
 
     @property
     def natural_lower(self) -> bool:
         """A lower bound that physics sets: resting on it gives a one-sided limit, not a warning."""
-        return self.key in _NATURAL_ZERO and self.lower == 0
+        strength = self.key == "A" and issubclass(self.owner, _STRENGTHS)
+        return (strength or (self.field or self.key) in _NATURAL_ZERO) and self.lower == 0
 
     @property
     def searched(self) -> bool:
         return self.key in _SEARCHED
+
+    @property
+    def levels(self) -> int | None:
+        """How many values a search should try, None to leave it to the width of the bounds."""
+        if self.owner is Oscillators or issubclass(self.owner, AbstractOscillator):
+            return _FEW
+        return None
 
 
 def parameters(scene: Scene) -> tuple[Parameter, ...]:
@@ -46,41 +66,43 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
 
 
 def _parameter(scene: Scene, path: tuple, free: Free) -> Parameter:
-    steps = [_step(key) for key in path]
-    key = _key(steps)
+    found = _place(scene, path)
     return Parameter(
-        name=".".join([*_owner(scene, steps), key]),
-        key=key,
-        unit=_unit(key),
+        name=".".join([*_owner(scene, path), found.name]),
+        key=found.key,
+        unit=_unit(found),
         value=free.value,
         lower=free.lower,
         upper=free.upper,
         prior=free.prior,
+        field=found.field,
+        owner=type(found.owner),
     )
 
 
-def _unit(key: str) -> str:
-    return _UNITS.get(key, _MODEL_UNITS.get(key, ""))
+def _place(scene: Scene, path: tuple) -> Place:
+    """What the number at `path` is called inside its medium, or inside the scene if it has none."""
+    node: Any = scene
+    for depth, step in enumerate(path):
+        node = getattr(node, step.name) if hasattr(step, "name") else node[step.idx]
+        if isinstance(node, AbstractDispersion):
+            return place(node, path[depth + 1 :])
+    key = path[-1].name
+    return Place(key, key, key, None)
 
 
-def _step(key: Any) -> str:
-    if isinstance(key, jax.tree_util.GetAttrKey):
-        return key.name
-    return str(getattr(key, "idx", getattr(key, "key", key)))
+def _unit(found: Place) -> str:
+    return found.unit or _UNITS.get(found.key, "")
 
 
-def _key(steps: list[str]) -> str:
-    """`A`, or `B1` for the first number of a tuple B."""
-    return f"{steps[-2]}{int(steps[-1]) + 1}" if steps[-1].isdigit() else steps[-1]
-
-
-def _owner(scene: Scene, steps: list[str]) -> list[str]:
-    """The part of the name before the last dot: nothing for the only layer of a scene."""
-    if steps[0] != "layers":
-        return [] if steps[0] == "light" else [steps[0]]
+def _owner(scene: Scene, path: tuple) -> list[str]:
+    """What goes in front of a name: nothing for the only layer of a scene."""
+    first = path[0].name
+    if first != "layers":
+        return [] if first == "light" else [first]
     if len(scene.layers) == 1:
         return []
-    position = int(steps[1])
+    position = path[1].idx
     return [scene.layers[position].name or f"layer{position + 1}"]
 
 
@@ -97,12 +119,10 @@ def anonymous(scene: Scene) -> Scene:
 
 def fixed_numbers(scene: Scene) -> list[tuple[str, float, str]]:
     """(name, value, unit) of the layer's numbers and the instrument's that are not free."""
-    leaves = jax.tree_util.tree_leaves_with_path((scene.layers, scene.instrument), is_leaf=is_free)
     found = []
-    for path, leaf in leaves:
-        if is_free(leaf) or np.ndim(leaf) or not isinstance(leaf, int | float):
+    for path, leaf in jax.tree_util.tree_leaves_with_path(scene, is_leaf=is_free):
+        if path[0].name not in ("layers", "instrument") or not isinstance(leaf, int | float):
             continue
-        steps = ["layers" if path[0].idx == 0 else "instrument", *(_step(key) for key in path[1:])]
-        key = _key(steps)
-        found.append((".".join([*_owner(scene, steps), key]), float(leaf), _unit(key)))
+        at = _place(scene, path)
+        found.append((".".join([*_owner(scene, path), at.name]), float(leaf), _unit(at)))
     return found

@@ -127,6 +127,8 @@ def _levels(p: Parameter, problem: Problem) -> np.ndarray:
         return np.array([(p.value - p.lower) / (p.upper - p.lower)])
     if p.key == "k":
         return np.array([0.001, 0.01, 0.05, 0.15, 0.4])
+    if p.levels is not None:
+        return _even(p.levels)
     count = np.ceil((p.upper - p.lower) / 0.2)
     if p.key == "B":
         count = np.ceil(_dispersion_fringes(p, problem))

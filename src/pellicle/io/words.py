@@ -2,34 +2,22 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterable
-from typing import Any, NamedTuple
 
+import jax
 import numpy as np
 
 from pellicle.errors import UsageError
+from pellicle.io.models import MODELS as MODELS
+from pellicle.io.models import bare, called, checked, default_bounds
+from pellicle.io.models import model as model
+from pellicle.io.models import nearest as nearest
 from pellicle.io.span import number, span
 from pellicle.materials import UnknownMaterial, lookup
-from pellicle.optics.dispersion import AbstractDispersion, Cauchy, Constant, Sellmeier, Shifted
-from pellicle.scene import Free
-
-
-class Own(NamedTuple):
-    """A model's own parameter: default bounds, default value, and whether the bare name frees it."""
-
-    lower: float
-    upper: float
-    value: float
-    free: bool = True
-
-
-MODELS: dict[str, dict[str, Own]] = {
-    "cauchy": {"A": Own(1.2, 3.0, 1.5), "B": Own(0.0, 1e5, 0.0), "C": Own(-1e10, 1e10, 0.0, False)},
-    "sellmeier": {"B1": Own(0.1, 6.0, 1.1), "C1": Own(0.0, 6e4, 8e3)},
-}
-"""Dispersion models by name. Cauchy: λ in nm, B in nm², C in nm⁴. Sellmeier, one term: C1 in nm²."""
+from pellicle.optics.dispersion import AbstractDispersion, Constant, Shifted
+from pellicle.optics.naming import place
+from pellicle.scene import Free, is_free
 
 _CALL = re.compile(r"\s*([A-Za-z][\w-]*)\s*(?:\((.*)\))?\s*")
 
@@ -65,7 +53,8 @@ def medium(text: str, free: Iterable[str] = (), what: str = "--layer") -> Abstra
     """A medium from a word: a name, a number (`1.46`, `2.9+0.1j`), a model or an n,k table.
 
     `cauchy` leaves its parameters free within the default bounds of `MODELS`; `cauchy(1.46,3000)`
-    fixes them. `free` holds items `n`, `k`, `A` or `n=1.3:1.7`: see `freed`. Raises UsageError.
+    fixes them, in the order of that table; `spline(400,500,600,800)` gives its knots instead. `free`
+    holds items `n`, `k`, `A` or `n=1.3:1.7`: see `freed`. Raises UsageError.
     """
     return freed(_known(text.strip(), what), list(free))
 
@@ -86,47 +75,18 @@ def _named(text: str, what: str) -> AbstractDispersion:
         return _catalogued(text)
     name, given = match[1].lower(), match[2]
     if given is None:
-        free = {key: Free(None, own.lower, own.upper) for key, own in MODELS[name].items() if own.free}
-        return model(name, free)
-    keys = list(MODELS[name])
-    values = [number(v, f"{what} {name}") for v in given.split(",") if v.strip()]
-    if not 0 < len(values) <= len(keys):
-        raise UsageError(
-            f"{what} {text}: {name} takes 1 to {len(keys)} numbers ({', '.join(keys)}), got {len(values)}"
-        )
-    return model(name, dict(zip(keys, values, strict=False)))
+        return bare(name)
+    return called(
+        name, [number(v, f"{what} {name}") for v in given.split(",") if v.strip()], f"{what} {text}"
+    )
 
 
 def _catalogued(name: str) -> AbstractDispersion:
     try:
         return lookup(name)
     except UnknownMaterial as error:
-        raise UsageError(str(error)) from None
-
-
-def model(name: str, given: dict[str, Any]) -> AbstractDispersion:
-    """A dispersion model: `given` numbers or `Free`s, the rest fixed at their defaults.
-
-    Raises UsageError for a name or a parameter that is none, with the nearest.
-    """
-    if name not in MODELS:
-        raise UsageError(f"no dispersion model {name!r}{nearest(name, MODELS)}; known: {', '.join(MODELS)}")
-    known = MODELS[name]
-    for key in given:
-        if key not in known:
-            raise UsageError(
-                f"{name} has no parameter {key!r}{nearest(key, known)}; it has {', '.join(known)}"
-            )
-    values = {key: given.get(key, own.value) for key, own in known.items()}
-    if name == "cauchy":
-        return Cauchy(**values)
-    return Sellmeier((values["B1"],), (values["C1"],))
-
-
-def nearest(word: str, known: Iterable[str]) -> str:
-    """` (did you mean ...?)`, or nothing."""
-    close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.5)
-    return f" (did you mean {close[0]!r}?)" if close else ""
+        close = nearest(name.lower(), MODELS, 0.8)
+        raise UsageError(f"no material or model {name!r}{close}" if close else str(error)) from None
 
 
 def freed(dispersion: AbstractDispersion, items: list[str]) -> AbstractDispersion:
@@ -147,15 +107,30 @@ def freed(dispersion: AbstractDispersion, items: list[str]) -> AbstractDispersio
 
 
 def _free_own(dispersion: AbstractDispersion, name: str, limits: tuple[float, float] | None):
-    if not isinstance(dispersion, Cauchy):
+    """The model's own number of that name, freed within `limits` or the model's default bounds."""
+    leaves, structure = jax.tree_util.tree_flatten_with_path(dispersion, is_leaf=is_free)
+    own = [i for i, (_, leaf) in enumerate(leaves) if is_free(leaf) or isinstance(leaf, int | float)]
+    known = {place(dispersion, leaves[i][0]).name: i for i in own}
+    if not known or (isinstance(dispersion, Constant | Shifted) and name not in known):
         raise UsageError(
             f"--free {name}: the layer has no such number; n and k can be freed for any material"
         )
-    own = {"A": dispersion.A, "B": dispersion.B, "C": dispersion.C}
-    if name not in own:
-        raise UsageError(f"--free {name}: a Cauchy layer has A, B and C, and n and k can be added")
-    usual = MODELS["cauchy"][name]
-    return Cauchy(**(own | {name: Free(None, *(limits or (usual.lower, usual.upper)))}))
+    if name not in known:
+        *first, last = known
+        listed = f"{', '.join(first)} and {last}" if first else last
+        raise UsageError(
+            f"--free {name}{nearest(name, known)}: the layer has {listed}, and n and k can be added"
+        )
+    path, leaf = leaves[known[name]]
+    bounds = limits or default_bounds(place(dispersion, path), leaf)
+    if bounds is None:
+        raise UsageError(f"--free {name}: give bounds, as in --free {name}=LO:HI")
+    value = leaf.value if is_free(leaf) else leaf
+    start = value if limits is None and bounds[0] <= value <= bounds[1] and not is_free(leaf) else None
+    numbers = [leaf for _, leaf in leaves]
+    numbers[known[name]] = Free(start, *bounds)
+    freed = jax.tree_util.tree_unflatten(structure, numbers)
+    return checked(freed, f"--free {name}")
 
 
 def _free_index(dispersion: AbstractDispersion, name: str, limits: tuple[float, float] | None):
