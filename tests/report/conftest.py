@@ -1,5 +1,6 @@
 """A fit written down by hand: what reports and figures are made of."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -68,3 +69,54 @@ def fit() -> Fit:
         profile=Profile(np.linspace(10.0, 3000.0, 60), np.linspace(5.0, 400.0, 60)),
         seconds=0.42,
     )
+
+
+def ellipsometric(fit: Fit, wavelength, angle, **curve) -> Fit:
+    """`fit` as if it were one of Ψ and Δ at these points; Δ passes through 360 degrees."""
+    size = np.size(wavelength)
+    psi, delta = np.linspace(20.0, 40.0, size), np.linspace(300.0, 420.0, size) % 360
+    turned = (delta + 0.5) % 360
+    spectrum = Spectrum(
+        wavelength,
+        psi + 0.1,
+        "psi-delta",
+        angle=angle,
+        path="/data/film.csv",
+        sha256="ab" * 32,
+        delta=turned,
+    )
+    zeros = np.zeros(size)
+    arrays = {
+        "sigma": zeros + 0.1,
+        "n": zeros + 1.46,
+        "k": zeros,
+        "n_stderr": zeros + 0.001,
+        "k_stderr": zeros,
+    }
+    made = Curve(
+        wavelength=spectrum.wavelength,
+        data=spectrum.values,
+        model=psi,
+        delta_data=spectrum.delta,
+        delta_model=delta,
+        **(arrays | curve),
+    )
+    return dataclasses.replace(fit, spectrum=spectrum, curve=made, rms=0.123)
+
+
+@pytest.fixture
+def spectroscopic(fit) -> Fit:
+    """Ψ and Δ at 20 wavelengths and two angles."""
+    return ellipsometric(fit, np.repeat(np.linspace(400.0, 800.0, 20), 2), np.tile([65.0, 75.0], 20))
+
+
+@pytest.fixture
+def angular(fit) -> Fit:
+    """Ψ and Δ at one wavelength and eleven angles."""
+    return ellipsometric(fit, np.full(11, 658.0), np.linspace(50.0, 70.0, 11))
+
+
+@pytest.fixture
+def as_ellipsometry(fit):
+    """Makes a fit of Ψ and Δ at any wavelengths (nm) and angles (degrees)."""
+    return lambda wavelength, angle: ellipsometric(fit, wavelength, angle)

@@ -79,6 +79,8 @@ def _untaken(stem: str, taken: set[str]) -> str:
 def fit_csv(fit: Fit) -> str:
     """Data, model, residual and σ at each wavelength, with the angle where the data have one."""
     curve, data = fit.curve, fit.spectrum
+    if curve.delta_data is not None:
+        return _psi_delta_csv(fit)
     columns = {
         "wavelength_nm": curve.wavelength,
         "data": curve.data,
@@ -94,6 +96,28 @@ def fit_csv(fit: Fit) -> str:
         f"fit of {data.signal}: data, model, residual = data - model, sigma = standard deviation assumed",
         f"pellicle reads the data again with --columns wavelength,{kind},_,_,sigma{angle}",
     ]
+    return _table(about, fit, columns)
+
+
+def _psi_delta_csv(fit: Fit) -> str:
+    """Ψ and Δ of data and model in degrees, in columns that pellicle reads again as they are."""
+    curve, data = fit.curve, fit.spectrum
+    assert curve.delta_data is not None
+    assert curve.delta_model is not None
+    columns = {"wavelength_nm": curve.wavelength}
+    if data.angle is not None:
+        columns["angle_deg"] = data.angle
+    columns |= {
+        "psi_deg": curve.data,
+        "psi_model": curve.model,
+        "psi_residual": curve.residual,
+        "delta_deg": curve.delta_data,
+        "delta_model": curve.delta_model,
+        "delta_residual": curve.delta_residual,
+    }
+    if data.sigma is not None and data.delta_sigma is not None:
+        columns |= {"sigma_psi": data.sigma, "sigma_delta": data.delta_sigma}
+    about = ["fit of psi and delta in degrees: data, model, residual = data - model (of delta: -180 to 180)"]
     return _table(about, fit, columns)
 
 

@@ -13,14 +13,13 @@ import numpy as np
 from pellicle.fitting.result import Fit, Profile
 from pellicle.fitting.status import RIVAL
 from pellicle.io.atomic import replacing
+from pellicle.report import psi_delta
+from pellicle.report.style import BLACK, BLUE, FITTED, GAP, GREY, ORANGE, marker_size
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-BLACK, ORANGE, BLUE, GREEN, GREY = "#000000", "#D55E00", "#0072B2", "#009E73", "#777777"
-"""Okabe and Ito's colours, which the colour-blind tell apart."""
-FITTED = {"color": ORANGE, "linewidth": 1.4}
 DPI = 150
 WIDTH_INCHES = 8.0
 MOST_LABELS = 6
@@ -28,8 +27,9 @@ ROOM_FOR_LABEL = 0.025
 """Least distance between two labels, as a share of the axis."""
 HOPELESS = 1e7
 """Δχ² from which nothing is worth showing: the search caps it above."""
-GAP = 10
-"""A step this many times the usual one is a gap in the data, which no line crosses."""
+
+Panel = tuple[Callable[["Axes", Fit], None], float]
+"""What draws a panel, and its height in inches."""
 
 _LABEL: dict[str, Any] = {
     "rotation": 90,
@@ -60,7 +60,8 @@ def draw(fit: Fit) -> Figure:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    panels: list[tuple[Callable[[Axes, Fit], None], float]] = [(_data, 3.0), (_residuals, 1.3)]
+    signal = _signal(fit)
+    panels = list(signal)
     if fit.profile is not None and fit.profile.thickness.size > 1:
         panels.append((_misfit, 1.9))
     if _index_is_free(fit):
@@ -69,11 +70,19 @@ def draw(fit: Fit) -> Figure:
     drawn = Figure(figsize=(WIDTH_INCHES, sum(heights) + 1.2), layout="constrained")
     FigureCanvasAgg(drawn)
     axes = drawn.subplots(len(panels), 1, squeeze=False, height_ratios=heights)[:, 0]
-    axes[1].sharex(axes[0])
+    for below in axes[1 : len(signal)]:
+        below.sharex(axes[0])
     for (panel, _), at in zip(panels, axes, strict=True):
         panel(at, fit)
     drawn.suptitle(_title(fit), fontsize="medium", x=0.01, ha="left")
     return drawn
+
+
+def _signal(fit: Fit) -> list[Panel]:
+    """The panels that share the axis of the data."""
+    if fit.curve.delta_data is None:
+        return [(_data, 3.0), (_residuals, 1.3)]
+    return [(psi_delta.psi, 2.2), (psi_delta.delta, 2.2), (psi_delta.residuals, 1.5)]
 
 
 def _title(fit: Fit) -> str:
@@ -97,7 +106,7 @@ def _series(fit: Fit) -> list[np.ndarray]:
 
 def _data(axes: Axes, fit: Fit) -> None:
     curve = fit.curve
-    size = float(np.clip(900 / max(curve.wavelength.size, 1), 1.5, 4.0))
+    size = marker_size(curve.wavelength.size)
     axes.plot(curve.wavelength, curve.data, ".", color=GREY, markersize=size, label="data")
     for i, part in enumerate(_series(fit)):
         axes.plot(curve.wavelength[part], curve.model[part], **FITTED, label="_" if i else "fit")
@@ -192,7 +201,8 @@ def _power(exponent: int) -> str:
 
 
 def _index_is_free(fit: Fit) -> bool:
-    return bool(np.any(fit.curve.n_stderr > 0) or np.any(fit.curve.k_stderr > 0))
+    several = fit.curve.delta_data is None or np.unique(fit.curve.wavelength).size > 1
+    return several and bool(np.any(fit.curve.n_stderr > 0) or np.any(fit.curve.k_stderr > 0))
 
 
 def _index(axes: Axes, fit: Fit) -> None:

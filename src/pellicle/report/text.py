@@ -7,6 +7,8 @@ import re
 import textwrap
 from collections.abc import Iterable, Sequence
 
+import numpy as np
+
 from pellicle.fitting.result import Estimate, Fit, Rival, Status
 from pellicle.fitting.status import RIVAL, describe
 
@@ -54,7 +56,7 @@ def summary_line(fit: Fit) -> str:
     told = [_value(p, named=True) for p in leading[:SUMMARY_PARAMETERS]]
     more = ["..."] if len(leading) > SUMMARY_PARAMETERS else []
     name = fit.spectrum.path.replace("\\", "/").rsplit("/", 1)[-1] or "spectrum"
-    return f"{name}: {fit.status}, {', '.join([*told, *more, f'rms {fit.rms:.3g}'])}"
+    return f"{name}: {fit.status}, {', '.join([*told, *more, f'rms {fit.rms:.3g}{_degrees(fit)}'])}"
 
 
 def _wrap(text: str, first: str = "", rest: str = "") -> list[str]:
@@ -77,12 +79,24 @@ def _verdict(fit: Fit) -> list[str]:
     data, nm = fit.spectrum, fit.curve.wavelength
     points = f"{data.signal}, {nm.size} points"
     if nm.size:
-        points += f" from {nm.min():g} to {nm.max():g} nm"
+        points += _span(nm, "nm")
+    if data.signal == "psi-delta" and data.angle is not None and nm.size:
+        points += "," + _span(data.angle, "degrees")
     if fit.effective_points < 0.95 * nm.size:
         points += f", worth {fit.effective_points:.3g} independent ones"
     file = [("file", _shortened(data.path))] if data.path else []
     status = f"{fit.status}. {ADVICE[fit.status]}"
     return [*_wrap(fit.verdict), *_facts([("status", status), *file, ("data", points)])]
+
+
+def _span(values: np.ndarray, unit: str) -> str:
+    lo, hi = values.min(), values.max()
+    return f" from {lo:g} to {hi:g} {unit}" if lo < hi else f" at {lo:g} {unit}"
+
+
+def _degrees(fit: Fit) -> str:
+    """The unit of what is measured, where it has one."""
+    return " degrees" if fit.spectrum.signal == "psi-delta" else ""
 
 
 def _shortened(path: str) -> str:
@@ -92,9 +106,14 @@ def _shortened(path: str) -> str:
 
 
 def _statistics(fit: Fit) -> list[str]:
+    apart = []
+    if fit.curve.delta_data is not None:
+        psi, delta = (np.sqrt(np.mean(r**2)) for r in (fit.curve.residual, fit.curve.delta_residual))
+        apart = [("of psi and of delta", f"{psi:.4g} and {delta:.4g} degrees")]
     return _facts(
         [
-            ("rms residual", f"{fit.rms:.4g}"),
+            ("rms residual", f"{fit.rms:.4g}{_degrees(fit)}"),
+            *apart,
             ("reduced chi-square", f"{fit.chi2_reduced:.4g}"),
             ("seconds", f"{fit.seconds:.2f}"),
         ]

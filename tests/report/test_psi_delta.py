@@ -1,0 +1,121 @@
+"""Reports and figures of ellipsometric fits: degrees, several angles, and Δ that turns round."""
+
+import dataclasses
+
+import numpy as np
+
+from pellicle.io import read_spectrum
+from pellicle.io.results import fit_csv, to_json
+from pellicle.report.figures import draw, figure
+from pellicle.report.text import report, summary_line
+
+
+def labels(drawn) -> list[str]:
+    return [axes.get_ylabel() for axes in drawn.axes]
+
+
+def named(axes) -> list[str]:
+    return [line.get_label() for line in axes.lines if not line.get_label().startswith("_")]
+
+
+def test_panels_of_several_angles(spectroscopic):
+    drawn = draw(spectroscopic)
+    assert labels(drawn) == ["Ψ (degrees)", "Δ (degrees)", "data − fit (degrees)", "misfit Δχ²", "n"]
+    psi, delta, residuals = drawn.axes[:3]
+    assert named(psi) == named(delta) == ["data", "fit, 65°", "fit, 75°"]
+    assert residuals.get_xlabel() == "wavelength (nm)"
+    for axes in (psi, delta):
+        assert axes.get_shared_x_axes().joined(axes, residuals)
+    curve, angle = spectroscopic.curve, spectroscopic.spectrum.angle
+    for line, value in zip(psi.lines[1:], (65.0, 75.0), strict=True):
+        np.testing.assert_array_equal(line.get_xdata(), curve.wavelength[angle == value])
+        np.testing.assert_array_equal(line.get_ydata(), curve.model[angle == value])
+    np.testing.assert_array_equal(delta.lines[0].get_ydata(), curve.delta_data)
+
+
+def test_no_stroke_crosses_360_degrees(spectroscopic):
+    strokes = draw(spectroscopic).axes[1].lines[1:]
+    assert len(strokes) == 4
+    assert sum(line.get_xdata().size for line in strokes) == 40
+    for line in strokes:
+        assert np.abs(np.diff(line.get_ydata())).max(initial=0) < 180
+    named_once = [line.get_label() for line in strokes]
+    assert named_once == ["fit, 65°", "_", "fit, 75°", "_"]
+
+
+def test_residuals_of_delta_are_the_short_way_round(spectroscopic):
+    residuals = draw(spectroscopic).axes[2]
+    assert named(residuals) == ["Ψ", "Δ"]
+    of_delta = [line for line in residuals.lines if line.get_linestyle() == "--"]
+    np.testing.assert_allclose(np.concatenate([line.get_ydata() for line in of_delta]), 0.5, atol=1e-12)
+
+
+def test_one_wavelength_is_drawn_against_the_angle(angular, tmp_path):
+    drawn = draw(angular)
+    assert labels(drawn) == ["Ψ (degrees)", "Δ (degrees)", "data − fit (degrees)", "misfit Δχ²"]
+    assert drawn.axes[2].get_xlabel() == "angle of incidence (degrees)"
+    assert named(drawn.axes[0]) == ["data", "fit"]
+    np.testing.assert_array_equal(drawn.axes[0].lines[1].get_xdata(), angular.spectrum.angle)
+    figure(angular, tmp_path / "figure.png")
+    assert (tmp_path / "figure.png").stat().st_size > 20_000
+
+
+def test_points_without_an_angle_are_one_line(spectroscopic):
+    half = {
+        name: array[::2] for name, array in vars(spectroscopic.curve).items() if isinstance(array, np.ndarray)
+    }
+    data = spectroscopic.spectrum
+    spectrum = dataclasses.replace(
+        data, wavelength=half["wavelength"], values=half["data"], delta=half["delta_data"], angle=None
+    )
+    curve = dataclasses.replace(spectroscopic.curve, **half)
+    drawn = draw(dataclasses.replace(spectroscopic, curve=curve, spectrum=spectrum))
+    assert named(drawn.axes[0]) == ["data", "fit"]
+
+
+def test_many_angles_are_not_all_named(as_ellipsometry):
+    many = as_ellipsometry(np.repeat(np.linspace(400.0, 800.0, 5), 9), np.tile(np.arange(9) + 60.0, 5))
+    assert named(draw(many).axes[0]) == ["data"]
+
+
+def test_the_report_says_degrees(spectroscopic, angular):
+    text = " ".join(report(spectroscopic).split())
+    assert "psi-delta, 40 points from 400 to 800 nm, from 65 to 75 degrees, worth 12" in text
+    assert "rms residual 0.123 degrees" in text
+    assert "of psi and of delta 0.1 and 0.5 degrees" in text
+    assert "11 points at 658 nm, from 50 to 70 degrees" in " ".join(report(angular).split())
+    assert summary_line(angular).endswith("rms 0.123 degrees")
+
+
+def test_the_table_is_read_again_as_it_is(spectroscopic, tmp_path):
+    size = len(spectroscopic.spectrum)
+    data = dataclasses.replace(
+        spectroscopic.spectrum, sigma=np.full(size, 0.1), delta_sigma=np.full(size, 0.2)
+    )
+    for spectrum in (spectroscopic.spectrum, data):
+        text = fit_csv(dataclasses.replace(spectroscopic, spectrum=spectrum))
+        (tmp_path / "fit.csv").write_text(text)
+        again = read_spectrum(tmp_path / "fit.csv")
+        assert again.signal == "psi-delta"
+        for name in ("wavelength", "angle", "values", "delta", "sigma", "delta_sigma"):
+            expected = getattr(spectrum, name)
+            if expected is None:
+                assert getattr(again, name) is None
+            else:
+                np.testing.assert_allclose(getattr(again, name), expected, rtol=1e-9)
+
+
+def test_the_table_holds_model_and_residuals(spectroscopic):
+    header, first = fit_csv(spectroscopic).splitlines()[3:5]
+    assert header == (
+        "wavelength_nm,angle_deg,psi_deg,psi_model,psi_residual,delta_deg,delta_model,delta_residual"
+    )
+    numbers = dict(zip(header.split(","), map(float, first.split(",")), strict=True))
+    assert numbers["psi_residual"] == 0.1
+    assert numbers["delta_residual"] == 0.5
+    assert (numbers["psi_model"], numbers["delta_model"]) == (20.0, 300.0)
+
+
+def test_the_record_names_the_signal_and_counts_points(angular):
+    assert to_json(angular)["data"]["signal"] == "psi-delta"
+    assert to_json(angular)["data"]["points"] == 11
