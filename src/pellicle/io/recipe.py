@@ -5,48 +5,19 @@ from __future__ import annotations
 import os
 import tomllib
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from pellicle.errors import DataError, UsageError
+from pellicle.errors import DataError
 from pellicle.io import words
+from pellicle.io.media import FreeTable, Medium, Number, PriorTable, medium, number
 from pellicle.io.words import nearest
-from pellicle.optics.dispersion import AbstractDispersion
-from pellicle.scene import Free, Instrument, Layer, Light, Normal, Scene, Substrate
+from pellicle.scene import Free, Instrument, Layer, Light, Scene, Substrate
 
 
 class _Table(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=False)
-
-
-class PriorTable(_Table):
-    """A normal prior: mean and standard deviation in the parameter's unit."""
-
-    mean: float
-    sd: float = Field(gt=0)
-
-
-class FreeTable(_Table):
-    """A number that may be free: bounds, and optionally a start value and a prior; or fixed."""
-
-    value: float | None = None
-    lower: float | None = None
-    upper: float | None = None
-    prior: PriorTable | None = None
-
-
-Number = float | FreeTable
-
-
-class MediumTable(BaseModel):
-    """`{ model = "cauchy", A = ..., B = ... }`: what else it holds are the model's parameters."""
-
-    model_config = ConfigDict(extra="allow")
-    model: str
-
-
-Medium = str | float | MediumTable
 
 
 class PlateTable(_Table):
@@ -188,7 +159,7 @@ def _scene(tables: RecipeTable, folder: Path) -> Scene:
     scene, data = tables.scene, tables.data
     layers = [
         Layer(
-            words.freed(_medium(layer.material, folder), layer.free),
+            words.freed(medium(layer.material, folder), layer.free),
             number(layer.thickness, "thickness", natural=0.0),
             layer.name,
         )
@@ -198,7 +169,7 @@ def _scene(tables: RecipeTable, folder: Path) -> Scene:
     return Scene(
         layers,
         _substrate(scene.substrate, folder),
-        ambient=_medium(scene.ambient, folder),
+        ambient=medium(scene.ambient, folder),
         light=Light(None, data.angle or 0.0, data.signal or "R", data.polarisation or "unpolarised"),
         instrument=Instrument(
             instrument.scale,
@@ -211,51 +182,11 @@ def _scene(tables: RecipeTable, folder: Path) -> Scene:
 
 def _substrate(given: Medium | PlateTable, folder: Path) -> Substrate:
     if not isinstance(given, PlateTable):
-        return Substrate(_medium(given, folder))
-    back = None if given.back is None else _medium(given.back, folder)
-    return Substrate(_medium(given.material, folder), back, number(given.plate_mm, "plate_mm", natural=0.0))
+        return Substrate(medium(given, folder))
+    back = None if given.back is None else medium(given.back, folder)
+    return Substrate(medium(given.material, folder), back, number(given.plate_mm, "plate_mm", natural=0.0))
 
 
 def optional(given: Number | None, what: str) -> float | Free | None:
     """A number that may be absent."""
     return None if given is None else number(given, what, natural=0.0)
-
-
-def number(given: Number, what: str, natural: float | None = None) -> float | Free:
-    """A fixed number or a `Free`; ValueError where it is neither, or below what nature allows."""
-    if isinstance(given, float | int):
-        lowest, result = float(given), float(given)
-    elif given.lower is None and given.upper is None and given.value is not None:
-        lowest, result = given.value, given.value
-    elif given.lower is None or given.upper is None:
-        raise UsageError(f"{what}: give lower and upper, or one plain number")
-    else:
-        prior = None if given.prior is None else Normal(given.prior.mean, given.prior.sd)
-        try:
-            result = Free(given.value, given.lower, given.upper, prior)
-        except ValueError as error:
-            raise UsageError(f"{what}: {error}") from None
-        lowest = given.lower
-    if natural is not None and lowest < natural:
-        raise UsageError(f"{what} must not be below {natural:g}, got {lowest:g}")
-    return result
-
-
-def _medium(given: Medium, folder: Path) -> AbstractDispersion:
-    if isinstance(given, MediumTable):
-        extras = given.model_extra or {}
-        return words.model(given.model, {key: _parameter(key, value) for key, value in extras.items()})
-    if isinstance(given, str) and given.lower().endswith((".csv", ".txt", ".dat")):
-        given = str(folder / given)
-    return words.medium(str(given), what="material")
-
-
-def _parameter(key: str, value: Any) -> float | Free:
-    """A model's parameter; without bounds of its own it is fixed."""
-    try:
-        table = FreeTable.model_validate(value) if isinstance(value, dict) else float(value)
-    except (ValidationError, TypeError, ValueError):
-        raise UsageError(
-            f"{key} must be a number or a table of value, lower and upper, got {value!r}"
-        ) from None
-    return number(table, key)
