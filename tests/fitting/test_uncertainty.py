@@ -8,7 +8,10 @@ import pytest
 from scipy.optimize import curve_fit
 
 import pellicle as pl
+from pellicle.fitting.problem import local, make
+from pellicle.fitting.uncertainty import errors
 from pellicle.signals import reflectance
+from pellicle.synthetic import synthesise
 
 CAUCHY = (pl.Free(None, 1.3, 1.7), pl.Free(None, 0.0, 2e4))
 TRUTH = (1.45, 4000.0, 480.0)  # A, B, thickness
@@ -158,3 +161,28 @@ def test_index_errors_follow_from_the_covariance(scene, measured):
     expected = np.sqrt(matrix[a, a] + 2 * u * matrix[a, b] + u**2 * matrix[b, b])
     np.testing.assert_allclose(fit.curve.n_stderr, expected, rtol=1e-6)
     np.testing.assert_array_equal(fit.curve.k_stderr, 0)
+
+
+def test_a_direction_that_the_data_do_not_see_keeps_its_variance(film, measured):
+    """The covariance itself, before any profile: a pseudo-inverse would drop the direction and say 0."""
+    scene = film(pl.Free(None, 1, 4000), "Au")
+    data = measured(scene, 3000.0, noise=0.005, sigma=True)
+    problem = make(scene, data.wavelength, data.values, data.sigma, 1.0)
+    at = jax.device_get(local(*problem.program, np.array([3000.0 / 4000])))
+    assert errors(problem, at, 1.0).stderr[0] > 1e6
+
+
+def test_a_lower_limit_is_where_chi2_has_risen_by_2_71(film, measured):
+    """A 95 % limit, interpolated on the grid of the scan; at half of it the film is far out."""
+    scene = film(pl.Free(None, 1, 1000), "Au")
+    data = measured(scene, 500.0, noise=0.005, sigma=True)
+    fit = pl.fit(data, scene)
+
+    def rise(thickness):
+        model = synthesise(film(thickness, "Au"), data.wavelength).clean
+        chi2 = np.sum(((data.values - model) / data.sigma) ** 2)
+        return (chi2 - fit.chi2_reduced * (len(data) - 1)) * fit.effective_points / len(data)
+
+    limit = fit["thickness"].lower_limit
+    assert 2 < rise(limit) < 3.5
+    assert rise(limit / 2) > 30

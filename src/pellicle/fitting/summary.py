@@ -18,6 +18,8 @@ from pellicle.scene import Drift, Scene
 _RULED_OUT = 1e8
 _ONE_SIDED = 2.71
 """χ² above the best at a one-sided 95 % limit."""
+_LEAST_RISE = 0.1
+"""Smaller rises of χ² are counted as this one: their logarithm is that of rounding, not of a film."""
 _OPEN = RIVAL
 """A side where the misfit never rises by as much as would rule a rival out is open."""
 _ON_BOUND = 1e-6
@@ -116,11 +118,21 @@ def _stays(level: np.ndarray, side: np.ndarray) -> bool:
 
 
 def _crossing(profile: Profile, best: float, beyond: np.ndarray, nearest: int) -> float:
-    """Where Δχ² reaches the limit, between the best and the nearest point beyond it (as a parabola)."""
+    """Where Δχ² reaches the limit, between the nearest point beyond it and the next one towards the best.
+
+    Light that returns through an absorber falls exponentially with its thickness, and Δχ² with it: its
+    logarithm is taken as linear.
+    """
     if not beyond.any():
         return best
-    far, delta = profile.thickness[beyond][nearest], profile.delta_chi2[beyond][nearest]
-    return float(best + (far - best) * math.sqrt(_ONE_SIDED / delta))
+    at = np.flatnonzero(beyond)[nearest]
+    inner = at + (1 if nearest < 0 else -1)
+    far, delta = profile.thickness[at], float(profile.delta_chi2[at])
+    near, low = profile.thickness[inner], float(profile.delta_chi2[inner])
+    if abs(best - far) <= abs(near - far):
+        near, low = best, 0.0
+    low = max(low, _LEAST_RISE)
+    return float(far + (near - far) * math.log(delta / _ONE_SIDED) / math.log(delta / low))
 
 
 def rivals(weighed: Weighed) -> tuple[Rival, ...]:
