@@ -184,6 +184,8 @@ def test_spectraray_in_energies(write):
 def test_spectraray_files_that_are_refused(write):
     refused(write(SPECTRARAY.replace("70.10000 70.10000", "70.1 70.2")), "line 1", "each angle", "twice")
     refused(write(SPECTRARAY.replace(" 70.10000 70.10000", " 70.10000")), "line 1", "each angle", "twice")
+    apart = SPECTRARAY.replace("50.20000 70.10000", "70.10000 50.20000", 1)
+    refused(write(apart), "line 1", "50.20000 70.10000 50.20000 70.10000")
     refused(write(SPECTRARAY.replace("70.10000", "50.20000")), "line 1", "each angle", "twice")
     refused(write(SPECTRARAY.replace(" 121.5", "")), "line 3 has 4 values", "make 5")
     refused(write("; WAVELENGTH 70 70\n"), "no rows")

@@ -72,10 +72,10 @@ def fit() -> Fit:
 
 
 def ellipsometric(fit: Fit, wavelength, angle, **curve) -> Fit:
-    """`fit` as if it were one of Ψ and Δ at these points; Δ passes through 360 degrees."""
+    """`fit` as if it were one of Ψ and Δ at these points; Δ passes 360 degrees, the data before the model."""
     size = np.size(wavelength)
     psi, delta = np.linspace(20.0, 40.0, size), np.linspace(300.0, 420.0, size) % 360
-    turned = (delta + 0.5) % 360
+    turned = (delta + 2.0) % 360
     spectrum = Spectrum(
         wavelength,
         psi + 0.1,

@@ -47,7 +47,7 @@ def test_residuals_of_delta_are_the_short_way_round(spectroscopic):
     residuals = draw(spectroscopic).axes[2]
     assert named(residuals) == ["Ψ", "Δ"]
     of_delta = [line for line in residuals.lines if line.get_linestyle() == "--"]
-    np.testing.assert_allclose(np.concatenate([line.get_ydata() for line in of_delta]), 0.5, atol=1e-12)
+    np.testing.assert_allclose(np.concatenate([line.get_ydata() for line in of_delta]), 2.0, atol=1e-12)
 
 
 def test_one_wavelength_is_drawn_against_the_angle(angular, tmp_path):
@@ -82,7 +82,7 @@ def test_the_report_says_degrees(spectroscopic, angular):
     text = " ".join(report(spectroscopic).split())
     assert "psi-delta, 40 points from 400 to 800 nm, from 65 to 75 degrees, worth 12" in text
     assert "rms residual 0.123 degrees" in text
-    assert "of psi and of delta 0.1 and 0.5 degrees" in text
+    assert "of psi and of delta 0.1 and 2 degrees" in text
     assert "11 points at 658 nm, from 50 to 70 degrees" in " ".join(report(angular).split())
     assert summary_line(angular).endswith("rms 0.123 degrees")
 
@@ -106,13 +106,14 @@ def test_the_table_is_read_again_as_it_is(spectroscopic, tmp_path):
 
 
 def test_the_table_holds_model_and_residuals(spectroscopic):
-    header, first = fit_csv(spectroscopic).splitlines()[3:5]
+    header, first, *others = fit_csv(spectroscopic).splitlines()[3:]
+    assert {row.split(",")[-1] for row in others} == {"2"}
     assert header == (
         "wavelength_nm,angle_deg,psi_deg,psi_model,psi_residual,delta_deg,delta_model,delta_residual"
     )
     numbers = dict(zip(header.split(","), map(float, first.split(",")), strict=True))
     assert numbers["psi_residual"] == 0.1
-    assert numbers["delta_residual"] == 0.5
+    assert numbers["delta_residual"] == 2.0
     assert (numbers["psi_model"], numbers["delta_model"]) == (20.0, 300.0)
 
 

@@ -46,7 +46,7 @@ def residuals(axes: Axes, fit: Fit) -> None:
             axes.plot(x[part], fit.curve.delta_residual[part], **of_delta, label=hidden or "Δ")
     axes.axhline(0, color=GREY, linewidth=0.6)
     axes.set(xlabel=label, ylabel="data − fit (degrees)")
-    axes.legend(loc="upper right", edgecolor="none", ncols=2, fontsize="small")
+    axes.legend(frameon=False, ncols=2, fontsize="small")
 
 
 def abscissa(fit: Fit) -> tuple[np.ndarray, str]:
