@@ -28,7 +28,7 @@ fit: $(VENV)/.fit
 	$(BIN)/pellicle fit --recipe $(EXAMPLE) --out results/hematite_on_glass_140nm
 
 test: $(VENV)/.dev lint
-	$(BIN)/python -m pytest --cov --cov-report=term -m "not slow"
+	$(BIN)/python -m pytest -n 2 --dist loadfile --cov --cov-report=term -m "not slow"
 
 slow: $(VENV)/.dev
 	$(BIN)/python -m pytest -m slow

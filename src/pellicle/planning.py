@@ -27,6 +27,12 @@ class Plan:
         return self.row(effect).on
 
     @property
+    def wordless(self) -> Plan:
+        """The same without reasons and bounds: all that a compiled program depends on."""
+        rows = tuple(Row(row.effect, row.on, "", count=row.count) for row in self.rows)
+        return Plan(rows, self.signal, self.polarisation)
+
+    @property
     def quadrature(self) -> bool:
         """Whether the bandwidth is averaged over wavelengths, for want of a series that it could damp."""
         return self.on("coherence") and (self.on("stack") or self.signal == "psi-delta")

@@ -63,7 +63,7 @@ class Problem(NamedTuple):
     @property
     def program(self) -> tuple[Any, ...]:
         """The arguments that the compiled functions take, the plan first (static)."""
-        return self.plan, self.scene, self.data, self.box
+        return self.plan.wordless, self.scene, self.data, self.box
 
 
 def make(scene: Scene, wavelength, values, sigma, temper: float) -> Problem:
