@@ -13,9 +13,22 @@ _TERMS = 17
 _EULER = 0.5772156649015329
 
 
+def _tiny(x: Any) -> Any:
+    # so far above the smallest number that its inverse times a few factors does not overflow
+    return 1e12 * jnp.finfo(jnp.result_type(float, x)).tiny
+
+
+@jax.custom_jvp
 def log_abs(x: Any) -> Any:
     """ln|x|; at zero a large negative number with slope zero, for use under a factor that vanishes."""
-    return 0.5 * jnp.log(x * x + jnp.finfo(jnp.result_type(float, x)).tiny)
+    return 0.5 * jnp.log(x * x + _tiny(x))
+
+
+@log_abs.defjvp
+def _log_abs_slope(primals, tangents):
+    (x,), (dx,) = primals, tangents
+    # one quotient: the slope of the logarithm alone would overflow
+    return log_abs(x), x / (x * x + _tiny(x)) * dx
 
 
 @jax.custom_jvp
@@ -98,4 +111,4 @@ def scaled_ei(x: Any) -> Any:
 def _scaled_ei_slope(primals, tangents):
     (x,), (dx,) = primals, tangents
     value = scaled_ei(x)
-    return value, (x / (x * x + jnp.finfo(jnp.result_type(float, x)).tiny) - value) * dx
+    return value, (x / (x * x + _tiny(x)) - value) * dx
