@@ -27,6 +27,10 @@ def _knots(what: Sequence[float]) -> tuple[float, ...]:
     return tuple(float(x) for x in what)
 
 
+def _column(what: Sequence[Any] | None) -> tuple[Any, ...] | None:
+    return None if what is None else tuple(what)
+
+
 def _check(model: str, knots: tuple[float, ...], **coefficients: Any) -> None:
     if len(knots) < 2 or any(a >= b for a, b in itertools.pairwise(knots)) or knots[0] <= 0:
         raise ValueError(f"{model}: knots must be two or more rising wavelengths in nm, got {list(knots)}")
@@ -43,14 +47,14 @@ def _check(model: str, knots: tuple[float, ...], **coefficients: Any) -> None:
 class Spline(AbstractDispersion):
     """n and k as cubic B-splines in wavelength; beyond the knots their end values hold.
 
-    `knots` are m ≥ 2 rising wavelengths in nm (fixed), `n` and `k` tuples of m coefficients; `k=None`
+    `knots` are m ≥ 2 rising wavelengths in nm (fixed), `n` and `k` m coefficients each; `k=None`
     is a transparent medium. Fewer than four knots lower the degree. Inner knots of the B-spline are
     de Boor's averages, so that every coefficient belongs to one of `knots`.
     """
 
     knots: tuple[float, ...] = eqx.field(static=True, converter=_knots)
     n: tuple[Any, ...] = eqx.field(converter=tuple)
-    k: tuple[Any, ...] | None = None
+    k: tuple[Any, ...] | None = eqx.field(converter=_column, default=None)
 
     def __check_init__(self):
         _check("spline", self.knots, n=self.n, k=self.k)
@@ -60,7 +64,8 @@ class Spline(AbstractDispersion):
         sites = np.array(self.knots)
         inner = [sites[i : i + degree].mean() for i in range(1, len(sites) - degree)]
         around = np.concatenate([[sites[0]] * (degree + 1), inner, [sites[-1]] * (degree + 1)])
-        basis = b_splines(jnp.clip(wavelength, sites[0], sites[-1]), around, degree)
+        inside = jnp.clip(wavelength, self.knots[0], self.knots[-1])
+        basis = b_splines(inside, around, degree)
         n = _combine(basis, self.n)
         return n if self.k is None else Pair(n, _combine(basis, self.k))
 
