@@ -24,6 +24,7 @@ TERMS = {
     "lorentz": Lorentz(2.0, 3.0, 0.5),
     "drude": Drude(4.0, 0.3),
     "gaussian": Gaussian(2.0, 3.0, 0.5),
+    "gaussian, wider than its energy": Gaussian(2.0, 0.8, 3.0),
     "tauc-lorentz": SILICON,
     "tauc-lorentz, narrow": TaucLorentz(60.0, 3.1, 0.3, 2.9),
     "tauc-lorentz, critically damped": TaucLorentz(60.0, 3.0, 6.0, 1.2),

@@ -13,9 +13,12 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.interpolate import BSpline
 
+import pellicle as pl
+from pellicle.fitting.parameters import parameters
 from pellicle.optics.dispersion import HC
 from pellicle.optics.number import imag, is_real, real
 from pellicle.optics.spline import KramersKronigSpline, Spline
+from pellicle.synthetic import synthesise
 
 KNOTS = (300.0, 400.0, 500.0, 700.0, 1000.0)
 AT = np.linspace(300.0, 1000.0, 141)
@@ -115,3 +118,19 @@ def test_precision_follows_the_wavelength():
 def test_impossible_splines(make, said):
     with pytest.raises(ValueError, match=said):
         make()
+
+
+def test_a_fit_scans_a_spline_as_a_whole(tmp_path):
+    """The index of every knot moves together: 8 candidates a thickness, not 8 to the number of knots."""
+    truth = Spline((400.0, 500.0, 600.0, 800.0), (2.9, 2.7, 2.6, 2.5))
+    wavelength = np.linspace(400, 800, 101)
+    measured = synthesise(pl.Scene(pl.Layer(truth, 120.0), "Si"), wavelength, 0.001, 1)
+    path = tmp_path / "data.csv"
+    np.savetxt(path, np.c_[wavelength, measured.values], delimiter=",", header="wavelength_nm,R", comments="")
+    free = tuple(pl.Free(1.5, 1.2, 4.0) for _ in truth.n)
+    layer = pl.Layer(Spline(truth.knots, free), pl.Free(lower=110, upper=130))
+    assert {p.together for p in parameters(pl.Scene(layer, "Si"))} == {"n", "thickness"}
+    fit = pl.fit(pl.read_spectrum(path, noise=0.001), pl.Scene(layer, "Si"))
+    for i, n in enumerate(truth.n):
+        found = fit.parameters[f"n{i + 1}"]
+        assert found.value == pytest.approx(n, abs=4 * found.stderr)

@@ -13,6 +13,7 @@ from pellicle.optics.cody_lorentz import CodyLorentz
 from pellicle.optics.dispersion import AbstractDispersion
 from pellicle.optics.naming import Place, place
 from pellicle.optics.oscillators import AbstractOscillator, Gaussian, Lorentz, Oscillators, TaucLorentz
+from pellicle.optics.spline import Spline
 from pellicle.scene import Free, Layer, Normal, Scene, free_leaves, insert, is_free
 
 _UNITS = {"thickness": "nm", "bandwidth": "nm", "thickness_spread": "nm", "plate_mm": "mm", "angle": "deg"}
@@ -50,7 +51,12 @@ class Parameter:
 
     @property
     def searched(self) -> bool:
-        return self.key in _SEARCHED
+        return self.key in _SEARCHED or (self.owner is Spline and self.field == "n")
+
+    @property
+    def together(self) -> str:
+        """What a search moves together: a spline's index as a whole, anything else alone."""
+        return self.name.removesuffix(self.key) + self.field if self.owner is Spline else self.name
 
     @property
     def levels(self) -> int | None:

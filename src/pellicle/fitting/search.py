@@ -112,10 +112,18 @@ def _design(problem: Problem) -> np.ndarray:
     levels = [_levels(p, problem) for p in problem.parameters]
     if problem.thickness_axis is not None:
         levels[problem.thickness_axis] = np.zeros(1)
-    while np.prod([len(level) for level in levels]) > _MOST_DESIGNS:
-        longest = max(range(len(levels)), key=lambda i: len(levels[i]))
-        levels[longest] = _even(len(levels[longest]) - 1)
-    return np.array(list(itertools.product(*levels))).reshape(-1, len(levels))
+    groups: dict[str, list[int]] = {}
+    for i, p in enumerate(problem.parameters):
+        groups.setdefault(p.together, []).append(i)
+    free = [levels[members[0]] for members in groups.values()]
+    while np.prod([len(level) for level in free]) > _MOST_DESIGNS:
+        longest = max(range(len(free)), key=lambda i: len(free[i]))
+        free[longest] = _even(len(free[longest]) - 1)
+    design = np.array(list(itertools.product(*free))).reshape(-1, len(free))
+    found = np.empty((len(design), len(levels)))
+    for column, members in zip(design.T, groups.values(), strict=True):
+        found[:, members] = column[:, None]
+    return found
 
 
 def _even(count: int) -> np.ndarray:

@@ -60,7 +60,7 @@ TERMS: dict[str, tuple[type[AbstractOscillator], dict[str, Own]]] = {
 }
 """Oscillators and their parameters; energies in eV, the strength A of lorentz and gaussian without unit."""
 
-_INDEX = {"n": Own(1.2, 3.0, 1.5), "k": Own(0.0, 1.0, 0.01)}
+_INDEX = {"n": Own(1.2, 4.0, 1.5), "k": Own(0.0, 2.0, 0.01)}
 MODELS: dict[str, dict[str, Own]] = {
     "cauchy": _CAUCHY,
     "cauchy-urbach": {
