@@ -66,6 +66,7 @@ class Free(eqx.Module):
 
 
 def is_free(leaf: Any) -> bool:
+    """True for a `Free`, which a pytree's traversal must take as one leaf."""
     return isinstance(leaf, Free)
 
 

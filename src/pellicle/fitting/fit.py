@@ -69,7 +69,7 @@ def seen_as(scene: Scene, data: Spectrum) -> Scene:
 
 def _fit(data: Spectrum, scene: Scene, progress: Progress) -> Fit:
     began = time.perf_counter()
-    source = Noise(given=data.sigma is not None, drifting=data.sigma is None and _slow(scene))
+    source = Noise(given=data.sigma is not None, drifting=data.sigma is None and summary.drifts(scene))
     problem = make(
         scene,
         data.wavelength,
@@ -79,10 +79,6 @@ def _fit(data: Spectrum, scene: Scene, progress: Progress) -> Fit:
     )
     weighed = weigh(problem, search(problem, progress), source)
     return _report(data, scene, weighed, summary.profile(problem, weighed), source, began)
-
-
-def _slow(scene: Scene) -> bool:
-    return isinstance(scene.instrument.scale, Drift) and scene.instrument.scale.degree > 0
 
 
 def _values(data: Spectrum) -> np.ndarray:

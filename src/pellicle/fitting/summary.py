@@ -35,7 +35,7 @@ def estimates(scene: Scene, weighed: Weighed, found: Errors, profile: Profile | 
     """Every parameter, free ones first, the thickness before all."""
     problem, unit = weighed.problem, weighed.minima.units[0]
     values = problem.box.values(unit)
-    least = thinnest(weighed) if _drifts(scene) and len(scene.layers) == 1 else 0.0
+    least = thinnest(weighed) if drifts(scene) and len(scene.layers) == 1 else 0.0
     scanned = problem.thickness_axis
     free = [
         _estimate(p, values[i], found.stderr[i], unit[i], profile if i == scanned else None, least)
@@ -54,7 +54,8 @@ def estimates(scene: Scene, weighed: Weighed, found: Errors, profile: Profile | 
     return {e.name: e for e in [*free, *linear, *fixed]}
 
 
-def _drifts(scene: Scene) -> bool:
+def drifts(scene: Scene) -> bool:
+    """Whether the scale varies along the spectrum."""
     return isinstance(scene.instrument.scale, Drift) and scene.instrument.scale.degree > 0
 
 
