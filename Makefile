@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 EXAMPLE := measurements/recipes/hematite_on_glass_140nm.toml
 
-.PHONY: fit test lint bench measurements slow clean
+.PHONY: fit test lint bench peers measurements slow clean
 
 # Debian splits venv's pip into a package of its own: without it, the system's pip does
 $(VENV)/bin/python:
@@ -43,8 +43,12 @@ bench: $(VENV)/.dev
 	$(BIN)/python benchmarks/film.py
 	$(BIN)/python benchmarks/cold_start.py
 
+# several GB: the other packages, in an environment of their own; writes the table of README.md
+peers: $(VENV)/.dev
+	$(BIN)/python benchmarks/peers --write-readme
+
 measurements: $(VENV)/.fit
 	$(BIN)/python scripts/make_measurements.py
 
 clean:
-	rm -rf $(VENV) results .pytest_cache .ruff_cache .hypothesis .coverage
+	rm -rf $(VENV) .venv-peers results .pytest_cache .ruff_cache .hypothesis .coverage

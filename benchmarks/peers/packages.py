@@ -1,0 +1,51 @@
+"""Which packages are compared, how each is installed, and what to know of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Package:
+    """A column of the table: its module in `adapters`, its head, and what pip installs for it.
+
+    Ours have nothing to install: they run in the Python that runs the comparison.
+    """
+
+    adapter: str
+    head: str
+    install: tuple[str, ...]
+    note: str
+
+
+OURS = (
+    Package("pellicle64", "pellicle", (), "float64"),
+    Package("pellicle32", "pellicle float32", (), "the same functions on float32 input"),
+)
+PEERS = (
+    Package("tmm", "tmm", ("tmm",), "float64; clamps layers under T = 1e-30, and says so"),
+    Package("tmm_fast", "tmm_fast", ("tmm_fast",), "float64; asks for real indices outside the stack"),
+    Package(
+        "tmmax",
+        "tmmax",
+        ("tmmax",),
+        "float32: under x64 its scan raises TypeError; called beneath `tmm`, which knows media by name only "
+        "and refuses d = 0",
+    ),
+    Package("tmm_faster", "tmm_faster", ("tmm_faster",), "float64"),
+    Package("pyelli2x2", "pyElli 2×2", ("pyElli",), "float64, its solver for isotropic stacks"),
+    Package("pyelli4x4", "pyElli 4×4", ("pyElli",), "float64, its default solver"),
+    Package("refellips", "refellips", ("refellips", "refnx"), "float64, R only: made for Ψ and Δ"),
+    Package(
+        "differentiable_tmm",
+        "differentiable_tmm",
+        ("differentiable_tmm",),
+        "float64; takes the real part of the substrate's index, as documented, and warns",
+    ),
+    Package(
+        "difftmm",
+        "difftmm",
+        ("difftmm",),
+        "complex64 by construction, R only: it gives amplitudes; fed n − ik, because n + ik amplifies in it",
+    ),
+)

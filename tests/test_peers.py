@@ -1,0 +1,80 @@
+"""The comparison with other packages: its truth, its errors and its table, with none of them installed."""
+
+from __future__ import annotations
+
+import importlib
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+HERE = Path(__file__).parents[1] / "benchmarks" / "peers"
+NAMES = ("cases", "truth", "table", "packages", "adapters.pellicle_any")
+
+
+@pytest.fixture(scope="module")
+def peers():
+    """The script's own modules, which live in no package."""
+    sys.path.insert(0, str(HERE))
+    try:
+        yield {name: importlib.import_module(name) for name in NAMES}
+    finally:
+        sys.path.remove(str(HERE))
+        for name in [*NAMES, "adapters"]:
+            sys.modules.pop(name, None)
+
+
+def test_the_truth_and_pellicle_agree(peers):
+    """Two codes and two formulas; what a critical substrate loses is its root's rounding."""
+    cases, ours, table = peers["cases"], peers["adapters.pellicle_any"], peers["table"]
+    for name, case in cases.CASES.items():
+        smooth = name not in cases.WITHOUT_SLOPE
+        truth = peers["truth"].truth(case, slopes=smooth)
+        assert table.error(ours.values(case, np.float64), truth["values"], "values") < (
+            1e-12 if smooth else 5e-7
+        ), name
+        if smooth:
+            assert table.error(ours.slopes(case, np.float64), truth["slopes"], "slopes") < 1e-9, name
+
+
+def test_every_package_has_its_adapter(peers):
+    packages = peers["packages"]
+    adapters = {path.stem for path in (HERE / "adapters").glob("*.py")}
+    assert {p.adapter for p in (*packages.OURS, *packages.PEERS)} <= adapters
+    assert all(p.install for p in packages.PEERS)
+
+
+def test_errors_and_cells(peers):
+    table = peers["table"]
+    truth = {"values": {"Rs": [0.5], "Rp": [0.25]}}
+    assert table.error({"Rp": [0.25], "Rs": [0.4]}, truth["values"], "values") == pytest.approx(0.1)
+    assert table.error({"Rs": [1.0]}, {"Rs": [0.5]}, "slopes") == pytest.approx(0.5 / 0.501)
+    assert math.isnan(table.error({"Rs": [math.nan]}, truth["values"], "values"))
+
+    def cell(answer):
+        return table.cell(answer, truth, "values")
+
+    assert cell({"values": {"Rs": [0.5]}}) == "0"
+    assert cell({"values": {"Rs": [0.5 + 1e-4]}, "warnings": ["beware"]}) == "1e-04†"
+    assert cell({"values": {"Rs": [0.51]}}) == "**1e-02**"
+    assert cell({"values": {"Rs": [math.nan]}}) == "**nan**"
+    assert cell({"values": "hang"}) == "**hang**"
+    assert cell({"values": "ValueError: no such thing"}) == "**refuses**"
+    assert cell({}) == ""
+
+
+def test_a_table_shows_who_is_wrong_and_names_the_rest(peers):
+    truths = {"easy": {"values": {"Rs": [0.5]}}, "hard": {"values": {"Rs": [0.5]}}}
+    good = {name: {"values": {"Rs": [0.5]}} for name in truths}
+    bad = good | {"hard": {"values": "crash"}}
+    text = peers["table"].table(["good", "bad"], [good, bad], truths, "values", False)
+    assert text.splitlines() == [
+        "|  | good | bad |",
+        "| --- | --- | --- |",
+        "| hard | 0 | **crash** |",
+        "| **wrong of 2** | 0 | 1 |",
+        "",
+        "All are right in: easy.",
+    ]
