@@ -200,6 +200,13 @@ def test_a_recipe_gives_what_the_flags_give(pellicle, spectrum_file, scene, tmp_
     assert by_recipe == by_flags == named
 
 
+def test_an_angle_beside_a_recipe_goes_before_its_own(pellicle, spectrum_file, tmp_path):
+    file, recipe = spectrum_file(), tmp_path / "film.toml"
+    recipe.write_text(RECIPE.replace("[scene]", "angle = 20\n[scene]"))
+    (found,) = pellicle("fit", file, "--recipe", recipe, "--angle", "40", "--json").objects
+    assert next(row["why"] for row in found["plan"] if row["effect"] == "oblique") == "incidence at 40°"
+
+
 def test_flags_that_describe_the_scene_are_refused_beside_a_recipe(pellicle, tmp_path):
     recipe = tmp_path / "film.toml"
     recipe.write_text(RECIPE)

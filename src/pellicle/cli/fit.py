@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from pellicle.cli.options import ReadWords, SceneWords, merged, read, scene_from_words
+from pellicle.cli.options import ReadWords, SceneWords, light, merged, read, scene_from_words
 from pellicle.cli.session import Progress, say, start
 from pellicle.errors import UsageError
 
@@ -132,6 +132,8 @@ def _what(files: list[str], recipe: str | None, words: SceneWords, reading: Read
         scene, assumed = scene_from_words(words, reading)
         say(*assumed)
         return scene, files, reading
+    import equinox as eqx
+
     from pellicle.io.recipe import read_recipe
 
     if words.given():
@@ -142,7 +144,8 @@ def _what(files: list[str], recipe: str | None, words: SceneWords, reading: Read
     files = files or found.files
     if not files:
         raise UsageError(f"{recipe}: names no data files: give them on the command line or in [data] files")
-    return found.scene(), files, merged(reading, found)
+    reading = merged(reading, found)
+    return eqx.tree_at(lambda s: s.light, found.scene(), light(reading)), files, reading
 
 
 class _Run:

@@ -9,7 +9,7 @@ from pellicle.errors import UsageError
 
 if TYPE_CHECKING:
     from pellicle.io.recipe import Recipe
-    from pellicle.scene import Scene
+    from pellicle.scene import Light, Scene
 
 DEFAULT_THICKNESS = "1:5000"
 
@@ -54,7 +54,7 @@ class ReadWords:
 def scene_from_words(words: SceneWords, read: ReadWords) -> tuple[Scene, list[str]]:
     """The scene that the flags describe, and what was assumed. Raises UsageError."""
     from pellicle.io import words as w
-    from pellicle.scene import Instrument, Layer, Light, Scene, Substrate
+    from pellicle.scene import Instrument, Layer, Scene, Substrate
 
     if words.layer is None or words.substrate is None:
         missing = "--layer" if words.layer is None else "--substrate"
@@ -72,7 +72,7 @@ def scene_from_words(words: SceneWords, read: ReadWords) -> tuple[Scene, list[st
         layer,
         Substrate(w.medium(words.substrate, what="--substrate"), back, words.plate_mm or 1.0),
         ambient=w.medium(words.ambient or "air", what="--ambient"),
-        light=Light(None, read.angle or 0.0, read.signal or "R", read.polarisation or "unpolarised"),
+        light=light(read),
         instrument=Instrument(
             w.drift(words.scale or "1", "--scale"),
             w.drift(words.offset or "0", "--offset"),
@@ -80,6 +80,13 @@ def scene_from_words(words: SceneWords, read: ReadWords) -> tuple[Scene, list[st
         ),
     )
     return scene, assumed
+
+
+def light(read: ReadWords) -> Light:
+    """How the scene is looked at, where the file does not say."""
+    from pellicle.scene import Light
+
+    return Light(None, read.angle or 0.0, read.signal or "R", read.polarisation or "unpolarised")
 
 
 def merged(read: ReadWords, recipe: Recipe | None) -> ReadWords:

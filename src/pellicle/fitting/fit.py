@@ -47,6 +47,8 @@ def fit(data: Spectrum, scene: Scene, *, progress: Progress = quiet) -> Fit:
 def _check_ellipsometry(data: Spectrum, scene: Scene, drifts: list[Drift]) -> None:
     if drifts or scene.instrument.scale != 1.0 or scene.instrument.offset != 0.0:
         raise UsageError(f"{data.path}: Ψ and Δ have no scale and no offset: leave both out")
+    if scene.substrate.back is not None:
+        raise UsageError(f"{data.path}: ellipsometry of a plate's back face is not simulated: leave back out")
     if data.angle is None and not free_leaves(scene.light) and not np.any(scene.light.angle):
         raise UsageError(f"{data.path}: ellipsometry needs its angle of incidence: add --angle 70, say")
 
