@@ -90,6 +90,7 @@ def ellipsometry(
 
     tan(Ψ) exp(iΔ) = conj(r_p / r_s) for n + ik, as instruments write it: Δ is near 180 for bare
     silicon at small angles. Δ wraps around: fit N, C, S instead (`pellicle.optics.ellipsometry`).
+    Where r_p or r_s is 0, Δ has no meaning and is 0; where both are, Ψ is 0 too.
     """
     angle = _floating(angle)  # also at 0 both polarisations are needed
     s, p = _waves(wavelength, thickness, layer, substrate, ambient, angle, "unpolarised")

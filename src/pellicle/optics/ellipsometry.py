@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 
 from pellicle.optics.film import Wave
@@ -37,15 +38,24 @@ def stokes(s: Wave, p: Wave) -> Stokes:
 
 def normalised(given: Stokes) -> tuple[Any, Any, Any]:
     """N, C, S on the unit sphere; all 0 where nothing is reflected, so that Ψ and Δ have no meaning."""
-    dark = given.intensity == 0
-    over = jnp.where(dark, 0.0, 1 / jnp.where(dark, 1.0, given.intensity))
+    dark = given.intensity < jnp.finfo(jnp.result_type(given.intensity)).tiny
+    # scaled to size first: the derivative of 1/x holds 1/x², which overflows where little is reflected
+    size = jax.lax.stop_gradient(jnp.where(dark, 0.0, 1 / jnp.where(dark, 1.0, given.intensity)))
+    over = jnp.where(dark, 0.0, 1 / jnp.where(dark, 1.0, given.intensity * size)) * size
     return given.n * over, given.c * over, given.s * over
 
 
 def angles(n: Any, c: Any, s: Any) -> tuple[Any, Any]:
-    """Ψ in 0 to 90 and Δ in 0 to 360 degrees. Where Ψ is 0 or 90, Δ is 0 and its derivatives are 0."""
+    """Ψ in 0 to 90 and Δ in 0 to 360 degrees.
+
+    Where Ψ is 0 or 90, Δ is 0 and its derivatives are 0; where nothing is reflected, all are 0.
+    """
     square = c * c + s * s
     pole = square == 0
-    psi = 0.5 * jnp.arctan2(jnp.sqrt(jnp.where(pole, 1.0, square)) * jnp.where(pole, 0.0, 1.0), n)
+    dark = pole & (n == 0)
+    across = jnp.sqrt(jnp.where(pole, 1.0, square)) * jnp.where(pole, 0.0, 1.0)
+    psi = 0.5 * jnp.arctan2(across, jnp.where(dark, 1.0, n))
     delta = jnp.arctan2(jnp.where(pole, 0.0, s), jnp.where(pole, 1.0, c))
-    return jnp.rad2deg(psi), jnp.mod(jnp.rad2deg(delta), 360.0)
+    turned = jnp.mod(jnp.rad2deg(delta), 360.0)
+    # −1e-17 + 360 rounds to 360
+    return jnp.rad2deg(psi), jnp.where(turned >= 360.0, 0.0, 1.0) * turned
