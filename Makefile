@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 EXAMPLE := measurements/recipes/hematite_on_glass_140nm.toml
 
-.PHONY: fit test lint bench peers measurements slow clean
+.PHONY: fit test lint bench peers properties measurements slow clean
 
 # Debian splits venv's pip into a package of its own: without it, the system's pip does
 $(VENV)/bin/python:
@@ -46,6 +46,9 @@ bench: $(VENV)/.dev
 # several GB: the other packages, in an environment of their own; writes the table of README.md
 peers: $(VENV)/.dev
 	$(BIN)/python benchmarks/peers --write-readme
+
+properties: $(VENV)/.dev
+	$(BIN)/python benchmarks/properties.py
 
 measurements: $(VENV)/.fit
 	$(BIN)/python scripts/make_measurements.py

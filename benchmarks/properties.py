@@ -1,0 +1,114 @@
+"""A million random scenes: is every value and derivative finite, and is energy conserved?
+
+Run `python benchmarks/properties.py` (`make properties`). Single films and stacks of 1 to 8 layers, in
+float64 and float32: media that are real, weakly absorbing, metallic; dense ambients; thickness 0 and
+1e-6 nm to 1 mm; angles at 0, at 90 and up to 1e-9 degrees from it, and critical in a layer or in the
+substrate. Each line counts the scenes that break a law; the exit code is 1 if there are any.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+import pellicle as pl
+
+CHUNK = 5000
+# of R + T above 1, or from 1 where nothing absorbs, and of s and p at normal incidence
+ROUNDING = {np.float64: 1e-9, np.float32: 2e-3}
+
+
+def scenes(rng: np.random.Generator, count: int, layers: int) -> np.ndarray:
+    """Rows of thicknesses, n and k of each layer; n, k of the substrate; ambient, angle, wavelength."""
+
+    def often(values, edges, chance=0.15):
+        return np.where(rng.random(values.shape) < chance, rng.choice(edges, values.shape), values)
+
+    def media(*shape):
+        n = often(10 ** rng.uniform(-1.3, 0.8, shape), [1.0, 1.5])
+        return n, often(10 ** rng.uniform(-12, 1, shape), [0.0], 0.4)
+
+    thickness = often(10 ** rng.uniform(-6, 6, (count, layers)), [0.0])
+    (n, k), (n2, k2) = media(count, layers), media(count)
+    transparent = rng.random(count) < 0.3
+    k, k2 = np.where(transparent[:, None], 0.0, k), np.where(transparent, 0.0, k2)
+    ambient = often(rng.uniform(1, 4, count), [1.0, 1.5])
+    near_grazing = 90 - 10 ** rng.uniform(-9, 0, count)
+    angle = often(often(rng.uniform(0, 90, count), [0.0, 30.0, 90.0]), near_grazing, 0.1)
+    critical = np.where(rng.random(count) < 0.5, n2, n[:, 0]) / ambient
+    total = (critical < 1) & (rng.random(count) < 0.2)
+    angle = np.where(total, np.rad2deg(np.arcsin(np.minimum(critical, 1))), angle)
+    rest = (n2, k2, ambient, angle, 10 ** rng.uniform(1, 6, count))
+    return np.concatenate([thickness, n, k, np.stack(rest, 1)], axis=1)
+
+
+def signals(row, layers: int):
+    """Rs, Rp, Ts, Tp, Ψ, Δ of one scene; no list of layers where there is one film."""
+    d, n, k = row[: 3 * layers].reshape(3, layers) if layers else row[:3].reshape(3, 1)
+    n2, k2, ambient, angle, wavelength = row[-5:]
+    media = list(jax.lax.complex(n, k)) if layers else jax.lax.complex(n[0], k[0])
+    film = (wavelength, d if layers else d[0], media, jax.lax.complex(n2, k2))
+    at = {"ambient": ambient, "angle": angle}
+    powers = [f(*film, **at, polarisation=p) for f in (pl.reflectance, pl.transmittance) for p in "sp"]
+    return jnp.stack([*powers, *pl.ellipsometry(*film, **at)])
+
+
+@partial(jax.jit, static_argnums=1)
+def run(rows, layers: int):
+    one = partial(signals, layers=layers)
+    return jax.vmap(lambda row: (one(row), jax.jacfwd(one)(row)))(rows)
+
+
+def broken(rows: np.ndarray, layers: int) -> dict[str, np.ndarray]:
+    """Law → which rows break it."""
+    values, slopes = map(np.asarray, run(rows, layers))
+    unit, count = ROUNDING[rows.dtype.type], max(layers, 1)
+    reflected, passed, (psi, delta) = values[:, :2], values[:, 2:4], values[:, 4:].T
+    lossless = np.all(rows[:, 2 * count : 3 * count] == 0, axis=1) & (rows[:, -4] == 0)
+    normal = rows[:, -2] == 0
+    total = reflected + passed
+    return {
+        "value not finite": ~np.all(np.isfinite(values), axis=1),
+        "derivative not finite": ~np.all(np.isfinite(slopes), axis=(1, 2)),
+        "R or T below 0": np.any((reflected < 0) | (passed < 0), axis=1),
+        "R + T above 1": np.any(total > 1 + unit, axis=1),
+        "energy lost where nothing absorbs": lossless & np.any(np.abs(total - 1) > unit, axis=1),
+        "s unlike p at normal incidence": normal & (np.abs(reflected[:, 0] - reflected[:, 1]) > unit),
+        "angles out of range": ~((psi >= 0) & (psi <= 90.0001) & (delta >= 0) & (delta < 360)),
+    }
+
+
+def main(total: int) -> int:
+    worst, rng = 0, np.random.default_rng(0)
+    shapes = (0, 1, 2, 4, 8)
+    chunks = max(1, total // (2 * len(shapes) * CHUNK))
+    for dtype in (np.float64, np.float32):
+        for layers in shapes:
+            began, counts, example = time.perf_counter(), {}, {}
+            for _ in range(chunks):
+                rows = scenes(rng, CHUNK, max(layers, 1)).astype(dtype)
+                for law, bad in broken(rows, layers).items():
+                    counts[law] = counts.get(law, 0) + int(bad.sum())
+                    if bad.any():
+                        example.setdefault(law, rows[bad][0].tolist())
+            name = f"{layers} in a list" if layers else "one film"
+            print(f"{dtype.__name__}, {name}: {chunks * CHUNK} in {time.perf_counter() - began:.0f} s")
+            for law, count in counts.items():
+                if count:
+                    print(f"  {law}: {count}, such as {example[law]}")
+            worst += sum(counts.values())
+            sys.stdout.flush()
+    return int(worst > 0)
+
+
+if __name__ == "__main__":
+    jax.config.update("jax_enable_x64", True)
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--scenes", type=int, default=1_000_000)
+    sys.exit(main(parser.parse_args().scenes))
