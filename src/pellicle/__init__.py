@@ -10,6 +10,8 @@ if TYPE_CHECKING:
     from pellicle.fitting.fit import fit as fit
     from pellicle.fitting.result import Fit as Fit
     from pellicle.fitting.result import Status as Status
+    from pellicle.io.brdf_samples import read_brdf_samples as read_brdf_samples
+    from pellicle.io.samples import BrdfSamples as BrdfSamples
     from pellicle.io.spectra import read_spectrum as read_spectrum
     from pellicle.io.spectrum import Spectrum as Spectrum
     from pellicle.materials import lookup as material  # noqa: F401
@@ -33,6 +35,8 @@ if TYPE_CHECKING:
 _HOME = {
     "pellicle.fitting.fit": ("fit",),
     "pellicle.fitting.result": ("Fit", "Status"),
+    "pellicle.io.brdf_samples": ("read_brdf_samples",),
+    "pellicle.io.samples": ("BrdfSamples",),
     "pellicle.io.spectra": ("read_spectrum",),
     "pellicle.io.spectrum": ("Spectrum",),
     "pellicle.materials": ("material",),

@@ -35,7 +35,19 @@ _NAMES = {
     "N": ("n",),
     "C": ("c",),
     "S": ("s",),
+    "theta_i": ("theta_i", "θ_i"),
+    "phi_i": ("phi_i", "φ_i"),
+    "theta_o": ("theta_o", "θ_o"),
+    "phi_o": ("phi_o", "φ_o"),
+    "value": ("value", "brdf"),
+    "G": ("g",),
+    "B": ("b",),
+    "sigma_R": ("sigma_r",),
+    "sigma_G": ("sigma_g",),
+    "sigma_B": ("sigma_b",),
 }
+#: The directions of a sample of a BRDF: of the incident light and of the view.
+DIRECTIONS = ("theta_i", "phi_i", "theta_o", "phi_o")
 _IMPLIED_UNIT = {"energy": "eV", "wavenumber": "cm-1", "angle": "deg"}
 _UNIT_OF = {
     "wavelength": units.wavelength_unit,
@@ -44,6 +56,7 @@ _UNIT_OF = {
     "delta": units.angle_unit,
     "sigma_psi": units.angle_unit,
     "sigma_delta": units.angle_unit,
+    **dict.fromkeys(DIRECTIONS, units.angle_unit),
     "counts": lambda text: None,
     "intensity": lambda text: None,
 }
@@ -59,10 +72,10 @@ SKIP = "_"
 class Column:
     """One column: where it is, what it holds and in which unit.
 
-    `role` is wavelength, R, T, intensity, counts, sigma, angle, psi, delta, sigma_psi, sigma_delta,
-    N, C, S or other; energies and
-    wavenumbers are wavelengths in another unit. `unit` is None where the name does not say, and
-    `unknown_unit` keeps a unit that was written but not understood.
+    `role` is a key of `_NAMES`, or other. Energies and wavenumbers are wavelengths in another unit,
+    and R and T have their polarisation beside them: those keys are no roles.
+    `unit` is None where the name does not say, and `unknown_unit` keeps a unit that was written but
+    not understood.
     """
 
     position: int
@@ -116,11 +129,10 @@ def recognise_all(names: Sequence[str]) -> tuple[Column, ...]:
 
 
 def is_header(names: Sequence[str]) -> bool:
-    """True if `names` announce a wavelength and something measured: no free text does both."""
+    """True if `names` announce a wavelength and something measured, or directions: no free text does."""
     roles = {column.role for column in recognise_all(names)}
-    return "wavelength" in roles and (
-        bool(roles & {"R", "T", "intensity", "counts", "psi"}) or {"N", "C", "S"} <= roles
-    )
+    measured = bool(roles & {"R", "T", "intensity", "counts", "psi"}) or {"N", "C", "S"} <= roles
+    return ("wavelength" in roles and measured) or roles.issuperset(DIRECTIONS)
 
 
 def is_unit_row(names: Sequence[str]) -> bool:
@@ -148,8 +160,7 @@ def requested(spec: str | Sequence[str], path: str, width: int) -> tuple[Column,
     for column in columns:
         if column.role == "other" and column.name not in (SKIP, ""):
             raise UsageError(
-                f"{path}: --columns does not know {column.name!r}; use wavelength, energy, wavenumber, R, T, "
-                "Rs, Rp, Ts, Tp, intensity, counts, sigma, angle, psi, delta, sigma_psi, sigma_delta, "
-                "N, C, S, or _ to skip a column"
+                f"{path}: --columns does not know {column.name!r}; use {', '.join(_NAMES)}, "
+                f"or {SKIP} to skip a column"
             )
     return columns

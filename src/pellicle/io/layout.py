@@ -52,7 +52,7 @@ def find_layout(lines: Sequence[Line], comments: Sequence[Line], path: str) -> L
     if first is None:
         raise DataError(
             f"{path}: line {lines[-1].number} ends the file without any row of two numbers; "
-            "expected rows of wavelength and signal below the header"
+            "expected rows of numbers below the header"
         )
     width = len(split(lines[first].bare, delimiter))
     start, header = _rows_begin(lines, first, width, delimiter, decimal)

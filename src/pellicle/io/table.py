@@ -21,12 +21,13 @@ from pellicle.io.text import Line, content_lines, is_number, read_text, split
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """A file's layout with its path and SHA-256; `lines` is the source line of each row."""
+    """A file's layout with its path, SHA-256 and comments; `lines` is the source line of each row."""
 
     path: str
     sha256: str
     layout: Layout
     lines: np.ndarray
+    comments: Sequence[Line] = ()
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -114,7 +115,7 @@ def read_table(path: str | os.PathLike[str], export: Finder | None = None) -> Ta
     text, digest = read_text(path)
     lines, comments = content_lines(text)
     if not lines:
-        raise DataError(f"{path}: holds only comments; expected rows of wavelength and signal")
+        raise DataError(f"{path}: holds only comments; expected rows of numbers")
     known = export(lines, comments, str(path)) if export else None
     layout = known or find_layout(lines, comments, str(path))
-    return Table(str(path), digest, layout, np.array([line.number for line in layout.rows]))
+    return Table(str(path), digest, layout, np.array([line.number for line in layout.rows]), comments)

@@ -6,7 +6,10 @@ import csv
 import hashlib
 import os
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from io import BufferedReader
 from pathlib import Path
 
 from pellicle.errors import DataError
@@ -27,13 +30,12 @@ class Line:
     bare: str
 
 
-def read_text(path: str | os.PathLike[str]) -> tuple[str, str]:
-    """Text and SHA-256 of a file: UTF-8, UTF-16 with its mark, or Latin-1 as older instruments write.
-
-    Raises DataError for a missing, unreadable, binary or empty file, or a folder.
-    """
+@contextmanager
+def opened(path: str | os.PathLike[str]) -> Iterator[BufferedReader]:
+    """A file open for reading bytes. Raises DataError for a missing or unreadable file, or a folder."""
     try:
-        content = Path(path).read_bytes()
+        with Path(path).open("rb") as file:
+            yield file
     except FileNotFoundError:
         raise DataError(f"{path}: no such file; check the name and the folder") from None
     except IsADirectoryError:
@@ -42,6 +44,15 @@ def read_text(path: str | os.PathLike[str]) -> tuple[str, str]:
         raise DataError(
             f"{path}: cannot be read ({error.strerror}); check its name and permissions"
         ) from None
+
+
+def read_text(path: str | os.PathLike[str]) -> tuple[str, str]:
+    """Text and SHA-256 of a file: UTF-8, UTF-16 with its mark, or Latin-1 as older instruments write.
+
+    Raises DataError as `opened` does, and for a binary or empty file.
+    """
+    with opened(path) as file:
+        content = file.read()
     digest = hashlib.sha256(content).hexdigest()
     marked = content.startswith((b"\xff\xfe", b"\xfe\xff"))
     try:
@@ -49,9 +60,9 @@ def read_text(path: str | os.PathLike[str]) -> tuple[str, str]:
     except UnicodeDecodeError:
         text = content.decode("latin-1")
     if _CONTROL.search(text):
-        raise DataError(f"{path}: is a binary file; export the spectrum as text (CSV) first")
+        raise DataError(f"{path}: is a binary file; export it as text (CSV) first")
     if not text.strip():
-        raise DataError(f"{path}: is empty; expected rows of wavelength and signal")
+        raise DataError(f"{path}: is empty; expected rows of numbers")
     return text, digest
 
 

@@ -24,6 +24,7 @@ _SIGNAL_SPELLINGS = {
     "percent": ("%", "percent", "pct", "perc"),
     "fraction": ("fraction", "frac", "1", "-", "", "0-1", "0..1", "abs", "unitless", "dimensionless"),
 }
+_BRDF_SPELLINGS = {"1/sr": ("1/sr", "sr-1", "sr^-1", "sr**-1", "sr⁻¹", "sr−1", "/sr", "persr")}
 _ANGLE_SPELLINGS = {"deg": ("deg", "degree", "degrees", "°", "º")}
 
 
@@ -45,6 +46,11 @@ def signal_unit(text: str) -> str | None:
 def angle_unit(text: str) -> str | None:
     """`deg` if `text` spells degrees, else None."""
     return _lookup(_ANGLE_SPELLINGS, text)
+
+
+def brdf_unit(text: str) -> str | None:
+    """`1/sr` if `text` spells the unit of a BRDF, else None."""
+    return _lookup(_BRDF_SPELLINGS, text)
 
 
 def to_nm(values: np.ndarray, unit: str) -> np.ndarray:
