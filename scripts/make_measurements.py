@@ -1,6 +1,6 @@
 """Write the synthetic spectra of `measurements/` from their recipes, and their index.
 
-The index keeps its rows of kind "measured".
+The index keeps its other rows: what was measured, or computed by other programs.
 
 Run `python scripts/make_measurements.py FOLDER` (default: measurements). Files that exist are left
 alone: remove one to have it made again.
@@ -29,19 +29,19 @@ def main(folder: Path) -> None:
         if not target.exists():
             simulate(str(recipe), out=str(target), seed=seed)
         rows.append(_row(recipe, target, seed))
-    rows += _measured(folder / "INDEX.csv")
+    rows += _from_elsewhere(folder / "INDEX.csv")
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerows([COLUMNS, *rows])
     write_text(folder / "INDEX.csv", text.getvalue(), overwrite=True)
 
 
-def _measured(index: Path) -> list[tuple[str, ...]]:
-    """The rows of what was measured, which only people write."""
+def _from_elsewhere(index: Path) -> list[tuple[str, ...]]:
+    """The rows of what was not made here, which only people write."""
     if not index.exists():
         return []
     with index.open(encoding="utf-8", newline="") as file:
-        found = [row for row in csv.DictReader(file) if row["kind"] == "measured"]
+        found = [row for row in csv.DictReader(file) if row["kind"] != "synthetic"]
     return [tuple(row[name] for name in COLUMNS) for row in found]
 
 
