@@ -1,0 +1,54 @@
+"""The fits that are kept: all there, told in their README as they came out, and reproducible."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+FITS = ROOT / "fits"
+QUICK = "brush_19-1-1"
+
+
+@pytest.fixture(scope="module")
+def script():
+    spec = spec_from_file_location("rerun_fits", ROOT / "scripts" / "rerun_fits.py")
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_every_study_is_whole_and_told_as_it_came_out():
+    rows = dict(re.findall(r"^\| \[([^\]]+)\](.*)\|$", (FITS / "README.md").read_text("utf-8"), re.MULTILINE))
+    assert rows.keys() == {path.name for path in FITS.iterdir() if path.is_dir()}
+    for name, row in rows.items():
+        study = FITS / name
+        files = {path.name for path in study.iterdir()}
+        assert files == {"recipe.toml", "result.json", "report.txt", "figure.png"}
+        result = json.loads((study / "result.json").read_text("utf-8"))
+        assert result["status"] == "converged"
+        data = result["data"]
+        assert hashlib.sha256((study / data["path"]).read_bytes()).hexdigest() == data["sha256"]
+        (best,) = re.findall(r"thickness (\S+ ± \S+ nm)", result["verdict"])
+        assert best in row
+        assert best in (study / "report.txt").read_text("utf-8")
+
+
+def test_what_moved_is_told(script):
+    kept = {"status": "converged", "parameters": {"d": {"value": 3.0, "stderr": 0.5}}}
+    near = {"status": "converged", "parameters": {"d": {"value": 3.04, "stderr": 0.5}}}
+    far = {"status": "ambiguous", "parameters": {"d": {"value": 3.06, "stderr": 0.5}}}
+    assert list(script.moved(kept, near)) == []
+    assert list(script.moved(kept, far)) == ["status ambiguous, was converged", "d 3.06, was 3 ± 0.5"]
+    lost = {"status": "converged", "parameters": {"d": {"value": 3.0, "stderr": None}, "n": {}}}
+    assert list(script.moved(kept, lost)) == ["d has a standard error of None, had 0.5", "n is new"]
+
+
+def test_a_study_comes_out_as_kept(script, monkeypatch):
+    monkeypatch.setenv("PELLICLE_CACHE", "off")
+    assert script.rerun(FITS / QUICK) == []
