@@ -85,12 +85,21 @@ def test_outside_a_materials_table(refused, spectrum_file):
         (("--wavelength-unit", "inch"), ("--wavelength-unit", "'inch'", "um")),
         (("--signal-unit", "dB"), ("--signal-unit", "'dB'", "percent")),
         (("--dark", "dark.csv"), ("--dark", "--reference")),
+        (("--layer", "inf"), ("--layer inf", "finite")),
+        (("--layer", "nan"), ("--layer nan", "finite")),
+        (("--layer", "bruggeman"), ("bruggeman", "recipe")),
+        (("--layer", "lorentz(-1,4,0.5)"), ("lorentz", "A must not be negative", "-1")),
+        (("--layer", "tauc-lorentz(100,2,2,3)"), ("Eg must lie below", "Eg 3 and E0 2")),
+        (("--layer", "cody-lorentz(100,2,2,3)"), ("Eg must lie below", "Eg 3 and E0 2")),
+        (("--thickness", "inf:10"), ("--thickness", "finite", "'inf'")),
+        (("--thickness", "10:inf"), ("--thickness", "finite", "'inf'")),
+        (("--plate-mm", "inf", "--back", "air"), ("--plate-mm", "finite", "inf")),
     ],
     ids=lambda value: " ".join(value),
 )
 def test_flags(refused, spectrum_file, flags, said):
     base = {"--layer": "1.46", "--substrate": "3.9", "--thickness": "10:800"}
-    given = base | {flags[0]: flags[1]}
+    given = base | dict(zip(flags[::2], flags[1::2], strict=True))
     refused("fit", spectrum_file(), *(x for pair in given.items() for x in pair), code=2, said=said)
 
 
@@ -139,6 +148,104 @@ def test_recipes(refused, tmp_path, recipe, said):
     path = tmp_path / "film.toml"
     path.write_text(recipe)
     refused("fit", "a.csv", "--recipe", path, code=3, said=(str(path), *said))
+
+
+GOOD = {
+    "data": "",
+    "material": "1.46",
+    "thickness": "{ lower = 10, upper = 800 }",
+    "instrument": "",
+    "substrate": "'Si'",
+}
+
+
+@pytest.mark.parametrize(
+    ("part", "said"),
+    [
+        ({"material": "{ model = 'lorentz', A = -1.0 }"}, ("lorentz: A must not be negative, got -1",)),
+        ({"material": "{ model = 'gaussian', A = { lower = -1, upper = 2 } }"}, ("gaussian: A", "negative")),
+        (
+            {"material": "{ model = 'oscillators', terms = [{ kind = 'drude', Ep = -3.0 }] }"},
+            ("drude: Ep must not be negative, got -3",),
+        ),
+        (
+            {"material": "{ model = 'tauc-lorentz', E0 = 2.0, Eg = 3.0 }"},
+            ("Eg must lie below", "Eg 3", "E0 2"),
+        ),
+        (
+            {"material": "{ model = 'cody-lorentz', E0 = 2.0, Eg = 3.0 }"},
+            ("Eg must lie below", "Eg 3", "E0 2"),
+        ),
+        ({"material": "{ model = 'tauc-lorentz', A = nan }"}, ("A must be a finite number, got nan",)),
+        ({"material": "{ model = 'spline', knots = [400, nan, 700] }"}, ("knots2", "finite", "nan")),
+        (
+            {"material": "{ mix = 'bruggeman', host = 'SiO2', inclusion = 'air', fraction = 1.2 }"},
+            ("bruggeman: fraction must lie in 0 to 1, got 1.2",),
+        ),
+        (
+            {
+                "material": "{ mix = 'looyenga', host = 1.5, inclusion = 1.0, "
+                "fraction = { lower = -0.2, upper = 1 } }"
+            },
+            ("looyenga: fraction must lie in 0 to 1, got -0.2",),
+        ),
+        ({"material": "inf"}, ("scene.layer.0.material", "finite", "inf")),
+        ({"material": "'inf'"}, ("material inf", "finite")),
+        ({"thickness": "nan"}, ("scene.layer.0.thickness", "finite", "nan")),
+        ({"thickness": "{ lower = 10, upper = inf }"}, ("thickness", "two finite bounds")),
+        ({"thickness": "{ lower = 1, upper = 9, prior = { mean = nan, sd = 1 } }"}, ("prior.mean", "finite")),
+        ({"substrate": "{ material = 'Si', back = 'air', plate_mm = nan }"}, ("plate_mm", "finite", "nan")),
+        ({"instrument": "scale = nan"}, ("instrument.scale", "finite", "nan")),
+        ({"instrument": "bandwidth = inf"}, ("instrument.bandwidth", "finite", "inf")),
+        ({"data": "angle = 95"}, ("data.angle", "90", "95")),
+        ({"data": "wavelengths = [400, nan]"}, ("data.wavelengths.1", "finite", "nan")),
+    ],
+    ids=lambda value: next(iter(value.values())) if isinstance(value, dict) else "",
+)
+def test_impossible_numbers_in_recipes(refused, spectrum_file, tmp_path, part, said):
+    text = GOOD | part
+    path = tmp_path / "film.toml"
+    path.write_text(
+        f"[data]\n{text['data']}\n[scene]\nsubstrate = {text['substrate']}\n"
+        f"[[scene.layer]]\nmaterial = {text['material']}\nthickness = {text['thickness']}\n"
+        f"[instrument]\n{text['instrument']}\n"
+    )
+    refused("fit", spectrum_file(), "--recipe", path, code=3, said=(str(path), *said))
+
+
+PSI_DELTA = "".join(f"{400 + 10 * i},70,{20 + i},{100 + i}\n" for i in range(10))
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("wavelength,angle,psi,delta\n" + PSI_DELTA + "500,70,95,100\n", ("line 12", "95", "0 to 90")),
+        ("wavelength,angle,psi,delta\n" + PSI_DELTA + "500,70,-3,100\n", ("line 12", "-3", "0 to 90")),
+        ("wavelength,angle,psi,delta\n" + PSI_DELTA + "500,,20,100\n", ("line 12", "'angle'", "empty")),
+        ("wavelength,psi,delta\n" + PSI_DELTA.replace(",70,", ","), ("angle of incidence", "--angle 70")),
+    ],
+    ids=["psi above 90", "psi below 0", "an angle missing", "every angle missing"],
+)
+def test_psi_and_delta(refused, tmp_path, scene, text, said):
+    file = tmp_path / "psi.csv"
+    file.write_text(text)
+    refused("fit", file, *scene, code=3, said=(str(file), *said))
+
+
+@pytest.mark.parametrize("step", ["1e-9", "0.1, stop = inf"])
+def test_a_grid_without_end(pellicle, tmp_path, step):
+    path = tmp_path / "film.toml"
+    stop = "" if "stop" in step else ", stop = 500"
+    path.write_text(
+        f"[data]\nwavelengths = {{ start = 400, step = {step}{stop} }}\n[scene]\nsubstrate = 'Si'\n"
+        "[[scene.layer]]\nmaterial = 1.46\nthickness = 100\n"
+    )
+    ran = pellicle("simulate", path, "--out", tmp_path / "out.csv")
+    assert ran.code == 3
+    assert ran.err.startswith(f"pellicle: {path}: ")
+    assert "wavelengths" in ran.err
+    assert ("larger step" if "e-9" in step else "finite") in ran.err
+    assert len(ran.err.splitlines()) == 1
 
 
 def test_a_missing_recipe(refused, tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from typing import TYPE_CHECKING, Any
 
 from pellicle.errors import UsageError
@@ -61,8 +62,8 @@ def scene_from_words(words: SceneWords, read: ReadWords) -> tuple[Scene, list[st
         raise UsageError(f"{missing} is missing: give --layer and --substrate, or a --recipe")
     if words.plate_mm is not None and words.back is None:
         raise UsageError("--plate-mm needs --back: which medium lies behind the plate, as in --back air")
-    if words.plate_mm is not None and not words.plate_mm > 0:
-        raise UsageError(f"--plate-mm must be above zero, got {words.plate_mm:g}")
+    if words.plate_mm is not None and not 0 < words.plate_mm < inf:
+        raise UsageError(f"--plate-mm must be a finite number above zero, got {words.plate_mm:g}")
     free = [item.strip() for item in (words.free or "").split(",") if item.strip()]
     assumed = [] if words.thickness else ["thickness: 1 to 5000 nm, since no --thickness was given"]
     layer = Layer(w.medium(words.layer, free), w.thickness(words.thickness or DEFAULT_THICKNESS))

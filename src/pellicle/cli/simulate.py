@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 
     from pellicle.io.recipe import Recipe
 
+MOST = 1_000_000
+"""Most wavelengths that are simulated at once: more is a slip of the step."""
+
 
 def simulate(
     recipe: Annotated[str, Parameter(help="A TOML file that describes the scene.")],
@@ -65,6 +68,10 @@ def _wavelengths(recipe: Recipe, scene: Any) -> np.ndarray:
         return grid
     if isinstance(given, list):
         grid = np.array(given)
+    elif (given.stop - given.start) / given.step > MOST:
+        raise DataError(
+            f"{recipe.path}: [data] wavelengths are more than {MOST:,} points: give a larger step"
+        )
     else:
         grid = np.arange(given.start, given.stop + given.step / 2, given.step)
     if len(grid) < 2 or not np.all(np.diff(grid) > 0) or grid[0] <= 0:

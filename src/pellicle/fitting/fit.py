@@ -50,13 +50,19 @@ def _check_ellipsometry(data: Spectrum, scene: Scene, drifts: list[Drift]) -> No
     if scene.substrate.back is not None:
         raise UsageError(f"{data.path}: ellipsometry of a plate's back face is not simulated: leave back out")
     if data.angle is None and not free_leaves(scene.light) and not np.any(scene.light.angle):
-        raise UsageError(f"{data.path}: ellipsometry needs its angle of incidence: add --angle 70, say")
+        raise UsageError(
+            f"{data.path}: ellipsometry needs its angle of incidence: add --angle 70, say, angle = 70 under "
+            "[data] in a recipe, or a column angle_deg"
+        )
 
 
 def check_free(scene: Scene) -> None:
     """UsageError where a scene has nothing to fit."""
     if not free_leaves(scene):
-        raise UsageError("nothing is free to fit: give bounds to the thickness, as in --thickness 10:3000")
+        raise UsageError(
+            "nothing is free to fit: give bounds to the thickness, as in --thickness 10:3000, or in a recipe "
+            "thickness = { lower = 10, upper = 3000 }"
+        )
 
 
 def seen_as(scene: Scene, data: Spectrum) -> Scene:

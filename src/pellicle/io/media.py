@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from pellicle.scene import Free, Normal
 class PriorTable(BaseModel):
     """A normal prior: mean and standard deviation in the parameter's unit."""
 
-    model_config = ConfigDict(extra="forbid")
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
     mean: float
     sd: float = Field(gt=0)
 
@@ -61,7 +62,7 @@ _MEDIUM: TypeAdapter[Any] = TypeAdapter(Medium)
 
 
 def number(given: Number, what: str, natural: float | None = None) -> float | Free:
-    """A fixed number or a `Free`; ValueError where it is neither, or below what nature allows."""
+    """A fixed number or a `Free`; ValueError where it is neither, not finite, or below what nature allows."""
     if isinstance(given, float | int):
         lowest, result = float(given), float(given)
     elif given.lower is None and given.upper is None and given.value is not None:
@@ -75,6 +76,8 @@ def number(given: Number, what: str, natural: float | None = None) -> float | Fr
         except ValueError as error:
             raise UsageError(f"{what}: {error}") from None
         lowest = given.lower
+    if not math.isfinite(lowest):
+        raise UsageError(f"{what} must be a finite number, got {lowest:g}")
     if natural is not None and lowest < natural:
         raise UsageError(f"{what} must not be below {natural:g}, got {lowest:g}")
     return result

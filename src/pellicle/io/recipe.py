@@ -17,7 +17,7 @@ from pellicle.scene import Free, Instrument, Layer, Light, Scene, Substrate
 
 
 class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=False)
+    model_config = ConfigDict(extra="forbid", strict=False, allow_inf_nan=False)
 
 
 class PlateTable(_Table):
@@ -138,13 +138,13 @@ _KEYS: dict[str, type[BaseModel]] = {
 
 
 def _first(error: ValidationError) -> str:
-    """The most telling error in one sentence: an unknown key before what a union made of it."""
+    """The most telling error in one sentence: an unknown key or an infinity before what unions made of it."""
     found = error.errors(include_url=False)
-    chosen = next((e for e in found if e["type"] == "extra_forbidden"), found[0])
+    telling = (e for kind in ("extra_forbidden", "finite_number") for e in found if e["type"] == kind)
+    chosen = next(telling, found[0])
     # unions put the name of the branch they tried into the location
-    where = [
-        str(part) for part in chosen["loc"] if not str(part)[:1].isupper() and part not in ("str", "float")
-    ]
+    branches = ("str", "float", "list[float]")
+    where = [str(part) for part in chosen["loc"] if not str(part)[:1].isupper() and part not in branches]
     key = ".".join(where)
     if chosen["type"] == "extra_forbidden":
         owner = next((part for part in reversed(where[:-1]) if not part.isdigit()), "")

@@ -16,6 +16,7 @@ from pellicle.io.models import nearest as nearest
 from pellicle.io.span import number, span
 from pellicle.materials import UnknownMaterial, lookup
 from pellicle.optics.dispersion import AbstractDispersion, Constant, Shifted
+from pellicle.optics.mixtures import MIXTURES
 from pellicle.optics.naming import place
 from pellicle.scene import Free, is_free
 
@@ -61,11 +62,11 @@ def medium(text: str, free: Iterable[str] = (), what: str = "--layer") -> Abstra
 
 def _known(text: str, what: str) -> AbstractDispersion:
     try:
-        value = complex(text.replace(" ", "").replace("i", "j"))
+        value = complex(re.sub("i$", "j", text.replace(" ", "")))
     except ValueError:
         return _named(text, what)
     if not np.isfinite(value) or value.real < 0 or value.imag < 0:
-        raise UsageError(f"{what} {text}: an index is n + ik with n and k not negative")
+        raise UsageError(f"{what} {text}: an index is n + ik with n and k finite and not negative")
     return Constant(value.real, value.imag if value.imag else None)
 
 
@@ -85,6 +86,8 @@ def _catalogued(name: str) -> AbstractDispersion:
     try:
         return lookup(name)
     except UnknownMaterial as error:
+        if name.lower() in (*MIXTURES, "oscillators"):
+            raise UsageError(f"{name} is made of several parts: describe it in a recipe") from None
         close = nearest(name.lower(), MODELS, 0.8)
         raise UsageError(f"no material or model {name!r}{close}" if close else str(error)) from None
 
