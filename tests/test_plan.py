@@ -20,9 +20,8 @@ FREE_ANGLE = pl.Free(0.0, lower=0, upper=60)
 
 def scene(layer=1.46, substrate=3.9 + 0.02j, thickness=300.0, ambient=1.0, instrument=None, **light):
     light = {"wavelength": WAVELENGTH} | light
-    return pl.Scene(
-        pl.Layer(layer, thickness), substrate, ambient, pl.Light(**light), instrument or pl.Instrument()
-    )
+    layer = layer if isinstance(layer, pl.Layer) else pl.Layer(layer, thickness)
+    return pl.Scene(layer, substrate, ambient, pl.Light(**light), instrument or pl.Instrument())
 
 
 BANDWIDTH = pl.Instrument(bandwidth=5.0)
@@ -73,6 +72,36 @@ TABLE = [
         "bandwidth",
         scene(instrument=pl.Instrument(bandwidth=pl.Free(0.0, lower=0, upper=9))),
     ),
+    (
+        "coherence",
+        True,
+        "each averaged over 15 nodes",
+        scene(signal="psi-delta", angle=60.0, instrument=BANDWIDTH),
+    ),
+    (
+        "orders",
+        False,
+        "nodes of the closed form",
+        scene(signal="psi-delta", angle=60.0, instrument=BANDWIDTH),
+    ),
+    ("roughness", False, "no face", scene()),
+    ("roughness", True, "1 rough: up to 3 nm", scene(pl.Layer(1.46, 300.0, roughness=3.0))),
+    ("stack", True, "rough faces", scene(pl.Layer(1.46, 300.0, roughness=FREE_K))),
+    ("angle-spread", False, "one angle of incidence", scene()),
+    (
+        "angle-spread",
+        True,
+        "within 17.5° of its axis",
+        scene(instrument=pl.Instrument(numerical_aperture=0.3)),
+    ),
+    ("oblique", True, "the light's cone has oblique rays", scene(instrument=pl.Instrument(angle_spread=5.0))),
+    ("polarisation", True, "cone has s and p", scene(instrument=pl.Instrument(angle_spread=5.0))),
+    (
+        "back-face",
+        True,
+        "2 incoherent",
+        pl.Scene([pl.Plate(1.5), pl.Layer(1.46, 9.0)], pl.Substrate(1.5, "air")),
+    ),
     ("orders", False, "the closed form sums all orders", scene()),
     ("orders", True, "over the bounds", scene(instrument=BANDWIDTH)),
 ]
@@ -97,8 +126,8 @@ def test_a_plan_lists_every_effect_in_order():
     lines = str(plan).splitlines()
     assert len(lines) == len(EFFECTS)
     assert lines[0].split()[:2] == ["absorption", "off"]
-    with pytest.raises(KeyError, match="roughness"):
-        plan.row("roughness")
+    with pytest.raises(KeyError, match="magic"):
+        plan.row("magic")
 
 
 def test_plans_are_values():

@@ -10,10 +10,15 @@ if TYPE_CHECKING:
     from pellicle.fitting.fit import fit as fit
     from pellicle.fitting.result import Fit as Fit
     from pellicle.fitting.result import Status as Status
+    from pellicle.instrument import Instrument as Instrument
     from pellicle.io.brdf_samples import read_brdf_samples as read_brdf_samples
     from pellicle.io.samples import BrdfSamples as BrdfSamples
     from pellicle.io.spectra import read_spectrum as read_spectrum
     from pellicle.io.spectrum import Spectrum as Spectrum
+    from pellicle.layers import Interface as Interface
+    from pellicle.layers import Layer as Layer
+    from pellicle.layers import Plate as Plate
+    from pellicle.layers import Substrate as Substrate
     from pellicle.materials import lookup as material  # noqa: F401
     from pellicle.optics.dispersion import Cauchy as Cauchy
     from pellicle.optics.dispersion import Constant as Constant
@@ -22,12 +27,9 @@ if TYPE_CHECKING:
     from pellicle.optics.dispersion import Table as Table
     from pellicle.planning import plan as plan
     from pellicle.scene import Free as Free
-    from pellicle.scene import Instrument as Instrument
-    from pellicle.scene import Layer as Layer
     from pellicle.scene import Light as Light
     from pellicle.scene import Normal as Normal
     from pellicle.scene import Scene as Scene
-    from pellicle.scene import Substrate as Substrate
     from pellicle.signals import ellipsometry as ellipsometry
     from pellicle.signals import reflectance as reflectance
     from pellicle.signals import transmittance as transmittance
@@ -42,7 +44,9 @@ _HOME = {
     "pellicle.materials": ("material",),
     "pellicle.optics.dispersion": ("Cauchy", "Constant", "Sellmeier", "Shifted", "Table"),
     "pellicle.planning": ("plan",),
-    "pellicle.scene": ("Free", "Instrument", "Layer", "Light", "Normal", "Scene", "Substrate"),
+    "pellicle.instrument": ("Instrument",),
+    "pellicle.layers": ("Interface", "Layer", "Plate", "Substrate"),
+    "pellicle.scene": ("Free", "Light", "Normal", "Scene"),
     "pellicle.signals": ("ellipsometry", "reflectance", "transmittance"),
 }
 _MODULE = {name: module for module, names in _HOME.items() for name in names}

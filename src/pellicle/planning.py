@@ -29,13 +29,8 @@ class Plan:
     @property
     def wordless(self) -> Plan:
         """The same without reasons and bounds: all that a compiled program depends on."""
-        rows = tuple(Row(row.effect, row.on, "", count=row.count) for row in self.rows)
+        rows = tuple(Row(row.effect, row.on, "", count=row.count, around=row.around) for row in self.rows)
         return Plan(rows, self.signal, self.polarisation)
-
-    @property
-    def quadrature(self) -> bool:
-        """Whether the bandwidth is averaged over wavelengths, for want of a series that it could damp."""
-        return self.on("coherence") and (self.on("stack") or self.signal == "psi-delta")
 
     def __str__(self) -> str:
         width = max(len(row.effect) for row in self.rows)
@@ -47,7 +42,7 @@ def plan(scene: Scene) -> Plan:
     """The effects that a scene calls for, judged from its types and bounds.
 
     An effect is left out only where it is provably absent, so every error bound is 0, but for the
-    number of orders, whose bound is measured (see `effects.largest_ratio`).
+    number of orders, of nodes and of rays, whose bounds are measured (see `effects`).
     """
     rows = tuple(effect.judge(scene) for effect in EFFECTS)
     return Plan(rows, scene.light.signal, scene.light.polarisation)

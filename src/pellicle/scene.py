@@ -8,141 +8,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, final
+from itertools import pairwise
+from typing import Any, NamedTuple, final
 
 import equinox as eqx
-import jax
 import numpy as np
 
-from pellicle.materials import lookup
-from pellicle.optics.dispersion import AbstractDispersion, Constant
-from pellicle.optics.number import is_real
+from pellicle.free import Free as Free
+from pellicle.free import Normal as Normal
+from pellicle.free import free_leaves as free_leaves
+from pellicle.free import insert as insert
+from pellicle.free import is_free as is_free
+from pellicle.free import start_values as start_values
+from pellicle.instrument import Drift as Drift
+from pellicle.instrument import Instrument as Instrument
+from pellicle.layers import Interface as Interface
+from pellicle.layers import Layer as Layer
+from pellicle.layers import Plate as Plate
+from pellicle.layers import Substrate as Substrate
+from pellicle.layers import absorbs as absorbs
+from pellicle.layers import medium as medium
+from pellicle.optics.dispersion import AbstractDispersion
 
 SIGNALS = ("R", "T", "psi-delta")
 POLARISATIONS = ("unpolarised", "s", "p")
-
-
-@final
-class Normal(eqx.Module):
-    """A normal prior on a free parameter, in the parameter's unit."""
-
-    mean: float = eqx.field(static=True)
-    sd: float = eqx.field(static=True)
-
-    def __check_init__(self):
-        if not self.sd > 0:
-            raise ValueError(f"a prior's standard deviation must be positive, not {self.sd}")
-
-
-@final
-class Free(eqx.Module):
-    """A parameter to be fitted, standing where its number would.
-
-    **Arguments:** `value` to start from (the middle of the bounds if None), `lower` and `upper`
-    bounds, and an optional `prior`; all in the parameter's own unit. Raises ValueError where the
-    bounds are reversed or the value is outside them.
-    """
-
-    value: float = eqx.field(static=True)
-    lower: float = eqx.field(static=True)
-    upper: float = eqx.field(static=True)
-    prior: Normal | None
-
-    def __init__(
-        self,
-        value: float | None = None,
-        lower: float = -math.inf,
-        upper: float = math.inf,
-        prior: Normal | None = None,
-    ):
-        if not lower < upper:
-            raise ValueError(f"bounds are reversed or equal: lower {lower:g} is not below upper {upper:g}")
-        if not (math.isfinite(lower) and math.isfinite(upper)):
-            raise ValueError("a free parameter needs two finite bounds: give lower and upper")
-        value = 0.5 * (lower + upper) if value is None else value
-        if not lower <= value <= upper:
-            raise ValueError(f"the start value {value:g} is outside its bounds {lower:g} to {upper:g}")
-        self.value, self.lower, self.upper, self.prior = float(value), float(lower), float(upper), prior
-
-
-def is_free(leaf: Any) -> bool:
-    """True for a `Free`, which a pytree's traversal must take as one leaf."""
-    return isinstance(leaf, Free)
-
-
-def free_leaves(tree: Any) -> list[tuple[Any, Free]]:
-    """(path, Free) for every free parameter in a pytree, in the pytree's own order."""
-    leaves = jax.tree_util.tree_leaves_with_path(tree, is_leaf=is_free)
-    return [(path, leaf) for path, leaf in leaves if is_free(leaf)]
-
-
-def insert(tree: Any, values: Any) -> Any:
-    """The pytree with its free parameters replaced by `values`, in the order of `free_leaves`."""
-    leaves, structure = jax.tree_util.tree_flatten(tree, is_leaf=is_free)
-    numbers = iter(values)
-    return jax.tree_util.tree_unflatten(structure, [next(numbers) if is_free(x) else x for x in leaves])
-
-
-def start_values(tree: Any) -> np.ndarray:
-    """The value of each free parameter, shape (parameters,)."""
-    return np.array([free.value for _, free in free_leaves(tree)])
-
-
-def medium(what: Any) -> AbstractDispersion:
-    """A medium from a material, a catalogue name or path, a number (n + ik), or a `Free` index.
-
-    Raises ValueError for an absorbing index with k < 0 (gain) and for an unknown name.
-    """
-    if isinstance(what, AbstractDispersion):
-        return what
-    if isinstance(what, str):
-        return lookup(what)
-    if is_free(what):
-        return Constant(what)
-    if isinstance(what, complex | np.complexfloating):
-        if what.imag < 0:
-            raise ValueError(
-                f"index {what} has a negative imaginary part, which is gain: absorption is n + ik with k ≥ 0"
-            )
-        return Constant(float(what.real), float(what.imag))
-    return Constant(what)
-
-
-def _not_negative(name: str, number: Any, unit: str) -> None:
-    lowest = number.lower if isinstance(number, Free) else number
-    if isinstance(lowest, int | float) and lowest < 0:
-        raise ValueError(f"{name} must not be negative, got {lowest:g} {unit}")
-
-
-@final
-class Layer(eqx.Module):
-    """A coherent layer: its material (anything `medium` takes) and its thickness in nm."""
-
-    material: AbstractDispersion = eqx.field(converter=medium)
-    thickness: float | Free
-    name: str | None = eqx.field(static=True, default=None)
-
-    def __check_init__(self):
-        _not_negative("thickness", self.thickness, "nm")
-
-
-def _medium_or_none(what: Any) -> AbstractDispersion | None:
-    return None if what is None else medium(what)
-
-
-@final
-class Substrate(eqx.Module):
-    """What the layer lies on: a half space, or, with `back`, a plate with an incoherent back face.
-
-    `back` is the medium behind the plate and `plate_mm` the plate's thickness in mm.
-    """
-
-    material: AbstractDispersion = eqx.field(converter=medium)
-    back: AbstractDispersion | None = eqx.field(converter=_medium_or_none, default=None)
-    plate_mm: float | Free = 1.0
-
-    def __check_init__(self):
-        _not_negative("plate_mm", self.plate_mm, "mm")
 
 
 @final
@@ -165,6 +54,11 @@ class Light(eqx.Module):
             if wrong:
                 raise ValueError(f"the angle of incidence must lie in 0 to 90 degrees, got {wrong[0]:g}")
 
+    @property
+    def largest_angle(self) -> float:
+        """The largest angle of incidence, in degrees, that values or bounds allow."""
+        return float(self.angle.upper if isinstance(self.angle, Free) else np.max(self.angle))
+
 
 def check_polarisation(polarisation: str) -> None:
     """ValueError unless the word is one that we know."""
@@ -172,59 +66,7 @@ def check_polarisation(polarisation: str) -> None:
         raise ValueError(f"polarisation must be one of {', '.join(POLARISATIONS)}, not {polarisation!r}")
 
 
-@final
-class Drift(eqx.Module):
-    """A linear nuisance solved exactly in each evaluation: a polynomial in wavelength of a degree.
-
-    Degree 0 is one free number. The coefficients of higher degree shrink under Gaussian priors:
-    of degree j, standard deviation `width`·2^(1−j) of the signal's own level.
-    """
-
-    degree: int = eqx.field(static=True, default=0)
-    width: float = eqx.field(static=True, default=0.3)
-
-
-SLOW_SCALE, SLOW_OFFSET, ONE_NUMBER = Drift(3), Drift(2), Drift(0)
-
-
-def scale_word(what: float | str | Drift) -> float | Drift:
-    """'free', 'slow' or a number, for the scale."""
-    return _word(what, SLOW_SCALE, "scale")
-
-
-def offset_word(what: float | str | Drift) -> float | Drift:
-    """'free', 'slow' or a number, for the offset."""
-    return _word(what, SLOW_OFFSET, "offset")
-
-
-def _word(what, slow, name):
-    if what in ("free", "slow"):
-        return ONE_NUMBER if what == "free" else slow
-    if isinstance(what, str):
-        raise ValueError(f"{name} must be 'free', 'slow' or a number, not {what!r}")
-    return what
-
-
-@final
-class Instrument(eqx.Module):
-    """What the instrument does to the signal.
-
-    `scale` and `offset` are numbers, "free" or "slow"; `bandwidth` is the full width at half maximum
-    in nm and `thickness_spread` the standard deviation of the thickness over the spot in nm, None or
-    0 being absent.
-    """
-
-    scale: float | Drift = eqx.field(converter=scale_word, default=1.0)
-    offset: float | Drift = eqx.field(converter=offset_word, default=0.0)
-    bandwidth: float | Free | None = None
-    thickness_spread: float | Free | None = None
-
-    def __check_init__(self):
-        _not_negative("bandwidth", self.bandwidth, "nm")
-        _not_negative("thickness_spread", self.thickness_spread, "nm")
-
-
-def _layers(what: Layer | Sequence[Layer]) -> tuple[Layer, ...]:
+def _layers(what: Layer | Sequence[Layer | Interface | Plate]) -> tuple[Layer | Interface | Plate, ...]:
     return (what,) if isinstance(what, Layer) else tuple(what)
 
 
@@ -232,16 +74,18 @@ def _layers(what: Layer | Sequence[Layer]) -> tuple[Layer, ...]:
 class Scene(eqx.Module):
     """Layers on a substrate, the medium they are seen from, the light and the instrument.
 
-    `layers` is one `Layer`, or several from the ambient down.
+    `layers` is one `Layer`, or several from the ambient down, with an `Interface` or a `Plate` among
+    them where there is one.
 
     ```python
     pl.Scene(pl.Layer("SiO2", thickness=pl.Free(lower=10, upper=3000)), substrate="Si")
     ```
 
-    Raises ValueError where the ambient absorbs, or where there is no layer.
+    Raises ValueError where the ambient absorbs, where there is no layer, or where what is asked for
+    has no meaning together.
     """
 
-    layers: tuple[Layer, ...] = eqx.field(converter=_layers)
+    layers: tuple[Layer | Interface | Plate, ...] = eqx.field(converter=_layers)
     substrate: Substrate = eqx.field(converter=lambda s: s if isinstance(s, Substrate) else Substrate(s))
     ambient: AbstractDispersion = eqx.field(converter=medium, default=1.0)
     light: Light = Light()
@@ -250,13 +94,84 @@ class Scene(eqx.Module):
     def __check_init__(self):
         if not self.layers:
             raise ValueError("a scene needs at least one layer; a bare surface is a layer of thickness 0")
-        ellipsometric = self.light.signal == "psi-delta"
-        if (len(self.layers) > 1 or ellipsometric) and self.instrument.thickness_spread is not None:
-            raise ValueError("thickness_spread is known for R and T of one layer only: leave it out here")
-        if ellipsometric and self.substrate.back is not None:
-            raise ValueError("ellipsometry of a plate's back face is not simulated: leave back out")
+        if any(isinstance(a, Interface) and isinstance(b, Interface) for a, b in pairwise(self.layers)):
+            raise ValueError("two interfaces lie on each other: an interface mixes the media at its sides")
         if absorbs(self.ambient):
             raise ValueError("the ambient must not absorb: give it a real index")
+        self._check_instrument()
+        if self.light.signal == "psi-delta" and _plates(self):
+            raise ValueError("ellipsometry of a plate's back face is not simulated: leave back out")
+
+    def _check_instrument(self):
+        if self.instrument.thickness_spread is not None:
+            if len(self.layers) > 1:
+                raise ValueError("with several layers give each its own thickness_spread, not the instrument")
+            only = [x for x in self.layers if isinstance(x, Layer) and x.thickness_spread is None]
+            if not only:
+                raise ValueError("thickness_spread is given twice, or for what is no coherent layer")
+        if self.instrument.has_cone:
+            half = math.degrees(self.instrument.largest_half_angle(1.0))
+            if self.light.largest_angle + half > 90:
+                raise ValueError(
+                    f"the light's cone reaches beyond 90 degrees: {self.light.largest_angle:g} and a half "
+                    f"angle of {half:.3g}"
+                )
+
+
+class Group(NamedTuple):
+    """Coherent layers between two thick media, and what roughens each face from the top down."""
+
+    above: AbstractDispersion
+    layers: tuple[Layer, ...]
+    below: AbstractDispersion
+    roughness: tuple[Any, ...]
+
+
+def groups(scene: Scene) -> tuple[tuple[Group, ...], tuple[Plate, ...]]:
+    """The coherent groups from the ambient down, and the plates between them."""
+    plates = _plates(scene)
+    runs: list[list[Layer]] = [[]]
+    for position, item in enumerate(scene.layers):
+        if isinstance(item, Plate):
+            runs.append([])
+        elif isinstance(item, Layer):
+            runs[-1].append(item)
+        else:
+            runs[-1].extend(item.slices(*_neighbours(scene, position)))
+    foot = len(runs) - 1  # the group that ends on the substrate's upper face
+    if scene.substrate.back is not None:
+        runs.append([])
+    last = scene.substrate.material if scene.substrate.back is None else scene.substrate.back
+    media = [scene.ambient, *(plate.material for plate in plates), last]
+    feet = [scene.substrate.roughness if i == foot else None for i in range(len(runs))]
+    found = [
+        Group(above, tuple(run), below, (*(layer.roughness for layer in run), foot))
+        for above, run, below, foot in zip(media[:-1], runs, media[1:], feet, strict=True)
+    ]
+    return tuple(found), plates
+
+
+def _plates(scene: Scene) -> tuple[Plate, ...]:
+    own = tuple(layer for layer in scene.layers if isinstance(layer, Plate))
+    substrate = scene.substrate
+    return own if substrate.back is None else (*own, Plate(substrate.material, substrate.plate_mm))
+
+
+def _neighbours(scene: Scene, position: int) -> tuple[AbstractDispersion, AbstractDispersion]:
+    media = [scene.ambient, *(getattr(x, "material", None) for x in scene.layers), scene.substrate.material]
+    above, below = media[position], media[position + 2]
+    assert above is not None and below is not None  # two interfaces never meet  # noqa: PT018
+    return above, below
+
+
+def coherent_layers(scene: Scene) -> tuple[Layer, ...]:
+    """Every coherent layer from the ambient down, interfaces as their slices."""
+    return tuple(layer for group in groups(scene)[0] for layer in group.layers)
+
+
+def thickness_spread(scene: Scene, layer: Layer) -> Any:
+    """The standard deviation of a layer's thickness (nm): its own, or the instrument's; None if even."""
+    return scene.instrument.thickness_spread if layer.thickness_spread is None else layer.thickness_spread
 
 
 def with_wavelength(scene: Scene, wavelength: Any, angle: Any = None) -> Scene:
@@ -264,11 +179,3 @@ def with_wavelength(scene: Scene, wavelength: Any, angle: Any = None) -> Scene:
     angle = scene.light.angle if angle is None else angle
     light = Light(wavelength, angle, scene.light.signal, scene.light.polarisation)
     return eqx.tree_at(lambda s: s.light, scene, light)
-
-
-def absorbs(dispersion: AbstractDispersion) -> bool:
-    """False where the type of the index, or an extinction fixed at exactly 0, rules absorption out."""
-    if isinstance(dispersion, Constant) and isinstance(dispersion.k, int | float) and dispersion.k == 0:
-        return False
-    numbers = insert(dispersion, start_values(dispersion))
-    return not is_real(jax.eval_shape(numbers.index, jax.ShapeDtypeStruct((1,), np.float32)))

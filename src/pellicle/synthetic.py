@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -44,11 +45,10 @@ def synthesise(scene: Scene, wavelength: Any, noise: float = 0.0, seed: int = 0)
 
 
 def _settled(instrument: Instrument) -> Instrument:
-    return Instrument(
-        1.0 if isinstance(instrument.scale, Drift) else instrument.scale,
-        0.0 if isinstance(instrument.offset, Drift) else instrument.offset,
-        instrument.bandwidth,
-        instrument.thickness_spread,
+    return replace(
+        instrument,
+        scale=1.0 if isinstance(instrument.scale, Drift) else instrument.scale,
+        offset=0.0 if isinstance(instrument.offset, Drift) else instrument.offset,
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import equinox as eqx
@@ -14,10 +14,11 @@ from pellicle.optics.dispersion import AbstractDispersion
 from pellicle.optics.naming import Place, place
 from pellicle.optics.oscillators import AbstractOscillator, Gaussian, Lorentz, Oscillators, TaucLorentz
 from pellicle.optics.spline import Spline
-from pellicle.scene import Free, Layer, Normal, Scene, free_leaves, insert, is_free
+from pellicle.scene import Free, Normal, Scene, free_leaves, insert, is_free
 
-_UNITS = {"thickness": "nm", "bandwidth": "nm", "thickness_spread": "nm", "plate_mm": "mm", "angle": "deg"}
-_NATURAL_ZERO = ("k", "k0", "fraction", "bandwidth", "thickness_spread", "offset")
+_WIDTHS = {"bandwidth": "nm", "thickness_spread": "nm", "roughness": "nm", "angle_spread": "deg"}
+_UNITS = {"thickness": "nm", "plate_mm": "mm", "angle": "deg", **_WIDTHS}
+_NATURAL_ZERO = ("k", "k0", "fraction", "offset", "numerical_aperture", *_WIDTHS)
 _STRENGTHS = (Lorentz, Gaussian, TaucLorentz, CodyLorentz)
 """Their A is a strength, which cannot be negative; the A of Cauchy is an index."""
 _SEARCHED = ("thickness", "n", "A", "B", "k", "B1", "Ep", "E0", "Eg", "eps_inf", "fraction")
@@ -120,7 +121,7 @@ def bounds(parameters: tuple[Parameter, ...]) -> tuple[np.ndarray, np.ndarray]:
 def anonymous(scene: Scene) -> Scene:
     """The scene without bounds and layers' names: neither may make a new program."""
     scene = insert(scene, [Free(0.5, 0.0, 1.0)] * len(free_leaves(scene)))
-    return eqx.tree_at(lambda s: s.layers, scene, tuple(Layer(x.material, x.thickness) for x in scene.layers))
+    return eqx.tree_at(lambda s: s.layers, scene, tuple(replace(layer, name=None) for layer in scene.layers))
 
 
 def fixed_numbers(scene: Scene) -> list[tuple[str, float, str]]:

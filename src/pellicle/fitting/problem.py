@@ -15,7 +15,7 @@ from pellicle.fitting.parameters import Parameter, anonymous, bounds, parameters
 from pellicle.fitting.programs import kept
 from pellicle.model import build, sampled
 from pellicle.planning import Plan, plan
-from pellicle.scene import Scene, free_leaves, insert, with_wavelength
+from pellicle.scene import Interface, Scene, coherent_layers, free_leaves, insert, with_wavelength
 
 _ROUND = 64
 """Spectra are padded to a multiple of this, so that files of nearly one length share a program."""
@@ -95,7 +95,7 @@ def make(scene: Scene, wavelength, values, sigma, temper: float) -> Problem:
         np.array([1 / p.prior.sd if p.prior else 0.0 for p in free]),
     )
     scene = sampled(scene, chosen.on("coherence"))
-    steepest = max(largest_index(layer.material, wavelength) for layer in scene.layers)
+    steepest = max((largest_index(x.material, wavelength) for x in coherent_layers(scene)), default=1.0)
     return Problem(chosen, anonymous(scene), data, box, free, points * channels, steepest)
 
 
@@ -181,10 +181,12 @@ class Local(NamedTuple):
     layer_slope: Any  # their derivatives, (2, points, parameters)
 
 
-def shown_layer(scene: Scene) -> int:
-    """Which layer's n and k are reported: the first with free numbers of its own, else the uppermost."""
-    free = [i for i, layer in enumerate(scene.layers) if free_leaves(layer.material)]
-    return free[0] if free else 0
+def shown_layer(scene: Scene) -> int | None:
+    """Which layer's n and k are reported: the first with free numbers of its own, else the uppermost;
+    None, the substrate, where nothing but interfaces lies on it."""
+    known = [(i, x.material) for i, x in enumerate(scene.layers) if not isinstance(x, Interface)]
+    free = [i for i, material in known if free_leaves(material)]
+    return next(iter([*free, *(i for i, _ in known)]), None)
 
 
 @kept
@@ -194,7 +196,8 @@ def local(plan: Plan, scene: Scene, data: Data, box: Box, unit: Any) -> Local:
 
     def both(values):
         numbers = insert(scene, list(values))
-        index = numbers.layers[shown].material(numbers.light.wavelength)
+        medium: Any = numbers.substrate if shown is None else numbers.layers[shown]
+        index = medium.material(numbers.light.wavelength)
         return simulate(numbers), jnp.stack([index.real, index.imag])
 
     values = box.values(unit)

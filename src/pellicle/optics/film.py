@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from pellicle.optics.interface import normal, normal_square, power, transverse
+from pellicle.optics.interface import carried, normal, normal_square, power, transverse
 from pellicle.optics.number import Number, Pair, SinCos, abs2, hold, imag, real, sincos, sqrt, times_i, where
 
 
@@ -103,9 +103,10 @@ def film(
 ) -> tuple[Wave, ...]:
     """Waves around one layer, one for each letter of `polarisations`.
 
-    Arguments broadcast. `ambient` is a real index; `layer` and `substrate` are numbers of any
-    type; `phase` is k₀d = 2πd/λ; `angle` is in radians, None being normal incidence, where s and p
-    are one and only the first polarisation is computed. `through` is `through`, or `through_wave`
+    Arguments broadcast. `ambient`, `layer` and `substrate` are numbers of any type, the ambient real
+    but for light from within a plate (`interface.Inside` in place of the angle); `phase` is
+    k₀d = 2πd/λ; `angle` is in radians, None being normal incidence, where s and p are one and only
+    the first polarisation is computed. `through` is `through`, or `through_wave`
     where the layer is real and total reflection impossible.
 
     With A, B, A′, B′ below, D = A c − iB f and N = A′ c − iB′ f; reversing the light turns the sign
@@ -119,11 +120,11 @@ def film(
     waves = []
     for polarisation in polarisations[:1] if angle is None else polarisations:
         if polarisation == "s":
-            A, B, A_, B_, weight = q0 + q2, q0 * q2 + q1_square, q0 - q2, q0 * q2 - q1_square, 4 * q0
+            A, B, A_, B_ = q0 + q2, q0 * q2 + q1_square, q0 - q2, q0 * q2 - q1_square
         else:
             u, v = e0 * e2 * q1_square / e1, e1 * q0 * q2
-            A, B, A_, B_, weight = e0 * q2 + e2 * q0, u + v, e2 * q0 - e0 * q2, v - u, 4 * e0 * q0
-        into = weight * power(substrate, q2, polarisation) * scale_square
+            A, B, A_, B_ = e0 * q2 + e2 * q0, u + v, e2 * q0 - e0 * q2, v - u
+        into = carried(ambient, q0, polarisation) * power(substrate, q2, polarisation) * scale_square
         waves.append(Wave(A_ * c + B_ * g, B_ * g - A_ * c, A * c + B * g, into))
     return tuple(waves)
 

@@ -6,12 +6,19 @@ medium, and what a medium contributes is the normal component of its index, q = 
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 
 from pellicle.optics.number import Number, Pair, abs2, conj, is_real, real, sqrt, where
+
+
+class Inside(NamedTuple):
+    """In place of an angle of incidence: light that comes from within a medium, such as a plate, with
+    the transverse index a that it had outside."""
+
+    a: Any
 
 
 def transverse(ambient: Any, angle: Any) -> tuple[Any, Any]:
@@ -21,6 +28,8 @@ def transverse(ambient: Any, angle: Any) -> tuple[Any, Any]:
     """
     if angle is None:
         return 0.0, ambient
+    if isinstance(angle, Inside):
+        return angle.a, normal(ambient, angle.a)
     # the cosine of a float32 π/2 is negative, and would turn T below 0 and R above 1
     cosine = jnp.cos(angle)
     least = float(jnp.finfo(cosine.dtype).eps) ** 1.25
@@ -58,6 +67,19 @@ def power(index: Number, q: Number, polarisation: str):
     substrate that is wrong for p (1 % in R + T at 60°).
     """
     return real(q) if polarisation == "s" else real(index * index * conj(q))
+
+
+def carried(index: Number, q: Number, polarisation: str):
+    """4 |q|²/Re q for s, 4 |εq|²/Re(ε q̄) for p: an incident wave's part in what a film transmits.
+
+    For a medium that does not absorb 4 q and 4 ε q, which need no division at grazing incidence.
+    """
+    if is_real(index) and is_real(q):
+        return 4 * q if polarisation == "s" else 4 * index * index * q
+    amplitude = q if polarisation == "s" else index * index * q
+    flux = power(index, q, polarisation)
+    nothing = flux == 0
+    return jnp.where(nothing, 0.0, 4 * abs2(amplitude) / jnp.where(nothing, 1.0, flux))
 
 
 def reflectance(n1: Number, q1: Number, n2: Number, q2: Number, polarisation: str):

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
-from pellicle.optics.interface import fresnel, normal, power, transverse
+from pellicle.optics.interface import carried, fresnel, normal, power, transverse
 from pellicle.optics.number import Number, Pair, SinCos, abs2, conj, imag, real, sincos
 
 Window = Callable[[int], Any]
@@ -46,15 +46,15 @@ def bounces(
     q1, q2 = normal(layer, a), normal(substrate, a)
     e0, e1, e2 = ambient * ambient, layer * layer, substrate * substrate
     if polarisation == "s":
-        direct = 16 * q0 * abs2(q1) / abs2((q0 + q1) * (q1 + q2))
+        direct = 4 * abs2(q1) / abs2((q0 + q1) * (q1 + q2))
     else:
-        direct = 16 * e0 * q0 * abs2(e1 * q1) / abs2((e1 * q0 + e0 * q1) * (e2 * q1 + e1 * q2))
+        direct = 4 * abs2(e1 * q1) / abs2((e1 * q0 + e0 * q1) * (e2 * q1 + e1 * q2))
     return Bounces(
         upper=fresnel(ambient, q0, layer, q1, polarisation),
         lower=fresnel(layer, q1, substrate, q2, polarisation),
         damping=jnp.exp(-2 * phase * imag(q1)),
         phase=2 * phase * real(q1),
-        direct=direct * power(substrate, q2, polarisation),
+        direct=carried(ambient, q0, polarisation) * direct * power(substrate, q2, polarisation),
     )
 
 

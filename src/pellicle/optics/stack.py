@@ -18,7 +18,7 @@ import jax
 import jax.numpy as jnp
 
 from pellicle.optics.film import Wave, through
-from pellicle.optics.interface import normal, power, transverse
+from pellicle.optics.interface import carried, normal, power, transverse
 from pellicle.optics.number import Number, SinCos, abs2, sincos, to_complex
 
 
@@ -30,35 +30,47 @@ def stack(
     angle: Any = None,
     polarisations: str = "sp",
     sincos: SinCos = sincos,
+    roughness: Sequence[Any] | None = None,
 ) -> tuple[Wave, ...]:
     """Waves around a stack, one for each letter of `polarisations`.
 
-    `layers` and `phases` (k₀d = 2πd/λ of each) run from the ambient down; the other arguments are as
-    for `film.film`. Every array broadcasts against every other.
+    `layers` and `phases` (k₀d = 2πd/λ of each) run from the ambient down; `roughness` is k₀σ of each
+    face from the top down, one more than there are layers, or None where all are smooth; the other
+    arguments are as for `film.film`. Every array broadcasts against every other.
     """
     a, q0 = transverse(ambient, angle)
-    leaves = jax.tree_util.tree_leaves((ambient, list(layers), substrate, list(phases), a))
+    leaves = jax.tree_util.tree_leaves((ambient, list(layers), substrate, list(phases), a, roughness))
     shape = jnp.broadcast_shapes(*(jnp.shape(x) for x in leaves))
     dtype = jnp.promote_types(jnp.result_type(*leaves), jnp.complex64)
 
     def full(number: Number):
         return jnp.broadcast_to(to_complex(number).astype(dtype), shape)
 
-    index = jnp.stack([full(n) for n in layers])
-    depth = jnp.stack([jnp.broadcast_to(p, shape) for p in phases]).astype(index.real.dtype)
+    def rows(numbers: Sequence[Any]):
+        return jnp.stack([full(n) for n in numbers]) if numbers else jnp.zeros((0, *shape), dtype)
+
+    index, depth = rows(layers), jnp.real(rows(phases))
     bottom, top, q_top = full(substrate), full(ambient), full(q0)
     q_bottom = normal(bottom, a)
     waves = []
     for polarisation in polarisations[:1] if angle is None else polarisations:
-        (E, H), scale_square = _fields(index[::-1], depth[::-1], a, bottom, q_bottom, polarisation, sincos)
-        (E_, H_), _ = _fields(index, depth, a, top, q_top, polarisation, sincos)
         e0, e2 = _weight(top, polarisation), _weight(bottom, polarisation)
+        down_faces = up_faces = None
+        if roughness is not None:
+            weight = jnp.concatenate([e0[None], _weight(index, polarisation), e2[None]])
+            q = jnp.concatenate([q_top[None], normal(index, a), q_bottom[None]])
+            rough = jnp.real(rows(roughness))
+            down_faces = _rough_faces(q[:-1], weight[:-1], q[1:], weight[1:], rough)[:, ::-1]
+            up_faces = _rough_faces(q[1:], weight[1:], q[:-1], weight[:-1], rough)
+        below = (index[::-1], depth[::-1], q_bottom / e2, down_faces)
+        (E, H), scale_square = _fields(*below, a, polarisation, sincos)
+        (E_, H_), _ = _fields(index, depth, q_top / e0, up_faces, a, polarisation, sincos)
         down, up = q_top * E / e0, q_bottom * E_ / e2
-        into = 4 * jnp.real(q0) * power(bottom, q_bottom, polarisation) * scale_square
+        into = carried(ambient, q0, polarisation) * power(bottom, q_bottom, polarisation) * scale_square
         denominator = down + H
         # the two directions share their denominator but for scale: bring the second to the first
-        below = (up - H_) / (up + H_) * denominator
-        waves.append(Wave(down - H, below, denominator, into / _square_weight(top, bottom, polarisation)))
+        reversed_ = (up - H_) / (up + H_) * denominator
+        waves.append(Wave(down - H, reversed_, denominator, into / abs2(e0 * e2)))
     return tuple(waves)
 
 
@@ -67,17 +79,39 @@ def _weight(index, polarisation: str):
     return jnp.ones_like(index) if polarisation == "s" else index * index
 
 
-def _square_weight(top, bottom, polarisation: str):
-    """Turns `power`, which is up to |n|², into the flux of a unit H (p) or E (s)."""
-    return 1.0 if polarisation == "s" else jnp.real(top * top) * abs2(bottom * bottom)
+def _rough_faces(q, weight, q_below, weight_below, rough):
+    """(2, faces, ...): by what the fields (E, H) grow on their way up through each rough face.
+
+    Névot and Croce 1980 (Rev. Phys. Appl. 15, 761): r exp(−x) with x = 2 k₀²σ² q q′, and
+    t exp(k₀²σ² (q − q′)²/2). In terms of fields this is diagonal, and with (1 − e^−x)/x entire, so
+    that a face that is smooth, or at a critical angle, is no special case.
+    """
+    square = rough * rough
+    pull = square * _damped(2 * square * q * q_below)
+    passed = jnp.exp(-0.5 * square * (q - q_below) ** 2)
+    E = 1 + pull * q_below * (q_below * weight / weight_below - q)
+    H = 1 + pull * q * (q * weight_below / weight - q_below)
+    return jnp.stack([E * passed, H * passed])
 
 
-def _fields(index, depth, a, last, q_last, polarisation: str, sincos: SinCos):
+def _damped(x):
+    """(1 − e^−x)/x."""
+    near = abs2(x) < 0.01
+    small, far = jnp.where(near, x, 0), jnp.where(near, 1, x)
+    taylor = jnp.ones_like(x)
+    for j in range(12, 1, -1):
+        taylor = 1 - small * taylor / j
+    return jnp.where(near, taylor, (1 - jnp.exp(-far)) / far)
+
+
+def _fields(index, depth, admittance, faces, a, polarisation: str, sincos: SinCos):
     """(E, H) at the far face for a unit wave in the last medium, layer after layer, and the scale²."""
 
     def through_layer(carry, layer):
         (E, H), scale_square = carry
-        n, k = layer
+        n, k, face = layer
+        if face is not None:
+            E, H = E * face[0], H * face[1]
         square, e = (n - a) * (n + a), _weight(n, polarisation)
         c, f, layer_scale = through(square, k, sincos)
         E, H = E * c - 1j * f * e * H, H * c - 1j * f * (square / e) * E
@@ -85,6 +119,7 @@ def _fields(index, depth, a, last, q_last, polarisation: str, sincos: SinCos):
         shrink = jax.lax.rsqrt(size)
         return ((E * shrink, H * shrink), scale_square * layer_scale / size), None
 
-    start = (jnp.ones_like(last), q_last / _weight(last, polarisation)), jnp.ones_like(jnp.real(last))
-    carry, _ = jax.lax.scan(through_layer, start, (index, depth))
-    return carry
+    start = (jnp.ones_like(admittance), admittance), jnp.ones_like(jnp.real(admittance))
+    inner = None if faces is None else jnp.moveaxis(faces[:, :-1], 0, 1)
+    ((E, H), scale_square), _ = jax.lax.scan(through_layer, start, (index, depth, inner))
+    return ((E, H) if faces is None else (E * faces[0, -1], H * faces[1, -1])), scale_square

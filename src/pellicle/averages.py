@@ -1,0 +1,161 @@
+"""What an instrument averages: a band of wavelengths, a spot of uneven thickness, a cone of light.
+
+Each average is a wrapper of a model, and each rule says how far a fringe averaged by it is from the
+truth. Intensities are averaged (rows, wavelengths), never amplitudes or ratios.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from pellicle.optics.orders import FWHM
+from pellicle.scene import Scene
+
+Intensities = Callable[[Scene], Any]
+"""A scene in numbers → intensities, (rows, wavelengths)."""
+
+
+def _normal_rule(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes, in standard deviations, and weights of a normal distribution (Gauss and Hermite)."""
+    nodes, weights = np.polynomial.hermite.hermgauss(count)
+    return np.sqrt(2) * nodes, weights / np.sqrt(np.pi)
+
+
+def _weighted(at: Callable[[Any], Any], nodes: np.ndarray, weights: np.ndarray) -> Any:
+    return jnp.tensordot(jnp.asarray(weights), jax.vmap(at)(jnp.asarray(nodes)), 1)
+
+
+def over_bandwidth(simulate: Intensities, count: int) -> Intensities:
+    """The mean over a spectrometer's window, a normal distribution of the given full width."""
+    nodes, weights = _normal_rule(count)
+
+    def average(scene: Scene):
+        bandwidth: Any = scene.instrument.bandwidth
+
+        def at(node):
+            shifted = scene.light.wavelength + node * (bandwidth / FWHM)
+            return simulate(eqx.tree_at(lambda s: s.light.wavelength, scene, shifted))
+
+        return _weighted(at, nodes, weights)
+
+    return average
+
+
+def over_thickness(simulate: Intensities, count: int, position: int, spread: Callable[[Scene], Any]):
+    """The mean over a layer's uneven thickness, a normal distribution cut off at no thickness."""
+    nodes, weights = _normal_rule(count)
+
+    def average(scene: Scene):
+        def at(node):
+            thickness: Any = scene.layers[position].thickness  # pyright: ignore[reportAttributeAccessIssue]
+            uneven = jnp.maximum(thickness + node * spread(scene), 0.0)
+            return simulate(eqx.tree_at(lambda s: s.layers[position].thickness, scene, uneven))
+
+        return _weighted(at, nodes, weights)
+
+    return average
+
+
+class Directions(NamedTuple):
+    """The cone's rays: angles of incidence (radians), their weights, and how much of light that was
+    polarised s along the axis each carries as s."""
+
+    angle: Any
+    weight: np.ndarray
+    s_share: Any
+
+
+def directions(angle: Any, sine: Any, count: int, around: int) -> Directions:
+    """Rays that fill a pupil evenly, as an aplanatic lens does, in half a turn (the rest is its mirror).
+
+    `angle` of the axis (radians) and `sine` of the half angle broadcast; rays come first. `around` is
+    1 where the axis is the surface's normal: then every azimuth is the same. The lens turns each ray
+    about the axis perpendicular to its own meridian, and its polarisation with it (Richards and Wolf
+    1959, Proc. R. Soc. A 253, 358).
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(count)
+    radius = np.sqrt(0.5 * (nodes + 1))
+    if around == 1:
+        return Directions(jnp.arcsin(_first(radius, sine) * sine), 0.5 * weights, 0.5)
+    azimuth = np.pi * (np.arange(around) + 0.5) / around
+    r, phi = (x.ravel() for x in np.meshgrid(radius, azimuth, indexing="ij"))
+    shape = jnp.broadcast_shapes(np.shape(angle), np.shape(sine))
+    cos_phi, sin_phi = (_first(x, np.empty(shape)) for x in (np.cos(phi), np.sin(phi)))
+    rho = _first(r, np.empty(shape)) * sine
+    along, c0, s0 = jnp.sqrt(1 - rho**2), jnp.cos(angle), jnp.sin(angle)
+    across = (rho * sin_phi) ** 2 + (along * s0 - rho * cos_phi * c0) ** 2
+    across = across + jnp.finfo(across.dtype).tiny  # so that no root has an infinite slope
+    s = s0 * (along * cos_phi**2 + sin_phi**2) - rho * cos_phi * c0
+    theta = jnp.arctan2(jnp.sqrt(across), along * c0 + rho * cos_phi * s0)
+    return Directions(theta, np.repeat(0.5 * weights, around) / around, s * s / across)
+
+
+def _first(x: np.ndarray, like: Any) -> np.ndarray:
+    """The nodes as a leading axis in front of another array's."""
+    return x.reshape(-1, *[1] * np.ndim(like))
+
+
+def cone_sine(scene: Scene) -> Any:
+    """The sine of the cone's half angle, at each wavelength if the ambient disperses."""
+    aperture, spread = scene.instrument.numerical_aperture, scene.instrument.angle_spread
+    if aperture is not None:
+        return aperture / scene.ambient.index(scene.light.wavelength)
+    return jnp.sin(jnp.deg2rad(spread))  # pyright: ignore[reportArgumentType]
+
+
+def over_cone(simulate: Intensities, count: int, around: int, mix: Callable[[Any, Any], Any]) -> Intensities:
+    """The mean over the light's cone. `mix(rows, s_share)` puts the polarisations of a ray together."""
+
+    def average(scene: Scene):
+        rays = directions(jnp.deg2rad(scene.light.angle), cone_sine(scene), count, around)
+
+        def at(angle, s_share):
+            turned = eqx.tree_at(lambda s: s.light.angle, scene, jnp.rad2deg(angle))
+            return mix(simulate(turned), s_share)
+
+        share = jnp.broadcast_to(rays.s_share, jnp.shape(rays.angle))
+        return jnp.tensordot(jnp.asarray(rays.weight), jax.vmap(at)(rays.angle, share), 1)
+
+    return average
+
+
+def mixed(polarisation: str) -> Callable[[Any, Any], Any]:
+    """How a ray's s and p add: halves where light is unpolarised, else by what the lens made of it."""
+
+    def mix(rows, s_share):
+        share = {"s": s_share, "p": 1 - s_share, "unpolarised": 0.5}[polarisation]
+        return (share * rows[0] + (1 - share) * rows[1])[None]
+
+    return mix
+
+
+def unmixed(rows: Any, s_share: Any) -> Any:
+    """For an ellipsometer, which keeps s and p apart; that the lens turns them is left out."""
+    return rows
+
+
+def normal_error(deviation: float, count: int) -> float:
+    """The largest error on a fringe blurred by up to `deviation` radians of phase."""
+    nodes, weights = _normal_rule(count)
+    sigma = np.linspace(0.0, deviation, 200)
+    kept = np.cos(sigma[:, None] * nodes) @ weights
+    return float(np.max(np.abs(kept - np.exp(-0.5 * sigma**2))))
+
+
+def cone_error(phase: Callable[[Any], Any], angle: float, sine: float, count: int, around: int) -> float:
+    """The error on a fringe of phase(angle of incidence), against twelve times as many rays."""
+    fringe = partial(_fringe, phase, angle)
+    finer = (12 * count, 1 if around == 1 else 4 * around)
+    return max(abs(fringe(s, count, around) - fringe(s, *finer)) for s in (0.5 * sine, sine))
+
+
+def _fringe(phase: Callable[[Any], Any], angle: float, sine: float, count: int, around: int) -> complex:
+    rays = directions(angle, sine, count, around)
+    return complex(np.sum(rays.weight * np.exp(1j * np.asarray(phase(np.asarray(rays.angle))))))

@@ -1,0 +1,76 @@
+"""Free parameters: they stand in a pytree wherever its number would."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, final
+
+import equinox as eqx
+import jax
+import numpy as np
+
+
+@final
+class Normal(eqx.Module):
+    """A normal prior on a free parameter, in the parameter's unit."""
+
+    mean: float = eqx.field(static=True)
+    sd: float = eqx.field(static=True)
+
+    def __check_init__(self):
+        if not self.sd > 0:
+            raise ValueError(f"a prior's standard deviation must be positive, not {self.sd}")
+
+
+@final
+class Free(eqx.Module):
+    """A parameter to be fitted, standing where its number would.
+
+    **Arguments:** `value` to start from (the middle of the bounds if None), `lower` and `upper`
+    bounds, and an optional `prior`; all in the parameter's own unit. Raises ValueError where the
+    bounds are reversed or the value is outside them.
+    """
+
+    value: float = eqx.field(static=True)
+    lower: float = eqx.field(static=True)
+    upper: float = eqx.field(static=True)
+    prior: Normal | None
+
+    def __init__(
+        self,
+        value: float | None = None,
+        lower: float = -math.inf,
+        upper: float = math.inf,
+        prior: Normal | None = None,
+    ):
+        if not lower < upper:
+            raise ValueError(f"bounds are reversed or equal: lower {lower:g} is not below upper {upper:g}")
+        if not (math.isfinite(lower) and math.isfinite(upper)):
+            raise ValueError("a free parameter needs two finite bounds: give lower and upper")
+        value = 0.5 * (lower + upper) if value is None else value
+        if not lower <= value <= upper:
+            raise ValueError(f"the start value {value:g} is outside its bounds {lower:g} to {upper:g}")
+        self.value, self.lower, self.upper, self.prior = float(value), float(lower), float(upper), prior
+
+
+def is_free(leaf: Any) -> bool:
+    """True for a `Free`, which a pytree's traversal must take as one leaf."""
+    return isinstance(leaf, Free)
+
+
+def free_leaves(tree: Any) -> list[tuple[Any, Free]]:
+    """(path, Free) for every free parameter in a pytree, in the pytree's own order."""
+    leaves = jax.tree_util.tree_leaves_with_path(tree, is_leaf=is_free)
+    return [(path, leaf) for path, leaf in leaves if is_free(leaf)]
+
+
+def insert(tree: Any, values: Any) -> Any:
+    """The pytree with its free parameters replaced by `values`, in the order of `free_leaves`."""
+    leaves, structure = jax.tree_util.tree_flatten(tree, is_leaf=is_free)
+    numbers = iter(values)
+    return jax.tree_util.tree_unflatten(structure, [next(numbers) if is_free(x) else x for x in leaves])
+
+
+def start_values(tree: Any) -> np.ndarray:
+    """The value of each free parameter, shape (parameters,)."""
+    return np.array([free.value for _, free in free_leaves(tree)])
