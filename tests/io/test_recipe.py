@@ -187,7 +187,7 @@ def test_missing_keys(refused):
     refused("", "scene is missing")
     refused(LAYER, "scene.substrate is missing")
     refused('[scene]\nsubstrate = "Si"\n', "scene.layer is missing")
-    refused(BASE.replace('material = "SiO2"\n', ""), "scene.layer.0.material is missing")
+    refused(BASE.replace('material = "SiO2"\n', ""), "scene.layer.0: a layer has a material, or between")
 
 
 def test_files_that_are_no_recipe(tmp_path):
@@ -198,3 +198,50 @@ def test_files_that_are_no_recipe(tmp_path):
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(DataError, match="is not TOML"):
         read_recipe(tmp_path / "binary.toml")
+
+
+def test_what_a_real_sample_adds(scene):
+    found = scene(
+        """
+        [scene]
+        substrate = { material = "Si", roughness = 1.5 }
+        [[scene.layer]]
+        between = "linear"
+        steps = 10
+        thickness = { lower = 0, upper = 20 }
+        [[scene.layer]]
+        name = "oxide"
+        material = "SiO2"
+        thickness = 300
+        thickness_spread = { lower = 0, upper = 9 }
+        roughness = 2
+        [[scene.layer]]
+        material = 1.52
+        plate_mm = 2
+        [instrument]
+        numerical_aperture = 0.3
+        """
+    )
+    top, oxide, plate = found.layers
+    assert (top.mix, top.steps, top.thickness.upper) == ("linear", 10, 20)
+    assert (oxide.name, oxide.thickness_spread.upper, oxide.roughness) == ("oxide", 9, 2)
+    assert plate.plate_mm == 2
+    assert found.substrate.roughness == 1.5
+    assert found.instrument.numerical_aperture == 0.3
+
+
+@pytest.mark.parametrize(
+    ("layer", "said"),
+    [
+        ("thickness = 5", 'a layer has a material, or between = "bruggeman"'),
+        ('material = 1.5\nbetween = "bruggeman"\nthickness = 5', "a layer has a material, or between"),
+        ("material = 1.5", "a thickness in nm, or plate_mm"),
+        ("material = 1.5\nthickness = 5\nplate_mm = 1", "a thickness in nm, or plate_mm"),
+        ("material = 1.5\nthickness = 5\nsteps = 3", "steps does not go with a coherent layer"),
+        ("material = 1.5\nplate_mm = 1\nroughness = 3", "roughness does not go with plate_mm"),
+        ('between = "brugeman"\nthickness = 5', "no mix 'brugeman'"),
+        ('between = "linear"\nthickness = 5\nsteps = 0', "1 to 100 steps"),
+    ],
+)
+def test_layers_that_make_no_sense(refused, layer, said):
+    refused(f'[scene]\nsubstrate = "Si"\n[[scene.layer]]\n{layer}\n', said)

@@ -5,15 +5,15 @@ from __future__ import annotations
 import os
 import tomllib
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from pellicle.errors import DataError
 from pellicle.io import words
 from pellicle.io.media import FreeTable, Medium, Number, PriorTable, medium, number
 from pellicle.io.words import nearest
-from pellicle.scene import Free, Instrument, Layer, Light, Scene, Substrate
+from pellicle.scene import Free, Instrument, Interface, Layer, Light, Plate, Scene, Substrate
 
 
 class _Table(BaseModel):
@@ -26,15 +26,43 @@ class PlateTable(_Table):
     material: Medium
     back: Medium | None = None
     plate_mm: Number = 1.0
+    roughness: Number | None = None
 
 
 class LayerTable(_Table):
-    """One `[[scene.layer]]`."""
+    """One `[[scene.layer]]`: a material with a thickness, or with plate_mm where it is incoherent, or
+    `between`, a mixing rule for the media above and below, in `steps` slices."""
 
     name: str | None = None
-    material: Medium
-    thickness: Number
+    material: Medium | None = None
+    between: str | None = None
+    steps: int | None = None
+    thickness: Number | None = None
+    plate_mm: Number | None = None
+    thickness_spread: Number | None = None
+    roughness: Number | None = None
     free: list[str] = []
+
+    @model_validator(mode="after")
+    def _one_kind(self):
+        if (self.material is None) == (self.between is None):
+            raise ValueError('a layer has a material, or between = "bruggeman" to mix its neighbours')
+        if (self.thickness is None) == (self.plate_mm is None):
+            raise ValueError("a layer has a thickness in nm, or plate_mm where it is an incoherent plate")
+        rejected = self.model_fields_set & self._foreign()
+        if rejected:
+            raise ValueError(f"{' and '.join(sorted(rejected))} does not go with {self._kind()}")
+        return self
+
+    def _kind(self) -> str:
+        if self.between is not None:
+            return "between, a mixed interface"
+        return "plate_mm, an incoherent plate" if self.plate_mm is not None else "a coherent layer"
+
+    def _foreign(self) -> set[str]:
+        if self.between is not None:
+            return {"plate_mm", "thickness_spread", "roughness", "free"}
+        return {"steps", "thickness_spread", "roughness"} if self.plate_mm is not None else {"steps"}
 
 
 class GridTable(_Table):
@@ -73,6 +101,8 @@ class InstrumentTable(_Table):
     offset: Literal["free", "slow"] | float = 0.0
     bandwidth: Number | None = None
     thickness_spread: Number | None = None
+    angle_spread: Number | None = None
+    numerical_aperture: Number | None = None
 
 
 class RecipeTable(_Table):
@@ -133,6 +163,9 @@ _KEYS: dict[str, type[BaseModel]] = {
     "plate_mm": FreeTable,
     "bandwidth": FreeTable,
     "thickness_spread": FreeTable,
+    "roughness": FreeTable,
+    "angle_spread": FreeTable,
+    "numerical_aperture": FreeTable,
     "prior": PriorTable,
 }
 
@@ -152,19 +185,14 @@ def _first(error: ValidationError) -> str:
         return f"unknown key {key!r}{nearest(where[-1], known)}; known here: {', '.join(known)}"
     if chosen["type"] == "missing":
         return f"{key} is missing"
+    if chosen["type"] == "value_error":
+        return f"{key}: {chosen.get('ctx', {}).get('error', chosen['msg'])}"
     return f"{key}: {chosen['msg'][0].lower()}{chosen['msg'][1:]}, got {chosen['input']!r}"
 
 
 def _scene(tables: RecipeTable, folder: Path) -> Scene:
     scene, data = tables.scene, tables.data
-    layers = [
-        Layer(
-            words.freed(medium(layer.material, folder), layer.free),
-            number(layer.thickness, "thickness", natural=0.0),
-            layer.name,
-        )
-        for layer in scene.layer
-    ]
+    layers = [_layer(layer, folder) for layer in scene.layer]
     instrument = tables.instrument
     return Scene(
         layers,
@@ -176,15 +204,30 @@ def _scene(tables: RecipeTable, folder: Path) -> Scene:
             instrument.offset,
             optional(instrument.bandwidth, "bandwidth"),
             optional(instrument.thickness_spread, "thickness_spread"),
+            optional(instrument.angle_spread, "angle_spread"),
+            optional(instrument.numerical_aperture, "numerical_aperture"),
         ),
     )
+
+
+def _layer(given: LayerTable, folder: Path) -> Layer | Interface | Plate:
+    thickness: Any = optional(given.thickness, "thickness")
+    stated: Any = given.material  # the table has seen to it that what a kind needs is there
+    if given.between is not None:
+        return Interface(thickness, 1 if given.steps is None else given.steps, given.between, given.name)
+    material = words.freed(medium(stated, folder), given.free)
+    if given.plate_mm is not None:
+        return Plate(material, number(given.plate_mm, "plate_mm", natural=0.0), given.name)
+    spread = optional(given.thickness_spread, "thickness_spread")
+    return Layer(material, thickness, given.name, spread, optional(given.roughness, "roughness"))
 
 
 def _substrate(given: Medium | PlateTable, folder: Path) -> Substrate:
     if not isinstance(given, PlateTable):
         return Substrate(medium(given, folder))
     back = None if given.back is None else medium(given.back, folder)
-    return Substrate(medium(given.material, folder), back, number(given.plate_mm, "plate_mm", natural=0.0))
+    plate_mm = number(given.plate_mm, "plate_mm", natural=0.0)
+    return Substrate(medium(given.material, folder), back, plate_mm, optional(given.roughness, "roughness"))
 
 
 def optional(given: Number | None, what: str) -> float | Free | None:
