@@ -175,17 +175,48 @@ NODES = 15
 
 def _coherence(scene: Scene) -> Row:
     """A single layer's series is damped order by order; anything else is averaged over nodes."""
-    spreads = [thickness_spread(scene, layer) for layer in coherent_layers(scene)]
-    bandwidth = scene.instrument.bandwidth
-    present = [] if bandwidth is None else ["bandwidth"]
-    present += ["uneven thickness"] if any(spread is not None for spread in spreads) else []
-    if not present or not spreads:
+    present, narrow = _blurs(scene), _unresolved(scene)
+    if narrow is not None:
+        return Row("coherence", True, f"{narrow}: what is read is their average", UNRESOLVED_ERROR)
+    if not present:
         return Row("coherence", False, "no bandwidth and no thickness spread were given: monochromatic light")
     why = f"fringes are damped by {' and '.join(present)}"
     if _has_series(scene):
         return Row("coherence", True, why)
     error = _nodes_error(scene)
     return Row("coherence", True, f"{why}, each averaged over {NODES} nodes", error, NODES)
+
+
+def _blurs(scene: Scene) -> list[str]:
+    """What washes out the fringes, if there are any layers to make them."""
+    layers = coherent_layers(scene)
+    uneven = any(thickness_spread(scene, layer) is not None for layer in layers)
+    found = [] if scene.instrument.bandwidth is None else ["bandwidth"]
+    return [*found, *(["uneven thickness"] if uneven else [])] if layers else []
+
+
+UNRESOLVED_ERROR = 4 * float(np.exp(-0.5 * (4 * np.pi / orders.FWHM) ** 2))
+"""What is left of a fringe after a window as wide as the sampling step, twice the fringes' spacing."""
+
+
+def _unresolved(scene: Scene) -> str | None:
+    """Says so where, all over the bounds, two fringes or more fit between neighbouring wavelengths.
+
+    A spectrometer that samples every so many nanometres does not resolve finer than that.
+    """
+    if scene.light.wavelength is None or not _has_series(scene) or _blurs(scene):
+        return None
+    at, (layer,) = np.unique(np.asarray(scene.light.wavelength, dtype=float)), coherent_layers(scene)
+    step = float(np.min(np.diff(at), initial=np.inf))
+    thickness = float(layer.thickness.lower if isinstance(layer.thickness, Free) else layer.thickness)
+    if at.size < 2 or 10 * thickness * step < at[-1] ** 2:  # resolved at any index below 10
+        return None
+    steepest = min(np.deg2rad(scene.light.largest_angle), np.pi / 2)
+    square = _smallest_index(layer.material, at) ** 2 - (_least_ambient(scene) * np.sin(steepest)) ** 2
+    spacing = at[-1] ** 2 / (2 * np.sqrt(max(square, 1e-12)) * thickness)
+    if 2 * spacing > step:
+        return None
+    return f"fringes every {spacing:.2g} nm are narrower than the sampling of {step:.2g} nm"
 
 
 def _has_series(scene: Scene) -> bool:
@@ -204,6 +235,8 @@ def _orders(scene: Scene) -> Row:
     if not _has_series(scene):
         return Row("orders", False, "nodes of the closed form are averaged, not orders")
     _need_wavelengths(scene)
+    if _unresolved(scene) is not None:
+        return Row("orders", True, "no order is left where fringes are not resolved", 0.0, 0)
     ratio = float(np.clip(largest_ratio(scene), 1e-12, 0.999))
     count = int(np.clip(np.ceil(np.log(ORDERS_ERROR * (1 - ratio)) / np.log(ratio)), 1, MOST_ORDERS))
     left = 2 * ratio**count / (1 - ratio)
@@ -254,11 +287,6 @@ def _least_ambient(scene: Scene) -> float:
     return float(np.min(np.real(ambient(np.atleast_1d(scene.light.wavelength)))))
 
 
-def _smallest_index(material: AbstractDispersion, wavelength: np.ndarray) -> float:
-    corners = insert(material, start_values(material))
-    return max(float(np.nanmin(_real_index(corners, wavelength))), 0.1)
-
-
 def _upper(number: Any) -> float:
     return float(number.upper if isinstance(number, Free) else number or 0.0)
 
@@ -270,11 +298,20 @@ def _real_index(material: AbstractDispersion, wavelength: Any) -> Any:
 
 def largest_index(material: AbstractDispersion, wavelength: np.ndarray) -> float:
     """The largest real index at these wavelengths (nm) over the corners of the bounds (at most 64)."""
+    return float(np.nanmax(_corner_indices(material, wavelength)))
+
+
+def _smallest_index(material: AbstractDispersion, wavelength: np.ndarray) -> float:
+    """The smallest likewise, but not below 0.1: a metal has no fringes to count."""
+    return max(float(np.nanmin(_corner_indices(material, wavelength))), 0.1)
+
+
+def _corner_indices(material: AbstractDispersion, wavelength: np.ndarray) -> np.ndarray:
     if isinstance(material, Sampled):
-        return float(np.max(np.asarray(real(material.value))))
+        return np.asarray(real(material.value))
     free = [leaf for _, leaf in free_leaves(material)]
     corners = itertools.islice(itertools.product(*[(f.lower, f.upper) for f in free]), 64)
-    return max(float(np.nanmax(_real_index(insert(material, c), wavelength))) for c in corners)
+    return np.stack([np.asarray(_real_index(insert(material, c), wavelength)) for c in corners])
 
 
 def largest_ratio(scene: Scene) -> float:
