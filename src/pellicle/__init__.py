@@ -20,11 +20,25 @@ if TYPE_CHECKING:
     from pellicle.layers import Plate as Plate
     from pellicle.layers import Substrate as Substrate
     from pellicle.materials import lookup as material  # noqa: F401
+    from pellicle.optics.cody_lorentz import CodyLorentz as CodyLorentz
     from pellicle.optics.dispersion import Cauchy as Cauchy
+    from pellicle.optics.dispersion import CauchyUrbach as CauchyUrbach
     from pellicle.optics.dispersion import Constant as Constant
     from pellicle.optics.dispersion import Sellmeier as Sellmeier
     from pellicle.optics.dispersion import Shifted as Shifted
     from pellicle.optics.dispersion import Table as Table
+    from pellicle.optics.dispersion import WithExtinction as WithExtinction
+    from pellicle.optics.mixtures import Bruggeman as Bruggeman
+    from pellicle.optics.mixtures import Linear as Linear
+    from pellicle.optics.mixtures import Looyenga as Looyenga
+    from pellicle.optics.mixtures import MaxwellGarnett as MaxwellGarnett
+    from pellicle.optics.oscillators import Drude as Drude
+    from pellicle.optics.oscillators import Gaussian as Gaussian
+    from pellicle.optics.oscillators import Lorentz as Lorentz
+    from pellicle.optics.oscillators import Oscillators as Oscillators
+    from pellicle.optics.oscillators import TaucLorentz as TaucLorentz
+    from pellicle.optics.spline import KramersKronigSpline as KramersKronigSpline
+    from pellicle.optics.spline import Spline as Spline
     from pellicle.planning import plan as plan
     from pellicle.scene import Free as Free
     from pellicle.scene import Light as Light
@@ -42,7 +56,19 @@ _HOME = {
     "pellicle.io.spectra": ("read_spectrum",),
     "pellicle.io.spectrum": ("Spectrum",),
     "pellicle.materials": ("material",),
-    "pellicle.optics.dispersion": ("Cauchy", "Constant", "Sellmeier", "Shifted", "Table"),
+    "pellicle.optics.cody_lorentz": ("CodyLorentz",),
+    "pellicle.optics.dispersion": (
+        "Cauchy",
+        "CauchyUrbach",
+        "Constant",
+        "Sellmeier",
+        "Shifted",
+        "Table",
+        "WithExtinction",
+    ),
+    "pellicle.optics.mixtures": ("Bruggeman", "Linear", "Looyenga", "MaxwellGarnett"),
+    "pellicle.optics.oscillators": ("Drude", "Gaussian", "Lorentz", "Oscillators", "TaucLorentz"),
+    "pellicle.optics.spline": ("KramersKronigSpline", "Spline"),
     "pellicle.planning": ("plan",),
     "pellicle.instrument": ("Instrument",),
     "pellicle.layers": ("Interface", "Layer", "Plate", "Substrate"),

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from pellicle.cli import main, session
+from pellicle.io.models import MODELS
 
 TELL = "import sys; from pellicle.cli import main; code = main(); print(*sys.modules, file=sys.stderr); "
 
@@ -31,6 +33,12 @@ def test_help_is_light(arguments):
     assert ran.returncode == 0
     assert not modules(ran) & {"jax", "pandas", "matplotlib", "numpy", "equinox", "optimistix", "pydantic"}
     assert "fit" in ran.stdout or arguments == ("--version",)
+
+
+def test_help_names_every_model(pellicle):
+    ran = pellicle("fit", "--help")
+    words = re.sub(r"[│\s]+", " ", ran.out).replace(",", " ").split()
+    assert set(MODELS) <= set(words)
 
 
 def test_a_plain_fit_imports_nothing_slow_and_keeps_its_programs(spectrum_file, scene, tmp_path):

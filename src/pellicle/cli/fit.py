@@ -31,7 +31,12 @@ def fit(
     recipe: Annotated[str | None, _flag(_scene, "A TOML file that describes the scene.")] = None,
     layer: Annotated[
         str | None,
-        _flag(_scene, "The layer: a material (SiO2), an index (1.46, 2.9+0.1j), cauchy, or an n,k CSV."),
+        _flag(
+            _scene,
+            "The layer: a material (SiO2), an index (1.46, 2.9+0.1j), an n,k CSV, or a model: cauchy, "
+            "cauchy-urbach, sellmeier, lorentz, drude, gaussian, tauc-lorentz, cody-lorentz, spline or "
+            "spline-kk, its numbers free; cauchy(1.46,3000) fixes them. A recipe also mixes and adds models.",
+        ),
     ] = None,
     substrate: Annotated[str | None, _flag(_scene, "What it lies on; the same words.")] = None,
     ambient: Annotated[str | None, _flag(_scene, "What it is seen from (air).")] = None,
