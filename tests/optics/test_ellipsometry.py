@@ -106,3 +106,41 @@ def test_a_faint_reflection_keeps_its_place_on_the_sphere(dtype, amplitude):
     slope = np.array([8 / 25, -6 / 25, 0.0]) / amplitude
     for jacobian in (jax.jacfwd, jax.jacrev):
         np.testing.assert_allclose(jacobian(point)(rs, rp), slope, rtol=1e-5)
+
+
+ANALYSER = np.array([5.0, 30.0, 45.0, 80.0])[:, None]
+PSI, DELTA = np.meshgrid([0.5, 20.0, 44.0, 89.0], [0.0, 40.0, 135.0, 300.0])
+
+
+def test_alpha_and_beta_are_what_a_turning_analyser_sees():
+    """By Jones vectors, and by the formulas that hold tangents; twice over gives N and C back."""
+    tan_psi, delta = np.tan(np.deg2rad(PSI.ravel())), np.deg2rad(DELTA.ravel())
+    n, c = np.cos(2 * np.arctan(tan_psi)), np.sin(2 * np.arctan(tan_psi)) * np.cos(delta)
+    alpha, beta = ellipsometry.alpha_beta(n, c, ANALYSER)
+
+    still = np.deg2rad(ANALYSER)
+    turn = np.linspace(0, np.pi, 16, endpoint=False)[:, None, None]
+    field = tan_psi * np.exp(1j * delta) * np.cos(still) * np.cos(turn) + np.sin(still) * np.sin(turn)
+    seen = np.abs(field) ** 2
+    wave = np.mean(seen * np.exp(2j * turn), axis=0) / np.mean(seen, axis=0) * 2
+    np.testing.assert_allclose(alpha, wave.real, atol=1e-13)
+    np.testing.assert_allclose(beta, wave.imag, atol=1e-13)
+
+    both = tan_psi**2 + np.tan(still) ** 2
+    np.testing.assert_allclose(alpha, (tan_psi**2 - np.tan(still) ** 2) / both, atol=1e-13)
+    np.testing.assert_allclose(beta, 2 * tan_psi * np.cos(delta) * np.tan(still) / both, atol=1e-13)
+    back = ellipsometry.alpha_beta(alpha, beta, ANALYSER)
+    np.testing.assert_allclose(back, np.broadcast_arrays(n, c, alpha)[:2], atol=1e-12)
+
+
+@pytest.mark.parametrize(("n", "alpha"), [(1.0, -1.0), (-1.0, 1.0)])
+def test_alpha_and_beta_at_the_poles(n, alpha):
+    """Where tan Ψ is 0 or infinite values and derivatives are finite."""
+    a, b = ellipsometry.alpha_beta(n, 0.0, 30.0)
+    assert float(a) == pytest.approx(alpha)
+    assert float(b) == 0
+    of_alpha, of_beta = jax.jacfwd(ellipsometry.alpha_beta, argnums=(0, 1, 2))(n, 0.0, 30.0)
+    # dα/dN = −sin² 2A/(1 − N cos 2A)², dβ/dC = sin 2A/(1 − N cos 2A), and α stays when A turns
+    over = 1 - 0.5 * n
+    np.testing.assert_allclose(of_alpha, [-0.75 / over**2, 0.0, 0.0], atol=1e-14)
+    np.testing.assert_allclose(of_beta, [0.0, np.sqrt(0.75) / over, 0.0], atol=1e-14)
