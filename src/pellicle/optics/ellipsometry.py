@@ -67,9 +67,9 @@ def alpha_beta(n: Any, c: Any, analyser: Any) -> tuple[Any, Any]:
     The detector sees 1 + α cos 2a + β sin 2a while one polariser turns by a and the other, before or
     behind the sample, stands at `analyser`, in degrees between 0 and 90, neither included; both angles
     count from the plane of incidence, and β has the sign of cos Δ. With A for `analyser`
-    α = (tan²Ψ − tan²A)/(tan²Ψ + tan²A) and β = 2 tanΨ cosΔ tanA/(tan²Ψ + tan²A) (the
-    instrument of D. E. Aspnes and A. A. Studna, Appl. Opt. 14, 220 (1975)), here as α = (cos 2A − N)/(1 − N cos 2A) and
-    β = C sin 2A/(1 − N cos 2A), which are finite at Ψ = 0 and 90. The function is its own inverse:
+    α = (tan²Ψ − tan²A)/(tan²Ψ + tan²A) and β = 2 tanΨ cosΔ tanA/(tan²Ψ + tan²A) (the instrument of
+    D. E. Aspnes and A. A. Studna, Appl. Opt. 14, 220 (1975)), here as α = (cos 2A − N)/(1 − N cos 2A)
+    and β = C sin 2A/(1 − N cos 2A), which are finite at Ψ = 0 and 90. The function is its own inverse:
     `alpha_beta(alpha, beta, analyser)` returns N and C.
     """
     twice = 2 * jnp.deg2rad(analyser)
