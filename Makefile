@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 EXAMPLE := measurements/recipes/hematite_on_glass_140nm.toml
 
-.PHONY: fit fits test lint bench peers properties measurements slow clean
+.PHONY: fit fits test lint bench peers properties measurements slow clean figures
 
 # Debian splits venv's pip into a package of its own: without it, the system's pip does
 $(VENV)/bin/python:
@@ -53,6 +53,9 @@ peers: $(VENV)/.dev
 
 properties: $(VENV)/.dev
 	$(BIN)/python benchmarks/properties.py
+
+figures: $(VENV)/.fit
+	$(BIN)/python scripts/make_figures.py
 
 measurements: $(VENV)/.fit
 	$(BIN)/python scripts/make_measurements.py

@@ -1,0 +1,96 @@
+"""Draws docs/figures: the examples of Gerardin, Holzschuch and Martinetto 2019, from our model.
+
+python scripts/make_figures.py
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import jax
+import matplotlib
+import numpy as np
+
+import pellicle as pl
+
+matplotlib.use("Agg")
+from matplotlib.figure import Figure
+
+FOLDER = Path(__file__).parents[1] / "docs" / "figures"
+VISIBLE = np.linspace(400.0, 700.0, 301)
+GLASS = pl.material("BK7")
+
+
+def canvas(title: str, panels: int) -> tuple[Figure, list]:
+    figure = Figure(figsize=(4.6 * panels, 3.8), layout="constrained")
+    figure.suptitle(title)
+    return figure, list(np.atleast_1d(figure.subplots(1, panels)))
+
+
+def map_of(axes, y, values, ylabel: str, title: str, most: float) -> None:
+    """A signal over wavelength and something else."""
+    mesh = axes.pcolormesh(
+        VISIBLE, y, values, cmap="viridis", vmin=0, vmax=most, shading="auto", rasterized=True
+    )
+    axes.set(xlabel="wavelength (nm)", ylabel=ylabel, title=title)
+    axes.figure.colorbar(mesh, ax=axes)
+
+
+def film(function, name: str, thickness):
+    return function(VISIBLE, np.asarray(thickness)[:, None], pl.material(name), GLASS)
+
+
+def hematite() -> Figure:
+    """Figure 1: a hematite layer on glass from 0 to 300 nm."""
+    thickness = np.linspace(0.0, 300.0, 301)
+    figure, (left, right) = canvas("Hematite on glass, normal incidence", 2)
+    for axes, function, title in (
+        (left, pl.reflectance, "reflectance"),
+        (right, pl.transmittance, "transmittance"),
+    ):
+        map_of(axes, thickness, film(function, "Fe2O3", thickness), "thickness (nm)", title, 1.0)
+    return figure
+
+
+def gold_and_cadmium_sulfide() -> Figure:
+    """Figure 4: how much light passes, and what is left of it as the layer grows."""
+    thickness = np.geomspace(1.0, 2e4, 600)
+    figure, panels = canvas("A layer on glass, mean over 500-700 nm", 2)
+    red = VISIBLE >= 500
+    for axes, function, label in zip(panels, (pl.transmittance, pl.reflectance), "TR", strict=True):
+        for name, colour in (("Au", "#D55E00"), ("main/CdS/Treharne", "#0072B2")):
+            mean = np.mean(np.asarray(film(function, name, thickness))[:, red], axis=1)
+            axes.semilogx(thickness, mean, color=colour, label=name.replace("main/", ""))
+        axes.axvline(100, color="#777777", linewidth=0.8, linestyle=":")
+        axes.set(xlabel="thickness (nm)", ylabel=f"mean {label}", ylim=(0, 1))
+    panels[0].legend(frameon=False)
+    return figure
+
+
+def copper_oxide_on_aluminium() -> Figure:
+    """Figure 5, right: against the angle of incidence, printed as 500 µm; fringes need some 100 nm."""
+    angle = np.linspace(0.0, 89.0, 180)
+    figure, panels = canvas("CuO on aluminium, unpolarised", 2)
+    for axes, thickness, title in zip(panels, (150.0, 500.0), ("150 nm", "500 nm"), strict=True):
+        signal = pl.reflectance(
+            VISIBLE, thickness, pl.material("CuO"), pl.material("Al"), angle=angle[:, None]
+        )
+        map_of(axes, angle, signal, "angle of incidence (degrees)", title, 0.6)
+    return figure
+
+
+def main() -> None:
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    drawn = {
+        "hematite_on_glass": hematite,
+        "gold_and_cds_on_glass": gold_and_cadmium_sulfide,
+        "cuo_on_aluminium": copper_oxide_on_aluminium,
+    }
+    with jax.enable_x64(True):
+        for name, draw in drawn.items():
+            draw().savefig(FOLDER / f"{name}.png", dpi=110, metadata={"Software": None})
+            print(FOLDER / f"{name}.png")
+
+
+if __name__ == "__main__":
+    main()
