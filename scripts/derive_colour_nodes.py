@@ -1,0 +1,69 @@
+"""Write src/pellicle/colour/data: the centres and widths of optimised samples and Gaussians.
+
+The transforms of the bands are brought as near as can be to those of the CIE 1931 observer under
+illuminant E, at all optical paths up to a reach; the difference is weighted as L*, a* and b* weight
+X, Y and Z near grey. Weights are linear, so only places and widths are searched; the library solves
+them anew for each observer and illuminant. Run: python scripts/derive_colour_nodes.py
+"""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from pellicle.colour.bands import LONGEST_PATH, fit_weights, reach_of, transforms
+from pellicle.colour.observers import sensor
+
+DATA = Path(__file__).parents[1] / "src/pellicle/colour/data"
+TARGET = sensor("1931", "E")
+TO_LAB = np.array([[0, 116, 0], [500, -500, 0], [0, 200, -200]]).T / 200
+NODES = {500: (3, 4, 6, 8, 12), 1000: (8, 12, 16)}
+GAUSSIANS = (4, 6)
+STARTS = 12
+
+
+def residual(wavelength, width, target):
+    weights = fit_weights(wavelength, width, target)
+    return ((target.columns(wavelength, width) @ weights - target.exact) @ TO_LAB).ravel()
+
+
+def split(x, gaussian):
+    """Frequencies (1/µm) and, for Gaussians, the logarithms of 10 × their widths, as nm and 1/nm."""
+    if not gaussian:
+        return 1000 / x, np.zeros_like(x)
+    frequency, width = np.split(x, 2)
+    return 1000 / frequency, np.exp(width) * 1e-4
+
+
+def derive(count, reach, gaussian):
+    rng, best, target = np.random.default_rng(0), None, transforms(TARGET, reach)
+    share = np.cumsum(TARGET.weights.sum(axis=1)) / TARGET.weights.sum()
+    starts = [1000 / np.interp((np.arange(count) + 0.5) / count, share, TARGET.wavelength)]
+    starts += [np.sort(rng.uniform(1.45, 2.45, count)) for _ in range(STARTS if gaussian else 0)]
+    for start in starts:
+        x = np.concatenate([start, rng.uniform(-0.5, 0.2, count)]) if gaussian else start
+        found = least_squares(lambda x: residual(*split(x, gaussian), target), x, max_nfev=100)
+        best = found if best is None or found.cost < best.cost else best
+    wavelength, width = split(best.x, gaussian)
+    order = np.argsort(wavelength)
+    print(count, reach, "cost", best.cost, flush=True)
+    return [
+        (count, f"{reach:g}", f"{w:.4f}", f"{s:.7g}")
+        for w, s in zip(wavelength[order], width[order] * 1000, strict=True)
+    ]
+
+
+def write(name, rows):
+    with (DATA / name).open("w", encoding="utf-8", newline="") as file:
+        file.write(f"# derived by {Path(__file__).name}\n")
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(("count", "reach_nm", "wavelength_nm", "width_per_um"))
+        writer.writerows(rows)
+
+
+if __name__ == "__main__":
+    write("gaussians.csv", [row for n in GAUSSIANS for row in derive(n, LONGEST_PATH, True)])
+    write(
+        "nodes.csv", [r for d, sizes in NODES.items() for n in sizes for r in derive(n, reach_of(d), False)]
+    )

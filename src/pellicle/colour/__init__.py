@@ -1,0 +1,15 @@
+"""What a film looks like: from its layer to XYZ, sRGB and Lab, by sampling or by Fourier orders.
+
+`observers` holds the eye and the lamp, `bands` the ways to integrate over them, `film` the film's
+colour, `spaces` and `difference` what is done with a colour.
+"""
+
+from pellicle.colour.bands import Bands as Bands
+from pellicle.colour.bands import way as way
+from pellicle.colour.difference import delta_e76 as delta_e76
+from pellicle.colour.difference import delta_e2000 as delta_e2000
+from pellicle.colour.film import film_colour as film_colour
+from pellicle.colour.observers import sensor as sensor
+from pellicle.colour.spaces import lab as lab
+from pellicle.colour.spaces import linear_srgb as linear_srgb
+from pellicle.colour.spaces import srgb as srgb

@@ -1,0 +1,134 @@
+"""The colour of one film: what each band sees of it, added up."""
+
+from __future__ import annotations
+
+from typing import Any, final
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from pellicle.colour import spaces
+from pellicle.colour.bands import Bands, way
+from pellicle.colour.observers import sensor
+from pellicle.optics import film, interface, orders
+from pellicle.optics.dispersion import AbstractDispersion
+from pellicle.optics.number import is_real, real, sincos_poly, to_pair
+
+
+@final
+class Colour(eqx.Module):
+    """A colour and the white it is seen against; `xyz` has Y = 1 for a perfect reflector."""
+
+    xyz: Float[Array, "... 3"]
+    white: tuple[float, float, float] = eqx.field(static=True)
+
+    @property
+    def lab(self):
+        """CIE 1976 L*, a*, b*."""
+        return spaces.lab(self.xyz, self.white)
+
+    @property
+    def linear_srgb(self):
+        """Linear sRGB, not clipped: interference colours leave its gamut."""
+        return spaces.linear_srgb(self.xyz, self.white)
+
+    @property
+    def srgb(self):
+        """What a display takes, 0 to 1."""
+        return spaces.srgb(self.linear_srgb)
+
+
+def film_colour(
+    thickness: Any,
+    layer: Any,
+    substrate: Any,
+    *,
+    ambient: Any = 1.0,
+    angle: Any = 0.0,
+    way: str = "gaussians-6",
+    illuminant: str = "D65",
+    observer: str = "1931",
+) -> Colour:
+    """The colour of a layer on a half space in unpolarised light.
+
+    **Arguments:** `thickness` in nm and `angle` of incidence in degrees broadcast; `layer` and
+    `substrate` are numbers n + ik, arrays of such, or materials (`pl.material("Fe2O3")`); `ambient`
+    is real; for `way` see `pellicle.colour.way`. Gaussians take a material's index at their centres
+    and its slope there: `uniform-64` is the way for media that change much within 30 nm.
+
+    **Raises:** ValueError for an unknown way, observer or illuminant, and for an absorbing layer by
+    `belcour-barla`, which has none.
+
+    ```python
+    >>> film_colour(300.0, 1.33, 1.0).srgb.round(2).tolist()
+    [0.05, 0.28, 0.27]
+
+    ```
+    """
+    bands, white = _way(way, observer, illuminant), sensor(observer, illuminant).white
+    seen = jnp.asarray(reflectance(thickness, layer, substrate, bands, ambient=ambient, angle=angle))
+    xyz = seen @ jnp.asarray(bands.weights, seen.dtype)
+    return Colour(xyz, (float(white[0]), float(white[1]), float(white[2])))
+
+
+_way = way
+
+
+def reflectance(thickness, layer, substrate, bands: Bands, *, ambient: Any = 1.0, angle: Any = 0.0):
+    """What each band sees of the film, (..., N); arguments as `film_colour`."""
+    thickness, theta = (jnp.asarray(x)[..., None] * 1.0 for x in (thickness, jnp.deg2rad(angle)))
+    wavelength = jnp.asarray(bands.wavelength, jnp.result_type(thickness, theta))
+    n0, n2 = _index(ambient, wavelength), interface.allow_tunnelling(_index(substrate, wavelength))
+    if not is_real(n0):
+        raise ValueError("the ambient must not absorb: give it a real index")
+    n1 = _index(layer, wavelength)
+    if not bands.absorbs and not is_real(n1):
+        raise ValueError("belcour-barla knows no absorbing layer: use gaussians-6 or uniform-64")
+    k0d = 2 * jnp.pi / wavelength * thickness
+    if bands.width is None:
+        waves = film.film(n0, n1, n2, k0d, theta, sincos=sincos_poly)
+        return 0.5 * (film.reflectance(waves[0]) + film.reflectance(waves[1]))
+    if not _propagates(ambient, layer):
+        n1 = interface.allow_tunnelling(n1)
+    turns = _turn_slope(layer, n0, n1, theta, wavelength)
+    spread = 2 * jnp.pi * jnp.asarray(bands.width, wavelength.dtype) * 2 * thickness * turns
+    kept = jnp.exp(-0.5 * spread * spread)
+    both = [
+        orders.reflectance(
+            orders.bounces(n0, n1, n2, k0d, theta, letter),
+            lambda m: kept ** (m * m),
+            bands.orders,
+            sincos_poly,
+        )
+        for letter in "sp"
+    ]
+    return 0.5 * (both[0] + both[1])
+
+
+def _index(what: Any, wavelength):
+    """The index at the bands; an array of numbers gets an axis for them."""
+    if isinstance(what, AbstractDispersion):
+        return what.index(wavelength)
+    return to_pair(jnp.asarray(what)[..., None] * 1.0)
+
+
+def _propagates(ambient, layer) -> bool:
+    """True where plain numbers say so before the program is traced: the layer cannot tunnel."""
+    if not all(isinstance(n, int | float | np.ndarray) and np.isrealobj(n) for n in (ambient, layer)):
+        return False
+    return bool(np.min(layer) >= np.max(ambient))
+
+
+def _turn_slope(layer, ambient, index, theta, wavelength):
+    """d(Re q₁/λ)/d(1/λ): Re q₁ where the layer has no dispersion, else its group index's like."""
+    if not isinstance(layer, AbstractDispersion):
+        return real(interface.normal(index, ambient * jnp.sin(theta)))
+
+    def turns(wavelength):
+        n1 = interface.allow_tunnelling(layer.index(wavelength))
+        return real(interface.normal(n1, ambient * jnp.sin(theta))) / wavelength
+
+    return jax.jvp(turns, (wavelength,), (-(wavelength**2),))[1]

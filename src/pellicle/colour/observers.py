@@ -1,0 +1,54 @@
+"""The eye and the lamp: CIE colour-matching functions times an illuminant."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib import resources
+from typing import NamedTuple
+
+import numpy as np
+
+SPAN = (380, 730)
+"""Wavelengths that count, in nm: what lies outside is below 3e-4 of X, Y and Z."""
+
+OBSERVERS = ("1931", "1964")
+ILLUMINANTS = ("E", "A", "D50", "D55", "D65", "D75")
+
+
+class Sensor(NamedTuple):
+    """An observer under an illuminant, at steps of 1 nm."""
+
+    wavelength: np.ndarray  # (351,), nm
+    weights: np.ndarray  # (351, 3): reflectance @ weights is XYZ, with Y = 1 for a perfect reflector
+
+    @property
+    def white(self) -> np.ndarray:
+        """XYZ of the perfect reflector, (3,)."""
+        return self.weights.sum(axis=0)
+
+
+@cache
+def _columns(name: str) -> dict[str, np.ndarray]:
+    text = (resources.files("pellicle.colour") / "data" / name).read_text(encoding="utf-8")
+    header, *rows = [line.split(",") for line in text.splitlines() if not line.startswith("#")]
+    return dict(zip(header, np.array(rows, dtype=float).T, strict=True))
+
+
+@cache
+def sensor(observer: str = "1931", illuminant: str = "D65") -> Sensor:
+    """The sensor of an observer ("1931" is 2°, "1964" is 10°) under an illuminant (`ILLUMINANTS`).
+
+    Illuminants are tabulated at 5 nm and interpolated linearly, as CIE 15 asks.
+    Raises ValueError for an unknown name.
+    """
+    if observer not in OBSERVERS:
+        raise ValueError(f"observer {observer!r} is unknown: expected one of {', '.join(OBSERVERS)}")
+    if illuminant not in ILLUMINANTS:
+        raise ValueError(f"illuminant {illuminant!r} is unknown: expected one of {', '.join(ILLUMINANTS)}")
+    table, lamps = _columns("observers.csv"), _columns("illuminants.csv")
+    inside = (table["wavelength_nm"] >= SPAN[0]) & (table["wavelength_nm"] <= SPAN[1])
+    wavelength = table["wavelength_nm"][inside]
+    functions = np.stack([table[f"{axis}_{observer}"][inside] for axis in "xyz"], axis=1)
+    if illuminant != "E":
+        functions = functions * np.interp(wavelength, lamps["wavelength_nm"], lamps[illuminant])[:, None]
+    return Sensor(wavelength, functions / functions[:, 1].sum())
