@@ -15,7 +15,7 @@ import numpy as np
 from pellicle.colour.observers import SPAN, Sensor, _columns, sensor
 from pellicle.colour.spaces import SRGB_WHITE, TO_SRGB, adaptation
 
-LONGEST_PATH = 12_000.0  # nm: no Gaussian of ours lets an order through beyond
+LONGEST_PATH = 12_000.0  # nm: beyond, our Gaussians let less than 4e-4 of an order through
 
 
 class Bands(NamedTuple):

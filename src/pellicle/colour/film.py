@@ -56,15 +56,20 @@ def film_colour(
 
     **Arguments:** `thickness` in nm and `angle` of incidence in degrees broadcast; `layer` and
     `substrate` are numbers n + ik, arrays of such, or materials (`pl.material("Fe2O3")`); `ambient`
-    is real; for `way` see `pellicle.colour.way`. Gaussians take a material's index at their centres
-    and its slope there: `uniform-64` is the way for media that change much within 30 nm.
+    is real; for `way` see `pellicle.colour.way`.
+
+    **How exact:** against steps of 1 nm, the mean ΔE2000 of `gaussians-6` over the sweep of
+    `benchmarks/colour.py` is 0.08 under E, for which its centres are derived, and 0.35 to 0.38 under D50
+    to D75 (2.9 at most). Under A it is 0.60 (3.8 at most): prefer `uniform-64` there. Gaussians take a
+    material's index at their centres and its slope there, which does not do for media that change much
+    within 30 nm: 140 nm of Fe2O3 on glass are 3.8 off, and by `uniform-64` 0.005.
 
     **Raises:** ValueError for an unknown way, observer or illuminant, and for an absorbing layer by
     `belcour-barla`, which has none.
 
     ```python
     >>> film_colour(300.0, 1.33, 1.0).srgb.round(2).tolist()
-    [0.05, 0.28, 0.27]
+    [0.23, 0.31, 0.2]
 
     ```
     """

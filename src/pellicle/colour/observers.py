@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 SPAN = (380, 730)
-"""Wavelengths that count, in nm: what lies outside is below 3e-4 of X, Y and Z."""
+"""Wavelengths that count, in nm: what lies outside is below 5e-4 of X, Y and Z under every lamp."""
 
 OBSERVERS = ("1931", "1964")
 ILLUMINANTS = ("E", "A", "D50", "D55", "D65", "D75")
