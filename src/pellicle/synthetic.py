@@ -11,6 +11,7 @@ import numpy as np
 
 from pellicle.model import build, sampled
 from pellicle.optics.dispersion import AbstractDispersion
+from pellicle.optics.ellipsometry import angles
 from pellicle.planning import Plan, plan
 from pellicle.scene import Drift, Instrument, Scene, insert, is_free, start_values, with_wavelength
 
@@ -42,6 +43,15 @@ def synthesise(scene: Scene, wavelength: Any, noise: float = 0.0, seed: int = 0)
     clean = float(fixed.instrument.scale) * signal + float(fixed.instrument.offset)
     random = np.random.default_rng(seed).normal(0.0, 1.0, clean.shape)
     return Synthetic(wavelength, clean + noise * random, clean, chosen)
+
+
+def synthesise_angles(scene: Scene, wavelength: Any, noise: float = 0.0, seed: int = 0) -> Synthetic:
+    """The same for ellipsometry as Ψ and Δ in degrees, (wavelengths, 2), with noise in degrees."""
+    exact = synthesise(scene, wavelength)
+    clean = np.stack(np.broadcast_arrays(*angles(*exact.clean.reshape(-1, 3).T)), axis=1)
+    noisy = clean + np.random.default_rng(seed).normal(0.0, noise, clean.shape)
+    psi, delta = np.clip(noisy[:, 0], 0.0, 90.0), np.mod(noisy[:, 1], 360.0)
+    return exact._replace(values=np.stack([psi, delta], axis=1), clean=clean)
 
 
 def _settled(instrument: Instrument) -> Instrument:

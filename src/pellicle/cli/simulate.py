@@ -40,11 +40,14 @@ def simulate(
     found = read_recipe(recipe)
     scene = found.scene()
     start()
-    from pellicle.synthetic import synthesise
+    from pellicle.synthetic import synthesise, synthesise_angles
 
+    ellipsometric = scene.light.signal == "psi-delta"
+    if ellipsometric and found.tables.data.angle is None:
+        raise DataError(f"{found.path}: ellipsometry needs an angle of incidence: give [data] angle = 70")
     noise = (found.tables.data.noise or 0.0) if noise is None else noise
     wavelength = _wavelengths(found, scene)
-    result = synthesise(scene, wavelength, noise, seed)
+    result = (synthesise_angles if ellipsometric else synthesise)(scene, wavelength, noise, seed)
     write_text(out, _csv(found, scene, result, noise, seed))
     say(f"{out}: {len(wavelength)} points, {wavelength[0]:g} to {wavelength[-1]:g} nm", str(result.plan))
     return 0
@@ -93,9 +96,12 @@ def _csv(recipe: Recipe, scene: Any, result: Any, noise: float, seed: int) -> st
         "truth: "
         + ", ".join(f"{name} = {value:.10g}{' ' + unit if unit else ''}" for name, value, unit in truth),
     ]
-    columns = f"wavelength_nm,{light.signal}" + (",sigma" if noise else "")
-    end = f",{noise:g}" if noise else ""
-    rows = [f"{w:.10g},{v:.8f}{end}" for w, v in zip(result.wavelength, result.values, strict=True)]
+    columns, middle = f"wavelength_nm,{light.signal}", ""
+    if light.signal == "psi-delta":
+        columns, middle = "wavelength_nm,angle_deg,psi_deg,delta_deg", f"{_angle(light.angle)},"
+    columns, end = (f"{columns},sigma", f",{noise:g}") if noise else (columns, "")
+    values = [",".join(f"{v:.8f}" for v in row) for row in result.values.reshape(len(result.wavelength), -1)]
+    rows = [f"{w:.10g},{middle}{v}{end}" for w, v in zip(result.wavelength, values, strict=True)]
     return "\n".join([*(f"# {line}" for line in head), columns, *rows, ""])
 
 
