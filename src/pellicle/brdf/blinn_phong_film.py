@@ -1,0 +1,67 @@
+"""A transparent film in a Blinn-Phong lobe ("Thin Film Interference for Computer Graphics", gamedev.net 2013).
+
+The article sums the transmitted waves and takes 1 − T. Its α = ρ₁₀ρ₁₂ carries the signs of both
+reflections, and its Δ adds the same half turns again: where they do not cancel, the published shader
+has bright and dark exchanged (n = 1/1.5/2, 250 nm of film, 550 nm, normal: 0.0942 where Airy gives
+0.0239). The corrected film is that of `pellicle.optics.film`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import jax.numpy as jnp
+
+from pellicle.brdf import film_colour, lobes
+from pellicle.brdf.directions import angle_to_half
+from pellicle.brdf.shapes import Parameters, column
+from pellicle.optics.orders import Bounces, bounces
+
+PUBLISHED_WAVELENGTHS = (650.0, 510.0, 475.0)
+"""Its R, G and B in nm."""
+
+
+def corrected(parameters: Parameters, angle: Any) -> Any:
+    """Airy's reflectance of the film, unpolarised."""
+    return film_colour.reflectance(parameters, angle)
+
+
+def published(parameters: Parameters, angle: Any) -> Any:
+    """The shader's reflectance, with Δ added to the phase of a signed α."""
+    n0, n1, n2 = (parameters[key] for key in ("ambient_n", "n", "base_n"))
+    half_turns = jnp.pi * (jnp.where(n1 < n0, 1, 0) + jnp.where(n1 < n2, 1, 0))
+
+    def transmitted(b: Bounces):
+        alpha = -b.upper * b.lower
+        return b.direct / (1 + alpha * alpha - 2 * alpha * jnp.cos(b.phase + half_turns))
+
+    return _one_minus(transmitted, parameters, angle)
+
+
+def phase_average(parameters: Parameters, angle: Any) -> Any:
+    """The mean over all phases, 1 − |β|²/(1 − α²) times the ratio of beams: what geometric optics gives."""
+    return _one_minus(lambda b: b.direct / (1 - (b.upper * b.lower) ** 2), parameters, angle)
+
+
+def _one_minus(transmitted: Callable[[Bounces], Any], parameters: Parameters, angle: Any) -> Any:
+    """1 − T, the mean of s and p; 1 where there is total reflection at either face, as in the shader."""
+    n0, n1, n2 = (parameters[key] for key in ("ambient_n", "n", "base_n"))
+    angle = angle[..., None]
+    a = n0 * jnp.sin(angle)
+    total = (a >= n1) | (a >= n2)
+    safe = jnp.where(total, 0.0, angle)
+    phase = 2 * jnp.pi / parameters["wavelengths"] * column(parameters["thickness"])
+    s, p = (transmitted(bounces(n0, n1, n2, phase, safe, letter)) for letter in "sp")
+    return jnp.where(total, 1.0, 1 - 0.5 * (s + p))
+
+
+def blinn_phong_film(reflectance: Callable = corrected) -> Callable:
+    """specular · ⟨n, h⟩₊^e R(⟨o, h⟩) + diffuse; the lobe is not normalised, as published."""
+
+    def evaluate(parameters, i, o):
+        lobe = column(lobes.blinn_phong(i, o, parameters["exponent"]))
+        colour = film_colour.rgb(parameters, reflectance(parameters, angle_to_half(i, o)))
+        return column(parameters["specular"]) * lobe * colour + column(parameters["diffuse"])
+
+    return evaluate

@@ -1,0 +1,184 @@
+"""A layered RGB BRDF by interference of two Phong lobes (X. Granier and W. Heidrich, Pacific Graphics 2002).
+
+Light is reflected at the upper boundary, whose normal n₀ is z, or refracted, mirrored at the lower
+one, whose normal n₁ is tilted, and refracted out; both lobes interfere. Equation numbers are the
+paper's. What it leaves open is read so that it agrees with itself:
+
+- i and o point away from the surface; t_i and t_o are **both** their refractions downward (with one
+  of them upward eq. 3 would cancel the phase), so that eq. 10's lobe is ⟨r_ti, −t_o⟩.
+- Eq. 8 is squared: unsquared it is negative.
+- Eq. 10 is null where ⟨−t_i, n₁⟩, ⟨−t_o, n₁⟩ or ⟨r_ti, −t_o⟩ is not positive: light meets the lower
+  boundary from within the layer. The paper's "always true" for parallel boundaries is not: two rays
+  on one side at 88° are null for an index below √2.
+- Eq. 9 with t_o is Schlick's formula at the angle inside the layer, as published: it is not 1 − F of
+  the way out, and reciprocity fails. The reciprocal variant has F at the half vector in R and
+  (1 − F(i))(1 − F(o)) in T.
+- The lower boundary reflects everything and turns no phase; the lobes are not normalised.
+
+Energy can exceed one: the weights are no albedos (`pellicle.brdf.albedo` measures it).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+
+from pellicle.brdf.directions import cosine_inside, cosine_to_half, direction
+from pellicle.brdf.lobes import cosine_to_mirror, power
+from pellicle.brdf.shapes import Parameters, column
+from pellicle.optics.number import sincos_poly, sqrt
+
+
+class Paths(NamedTuple):
+    """Cosines along the two ways through the layer, each (..., 1) or per channel (..., 3)."""
+
+    i: Any  # ⟨i, n₀⟩
+    o: Any  # ⟨o, n₀⟩
+    half: Any  # ⟨i, h⟩
+    inside_i: Any  # ⟨t_i, −n₀⟩
+    inside_o: Any  # ⟨t_o, −n₀⟩
+    mirror: Any  # ⟨r_i, o⟩
+    lower: Any  # ⟨r_ti, −t_o⟩, 0 where light misses the lower boundary
+
+
+class Amplitudes(NamedTuple):
+    """√R and √T of eqs. 6 and 10, and the phase Φ of eq. 3 in radians, per channel."""
+
+    reflected: Any
+    transmitted: Any
+    phase: Any
+
+
+def paths(i: Any, o: Any, n: Any, normal: Any) -> Paths:
+    """The cosines for a layer of index n ≥ 1 (scalar or per channel) over a boundary with this normal.
+
+    With u = −t_i and w = −t_o the lobe of eq. 10 is ⟨r_ti, w⟩ = 2⟨u, n₁⟩⟨w, n₁⟩ − ⟨u, w⟩.
+    """
+    (xi, yi, zi), (xo, yo, zo) = ((v[..., 0:1], v[..., 1:2], v[..., 2:3]) for v in (i, o))
+    x, y, z = (normal[..., k : k + 1] for k in range(3))
+    down_i, down_o = cosine_inside(zi, n), cosine_inside(zo, n)
+    toward_i = (xi * x + yi * y) / n + down_i * z
+    toward_o = (xo * x + yo * y) / n + down_o * z
+    between = (xi * xo + yi * yo) / (n * n) + down_i * down_o
+    meets = (toward_i > 0) & (toward_o > 0)
+    return Paths(
+        i=zi,
+        o=zo,
+        half=cosine_to_half(i, o)[..., None],
+        inside_i=down_i,
+        inside_o=down_o,
+        mirror=cosine_to_mirror(i, o)[..., None],
+        lower=jnp.where(meets, 2 * toward_i * toward_o - between, 0.0),
+    )
+
+
+def normal_reflectance(n: Any) -> Any:
+    """f of eq. 8, squared, from air."""
+    return ((1 - n) / (1 + n)) ** 2
+
+
+def schlick(cosine: Any, n: Any) -> Any:
+    """F of eq. 7."""
+    f = normal_reflectance(n)
+    return f + (1 - f) * (1 - cosine) ** 5
+
+
+def _opening(c):
+    """1 − (1 − c)⁵, so that 1 − F = (1 − f) times it, without its cancellation at grazing."""
+    return c * (5 - c * (10 - c * (10 - c * (5 - c))))
+
+
+def published(p: Paths, n: Any) -> tuple[Any, Any]:
+    """F and (1 − F(i)) T(t_o) of eqs. 6 and 10, the latter over (1 − f)²."""
+    return schlick(p.i, n), _opening(p.i) * _opening(p.inside_o)
+
+
+def reciprocal(p: Paths, n: Any) -> tuple[Any, Any]:
+    """The same from factors that do not change when i and o are exchanged."""
+    return schlick(p.half, n), _opening(p.i) * _opening(p.o)
+
+
+def amplitudes(parameters: Parameters, i: Any, o: Any, fresnel: Callable = published) -> Amplitudes:
+    """√R, √T and Φ. The roots are products of roots: √(lobe^e) itself has no slope at the lobe's edge."""
+    n = parameters["n"]
+    p = paths(i, o, n, direction(parameters["deviation"], parameters["azimuth"]))
+    F, through = fresnel(p, n)
+    e0, e1 = column(parameters["exponent_reflection"]), column(parameters["exponent_transmission"])
+    per_wavelength = jnp.pi * n * column(parameters["thickness"]) / parameters["wavelengths"]
+    return Amplitudes(
+        reflected=sqrt(F) * power(p.mirror, 0.5 * e0),
+        transmitted=(1 - normal_reflectance(n)) * sqrt(through) * power(p.lower, 0.5 * e1),
+        phase=per_wavelength * (p.inside_i + p.inside_o),
+    )
+
+
+def interfering(a: Amplitudes) -> Any:
+    """R + T + 2 cos 2Φ √(RT), eq. 5, as (√R − √T)² + 4 √R √T cos² Φ: never negative."""
+    cosine = sincos_poly(a.phase)[1]
+    return (a.reflected - a.transmitted) ** 2 + 4 * a.reflected * a.transmitted * cosine * cosine
+
+
+def incoherent(a: Amplitudes) -> Any:
+    """R + T: the same surface without interference."""
+    return a.reflected * a.reflected + a.transmitted * a.transmitted
+
+
+def diffuse_reflectance(n: Any) -> Any:
+    """R_d of eq. 12: exactly the cosine-weighted average of Schlick's F over the hemisphere.
+
+    It is 1/21 at n = 1 and 0.0857 at n = 1.5, where Fresnel's own formula gives 0.0918.
+    """
+    return (21 * (n * n + 1) - 38 * n) / (21 * (1 + n) ** 2)
+
+
+def diffuse_transmittance(n: Any) -> Any:
+    """T_d = 1 − R_d of eq. 13."""
+    return 80 / 21 * n / (1 + n) ** 2
+
+
+def mean_cosine_inside(n: Any) -> Any:
+    """The mean of ⟨t_i, −n₀⟩ over the hemisphere, eq. 14, for n > 1; eq. 15 then takes 1 in its place.
+
+    It weights all solid angle alike, where eq. 12 weights by the cosine.
+    """
+    return 0.25 * (jnp.log((n + 1) / (n - 1)) * (n * n - 1) + 2 * n) / n
+
+
+def layered_diffuse(parameters: Parameters, join: Callable = interfering) -> Any:
+    """ρ_d of eqs. 11 and 16 per channel; 1 without interference."""
+    n = parameters["n"]
+    phase = 2 * jnp.pi * n * column(parameters["thickness"]) / parameters["wavelengths"]
+    return join(Amplitudes(sqrt(diffuse_reflectance(n)), sqrt(diffuse_transmittance(n)), phase))
+
+
+def specular(fresnel: Callable = published, join: Callable = interfering) -> Callable:
+    """The Phong-like model over a grey diffuse base: specular · (eq. 5) + diffuse."""
+
+    def evaluate(parameters, i, o):
+        lobes = join(amplitudes(parameters, i, o, fresnel))
+        return column(parameters["specular"]) * lobes + column(parameters["diffuse"])
+
+    return evaluate
+
+
+def diffuse(join: Callable = interfering) -> Callable:
+    """The diffuse model alone: diffuse · ρ_d, the same for all directions."""
+
+    def evaluate(parameters, i, o):
+        same = jnp.zeros_like(i[..., 2:3] * o[..., 2:3])
+        return column(parameters["diffuse"]) * layered_diffuse(parameters, join) + same
+
+    return evaluate
+
+
+def full(fresnel: Callable = published, join: Callable = interfering) -> Callable:
+    """Both: specular · (eq. 5) + diffuse · ρ_d (eq. 16), as in the paper's figures 3 and 5."""
+
+    def evaluate(parameters, i, o):
+        lobes = join(amplitudes(parameters, i, o, fresnel))
+        below = column(parameters["diffuse"]) * layered_diffuse(parameters, join)
+        return column(parameters["specular"]) * lobes + below
+
+    return evaluate

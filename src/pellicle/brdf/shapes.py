@@ -1,0 +1,17 @@
+"""How parameters and directions broadcast: a parameter is one number, or a map as large as the directions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, TypeAlias
+
+import jax.numpy as jnp
+
+Parameters: TypeAlias = Mapping[str, Any]
+"""Key → a number, or a map (...) that broadcasts with the directions. `n` and `k` of any medium,
+`wavelengths` and `weights` have a last axis of channels, or are one number for all of them."""
+
+
+def column(map_: Any) -> Any:
+    """A map (...) as (..., 1), to broadcast with channels; a number as it is."""
+    return map_ if jnp.ndim(map_) == 0 else jnp.asarray(map_)[..., None]
