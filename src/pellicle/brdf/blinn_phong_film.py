@@ -1,9 +1,10 @@
-"""A transparent film in a Blinn-Phong lobe ("Thin Film Interference for Computer Graphics", gamedev.net 2013).
+"""A transparent film in a Blinn-Phong lobe.
 
-The article sums the transmitted waves and takes 1 − T. Its α = ρ₁₀ρ₁₂ carries the signs of both
-reflections, and its Δ adds the same half turns again: where they do not cancel, the published shader
-has bright and dark exchanged (n = 1/1.5/2, 250 nm of film, 550 nm, normal: 0.0942 where Airy gives
-0.0239). The corrected film is that of `pellicle.optics.film`.
+"Thin Film Interference for Computer Graphics" (gamedev.net, 2013) sums the transmitted waves and
+takes 1 − T. Its α = ρ₁₀ρ₁₂ carries the signs of both reflections, and its Δ adds the same half turns
+again: where they do not cancel, the published shader has bright and dark exchanged (n = 1/1.5/2,
+250 nm of film, 550 nm, normal: 0.0942 where Airy gives 0.0239). The corrected film is that of
+`pellicle.optics.film`.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ def direction(theta: Any, phi: Any) -> Float[Array, "... 3"]:
     return jnp.stack([sine * jnp.cos(phi), sine * jnp.sin(phi), jnp.cos(theta)], axis=-1)
 
 
-def dot(a: Any, b: Any) -> Float[Array, "..."]:
+def dot(a: Any, b: Any) -> Any:
     """⟨a, b⟩ over the last axis."""
     return a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2]
 
@@ -88,5 +88,5 @@ def cosine_to_half(i: Any, o: Any) -> Float[Array, "..."]:
 
 
 def angle_to_half(i: Any, o: Any) -> Float[Array, "..."]:
-    """The angle (radians) between i and h. Its slope at i = o is returned as zero: use even functions of it."""
+    """The angle (radians) between i and h. Its slope at i = o is given as zero: use even functions."""
     return jnp.arctan2(length(i - o), length(i + o))

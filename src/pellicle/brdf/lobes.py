@@ -48,7 +48,8 @@ def ggx(h: Any, alpha: Any) -> Float[Array, "..."]:
     """
     square = alpha * alpha
     spread = square * h[..., 2] ** 2 + h[..., 0] ** 2 + h[..., 1] ** 2
-    return square / (jnp.pi * spread * spread)
+    some = spread > 0  # there is no half vector where i = −o
+    return jnp.where(some, square / (jnp.pi * jnp.where(some, spread, 1.0) ** 2), 0.0)
 
 
 def smith(i: Any, o: Any, alpha: Any) -> Float[Array, "..."]:
@@ -70,4 +71,3 @@ def smith(i: Any, o: Any, alpha: Any) -> Float[Array, "..."]:
 def microfacets(i: Any, o: Any, alpha: Any) -> Float[Array, "..."]:
     """D G₂/(4⟨i, n⟩⟨o, n⟩) in 1/sr: the BRDF of mirror-like GGX facets."""
     return ggx(half(i, o), alpha) * smith(i, o, alpha)
-

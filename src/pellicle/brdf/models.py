@@ -62,7 +62,7 @@ class Model(NamedTuple):
         """
         given = {"wavelengths": jnp.asarray(self.wavelengths, i.dtype), **parameters}
         above = (i[..., 2:3] >= 0) & (o[..., 2:3] >= 0)
-        return jnp.where(above, self.evaluate(given, i, o), 0.0)
+        return jnp.where(above, self.evaluate(given, i, o), jnp.zeros(3, i.dtype))
 
     def defaults(self) -> dict[str, Any]:
         """Each key's default value; a channel's numbers as an array."""
@@ -75,9 +75,7 @@ _SPECULAR = Parameter("specular", "", 0.0, 100.0, 1.0, "weight of the layered lo
 _GREY = Parameter("diffuse", "1/sr", 0.0, 2.0, 0.1, "grey diffuse BRDF", linear=True)
 _LAYERED = Parameter("diffuse", "1/sr", 0.0, 2.0, 0.1, "weight of the layered diffuse BRDF", linear=True)
 _THICKNESS = Parameter("thickness", "nm", 0.0, 1000.0, 300.0, "thickness of the layer")
-_INDEX = Parameter(
-    "n", "", 1.05, 2.5, (1.5, 1.5, 1.5), "index of the layer for R, G and B", per_channel=True
-)
+_INDEX = Parameter("n", "", 1.05, 2.5, (1.5, 1.5, 1.5), "index of the layer for R, G and B", per_channel=True)
 _LOBES = (
     Parameter("exponent_reflection", "", 1.0, 1000.0, 90.0, "Phong exponent of the upper boundary", log=True),
     Parameter(

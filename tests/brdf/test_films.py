@@ -1,0 +1,169 @@
+"""Microfacets and Blinn-Phong under a film, against tmm and quadrature; the models by name."""
+
+from __future__ import annotations
+
+import colorsys
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+import tmm
+
+from pellicle.brdf import blinn_phong_film, film_colour, lobes
+from pellicle.brdf.albedo import directional_albedo
+from pellicle.brdf.directions import cosine_to_half, direction
+from pellicle.brdf.models import MODELS, RGB, model
+from pellicle.brdf.presets import PRESETS
+
+RNG = np.random.default_rng(2)
+N = 60
+I = direction(RNG.uniform(0, 88, N), RNG.uniform(-180, 180, N))
+O = direction(RNG.uniform(0, 88, N), RNG.uniform(-180, 180, N))
+STEEL = PRESETS["tempered steel"][1]
+SENSOR = {"wavelengths": np.array(RGB)}
+FACETS = jax.jit(lambda s, i, o: model("microfacet-film")(s, i, o))
+exact, chebyshev = jax.jit(film_colour.exact), jax.jit(film_colour.chebyshev)
+
+
+def test_film_colour_is_tmm_at_the_facet():
+    found = exact({**STEEL, **SENSOR, "k": 0.1}, I, O)
+    for row in range(0, N, 10):
+        angle = np.arccos(float(cosine_to_half(I[row], O[row])))
+        for channel, wavelength in enumerate(RGB):
+            media = [1, 2.9 + 0.1j, 2.7 + 2.8j], [np.inf, 40.0, np.inf]
+            expected = tmm.unpolarized_RT(*media, angle, wavelength)["R"]
+            assert float(found[row, channel]) == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize(("thickest", "error"), [(500, 3e-4), (1500, 1e-2)])
+def test_nodes_follow_the_exact_film(thickest, error):
+    for _ in range(60):
+        film = {
+            "thickness": RNG.uniform(0, thickest),
+            "n": RNG.uniform(1.1, 3),
+            "k": RNG.choice([0.0, RNG.uniform(0, 1)]),
+            "base_n": RNG.uniform(1.05, 4),
+            "base_k": RNG.uniform(0, 6),
+            **SENSOR,
+        }
+        np.testing.assert_allclose(chebyshev(film, I, O), exact(film, I, O), atol=error)
+
+
+def test_tempered_steel_turns_straw_then_purple_then_blue():
+    up = direction(0.0, 0.0)
+
+    def hue(thickness):
+        return (
+            360
+            * colorsys.rgb_to_hls(*map(float, exact({**STEEL, **SENSOR, "thickness": thickness}, up, up)))[0]
+        )
+
+    straw, purple, blue = hue(15.0), hue(28.0), hue(40.0)
+    assert 20 < straw < 60
+    assert 260 < purple < 345
+    assert 190 < blue < 250
+
+
+def test_weights_integrate_a_sensor():
+    """Two wavelengths of equal weight are the mean of their reflectances."""
+    nodes = {"wavelengths": np.array([500.0, 600.0])}
+    apart = exact({**STEEL, **nodes}, I, O)
+    together = exact({**STEEL, **nodes, "weights": np.full((2, 3), 0.5)}, I, O)
+    np.testing.assert_allclose(together, np.repeat(apart.mean(-1)[:, None], 3, 1), rtol=1e-12)
+
+
+def test_microfacets_compose_lobe_and_colour():
+    s = {**STEEL, "specular": 2.0, "diffuse": 0.3}
+    expected = 2 * lobes.microfacets(I, O, 0.2)[:, None] * exact({**s, **SENSOR}, I, O) + 0.3
+    np.testing.assert_allclose(FACETS(s, I, O), expected, rtol=1e-6)
+
+
+def test_a_thickness_map():
+    thickness = np.linspace(10, 70, N)
+    found = FACETS({**STEEL, "thickness": thickness}, I, O)
+    one = model("microfacet-film-exact")({**STEEL, "thickness": float(thickness[7])}, I[7], O[7])
+    np.testing.assert_allclose(found[7], one, rtol=1e-10)
+
+
+def test_microfacets_return_at_most_what_the_film_reflects():
+    """A film that reflects everything (a perfect metal below) loses only what bounces between facets."""
+    mirror = {**STEEL, "base_n": 0.001, "base_k": 50.0, "roughness": 0.05}
+    albedo = np.asarray(jax.jit(lambda s: directional_albedo(FACETS, s, 30.0, rings=128, spokes=256))(mirror))
+    assert np.all((albedo > 0.985) & (albedo < 1.001))
+
+
+SHADER = {"ambient_n": 1.0, "n": 1.5, "base_n": 2.0, "thickness": 250.0, "wavelengths": np.array([550.0])}
+
+
+def test_the_shader_counts_its_phase_twice():
+    """FINDINGS.md: 0.0942 as published, 0.0239 by tmm."""
+    up = jnp.array(0.0)
+    assert float(blinn_phong_film.published(SHADER, up)[0]) == pytest.approx(0.0942, abs=5e-5)
+    truth = tmm.unpolarized_RT([1, 1.5, 2], [np.inf, 250, np.inf], 0, 550)["R"]
+    assert truth == pytest.approx(0.0239, abs=5e-5)
+    assert float(blinn_phong_film.corrected(SHADER, up)[0]) == pytest.approx(truth, rel=1e-12)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.9])
+def test_phase_average_is_the_mean_over_a_period(angle):
+    cosine = np.sqrt(1 - np.sin(angle) ** 2 / 1.5**2)
+    heights = np.arange(200) / 200 * 550 / (2 * 1.5 * cosine)
+    angles = jnp.full(200, angle)
+    mean = blinn_phong_film.corrected({**SHADER, "thickness": heights}, angles).mean()
+    found = blinn_phong_film.phase_average(SHADER, jnp.array(angle))
+    assert float(found[0]) == pytest.approx(float(mean), rel=1e-12)
+
+
+def test_total_reflection_is_total():
+    glass = {**SHADER, "ambient_n": 1.5, "n": 1.3, "base_n": 1.0}
+    for reflectance in (
+        blinn_phong_film.corrected,
+        blinn_phong_film.published,
+        blinn_phong_film.phase_average,
+    ):
+        assert float(reflectance(glass, jnp.array(1.2))[0]) == pytest.approx(1, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_every_model_has_the_same_shape(name):
+    """Finite value and slope in every parameter at defaults; nothing below the horizon; float32 stays."""
+    m = model(name)
+    i, o = (
+        direction(np.array([0.0, 30.0, 90.0, 100.0]), 0.0),
+        direction(np.array([0.0, 30.0, 90.0, 10.0]), 180.0),
+    )
+    value, slope = jax.jit(lambda p: (m(p, i, o), jax.jacfwd(lambda p: m(p, i, o))(p)))(m.defaults())
+    assert value.shape == (4, 3)
+    assert np.all(value[3] == 0)
+    assert np.all(value[:3] >= 0)
+    assert set(slope) == {p.key for p in m.parameters}
+    assert all(np.all(np.isfinite(x)) for x in jax.tree.leaves(slope))
+    for p in m.parameters:
+        assert p.lower <= np.min(p.value) <= np.max(p.value) <= p.upper
+    narrow = {key: np.asarray(x, np.float32) for key, x in m.defaults().items()}
+    assert jax.eval_shape(m, narrow, i.astype(np.float32), o.astype(np.float32)).dtype == np.float32
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_presets_are_complete(name):
+    which, parameters = PRESETS[name]
+    assert set(parameters) == {p.key for p in model(which).parameters}
+
+
+def test_a_wrong_name_says_the_nearest():
+    with pytest.raises(ValueError, match="did you mean 'microfacet-film'"):
+        model("microfacet-fil")
+
+
+def test_slopes_of_the_film_are_finite_differences():
+    m = FACETS
+    s = {**STEEL, "diffuse": 0.1, "k": 0.05}
+    slope = jax.jacfwd(lambda free: m({**s, **free}, I, O))(
+        {key: s[key] for key in ("thickness", "roughness", "n")}
+    )
+    for key, found in slope.items():
+        step = 1e-5 * s[key]
+        up, down = (m({**s, key: s[key] + sign * step}, I, O) for sign in (1, -1))
+        expected = (up - down) / (2 * step)
+        np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-7 * float(jnp.max(jnp.abs(expected))))

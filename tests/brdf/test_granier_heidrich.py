@@ -1,0 +1,158 @@
+"""The layered model of 2002 against its own vectors, mpmath, quadrature, and the facts known of it."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+import mpmath
+import numpy as np
+import pytest
+
+from pellicle.brdf import granier_heidrich as gh
+from pellicle.brdf.albedo import directional_albedo, greatest_albedo
+from pellicle.brdf.directions import direction, reflect, refract
+from pellicle.brdf.models import model
+
+RNG = np.random.default_rng(5)
+N = 40
+I = direction(RNG.uniform(0, 85, N), RNG.uniform(-180, 180, N))
+O = direction(RNG.uniform(0, 85, N), RNG.uniform(-180, 180, N))
+WAVELENGTHS = np.array([645.0, 525.0, 445.0])
+SURFACE = {
+    "thickness": 71.0,
+    "n": np.array([1.4, 1.45, 1.6]),
+    "exponent_reflection": 3.0,
+    "exponent_transmission": 5.0,
+    "deviation": 10.0,
+    "azimuth": 25.0,
+    "specular": 1.3,
+    "diffuse": 0.2,
+}
+
+
+def jitted(name):
+    return jax.jit(lambda s, i, o: model(name)(s, i, o))
+
+
+PUBLISHED, RECIPROCAL = jitted("granier-heidrich"), jitted("granier-heidrich-reciprocal")
+
+
+def by_hand(s, i, o, index, wavelength):
+    """Eqs. 3 and 5 to 10 with vectors, one channel of one pair of directions."""
+    n0, n1 = np.array([0, 0, 1.0]), direction(s["deviation"], s["azimuth"])
+    down_i, down_o = (np.asarray(refract(v, n0, index)) for v in (i, o))
+    f = ((1 - index) / (1 + index)) ** 2
+    F = f + (1 - f) * (1 - i @ n0) ** 5
+    T_o = (1 - f) * (1 - (1 + down_o @ n0) ** 5)
+    bounced = down_i - 2 * (down_i @ n1) * n1
+    lobe = bounced @ -down_o
+    null = down_i @ n1 >= 0 or down_o @ n1 >= 0 or lobe <= 0
+    R = F * max(float(reflect(i, n0) @ o), 0) ** s["exponent_reflection"]
+    T = 0 if null else (1 - F) * T_o * lobe ** s["exponent_transmission"]
+    phase = np.pi * index * s["thickness"] / wavelength * ((down_i + down_o) @ -n0)
+    return s["specular"] * (R + T + 2 * np.cos(2 * phase) * np.sqrt(R * T)) + s["diffuse"]
+
+
+def test_it_is_the_paper_by_vectors():
+    found = np.asarray(PUBLISHED(SURFACE, I, O))
+    i, o = np.asarray(I), np.asarray(O)
+    for row in range(N):
+        for channel in range(3):
+            expected = by_hand(SURFACE, i[row], o[row], SURFACE["n"][channel], WAVELENGTHS[channel])
+            assert found[row, channel] == pytest.approx(expected, rel=1e-11)
+
+
+def test_only_the_variant_is_reciprocal():
+    there, back = RECIPROCAL(SURFACE, I, O), RECIPROCAL(SURFACE, O, I)
+    np.testing.assert_allclose(there, back, rtol=1e-12)
+    there, back = PUBLISHED(SURFACE, I, O), PUBLISHED(SURFACE, O, I)
+    assert float(jnp.max(jnp.abs(there - back) / jnp.maximum(there, back))) > 0.1
+
+
+@pytest.mark.parametrize("n", [1.0, 1.5, 2.2])
+def test_diffuse_reflectance_is_the_average_of_schlick(n):
+    f = ((1 - n) / (1 + n)) ** 2
+    average = mpmath.quad(lambda c: 2 * c * (f + (1 - f) * (1 - c) ** 5), [0, 1])
+    assert float(gh.diffuse_reflectance(n)) == pytest.approx(float(average), rel=1e-14)
+    assert float(gh.diffuse_reflectance(n) + gh.diffuse_transmittance(n)) == pytest.approx(1, rel=1e-14)
+
+
+def test_mean_cosine_weighs_all_solid_angle_alike():
+    mean = mpmath.quad(lambda c: mpmath.sqrt(1 - (1 - c * c) / 2.25), [0, 1])
+    assert float(gh.mean_cosine_inside(1.5)) == pytest.approx(float(mean), rel=1e-13)
+
+
+def test_diffuse_part_is_eq_16():
+    n, T = SURFACE["n"], 80 / 21 * SURFACE["n"] / (1 + SURFACE["n"]) ** 2
+    expected = 1 + 2 * np.cos(4 * np.pi * n * 71.0 / WAVELENGTHS) * np.sqrt(T * (1 - T))
+    found = model("granier-heidrich-diffuse")({"thickness": 71.0, "n": n, "diffuse": 0.7}, I, O)
+    np.testing.assert_allclose(found, np.broadcast_to(0.7 * expected, (N, 3)), rtol=1e-12)
+    bare = PUBLISHED({**SURFACE, "diffuse": 0.0}, I, O)
+    full = model("granier-heidrich-full")({**SURFACE, "diffuse": 0.7}, I, O)
+    np.testing.assert_allclose(full, bare + found, rtol=1e-12)
+
+
+def test_without_interference_it_is_the_mean_over_thickness():
+    """cos 2Φ averages to zero over whole periods of one direction and channel."""
+    i, o, n = I[0], I[0] * jnp.array([-1.0, -1.0, 1.0]), 1.5
+    inside = np.sqrt(1 - (1 - float(i[2]) ** 2) / n**2)
+    heights = np.arange(64) / 64 * 525.0 / (2 * n * inside)
+    s = {**SURFACE, "n": n}
+    waves = PUBLISHED({**s, "thickness": heights}, i[None], o[None])[:, 1].mean()
+    assert float(waves) == pytest.approx(float(model("granier-heidrich-incoherent")(s, i, o)[1]), rel=1e-12)
+
+
+def test_energy_exceeds_one_as_published():
+    """The peak is (√F + 1 − F)² = 1.346 for F = 0.04; with exponents of 1 the albedo is far above 1."""
+    up = direction(0.0, 0.0)
+    s = {**SURFACE, "n": 1.5, "thickness": 0.0, "deviation": 0.0, "specular": 1.0, "diffuse": 0.0}
+    np.testing.assert_allclose(PUBLISHED(s, up, up), (0.2 + 0.96) ** 2, rtol=1e-12)
+    broad = {**s, "exponent_reflection": 1.0, "exponent_transmission": 1.0}
+    assert greatest_albedo(PUBLISHED, broad) > 2
+
+
+def test_albedo_of_known_surfaces():
+    def grey(p, i, o):
+        return p["rho"] / jnp.pi + 0 * o
+
+    assert np.asarray(directional_albedo(grey, {"rho": 0.6}, 50.0)) == pytest.approx(0.6, rel=1e-6)
+
+    def mirror(p, i, o):  # normal incidence: ∫ cos^20 cos dω = 2π/22
+        return o[..., 2:3] ** 20 + 0 * o
+
+    assert np.asarray(directional_albedo(mirror, {}, 0.0)) == pytest.approx(2 * np.pi / 22, rel=1e-6)
+
+
+KEYS = ("thickness", "exponent_reflection", "exponent_transmission", "deviation", "azimuth", "n")
+
+
+@jax.jit
+def slopes(s, i, o):
+    return jax.jacfwd(lambda free: PUBLISHED({**s, **free}, i, o))({key: s[key] for key in KEYS})
+
+
+def test_slopes_are_finite_differences():
+    found = slopes(SURFACE, I, O)
+    for key in KEYS:
+        step = 1e-5 * np.max(SURFACE[key])
+        if key == "n":
+            moved = [PUBLISHED({**SURFACE, "n": SURFACE["n"] + sign * step}, I, O) for sign in (1, -1)]
+            slope = jnp.einsum("nck->nc", found[key])
+        else:
+            moved = [PUBLISHED({**SURFACE, key: SURFACE[key] + sign * step}, I, O) for sign in (1, -1)]
+            slope = found[key]
+        expected = (moved[0] - moved[1]) / (2 * step)
+        scale = float(jnp.max(jnp.abs(expected)))
+        np.testing.assert_allclose(slope, expected, rtol=1e-5, atol=1e-7 * scale)
+
+
+def test_value_and_slopes_are_finite_at_the_edges():
+    """Parallel boundaries, exponents at their bound, grazing and normal light, no layer, no contrast."""
+    edge = direction(np.array([0.0, 90.0, 88.0, 45.0, 45.0]), np.array([0.0, 0.0, 10.0, 0.0, 0.0]))
+    other = direction(np.array([0.0, 90.0, 88.0, 45.0, 90.0]), np.array([0.0, 180.0, 10.0, 0.0, 90.0]))
+    for n in (1.0, 1.05, 1.41, 2.5):
+        for exponent in (1.0, 1000.0):
+            s = {**SURFACE, "n": n * np.ones(3), "deviation": 0.0, "thickness": 0.0}
+            s |= {"exponent_reflection": exponent, "exponent_transmission": exponent}
+            assert np.all(np.asarray(PUBLISHED(s, edge, other)) >= 0)
+            assert all(np.all(np.isfinite(x)) for x in jax.tree.leaves(slopes(s, edge, other)))
