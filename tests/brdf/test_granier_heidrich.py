@@ -55,7 +55,7 @@ def by_hand(s, i, o, index, wavelength):
 
 def test_it_is_the_paper_by_vectors():
     found = np.asarray(PUBLISHED(SURFACE, I, O))
-    i, o = np.asarray(I), np.asarray(O)
+    i, o = I, O
     for row in range(N):
         for channel in range(3):
             expected = by_hand(SURFACE, i[row], o[row], SURFACE["n"][channel], WAVELENGTHS[channel])
