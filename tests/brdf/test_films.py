@@ -142,7 +142,8 @@ def test_every_model_has_the_same_shape(name):
     for p in m.parameters:
         assert p.lower <= np.min(p.value) <= np.max(p.value) <= p.upper
     narrow = {key: np.asarray(x, np.float32) for key, x in m.defaults().items()}
-    assert jax.eval_shape(m, narrow, i.astype(np.float32), o.astype(np.float32)).dtype == np.float32
+    directions = (v.astype(np.float32) for v in (i, o))
+    assert jax.eval_shape(lambda *a: m(*a), narrow, *directions).dtype == np.float32
 
 
 @pytest.mark.parametrize("name", PRESETS)
