@@ -21,10 +21,12 @@ import numpy as np
 from jax.flatten_util import ravel_pytree
 
 from pellicle.brdf.directions import direction
-from pellicle.brdf.models import MODELS
+from pellicle.brdf.models import model as named
 
 jax.config.update("jax_enable_x64", True)
 
+THICKEST = 500.0
+"""Films may be so thick (nm): what the nodes of their colour are counted for."""
 MEASURED = ("granier-heidrich", "granier-heidrich-reciprocal", "microfacet-film", "microfacet-film-exact")
 
 
@@ -33,7 +35,7 @@ def programs(name: str, dtype: type, samples: int) -> dict[str, tuple]:
     rng = np.random.default_rng(0)
     theta, phi = rng.uniform(0, 85, (2, samples)), rng.uniform(0, 360, (2, samples))
     i, o = (direction(t, p).astype(dtype) for t, p in zip(theta, phi, strict=True))
-    model = MODELS[name]
+    model = named(name).up_to(THICKEST)
     values = {key: jnp.asarray(value, dtype) for key, value in model.defaults().items()}
     x, unravel = ravel_pytree(values)
     forward = jax.jit(lambda x, i, o: model(unravel(x), i, o))

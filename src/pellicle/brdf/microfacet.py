@@ -12,7 +12,7 @@ from pellicle.brdf import film_colour, lobes
 from pellicle.brdf.shapes import column
 
 
-def microfacet(colour: Callable = film_colour.chebyshev) -> Callable:
+def microfacet(colour: Callable = film_colour.exact) -> Callable:
     """specular · D G₂ R(⟨i, h⟩)/(4 cos θ_i cos θ_o) + diffuse, with R the film's RGB reflectance."""
 
     def evaluate(parameters, i, o):

@@ -51,6 +51,11 @@ class Model(NamedTuple):
     parameters: tuple[Parameter, ...]
     evaluate: Callable[[Parameters, Any, Any], Any]
     wavelengths: tuple[float, ...] = RGB
+    planned: Callable[[float], Callable] | None = None  # `evaluate` for films no thicker than so many nm
+
+    def up_to(self, thickest: float) -> Model:
+        """The same model for layers of at most `thickest` nm, and as quick as that allows."""
+        return self if self.planned is None else self._replace(evaluate=self.planned(thickest))
 
     def __call__(self, parameters: Parameters, i: Any, o: Any) -> Float[Array, "... 3"]:
         """The BRDF for light from `i` to `o`, unit vectors (..., 3) with the normal as third axis.
@@ -110,6 +115,10 @@ def _granier_heidrich(name: str, description: str, *options: Callable) -> Model:
     return Model(name, description, keys, granier_heidrich.specular(*options))
 
 
+def _polynomial(thickest: float) -> Callable:
+    return microfacet(film_colour.chebyshev(thickest))
+
+
 def _shader(name: str, description: str, *reflectance: Callable) -> Model:
     return Model(name, description, _SHADER, blinn_phong_film(*reflectance), PUBLISHED_WAVELENGTHS)
 
@@ -139,12 +148,18 @@ _ALL = (
         (_THICKNESS, _INDEX, *_LOBES, _SPECULAR, _LAYERED),
         granier_heidrich.full(),
     ),
-    Model("microfacet-film", "GGX microfacets under a film that may absorb", _FACETS, microfacet()),
+    Model(
+        "microfacet-film",
+        "GGX microfacets under a film that may absorb",
+        _FACETS,
+        _polynomial(_FACETS[0].upper),
+        planned=_polynomial,
+    ),
     Model(
         "microfacet-film-exact",
         "the same with the film computed for every sample",
         _FACETS,
-        microfacet(film_colour.exact),
+        microfacet(),
     ),
     _shader("blinn-phong-film", "a transparent film in a Blinn-Phong lobe"),
     _shader("blinn-phong-film-published", "the same with the shader's phase counted twice", published),
