@@ -20,34 +20,37 @@ import jax.numpy as jnp
 import numpy as np
 from jax.flatten_util import ravel_pytree
 
-from pellicle.brdf.directions import direction
-from pellicle.brdf.models import model as named
+from pellicle.brdf import direction, model
+from pellicle.brdf.models import Model
 
 jax.config.update("jax_enable_x64", True)
 
-THICKEST = 500.0
-"""Films may be so thick (nm): what the nodes of their colour are counted for."""
-MEASURED = ("granier-heidrich", "granier-heidrich-reciprocal", "microfacet-film", "microfacet-film-exact")
+MEASURED = {
+    "granier-heidrich": model("granier-heidrich"),
+    "granier-heidrich-reciprocal": model("granier-heidrich-reciprocal"),
+    "microfacet-film": model("microfacet-film"),
+    "microfacet-film up to 500 nm": model("microfacet-film").up_to(500.0),
+    "microfacet-film up to 100 nm": model("microfacet-film").up_to(100.0),
+}
 
 
-def programs(name: str, dtype: type, samples: int) -> dict[str, tuple]:
+def programs(brdf: Model, dtype: type, samples: int) -> dict[str, tuple]:
     """Compiled forward and Jacobian with their arguments."""
     rng = np.random.default_rng(0)
     theta, phi = rng.uniform(0, 85, (2, samples)), rng.uniform(0, 360, (2, samples))
     i, o = (direction(t, p).astype(dtype) for t, p in zip(theta, phi, strict=True))
-    model = named(name).up_to(THICKEST)
-    values = {key: jnp.asarray(value, dtype) for key, value in model.defaults().items()}
+    values = {key: jnp.asarray(value, dtype) for key, value in brdf.defaults().items()}
     x, unravel = ravel_pytree(values)
-    forward = jax.jit(lambda x, i, o: model(unravel(x), i, o))
+    forward = jax.jit(lambda x, i, o: brdf(unravel(x), i, o))
     return {"forward": (forward, (x, i, o)), "Jacobian": (jax.jit(jax.jacfwd(forward)), (x, i, o))}
 
 
 def main(rounds: int, samples: int) -> None:
     runs = {
         (name, dtype.__name__, kind): run
-        for name in MEASURED
+        for name, brdf in MEASURED.items()
         for dtype in (np.float32, np.float64)
-        for kind, run in programs(name, dtype, samples).items()
+        for kind, run in programs(brdf, dtype, samples).items()
     }
     for function, arguments in runs.values():
         function(*arguments).block_until_ready()

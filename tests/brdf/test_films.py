@@ -91,7 +91,7 @@ def test_microfacets_compose_lobe_and_colour():
 def test_a_thickness_map():
     thickness = np.linspace(10, 70, N)
     found = FACETS({**STEEL, "thickness": thickness}, I, O)
-    one = model("microfacet-film-exact")({**STEEL, "thickness": float(thickness[7])}, I[7], O[7])
+    one = model("microfacet-film")({**STEEL, "thickness": float(thickness[7])}, I[7], O[7])
     np.testing.assert_allclose(found[7], one, rtol=1e-10)
 
 
@@ -122,6 +122,22 @@ def test_phase_average_is_the_mean_over_a_period(angle):
     mean = blinn_phong_film.corrected({**SHADER, "thickness": heights}, angles).mean()
     found = blinn_phong_film.phase_average(SHADER, jnp.array(angle))
     assert float(found[0]) == pytest.approx(float(mean), rel=1e-12)
+
+
+def test_a_film_without_interference_is_the_mean_over_its_phase():
+    period = 550 / 2 / np.sqrt(2.2**2 - np.sin(0.6) ** 2)
+    film = {**STEEL, "n": 2.2, "wavelengths": np.array([550.0])}
+    heights = np.arange(64) / 64 * period
+    waves = film_colour.reflectance({**film, "thickness": heights}, jnp.full(64, 0.6)).mean()
+    flat = film_colour.without_interference(film, jnp.array(0.6))
+    assert float(flat[0]) == pytest.approx(float(waves), rel=1e-12)
+
+
+def test_light_that_never_returns_has_met_one_face():
+    deep = {**STEEL, "n": 2.2, "k": 0.2, "thickness": 1e5, "wavelengths": np.array([550.0])}
+    truth = tmm.unpolarized_RT([1, 2.2 + 0.2j, 1], [np.inf, 1e5, np.inf], 0.6, 550)["R"]
+    found = film_colour.without_interference(deep, jnp.array(0.6))
+    assert float(found[0]) == pytest.approx(truth, rel=1e-9)
 
 
 def test_total_reflection_is_total():
@@ -167,7 +183,7 @@ def test_a_wrong_name_says_the_nearest():
 
 
 def test_slopes_of_the_film_are_finite_differences():
-    m = jax.jit(lambda s, i, o: model("microfacet-film-exact")(s, i, o))
+    m = FACETS
     s = {**STEEL, "diffuse": 0.1, "k": 0.05}
     slope = jax.jit(jax.jacfwd(lambda free: m({**s, **free}, I, O)))(
         {key: s[key] for key in ("thickness", "roughness", "n")}

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from pellicle.brdf import granier_heidrich as gh
-from pellicle.brdf.albedo import directional_albedo, greatest_albedo
+from pellicle.brdf.albedo import directional_albedo, energy_warning, greatest_albedo
 from pellicle.brdf.directions import direction
 from pellicle.brdf.models import model
+from pellicle.brdf.presets import PRESETS
 
 RNG = np.random.default_rng(5)
 N = 40
@@ -110,7 +111,8 @@ def test_without_interference_it_is_the_mean_over_thickness():
     heights = np.arange(64) / 64 * 525.0 / (2 * n * inside)
     s = {**SURFACE, "n": n}
     waves = PUBLISHED({**s, "thickness": heights}, i[None], o[None])[:, 1].mean()
-    assert float(waves) == pytest.approx(float(model("granier-heidrich-incoherent")(s, i, o)[1]), rel=1e-12)
+    flat = model("granier-heidrich").without_interference()(s, i, o)
+    assert float(waves) == pytest.approx(float(flat[1]), rel=1e-12)
 
 
 def test_energy_exceeds_one_as_published():
@@ -120,6 +122,23 @@ def test_energy_exceeds_one_as_published():
     np.testing.assert_allclose(PUBLISHED(s, up, up), (0.2 + 0.96) ** 2, rtol=1e-12)
     broad = {**s, "exponent_reflection": 1.0, "exponent_transmission": 1.0}
     assert greatest_albedo(PUBLISHED, broad) > 2
+
+
+def test_a_surface_that_creates_energy_is_told_with_the_number():
+    """Figure 3 is drawn with weights 1 and 0.7. Light at the normal, summed by hand over the hemisphere."""
+    name, figure = PRESETS["granier-heidrich figure 3, parallel"]
+    node, weight = np.polynomial.legendre.leggauss(200)
+    theta = 45 * (node + 1)
+    ring = weight * np.pi / 4 * 2 * np.pi * np.cos(np.deg2rad(theta)) * np.sin(np.deg2rad(theta))
+    lobes = {**figure, "diffuse": 0.0}
+    red = [by_hand(lobes, unit(0, 0), unit(each, 0), 1.4, 645.0) for each in theta] @ ring
+    T = 80 / 21 * 1.4 / 2.4**2
+    red += np.pi * 0.7 * (1 + 2 * np.cos(4 * np.pi * 1.4 * 71 / 645) * np.sqrt(T * (1 - T)))
+    assert float(directional_albedo(model(name), figure, 0.0)[0]) == pytest.approx(red, rel=1e-6)
+    told = energy_warning(model(name), figure)
+    assert told is not None
+    assert float(told.split("up to ")[1].split()[0]) >= round(red, 2) > 1
+    assert energy_warning(PUBLISHED, SURFACE | {"specular": 0.01, "diffuse": 0.1}) is None
 
 
 def test_albedo_of_known_surfaces():

@@ -37,3 +37,13 @@ def greatest_albedo(brdf: Callable, parameters: Parameters) -> float:
     """The greatest directional albedo over `ANGLES` and channels; above 1 says that energy is created."""
     at = jax.jit(jax.vmap(lambda theta: directional_albedo(brdf, parameters, theta)))
     return float(jnp.max(at(jnp.asarray(ANGLES))))
+
+
+def energy_warning(brdf: Callable, parameters: Parameters) -> str | None:
+    """A sentence with the number where the BRDF sends back more light than it gets, else None."""
+    most = greatest_albedo(brdf, parameters)
+    if most <= 1.005:  # the quadrature's own error, for lobes wider than a degree
+        return None
+    return (
+        f"the BRDF creates energy: it sends back up to {most:.2f} times its light; its weights are no albedos"
+    )

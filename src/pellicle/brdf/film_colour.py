@@ -15,7 +15,7 @@ import numpy as np
 
 from pellicle.brdf.directions import angle_to_half, cosine_to_half
 from pellicle.brdf.shapes import Parameters, column
-from pellicle.optics import film
+from pellicle.optics import film, orders
 from pellicle.optics.interface import allow_tunnelling
 from pellicle.optics.number import Number, Pair, sincos_poly
 
@@ -38,21 +38,32 @@ def index(n: Any, k: Any) -> Number:
     return n if k is None else Pair(n, k)
 
 
+def _lit(parameters: Parameters, angle: Any) -> tuple[Any, Any, Any, Any, Any]:
+    """Ambient, film, base, 2πd/λ and angle, (..., wavelengths)."""
+    return (
+        parameters.get("ambient_n", 1.0),
+        index(parameters["n"], parameters.get("k")),
+        allow_tunnelling(index(parameters["base_n"], parameters.get("base_k"))),
+        2 * jnp.pi / parameters["wavelengths"] * column(parameters["thickness"]),
+        angle[..., None],
+    )
+
+
 def reflectance(parameters: Parameters, angle: Any) -> Any:
     """Unpolarised Airy reflectance (..., wavelengths) at angles (...) in radians, in air.
 
     Reads `thickness` (nm), `n`, `k`, `base_n`, `base_k`, `wavelengths` (nm), and `ambient_n` where
     the ambient is not air.
     """
-    s, p = film.film(
-        parameters.get("ambient_n", 1.0),
-        index(parameters["n"], parameters.get("k")),
-        allow_tunnelling(index(parameters["base_n"], parameters.get("base_k"))),
-        2 * jnp.pi / parameters["wavelengths"] * column(parameters["thickness"]),
-        angle[..., None],
-        sincos=sincos_poly,
-    )
+    s, p = film.film(*_lit(parameters, angle), sincos=sincos_poly)
     return 0.5 * (film.reflectance(s) + film.reflectance(p))
+
+
+def without_interference(parameters: Parameters, angle: Any) -> Any:
+    """The same averaged over the film's phase: order 0 of its Fourier series."""
+    lit = _lit(parameters, angle)
+    s, p = (orders.reflectance(orders.bounces(*lit, letter), lambda _: 1.0, count=0) for letter in "sp")
+    return 0.5 * (s + p)
 
 
 def rgb(parameters: Parameters, spectrum: Any) -> Any:
@@ -64,6 +75,11 @@ def rgb(parameters: Parameters, spectrum: Any) -> Any:
 def exact(parameters: Parameters, i: Any, o: Any) -> Any:
     """The film's RGB reflectance for light from i to o, computed for each sample."""
     return rgb(parameters, reflectance(parameters, angle_to_half(i, o)))
+
+
+def incoherent(parameters: Parameters, i: Any, o: Any) -> Any:
+    """The same without interference."""
+    return rgb(parameters, without_interference(parameters, angle_to_half(i, o)))
 
 
 def coefficients(parameters: Parameters, dtype: Any, count: int) -> Any:
@@ -88,7 +104,7 @@ def chebyshev(thickest: float) -> Callable[[Parameters, Any, Any], Any]:
         cosine = cosine_to_half(i, o)
         series = coefficients(parameters, cosine.dtype, count)
         # one channel after the other: a last axis of three would keep the processor's lanes empty
-        return jnp.stack([_clenshaw(series[:, channel], 4 * cosine - 2) for channel in range(3)], axis=-1)
+        return jnp.stack([_clenshaw(channel, 4 * cosine - 2) for channel in series.T], axis=-1)
 
     return colour
 

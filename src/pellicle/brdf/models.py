@@ -15,13 +15,12 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from pellicle.brdf import film_colour, granier_heidrich
-from pellicle.brdf.blinn_phong_film import PUBLISHED_WAVELENGTHS, blinn_phong_film, phase_average, published
+from pellicle.brdf import blinn_phong_film, film_colour, granier_heidrich
 from pellicle.brdf.microfacet import microfacet
 from pellicle.brdf.shapes import Parameters
 
@@ -43,37 +42,45 @@ class Parameter(NamedTuple):
     linear: bool = False  # a weight: the BRDF is linear in it
 
 
+Evaluate: TypeAlias = Callable[[Parameters, Any, Any], Any]
+"""(parameters, i, o) → (..., channels), whatever the side of the horizon."""
+
+
 class Model(NamedTuple):
     """A BRDF by name. Called with parameters and directions it gives (..., 3), RGB, in 1/sr."""
 
     name: str
     description: str
     parameters: tuple[Parameter, ...]
-    evaluate: Callable[[Parameters, Any, Any], Any]
+    evaluate: Evaluate
+    incoherent: Evaluate  # without interference: what a layer must beat
     wavelengths: tuple[float, ...] = RGB
-    planned: Callable[[float], Callable] | None = None  # `evaluate` for films no thicker than so many nm
+    planned: Callable[[float], Evaluate] | None = None  # `evaluate` for films no thicker than so many nm
 
     def up_to(self, thickest: float) -> Model:
         """The same model for layers of at most `thickest` nm, and as quick as that allows."""
         return self if self.planned is None else self._replace(evaluate=self.planned(thickest))
 
-    def __call__(self, parameters: Parameters, i: Any, o: Any) -> Float[Array, "... 3"]:
+    def without_interference(self) -> Model:
+        """The same model with its phase averaged away, or its lobes added as intensities."""
+        return self._replace(evaluate=self.incoherent, planned=None)
+
+    def __call__(self, parameters: Parameters, i: Any, o: Any) -> Float[Array, "... channels"]:
         """The BRDF for light from `i` to `o`, unit vectors (..., 3) with the normal as third axis.
 
         `parameters` has every key of the model, each a number or a map (...) that broadcasts with
-        the directions, and may have `wavelengths` (nm, of R, G and B). A film's model also takes
-        `weights` (wavelengths, 3): its reflectance at any wavelengths is then weighted to RGB.
-        Below the horizon the BRDF is 0.
+        the directions, and may have `wavelengths` (nm, one a channel, of R, G and B by default). A
+        film's model also takes `weights` (wavelengths, 3): its reflectance at any wavelengths is then
+        weighted to RGB. Below the horizon the BRDF is 0.
         """
-        given = {"wavelengths": jnp.asarray(self.wavelengths, i.dtype), **parameters}
+        given = {"wavelengths": self.wavelengths, **parameters}
+        given = {k: jnp.asarray(x, i.dtype) if isinstance(x, tuple | list) else x for k, x in given.items()}
         above = (i[..., 2:3] >= 0) & (o[..., 2:3] >= 0)
         return jnp.where(above, self.evaluate(given, i, o), jnp.zeros(3, i.dtype))
 
     def defaults(self) -> dict[str, Any]:
         """Each key's default value; a channel's numbers as an array."""
-        return {
-            p.key: jnp.asarray(p.value) if isinstance(p.value, tuple) else p.value for p in self.parameters
-        }
+        return {p.key: jnp.asarray(p.value) if p.per_channel else p.value for p in self.parameters}
 
 
 _SPECULAR = Parameter("specular", "", 0.0, 100.0, 1.0, "weight of the layered lobes", linear=True)
@@ -110,60 +117,60 @@ _SHADER = (
 )
 
 
-def _granier_heidrich(name: str, description: str, *options: Callable) -> Model:
-    keys = (_THICKNESS, _INDEX, *_LOBES, _SPECULAR, _GREY)
-    return Model(name, description, keys, granier_heidrich.specular(*options))
+def _granier_heidrich(name: str, description: str, make: Callable, fresnel: Callable, diffuse=_GREY) -> Model:
+    keys = (_THICKNESS, _INDEX, *_LOBES, _SPECULAR, diffuse)
+    return Model(
+        name, description, keys, make(fresnel), incoherent=make(fresnel, granier_heidrich.incoherent)
+    )
 
 
-def _polynomial(thickest: float) -> Callable:
-    return microfacet(film_colour.chebyshev(thickest))
-
-
-def _shader(name: str, description: str, *reflectance: Callable) -> Model:
-    return Model(name, description, _SHADER, blinn_phong_film(*reflectance), PUBLISHED_WAVELENGTHS)
+def _shader(name: str, description: str, reflectance: Callable) -> Model:
+    average = blinn_phong_film.blinn_phong_film(blinn_phong_film.phase_average)
+    made = blinn_phong_film.blinn_phong_film(reflectance)
+    return Model(name, description, _SHADER, made, average, blinn_phong_film.PUBLISHED_WAVELENGTHS)
 
 
 _ALL = (
-    _granier_heidrich("granier-heidrich", "two interfering Phong lobes, as published in 2002"),
+    _granier_heidrich(
+        "granier-heidrich",
+        "two interfering Phong lobes, as published in 2002",
+        granier_heidrich.specular,
+        granier_heidrich.published,
+    ),
     _granier_heidrich(
         "granier-heidrich-reciprocal",
         "the same with Fresnel factors that obey reciprocity",
+        granier_heidrich.specular,
         granier_heidrich.reciprocal,
-    ),
-    _granier_heidrich(
-        "granier-heidrich-incoherent",
-        "granier-heidrich without interference: what a layer must beat",
-        granier_heidrich.published,
-        granier_heidrich.incoherent,
     ),
     Model(
         "granier-heidrich-diffuse",
         "the diffuse part with interference, eqs. 11 to 16",
         (_THICKNESS, _INDEX, _LAYERED),
         granier_heidrich.diffuse(),
+        granier_heidrich.diffuse(granier_heidrich.incoherent),
     ),
-    Model(
+    _granier_heidrich(
         "granier-heidrich-full",
         "two interfering Phong lobes and the layered diffuse part",
-        (_THICKNESS, _INDEX, *_LOBES, _SPECULAR, _LAYERED),
-        granier_heidrich.full(),
+        granier_heidrich.full,
+        granier_heidrich.published,
+        _LAYERED,
     ),
     Model(
         "microfacet-film",
         "GGX microfacets under a film that may absorb",
         _FACETS,
-        _polynomial(_FACETS[0].upper),
-        planned=_polynomial,
-    ),
-    Model(
-        "microfacet-film-exact",
-        "the same with the film computed for every sample",
-        _FACETS,
         microfacet(),
+        microfacet(film_colour.incoherent),
+        planned=lambda thickest: microfacet(film_colour.chebyshev(thickest)),
     ),
-    _shader("blinn-phong-film", "a transparent film in a Blinn-Phong lobe"),
-    _shader("blinn-phong-film-published", "the same with the shader's phase counted twice", published),
-    _shader("blinn-phong-film-average", "the same averaged over the phase: no interference", phase_average),
+    _shader("blinn-phong-film", "a transparent film in a Blinn-Phong lobe", blinn_phong_film.corrected),
+    _shader(
+        "blinn-phong-film-published",
+        "the same with the shader's phase counted twice",
+        blinn_phong_film.published,
+    ),
 )
 
 MODELS: dict[str, Model] = {each.name: each for each in _ALL}
