@@ -22,26 +22,20 @@ POINTS = np.array([case["at"] for case in CASES.values()])
 SMOOTH = [name for name, case in CASES.items() if case["smooth"]]
 CRITICAL = "substrate exactly critical"
 
-VALUE, GRADIENT = 3e-15, 3e-12
+VALUE, GRADIENT = 5e-15, 3e-12
 # case: (value, gradient), where the defaults do not hold in float64
 LOOSER = {
-    # k₀d of 1e4: the derivatives of c and f are that large, and cancel in R, which has no thickness left
-    "1 mm of k = 3": (VALUE, 1e-9),
     # the round trip is 3e4 rad: its rounding alone is 4e-12
     "1 mm transparent": (4e-12, 1e-11),
-    # κd of 170: again derivatives that large cancel in R
-    "total reflection, 20 µm gap": (VALUE, 1e-9),
     # k₀d of 860
-    "wavelength 1 nm": (VALUE, 1e-10),
+    "wavelength 1 nm": (VALUE, 1e-11),
     # the root of n² − a², a difference of 1e-16 that sin 30° brings, is 1e-8: the truth is singular here
     CRITICAL: (5e-7, np.nan),
 }
 
-VALUE32, GRADIENT32 = 1.5e-6, 6e-4
+VALUE32, GRADIENT32 = 1.5e-6, 1e-3
 LOOSER32 = {
-    "1 mm of k = 3": (VALUE32, 0.3),  # as above: 1e4 times float32's rounding, floor 1e-3
     "1 mm transparent": (2e-3, 5e-3),  # 3e4 rad
-    "total reflection, 20 µm gap": (VALUE32, 0.2),
     "wavelength 1 nm": (1e-5, 2e-2),
     "89.999 degrees": (VALUE32, 3e-3),  # the angle itself rounds to 89.9990005
     "89.999 degrees, transparent": (VALUE32, 3e-3),
@@ -147,9 +141,10 @@ def test_a_faint_transmittance_keeps_its_relative_accuracy(letter, transparent):
     u, v = (q0, q1) if letter == "s" else (n1**2 * q0, n0**2 * q1)
     # so deep that one passage is all: |t₁₂ t₂₃|² e^{−2κk₀d}, and r₂₃ = −r₁₂
     truth = abs(4 * u * v / (u + v) ** 2) ** 2 * np.exp(-4 * np.pi / wavelength * d * q1.imag)
-    found = alone("T", letter, row, transparent)[0]
+    found, slopes, _ = alone("T", letter, row, transparent)
     assert 1e-25 < truth < 1e-15
     assert found == pytest.approx(truth, rel=1e-12, abs=0)
+    assert slopes[0] == pytest.approx(truth * -4 * np.pi / wavelength * q1.imag, rel=1e-12, abs=0)
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])

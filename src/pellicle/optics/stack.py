@@ -1,7 +1,7 @@
 """Several coherent layers: the product of characteristic matrices, each held to size.
 
 The fields (E, H) at a layer's lower face give those at its upper face through the same two entire
-functions as one film (`film.through`), both times a positive scale; after each layer the fields are
+functions as one film (`film.through`), both times a scale; after each layer the fields are
 divided by their own size. So 50 layers with an opaque one among them stay finite, and nothing is
 clamped. Complex arithmetic: on separate real arrays a stack gains nothing. One `lax.scan` over the
 layers: unrolled, 50 of them do not compile in minutes.
@@ -113,7 +113,7 @@ def _fields(index, depth, admittance, faces, a, polarisation: str, sincos: SinCo
         if face is not None:
             E, H = E * face[0], H * face[1]
         square, e = (n - a) * (n + a), _weight(n, polarisation)
-        c, f, layer_scale = through(square, k, sincos)
+        c, f, layer_scale, _ = through(square, k, sincos)
         E, H = E * c - 1j * f * e * H, H * c - 1j * f * (square / e) * E
         size = jax.lax.stop_gradient(abs2(E) + abs2(H))
         shrink = jax.lax.rsqrt(size)
