@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import hypothesis
@@ -28,6 +29,17 @@ hypothesis.settings.register_profile(
     "tests", deadline=None, derandomize=True, database=None, max_examples=100
 )
 hypothesis.settings.load_profile("tests")
+
+
+@pytest.fixture(scope="session")
+def with_part():
+    """Makes the same fit with other facts of its only spectrum."""
+    return _with_part
+
+
+def _with_part(fit, **changes):
+    [part] = fit.parts
+    return dataclasses.replace(fit, parts=(dataclasses.replace(part, **changes),))
 
 
 @pytest.fixture(scope="session")

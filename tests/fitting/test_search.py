@@ -1,11 +1,14 @@
 """Where fits start: how fine the scan is, what goes on to the solver, and how often it succeeds."""
 
+import dataclasses
+
 import jax
 import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.fitting import problem as problems
+from pellicle.fitting import evaluation
+from pellicle.fitting.measured import measured as as_numbers
 from pellicle.fitting.problem import make
 from pellicle.fitting.search import polished, quiet, search
 
@@ -15,7 +18,7 @@ NM = np.linspace(400.0, 900.0, 128)
 def built(scene, data):
     """The problem as `fit` would make it, with a given σ."""
     with jax.enable_x64(True):
-        return make(scene, data.wavelength, data.values, np.full(len(data), 0.003), 1.0)
+        return make(as_numbers(dataclasses.replace(data, sigma=np.full(len(data), 0.003)), scene))
 
 
 def test_the_scan_resolves_the_shortest_fringe(film, measured):
@@ -34,7 +37,7 @@ def test_only_local_minima_are_polished_and_all_of_them_are_kept(film, measured,
     scene = film()
     problem = built(scene, measured(scene, 700.0))
     starts = []
-    real = problems.polish
+    real = evaluation.polish
 
     def watched(*arguments):
         starts.append(np.asarray(arguments[-1]))
@@ -43,7 +46,7 @@ def test_only_local_minima_are_polished_and_all_of_them_are_kept(film, measured,
     monkeypatch.setattr("pellicle.fitting.search.polish", watched)
     found = search(problem, quiet)
     scan = found.scan
-    evidence = np.concatenate([[np.inf], scan.evidence, [np.inf]])
+    evidence = np.concatenate([[np.inf], scan.evidence[0, :, 0], [np.inf]])
     lowest = (evidence[1:-1] <= evidence[:-2]) & (evidence[1:-1] <= evidence[2:])
     tried = np.unique(np.concatenate(starts)) * 990 + 10
     np.testing.assert_allclose(tried, scan.thickness[lowest], atol=1e-6)

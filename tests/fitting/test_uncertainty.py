@@ -8,7 +8,9 @@ import pytest
 from scipy.optimize import curve_fit
 
 import pellicle as pl
-from pellicle.fitting.problem import local, make
+from pellicle.fitting.evaluation import local
+from pellicle.fitting.measured import measured as as_numbers
+from pellicle.fitting.problem import make
 from pellicle.fitting.uncertainty import errors
 from pellicle.signals import reflectance
 from pellicle.synthetic import synthesise
@@ -167,9 +169,9 @@ def test_a_direction_that_the_data_do_not_see_keeps_its_variance(film, measured)
     """The covariance itself, before any profile: a pseudo-inverse would drop the direction and say 0."""
     scene = film(pl.Free(None, 1, 4000), "Au")
     data = measured(scene, 3000.0, noise=0.005, sigma=True)
-    problem = make(scene, data.wavelength, data.values, data.sigma, 1.0)
-    at = jax.device_get(local(*problem.program, np.array([3000.0 / 4000])))
-    assert errors(problem, at, 1.0).stderr[0] > 1e6
+    problem = make(as_numbers(data, scene))
+    at = jax.device_get(local(*problem.views[0].program, np.array([3000.0 / 4000])))
+    assert errors(problem, [at], [1.0]).stderr[0] > 1e6
 
 
 def test_a_lower_limit_is_where_chi2_has_risen_by_2_71(film, measured):

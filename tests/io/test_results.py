@@ -13,7 +13,7 @@ import pytest
 
 from pellicle.effects import Row
 from pellicle.errors import UsageError
-from pellicle.fitting.result import Curve, Estimate, Fit, Profile, Rival, Status
+from pellicle.fitting.result import Curve, Estimate, Fit, Part, Profile, Rival, Status
 from pellicle.io import read_spectrum
 from pellicle.io.results import (
     failure,
@@ -42,7 +42,26 @@ def fit() -> Fit:
     model = 0.3 + 0.1 * np.cos(nm / 30)
     data = model + 0.002 * np.sin(nm)
     return Fit(
-        spectrum=Spectrum(nm, data, "R", path="/data/film.csv", sha256="ab" * 32),
+        parts=(
+            Part(
+                name="",
+                spectrum=Spectrum(nm, data, "R", path="/data/film.csv", sha256="ab" * 32),
+                curve=Curve(
+                    wavelength=nm,
+                    data=data,
+                    sigma=np.full(41, 0.002),
+                    model=model,
+                    n=np.linspace(1.4, 1.3, 41),
+                    k=np.linspace(0.02, 0.01, 41),
+                    n_stderr=np.linspace(0.0, 0.001, 41),
+                    k_stderr=np.where(nm < 600, np.inf, 0.001),
+                ),
+                plan=Plan((Row("absorption", True, "k is free", np.float64(0.0)),), "R", "unpolarised"),
+                rms=0.00141,
+                chi2_reduced=math.nan,
+                effective_points=12.0,
+            ),
+        ),
         status=Status.CONVERGED,
         verdict="The data decide: thickness 486.28 ± 0.12 nm.",
         parameters={
@@ -57,18 +76,7 @@ def fit() -> Fit:
         effective_points=12.0,
         correlation_names=("thickness", "k"),
         correlation=np.array([[1.0, np.nan], [np.nan, 1.0]]),
-        plan=Plan((Row("absorption", True, "k is free", np.float64(0.0)),), "R", "unpolarised"),
         warnings=("a warning",),
-        curve=Curve(
-            wavelength=nm,
-            data=data,
-            sigma=np.full(41, 0.002),
-            model=model,
-            n=np.linspace(1.4, 1.3, 41),
-            k=np.linspace(0.02, 0.01, 41),
-            n_stderr=np.linspace(0.0, 0.001, 41),
-            k_stderr=np.where(nm < 600, np.inf, 0.001),
-        ),
         profile=Profile(np.linspace(10.0, 3000.0, 30), np.linspace(5.0, 400.0, 30)),
         seconds=0.42,
     )
@@ -193,11 +201,11 @@ def test_fit_csv_says_what_it_is_and_is_read_again(fit, tmp_path):
     np.testing.assert_allclose(again.sigma, fit.curve.sigma, rtol=1e-9)
 
 
-def test_uncalibrated_data_at_angles_are_read_again_as_such(fit, tmp_path):
+def test_uncalibrated_data_at_angles_are_read_again_as_such(fit, with_part, tmp_path):
     path = tmp_path / "fit.csv"
     curve = replace(fit.curve, data=50 * fit.curve.data)
     angled = replace(fit.spectrum, values=curve.data, angle=np.full(41, 30.0), calibrated=False)
-    path.write_text(fit_csv(replace(fit, spectrum=angled, curve=curve)), encoding="utf-8")
+    path.write_text(fit_csv(with_part(fit, spectrum=angled, curve=curve)), encoding="utf-8")
     assert "wavelength,intensity,_,_,sigma,angle" in path.read_text()
     again = read_spectrum(path, columns="wavelength,intensity,_,_,sigma,angle", signal="R")
     assert not again.calibrated
@@ -215,25 +223,25 @@ def test_nk_csv_is_a_material(fit, tmp_path):
     np.testing.assert_allclose(index, fit.curve.n + 1j * fit.curve.k, rtol=1e-9)
 
 
-def test_nk_csv_of_several_angles_holds_each_wavelength_once(fit, tmp_path):
+def test_nk_csv_of_several_angles_holds_each_wavelength_once(fit, with_part, tmp_path):
     path = tmp_path / "nk.csv"
     twice = {name: np.repeat(getattr(fit.curve, name), 2) for name in vars(fit.curve)}
-    path.write_text(nk_csv(replace(fit, curve=Curve(**twice))), encoding="utf-8")
+    path.write_text(nk_csv(with_part(fit, curve=Curve(**twice))), encoding="utf-8")
     assert path.read_text() == nk_csv(fit)
     lookup(str(path))
 
 
 @pytest.mark.parametrize("everywhere", [["n_stderr"], ["k_stderr"], ["n_stderr", "k_stderr"]])
-def test_nk_csv_is_a_material_whatever_errors_are_infinite(fit, tmp_path, everywhere):
+def test_nk_csv_is_a_material_whatever_errors_are_infinite(fit, with_part, tmp_path, everywhere):
     path = tmp_path / "nk.csv"
     unseen = replace(fit.curve, **{name: np.full(41, np.inf) for name in everywhere})
-    path.write_text(nk_csv(replace(fit, curve=unseen)), encoding="utf-8")
+    path.write_text(nk_csv(with_part(fit, curve=unseen)), encoding="utf-8")
     index = np.asarray(lookup(str(path))(fit.curve.wavelength))
     np.testing.assert_allclose(index, fit.curve.n + 1j * fit.curve.k, rtol=1e-9)
 
 
-def test_a_path_cannot_break_out_of_its_comment(fit, tmp_path):
-    odd = replace(fit, spectrum=replace(fit.spectrum, path="a\n1,2\r3.csv"))
+def test_a_path_cannot_break_out_of_its_comment(fit, with_part, tmp_path):
+    odd = with_part(fit, spectrum=replace(fit.spectrum, path="a\n1,2\r3.csv"))
     assert "# from a 1,2 3.csv, sha256" in fit_csv(odd)
 
 

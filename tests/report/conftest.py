@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pellicle.effects import Row
-from pellicle.fitting.result import Curve, Estimate, Fit, Profile, Rival, Status
+from pellicle.fitting.result import Curve, Estimate, Fit, Part, Profile, Rival, Status
 from pellicle.io.spectrum import Spectrum
 from pellicle.planning import Plan
 
@@ -19,7 +19,33 @@ def fit() -> Fit:
     model = 0.3 + 0.1 * np.cos(nm / 30)
     noise = 0.002 * np.sin(nm)
     return Fit(
-        spectrum=Spectrum(nm, model + noise, "R", path="/data/film.csv", sha256="ab" * 32),
+        parts=(
+            Part(
+                name="",
+                spectrum=Spectrum(nm, model + noise, "R", path="/data/film.csv", sha256="ab" * 32),
+                curve=Curve(
+                    wavelength=nm,
+                    data=model + noise,
+                    sigma=np.full(41, 0.002),
+                    model=model,
+                    n=np.full(41, 1.33),
+                    k=np.zeros(41),
+                    n_stderr=np.full(41, 0.0012),
+                    k_stderr=np.zeros(41),
+                ),
+                plan=Plan(
+                    (
+                        Row("absorption", False, "the layer has no extinction, and none is free"),
+                        Row("back-face", True, "the substrate is a plate; its back face adds incoherently"),
+                    ),
+                    "R",
+                    "unpolarised",
+                ),
+                rms=0.00141,
+                chi2_reduced=1.02,
+                effective_points=12.0,
+            ),
+        ),
         status=Status.AMBIGUOUS,
         verdict="The data do not decide: thickness 486.28 nm fits best, but 242.87 nm fits nearly as well.",
         parameters={
@@ -47,31 +73,13 @@ def fit() -> Fit:
                 [0.1, 0.0, 0.93, 0.4, 1.0],
             ]
         ),
-        plan=Plan(
-            (
-                Row("absorption", False, "the layer has no extinction, and none is free"),
-                Row("back-face", True, "the substrate is a plate; its back face adds incoherently"),
-            ),
-            "R",
-            "unpolarised",
-        ),
         warnings=("SiO2 has no data for k: it is taken as transparent, which its source does not say.",),
-        curve=Curve(
-            wavelength=nm,
-            data=model + noise,
-            sigma=np.full(41, 0.002),
-            model=model,
-            n=np.full(41, 1.33),
-            k=np.zeros(41),
-            n_stderr=np.full(41, 0.0012),
-            k_stderr=np.zeros(41),
-        ),
         profile=Profile(np.linspace(10.0, 3000.0, 60), np.linspace(5.0, 400.0, 60)),
         seconds=0.42,
     )
 
 
-def ellipsometric(fit: Fit, wavelength, angle, **curve) -> Fit:
+def ellipsometric(fit: Fit, wavelength, angle, with_part, **curve) -> Fit:
     """`fit` as if it were one of Ψ and Δ at these points; Δ passes 360 degrees, the data before the model."""
     size = np.size(wavelength)
     psi, delta = np.linspace(20.0, 40.0, size), np.linspace(300.0, 420.0, size) % 360
@@ -101,22 +109,24 @@ def ellipsometric(fit: Fit, wavelength, angle, **curve) -> Fit:
         delta_model=delta,
         **(arrays | curve),
     )
-    return dataclasses.replace(fit, spectrum=spectrum, curve=made, rms=0.123)
+    return with_part(dataclasses.replace(fit, rms=0.123), spectrum=spectrum, curve=made, rms=0.123)
 
 
 @pytest.fixture
-def spectroscopic(fit) -> Fit:
+def spectroscopic(fit, with_part) -> Fit:
     """Ψ and Δ at 20 wavelengths and two angles."""
-    return ellipsometric(fit, np.repeat(np.linspace(400.0, 800.0, 20), 2), np.tile([65.0, 75.0], 20))
+    return ellipsometric(
+        fit, np.repeat(np.linspace(400.0, 800.0, 20), 2), np.tile([65.0, 75.0], 20), with_part
+    )
 
 
 @pytest.fixture
-def angular(fit) -> Fit:
+def angular(fit, with_part) -> Fit:
     """Ψ and Δ at one wavelength and eleven angles."""
-    return ellipsometric(fit, np.full(11, 658.0), np.linspace(50.0, 70.0, 11))
+    return ellipsometric(fit, np.full(11, 658.0), np.linspace(50.0, 70.0, 11), with_part)
 
 
 @pytest.fixture
-def as_ellipsometry(fit):
+def as_ellipsometry(fit, with_part):
     """Makes a fit of Ψ and Δ at any wavelengths (nm) and angles (degrees)."""
-    return lambda wavelength, angle: ellipsometric(fit, wavelength, angle)
+    return lambda wavelength, angle: ellipsometric(fit, wavelength, angle, with_part)

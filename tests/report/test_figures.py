@@ -75,15 +75,15 @@ def test_hopeless_thicknesses_are_left_out(fit):
     assert 963.57 < right < 1100
 
 
-def test_without_a_scan_or_a_free_index_there_is_no_panel_for_it(fit):
+def test_without_a_scan_or_a_free_index_there_is_no_panel_for_it(fit, with_part):
     assert labels(draw(replace(fit, profile=None))) == ["reflectance", "data − fit", "n"]
     curve = replace(fit.curve, n_stderr=np.zeros(41))
-    assert labels(draw(replace(fit, profile=None, curve=curve))) == ["reflectance", "data − fit"]
+    assert labels(draw(with_part(replace(fit, profile=None), curve=curve))) == ["reflectance", "data − fit"]
 
 
-def test_n_and_k_do_not_lie_on_each_other(fit):
+def test_n_and_k_do_not_lie_on_each_other(fit, with_part):
     curve = replace(fit.curve, k=np.full(41, 0.01), k_stderr=np.full(41, 0.002))
-    drawn = draw(replace(fit, curve=curve))
+    drawn = draw(with_part(fit, curve=curve))
     n, k = drawn.axes[3:]
     assert k.get_ylabel() == "k (dashed)"
     lowest_n = n.transData.transform((600, 1.33 - 0.0012))[1]
@@ -91,35 +91,34 @@ def test_n_and_k_do_not_lie_on_each_other(fit):
     assert highest_k < lowest_n
 
 
-def test_an_infinite_error_leaves_a_gap_in_the_band(fit, tmp_path):
+def test_an_infinite_error_leaves_a_gap_in_the_band(fit, with_part, tmp_path):
     curve = replace(fit.curve, n_stderr=np.where(np.arange(41) < 9, np.inf, 0.001))
-    figure(replace(fit, curve=curve), tmp_path / "figure.png")
-    [band] = draw(replace(fit, curve=curve)).axes[3].collections
+    figure(with_part(fit, curve=curve), tmp_path / "figure.png")
+    [band] = draw(with_part(fit, curve=curve)).axes[3].collections
     vertices = np.concatenate([path.vertices for path in band.get_paths()])
     assert np.isfinite(vertices).all()
     assert vertices[:, 0].min() == fit.curve.wavelength[9]
 
 
-def test_lines_cross_neither_gaps_nor_angles(fit):
+def test_lines_cross_neither_gaps_nor_angles(fit, with_part):
     half = np.flatnonzero((fit.curve.wavelength < 500) | (fit.curve.wavelength > 700))
     curve = replace(
         fit.curve, **{name: array[half] for name, array in vars(fit.curve).items() if array is not None}
     )
     spectrum = replace(fit.spectrum, wavelength=curve.wavelength, values=curve.data)
-    gapped = draw(replace(fit, curve=curve, spectrum=spectrum)).axes[0]
+    gapped = draw(with_part(fit, curve=curve, spectrum=spectrum)).axes[0]
     assert [line.get_xdata().size for line in gapped.lines] == [20, 10, 10]
     angled = replace(fit.spectrum, angle=np.where(np.arange(41) % 2, 30.0, 60.0))
-    assert [line.get_xdata().size for line in draw(replace(fit, spectrum=angled)).axes[0].lines] == [
+    assert [line.get_xdata().size for line in draw(with_part(fit, spectrum=angled)).axes[0].lines] == [
         41,
         20,
         21,
     ]
 
 
-def test_odd_fits_are_drawn_too(fit, tmp_path):
+def test_odd_fits_are_drawn_too(fit, with_part, tmp_path):
     odd = replace(
-        fit,
-        spectrum=replace(fit.spectrum, path="a$b_{$.csv", calibrated=False, signal="T"),
+        with_part(fit, spectrum=replace(fit.spectrum, path="a$b_{$.csv", calibrated=False, signal="T")),
         rivals=(),
         parameters={"A": fit["A"]},
         profile=Profile(np.linspace(1.0, 9.0, 5), np.full(5, 1e8)),

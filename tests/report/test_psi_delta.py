@@ -60,7 +60,7 @@ def test_one_wavelength_is_drawn_against_the_angle(angular, tmp_path):
     assert (tmp_path / "figure.png").stat().st_size > 20_000
 
 
-def test_points_without_an_angle_are_one_line(spectroscopic):
+def test_points_without_an_angle_are_one_line(spectroscopic, with_part):
     half = {
         name: array[::2] for name, array in vars(spectroscopic.curve).items() if isinstance(array, np.ndarray)
     }
@@ -69,7 +69,7 @@ def test_points_without_an_angle_are_one_line(spectroscopic):
         data, wavelength=half["wavelength"], values=half["data"], delta=half["delta_data"], angle=None
     )
     curve = dataclasses.replace(spectroscopic.curve, **half)
-    drawn = draw(dataclasses.replace(spectroscopic, curve=curve, spectrum=spectrum))
+    drawn = draw(with_part(spectroscopic, curve=curve, spectrum=spectrum))
     assert named(drawn.axes[0]) == ["data", "fit"]
 
 
@@ -87,13 +87,13 @@ def test_the_report_says_degrees(spectroscopic, angular):
     assert summary_line(angular).endswith("rms 0.123 degrees")
 
 
-def test_the_table_is_read_again_as_it_is(spectroscopic, tmp_path):
+def test_the_table_is_read_again_as_it_is(spectroscopic, with_part, tmp_path):
     size = len(spectroscopic.spectrum)
     data = dataclasses.replace(
         spectroscopic.spectrum, sigma=np.full(size, 0.1), delta_sigma=np.full(size, 0.2)
     )
     for spectrum in (spectroscopic.spectrum, data):
-        text = fit_csv(dataclasses.replace(spectroscopic, spectrum=spectrum))
+        text = fit_csv(with_part(spectroscopic, spectrum=spectrum))
         (tmp_path / "fit.csv").write_text(text)
         again = read_spectrum(tmp_path / "fit.csv")
         assert again.signal == "psi-delta"

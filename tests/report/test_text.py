@@ -34,8 +34,8 @@ def test_the_verdict_comes_first_with_status_advice_file_and_points(fit):
     assert "data    R, 41 points from 400 to 800 nm, worth 12 independent ones" in lines
 
 
-def test_independent_points_are_not_counted_twice(fit):
-    assert "independent" not in report(replace(fit, effective_points=41.0))
+def test_independent_points_are_not_counted_twice(fit, with_part):
+    assert "independent" not in report(with_part(fit, effective_points=41.0))
 
 
 def test_every_status_has_one_sentence_of_advice():
@@ -118,13 +118,12 @@ def test_plan_warnings_and_statistics(fit):
     assert "Warnings" not in report(replace(fit, warnings=()))
 
 
-def test_no_line_is_longer_than_100_columns(fit):
+def test_no_line_is_longer_than_100_columns(fit, with_part):
     spectrum = replace(fit.spectrum, path="/a folder/" + 30 * "long/" + "film.csv")
     rival = Rival({f"parameter_{i}": 1.0 for i in range(9)}, 3.0)
     parameters = {name: Estimate(name, 1.0, 0.1, "", 0.0, 2.0, True) for name in rival.parameters}
     long = replace(
-        fit,
-        spectrum=spectrum,
+        with_part(fit, spectrum=spectrum),
         verdict=40 * "words ",
         warnings=(60 * "and ",),
         rivals=(rival,),

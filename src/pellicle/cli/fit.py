@@ -64,6 +64,9 @@ def fit(
     ] = None,
     reference_material: Annotated[str, _flag(_reading, "What the reference is.")] = "Si",
     dark: Annotated[str | None, _flag(_reading, "Raw counts without light.")] = None,
+    joint: Annotated[
+        bool, Parameter(group=_scene, help="All files are of one sample: fit them together.", negative="")
+    ] = False,
     out: Annotated[str | None, _flag(_output, "A folder for report, figure and tables.")] = None,
     json: Annotated[bool, Parameter(group=_output, help="One JSON object a line.", negative="")] = False,
 ) -> int:
@@ -88,12 +91,13 @@ def fit(
         dark,
     )
     _check(reading)
-    scene, files, reading = _what(list(data), recipe, scene_words, reading)
+    scene, files, reading, together = _what(list(data), recipe, scene_words, reading)
     from pellicle.fitting.fit import check_free
 
     check_free(scene)
     start()
-    return _Run(scene, reading, out, json, several=len(files) > 1)(files)
+    groups = [files] if joint or together else [[file] for file in files]
+    return _Run(scene, reading, out, json, several=len(groups) > 1)(groups)
 
 
 def _range(text: str | None) -> tuple[float, float] | None:
@@ -130,13 +134,13 @@ def _check_units(reading: ReadWords) -> None:
 
 
 def _what(files: list[str], recipe: str | None, words: SceneWords, reading: ReadWords):
-    """The scene, the files and how to read them, from a recipe or from flags."""
+    """The scene, the files, how to read them and whether they are of one sample, from a recipe or flags."""
     if recipe is None:
         if not files:
             raise UsageError("no data: name the file to fit, as in pellicle fit oxide.csv --layer SiO2 ...")
         scene, assumed = scene_from_words(words, reading)
         say(*assumed)
-        return scene, files, reading
+        return scene, files, reading, False
     import equinox as eqx
 
     from pellicle.io.recipe import read_recipe
@@ -144,53 +148,56 @@ def _what(files: list[str], recipe: str | None, words: SceneWords, reading: Read
     if words.given():
         raise UsageError(f"{', '.join(words.given())} and --recipe exclude each other: put it in the recipe")
     found = read_recipe(recipe)
-    if found.tables.data.joint:
-        raise UsageError(f"{recipe}: joint fits are not available yet; set joint = false")
     files = files or found.files
     if not files:
         raise UsageError(f"{recipe}: names no data files: give them on the command line or in [data] files")
     reading = merged(reading, found)
-    return eqx.tree_at(lambda s: s.light, found.scene(), light(reading)), files, reading
+    scene = eqx.tree_at(lambda s: s.light, found.scene(), light(reading))
+    return scene, files, reading, found.tables.data.joint
 
 
 class _Run:
-    """Fits file after file; a file that fails does not stop the others."""
+    """Fits group after group of files; one that fails does not stop the others.
+
+    The files of a group are fitted together: one file, unless the fit is a joint one.
+    """
 
     def __init__(self, scene: Any, reading: ReadWords, out: str | None, as_json: bool, several: bool):
         self.scene, self.reading, self.out, self.as_json, self.several = scene, reading, out, as_json, several
         self.done: list[Any] = []
 
-    def __call__(self, files: list[str]) -> int:
+    def __call__(self, groups: list[list[str]]) -> int:
         from pellicle.io.atomic import new_folder
         from pellicle.io.results import several
 
-        folders = [None] * len(files)
+        folders = [None] * len(groups)
         if self.out is not None:
             root = Path(self.out)
-            folders = several(root, files) if self.several else [root]
+            folders = several(root, [paths[0] for paths in groups]) if self.several else [root]
             if root.exists():
                 new_folder(root)  # refuses a stranger's folder before the work, not after
         worst = 0
         try:
-            for path, folder in zip(files, folders, strict=True):
-                worst = max(worst, self._one(path, folder))
+            for paths, folder in zip(groups, folders, strict=True):
+                worst = max(worst, self._one(paths, folder))
         except KeyboardInterrupt:
-            say(f"interrupted after {len(self.done)} of {len(files)} files; what is done is kept")
+            say(f"interrupted after {len(self.done)} of {len(groups)} files; what is done is kept")
             worst = 130
         self._summarise()
         return worst
 
-    def _one(self, path: str, folder: Path | None) -> int:
+    def _one(self, paths: list[str], folder: Path | None) -> int:
         from pellicle.io.results import failure
 
-        progress = Progress(path)
+        label = ", ".join(paths)
+        progress = Progress(label)
         try:
-            found = self._fit(path, progress)
+            found = self._fit(paths, progress)
         except ValueError as error:
             progress.clear()
-            message = str(error) if path in str(error) else f"{path}: {error}"
+            message = str(error) if any(path in str(error) for path in paths) else f"{label}: {error}"
             say(f"pellicle: {message}")
-            self.done.append(failure(path, message))
+            self.done.append(failure(paths if len(paths) > 1 else paths[0], message))
             if self.as_json:
                 print(json_module.dumps(self.done[-1], allow_nan=False), flush=True)
             return 3  # a failed file is 3, whatever would mend it
@@ -199,14 +206,16 @@ class _Run:
         self._show(found, folder)
         return 0 if found.status == "converged" else 4
 
-    def _fit(self, path: str, progress: Progress) -> Fit:
+    def _fit(self, paths: list[str], progress: Progress) -> Fit:
         from pellicle.fitting.fit import fit as run
         from pellicle.scene import Drift
 
         scaled = isinstance(self.scene.instrument.scale, Drift)
-        spectrum = read(path, self.reading, scaled=scaled)
-        say(*(f"{path}: {note}" for note in spectrum.notes))
-        return run(spectrum, self.scene, progress=progress)
+        spectra = []
+        for path in paths:
+            spectra.append(read(path, self.reading, scaled=scaled))
+            say(*(f"{path}: {note}" for note in spectra[-1].notes))
+        return run(spectra, self.scene, progress=progress)
 
     def _show(self, found: Fit, folder: Path | None) -> None:
         from pellicle.io.results import to_json, write_fit

@@ -2,50 +2,78 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import equinox as eqx
 import jax
 import numpy as np
 
-from pellicle.fitting.problem import Problem, local, make
+from pellicle.fitting.evaluation import Local, local
+from pellicle.fitting.measured import Measured
+from pellicle.fitting.problem import Problem, View, make
 from pellicle.fitting.search import polished, quiet
 from pellicle.fitting.weigh import Weighed
 from pellicle.scene import Scene, free_leaves
 
 
-def rms_without(scene: Scene, weighed: Weighed) -> float | None:
-    """rms of the best fit with the substrate as a half space, from the same minima.
+class Worth(NamedTuple):
+    """rms of the spectra that see a back face, with it and without."""
 
-    None where the back face itself has free parameters: without it they would have no meaning.
+    rms: float
+    without: float
+
+
+def worth(spectra: Sequence[Measured], weighed: Weighed) -> Worth | None:
+    """How well substrates as half spaces would fit, from the same minima.
+
+    None where no plate has a back face, or where it has free parameters: without it they would have
+    no meaning.
     """
-    if free_leaves((scene.substrate.back, scene.substrate.plate_mm)):
+    seen = [i for i, view in enumerate(weighed.problem.views) if view.plan.on("back-face")]
+    backs = [spectra[i].scene.substrate for i in seen]
+    if not seen or any(free_leaves((plate.back, plate.plate_mm)) for plate in backs):
         return None
-    bare = eqx.tree_at(
+    views = zip(spectra, weighed.problem.views, strict=True)
+    without = make(*(_bare(spectrum, view) for spectrum, view in views))
+    best = polished(without, weighed.minima.units, quiet).units[0]
+    at = [_at(without, i, best) for i in seen]
+    return Worth(
+        _rms([weighed.problem.views[i] for i in seen], [weighed.met[i].at for i in seen]),
+        _rms([without.views[i] for i in seen], at),
+    )
+
+
+def _bare(spectrum: Measured, view: View) -> Measured:
+    """The spectrum as it was weighed, of a sample without a back face."""
+    sigma = 1 / view.data.weight[: view.points : view.channels]
+    return spectrum._replace(scene=_half_space(spectrum.scene), sigma=sigma, temper=float(view.data.temper))
+
+
+def _half_space(scene: Scene) -> Scene:
+    return eqx.tree_at(
         lambda s: s.substrate.back, scene, None, is_leaf=lambda x: x is None or x is scene.substrate.back
     )
-    problem = weighed.problem
-    keep = slice(problem.points)
-    wavelength = np.asarray(problem.scene.light.wavelength)[keep]
-    without = make(
-        bare,
-        wavelength,
-        problem.data.values[keep],
-        1 / problem.data.weight[keep],
-        float(problem.data.temper),
-    )
-    best = polished(without, weighed.minima.units, quiet).units[0]
-    at = jax.device_get(local(*without.program, best))
-    return _rms(without, at)
 
 
-def _rms(problem: Problem, at) -> float:
-    residual = (problem.data.values - np.asarray(at.model))[: problem.points]
-    return float(np.sqrt(np.mean(residual**2)))
+def _at(problem: Problem, which: int, unit: np.ndarray) -> Local:
+    view = problem.views[which]
+    return jax.device_get(local(*view.program, unit[list(view.takes)]))
 
 
-def told(rms: float, without: float | None) -> str:
+def _rms(views: Sequence[View], at: Sequence[Local]) -> float:
+    residuals = [
+        (view.data.values - np.asarray(there.model))[: view.points]
+        for view, there in zip(views, at, strict=True)
+    ]
+    return float(np.sqrt(np.mean(np.concatenate(residuals) ** 2)))
+
+
+def told(found: Worth | None) -> str:
     """A sentence for the verdict."""
-    if without is None:
+    if found is None:
         return ""
+    rms, without = found
     if without > 1.05 * rms:
         return f" The back face matters: rms {rms:.4f} with it, {without:.4f} without."
     if rms > 1.05 * without:

@@ -1,59 +1,52 @@
-"""Fit a scene to a spectrum: scan, polish, compare, and say how sure the answer is."""
+"""Fit a scene to spectra of one sample: scan, polish, compare, and say how sure the answer is."""
 
 from __future__ import annotations
 
-import math
 import time
-from typing import Any
+from collections.abc import Sequence
+from pathlib import Path
 
 import equinox as eqx
 import jax
-import numpy as np
 
 from pellicle.errors import UsageError
-from pellicle.fitting import backface, noise, summary
-from pellicle.fitting.problem import Problem, make
+from pellicle.fitting import backface, parts, summary
+from pellicle.fitting.measured import Measured, measured, unscaled
+from pellicle.fitting.problem import make
 from pellicle.fitting.result import Fit
 from pellicle.fitting.search import Progress, quiet, search
-from pellicle.fitting.status import judge, misfits, verdict
+from pellicle.fitting.status import judge, verdict
 from pellicle.fitting.uncertainty import errors
-from pellicle.fitting.weigh import Noise, Weighed, weigh
+from pellicle.fitting.weigh import Weighed, weigh
 from pellicle.io.spectrum import Spectrum
-from pellicle.scene import Drift, Light, Scene, free_leaves
+from pellicle.scene import Scene, free_leaves
 
 
-def fit(data: Spectrum, scene: Scene, *, progress: Progress = quiet) -> Fit:
-    """Fit the free parameters of `scene` to one spectrum, in float64 whatever the caller's setting.
+def fit(
+    data: Spectrum | Sequence[Spectrum], scene: Scene | Sequence[Scene], *, progress: Progress = quiet
+) -> Fit:
+    """Fit the free parameters of `scene` to a spectrum, in float64 whatever the caller's setting.
 
-    The signal, and the polarisation and angle where the file has them, come from the spectrum.
+    The signal, and the polarisation and angle where the file has them, come from the spectrum. A list
+    of spectra of one sample is fitted jointly: layers and substrate are shared, what is free of the
+    light and the instrument is each spectrum's own (`instrument.scale.R`). `scene` may then be a list
+    too, of one scene for each, that differ in light, instrument and back face only; of a single scene,
+    Ψ and Δ leave out scale and offset.
+
     `progress` is called with a stage's name, how much is done and how much there is. Returns a
     `Fit`: best parameters with errors, rivals, a status and what was simulated.
 
-    **Raises:** UsageError where nothing is free, or an uncalibrated signal is given a fixed scale;
-    ValueError where a material has no data at a wavelength, naming it.
+    **Raises:** UsageError where nothing is free, where scenes are not of one sample, or an
+    uncalibrated signal is given a fixed scale; ValueError where a material has no data at a
+    wavelength, naming it.
     """
-    drifts = [x for x in (scene.instrument.scale, scene.instrument.offset) if isinstance(x, Drift)]
-    check_free(scene)
-    if not data.calibrated and scene.instrument.scale not in drifts:
-        raise UsageError(
-            f"{data.path}: an uncalibrated intensity needs a free scale: add --scale slow, or --scale free"
-        )
-    if data.delta is not None:
-        _check_ellipsometry(data, scene, drifts)
+    spectra = [data] if isinstance(data, Spectrum) else list(data)
+    scenes = _scenes(spectra, scene)
+    for each in scenes:
+        check_free(each)
+    names = labels(spectra)
     with jax.enable_x64(True):
-        return _fit(data, seen_as(scene, data), progress)
-
-
-def _check_ellipsometry(data: Spectrum, scene: Scene, drifts: list[Drift]) -> None:
-    if drifts or scene.instrument.scale != 1.0 or scene.instrument.offset != 0.0:
-        raise UsageError(f"{data.path}: Ψ and Δ have no scale and no offset: leave both out")
-    if scene.substrate.back is not None:
-        raise UsageError(f"{data.path}: ellipsometry of a plate's back face is not simulated: leave back out")
-    if data.angle is None and not free_leaves(scene.light) and not np.any(scene.light.angle):
-        raise UsageError(
-            f"{data.path}: ellipsometry needs its angle of incidence: add --angle 70, say, angle = 70 under "
-            "[data] in a recipe, or a column angle_deg"
-        )
+        return _fit(spectra, [measured(*each) for each in zip(spectra, scenes, names, strict=True)], progress)
 
 
 def check_free(scene: Scene) -> None:
@@ -65,108 +58,73 @@ def check_free(scene: Scene) -> None:
         )
 
 
-def seen_as(scene: Scene, data: Spectrum) -> Scene:
-    """The scene looked at as the spectrum was: its signal, wavelengths, polarisation and angles."""
-    angle: Any = scene.light.angle
-    if data.angle is not None:
-        angle = float(data.angle[0]) if np.ptp(data.angle) == 0 else data.angle
-    stated = data.polarisation != "unpolarised"
-    polarisation = data.polarisation if stated else scene.light.polarisation
-    return eqx.tree_at(lambda s: s.light, scene, Light(data.wavelength, angle, data.signal, polarisation))
+def labels(spectra: Sequence[Spectrum]) -> list[str]:
+    """What tells spectra apart, without dots: files' stems, else with their signals, else numbered.
 
-
-def _fit(data: Spectrum, scene: Scene, progress: Progress) -> Fit:
-    began = time.perf_counter()
-    source = Noise(given=data.sigma is not None, drifting=data.sigma is None and summary.drifts(scene))
-    problem = make(
-        scene,
-        data.wavelength,
-        _values(data),
-        _sigma(data, source),
-        1 / noise.DRIFT_CORRELATION if source.drifting else 1.0,
-    )
-    weighed = weigh(problem, search(problem, progress), source)
-    return _report(data, scene, weighed, summary.profile(problem, weighed), source, began)
-
-
-def _values(data: Spectrum) -> np.ndarray:
-    """What is fitted: fractions, or N, C, S (points, 3) for ellipsometry, which have no wrap-around."""
-    if data.delta is None:
-        return data.values
-    psi, delta = 2 * np.deg2rad(data.values), np.deg2rad(data.delta)
-    return np.stack([np.cos(psi), np.sin(psi) * np.cos(delta), np.sin(psi) * np.sin(delta)], -1)
-
-
-def _sigma(data: Spectrum, source: Noise) -> np.ndarray:
-    """σ of each point: given, the model's own error, or a guess that the residuals will replace.
-
-    On the sphere of N, C, S an error of Ψ moves a point by 2σ_Ψ and one of Δ by sin(2Ψ) σ_Δ; their
-    mean square serves for all directions.
+    Empty for a single one, and where a name would read as a parameter's it is numbered.
     """
-    if data.sigma is not None and data.delta is not None:
-        across = data.sigma if data.delta_sigma is None else data.delta_sigma
-        along = np.sin(2 * np.deg2rad(data.values)) * across
-        return np.deg2rad(np.sqrt(0.5 * ((2 * data.sigma) ** 2 + along**2)))
-    if data.sigma is not None:
-        return data.sigma
-    if data.delta is not None:
-        return np.full(len(data), 0.01)
-    if source.drifting:
-        return noise.drifting_sigma(data.values)
-    guess = max(0.01 * float(np.ptp(data.values)), float(np.median(noise.local_noise(data.values))), 1e-12)
-    return np.full(len(data), guess)
+    if len(spectra) == 1:
+        return [""]
+    stems = [Path(s.path).stem.replace(".", "_") or s.signal for s in spectra]
+    signals = [f"{stem}-{s.signal}" for stem, s in zip(stems, spectra, strict=True)]
+    numbers = [f"{stem}-{i}" for i, stem in enumerate(stems, start=1)]
+    for names in (stems, signals):
+        if len(set(names)) == len(names) and "thickness" not in names:
+            return names
+    return numbers
 
 
-def _size(data: Spectrum, problem: Problem, weighed: Weighed) -> tuple[float, float]:
-    """rms of the residuals, and the signal's span. For ellipsometry the rms is in degrees of Ψ: half the
-    distance on the sphere, in each of its two directions."""
-    residual = (problem.data.values - np.asarray(weighed.at.model))[: problem.points]
-    values = problem.data.values[: problem.points].reshape(problem.rows, problem.channels)
-    span = float(np.max(np.ptp(values, axis=0)))
-    if data.delta is None:
-        return float(np.sqrt(np.mean(residual**2))), span
-    return float(np.rad2deg(np.sqrt(residual @ residual / (2 * problem.rows))) / 2), span
+def _scenes(spectra: list[Spectrum], scene: Scene | Sequence[Scene]) -> list[Scene]:
+    """A scene for each spectrum, checked to be of one sample."""
+    if not spectra:
+        raise UsageError("there is no spectrum to fit: give one, or a list of some")
+    if isinstance(scene, Scene):
+        alone = len(spectra) == 1
+        return [scene if alone or s.delta is None else unscaled(scene) for s in spectra]
+    scenes = list(scene)
+    if len(scenes) != len(spectra):
+        raise UsageError(f"{len(spectra)} spectra need as many scenes, or one for all, not {len(scenes)}")
+    samples = [(s.layers, s.ambient, s.substrate.material) for s in scenes]
+    if not all(eqx.tree_equal(sample, samples[0]) is True for sample in samples):
+        raise UsageError("the scenes of a joint fit must have the same layers, ambient and substrate")
+    return scenes
 
 
-def _report(data: Spectrum, scene: Scene, weighed: Weighed, profile, source: Noise, began: float) -> Fit:
+def _fit(data: list[Spectrum], spectra: list[Measured], progress: Progress) -> Fit:
+    began = time.perf_counter()
+    problem = make(*spectra)
+    weighed = weigh(problem, search(problem, progress))
+    return _report(data, spectra, weighed, summary.profile(problem, weighed), began)
+
+
+def _report(data: list[Spectrum], spectra: list[Measured], weighed: Weighed, profile, began: float) -> Fit:
     problem = weighed.problem
-    found = errors(problem, weighed.at, weighed.variance)
-    parameters = summary.estimates(scene, weighed, found, profile)
+    found = errors(problem, [m.at for m in weighed.met], [m.variance for m in weighed.met])
+    parameters = summary.estimates(spectra, weighed, found, profile)
     others = summary.rivals(weighed)
-    curve = summary.curve(problem, weighed, found)
-    rms, span = _size(data, problem, weighed)
-    misfit = misfits(
-        chi2_reduced=weighed.chi2_reduced,
-        sigma_known=source.given,
-        drifting=source.drifting,
-        effective_share=1 / weighed.length,
-        rms=rms if data.delta is None else math.radians(2 * rms),
-        span=span,
-        calibrated=data.calibrated,
-    )
-    plate = backface.rms_without(scene, weighed) if problem.plan.on("back-face") else None
-    natural = frozenset(p.name for p in problem.parameters if p.natural_lower)
+    each = parts.parts(data, weighed, found)
+    missed = parts.missed(each, weighed)
     status = judge(
         converged=bool(weighed.minima.converged[0]),
-        misfit=misfit,
+        misfit=bool(missed),
         parameters=parameters,
         rivals=others,
-        natural=natural,
+        natural=frozenset(p.name for p in problem.parameters if p.natural_lower),
     )
+    shown = (missed or each)[0]
+    said = verdict(status, parameters, others, shown.rms, shown.name or "the data")
     return Fit(
-        spectrum=data,
+        parts=each,
         status=status,
-        verdict=verdict(status, parameters, others, rms) + backface.told(rms, plate),
+        verdict=said + backface.told(backface.worth(spectra, weighed)),
         parameters=parameters,
         rivals=others,
         chi2_reduced=weighed.chi2_reduced,
-        rms=rms,
-        effective_points=summary.effective_points(problem, weighed),
+        rms=parts.together(each),
+        effective_points=sum(part.effective_points for part in each),
         correlation_names=found.names,
         correlation=found.correlation,
-        plan=problem.plan,
-        warnings=summary.warnings(scene, weighed, found),
-        curve=curve,
+        warnings=summary.warnings(spectra, weighed, found),
         profile=profile,
         seconds=time.perf_counter() - began,
     )

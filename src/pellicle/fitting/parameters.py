@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -69,13 +70,41 @@ class Parameter:
 
 def parameters(scene: Scene) -> tuple[Parameter, ...]:
     """Every free parameter, in the order of the scene's pytree."""
-    return tuple(_parameter(scene, path, free) for path, free in free_leaves(scene))
+    return shared([scene], [""])[0]
 
 
-def _parameter(scene: Scene, path: tuple, free: Free) -> Parameter:
+def shared(
+    scenes: Sequence[Scene], names: Sequence[str]
+) -> tuple[tuple[Parameter, ...], list[tuple[int, ...]]]:
+    """The free parameters of one sample looked at in several ways, and which of them each scene holds.
+
+    Layers, substrate and ambient are shared; light and instrument are each scene's own, and bear its name.
+    """
+    found: dict[tuple[str, str], Parameter] = {}
+    held: list[list[tuple[str, str]]] = []
+    for scene, name in zip(scenes, names, strict=True):
+        held.append([])
+        for path, free in free_leaves(scene):
+            key = _own(path, name), jax.tree_util.keystr(path)
+            found.setdefault(key, _parameter(scene, path, free, name))
+            held[-1].append(key)
+    order = {key: i for i, key in enumerate(found)}
+    return tuple(found.values()), [tuple(order[key] for key in keys) for keys in held]
+
+
+def _own(path: tuple, name: str) -> str:
+    """The name of the scene that a number belongs to, empty where all share it."""
+    return name if path[0].name in ("light", "instrument") else ""
+
+
+def _full_name(scene: Scene, path: tuple, last: str, name: str) -> str:
+    return ".".join(part for part in (*_owner(scene, path), last, _own(path, name)) if part)
+
+
+def _parameter(scene: Scene, path: tuple, free: Free, name: str) -> Parameter:
     found = _place(scene, path)
     return Parameter(
-        name=".".join([*_owner(scene, path), found.name]),
+        name=_full_name(scene, path, found.name, name),
         key=found.key,
         unit=_unit(found),
         value=free.value,
@@ -124,12 +153,15 @@ def anonymous(scene: Scene) -> Scene:
     return eqx.tree_at(lambda s: s.layers, scene, tuple(replace(layer, name=None) for layer in scene.layers))
 
 
-def fixed_numbers(scene: Scene) -> list[tuple[str, float, str]]:
-    """(name, value, unit) of the layer's numbers and the instrument's that are not free."""
+def fixed_numbers(scene: Scene, name: str = "") -> list[tuple[str, float, str]]:
+    """(name, value, unit) of the layer's numbers and the instrument's that are not free.
+
+    `name` is the scene's where it is one of several.
+    """
     found = []
     for path, leaf in jax.tree_util.tree_leaves_with_path(scene, is_leaf=is_free):
         if path[0].name not in ("layers", "instrument") or not isinstance(leaf, int | float):
             continue
         at = _place(scene, path)
-        found.append((".".join([*_owner(scene, path), at.name]), float(leaf), _unit(at)))
+        found.append((_full_name(scene, path, at.name, name), float(leaf), _unit(at)))
     return found

@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from functools import lru_cache, wraps
 from pathlib import Path
 from typing import Any, get_type_hints
@@ -18,20 +18,19 @@ from typing import Any, get_type_hints
 import jax
 import numpy as np
 
-from pellicle.planning import Plan
-
 Program = Callable[..., Any]
 
 
 def kept(function: Program) -> Program:
-    """`jax.jit` with the plan (the first argument) static, kept on disk where there is a cache.
+    """`jax.jit` with the first argument static, kept on disk where there is a cache.
 
-    `function(plan, *pytrees)` must be pure and return arrays or named tuples of them.
+    `function(plan, *pytrees)` must be pure and return a named tuple of arrays; `plan` is hashable, and
+    its `repr` says all that the program depends on.
     """
     jitted = jax.jit(function, static_argnums=0)
 
     @wraps(function)
-    def call(plan: Plan, *arguments: Any) -> Any:
+    def call(plan: Hashable, *arguments: Any) -> Any:
         folder = jax.config.jax_compilation_cache_dir  # pyright: ignore[reportAttributeAccessIssue]
         if not folder:
             return jitted(plan, *arguments)
@@ -45,7 +44,9 @@ def kept(function: Program) -> Program:
 
 
 @lru_cache(maxsize=128)
-def _load(function: Program, plan: Plan, structure: Any, shapes: tuple, folder: str) -> tuple[Program, Any]:
+def _load(
+    function: Program, plan: Hashable, structure: Any, shapes: tuple, folder: str
+) -> tuple[Program, Any]:
     """The program as a function of flat arrays, and the structure of what it returns."""
     from jax import export
 
@@ -60,7 +61,7 @@ def _load(function: Program, plan: Plan, structure: Any, shapes: tuple, folder: 
     return jax.jit(found.call), _output(function)
 
 
-def _flat(function: Program, plan: Plan, structure: Any) -> Program:
+def _flat(function: Program, plan: Hashable, structure: Any) -> Program:
     def run(*arrays: Any) -> Any:
         return jax.tree_util.tree_leaves(function(plan, *jax.tree_util.tree_unflatten(structure, arrays)))
 
@@ -73,13 +74,10 @@ def _output(function: Program) -> Any:
     return jax.tree_util.tree_structure(kind(*range(len(kind._fields))))
 
 
-def _key(function: Program, plan: Plan, structure: Any, shapes: tuple) -> str:
-    effects = tuple((row.effect, row.on, row.count) for row in plan.rows)
+def _key(function: Program, plan: Hashable, structure: Any, shapes: tuple) -> str:
     parts = (
         function.__qualname__,
-        effects,
-        plan.signal,
-        plan.polarisation,
+        repr(plan),
         str(structure),
         shapes,
         jax.__version__,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 from typing import Any
 
@@ -81,6 +81,17 @@ class Curve:
 
 
 @dataclass(frozen=True)
+class Index:
+    """The layer's n and k with standard errors at each wavelength (nm), rising."""
+
+    wavelength: np.ndarray
+    n: np.ndarray
+    k: np.ndarray
+    n_stderr: np.ndarray
+    k_stderr: np.ndarray
+
+
+@dataclass(frozen=True)
 class Profile:
     """χ² above the best against thickness (nm): what the search saw."""
 
@@ -89,25 +100,41 @@ class Profile:
 
 
 @dataclass(frozen=True)
-class Fit:
-    """The outcome of fitting one spectrum.
+class Part:
+    """One spectrum of a fit, and how the best scene explains it.
 
+    `name` is what its own parameters end in, empty where there is no other spectrum; `rms` is in the
+    unit of the signal: a fraction, or degrees of Ψ.
+    """
+
+    name: str
+    spectrum: Any
+    curve: Curve
+    plan: Plan
+    rms: float
+    chi2_reduced: float
+    effective_points: float
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The outcome of fitting a spectrum, or several of one sample together: `parts`.
+
+    `rms` is None where the spectra have no unit in common.
     `print(fit)` gives the verdict and the parameters; `pellicle.report.text.report(fit)` everything.
     """
 
-    spectrum: Any
+    parts: tuple[Part, ...]
     status: Status
     verdict: str
     parameters: dict[str, Estimate]
     rivals: tuple[Rival, ...]
     chi2_reduced: float
-    rms: float
+    rms: float | None
     effective_points: float
     correlation_names: tuple[str, ...]
     correlation: np.ndarray
-    plan: Plan
     warnings: tuple[str, ...]
-    curve: Curve
     profile: Profile | None
     seconds: float
 
@@ -122,3 +149,36 @@ class Fit:
     @property
     def free(self) -> tuple[Estimate, ...]:
         return tuple(p for p in self.parameters.values() if p.free)
+
+    @property
+    def spectrum(self) -> Any:
+        """The spectrum that was fitted. Raises ValueError where there are several."""
+        return self._only.spectrum
+
+    @property
+    def curve(self) -> Curve:
+        """Data and model of the only spectrum. Raises ValueError where there are several."""
+        return self._only.curve
+
+    @property
+    def plan(self) -> Plan:
+        """What was simulated for the only spectrum. Raises ValueError where there are several."""
+        return self._only.plan
+
+    @property
+    def index(self) -> Index:
+        """The layer's n and k at every wavelength of any spectrum, each once."""
+        curves = [part.curve for part in self.parts]
+        columns = {f.name: np.concatenate([getattr(c, f.name) for c in curves]) for f in fields(Index)}
+        _, first = np.unique(columns["wavelength"], return_index=True)
+        return Index(**{name: column[first] for name, column in columns.items()})
+
+    @property
+    def _only(self) -> Part:
+        if len(self.parts) != 1:
+            raise ValueError(f"a joint fit of {len(self.parts)} spectra has one of these for each: see parts")
+        return self.parts[0]
+
+    def alone(self, part: Part) -> Fit:
+        """This fit as one spectrum of it sees it: for panels and tables of one file."""
+        return replace(self, parts=(part,), rms=part.rms, chi2_reduced=part.chi2_reduced)

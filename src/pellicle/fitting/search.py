@@ -14,8 +14,9 @@ from dataclasses import dataclass, replace
 import jax
 import numpy as np
 
+from pellicle.fitting.evaluation import evidences, polish
 from pellicle.fitting.parameters import Parameter
-from pellicle.fitting.problem import Problem, evidences, polish, thin
+from pellicle.fitting.problem import Problem, thin
 
 Progress = Callable[[str, int, int], None]
 """Called with what is being done, how much is done and how much there is."""
@@ -35,8 +36,10 @@ _MOST_DESIGNS = 1200
 
 @dataclass(frozen=True)
 class Scan:
-    """The misfit against thickness (nm): the best over the other parameters' coarse design, above the
-    evidence at the best minimum."""
+    """The misfit of each view at a coarse design of the other parameters, against thickness (nm).
+
+    `evidence` (design, thickness, views) is above that at the best minimum.
+    """
 
     thickness: np.ndarray
     evidence: np.ndarray
@@ -54,23 +57,23 @@ class Minima:
 
 def search(problem: Problem, progress: Progress) -> Minima:
     """Scan the box, polish the best distinct local minima, sort them."""
-    thinned = thin(problem, SCAN_POINTS)
+    thinned = problem._replace(views=tuple(thin(view, SCAN_POINTS) for view in problem.views))
     depth = problem.thickness_axis
     grid = _thickness_grid(problem)
     design = _design(problem)
     units = np.repeat(design, max(len(grid), 1), axis=0)
     if depth is not None:
         units[:, depth] = np.tile(grid, len(design))
-    table = _scan(thinned, units, progress).reshape(len(design), -1)
+    table = _scan(thinned, units, progress).reshape(len(design), max(len(grid), 1), -1)
     batches = 1 if len(design) == 1 else 3 if len(problem.parameters) < 4 else 6
-    starts = units[_local_minima(table, most=batches * LANES)]
+    starts = units[_local_minima(table.sum(-1), most=batches * LANES)]
     minima = polished(problem, starts, progress)
     if depth is None:
         return minima
     p = problem.parameters[depth]
-    best = _scan(thinned, minima.units[:1], quiet)
-    scan = Scan(p.lower + grid * (p.upper - p.lower), table.min(axis=0) - min(best[0], table.min()))
-    return replace(minima, scan=scan)
+    seen = np.concatenate([_scan(thinned, minima.units[:1], quiet), table.reshape(len(units), -1)])
+    lowest = seen[np.argmin(seen.sum(-1))]
+    return replace(minima, scan=Scan(p.lower + grid * (p.upper - p.lower), table - lowest))
 
 
 def polished(problem: Problem, starts: np.ndarray, progress: Progress) -> Minima:
@@ -102,7 +105,7 @@ def _thickness_grid(problem: Problem) -> np.ndarray:
     if problem.thickness_axis is None:
         return np.zeros(0)
     p = problem.parameters[problem.thickness_axis]
-    step = problem.scene.light.wavelength.min() / (8 * problem.largest_index)
+    step = problem.shortest / 8
     count = int(np.clip(np.ceil((p.upper - p.lower) / step) + 1, 9, _MOST_STEPS))
     return np.linspace(0.0, 1.0, count)
 
@@ -141,27 +144,28 @@ def _levels(p: Parameter, problem: Problem) -> np.ndarray:
     if p.key == "B":
         count = np.ceil(_dispersion_fringes(p, problem))
     if p.key == "thickness":
-        step = problem.scene.light.wavelength.min() / (4 * problem.largest_index)
+        step = problem.shortest / 4
         return _even(int(np.clip(np.ceil((p.upper - p.lower) / step), 3, 24)))
     return _even(int(np.clip(count, 3, 8)))
 
 
 def _dispersion_fringes(p: Parameter, problem: Problem) -> float:
-    """By how many fringes the ends of the spectrum part over the bounds of Cauchy's B."""
+    """By how many fringes the ends of the spectra part over the bounds of Cauchy's B."""
     thickest = max([q.upper for q in problem.parameters if q.key == "thickness"], default=1000.0)
-    wavelength = problem.scene.light.wavelength
-    blue, red = wavelength.min(), wavelength.max()
+    wavelengths = [view.scene.light.wavelength for view in problem.views]
+    blue, red = min(nm.min() for nm in wavelengths), max(nm.max() for nm in wavelengths)
     return 2 * min(thickest, 2000.0) / blue * (p.upper - p.lower) * (1 / blue**2 - 1 / red**2)
 
 
 def _scan(problem: Problem, units: np.ndarray, progress: Progress) -> np.ndarray:
-    """Evidence of every candidate, in chunks of one shape: one program, and room for Ctrl-C."""
-    plan, *arguments = problem.program
-    found = np.empty(len(units))
+    """Evidence of every candidate in each view, in chunks of one shape: one program, and room for Ctrl-C."""
+    found = np.empty((len(units), len(problem.views)))
     for first in range(0, len(units), _CHUNK):
         chunk = units[first : first + _CHUNK]
         padded = np.concatenate([chunk, np.repeat(chunk[-1:], _CHUNK - len(chunk), axis=0)])
-        found[first : first + _CHUNK] = np.asarray(evidences(plan, *arguments, padded).evidence)[: len(chunk)]
+        for column, view in zip(found.T, problem.views, strict=True):
+            evidence = evidences(*view.program, padded[:, list(view.takes)]).evidence
+            column[first : first + _CHUNK] = np.asarray(evidence)[: len(chunk)]
         progress("scan", min(first + _CHUNK, len(units)), len(units))
     return np.where(np.isfinite(found), found, np.inf)
 
@@ -175,12 +179,12 @@ def _local_minima(table: np.ndarray, most: int) -> np.ndarray:
 
 
 def _polish(problem: Problem, starts: np.ndarray, progress: Progress):
-    plan, *arguments = problem.program
+    looks, *arguments = problem.program
     pieces = []
     for first in range(0, len(starts), LANES):
         lanes = starts[first : first + LANES]
         padded = np.concatenate([lanes, np.repeat(lanes[-1:], LANES - len(lanes), axis=0)])
-        result = jax.device_get(polish(plan, *arguments, padded))
+        result = jax.device_get(polish(looks, *arguments, padded))
         pieces.append([column[: len(lanes)] for column in result])
         progress("polish", min(first + LANES, len(starts)), len(starts))
     units, evidence, converged = (np.concatenate(column) for column in zip(*pieces, strict=True))

@@ -73,8 +73,17 @@ def _outside(parameters: Mapping[str, Estimate], rival: Rival) -> bool:
     )
 
 
-def verdict(status: Status, parameters: Mapping[str, Estimate], rivals: tuple[Rival, ...], rms: float) -> str:
-    """One or two sentences for a reader who is no statistician."""
+def verdict(
+    status: Status,
+    parameters: Mapping[str, Estimate],
+    rivals: tuple[Rival, ...],
+    rms: float,
+    missed: str = "the data",
+) -> str:
+    """One or two sentences for a reader who is no statistician.
+
+    `missed` is what the scene does not explain, by `rms`, where it explains too little.
+    """
     lead = next((p for p in parameters.values() if p.free), None)
     if lead is None:
         return "Nothing was free to fit."
@@ -96,7 +105,7 @@ def verdict(status: Status, parameters: Mapping[str, Estimate], rivals: tuple[Ri
         return f"The data do not determine {lead.name}: {_limits(lead)}."
     if status is Status.MISFIT:
         return (
-            f"The scene does not explain the data (rms {rms:.4f} with structured residuals): the best fit,"
+            f"The scene does not explain {missed} (rms {rms:.4f} with structured residuals): the best fit,"
             f" {told}, should not be used."
         )
     return f"The solver did not settle; its best point, {told}, should not be used."

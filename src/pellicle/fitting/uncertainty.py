@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from pellicle.fitting.evaluation import Local
 from pellicle.fitting.nuisance import offset_prior, scale_prior
-from pellicle.fitting.problem import Local, Problem
+from pellicle.fitting.problem import Problem, View
 from pellicle.scene import Drift
 
 UNSEEN = 0.5
@@ -42,53 +44,74 @@ class Errors:
         return self.covariance / np.outer(sd, sd)
 
 
-def linear_coefficients(problem: Problem, at: Local) -> list[Linear]:
+def linear_coefficients(view: View, at: Local) -> list[Linear]:
     """Scale and offset as Chebyshev coefficients in wavelength, recovered from their curves."""
-    instrument = problem.scene.instrument
+    instrument = view.scene.instrument
     found: list[Linear] = []
     if isinstance(instrument.scale, Drift):
         _, sd = scale_prior(instrument.scale)
-        found += _series("scale", problem, at.gain, sd, size=None)
+        found += _series("scale", view, at.gain, sd, size=None)
     if isinstance(instrument.offset, Drift):
         _, sd = offset_prior(instrument.offset)
-        found += _series("offset", problem, at.offset, sd, size=float(problem.data.level))
+        found += _series("offset", view, at.offset, sd, size=float(view.data.level))
     return found
 
 
-def _series(name: str, problem: Problem, curve, sd: np.ndarray, size: float | None) -> list[Linear]:
+def _series(name: str, view: View, curve, sd: np.ndarray, size: float | None) -> list[Linear]:
     """The coefficients of one curve; a gain's priors are in units of its own mean (`size=None`)."""
-    position, degree = np.asarray(problem.data.position)[: problem.points], len(sd) - 1
-    coefficients = np.polynomial.chebyshev.chebfit(position, np.asarray(curve)[: problem.points], degree)
+    position, degree = np.asarray(view.data.position)[: view.points], len(sd) - 1
+    coefficients = np.polynomial.chebyshev.chebfit(position, np.asarray(curve)[: view.points], degree)
     basis = np.polynomial.chebyshev.chebvander(position, degree).T
     prior_sd = sd * (abs(coefficients[0]) if size is None else size)
-    names = [f"instrument.{name}" + (f"_{j}" if j else "") for j in range(degree + 1)]
+    own = f".{view.name}" if view.name else ""
+    names = [f"instrument.{name}" + (f"_{j}" if j else "") + own for j in range(degree + 1)]
     return [
         Linear(*row, name == "scale")
         for row in zip(names, coefficients.tolist(), basis, prior_sd, strict=True)
     ]
 
 
-def errors(problem: Problem, at: Local, variance: float) -> Errors:
+def errors(problem: Problem, at: Sequence[Local], variance: Sequence[float]) -> Errors:
     """Covariance by a singular value decomposition of the Jacobian in units of each parameter's range.
 
-    `variance` multiplies σ²: what the residuals say of the noise, and of its correlation. Nothing is
-    inverted that is not there: a direction that the data do not see keeps its huge variance (a
-    pseudo-inverse would call it 0, and an opaque gold film known to ± 0.00 nm).
+    `at` and `variance` are those of each view; `variance` multiplies σ²: what the residuals say of the
+    noise, and of its correlation. Nothing is inverted that is not there: a direction that the data do
+    not see keeps its huge variance (a pseudo-inverse would call it 0, and an opaque gold film known to
+    ± 0.00 nm).
     """
-    points, linear = problem.points, linear_coefficients(problem, at)
-    weight = (np.asarray(problem.data.weight)[:points] / np.sqrt(variance))[:, None]
+    linear = [linear_coefficients(view, local) for view, local in zip(problem.views, at, strict=True)]
+    every = [c for own in linear for c in own]
     span = problem.box.upper - problem.box.lower
-    gain, signal = np.asarray(at.gain)[:points, None], np.asarray(at.signal)[:points]
-    steep = gain * np.asarray(at.slope)[:points] * span
-    flat = [c.basis * (signal if c.on_signal else 1.0) * c.prior_sd for c in linear]
-    jacobian = weight * np.column_stack([steep, *flat])
-    priors = np.diag(np.concatenate([problem.box.prior_weight * span, np.ones(len(linear))]))
-    _, values, rows = np.linalg.svd(np.vstack([jacobian, priors]), full_matrices=False)
-    floor = np.finfo(float).eps * len(jacobian) * max(values.max(initial=0.0), 1e-100)
-    unit = np.concatenate([span, [c.prior_sd for c in linear]])
+    blocks, first = [], len(span)
+    for view, local, own, widened in zip(problem.views, at, linear, variance, strict=True):
+        block = np.zeros((view.points, len(span) + len(every)))
+        weight = (np.asarray(view.data.weight)[: view.points] / np.sqrt(widened))[:, None]
+        block[:, list(view.takes)] = weight * _steep(view, local)
+        if own:
+            block[:, first : first + len(own)] = weight * _flat(view, local, own)
+        first += len(own)
+        blocks.append(block)
+    priors = np.diag(np.concatenate([problem.box.prior_weight * span, np.ones(len(every))]))
+    jacobian = np.vstack([*blocks, priors])
+    _, values, rows = np.linalg.svd(jacobian, full_matrices=False)
+    points = len(jacobian) - len(priors)
+    floor = np.finfo(float).eps * points * max(values.max(initial=0.0), 1e-100)
+    unit = np.concatenate([span, [c.prior_sd for c in every]])
     spread = rows.T / np.maximum(values, floor)
     covariance = (spread @ spread.T) * np.outer(unit, unit)
-    return Errors((*(p.name for p in problem.parameters), *(c.name for c in linear)), covariance)
+    return Errors((*(p.name for p in problem.parameters), *(c.name for c in every)), covariance)
+
+
+def _steep(view: View, at: Local) -> np.ndarray:
+    """∂ model / ∂ nonlinear parameter in units of its range, (points, the view's parameters)."""
+    gain, slope = np.asarray(at.gain)[: view.points, None], np.asarray(at.slope)[: view.points]
+    return gain * slope * (view.box.upper - view.box.lower)
+
+
+def _flat(view: View, at: Local, linear: list[Linear]) -> np.ndarray:
+    """∂ model / ∂ linear coefficient in units of its prior, (points, coefficients)."""
+    signal = np.asarray(at.signal)[: view.points]
+    return np.column_stack([c.basis * (signal if c.on_signal else 1.0) * c.prior_sd for c in linear])
 
 
 def layer_errors(at: Local, covariance: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray]:

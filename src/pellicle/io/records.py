@@ -6,7 +6,7 @@ import json
 import math
 import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,7 @@ import numpy as np
 from pellicle import __version__
 
 if TYPE_CHECKING:
-    from pellicle.fitting.result import Estimate, Fit
+    from pellicle.fitting.result import Estimate, Fit, Part
 
 SCHEMA = "pellicle.fit/1"
 
@@ -24,16 +24,10 @@ _PACKAGES = ("jax", "optimistix", "numpy")
 
 def to_json(fit: Fit) -> dict[str, Any]:
     """A fit as plain dictionaries of the schema; what is infinite or undefined is None."""
-    data = fit.spectrum
     matrix = np.asarray(fit.correlation, dtype=float)
     return {
         "schema": SCHEMA,
-        "data": {
-            "path": data.path,
-            "sha256": data.sha256,
-            "signal": data.signal,
-            "points": int(fit.curve.wavelength.size),
-        },
+        "data": _data(fit),
         "status": str(fit.status),
         "verdict": fit.verdict,
         "parameters": {name: _parameter(p) for name, p in fit.parameters.items()},
@@ -45,34 +39,69 @@ def to_json(fit: Fit) -> dict[str, Any]:
             for rival in fit.rivals
         ],
         "chi2_reduced": _number(fit.chi2_reduced),
-        "rms": _number(fit.rms),
+        "rms": None if fit.rms is None else _number(fit.rms),
         "effective_points": _number(fit.effective_points),
         "correlation": {
             "names": list(fit.correlation_names),
             "matrix": [[_number(value) for value in row] for row in matrix],
         },
-        "plan": [
-            {
-                "effect": row.effect,
-                "on": bool(row.on),
-                "why": row.why,
-                "error_bound": _number(row.error_bound),
-            }
-            for row in fit.plan.rows
-        ],
+        "plan": [row for part in fit.parts for row in _plan(part)],
         "warnings": list(fit.warnings),
         "versions": versions(),
         "seconds": _number(fit.seconds),
     }
 
 
+def _data(fit: Fit) -> dict[str, Any] | list[dict[str, Any]]:
+    """What was fitted: a list where it is several spectra."""
+    first, *others = fit.parts
+    return [_part(part) for part in fit.parts] if others else _source(first)
+
+
+def _source(part: Part) -> dict[str, Any]:
+    data = part.spectrum
+    points = int(part.curve.wavelength.size)
+    return {"path": data.path, "sha256": data.sha256, "signal": data.signal, "points": points}
+
+
+def _part(part: Part) -> dict[str, Any]:
+    """One of several spectra: its name, by which its own parameters end, and how well it is explained."""
+    return {
+        "name": part.name,
+        **_source(part),
+        "rms": _number(part.rms),
+        "chi2_reduced": _number(part.chi2_reduced),
+        "effective_points": _number(part.effective_points),
+    }
+
+
+def _plan(part: Part) -> list[dict[str, Any]]:
+    """The plan's rows, with the name of the spectrum where it is one of several."""
+    return [
+        {
+            **({"name": part.name} if part.name else {}),
+            "effect": row.effect,
+            "on": bool(row.on),
+            "why": row.why,
+            "error_bound": _number(row.error_bound),
+        }
+        for row in part.plan.rows
+    ]
+
+
 def failure(
-    path: str | os.PathLike[str], error: Exception | str, sha256: str | None = None
+    path: str | os.PathLike[str] | Sequence[str], error: Exception | str, sha256: str | None = None
 ) -> dict[str, Any]:
-    """The record of a file that gave no fit: the same schema, status "failed", and why."""
+    """The record of a file that gave no fit, or of several that gave no joint one, and why.
+
+    Its schema is the same, its status "failed".
+    """
+    alone = isinstance(path, str | os.PathLike)
+    paths = [os.fspath(path)] if isinstance(path, str | os.PathLike) else list(path)
+    data = [{"path": name, "sha256": sha256, "signal": None, "points": 0} for name in paths]
     return {
         "schema": SCHEMA,
-        "data": {"path": os.fspath(path), "sha256": sha256, "signal": None, "points": 0},
+        "data": data[0] if alone else data,
         "status": "failed",
         "verdict": "No fit was made.",
         "error": str(error),

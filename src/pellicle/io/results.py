@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import csv
-import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from pellicle import __version__
 from pellicle.io.atomic import MARKER, new_folder, write_text
@@ -18,6 +15,8 @@ from pellicle.io.records import failure as failure
 from pellicle.io.records import indented, versions
 from pellicle.io.records import one_line as one_line
 from pellicle.io.records import to_json as to_json
+from pellicle.io.tables import fit_csv as fit_csv
+from pellicle.io.tables import nk_csv as nk_csv
 
 if TYPE_CHECKING:
     from pellicle.fitting.result import Fit
@@ -74,77 +73,6 @@ def _untaken(stem: str, taken: set[str]) -> str:
         count += 1
         name = f"{stem}-{count}"
     return name
-
-
-def fit_csv(fit: Fit) -> str:
-    """Data, model, residual and σ at each wavelength, with the angle where the data have one."""
-    curve, data = fit.curve, fit.spectrum
-    if curve.delta_data is not None:
-        return _psi_delta_csv(fit)
-    columns = {
-        "wavelength_nm": curve.wavelength,
-        "data": curve.data,
-        "model": curve.model,
-        "residual": curve.residual,
-        "sigma": curve.sigma,
-    }
-    angle = ""
-    if data.angle is not None:
-        columns["angle_deg"], angle = data.angle, ",angle"
-    kind = data.signal if data.calibrated else "intensity"
-    about = [
-        f"fit of {data.signal}: data, model, residual = data - model, sigma = standard deviation assumed",
-        f"pellicle reads the data again with --columns wavelength,{kind},_,_,sigma{angle}",
-    ]
-    return _table(about, fit, columns)
-
-
-def _psi_delta_csv(fit: Fit) -> str:
-    """Ψ and Δ of data and model in degrees, in columns that pellicle reads again as they are."""
-    curve, data = fit.curve, fit.spectrum
-    assert curve.delta_data is not None
-    assert curve.delta_model is not None
-    columns = {"wavelength_nm": curve.wavelength}
-    if data.angle is not None:
-        columns["angle_deg"] = data.angle
-    columns |= {
-        "psi_deg": curve.data,
-        "psi_model": curve.model,
-        "psi_residual": curve.residual,
-        "delta_deg": curve.delta_data,
-        "delta_model": curve.delta_model,
-        "delta_residual": curve.delta_residual,
-    }
-    if data.sigma is not None and data.delta_sigma is not None:
-        columns |= {"sigma_psi": data.sigma, "sigma_delta": data.delta_sigma}
-    about = ["fit of psi and delta in degrees: data, model, residual = data - model (of delta: -180 to 180)"]
-    return _table(about, fit, columns)
-
-
-def nk_csv(fit: Fit) -> str:
-    """The layer's n and k with standard errors (empty where infinite), each wavelength once."""
-    curve = fit.curve
-    nm, first = np.unique(curve.wavelength, return_index=True)
-    columns = {"wavelength_nm": nm} | {
-        name: getattr(curve, name)[first] for name in ("n", "k", "n_stderr", "k_stderr")
-    }
-    return _table(["n and k of the fitted layer, a material that pellicle takes by its path"], fit, columns)
-
-
-def _table(about: Iterable[str], fit: Fit, columns: Mapping[str, np.ndarray]) -> str:
-    source = f"from {_plain(fit.spectrum.path) or 'a spectrum'}, sha256 {fit.spectrum.sha256 or 'unknown'}"
-    comments = [f"# {line}" for line in (*about, source, f"written by pellicle {__version__}")]
-    rows = (",".join(map(_cell, row)) for row in zip(*columns.values(), strict=True))
-    return "\n".join([*comments, ",".join(columns), *rows]) + "\n"
-
-
-def _plain(path: str) -> str:
-    """A path on one line, whatever its name holds."""
-    return " ".join(path.split())
-
-
-def _cell(value: float) -> str:
-    return f"{float(value):.10g}" if math.isfinite(value) else ""
 
 
 def write_summary(path: str | os.PathLike[str], fits: Iterable[Fit | Mapping[str, Any]]) -> None:

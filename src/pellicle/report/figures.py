@@ -60,20 +60,25 @@ def draw(fit: Fit) -> Figure:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    signal = _signal(fit)
-    panels = list(signal)
+    panels: list[tuple[Callable[[Axes, Fit], None], float, Fit]] = []
+    for part in fit.parts:
+        alone = fit.alone(part)
+        panels += [(panel, height, alone) for panel, height in _signal(alone)]
+    of_data = len(panels)
     if fit.profile is not None and fit.profile.thickness.size > 1:
-        panels.append((_misfit, 1.9))
+        panels.append((_misfit, 1.9, fit))
     if _index_is_free(fit):
-        panels.append((_index, 1.5))
-    heights = [height for _, height in panels]
+        panels.append((_index, 1.5, fit))
+    heights = [height for _, height, _ in panels]
     drawn = Figure(figsize=(WIDTH_INCHES, sum(heights) + 1.2), layout="constrained")
     FigureCanvasAgg(drawn)
     axes = drawn.subplots(len(panels), 1, squeeze=False, height_ratios=heights)[:, 0]
-    for below in axes[1 : len(signal)]:
-        below.sharex(axes[0])
-    for (panel, _), at in zip(panels, axes, strict=True):
-        panel(at, fit)
+    for above, below, one, other in zip(axes, axes[1:of_data], panels, panels[1:of_data], strict=False):
+        if one[2] is other[2]:
+            below.sharex(above)
+    for (panel, _, shown), at in zip(panels, axes, strict=True):
+        panel(at, shown)
+    _name_parts(fit, list(axes[:of_data]), [shown for _, _, shown in panels[:of_data]])
     drawn.suptitle(_title(fit), fontsize="medium", x=0.01, ha="left")
     return drawn
 
@@ -85,8 +90,17 @@ def _signal(fit: Fit) -> list[Panel]:
     return [(psi_delta.psi, 2.2), (psi_delta.delta, 2.2), (psi_delta.residuals, 1.5)]
 
 
+def _name_parts(fit: Fit, axes: list[Axes], shown: list[Fit]) -> None:
+    """The name of each of several spectra over its first panel."""
+    if len(fit.parts) == 1:
+        return
+    for part in fit.parts:
+        first = next(at for at, of in zip(axes, shown, strict=True) if of.parts[0] is part)
+        first.set_title(part.name.replace("$", r"\$"), fontsize="small", loc="left")
+
+
 def _title(fit: Fit) -> str:
-    name = fit.spectrum.path.replace("\\", "/").rsplit("/", 1)[-1]
+    name = " and ".join(part.spectrum.path.replace("\\", "/").rsplit("/", 1)[-1] for part in fit.parts)
     verdict = textwrap.wrap(fit.verdict.replace(" ± ", "\u00a0±\u00a0"), 108, break_on_hyphens=False)
     text = "\n".join([f"{textwrap.shorten(name, 70) or 'spectrum'}: {fit.status}", *verdict])
     return text.replace("$", r"\$")  # no mathematics in a file's name
@@ -201,13 +215,13 @@ def _power(exponent: int) -> str:
 
 
 def _index_is_free(fit: Fit) -> bool:
-    several = fit.curve.delta_data is None or np.unique(fit.curve.wavelength).size > 1
-    return several and bool(np.any(fit.curve.n_stderr > 0) or np.any(fit.curve.k_stderr > 0))
+    several = any(part.curve.delta_data is None for part in fit.parts) or fit.index.wavelength.size > 1
+    return several and bool(np.any(fit.index.n_stderr > 0) or np.any(fit.index.k_stderr > 0))
 
 
 def _index(axes: Axes, fit: Fit) -> None:
     """n on the left; k, if there is any, on the right and below n, so that their bands stay apart."""
-    curve = fit.curve
+    curve = fit.index
     _band(axes, curve.wavelength, curve.n, curve.n_stderr, BLUE, "-")
     axes.set(xlabel="wavelength (nm)")
     axes.margins(x=0.01)

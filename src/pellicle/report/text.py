@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from pellicle.fitting.result import Estimate, Fit, Rival, Status
+from pellicle.fitting.result import Estimate, Fit, Part, Rival, Status
 from pellicle.fitting.status import RIVAL, describe
 
 COLUMNS = 100
@@ -30,7 +30,7 @@ ADVICE = {
 """What to do next, for every status."""
 
 _INDENT = "    "
-_NUISANCE = re.compile(r"instrument\.(scale|offset)(_\d+)?")
+_NUISANCE = re.compile(r"instrument\.(scale|offset)(_\d+)?(\..+)?")
 
 
 def report(fit: Fit) -> str:
@@ -55,8 +55,9 @@ def summary_line(fit: Fit) -> str:
     leading = [p for p in fit.free if not _NUISANCE.fullmatch(p.name)] or list(fit.free)
     told = [_value(p, named=True) for p in leading[:SUMMARY_PARAMETERS]]
     more = ["..."] if len(leading) > SUMMARY_PARAMETERS else []
-    name = fit.spectrum.path.replace("\\", "/").rsplit("/", 1)[-1] or "spectrum"
-    return f"{name}: {fit.status}, {', '.join([*told, *more, f'rms {fit.rms:.3g}{_degrees(fit)}'])}"
+    names = (part.spectrum.path.replace("\\", "/").rsplit("/", 1)[-1] or "spectrum" for part in fit.parts)
+    rms = [] if fit.rms is None else [f"rms {fit.rms:.3g}{_degrees(fit.parts[0])}"]
+    return f"{' and '.join(names)}: {fit.status}, {', '.join([*told, *more, *rms])}"
 
 
 def _wrap(text: str, first: str = "", rest: str = "") -> list[str]:
@@ -76,17 +77,23 @@ def _facts(rows: Iterable[tuple[str, str]]) -> list[str]:
 
 
 def _verdict(fit: Fit) -> list[str]:
-    data, nm = fit.spectrum, fit.curve.wavelength
+    status = f"{fit.status}. {ADVICE[fit.status]}"
+    files = [row for part in fit.parts for row in _file(part)]
+    return [*_wrap(fit.verdict), *_facts([("status", status), *files])]
+
+
+def _file(part: Part) -> list[tuple[str, str]]:
+    """What was measured, and where it lies."""
+    data, nm = part.spectrum, part.curve.wavelength
     points = f"{data.signal}, {nm.size} points"
     if nm.size:
         points += _span(nm, "nm")
     if data.signal == "psi-delta" and data.angle is not None and nm.size:
         points += "," + _span(data.angle, "degrees")
-    if fit.effective_points < 0.95 * nm.size:
-        points += f", worth {fit.effective_points:.3g} independent ones"
+    if part.effective_points < 0.95 * nm.size:
+        points += f", worth {part.effective_points:.3g} independent ones"
     file = [("file", _shortened(data.path))] if data.path else []
-    status = f"{fit.status}. {ADVICE[fit.status]}"
-    return [*_wrap(fit.verdict), *_facts([("status", status), *file, ("data", points)])]
+    return [*file, (part.name or "data", points)]
 
 
 def _span(values: np.ndarray, unit: str) -> str:
@@ -94,9 +101,9 @@ def _span(values: np.ndarray, unit: str) -> str:
     return f" from {lo:g} to {hi:g} {unit}" if lo < hi else f" at {lo:g} {unit}"
 
 
-def _degrees(fit: Fit) -> str:
+def _degrees(part: Part) -> str:
     """The unit of what is measured, where it has one."""
-    return " degrees" if fit.spectrum.signal == "psi-delta" else ""
+    return " degrees" if part.spectrum.signal == "psi-delta" else ""
 
 
 def _shortened(path: str) -> str:
@@ -106,18 +113,25 @@ def _shortened(path: str) -> str:
 
 
 def _statistics(fit: Fit) -> list[str]:
-    apart = []
-    if fit.curve.delta_data is not None:
-        psi, delta = (np.sqrt(np.mean(r**2)) for r in (fit.curve.residual, fit.curve.delta_residual))
-        apart = [("of psi and of delta", f"{psi:.4g} and {delta:.4g} degrees")]
     return _facts(
         [
-            ("rms residual", f"{fit.rms:.4g}{_degrees(fit)}"),
-            *apart,
+            *(row for part in fit.parts for row in _rms(part)),
             ("reduced chi-square", f"{fit.chi2_reduced:.4g}"),
             ("seconds", f"{fit.seconds:.2f}"),
         ]
     )
+
+
+def _rms(part: Part) -> list[tuple[str, str]]:
+    """How far the model is from one spectrum; of several also the reduced χ², as each has its noise."""
+    rows = [("rms residual", f"{part.rms:.4g}{_degrees(part)}")]
+    if part.name:
+        chi2 = f"reduced chi-square {part.chi2_reduced:.4g}"
+        rows = [(f"{label} of {part.name}", f"{rms}, {chi2}") for label, rms in rows]
+    if part.curve.delta_data is not None:
+        psi, delta = (np.sqrt(np.mean(r**2)) for r in (part.curve.residual, part.curve.delta_residual))
+        rows.append(("of psi and of delta", f"{psi:.4g} and {delta:.4g} degrees"))
+    return rows
 
 
 def _parameters(fit: Fit) -> list[str]:
@@ -211,4 +225,9 @@ def _left_out(count: int) -> list[str]:
 
 
 def _plan(fit: Fit) -> list[str]:
-    return _facts((f"{row.effect:<13} {'on' if row.on else 'off':<3}", row.why) for row in fit.plan.rows)
+    lines = []
+    for part in fit.parts:
+        lines += _wrap(f"{part.name}:") if part.name else []
+        rows = part.plan.rows
+        lines += _facts((f"{row.effect:<13} {'on' if row.on else 'off':<3}", row.why) for row in rows)
+    return lines

@@ -1,0 +1,114 @@
+"""What the search and the solver evaluate: compiled functions of a problem's views and its parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from pellicle.fitting import nuisance
+from pellicle.fitting.nuisance import Data
+from pellicle.fitting.problem import Box
+from pellicle.fitting.programs import kept
+from pellicle.model import build
+from pellicle.planning import Plan
+from pellicle.scene import Interface, Scene, free_leaves, insert
+
+
+def _solve(plan: Plan, scene: Scene, data: Data, values: Sequence[Any]) -> nuisance.Solved:
+    signal = build(plan)(insert(scene, values))
+    return nuisance.solve(signal, data, scene.instrument)
+
+
+def _prior(box: Box, unit):
+    return (box.values(unit) - box.prior_mean) * box.prior_weight
+
+
+class Scanned(NamedTuple):
+    """−2 log evidence of each candidate."""
+
+    evidence: Any
+
+
+@kept
+def evidences(plan: Plan, scene: Scene, data: Data, box: Box, units: Any) -> Scanned:
+    """−2 log evidence, in one view, of candidates `units` (candidates, its parameters) in the unit cube."""
+
+    def one(unit):
+        solved = _solve(plan, scene, data, list(box.values(unit)))
+        return solved.evidence + jnp.sum(_prior(box, unit) ** 2)
+
+    return Scanned(jax.vmap(one)(units))
+
+
+Looks = tuple[tuple[Plan, tuple[int, ...]], ...]
+"""Of each view the plan, and which of the parameters it takes: what a compiled program depends on."""
+
+
+class Polished(NamedTuple):
+    """Local minima in the unit cube, (starts, parameters), their evidence, and whether they settled."""
+
+    units: Any
+    evidence: Any
+    converged: Any
+
+
+@kept
+def polish(looks: Looks, scenes: tuple[Scene, ...], data: tuple[Data, ...], box: Box, units: Any) -> Polished:
+    """The local minimum below each start (starts, parameters), in all views together."""
+    from pellicle.fitting.solve import least_squares  # a kept program needs no solver
+
+    def solved(unit):
+        values = list(box.values(unit))
+        views = zip(looks, scenes, data, strict=True)
+        return [_solve(plan, s, d, [values[i] for i in takes]) for (plan, takes), s, d in views]
+
+    def residual(unit):
+        return jnp.concatenate([*(view.residual for view in solved(unit)), _prior(box, unit)])
+
+    def one(unit):
+        best, converged = least_squares(residual, unit)
+        evidence = sum(view.evidence for view in solved(best)) + jnp.sum(_prior(box, best) ** 2)
+        return Polished(best, evidence, converged)
+
+    return jax.vmap(one)(units)
+
+
+class Local(NamedTuple):
+    """The model around one point of the box, for errors and reports."""
+
+    signal: Any  # simulated, without scale and offset
+    slope: Any  # ∂ signal / ∂ parameter in its own unit, (points, parameters)
+    model: Any
+    gain: Any
+    offset: Any
+    layer: Any  # n and k of the layer at each wavelength
+    layer_slope: Any  # their derivatives, (2, points, parameters)
+
+
+def shown_layer(scene: Scene) -> int | None:
+    """Which layer's n and k are reported: the first with free numbers of its own, else the uppermost;
+    None, the substrate, where nothing but interfaces lies on it."""
+    known = [(i, x.material) for i, x in enumerate(scene.layers) if not isinstance(x, Interface)]
+    free = [i for i, material in known if free_leaves(material)]
+    return next(iter([*free, *(i for i, _ in known)]), None)
+
+
+@kept
+def local(plan: Plan, scene: Scene, data: Data, box: Box, unit: Any) -> Local:
+    """Signal, its Jacobian, and the layer's index at one point of the box."""
+    simulate, shown = build(plan), shown_layer(scene)
+
+    def both(values):
+        numbers = insert(scene, list(values))
+        medium: Any = numbers.substrate if shown is None else numbers.layers[shown]
+        index = medium.material(numbers.light.wavelength)
+        return simulate(numbers), jnp.stack([index.real, index.imag])
+
+    values = box.values(unit)
+    (signal, layer), push = jax.linearize(both, values)
+    slope, layer_slope = jax.vmap(push, out_axes=-1)(jnp.eye(len(values)))
+    solved = nuisance.solve(signal, data, scene.instrument)
+    return Local(signal, slope, solved.model, solved.gain, solved.offset, layer, layer_slope)

@@ -1,0 +1,115 @@
+"""A spectrum and its scene as the numbers that a fit compares."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import numpy as np
+
+from pellicle.errors import UsageError
+from pellicle.fitting import noise
+from pellicle.io.spectrum import Spectrum
+from pellicle.scene import Drift, Instrument, Light, Scene, free_leaves
+
+
+class Noise(NamedTuple):
+    """Where the weights come from: `given` is an absolute σ; `drifting` the model's own error."""
+
+    given: bool = True
+    drifting: bool = False
+
+
+class Measured(NamedTuple):
+    """What is fitted, and the scene that is to explain it.
+
+    `values` are fractions (points,), or N, C, S (points, 3) for ellipsometry, which have no wrap-around;
+    `wavelength` (nm) and `sigma` are (points,); `temper` is how many independent points each counts for.
+    """
+
+    scene: Scene
+    wavelength: np.ndarray
+    values: np.ndarray
+    sigma: np.ndarray
+    temper: float = 1.0
+    noise: Noise = Noise()
+    name: str = ""  # that of one among several
+
+
+def measured(data: Spectrum, scene: Scene, name: str = "") -> Measured:
+    """A spectrum in numbers, with the scene looked at as it was. Raises UsageError as `fit` does."""
+    scene = seen_as(scene, data)
+    _check(data, scene)
+    source = Noise(data.sigma is not None, data.sigma is None and drifts(scene))
+    temper = 1 / noise.DRIFT_CORRELATION if source.drifting else 1.0
+    return Measured(scene, data.wavelength, _values(data), _sigma(data, source), temper, source, name)
+
+
+def seen_as(scene: Scene, data: Spectrum) -> Scene:
+    """The scene looked at as the spectrum was: its signal, wavelengths, polarisation and angles."""
+    angle: Any = scene.light.angle
+    if data.angle is not None:
+        angle = float(data.angle[0]) if np.ptp(data.angle) == 0 else data.angle
+    stated = data.polarisation != "unpolarised"
+    polarisation = data.polarisation if stated else scene.light.polarisation
+    return eqx.tree_at(lambda s: s.light, scene, Light(data.wavelength, angle, data.signal, polarisation))
+
+
+def unscaled(scene: Scene) -> Scene:
+    """The scene with neither scale nor offset, which Ψ and Δ cannot have."""
+    kept = {name: value for name, value in vars(scene.instrument).items() if name not in ("scale", "offset")}
+    return eqx.tree_at(lambda s: s.instrument, scene, Instrument(**kept))
+
+
+def drifts(scene: Scene) -> bool:
+    """Whether the scale varies along the spectrum."""
+    return isinstance(scene.instrument.scale, Drift) and scene.instrument.scale.degree > 0
+
+
+def _check(data: Spectrum, scene: Scene) -> None:
+    drifting = [x for x in (scene.instrument.scale, scene.instrument.offset) if isinstance(x, Drift)]
+    if data.delta is None and not data.calibrated and scene.instrument.scale not in drifting:
+        raise UsageError(
+            f"{data.path}: an uncalibrated intensity needs a free scale: add --scale slow, or --scale free"
+        )
+    if data.delta is None:
+        return
+    if drifting or scene.instrument.scale != 1.0 or scene.instrument.offset != 0.0:
+        raise UsageError(f"{data.path}: Ψ and Δ have no scale and no offset: leave both out")
+    if scene.substrate.back is not None:
+        raise UsageError(
+            f"{data.path}: ellipsometry of a plate's back face is not simulated: leave back out (in Python a"
+            " joint fit takes a scene for each spectrum)"
+        )
+    if data.angle is None and not free_leaves(scene.light) and not np.any(scene.light.angle):
+        raise UsageError(
+            f"{data.path}: ellipsometry needs its angle of incidence: add --angle 70, say, angle = 70 under "
+            "[data] in a recipe, or a column angle_deg"
+        )
+
+
+def _values(data: Spectrum) -> np.ndarray:
+    if data.delta is None:
+        return data.values
+    psi, delta = 2 * np.deg2rad(data.values), np.deg2rad(data.delta)
+    return np.stack([np.cos(psi), np.sin(psi) * np.cos(delta), np.sin(psi) * np.sin(delta)], -1)
+
+
+def _sigma(data: Spectrum, source: Noise) -> np.ndarray:
+    """σ of each point: given, the model's own error, or a guess that the residuals will replace.
+
+    On the sphere of N, C, S an error of Ψ moves a point by 2σ_Ψ and one of Δ by sin(2Ψ) σ_Δ; their
+    mean square serves for all directions.
+    """
+    if data.sigma is not None and data.delta is not None:
+        across = data.sigma if data.delta_sigma is None else data.delta_sigma
+        along = np.sin(2 * np.deg2rad(data.values)) * across
+        return np.deg2rad(np.sqrt(0.5 * ((2 * data.sigma) ** 2 + along**2)))
+    if data.sigma is not None:
+        return data.sigma
+    if data.delta is not None:
+        return np.full(len(data), 0.01)
+    if source.drifting:
+        return noise.drifting_sigma(data.values)
+    guess = max(0.01 * float(np.ptp(data.values)), float(np.median(noise.local_noise(data.values))), 1e-12)
+    return np.full(len(data), guess)

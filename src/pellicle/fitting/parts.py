@@ -1,0 +1,101 @@
+"""How the best scene explains each spectrum of a fit."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pellicle.fitting.problem import View
+from pellicle.fitting.result import Curve, Part
+from pellicle.fitting.status import misfits
+from pellicle.fitting.uncertainty import Errors, layer_errors
+from pellicle.fitting.weigh import Met, Weighed
+from pellicle.io.spectrum import Spectrum
+
+
+def parts(data: list[Spectrum], weighed: Weighed, found: Errors) -> tuple[Part, ...]:
+    """One part for each spectrum, in their order."""
+    views = zip(data, weighed.problem.views, weighed.met, strict=True)
+    return tuple(_part(spectrum, view, met, found) for spectrum, view, met in views)
+
+
+def _part(spectrum: Spectrum, view: View, met: Met, found: Errors) -> Part:
+    return Part(
+        name=view.name,
+        spectrum=spectrum,
+        curve=_curve(view, met, found),
+        plan=view.plan,
+        rms=_rms(view, met),
+        chi2_reduced=met.chi2 / met.freedom,
+        effective_points=view.rows / met.length,
+    )
+
+
+def _rms(view: View, met: Met) -> float:
+    """rms of the residuals. For ellipsometry it is in degrees of Ψ: half the distance on the sphere, in
+    each of its two directions."""
+    residual = (view.data.values - np.asarray(met.at.model))[: view.points]
+    if view.channels == 1:
+        return float(np.sqrt(np.mean(residual**2)))
+    return float(np.rad2deg(np.sqrt(residual @ residual / (2 * view.rows))) / 2)
+
+
+def together(found: tuple[Part, ...]) -> float | None:
+    """rms over all spectra, None where they have no unit in common."""
+    if len({part.spectrum.signal == "psi-delta" for part in found}) > 1:
+        return None
+    if len(found) == 1:
+        return found[0].rms
+    sizes = [part.curve.wavelength.size for part in found]
+    return math.sqrt(np.average([part.rms**2 for part in found], weights=sizes))
+
+
+def missed(found: tuple[Part, ...], weighed: Weighed) -> tuple[Part, ...]:
+    """The spectra that the scene does not explain."""
+    views = zip(found, weighed.problem.views, weighed.met, strict=True)
+    return tuple(part for part, view, met in views if _misses(part, view, met))
+
+
+def _misses(part: Part, view: View, met: Met) -> bool:
+    values = view.data.values[: view.points].reshape(view.rows, view.channels)
+    return misfits(
+        chi2_reduced=part.chi2_reduced,
+        sigma_known=view.noise.given,
+        drifting=view.noise.drifting,
+        effective_share=1 / met.length,
+        rms=part.rms if view.channels == 1 else math.radians(2 * part.rms),
+        span=float(np.max(np.ptp(values, axis=0))),
+        calibrated=part.spectrum.calibrated,
+    )
+
+
+def _curve(view: View, met: Met, found: Errors) -> Curve:
+    """Data, model and the layer's index with errors, at the real points."""
+    at, rows, held = met.at, view.rows, list(view.takes)
+    n_stderr, k_stderr = layer_errors(at, found.covariance[np.ix_(held, held)], rows)
+    n, k = np.asarray(at.layer)[:, :rows]
+    keep, shape = slice(view.points), (rows, view.channels)
+    data, model = view.data.values[keep].reshape(shape), np.asarray(at.model)[keep].reshape(shape)
+    sigma = 1 / view.data.weight[keep].reshape(shape)[:, 0]
+    angles = {}
+    if view.channels == 3:
+        (data, delta_data), (model, delta_model) = _psi_delta(data), _psi_delta(model)
+        sigma, angles = np.rad2deg(sigma) / 2, {"delta_data": delta_data, "delta_model": delta_model}
+    return Curve(
+        wavelength=np.asarray(view.scene.light.wavelength)[:rows],
+        data=np.ravel(data),
+        sigma=sigma,
+        model=np.ravel(model),
+        n=n,
+        k=k,
+        n_stderr=n_stderr,
+        k_stderr=k_stderr,
+        **angles,
+    )
+
+
+def _psi_delta(sphere: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Ψ and Δ in degrees from N, C, S (points, 3)."""
+    n, c, s = sphere.T
+    return np.rad2deg(np.arctan2(np.hypot(c, s), n)) / 2, np.rad2deg(np.arctan2(s, c)) % 360.0
