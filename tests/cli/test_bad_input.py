@@ -252,15 +252,6 @@ def test_a_missing_recipe(refused, tmp_path):
     refused("fit", "--recipe", tmp_path / "gone.toml", code=3, said=("gone.toml",))
 
 
-def test_joint_fits_say_that_they_are_not_there(refused, tmp_path):
-    path = tmp_path / "film.toml"
-    path.write_text(
-        "[data]\njoint = true\n[scene]\nsubstrate = 'Si'\n[[scene.layer]]\nmaterial = 'SiO2'\n"
-        "thickness = { lower = 1, upper = 10 }\n"
-    )
-    refused("fit", "a.csv", "--recipe", path, code=2, said=("joint",))
-
-
 def test_unknown_flags_and_commands_are_2(pellicle, spectrum_file, scene):
     for arguments in (
         ("fit", spectrum_file(), *scene, "--tickness", "3"),

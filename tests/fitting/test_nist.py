@@ -16,9 +16,10 @@ import numpy as np
 import optimistix as optx
 import pytest
 
+from pellicle.fitting.evaluation import Local
 from pellicle.fitting.nuisance import Data
 from pellicle.fitting.parameters import Parameter
-from pellicle.fitting.problem import Box, Local
+from pellicle.fitting.problem import Box, View
 from pellicle.fitting.problem import Problem as FitProblem
 from pellicle.fitting.solve import BoundedLevenbergMarquardt
 from pellicle.fitting.uncertainty import errors
@@ -156,10 +157,10 @@ def test_certified_standard_deviations(name):
     numbers = tuple(Parameter(f"b{i + 1}", f"b{i + 1}", "", 0.0, 0.0, 1.0, None) for i in range(free))
     # the scene matters only for its instrument: no scale and no offset to solve for
     known = {"scene": Scene(Layer(1.5, 100.0), 1.5), "data": data, "box": box}
-    known |= {"parameters": numbers, "points": points}
-    whole = FitProblem(**(dict.fromkeys(FitProblem._fields) | known))
+    known |= {"takes": tuple(range(free)), "points": points}
+    whole = FitProblem((View(**(dict.fromkeys(View._fields) | known)),), box, numbers)
     slope = np.asarray(jax.jacfwd(lambda b: model(b, problem.x))(jnp.asarray(found)))
     one = np.ones(points)
     at = Local(problem.y, slope, problem.y, one, 0 * one, None, None)
-    found = errors(whole, at, float(residual @ residual) / (points - free))
+    found = errors(whole, [at], [float(residual @ residual) / (points - free)])
     np.testing.assert_allclose(found.stderr, problem.stderr, rtol=2e-6)

@@ -292,3 +292,45 @@ def test_folders_of_several_files(tmp_path):
 def test_one_file_has_the_folder_to_itself(tmp_path):
     assert several(tmp_path / "out", ["a.csv"]) == [tmp_path / "out"]
     assert not (tmp_path / "out").exists()
+
+
+@pytest.fixture
+def joint(fit) -> Fit:
+    """A joint fit: the spectrum, and Ψ and Δ at four points of it, without a common unit."""
+    [one] = fit.parts
+    few = {name: array[:4] for name, array in vars(one.curve).items() if array is not None}
+    curve = Curve(**few | {"delta_data": np.full(4, 359.0), "delta_model": np.full(4, 1.0)})
+    spectrum = Spectrum(few["wavelength"], few["data"], "psi-delta", path="b,c.csv", delta=np.full(4, 359.0))
+    other = replace(one, name="b,c", spectrum=spectrum, curve=curve, rms=0.1)
+    return replace(fit, parts=(replace(one, name="film"), other), rms=None)
+
+
+def test_json_of_a_joint_fit_lists_its_data(joint):
+    record = strictly(one_line(to_json(joint)))
+    assert [(d["name"], d["path"], d["signal"], d["points"], d["rms"]) for d in record["data"]] == [
+        ("film", "/data/film.csv", "R", 41, 0.00141),
+        ("b,c", "b,c.csv", "psi-delta", 4, 0.1),
+    ]
+    assert record["rms"] is None
+    assert [row["name"] for row in record["plan"]] == ["film", "b,c"]
+
+
+def test_tables_of_a_joint_fit(joint, fit, tmp_path):
+    write_fit(tmp_path / "out", joint, True)
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == sorted([*FILES, "figure.png"])
+    frame = pd.read_csv(tmp_path / "out" / "fit.csv", comment="#")
+    assert frame.groupby(["file", "signal"]).size().to_dict() == {
+        ("film", "R"): 41,
+        ("b,c", "psi"): 4,
+        ("b,c", "delta"): 4,
+    }
+    np.testing.assert_allclose(frame["data"][:41], fit.curve.data, rtol=1e-9)
+    assert set(frame["residual"][frame["signal"] == "delta"]) == {-2.0}
+    without = [line for line in nk_csv(joint).splitlines() if not line.startswith("#")]
+    assert without == [line for line in nk_csv(fit).splitlines() if not line.startswith("#")]
+
+
+def test_a_joint_fit_that_failed_lists_its_files():
+    record = failure(["a.csv", "b.csv"], "no such file")
+    assert [d["path"] for d in record["data"]] == ["a.csv", "b.csv"]
+    assert record["status"] == "failed"

@@ -139,3 +139,19 @@ def test_a_figure_belongs_to_no_window(fit):
     drawn = draw(fit)
     assert drawn.canvas.manager is None  # pyplot would have given it one
     assert type(drawn.canvas).__name__ == "FigureCanvasAgg"
+
+
+def test_a_joint_fit_has_panels_for_each_file(fit, spectroscopic):
+    parts = (replace(fit.parts[0], name="film"), replace(spectroscopic.parts[0], name="a$b"))
+    drawn = draw(replace(fit, parts=parts, rms=None))
+    assert labels(drawn)[:5] == [
+        "reflectance",
+        "data − fit",
+        "Ψ (degrees)",
+        "Δ (degrees)",
+        "data − fit (degrees)",
+    ]
+    assert [at.get_title(loc="left") for at in drawn.axes[:5]] == ["film", "", r"a\$b", "", ""]
+    assert drawn.axes[1].get_shared_x_axes().joined(drawn.axes[0], drawn.axes[1])
+    assert not drawn.axes[0].get_shared_x_axes().joined(drawn.axes[0], drawn.axes[2])
+    assert drawn.get_suptitle().startswith("film.csv and film.csv: ambiguous")

@@ -145,3 +145,29 @@ def test_a_line_per_file(fit):
     assert ", ..., rms" in summary_line(replace(fit, parameters=many))
     only_scale = {"instrument.scale": fit["instrument.scale"]}
     assert "instrument.scale 4.50" in summary_line(replace(fit, parameters=only_scale))
+
+
+def test_a_joint_fit_has_a_line_for_each_file(fit, spectroscopic):
+    text = report(joint(fit, spectroscopic))
+    verdict = block(text, "Verdict")
+    assert "film    R, 41 points from 400 to 800 nm, worth 12 independent ones" in verdict
+    assert "angles  psi-delta, 40 points from 400 to 800 nm, from 65 to 75 degrees, worth 12" in " ".join(
+        verdict
+    )
+    statistics = block(text, "Fit statistics")
+    assert any(line.startswith("rms residual of film") and "0.00141" in line for line in statistics)
+    assert any(line.startswith("rms residual of angles") and "0.123 degrees" in line for line in statistics)
+    assert [line for line in block(text, "Plan: what was simulated") if line.endswith(":")] == [
+        "film:",
+        "angles:",
+    ]
+    assert max(map(len, text.splitlines())) <= 100
+
+
+def test_the_summary_of_a_joint_fit_without_a_common_unit_has_no_rms(fit, spectroscopic):
+    assert "rms" not in summary_line(joint(fit, spectroscopic))
+
+
+def joint(fit, other):
+    parts = (replace(fit.parts[0], name="film"), replace(other.parts[0], name="angles"))
+    return replace(fit, parts=parts, rms=None)

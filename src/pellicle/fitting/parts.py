@@ -43,10 +43,11 @@ def _rms(view: View, met: Met) -> float:
 
 def together(found: tuple[Part, ...]) -> float | None:
     """rms over all spectra, None where they have no unit in common."""
-    if len({part.spectrum.signal == "psi-delta" for part in found}) > 1:
-        return None
     if len(found) == 1:
         return found[0].rms
+    units = {part.spectrum.signal == "psi-delta" for part in found}
+    if len(units) > 1 or not all(part.spectrum.calibrated for part in found):
+        return None
     sizes = [part.curve.wavelength.size for part in found]
     return math.sqrt(np.average([part.rms**2 for part in found], weights=sizes))
 
