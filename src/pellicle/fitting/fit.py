@@ -84,10 +84,8 @@ def _scenes(spectra: list[Spectrum], scene: Scene | Sequence[Scene]) -> list[Sce
     scenes = list(scene)
     if len(scenes) != len(spectra):
         raise UsageError(f"{len(spectra)} spectra need as many scenes, or one for all, not {len(scenes)}")
-    samples = [
-        (s.layers, s.ambient, s.substrate.material, s.substrate.plate_mm, s.substrate.roughness)
-        for s in scenes
-    ]
+    of = [(s.substrate.material, s.substrate.plate_mm, s.substrate.roughness) for s in scenes]
+    samples = [(s.layers, s.ambient, substrate) for s, substrate in zip(scenes, of, strict=True)]
     if not all(eqx.tree_equal(sample, samples[0]) is True for sample in samples):
         raise UsageError("the scenes of a joint fit must have the same layers, ambient and substrate")
     return scenes
