@@ -85,7 +85,10 @@ def test_a_part_for_each_spectrum(both, spectra):
 
 
 def test_a_file_in_two_is_the_whole_file():
-    """Ψ and Δ of a real polymer brush: every other angle apart, with a σ that both know."""
+    """Ψ and Δ of a real polymer brush: every other angle apart, with a σ that both know.
+
+    The minimum may move by a little of its error: each half counts the correlation of its own residuals.
+    """
     whole = pl.read_spectrum(BRUSH, noise=0.1)
     scene = pl.Scene(pl.Layer(1.45, pl.Free(lower=1, upper=200)), "Si")
     halves = [
@@ -93,10 +96,10 @@ def test_a_file_in_two_is_the_whole_file():
         for first in (0, 1)
     ]
     one, two = pl.fit(whole, scene), pl.fit(halves, scene)
-    assert two["thickness"].value == pytest.approx(one["thickness"].value, rel=1e-7)
+    assert abs(two["thickness"].value - one["thickness"].value) < 0.01 * one["thickness"].stderr
     assert two["thickness"].stderr == pytest.approx(one["thickness"].stderr, rel=1e-5)
     assert two.chi2_reduced == pytest.approx(one.chi2_reduced, rel=1e-7)
-    assert two.rms == pytest.approx(one.rms, rel=1e-3)  # halves of unlike length: 6 and 5 angles
+    assert two.rms == pytest.approx(one.rms, rel=1e-4)
     assert two.status == one.status
 
 
