@@ -45,3 +45,28 @@ def test_a_bad_file_is_one_failed_object(pellicle, files, scene, tmp_path):
     assert len(found["data"]) == 2
     assert "gone.csv" in found["error"]
     assert "a.csv" not in found["error"]
+
+
+def test_files_with_their_own_words(pellicle, files, tmp_path):
+    """b.csv has counts, not fractions, so only it has a scale; and its own noise."""
+    rows = files[1].read_text().splitlines()[1:]
+    pairs = [row.split(",") for row in rows]
+    files[1].write_text("\n".join(["wavelength_nm,intensity", *(f"{w},{3 * float(r)}" for w, r in pairs)]))
+    path = tmp_path / "film.toml"
+    path.write_text(
+        "[data]\njoint = true\n[[data.file]]\npath = 'a.csv'\n[[data.file]]\npath = 'b.csv'\nsignal = 'R'\n"
+        "noise = 0.006\nrange = [420, 790]\ninstrument = { scale = 'free' }\n"
+        "[scene]\nsubstrate = '3.9+0.02j'\n"
+        "[[scene.layer]]\nmaterial = 1.46\nthickness = { lower = 10, upper = 800 }\n"
+    )
+    ran = pellicle("fit", "--recipe", path, "--json")
+    assert ran.code == 0
+    [found] = ran.objects
+    scale = found["parameters"]["instrument.scale.b"]
+    assert abs(scale["value"] - 3) < 4 * scale["stderr"]
+    assert not found["parameters"]["instrument.scale.a"]["free"]
+    assert found["data"][1]["points"] < 100
+    assert 0.7 < found["data"][1]["chi2_reduced"] < 1.4
+    refused = pellicle("fit", files[0], "--recipe", path)
+    assert refused.code == 2
+    assert "exclude each other" in refused.err

@@ -140,7 +140,7 @@ def test_free_words_in_a_layer(scene):
     ("text", "said"),
     [
         ("[dat]\n" + BASE, ("'dat'", "'data'")),
-        ("[data]\nfile = ['a.csv']\n" + BASE, ("'data.file'", "'files'")),
+        ("[data]\nfilles = ['a.csv']\n" + BASE, ("'data.filles'", "'files'")),
         (BASE.replace("substrate", "substrat"), ("'scene.substrat'", "'substrate'")),
         (BASE.replace("thickness", "thicknes"), ("thicknes", "'thickness'")),
         (BASE.replace("upper", "uper"), ("uper", "'upper'")),
@@ -245,3 +245,40 @@ def test_what_a_real_sample_adds(scene):
 )
 def test_layers_that_make_no_sense(refused, layer, said):
     refused(f'[scene]\nsubstrate = "Si"\n[[scene.layer]]\n{layer}\n', said)
+
+
+def test_a_file_has_its_own_words(tmp_path):
+    """What a file does not say is that of the recipe; `back = false` makes the plate a half space."""
+    path = tmp_path / "film.toml"
+    path.write_text(
+        "[data]\nangle = 10.0\nnoise = 0.01\n[[data.file]]\npath = 'r.csv'\n"
+        "[[data.file]]\npath = 'e.csv'\nsignal = 'psi-delta'\nangle = 70.0\nback = false\n"
+        "instrument = { bandwidth = 2.0, scale = 1.0 }\n"
+        "[scene]\nsubstrate = { material = 'SiO2', back = 'air', plate_mm = 2.0 }\n"
+        "[[scene.layer]]\nmaterial = 1.46\nthickness = 10\n[instrument]\nscale = 'free'\nbandwidth = 3.0\n"
+    )
+    found = read_recipe(path)
+    assert found.files == [str(tmp_path / name) for name in ("r.csv", "e.csv")]
+    first, second = found.each
+    assert (first.tables.data.angle, second.tables.data.angle) == (10.0, 70.0)
+    assert (first.tables.data.noise, second.tables.data.noise) == (0.01, 0.01)
+    assert (first.tables.instrument.scale, second.tables.instrument.scale) == ("free", 1.0)
+    assert (first.scene().instrument.bandwidth, second.scene().instrument.bandwidth) == (3.0, 2.0)
+    assert first.scene().substrate.back is not None
+    assert second.scene().substrate.back is None
+    assert second.scene().substrate.plate_mm == 2.0
+
+
+def test_bad_words_of_a_file(tmp_path):
+    path = tmp_path / "film.toml"
+    for words, said in (
+        ("files = ['b.csv']\n[[data.file]]\npath = 'a.csv'", "exclude each other"),
+        ("[[data.file]]\npath = 'a.csv'\nnoize = 1", "did you mean 'noise'"),
+        ("[[data.file]]\nsignal = 'R'", "data.file.0.path is missing"),
+        ("[[data.file]]\npath = 'a.csv'\ninstrument = { scal = 1 }", "scale"),
+    ):
+        path.write_text(
+            f"[data]\n{words}\n[scene]\nsubstrate = 'Si'\n[[scene.layer]]\nmaterial = 1.46\nthickness = 10\n"
+        )
+        with pytest.raises(DataError, match=said):
+            read_recipe(path)

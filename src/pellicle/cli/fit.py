@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import json as json_module
 from math import inf
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
-from pellicle.cli.options import ReadWords, SceneWords, light, merged, read, scene_from_words
-from pellicle.cli.session import Progress, say, start
+from pellicle.cli.batch import Batch, Look
+from pellicle.cli.options import ReadWords, SceneWords, light, merged, scene_from_words
+from pellicle.cli.session import say, start
 from pellicle.errors import UsageError
 
 if TYPE_CHECKING:
-    from pellicle.fitting.result import Fit
+    from pellicle.io.recipe import Recipe
 
 _scene = Group("Scene", sort_key=1)
 _instrument = Group("Instrument", sort_key=2)
@@ -91,13 +90,14 @@ def fit(
         dark,
     )
     _check(reading)
-    scene, files, reading, together = _what(list(data), recipe, scene_words, reading)
+    looks, together = _what(list(data), recipe, scene_words, reading)
     from pellicle.fitting.fit import check_free
 
-    check_free(scene)
+    for look in looks:
+        check_free(look.scene)
     start()
-    groups = [files] if joint or together else [[file] for file in files]
-    return _Run(scene, reading, out, json, several=len(groups) > 1)(groups)
+    groups = [looks] if joint or together else [[look] for look in looks]
+    return Batch(out, json, several=len(groups) > 1)(groups)
 
 
 def _range(text: str | None) -> tuple[float, float] | None:
@@ -134,103 +134,30 @@ def _check_units(reading: ReadWords) -> None:
 
 
 def _what(files: list[str], recipe: str | None, words: SceneWords, reading: ReadWords):
-    """The scene, the files, how to read them and whether they are of one sample, from a recipe or flags."""
+    """The files with their scenes, and whether they are of one sample, from a recipe or from flags."""
     if recipe is None:
         if not files:
             raise UsageError("no data: name the file to fit, as in pellicle fit oxide.csv --layer SiO2 ...")
         scene, assumed = scene_from_words(words, reading)
         say(*assumed)
-        return scene, files, reading, False
-    import equinox as eqx
-
+        return [Look(file, scene, reading) for file in files], False
     from pellicle.io.recipe import read_recipe
 
     if words.given():
         raise UsageError(f"{', '.join(words.given())} and --recipe exclude each other: put it in the recipe")
     found = read_recipe(recipe)
+    if found.each and files:
+        raise UsageError(f"{recipe}: [[data.file]] and files on the command line exclude each other")
     files = files or found.files
     if not files:
         raise UsageError(f"{recipe}: names no data files: give them on the command line or in [data] files")
-    reading = merged(reading, found)
-    scene = eqx.tree_at(lambda s: s.light, found.scene(), light(reading))
-    return scene, files, reading, found.tables.data.joint
+    recipes = found.each or [found] * len(files)
+    looks = [_look(file, one, reading) for file, one in zip(files, recipes, strict=True)]
+    return looks, found.tables.data.joint
 
 
-class _Run:
-    """Fits group after group of files; one that fails does not stop the others.
+def _look(file: str, recipe: Recipe, reading: ReadWords) -> Look:
+    import equinox as eqx
 
-    The files of a group are fitted together: one file, unless the fit is a joint one.
-    """
-
-    def __init__(self, scene: Any, reading: ReadWords, out: str | None, as_json: bool, several: bool):
-        self.scene, self.reading, self.out, self.as_json, self.several = scene, reading, out, as_json, several
-        self.done: list[Any] = []
-
-    def __call__(self, groups: list[list[str]]) -> int:
-        from pellicle.io.atomic import new_folder
-        from pellicle.io.results import several
-
-        folders = [None] * len(groups)
-        if self.out is not None:
-            root = Path(self.out)
-            folders = several(root, [paths[0] for paths in groups]) if self.several else [root]
-            if root.exists():
-                new_folder(root)  # refuses a stranger's folder before the work, not after
-        worst = 0
-        try:
-            for paths, folder in zip(groups, folders, strict=True):
-                worst = max(worst, self._one(paths, folder))
-        except KeyboardInterrupt:
-            say(f"interrupted after {len(self.done)} of {len(groups)} files; what is done is kept")
-            worst = 130
-        self._summarise()
-        return worst
-
-    def _one(self, paths: list[str], folder: Path | None) -> int:
-        from pellicle.io.results import failure
-
-        label = ", ".join(paths)
-        progress = Progress(label)
-        try:
-            found = self._fit(paths, progress)
-        except ValueError as error:
-            progress.clear()
-            message = str(error) if any(path in str(error) for path in paths) else f"{label}: {error}"
-            say(f"pellicle: {message}")
-            self.done.append(failure(paths if len(paths) > 1 else paths[0], message))
-            if self.as_json:
-                print(json_module.dumps(self.done[-1], allow_nan=False), flush=True)
-            return 3  # a failed file is 3, whatever would mend it
-        progress.clear()
-        self.done.append(found)
-        self._show(found, folder)
-        return 0 if found.status == "converged" else 4
-
-    def _fit(self, paths: list[str], progress: Progress) -> Fit:
-        from pellicle.fitting.fit import fit as run
-        from pellicle.scene import Drift
-
-        scaled = isinstance(self.scene.instrument.scale, Drift)
-        spectra = []
-        for path in paths:
-            spectra.append(read(path, self.reading, scaled=scaled))
-            say(*(f"{path}: {note}" for note in spectra[-1].notes))
-        return run(spectra, self.scene, progress=progress)
-
-    def _show(self, found: Fit, folder: Path | None) -> None:
-        from pellicle.io.results import to_json, write_fit
-        from pellicle.report.text import report
-
-        print(
-            json_module.dumps(to_json(found), allow_nan=False) if self.as_json else report(found), flush=True
-        )
-        if folder is not None:
-            write_fit(folder, found, figure=True)
-            say(f"{folder}: report, figure and tables written")
-
-    def _summarise(self) -> None:
-        if self.out is None or not self.several or not self.done:
-            return
-        from pellicle.io.results import write_summary
-
-        write_summary(Path(self.out) / "summary.csv", self.done)
+    reading = merged(reading, recipe)
+    return Look(file, eqx.tree_at(lambda s: s.light, recipe.scene(), light(reading)), reading)

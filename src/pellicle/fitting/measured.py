@@ -78,8 +78,8 @@ def _check(data: Spectrum, scene: Scene) -> None:
         raise UsageError(f"{data.path}: Ψ and Δ have no scale and no offset: leave both out")
     if scene.substrate.back is not None:
         raise UsageError(
-            f"{data.path}: ellipsometry of a plate's back face is not simulated: leave back out (in Python a"
-            " joint fit takes a scene for each spectrum)"
+            f"{data.path}: ellipsometry of a plate's back face is not simulated: leave back out, or,"
+            " beside other spectra, write back = false in the file's own [[data.file]]"
         )
     if data.angle is None and not free_leaves(scene.light) and not np.any(scene.light.angle):
         raise UsageError(

@@ -5,112 +5,26 @@ from __future__ import annotations
 import os
 import tomllib
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ValidationError
 
 from pellicle.errors import DataError
 from pellicle.io import words
 from pellicle.io.media import FreeTable, Medium, Number, PriorTable, medium, number
+from pellicle.io.recipe_tables import (
+    DataTable,
+    FileTable,
+    GridTable,
+    InstrumentTable,
+    LayerTable,
+    PlateTable,
+    RecipeTable,
+    SceneTable,
+    of_file,
+)
 from pellicle.io.words import nearest
 from pellicle.scene import Free, Instrument, Interface, Layer, Light, Plate, Scene, Substrate
-
-
-class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=False, allow_inf_nan=False)
-
-
-class PlateTable(_Table):
-    """A substrate that is a plate with an incoherent back face."""
-
-    material: Medium
-    back: Medium | None = None
-    plate_mm: Number = 1.0
-    roughness: Number | None = None
-
-
-class LayerTable(_Table):
-    """One `[[scene.layer]]`: a material with a thickness, or with plate_mm where it is incoherent, or
-    `between`, a mixing rule for the media above and below, in `steps` slices."""
-
-    name: str | None = None
-    material: Medium | None = None
-    between: str | None = None
-    steps: int | None = None
-    thickness: Number | None = None
-    plate_mm: Number | None = None
-    thickness_spread: Number | None = None
-    roughness: Number | None = None
-    free: list[str] = []
-
-    @model_validator(mode="after")
-    def _one_kind(self):
-        if (self.material is None) == (self.between is None):
-            raise ValueError('a layer has a material, or between = "bruggeman" to mix its neighbours')
-        if (self.thickness is None) == (self.plate_mm is None):
-            raise ValueError("a layer has a thickness in nm, or plate_mm where it is an incoherent plate")
-        rejected = self.model_fields_set & self._foreign()
-        if rejected:
-            raise ValueError(f"{' and '.join(sorted(rejected))} does not go with {self._kind()}")
-        return self
-
-    def _kind(self) -> str:
-        if self.between is not None:
-            return "between, a mixed interface"
-        return "plate_mm, an incoherent plate" if self.plate_mm is not None else "a coherent layer"
-
-    def _foreign(self) -> set[str]:
-        if self.between is not None:
-            return {"plate_mm", "thickness_spread", "roughness", "free"}
-        return {"steps", "thickness_spread", "roughness"} if self.plate_mm is not None else {"steps"}
-
-
-class GridTable(_Table):
-    """Evenly spaced wavelengths in nm."""
-
-    start: float = Field(gt=0)
-    stop: float
-    step: float = Field(gt=0)
-
-
-class DataTable(_Table):
-    """`[data]`."""
-
-    files: list[str] = []
-    signal: Literal["R", "T", "psi-delta"] | None = None
-    angle: float | None = Field(default=None, ge=0, le=90)
-    polarisation: Literal["unpolarised", "s", "p"] | None = None
-    noise: float | None = Field(default=None, gt=0)
-    range: tuple[float, float] | None = None
-    wavelengths: GridTable | list[float] | None = None
-    joint: bool = False
-
-
-class SceneTable(_Table):
-    """`[scene]`."""
-
-    ambient: Medium = 1.0
-    substrate: Medium | PlateTable
-    layer: list[LayerTable] = Field(min_length=1)
-
-
-class InstrumentTable(_Table):
-    """`[instrument]`."""
-
-    scale: Literal["free", "slow"] | float = 1.0
-    offset: Literal["free", "slow"] | float = 0.0
-    bandwidth: Number | None = None
-    thickness_spread: Number | None = None
-    angle_spread: Number | None = None
-    numerical_aperture: Number | None = None
-
-
-class RecipeTable(_Table):
-    """A whole recipe."""
-
-    data: DataTable = DataTable()
-    scene: SceneTable
-    instrument: InstrumentTable = InstrumentTable()
 
 
 class Recipe(BaseModel):
@@ -122,7 +36,14 @@ class Recipe(BaseModel):
     @property
     def files(self) -> list[str]:
         """Data files, relative to the recipe."""
-        return [os.path.normpath(Path(self.path).parent / name) for name in self.tables.data.files]
+        data = self.tables.data
+        names = [*data.files, *(file.path for file in data.file)]
+        return [os.path.normpath(Path(self.path).parent / name) for name in names]
+
+    @property
+    def each(self) -> list[Recipe]:
+        """The recipe as each `[[data.file]]` changes it, none where there are no such tables."""
+        return [Recipe(path=self.path, tables=of_file(self.tables, file)) for file in self.tables.data.file]
 
     def scene(self) -> Scene:
         """The scene it describes. Raises DataError with the recipe's name in front."""
@@ -154,6 +75,7 @@ def read_recipe(path: str | os.PathLike[str]) -> Recipe:
 _KEYS: dict[str, type[BaseModel]] = {
     "": RecipeTable,
     "data": DataTable,
+    "file": FileTable,
     "wavelengths": GridTable,
     "scene": SceneTable,
     "layer": LayerTable,

@@ -1,0 +1,114 @@
+"""Fits of one file after the other, or of several together, and what is left of each."""
+
+from __future__ import annotations
+
+import json as json_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from pellicle.cli.options import ReadWords, read
+from pellicle.cli.session import Progress, say
+
+if TYPE_CHECKING:
+    from pellicle.fitting.result import Fit
+    from pellicle.scene import Scene
+
+
+class Look(NamedTuple):
+    """A file, the scene that is to explain it, and how it is read."""
+
+    path: str
+    scene: Scene
+    reading: ReadWords
+
+
+class Batch:
+    """Fits group after group of files; one that fails does not stop the others.
+
+    The files of a group are fitted together: one file, unless the fit is a joint one.
+    """
+
+    def __init__(self, out: str | None, as_json: bool, several: bool):
+        self.out, self.as_json, self.several = out, as_json, several
+        self.done: list[Any] = []
+
+    def __call__(self, groups: list[list[Look]]) -> int:
+        from pellicle.io.atomic import new_folder
+        from pellicle.io.results import several
+
+        folders = [None] * len(groups)
+        if self.out is not None:
+            root = Path(self.out)
+            folders = several(root, [looks[0].path for looks in groups]) if self.several else [root]
+            if root.exists():
+                new_folder(root)  # refuses a stranger's folder before the work, not after
+        worst = 0
+        try:
+            for looks, folder in zip(groups, folders, strict=True):
+                worst = max(worst, self._one(looks, folder))
+        except KeyboardInterrupt:
+            say(f"interrupted after {len(self.done)} of {len(groups)} files; what is done is kept")
+            worst = 130
+        self._summarise()
+        return worst
+
+    def _one(self, looks: list[Look], folder: Path | None) -> int:
+        from pellicle.io.results import failure
+
+        paths = [look.path for look in looks]
+        label = ", ".join(paths)
+        progress = Progress(label)
+        try:
+            found = _fit(looks, progress)
+        except ValueError as error:
+            progress.clear()
+            message = str(error) if any(path in str(error) for path in paths) else f"{label}: {error}"
+            say(f"pellicle: {message}")
+            self.done.append(failure(paths if len(paths) > 1 else paths[0], message))
+            if self.as_json:
+                print(json_module.dumps(self.done[-1], allow_nan=False), flush=True)
+            return 3  # a failed file is 3, whatever would mend it
+        progress.clear()
+        self.done.append(found)
+        self._show(found, folder)
+        return 0 if found.status == "converged" else 4
+
+    def _show(self, found: Fit, folder: Path | None) -> None:
+        from pellicle.io.results import to_json, write_fit
+        from pellicle.report.text import report
+
+        print(
+            json_module.dumps(to_json(found), allow_nan=False) if self.as_json else report(found), flush=True
+        )
+        if folder is not None:
+            write_fit(folder, found, figure=True)
+            say(f"{folder}: report, figure and tables written")
+
+    def _summarise(self) -> None:
+        if self.out is None or not self.several or not self.done:
+            return
+        from pellicle.io.results import write_summary
+
+        write_summary(Path(self.out) / "summary.csv", self.done)
+
+
+def _fit(looks: list[Look], progress: Progress) -> Fit:
+    from pellicle.fitting.fit import fit as run
+
+    spectra, scenes = [], []
+    for look in looks:
+        spectrum, scene = _seen(look, alone=len(looks) == 1)
+        spectra.append(spectrum)
+        scenes.append(scene)
+        say(*(f"{look.path}: {note}" for note in spectrum.notes))
+    return run(spectra, scenes, progress=progress)
+
+
+def _seen(look: Look, alone: bool) -> tuple[Any, Scene]:
+    """The spectrum, and its scene: beside other spectra Ψ and Δ leave out what only those can have."""
+    from pellicle.fitting.measured import unscaled
+    from pellicle.scene import Drift
+
+    scaled = isinstance(look.scene.instrument.scale, Drift)
+    spectrum = read(look.path, look.reading, scaled=scaled)
+    return spectrum, look.scene if alone or spectrum.delta is None else unscaled(look.scene)

@@ -1,0 +1,146 @@
+"""The tables of a recipe, and what may stand in them."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from pellicle.io.media import Medium, Number
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=False, allow_inf_nan=False)
+
+
+class PlateTable(_Table):
+    """A substrate that is a plate with an incoherent back face."""
+
+    material: Medium
+    back: Medium | None = None
+    plate_mm: Number = 1.0
+    roughness: Number | None = None
+
+
+class LayerTable(_Table):
+    """One `[[scene.layer]]`: a material with a thickness, or with plate_mm where it is incoherent, or
+    `between`, a mixing rule for the media above and below, in `steps` slices."""
+
+    name: str | None = None
+    material: Medium | None = None
+    between: str | None = None
+    steps: int | None = None
+    thickness: Number | None = None
+    plate_mm: Number | None = None
+    thickness_spread: Number | None = None
+    roughness: Number | None = None
+    free: list[str] = []
+
+    @model_validator(mode="after")
+    def _one_kind(self):
+        if (self.material is None) == (self.between is None):
+            raise ValueError('a layer has a material, or between = "bruggeman" to mix its neighbours')
+        if (self.thickness is None) == (self.plate_mm is None):
+            raise ValueError("a layer has a thickness in nm, or plate_mm where it is an incoherent plate")
+        rejected = self.model_fields_set & self._foreign()
+        if rejected:
+            raise ValueError(f"{' and '.join(sorted(rejected))} does not go with {self._kind()}")
+        return self
+
+    def _kind(self) -> str:
+        if self.between is not None:
+            return "between, a mixed interface"
+        return "plate_mm, an incoherent plate" if self.plate_mm is not None else "a coherent layer"
+
+    def _foreign(self) -> set[str]:
+        if self.between is not None:
+            return {"plate_mm", "thickness_spread", "roughness", "free"}
+        return {"steps", "thickness_spread", "roughness"} if self.plate_mm is not None else {"steps"}
+
+
+class GridTable(_Table):
+    """Evenly spaced wavelengths in nm."""
+
+    start: float = Field(gt=0)
+    stop: float
+    step: float = Field(gt=0)
+
+
+class InstrumentTable(_Table):
+    """`[instrument]`."""
+
+    scale: Literal["free", "slow"] | float = 1.0
+    offset: Literal["free", "slow"] | float = 0.0
+    bandwidth: Number | None = None
+    thickness_spread: Number | None = None
+    angle_spread: Number | None = None
+    numerical_aperture: Number | None = None
+
+
+class FileTable(_Table):
+    """One `[[data.file]]`: what is said here goes before `[data]` and `[instrument]`."""
+
+    path: str
+    signal: Literal["R", "T", "psi-delta"] | None = None
+    angle: float | None = Field(default=None, ge=0, le=90)
+    polarisation: Literal["unpolarised", "s", "p"] | None = None
+    noise: float | None = Field(default=None, gt=0)
+    range: tuple[float, float] | None = None
+    instrument: InstrumentTable = InstrumentTable()
+    back: Literal[False] | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _table(cls, given):
+        if isinstance(given, str):
+            raise ValueError(f"a table with a path was expected, not {given!r}: names alone go into files")
+        return given
+
+
+class DataTable(_Table):
+    """`[data]`."""
+
+    files: list[str] = []
+    file: list[FileTable] = []
+    signal: Literal["R", "T", "psi-delta"] | None = None
+    angle: float | None = Field(default=None, ge=0, le=90)
+    polarisation: Literal["unpolarised", "s", "p"] | None = None
+    noise: float | None = Field(default=None, gt=0)
+    range: tuple[float, float] | None = None
+    wavelengths: GridTable | list[float] | None = None
+    joint: bool = False
+
+    @model_validator(mode="after")
+    def _one_list(self):
+        if self.files and self.file:
+            raise ValueError("files and [[data.file]] exclude each other: name every file in one of them")
+        return self
+
+
+class SceneTable(_Table):
+    """`[scene]`."""
+
+    ambient: Medium = 1.0
+    substrate: Medium | PlateTable
+    layer: list[LayerTable] = Field(min_length=1)
+
+
+class RecipeTable(_Table):
+    """A whole recipe."""
+
+    data: DataTable = DataTable()
+    scene: SceneTable
+    instrument: InstrumentTable = InstrumentTable()
+
+
+def of_file(tables: RecipeTable, file: FileTable) -> RecipeTable:
+    """The recipe of one file: with its own signal, angle, noise and so on, and no other file."""
+    light = {name: getattr(file, name) for name in ("signal", "angle", "polarisation", "noise", "range")}
+    said = {name: value for name, value in light.items() if value is not None}
+    data = tables.data.model_copy(update={**said, "files": [file.path], "file": []})
+    own = {name: getattr(file.instrument, name) for name in file.instrument.model_fields_set}
+    instrument = tables.instrument.model_copy(update=own)
+    scene, plate = tables.scene, tables.scene.substrate
+    if file.back is False and isinstance(plate, PlateTable):
+        scene = scene.model_copy(update={"substrate": plate.model_copy(update={"back": None})})
+    return tables.model_copy(update={"data": data, "instrument": instrument, "scene": scene})
