@@ -147,6 +147,13 @@ def test_a_misfit_names_the_file():
     assert found.parts[0].name not in found.verdict
 
 
+def test_a_spectrum_of_another_sample_is_not_given_up_in_silence():
+    """Without σ its noise would grow with its residuals until it counts for nothing."""
+    scene = pl.Scene(pl.Layer("SiO2", pl.Free(lower=10, upper=400)), "Si")
+    found = pl.fit([replace(oxide(100.0), sigma=None), replace(oxide(250.0), sigma=None)], scene)
+    assert found.status == "misfit"
+
+
 def test_what_tells_spectra_apart():
     r = pl.Spectrum(WAVELENGTH, np.full(60, 0.1), "R", path="a/film.v2.csv")
     t = replace(r, signal="T")

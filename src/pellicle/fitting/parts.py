@@ -6,12 +6,16 @@ import math
 
 import numpy as np
 
+from pellicle.fitting import noise
 from pellicle.fitting.problem import View
 from pellicle.fitting.result import Curve, Part
 from pellicle.fitting.status import misfits
 from pellicle.fitting.uncertainty import Errors, layer_errors
 from pellicle.fitting.weigh import Met, Weighed
 from pellicle.io.spectrum import Spectrum
+
+FAR = 3.0
+"""Residuals of a spectrum among several above this many times its noise count as structured."""
 
 
 def parts(data: list[Spectrum], weighed: Weighed, found: Errors) -> tuple[Part, ...]:
@@ -60,12 +64,16 @@ def missed(found: tuple[Part, ...], weighed: Weighed) -> tuple[Part, ...]:
 
 def _misses(part: Part, view: View, met: Met) -> bool:
     values = view.data.values[: view.points].reshape(view.rows, view.channels)
+    rms = part.rms if view.channels == 1 else math.radians(2 * part.rms)
+    floor = np.sqrt(np.mean([np.median(noise.local_noise(column)) ** 2 for column in values.T]))
+    # beside others a spectrum may be given up, its σ growing with its residuals, without much structure
+    given_up = bool(part.name) and rms > FAR * floor
     return misfits(
         chi2_reduced=part.chi2_reduced,
         sigma_known=view.noise.given,
         drifting=view.noise.drifting,
-        effective_share=1 / met.length,
-        rms=part.rms if view.channels == 1 else math.radians(2 * part.rms),
+        effective_share=0.0 if given_up else 1 / met.length,
+        rms=rms,
         span=float(np.max(np.ptp(values, axis=0))),
         calibrated=part.spectrum.calibrated,
     )
