@@ -125,7 +125,7 @@ def test_an_intensity_without_a_scale(refused, tmp_path, scene):
 @pytest.mark.parametrize(
     ("recipe", "said"),
     [
-        ("[data]\nfile = ['a.csv']\n[scene]\nsubstrate = 'Si'\nlayer = []\n", ("data.file", "'files'")),
+        ("[data]\nfile = ['a.csv']\n[scene]\nsubstrate = 'Si'\nlayer = []\n", ("data.file", "go into files")),
         ("[scene\n", ("is not TOML", "line 1")),
         ("[scene]\nsubstrat = 'Si'\n", ("scene.substrat", "'substrate'")),
         ("[scene]\nsubstrate = 'Si'\n", ("scene.layer is missing",)),
