@@ -4,6 +4,9 @@ import json
 
 import pytest
 
+from pellicle.errors import DataError
+from pellicle.scene import Drift
+
 
 @pytest.fixture
 def files(spectrum_file):
@@ -47,11 +50,22 @@ def test_a_bad_file_is_one_failed_object(pellicle, files, scene, tmp_path):
     assert "a.csv" not in found["error"]
 
 
-def test_files_with_their_own_words(pellicle, files, tmp_path):
-    """b.csv has counts, not fractions, so only it has a scale; and its own noise."""
-    rows = files[1].read_text().splitlines()[1:]
-    pairs = [row.split(",") for row in rows]
-    files[1].write_text("\n".join(["wavelength_nm,intensity", *(f"{w},{3 * float(r)}" for w, r in pairs)]))
+@pytest.fixture
+def asked(monkeypatch):
+    """What would be fitted: (spectra, scenes) of each call, in place of the fits themselves."""
+    calls = []
+
+    def fit(spectra, scenes, progress):
+        calls.append((spectra, scenes))
+        raise DataError("not fitted here")
+
+    monkeypatch.setattr("pellicle.fitting.fit.fit", fit)
+    return calls
+
+
+def test_files_with_their_own_words(pellicle, files, tmp_path, asked):
+    """b.csv has counts, not fractions, so only it has a scale; and its own noise and range."""
+    files[1].write_text(files[1].read_text().replace("R", "intensity"))
     path = tmp_path / "film.toml"
     path.write_text(
         "[data]\njoint = true\n[[data.file]]\npath = 'a.csv'\n[[data.file]]\npath = 'b.csv'\nsignal = 'R'\n"
@@ -59,14 +73,49 @@ def test_files_with_their_own_words(pellicle, files, tmp_path):
         "[scene]\nsubstrate = '3.9+0.02j'\n"
         "[[scene.layer]]\nmaterial = 1.46\nthickness = { lower = 10, upper = 800 }\n"
     )
-    ran = pellicle("fit", "--recipe", path, "--json")
-    assert ran.code == 0
-    [found] = ran.objects
-    scale = found["parameters"]["instrument.scale.b"]
-    assert abs(scale["value"] - 3) < 4 * scale["stderr"]
-    assert not found["parameters"]["instrument.scale.a"]["free"]
-    assert found["data"][1]["points"] < 100
-    assert 0.7 < found["data"][1]["chi2_reduced"] < 1.4
+    pellicle("fit", "--recipe", path)
+    [([a, b], [seen_a, seen_b])] = asked
+    assert (a.sigma, set(b.sigma)) == (None, {0.006})
+    assert (a.wavelength.min(), b.wavelength.min()) == (400, 420)
+    assert (seen_a.instrument.scale, seen_b.instrument.scale) == (1.0, Drift(0))
     refused = pellicle("fit", files[0], "--recipe", path)
     assert refused.code == 2
     assert "exclude each other" in refused.err
+
+
+def test_one_file_may_be_joint_and_several_need_not(pellicle, files, scene, asked):
+    """A joint fit is one of a list, if only of one file; else each file is fitted by itself."""
+    pellicle("fit", files[0], *scene, "--joint")
+    pellicle("fit", *files, *scene)
+    joint, *apart = (spectra for spectra, _ in asked)
+    assert [s.path for s in joint] == [str(files[0])]
+    assert [s.path for s in apart] == list(map(str, files))
+
+
+@pytest.fixture
+def beside(files, tmp_path):
+    """A recipe of a reflectance of free scale and of Ψ and Δ, about which `own` is said."""
+
+    def write(own: str = ""):
+        (tmp_path / "e.csv").write_text("wavelength,psi,delta,angle\n500,30,170,70\n600,31,160,70\n")
+        path = tmp_path / "film.toml"
+        path.write_text(
+            f"[data]\njoint = true\n[[data.file]]\npath = 'a.csv'\n[[data.file]]\npath = 'e.csv'\n{own}\n"
+            "[scene]\nsubstrate = 'Si'\n[[scene.layer]]\nmaterial = 1.46\n"
+            "thickness = { lower = 10, upper = 800 }\n[instrument]\nscale = 'free'\n"
+        )
+        return path
+
+    return write
+
+
+def test_ellipsometry_leaves_out_the_scale_of_all(pellicle, beside, asked):
+    pellicle("fit", "--recipe", beside())
+    [(_, scenes)] = asked
+    assert [s.instrument.scale for s in scenes] == [Drift(0), 1.0]
+
+
+def test_ellipsometry_with_a_scale_of_its_own_is_refused(pellicle, beside):
+    ran = pellicle("fit", "--recipe", beside("instrument = { scale = 1.1 }"))
+    assert ran.code == 3
+    assert "e.csv: Ψ and Δ have no scale and no offset" in ran.err

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,136 +11,158 @@ from scipy.optimize import least_squares
 
 import pellicle as pl
 from pellicle.errors import UsageError
+from pellicle.fitting import fit as fitting
 from pellicle.fitting.fit import labels
 from pellicle.optics.dispersion import CauchyUrbach
 
-BRUSH = Path(__file__).parents[2] / "measurements" / "ellipsometry" / "19-1-1.dat"
 WAVELENGTH = np.linspace(400.0, 900.0, 60)
-TRUTH = (150.0, 2.0, 2e4, 0.1, 0.3)  # thickness, A, B, k0 at 2.5 eV, Eu
-NAMES = ("thickness", "A", "B", "k0", "Eu")
-SIGMA = {"R": 0.002, "T": 0.001}
+GLASS = 1.52
+SIZE = np.array([100.0, 1.0, 1e4, 1.0, 1.0])
+"""What thickness, A, B and the scales of R and T are measured in."""
+TRUTH = np.array([150.0, 2.0, 2e4, 1.1, 0.9])
+NOISE = {"R": 0.002, "T": 0.001, "psi": 0.05, "delta": 0.1}
+FREE = (pl.Free(lower=20, upper=600), pl.Free(lower=1.6, upper=2.6), pl.Free(lower=0, upper=5e4))
 
 
-def plate(signal: str, numbers=TRUTH) -> np.ndarray:
-    """R or T of an absorbing film on a glass plate, by the package tmm (S. J. Byrnes, arXiv:1603.02720)."""
-    thickness, a, b, k0, eu = numbers
-    energy = 1239.841984 / WAVELENGTH
-    index = a + b / WAVELENGTH**2 + 1j * k0 * np.exp((energy - 2.5) / eu)
-    stack, kinds = [np.inf, thickness, 1e6, np.inf], ["i", "c", "i", "i"]
-    at = zip(index, WAVELENGTH, strict=True)
-    return np.array([tmm.inc_tmm("s", [1, n, 1.52, 1], stack, kinds, 0, nm)[signal] for n, nm in at])
+def films(thickness, a, b, scale_r, scale_t) -> dict[str, np.ndarray]:
+    """Scaled R and T at 0°, Ψ and Δ at 70°, of a Cauchy film on glass, by the package tmm (S. J. Byrnes,
+    arXiv:1603.02720); its Δ is counted from −180° and with the other sign."""
+    found = {name: [] for name in NOISE}
+    for nm in WAVELENGTH:
+        stack = [1, a + b / nm**2, GLASS], [np.inf, thickness, np.inf]
+        straight = tmm.coh_tmm("s", *stack, 0, nm)
+        oblique = tmm.ellips(*stack, np.deg2rad(70.0), nm)
+        found["R"].append(scale_r * straight["R"])
+        found["T"].append(scale_t * straight["T"])
+        found["psi"].append(np.rad2deg(oblique["psi"]))
+        found["delta"].append(180.0 - np.rad2deg(oblique["Delta"]))
+    return {name: np.array(column) for name, column in found.items()}
 
 
 @pytest.fixture(scope="module")
 def spectra() -> list[pl.Spectrum]:
-    """R and T with their own noise."""
+    """R and T of unknown scales, and Ψ and Δ, of one film, each with its own noise."""
     rng = np.random.default_rng(1)
-    return [
-        pl.Spectrum(
-            WAVELENGTH,
-            plate(signal) + rng.normal(0, sigma, 60),
-            signal,
-            sigma=np.full(60, sigma),
-            path=f"film_{signal}.csv",
-        )
-        for signal, sigma in SIGMA.items()
-    ]
+    clean = films(*TRUTH)
+    seen = {name: clean[name] + rng.normal(0, sd, 60) for name, sd in NOISE.items()}
+    sigma = {name: np.full(60, sd) for name, sd in NOISE.items()}
+    light = [pl.Spectrum(WAVELENGTH, seen[x], x, sigma=sigma[x], path=f"film_{x}.csv") for x in "RT"]
+    ellipsometric = pl.Spectrum(
+        WAVELENGTH,
+        seen["psi"],
+        "psi-delta",
+        sigma=sigma["psi"],
+        angle=np.full(60, 70.0),
+        delta=seen["delta"] % 360,
+        delta_sigma=sigma["delta"],
+        path="angles.csv",
+    )
+    return [*light, ellipsometric]
 
 
 @pytest.fixture(scope="module")
-def both(spectra) -> pl.Fit:
-    free = pl.Free
-    film = CauchyUrbach(
-        free(None, 1.6, 2.6), free(None, 0.0, 5e4), 0.0, free(None, 0.0, 1.0), free(None, 0.1, 1.0), 2.5
-    )
-    return pl.fit(spectra, pl.Scene(pl.Layer(film, free(None, 20, 600)), pl.Substrate(1.52, "air")))
+def together(spectra) -> pl.Fit:
+    layer = pl.Layer(pl.Cauchy(FREE[1], FREE[2]), FREE[0])
+    return pl.fit(spectra, pl.Scene(layer, GLASS, instrument=pl.Instrument(scale="free")))
 
 
-def test_reflectance_and_transmittance_as_an_independent_fit(both, spectra):
+def on_the_sphere(psi, delta) -> np.ndarray:
+    psi, delta = 2 * np.deg2rad(psi), np.deg2rad(delta)
+    return np.stack([np.cos(psi), np.sin(psi) * np.cos(delta), np.sin(psi) * np.sin(delta)])
+
+
+def test_reflectance_transmittance_and_ellipsometry_as_an_independent_fit(together, spectra):
     """The same minimum and errors as scipy's least squares of tmm's films, started at the truth."""
-    size = np.array([100.0, 1.0, 1e4, 0.1, 0.1])
+    r, t, angles = spectra
+    along, across = 2 * angles.sigma, np.sin(2 * np.deg2rad(angles.values)) * angles.delta_sigma
+    spread = np.deg2rad(np.sqrt((along**2 + across**2) / 2))
+    seen = on_the_sphere(angles.values, angles.delta)
 
     def residual(scaled):
-        return np.concatenate([(s.values - plate(s.signal, scaled * size)) / s.sigma for s in spectra])
+        film = films(*(scaled * SIZE))
+        missed = (seen - on_the_sphere(film["psi"], film["delta"])) / spread
+        return np.concatenate([(s.values - film[s.signal]) / s.sigma for s in (r, t)] + [missed.ravel()])
 
-    found = least_squares(residual, TRUTH / size, xtol=1e-12, ftol=1e-12)
-    stderr = np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac))) * size
-    assert both.status == "converged"
-    for name, value, error, truth in zip(NAMES, found.x * size, stderr, TRUTH, strict=True):
-        assert abs(both[name].value - value) < 1e-2 * error
-        assert both[name].stderr == pytest.approx(error, rel=1e-2)
-        assert abs(both[name].value - truth) < 4 * error
-    assert both.chi2_reduced == pytest.approx(2 * found.cost / (120 - 5), rel=1e-6)
+    found = least_squares(residual, TRUTH / SIZE, xtol=1e-12, ftol=1e-12)
+    stderr = np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac))) * SIZE
+    assert together.status == "converged"
+    scales = ["instrument.scale.film_R", "instrument.scale.film_T"]
+    assert [p.name for p in together.free] == ["thickness", "A", "B", *scales]
+    for estimate, value, error, truth in zip(together.free, found.x * SIZE, stderr, TRUTH, strict=True):
+        assert abs(estimate.value - value) < 1e-2 * error
+        assert estimate.stderr == pytest.approx(error, rel=1e-2)
+        assert abs(estimate.value - truth) < 4 * error
+    # N, C and S of 60 points are 120 independent numbers
+    assert together.chi2_reduced == pytest.approx(2 * found.cost / (240 - 5), rel=1e-6)
 
 
-def test_a_part_for_each_spectrum(both, spectra):
-    assert [part.name for part in both.parts] == ["film_R", "film_T"]
-    for part, spectrum in zip(both.parts, spectra, strict=True):
-        assert part.rms == pytest.approx(np.sqrt(np.mean((spectrum.values - part.curve.model) ** 2)))
+def test_a_part_for_each_spectrum(together, spectra):
+    assert [part.name for part in together.parts] == ["film_R", "film_T", "angles"]
+    for part, spectrum in zip(together.parts, spectra, strict=True):
         assert part.plan.signal == spectrum.signal
-    assert both.rms == pytest.approx(np.sqrt(np.mean([part.rms**2 for part in both.parts])))
-    with pytest.raises(ValueError, match="joint fit of 2 spectra"):
-        both.curve  # noqa: B018
+    for part, spectrum in list(zip(together.parts, spectra, strict=True))[:2]:
+        assert part.rms == pytest.approx(np.sqrt(np.mean((spectrum.values - part.curve.model) ** 2)))
+    assert together.rms is None  # fractions and degrees have none in common
+    with pytest.raises(ValueError, match="joint fit of 3 spectra"):
+        together.curve  # noqa: B018
 
 
-def test_a_file_in_two_is_the_whole_file():
-    """Ψ and Δ of a real polymer brush: every other angle apart, with a σ that both know.
-
-    The minimum may move by a little of its error: each half counts the correlation of its own residuals.
-    """
-    whole = pl.read_spectrum(BRUSH, noise=0.1)
-    scene = pl.Scene(pl.Layer(1.45, pl.Free(lower=1, upper=200)), "Si")
-    halves = [
-        replace(whole, **{name: getattr(whole, name)[first::2] for name in ARRAYS}, path=f"{first}.dat")
-        for first in (0, 1)
-    ]
-    one, two = pl.fit(whole, scene), pl.fit(halves, scene)
-    assert abs(two["thickness"].value - one["thickness"].value) < 0.01 * one["thickness"].stderr
-    assert two["thickness"].stderr == pytest.approx(one["thickness"].stderr, rel=1e-5)
-    assert two.chi2_reduced == pytest.approx(one.chi2_reduced, rel=1e-7)
-    assert two.rms == pytest.approx(one.rms, rel=1e-4)
-    assert two.status == one.status
+OXIDE = pl.Scene(pl.Layer("SiO2", pl.Free(lower=10, upper=400)), "Si")
+ARRAYS = ("wavelength", "values", "sigma")
 
 
-ARRAYS = ("wavelength", "values", "sigma", "angle", "delta", "delta_sigma", "lines")
-
-
-def oxide(thickness: float = 100.0, scale: float = 1.0) -> pl.Spectrum:
-    values = scale * np.asarray(pl.reflectance(WAVELENGTH, thickness, "SiO2", "Si"))
+def oxide(thickness: float = 100.0) -> pl.Spectrum:
+    values = np.asarray(pl.reflectance(WAVELENGTH, thickness, "SiO2", "Si"))
     noise = np.random.default_rng(2).normal(0, 0.002, 60)
     return pl.Spectrum(WAVELENGTH, values + noise, "R", sigma=np.full(60, 0.002), path=f"{thickness:g}nm.csv")
 
 
-SCENE = pl.Scene(pl.Layer("SiO2", pl.Free(lower=10, upper=400)), "Si", instrument=pl.Instrument(scale="free"))
+def test_a_file_in_two_is_the_whole_file():
+    """Every other wavelength apart, with a σ that both know.
+
+    The minimum may move by a little of its error: each half counts the correlation of its own residuals.
+    """
+    whole = oxide()
+    halves = [
+        replace(whole, **{name: getattr(whole, name)[first::2] for name in ARRAYS}, path=f"{first}.csv")
+        for first in (0, 1)
+    ]
+    one, two = pl.fit(whole, OXIDE), pl.fit(halves, OXIDE)
+    assert abs(two["thickness"].value - one["thickness"].value) < 0.02 * one["thickness"].stderr
+    assert two["thickness"].stderr == pytest.approx(one["thickness"].stderr, rel=1e-4)
+    assert two.chi2_reduced == pytest.approx(one.chi2_reduced, rel=1e-4)
+    assert two.rms == pytest.approx(one.rms, rel=1e-4)
+    assert two.status == one.status
 
 
-def test_ellipsometry_beside_a_reflectance_of_unknown_scale():
-    """Of one scene for both, only the reflectance has a scale; rms of fractions and degrees is none."""
-    psi, delta = pl.ellipsometry(WAVELENGTH, 100.0, "SiO2", "Si", angle=70.0)
-    rng = np.random.default_rng(3)
-    ellipsometric = pl.Spectrum(
-        WAVELENGTH,
-        np.asarray(psi) + rng.normal(0, 0.02, 60),
-        "psi-delta",
-        sigma=np.full(60, 0.02),
-        angle=np.full(60, 70.0),
-        delta=np.asarray(delta) + rng.normal(0, 0.05, 60),
-        delta_sigma=np.full(60, 0.05),
-        path="oxide.csv",
-    )
-    found = pl.fit([ellipsometric, oxide(scale=1.1)], SCENE)
-    assert found.status == "converged"
-    assert abs(found["thickness"].value - 100.0) < 4 * found["thickness"].stderr < 0.1
-    scale = found["instrument.scale.100nm"]
-    assert abs(scale.value - 1.1) < 4 * scale.stderr < 0.02
-    assert [p.name for p in found.free] == ["thickness", "instrument.scale.100nm"]
-    assert found.rms is None
+def test_a_list_of_one_is_the_spectrum_with_a_name():
+    one, listed = pl.fit(oxide(), OXIDE), pl.fit([oxide()], OXIDE)
+    assert (one.joint, listed.joint) == (False, True)
+    assert listed.parts[0].name == "100nm"
+    assert listed["thickness"] == one["thickness"]
+
+
+def test_of_one_scene_ellipsometry_leaves_out_the_scale(monkeypatch, spectra, together):
+    """And alone it is refused: a scale was asked for that it cannot have."""
+    asked = []
+
+    def measured_only(data, measured, progress):
+        asked.append(measured)
+        return together
+
+    monkeypatch.setattr(fitting, "_fit", measured_only)
+    scene = pl.Scene(OXIDE.layers, "Si", instrument=pl.Instrument(scale="free", offset=0.01, bandwidth=2.0))
+    pl.fit(spectra, scene)
+    scaled = [(m.scene.instrument.scale, m.scene.instrument.offset) for m in asked[0]]
+    assert scaled == [(scene.instrument.scale, 0.01)] * 2 + [(1.0, 0.0)]
+    assert [m.scene.instrument.bandwidth for m in asked[0]] == [2.0] * 3
+    with pytest.raises(UsageError, match="no scale and no offset"):
+        pl.fit(spectra[2], scene)
 
 
 def test_a_misfit_names_the_file():
-    scene = pl.Scene(pl.Layer("SiO2", pl.Free(lower=10, upper=400)), "Si")
     right, wrong = oxide(100.0), oxide(130.0)
-    found = pl.fit([right, replace(wrong, sigma=np.full(60, 0.02))], scene)
+    found = pl.fit([right, replace(wrong, sigma=np.full(60, 0.02))], OXIDE)
     assert found.status == "misfit"
     assert found.parts[1].name in found.verdict
     assert found.parts[0].name not in found.verdict
@@ -149,15 +170,14 @@ def test_a_misfit_names_the_file():
 
 def test_a_spectrum_of_another_sample_is_not_given_up_in_silence():
     """Without σ its noise would grow with its residuals until it counts for nothing."""
-    scene = pl.Scene(pl.Layer("SiO2", pl.Free(lower=10, upper=400)), "Si")
-    found = pl.fit([replace(oxide(100.0), sigma=None), replace(oxide(250.0), sigma=None)], scene)
+    found = pl.fit([replace(oxide(thickness), sigma=None) for thickness in (100.0, 250.0)], OXIDE)
     assert found.status == "misfit"
 
 
 def test_what_tells_spectra_apart():
     r = pl.Spectrum(WAVELENGTH, np.full(60, 0.1), "R", path="a/film.v2.csv")
     t = replace(r, signal="T")
-    assert labels([r]) == [""]
+    assert labels([r]) == ["film_v2"]
     assert labels([r, replace(t, path="b.csv")]) == ["film_v2", "b"]
     assert labels([r, t]) == ["film_v2-R", "film_v2-T"]
     assert labels([r, r]) == ["film_v2-1", "film_v2-2"]
@@ -168,12 +188,41 @@ def test_what_tells_spectra_apart():
 @pytest.mark.parametrize(
     ("spectra", "scenes", "said"),
     [
-        ([], SCENE, "no spectrum"),
-        ([oxide(), oxide()], [SCENE], "2 spectra need as many scenes"),
-        ([oxide(), oxide()], [SCENE, pl.Scene(pl.Layer("SiO2", 1.0), "Si")], "same layers"),
-        ([oxide(), oxide()], [SCENE, pl.Scene(SCENE.layers, "BK7")], "same layers, ambient and substrate"),
+        ([], OXIDE, "no spectrum"),
+        ([oxide(), oxide()], [OXIDE], "2 spectra need as many scenes"),
+        ([oxide(), oxide()], [OXIDE, pl.Scene(pl.Layer("SiO2", 1.0), "Si")], "same layers"),
+        ([oxide(), oxide()], [OXIDE, pl.Scene(OXIDE.layers, "BK7")], "same layers, ambient and substrate"),
     ],
 )
 def test_what_is_no_joint_fit(spectra, scenes, said):
     with pytest.raises(UsageError, match=said):
         pl.fit(spectra, scenes)
+
+
+@pytest.mark.slow
+def test_an_absorbing_film_on_a_plate_from_both_its_faces():
+    """R and T of what a user has: an absorbing film on a glass plate, against tmm's incoherent plate."""
+    rng, energy = np.random.default_rng(1), 1239.841984 / WAVELENGTH
+    index = 2.0 + 2e4 / WAVELENGTH**2 + 0.1j * np.exp((energy - 2.5) / 0.3)
+    stack, kinds = [np.inf, 150.0, 1e6, np.inf], ["i", "c", "i", "i"]
+    seen = [
+        tmm.inc_tmm("s", [1, n, GLASS, 1], stack, kinds, 0, nm)
+        for n, nm in zip(index, WAVELENGTH, strict=True)
+    ]
+    measured = [
+        pl.Spectrum(
+            WAVELENGTH,
+            np.array([at[x] for at in seen]) + rng.normal(0, NOISE[x], 60),
+            x,
+            sigma=np.full(60, NOISE[x]),
+            path=f"{x}.csv",
+        )
+        for x in "RT"
+    ]
+    k0, width = pl.Free(lower=0, upper=1), pl.Free(lower=0.1, upper=1)
+    film = CauchyUrbach(FREE[1], FREE[2], 0.0, k0, width, 2.5)
+    found = pl.fit(measured, pl.Scene(pl.Layer(film, FREE[0]), pl.Substrate(GLASS, "air")))
+    assert found.status == "converged"
+    assert "The back face matters" in found.verdict
+    for name, truth in (("thickness", 150.0), ("A", 2.0), ("B", 2e4), ("k0", 0.1), ("Eu", 0.3)):
+        assert abs(found[name].value - truth) < 4 * found[name].stderr

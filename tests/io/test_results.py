@@ -313,6 +313,8 @@ def test_json_of_a_joint_fit_lists_its_data(joint):
     ]
     assert record["rms"] is None
     assert [row["name"] for row in record["plan"]] == ["film", "b,c"]
+    alone = to_json(replace(joint, parts=joint.parts[:1]))
+    assert [d["name"] for d in alone["data"]] == ["film"]
 
 
 def test_tables_of_a_joint_fit(joint, fit, tmp_path):

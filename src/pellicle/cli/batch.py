@@ -15,31 +15,35 @@ if TYPE_CHECKING:
 
 
 class Look(NamedTuple):
-    """A file, the scene that is to explain it, and how it is read."""
+    """A file, the scene that is to explain it, and how it is read.
+
+    `rescaled` says that the scale or the offset is of this file alone.
+    """
 
     path: str
     scene: Scene
     reading: ReadWords
+    rescaled: bool = False
 
 
 class Batch:
     """Fits group after group of files; one that fails does not stop the others.
 
-    The files of a group are fitted together: one file, unless the fit is a joint one.
+    A joint batch has one group, whose files are fitted together; else every group is one file.
     """
 
-    def __init__(self, out: str | None, as_json: bool, several: bool):
-        self.out, self.as_json, self.several = out, as_json, several
+    def __init__(self, out: str | None, as_json: bool, joint: bool):
+        self.out, self.as_json, self.joint = out, as_json, joint
         self.done: list[Any] = []
 
     def __call__(self, groups: list[list[Look]]) -> int:
         from pellicle.io.atomic import new_folder
-        from pellicle.io.results import several
+        from pellicle.io.results import several, write_summary
 
         folders = [None] * len(groups)
         if self.out is not None:
             root = Path(self.out)
-            folders = several(root, [looks[0].path for looks in groups]) if self.several else [root]
+            folders = several(root, [looks[0].path for looks in groups])
             if root.exists():
                 new_folder(root)  # refuses a stranger's folder before the work, not after
         worst = 0
@@ -49,7 +53,8 @@ class Batch:
         except KeyboardInterrupt:
             say(f"interrupted after {len(self.done)} of {len(groups)} files; what is done is kept")
             worst = 130
-        self._summarise()
+        if self.out is not None and len(groups) > 1 and self.done:
+            write_summary(Path(self.out) / "summary.csv", self.done)
         return worst
 
     def _one(self, looks: list[Look], folder: Path | None) -> int:
@@ -59,12 +64,12 @@ class Batch:
         label = ", ".join(paths)
         progress = Progress(label)
         try:
-            found = _fit(looks, progress)
+            found = self._fit(looks, progress)
         except ValueError as error:
             progress.clear()
             message = str(error) if any(path in str(error) for path in paths) else f"{label}: {error}"
             say(f"pellicle: {message}")
-            self.done.append(failure(paths if len(paths) > 1 else paths[0], message))
+            self.done.append(failure(paths if self.joint else paths[0], message))
             if self.as_json:
                 print(json_module.dumps(self.done[-1], allow_nan=False), flush=True)
             return 3  # a failed file is 3, whatever would mend it
@@ -84,31 +89,24 @@ class Batch:
             write_fit(folder, found, figure=True)
             say(f"{folder}: report, figure and tables written")
 
-    def _summarise(self) -> None:
-        if self.out is None or not self.several or not self.done:
-            return
-        from pellicle.io.results import write_summary
+    def _fit(self, looks: list[Look], progress: Progress) -> Fit:
+        from pellicle.fitting.fit import fit as run
 
-        write_summary(Path(self.out) / "summary.csv", self.done)
-
-
-def _fit(looks: list[Look], progress: Progress) -> Fit:
-    from pellicle.fitting.fit import fit as run
-
-    spectra, scenes = [], []
-    for look in looks:
-        spectrum, scene = _seen(look, alone=len(looks) == 1)
-        spectra.append(spectrum)
-        scenes.append(scene)
-        say(*(f"{look.path}: {note}" for note in spectrum.notes))
-    return run(spectra, scenes, progress=progress)
+        spectra, scenes = [], []
+        for look in looks:
+            spectrum, scene = _seen(look, own=look.rescaled or len(looks) == 1)
+            spectra.append(spectrum)
+            scenes.append(scene)
+            say(*(f"{look.path}: {note}" for note in spectrum.notes))
+        what = (spectra, scenes) if self.joint else (spectra[0], scenes[0])
+        return run(*what, progress=progress)
 
 
-def _seen(look: Look, alone: bool) -> tuple[Any, Scene]:
-    """The spectrum, and its scene: beside other spectra Ψ and Δ leave out what only those can have."""
+def _seen(look: Look, own: bool) -> tuple[Any, Scene]:
+    """The spectrum, and its scene: Ψ and Δ leave out a scale and an offset that are not their own."""
     from pellicle.fitting.measured import unscaled
     from pellicle.scene import Drift
 
     scaled = isinstance(look.scene.instrument.scale, Drift)
     spectrum = read(look.path, look.reading, scaled=scaled)
-    return spectrum, look.scene if alone or spectrum.delta is None else unscaled(look.scene)
+    return spectrum, look.scene if own or spectrum.delta is None else unscaled(look.scene)

@@ -96,8 +96,8 @@ def fit(
     for look in looks:
         check_free(look.scene)
     start()
-    groups = [looks] if joint or together else [[look] for look in looks]
-    return Batch(out, json, several=len(groups) > 1)(groups)
+    joint = joint or together
+    return Batch(out, json, joint)([looks] if joint else [[look] for look in looks])
 
 
 def _range(text: str | None) -> tuple[float, float] | None:
@@ -160,4 +160,5 @@ def _look(file: str, recipe: Recipe, reading: ReadWords) -> Look:
     import equinox as eqx
 
     reading = merged(reading, recipe)
-    return Look(file, eqx.tree_at(lambda s: s.light, recipe.scene(), light(reading)), reading)
+    scene = eqx.tree_at(lambda s: s.light, recipe.scene(), light(reading))
+    return Look(file, scene, reading, any(own.rescales for own in recipe.tables.data.file))

@@ -44,7 +44,7 @@ def fit(
     scenes = _scenes(spectra, scene)
     for each in scenes:
         check_free(each)
-    names = labels(spectra)
+    names = [""] if isinstance(data, Spectrum) else labels(spectra)
     with jax.enable_x64(True):
         return _fit(spectra, [measured(*each) for each in zip(spectra, scenes, names, strict=True)], progress)
 
@@ -61,10 +61,8 @@ def check_free(scene: Scene) -> None:
 def labels(spectra: Sequence[Spectrum]) -> list[str]:
     """What tells spectra apart, without dots: files' stems, else with their signals, else numbered.
 
-    Empty for a single one, and where a name would read as a parameter's it is numbered.
+    Where a name would read as a parameter's it is numbered.
     """
-    if len(spectra) == 1:
-        return [""]
     stems = [Path(s.path).stem.replace(".", "_") or s.signal for s in spectra]
     signals = [f"{stem}-{s.signal}" for stem, s in zip(stems, spectra, strict=True)]
     numbers = [f"{stem}-{i}" for i, stem in enumerate(stems, start=1)]

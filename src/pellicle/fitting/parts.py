@@ -9,13 +9,14 @@ import numpy as np
 from pellicle.fitting import noise
 from pellicle.fitting.problem import View
 from pellicle.fitting.result import Curve, Part
-from pellicle.fitting.status import misfits
+from pellicle.fitting.status import MISFIT_CHI2, misfits
 from pellicle.fitting.uncertainty import Errors, layer_errors
 from pellicle.fitting.weigh import Met, Weighed
 from pellicle.io.spectrum import Spectrum
 
-FAR = 3.0
-"""Residuals of a spectrum among several above this many times its noise count as structured."""
+FAR = math.sqrt(MISFIT_CHI2)
+"""Residuals of a spectrum among several above this many times its noise count as structured: what its
+neighbouring points differ by serves as the σ that nobody gave, and the bound is that of a known one."""
 
 
 def parts(data: list[Spectrum], weighed: Weighed, found: Errors) -> tuple[Part, ...]:
@@ -59,15 +60,16 @@ def together(found: tuple[Part, ...]) -> float | None:
 def missed(found: tuple[Part, ...], weighed: Weighed) -> tuple[Part, ...]:
     """The spectra that the scene does not explain."""
     views = zip(found, weighed.problem.views, weighed.met, strict=True)
-    return tuple(part for part, view, met in views if _misses(part, view, met))
+    several = len(found) > 1
+    return tuple(part for part, view, met in views if _misses(part, view, met, several))
 
 
-def _misses(part: Part, view: View, met: Met) -> bool:
+def _misses(part: Part, view: View, met: Met, several: bool) -> bool:
     values = view.data.values[: view.points].reshape(view.rows, view.channels)
     rms = part.rms if view.channels == 1 else math.radians(2 * part.rms)
     floor = np.sqrt(np.mean([np.median(noise.local_noise(column)) ** 2 for column in values.T]))
     # beside others a spectrum may be given up, its σ growing with its residuals, without much structure
-    given_up = bool(part.name) and rms > FAR * floor
+    given_up = several and rms > FAR * floor
     return misfits(
         chi2_reduced=part.chi2_reduced,
         sigma_known=view.noise.given,

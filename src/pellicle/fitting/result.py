@@ -103,8 +103,8 @@ class Profile:
 class Part:
     """One spectrum of a fit, and how the best scene explains it.
 
-    `name` is what its own parameters end in, empty where there is no other spectrum; `rms` is in the
-    unit of the signal: a fraction, or degrees of Ψ.
+    `name` is what its own parameters end in, empty where the fit is no joint one; `rms` is in the unit of
+    the signal: a fraction, or degrees of Ψ.
     """
 
     name: str
@@ -149,6 +149,11 @@ class Fit:
     @property
     def free(self) -> tuple[Estimate, ...]:
         return tuple(p for p in self.parameters.values() if p.free)
+
+    @property
+    def joint(self) -> bool:
+        """Whether a list of spectra was fitted, if only of one."""
+        return bool(self.parts[0].name)
 
     @property
     def spectrum(self) -> Any:

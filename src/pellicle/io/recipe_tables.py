@@ -89,6 +89,11 @@ class FileTable(_Table):
     instrument: InstrumentTable = InstrumentTable()
     back: Literal[False] | None = None
 
+    @property
+    def rescales(self) -> bool:
+        """Whether it gives this file a scale or an offset of its own."""
+        return self.instrument.scale != 1.0 or self.instrument.offset != 0.0
+
     @model_validator(mode="before")
     @classmethod
     def _table(cls, given):
@@ -137,7 +142,7 @@ def of_file(tables: RecipeTable, file: FileTable) -> RecipeTable:
     """The recipe of one file: with its own signal, angle, noise and so on, and no other file."""
     light = {name: getattr(file, name) for name in ("signal", "angle", "polarisation", "noise", "range")}
     said = {name: value for name, value in light.items() if value is not None}
-    data = tables.data.model_copy(update={**said, "files": [file.path], "file": []})
+    data = tables.data.model_copy(update={**said, "file": [file]})
     own = {name: getattr(file.instrument, name) for name in file.instrument.model_fields_set}
     instrument = tables.instrument.model_copy(update=own)
     scene, plate = tables.scene, tables.scene.substrate

@@ -53,9 +53,8 @@ def to_json(fit: Fit) -> dict[str, Any]:
 
 
 def _data(fit: Fit) -> dict[str, Any] | list[dict[str, Any]]:
-    """What was fitted: a list where it is several spectra."""
-    first, *others = fit.parts
-    return [_part(part) for part in fit.parts] if others else _source(first)
+    """What was fitted: a list where the fit is a joint one."""
+    return [_part(part) for part in fit.parts] if fit.joint else _source(fit.parts[0])
 
 
 def _source(part: Part) -> dict[str, Any]:
@@ -65,7 +64,7 @@ def _source(part: Part) -> dict[str, Any]:
 
 
 def _part(part: Part) -> dict[str, Any]:
-    """One of several spectra: its name, by which its own parameters end, and how well it is explained."""
+    """One spectrum of a joint fit: its name, that its own parameters end in, and how it is explained."""
     return {
         "name": part.name,
         **_source(part),

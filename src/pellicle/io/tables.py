@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 def fit_csv(fit: Fit) -> str:
     """Data, model, residual and σ at each wavelength, with the angle where the data have one.
 
-    Of several spectra one table of one value a row, with the spectrum's name and the signal.
+    Of a joint fit one table of one value a row, with the spectrum's name and the signal.
     """
-    if len(fit.parts) > 1:
+    if fit.joint:
         return _joint_csv(fit)
     curve, data = fit.curve, fit.spectrum
     if curve.delta_data is not None:
