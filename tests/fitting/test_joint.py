@@ -13,6 +13,8 @@ import pellicle as pl
 from pellicle.errors import UsageError
 from pellicle.fitting import fit as fitting
 from pellicle.fitting.fit import labels
+from pellicle.fitting.measured import measured
+from pellicle.fitting.problem import make
 from pellicle.optics.dispersion import CauchyUrbach
 
 WAVELENGTH = np.linspace(400.0, 900.0, 60)
@@ -172,6 +174,19 @@ def test_a_spectrum_of_another_sample_is_not_given_up_in_silence():
     """Without σ its noise would grow with its residuals until it counts for nothing."""
     found = pl.fit([replace(oxide(thickness), sigma=None) for thickness in (100.0, 250.0)], OXIDE)
     assert found.status == "misfit"
+
+
+def test_layers_are_shared_and_the_instrument_is_each_spectrums_own():
+    """A prior of what is shared counts once."""
+    width = pl.Free(lower=0, upper=20, prior=pl.Normal(5.0, 1.0))
+    thickness = pl.Free(lower=10, upper=400, prior=pl.Normal(100.0, 2.0))
+    scene = pl.Scene(pl.Layer(1.46, thickness), "Si", instrument=pl.Instrument(bandwidth=width))
+    problem = make(*(measured(oxide(), scene, name) for name in "ab"))
+    names = [p.name for p in problem.parameters]
+    assert names == ["thickness", "instrument.bandwidth.a", "instrument.bandwidth.b"]
+    assert [view.takes for view in problem.views] == [(0, 1), (0, 2)]
+    assert problem.box.prior_weight.tolist() == [0.5, 1.0, 1.0]
+    assert [view.box.prior_weight.tolist() for view in problem.views] == [[0.5, 1.0], [0.0, 1.0]]
 
 
 def test_what_tells_spectra_apart():
