@@ -1,5 +1,7 @@
 """Ψ and Δ from plain columns: every way they are written, and one sentence where they cannot be."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -12,24 +14,8 @@ DELTA = np.array([170.0, 179.5, 190.25])
 
 
 @pytest.fixture
-def write(tmp_path):
-    def write(text, name="film.csv"):
-        path = tmp_path / name
-        path.write_text(text)
-        return path
-
-    return write
-
-
-def refused(path, error, *said, **kwargs):
-    with pytest.raises(error) as caught:
-        read_spectrum(path, **kwargs)
-    message = str(caught.value)
-    assert type(caught.value) is error
-    assert message.startswith(str(path))
-    for words in said:
-        assert words in message.removeprefix(str(path)), message
-    assert "\n" not in message
+def refused(refusal):
+    return partial(refusal, read_spectrum)
 
 
 def rows(*columns, separator=","):
@@ -140,13 +126,13 @@ def test_psi_and_delta_go_before_ncs_beside_them(write):
     assert "ignored: 'N', 'C', 'S'" in spectrum.notes
 
 
-def test_three_columns_without_a_header(write):
+def test_three_columns_without_a_header(write, refused):
     path = write(rows(NM, PSI, DELTA, separator=" "))
     assert_film(read_spectrum(path, signal="psi-delta"))
     refused(path, UsageError, "no header", "--signal")
 
 
-def test_four_columns_without_a_header_need_names(write):
+def test_four_columns_without_a_header_need_names(write, refused):
     path = write(rows(NM, [70, 70, 70], PSI, DELTA))
     refused(path, UsageError, "4 columns and no header", "--columns", signal="psi-delta")
     spectrum = read_spectrum(path, columns="wavelength,angle,psi,delta")
@@ -154,7 +140,7 @@ def test_four_columns_without_a_header_need_names(write):
     np.testing.assert_array_equal(spectrum.angle, [70, 70, 70])
 
 
-def test_the_signal_settles_what_to_read(write):
+def test_the_signal_settles_what_to_read(write, refused):
     path = write("wl,R,psi,delta\n400,0.1,20,170\n500,0.2,21,171\n")
     refused(path, UsageError, "psi and delta as well as R", "--signal")
     assert read_spectrum(path, signal="R").signal == "R"
@@ -173,38 +159,38 @@ def test_the_signal_settles_what_to_read(write):
         ("400,21,171", ("line 3", "400 repeats 400 of line 2", "within one angle")),
     ],
 )
-def test_impossible_rows(write, row, said):
+def test_impossible_rows(write, row, said, refused):
     refused(write(f"wl,psi,delta\n400,20,170\n{row}\n600,22,172\n"), DataError, *said)
 
 
-def test_an_impossible_end_may_be_cut_off(write):
+def test_an_impossible_end_may_be_cut_off(write, refused):
     nm = np.arange(400.0, 500.0, 10)
     bent = write(f"wl,psi,delta\n{rows(nm, np.where(nm < 420, 95.0, 20.0), nm - 300)}")
     refused(bent, DataError, "line 2", "95")
     assert len(read_spectrum(bent, range=(420, 500))) == 8
 
 
-def test_errors_that_are_none(write):
+def test_errors_that_are_none(write, refused):
     text = "wl,psi,delta,sigma_psi,sigma_delta\n400,20,170,0.1,1\n500,21,171,0.1,0\n"
     refused(write(text), DataError, "line 3, column 'sigma_delta': 0", "above zero")
     refused(write(text.replace("sigma_delta", "x")), DataError, "only one of psi and delta")
 
 
 @pytest.mark.parametrize("header", ["wl,psi,x", "wl,delta,x", "wl,N,C", "wl,R,x"])
-def test_missing_columns(write, header):
+def test_missing_columns(write, header, refused):
     path = write(f"{header}\n400,0.20,0.70\n500,0.21,0.71\n")
     refused(path, DataError, "not all among", "--columns", signal="psi-delta")
 
 
-def test_missing_delta_without_a_flag(write):
+def test_missing_delta_without_a_flag(write, refused):
     refused(write("wl,psi\n400,20\n500,21\n"), DataError, "'psi'", "--columns wavelength,angle,psi,delta")
 
 
-def test_missing_wavelength(write):
+def test_missing_wavelength(write, refused):
     refused(write("x,psi,delta\n400,20,170\n"), DataError, "no column is a wavelength", "angle,psi,delta")
 
 
-def test_radians_are_not_taken_for_degrees(write):
+def test_radians_are_not_taken_for_degrees(write, refused):
     small = write("wl,psi,delta\n400,0.35,2.9\n500,0.36,3.0\n")
     refused(small, DataError, "look like radians", "psi_deg")
     refused(write("wl,psi (rad),delta (rad)\n400,0.35,2.9\n500,0.36,3.0\n"), DataError, "'rad'", "degrees")
@@ -213,18 +199,18 @@ def test_radians_are_not_taken_for_degrees(write):
 
 
 @pytest.mark.parametrize("row", ["0.1,0.1,0.1", "1,0.5,0.5"])
-def test_impossible_ncs(write, row):
+def test_impossible_ncs(write, row, refused):
     refused(
         write(f"wl,N,C,S\n400,1,0,0\n500,{row}\n"), DataError, "line 3, column 'N'", "degree of polarisation"
     )
 
 
-def test_angles_of_incidence(write):
+def test_angles_of_incidence(write, refused):
     refused(write("wl,aoi,psi,delta\n400,90,20,170\n"), DataError, "line 2, column 'aoi': 90", "below 90")
     refused(write("wl,aoi (rad),psi,delta\n400,1,20,170\n"), DataError, "'rad'", "angles in degrees")
 
 
-def test_flags_without_a_meaning(write):
+def test_flags_without_a_meaning(write, refused):
     path = write(f"wl,psi,delta\n{rows(NM, PSI, DELTA)}")
     refused(path, UsageError, "--signal-unit", signal_unit="percent")
     refused(path, UsageError, "--polarisation", polarisation="p")

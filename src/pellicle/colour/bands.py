@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pellicle.colour.observers import SPAN, Sensor, _columns, sensor
+from pellicle.colour.observers import SPAN, Sensor, columns, sensor
 from pellicle.colour.spaces import SRGB_WHITE, TO_SRGB, adaptation
 
 LONGEST_PATH = 12_000.0  # nm: beyond, our Gaussians let less than 4e-4 of an order through
@@ -89,7 +89,7 @@ def fit_weights(wavelength: np.ndarray, width: np.ndarray, target: Transforms) -
 
 
 def _derived(kind: str, count: int, reach: float, target: Sensor) -> Bands:
-    table = _columns(f"{kind}.csv")
+    table = columns(f"{kind}.csv")
     chosen = (table["count"] == count) & (table["reach_nm"] == reach)
     if not chosen.any():
         known = sorted({(int(c), int(r)) for c, r in zip(table["count"], table["reach_nm"], strict=True)})

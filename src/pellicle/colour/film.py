@@ -11,7 +11,8 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from pellicle.colour import spaces
-from pellicle.colour.bands import Bands, way
+from pellicle.colour.bands import Bands
+from pellicle.colour.bands import way as bands_of
 from pellicle.colour.observers import sensor
 from pellicle.optics import film, interface, orders
 from pellicle.optics.dispersion import AbstractDispersion
@@ -73,13 +74,10 @@ def film_colour(
 
     ```
     """
-    bands, white = _way(way, observer, illuminant), sensor(observer, illuminant).white
+    bands, white = bands_of(way, observer, illuminant), sensor(observer, illuminant).white
     seen = jnp.asarray(reflectance(thickness, layer, substrate, bands, ambient=ambient, angle=angle))
     xyz = seen @ jnp.asarray(bands.weights, seen.dtype)
     return Colour(xyz, (float(white[0]), float(white[1]), float(white[2])))
-
-
-_way = way
 
 
 def reflectance(thickness, layer, substrate, bands: Bands, *, ambient: Any = 1.0, angle: Any = 0.0):

@@ -28,7 +28,8 @@ class Sensor(NamedTuple):
 
 
 @cache
-def _columns(name: str) -> dict[str, np.ndarray]:
+def columns(name: str) -> dict[str, np.ndarray]:
+    """The columns of one of the package's tables, by their names."""
     text = (resources.files("pellicle.colour") / "data" / name).read_text(encoding="utf-8")
     header, *rows = [line.split(",") for line in text.splitlines() if not line.startswith("#")]
     return dict(zip(header, np.array(rows, dtype=float).T, strict=True))
@@ -45,7 +46,7 @@ def sensor(observer: str = "1931", illuminant: str = "D65") -> Sensor:
         raise ValueError(f"observer {observer!r} is unknown: expected one of {', '.join(OBSERVERS)}")
     if illuminant not in ILLUMINANTS:
         raise ValueError(f"illuminant {illuminant!r} is unknown: expected one of {', '.join(ILLUMINANTS)}")
-    table, lamps = _columns("observers.csv"), _columns("illuminants.csv")
+    table, lamps = columns("observers.csv"), columns("illuminants.csv")
     inside = (table["wavelength_nm"] >= SPAN[0]) & (table["wavelength_nm"] <= SPAN[1])
     wavelength = table["wavelength_nm"][inside]
     functions = np.stack([table[f"{axis}_{observer}"][inside] for axis in "xyz"], axis=1)

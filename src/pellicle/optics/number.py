@@ -104,10 +104,12 @@ def narrow(re: Any, im: Any) -> Number:
 
 
 def real(z: Number):
+    """The real part; 0 where it is absent."""
     return _some(parts(z)[0])
 
 
 def imag(z: Number):
+    """The imaginary part; 0 where it is absent."""
     return _some(parts(z)[1])
 
 
@@ -117,6 +119,7 @@ def is_real(z: Number) -> bool:
 
 
 def conj(z: Number) -> Number:
+    """The conjugate, of the same type."""
     if isinstance(z, Pair):
         return Pair(z.re, _minus(z.im))
     return jnp.conj(z) if jnp.iscomplexobj(z) else z
@@ -129,6 +132,7 @@ def abs2(z: Number):
 
 
 def times_i(z: Number) -> Number:
+    """i z; the parts of a Pair change places, so that an absent one stays absent."""
     if not isinstance(z, Pair) and jnp.iscomplexobj(z):
         return 1j * z
     re, im = parts(z)

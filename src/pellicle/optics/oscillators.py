@@ -29,6 +29,7 @@ class AbstractOscillator(eqx.Module):
 
 
 def check(model: str, *, gap: Any = None, centre: Any = None, **not_below_zero: Any) -> None:
+    """ValueError where a parameter may fall below zero, or the gap lies wholly above the resonance."""
     not_negative(model, **not_below_zero)
     low, high = bounds_of(gap), bounds_of(centre)
     if low is not None and high is not None and low[0] >= high[1]:
