@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from pellicle.optics.oscillators import TaucLorentz as TaucLorentz
     from pellicle.optics.spline import KramersKronigSpline as KramersKronigSpline
     from pellicle.optics.spline import Spline as Spline
-    from pellicle.planning import plan as plan
     from pellicle.scene import Free as Free
     from pellicle.scene import Light as Light
     from pellicle.scene import Normal as Normal
@@ -47,6 +46,7 @@ if TYPE_CHECKING:
     from pellicle.signals import ellipsometry as ellipsometry
     from pellicle.signals import reflectance as reflectance
     from pellicle.signals import transmittance as transmittance
+    from pellicle.thrift import plan as plan
 
 _HOME = {
     "pellicle.fitting.fit": ("fit",),
@@ -69,7 +69,7 @@ _HOME = {
     "pellicle.optics.mixtures": ("Bruggeman", "Linear", "Looyenga", "MaxwellGarnett"),
     "pellicle.optics.oscillators": ("Drude", "Gaussian", "Lorentz", "Oscillators", "TaucLorentz"),
     "pellicle.optics.spline": ("KramersKronigSpline", "Spline"),
-    "pellicle.planning": ("plan",),
+    "pellicle.thrift": ("plan",),
     "pellicle.instrument": ("Instrument",),
     "pellicle.layers": ("Interface", "Layer", "Plate", "Substrate"),
     "pellicle.scene": ("Free", "Light", "Normal", "Scene"),

@@ -28,8 +28,10 @@ def _normal_rule(count: int) -> tuple[np.ndarray, np.ndarray]:
     return np.sqrt(2) * nodes, weights / np.sqrt(np.pi)
 
 
-def _weighted(at: Callable[[Any], Any], nodes: np.ndarray, weights: np.ndarray) -> Any:
-    return jnp.tensordot(jnp.asarray(weights), jax.vmap(at)(jnp.asarray(nodes)), 1)
+def _weighted(at: Callable[[Any], Any], nodes: Any, weights: np.ndarray, wavelength: Any) -> Any:
+    """Σ weights · at(nodes), in the precision of the wavelengths."""
+    like = jnp.result_type(wavelength)
+    return jnp.tensordot(jnp.asarray(weights, like), jax.vmap(at)(jnp.asarray(nodes, like)), 1)
 
 
 def over_bandwidth(simulate: Intensities, count: int) -> Intensities:
@@ -43,7 +45,7 @@ def over_bandwidth(simulate: Intensities, count: int) -> Intensities:
             shifted = scene.light.wavelength + node * (bandwidth / FWHM)
             return simulate(eqx.tree_at(lambda s: s.light.wavelength, scene, shifted))
 
-        return _weighted(at, nodes, weights)
+        return _weighted(at, nodes, weights, scene.light.wavelength)
 
     return average
 
@@ -58,7 +60,7 @@ def over_thickness(simulate: Intensities, count: int, position: int, spread: Cal
             uneven = jnp.maximum(thickness + node * spread(scene), 0.0)
             return simulate(eqx.tree_at(lambda s: s.layers[position].thickness, scene, uneven))
 
-        return _weighted(at, nodes, weights)
+        return _weighted(at, nodes, weights, scene.light.wavelength)
 
     return average
 
@@ -114,14 +116,17 @@ def over_cone(simulate: Intensities, count: int, around: int, mix: Callable[[Any
     """The mean over the light's cone. `mix(rows, s_share)` puts the polarisations of a ray together."""
 
     def average(scene: Scene):
+        like = jnp.result_type(scene.light.wavelength)
         rays = directions(jnp.deg2rad(scene.light.angle), cone_sine(scene), count, around)
 
         def at(angle, s_share):
             turned = eqx.tree_at(lambda s: s.light.angle, scene, jnp.rad2deg(angle))
             return mix(simulate(turned), s_share)
 
-        share = jnp.broadcast_to(rays.s_share, jnp.shape(rays.angle))
-        return jnp.tensordot(jnp.asarray(rays.weight), jax.vmap(at)(rays.angle, share), 1)
+        share = jnp.broadcast_to(jnp.asarray(rays.s_share, like), jnp.shape(rays.angle))
+        return jnp.tensordot(
+            jnp.asarray(rays.weight, like), jax.vmap(at)(jnp.asarray(rays.angle, like), share), 1
+        )
 
     return average
 

@@ -71,7 +71,13 @@ def build(plan: Plan) -> Simulate:
         mix = averages.unmixed if ellipsometric else averages.mixed(plan.polarisation)
         rows = averages.over_cone(rows, cone.count, cone.around, mix)
     finish = _on_sphere if ellipsometric else _mean
-    return lambda scene: finish(rows(scene))
+    return lambda scene: finish(rows(_simplified(plan, scene)))
+
+
+def _simplified(plan: Plan, scene: Scene) -> Scene:
+    for leave_out in plan.left_out:
+        scene = leave_out(scene)
+    return scene
 
 
 def _blurred(rows: Intensities, count: int) -> Intensities:

@@ -5,16 +5,25 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pellicle.effects import EFFECTS, Row
+from pellicle.effects.without import LeftOut
 from pellicle.scene import Scene
 
 
 @dataclass(frozen=True)
 class Plan:
-    """Frozen, hashable and printable; `model.build` composes what it names and nothing else."""
+    """Frozen, hashable and printable; `model.build` composes what it names and nothing else.
+
+    `left_out` are the effects that a `tolerance` (in the unit of the signal) leaves out although they
+    are there, in the order in which the scene is simplified. `gradient_error` is by how much of its
+    largest value a derivative in a free parameter changes through that, at most.
+    """
 
     rows: tuple[Row, ...]
     signal: str
     polarisation: str
+    left_out: tuple[LeftOut, ...] = ()
+    tolerance: float = 0.0
+    gradient_error: float = 0.0
 
     def row(self, effect: str) -> Row:
         """The line of one effect; KeyError for a name that is none."""
@@ -27,10 +36,15 @@ class Plan:
         return self.row(effect).on
 
     @property
+    def error_bound(self) -> float:
+        """How far the signal can be off by all that the plan leaves out, and by how it averages."""
+        return sum(row.error_bound for row in self.rows)
+
+    @property
     def wordless(self) -> Plan:
         """The same without reasons and bounds: all that a compiled program depends on."""
         rows = tuple(Row(row.effect, row.on, "", count=row.count, around=row.around) for row in self.rows)
-        return Plan(rows, self.signal, self.polarisation)
+        return Plan(rows, self.signal, self.polarisation, self.left_out)
 
     def __str__(self) -> str:
         width = max(len(row.effect) for row in self.rows)
@@ -38,11 +52,11 @@ class Plan:
         return "\n".join(lines)
 
 
-def plan(scene: Scene) -> Plan:
+def exact(scene: Scene) -> Plan:
     """The effects that a scene calls for, judged from its types and bounds.
 
-    An effect is left out only where it is provably absent, so every error bound is 0, but for the
-    number of orders, of nodes and of rays, whose bounds are measured (see `effects`).
+    An effect is left out only where it is provably absent: of those the error bound is 0. The orders,
+    nodes and rays of an average have a bound (see `effects.averaging`).
     """
     rows = tuple(effect.judge(scene) for effect in EFFECTS)
     return Plan(rows, scene.light.signal, scene.light.polarisation)

@@ -12,7 +12,7 @@ import numpy as np
 from pellicle.model import build, sampled
 from pellicle.optics.dispersion import AbstractDispersion
 from pellicle.optics.ellipsometry import angles
-from pellicle.planning import Plan, plan
+from pellicle.planning import Plan, exact
 from pellicle.scene import Drift, Instrument, Scene, insert, is_free, start_values, with_wavelength
 
 VISIBLE = (380.0, 780.0, 2.0)
@@ -38,7 +38,7 @@ def synthesise(scene: Scene, wavelength: Any, noise: float = 0.0, seed: int = 0)
     with jax.enable_x64(True):
         fixed = with_wavelength(insert(scene, start_values(scene)), wavelength)
         fixed = eqx.tree_at(lambda s: s.instrument, fixed, _settled(fixed.instrument))
-        chosen = plan(fixed)
+        chosen = exact(fixed)
         signal = np.asarray(jax.jit(build(chosen))(sampled(fixed, chosen.on("coherence"))))
     clean = float(fixed.instrument.scale) * signal + float(fixed.instrument.offset)
     random = np.random.default_rng(seed).normal(0.0, 1.0, clean.shape)

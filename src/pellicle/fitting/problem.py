@@ -7,12 +7,12 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
-from pellicle.effects import largest_index
+from pellicle.effects.box import largest_index
 from pellicle.fitting.measured import Measured, Noise
 from pellicle.fitting.nuisance import Data
 from pellicle.fitting.parameters import Parameter, anonymous, bounds, shared
 from pellicle.model import sampled
-from pellicle.planning import Plan, plan
+from pellicle.planning import Plan, exact
 from pellicle.scene import Scene, coherent_layers, with_wavelength
 
 _ROUND = 64
@@ -123,7 +123,7 @@ def _view(spectrum: Measured, box: Box, takes: tuple[int, ...]) -> View:
     extra = -points % _ROUND
     wavelength, values = _pad(wavelength, extra), _pad(values, extra)
     scene = with_wavelength(scene, wavelength, _pad_angle(scene.light.angle, extra))
-    chosen = plan(scene)
+    chosen = exact(scene)
     span = max(wavelength.max() - wavelength.min(), 1e-9)  # one wavelength at many angles has none
     weight = np.concatenate([1 / np.broadcast_to(spectrum.sigma, points), np.zeros(extra)])
     data = Data(

@@ -1,0 +1,183 @@
+"""What an instrument averages over: how many orders, nodes or rays it takes, and how exact that is."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pellicle import averages
+from pellicle.effects.box import is_zero, largest_index, largest_ratio, least_ambient, smallest_index, upper
+from pellicle.effects.presence import roughness
+from pellicle.effects.row import Row
+from pellicle.free import Free
+from pellicle.layers import Layer, absorbs
+from pellicle.optics import orders as series
+from pellicle.scene import Scene, coherent_layers, thickness_spread
+
+
+def coherence(scene: Scene) -> Row:
+    """A single layer's series is damped order by order; anything else is averaged over nodes."""
+    present, narrow = _blurs(scene), _unresolved(scene)
+    if narrow is not None:
+        return Row("coherence", True, f"{narrow}: what is read is their average", UNRESOLVED_ERROR)
+    if not present:
+        return Row("coherence", False, "no bandwidth and no thickness spread were given: monochromatic light")
+    _need_wavelengths(scene)
+    if _by_orders(scene):
+        why = f"fringes are damped by {' and '.join(present)}"
+        return Row("coherence", True, why, _straight_phase_error(scene))
+    return coherence_by_nodes(scene)
+
+
+def coherence_by_nodes(scene: Scene) -> Row:
+    """The same without orders: the closed form, averaged over wavelengths and thicknesses."""
+    count, error = _nodes(scene)
+    why = f"fringes are damped by {' and '.join(_blurs(scene))}, each averaged over {count} nodes"
+    return Row("coherence", True, why, error, count)
+
+
+def _blurs(scene: Scene) -> list[str]:
+    """What washes out the fringes, if there are any layers to make them."""
+    layers = coherent_layers(scene)
+    uneven = any(thickness_spread(scene, layer) is not None for layer in layers)
+    found = [] if scene.instrument.bandwidth is None else ["bandwidth"]
+    return [*found, *(["uneven thickness"] if uneven else [])] if layers else []
+
+
+UNRESOLVED_ERROR = 4 * float(np.exp(-0.5 * (4 * np.pi / series.FWHM) ** 2))
+"""What is left of a fringe after a window as wide as the sampling step, twice the fringes' spacing."""
+
+
+def _unresolved(scene: Scene) -> str | None:
+    """Says so where, all over the bounds, two fringes or more fit between neighbouring wavelengths.
+
+    A spectrometer that samples every so many nanometres does not resolve finer than that.
+    """
+    if scene.light.wavelength is None or not _has_series(scene) or _blurs(scene):
+        return None
+    at, (layer,) = np.unique(np.asarray(scene.light.wavelength, dtype=float)), coherent_layers(scene)
+    step = float(np.min(np.diff(at), initial=np.inf))
+    thickness = float(layer.thickness.lower if isinstance(layer.thickness, Free) else layer.thickness)
+    if at.size < 2 or 10 * thickness * step < at[-1] ** 2:  # resolved at any index below 10
+        return None
+    steepest = min(np.deg2rad(scene.light.largest_angle), np.pi / 2)
+    square = smallest_index(layer.material, at) ** 2 - (least_ambient(scene) * np.sin(steepest)) ** 2
+    spacing = at[-1] ** 2 / (2 * np.sqrt(max(square, 1e-12)) * thickness)
+    if 2 * spacing > step:
+        return None
+    return f"fringes every {spacing:.2g} nm are narrower than the sampling of {step:.2g} nm"
+
+
+def _has_series(scene: Scene) -> bool:
+    """Whether there is one coherent layer, of which only intensities are asked for."""
+    one = len(coherent_layers(scene)) == 1
+    return one and scene.light.signal != "psi-delta" and not roughness(scene).on
+
+
+def _by_orders(scene: Scene) -> bool:
+    """Whether fringes are damped order by order, or the closed form is averaged over nodes.
+
+    Orders know the spread of the phase but not of what the layer absorbs, which varies with an uneven
+    thickness; and where |q| is near 1 there are too many of them.
+    """
+    if not _has_series(scene):
+        return False
+    (layer,) = coherent_layers(scene)
+    if thickness_spread(scene, layer) is not None and absorbs(layer.material):
+        return False
+    left_out = _orders(scene)[2]
+    return left_out <= 2 * ORDERS_ERROR or left_out <= _nodes(scene)[1]
+
+
+MOST_ORDERS = 64
+ORDERS_ERROR = 1e-6
+
+
+def orders(scene: Scene) -> Row:
+    if not coherence(scene).on:
+        return Row("orders", False, "the closed form sums all orders")
+    if _unresolved(scene) is not None:
+        return Row("orders", True, "no order is left where fringes are not resolved", 0.0, 0)
+    if not _by_orders(scene):
+        return Row("orders", False, "nodes of the closed form are averaged, not orders")
+    ratio, count, left_out = _orders(scene)
+    return Row("orders", True, f"|q| ≤ {ratio:.2g} over the bounds: {count} orders", left_out, count)
+
+
+def _orders(scene: Scene) -> tuple[float, int, float]:
+    """The largest |q|, how many orders that takes, and what those beyond them can add up to."""
+    ratio = float(np.clip(largest_ratio(scene), 1e-12, 0.999))
+    count = int(np.clip(np.ceil(np.log(ORDERS_ERROR * (1 - ratio)) / np.log(ratio)), 1, MOST_ORDERS))
+    return ratio, count, float(min(2 * ratio**count / (1 - ratio), 1.0))
+
+
+NODES = (15, 25, 41, 63)
+NODES_ERROR = 1e-6
+
+
+def _nodes(scene: Scene) -> tuple[int, float]:
+    """The fewest wavelengths, or thicknesses, that stand for a blur, and their error.
+
+    It is that on a fringe of the thickest stack the bounds allow, for every blur up to theirs.
+    """
+    at, layers = _seen_layers(scene)
+    blurs = [_path(at, layers) / np.min(at) * upper(scene.instrument.bandwidth) / series.FWHM]
+    blurs += [4 * np.pi / np.min(at) * index * upper(thickness_spread(scene, x)) for x, index in layers]
+    tried = [(n, float(sum(averages.normal_error(blur, n) for blur in blurs))) for n in NODES]
+    return next((found for found in tried if found[1] < NODES_ERROR), tried[-1])
+
+
+def _straight_phase_error(scene: Scene) -> float:
+    """How far a fringe's mean phase over the window is from that at its middle: P σ²/λ² for P radians."""
+    at, layers = _seen_layers(scene)
+    window = upper(scene.instrument.bandwidth) / series.FWHM / np.min(at)
+    return float(min(_path(at, layers) * window**2, 1.0))
+
+
+def _seen_layers(scene: Scene) -> tuple[np.ndarray, list[tuple[Layer, float]]]:
+    """The wavelengths, and every coherent layer with its largest index."""
+    at = np.asarray(scene.light.wavelength, dtype=float)
+    return at, [(layer, largest_index(layer.material, at)) for layer in coherent_layers(scene)]
+
+
+def _path(at: np.ndarray, layers: list[tuple[Layer, float]]) -> float:
+    """The largest phase of a round trip through all layers, in radians."""
+    return float(4 * np.pi / np.min(at) * sum(upper(layer.thickness) * index for layer, index in layers))
+
+
+def _need_wavelengths(scene: Scene) -> None:
+    if scene.light.wavelength is None:
+        raise ValueError("the number of orders depends on the wavelengths: give the light its wavelengths")
+
+
+def angle_spread(scene: Scene) -> Row:
+    if not scene.instrument.has_cone:
+        return Row("angle-spread", False, "no cone of light was given: one angle of incidence")
+    if scene.light.wavelength is None:
+        raise ValueError("the cone's rays depend on the wavelengths: give the light its wavelengths")
+    count, around, error = _rays(scene)
+    half = np.rad2deg(scene.instrument.largest_half_angle(least_ambient(scene)))
+    why = f"light within {half:.3g}° of its axis, averaged over {count * around} rays"
+    return Row("angle-spread", True, why, error, count, around)
+
+
+RAYS = (3, 4, 6, 8, 12, 16, 24)
+CONE_ERROR = 1e-6
+
+
+def _rays(scene: Scene) -> tuple[int, int, float]:
+    """The fewest rays for a fringe of the thickest stack, and its error over the cone."""
+    at, ambient = np.asarray(scene.light.wavelength, dtype=float), least_ambient(scene)
+    sine = np.sin(scene.instrument.largest_half_angle(ambient))
+    axis = np.deg2rad(scene.light.largest_angle)
+    index = min([smallest_index(layer.material, at) for layer in coherent_layers(scene)], default=1.0)
+    path = 4 * np.pi / np.min(at) * sum(upper(layer.thickness) for layer in coherent_layers(scene))
+
+    def phase(angle):
+        return path * np.sqrt(np.maximum(index**2 - (ambient * np.sin(angle)) ** 2, 0.0))
+
+    def rays(count: int) -> tuple[int, int, float]:
+        around = 1 if is_zero(scene.light.angle) else count
+        return count, around, averages.cone_error(phase, float(axis), float(sine), count, around)
+
+    tried = map(rays, RAYS)
+    return next((found for found in tried if found[2] < CONE_ERROR), rays(RAYS[-1]))

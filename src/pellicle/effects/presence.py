@@ -1,0 +1,136 @@
+"""Which effects are there, judged from types and from the *bounds* of free parameters.
+
+Never from their current values: a layer whose k is 0 but free keeps its absorption, because dR/dk is
+not 0 there.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pellicle.effects.box import is_zero, upper
+from pellicle.effects.row import Row
+from pellicle.free import Free, free_leaves
+from pellicle.layers import Interface, absorbs
+from pellicle.optics.dispersion import AbstractDispersion, Constant
+from pellicle.scene import Scene, coherent_layers, groups
+
+
+def absorption(scene: Scene) -> Row:
+    if any(absorbs(layer.material) for layer in coherent_layers(scene)):
+        return Row("absorption", True, "a layer's extinction is free, or not zero")
+    return Row("absorption", False, "no layer has any extinction, and none is free")
+
+
+def stack(scene: Scene) -> Row:
+    count = max(len(group.layers) for group in groups(scene)[0])
+    if count > 1:
+        return Row("stack", True, f"{count} coherent layers: a product of characteristic matrices")
+    if roughness(scene).on:
+        return Row("stack", True, "rough faces stand between characteristic matrices")
+    return Row("stack", False, "one layer: its closed form")
+
+
+def roughness(scene: Scene) -> Row:
+    faces = [upper(each) for group in groups(scene)[0] for each in group.roughness if each is not None]
+    if faces:
+        how = f"up to {max(faces):g} nm damps what a face reflects"
+        return Row("roughness", True, f"{len(faces)} rough: {how}")
+    return Row("roughness", False, "no face was given a roughness")
+
+
+def oblique(scene: Scene) -> Row:
+    angle = scene.light.angle
+    if scene.instrument.has_cone:
+        return Row("oblique", True, "the light's cone has oblique rays")
+    if is_zero(angle):
+        return Row("oblique", False, "normal incidence, and the angle is not free")
+    if isinstance(angle, Free):
+        return Row("oblique", True, "the angle of incidence is free")
+    span = " to ".join(f"{x:g}" for x in sorted({np.min(angle), np.max(angle)}))
+    return Row("oblique", True, f"incidence at {span}°")
+
+
+def tunnelling(scene: Scene) -> Row:
+    """Off where every real index is provably above n₀ sin θ: then its root needs no branch."""
+    if not oblique(scene).on:
+        return Row("tunnelling", False, "normal incidence: every wave propagates")
+    unsure = [name for name, m in _media(scene) if not absorbs(m) and not _propagates(m, scene)]
+    if unsure:
+        named = " and ".join(dict.fromkeys(unsure))
+        return Row("tunnelling", True, f"total reflection in the {named} is not ruled out")
+    return Row("tunnelling", False, "no real index can fall below n₀ sin θ")
+
+
+def _media(scene: Scene) -> list[tuple[str, AbstractDispersion]]:
+    """Everything that a wave enters, with the name that a reader knows it by."""
+    own = [(i, x.material) for i, x in enumerate(scene.layers) if not isinstance(x, Interface)]
+    names = {id(material): name(scene, i) for i, material in own}
+    coherent = [(names.get(id(x.material), "interface"), x.material) for x in coherent_layers(scene)]
+    thick = [(names.get(id(g.below), "substrate"), g.below) for g in groups(scene)[0]]
+    return [*coherent, *thick]
+
+
+def name(scene: Scene, position: int) -> str:
+    """What a reader knows a layer by."""
+    return "layer" if len(scene.layers) == 1 else scene.layers[position].name or f"layer{position + 1}"
+
+
+def _propagates(material, scene: Scene) -> bool:
+    angle, wavelength = scene.light.angle, scene.light.wavelength
+    if free_leaves(material) or isinstance(angle, Free) or wavelength is None or free_leaves(scene.ambient):
+        return False
+    at = np.asarray(wavelength, dtype=float)
+    index, ambient = np.real(material(at)), np.real(scene.ambient(at))
+    steepest = np.deg2rad(angle) + scene.instrument.largest_half_angle(float(np.min(ambient)))
+    return bool(np.all(index > ambient * np.sin(np.minimum(steepest, np.pi / 2)) * (1 + 1e-6)))
+
+
+def polarisation(scene: Scene) -> Row:
+    if scene.light.signal == "psi-delta":
+        return Row("polarisation", True, "ellipsometry compares p with s")
+    if scene.instrument.has_cone:
+        return Row("polarisation", True, "the light's cone has s and p")
+    if is_zero(scene.light.angle):
+        return Row("polarisation", False, "s and p are one at normal incidence")
+    if scene.light.polarisation != "unpolarised":
+        return Row("polarisation", False, f"only {scene.light.polarisation} is asked for")
+    return Row("polarisation", True, "unpolarised light at an angle: the mean of s and p")
+
+
+def transmission(scene: Scene) -> Row:
+    if scene.light.signal == "T":
+        return Row("transmission", True, "the signal is a transmittance")
+    if back_face(scene).on:
+        return Row("transmission", True, "light that reaches the back face returns through the layer")
+    return Row("transmission", False, "the signal is a reflectance and the substrate has no back face")
+
+
+def back_face(scene: Scene) -> Row:
+    plates = len(groups(scene)[1])
+    if plates == 0:
+        return Row("back-face", False, "the substrate is a half space: no back face was given")
+    if plates == 1 and scene.substrate.back is not None:
+        return Row("back-face", True, "the substrate is a plate; its back face adds incoherently")
+    return Row("back-face", True, f"{plates} incoherent: the faces of a plate add intensities")
+
+
+def dispersion(scene: Scene) -> Row:
+    at = scene.light.wavelength
+    varying = [name for name, m in _media(scene) if not isinstance(m, Constant)]
+    if not isinstance(scene.ambient, Constant):
+        varying.append("ambient")
+    if at is not None and np.size(np.unique(at)) == 1:
+        return Row("dispersion", False, "one wavelength")
+    if not varying:
+        return Row("dispersion", False, "no index varies with the wavelength")
+    named = " and ".join(dict.fromkeys(varying))
+    return Row("dispersion", True, f"the index of {named} varies with the wavelength")
+
+
+def opaque(scene: Scene) -> Row:
+    return Row("opaque", False, "light may reach everything, down to the substrate")
+
+
+def precision(scene: Scene) -> Row:
+    return Row("precision", True, "double, as far as JAX is set to it")
