@@ -64,7 +64,7 @@ def test_no_cache_where_it_is_off(spectrum_file, tmp_path):
 
 
 def test_where_programs_are_kept(monkeypatch, tmp_path):
-    folder = session._cache_folder
+    folder = session.cache_folder
     monkeypatch.setenv("PELLICLE_CACHE", "OFF")
     assert folder() is None
     monkeypatch.setenv("PELLICLE_CACHE", str(tmp_path))

@@ -19,7 +19,7 @@ def start() -> None:
     import jax
 
     jax.config.update("jax_enable_x64", True)
-    folder = _cache_folder()
+    folder = cache_folder()
     if folder is None:
         return
     try:
@@ -31,7 +31,7 @@ def start() -> None:
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
 
 
-def _cache_folder() -> Path | None:
+def cache_folder() -> Path | None:
     chosen = os.environ.get(CACHE_VARIABLE, "")
     if chosen.lower() == "off":
         return None
