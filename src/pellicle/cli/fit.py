@@ -63,6 +63,12 @@ def fit(
     ] = None,
     reference_material: Annotated[str, _flag(_reading, "What the reference is.")] = "Si",
     dark: Annotated[str | None, _flag(_reading, "Raw counts without light.")] = None,
+    folded: Annotated[
+        bool, Parameter(group=_reading, help="Δ is known in 0 to 180 degrees only.", negative="")
+    ] = False,
+    analyser: Annotated[
+        float | None, _flag(_reading, "Of columns alpha and beta: the analyser's angle in degrees.")
+    ] = None,
     joint: Annotated[
         bool, Parameter(group=_scene, help="All files are of one sample: fit them together.", negative="")
     ] = False,
@@ -88,6 +94,8 @@ def fit(
         reference,
         reference_material,
         dark,
+        folded or None,
+        analyser,
     )
     _check(reading)
     looks, together = _what(list(data), recipe, scene_words, reading)

@@ -50,6 +50,8 @@ class ReadWords:
     reference: str | None = None
     reference_material: str = "Si"
     dark: str | None = None
+    folded: bool | None = None
+    analyser: float | None = None
 
 
 def scene_from_words(words: SceneWords, read: ReadWords) -> tuple[Scene, list[str]]:
@@ -102,6 +104,8 @@ def merged(read: ReadWords, recipe: Recipe | None) -> ReadWords:
         "polarisation": data.polarisation,
         "range": data.range,
         "noise": data.noise,
+        "folded": data.folded,
+        "analyser": data.analyser,
     }
     return ReadWords(**({k: v for k, v in from_recipe.items() if v is not None} | kept))
 
@@ -125,6 +129,8 @@ def read(path: str, words: ReadWords, *, scaled: bool) -> Any:
         noise=words.noise,
         polarisation=words.polarisation,
         calibrated=False if scaled else None,
+        folded=bool(words.folded),
+        analyser=words.analyser,
     )
 
 

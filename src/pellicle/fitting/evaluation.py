@@ -17,8 +17,14 @@ from pellicle.planning import Plan
 from pellicle.scene import Interface, Scene, free_leaves, insert
 
 
+def _simulated(plan: Plan, numbers: Scene, data: Data) -> Any:
+    """What was measured of the signal: all of it, or of N, C, S the N and C that a folded Δ leaves."""
+    signal = build(plan)(numbers).reshape(numbers.light.wavelength.size, -1)
+    return signal[:, : data.values.size // len(signal)].reshape(-1)
+
+
 def _solve(plan: Plan, scene: Scene, data: Data, values: Sequence[Any]) -> nuisance.Solved:
-    signal = build(plan)(insert(scene, values))
+    signal = _simulated(plan, insert(scene, values), data)
     return nuisance.solve(signal, data, scene.instrument)
 
 
@@ -99,13 +105,13 @@ def shown_layer(scene: Scene) -> int | None:
 @kept
 def local(plan: Plan, scene: Scene, data: Data, box: Box, unit: Any) -> Local:
     """Signal, its Jacobian, and the layer's index at one point of the box."""
-    simulate, shown = build(plan), shown_layer(scene)
+    shown = shown_layer(scene)
 
     def both(values):
         numbers = insert(scene, list(values))
         medium: Any = numbers.substrate if shown is None else numbers.layers[shown]
         index = medium.material(numbers.light.wavelength)
-        return simulate(numbers), jnp.stack([index.real, index.imag])
+        return _simulated(plan, numbers, data), jnp.stack([index.real, index.imag])
 
     values = box.values(unit)
     (signal, layer), push = jax.linearize(both, values)

@@ -23,7 +23,8 @@ class Noise(NamedTuple):
 class Measured(NamedTuple):
     """What is fitted, and the scene that is to explain it.
 
-    `values` are fractions (points,), or N, C, S (points, 3) for ellipsometry, which have no wrap-around;
+    `values` are fractions (points,), or N, C, S (points, 3) for ellipsometry, which have no wrap-around,
+    or N and C alone (points, 2) where Δ is folded;
     `wavelength` (nm) and `sigma` are (points,); `temper` is how many independent points each counts for.
     """
 
@@ -92,19 +93,16 @@ def _values(data: Spectrum) -> np.ndarray:
     if data.delta is None:
         return data.values
     psi, delta = 2 * np.deg2rad(data.values), np.deg2rad(data.delta)
-    return np.stack([np.cos(psi), np.sin(psi) * np.cos(delta), np.sin(psi) * np.sin(delta)], -1)
+    sphere = np.stack([np.cos(psi), np.sin(psi) * np.cos(delta), np.sin(psi) * np.sin(delta)], -1)
+    return sphere[:, :2] if data.folded else sphere
 
 
 def _sigma(data: Spectrum, source: Noise) -> np.ndarray:
-    """σ of each point: given, the model's own error, or a guess that the residuals will replace.
-
-    On the sphere of N, C, S an error of Ψ moves a point by 2σ_Ψ and one of Δ by sin(2Ψ) σ_Δ; their
-    mean square serves for all directions.
-    """
+    """σ of each point: given, the model's own error, or a guess that the residuals will replace."""
     if data.sigma is not None and data.delta is not None:
         across = data.sigma if data.delta_sigma is None else data.delta_sigma
-        along = np.sin(2 * np.deg2rad(data.values)) * across
-        return np.deg2rad(np.sqrt(0.5 * ((2 * data.sigma) ** 2 + along**2)))
+        psi, delta, psi_sigma, delta_sigma = np.deg2rad([data.values, data.delta, data.sigma, across])
+        return _sigma_of_angles(psi, delta, psi_sigma, delta_sigma, data.folded)
     if data.sigma is not None:
         return data.sigma
     if data.delta is not None:
@@ -113,3 +111,19 @@ def _sigma(data: Spectrum, source: Noise) -> np.ndarray:
         return noise.drifting_sigma(data.values)
     guess = max(0.01 * float(np.ptp(data.values)), float(np.median(noise.local_noise(data.values))), 1e-12)
     return np.full(len(data), guess)
+
+
+def _sigma_of_angles(
+    psi: np.ndarray, delta: np.ndarray, psi_sigma: np.ndarray, delta_sigma: np.ndarray, folded: bool
+) -> np.ndarray:
+    """On the sphere of N, C, S an error of Ψ moves a point by 2σ_Ψ and one of Δ by sin(2Ψ) σ_Δ; their
+    mean square serves for all directions. All in radians.
+
+    Where only N and C are seen, an error of Δ at 0 or 180° moves neither to first order; the second order
+    of σ_Ψ keeps σ above zero.
+    """
+    along, across = 2 * psi_sigma, np.sin(2 * psi) * delta_sigma
+    if not folded:
+        return np.sqrt(0.5 * (along**2 + across**2))
+    seen = np.sin(2 * psi) ** 2 + (np.cos(2 * psi) * np.cos(delta)) ** 2
+    return np.sqrt(0.5 * (seen * along**2 + (across * np.sin(delta)) ** 2 + along**4))

@@ -90,7 +90,7 @@ def _curve(view: View, met: Met, found: Errors) -> Curve:
     data, model = view.data.values[keep].reshape(shape), np.asarray(at.model)[keep].reshape(shape)
     sigma = 1 / view.data.weight[keep].reshape(shape)[:, 0]
     angles = {}
-    if view.channels == 3:
+    if view.channels > 1:
         (data, delta_data), (model, delta_model) = _psi_delta(data), _psi_delta(model)
         sigma, angles = np.rad2deg(sigma) / 2, {"delta_data": delta_data, "delta_model": delta_model}
     return Curve(
@@ -107,6 +107,7 @@ def _curve(view: View, met: Met, found: Errors) -> Curve:
 
 
 def _psi_delta(sphere: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Ψ and Δ in degrees from N, C, S (points, 3)."""
-    n, c, s = sphere.T
+    """Ψ and Δ in degrees from N, C, S (points, 3), or from N and C (points, 2): then Δ is in 0 to 180."""
+    n, c, *seen = sphere.T
+    s = seen[0] if seen else np.sqrt(np.maximum(1 - n**2 - c**2, 0.0))
     return np.rad2deg(np.arctan2(np.hypot(c, s), n)) / 2, np.rad2deg(np.arctan2(s, c)) % 360.0

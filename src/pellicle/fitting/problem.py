@@ -45,7 +45,7 @@ class View(NamedTuple):
     box: Box
     takes: tuple[int, ...]
     noise: Noise
-    points: int  # data values: three for each wavelength in ellipsometry
+    points: int  # data values: N, C, S, or N and C, for each wavelength in ellipsometry
     largest_index: float
 
     @property
@@ -61,7 +61,7 @@ class View(NamedTuple):
     @property
     def independent(self) -> int:
         """Data values that are independent: N, C and S lie on a sphere, so two of the three."""
-        return self.points if self.channels == 1 else 2 * self.rows
+        return self.points if self.channels < 3 else 2 * self.rows
 
     @property
     def program(self) -> tuple[Any, ...]:

@@ -35,6 +35,9 @@ _NAMES = {
     "N": ("n",),
     "C": ("c",),
     "S": ("s",),
+    "alpha": ("alpha", "α"),
+    "beta": ("beta", "β"),
+    "analyser": ("analyser", "analyzer", "analyser angle", "analyzer angle"),
     "theta_i": ("theta_i", "θ_i"),
     "phi_i": ("phi_i", "φ_i"),
     "theta_o": ("theta_o", "θ_o"),
@@ -54,6 +57,7 @@ _UNIT_OF = {
     "angle": units.angle_unit,
     "psi": units.angle_unit,
     "delta": units.angle_unit,
+    "analyser": units.angle_unit,
     "sigma_psi": units.angle_unit,
     "sigma_delta": units.angle_unit,
     **dict.fromkeys(DIRECTIONS, units.angle_unit),
@@ -131,7 +135,8 @@ def recognise_all(names: Sequence[str]) -> tuple[Column, ...]:
 def is_header(names: Sequence[str]) -> bool:
     """True if `names` announce a wavelength and something measured, or directions: no free text does."""
     roles = {column.role for column in recognise_all(names)}
-    measured = bool(roles & {"R", "T", "intensity", "counts", "psi"}) or {"N", "C", "S"} <= roles
+    measured = bool(roles & {"R", "T", "intensity", "counts", "psi"})
+    measured = measured or {"N", "C", "S"} <= roles or {"alpha", "beta"} <= roles
     return ("wavelength" in roles and measured) or roles.issuperset(DIRECTIONS)
 
 

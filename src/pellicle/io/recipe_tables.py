@@ -86,6 +86,8 @@ class FileTable(_Table):
     polarisation: Literal["unpolarised", "s", "p"] | None = None
     noise: float | None = Field(default=None, gt=0)
     range: tuple[float, float] | None = None
+    folded: bool | None = None
+    analyser: float | None = Field(default=None, gt=0, lt=90)
     instrument: InstrumentTable = InstrumentTable()
     back: Literal[False] | None = None
 
@@ -112,6 +114,8 @@ class DataTable(_Table):
     polarisation: Literal["unpolarised", "s", "p"] | None = None
     noise: float | None = Field(default=None, gt=0)
     range: tuple[float, float] | None = None
+    folded: bool | None = None
+    analyser: float | None = Field(default=None, gt=0, lt=90)
     wavelengths: GridTable | list[float] | None = None
     joint: bool = False
 
@@ -140,8 +144,8 @@ class RecipeTable(_Table):
 
 def of_file(tables: RecipeTable, file: FileTable) -> RecipeTable:
     """The recipe of one file: with its own signal, angle, noise and so on, and no other file."""
-    light = {name: getattr(file, name) for name in ("signal", "angle", "polarisation", "noise", "range")}
-    said = {name: value for name, value in light.items() if value is not None}
+    words = {name: getattr(file, name) for name in FileTable.model_fields if name in DataTable.model_fields}
+    said = {name: value for name, value in words.items() if value is not None}
     data = tables.data.model_copy(update={**said, "file": [file]})
     own = {name: getattr(file.instrument, name) for name in file.instrument.model_fields_set}
     instrument = tables.instrument.model_copy(update=own)

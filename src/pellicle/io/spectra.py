@@ -30,6 +30,8 @@ def read_spectrum(
     noise: float | int | None = None,
     polarisation: str | None = None,
     calibrated: bool | None = None,
+    folded: bool = False,
+    analyser: float | int | None = None,
 ) -> Spectrum:
     """Reads a text file of reflectance, transmittance or ellipsometry: CSV, or an instrument's export.
 
@@ -41,6 +43,8 @@ def read_spectrum(
     - `range`: wavelengths in nm to keep. It cuts before values are judged, so noisy ends may go.
     - `noise`: standard deviation of every point as a fraction, or of Ψ and Δ in degrees; replaces the file's.
     - `polarisation`: "s", "p" or "unpolarised", where the column's name does not say.
+    - `folded`: Δ is in 0 to 180, as an instrument without a compensator sees it, and its sign is not fitted.
+    - `analyser`: of columns α and β the angle of the polariser that stands, in degrees.
     - `calibrated`: false lifts the limits on the values; by default only for an `intensity` column.
 
     Returns a `Spectrum`. Raises DataError (unreadable or impossible data) or UsageError (an
@@ -53,7 +57,8 @@ def read_spectrum(
     table = read_table(path, find_export)
     if is_ellipsometry(table, named_columns(table, columns), signal):
         _refuse_flags(table.path, signal_unit, polarisation)
-        return read_ellipsometry(table, columns, wavelength_unit, noise, range)
+        return read_ellipsometry(table, columns, wavelength_unit, noise, range, folded, analyser)
+    _refuse_ellipsometry(table.path, folded, analyser)
     chosen = choose_spectrum(table, columns, signal, polarisation)
     axis = axis_unit(table, chosen.wavelength, wavelength_unit)
     scale = signal_scale(table, chosen, signal_unit)
@@ -87,6 +92,13 @@ def read_spectrum(
 def _check_choice(flag: str, given: str | None, known: Sequence[str]) -> None:
     if given is not None and given not in known:
         raise UsageError(f"{flag} {given!r} is not known; use one of {', '.join(known)}")
+
+
+def _refuse_ellipsometry(path: str, folded: bool, analyser: float | None) -> None:
+    """What has a meaning for Ψ and Δ only."""
+    if folded or analyser is not None:
+        flag = "--folded" if folded else "--analyser"
+        raise UsageError(f"{path}: {flag} is for ellipsometry, and the file holds none; leave it out")
 
 
 def _refuse_flags(path: str, signal_unit: str | None, polarisation: str | None) -> None:

@@ -22,8 +22,8 @@ class Spectrum:
     degrees, or None where the file does not say: then it is for the scene to say. `lines` are the
     source line numbers of the points, `notes` sentences on what was detected. `signal` is "R",
     "T", "counts" for raw detector counts, or "psi-delta": then `values` is Ψ and `delta` Δ, both in
-    degrees, and `sigma` and `delta_sigma` their standard deviations. Given in any order, points are
-    sorted here.
+    degrees, and `sigma` and `delta_sigma` their standard deviations; `folded` says that the sign of
+    sin Δ was not measured, and Δ is in 0 to 180. Given in any order, points are sorted here.
     """
 
     wavelength: np.ndarray
@@ -39,6 +39,7 @@ class Spectrum:
     lines: np.ndarray | None = None
     delta: np.ndarray | None = None
     delta_sigma: np.ndarray | None = None
+    folded: bool = False
 
     def __post_init__(self) -> None:
         size = np.size(self.wavelength)
