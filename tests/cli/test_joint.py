@@ -119,3 +119,12 @@ def test_ellipsometry_with_a_scale_of_its_own_is_refused(pellicle, beside):
     ran = pellicle("fit", "--recipe", beside("instrument = { scale = 1.1 }"))
     assert ran.code == 3
     assert "e.csv: Ψ and Δ have no scale and no offset" in ran.err
+
+
+def test_a_folded_delta_is_said_by_flag_or_recipe(pellicle, beside, scene, tmp_path, asked):
+    pellicle("fit", "--recipe", beside("folded = true"))
+    pellicle("fit", tmp_path / "e.csv", *scene, "--folded")
+    (tmp_path / "e.csv").write_text("wavelength,alpha,beta,angle\n500,0.1,0.2,70\n600,0.2,0.3,70\n")
+    pellicle("fit", tmp_path / "e.csv", *scene, "--analyser", 45)
+    [([_, in_recipe], _), (by_flag, _), (rotating, _)] = asked
+    assert (in_recipe.folded, by_flag.folded, rotating.folded) == (True, True, True)

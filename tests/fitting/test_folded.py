@@ -44,3 +44,4 @@ def test_errors_of_n_and_c_by_finite_differences():
     ]
     expected = np.sqrt(np.mean(np.sum(np.square(slopes), axis=0), axis=-1)) * spread
     np.testing.assert_allclose(at.sigma, expected, rtol=1e-2)
+    assert seen(np.zeros(5), np.full(5, 90.0)).sigma.min() > 0  # where neither moves to first order

@@ -37,6 +37,7 @@ def test_alpha_and_beta_with_their_analyser(write, header):
     assert spectrum.folded
     np.testing.assert_allclose(spectrum.values, PSI, rtol=1e-12)
     np.testing.assert_allclose(spectrum.delta, DELTA, rtol=1e-12)
+    assert spectrum.sigma is None
 
 
 def test_one_analyser_for_all(write):
