@@ -245,7 +245,8 @@ def _windowed_faces(plan: Plan, sheet: _Sheet, polarisation: str) -> dict[str, A
     """The same, order by order through the instrument's window."""
     layer = interface.allow_tunnelling(sheet.layers[0]) if plan.on("tunnelling") else sheet.layers[0]
     b = orders.bounces(sheet.above, layer, sheet.below, sheet.phases[0], sheet.angle, polarisation)
-    window = orders.gaussian(_blur(plan, sheet))
+    widths = (sheet.scene.instrument.bandwidth, thickness_spread(sheet.scene, sheet.group.layers[0]))
+    window = orders.monochromatic if widths == (None, None) else orders.gaussian(_blur(plan, sheet))
     count = plan.row("orders").count
     back = orders.reversed_bounces(b)
     return {

@@ -89,6 +89,11 @@ def transmittance(b: Bounces, window: Window, count: int, sincos: SinCos = sinco
     return b.direct * b.damping / (1 - abs2(q)) * (1 + _series(q, q, b.phase, window, count, sincos))
 
 
+def monochromatic(order: int) -> float:
+    """The window of light of one wavelength on an even layer: every order is whole."""
+    return 1.0
+
+
 def gaussian(variance) -> Window:
     """W_m = exp(−m²σ²/2): the phase ϕ is blurred by a normal distribution of variance σ² (rad²)."""
     return lambda m: jnp.exp(-0.5 * m * m * variance)

@@ -1,0 +1,1 @@
+"""A ladder of ways to one answer: what each leaves out, how far off it is, and what it costs."""

@@ -1,0 +1,140 @@
+"""Climbing a ladder: every rung compiled, run in turns with the others, and set against the reference."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from pellicle.ladder.case import Case
+from pellicle.ladder.program import compiled
+from pellicle.ladder.reference import Reference, reference
+from pellicle.ladder.rungs import FORWARD, Rung
+
+Progress = Callable[[str, int, int], None]
+"""Called with what is being done, how much is done and how much there is."""
+
+ROUNDS, SECONDS = 40, 15.0
+"""Most rounds in which the rungs take turns, and about how long all of them together may take."""
+
+
+@dataclass
+class Standing:
+    """What a rung costs and how far off it is.
+
+    `error` is in the signal's unit; `seconds` is the median time of one spectrum, compilation apart;
+    `flops` is XLA's count for one spectrum.
+    """
+
+    name: str
+    leaves_out: str
+    error: float
+    seconds: float
+    compile_seconds: float
+    flops: float | None
+    pareto: bool = False
+
+
+@dataclass
+class Ladder:
+    """The forward rungs of one case, the fastest first, and those that make no sense for it, with why.
+
+    `recommended` is the fastest rung within the tolerance, None if none is.
+    """
+
+    reference: str
+    tolerance: float
+    unit: str
+    wavelengths: int
+    draws: int
+    rungs: list[Standing] = field(default_factory=list)
+    left_out: dict[str, str] = field(default_factory=dict)
+    interrupted: bool = False
+
+    @property
+    def recommended(self) -> str | None:
+        within = [rung for rung in self.rungs if rung.error <= self.tolerance]
+        return min(within, key=lambda rung: rung.seconds).name if within else None
+
+
+def climb(
+    case: Case, against: str, tolerance: float, progress: Progress, rungs: Sequence[Rung] = FORWARD
+) -> Ladder:
+    """Measure every rung of a case. Ctrl-C ends it, and keeps what was measured.
+
+    Raises UsageError for a reference that the case cannot be computed with, ValueError where a material
+    has no data at a wavelength.
+    """
+    truth = reference(against, case)
+    unit = "degrees" if case.ellipsometric else case.plan.signal
+    ladder = Ladder(truth.name, tolerance, unit, len(truth.wavelengths), len(truth.draws))
+    runs: list[_Run] = []
+    try:
+        _compile(case, truth, rungs, runs, ladder, progress)
+        _take_turns(runs, progress)
+    except KeyboardInterrupt:
+        ladder.interrupted = True
+    ladder.rungs = sorted((run.standing() for run in runs if run.times), key=lambda rung: rung.seconds)
+    mark_pareto(ladder.rungs)
+    return ladder
+
+
+@dataclass
+class _Run:
+    """A rung while it is measured."""
+
+    rung: Rung
+    program: Any
+    error: float
+    times: list[float] = field(default_factory=list)
+
+    def standing(self) -> Standing:
+        program = self.program
+        return Standing(
+            self.rung.name,
+            self.rung.leaves_out,
+            self.error,
+            statistics.median(self.times),
+            program.compile_seconds,
+            program.flops,
+        )
+
+
+def _compile(
+    case: Case, truth: Reference, rungs: Sequence[Rung], runs: list[_Run], ladder: Ladder, progress: Progress
+) -> None:
+    """Compile and run each rung once. It counts as measured from then on."""
+    for done, rung in enumerate(rungs):
+        progress(f"compile {rung.name}", done, len(rungs))
+        way = rung.way(case)
+        if isinstance(way, str):
+            ladder.left_out[rung.name] = way
+            continue
+        program = compiled(case, way)
+        runs.append(_Run(rung, program, truth.error(case, program.run())))
+        runs[-1].times.append(program.seconds())
+
+
+def _take_turns(runs: list[_Run], progress: Progress) -> None:
+    """Time the rungs round after round, so that a noisy machine is noisy for all."""
+    began = time.perf_counter()
+    for done in range(ROUNDS):
+        if done > 4 and time.perf_counter() - began > SECONDS:
+            break
+        progress("rounds", done, ROUNDS)
+        for run in runs:
+            run.times.append(run.program.seconds())
+
+
+def mark_pareto(rungs: Sequence[Any]) -> None:
+    """Mark the rungs that no other beats in error or time without being worse in the other."""
+    for rung in rungs:
+        beaten = (
+            other.error <= rung.error
+            and other.seconds <= rung.seconds
+            and (other.error < rung.error or other.seconds < rung.seconds)
+            for other in rungs
+        )
+        rung.pareto = not any(beaten)
