@@ -160,38 +160,38 @@ def _constant_index(case: Case) -> Way | str:
     return Way(case.plan, eqx.tree_at(media, case.scene, flat))
 
 
-def _resampled(wavelength: np.ndarray, case: Case) -> Way:
-    """The scene at other wavelengths that rise, and a straight line between them."""
-    own = case.wavelength
-    right = np.clip(np.searchsorted(wavelength, own), 1, len(wavelength) - 1)
-    left = right - 1
-    share = (own - wavelength[left]) / (wavelength[right] - wavelength[left])
-    channels = 3 if case.ellipsometric else 1
-
-    def finish(signal):
-        (rows,) = hold(signal.reshape(-1, channels))  # or every point would be simulated once for each side
-        between = rows[left] * (1 - share)[:, None] + rows[right] * share[:, None]
-        return between.reshape(-1)
-
-    return Way(case.plan, with_wavelength(case.scene, wavelength), finish)
-
-
-def _irregular(case: Case) -> bool:
-    return bool(np.ndim(case.scene.light.angle)) or bool(np.any(np.diff(case.wavelength) <= 0))
+def _rises(case: Case) -> bool:
+    return not np.ndim(case.scene.light.angle) and bool(np.all(np.diff(case.wavelength) > 0))
 
 
 def _coarser(step: int, case: Case) -> Way | str:
+    """Every so-many-th wavelength and the last, and straight lines between them."""
     own = case.wavelength
-    if _irregular(case) or len(own) < 3 * step:
+    if not _rises(case) or len(own) < 3 * step:
         return "there are too few wavelengths to leave any out"
-    return _resampled(np.unique([*own[::step], own[-1]]), case)
+    some = np.unique([*own[::step], own[-1]])
+    size, left = len(own) - 1, np.arange(len(own) - 1) // step
+    share = ((own[:-1] - some[left]) / (some[left + 1] - some[left]))[:, None]
+
+    def finish(signal):
+        (rows,) = hold(signal.reshape(len(some), -1))  # or each line would simulate its ends again
+        first, second = (jnp.repeat(x, step, axis=0)[:size] for x in (rows[:-1], rows[1:]))
+        return jnp.concatenate([first + (second - first) * share.astype(rows.dtype), rows[-1:]]).reshape(-1)
+
+    return Way(case.plan, with_wavelength(case.scene, some), finish)
 
 
 def _finer(case: Case) -> Way | str:
+    """A wavelength between any two, whose signals are then not used."""
     own = case.wavelength
-    if _irregular(case) or len(own) < 2:
+    if not _rises(case) or len(own) < 2:
         return "there are no wavelengths between which others lie"
-    return _resampled(np.sort(np.concatenate([own, 0.5 * (own[1:] + own[:-1])])), case)
+    all_of_them = np.sort(np.concatenate([own, 0.5 * (own[1:] + own[:-1])]))
+    return Way(
+        case.plan,
+        with_wavelength(case.scene, all_of_them),
+        lambda signal: hold(signal)[0].reshape(len(all_of_them), -1)[::2].reshape(-1),
+    )
 
 
 ORDERS = (1, 2, 3, 5, 8)
