@@ -6,6 +6,7 @@ import sys
 
 from cyclopts import App
 
+from pellicle.cli.cost import cost
 from pellicle.cli.fit import fit
 from pellicle.cli.materials import materials
 from pellicle.cli.simulate import simulate
@@ -24,6 +25,7 @@ app = App(
 )
 app.command(fit)
 app.command(simulate)
+app.command(cost)
 app.command(materials)
 
 

@@ -10,16 +10,17 @@ CACHE_VARIABLE = "PELLICLE_CACHE"
 """A folder for compiled programs, or `off`."""
 
 
-def start() -> None:
+def start(keep: bool = True) -> None:
     """Set JAX up for the command line: float64, and compiled programs kept between runs.
 
-    The cache lies in the user's cache folder; the variable PELLICLE_CACHE names another one, or is
-    `off`. A folder that cannot be made means no cache, not a failure.
+    Without `keep` they are not, for whoever times compilation. The cache lies in the user's cache
+    folder; the variable PELLICLE_CACHE names another one, or is `off`. A folder that cannot be made
+    means no cache, not a failure.
     """
     import jax
 
     jax.config.update("jax_enable_x64", True)
-    folder = cache_folder()
+    folder = cache_folder() if keep else None
     if folder is None:
         return
     try:

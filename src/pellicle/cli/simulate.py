@@ -46,14 +46,14 @@ def simulate(
     if ellipsometric and found.tables.data.angle is None:
         raise DataError(f"{found.path}: ellipsometry needs an angle of incidence: give [data] angle = 70")
     noise = (found.tables.data.noise or 0.0) if noise is None else noise
-    wavelength = _wavelengths(found, scene)
+    wavelength = wavelengths(found, scene)
     result = (synthesise_angles if ellipsometric else synthesise)(scene, wavelength, noise, seed)
     write_text(out, _csv(found, scene, result, noise, seed))
     say(f"{out}: {len(wavelength)} points, {wavelength[0]:g} to {wavelength[-1]:g} nm", str(result.plan))
     return 0
 
 
-def _wavelengths(recipe: Recipe, scene: Any) -> np.ndarray:
+def wavelengths(recipe: Recipe, scene: Any) -> np.ndarray:
     """The recipe's wavelengths, or the visible ones that every material has data for."""
     import numpy as np
 

@@ -39,10 +39,7 @@ class Standing:
 
 @dataclass
 class Ladder:
-    """The forward rungs of one case, the fastest first, and those that make no sense for it, with why.
-
-    `recommended` is the fastest rung within the tolerance, None if none is.
-    """
+    """The forward rungs of one case, the fastest first, and those that make no sense for it, with why."""
 
     reference: str
     tolerance: float
@@ -54,9 +51,17 @@ class Ladder:
     interrupted: bool = False
 
     @property
+    def within(self) -> bool:
+        """Whether any rung meets the tolerance."""
+        return any(rung.error <= self.tolerance for rung in self.rungs)
+
+    @property
     def recommended(self) -> str | None:
-        within = [rung for rung in self.rungs if rung.error <= self.tolerance]
-        return min(within, key=lambda rung: rung.seconds).name if within else None
+        """The fastest rung within the tolerance, or the most accurate where none is."""
+        good = [rung for rung in self.rungs if rung.error <= self.tolerance]
+        if good:
+            return min(good, key=lambda rung: rung.seconds).name
+        return min(self.rungs, key=lambda rung: rung.error).name if self.rungs else None
 
 
 def climb(

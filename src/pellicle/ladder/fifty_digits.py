@@ -65,7 +65,7 @@ def _seen(scene: Scene) -> list[_Seen]:
     wavelength = np.asarray(scene.light.wavelength)
     tables = [
         (_indices(g.above, wavelength), [_indices(x.material, wavelength) for x in g.layers],
-         _indices(g.below, wavelength), [mpf(float(x.thickness)) for x in g.layers])
+         _indices(g.below, wavelength), [_exact(x.thickness) for x in g.layers])
         for g in found
     ]  # fmt: skip
     return [
@@ -76,10 +76,14 @@ def _seen(scene: Scene) -> list[_Seen]:
                 _Sheet(above[i], [(n[i], d) for n, d in zip(layers, depths, strict=True)], below[i])
                 for above, layers, below, depths in tables
             ],
-            [mpf(float(plate.plate_mm)) for plate in plates],
+            [_exact(plate.plate_mm) for plate in plates],
         )
         for i, nm in enumerate(wavelength)
     ]
+
+
+def _exact(number: Any) -> Any:
+    return mpf(float(number))
 
 
 def _indices(medium: Any, wavelength: np.ndarray) -> list[Any]:
@@ -149,5 +153,8 @@ def _faces(seen: _Seen, sheet: _Sheet, letter: str) -> tuple[Any, Any, Any, Any]
         top, bottom = _admittance(seen, above, letter), _admittance(seen, below, letter)
         E, H = _fields(seen, layers, bottom, letter)
         start = top * E + H
-        found += [abs((top * E - H) / start) ** 2, 4 * abs(top) ** 2 * mp.re(bottom) / abs(start) ** 2 / mp.re(top)]
+        found += [
+            abs((top * E - H) / start) ** 2,
+            4 * abs(top) ** 2 * mp.re(bottom) / abs(start) ** 2 / mp.re(top),
+        ]
     return tuple(found)

@@ -47,7 +47,11 @@ class Race:
     @property
     def recommended(self) -> str | None:
         """The fastest of those that failed least."""
-        return min(self.solvers, key=lambda s: (s.failures / s.datasets, s.seconds)).name if self.solvers else None
+        return (
+            min(self.solvers, key=lambda s: (s.failures / s.datasets, s.seconds)).name
+            if self.solvers
+            else None
+        )
 
 
 @dataclass

@@ -63,7 +63,7 @@ def _fifty_digits(case: Case) -> Reference:
     why = unsuitable(case)
     if why is not None:
         raise UsageError(
-            f"--reference mpmath computes smooth, even layers in light of one wavelength and one angle; {why}:"
+            f"--reference mpmath computes smooth, even layers in light of one wavelength and angle; {why}:"
             " use --reference float64"
         )
     draws = np.arange(min(MP_DRAWS, len(case.draws) if case.draws.shape[1] else 1))

@@ -13,13 +13,13 @@ import numpy as np
 
 from pellicle.ladder.case import Case, altered, disperses, media
 from pellicle.optics.dispersion import AbstractDispersion
-from pellicle.optics.number import Pair, hold, is_real, parts, real
+from pellicle.optics.number import Pair, is_real, parts, real
 from pellicle.planning import Plan, plan
 from pellicle.scene import Free, Layer, Light, Scene, Substrate, coherent_layers, with_wavelength
 
 
 class Way(NamedTuple):
-    """How a rung simulates: its plan and scene, what is done to the signal after, and the precision."""
+    """How a rung simulates: its plan and scene, what a second program makes of the signal, the precision."""
 
     plan: Plan
     scene: Scene
@@ -71,9 +71,7 @@ def _closed(case: Case) -> Way | str:
     if not case.plan.on("coherence"):
         return "the full plan is the closed form"
     sharp = replace(case.scene.instrument, bandwidth=None, thickness_spread=None)
-    layers = [
-        replace(x, thickness_spread=None) if isinstance(x, Layer) else x for x in case.scene.layers
-    ]
+    layers = [replace(x, thickness_spread=None) if isinstance(x, Layer) else x for x in case.scene.layers]
     scene = eqx.tree_at(lambda s: (s.instrument, s.layers), case.scene, (sharp, tuple(layers)))
     return Way(altered(altered(plan(scene), "coherence", False), "orders", False), scene)
 
@@ -114,9 +112,7 @@ def _smooth(case: Case) -> Way | str:
         return "every face is smooth"
     layers = [replace(x, roughness=None) if isinstance(x, Layer) else x for x in case.scene.layers]
     substrate = replace(case.scene.substrate, roughness=None)
-    return _replanned(
-        eqx.tree_at(lambda s: (s.layers, s.substrate), case.scene, (tuple(layers), substrate))
-    )
+    return _replanned(eqx.tree_at(lambda s: (s.layers, s.substrate), case.scene, (tuple(layers), substrate)))
 
 
 @final
@@ -174,7 +170,7 @@ def _coarser(step: int, case: Case) -> Way | str:
     share = ((own[:-1] - some[left]) / (some[left + 1] - some[left]))[:, None]
 
     def finish(signal):
-        (rows,) = hold(signal.reshape(len(some), -1))  # or each line would simulate its ends again
+        rows = signal.reshape(len(some), -1)
         first, second = (jnp.repeat(x, step, axis=0)[:size] for x in (rows[:-1], rows[1:]))
         return jnp.concatenate([first + (second - first) * share.astype(rows.dtype), rows[-1:]]).reshape(-1)
 
@@ -186,11 +182,11 @@ def _finer(case: Case) -> Way | str:
     own = case.wavelength
     if not _rises(case) or len(own) < 2:
         return "there are no wavelengths between which others lie"
-    all_of_them = np.sort(np.concatenate([own, 0.5 * (own[1:] + own[:-1])]))
+    more = np.sort(np.concatenate([own, 0.5 * (own[1:] + own[:-1])]))
     return Way(
         case.plan,
-        with_wavelength(case.scene, all_of_them),
-        lambda signal: hold(signal)[0].reshape(len(all_of_them), -1)[::2].reshape(-1),
+        with_wavelength(case.scene, more),
+        lambda signal: signal.reshape(len(more), -1)[::2].reshape(-1),
     )
 
 

@@ -40,7 +40,7 @@ def _best(units: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
 
 
 def _in_lanes(program: Callable[[np.ndarray], Any], starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points and misfits of a program that takes one start, or `LANES` of them: no shape is compiled twice."""
+    """Points and misfits of a program that takes one start or `LANES` of them, and no other number."""
     size = 1 if len(starts) == 1 else LANES
     padded = np.concatenate([starts, np.repeat(starts[-1:], -len(starts) % size, axis=0)])
     found = [jax.device_get(program(padded[i : i + size])[:2]) for i in range(0, len(padded), size)]

@@ -1,0 +1,109 @@
+"""`pellicle cost`: for a recipe, what each way to the answer is off by, and how long it takes."""
+
+from __future__ import annotations
+
+import json as json_module
+from math import inf
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from pellicle.cli.session import Progress, say, start
+from pellicle.errors import DataError, UsageError
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from pellicle.io.recipe import Recipe
+
+
+def cost(
+    recipe: Annotated[str, Parameter(help="A TOML file that describes the scene.")],
+    *,
+    reference: Annotated[
+        str, Parameter(help="What errors are measured against: float64, or mpmath with 50 digits.")
+    ] = "float64",
+    tolerance: Annotated[
+        float | None,
+        Parameter(help="The error that is small enough, in R, T or degrees (the recipe's noise, or 0.001)."),
+    ] = None,
+    datasets: Annotated[
+        int, Parameter(help="Simulated spectra that every solver fits; 0 leaves the solvers out.")
+    ] = 20,
+    out: Annotated[str | None, Parameter(help="A folder for report, figure and tables.")] = None,
+    json: Annotated[bool, Parameter(help="One JSON object on stdout.", negative="")] = False,
+) -> int:
+    """Show what accuracy costs in time: every way to compute a recipe's scene, and to fit it.
+
+    Example: pellicle cost film.toml --tolerance 0.001 --out cost
+    """
+    from pellicle.io.atomic import new_folder
+    from pellicle.io.recipe import read_recipe
+
+    if tolerance is not None and not 0 < tolerance < inf:
+        raise UsageError(f"--tolerance must be above zero, got {tolerance:g}: what error is small enough?")
+    if datasets < 0:
+        raise UsageError(f"--datasets must not be negative, got {datasets}")
+    found = read_recipe(recipe)
+    scene, wavelength = _seen(found)
+    if out is not None and Path(out).exists():
+        new_folder(out)  # refuses a stranger's folder before the work, not after
+    start(keep=False)
+    from pellicle.io.costs import to_json, write_cost
+    from pellicle.ladder.cost import cost as measure
+    from pellicle.report.cost import text
+
+    progress = Progress(found.path)
+    try:
+        result = measure(
+            scene,
+            wavelength,
+            against=reference,
+            tolerance=tolerance,
+            noise=found.tables.data.noise,
+            datasets=datasets,
+            progress=progress,
+        )
+    finally:
+        progress.clear()
+    record = to_json(result, found.path)
+    print(json_module.dumps(record, allow_nan=False) if json else text(result, found.path), flush=True)
+    if out is not None:
+        say(f"{write_cost(out, result, found.path)}: report, figure and tables written")
+    return 130 if result.interrupted else 0
+
+
+def _seen(recipe: Recipe) -> tuple[Any, np.ndarray]:
+    """The scene, looked at as the recipe says, and its wavelengths: the recipe's, or its first file's."""
+    from pellicle.cli.simulate import wavelengths
+
+    data = recipe.tables.data
+    if recipe.files and data.wavelengths is None:
+        scene, wavelength = _as_measured(recipe)
+    else:
+        scene = recipe.scene()
+        wavelength = wavelengths(recipe, scene)
+    if scene.light.signal == "psi-delta" and scene.light.angle == 0.0:
+        raise DataError(f"{recipe.path}: ellipsometry needs an angle of incidence: give [data] angle = 70")
+    return scene, wavelength
+
+
+def _as_measured(recipe: Recipe) -> tuple[Any, np.ndarray]:
+    """The scene seen as the recipe's first file was, at the first of its angles."""
+    import equinox as eqx
+    import numpy as np
+
+    from pellicle.cli.options import ReadWords, light, merged, read
+    from pellicle.scene import Drift, Light
+
+    scene, words = recipe.scene(), merged(ReadWords(), recipe)
+    path = recipe.files[0]
+    spectrum = read(path, words, scaled=isinstance(scene.instrument.scale, Drift))
+    say(f"wavelengths: those of {path} (the recipe gives none)")
+    stated = light(words)
+    angle = stated.angle if spectrum.angle is None else float(spectrum.angle[0])
+    same = slice(None) if spectrum.angle is None else spectrum.angle == spectrum.angle[0]
+    polarised = spectrum.polarisation if spectrum.polarisation != "unpolarised" else stated.polarisation
+    seen = Light(None, angle, spectrum.signal, polarised)
+    return eqx.tree_at(lambda s: s.light, scene, seen), np.sort(spectrum.wavelength[same])
