@@ -8,6 +8,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
+from pellicle.errors import UsageError
 from pellicle.ladder.case import Case
 from pellicle.ladder.program import compiled
 from pellicle.ladder.reference import Reference, reference
@@ -73,6 +76,7 @@ def climb(
     has no data at a wavelength.
     """
     truth = reference(against, case)
+    _check(truth, case)
     unit = "degrees" if case.ellipsometric else case.plan.signal
     ladder = Ladder(truth.name, tolerance, unit, len(truth.wavelengths), len(truth.draws))
     runs: list[_Run] = []
@@ -84,6 +88,17 @@ def climb(
     ladder.rungs = sorted((run.standing() for run in runs if run.times), key=lambda rung: rung.seconds)
     mark_pareto(ladder.rungs)
     return ladder
+
+
+def _check(truth: Reference, case: Case) -> None:
+    """UsageError where there is no signal to be wrong about."""
+    known = truth.values[np.isfinite(truth.values)]
+    if known.size == 0:
+        raise UsageError("there is nothing to compute: the signal is no number anywhere between the bounds")
+    if not np.any(known):
+        raise UsageError(
+            f"there is nothing to compute: {case.plan.signal} is 0 everywhere between the bounds"
+        )
 
 
 @dataclass

@@ -1,0 +1,95 @@
+"""`pellicle cost`: a table, a folder, a record, and one sentence for what cannot be asked."""
+
+import csv
+import json
+
+import pytest
+
+RECIPE = """
+[data]
+signal = "R"
+noise = 0.002
+wavelengths = { start = 400, stop = 790, step = 30 }
+
+[scene]
+substrate = "3.9+0.02j"
+
+[[scene.layer]]
+name = "oxide"
+material = 1.46
+thickness = { value = 321.5, lower = 10, upper = 800 }
+"""
+
+
+@pytest.fixture
+def recipe(tmp_path):
+    path = tmp_path / "film.toml"
+    path.write_text(RECIPE)
+    return path
+
+
+def test_table_folder_and_record_say_the_same(pellicle, recipe, tmp_path):
+    out = tmp_path / "cost"
+    ran = pellicle("cost", recipe, "--datasets", 0, "--json", "--out", out)
+    assert ran.code == 0
+    (record,) = ran.objects
+    assert record == json.loads((out / "result.json").read_text())
+    assert record["schema"] == "pellicle.cost/1"
+    assert (record["reference"], record["tolerance"], record["unit"]) == ("float64", 0.002, "R")
+    names = [rung["name"] for rung in record["rungs"]]
+    assert record["recommended"] in names
+    assert {"float64", "float32", "1 order", "incoherent"} <= set(names)
+    for rung in record["rungs"]:
+        assert rung["seconds"] > 0
+        assert isinstance(rung["pareto"], bool)
+    assert record["left_out"]["normal incidence"] == "light comes at normal incidence"
+    rows = list(csv.DictReader((out / "cost.csv").read_text().splitlines()))
+    assert [row["name"] for row in rows] == names
+    assert float(rows[0]["error"]) == record["rungs"][0]["error"]
+    report = (out / "report.txt").read_text()
+    assert f"→ {record['recommended']} is the fastest within an error of 0.002 in R" in report
+    assert all(name in report for name in [*names, *record["left_out"]])
+    assert (out / "cost.png").read_bytes().startswith(b"\x89PNG")
+    assert max(map(len, report.splitlines())) < 130
+
+
+def test_what_cannot_be_asked(pellicle, recipe, tmp_path):
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "notes.txt").write_text("keep")
+    for flags, said, code in (
+        (("--tolerance", 0), "--tolerance must be above zero", 2),
+        (("--tolerance", -0.1), "--tolerance must be above zero", 2),
+        (("--datasets", -1), "--datasets must not be negative", 2),
+        (("--reference", "tmm"), "--reference must be float64 or mpmath", 2),
+        (("--out", tmp_path / "mine"), "did not write", 2),
+    ):
+        ran = pellicle("cost", recipe, *flags)
+        assert (ran.code, ran.out) == (code, "")
+        assert said in ran.err
+        assert len(ran.err.strip().splitlines()) == 1
+    recipe.write_text(RECIPE + "\n[instrument]\nbandwidth = 3.0\n")
+    ran = pellicle("cost", recipe, "--reference", "mpmath")
+    assert ran.code == 2
+    assert "this light has a bandwidth" in ran.err
+    recipe.write_text(RECIPE.replace('"3.9+0.02j"', "1.46").replace("[scene]", "[scene]\nambient = 1.46"))
+    ran = pellicle("cost", recipe)
+    assert ran.code == 2
+    assert "nothing to compute" in ran.err
+
+
+def test_wavelengths_of_the_first_file(pellicle, recipe, tmp_path, monkeypatch):
+    """Where the recipe gives none; and 50 digits are told from 16."""
+    rows = "".join(f"{nm},0.2\n" for nm in (450, 500, 560, 640, 700))
+    (tmp_path / "film.csv").write_text("wavelength_nm,R\n" + rows)
+    lines = RECIPE.replace("wavelengths = { start = 400, stop = 790, step = 30 }", 'files = ["film.csv"]')
+    recipe.write_text(
+        lines.replace("thickness = { value = 321.5, lower = 10, upper = 800 }", "thickness = 321.5")
+    )
+    ran = pellicle("cost", recipe, "--reference", "mpmath", "--json")
+    (record,) = ran.objects
+    assert (record["wavelengths"], record["draws"]) == (5, 1)
+    assert "those of" in ran.err
+    assert record["no_fits"] == "nothing is free to fit"
+    errors = {rung["name"]: rung["error"] for rung in record["rungs"]}
+    assert 0 < errors["float64"] < 1e-14
+    assert 1e-9 < errors["float32"] < 1e-6
