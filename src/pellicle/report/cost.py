@@ -66,7 +66,8 @@ def _ladder(ladder: Ladder, name: str) -> str:
     if not ladder.within:
         advice = f"→ no rung is within {within}; {found} comes nearest"
     notes = ["* no other is both faster and as accurate", advice, *_left_out(ladder.left_out)]
-    return "\n".join([said, "", *_aligned(rows, left=3), "", *notes]) + "\n"
+    table = _aligned(rows, left=3)
+    return "\n".join([*textwrap.wrap(said, COLUMNS), "", *table, "", *notes]) + "\n"
 
 
 def _race(race: Race) -> str:
@@ -151,13 +152,20 @@ def _scatter(axes: Axes, rungs: Sequence[Any], recommended: str | None, scale: f
     seen = [(rung.seconds * scale, max(rung.error, FLOOR)) for rung in rungs]
     front = sorted(point for point, rung in zip(seen, rungs, strict=True) if rung.pareto)
     axes.plot(*zip(*front, strict=True), color=ORANGE, linewidth=1.0, zorder=1)
-    for point, rung in zip(seen, rungs, strict=True):
+    for i, (point, rung) in enumerate(
+        zip(seen, rungs, strict=True)
+    ):  # neighbours in time, as they are sorted
         if not np.isfinite(point[1]):
             continue
         colour = ORANGE if rung.pareto else GREY
         axes.plot(*point, "D" if rung.name == recommended else "o", color=colour, markersize=5)
         axes.annotate(
-            rung.name, point, xytext=(5, 3), textcoords="offset points", fontsize="x-small", color=colour
+            rung.name,
+            point,
+            xytext=(5, -8 if i % 2 else 3),
+            textcoords="offset points",
+            fontsize="x-small",
+            color=colour,
         )
     axes.set(xscale="log", yscale="log")
     axes.margins(x=0.12, y=0.08)
