@@ -33,7 +33,7 @@ def test_a_data_set_is_its_truth_and_noise(several):
     assert len({float(t.truth[0]) for t in several}) == 3
     for trial in several:
         clean = np.asarray(pl.reflectance(NM, 50.0 + 1450.0 * trial.truth[0], 2.2, 1.5))
-        off = np.asarray(trial.problem.data.values)[: len(NM)] - clean
+        off = np.asarray(trial.problem.views[0].data.values)[: len(NM)] - clean
         assert 0.5 * NOISE < np.std(off) < 1.5 * NOISE
         assert np.abs(np.mean(off)) < NOISE
         assert trial.start == 0.5

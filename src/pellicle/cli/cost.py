@@ -97,8 +97,9 @@ def _as_measured(recipe: Recipe) -> tuple[Any, np.ndarray]:
     from pellicle.cli.options import ReadWords, light, merged, read
     from pellicle.scene import Drift, Light
 
-    scene, words = recipe.scene(), merged(ReadWords(), recipe)
     path = recipe.files[0]
+    own = recipe if recipe.tables.data.files else recipe.each[0]  # the first [[data.file]] has its own words
+    scene, words = own.scene(), merged(ReadWords(), own)
     spectrum = read(path, words, scaled=isinstance(scene.instrument.scale, Drift))
     say(f"wavelengths: those of {path} (the recipe gives none)")
     stated = light(words)

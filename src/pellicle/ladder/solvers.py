@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.fitting.problem import polish
+from pellicle.fitting.evaluation import polish
 from pellicle.fitting.search import LANES, quiet, search
 from pellicle.ladder.trial import Trial, descend, misfit, misfit_and_slope, residual
 from pellicle.planning import Plan

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from pellicle.fitting import nuisance
+from pellicle.fitting.measured import Measured
 from pellicle.fitting.problem import Problem, make
 from pellicle.fitting.solve import least_squares
 from pellicle.ladder.case import Case
@@ -30,7 +31,8 @@ class Trial(NamedTuple):
     @property
     def program(self) -> tuple[Any, ...]:
         """The arguments of the functions below, the plan first (static)."""
-        return self.problem.program
+        (view,) = self.problem.views
+        return view.program
 
 
 def trials(case: Case, scene: Scene, noise: float, count: int, seed: int = 0) -> list[Trial]:
@@ -50,9 +52,9 @@ def trials(case: Case, scene: Scene, noise: float, count: int, seed: int = 0) ->
     noisy = clean + random.normal(0.0, sigma, clean.shape)
     if case.ellipsometric:
         noisy = noisy.reshape(count, -1, 3)
-    sigmas = np.full(len(case.wavelength), sigma)
+    nm, sigmas = case.wavelength, np.full(len(case.wavelength), sigma)
     return [
-        Trial(make(scene, case.wavelength, values, sigmas, 1.0), unit, start)
+        Trial(make(Measured(scene, nm, values, sigmas)), unit, start)
         for values, unit in zip(noisy, units, strict=True)
     ]
 
