@@ -14,6 +14,10 @@ from pellicle.ladder.rungs import FORWARD, Rung
 from .conftest import NM, few
 
 
+RUNGS = {rung.name: rung for rung in FORWARD}
+USED = ("float64", "float32", "closed form", "1 order", "2 orders")
+
+
 def quiet(what, done, total):
     pass
 
@@ -37,7 +41,7 @@ def test_the_front_is_what_nobody_beats():
 
 @pytest.fixture(scope="module")
 def ladder(film):
-    return climb(film, "float64", 1e-3, quiet, FORWARD[:5])
+    return climb(film, "float64", quiet, tuple(RUNGS[name] for name in USED))
 
 
 def test_errors_and_costs(ladder):
@@ -70,7 +74,7 @@ def test_an_interruption_keeps_what_was_measured(film):
         raise KeyboardInterrupt
 
     rungs = (FORWARD[0], Rung("slow", "", interrupted), FORWARD[1])
-    ladder = climb(film, "float64", 1e-3, quiet, rungs)
+    ladder = climb(film, "float64", quiet, rungs)
     assert ladder.interrupted
     assert [rung.name for rung in ladder.rungs] == ["float64"]
     assert ladder.recommended == "float64"

@@ -58,6 +58,16 @@ def test_single_precision_is_single(oblique):
     assert 1e-9 < error < 2e-6
 
 
+def test_what_is_planned_is_within_the_tolerance(oblique):
+    """At a tenth the angle may go, at a hundred-thousandth next to nothing."""
+    truth, costs = by_library(oblique), []
+    for tolerance in (0.1, 1e-5):
+        program = compiled(oblique, RUNGS["planned"].way(oblique._replace(tolerance=tolerance)))
+        assert np.abs(program.run() - truth).max() < tolerance
+        costs.append(program.flops)
+    assert costs[0] < costs[1]
+
+
 def test_coarser_wavelengths_are_joined_by_lines(oblique):
     truth = by_library(oblique)
     lines = np.stack([np.interp(NM, NM[::2], row[::2]) for row in truth])
@@ -102,7 +112,7 @@ def test_a_blur_a_cone_and_a_back_face_are_left_out():
 def test_what_makes_no_sense_says_why():
     case = few(pl.Scene(pl.Layer(2.2, 300.0), 1.5))
     assert {name for name in RUNGS if not isinstance(RUNGS[name].way(case), str)} == {
-        *("float64", "float32", "incoherent", "twice the wavelengths", "every 2nd wavelength"),
+        *("float64", "float32", "planned", "incoherent", "twice the wavelengths", "every 2nd wavelength"),
         *("1 order", "2 orders", "3 orders", "5 orders", "8 orders"),
     }
     angles = few(pl.Scene(pl.Layer(2.2, 300.0), 1.5, light=pl.Light(angle=70.0, signal="psi-delta")))

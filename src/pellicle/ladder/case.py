@@ -9,8 +9,9 @@ import equinox as eqx
 import numpy as np
 
 from pellicle.optics.dispersion import AbstractDispersion
-from pellicle.planning import Plan, plan
+from pellicle.planning import Plan
 from pellicle.scene import Interface, Scene, free_leaves, insert, start_values, with_wavelength
+from pellicle.thrift import reference
 
 MOST_DRAWS, LEAST_DRAWS, POINTS = 256, 16, 65536
 """Spectra in one call: so many that the call itself does not count, and about this many points in all."""
@@ -19,13 +20,14 @@ MOST_DRAWS, LEAST_DRAWS, POINTS = 256, 16, 65536
 class Case(NamedTuple):
     """One scene, looked at at its wavelengths through an instrument without scale and offset.
 
-    `plan` is the full one, from which nothing is left out that could be seen. `draws` are values of the
-    free parameters, (draws, parameters), the first of them the scene's own.
+    `plan` is the full one, from which nothing is left out. `draws` are values of the free parameters,
+    (draws, parameters), the first of them the scene's own. `tolerance` is in the signal's unit.
     """
 
     scene: Scene
     plan: Plan
     draws: np.ndarray
+    tolerance: float
 
     @property
     def wavelength(self) -> np.ndarray:
@@ -36,7 +38,7 @@ class Case(NamedTuple):
         return self.plan.signal == "psi-delta"
 
 
-def case(scene: Scene, wavelength: np.ndarray, seed: int = 0) -> Case:
+def case(scene: Scene, wavelength: np.ndarray, tolerance: float = 1e-3, seed: int = 0) -> Case:
     """The case of a scene at `wavelength` (nm). Draws are uniform between the bounds."""
     bare = replace(scene.instrument, scale=1.0, offset=0.0)
     seen = with_wavelength(eqx.tree_at(lambda s: s.instrument, scene, bare), np.asarray(wavelength, float))
@@ -45,7 +47,7 @@ def case(scene: Scene, wavelength: np.ndarray, seed: int = 0) -> Case:
     low, high = np.array([f.lower for f in free]), np.array([f.upper for f in free])
     draws = np.random.default_rng(seed).uniform(low, high, (count, len(free)))
     draws[0] = start_values(seen)
-    return Case(seen, plan(seen), draws)
+    return Case(seen, reference(seen), draws, tolerance)
 
 
 def media(scene: Scene) -> list[AbstractDispersion]:

@@ -67,9 +67,7 @@ class Ladder:
         return min(self.rungs, key=lambda rung: rung.error).name if self.rungs else None
 
 
-def climb(
-    case: Case, against: str, tolerance: float, progress: Progress, rungs: Sequence[Rung] = FORWARD
-) -> Ladder:
+def climb(case: Case, against: str, progress: Progress, rungs: Sequence[Rung] = FORWARD) -> Ladder:
     """Measure every rung of a case. Ctrl-C ends it, and keeps what was measured.
 
     Raises UsageError for a reference that the case cannot be computed with, ValueError where a material
@@ -78,7 +76,7 @@ def climb(
     truth = reference(against, case)
     _check(truth, case)
     unit = "degrees" if case.ellipsometric else case.plan.signal
-    ladder = Ladder(truth.name, tolerance, unit, len(truth.wavelengths), len(truth.draws))
+    ladder = Ladder(truth.name, case.tolerance, unit, len(truth.wavelengths), len(truth.draws))
     runs: list[_Run] = []
     try:
         _compile(case, truth, rungs, runs, ladder, progress)

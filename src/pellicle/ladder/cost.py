@@ -15,9 +15,9 @@ from pellicle.ladder.race import Race, race
 from pellicle.ladder.trial import trials
 from pellicle.scene import Scene, free_leaves
 
-TOLERANCE = {"psi-delta": 0.05}
+TOLERANCE = {"psi-delta": 0.1}
 DEFAULT_TOLERANCE = 1e-3
-"""What is accurate enough unless somebody says otherwise: degrees of Ψ and Δ, or a fraction."""
+"""What is accurate enough unless somebody says otherwise: a fraction, or degrees on the sphere of N, C, S."""
 
 
 @dataclass
@@ -45,9 +45,9 @@ def cost(
 ) -> Cost:
     """Measure every way to a scene's signal at `wavelength` (nm), and to its free parameters.
 
-    `against` is "float64" or "mpmath". `tolerance` is in the signal's unit: a fraction, or degrees; without
-    it, it is the `noise`, or 0.001 (0.05 degrees). `datasets` spectra are simulated with that noise, or
-    noise as large as the tolerance, and fitted by every solver.
+    `against` is "float64" or "mpmath". `tolerance` is in the signal's unit: a fraction, or degrees on the
+    sphere of N, C and S; without it, it is the `noise`, or 0.001 (0.1 degrees). `datasets` spectra are
+    simulated with that noise, or noise as large as the tolerance, and fitted by every solver.
 
     **Raises:** UsageError for a tolerance that is not above zero, a reference that the scene cannot be
     computed with, and a scene whose signal is nothing.
@@ -57,8 +57,8 @@ def cost(
     if not 0 < tolerance < np.inf:
         raise UsageError(f"the tolerance must be above zero, got {tolerance:g}: what error is small enough?")
     with jax.enable_x64(True):
-        here = case(scene, wavelength)
-        ladder = climb(here, against, tolerance, progress)
+        here = case(scene, wavelength, tolerance)
+        ladder = climb(here, against, progress)
         if ladder.interrupted:
             return Cost(ladder, None, "interrupted before")
         if datasets == 0:

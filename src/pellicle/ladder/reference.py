@@ -27,14 +27,14 @@ class Reference(NamedTuple):
     def error(self, case: Case, answer: np.ndarray) -> float:
         """The largest distance of an answer (draws, points) from the truth, in the signal's unit.
 
-        For ellipsometry half the distance of N, C, S on their sphere, in degrees: an error of Ψ counts
-        as it is, one of Δ by ½ sin 2Ψ. Infinite where the answer is no number and the truth is.
+        For ellipsometry the arc between two points (N, C, S) in degrees: an error of Ψ counts twice, one
+        of Δ by sin 2Ψ. Infinite where the answer is no number and the truth is.
         """
         rows = answer.reshape(len(answer), len(case.wavelength), -1)[self.draws][:, self.wavelengths]
         known = np.all(np.isfinite(self.values), axis=-1)
         off = np.linalg.norm(np.asarray(rows, dtype=float) - self.values, axis=-1)[known]
         worst = float(np.max(off, initial=0.0)) if np.all(np.isfinite(off)) else np.inf
-        return float(np.rad2deg(worst) / 2) if case.ellipsometric else worst
+        return float(np.rad2deg(worst)) if case.ellipsometric else worst
 
 
 def reference(name: str, case: Case) -> Reference:

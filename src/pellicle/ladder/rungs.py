@@ -11,11 +11,13 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
+from pellicle.effects.without import LeftOut, RealPart
 from pellicle.ladder.case import Case, altered, disperses, media
 from pellicle.optics.dispersion import AbstractDispersion
-from pellicle.optics.number import Pair, is_real, parts, real
-from pellicle.planning import Plan, plan
-from pellicle.scene import Free, Layer, Light, Scene, Substrate, coherent_layers, with_wavelength
+from pellicle.optics.number import Pair, is_real, parts
+from pellicle.planning import Plan
+from pellicle.scene import Layer, Scene, coherent_layers, with_wavelength
+from pellicle.thrift import plan, reference
 
 
 class Way(NamedTuple):
@@ -44,43 +46,53 @@ def _single(case: Case) -> Way:
     return Way(case.plan, case.scene, double=False)
 
 
-def _replanned(scene: Scene) -> Way:
-    return Way(plan(scene), scene)
+def _planned(case: Case) -> Way:
+    return Way(plan(case.scene, case.tolerance), case.scene)
 
 
-def _normal(case: Case) -> Way | str:
-    light = case.scene.light
+def _without(effect: str, absent: str, case: Case) -> Way | str:
+    """The scene without one effect, all else in full; `absent` is what to say where it has none."""
+    if not case.plan.on(effect):
+        return absent
+    return _left_out(effect, case)
+
+
+def _left_out(effect: str, case: Case) -> Way:
+    leave_out = LeftOut(effect)
+    return Way(replace(reference(leave_out(case.scene)), left_out=(leave_out,)), case.scene)
+
+
+def _without_angle(case: Case) -> Way | str:
     if case.ellipsometric:
         return "ellipsometry compares s and p, which are one at normal incidence"
-    if not isinstance(light.angle, Free) and not np.any(light.angle):
-        return "light comes at normal incidence"
-    return _replanned(
-        eqx.tree_at(
-            lambda s: s.light, case.scene, Light(light.wavelength, 0.0, light.signal, light.polarisation)
-        )
-    )
+    return _without("oblique", "light comes at normal incidence", case)
 
 
-def _has_series(case: Case) -> bool:
-    """Whether there is one smooth coherent layer, of which only intensities are asked for."""
-    smooth = not case.plan.on("roughness")
-    return smooth and not case.ellipsometric and len(coherent_layers(case.scene)) == 1
+def _s_alone(case: Case) -> Way | str:
+    if case.ellipsometric or case.scene.instrument.has_cone:
+        return "this scene is seen in both polarisations"
+    return _without("polarisation", "one polarisation is all there is", case)
+
+
+def _half_space(case: Case) -> Way | str:
+    if case.plan.signal == "T":
+        return "what passes a plate has met its back face"
+    return _without("back-face", "the substrate has no back face", case)
 
 
 def _closed(case: Case) -> Way | str:
     if not case.plan.on("coherence"):
         return "the full plan is the closed form"
-    sharp = replace(case.scene.instrument, bandwidth=None, thickness_spread=None)
-    layers = [replace(x, thickness_spread=None) if isinstance(x, Layer) else x for x in case.scene.layers]
-    scene = eqx.tree_at(lambda s: (s.instrument, s.layers), case.scene, (sharp, tuple(layers)))
-    return Way(altered(altered(plan(scene), "coherence", False), "orders", False), scene)
+    sharp = _left_out("coherence", case)
+    return sharp._replace(plan=altered(altered(sharp.plan, "coherence", False), "orders", False))
 
 
 def _orders(count: int, case: Case) -> Way | str:
-    if not _has_series(case):
+    smooth = not case.plan.on("roughness")
+    if case.ellipsometric or not smooth or len(coherent_layers(case.scene)) != 1:
         return "there is no series of one smooth layer's orders to cut off"
-    if case.plan.on("coherence") and case.plan.row("orders").count <= count:
-        return f"the full plan has no more than {case.plan.row('orders').count}"
+    if case.plan.on("orders"):
+        return "fringes narrower than the sampling leave no order" if count else "that is the full plan"
     return Way(altered(altered(case.plan, "coherence", True), "orders", True, count), case.scene)
 
 
@@ -90,39 +102,14 @@ def _nodes(count: int, case: Case) -> Way | str:
     return Way(altered(case.plan, "coherence", True, count), case.scene)
 
 
-def _one_ray(case: Case) -> Way | str:
-    if not case.scene.instrument.has_cone:
-        return "there is no cone of light"
-    narrow = replace(case.scene.instrument, angle_spread=None, numerical_aperture=None)
-    return _replanned(eqx.tree_at(lambda s: s.instrument, case.scene, narrow))
-
-
-def _no_back(case: Case) -> Way | str:
-    substrate = case.scene.substrate
-    if substrate.back is None:
-        return "the substrate has no back face"
-    if case.plan.signal == "T":
-        return "what passes a plate has met its back face"
-    deep = Substrate(substrate.material, roughness=substrate.roughness)
-    return _replanned(eqx.tree_at(lambda s: s.substrate, case.scene, deep))
-
-
-def _smooth(case: Case) -> Way | str:
-    if not case.plan.on("roughness"):
-        return "every face is smooth"
-    layers = [replace(x, roughness=None) if isinstance(x, Layer) else x for x in case.scene.layers]
-    substrate = replace(case.scene.substrate, roughness=None)
-    return _replanned(eqx.tree_at(lambda s: (s.layers, s.substrate), case.scene, (tuple(layers), substrate)))
-
-
-@final
-class Transparent(AbstractDispersion):
-    """The real index of another medium."""
-
-    base: AbstractDispersion
-
-    def index(self, wavelength):
-        return real(self.base.index(wavelength))
+def _transparent(case: Case) -> Way | str:
+    if not case.plan.on("absorption"):
+        return "no layer absorbs"
+    layers = tuple(
+        replace(x, material=RealPart(x.material)) if isinstance(x, Layer) else x for x in case.scene.layers
+    )
+    clear = eqx.tree_at(lambda s: s.layers, case.scene, layers)
+    return Way(reference(clear), clear)
 
 
 @final
@@ -137,15 +124,6 @@ class AtOne(AbstractDispersion):
         index = self.base.index(self.at * one[..., :1] if one.ndim else self.at * one)
         re, im = parts(index)
         return re * one if is_real(index) else Pair(re * one, im * one)
-
-
-def _transparent(case: Case) -> Way | str:
-    if not case.plan.on("absorption"):
-        return "no layer absorbs"
-    layers = tuple(
-        replace(x, material=Transparent(x.material)) if isinstance(x, Layer) else x for x in case.scene.layers
-    )
-    return _replanned(eqx.tree_at(lambda s: s.layers, case.scene, layers))
 
 
 def _constant_index(case: Case) -> Way | str:
@@ -195,14 +173,16 @@ ORDERS = (1, 2, 3, 5, 8)
 FORWARD = (
     Rung("float64", "nothing", _full),
     Rung("float32", "nine digits of sixteen", _single),
+    Rung("planned", "what a plan within the tolerance does", _planned),
     Rung("closed form", "what damps the fringes", _closed),
     *(Rung(f"{m} order{'s' * (m > 1)}", "higher orders", partial(_orders, m)) for m in ORDERS),
     Rung("incoherent", "interference", partial(_orders, 0)),
     *(Rung(f"{n} nodes", "finer averages", partial(_nodes, n)) for n in (3, 7)),
-    Rung("normal incidence", "the angle", _normal),
-    Rung("one ray", "the cone of light", _one_ray),
-    Rung("half space", "the plate's back face", _no_back),
-    Rung("smooth faces", "roughness", _smooth),
+    Rung("normal incidence", "the angle", _without_angle),
+    Rung("s alone", "p", _s_alone),
+    Rung("one ray", "the cone of light", partial(_without, "angle-spread", "there is no cone of light")),
+    Rung("half space", "the plate's back face", _half_space),
+    Rung("smooth faces", "roughness", partial(_without, "roughness", "every face is smooth")),
     Rung("transparent layer", "its absorption", _transparent),
     Rung("constant index", "dispersion: the index of mid-band", _constant_index),
     Rung("twice the wavelengths", "nothing", _finer),
