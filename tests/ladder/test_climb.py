@@ -13,7 +13,6 @@ from pellicle.ladder.rungs import FORWARD, Rung
 
 from .conftest import NM, few
 
-
 RUNGS = {rung.name: rung for rung in FORWARD}
 USED = ("float64", "float32", "closed form", "1 order", "2 orders")
 

@@ -58,14 +58,12 @@ def test_single_precision_is_single(oblique):
     assert 1e-9 < error < 2e-6
 
 
-def test_what_is_planned_is_within_the_tolerance(oblique):
-    """At a tenth the angle may go, at a hundred-thousandth next to nothing."""
-    truth, costs = by_library(oblique), []
-    for tolerance in (0.1, 1e-5):
-        program = compiled(oblique, RUNGS["planned"].way(oblique._replace(tolerance=tolerance)))
-        assert np.abs(program.run() - truth).max() < tolerance
-        costs.append(program.flops)
-    assert costs[0] < costs[1]
+def test_what_is_planned_is_within_the_tolerance():
+    """A bandwidth that hardly blurs the fringes may go, and most of the cost with it."""
+    case = few(pl.Scene(pl.Layer(2.2, 300.0), 1.5, instrument=Instrument(bandwidth=1.0)), draws=1)
+    full, planned = (compiled(case, RUNGS[name].way(case)) for name in ("float64", "planned"))
+    assert 0 < np.abs(planned.run() - full.run()).max() < case.tolerance
+    assert planned.flops < full.flops / 3
 
 
 def test_coarser_wavelengths_are_joined_by_lines(oblique):
