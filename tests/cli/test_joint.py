@@ -1,11 +1,14 @@
 """`pellicle fit --joint`: several files of one sample, one result."""
 
 import json
+from pathlib import Path
 
 import pytest
 
 from pellicle.errors import DataError
 from pellicle.scene import Drift
+
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture
@@ -128,3 +131,20 @@ def test_a_folded_delta_is_said_by_flag_or_recipe(pellicle, beside, scene, tmp_p
     pellicle("fit", tmp_path / "e.csv", *scene, "--analyser", 45)
     [([_, in_recipe], _), (by_flag, _), (rotating, _)] = asked
     assert (in_recipe.folded, by_flag.folded, rotating.folded) == (True, True, True)
+
+
+def test_columns_and_spots_are_said_by_flag_or_recipe(pellicle, scene, tmp_path, asked):
+    """What a flag says goes before the recipe."""
+    (tmp_path / "f.csv").write_text("500,20,30\n600,21,31\n")
+    path = tmp_path / "film.toml"
+    path.write_text(
+        "[data]\nfiles = ['f.csv']\ncolumns = 'wavelength,_,R'\nsignal_unit = 'percent'\n"
+        "[scene]\nsubstrate = 'Si'\n[[scene.layer]]\nmaterial = 1.46\nthickness = { lower = 10, upper = 800 }\n"
+    )
+    pellicle("fit", "--recipe", path)
+    pellicle("fit", "--recipe", path, "--columns", "wavelength,R,_")
+    spots = ROOT / "measurements" / "ellipsometry" / "post_synthesis.dat"
+    pellicle("fit", spots, *scene, "--spot", 2)
+    (by_recipe, _), (by_flag, _), (spot, _) = asked
+    assert (by_recipe.values.tolist(), by_flag.values.tolist()) == ([0.3, 0.31], [0.2, 0.21])
+    assert spot.values[0] == 34.733

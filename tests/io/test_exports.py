@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pellicle.errors import DataError
+from pellicle.errors import DataError, UsageError
 from pellicle.io import read_spectrum
 
 REAL = Path(__file__).resolve().parents[2] / "measurements" / "ellipsometry"
@@ -231,8 +231,6 @@ def test_accurion_with_one_zone(write):
 def test_accurion_files_that_are_refused(write):
     lines = ACCURION.splitlines(keepends=True)
     refused(write("".join(lines[:6])), "zones 1, 2 without their mean", "one zone")
-    refused(write(ACCURION + lines[6]), "2 spots or times")
-    refused(write(IMAGE + "1\t40.000\t365.0\t417.6\t179.8\t32.5\n"), "2 regions of interest")
     refused(write(IMAGE.replace("#-\tdeg\tnm", "#-\tdeg\tum")), "Lambda in 'um', not in 'nm'")
     refused(write(IMAGE.replace("\t24.5", "")), "line 5 has fewer values")
     refused(write(IMAGE.replace("24.5", "94.5")), "line 5, column 'psi_deg': 94.5")
@@ -253,11 +251,53 @@ def test_real_accurion_files(name, points):
         assert abs(np.mean([float(row[3]) for row in four]) - delta) < 0.002
 
 
-def test_a_real_file_of_many_spots_is_refused():
-    refused(REAL / "post_synthesis.dat", "32 spots")
+def refused_words(path, *said, **kwargs):
+    with pytest.raises(UsageError) as caught:
+        read_spectrum(path, **kwargs)
+    message = str(caught.value)
+    assert message.startswith(f"{path}: ")
+    assert all(words in message for words in said), message
+    assert "\n" not in message
+
+
+def test_a_file_of_several_spots_lists_them(write):
+    lines = ACCURION.splitlines(keepends=True)
+    again = write(ACCURION + lines[6])
+    refused_words(again, "2 spots or times", ": 1 from line 7; 2 from line 13; choose one with --spot 1 to 2")
+    region = write(IMAGE + "1\t40.000\t365.0\t417.6\t179.8\t32.5\n", "image.dat")
+    refused_words(region, ": 1 in region 0; 2 in region 1;")
+    refused_words(
+        REAL / "post_synthesis.dat", "32 spots", ": 1 at -18.183, -30.305 mm; 2 at -6.061, -30.305 mm;"
+    )
+    assert read_spectrum(again, spot=2).lines.tolist() == [13]
+    assert read_spectrum(region, spot=2).lines.tolist() == [6]
+
+
+def test_spots_measured_by_turns_at_each_angle(write):
+    """A stage that drifts by micrometres is still at its spot, in whatever order the rows come."""
+    head = ACCURION.splitlines(keepends=True)[:2]
+    row = "658.0\t2.0\t{}\t170.0\t{}\t0\t000\t{}\n".format
+    given = [row(a, 10 * s + i, 6 * s + 0.004 * i) for i, a in enumerate((50, 60, 70)) for s in (1, 2)]
+    path = write("".join([*head, *given]))
+    for spot in (1, 2):
+        spectrum = read_spectrum(path, spot=spot)
+        assert spectrum.values.tolist() == [10 * spot + i for i in range(3)]
+        assert f"spot {spot} of 2 at {6 * spot} mm" in spectrum.notes
+
+    refused(write("".join([*head, *given[1:]])), "line 4 lies 6 mm from line 3")
+
+
+def test_a_spot_that_is_not_there(write):
+    refused_words(REAL / "post_synthesis.dat", "choose one with --spot 1 to 32", spot=33)
+    refused_words(write(ACCURION), "holds one spot only; choose it with --spot 1", spot=2)
+    refused_words(write(SPECTRARAY), "--spot chooses among the spots of an Accurion file", spot=1)
 
 
 def test_the_first_spot_is_a_part_of_the_whole():
+    """And is what `spot = 1` reads of it."""
+    whole, first = (read_spectrum(REAL / f"post_synthesis{end}.dat", spot=1) for end in ("", "_spot_1"))
+    for name in ("wavelength", "angle", "values", "delta"):
+        np.testing.assert_array_equal(getattr(whole, name), getattr(first, name))
     whole = (REAL / "post_synthesis.dat").read_text().splitlines()
     part = (REAL / "post_synthesis_spot_1.dat").read_text().splitlines()
     assert len(part) == 2 + 5 * 6

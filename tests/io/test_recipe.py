@@ -269,6 +269,32 @@ def test_a_file_has_its_own_words(tmp_path):
     assert second.scene().substrate.plate_mm == 2.0
 
 
+def test_how_files_are_read(tmp_path):
+    """The words of the flags, of all files or of one."""
+    path = tmp_path / "film.toml"
+    path.write_text(
+        "[data]\ncolumns = 'wavelength,R,_'\nwavelength_unit = 'µm'\n[[data.file]]\npath = 'a.csv'\n"
+        "[[data.file]]\npath = 'b.dat'\ncolumns = ['energy', 'T']\nsignal_unit = '%'\nspot = 2\n" + BASE
+    )
+    first, second = (found.tables.data for found in read_recipe(path).each)
+    assert (first.columns, second.columns) == ("wavelength,R,_", ["energy", "T"])
+    assert (first.wavelength_unit, second.wavelength_unit) == ("µm", "µm")
+    assert (first.signal_unit, second.signal_unit, first.spot, second.spot) == (None, "%", None, 2)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("wavelength_unit = 'mm'", "data.wavelength_unit: must be one of nm, um, A, eV, cm-1, not 'mm'"),
+        ("signal_unit = 'permille'", "data.signal_unit: must be one of fraction, percent, not 'permille'"),
+        ("spot = 0", "data.spot: "),
+        ("analyser = 90", "data.analyser: "),
+    ],
+)
+def test_what_is_no_way_to_read(refused, words, said):
+    refused(f"[data]\n{words}\n{BASE}", said)
+
+
 def test_bad_words_of_a_file(tmp_path):
     path = tmp_path / "film.toml"
     for words, said in (

@@ -69,6 +69,7 @@ def fit(
     analyser: Annotated[
         float | None, _flag(_reading, "Of columns alpha and beta: the analyser's angle in degrees.")
     ] = None,
+    spot: Annotated[int | None, _flag(_reading, "Which spot of an Accurion file, from 1.")] = None,
     joint: Annotated[
         bool, Parameter(group=_scene, help="All files are of one sample: fit them together.", negative="")
     ] = False,
@@ -96,6 +97,7 @@ def fit(
         dark,
         folded or None,
         analyser,
+        spot,
     )
     _check(reading)
     looks, together = _what(list(data), recipe, scene_words, reading)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from typing import TYPE_CHECKING, Any
 
@@ -44,7 +44,7 @@ class ReadWords:
     polarisation: str | None = None
     range: tuple[float, float] | None = None
     noise: float | None = None
-    columns: str | None = None
+    columns: str | list[str] | None = None
     wavelength_unit: str | None = None
     signal_unit: str | None = None
     reference: str | None = None
@@ -52,6 +52,7 @@ class ReadWords:
     dark: str | None = None
     folded: bool | None = None
     analyser: float | None = None
+    spot: int | None = None
 
 
 def scene_from_words(words: SceneWords, read: ReadWords) -> tuple[Scene, list[str]]:
@@ -97,17 +98,9 @@ def merged(read: ReadWords, recipe: Recipe | None) -> ReadWords:
     if recipe is None:
         return read
     data = recipe.tables.data
-    kept: dict[str, Any] = {k: v for k, v in vars(read).items() if v is not None}
-    from_recipe = {
-        "signal": data.signal,
-        "angle": data.angle,
-        "polarisation": data.polarisation,
-        "range": data.range,
-        "noise": data.noise,
-        "folded": data.folded,
-        "analyser": data.analyser,
-    }
-    return ReadWords(**({k: v for k, v in from_recipe.items() if v is not None} | kept))
+    return replace(
+        read, **{word: getattr(data, word, None) for word, given in vars(read).items() if given is None}
+    )
 
 
 def read(path: str, words: ReadWords, *, scaled: bool) -> Any:
@@ -131,6 +124,7 @@ def read(path: str, words: ReadWords, *, scaled: bool) -> Any:
         calibrated=False if scaled else None,
         folded=bool(words.folded),
         analyser=words.analyser,
+        spot=words.spot,
     )
 
 

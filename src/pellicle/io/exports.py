@@ -7,19 +7,27 @@ axes are judged as in any other file, and messages name the user's own lines.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 
+from pellicle.errors import UsageError
 from pellicle.io import accurion, spectraray, woollam
 from pellicle.io.layout import Layout
 from pellicle.io.text import Line
 
 Reader = Callable[[Sequence[Line], Sequence[Line], str], Layout | None]
 
-READERS: tuple[Reader, ...] = (woollam.layout, spectraray.layout, accurion.layout)
+READERS: tuple[Reader, ...] = (woollam.layout, spectraray.layout)
 
 
 def find_export(
-    lines: Sequence[Line], comments: Sequence[Line], path: str, readers: Iterable[Reader] = READERS
+    lines: Sequence[Line], comments: Sequence[Line], path: str, spot: int | None = None
 ) -> Layout | None:
-    """The layout of an instrument's own format, or None. Raises DataError for one that is unclear."""
-    return next((found for reader in readers if (found := reader(lines, comments, path))), None)
+    """The layout of an instrument's own format, or None.
+
+    `spot`, from 1, chooses among several in one file. Raises DataError for a file that is unclear,
+    UsageError where spots leave open which, or there is no such spot.
+    """
+    found = accurion.layout(lines, comments, path, spot)
+    if found is None and spot is not None:
+        raise UsageError(f"{path}: --spot chooses among the spots of an Accurion file, which this is not")
+    return found or next((known for reader in READERS if (known := reader(lines, comments, path))), None)

@@ -2,11 +2,28 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Callable, Sequence
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from pellicle.io.media import Medium, Number
+from pellicle.io.units import SIGNAL_UNITS, WAVELENGTH_UNITS, signal_unit, wavelength_unit
+
+
+def _unit(known: Sequence[str], find: Callable[[str], str | None]) -> AfterValidator:
+    """Refuses what is no unit, as the flags do."""
+
+    def check(given: str) -> str:
+        if find(given) is None:
+            raise ValueError(f"must be one of {', '.join(known)}, not {given!r}")
+        return given
+
+    return AfterValidator(check)
+
+
+WavelengthUnit = Annotated[str, _unit(WAVELENGTH_UNITS, wavelength_unit)]
+SignalUnit = Annotated[str, _unit(SIGNAL_UNITS, signal_unit)]
 
 
 class _Table(BaseModel):
@@ -77,17 +94,26 @@ class InstrumentTable(_Table):
     numerical_aperture: Number | None = None
 
 
-class FileTable(_Table):
-    """One `[[data.file]]`: what is said here goes before `[data]` and `[instrument]`."""
+class _Reading(_Table):
+    """How files are read and looked at: the words of the command line's flags."""
 
-    path: str
     signal: Literal["R", "T", "psi-delta"] | None = None
     angle: float | None = Field(default=None, ge=0, le=90)
     polarisation: Literal["unpolarised", "s", "p"] | None = None
     noise: float | None = Field(default=None, gt=0)
+    columns: str | list[str] | None = None
+    wavelength_unit: WavelengthUnit | None = None
+    signal_unit: SignalUnit | None = None
     range: tuple[float, float] | None = None
     folded: bool | None = None
     analyser: float | None = Field(default=None, gt=0, lt=90)
+    spot: int | None = Field(default=None, ge=1)
+
+
+class FileTable(_Reading):
+    """One `[[data.file]]`: what is said here goes before `[data]` and `[instrument]`."""
+
+    path: str
     instrument: InstrumentTable = InstrumentTable()
     back: Literal[False] | None = None
 
@@ -104,18 +130,11 @@ class FileTable(_Table):
         return given
 
 
-class DataTable(_Table):
+class DataTable(_Reading):
     """`[data]`."""
 
     files: list[str] = []
     file: list[FileTable] = []
-    signal: Literal["R", "T", "psi-delta"] | None = None
-    angle: float | None = Field(default=None, ge=0, le=90)
-    polarisation: Literal["unpolarised", "s", "p"] | None = None
-    noise: float | None = Field(default=None, gt=0)
-    range: tuple[float, float] | None = None
-    folded: bool | None = None
-    analyser: float | None = Field(default=None, gt=0, lt=90)
     wavelengths: GridTable | list[float] | None = None
     joint: bool = False
 
@@ -144,7 +163,7 @@ class RecipeTable(_Table):
 
 def of_file(tables: RecipeTable, file: FileTable) -> RecipeTable:
     """The recipe of one file: with its own signal, angle, noise and so on, and no other file."""
-    words = {name: getattr(file, name) for name in FileTable.model_fields if name in DataTable.model_fields}
+    words = {name: getattr(file, name) for name in _Reading.model_fields}
     said = {name: value for name, value in words.items() if value is not None}
     data = tables.data.model_copy(update={**said, "file": [file]})
     own = {name: getattr(file.instrument, name) for name in file.instrument.model_fields_set}

@@ -6,6 +6,7 @@ import dataclasses
 import math
 import os
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -32,6 +33,7 @@ def read_spectrum(
     calibrated: bool | None = None,
     folded: bool = False,
     analyser: float | int | None = None,
+    spot: int | None = None,
 ) -> Spectrum:
     """Reads a text file of reflectance, transmittance or ellipsometry: CSV, or an instrument's export.
 
@@ -45,6 +47,7 @@ def read_spectrum(
     - `polarisation`: "s", "p" or "unpolarised", where the column's name does not say.
     - `folded`: Δ is in 0 to 180, as an instrument without a compensator sees it, and its sign is not fitted.
     - `analyser`: of columns α and β the angle of the polariser that stands, in degrees.
+    - `spot`: of an Accurion file of several spots, which: counted from 1 as they come in the file.
     - `calibrated`: false lifts the limits on the values; by default only for an `intensity` column.
 
     Returns a `Spectrum`. Raises DataError (unreadable or impossible data) or UsageError (an
@@ -54,7 +57,7 @@ def read_spectrum(
     _check_choice("--polarisation", polarisation, POLARISATIONS)
     if noise is not None and not (0 < noise < math.inf):
         raise UsageError(f"--noise {noise:g} must be a standard deviation above zero, e.g. --noise 0.005")
-    table = read_table(path, find_export)
+    table = read_table(path, partial(find_export, spot=spot))
     if is_ellipsometry(table, named_columns(table, columns), signal):
         _refuse_flags(table.path, signal_unit, polarisation)
         return read_ellipsometry(table, columns, wavelength_unit, noise, range, folded, analyser)
