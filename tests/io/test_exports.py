@@ -264,13 +264,14 @@ def test_a_file_of_several_spots_lists_them(write):
     lines = ACCURION.splitlines(keepends=True)
     again = write(ACCURION + lines[6])
     refused_words(again, "2 spots or times", ": 1 from line 7; 2 from line 13; choose one with --spot 1 to 2")
-    region = write(IMAGE + "1\t40.000\t365.0\t417.6\t179.8\t32.5\n", "image.dat")
+    other = "1\t40.000\t365.0\t417.6\t179.8\t32.5\n1\t60.000\t365.0\t417.6\t139.8\t22.5\n"
+    region = write(IMAGE + other, "image.dat")
     refused_words(region, ": 1 in region 0; 2 in region 1;")
     refused_words(
         REAL / "post_synthesis.dat", "32 spots", ": 1 at -18.183, -30.305 mm; 2 at -6.061, -30.305 mm;"
     )
     assert read_spectrum(again, spot=2).lines.tolist() == [13]
-    assert read_spectrum(region, spot=2).lines.tolist() == [6]
+    assert read_spectrum(region, spot=2).lines.tolist() == [6, 7]
 
 
 def test_spots_measured_by_turns_at_each_angle(write):
