@@ -139,7 +139,7 @@ def test_columns_and_spots_are_said_by_flag_or_recipe(pellicle, scene, tmp_path,
     path = tmp_path / "film.toml"
     path.write_text(
         "[data]\nfiles = ['f.csv']\ncolumns = 'wavelength,_,R'\nsignal_unit = 'percent'\n"
-        "[scene]\nsubstrate = 'Si'\n[[scene.layer]]\nmaterial = 1.46\nthickness = { lower = 10, upper = 9 }\n"
+        "[scene]\nsubstrate = 'Si'\n[[scene.layer]]\nmaterial = 1.46\nthickness = { lower = 1, upper = 9 }\n"
     )
     pellicle("fit", "--recipe", path)
     pellicle("fit", "--recipe", path, "--columns", "wavelength,R,_")
