@@ -3,7 +3,8 @@
 Run `python benchmarks/properties.py` (`make properties`). Single films and stacks of 1 to 8 layers, in
 float64 and float32: media that are real, weakly absorbing, metallic; dense ambients; thickness 0 and
 1e-6 nm to 1 mm; angles at 0, at 90 and up to 1e-9 degrees from it, and critical in a layer or in the
-substrate. Each line counts the scenes that break a law; the exit code is 1 if there are any.
+substrate. Each line counts the scenes that break a law; the exit code is 1 if there are any. N² + C² + S²
+must be 1, and at most 1 for two samples seen at once.
 """
 
 from __future__ import annotations
@@ -18,10 +19,19 @@ import jax.numpy as jnp
 import numpy as np
 
 import pellicle as pl
+from pellicle.optics.ellipsometry import Stokes, normalised, stokes
+from pellicle.signals import _waves as signals_of_waves
 
 CHUNK = 5000
-# of R + T above 1, or from 1 where nothing absorbs, and of s and p at normal incidence
-ROUNDING = {np.float64: 1e-9, np.float32: 2e-3}
+
+
+def rounding(dtype: type, layers: int) -> float:
+    """What R + T may miss 1 by, in a scene of so many layers.
+
+    Light's flux through a layer is conserved by c² + Q f² = 1, whatever the phase is. So neither a thick
+    layer, nor grazing incidence, nor a critical angle enters: only the few roundings of each product.
+    """
+    return 16 * (1 + layers) * float(np.finfo(dtype).eps)
 
 
 def scenes(rng: np.random.Generator, count: int, layers: int) -> np.ndarray:
@@ -49,14 +59,15 @@ def scenes(rng: np.random.Generator, count: int, layers: int) -> np.ndarray:
 
 
 def signals(row, layers: int):
-    """Rs, Rp, Ts, Tp, Ψ, Δ of one scene; no list of layers where there is one film."""
+    """Rs, Rp, Ts, Tp, Ψ, Δ and the Stokes sums of one scene; no list of layers where there is one film."""
     d, n, k = row[: 3 * layers].reshape(3, layers) if layers else row[:3].reshape(3, 1)
     n2, k2, ambient, angle, wavelength = row[-5:]
     media = list(jax.lax.complex(n, k)) if layers else jax.lax.complex(n[0], k[0])
     film = (wavelength, d if layers else d[0], media, jax.lax.complex(n2, k2))
     at = {"ambient": ambient, "angle": angle}
     powers = [f(*film, **at, polarisation=p) for f in (pl.reflectance, pl.transmittance) for p in "sp"]
-    return jnp.stack([*powers, *pl.ellipsometry(*film, **at)])
+    waves = signals_of_waves(*film, ambient, angle, "unpolarised")
+    return jnp.stack([*powers, *pl.ellipsometry(*film, **at), *stokes(*waves)])
 
 
 @partial(jax.jit, static_argnums=1)
@@ -65,14 +76,25 @@ def run(rows, layers: int):
     return jax.vmap(lambda row: (one(row), jax.jacfwd(one)(row)))(rows)
 
 
+def purity(sums) -> np.ndarray:
+    """N² + C² + S² of Stokes sums (4, scenes); 1 where nothing is reflected."""
+    n, c, s = map(np.asarray, normalised(Stokes(*map(jnp.asarray, sums))))
+    square = n**2 + c**2 + s**2
+    return np.where(square == 0, 1, square)
+
+
 def broken(rows: np.ndarray, layers: int) -> dict[str, np.ndarray]:
     """Law → which rows break it."""
     values, slopes = map(np.asarray, run(rows, layers))
-    unit, count = ROUNDING[rows.dtype.type], max(layers, 1)
-    reflected, passed, (psi, delta) = values[:, :2], values[:, 2:4], values[:, 4:].T
+    count = max(layers, 1)
+    unit, few = rounding(rows.dtype.type, count), 16 * np.finfo(rows.dtype).eps
+    reflected, passed, (psi, delta) = values[:, :2], values[:, 2:4], values[:, 4:6].T
     lossless = np.all(rows[:, 2 * count : 3 * count] == 0, axis=1) & (rows[:, -4] == 0)
     normal = rows[:, -2] == 0
     total = reflected + passed
+    sums = values[:, 6:].T
+    # two samples side by side: what a detector sees of both
+    mixed = purity(sums + sums[:, ::-1])
     return {
         "value not finite": ~np.all(np.isfinite(values), axis=1),
         "derivative not finite": ~np.all(np.isfinite(slopes), axis=(1, 2)),
@@ -81,6 +103,8 @@ def broken(rows: np.ndarray, layers: int) -> dict[str, np.ndarray]:
         "energy lost where nothing absorbs": lossless & np.any(np.abs(total - 1) > unit, axis=1),
         "s unlike p at normal incidence": normal & (np.abs(reflected[:, 0] - reflected[:, 1]) > unit),
         "angles out of range": ~((psi >= 0) & (psi <= 90.0001) & (delta >= 0) & (delta < 360)),
+        "N, C, S off the sphere": np.abs(purity(sums) - 1) > few,
+        "N, C, S of a mixture outside the sphere": mixed > 1 + few,
     }
 
 

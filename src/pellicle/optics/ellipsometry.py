@@ -41,8 +41,9 @@ def normalised(given: Stokes) -> tuple[Any, Any, Any]:
     dark = given.intensity < jnp.finfo(jnp.result_type(given.intensity)).tiny
     # scaled to size first: the derivative of 1/x holds 1/x², which overflows where little is reflected
     size = jax.lax.stop_gradient(jnp.where(dark, 0.0, 1 / jnp.where(dark, 1.0, given.intensity)))
-    over = jnp.where(dark, 0.0, 1 / jnp.where(dark, 1.0, given.intensity * size)) * size
-    return given.n * over, given.c * over, given.s * over
+    over = jnp.where(dark, 0.0, 1 / jnp.where(dark, 1.0, given.intensity * size))
+    n, c, s = (x * size * over for x in given[:3])
+    return n, c, s
 
 
 def angles(n: Any, c: Any, s: Any) -> tuple[Any, Any]:

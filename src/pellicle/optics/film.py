@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from pellicle.optics.interface import carried, normal, normal_square, power, transverse
+from pellicle.optics.interface import carried, normal, normal_square, nothing_where, power, same, transverse
 from pellicle.optics.number import Number, Pair, SinCos, abs2, hold, imag, real, sincos, sqrt, times_i, where
 
 
@@ -152,12 +152,15 @@ def film(
 
     With A, B, A′, B′ below, D = A c − iB f and N = A′ c − iB′ f; reversing the light turns the sign
     of A′. Denominators carry no division: at grazing incidence T is 0, not 0/0.
+    Between equal media A′ is exactly 0, and nothing between them (no thickness, or the same medium
+    again) reflects exactly nothing, at 90° too.
     """
     a, q0 = transverse(ambient, angle)
     e0, e1, e2, q1_square = ambient * ambient, layer * layer, substrate * substrate, normal_square(layer, a)
     q2 = normal(substrate, a)
     c, f, scale_square, _ = through(q1_square, phase, sincos)
     g = times_i(-f)
+    bare, empty = same(ambient, substrate), same(ambient, layer, substrate)
     waves = []
     for polarisation in polarisations[:1] if angle is None else polarisations:
         if polarisation == "s":
@@ -166,6 +169,7 @@ def film(
             u, v = e0 * e2 * q1_square / e1, e1 * q0 * q2
             A, B, A_, B_ = e0 * q2 + e2 * q0, u + v, e2 * q0 - e0 * q2, v - u
         into = carried(ambient, q0, polarisation) * power(substrate, q2, polarisation) * scale_square
+        A_, B_ = nothing_where(bare, A_), nothing_where(empty, B_)
         waves.append(Wave(A_ * c + B_ * g, B_ * g - A_ * c, A * c + B * g, into))
     return tuple(waves)
 

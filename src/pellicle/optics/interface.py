@@ -6,12 +6,21 @@ medium, and what a medium contributes is the normal component of its index, q = 
 
 from __future__ import annotations
 
+from functools import reduce
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 
 from pellicle.optics.number import Number, Pair, abs2, conj, is_real, real, sqrt, where
+
+
+class Transverse(NamedTuple):
+    """The transverse index, and by how much it falls short of the ambient's, to its last digit."""
+
+    index: Any  # a = n₀ sin θ
+    ambient: Any  # n₀
+    short: Any  # n₀ − a
 
 
 class Inside(NamedTuple):
@@ -22,7 +31,7 @@ class Inside(NamedTuple):
 
 
 def transverse(ambient: Any, angle: Any) -> tuple[Any, Any]:
-    """a = n₀ sin θ and q₀ = n₀ cos θ for the angle of incidence (radians); None is normal incidence.
+    """a (a `Transverse`) and q₀ = n₀ cos θ for the angle of incidence (radians); None is normal incidence.
 
     With None the transverse index is the literal 0.0, so nothing oblique is computed.
     """
@@ -34,12 +43,31 @@ def transverse(ambient: Any, angle: Any) -> tuple[Any, Any]:
     cosine = jnp.cos(angle)
     least = float(jnp.finfo(cosine.dtype).eps) ** 1.25
     cosine = cosine + jax.lax.stop_gradient(jnp.maximum(least - cosine, 0.0))
-    return ambient * jnp.sin(angle), ambient * cosine
+    a, q0 = ambient * jnp.sin(angle), ambient * cosine
+    return Transverse(a, ambient, q0 * q0 / (ambient + a)), q0
 
 
 def normal_square(index: Number, a: Any) -> Number:
-    """q² = (n − a)(n + a): no cancellation near the critical angle."""
+    """q² = (n − a)(n + a): no cancellation near the critical angle.
+
+    With a `Transverse` none near grazing incidence either, where n − a = (n − n₀) + (n₀ − a): a medium
+    that equals the ambient has the ambient's own q there.
+    """
+    if isinstance(a, Transverse):
+        less = where(a.short < a.index, index - a.ambient + a.short, index - a.index)
+        return less * (index + a.index)
     return (index - a) * (index + a)
+
+
+def same(ambient: Any, *others: Number):
+    """Where all these media are the ambient itself, to the last digit."""
+    return reduce(jnp.logical_and, [abs2(other - ambient) == 0 for other in others])
+
+
+def nothing_where(test, amplitude: Number) -> Number:
+    """An amplitude that is exactly 0 where `test` holds, and not by rounding; its slope stays."""
+    exact = where(test, amplitude, 0.0 * amplitude)
+    return amplitude - jax.tree.map(jax.lax.stop_gradient, exact)
 
 
 def normal(index: Number, a: Any) -> Number:

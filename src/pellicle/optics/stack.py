@@ -18,7 +18,7 @@ import jax
 import jax.numpy as jnp
 
 from pellicle.optics.film import Wave, through
-from pellicle.optics.interface import carried, normal, power, transverse
+from pellicle.optics.interface import carried, normal, normal_square, nothing_where, power, same, transverse
 from pellicle.optics.number import Number, SinCos, abs2, sincos, to_complex
 
 
@@ -52,6 +52,7 @@ def stack(
     index, depth = rows(layers), jnp.real(rows(phases))
     bottom, top, q_top = full(substrate), full(ambient), full(q0)
     q_bottom = normal(bottom, a)
+    empty = same(ambient, substrate, *layers)
     waves = []
     for polarisation in polarisations[:1] if angle is None else polarisations:
         e0, e2 = _weight(top, polarisation), _weight(bottom, polarisation)
@@ -70,7 +71,7 @@ def stack(
         denominator = down + H
         # the two directions share their denominator but for scale: bring the second to the first
         reversed_ = (up - H_) / (up + H_) * denominator
-        waves.append(Wave(down - H, reversed_, denominator, into / abs2(e0 * e2)))
+        waves.append(Wave(nothing_where(empty, down - H), reversed_, denominator, into / abs2(e0 * e2)))
     return tuple(waves)
 
 
@@ -112,7 +113,7 @@ def _fields(index, depth, admittance, faces, a, polarisation: str, sincos: SinCo
         n, k, face = layer
         if face is not None:
             E, H = E * face[0], H * face[1]
-        square, e = (n - a) * (n + a), _weight(n, polarisation)
+        square, e = normal_square(n, a), _weight(n, polarisation)
         c, f, layer_scale, _ = through(square, k, sincos)
         E, H = E * c - 1j * f * e * H, H * c - 1j * f * (square / e) * E
         size = jax.lax.stop_gradient(abs2(E) + abs2(H))
