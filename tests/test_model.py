@@ -109,7 +109,7 @@ LEAVES_NO_TRACE = {
     "back face": (scene(substrate=1.52), scene(substrate=PLATE)),
     "coherence": (scene(), scene(instrument=BANDWIDTH)),
     "bandwidth of 0": (scene(instrument=pl.Instrument(bandwidth=0.0)), scene(instrument=BANDWIDTH)),
-    "transmission": (scene(), scene(substrate=PLATE)),
+    "transmission": (scene(substrate=1.52), scene(substrate=PLATE)),
 }
 
 
