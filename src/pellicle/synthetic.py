@@ -12,8 +12,9 @@ import numpy as np
 from pellicle.model import build, sampled
 from pellicle.optics.dispersion import AbstractDispersion
 from pellicle.optics.ellipsometry import angles
-from pellicle.planning import Plan, exact
+from pellicle.planning import Plan
 from pellicle.scene import Drift, Instrument, Scene, insert, is_free, start_values, with_wavelength
+from pellicle.thrift import plan
 
 VISIBLE = (380.0, 780.0, 2.0)
 """Default wavelengths: start, stop and step in nm."""
@@ -28,26 +29,31 @@ class Synthetic(NamedTuple):
     plan: Plan
 
 
-def synthesise(scene: Scene, wavelength: Any, noise: float = 0.0, seed: int = 0) -> Synthetic:
+def synthesise(
+    scene: Scene, wavelength: Any, noise: float = 0.0, seed: int = 0, tolerance: float = 0.0
+) -> Synthetic:
     """The signal of a scene at `wavelength` (nm) with normal noise of standard deviation `noise`.
 
-    Free parameters take their values, scale and offset that are free are 1 and 0. Raises ValueError
+    Free parameters take their values, scale and offset that are free are 1 and 0. Effects that change
+    less than the `tolerance` are left out (`pellicle.plan`). Raises ValueError
     where a material has no data at a wavelength.
     """
     wavelength = np.asarray(wavelength, dtype=float)
     with jax.enable_x64(True):
         fixed = with_wavelength(insert(scene, start_values(scene)), wavelength)
         fixed = eqx.tree_at(lambda s: s.instrument, fixed, _settled(fixed.instrument))
-        chosen = exact(fixed)
+        chosen = plan(fixed, tolerance)
         signal = np.asarray(jax.jit(build(chosen))(sampled(fixed, chosen.on("coherence"))))
     clean = float(fixed.instrument.scale) * signal + float(fixed.instrument.offset)
     random = np.random.default_rng(seed).normal(0.0, 1.0, clean.shape)
     return Synthetic(wavelength, clean + noise * random, clean, chosen)
 
 
-def synthesise_angles(scene: Scene, wavelength: Any, noise: float = 0.0, seed: int = 0) -> Synthetic:
+def synthesise_angles(
+    scene: Scene, wavelength: Any, noise: float = 0.0, seed: int = 0, tolerance: float = 0.0
+) -> Synthetic:
     """The same for ellipsometry as Ψ and Δ in degrees, (wavelengths, 2), with noise in degrees."""
-    exact = synthesise(scene, wavelength)
+    exact = synthesise(scene, wavelength, tolerance=tolerance)
     clean = np.stack(np.broadcast_arrays(*angles(*exact.clean.reshape(-1, 3).T)), axis=1)
     noisy = clean + np.random.default_rng(seed).normal(0.0, noise, clean.shape)
     psi, delta = np.clip(noisy[:, 0], 0.0, 90.0), np.mod(noisy[:, 1], 360.0)

@@ -32,8 +32,8 @@ class Batch:
     A joint batch has one group, whose files are fitted together; else every group is one file.
     """
 
-    def __init__(self, out: str | None, as_json: bool, joint: bool):
-        self.out, self.as_json, self.joint = out, as_json, joint
+    def __init__(self, out: str | None, as_json: bool, joint: bool, tolerance: float):
+        self.out, self.as_json, self.joint, self.tolerance = out, as_json, joint, tolerance
         self.done: list[Any] = []
 
     def __call__(self, groups: list[list[Look]]) -> int:
@@ -99,7 +99,7 @@ class Batch:
             scenes.append(scene)
             say(*(f"{look.path}: {note}" for note in spectrum.notes))
         what = (spectra, scenes) if self.joint else (spectra[0], scenes[0])
-        return run(*what, progress=progress)
+        return run(*what, tolerance=self.tolerance, progress=progress)
 
 
 def _seen(look: Look, own: bool) -> tuple[Any, Scene]:

@@ -9,7 +9,7 @@ from cyclopts import Group, Parameter
 
 from pellicle.cli.batch import Batch, Look
 from pellicle.cli.options import ReadWords, SceneWords, light, merged, scene_from_words
-from pellicle.cli.session import say, start
+from pellicle.cli.session import not_negative, say, start
 from pellicle.errors import UsageError
 
 if TYPE_CHECKING:
@@ -73,6 +73,9 @@ def fit(
     joint: Annotated[
         bool, Parameter(group=_scene, help="All files are of one sample: fit them together.", negative="")
     ] = False,
+    tolerance: Annotated[
+        float, _flag(_scene, "Leave out effects that change the signal by less than this; 0 leaves none out.")
+    ] = 0.0,
     out: Annotated[str | None, _flag(_output, "A folder for report, figure and tables.")] = None,
     json: Annotated[bool, Parameter(group=_output, help="One JSON object a line.", negative="")] = False,
 ) -> int:
@@ -100,6 +103,7 @@ def fit(
         spot,
     )
     _check(reading)
+    not_negative("--tolerance", tolerance)
     looks, together = _what(list(data), recipe, scene_words, reading)
     from pellicle.fitting.fit import check_free
 
@@ -107,7 +111,7 @@ def fit(
         check_free(look.scene)
     start()
     joint = joint or together
-    return Batch(out, json, joint)([looks] if joint else [[look] for look in looks])
+    return Batch(out, json, joint, tolerance)([looks] if joint else [[look] for look in looks])
 
 
 def _range(text: str | None) -> tuple[float, float] | None:

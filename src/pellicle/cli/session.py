@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import os
 import sys
+from math import inf
 from pathlib import Path
+
+from pellicle.errors import UsageError
 
 CACHE_VARIABLE = "PELLICLE_CACHE"
 """A folder for compiled programs, or `off`."""
@@ -43,6 +46,12 @@ def cache_folder() -> Path | None:
     if sys.platform == "win32":
         return Path(os.environ.get("LOCALAPPDATA", "~")).expanduser() / "pellicle" / "cache"
     return Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "pellicle"
+
+
+def not_negative(flag: str, number: float) -> None:
+    """UsageError for a flag's number below 0, infinite or none."""
+    if not 0 <= number < inf:
+        raise UsageError(f"{flag} must not be negative, got {number:g}")
 
 
 def say(*sentences: str) -> None:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from pellicle.cli.session import say, start
-from pellicle.errors import DataError, UsageError
+from pellicle.cli.session import not_negative, say, start
+from pellicle.errors import DataError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -27,6 +27,9 @@ def simulate(
         float | None, Parameter(help="Standard deviation of the noise (the recipe's, or 0).")
     ] = None,
     seed: Annotated[int, Parameter(help="Seed of the noise.")] = 0,
+    tolerance: Annotated[
+        float, Parameter(help="Leave out effects that change the signal by less than this; 0 leaves none out.")
+    ] = 0.0,
 ) -> int:
     """Write the spectrum that a recipe's scene would give.
 
@@ -35,8 +38,8 @@ def simulate(
     from pellicle.io.atomic import write_text
     from pellicle.io.recipe import read_recipe
 
-    if noise is not None and not noise >= 0:
-        raise UsageError(f"--noise must not be negative, got {noise:g}")
+    not_negative("--noise", noise or 0.0)
+    not_negative("--tolerance", tolerance)
     found = read_recipe(recipe)
     scene = found.scene()
     start()
@@ -47,7 +50,7 @@ def simulate(
         raise DataError(f"{found.path}: ellipsometry needs an angle of incidence: give [data] angle = 70")
     noise = (found.tables.data.noise or 0.0) if noise is None else noise
     wavelength = wavelengths(found, scene)
-    result = (synthesise_angles if ellipsometric else synthesise)(scene, wavelength, noise, seed)
+    result = (synthesise_angles if ellipsometric else synthesise)(scene, wavelength, noise, seed, tolerance)
     write_text(out, _csv(found, scene, result, noise, seed))
     say(f"{out}: {len(wavelength)} points, {wavelength[0]:g} to {wavelength[-1]:g} nm", str(result.plan))
     return 0

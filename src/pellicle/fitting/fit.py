@@ -12,7 +12,7 @@ import jax
 from pellicle.errors import UsageError
 from pellicle.fitting import backface, parts, summary
 from pellicle.fitting.measured import Measured, measured, unscaled
-from pellicle.fitting.problem import make
+from pellicle.fitting.problem import Problem, beyond, make
 from pellicle.fitting.result import Fit
 from pellicle.fitting.search import Progress, quiet, search
 from pellicle.fitting.status import judge, verdict
@@ -23,7 +23,11 @@ from pellicle.scene import Scene, free_leaves
 
 
 def fit(
-    data: Spectrum | Sequence[Spectrum], scene: Scene | Sequence[Scene], *, progress: Progress = quiet
+    data: Spectrum | Sequence[Spectrum],
+    scene: Scene | Sequence[Scene],
+    *,
+    tolerance: float = 0.0,
+    progress: Progress = quiet,
 ) -> Fit:
     """Fit the free parameters of `scene` to a spectrum, in float64 whatever the caller's setting.
 
@@ -32,6 +36,9 @@ def fit(
     light and the instrument is each spectrum's own (`instrument.scale.R`). `scene` may then be a list
     too, of one scene for each, that differ in light, instrument and back face only; of a single scene,
     Ψ and Δ leave out scale and offset.
+
+    With a `tolerance`, in the unit of each signal, effects that change less are left out (`pellicle.plan`);
+    where the best fit turns out to lie beyond it, all of them are put back and the fit is done again.
 
     `progress` is called with a stage's name, how much is done and how much there is. Returns a
     `Fit`: best parameters with errors, rivals, a status and what was simulated.
@@ -46,7 +53,8 @@ def fit(
         check_free(each)
     names = [""] if isinstance(data, Spectrum) else labels(spectra)
     with jax.enable_x64(True):
-        return _fit(spectra, [measured(*each) for each in zip(spectra, scenes, names, strict=True)], progress)
+        found = [measured(*each) for each in zip(spectra, scenes, names, strict=True)]
+        return _fit(spectra, found, tolerance, progress)
 
 
 def check_free(scene: Scene) -> None:
@@ -89,14 +97,26 @@ def _scenes(spectra: list[Spectrum], scene: Scene | Sequence[Scene]) -> list[Sce
     return scenes
 
 
-def _fit(data: list[Spectrum], spectra: list[Measured], progress: Progress) -> Fit:
+def _fit(data: list[Spectrum], spectra: list[Measured], tolerance: float, progress: Progress) -> Fit:
     began = time.perf_counter()
-    problem = make(*spectra)
-    weighed = weigh(problem, search(problem, progress))
-    return _report(data, spectra, weighed, summary.profile(problem, weighed), began)
+    weighed, warnings = _weighed(make(*spectra, tolerance=tolerance), progress), []
+    off = max(beyond(view, weighed.minima.units[0]) for view in weighed.problem.views)
+    if off > tolerance:
+        warnings = [
+            f"at the best fit what was left out changes the signal by {off:.2g}, more than the tolerance "
+            f"{tolerance:g}: fitted again with every effect"
+        ]
+        weighed = _weighed(make(*spectra), progress)
+    return _report(data, spectra, weighed, warnings, began)
 
 
-def _report(data: list[Spectrum], spectra: list[Measured], weighed: Weighed, profile, began: float) -> Fit:
+def _weighed(problem: Problem, progress: Progress) -> Weighed:
+    return weigh(problem, search(problem, progress))
+
+
+def _report(
+    data: list[Spectrum], spectra: list[Measured], weighed: Weighed, warnings: list[str], began: float
+) -> Fit:
     problem = weighed.problem
     found = errors(problem, [m.at for m in weighed.met], [m.variance for m in weighed.met])
     parameters = summary.estimates(spectra, weighed, found, profile)
@@ -123,7 +143,7 @@ def _report(data: list[Spectrum], spectra: list[Measured], weighed: Weighed, pro
         effective_points=sum(part.effective_points for part in each),
         correlation_names=found.names,
         correlation=found.correlation,
-        warnings=summary.warnings(spectra, weighed, found),
-        profile=profile,
+        warnings=(*warnings, *summary.warnings(spectra, weighed, found)),
+        profile=summary.profile(problem, weighed),
         seconds=time.perf_counter() - began,
     )

@@ -7,13 +7,19 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
+from pellicle.differences import largest_difference, signals
 from pellicle.effects.box import largest_index
 from pellicle.fitting.measured import Measured, Noise
 from pellicle.fitting.nuisance import Data
 from pellicle.fitting.parameters import Parameter, anonymous, bounds, shared
 from pellicle.model import sampled
-from pellicle.planning import Plan, exact
+from pellicle.planning import Plan
 from pellicle.scene import Scene, coherent_layers, with_wavelength
+from pellicle.thrift import plan, reference
+
+_STAY = ("precision", "dispersion")
+"""What a tolerance leaves alone: a fit stops by differences below single precision, and its media are
+evaluated once in any case."""
 
 _ROUND = 64
 """Spectra are padded to a multiple of this, so that files of nearly one length share a program."""
@@ -94,8 +100,8 @@ class Problem(NamedTuple):
         return looks, tuple(v.scene for v in self.views), tuple(v.data for v in self.views), self.box
 
 
-def make(*spectra: Measured) -> Problem:
-    """The problem of explaining these spectra of one sample.
+def make(*spectra: Measured, tolerance: float = 0.0) -> Problem:
+    """The problem of explaining these spectra of one sample, with models that are off by up to `tolerance`.
 
     Raises ValueError where a material has no data at a wavelength.
     """
@@ -113,17 +119,17 @@ def make(*spectra: Measured) -> Problem:
         first = np.array([i not in told for i in takes], dtype=float)
         told |= set(takes)
         own = Box(*(column[list(takes)] for column in box))
-        views.append(_view(spectrum, own._replace(prior_weight=own.prior_weight * first), takes))
+        views.append(_view(spectrum, own._replace(prior_weight=own.prior_weight * first), takes, tolerance))
     return Problem(tuple(views), box, free)
 
 
-def _view(spectrum: Measured, box: Box, takes: tuple[int, ...]) -> View:
+def _view(spectrum: Measured, box: Box, takes: tuple[int, ...], tolerance: float) -> View:
     scene, wavelength, values = spectrum.scene, spectrum.wavelength, spectrum.values
     points, channels = len(wavelength), values.size // len(wavelength)
     extra = -points % _ROUND
     wavelength, values = _pad(wavelength, extra), _pad(values, extra)
     scene = with_wavelength(scene, wavelength, _pad_angle(scene.light.angle, extra))
-    chosen = exact(scene)
+    chosen = plan(scene, tolerance, _STAY)
     span = max(wavelength.max() - wavelength.min(), 1e-9)  # one wavelength at many angles has none
     weight = np.concatenate([1 / np.broadcast_to(spectrum.sigma, points), np.zeros(extra)])
     data = Data(
@@ -146,6 +152,15 @@ def _view(spectrum: Measured, box: Box, takes: tuple[int, ...]) -> View:
         points * channels,
         steepest,
     )
+
+
+def beyond(view: View, unit: np.ndarray) -> float:
+    """How far the view's plan is off at one point of the unit cube, in the unit of its signal."""
+    if not view.plan.tolerance:
+        return 0.0
+    at = np.asarray(view.box.values(unit[list(view.takes)]))[None]
+    planned, whole = (signals(p, view.scene, at) for p in (view.plan, reference(view.scene)))
+    return largest_difference(planned, whole, view.plan.signal)
 
 
 def _pad(x: np.ndarray, extra: int) -> np.ndarray:
