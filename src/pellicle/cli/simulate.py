@@ -28,7 +28,7 @@ def simulate(
     ] = None,
     seed: Annotated[int, Parameter(help="Seed of the noise.")] = 0,
     tolerance: Annotated[
-        float, Parameter(help="Leave out effects that change the signal by less than this; 0 leaves none out.")
+        float, Parameter(help="Leave out effects that change the signal by less than this; 0: none.")
     ] = 0.0,
 ) -> int:
     """Write the spectrum that a recipe's scene would give.

@@ -97,7 +97,9 @@ def _absorption(scene: Scene, _: LeftOut) -> Scene:
 
 def _lossless(material: AbstractDispersion) -> AbstractDispersion:
     """Without a free parameter: one may be the extinction, or be lost with it."""
-    return material if free_leaves(material) else RealPart(material)
+    if free_leaves(material):
+        return material
+    return Constant(material.n) if isinstance(material, Constant) else RealPart(material)
 
 
 @final

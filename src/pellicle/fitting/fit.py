@@ -118,6 +118,7 @@ def _report(
     data: list[Spectrum], spectra: list[Measured], weighed: Weighed, warnings: list[str], began: float
 ) -> Fit:
     problem = weighed.problem
+    profile = summary.profile(problem, weighed)
     found = errors(problem, [m.at for m in weighed.met], [m.variance for m in weighed.met])
     parameters = summary.estimates(spectra, weighed, found, profile)
     others = summary.rivals(weighed)
@@ -144,6 +145,6 @@ def _report(
         correlation_names=found.names,
         correlation=found.correlation,
         warnings=(*warnings, *summary.warnings(spectra, weighed, found)),
-        profile=summary.profile(problem, weighed),
+        profile=profile,
         seconds=time.perf_counter() - began,
     )

@@ -147,7 +147,7 @@ def warnings(spectra: Sequence[Measured], weighed: Weighed, found: Errors) -> tu
 def _of_view(scene: Scene, view: View, length: float) -> list[str]:
     told = []
     orders = view.plan.row("orders")
-    if orders.on and orders.error_bound > 1e-4:
+    if orders.on and orders.error_bound > max(1e-4, view.plan.tolerance):
         told.append(f"{orders.count} orders leave an error of up to {orders.error_bound:.1g}: |q| is near 1")
     if length >= 10:
         told.append(
