@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 EXAMPLE := measurements/recipes/hematite_on_glass_140nm.toml
 
-.PHONY: fit fits test lint bench peers properties measurements slow clean figures
+.PHONY: fit fits test lint bench peers properties tolerance measurements slow clean figures
 
 # Debian splits venv's pip into a package of its own: without it, the system's pip does
 $(VENV)/bin/python:
@@ -50,6 +50,10 @@ bench: $(VENV)/.dev
 # several GB: the other packages, in an environment of their own; writes the table of README.md
 peers: $(VENV)/.dev
 	$(BIN)/python benchmarks/peers --write-readme
+
+# a thousand random scenes: does what a plan leaves out stay within the bound that it states?
+tolerance: $(VENV)/.dev
+	$(BIN)/python benchmarks/tolerance.py
 
 properties: $(VENV)/.dev
 	$(BIN)/python benchmarks/properties.py

@@ -148,7 +148,7 @@ def test_of_one_scene_ellipsometry_leaves_out_the_scale(monkeypatch, spectra, to
     """And alone it is refused: a scale was asked for that it cannot have."""
     asked = []
 
-    def measured_only(data, measured, progress):
+    def measured_only(data, measured, tolerance, progress):
         asked.append(measured)
         return together
 

@@ -9,6 +9,7 @@ from cyclopts import App
 from pellicle.cli.cost import cost
 from pellicle.cli.fit import fit
 from pellicle.cli.materials import materials
+from pellicle.cli.plan import plan
 from pellicle.cli.simulate import simulate
 from pellicle.errors import DataError, UsageError
 
@@ -25,6 +26,7 @@ app = App(
 )
 app.command(fit)
 app.command(simulate)
+app.command(plan)
 app.command(cost)
 app.command(materials)
 

@@ -5,17 +5,15 @@ from __future__ import annotations
 import json as json_module
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from pellicle.cli.session import Progress, say, start
-from pellicle.errors import DataError, UsageError
+from pellicle.errors import UsageError
 
 if TYPE_CHECKING:
-    import numpy as np
-
-    from pellicle.io.recipe import Recipe
+    pass
 
 
 def cost(
@@ -38,6 +36,7 @@ def cost(
 
     Example: pellicle cost film.toml --tolerance 0.001 --out cost
     """
+    from pellicle.cli.seen import seen
     from pellicle.io.atomic import new_folder
     from pellicle.io.recipe import read_recipe
 
@@ -46,7 +45,7 @@ def cost(
     if datasets < 0:
         raise UsageError(f"--datasets must not be negative, got {datasets}")
     found = read_recipe(recipe)
-    scene, wavelength = _seen(found)
+    scene, wavelength = seen(found)
     if out is not None and Path(out).exists():
         new_folder(out)  # refuses a stranger's folder before the work, not after
     start(keep=False)
@@ -72,39 +71,3 @@ def cost(
     if out is not None:
         say(f"{write_cost(out, result, found.path)}: report, figure and tables written")
     return 130 if result.interrupted else 0
-
-
-def _seen(recipe: Recipe) -> tuple[Any, np.ndarray]:
-    """The scene, looked at as the recipe says, and its wavelengths: the recipe's, or its first file's."""
-    from pellicle.cli.simulate import wavelengths
-
-    data = recipe.tables.data
-    if recipe.files and data.wavelengths is None:
-        scene, wavelength = _as_measured(recipe)
-    else:
-        scene = recipe.scene()
-        wavelength = wavelengths(recipe, scene)
-    if scene.light.signal == "psi-delta" and scene.light.angle == 0.0:
-        raise DataError(f"{recipe.path}: ellipsometry needs an angle of incidence: give [data] angle = 70")
-    return scene, wavelength
-
-
-def _as_measured(recipe: Recipe) -> tuple[Any, np.ndarray]:
-    """The scene seen as the recipe's first file was, at the first of its angles."""
-    import equinox as eqx
-    import numpy as np
-
-    from pellicle.cli.options import ReadWords, light, merged, read
-    from pellicle.scene import Drift, Light
-
-    path = recipe.files[0]
-    own = recipe if recipe.tables.data.files else recipe.each[0]  # the first [[data.file]] has its own words
-    scene, words = own.scene(), merged(ReadWords(), own)
-    spectrum = read(path, words, scaled=isinstance(scene.instrument.scale, Drift))
-    say(f"wavelengths: those of {path} (the recipe gives none)")
-    stated = light(words)
-    angle = stated.angle if spectrum.angle is None else float(spectrum.angle[0])
-    same = slice(None) if spectrum.angle is None else spectrum.angle == spectrum.angle[0]
-    polarised = spectrum.polarisation if spectrum.polarisation != "unpolarised" else stated.polarisation
-    seen = Light(None, angle, spectrum.signal, polarised)
-    return eqx.tree_at(lambda s: s.light, scene, seen), np.sort(spectrum.wavelength[same])

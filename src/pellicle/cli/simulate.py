@@ -11,12 +11,7 @@ from pellicle.cli.session import not_negative, say, start
 from pellicle.errors import DataError
 
 if TYPE_CHECKING:
-    import numpy as np
-
     from pellicle.io.recipe import Recipe
-
-MOST = 1_000_000
-"""Most wavelengths that are simulated at once: more is a slip of the step."""
 
 
 def simulate(
@@ -35,6 +30,7 @@ def simulate(
 
     Example: pellicle simulate film.toml --out film.csv --noise 0.002 --seed 1
     """
+    from pellicle.cli.seen import wavelengths
     from pellicle.io.atomic import write_text
     from pellicle.io.recipe import read_recipe
 
@@ -54,35 +50,6 @@ def simulate(
     write_text(out, _csv(found, scene, result, noise, seed))
     say(f"{out}: {len(wavelength)} points, {wavelength[0]:g} to {wavelength[-1]:g} nm", str(result.plan))
     return 0
-
-
-def wavelengths(recipe: Recipe, scene: Any) -> np.ndarray:
-    """The recipe's wavelengths, or the visible ones that every material has data for."""
-    import numpy as np
-
-    from pellicle.synthetic import VISIBLE, default_wavelengths
-
-    given = recipe.tables.data.wavelengths
-    if given is None:
-        grid = default_wavelengths(scene)
-        if len(grid) < 2:
-            raise DataError(
-                f"{recipe.path}: the materials share no wavelengths in {VISIBLE[0]:g} to {VISIBLE[1]:g} nm:"
-                " give [data] wavelengths = { start, stop, step }"
-            )
-        say(f"wavelengths: {grid[0]:g} to {grid[-1]:g} nm every {VISIBLE[2]:g} nm (the recipe gives none)")
-        return grid
-    if isinstance(given, list):
-        grid = np.array(given)
-    elif (given.stop - given.start) / given.step > MOST:
-        raise DataError(
-            f"{recipe.path}: [data] wavelengths are more than {MOST:,} points: give a larger step"
-        )
-    else:
-        grid = np.arange(given.start, given.stop + given.step / 2, given.step)
-    if len(grid) < 2 or not np.all(np.diff(grid) > 0) or grid[0] <= 0:
-        raise DataError(f"{recipe.path}: [data] wavelengths must be at least two rising positive numbers")
-    return grid
 
 
 def _csv(recipe: Recipe, scene: Any, result: Any, noise: float, seed: int) -> str:

@@ -1,0 +1,52 @@
+"""`pellicle plan`: a table and a record that say the same, and one sentence for what cannot be asked."""
+
+import pytest
+
+RECIPE = """
+[data]
+signal = "R"
+angle = 0.2
+wavelengths = { start = 400, stop = 790, step = 65 }
+
+[scene]
+substrate = "3.9+0.02j"
+
+[[scene.layer]]
+material = "1.46+1e-7j"
+thickness = { lower = 10, upper = 800 }
+"""
+
+
+@pytest.fixture
+def recipe(tmp_path):
+    path = tmp_path / "film.toml"
+    path.write_text(RECIPE)
+    return path
+
+
+def test_table_and_record_say_the_same(pellicle, recipe):
+    (record,) = pellicle("plan", recipe, "--tolerance", 1e-3, "--json").objects
+    assert (record["schema"], record["tolerance"]) == ("pellicle.plan/1", 1e-3)
+    rows = {row["effect"]: row for row in record["effects"]}
+    assert sum(row["error_bound"] for row in rows.values()) == pytest.approx(record["error_bound"])
+    assert 0 < record["error_bound"] <= 1e-3
+    for gone in ("absorption", "oblique", "precision"):
+        assert not rows[gone]["on"]
+        assert "left out" in rows[gone]["why"]
+        assert rows[gone]["cost"] > 0
+        assert 0 < rows[gone]["error_without"] < 1e-3
+    assert (rows["back-face"]["cost"], rows["back-face"]["error_without"]) == (0.0, None)
+    table = pellicle("plan", recipe, "--tolerance", 1e-3).out.splitlines()
+    assert [line.split()[0] for line in table[1 : 1 + len(rows)]] == list(rows)
+    assert "the tolerance is 0.001" in table[len(rows) + 2]
+
+
+def test_what_cannot_be_asked(pellicle, recipe):
+    for tolerance in (0, -1e-3, "nan"):
+        ran = pellicle("plan", recipe, "--tolerance", tolerance)
+        assert (ran.code, ran.out) == (2, "")
+        assert "--tolerance must be above zero" in ran.err
+        assert len(ran.err.strip().splitlines()) == 1
+    ran = pellicle("simulate", recipe, "--out", recipe.with_suffix(".csv"), "--tolerance", -1)
+    assert ran.code == 2
+    assert "--tolerance must not be negative" in ran.err
