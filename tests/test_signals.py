@@ -5,6 +5,8 @@ from __future__ import annotations
 import doctest
 import subprocess
 import sys
+from functools import partial
+from itertools import pairwise
 
 import jax
 import jax.numpy as jnp
@@ -13,6 +15,8 @@ import pytest
 
 import pellicle as pl
 from pellicle import signals
+from pellicle.materials import CLEAR, Material
+from pellicle.optics.dispersion import Table
 
 FUNCTIONS = {"R": pl.reflectance, "T": pl.transmittance}
 BOTH = pytest.mark.parametrize("function", FUNCTIONS.values(), ids=FUNCTIONS)
@@ -123,6 +127,47 @@ def test_total_reflection_needs_no_complex_index(function):
 def test_an_absorbing_ambient_is_refused(function, ambient):
     with pytest.raises(ValueError, match="the ambient must not absorb: give it a real index"):
         call(function, ambient=ambient)
+
+
+def test_an_ambient_of_little_absorption_is_its_real_part():
+    """What that leaves out, by the exact film in an ambient of k = CLEAR: R, N, C and S change by less."""
+    wavelength, angle = np.array([450.0, 600.0, 800.0]), np.deg2rad(65.0)
+    water = Material(
+        Table(np.array([400.0, 900.0]), np.array([1.34, 1.33]), np.array([0.9, 0.9]) * CLEAR),
+        "water",
+        "water.csv",
+        "",
+        (400.0, 900.0),
+        True,
+    )
+    n0, n1, n2 = np.interp(wavelength, [400, 900], [1.34, 1.33]), 1.46, 3.9 + 0.02j
+    found = pl.reflectance(wavelength, 120.0, n1, n2, ambient=water, angle=65.0, polarisation="p")
+    psi, delta = pl.ellipsometry(wavelength, 120.0, n1, n2, ambient=water, angle=65.0)
+    s, p = (_film(n0 + 0.9j * CLEAR, n1, n2, n0 * np.sin(angle), 120.0, wavelength, x) for x in "sp")
+    np.testing.assert_allclose(found, abs(p) ** 2, atol=2 * CLEAR, rtol=0)
+    assert np.max(np.abs(found - abs(p) ** 2)) > 1e-9  # it is left out
+    ratio = np.tan(np.deg2rad(psi)) * np.exp(1j * np.deg2rad(delta))
+    np.testing.assert_allclose(ratio, np.conj(-p / s), atol=5 * CLEAR, rtol=0)
+
+
+def _film(n0, n1, n2, transverse, thickness, wavelength, polarisation):
+    """r of one layer by Airy's formula, of p as the ratio of magnetic fields."""
+    roots = [np.sqrt((n + 0j) ** 2 - transverse**2) for n in (n0, n1, n2)]
+    media = zip(roots, (n0, n1, n2), strict=True)
+    terms = [q if polarisation == "s" else (n + 0j) ** 2 / q for q, n in media]
+    first, second = ((a - b) / (a + b) for a, b in pairwise(terms))
+    turn = np.exp(4j * np.pi / wavelength * roots[1] * thickness)
+    return (first + second * turn) / (1 + first * second * turn)
+
+
+@pytest.mark.parametrize("function", [pl.reflectance, pl.ellipsometry])
+def test_water_as_ambient_where_it_is_clear(function):
+    call = partial(function, thickness=100.0, layer="SiO2", substrate="Si", angle=60.0)
+    seen = jax.jit(lambda nm: call(nm, ambient="H2O"))(np.array([550.0, 1450.0]))
+    for one, other in zip(jax.tree.leaves(seen), jax.tree.leaves(call(550.0, ambient=1.333)), strict=True):
+        np.testing.assert_allclose(one, [other, np.nan], rtol=1e-4)
+    with pytest.raises(ValueError, match=r"must not absorb: H2O has k = 0\.00012 at 1450 nm"):
+        call(np.array([550.0, 1450.0]), ambient="H2O")
 
 
 @BOTH

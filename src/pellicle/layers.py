@@ -9,7 +9,7 @@ import jax
 import numpy as np
 
 from pellicle.free import Free, insert, is_free, start_values
-from pellicle.materials import lookup
+from pellicle.materials import Material, lookup
 from pellicle.optics.dispersion import AbstractDispersion, Constant
 from pellicle.optics.mixtures import MIXTURES
 from pellicle.optics.number import is_real
@@ -49,6 +49,12 @@ def absorbs(dispersion: AbstractDispersion) -> bool:
         return False
     numbers = insert(dispersion, start_values(dispersion))
     return not is_real(jax.eval_shape(numbers.index, jax.ShapeDtypeStruct((1,), np.float32)))
+
+
+def surroundings(what: Any) -> AbstractDispersion:
+    """A medium as an ambient: of a material with a little absorption (`CLEAR`) only the real part."""
+    found = medium(what)
+    return found.as_ambient() if isinstance(found, Material) and absorbs(found) else found
 
 
 def check_not_negative(name: str, number: Any, unit: str) -> None:
@@ -117,6 +123,13 @@ def share(thickness: Any, parts: int) -> Any:
     return thickness / parts
 
 
+def _check_thick(plate_mm: Any) -> None:
+    """ValueError where a plate's thickness, or the lower bound of a free one, is no thickness."""
+    check_not_negative("plate_mm", plate_mm, "mm")
+    if isinstance(plate_mm, int | float) and plate_mm == 0:
+        raise ValueError("plate_mm must be above 0 mm: what has no thickness is no plate")
+
+
 @final
 class Plate(eqx.Module):
     """A thick, incoherent layer: light between its faces adds as intensities. `plate_mm` in mm."""
@@ -126,7 +139,7 @@ class Plate(eqx.Module):
     name: str | None = eqx.field(static=True, default=None)
 
     def __check_init__(self):
-        check_not_negative("plate_mm", self.plate_mm, "mm")
+        _check_thick(self.plate_mm)
 
 
 @final
@@ -143,5 +156,5 @@ class Substrate(eqx.Module):
     roughness: Quantity | None = eqx.field(converter=none_if_zero, default=None)
 
     def __check_init__(self):
-        check_not_negative("plate_mm", self.plate_mm, "mm")
+        _check_thick(self.plate_mm)
         check_not_negative("roughness", self.roughness, "nm")

@@ -28,6 +28,7 @@ from pellicle.layers import Plate as Plate
 from pellicle.layers import Substrate as Substrate
 from pellicle.layers import absorbs as absorbs
 from pellicle.layers import medium as medium
+from pellicle.layers import surroundings as surroundings
 from pellicle.optics.dispersion import AbstractDispersion
 
 SIGNALS = ("R", "T", "psi-delta")
@@ -87,7 +88,7 @@ class Scene(eqx.Module):
 
     layers: tuple[Layer | Interface | Plate, ...] = eqx.field(converter=_layers)
     substrate: Substrate = eqx.field(converter=lambda s: s if isinstance(s, Substrate) else Substrate(s))
-    ambient: AbstractDispersion = eqx.field(converter=medium, default=1.0)
+    ambient: AbstractDispersion = eqx.field(converter=surroundings, default=1.0)
     light: Light = Light()
     instrument: Instrument = Instrument()
 

@@ -19,7 +19,7 @@ from pellicle.optics import film, interface, stack
 from pellicle.optics.dispersion import AbstractDispersion
 from pellicle.optics.ellipsometry import angles, normalised, stokes
 from pellicle.optics.number import Number, is_real, sincos_poly, to_pair
-from pellicle.scene import check_polarisation, medium
+from pellicle.scene import check_polarisation, medium, surroundings
 
 Medium = Any
 """A number (n + ik), an array of them, a material, or a material's name."""
@@ -106,7 +106,9 @@ def _waves(wavelength, thickness, layer, substrate, ambient, angle, polarisation
     _warn_of_lost_precision(wavelength, thickness, layer, substrate, ambient, angle)
     wavelength = _floating(wavelength)
     normal = isinstance(angle, int | float) and angle == 0
-    substrate, ambient = _index(substrate, wavelength), _index(ambient, wavelength)
+    named = isinstance(ambient, str | AbstractDispersion)
+    ambient = _index(surroundings(ambient) if named else ambient, wavelength)
+    substrate = _index(substrate, wavelength)
     if not is_real(ambient):
         raise ValueError("the ambient must not absorb: give it a real index")
     if not normal:

@@ -252,6 +252,22 @@ def test_a_missing_recipe(refused, tmp_path):
     refused("fit", "--recipe", tmp_path / "gone.toml", code=3, said=("gone.toml",))
 
 
+def test_a_recipe_with_nothing_free(refused, tmp_path, spectrum_file):
+    path = tmp_path / "film.toml"
+    path.write_text("[scene]\nsubstrate = 'Si'\n[[scene.layer]]\nmaterial = 'SiO2'\nthickness = 300\n")
+    refused("fit", spectrum_file(), "--recipe", path, code=3, said=("film.toml: nothing is free to fit",))
+
+
+def test_a_plate_without_thickness(refused, tmp_path, spectrum_file, scene):
+    path, file = tmp_path / "film.toml", spectrum_file()
+    path.write_text(
+        "[scene]\nsubstrate = { material = 'SiO2', back = 'air', plate_mm = 0 }\n[[scene.layer]]\n"
+        "material = 1.46\nthickness = { lower = 1, upper = 9 }\n"
+    )
+    refused("fit", file, "--recipe", path, code=3, said=("film.toml: plate_mm must be above 0 mm",))
+    refused("fit", file, *scene, "--back", "air", "--plate-mm", 0, code=2, said=("--plate-mm", "above zero"))
+
+
 def test_unknown_flags_and_commands_are_2(pellicle, spectrum_file, scene):
     for arguments in (
         ("fit", spectrum_file(), *scene, "--tickness", "3"),

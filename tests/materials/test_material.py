@@ -5,8 +5,10 @@ import math
 import numpy as np
 import pytest
 
+from pellicle.errors import DataError
 from pellicle.materials import Material, lookup, materials_in
 from pellicle.optics.dispersion import Constant, Shifted
+from pellicle.optics.number import is_real
 
 
 def test_inside_the_range_nothing_happens():
@@ -72,3 +74,17 @@ def test_caution_comes_first():
     material = Material(Constant(1.5), "X", "a/X/b", "", (0.0, math.inf), False, caution="Look out.")
     assert material.warnings()[0] == "Look out."
     assert "no data for k" in material.warnings()[1]
+
+
+def test_an_ambient_leaves_out_a_small_extinction():
+    """Where it is small nowhere, or not known, nothing is left out."""
+    water = lookup("H2O")
+    ambient = water.as_ambient()
+    assert is_real(ambient.index(np.array([550.0])))
+    assert ambient.warnings() == ["H2O (main/H2O/Hale) is the ambient: its k, at most 1e-05, is left out."]
+    assert [m.clear for m in materials_in((water, ambient))] == [False, True]
+    ambient.check_range([300.0, 900.0])
+    with pytest.raises(DataError, match=r"H2O has k = 0\.00012 at 1450 nm, and up to 1e-05 is left out"):
+        ambient.check_range([900.0, 1450.0])
+    for name in ("Au", "SiO2"):
+        assert lookup(name).as_ambient() == lookup(name)

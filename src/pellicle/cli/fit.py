@@ -10,7 +10,7 @@ from cyclopts import Group, Parameter
 from pellicle.cli.batch import Batch, Look
 from pellicle.cli.options import ReadWords, SceneWords, light, merged, scene_from_words
 from pellicle.cli.session import not_negative, say, start
-from pellicle.errors import UsageError
+from pellicle.errors import DataError, UsageError
 
 if TYPE_CHECKING:
     from pellicle.io.recipe import Recipe
@@ -107,8 +107,13 @@ def fit(
     looks, together = _what(list(data), recipe, scene_words, reading)
     from pellicle.fitting.fit import check_free
 
-    for look in looks:
-        check_free(look.scene)
+    try:
+        for look in looks:
+            check_free(look.scene)
+    except UsageError as error:
+        if recipe is None:
+            raise
+        raise DataError(f"{recipe}: {error}") from None
     start()
     joint = joint or together
     return Batch(out, json, joint, tolerance)([looks] if joint else [[look] for look in looks])

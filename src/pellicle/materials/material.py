@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, final
 
 import equinox as eqx
@@ -14,6 +15,15 @@ from pellicle.materials.index import covering
 from pellicle.optics.dispersion import AbstractDispersion
 from pellicle.optics.number import Pair, imag, is_real, real
 
+CLEAR = 1e-5
+"""Largest k of an ambient that is taken as transparent. In the coefficients of the sample's faces k changes
+R, T and N, C, S by about k itself; what the path through the ambient absorbs is the same with a reference
+in the sample's place, or in both polarisations, so calibration or the ratio has removed it."""
+
+
+_SAMPLES = 200
+"""Wavelengths at which an ambient's k is looked at."""
+
 
 @final
 class Material(AbstractDispersion):
@@ -22,7 +32,8 @@ class Material(AbstractDispersion):
     `name` is what was asked for, `page` the source (shelf/book/page, or a file), `citation` its
     reference in plain text, `wavelength_range` (nm) where both n and k are known, `has_extinction`
     whether the source says anything about k (a k that is zero throughout counts), `note` why this
-    page or what the sample was, `caution` a sentence that must accompany every use.
+    page or what the sample was, `caution` a sentence that must accompany every use, `clear` whether a
+    k up to `CLEAR` is left out.
     """
 
     dispersion: AbstractDispersion
@@ -33,12 +44,18 @@ class Material(AbstractDispersion):
     has_extinction: bool = eqx.field(static=True)
     note: str = eqx.field(static=True, default="")
     caution: str = eqx.field(static=True, default="")
+    clear: bool = eqx.field(static=True, default=False)
 
     def index(self, wavelength):
-        """Index at `wavelength` (nm): real where the source has no absorption; NaN outside the range."""
+        """Index at `wavelength` (nm): real where the source has no absorption; NaN outside the range.
+
+        Where `clear`, it is real, and NaN beyond `CLEAR`.
+        """
         # a Python number or whole ones would let a table fall back to float32
         wavelength = jnp.asarray(wavelength, dtype=jnp.result_type(float, wavelength))
         value = self.dispersion.index(wavelength)
+        if self.clear:
+            value = jnp.where(imag(value) <= CLEAR, real(value), jnp.nan)
         low, high = self.wavelength_range
         if low <= 0 and high == np.inf:
             return value
@@ -53,6 +70,7 @@ class Material(AbstractDispersion):
         low, high = self.wavelength_range
         outside = at[~((at >= low) & (at <= high))]
         if not outside.size:
+            self._check_clear(at)
             return
         first, last = float(outside.min()), float(outside.max())
         which = f"{first:g} nm" if not last > first else f"{first:g} to {last:g} nm"
@@ -69,9 +87,33 @@ class Material(AbstractDispersion):
             f"{' or '.join(remedies)}"
         )
 
+    def _check_clear(self, at: np.ndarray) -> None:
+        k = self._extinction(at) if self.clear else np.zeros(1)
+        if k.max() > CLEAR:
+            raise DataError(
+                f"the ambient must not absorb: {self.name} has k = {k.max():.2g} at {at[k.argmax()]:g} nm, "
+                f"and up to {CLEAR:g} is left out: cut the data with --range, or give it a real index"
+            )
+
+    def _extinction(self, at: np.ndarray) -> np.ndarray:
+        with jax.ensure_compile_time_eval():  # a table is no tracer, wherever it is asked
+            return np.asarray(imag(self.dispersion.index(at)))
+
+    def as_ambient(self) -> Material:
+        """Without its k, if that is small somewhere; elsewhere `check_range` refuses it."""
+        low, high = self.wavelength_range
+        bounded = self.has_extinction and low > 0 and high < np.inf
+        if bounded and self._extinction(np.geomspace(low, high, _SAMPLES)).min() <= CLEAR:
+            return replace(self, clear=True)
+        return self
+
     def warnings(self) -> list[str]:
         """Sentences that a result made with this material must carry."""
         sentences = [self.caution] if self.caution else []
+        if self.clear:
+            sentences.append(
+                f"{self.name} ({self.page}) is the ambient: its k, at most {CLEAR:g}, is left out."
+            )
         if not self.has_extinction:
             sentences.append(
                 f"{self.name} ({self.page}) has no data for k: it is taken as transparent, "
@@ -83,8 +125,8 @@ class Material(AbstractDispersion):
 def materials_in(tree: Any) -> list[Material]:
     """Every Material inside a pytree (a scene, a layer, a mixture), each once."""
     leaves = jax.tree.leaves(tree, is_leaf=lambda node: isinstance(node, Material))
-    found: dict[tuple[str, str], Material] = {}
+    found: dict[tuple[str, str, bool], Material] = {}
     for leaf in leaves:
         if isinstance(leaf, Material):
-            found.setdefault((leaf.name, leaf.page), leaf)
+            found.setdefault((leaf.name, leaf.page, leaf.clear), leaf)
     return list(found.values())
