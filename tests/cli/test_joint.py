@@ -58,7 +58,7 @@ def asked(monkeypatch):
     """What would be fitted: (spectra, scenes) of each call, in place of the fits themselves."""
     calls = []
 
-    def fit(spectra, scenes, progress):
+    def fit(spectra, scenes, **_):
         calls.append((spectra, scenes))
         raise DataError("not fitted here")
 
