@@ -65,10 +65,13 @@ class BrdfSamples:
         kept = spread(len(self), samples)
         if kept.size == len(self):
             return self
-        names = [name for name in (*DIRECTIONS, *_TABLES, "lines") if getattr(self, name) is not None]
         note = f"{kept.size} of {len(self)} samples kept, spread over the file"
-        parts = {name: getattr(self, name)[kept] for name in names}
-        return dataclasses.replace(self, **parts, notes=(*self.notes, note))
+        return dataclasses.replace(self.at(kept), notes=(*self.notes, note))
+
+    def at(self, rows: np.ndarray) -> BrdfSamples:
+        """The samples of these rows, in their order."""
+        names = [name for name in (*DIRECTIONS, *_TABLES, "lines") if getattr(self, name) is not None]
+        return dataclasses.replace(self, **{name: getattr(self, name)[rows] for name in names})
 
 
 def sigma_names(channels: tuple[str, ...]) -> tuple[str, ...]:

@@ -1,0 +1,1 @@
+"""Fits of layered surfaces to samples of a BRDF: `fit` leads, and doubts before it believes."""

@@ -1,0 +1,84 @@
+"""Whether the samples call for a layer: three doubts, and the sentences that say so."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from pellicle.brdf_fitting.result import Baseline
+from pellicle.fitting.result import Estimate, Rival
+from pellicle.fitting.status import RIVAL, describe
+
+GAIN = 0.10
+"""The held-out error must fall by more than this share against every baseline."""
+FLATTEST = 2.0
+"""A lobe of a smaller exponent is a second diffuse part."""
+ROUGHEST = 0.7
+"""The same for microfacets: α = √(2/(e + 2)) has as wide a lobe as an exponent e."""
+
+
+class Evidence(NamedTuple):
+    """Whether there is a layer, and in words why, or why not."""
+
+    layered: bool
+    verdict: str
+
+
+def weigh(
+    parameters: Mapping[str, Estimate],
+    rivals: tuple[Rival, ...],
+    held_out: float,
+    baselines: tuple[Baseline, ...],
+) -> Evidence:
+    """The rule: better than both baselines by `GAIN`, one thickness, and parameters that mean something."""
+    doubts = [*_no_better(held_out, baselines), *_other_thickness(parameters, rivals), *_empty(parameters)]
+    if doubts:
+        return Evidence(False, f"No evidence of a layer: {'; '.join(doubts)}.")
+    depth = parameters.get("thickness")
+    gains = " and ".join(f"{100 * (1 - held_out / b.held_out):.0f} % below {b.name}" for b in baselines)
+    lead = f"{describe(depth)}. The" if depth is not None else "the"
+    return Evidence(True, f"The samples call for a layer: {lead} held-out error is {gains}.")
+
+
+def _no_better(held_out: float, baselines: tuple[Baseline, ...]) -> list[str]:
+    found = []
+    for b in baselines:
+        if not held_out < (1 - GAIN) * b.held_out:
+            ratio = held_out / b.held_out if b.held_out > 0 else math.inf
+            how = f"{100 * (1 - ratio):.0f} % below" if ratio < 0.995 else f"{ratio:.2f} times that of"
+            found.append(f"its held-out error is {how} {b.name}, and {100 * GAIN:.0f} % below is asked for")
+    return found
+
+
+def _other_thickness(parameters: Mapping[str, Estimate], rivals: tuple[Rival, ...]) -> list[str]:
+    depth = parameters.get("thickness")
+    if depth is None or not depth.free:
+        return []
+    if not math.isfinite(depth.stderr):
+        return ["the thickness has no finite error"]
+    for rival in rivals:
+        other = rival.parameters.get("thickness", depth.value)
+        if rival.delta_chi2 < RIVAL and abs(other - depth.value) > 3 * depth.stderr:
+            return [f"{other:.4g} nm fits as well as {depth.value:.4g} nm (Δχ² {rival.delta_chi2:.1f})"]
+    return []
+
+
+def _empty(parameters: Mapping[str, Estimate]) -> list[str]:
+    """Free numbers that mean nothing where they are."""
+    found = []
+    for name, p in parameters.items():
+        key = name.split("_")[0]
+        if not p.free:
+            continue
+        if key == "exponent" and p.value <= FLATTEST:
+            found.append(f"{name} {p.value:.2f} is no lobe (above {FLATTEST:g} is asked for)")
+        elif name == "roughness" and p.value >= ROUGHEST:
+            found.append(f"roughness {p.value:.2f} is no lobe (below {ROUGHEST:g} is asked for)")
+        elif name == "specular" and p.value == p.lower:
+            found.append("the layered lobes have no weight")
+        elif p.at_bound and (
+            key in ("exponent", "n", "roughness") or (name == "deviation" and p.value > p.lower)
+        ):
+            found.append(f"{name} rests on its bound {p.value:g}")
+    return found

@@ -1,0 +1,185 @@
+"""Fit a layered surface to samples of a BRDF, and the same samples without one: then judge."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import time
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+
+from pellicle.brdf_fitting import doubts, evidence
+from pellicle.brdf_fitting.baselines import plain
+from pellicle.brdf_fitting.coordinates import coordinates
+from pellicle.brdf_fitting.estimates import Local, estimates, local, rivals
+from pellicle.brdf_fitting.plan import plan
+from pellicle.brdf_fitting.problem import Form, Problem, chi_square, data, seeing
+from pellicle.brdf_fitting.residuals import RESIDUALS
+from pellicle.brdf_fitting.result import Baseline, BrdfFit
+from pellicle.brdf_fitting.search import FEW, SMOOTH, THOROUGH, Effort, Minima, polish, search
+from pellicle.brdf_fitting.surface import Surface
+from pellicle.errors import UsageError
+from pellicle.fitting.result import Estimate, Status
+from pellicle.fitting.search import Progress, quiet
+from pellicle.fitting.status import judge, misfits, verdict
+from pellicle.io.samples import BrdfSamples, spread
+
+HELD_OUT = 0.2
+"""The share of the samples that no fit sees until it is judged."""
+FEWEST = 20
+_NATURAL = frozenset({"thickness", "k", "base_k", "deviation", "specular", "diffuse"})
+"""Their lower bound, 0, is physics': resting on it is no fault of the bounds."""
+_FLAT, _PLAIN = "the surface without interference", "two lobes without a layer"
+
+
+def fit_brdf(
+    samples: BrdfSamples, surface: Surface, *, residual: str | None = None, progress: Progress = quiet
+) -> BrdfFit:
+    """Fit the free numbers of `surface`, in float64 whatever the caller's setting.
+
+    `residual` names what is compared (`residuals.RESIDUALS`): by default `linear` over σ where the
+    samples have one, else `cube-root`. The same samples are fitted without interference and with two
+    lobes and no layer, all of them on four fifths of the samples and judged on the rest.
+
+    **Raises:** UsageError where nothing is free, a residual or the wavelengths do not match, or the
+    samples are too few.
+    """
+    name = residual or ("linear" if samples.sigma is not None else "cube-root")
+    if name not in RESIDUALS:
+        raise UsageError(f"residual must be one of {', '.join(RESIDUALS)}, not {name!r}")
+    _check(samples, surface)
+    with jax.enable_x64(True):
+        return _fit(samples, surface, name, progress)
+
+
+def _check(samples: BrdfSamples, surface: Surface) -> None:
+    where = f"{samples.path}: " if samples.path else ""
+    if not surface.leaves():
+        raise UsageError("nothing is free to fit: give bounds, as in thickness = { lower = 0, upper = 1000 }")
+    if surface.channels != len(samples.channels):
+        raise UsageError(
+            f"{where}{len(samples.channels)} channels ({', '.join(samples.channels)}) for"
+            f" {surface.channels} wavelengths: give wavelengths one for each"
+        )
+    if len(samples) < FEWEST:
+        raise UsageError(
+            f"{where}{len(samples)} samples are too few to fit and to judge: give {FEWEST} or more"
+        )
+
+
+def problem(samples: BrdfSamples, surface: Surface, residual: str, evaluate: Any) -> Problem:
+    """The problem of fitting `surface`, by `evaluate`, to the samples."""
+    leaves = surface.leaves()
+    steep = tuple(leaf for leaf in leaves if not leaf.about.linear)
+    linear = [leaf for leaf in leaves if leaf.about.linear]
+    chosen, box = coordinates(steep, doubts.in_plane(samples))
+    form = Form(evaluate, chosen, tuple(leaf.key for leaf in linear), False, residual)
+    most = np.array([leaf.free.upper for leaf in linear])
+    return Problem(form, data(samples, residual), surface.fixed(), box, most, len(samples))
+
+
+class Split(NamedTuple):
+    """The rows that are fitted and those that judge, and how many numbers the latter are."""
+
+    fitted: np.ndarray
+    judging: np.ndarray
+    size: int
+
+
+def _split(samples: BrdfSamples) -> Split:
+    """Four fifths to fit, spread over the file, and the rest to judge."""
+    out = spread(len(samples), max(1, round(HELD_OUT * len(samples))))
+    return Split(np.setdiff1d(np.arange(len(samples)), out), out, out.size * len(samples.channels))
+
+
+def _rate(whole: Problem, split: Split, effort: Effort, progress: Progress) -> tuple[Minima, float]:
+    """Minima on the fitted rows, and the best one's error on the others."""
+    minima = search(seeing(whole, split.fitted), effort, progress)
+    chi2 = chi_square(*seeing(whole, split.judging).program, minima.units[0])
+    return minima, float(np.sqrt(chi2 / split.size))
+
+
+def _fit(samples: BrdfSamples, surface: Surface, residual: str, progress: Progress) -> BrdfFit:
+    began = time.perf_counter()
+    split, brdf = _split(samples), surface.brdf
+    whole = problem(samples, surface, residual, brdf.evaluate)
+    flat = whole._replace(form=whole.form._replace(evaluate=brdf.incoherent))
+    minima, held_out = _rate(whole, split, THOROUGH, progress)
+    baselines = (
+        Baseline(_FLAT, _rate(flat, split, SMOOTH, progress)[1]),
+        Baseline(_PLAIN, _rate(plain(whole), split, FEW, progress)[1]),
+    )
+    minima = polish(whole, minima.units, THOROUGH, progress)
+    return _report(samples, surface, whole, minima, held_out, baselines, began)
+
+
+def _unlayered(parameters: dict[str, Estimate]) -> dict[str, Estimate]:
+    """Without evidence of a layer its thickness has no finite error."""
+    depth = parameters.get("thickness")
+    if depth is None or not depth.free:
+        return parameters
+    return {**parameters, "thickness": dataclasses.replace(depth, stderr=math.inf)}
+
+
+def _report(
+    samples: BrdfSamples,
+    surface: Surface,
+    whole: Problem,
+    minima: Minima,
+    held_out: float,
+    baselines: tuple[Baseline, ...],
+    began: float,
+) -> BrdfFit:
+    at: Local = local(whole, minima.units[0], samples.sigma is not None)
+    parameters = estimates(surface, whole, minima.units[0], at)
+    others = rivals(whole, minima, at)
+    found = evidence.weigh(parameters, others, held_out, baselines)
+    rms = float(np.sqrt(np.mean(at.residuals**2)))
+    misfit = misfits(
+        chi2_reduced=at.chi2_reduced,
+        sigma_known=samples.sigma is not None,
+        drifting=False,
+        effective_share=1 / at.length,
+        rms=rms,
+        span=at.span,
+        calibrated=False,
+    )
+    status = judge(
+        converged=bool(minima.converged[0]),
+        misfit=misfit,
+        parameters=parameters,
+        rivals=others,
+        natural=_NATURAL,
+    )
+    sentence = verdict(status, parameters, others, rms)
+    if not found.layered:
+        sentence = found.verdict
+        parameters = _unlayered(parameters)
+        status = status if status in (Status.NOT_CONVERGED, Status.MISFIT) else Status.NOT_IDENTIFIABLE
+    elif status is Status.CONVERGED:
+        sentence = found.verdict
+    fitted = {p.key: np.asarray(at.parameters[p.key]) for p in surface.brdf.parameters}
+    fitted["wavelengths"] = np.array(surface.seen_at)
+    return BrdfFit(
+        samples=samples,
+        surface=surface,
+        residual=whole.form.residual,
+        status=status,
+        verdict=sentence,
+        layered=found.layered,
+        parameters=parameters,
+        rivals=others,
+        baselines=baselines,
+        held_out=held_out,
+        chi2_reduced=at.chi2_reduced if samples.sigma is not None else 1.0,
+        rms=rms,
+        effective_points=at.residuals.size / at.length,
+        correlation_names=at.names,
+        correlation=at.correlation,
+        plan=plan(surface),
+        warnings=(*doubts.directions(samples, surface), *doubts.numbers(surface, parameters, fitted)),
+        model=at.model,
+        seconds=time.perf_counter() - began,
+    )

@@ -1,0 +1,30 @@
+"""What is compared: a BRDF spans decades, and where a fit looks depends on the scale it looks at.
+
+- `linear`: ρ. The mirror peak decides everything; right where σ is known.
+- `cosine`: ρ cos θ_i (A. Ngan, F. Durand and W. Matusik, EGSR 2005).
+- `log`: log(1 + ρ cos θ_i), as neural BRDFs are trained.
+- `cube-root`: ρ^⅓, nearest to what eyes see (the default without σ).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+Transform = Callable[[Any, Any, Any], Any]
+"""(ρ, cos θ_i, floor) → the number that is compared; `floor` (1/sr) keeps slopes finite at ρ = 0."""
+
+RESIDUALS: dict[str, Transform] = {
+    "linear": lambda rho, cosine, floor: rho,
+    "cosine": lambda rho, cosine, floor: rho * cosine,
+    "log": lambda rho, cosine, floor: jnp.log1p(rho * cosine),
+    "cube-root": lambda rho, cosine, floor: jnp.cbrt(rho + floor),
+}
+
+
+def slope(transform: Transform, rho: Any, cosine: Any, floor: Any) -> Any:
+    """d transform/dρ at each value."""
+    return jax.jvp(lambda x: transform(x, cosine, floor), (rho,), (jnp.ones_like(rho),))[1]

@@ -1,0 +1,62 @@
+"""What a fit of a BRDF returns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pellicle.brdf_fitting.surface import Surface
+from pellicle.fitting.result import Estimate, Rival, Status
+from pellicle.io.samples import BrdfSamples
+from pellicle.planning import Plan
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """Another model of the same samples and its error on those that were held out."""
+
+    name: str
+    held_out: float
+
+
+@dataclass(frozen=True)
+class BrdfFit:
+    """The outcome of fitting samples of a BRDF.
+
+    `rms` and `held_out` are in the units of the residual (`residual`: its name; standard deviations
+    where σ is known); `held_out` is the error on a fifth of the samples of a fit to the others, as it
+    is for the `baselines`. `model` has the shape of the samples' values.
+    """
+
+    samples: BrdfSamples
+    surface: Surface
+    residual: str
+    status: Status
+    verdict: str
+    layered: bool
+    parameters: dict[str, Estimate]
+    rivals: tuple[Rival, ...]
+    baselines: tuple[Baseline, ...]
+    held_out: float
+    chi2_reduced: float
+    rms: float
+    effective_points: float
+    correlation_names: tuple[str, ...]
+    correlation: np.ndarray
+    plan: Plan
+    warnings: tuple[str, ...]
+    model: np.ndarray
+    seconds: float
+
+    def __getitem__(self, name: str) -> Estimate:
+        return self.parameters[name]
+
+    def __str__(self) -> str:
+        lines = [f"{self.status}: {self.verdict}"]
+        lines += [f"  {p.name} = {p.value:.8g} ± {p.stderr:.2g} {p.unit}".rstrip() for p in self.free]
+        return "\n".join(lines)
+
+    @property
+    def free(self) -> tuple[Estimate, ...]:
+        return tuple(p for p in self.parameters.values() if p.free)

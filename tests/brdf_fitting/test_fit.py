@@ -1,0 +1,133 @@
+"""Whole fits: a surface that is known, one that has no layer, and samples that cannot be fitted."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import jax
+import numpy as np
+import pytest
+
+import pellicle as pl
+from pellicle.brdf import direction, model
+from pellicle.brdf_fitting.fit import fit_brdf
+from pellicle.brdf_fitting.surface import Surface
+from pellicle.errors import UsageError
+from pellicle.fitting.result import Status
+from pellicle.free import Free
+from pellicle.io.samples import BrdfSamples
+
+TRUTH = {
+    "thickness": 320.0,
+    "n": (1.48, 1.5, 1.53),
+    "exponent_reflection": 60.0,
+    "exponent_transmission": 25.0,
+    "deviation": 0.0,
+    "azimuth": 0.0,
+    "specular": 1.5,
+    "diffuse": 0.1,
+}
+FREE = Surface(
+    "granier-heidrich",
+    {
+        "thickness": Free(lower=0, upper=1000),
+        "n": (1.48, 1.5, 1.53),
+        "exponent_reflection": Free(lower=1, upper=1000),
+        "exponent_transmission": Free(lower=1, upper=1000),
+        "specular": Free(lower=0, upper=100),
+        "diffuse": Free(lower=0, upper=2),
+    },
+)
+FOUND = ("thickness", "exponent_reflection", "exponent_transmission", "specular", "diffuse")
+
+
+def arcs(values, sigma):
+    """40 directions in the plane of incidence at each of five incidences, as a goniometer takes them."""
+    theta_o = np.tile(np.linspace(-78, 78, 40), 5)
+    return BrdfSamples(
+        np.repeat([10.0, 25, 40, 55, 70], 40),
+        np.zeros(200),
+        np.abs(theta_o),
+        np.where(theta_o > 0, 180.0, 0.0),
+        values,
+        ("R", "G", "B"),
+        sigma=sigma,
+    )
+
+
+def noisy(rho, seed):
+    sigma = 0.01 * rho
+    return arcs(np.abs(rho + sigma * np.random.default_rng(seed).standard_normal(rho.shape)), sigma)
+
+
+@pytest.fixture(scope="module")
+def known():
+    empty = arcs(np.ones((200, 3)), None)
+    i, o = direction(empty.theta_i, empty.phi_i), direction(empty.theta_o, empty.phi_o)
+    rho = np.asarray(jax.jit(lambda: model("granier-heidrich")(TRUTH, i, o))())
+    return fit_brdf(noisy(rho, seed=3), FREE)
+
+
+def test_a_known_surface_is_found_within_its_errors(known):
+    assert known.status is Status.CONVERGED
+    assert known.layered
+    assert known.verdict.startswith("The samples call for a layer: thickness 320")
+    for name in FOUND:
+        p = known[name]
+        assert abs(p.value - TRUTH[name]) < 4 * p.stderr < 0.1 * p.value
+    assert known.chi2_reduced == pytest.approx(1, abs=0.25)
+    assert all(known.held_out < 0.5 * b.held_out for b in known.baselines)
+    assert "specular is a weight and no albedo" in " ".join(known.warnings)
+
+
+def test_errors_are_those_of_the_inverse_hessian(known):
+    """Σ = (JᵀJ)⁻¹ with J by finite differences of the model itself."""
+    s = known.samples
+    i, o = direction(s.theta_i, s.phi_i), direction(s.theta_o, s.phi_o)
+    best = {**TRUTH, **{name: known[name].value for name in FOUND}}
+    rho = jax.jit(lambda p: model("granier-heidrich")({**TRUTH, **p}, i, o))
+
+    def slope(name):
+        step = 1e-5 * best[name]
+        up, down = (rho({f: best[f] + sign * step * (f == name) for f in FOUND}) for sign in (1, -1))
+        return np.ravel((up - down) / (2 * step) / s.sigma)
+
+    jacobian = np.stack([slope(name) for name in FOUND], axis=1)
+    expected = np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian)))
+    length = 600 / known.effective_points
+    np.testing.assert_allclose([known[name].stderr for name in FOUND], expected * np.sqrt(length), rtol=1e-4)
+
+
+def test_a_lambertian_surface_has_no_layer():
+    found = fit_brdf(noisy(np.full((200, 3), 0.2), seed=0), FREE)
+    assert not found.layered
+    assert found.verdict.startswith("No evidence of a layer: ")
+    assert found.status is Status.NOT_IDENTIFIABLE
+    assert found["thickness"].stderr == np.inf
+
+
+def test_what_cannot_be_fitted_is_refused_in_words():
+    flat = noisy(np.full((200, 3), 0.2), seed=0)
+    with pytest.raises(UsageError, match="nothing is free"):
+        fit_brdf(flat, Surface("granier-heidrich", {}))
+    with pytest.raises(UsageError, match=r"3 channels .* for 1 wavelengths"):
+        fit_brdf(flat, dataclasses.replace(FREE, wavelengths=(550.0,), numbers={**FREE.numbers, "n": 1.5}))
+    with pytest.raises(UsageError, match="residual must be one of linear, cosine, log, cube-root"):
+        fit_brdf(flat, FREE, residual="cubic")
+    with pytest.raises(UsageError, match="5 samples are too few"):
+        fit_brdf(flat.at(np.arange(5)), FREE)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["granier-heidrich", "microfacet-film"])
+def test_ptfe_has_no_layer(shared_data, name):
+    """Sintered PTFE, measured by NIST: a white diffuser without any film, that interference fits well."""
+    ptfe = pl.read_brdf_samples(shared_data / "brdf" / "nist_ptfe_633_532.csv")
+    free = {"thickness": Free(lower=0, upper=1000), "n": Free(lower=1.05, upper=2.5)}
+    free |= {"specular": Free(lower=0, upper=100), "diffuse": Free(lower=0, upper=2)}
+    if name == "granier-heidrich":
+        free |= {f"exponent_{side}": Free(lower=1, upper=1000) for side in ("reflection", "transmission")}
+    else:
+        free["roughness"] = Free(lower=0.003, upper=1)
+    found = fit_brdf(ptfe, Surface(name, free, (633.0, 532.0, 532.0)))
+    assert found.verdict.startswith("No evidence of a layer: ")

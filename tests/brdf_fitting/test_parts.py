@@ -1,0 +1,202 @@
+"""What a BRDF fit is made of: surfaces, coordinates, residuals, weights, and the rule of evidence."""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.optimize import nnls
+
+from pellicle.brdf_fitting import doubts, evidence, residuals
+from pellicle.brdf_fitting.coordinates import coordinates, named, values
+from pellicle.brdf_fitting.plan import plan
+from pellicle.brdf_fitting.problem import _nonnegative
+from pellicle.brdf_fitting.result import Baseline
+from pellicle.brdf_fitting.surface import Surface
+from pellicle.errors import UsageError
+from pellicle.fitting.result import Estimate, Rival
+from pellicle.free import Free
+from pellicle.io.samples import BrdfSamples
+
+
+def between(lower, upper):
+    return Free(lower=lower, upper=upper)
+
+
+TILTED = Surface(
+    "granier-heidrich",
+    {
+        "thickness": between(0, 1000),
+        "n": between(1.05, 2.5),
+        "exponent_reflection": between(1, 1000),
+        "deviation": between(0, 20),
+        "azimuth": between(-180, 180),
+        "specular": between(0, 100),
+    },
+)
+
+
+def test_a_free_key_per_channel_is_one_number_each():
+    assert [leaf.name for leaf in TILTED.leaves()] == [
+        *("thickness", "n_r", "n_g", "n_b", "exponent_reflection", "deviation", "azimuth", "specular")
+    ]
+    grey = Surface("granier-heidrich", {"n": between(1.2, 2)}, wavelengths=(550.0,))
+    assert [leaf.name for leaf in grey.leaves()] == ["n"]
+
+
+def test_what_is_not_given_keeps_its_default():
+    fixed = TILTED.fixed()
+    assert fixed["exponent_transmission"] == 170.0
+    assert fixed["wavelengths"].tolist() == [645.0, 525.0, 445.0]
+    assert "n" not in fixed
+    assert Surface("granier-heidrich", {"n": [1.4, 1.5, 1.6]}).fixed()["n"].tolist() == [1.4, 1.5, 1.6]
+
+
+@pytest.mark.parametrize(
+    ("name", "numbers", "told"),
+    [
+        ("granier-heidrik", {}, "did you mean 'granier-heidrich'"),
+        ("microfacet-film", {"roughnes": 0.1}, "did you mean 'roughness'"),
+        ("granier-heidrich", {"n": [1.4, 1.5]}, "2 numbers for 3 wavelengths"),
+    ],
+)
+def test_a_wrong_surface_is_refused_in_words(name, numbers, told):
+    with pytest.raises(UsageError, match=told):
+        Surface(name, numbers)
+
+
+def steep(surface, in_plane=False):
+    return coordinates(tuple(leaf for leaf in surface.leaves() if not leaf.about.linear), in_plane)
+
+
+def test_coordinates_span_the_bounds():
+    chosen, box = steep(TILTED)
+    for corner in (0.0, 1.0):
+        found = named(chosen, values(chosen, box, jnp.full(7, corner)))
+        ends = [(0, 1000), (1.05, 2.5), (1, 1000)]
+        for key, end in zip(("thickness", "n", "exponent_reflection"), ends, strict=True):
+            np.testing.assert_allclose(found[key], end[int(corner)], rtol=1e-12)
+        assert found["n"].shape == (3,)
+        assert float(found["deviation"]) == pytest.approx(20)
+    middle = values(chosen, box, jnp.full(7, 0.5))
+    assert float(middle[4]) == pytest.approx(np.sqrt(1000))  # exponents are searched by their logarithm
+
+
+def test_a_tilt_is_a_disc_and_in_a_plane_half_of_one():
+    rng = np.random.default_rng(0)
+    for in_plane in (False, True):
+        chosen, box = steep(TILTED, in_plane)
+        found = np.array([values(chosen, box, jnp.asarray(rng.random(7)))[5:] for _ in range(200)])
+        deviation, azimuth = found.T
+        assert deviation.max() <= 20
+        assert (azimuth.min() >= 0) == in_plane
+
+
+@pytest.mark.parametrize("name", residuals.RESIDUALS)
+def test_residuals_by_name(name):
+    rho, cosine = np.array([0.0, 0.3, 40.0]), np.array([1.0, 0.5, 0.2])
+    expected = {
+        "linear": rho,
+        "cosine": rho * cosine,
+        "log": np.log(1 + rho * cosine),
+        "cube-root": (rho + 1e-3) ** (1 / 3),
+    }[name]
+    transform = residuals.RESIDUALS[name]
+    np.testing.assert_allclose(transform(rho, cosine, 1e-3), expected, rtol=1e-12)
+    step = 1e-6
+    slope = (transform(rho + step, cosine, 1e-3) - transform(rho - step, cosine, 1e-3)) / (2 * step)
+    np.testing.assert_allclose(residuals.slope(transform, jnp.asarray(rho), cosine, 1e-3), slope, rtol=1e-5)
+
+
+def test_weights_are_the_nonnegative_least_squares():
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        columns, data = rng.normal(size=(30, 3)), rng.normal(size=30)
+        found = _nonnegative(jnp.asarray(columns.T @ columns), jnp.asarray(columns.T @ data))
+        np.testing.assert_allclose(found, nnls(columns, data)[0], atol=1e-9)
+
+
+def estimate(name, value, stderr=0.1, lower=0.0, upper=1000.0, at_bound=False):
+    return Estimate(name, value, stderr, "", lower, upper, True, at_bound)
+
+
+GOOD = {
+    "thickness": estimate("thickness", 300.0),
+    "exponent_reflection": estimate("exponent_reflection", 50.0),
+}
+WORSE = (Baseline("no interference", 2.0), Baseline("two lobes", 3.0))
+
+
+def test_a_layer_that_passes_every_doubt():
+    found = evidence.weigh(GOOD, (Rival({"thickness": 500.0}, 40.0),), 1.0, WORSE)
+    assert found.layered
+    assert "thickness 300.00 ± 0.10" in found.verdict
+    assert "50 % below no interference and 67 % below two lobes" in found.verdict
+
+
+@pytest.mark.parametrize(
+    ("changed", "rivals", "held_out", "why"),
+    [
+        ({}, (), 1.84, "8 % below no interference"),
+        ({}, (), 3.3, "1.10 times that of two lobes"),
+        ({}, (Rival({"thickness": 500.0}, 3.0),), 1.0, "500 nm fits as well as 300 nm"),
+        ({"thickness": estimate("thickness", 300.0, np.inf)}, (), 1.0, "no finite error"),
+        ({"exponent_reflection": estimate("exponent_reflection", 1.5)}, (), 1.0, "is no lobe"),
+        ({"exponent_reflection": estimate("exponent_reflection", 1e3, at_bound=True)}, (), 1.0, "its bound"),
+        ({"deviation": estimate("deviation", 20.0, upper=20.0, at_bound=True)}, (), 1.0, "its bound 20"),
+        ({"n_g": estimate("n_g", 2.5, upper=2.5, at_bound=True)}, (), 1.0, "n_g rests on its bound"),
+        ({"roughness": estimate("roughness", 0.84)}, (), 1.0, "roughness 0.84 is no lobe"),
+        ({"specular": estimate("specular", 0.0, at_bound=True)}, (), 1.0, "no weight"),
+    ],
+)
+def test_each_doubt_alone_denies_a_layer(changed, rivals, held_out, why):
+    found = evidence.weigh({**GOOD, **changed}, rivals, held_out, WORSE)
+    assert not found.layered
+    assert found.verdict.startswith("No evidence of a layer: ")
+    assert why in found.verdict
+
+
+def samples(theta_i, phi_i, theta_o, phi_o, channels=("R", "G", "B")):
+    theta_i, phi_i, theta_o, phi_o = np.broadcast_arrays(
+        *map(np.atleast_1d, (theta_i, phi_i, theta_o, phi_o))
+    )
+    return BrdfSamples(theta_i, phi_i, theta_o, phi_o, np.ones((theta_i.size, len(channels))), channels)
+
+
+def test_samples_in_a_plane():
+    arc = [10.0, 40.0, 80.0]
+    assert doubts.in_plane(samples(30.0, 0.0, arc, [0.0, 180.0, 180.0]))
+    assert doubts.in_plane(samples(30.0, 25.0, arc, [25.0, 205.0, 205.0]))
+    assert doubts.in_plane(samples(30.0, [0.0, 180.0, 0.0], arc, 0.0))
+    assert not doubts.in_plane(samples(30.0, 0.0, arc, [0.0, 180.0, 90.0]))
+    assert not doubts.in_plane(samples(30.0, [0.0, 45.0, 90.0], arc, [180.0, 225.0, 270.0]))
+
+
+def test_what_directions_cannot_decide_is_told():
+    told = " ".join(doubts.directions(samples(30.0, 0.0, [10.0, 40.0], 180.0), TILTED))
+    assert "at one angle" in told
+    assert "cannot see the sign" in told
+    told = " ".join(doubts.directions(samples([10.0, 30.0], 0.0, 40.0, [90.0, 180.0]), TILTED))
+    assert "never turned" in told
+    grey = samples([5.0, 12.0], 0.0, 10.0, 180.0, ("value",))
+    base = Surface("microfacet-film", {"base_n": between(1, 3), "base_k": between(0, 6)}, (550.0,))
+    told = " ".join(doubts.directions(grey, base))
+    assert "within 12 degrees of the normal" in told
+    assert "one channel" in told
+    assert "base_n and base_k are both free" in told
+
+
+def test_the_plan_names_what_is_there():
+    on = {row.effect: row.on for row in plan(TILTED).rows}
+    assert on == {
+        "spectral-sampling": True,
+        "roughness": True,
+        "deviation": True,
+        "diffuse": True,
+        "precision": True,
+    }
+    flat = plan(Surface("granier-heidrich", {"deviation": 0.0, "diffuse": 0.0}))
+    assert not flat.on("deviation")
+    assert not flat.on("diffuse")
+    assert not plan(Surface("microfacet-film", {})).on("absorption")
+    assert plan(Surface("microfacet-film", {"k": between(0, 1)})).on("absorption")
