@@ -7,6 +7,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from pellicle.brdf_fitting.fit import fit_brdf as fit_brdf
+    from pellicle.brdf_fitting.result import BrdfFit as BrdfFit
+    from pellicle.brdf_fitting.surface import Surface as Surface
     from pellicle.fitting.fit import fit as fit
     from pellicle.fitting.result import Fit as Fit
     from pellicle.fitting.result import Status as Status
@@ -49,6 +52,9 @@ if TYPE_CHECKING:
     from pellicle.thrift import plan as plan
 
 _HOME = {
+    "pellicle.brdf_fitting.fit": ("fit_brdf",),
+    "pellicle.brdf_fitting.result": ("BrdfFit",),
+    "pellicle.brdf_fitting.surface": ("Surface",),
     "pellicle.fitting.fit": ("fit",),
     "pellicle.fitting.result": ("Fit", "Status"),
     "pellicle.io.brdf_samples": ("read_brdf_samples",),
