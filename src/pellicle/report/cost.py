@@ -44,10 +44,10 @@ def unit_of(ladder: Ladder) -> str:
 
 def _ladder(ladder: Ladder, name: str) -> str:
     said = (
-        f"{name}: {ladder.wavelengths} wavelengths, the largest error of {ladder.draws} "
+        f"{name}: {ladder.wavelengths} wavelength{'s' * (ladder.wavelengths > 1)}, the largest error of {ladder.draws} "
         f"{'draws between the bounds' if ladder.draws > 1 else 'spectrum'} against {ladder.reference}"
     )
-    rows = [("", "rung", "leaves out", f"error{unit_of(ladder)}", "µs/spectrum", "compile s", "kflop")]
+    rows = [("", "rung", "leaves out", f"error in {ladder.unit}", "µs/spectrum", "compile s", "kflop")]
     rows += [
         (
             _mark(rung, ladder.recommended),
@@ -137,7 +137,7 @@ def draw(cost: Cost, name: str) -> Figure:
     axes[0].axhline(ladder.tolerance, color=BLUE, linewidth=0.8, linestyle=":")
     axes[0].set(
         xlabel="time of one spectrum (µs)",
-        ylabel=f"largest error{unit_of(ladder)}, against {ladder.reference}",
+        ylabel=f"largest error in {ladder.unit}, against {ladder.reference}",
         title=name.replace("$", r"\$"),
     )
     if raced:
