@@ -83,8 +83,7 @@ def _half_space(case: Case) -> Way | str:
 def _closed(case: Case) -> Way | str:
     if not case.plan.on("coherence"):
         return "the full plan is the closed form"
-    sharp = _left_out("coherence", case)
-    return sharp._replace(plan=altered(altered(sharp.plan, "coherence", False), "orders", False))
+    return Way(altered(altered(case.plan, "coherence", False), "orders", False), case.scene)
 
 
 def _orders(count: int, case: Case) -> Way | str:

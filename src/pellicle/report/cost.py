@@ -43,9 +43,11 @@ def unit_of(ladder: Ladder) -> str:
 
 
 def _ladder(ladder: Ladder, name: str) -> str:
+    several = "s" * (ladder.wavelengths > 1)
+    draws = "draws between the bounds" if ladder.draws > 1 else "spectrum"
     said = (
-        f"{name}: {ladder.wavelengths} wavelength{'s' * (ladder.wavelengths > 1)}, the largest error of {ladder.draws} "
-        f"{'draws between the bounds' if ladder.draws > 1 else 'spectrum'} against {ladder.reference}"
+        f"{name}: {ladder.wavelengths} wavelength{several}, the largest error of {ladder.draws} {draws} "
+        f"against {ladder.reference}"
     )
     rows = [("", "rung", "leaves out", f"error in {ladder.unit}", "µs/spectrum", "compile s", "kflop")]
     rows += [
