@@ -53,7 +53,9 @@ class Runner(NamedTuple):
     floor: str = "floor float64"
 
 
-def numpy_airy(layer: complex, wavelength: np.ndarray, thickness: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def numpy_airy(
+    layer: complex, wavelength: np.ndarray, thickness: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """The textbook Airy formula in complex NumPy, the transmitted power weighted for each polarisation."""
     q0, a = np.cos(np.deg2rad(ANGLE)), np.sin(np.deg2rad(ANGLE))
     q1, q2 = np.sqrt(layer**2 - a**2 + 0j), np.sqrt(SUBSTRATE**2 - a**2 + 0j)
@@ -146,7 +148,9 @@ def by_tmmax() -> Run:
     @jax.jit
     def both(light, thickness):
         def one(d):
-            pairs = [vectorized_coh_tmm(table, order, d[None], light, theta, jnp.array([p])) for p in (False, True)]
+            pairs = [
+                vectorized_coh_tmm(table, order, d[None], light, theta, jnp.array([p])) for p in (False, True)
+            ]
             return [0.5 * (s.reshape(-1) + p.reshape(-1)) for s, p in zip(*pairs, strict=True)]
 
         return jax.vmap(one)(thickness)
@@ -166,7 +170,9 @@ def by_tmm_faster() -> Run:
 
     def run(wavelength, thickness):
         index = np.tile(np.array([1.0, ABSORBING, SUBSTRATE], dtype=complex), (wavelength.size, 1))
-        found = [calc_coherent(index, [np.inf, d, np.inf], [ANGLE], wavelength.ravel()) for d in thickness.ravel()]
+        found = [
+            calc_coherent(index, [np.inf, d, np.inf], [ANGLE], wavelength.ravel()) for d in thickness.ravel()
+        ]
         return tuple(
             np.stack([0.5 * (np.ravel(f[f"{k}_s"]) + np.ravel(f[f"{k}_p"])) for f in found]) for k in "RT"
         )  # type: ignore[return-value]

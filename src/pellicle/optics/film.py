@@ -17,7 +17,20 @@ import jax
 import jax.numpy as jnp
 
 from pellicle.optics.interface import carried, normal, normal_square, nothing_where, power, same, transverse
-from pellicle.optics.number import Number, Pair, SinCos, abs2, hold, imag, real, sincos, sqrt, times_i, where
+from pellicle.optics.number import (
+    Number,
+    Pair,
+    SinCos,
+    abs2,
+    exponentials,
+    hold,
+    imag,
+    real,
+    sincos,
+    sqrt,
+    times_i,
+    where,
+)
 
 
 class Passage(NamedTuple):
@@ -41,15 +54,12 @@ def through(Q: Number, k: Any, sincos: SinCos = sincos) -> Passage:
     q = sqrt(Q)
     flat = abs2(q) == 0
     over, q, flat = hold(1 / where(flat, 1.0 + 0.0 * q, q), q, flat)
-    decay = -2 * (k * imag(q))
-    m = jnp.expm1(decay)
+    scale_square, m = exponentials(-2 * (k * imag(q)))  # 1 + m would lose a transmittance of 1e-22
     sine, cosine = sincos(k * real(q))
     square, product = sine * sine, sine * cosine
     re, im = m * (0.5 - square) - square, product + m * product  # of M/2
     join = Pair if isinstance(Q, Pair) else jax.lax.complex
     c, f = join(1 + re, im), where(flat, k + 0.0 * im, join(im, -re) * over)
-    # its own exponential: 1 + m would lose a transmittance of 1e-22
-    scale_square = jnp.exp(decay)
     echo = scale_square * join(1 - 2 * square, 2 * product)
     return Passage(c, f, scale_square, where(_near(Q, k), c, echo))
 
@@ -59,10 +69,8 @@ def _through_real(Q, k, sincos):
     flat = q == 0
     over, wave, q, flat = hold(1 / jnp.where(flat, 1.0, q), Q >= 0, q, flat)
     sine, cosine = sincos(k * q)
-    decay = jnp.where(wave, 0.0, -2 * (k * q))
-    m = jnp.expm1(decay)
+    scale_square, m = exponentials(jnp.where(wave, 0.0, -2 * (k * q)))
     c = jnp.where(wave, cosine, 1 + 0.5 * m)
-    scale_square = jnp.exp(decay)
     f = jnp.where(flat, k, jnp.where(wave, sine, -0.5 * m) * over)
     return Passage(c, f, scale_square, jnp.where(wave | _near(Q, k), c, scale_square))
 
