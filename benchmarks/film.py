@@ -1,12 +1,12 @@
 """Nanoseconds per point of one film: pellicle against a floor, other packages and plain NumPy, in one run.
 
 Run `python benchmarks/film.py`. A point is one (wavelength, thickness) giving unpolarised R and T at
-45°; the time is the processor's, so that what else runs on it counts little. The floor is what no formula for a film can do without: one exponential, and one
-sine and cosine by the same polynomial, at every point, written to one array as large as pellicle's.
-Competitors take turns in each round, so that a noisy machine is noisy for all; the table gives medians
-and the ratio to the floor of the same precision, the median of the rounds' own. Compilation is timed
-apart. Packages take part if they are installed (`pip install tmm_fast tmmax tmm-faster`); those that are
-slow get fewer points.
+45°; the time is the processor's, so that what else runs on it counts little. The floor is what no
+formula for a film can do without: one exponential, and one sine and cosine by the same polynomial, at
+every point, written to one array as large as pellicle's. Competitors take turns in each round; the
+table gives medians, and the median of each round's ratio to the floor of the same precision.
+Compilation is timed apart. Packages take part if they are installed (`pip install tmm_fast tmmax
+tmm-faster`); those that are slow get fewer points.
 """
 
 from __future__ import annotations
