@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
+from pellicle.cli import brdf
 from pellicle.cli.batch import Batch, Look
 from pellicle.cli.options import ReadWords, SceneWords, light, merged, scene_from_words
 from pellicle.cli.session import not_negative, say, start
@@ -79,7 +80,7 @@ def fit(
     out: Annotated[str | None, _flag(_output, "A folder for report, figure and tables.")] = None,
     json: Annotated[bool, Parameter(group=_output, help="One JSON object a line.", negative="")] = False,
 ) -> int:
-    """Fit a layer to measured reflectance or transmittance.
+    """Fit a layer to measured reflectance, transmittance, ellipsometry, or samples of a BRDF.
 
     Example: pellicle fit oxide.csv --layer SiO2 --substrate Si --thickness 10:3000
     """
@@ -102,6 +103,8 @@ def fit(
         analyser,
         spot,
     )
+    if brdf.wanted(recipe, reading.signal):
+        return brdf.fit_surface(list(data), str(recipe), scene_words.given(), reading, out, json)
     _check(reading)
     not_negative("--tolerance", tolerance)
     looks, together = _what(list(data), recipe, scene_words, reading)

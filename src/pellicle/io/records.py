@@ -15,7 +15,9 @@ import numpy as np
 from pellicle import __version__
 
 if TYPE_CHECKING:
+    from pellicle.brdf_fitting.result import BrdfFit
     from pellicle.fitting.result import Estimate, Fit, Part
+    from pellicle.planning import Plan
 
 SCHEMA = "pellicle.fit/1"
 
@@ -24,10 +26,27 @@ _PACKAGES = ("jax", "optimistix", "numpy")
 
 def to_json(fit: Fit) -> dict[str, Any]:
     """A fit as plain dictionaries of the schema; what is infinite or undefined is None."""
+    return _record(fit, _data(fit), [row for part in fit.parts for row in _plan(part.plan, part.name)])
+
+
+def brdf_to_json(fit: BrdfFit) -> dict[str, Any]:
+    """The same of a fit to samples of a BRDF, with what it was judged against."""
+    data = {"path": fit.samples.path, "sha256": fit.samples.sha256, "signal": "brdf"}
+    judged = {
+        "model": fit.surface.model,
+        "residual": fit.residual,
+        "layered": fit.layered,
+        "held_out": _number(fit.held_out),
+        "baselines": [{"name": b.name, "held_out": _number(b.held_out)} for b in fit.baselines],
+    }
+    return _record(fit, {**data, "points": int(fit.samples.values.size)}, _plan(fit.plan)) | judged
+
+
+def _record(fit: Fit | BrdfFit, data: Any, plan: list[dict[str, Any]]) -> dict[str, Any]:
     matrix = np.asarray(fit.correlation, dtype=float)
     return {
         "schema": SCHEMA,
-        "data": _data(fit),
+        "data": data,
         "status": str(fit.status),
         "verdict": fit.verdict,
         "parameters": {name: _parameter(p) for name, p in fit.parameters.items()},
@@ -45,7 +64,7 @@ def to_json(fit: Fit) -> dict[str, Any]:
             "names": list(fit.correlation_names),
             "matrix": [[_number(value) for value in row] for row in matrix],
         },
-        "plan": [row for part in fit.parts for row in _plan(part)],
+        "plan": plan,
         "warnings": list(fit.warnings),
         "versions": versions(),
         "seconds": _number(fit.seconds),
@@ -74,17 +93,17 @@ def _part(part: Part) -> dict[str, Any]:
     }
 
 
-def _plan(part: Part) -> list[dict[str, Any]]:
+def _plan(plan: Plan, name: str = "") -> list[dict[str, Any]]:
     """The plan's rows, with the name of the spectrum where it is one of several."""
     return [
         {
-            **({"name": part.name} if part.name else {}),
+            **({"name": name} if name else {}),
             "effect": row.effect,
             "on": bool(row.on),
             "why": row.why,
             "error_bound": _number(row.error_bound),
         }
-        for row in part.plan.rows
+        for row in plan.rows
     ]
 
 

@@ -1,0 +1,162 @@
+"""`pellicle fit` of BRDF samples: the recipe of a surface, its errors in words, JSON, report and files."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pellicle.brdf_fitting import fit as fitting
+from pellicle.brdf_fitting.plan import plan
+from pellicle.brdf_fitting.result import Baseline, BrdfFit
+from pellicle.fitting.result import Estimate, Rival, Status
+from pellicle.io.surface_recipe import read_surface_recipe
+
+RECIPE = """
+[data]
+signal = "brdf"
+files = ["paint.csv"]
+noise = 0.01
+residual = "log"
+[scene.surface]
+model = "microfacet-film"
+wavelengths = [633, 532, 450]
+thickness = { lower = 10, upper = 700 }
+n = 1.5
+base = "3.9+0.02j"
+roughness = { lower = 0.01, upper = 1 }
+diffuse = 0
+"""
+ROWS = "theta_i,phi_i,theta_o,phi_o,R,G,B\n" + "".join(f"30,0,{t},180,0.{t},0.2,0.3\n" for t in range(10, 40))
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "paint.toml").write_text(RECIPE)
+    (tmp_path / "paint.csv").write_text(ROWS)
+    return tmp_path
+
+
+@pytest.fixture
+def told(monkeypatch):
+    """A stand-in for the fit: what it was asked, and an answer."""
+    asked = {}
+
+    def stand_in(samples, surface, *, residual=None, progress=None):
+        asked.update(samples=samples, surface=surface, residual=residual)
+        return BrdfFit(
+            samples=samples,
+            surface=surface,
+            residual=residual or "linear",
+            status=Status.NOT_IDENTIFIABLE,
+            verdict="No evidence of a layer: it was not sought.",
+            layered=False,
+            parameters={
+                "thickness": Estimate("thickness", 300.0, np.inf, "nm", 10.0, 700.0, True),
+                "n": Estimate("n", 1.5, 0.0, "", 1.5, 1.5, False),
+            },
+            rivals=(Rival({"thickness": 120.0}, 9.0),),
+            baselines=(Baseline("two lobes", 2.0),),
+            held_out=1.9,
+            chi2_reduced=1.1,
+            rms=1.0,
+            effective_points=90.0,
+            correlation_names=("thickness",),
+            correlation=np.eye(1),
+            plan=plan(surface),
+            warnings=("a warning",),
+            model=np.zeros_like(samples.values),
+            seconds=0.1,
+        )
+
+    monkeypatch.setattr(fitting, "fit_brdf", stand_in)
+    return asked
+
+
+def test_a_recipe_says_what_is_fitted_and_how(folder, told, pellicle):
+    ran = pellicle("fit", "--recipe", folder / "paint.toml", "--json", "--out", folder / "out")
+    assert ran.code == 4
+    (found,) = ran.objects
+    assert found["schema"] == "pellicle.fit/1"
+    assert found["data"]["signal"] == "brdf"
+    assert found["data"]["points"] == 90
+    assert found["parameters"]["thickness"]["stderr"] is None
+    assert found["verdict"].startswith("No evidence of a layer")
+    assert found["baselines"] == [{"name": "two lobes", "held_out": 2.0}]
+    assert (found["held_out"], found["layered"]) == (1.9, False)
+    assert {row["effect"] for row in found["plan"]} >= {"spectral-sampling", "roughness", "diffuse"}
+    assert told["residual"] == "log"
+    assert np.all(told["samples"].sigma == 0.01)
+    fixed = told["surface"].fixed()
+    assert fixed["base_n"].tolist() == [3.9] * 3
+    assert fixed["base_k"].tolist() == [0.02] * 3
+    assert [leaf.name for leaf in told["surface"].leaves()] == ["thickness", "roughness"]
+    report = (folder / "out" / "report.txt").read_text()
+    assert "two lobes" in report
+    assert "not determined" in report
+    assert max(map(len, report.splitlines())) <= 100
+    table = (folder / "out" / "fit.csv").read_text().splitlines()
+    assert table[3].endswith("R,G,B,model_R,model_G,model_B")
+    assert len(table) == 34
+
+
+def test_flags_go_before_the_recipe_and_a_bad_file_does_not_stop_the_others(folder, told, pellicle):
+    ran = pellicle(
+        *("fit", folder / "absent.csv", folder / "paint.csv", "--noise", 0.5),
+        *("--recipe", folder / "paint.toml", "--json"),
+    )
+    assert ran.code == 4
+    assert [each["status"] for each in ran.objects] == ["failed", "not-identifiable"]
+    assert "no such file" in ran.err
+    assert np.all(told["samples"].sigma == 0.5)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "code", "words"),
+    [
+        ("roughness =", "roughnes =", 3, "did you mean 'roughness'"),
+        ("microfacet-film", "microfacet", 3, "did you mean 'microfacet-film'"),
+        ("residual", "residuals", 3, "unknown key 'data.residuals' (did you mean 'residual'?)"),
+        ("n = 1.5", 'n = "glass"', 3, "n: a number, a list of one for each channel"),
+        ("n = 1.5", "n = 1.5\nbase_n = 2", 3, "base and base_n exclude each other"),
+        ("lower = 10, upper = 700", "lower = 700, upper = 10", 3, "thickness: bounds are reversed"),
+        ("[633, 532, 450]", "[]", 3, "wavelengths"),
+        ('model = "microfacet-film"', "", 3, "scene.surface.model is missing"),
+    ],
+)
+def test_a_bad_recipe_is_told_in_one_sentence(folder, pellicle, old, new, code, words):
+    (folder / "paint.toml").write_text(RECIPE.replace(old, new))
+    ran = pellicle("fit", "--recipe", folder / "paint.toml")
+    assert ran.code == code
+    assert words in ran.err
+    assert len(ran.err.strip().splitlines()) == 1
+    assert ran.out == ""
+
+
+def test_nothing_free_is_a_bad_recipe(folder, pellicle):
+    fixed = RECIPE.replace("{ lower = 10, upper = 700 }", "50").replace("{ lower = 0.01, upper = 1 }", "0.2")
+    (folder / "paint.toml").write_text(fixed)
+    ran = pellicle("fit", "--recipe", folder / "paint.toml")
+    assert ran.code == 3
+    assert "nothing is free to fit" in ran.err
+
+
+def test_flags_that_a_surface_has_no_use_for(folder, pellicle):
+    recipe = ("--recipe", folder / "paint.toml")
+    for flags, words in (
+        (("--angle", 30), "--angle cannot be used on a BRDF"),
+        (("--layer", "SiO2"), "--layer cannot be used on a BRDF"),
+        (("--signal", "R"), "describes a surface, whose signal is brdf and not R"),
+    ):
+        ran = pellicle("fit", *recipe, *flags)
+        assert ran.code == 2
+        assert words in ran.err
+    ran = pellicle("fit", folder / "paint.csv", "--signal", "brdf")
+    assert ran.code == 2
+    assert "needs a --recipe that describes the surface" in ran.err
+
+
+def test_a_metal_from_the_catalogue_is_the_base(folder):
+    (folder / "paint.toml").write_text(RECIPE.replace('"3.9+0.02j"', '"Fe"'))
+    fixed = read_surface_recipe(folder / "paint.toml").surface.fixed()
+    assert fixed["base_n"].shape == (3,)
+    assert np.all((fixed["base_n"] > 2) & (fixed["base_n"] < 3.2) & (fixed["base_k"] > 2))
