@@ -26,7 +26,7 @@ CHUNK = 5000
 
 
 def rounding(rows: np.ndarray, slopes: np.ndarray, layers: int) -> np.ndarray:
-    """What R + T of s and p may miss 1 by: 16 roundings of 1, of each layer, and of each layer's index.
+    """What R + T of s and p may miss 1 by: 32 roundings of 1, of each layer, and of each layer's index.
 
     Light's flux through a layer is conserved by c² + Q f² = 1, whatever the phase is, so neither grazing
     incidence nor a critical angle enters. A guided wave does, near a resonance: an index that
@@ -34,7 +34,7 @@ def rounding(rows: np.ndarray, slopes: np.ndarray, layers: int) -> np.ndarray:
     """
     n, k = rows[:, layers : 2 * layers], slopes[:, :4, 2 * layers : 3 * layers]
     turned = np.sum(np.abs(k[:, :2] + k[:, 2:]) * n[:, None], axis=2)
-    return 16 * np.finfo(rows.dtype).eps * (1 + layers + turned)
+    return 32 * np.finfo(rows.dtype).eps * (1 + layers + turned)
 
 
 def scenes(rng: np.random.Generator, count: int, layers: int) -> np.ndarray:

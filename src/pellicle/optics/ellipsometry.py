@@ -58,8 +58,9 @@ def angles(n: Any, c: Any, s: Any) -> tuple[Any, Any]:
     psi = 0.5 * jnp.arctan2(across, jnp.where(dark, 1.0, n))
     delta = jnp.arctan2(jnp.where(pole, 0.0, s), jnp.where(pole, 1.0, c))
     turned = jnp.mod(jnp.rad2deg(delta), 360.0)
-    # −1e-17 + 360 rounds to 360
-    return jnp.rad2deg(psi), jnp.where(turned >= 360.0, 0.0, 1.0) * turned
+    # −1e-17 + 360 rounds to 360: such a Δ is 0, with the slope that it has
+    whole = jax.lax.stop_gradient(jnp.where(turned >= 360.0, turned, 0.0))
+    return jnp.rad2deg(psi), turned - whole
 
 
 def alpha_beta(n: Any, c: Any, analyser: Any) -> tuple[Any, Any]:

@@ -1,0 +1,233 @@
+"""Writes stacks.json: R, T, N, C and S of hard films and stacks with their derivatives, to 50 digits.
+
+The numbers put in are float32's own, so that both precisions share one truth. Two formulas must agree to
+1e-40 before a number is written: the product of characteristic matrices (H. A. Macleod, Thin-Film
+Optical Filters, chapter 2) and the recursion over reflections (P. Rouard, 1937). Beside each number stands
+its condition: by how much it changes, to first order, where every input changes by its own size. Run as
+`python tests/hard/make_stacks.py`; it takes some minutes.
+"""
+
+from __future__ import annotations
+
+import json
+from itertools import chain
+from pathlib import Path
+
+import numpy as np
+from make_table import AGREEMENT, CASES, NUDGE, STEP, root
+from mpmath import mp, mpc, mpf
+
+SIGNALS = ("Rs", "Rp", "Ts", "Tp", "N", "C", "S")
+
+
+def case(*layers, substrate=3.9 + 0.02j, ambient=1.0, angle=55.0, wavelength=550.0, smooth=True, dark=False):
+    """One row: layers as (thickness, n + ik) from the top down, as thicknesses, n, k and the rest.
+
+    `dark`: nothing is reflected, so that N, C and S have no value.
+    """
+    depth, index = [d for d, _ in layers], [complex(n) for _, n in layers]
+    below = complex(substrate)
+    media = [n.real for n in index] + [n.imag for n in index] + [below.real, below.imag]
+    at = np.array([*depth, *media, ambient, angle, wavelength], np.float32)
+    return {"at": [float(x) for x in at], "smooth": smooth, "dark": dark}
+
+
+GLASS = {"ambient": 1.5, "angle": 60.0, "substrate": 1.5}
+STACKS = {
+    "ordinary": case((137.0, 1.46), (40.0, 2.1 + 0.3j), (210.0, 1.38), substrate=1.52),
+    "ordinary, normal incidence": case((137.0, 1.46), (40.0, 2.1 + 0.3j), (210.0, 1.38), angle=0.0),
+    "opaque in the middle": case((100.0, 1.46), (2000.0, 1.2 + 7j), (80.0, 2.1)),
+    "1 mm of k = 3 in the middle": case((100.0, 1.46), (1e6, 2.9 + 3j), (80.0, 2.1)),
+    "1 mm transparent in the middle": case((100.0, 2.1), (1e6, 1.46), (80.0, 2.1)),
+    "all matched": case((100.0, 1.5), (0.0, 1.5), (30.0, 1.5), substrate=1.5, ambient=1.5, dark=True),
+    "matched to the substrate": case((100.0, 2.1), (50.0, 1.52), (30.0, 1.52), substrate=1.52),
+    "matched to the ambient": case((100.0, 1.0), (50.0, 1.0), (30.0, 2.1 + 0.3j), substrate=1.52),
+    "matched to each other": case((100.0, 2.1 + 0.3j), (50.0, 2.1 + 0.3j), (30.0, 2.1 + 0.3j)),
+    "20 nm gap": case((50.0, 1.8), (20.0, 1.0), (50.0, 1.8), **GLASS),
+    "200 nm gap": case((50.0, 1.8), (200.0, 1.0), (50.0, 1.8), **GLASS),
+    "20 µm gap": case((50.0, 1.8), (2e4, 1.0), (50.0, 1.8), **GLASS),
+    "Kretschmann with its adhesion layer": case(
+        (2.0, 3.1 + 3.3j),
+        (48.0, 0.135 + 4j),
+        (10.0, 1.46),
+        ambient=1.515,
+        angle=45.5,
+        wavelength=633.0,
+        substrate=1.0,
+    ),
+    "no thickness at all": case((0.0, 1.46), (0.0, 1.2 + 7j), (0.0, 2.1)),
+    "a metal of no thickness": case((100.0, 1.46), (0.0, 1.2 + 7j), (80.0, 2.1)),
+    "thickness 1e-6 nm": case((1e-6, 1.46), (1e-6, 1.2 + 7j), (1e-6, 2.1)),
+    "k = -0.0": case((100.0, complex(1.46, -0.0)), (50.0, complex(2.1, -0.0)), (30.0, 1.38), substrate=1.52),
+    "k = 1e-12": case((100.0, 1.46 + 1e-12j), (50.0, 2.1 + 1e-12j), (30.0, 1.38), substrate=1.52),
+    "k = 1e-30": case((100.0, 1.46 + 1e-30j), (50.0, 2.1 + 1e-30j), (30.0, 1.38), substrate=1.52),
+    "89.999 degrees": case((100.0, 1.46), (50.0, 2.1 + 0.3j), (30.0, 1.38), angle=89.999),
+    "exactly 90 degrees": case((100.0, 1.46), (50.0, 2.1 + 0.3j), (30.0, 1.38), angle=90.0),
+    "critical in the middle": case(
+        (100.0, 1.46), (300.0, 0.75), (30.0, 1.38), ambient=1.5, angle=30.0, substrate=1.52
+    ),
+    "critical in the substrate": case(
+        (100.0, 1.46), (300.0, 2.1), (30.0, 1.38), ambient=1.5, angle=30.0, substrate=0.75, smooth=False
+    ),
+    "total reflection in the substrate": case(
+        (100.0, 1.46), (300.0, 2.1), (30.0, 1.38), ambient=1.52, substrate=1.0
+    ),
+    "n = 0.05 + 4i": case((20.0, 0.05 + 4j), (100.0, 1.46), (20.0, 0.05 + 4j)),
+    "metal substrate": case((100.0, 1.46), (50.0, 2.1), (30.0, 1.38), substrate=0.2 + 3.4j),
+    "dense ambient": case((100.0, 1.33), (50.0, 2.1), (30.0, 1.38), ambient=1.52, substrate=1.7, angle=40.0),
+    "wavelength 1e7 nm": case((100.0, 1.46), (50.0, 2.1 + 0.3j), (30.0, 1.38), wavelength=1e7),
+    "wavelength 1 nm": case(
+        (100.0, 1 - 1e-3 + 1e-4j),
+        (50.0, 1 - 2e-3 + 2e-4j),
+        (30.0, 1 - 1e-3),
+        wavelength=1.0,
+        angle=20.0,
+        substrate=0.999 + 1e-4j,
+    ),
+}
+# the cases of table.json, one layer each, at float32's nearest numbers; k = 1e-300 is 0 there
+FILMS = {}
+for _name, _case in CASES.items():
+    d, n, k, n2, k2, n0, angle, wavelength = _case["at"]
+    film = ((d, complex(n, k)),)
+    light = {"substrate": complex(n2, k2), "ambient": n0, "angle": angle, "wavelength": wavelength}
+    FILMS[_name] = case(*film, **light, smooth=_case["smooth"], dark=_name == "film matched to both")
+
+
+def unpack(p, near):
+    """Depths, permittivities from the ambient to the substrate, normal components of the index, k₀."""
+    count = (len(p) - 5) // 3
+    depth, n, k = p[:count], p[count : 2 * count], p[2 * count : 3 * count]
+    n2, k2, n0, angle, wavelength = p[-5:]
+    theta = angle * mp.pi / 180
+    a = n0 * mp.sin(theta)
+    eps = [n0**2, *(mpc(*nk) ** 2 for nk in zip(n, k, strict=True)), mpc(n2, k2) ** 2]
+    # a root that is exactly 0 makes both formulas 0/0
+    eps = [eps[0], *(e + NUDGE if abs(e - a * a) < NUDGE else e for e in eps[1:])]
+    q = [n0 * mp.cos(theta), *(root(e - a * a) for e in eps[1:-1]), root(eps[-1] - a * a, near)]
+    return depth, eps, q, 2 * mp.pi / wavelength
+
+
+def by_matrix(p, near=None):
+    """r and T of s and p."""
+    depth, eps, q, k0 = unpack(p, near)
+    result = {}
+    for letter in "sp":
+        y = q if letter == "s" else [normal / e for normal, e in zip(q, eps, strict=True)]
+        electric, magnetic = mpf(1), y[-1]
+        for d, normal, tilted in reversed(list(zip(depth, q[1:-1], y[1:-1], strict=True))):
+            cosine, sine = mp.cos(k0 * d * normal), -1j * mp.sin(k0 * d * normal)
+            electric, magnetic = (
+                cosine * electric + sine / tilted * magnetic,
+                tilted * sine * electric + cosine * magnetic,
+            )
+        below = y[0] * electric + magnetic
+        result[letter] = (y[0] * electric - magnetic) / below, 4 * y[0] * mp.re(y[-1]) / abs(below) ** 2
+    return result
+
+
+def by_recursion(p, near=None):
+    """The same, face by face from the bottom, with Fresnel's coefficients."""
+    depth, eps, q, k0 = unpack(p, near)
+    result = {}
+    for letter in "sp":
+        # in p the magnetic field carries the amplitude
+        y = q if letter == "s" else [normal / e for normal, e in zip(q, eps, strict=True)]
+        r = t = None
+        for i in range(len(q) - 2, -1, -1):
+            face, into = (y[i] - y[i + 1]) / (y[i] + y[i + 1]), 2 * y[i] / (y[i] + y[i + 1])
+            if r is None:
+                r, t = face, into
+                continue
+            passage = mp.exp(1j * k0 * depth[i] * q[i + 1])
+            echoes = 1 + face * r * passage**2
+            r, t = (face + r * passage**2) / echoes, into * t * passage / echoes
+        result[letter] = r, abs(t) ** 2 * mp.re(y[-1]) / y[0]
+    return result
+
+
+def signals(formula, p, dark, near=None):
+    """Every signal by name; N, C and S in the convention of `pellicle.optics.ellipsometry`."""
+    found = formula(p, near)
+    (rs, Ts), (rp, Tp) = found["s"], found["p"]
+    Rs, Rp = abs(rs) ** 2, abs(rp) ** 2
+    if dark:
+        return [Rs, Rp, Ts, Tp, mpf(0), mpf(0), mpf(0)]
+    both = 2 * mp.conj(rp) * rs / (Rs + Rp)
+    return [Rs, Rp, Ts, Tp, (Rs - Rp) / (Rs + Rp), mp.re(both), mp.im(both)]
+
+
+def slopes(formula, p, dark, near):
+    """[parameter][signal], central differences: their error is of order 1e-80.
+
+    `near` is the substrate's root, on whose branch all of them stay.
+    """
+    table = []
+    for i in range(len(p)):
+        up, down = list(p), list(p)
+        up[i], down[i] = p[i] + STEP, p[i] - STEP
+        above, below = signals(formula, up, dark, near), signals(formula, down, dark, near)
+        table.append([(x - y) / (2 * STEP) for x, y in zip(above, below, strict=True)])
+    return table
+
+
+def sizes(p):
+    """What a rounding of each input is proportional to: an index is rounded as n + ik."""
+    count = (len(p) - 5) // 3
+    index = [abs(mpc(*nk)) for nk in zip(p[count : 2 * count], p[2 * count : 3 * count], strict=True)]
+    below = abs(mpc(p[-5], p[-4]))
+    return [*(abs(d) for d in p[:count]), *index, *index, below, below, *(abs(x) for x in p[-3:])]
+
+
+def natural(p):
+    """The slope of a film that changes a signal by 1 over a radian, for each parameter."""
+    count, size = (len(p) - 5) // 3, sizes(p)
+    k0 = 2 * mp.pi / p[-1]
+    depths = [k0 * n for n in size[count : 2 * count]]
+    return [*depths, *(1 / x for x in size[count : 3 * count + 3]), mp.pi / 180, 1 / p[-1]]
+
+
+def agree(name, ones, others):
+    for one, two in zip(ones, others, strict=True):
+        if abs(one - two) > AGREEMENT * (1 + abs(one)):
+            raise SystemExit(f"{name}: the formulas differ by {mp.nstr(abs(one - two), 3)}")
+
+
+def row(name, given):
+    p, dark = [mpf(x) for x in given["at"]], given["dark"]
+    size, floor = sizes(p), natural(p)
+    values = signals(by_matrix, p, dark)
+    agree(name, values, signals(by_recursion, p, dark))
+    out = given | {"value": [float(x) for x in values]}
+    if not given["smooth"]:
+        return out
+    near = unpack(p, None)[2][-1]
+    first = slopes(by_matrix, p, dark, near)
+    agree(name, chain(*first), chain(*slopes(by_recursion, p, dark, near)))
+    out["slope"] = [[float(x) for x in column] for column in first]
+    spread = [sum(s * abs(c[i]) for s, c in zip(size, first, strict=True)) for i in range(len(SIGNALS))]
+    out["condition"] = [float(1 + x) for x in spread]
+    bends = [[f + abs(x) for x in column] for f, column in zip(floor, first, strict=True)]
+    for j, s in enumerate(size):
+        if s == 0:
+            continue
+        up, down = list(p), list(p)
+        up[j], down[j] = p[j] + STEP, p[j] - STEP
+        above, below = slopes(by_matrix, up, dark, near), slopes(by_matrix, down, dark, near)
+        for column, x, y in zip(bends, above, below, strict=True):
+            for i in range(len(SIGNALS)):
+                column[i] += s * abs(x[i] - y[i]) / (2 * STEP)
+    out["slope_condition"] = [[float(f"{float(x):.3g}") for x in column] for column in bends]
+    out["condition"] = [float(f"{x:.3g}") for x in out["condition"]]
+    return out
+
+
+def main():
+    tables = {"films": FILMS, "stacks": STACKS}
+    found = {key: {name: row(name, given) for name, given in cases.items()} for key, cases in tables.items()}
+    text = json.dumps({"signals": SIGNALS, **found}).replace('}, "', '},\n"')
+    Path(__file__).with_name("stacks.json").write_text(text + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
