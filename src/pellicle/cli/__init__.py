@@ -6,6 +6,7 @@ import sys
 
 from cyclopts import App
 
+from pellicle.cli.chart import chart
 from pellicle.cli.cost import cost
 from pellicle.cli.fit import fit
 from pellicle.cli.materials import materials
@@ -28,6 +29,7 @@ app.command(fit)
 app.command(simulate)
 app.command(plan)
 app.command(cost)
+app.command(chart)
 app.command(materials)
 
 

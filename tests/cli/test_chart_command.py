@@ -1,0 +1,62 @@
+"""The colours of a chart are those of the film, whatever else the scene holds."""
+
+import numpy as np
+import pytest
+
+import pellicle as pl
+from pellicle.appearance import interference_colours
+from pellicle.colour import delta_e2000, film_colour
+from pellicle.errors import UsageError
+
+NM, DEGREES = np.linspace(0.0, 600.0, 7), np.array([0.0, 30.0, 60.0])
+FREE = pl.Free(lower=0, upper=600)
+
+
+@pytest.fixture(scope="module")
+def oxide():
+    scene = pl.Scene(pl.Layer("SiO2", FREE, name="oxide"), "Si")
+    return scene, interference_colours(scene, NM, DEGREES)
+
+
+def test_one_layer_is_the_film(oxide):
+    """Against the colour package's own film, by other bands."""
+    layer, substrate = pl.material("SiO2"), pl.material("Si")
+    thickness, angle = np.meshgrid(NM, DEGREES)
+    own = film_colour(thickness, layer, substrate, angle=angle, way="uniform-200")
+    assert oxide[1].xyz.shape == (3, 7, 3)
+    assert np.max(np.asarray(delta_e2000(oxide[1].lab, own.lab))) < 0.1
+
+
+def test_a_stack_varies_the_layer_that_is_named(oxide):
+    """An oxide on nothing at all is the oxide; a fixed layer of no thickness is chosen by name only."""
+    nothing = pl.Layer(2.0, 0.0, name="nothing")
+    stack = pl.Scene([pl.Layer("SiO2", 300.0, name="oxide"), nothing], "Si")
+    by_name = interference_colours(stack, NM, DEGREES, "oxide")
+    np.testing.assert_allclose(by_name.xyz, oxide[1].xyz, atol=1e-9)
+    with pytest.raises(UsageError, match="no layer 'gold' to vary; known: oxide, nothing"):
+        interference_colours(stack, NM, DEGREES, "gold")
+
+
+def test_what_has_no_colour():
+    with pytest.raises(UsageError, match="ellipsometry has no colour"):
+        interference_colours(pl.Scene(pl.Layer(1.46, FREE), "Si", light=pl.Light(signal="psi-delta")), NM, NM)
+
+
+def test_the_command_draws_it(pellicle, tmp_path):
+    recipe, out = tmp_path / "oxide.toml", tmp_path / "oxide.png"
+    recipe.write_text('[scene]\nsubstrate = "Si"\n[[scene.layer]]\nmaterial = "SiO2"\nthickness = 300\n')
+    ran = pellicle("chart", recipe, "--out", out)
+    assert (ran.code, ran.out) == (0, "")
+    assert out.read_bytes().startswith(b"\x89PNG")
+    assert "0 to 600 nm, 0 to 80 degrees" in ran.err
+    for flags, said in (
+        (("--out", out), "exists"),
+        (("--out", tmp_path / "a.txt"), "ending in .png"),
+        (("--out", tmp_path / "a.png", "--thickness", "9:3"), "--thickness is reversed"),
+        (("--out", tmp_path / "a.png", "--angle", "0:95"), "--angle must lie in 0 to 90"),
+        (("--out", tmp_path / "a.png", "--illuminant", "F2"), "illuminant 'F2' is unknown"),
+    ):
+        ran = pellicle("chart", recipe, *flags)
+        assert ran.code in (2, 3)
+        assert said in ran.err
+        assert len(ran.err.strip().splitlines()) == 1
