@@ -243,7 +243,6 @@ REFUSED = [
     (lambda: pl.Interface(1.0, steps=0), "1 to 100 steps"),
     (lambda: pl.Interface(1.0, mix="brugeman"), "no mix 'brugeman'"),
     (lambda: pl.Layer(1.5, 1.0, roughness=-1), "roughness must not be negative, got -1 nm"),
-    (lambda: scene([pl.Plate(1.5)], 1.0, angle=60.0, signal="psi-delta"), "is not simulated: leave"),
 ]
 
 

@@ -124,10 +124,22 @@ def _ellipsometer(plan: Plan) -> Intensities:
     """Sums of intensities, (4, wavelengths)."""
 
     def simulate(scene: Scene):
-        (sheet,) = _sheets(plan, scene)
-        return jnp.stack(ellipsometry.stokes(_wave(plan, sheet, "s"), _wave(plan, sheet, "p")))
+        sheet, *under = sheets = _sheets(plan, scene)
+        if not under:
+            return jnp.stack(ellipsometry.stokes(_wave(plan, sheet, "s"), _wave(plan, sheet, "p")))
+        s, p = (_reflected(plan, sheets, polarisation) for polarisation in "sp")
+        return jnp.stack(ellipsometry.summed(s, p, _crossed(plan, sheets)))
 
     return simulate
+
+
+def _crossed(plan: Plan, sheets: list[_Sheet]):
+    """conj(r_p) r_s of the first sheet and everything under it."""
+    sheet, *under = sheets
+    front = ellipsometry.crossed(_wave(plan, sheet, "s"), _wave(plan, sheet, "p"))
+    if not under:
+        return front.reflected
+    return plate.bounced(*front, _crossed(plan, under), sheet.internal)
 
 
 def _polarisations(plan: Plan) -> str:

@@ -100,8 +100,6 @@ class Scene(eqx.Module):
         if absorbs(self.ambient):
             raise ValueError("the ambient must not absorb: give it a real index")
         self._check_instrument()
-        if self.light.signal == "psi-delta" and _plates(self):
-            raise ValueError("ellipsometry of a plate's back face is not simulated: leave back out")
 
     def _check_instrument(self):
         if self.instrument.thickness_spread is not None:

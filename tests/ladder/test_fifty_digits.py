@@ -58,6 +58,14 @@ def test_a_plate_adds_intensities(kind):
     np.testing.assert_allclose(found, truth, atol=1e-8)  # tmm leaves the plate's k out at its faces
 
 
+def test_ellipsometry_through_a_plate():
+    """The model has the plate transparent at its faces, and is held against Mueller matrices elsewhere."""
+    plate = pl.Substrate(pl.Constant(1.5, 1e-8), back=1.0, plate_mm=0.5)
+    case = few(pl.Scene(STACK[:1], plate, light=pl.Light(angle=50.0, signal="psi-delta")))
+    truth = signal(case, case.draws[0], np.arange(9)).ravel()
+    np.testing.assert_allclose(reference("float64", case).values[0], truth, atol=1e-7)
+
+
 def test_the_model_is_within_rounding(oblique):
     truth = reference("mpmath", oblique)
     assert truth.values.shape == (3, 9, 1)

@@ -18,7 +18,8 @@ from pellicle.scene import Scene, free_leaves
 
 
 class Worth(NamedTuple):
-    """rms of the spectra that see a back face, with it and without."""
+    """rms of the spectra that see a back face, with it and without: fractions, or degrees of Ψ where all
+    are ellipsometry."""
 
     rms: float
     without: float
@@ -31,6 +32,7 @@ def worth(spectra: Sequence[Measured], weighed: Weighed) -> Worth | None:
     no meaning.
     """
     seen = [i for i, view in enumerate(weighed.problem.views) if view.plan.on("back-face")]
+    seen = [i for i in seen if weighed.problem.views[i].channels == 1] or seen
     backs = [spectra[i].scene.substrate for i in seen]
     if not seen or any(free_leaves((plate.back, plate.plate_mm)) for plate in backs):
         return None
@@ -62,11 +64,8 @@ def _at(problem: Problem, which: int, unit: np.ndarray) -> Local:
 
 
 def _rms(views: Sequence[View], at: Sequence[Local]) -> float:
-    residuals = [
-        (view.data.values - np.asarray(there.model))[: view.points]
-        for view, there in zip(views, at, strict=True)
-    ]
-    return float(np.sqrt(np.mean(np.concatenate(residuals) ** 2)))
+    squares = [view.rms(there.model) ** 2 for view, there in zip(views, at, strict=True)]
+    return float(np.sqrt(np.average(squares, weights=[view.points for view in views])))
 
 
 def told(found: Worth | None) -> str:

@@ -18,9 +18,22 @@ from pellicle.scene import Interface, Scene, free_leaves, insert
 
 
 def _simulated(plan: Plan, numbers: Scene, data: Data) -> Any:
-    """What was measured of the signal: all of it, or of N, C, S the N and C that a folded Δ leaves."""
+    """What was measured of the signal: all of it, or of N, C, S the N and C that a folded Δ leaves.
+
+    Ψ and Δ do not tell how much of the light is polarised, so where some is not, N, C, S are brought to
+    their sphere; a rotating analyser sees N and C as they are.
+    """
     signal = build(plan)(numbers).reshape(numbers.light.wavelength.size, -1)
-    return signal[:, : data.values.size // len(signal)].reshape(-1)
+    channels = data.values.size // len(signal)
+    if channels == 3 and _depolarises(plan):
+        square = jnp.sum(signal**2, axis=1, keepdims=True)
+        signal = signal * jnp.where(square > 0, jax.lax.rsqrt(jnp.where(square > 0, square, 1.0)), 0.0)
+    return signal[:, :channels].reshape(-1)
+
+
+def _depolarises(plan: Plan) -> bool:
+    """Whether intensities of several polarisations add."""
+    return plan.on("back-face") or plan.on("angle-spread") or bool(plan.row("coherence").count)
 
 
 def _solve(plan: Plan, scene: Scene, data: Data, values: Sequence[Any]) -> nuisance.Solved:

@@ -77,11 +77,6 @@ def _check(data: Spectrum, scene: Scene) -> None:
         return
     if drifting or scene.instrument.scale != 1.0 or scene.instrument.offset != 0.0:
         raise UsageError(f"{data.path}: Ψ and Δ have no scale and no offset: leave both out")
-    if scene.substrate.back is not None:
-        raise UsageError(
-            f"{data.path}: ellipsometry of a plate's back face is not simulated: leave back out, or,"
-            " beside other spectra, write back = false in the file's own [[data.file]]"
-        )
     if data.angle is None and not free_leaves(scene.light) and not np.any(scene.light.angle):
         raise UsageError(
             f"{data.path}: ellipsometry needs its angle of incidence: add --angle 70, say, angle = 70 under "

@@ -31,19 +31,10 @@ def _part(spectrum: Spectrum, view: View, met: Met, found: Errors) -> Part:
         spectrum=spectrum,
         curve=_curve(view, met, found),
         plan=view.plan,
-        rms=_rms(view, met),
+        rms=view.rms(met.at.model),
         chi2_reduced=met.chi2 / met.freedom,
         effective_points=view.rows / met.length,
     )
-
-
-def _rms(view: View, met: Met) -> float:
-    """rms of the residuals. For ellipsometry it is in degrees of Ψ: half the distance on the sphere, in
-    each of its two directions."""
-    residual = (view.data.values - np.asarray(met.at.model))[: view.points]
-    if view.channels == 1:
-        return float(np.sqrt(np.mean(residual**2)))
-    return float(np.rad2deg(np.sqrt(residual @ residual / (2 * view.rows))) / 2)
 
 
 def together(found: tuple[Part, ...]) -> float | None:

@@ -69,6 +69,14 @@ class View(NamedTuple):
         """Data values that are independent: N, C and S lie on a sphere, so two of the three."""
         return self.points if self.channels < 3 else 2 * self.rows
 
+    def rms(self, model: Any) -> float:
+        """rms of the residuals. For ellipsometry it is in degrees of Ψ: half the distance on the sphere, in
+        each of its two directions."""
+        residual = (self.data.values - np.asarray(model))[: self.points]
+        if self.channels == 1:
+            return float(np.sqrt(np.mean(residual**2)))
+        return float(np.rad2deg(np.sqrt(residual @ residual / (2 * self.rows))) / 2)
+
     @property
     def program(self) -> tuple[Any, ...]:
         """The arguments that the compiled functions take, the plan first (static)."""

@@ -93,10 +93,13 @@ def _indices(medium: Any, wavelength: np.ndarray) -> list[Any]:
 def _point(scene: Scene, seen: _Seen) -> list[Any]:
     light = scene.light
     if light.signal == "psi-delta":
-        s, p = (_amplitude(seen, seen.sheets[0], letter) for letter in "sp")
-        whole, cross = abs(s) ** 2 + abs(p) ** 2, p * mp.conj(s)
+        s, p, cross = (
+            mp.re(_product(seen, 0, "ss")),
+            mp.re(_product(seen, 0, "pp")),
+            _product(seen, 0, "ps"),
+        )
         # tan Ψ e^{iΔ} = conj(r_p/r_s): N = cos 2Ψ, C = sin 2Ψ cos Δ, S = sin 2Ψ sin Δ
-        return [(abs(s) ** 2 - abs(p) ** 2) / whole, 2 * mp.re(cross) / whole, -2 * mp.im(cross) / whole]
+        return [(s - p) / (s + p), 2 * mp.re(cross) / (s + p), -2 * mp.im(cross) / (s + p)]
     letters = "sp" if light.polarisation == "unpolarised" else light.polarisation
     which = 0 if light.signal == "R" else 1
     return [sum(_powers(seen, 0, letter)[which] for letter in letters) / len(letters)]
@@ -112,6 +115,17 @@ def _powers(seen: _Seen, first: int, letter: str) -> tuple[Any, Any]:
     passed = mp.exp(-4 * mp.pi * mp.im(q) * seen.plates_mm[first] * 10**6 / seen.wavelength)
     between = 1 - R_below * R_next * passed**2
     return R + T * T_below * R_next * passed**2 / between, T * T_next * passed / between
+
+
+def _product(seen: _Seen, first: int, letters: str) -> Any:
+    """r conj(r) of a sheet and all under it, for two polarisations, summed over the plates' orders."""
+    (r, back, twice), (r_, back_, twice_) = (_amplitudes(seen, seen.sheets[first], x) for x in letters)
+    if first == len(seen.sheets) - 1:
+        return r * mp.conj(r_)
+    q = _normal(seen, seen.sheets[first].below)
+    passed = mp.exp(-4 * mp.pi * mp.im(q) * seen.plates_mm[first] * 10**6 / seen.wavelength)
+    beneath = _product(seen, first + 1, letters) * passed**2
+    return r * mp.conj(r_) + twice * mp.conj(twice_) * beneath / (1 - back * mp.conj(back_) * beneath)
 
 
 def _normal(seen: _Seen, index: Any) -> Any:
@@ -136,11 +150,13 @@ def _fields(seen: _Seen, layers: list[tuple[Any, Any]], bottom: Any, letter: str
     return E, H
 
 
-def _amplitude(seen: _Seen, sheet: _Sheet, letter: str) -> Any:
-    """r of one sheet; at normal incidence r_p = −r_s."""
+def _amplitudes(seen: _Seen, sheet: _Sheet, letter: str) -> tuple[Any, Any, Any]:
+    """r of one sheet from above and from below, and t t′; at normal incidence r_p = −r_s."""
     top, bottom = _admittance(seen, sheet.above, letter), _admittance(seen, sheet.below, letter)
     E, H = _fields(seen, sheet.layers, bottom, letter)
-    return (top * E - H) / (top * E + H)
+    E_, H_ = _fields(seen, sheet.layers[::-1], top, letter)
+    start, start_ = top * E + H, bottom * E_ + H_
+    return (top * E - H) / start, (bottom * E_ - H_) / start_, 4 * top * bottom / (start * start_)
 
 
 def _faces(seen: _Seen, sheet: _Sheet, letter: str) -> tuple[Any, Any, Any, Any]:

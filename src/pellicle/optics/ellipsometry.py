@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from pellicle.optics.film import Wave
-from pellicle.optics.number import abs2, conj, imag, real
+from pellicle.optics.film import Wave, transmittance
+from pellicle.optics.number import abs2, conj, imag, real, to_complex
 
 
 class Stokes(NamedTuple):
@@ -34,6 +34,34 @@ def stokes(s: Wave, p: Wave) -> Stokes:
     rs, rp = s.reflected / s.denominator, p.reflected / p.denominator
     both = 2 * (conj(rp) * rs)
     return Stokes(abs2(rs) - abs2(rp), real(both), imag(both), abs2(rs) + abs2(rp))
+
+
+class Crossed(NamedTuple):
+    """conj(x_p) x_s of one sheet's amplitudes x: reflected, passed both ways, and reflected from below."""
+
+    reflected: Any
+    passed_twice: Any
+    below: Any
+
+
+def crossed(s: Wave, p: Wave) -> Crossed:
+    """From the waves of both polarisations around the same layers, between media that absorb next to nothing.
+
+    Their t t′ has the size T and, but for what s and p have in common, twice the phase of 1/denominator.
+    """
+    ds, dp = to_complex(s.denominator), to_complex(p.denominator)
+    apart = jnp.conj(ds) * dp
+    turn = apart / jnp.abs(apart)
+    return Crossed(
+        jnp.conj(to_complex(p.reflected) / dp) * (to_complex(s.reflected) / ds),
+        transmittance(p) * transmittance(s) * turn * turn,
+        jnp.conj(to_complex(p.below) / dp) * (to_complex(s.below) / ds),
+    )
+
+
+def summed(s: Any, p: Any, cross: Any) -> Stokes:
+    """From sums of intensities |x_s|², |x_p|² and of conj(x_p) x_s: what comes back from plates."""
+    return Stokes(s - p, 2 * jnp.real(cross), 2 * jnp.imag(cross), s + p)
 
 
 def normalised(given: Stokes) -> tuple[Any, Any, Any]:

@@ -27,8 +27,19 @@ def plate_reflectance(front: Face, back_reflectance, internal):
     transparent plate; for one that absorbs, the relative error is (k/n)², at most 1e-5 for plates
     over 10 µm through which anything passes.
     """
-    seen = back_reflectance * internal**2
-    return front.reflectance + front.transmittance**2 * seen / (1 - front.reflectance_below * seen)
+    return bounced(
+        front.reflectance, front.transmittance**2, front.reflectance_below, back_reflectance, internal
+    )
+
+
+def bounced(reflected, passed_twice, below, back, internal):
+    """reflected + passed_twice·back·τ²/(1 − below·back·τ²), the orders of light in a plate summed.
+
+    For powers, and for the products conj(x_p) x_s of two polarisations' amplitudes: both add from order to
+    order, as what one order has to do with another is washed out.
+    """
+    seen = back * internal**2
+    return reflected + passed_twice * seen / (1 - below * seen)
 
 
 def plate_transmittance(front: Face, back_reflectance, back_transmittance, internal):
