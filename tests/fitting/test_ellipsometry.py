@@ -67,11 +67,6 @@ def test_what_ellipsometry_cannot_have():
     )
     with pytest.raises(UsageError, match=r"oxide.csv: ellipsometry needs its angle of incidence"):
         pl.fit(bare, scene())
-    plate = pl.Scene(pl.Layer("SiO2", pl.Free(lower=0, upper=1000)), pl.Substrate("Si", back="air"))
-    with pytest.raises(UsageError, match=r"oxide.csv: .* leave back out"):
-        pl.fit(spectrum, plate)
-    with pytest.raises(ValueError, match="leave back out"):
-        pl.Scene(pl.Layer(1.5, 1.0), pl.Substrate(1.5, back=1.0), light=pl.Light(signal="psi-delta"))
 
 
 def test_hafnia(shared_data):
