@@ -20,21 +20,24 @@ import numpy as np
 
 import pellicle as pl
 from pellicle.optics.ellipsometry import Stokes, normalised, stokes
+from pellicle.optics.number import abs2
 from pellicle.signals import _waves as signals_of_waves
 
 CHUNK = 5000
 
 
-def rounding(rows: np.ndarray, slopes: np.ndarray, layers: int) -> np.ndarray:
-    """What R + T of s and p may miss 1 by: 32 roundings of 1, of each layer, and of each layer's index.
+def rounding(rows: np.ndarray, values: np.ndarray, slopes: np.ndarray, layers: int) -> np.ndarray:
+    """What R + T of s and p may miss 1 by: 32 roundings of 1, of each layer, and of what resonates.
 
     Light's flux through a layer is conserved by c² + Q f² = 1, whatever the phase is, so neither grazing
-    incidence nor a critical angle enters. A guided wave does, near a resonance: an index that
-    rounding turns by ε in the complex plane takes ε n ∂(R + T)/∂k there.
+    incidence nor a critical angle enters. A guided wave does: an index that rounding turns by ε in the
+    complex plane takes ε n ∂(R + T)/∂k there, and amplitudes of size 1 cancel in a denominator that is
+    as small as cos θ/|1 + r|.
     """
     n, k = rows[:, layers : 2 * layers], slopes[:, :4, 2 * layers : 3 * layers]
     turned = np.sum(np.abs(k[:, :2] + k[:, 2:]) * n[:, None], axis=2)
-    return 32 * np.finfo(rows.dtype).eps * (1 + layers + turned)
+    cosine = np.maximum(np.cos(np.deg2rad(rows[:, -2:-1])), 1e-9)
+    return 32 * np.finfo(rows.dtype).eps * (1 + layers + turned + values[:, 10:] / cosine)
 
 
 def scenes(rng: np.random.Generator, count: int, layers: int) -> np.ndarray:
@@ -62,7 +65,7 @@ def scenes(rng: np.random.Generator, count: int, layers: int) -> np.ndarray:
 
 
 def signals(row, layers: int):
-    """Rs, Rp, Ts, Tp, Ψ, Δ and the Stokes sums of one scene; no list of layers where there is one film."""
+    """Rs, Rp, Ts, Tp, Ψ, Δ, the Stokes sums and |1 + r| of one scene; one film is in no list."""
     d, n, k = row[: 3 * layers].reshape(3, layers) if layers else row[:3].reshape(3, 1)
     n2, k2, ambient, angle, wavelength = row[-5:]
     media = list(jax.lax.complex(n, k)) if layers else jax.lax.complex(n[0], k[0])
@@ -70,7 +73,8 @@ def signals(row, layers: int):
     at = {"ambient": ambient, "angle": angle}
     powers = [f(*film, **at, polarisation=p) for f in (pl.reflectance, pl.transmittance) for p in "sp"]
     waves = signals_of_waves(*film, ambient, angle, "unpolarised")
-    return jnp.stack([*powers, *pl.ellipsometry(*film, **at), *stokes(*waves)])
+    field = [abs2(1 + wave.reflected / wave.denominator) ** 0.5 for wave in waves]
+    return jnp.stack([*powers, *pl.ellipsometry(*film, **at), *stokes(*waves), *field])
 
 
 @partial(jax.jit, static_argnums=1)
@@ -90,17 +94,17 @@ def broken(rows: np.ndarray, layers: int) -> dict[str, np.ndarray]:
     """Law → which rows break it."""
     values, slopes = map(np.asarray, run(rows, layers))
     count = max(layers, 1)
-    unit, few = rounding(rows, slopes, count), 16 * np.finfo(rows.dtype).eps
+    unit, few = rounding(rows, values, slopes, count), 16 * np.finfo(rows.dtype).eps
     reflected, passed, (psi, delta) = values[:, :2], values[:, 2:4], values[:, 4:6].T
     lossless = np.all(rows[:, 2 * count : 3 * count] == 0, axis=1) & (rows[:, -4] == 0)
     normal = rows[:, -2] == 0
     total = reflected + passed
-    sums = values[:, 6:].T
+    sums = values[:, 6:10].T
     # two samples side by side: what a detector sees of both
     mixed = purity(sums + sums[:, ::-1])
     return {
         "value not finite": ~np.all(np.isfinite(values), axis=1),
-        "derivative not finite": ~np.all(np.isfinite(slopes), axis=(1, 2)),
+        "derivative not finite": ~np.all(np.isfinite(slopes[:, :10]), axis=(1, 2)),
         "R or T below 0": np.any((reflected < 0) | (passed < 0), axis=1),
         "R + T above 1": np.any(total > 1 + unit, axis=1),
         "energy lost where nothing absorbs": lossless & np.any(np.abs(total - 1) > unit, axis=1),

@@ -12,6 +12,7 @@ import matplotlib
 import numpy as np
 
 import pellicle as pl
+from pellicle.colour import film_colour
 
 matplotlib.use("Agg")
 from matplotlib.figure import Figure
@@ -49,6 +50,12 @@ def hematite() -> Figure:
         (right, pl.transmittance, "transmittance"),
     ):
         map_of(axes, thickness, film(function, "Fe2O3", thickness), "thickness (nm)", title, 1.0)
+    swatches = film_colour(thickness, pl.material("Fe2O3"), GLASS).srgb
+    beside = left.inset_axes((-0.32, 0, 0.07, 1), sharey=left)
+    beside.imshow(
+        np.asarray(swatches)[:, None], extent=(0, 1, 0, 300), origin="lower", aspect="auto", rasterized=True
+    )
+    beside.axis("off")
     return figure
 
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
 import pellicle as pl
+from pellicle.colour import film_colour
 from pellicle.materials import lookup
 
 VISIBLE = np.linspace(400.0, 700.0, 61)
@@ -15,6 +18,22 @@ def on_glass(function, material, thickness, wavelength=VISIBLE):
     """R or T of a film on glass; 61 points in every call, so that all share what is compiled."""
     wavelength, thickness = (np.broadcast_to(x, VISIBLE.shape).copy() for x in (wavelength, thickness))
     return np.asarray(function(wavelength, thickness, lookup(material)(wavelength), 1.52))
+
+
+def test_hematite_runs_through_the_temper_colours_three_times():
+    """Figure 1, by what is reflected as the layer grows to 300 nm: the order that oxide on heated steel
+    is known for, straw, red, purple, blue, green; paler each time, as hematite takes the blue."""
+    thickness = np.arange(40.0, 287.0, 2.0)
+    _, a, b = np.asarray(film_colour(thickness, lookup("Fe2O3"), 1.52).lab).T
+    hue, chroma = np.rad2deg(np.unwrap(np.arctan2(b, a))), np.hypot(a, b)
+    assert np.all(np.diff(hue) < 0)
+    edges = np.array([45.0, 115.0, 220.0, 290.0, 345.0])
+    names = np.array(["red", "straw", "green", "blue", "purple", "red"])
+    seen = names[np.searchsorted(edges, hue % 360)]
+    assert [name for name, _ in itertools.groupby(seen)] == 3 * ["straw", "red", "purple", "blue", "green"]
+    orders = np.floor((hue[0] - hue + 20) / 360).astype(int)
+    strongest = [np.max(chroma[orders == i]) for i in range(3)]
+    assert strongest[0] > strongest[1] > strongest[2]
 
 
 def test_gold_lets_light_through_at_30_nm_and_hardly_any_above_100():
