@@ -42,6 +42,10 @@ def reflectance(
     `ambient` real; `polarisation` "s", "p" or "unpolarised" (the mean of both). For several coherent
     layers `layer` is a list from the ambient down and `thickness` a list as long.
 
+    At 90° R is 1 and T is 0, save where nothing lies between equal media: that reflects nothing at any
+    angle. Where the substrate is exactly critical, its derivatives are truly infinite; those returned
+    are finite.
+
     **Raises:** ValueError for an absorbing ambient, an unknown polarisation or material, and
     wavelengths outside a material's data. Under `jit`, where wavelengths are unknown, the result is
     NaN there.
