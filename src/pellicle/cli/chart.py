@@ -1,4 +1,4 @@
-"""`pellicle chart`: the colours of a film against its thickness and the angle of incidence."""
+"""`pellicle chart`: the colours of a film against thickness and angle, or a picture of a surface."""
 
 from __future__ import annotations
 
@@ -26,13 +26,21 @@ def chart(
     angle: Annotated[str, Parameter(help="LO:HI in degrees.")] = "0:80",
     illuminant: Annotated[str, Parameter(help="E, A, D50, D55, D65 or D75.")] = "D65",
     observer: Annotated[str, Parameter(help="1931 (2 degrees) or 1964 (10 degrees).")] = "1931",
+    light: Annotated[
+        float, Parameter(help="Of a surface: degrees between the light and the line of sight.")
+    ] = 35.0,
 ) -> int:
-    """Draw the interference colours of a recipe's film.
+    """Draw the interference colours of a recipe's film, or, of a recipe of a surface, a sphere and its BRDF.
 
     Example: pellicle chart film.toml --out colours.png --thickness 0:1000
     """
     from pellicle.io.recipe import read_recipe
+    from pellicle.io.recipe_kind import describes_surface
 
+    if describes_surface(recipe):
+        if layer is not None or thickness is not None:
+            raise UsageError("--layer and --thickness are for films: a surface has its own thickness")
+        return _surface(recipe, out, light)
     found = read_recipe(recipe)
     scene = found.scene()
     angles = _range("--angle", angle, 90.0)
@@ -46,6 +54,20 @@ def chart(
     say(f"{out}: {nm[0]:g} to {nm[1]:g} nm, {angles[0]:g} to {angles[1]:g} degrees")
     if lost > 0.005:
         say(f"{100 * lost:.0f} % of the colours lie outside sRGB and are shown by their nearest")
+    return 0
+
+
+def _surface(recipe: str, out: str, light: float) -> int:
+    from pellicle.io.surface_recipe import read_surface_recipe
+
+    if not 0 <= light <= 180:
+        raise UsageError(f"--light must lie in 0 to 180 degrees, got {light:g}")
+    surface = read_surface_recipe(recipe).surface
+    start()
+    from pellicle.report.spheres import sphere
+
+    sphere(surface, out, (light, 60.0), title=Path(recipe).stem)
+    say(f"{out}: a sphere of {surface.model}, the light {light:g} degrees from the line of sight")
     return 0
 
 
