@@ -2,7 +2,7 @@
 
 Run `python benchmarks/brdf_layers.py FOLDER`: every CSV of BRDF samples in it is fitted with both layered
 models, and the table of fits/brdf/README.md comes out. Directions beyond 70 degrees are left out, and at
-most 1500 samples of a file are kept, spread over it.
+most 1000 samples of a file are kept, spread over it.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from pellicle.io.samples import BrdfSamples
 jax.config.update("jax_enable_x64", True)
 
 STEEPEST = 70.0
-MOST = 1500
+MOST = 1000
 
 
 def between(lower: float, upper: float) -> pl.Free:
