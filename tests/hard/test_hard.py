@@ -31,6 +31,8 @@ LOOSER = {
     "1 mm transparent": (4e-12, 1e-11),
     # k₀d of 860
     "wavelength 1 nm": (VALUE, 2e-11),
+    # a sharp resonance: n₂ ∂R/∂n₂ is 114, so that the rounding of n₂ alone is 1.3e-14
+    "Kretschmann plasmon": (1.3e-14, GRADIENT),
     # the root of n² − a², a difference of 1e-16 that sin 30° brings, is 1e-8: the truth is singular here
     CRITICAL: (5e-7, np.nan),
 }
@@ -43,6 +45,7 @@ LOOSER32 = {
     "89.999 degrees, transparent": (VALUE32, 3e-3),
     "exactly 90 degrees": (VALUE32, 3e-3),
     "exactly 90 degrees, transparent": (VALUE32, 3e-3),
+    "Kretschmann plasmon": (7e-6, GRADIENT32),  # n₂ itself rounds by 6e-8, and n₂ ∂R/∂n₂ is 114
     CRITICAL: (VALUE32, np.nan),
 }
 

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+from jax.custom_derivatives import SymbolicZero
 
 from pellicle.optics.interface import carried, normal, normal_square, nothing_where, power, same, transverse
 from pellicle.optics.number import (
@@ -51,17 +52,25 @@ def through(Q: Number, k: Any, sincos: SinCos = sincos) -> Passage:
     """
     if _real_array(Q):
         return _through_real(Q, k, sincos)
+    q = _root(Q)
+    half, scale_square = _half(q, k, sincos)
+    c, f = 1 + half, times_i(-half) * (1 / q)
+    return Passage(c, f, scale_square, where(_near(Q, k), c, 1 + 2 * half))
+
+
+def _root(Q: Number) -> Number:
+    """√Q; one of exactly 0 is replaced by one whose distance from 0 is beneath all digits."""
     q = sqrt(Q)
-    flat = abs2(q) == 0
-    over, q, flat = hold(1 / where(flat, 1.0 + 0.0 * q, q), q, flat)
+    return hold(where(abs2(q) == 0, 1e-15 + 0.0 * q, q))[0]
+
+
+def _half(q: Number, k: Any, sincos: SinCos) -> tuple[Number, Any]:
+    """½(e^{2ikq} − 1), to the last digit where it is small, and |e^{ikq}|²."""
     scale_square, m = exponentials(-2 * (k * imag(q)))  # 1 + m would lose a transmittance of 1e-22
     sine, cosine = sincos(k * real(q))
     square, product = sine * sine, sine * cosine
-    re, im = m * (0.5 - square) - square, product + m * product  # of M/2
-    join = Pair if isinstance(Q, Pair) else jax.lax.complex
-    c, f = join(1 + re, im), where(flat, k + 0.0 * im, join(im, -re) * over)
-    echo = scale_square * join(1 - 2 * square, 2 * product)
-    return Passage(c, f, scale_square, where(_near(Q, k), c, echo))
+    join = Pair if isinstance(q, Pair) else jax.lax.complex
+    return join(m * (0.5 - square) - square, product + m * product), scale_square
 
 
 def _through_real(Q, k, sincos):
@@ -131,6 +140,59 @@ through.defjvp(lambda s, p, t: _slopes(through, s, p, t))
 through_wave.defjvp(lambda s, p, t: _slopes(through_wave, s, p, t))
 
 
+Sides = tuple[tuple[Number, Number], ...]
+
+
+def _combined(sides: Sides, Q: Number, k: Any, through, sincos: SinCos) -> tuple[list[Number], Any]:
+    """A c − iB f for each (A, B), and the scale squared."""
+    if through is not globals()["through"] or _real_array(Q):
+        c, f, scale_square, _ = through(Q, k, sincos)
+        g = times_i(-f)
+        return [A * c + B * g for A, B in sides], scale_square
+    found, scale_square = _amplitudes(sides, Q, k, sincos)
+    return list(found), scale_square
+
+
+@partial(jax.custom_jvp, nondiff_argnums=(3,))
+def _amplitudes(sides: Sides, Q: Number, k: Any, sincos: SinCos) -> tuple[tuple[Number, ...], Any]:
+    """The same where Q is no real array: as c = 1 + M/2 and −if = −M/2q, it is A + M/2 (A − B/q), whose
+    bracket knows nothing of the thickness: one product at each point."""
+    q = _root(Q)
+    over = 1 / q
+    half, scale_square = _half(q, k, sincos)
+    return tuple(A + half * (A - B * over) for A, B in sides), scale_square
+
+
+def _amplitudes_slope(sincos, primal, tangent):
+    """By the derivatives of c and f. What is known not to vary costs nothing."""
+    (sides, Q, k), (dsides, dQ, dk) = primal, tangent
+    dQ, dk = jax.tree.map(_filled, (dQ, dk), is_leaf=_is_nothing)
+    (c, f, _, _), (dc, df, dscale, _) = _slopes(through, sincos, (Q, k), (dQ, dk))
+    g, dg = times_i(-f), times_i(-df)
+    moved = []
+    for (A, B), turns in zip(sides, dsides, strict=True):
+        dA, dB = (None if _all_nothing(x) else jax.tree.map(_filled, x, is_leaf=_is_nothing) for x in turns)
+        slope = A * dc + B * dg
+        slope = slope if dA is None else slope + dA * c
+        moved.append(slope if dB is None else slope + dB * g)
+    return _amplitudes(sides, Q, k, sincos), (tuple(moved), dscale)
+
+
+def _is_nothing(x: Any) -> bool:
+    return isinstance(x, SymbolicZero)
+
+
+def _filled(x: Any) -> Any:
+    return jnp.zeros(x.shape, x.dtype) if _is_nothing(x) else x
+
+
+def _all_nothing(x: Any) -> bool:
+    return all(map(_is_nothing, jax.tree.leaves(x, is_leaf=_is_nothing)))
+
+
+_amplitudes.defjvp(_amplitudes_slope, symbolic_zeros=True)
+
+
 class Wave(NamedTuple):
     """One polarisation of the light around a layer: amplitudes over a common denominator."""
 
@@ -166,20 +228,21 @@ def film(
     a, q0 = transverse(ambient, angle)
     e0, e1, e2, q1_square = ambient * ambient, layer * layer, substrate * substrate, normal_square(layer, a)
     q2 = normal(substrate, a)
-    c, f, scale_square, _ = through(q1_square, phase, sincos)
-    g = times_i(-f)
     bare, empty = same(ambient, substrate), same(ambient, layer, substrate)
-    waves = []
-    for polarisation in polarisations[:1] if angle is None else polarisations:
+    letters = polarisations[:1] if angle is None else polarisations
+    sides, powers = [], []
+    for polarisation in letters:
         if polarisation == "s":
             A, B, A_, B_ = q0 + q2, q0 * q2 + q1_square, q0 - q2, q0 * q2 - q1_square
         else:
             u, v = e0 * e2 * q1_square / e1, e1 * q0 * q2
             A, B, A_, B_ = e0 * q2 + e2 * q0, u + v, e2 * q0 - e0 * q2, v - u
-        into = carried(ambient, q0, polarisation) * power(substrate, q2, polarisation) * scale_square
         A_, B_ = nothing_where(bare, A_), nothing_where(empty, B_)
-        waves.append(Wave(A_ * c + B_ * g, B_ * g - A_ * c, A * c + B * g, into))
-    return tuple(waves)
+        sides += [(A_, B_), (-A_, B_), (A, B)]
+        powers.append(carried(ambient, q0, polarisation) * power(substrate, q2, polarisation))
+    found, scale_square = _combined(tuple(sides), q1_square, phase, through, sincos)
+    trios = zip(found[0::3], found[1::3], found[2::3], powers, strict=True)
+    return tuple(Wave(down, below, whole, into * scale_square) for down, below, whole, into in trios)
 
 
 def reflectance(wave: Wave):
