@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pellicle.optics import number
-from pellicle.optics.number import Pair, exponentials
+from pellicle.optics.number import Pair
 
 finite = st.floats(-1e3, 1e3, allow_subnormal=False)
 # away from 0, where a quotient's relative error has no meaning
@@ -149,21 +149,3 @@ def test_hold_changes_nothing():
     (held,) = number.hold(z)
     assert number.is_real(held.im) if held.im is not None else True
     np.testing.assert_array_equal(held.re, z.re)
-
-
-@pytest.mark.parametrize(("dtype", "tolerance"), [(np.float64, 2e-16), (np.float32, 1.2e-7)])
-def test_exponentials(dtype, tolerance):
-    """Both within a rounding of the library's in more digits, until underflow is near."""
-    lowest = -670.0 if dtype is np.float64 else -70.0
-    steps = np.concatenate([np.linspace(lowest, 0.0, 20001), -np.logspace(-30, 0, 301), [-0.0]])
-    x = steps.astype(dtype)
-    exact = x.astype(np.longdouble)
-    both, less = (np.asarray(y) for y in exponentials(jnp.asarray(x)))
-    assert both.dtype == less.dtype == dtype
-    assert np.max(np.abs(both / np.exp(exact) - 1)) < tolerance
-    some = exact != 0
-    assert np.max(np.abs(less[some] / np.expm1(exact[some]) - 1)) < tolerance
-    assert np.all(less[~some] == 0)
-    none, all_of_it = exponentials(jnp.asarray([-1e5, -np.inf, np.nan], dtype))
-    np.testing.assert_array_equal(none, np.array([0, 0, np.nan], dtype))
-    np.testing.assert_array_equal(all_of_it, np.array([-1, -1, np.nan], dtype))

@@ -17,13 +17,13 @@ import jax
 import jax.numpy as jnp
 from jax.custom_derivatives import SymbolicZero
 
+from pellicle.optics.exponentials import exponentials
 from pellicle.optics.interface import carried, normal, normal_square, nothing_where, power, same, transverse
 from pellicle.optics.number import (
     Number,
     Pair,
     SinCos,
     abs2,
-    exponentials,
     hold,
     imag,
     real,
@@ -145,7 +145,7 @@ Sides = tuple[tuple[Number, Number], ...]
 
 def _combined(sides: Sides, Q: Number, k: Any, through, sincos: SinCos) -> tuple[list[Number], Any]:
     """A c − iB f for each (A, B), and the scale squared."""
-    if through is not globals()["through"] or _real_array(Q):
+    if through is through_wave or _real_array(Q):
         c, f, scale_square, _ = through(Q, k, sincos)
         g = times_i(-f)
         return [A * c + B * g for A, B in sides], scale_square
