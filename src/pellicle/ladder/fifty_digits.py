@@ -28,6 +28,8 @@ def unsuitable(case: Case) -> str | None:
         return "this light comes in a cone"
     if case.plan.on("roughness"):
         return "this scene has a rough face"
+    if case.ellipsometric and case.plan.on("back-face"):
+        return "this ellipsometer sees a plate's other face"
     if case.plan.on("coherence"):
         return "these fringes are narrower than the sampling"
     return None
