@@ -199,4 +199,6 @@ def test_the_plan_names_what_is_there():
     assert not flat.on("deviation")
     assert not flat.on("diffuse")
     assert not plan(Surface("microfacet-film", {})).on("absorption")
-    assert plan(Surface("microfacet-film", {"k": between(0, 1)})).on("absorption")
+    absorbing = plan(Surface("microfacet-film", {"k": between(0, 1)})).row("absorption")
+    assert absorbing.on
+    assert absorbing.why == "the film's extinction is free"

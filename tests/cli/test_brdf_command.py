@@ -137,7 +137,7 @@ def test_nothing_free_is_a_bad_recipe(folder, pellicle):
     (folder / "paint.toml").write_text(fixed)
     ran = pellicle("fit", "--recipe", folder / "paint.toml")
     assert ran.code == 3
-    assert "nothing is free to fit" in ran.err
+    assert "paint.toml: nothing is free to fit" in ran.err
 
 
 def test_flags_that_a_surface_has_no_use_for(folder, pellicle):
