@@ -8,11 +8,15 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import mpmath
 import numpy as np
-from mpmath import mp, mpc, mpf
 
 from pellicle.ladder.case import Case
 from pellicle.scene import Scene, groups, insert, thickness_spread, with_wavelength
+
+mp: Any = mpmath.mp  # its functions are made at run time, which type checkers do not see
+mpc: Any = mpmath.mpc
+mpf: Any = mpmath.mpf
 
 DIGITS = 50
 

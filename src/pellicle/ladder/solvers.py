@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import warnings
 from collections.abc import Callable
@@ -95,8 +96,8 @@ def _scipy_lbfgsb(trial: Trial) -> np.ndarray:
 def _jaxopt_run(plan: Plan, scene: Any, data: Any, box: Any, unit: Any) -> Any:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # jaxopt says on import that nobody maintains it
-        from jaxopt import LBFGSB
-    solver = LBFGSB(fun=lambda u: misfit(plan, scene, data, box, u), maxiter=STEPS, tol=1e-8)
+        jaxopt: Any = importlib.import_module("jaxopt")  # optional
+    solver = jaxopt.LBFGSB(fun=lambda u: misfit(plan, scene, data, box, u), maxiter=STEPS, tol=1e-8)
     return solver.run(unit, bounds=(jnp.zeros_like(unit), jnp.ones_like(unit))).params
 
 
