@@ -31,7 +31,11 @@ def peers_python() -> Path:
     """The Python of the packages' own environment, made if it is not there."""
     python = VENV / "bin" / "python"
     if not python.exists():
-        subprocess.run([sys.executable, "-m", "venv", VENV], check=True)
+        made = subprocess.run([sys.executable, "-m", "venv", VENV], capture_output=True)
+        if made.returncode:  # Debian splits venv's pip into a package of its own: then ours does
+            subprocess.run([sys.executable, "-m", "venv", "--without-pip", VENV], check=True)
+            pip = [sys.executable, "-m", "pip", "--python", str(python), "install", "--quiet", "pip"]
+            subprocess.run(pip, check=True)
     return python
 
 

@@ -145,6 +145,7 @@ def test_flags_that_a_surface_has_no_use_for(folder, pellicle):
     for flags, words in (
         (("--angle", 30), "--angle cannot be used on a BRDF"),
         (("--layer", "SiO2"), "--layer cannot be used on a BRDF"),
+        (("--joint", "--tolerance", 0.1), "--joint, --tolerance cannot be used on a BRDF"),
         (("--signal", "R"), "describes a surface, whose signal is brdf and not R"),
     ):
         ran = pellicle("fit", *recipe, *flags)

@@ -104,7 +104,10 @@ def fit(
         spot,
     )
     if brdf.wanted(recipe, reading.signal):
-        return brdf.fit_surface(list(data), str(recipe), scene_words.given(), reading, out, json)
+        of_films = [*(["--joint"] if joint else []), *(["--tolerance"] if tolerance else [])]
+        return brdf.fit_surface(
+            list(data), str(recipe), [*scene_words.given(), *of_films], reading, out, json
+        )
     _check(reading)
     not_negative("--tolerance", tolerance)
     looks, together = _what(list(data), recipe, scene_words, reading)
