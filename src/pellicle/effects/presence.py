@@ -12,6 +12,7 @@ from pellicle.effects.box import is_zero, upper
 from pellicle.effects.row import Row
 from pellicle.free import Free, free_leaves
 from pellicle.layers import Interface, absorbs
+from pellicle.materials import Material
 from pellicle.optics.dispersion import AbstractDispersion, Constant
 from pellicle.scene import Scene, coherent_layers, groups
 
@@ -117,15 +118,17 @@ def back_face(scene: Scene) -> Row:
 
 def dispersion(scene: Scene) -> Row:
     at = scene.light.wavelength
-    varying = [name for name, m in _media(scene) if not isinstance(m, Constant)]
-    if not isinstance(scene.ambient, Constant):
-        varying.append("ambient")
+    varying = [name for name, m in [*_media(scene), ("ambient", scene.ambient)] if not _constant(m)]
     if at is not None and np.size(np.unique(at)) == 1:
         return Row("dispersion", False, "one wavelength")
     if not varying:
         return Row("dispersion", False, "no index varies with the wavelength")
     named = " and ".join(dict.fromkeys(varying))
     return Row("dispersion", True, f"the index of {named} varies with the wavelength")
+
+
+def _constant(material: AbstractDispersion) -> bool:
+    return isinstance(material.dispersion if isinstance(material, Material) else material, Constant)
 
 
 def opaque(scene: Scene) -> Row:
