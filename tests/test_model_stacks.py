@@ -220,6 +220,7 @@ def test_a_free_cone_has_a_finite_slope_at_zero(angle):
     np.testing.assert_allclose(slope(6.0), numeric, rtol=1e-5, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_microscope_reads_a_wrong_thickness_without_its_cone():
     """The reason for the effect: 5 to 30 nm at a numerical aperture of 0.5."""
     wavelength = np.linspace(450.0, 850.0, 128)

@@ -17,7 +17,7 @@ def scene(oxide, nitride, **options) -> pl.Scene:
     return pl.Scene(layers, "Si", **options)
 
 
-@pytest.mark.parametrize("bandwidth", [None, 4.0])
+@pytest.mark.parametrize("bandwidth", [pytest.param(None, marks=pytest.mark.slow), 4.0])
 def test_both_thicknesses_come_out(bandwidth):
     """Also through a spectrometer's window, which a stack takes by quadrature."""
     instrument = pl.Instrument(bandwidth=bandwidth)

@@ -147,6 +147,7 @@ def _fit(tmp_path, truth, layer):
     return pl.fit(pl.read_spectrum(path, noise=0.001), pl.Scene(layer, "Si"))
 
 
+@pytest.mark.slow  # the Tauc-Lorentz layer's fit below goes the same way
 def test_a_fit_finds_the_porosity(tmp_path):
     def porous(fraction):
         return Bruggeman(lookup("TiO2"), Constant(1.0), fraction)
