@@ -105,6 +105,7 @@ def _rough(sheet: Sheet) -> bool:
 
 
 def wave_of(plan: Plan, sheet: Sheet, polarisation: str) -> film.Wave:
+    """The reflected and transmitted wave of a sheet, by the closed form or by matrices."""
     ends = (sheet.angle, polarisation)
     if len(sheet.layers) == 1 and not _rough(sheet):
         only_waves = not plan.on("absorption") and not plan.on("tunnelling") and is_real(sheet.layers[0])

@@ -22,11 +22,13 @@ def is_zero(number: Any) -> bool:
 
 
 def least_ambient(scene: Scene) -> float:
+    """The ambient's smallest index at the light's wavelengths."""
     ambient = insert(scene.ambient, start_values(scene.ambient))
     return float(np.min(np.real(ambient(np.atleast_1d(scene.light.wavelength)))))
 
 
 def upper(number: Any) -> float:
+    """The largest value that a number or a free one's bounds allow; 0 where it is absent."""
     return float(number.upper if isinstance(number, Free) else number or 0.0)
 
 

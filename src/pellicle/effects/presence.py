@@ -18,12 +18,14 @@ from pellicle.scene import Scene, coherent_layers, groups
 
 
 def absorption(scene: Scene) -> Row:
+    """On where a layer's extinction is free or not zero."""
     if any(absorbs(layer.material) for layer in coherent_layers(scene)):
         return Row("absorption", True, "a layer's extinction is free, or not zero")
     return Row("absorption", False, "no layer has any extinction, and none is free")
 
 
 def stack(scene: Scene) -> Row:
+    """On where one closed form does not do: several layers, or rough faces."""
     count = max(len(group.layers) for group in groups(scene)[0])
     if count > 1:
         return Row("stack", True, f"{count} coherent layers: a product of characteristic matrices")
@@ -33,6 +35,7 @@ def stack(scene: Scene) -> Row:
 
 
 def roughness(scene: Scene) -> Row:
+    """On where a face was given a roughness, free or not."""
     faces = [upper(each) for group in groups(scene)[0] for each in group.roughness if each is not None]
     if faces:
         how = f"up to {max(faces):g} nm damps what a face reflects"
@@ -41,6 +44,7 @@ def roughness(scene: Scene) -> Row:
 
 
 def oblique(scene: Scene) -> Row:
+    """On where light comes at an angle, at a free one or in a cone."""
     angle = scene.light.angle
     if scene.instrument.has_cone:
         return Row("oblique", True, "the light's cone has oblique rays")
@@ -88,6 +92,7 @@ def _propagates(material, scene: Scene) -> bool:
 
 
 def polarisation(scene: Scene) -> Row:
+    """On where s and p differ and both are needed."""
     if scene.light.signal == "psi-delta":
         return Row("polarisation", True, "ellipsometry compares p with s")
     if scene.instrument.has_cone:
@@ -100,6 +105,7 @@ def polarisation(scene: Scene) -> Row:
 
 
 def transmission(scene: Scene) -> Row:
+    """On where the signal, or a plate's back face, needs what passes the layers."""
     if scene.light.signal == "T":
         return Row("transmission", True, "the signal is a transmittance")
     if back_face(scene).on:
@@ -108,6 +114,7 @@ def transmission(scene: Scene) -> Row:
 
 
 def back_face(scene: Scene) -> Row:
+    """On where there is a plate: its faces add intensities."""
     plates = len(groups(scene)[1])
     if plates == 0:
         return Row("back-face", False, "the substrate is a half space: no back face was given")
@@ -117,6 +124,7 @@ def back_face(scene: Scene) -> Row:
 
 
 def dispersion(scene: Scene) -> Row:
+    """On where an index varies over the wavelengths."""
     at = scene.light.wavelength
     varying = [name for name, m in [*_media(scene), ("ambient", scene.ambient)] if not _constant(m)]
     if at is not None and np.size(np.unique(at)) == 1:
@@ -132,8 +140,10 @@ def _constant(material: AbstractDispersion) -> bool:
 
 
 def opaque(scene: Scene) -> Row:
+    """Off: only a tolerance says that a layer hides what lies beneath (`pellicle.thrift`)."""
     return Row("opaque", False, "light may reach everything, down to the substrate")
 
 
 def precision(scene: Scene) -> Row:
+    """On: only a tolerance says that single precision will do (`pellicle.thrift`)."""
     return Row("precision", True, "double, as far as JAX is set to it")
