@@ -13,7 +13,7 @@ from pellicle.brdf_fitting.search import Minima
 from pellicle.brdf_fitting.surface import Surface
 from pellicle.fitting.noise import correlation_length
 from pellicle.fitting.result import Estimate, Rival
-from pellicle.fitting.uncertainty import UNSEEN
+from pellicle.fitting.uncertainty import UNSEEN, correlation
 
 _ON_BOUND = 1e-6
 _MOST_RIVALS = 10
@@ -39,8 +39,7 @@ class Local(NamedTuple):
 
     @property
     def correlation(self) -> np.ndarray:
-        sd = np.where(self.stderr > 0, self.stderr, 1.0)
-        return self.covariance / np.outer(sd, sd)
+        return correlation(self.covariance)
 
 
 def local(problem: Problem, unit: np.ndarray, sigma_known: bool) -> Local:

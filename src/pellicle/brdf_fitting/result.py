@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pellicle.brdf_fitting.surface import Surface
-from pellicle.fitting.result import Estimate, Rival, Status
+from pellicle.fitting.result import Estimate, Rival, Status, in_short
 from pellicle.io.samples import BrdfSamples
 from pellicle.planning import Plan
 
@@ -53,9 +53,7 @@ class BrdfFit:
         return self.parameters[name]
 
     def __str__(self) -> str:
-        lines = [f"{self.status}: {self.verdict}"]
-        lines += [f"  {p.name} = {p.value:.8g} ± {p.stderr:.2g} {p.unit}".rstrip() for p in self.free]
-        return "\n".join(lines)
+        return in_short(self.status, self.verdict, self.free)
 
     @property
     def free(self) -> tuple[Estimate, ...]:

@@ -42,6 +42,12 @@ class Estimate:
     upper_limit: float | None = None
 
 
+def in_short(status: str, verdict: str, free: tuple[Estimate, ...]) -> str:
+    """A fit as it prints: status and verdict, then each free parameter with its error."""
+    told = [f"  {p.name} = {p.value:.8g} ± {p.stderr:.2g} {p.unit}".rstrip() for p in free]
+    return "\n".join([f"{status}: {verdict}", *told])
+
+
 @dataclass(frozen=True)
 class Rival:
     """Another minimum: its parameters and how much worse it is, in χ² on the effective points."""
@@ -142,9 +148,7 @@ class Fit:
         return self.parameters[name]
 
     def __str__(self) -> str:
-        lines = [f"{self.status}: {self.verdict}"]
-        lines += [f"  {p.name} = {p.value:.8g} ± {p.stderr:.2g} {p.unit}".rstrip() for p in self.free]
-        return "\n".join(lines)
+        return in_short(self.status, self.verdict, self.free)
 
     @property
     def free(self) -> tuple[Estimate, ...]:

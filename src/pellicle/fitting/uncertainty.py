@@ -27,6 +27,13 @@ class Linear:
     on_signal: bool
 
 
+def correlation(covariance: np.ndarray) -> np.ndarray:
+    """The correlation matrix of a covariance; zero for a parameter without one."""
+    deviation = np.sqrt(np.diag(covariance))
+    sd = np.where(deviation > 0, deviation, 1.0)
+    return covariance / np.outer(sd, sd)
+
+
 @dataclass(frozen=True)
 class Errors:
     """Covariance of nonlinear then linear parameters; `names` in the same order."""
@@ -40,8 +47,7 @@ class Errors:
 
     @property
     def correlation(self) -> np.ndarray:
-        sd = np.where(self.stderr > 0, self.stderr, 1.0)
-        return self.covariance / np.outer(sd, sd)
+        return correlation(self.covariance)
 
 
 def linear_coefficients(view: View, at: Local) -> list[Linear]:
