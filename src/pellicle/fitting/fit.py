@@ -47,6 +47,13 @@ def fit(
     uncalibrated signal is given a fixed scale; ValueError where a material has no data at a
     wavelength, naming it.
     """
+    return fitted(data, scene, tolerance, progress)[0]
+
+
+def fitted(
+    data: Spectrum | Sequence[Spectrum], scene: Scene | Sequence[Scene], tolerance: float, progress: Progress
+) -> tuple[Fit, Weighed]:
+    """What `fit` returns, and the minima and weights that it rests on, for whoever goes on from there."""
     spectra = [data] if isinstance(data, Spectrum) else list(data)
     scenes = _scenes(spectra, scene)
     for each in scenes:
@@ -97,7 +104,9 @@ def _scenes(spectra: list[Spectrum], scene: Scene | Sequence[Scene]) -> list[Sce
     return scenes
 
 
-def _fit(data: list[Spectrum], spectra: list[Measured], tolerance: float, progress: Progress) -> Fit:
+def _fit(
+    data: list[Spectrum], spectra: list[Measured], tolerance: float, progress: Progress
+) -> tuple[Fit, Weighed]:
     began = time.perf_counter()
     weighed, warnings = _weighed(make(*spectra, tolerance=tolerance), progress), []
     off = max(beyond(view, weighed.minima.units[0]) for view in weighed.problem.views)
@@ -107,7 +116,7 @@ def _fit(data: list[Spectrum], spectra: list[Measured], tolerance: float, progre
             f"{tolerance:g}: fitted again with every effect"
         ]
         weighed = _weighed(make(*spectra), progress)
-    return _report(data, spectra, weighed, warnings, began)
+    return _report(data, spectra, weighed, warnings, began), weighed
 
 
 def _weighed(problem: Problem, progress: Progress) -> Weighed:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -77,14 +78,21 @@ def _series(name: str, view: View, curve, sd: np.ndarray, size: float | None) ->
     ]
 
 
-def errors(problem: Problem, at: Sequence[Local], variance: Sequence[float]) -> Errors:
-    """Covariance by a singular value decomposition of the Jacobian in units of each parameter's range.
+class Scaled(NamedTuple):
+    """The weighted Jacobian of all data and priors, each column in the `unit` of its parameter.
 
-    `at` and `variance` are those of each view; `variance` multiplies σ²: what the residuals say of the
-    noise, and of its correlation. Nothing is inverted that is not there: a direction that the data do
-    not see keeps its huge variance (a pseudo-inverse would call it 0, and an opaque gold film known to
-    ± 0.00 nm).
+    `jacobian` (points and priors, parameters): nonlinear parameters by their range, then linear
+    coefficients by their prior's standard deviation, and in its last rows the priors.
     """
+
+    jacobian: np.ndarray
+    unit: np.ndarray
+    names: tuple[str, ...]
+
+
+def scaled(problem: Problem, at: Sequence[Local], variance: Sequence[float]) -> Scaled:
+    """`at` and `variance` are those of each view; `variance` multiplies σ²: what the residuals say of the
+    noise, and of its correlation."""
     linear = [linear_coefficients(view, local) for view, local in zip(problem.views, at, strict=True)]
     every = [c for own in linear for c in own]
     span = problem.box.upper - problem.box.lower
@@ -98,14 +106,26 @@ def errors(problem: Problem, at: Sequence[Local], variance: Sequence[float]) -> 
         first += len(own)
         blocks.append(block)
     priors = np.diag(np.concatenate([problem.box.prior_weight * span, np.ones(len(every))]))
-    jacobian = np.vstack([*blocks, priors])
+    return Scaled(
+        np.vstack([*blocks, priors]),
+        np.concatenate([span, [c.prior_sd for c in every]]),
+        (*(p.name for p in problem.parameters), *(c.name for c in every)),
+    )
+
+
+def errors(problem: Problem, at: Sequence[Local], variance: Sequence[float]) -> Errors:
+    """Covariance by a singular value decomposition of the Jacobian in units of each parameter's range.
+
+    The arguments are those of `scaled`. Nothing is inverted that is not there: a direction that the data
+    do not see keeps its huge variance (a pseudo-inverse would call it 0, and an opaque gold film known to
+    ± 0.00 nm).
+    """
+    jacobian, unit, names = scaled(problem, at, variance)
     _, values, rows = np.linalg.svd(jacobian, full_matrices=False)
-    points = len(jacobian) - len(priors)
+    points = len(jacobian) - len(unit)
     floor = np.finfo(float).eps * points * max(values.max(initial=0.0), 1e-100)
-    unit = np.concatenate([span, [c.prior_sd for c in every]])
     spread = rows.T / np.maximum(values, floor)
-    covariance = (spread @ spread.T) * np.outer(unit, unit)
-    return Errors((*(p.name for p in problem.parameters), *(c.name for c in every)), covariance)
+    return Errors(names, (spread @ spread.T) * np.outer(unit, unit))
 
 
 def _steep(view: View, at: Local) -> np.ndarray:
