@@ -22,10 +22,10 @@ from pellicle.brdf import direction
 from pellicle.brdf_fitting.estimates import estimates, local
 from pellicle.brdf_fitting.fit import problem
 from pellicle.brdf_fitting.search import THOROUGH, search
-from pellicle.brdf_fitting.surface import Surface
 from pellicle.fitting.search import quiet
 from pellicle.free import Free
 from pellicle.io.samples import BrdfSamples
+from pellicle.surfaces.surface import Surface
 
 jax.config.update("jax_enable_x64", True)
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from pellicle.brdf_fitting.fit import fit_brdf as fit_brdf
     from pellicle.brdf_fitting.result import BrdfFit as BrdfFit
-    from pellicle.brdf_fitting.surface import Surface as Surface
     from pellicle.fitting.fit import fit as fit
     from pellicle.fitting.result import Fit as Fit
     from pellicle.fitting.result import Status as Status
@@ -49,12 +48,13 @@ if TYPE_CHECKING:
     from pellicle.signals import ellipsometry as ellipsometry
     from pellicle.signals import reflectance as reflectance
     from pellicle.signals import transmittance as transmittance
+    from pellicle.surfaces.surface import Surface as Surface
     from pellicle.thrift import plan as plan
 
 _HOME = {
     "pellicle.brdf_fitting.fit": ("fit_brdf",),
     "pellicle.brdf_fitting.result": ("BrdfFit",),
-    "pellicle.brdf_fitting.surface": ("Surface",),
+    "pellicle.surfaces.surface": ("Surface",),
     "pellicle.fitting.fit": ("fit",),
     "pellicle.fitting.result": ("Fit", "Status"),
     "pellicle.io.brdf_samples": ("read_brdf_samples",),

@@ -8,8 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from pellicle.brdf.directions import direction, frame
-from pellicle.brdf_fitting.surface import Surface
 from pellicle.free import Free
+from pellicle.surfaces.surface import Surface
 
 WAVES = 24
 """Plane waves in the noise that a free thickness follows over the sphere."""
@@ -66,19 +66,19 @@ def relief(normal: np.ndarray, axes: np.ndarray, rng: np.random.Generator) -> Re
 
 
 def numbers(surface: Surface, noise: Relief | None) -> dict[str, Any]:
-    """Every number of the surface: fixed ones, free ones halfway, and what follows the noise."""
-    found: dict[str, Any] = dict(surface.fixed())
-    for key, given in surface.numbers.items():
-        if isinstance(given, Free):
-            found[key] = _mapped(key, given, noise)
-    if noise is not None and isinstance(surface.numbers.get("deviation"), Free):
-        found["azimuth"] = noise.azimuth
+    """Every number of the surface: fixed ones, free ones where they start, and what follows the noise."""
+    found = surface.start()
+    if noise is not None:
+        found |= _following(surface, noise)
     return {key: jnp.asarray(value) for key, value in found.items()}
 
 
-def _mapped(key: str, given: Free, noise: Relief | None) -> Any:
-    if noise is not None and key == "thickness":
-        return given.lower + noise.height * (given.upper - given.lower)
-    if noise is not None and key == "deviation":
-        return given.upper * noise.slope
-    return given.value
+def _following(surface: Surface, noise: Relief) -> dict[str, Any]:
+    """The thickness by the noise's height, and the deviation by its slope, where they are free."""
+    depth, tilt = (surface.numbers.get(key) for key in ("thickness", "deviation"))
+    found = {}
+    if isinstance(depth, Free):
+        found["thickness"] = depth.lower + noise.height * (depth.upper - depth.lower)
+    if isinstance(tilt, Free):
+        found |= {"deviation": tilt.upper * noise.slope, "azimuth": noise.azimuth}
+    return found

@@ -11,11 +11,11 @@ import pytest
 import pellicle as pl
 from pellicle.brdf import direction, model
 from pellicle.brdf_fitting.fit import fit_brdf
-from pellicle.brdf_fitting.surface import Surface
 from pellicle.errors import UsageError
 from pellicle.fitting.result import Status
 from pellicle.free import Free
 from pellicle.io.samples import BrdfSamples
+from pellicle.surfaces.surface import Surface
 
 TRUTH = {
     "thickness": 320.0,

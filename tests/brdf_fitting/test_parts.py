@@ -12,11 +12,11 @@ from pellicle.brdf_fitting.coordinates import coordinates, named, values
 from pellicle.brdf_fitting.plan import plan
 from pellicle.brdf_fitting.problem import _nonnegative
 from pellicle.brdf_fitting.result import Baseline
-from pellicle.brdf_fitting.surface import Surface
 from pellicle.errors import UsageError
 from pellicle.fitting.result import Estimate, Rival
 from pellicle.free import Free
 from pellicle.io.samples import BrdfSamples
+from pellicle.surfaces.surface import Surface
 
 
 def between(lower, upper):

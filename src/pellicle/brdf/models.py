@@ -76,7 +76,7 @@ class Model(NamedTuple):
         given = {"wavelengths": self.wavelengths, **parameters}
         given = {k: jnp.asarray(x, i.dtype) if isinstance(x, tuple | list) else x for k, x in given.items()}
         above = (i[..., 2:3] >= 0) & (o[..., 2:3] >= 0)
-        return jnp.where(above, self.evaluate(given, i, o), jnp.zeros(3, i.dtype))
+        return jnp.where(above, self.evaluate(given, i, o), 0.0)
 
     def defaults(self) -> dict[str, Any]:
         """Each key's default value; a channel's numbers as an array."""

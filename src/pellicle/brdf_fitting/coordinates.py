@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.brdf_fitting.surface import Leaf
+from pellicle.surfaces.surface import Leaf
 
 _TILT = ("deviation", "azimuth")
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from pellicle.brdf.albedo import energy_warning
-from pellicle.brdf_fitting.surface import Surface
 from pellicle.fitting.result import Estimate
 from pellicle.io.samples import BrdfSamples
+from pellicle.surfaces.surface import Surface
 
 _STEEP = 15.0
 _TOLERANCE = 0.5

@@ -10,10 +10,10 @@ import numpy as np
 
 from pellicle.brdf_fitting.problem import Problem, around, compared, parameters
 from pellicle.brdf_fitting.search import Minima
-from pellicle.brdf_fitting.surface import Surface
 from pellicle.fitting.noise import correlation_length
 from pellicle.fitting.result import Estimate, Rival
 from pellicle.fitting.uncertainty import UNSEEN, correlation
+from pellicle.surfaces.surface import Surface
 
 _ON_BOUND = 1e-6
 _MOST_RIVALS = 10

@@ -19,12 +19,12 @@ from pellicle.brdf_fitting.problem import Form, Problem, chi_square, data, seein
 from pellicle.brdf_fitting.residuals import RESIDUALS
 from pellicle.brdf_fitting.result import Baseline, BrdfFit
 from pellicle.brdf_fitting.search import FEW, SMOOTH, THOROUGH, Effort, Minima, polish, search
-from pellicle.brdf_fitting.surface import Surface
 from pellicle.errors import UsageError
 from pellicle.fitting.result import Estimate, Status
 from pellicle.fitting.search import Progress, quiet
 from pellicle.fitting.status import judge, misfits, verdict
 from pellicle.io.samples import BrdfSamples, spread
+from pellicle.surfaces.surface import Surface
 
 HELD_OUT = 0.2
 """The share of the samples that no fit sees until it is judged."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pellicle.brdf_fitting.surface import Surface
 from pellicle.effects import Row
 from pellicle.free import Free
 from pellicle.planning import Plan
+from pellicle.surfaces.surface import Surface
 
 
 def plan(surface: Surface) -> Plan:

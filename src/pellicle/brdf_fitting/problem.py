@@ -97,8 +97,9 @@ def parameters(form: Form, fixed: dict[str, Any], box: Box, most: Any, unit: Any
     """What the BRDF takes, from a point of the unit cube."""
     count = len(form.coordinates.names)
     free = named(form.coordinates, values(form.coordinates, box, unit[:count]))
-    weights = (unit[count:] * most).reshape(len(form.weights), -1)
-    return {**fixed, **free, **dict(zip(form.weights, weights if form.each else weights[:, 0], strict=True))}
+    weights = unit[count:] * most  # none, or one of each kind, or one of each kind for each channel
+    weights = weights.reshape(len(form.weights), -1) if form.each else weights
+    return {**fixed, **free, **dict(zip(form.weights, weights, strict=True))}
 
 
 def compared(form: Form, data: Data, rho: Any) -> Any:

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pellicle.brdf_fitting.surface import Surface
 from pellicle.fitting.result import Estimate, Rival, Status, in_short
 from pellicle.io.samples import BrdfSamples
 from pellicle.planning import Plan
+from pellicle.surfaces.surface import Surface
 
 
 @dataclass(frozen=True)

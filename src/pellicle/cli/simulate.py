@@ -26,16 +26,21 @@ def simulate(
         float, Parameter(help="Leave out effects that change the signal by less than this; 0: none.")
     ] = 0.0,
 ) -> int:
-    """Write the spectrum that a recipe's scene would give.
+    """Write the spectrum, or for a surface the samples of its BRDF, that a recipe's scene would give.
 
     Example: pellicle simulate film.toml --out film.csv --noise 0.002 --seed 1
     """
     from pellicle.cli.seen import wavelengths
     from pellicle.io.atomic import write_text
     from pellicle.io.recipe import read_recipe
+    from pellicle.io.recipe_kind import describes_surface
 
     not_negative("--noise", noise or 0.0)
     not_negative("--tolerance", tolerance)
+    if describes_surface(recipe):
+        from pellicle.cli.surfaces import simulate_surface
+
+        return simulate_surface(recipe, out, noise, seed)
     found = read_recipe(recipe)
     scene = found.scene()
     start()

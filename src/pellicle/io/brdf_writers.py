@@ -15,8 +15,10 @@ from pellicle.io.samples import BrdfSamples, sigma_names
 Path = str | os.PathLike[str]
 
 
-def write_brdf_samples(path: Path, samples: BrdfSamples, *, overwrite: bool = False) -> None:
-    """Writes samples as CSV, in columns that pellicle reads again as they were.
+def write_brdf_samples(
+    path: Path, samples: BrdfSamples, *, said: Sequence[str] = (), overwrite: bool = False
+) -> None:
+    """Writes samples as CSV, in columns that pellicle reads again as they were; `said` are comments.
 
     Raises UsageError where `path` exists without `overwrite`, or cannot be written.
     """
@@ -24,6 +26,7 @@ def write_brdf_samples(path: Path, samples: BrdfSamples, *, overwrite: bool = Fa
     names += [] if samples.sigma is None else sigma_names(samples.channels)
     header = [
         "# BRDF in 1/sr; directions in degrees, from the normal and around it",
+        *(f"# {line}" for line in said),
         *_source(samples),
         ",".join(names),
     ]

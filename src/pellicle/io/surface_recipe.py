@@ -11,12 +11,12 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
-from pellicle.brdf_fitting.surface import Surface
 from pellicle.errors import DataError, UsageError
 from pellicle.io.brdf_samples import read_brdf_samples
 from pellicle.io.media import Medium, Number, medium, number
 from pellicle.io.models import nearest
 from pellicle.io.samples import BrdfSamples
+from pellicle.surfaces.surface import Surface
 
 _NUMBERS: TypeAdapter[Any] = TypeAdapter(Number | list[float])
 

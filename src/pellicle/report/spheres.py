@@ -10,12 +10,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.brdf_fitting.surface import Surface
 from pellicle.colour import srgb
 from pellicle.errors import UsageError
 from pellicle.io.atomic import replacing
 from pellicle.report.charts import FORMATS
 from pellicle.sphere import in_plane, render
+from pellicle.surfaces.surface import Surface
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

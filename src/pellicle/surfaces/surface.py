@@ -95,3 +95,8 @@ class Surface:
             default = about.key not in self.numbers and about.per_channel
             found[about.key] = np.asarray(given[0] if default else given, dtype=float)
         return found
+
+    def start(self) -> dict[str, np.ndarray]:
+        """Every number as an array: fixed ones, and where free ones start."""
+        free = {key: np.asarray(x.value) for key, x in self.numbers.items() if isinstance(x, Free)}
+        return self.fixed() | free

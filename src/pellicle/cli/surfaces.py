@@ -1,0 +1,54 @@
+"""`pellicle simulate` of a surface: samples of its BRDF, where the recipe's data files have theirs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pellicle.cli.session import say, start
+
+if TYPE_CHECKING:
+    from pellicle.io.samples import BrdfSamples
+    from pellicle.io.surface_recipe import SurfaceRecipe
+    from pellicle.surfaces.sampling import Directions
+
+
+def simulate_surface(recipe: str, out: str, noise: float | None, seed: int) -> int:
+    """Write the recipe's BRDF as CSV. Returns the exit code."""
+    from pellicle import __version__
+    from pellicle.io.brdf_writers import write_brdf_samples
+    from pellicle.io.surface_recipe import read_surface_recipe
+    from pellicle.surfaces.sampling import synthesise
+
+    found = read_surface_recipe(recipe)
+    looked = directions(found)
+    noise = (found.data.noise or 0.0) if noise is None else noise
+    start()
+    samples = synthesise(found.surface, looked, noise, seed)
+    numbers = found.surface.start()
+    units = {about.key: about.unit for about in found.surface.brdf.parameters}
+    truth = (f"{key} = {_listed(x)} {units.get(key, 'nm')}".strip() for key, x in numbers.items())
+    said = [
+        "SYNTHETIC: simulated, not measured",
+        f"recipe {Path(recipe).name}, seed {seed}, noise {noise:g}, pellicle {__version__}",
+        f"truth: model {found.surface.model}, {', '.join(truth)}",
+    ]
+    write_brdf_samples(out, samples, said=said)
+    say(f"{out}: {len(samples)} samples of {', '.join(samples.channels)}", *samples.notes)
+    return 0
+
+
+def directions(recipe: SurfaceRecipe) -> Directions | BrdfSamples:
+    """Where the recipe's first file was measured, or, as is said, directions spread over the lobes."""
+    from pellicle.surfaces.sampling import default_directions
+
+    if recipe.files:
+        say(f"directions: those of {recipe.files[0]}")
+        return recipe.read(recipe.files[0])
+    found = default_directions()
+    say(f"directions: {len(found.theta_i)} spread over the lobe and around it (the recipe names no files)")
+    return found
+
+
+def _listed(number) -> str:
+    return " ".join(f"{x:.10g}" for x in number.reshape(-1))

@@ -1,0 +1,1 @@
+"""Layered surfaces, RGB: what a recipe says of one, and its samples."""

@@ -1,0 +1,70 @@
+"""`pellicle simulate`, `plan` and `cost` of surfaces."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pellicle.io.brdf_samples import read_brdf_samples
+
+RECIPE = """
+[data]
+signal = "brdf"
+[scene.surface]
+model = "blinn-phong-film"
+thickness = { value = 0, lower = 0, upper = 700 }
+n = 1.5
+base_n = 2.0
+exponent = 4
+diffuse = 0.05
+"""
+
+
+def vectors(theta, phi):
+    theta, phi = np.deg2rad(theta), np.deg2rad(phi)
+    return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
+
+
+def by_hand(d):
+    """A bare face of index 2 in a Blinn-Phong lobe of exponent 4, on 0.05/sr."""
+    i, o = vectors(d.theta_i, d.phi_i), vectors(d.theta_o, d.phi_o)
+    h = (i + o) / np.linalg.norm(i + o, axis=-1, keepdims=True)
+    c0 = np.sum(i * h, axis=-1)
+    c1 = np.sqrt(1 - (1 - c0**2) / 4)
+    fresnel = 0.5 * ((c0 - 2 * c1) / (c0 + 2 * c1)) ** 2 + 0.5 * ((2 * c0 - c1) / (2 * c0 + c1)) ** 2
+    return h[:, 2] ** 4 * fresnel + 0.05
+
+
+def test_the_command_writes_what_the_surface_sends_back(pellicle, tmp_path):
+    (tmp_path / "bare.toml").write_text(RECIPE)
+    ran = pellicle("simulate", tmp_path / "bare.toml", "--out", tmp_path / "bare.csv")
+    assert (ran.code, ran.out) == (0, "")
+    assert "1000 spread over the lobe" in ran.err
+    text = (tmp_path / "bare.csv").read_text().splitlines()
+    assert "SYNTHETIC" in text[1]
+    assert "recipe bare.toml, seed 0, noise 0" in text[2]
+    assert "thickness = 0 nm" in text[3]
+    found = read_brdf_samples(tmp_path / "bare.csv")
+    assert found.sigma is None
+    np.testing.assert_allclose(found.values, np.tile(by_hand(found)[:, None], 3), rtol=1e-9)
+
+
+def test_noise_seed_and_the_directions_of_a_file(pellicle, tmp_path):
+    rows = "".join(f"30,0,{t},180,0.1,0.2,0.3\n" for t in range(80))
+    (tmp_path / "seen.csv").write_text("theta_i,phi_i,theta_o,phi_o,R,G,B\n" + rows)
+    (tmp_path / "bare.toml").write_text(
+        RECIPE.replace('"brdf"\n', '"brdf"\nfiles = ["seen.csv"]\nnoise = 0.02\n')
+    )
+
+    def made(name, *flags):
+        assert pellicle("simulate", tmp_path / "bare.toml", "--out", tmp_path / name, *flags).code == 0
+        return read_brdf_samples(tmp_path / name)
+
+    one, same, other = made("a.csv"), made("b.csv"), made("c.csv", "--seed", 1)
+    np.testing.assert_array_equal(one.values, same.values)
+    np.testing.assert_array_equal(one.theta_o, np.arange(80.0))
+    assert one.sigma is not None
+    assert np.all(one.sigma == 0.02)
+    truth = by_hand(one)[:, None]
+    for found in (one, other):
+        assert 0.017 < np.std(found.values - truth) < 0.023
+    assert np.std(one.values - other.values) > 0.02
