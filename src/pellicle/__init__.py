@@ -12,6 +12,10 @@ if TYPE_CHECKING:
     from pellicle.fitting.fit import fit as fit
     from pellicle.fitting.result import Fit as Fit
     from pellicle.fitting.result import Status as Status
+    from pellicle.free import Free as Free
+    from pellicle.free import HalfNormal as HalfNormal
+    from pellicle.free import LogUniform as LogUniform
+    from pellicle.free import Normal as Normal
     from pellicle.instrument import Instrument as Instrument
     from pellicle.io.brdf_samples import read_brdf_samples as read_brdf_samples
     from pellicle.io.samples import BrdfSamples as BrdfSamples
@@ -41,9 +45,9 @@ if TYPE_CHECKING:
     from pellicle.optics.oscillators import TaucLorentz as TaucLorentz
     from pellicle.optics.spline import KramersKronigSpline as KramersKronigSpline
     from pellicle.optics.spline import Spline as Spline
-    from pellicle.scene import Free as Free
+    from pellicle.sampling.result import Posterior as Posterior
+    from pellicle.sampling.sample import sample as sample
     from pellicle.scene import Light as Light
-    from pellicle.scene import Normal as Normal
     from pellicle.scene import Scene as Scene
     from pellicle.signals import ellipsometry as ellipsometry
     from pellicle.signals import reflectance as reflectance
@@ -78,7 +82,10 @@ _HOME = {
     "pellicle.thrift": ("plan",),
     "pellicle.instrument": ("Instrument",),
     "pellicle.layers": ("Interface", "Layer", "Plate", "Substrate"),
-    "pellicle.scene": ("Free", "Light", "Normal", "Scene"),
+    "pellicle.free": ("Free", "HalfNormal", "LogUniform", "Normal"),
+    "pellicle.sampling.result": ("Posterior",),
+    "pellicle.sampling.sample": ("sample",),
+    "pellicle.scene": ("Light", "Scene"),
     "pellicle.signals": ("ellipsometry", "reflectance", "transmittance"),
 }
 _MODULE = {name: module for module, names in _HOME.items() for name in names}

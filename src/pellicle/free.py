@@ -12,14 +12,52 @@ import numpy as np
 
 @final
 class Normal(eqx.Module):
-    """A normal prior on a free parameter, in the parameter's unit."""
+    """A normal prior on a free parameter, in the parameter's unit; its bounds cut it off."""
 
     mean: float = eqx.field(static=True)
     sd: float = eqx.field(static=True)
 
     def __check_init__(self):
-        if not self.sd > 0:
-            raise ValueError(f"a prior's standard deviation must be positive, not {self.sd}")
+        _positive(self.sd)
+
+    @property
+    def row(self) -> tuple[float, float]:
+        """What least squares take: the mean, and the weight 1/sd of the distance from it."""
+        return self.mean, 1 / self.sd
+
+
+@final
+class HalfNormal(eqx.Module):
+    """A normal prior around zero for a parameter that is never negative: a roughness, an extinction."""
+
+    sd: float = eqx.field(static=True)
+
+    def __check_init__(self):
+        _positive(self.sd)
+
+    @property
+    def row(self) -> tuple[float, float]:
+        return 0.0, 1 / self.sd
+
+
+@final
+class LogUniform(eqx.Module):
+    """Every factor of two is as likely as any other between the bounds, which must be above zero.
+
+    For posteriors only: the best fit is the one in the logarithm of the parameter, where this is flat.
+    """
+
+    @property
+    def row(self) -> tuple[float, float]:
+        return 0.0, 0.0
+
+
+Prior = Normal | HalfNormal | LogUniform
+
+
+def _positive(sd: float) -> None:
+    if not sd > 0:
+        raise ValueError(f"a prior's standard deviation must be positive, not {sd}")
 
 
 @final
@@ -27,21 +65,21 @@ class Free(eqx.Module):
     """A parameter to be fitted, standing where its number would.
 
     **Arguments:** `value` to start from (the middle of the bounds if None), `lower` and `upper`
-    bounds, and an optional `prior`; all in the parameter's own unit. Raises ValueError where the
-    bounds are reversed or the value is outside them.
+    bounds, and an optional `prior` (uniform between the bounds if None); all in the parameter's own
+    unit. Raises ValueError where the bounds are reversed, or the value or the prior is outside them.
     """
 
     value: float = eqx.field(static=True)
     lower: float = eqx.field(static=True)
     upper: float = eqx.field(static=True)
-    prior: Normal | None
+    prior: Prior | None
 
     def __init__(
         self,
         value: float | None = None,
         lower: float = -math.inf,
         upper: float = math.inf,
-        prior: Normal | None = None,
+        prior: Prior | None = None,
     ):
         if not lower < upper:
             raise ValueError(f"bounds are reversed or equal: lower {lower:g} is not below upper {upper:g}")
@@ -50,7 +88,17 @@ class Free(eqx.Module):
         value = 0.5 * (lower + upper) if value is None else value
         if not lower <= value <= upper:
             raise ValueError(f"the start value {value:g} is outside its bounds {lower:g} to {upper:g}")
+        _check_prior(prior, lower, upper)
         self.value, self.lower, self.upper, self.prior = float(value), float(lower), float(upper), prior
+
+
+def _check_prior(prior: Prior | None, lower: float, upper: float) -> None:
+    if isinstance(prior, Normal) and not lower <= prior.mean <= upper:
+        raise ValueError(f"the prior's mean {prior.mean:g} is outside the bounds {lower:g} to {upper:g}")
+    if isinstance(prior, HalfNormal) and not lower <= 0 < upper:
+        raise ValueError(f"a half-normal prior starts at 0, outside the bounds {lower:g} to {upper:g}")
+    if isinstance(prior, LogUniform) and not lower > 0:
+        raise ValueError(f"a log-uniform prior needs a lower bound above 0, not {lower:g}")
 
 
 def is_free(leaf: Any) -> bool:

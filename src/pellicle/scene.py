@@ -15,7 +15,6 @@ import equinox as eqx
 import numpy as np
 
 from pellicle.free import Free as Free
-from pellicle.free import Normal as Normal
 from pellicle.free import free_leaves as free_leaves
 from pellicle.free import insert as insert
 from pellicle.free import is_free as is_free

@@ -153,7 +153,7 @@ def test_certified_standard_deviations(name):
     free = len(found)
     data = Data(problem.y, np.ones(points), np.linspace(-1, 1, points), 1.0, 1.0)
     # the unit of each parameter is its own size, as the box's is in a fit
-    box = Box(np.zeros(free), np.abs(found), np.zeros(free), np.zeros(free))
+    box = Box(np.zeros(free), np.abs(found), np.zeros(free), np.zeros(free), np.zeros(free))
     numbers = tuple(Parameter(f"b{i + 1}", f"b{i + 1}", "", 0.0, 0.0, 1.0, None) for i in range(free))
     # the scene matters only for its instrument: no scale and no offset to solve for
     known = {"scene": Scene(Layer(1.5, 100.0), 1.5), "data": data, "box": box}

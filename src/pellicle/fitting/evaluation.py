@@ -66,6 +66,16 @@ Looks = tuple[tuple[Plan, tuple[int, ...]], ...]
 """Of each view the plan, and which of the parameters it takes: what a compiled program depends on."""
 
 
+def explained(
+    looks: Looks, scenes: Sequence[Scene], data: Sequence[Data], box: Box, unit: Any
+) -> tuple[list[nuisance.Solved], Any]:
+    """Every view at one point of the unit cube, and the rows of the priors."""
+    values = list(box.values(unit))
+    views = zip(looks, scenes, data, strict=True)
+    solved = [_solve(plan, s, d, [values[i] for i in takes]) for (plan, takes), s, d in views]
+    return solved, _prior(box, unit)
+
+
 class Polished(NamedTuple):
     """Local minima in the unit cube, (starts, parameters), their evidence, and whether they settled."""
 
@@ -79,18 +89,14 @@ def polish(looks: Looks, scenes: tuple[Scene, ...], data: tuple[Data, ...], box:
     """The local minimum below each start (starts, parameters), in all views together."""
     from pellicle.fitting.solve import least_squares  # a kept program needs no solver
 
-    def solved(unit):
-        values = list(box.values(unit))
-        views = zip(looks, scenes, data, strict=True)
-        return [_solve(plan, s, d, [values[i] for i in takes]) for (plan, takes), s, d in views]
-
     def residual(unit):
-        return jnp.concatenate([*(view.residual for view in solved(unit)), _prior(box, unit)])
+        views, prior = explained(looks, scenes, data, box, unit)
+        return jnp.concatenate([*(view.residual for view in views), prior])
 
     def one(unit):
         best, converged = least_squares(residual, unit)
-        evidence = sum(view.evidence for view in solved(best)) + jnp.sum(_prior(box, best) ** 2)
-        return Polished(best, evidence, converged)
+        views, prior = explained(looks, scenes, data, box, best)
+        return Polished(best, sum(view.evidence for view in views) + jnp.sum(prior**2), converged)
 
     return jax.vmap(one)(units)
 

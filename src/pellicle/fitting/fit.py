@@ -54,14 +54,20 @@ def fitted(
     data: Spectrum | Sequence[Spectrum], scene: Scene | Sequence[Scene], tolerance: float, progress: Progress
 ) -> tuple[Fit, Weighed]:
     """What `fit` returns, and the minima and weights that it rests on, for whoever goes on from there."""
+    with jax.enable_x64(True):
+        found = measurements(data, scene)
+        spectra = [data] if isinstance(data, Spectrum) else list(data)
+        return _fit(spectra, found, tolerance, progress)
+
+
+def measurements(data: Spectrum | Sequence[Spectrum], scene: Scene | Sequence[Scene]) -> list[Measured]:
+    """The numbers and the scene of each spectrum. Raises UsageError as `fit` does."""
     spectra = [data] if isinstance(data, Spectrum) else list(data)
     scenes = _scenes(spectra, scene)
     for each in scenes:
         check_free(each)
     names = [""] if isinstance(data, Spectrum) else labels(spectra)
-    with jax.enable_x64(True):
-        found = [measured(*each) for each in zip(spectra, scenes, names, strict=True)]
-        return _fit(spectra, found, tolerance, progress)
+    return [measured(*each) for each in zip(spectra, scenes, names, strict=True)]
 
 
 def check_free(scene: Scene) -> None:

@@ -10,12 +10,13 @@ import equinox as eqx
 import jax
 import numpy as np
 
+from pellicle.free import Prior
 from pellicle.optics.cody_lorentz import CodyLorentz
 from pellicle.optics.dispersion import AbstractDispersion
 from pellicle.optics.naming import Place, place
 from pellicle.optics.oscillators import AbstractOscillator, Gaussian, Lorentz, Oscillators, TaucLorentz
 from pellicle.optics.spline import Spline
-from pellicle.scene import Free, Normal, Scene, free_leaves, insert, is_free
+from pellicle.scene import Free, Scene, free_leaves, insert, is_free
 
 _WIDTHS = {"bandwidth": "nm", "thickness_spread": "nm", "roughness": "nm", "angle_spread": "deg"}
 _UNITS = {"thickness": "nm", "plate_mm": "mm", "angle": "deg", **_WIDTHS}
@@ -41,7 +42,7 @@ class Parameter:
     value: float
     lower: float
     upper: float
-    prior: Normal | None
+    prior: Prior | None
     field: str = ""
     owner: type = object
 

@@ -12,6 +12,7 @@ from pellicle.effects.box import largest_index
 from pellicle.fitting.measured import Measured, Noise
 from pellicle.fitting.nuisance import Data
 from pellicle.fitting.parameters import Parameter, anonymous, bounds, shared
+from pellicle.free import LogUniform
 from pellicle.model import sampled
 from pellicle.planning import Plan
 from pellicle.scene import Scene, coherent_layers, with_wavelength
@@ -26,12 +27,17 @@ _ROUND = 64
 
 
 class Box(NamedTuple):
-    """Bounds and normal priors; the search lives in the unit cube between the bounds."""
+    """Bounds and priors; the search lives in the unit cube between the bounds.
+
+    Normal and half-normal priors have a mean and a weight; `logarithmic` is 1 for a log-uniform one, which
+    posteriors count and fits do not.
+    """
 
     lower: Any
     upper: Any
     prior_mean: Any
     prior_weight: Any  # 1/sd, 0 for none
+    logarithmic: Any
 
     def values(self, unit):
         return self.lower + unit * (self.upper - self.lower)
@@ -119,8 +125,9 @@ def make(*spectra: Measured, tolerance: float = 0.0) -> Problem:
     box = Box(
         lower,
         upper,
-        np.array([p.prior.mean if p.prior else 0.0 for p in free]),
-        np.array([1 / p.prior.sd if p.prior else 0.0 for p in free]),
+        np.array([p.prior.row[0] if p.prior else 0.0 for p in free]),
+        np.array([p.prior.row[1] if p.prior else 0.0 for p in free]),
+        np.array([float(isinstance(p.prior, LogUniform)) for p in free]),
     )
     views, told = [], set()
     for spectrum, takes in zip(spectra, held, strict=True):

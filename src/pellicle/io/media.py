@@ -4,24 +4,42 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 
 from pellicle.errors import UsageError
+from pellicle.free import HalfNormal, LogUniform, Normal, Prior
 from pellicle.io import models, words
 from pellicle.io.models import nearest
 from pellicle.optics.dispersion import AbstractDispersion
 from pellicle.optics.mixtures import MIXTURES
-from pellicle.scene import Free, Normal
+from pellicle.scene import Free
 
 
 class PriorTable(BaseModel):
-    """A normal prior: mean and standard deviation in the parameter's unit."""
+    """`{ mean = 100, sd = 5 }`, `{ half_normal = 0.01 }` by its standard deviation, or
+    `{ log_uniform = true }`; in the parameter's unit, cut off at the bounds."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
-    mean: float
-    sd: float = Field(gt=0)
+    mean: float | None = None
+    sd: float | None = Field(None, gt=0)
+    half_normal: float | None = Field(None, gt=0)
+    log_uniform: Literal[True] | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> PriorTable:
+        given = {name for name, value in vars(self).items() if value is not None}
+        if given not in ({"mean", "sd"}, {"half_normal"}, {"log_uniform"}):
+            raise ValueError("give mean and sd, or half_normal, or log_uniform = true")
+        return self
+
+    def prior(self) -> Prior:
+        if self.half_normal is not None:
+            return HalfNormal(self.half_normal)
+        if self.mean is None or self.sd is None:
+            return LogUniform()
+        return Normal(self.mean, self.sd)
 
 
 class FreeTable(BaseModel):
@@ -70,8 +88,8 @@ def number(given: Number, what: str, natural: float | None = None) -> float | Fr
     elif given.lower is None or given.upper is None:
         raise UsageError(f"{what}: give lower and upper, or one plain number")
     else:
-        prior = None if given.prior is None else Normal(given.prior.mean, given.prior.sd)
         try:
+            prior = None if given.prior is None else given.prior.prior()
             result = Free(given.value, given.lower, given.upper, prior)
         except ValueError as error:
             raise UsageError(f"{what}: {error}") from None

@@ -1,0 +1,117 @@
+"""Whether a chain is long enough, mixed enough and wide enough to be believed."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+
+from pellicle.sampling.chain import Chain
+from pellicle.sampling.modes import Modes
+
+LONG_ENOUGH = 50.0
+"""Steps after burn-in, in autocorrelation times (D. Foreman-Mackey et al., 2013, PASP 125, 306)."""
+MIXED_ENOUGH = 1.05
+"""Largest split R̂ (A. Gelman et al., 2013, Bayesian data analysis, section 11.4)."""
+MOVING = 0.01
+"""Smallest share of proposals that is accepted."""
+_BURNED = 5
+"""Autocorrelation times that are thrown away."""
+
+
+@dataclass(frozen=True)
+class Checks:
+    """What a chain says of itself.
+
+    `discard` first steps are burn-in. `autocorrelation_time` is the longest of all parameters' and of the
+    shares of the minima; `rhat` the largest split R̂, each walker a chain. `minima_found` counts the minima
+    of the fit that hold a share worth missing, `minima_visited` those of them where walkers are.
+    """
+
+    steps: int
+    discard: int
+    autocorrelation_time: float
+    rhat: float
+    acceptance: float
+    minima_found: int
+    minima_visited: int
+    independent: int
+
+    @property
+    def n_over_tau(self) -> float:
+        return (self.steps - self.discard) / self.autocorrelation_time
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Why no interval should be taken from the chain; empty if it can be trusted."""
+        told = []
+        if not self.n_over_tau >= LONG_ENOUGH:
+            told.append(
+                f"the chain is {self.n_over_tau:.0f} autocorrelation times long,"
+                f" and {LONG_ENOUGH:.0f} are needed"
+            )
+        if not self.rhat <= MIXED_ENOUGH:
+            told.append(f"walkers differ (split R̂ {self.rhat:.3f}, at most {MIXED_ENOUGH} is trusted)")
+        if self.minima_visited < self.minima_found:
+            told.append(f"{self.minima_visited} of the {self.minima_found} minima that matter were visited")
+        if not self.acceptance >= MOVING:
+            told.append(f"only {100 * self.acceptance:.2g} % of the moves were accepted")
+        return tuple(told)
+
+    @property
+    def trusted(self) -> bool:
+        return not self.doubts
+
+
+def check(chain: Chain, modes: Modes) -> Checks:
+    """Every check of a chain of at least a few steps."""
+    tau = autocorrelation_time(chain.draws, modes)
+    discard = min(int(np.ceil(_BURNED * tau)), chain.steps // 2)
+    kept = chain.draws[discard:]
+    home = modes.nearest(kept.reshape(-1, kept.shape[-1]))
+    found = np.flatnonzero(modes.matter)
+    return Checks(
+        steps=chain.steps,
+        discard=discard,
+        autocorrelation_time=tau,
+        rhat=split_rhat(kept),
+        acceptance=float(chain.accepted.mean() / chain.steps),
+        minima_found=len(found),
+        minima_visited=int(np.isin(found, home).sum()),
+        independent=int(kept.shape[0] * kept.shape[1] / tau),
+    )
+
+
+def autocorrelation_time(draws: np.ndarray, modes: Modes) -> float:
+    """The longest integrated autocorrelation time (steps), of parameters and of the minima's shares."""
+    from emcee.autocorr import integrated_time
+
+    columns = draws
+    several = np.flatnonzero(modes.matter)
+    if len(several) > 1:
+        home = modes.nearest(draws.reshape(-1, draws.shape[-1])).reshape(draws.shape[:2])
+        columns = np.concatenate([draws, home[..., None] == several[:-1]], axis=2)
+    moving = columns[..., np.ptp(columns, axis=(0, 1)) > 0]
+    if not moving.shape[-1]:
+        return float("inf")
+    with warnings.catch_warnings(), np.errstate(invalid="ignore", divide="ignore"):
+        warnings.simplefilter("ignore")  # a walker that never moved has no autocorrelation
+        times = integrated_time(moving, tol=0)
+    return float(max(np.max(times), 1.0)) if np.isfinite(times).all() else float("inf")
+
+
+def split_rhat(draws: np.ndarray) -> float:
+    """The largest split R̂ of (steps, walkers, parameters), by ArviZ."""
+    rhat = arviz().rhat
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return float(max(rhat(draws[:, :, i].T, method="split") for i in range(draws.shape[2])))
+
+
+def arviz():
+    """ArviZ, whose import warns once a day of its next version."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        import arviz
+
+        return arviz

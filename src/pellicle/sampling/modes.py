@@ -1,0 +1,112 @@
+"""The minima of a fit as a mixture of t distributions: where walkers start, and where they may jump."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import jax
+import numpy as np
+
+from pellicle.fitting.evaluation import local
+from pellicle.fitting.uncertainty import scaled
+from pellicle.fitting.weigh import Weighed
+
+FREEDOM = 5.0
+"""Degrees of freedom of the t distributions: their tails are heavier than those of what is sampled."""
+MATTERS = 0.01
+"""A minimum with a smaller share of the posterior is not missed."""
+_LEAST = 1e-3
+"""Every minimum found is given this share, in case its quadratic estimate is wrong."""
+_HOPELESS = 60.0
+"""Minima with a χ² further above the best hold nothing, whatever their width."""
+
+
+@dataclass(frozen=True)
+class Modes:
+    """Minima in the unit cube, best first, by their normal approximation.
+
+    `centre` (modes, parameters); `factor` the Cholesky factors of their covariances, (modes, parameters,
+    parameters); `share` (modes,) of the posterior, by that approximation.
+    """
+
+    centre: np.ndarray
+    factor: np.ndarray
+    share: np.ndarray
+
+    @property
+    def matter(self) -> np.ndarray:
+        """Which of them hold enough of the posterior to be missed, (modes,)."""
+        return self.share >= MATTERS
+
+    def draw(self, count: int, random: np.random.RandomState) -> np.ndarray:
+        """Points (count, parameters), some of them outside the unit cube."""
+        mode = random.choice(len(self.share), count, p=self._drawn)
+        return self._around(mode, random)
+
+    def start(self, count: int, random: np.random.RandomState) -> np.ndarray:
+        """Starting points inside the unit cube, every minimum that matters among them."""
+        first = np.flatnonzero(self.matter)[: count // 2]
+        mode = np.concatenate([first, random.choice(len(self.share), count - len(first), p=self._drawn)])
+        found = self._around(mode, random)
+        for _ in range(100):
+            outside = np.any((found < 0) | (found > 1), axis=1)
+            if not outside.any():
+                return found
+            found[outside] = self._around(mode[outside], random)
+        return np.clip(found, 1e-9, 1 - 1e-9)
+
+    def log_density(self, units: np.ndarray) -> np.ndarray:
+        """ln of the mixture's density at (points, parameters), up to a constant."""
+        log = self._each(units) + np.log(self._drawn)
+        top = log.max(axis=1, keepdims=True)
+        return top[:, 0] + np.log(np.exp(log - top).sum(axis=1))
+
+    def nearest(self, units: np.ndarray) -> np.ndarray:
+        """The mode that each point (points, parameters) belongs to: the one of the highest density there."""
+        return np.argmax(self._each(units) + np.log(self._drawn), axis=1)
+
+    @property
+    def _drawn(self) -> np.ndarray:
+        share = np.maximum(self.share, _LEAST)
+        return share / share.sum()
+
+    def _around(self, mode: np.ndarray, random: np.random.RandomState) -> np.ndarray:
+        size = self.centre.shape[1]
+        normal = random.standard_normal((len(mode), size))
+        stretch = np.sqrt(FREEDOM / random.chisquare(FREEDOM, len(mode)))
+        return self.centre[mode] + stretch[:, None] * np.einsum("mij,mj->mi", self.factor[mode], normal)
+
+    def _each(self, units: np.ndarray) -> np.ndarray:
+        """ln density of every t distribution, (points, modes)."""
+        size = self.centre.shape[1]
+        away = units[:, None, :] - self.centre
+        normal = np.linalg.solve(self.factor, away[..., None])[..., 0]
+        log_volume = np.log(np.diagonal(self.factor, axis1=1, axis2=2)).sum(axis=1)
+        square = np.sum(normal**2, axis=-1)
+        return -0.5 * (FREEDOM + size) * np.log1p(square / FREEDOM) - log_volume
+
+
+def modes(weighed: Weighed) -> Modes:
+    """The minima that a fit has ranked, each with the covariance of its own Jacobian."""
+    minima = weighed.minima
+    kept = minima.evidence - minima.evidence[0] < _HOPELESS
+    centre = minima.units[kept]
+    factor = np.array([np.linalg.cholesky(_covariance(weighed, unit)) for unit in centre])
+    log = -0.5 * (minima.evidence[kept] - minima.evidence[0])
+    log += np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
+    share = np.exp(log - log.max())
+    return Modes(centre, factor, share / share.sum())
+
+
+def _covariance(weighed: Weighed, unit: np.ndarray) -> np.ndarray:
+    """Of the nonlinear parameters, scale and offset integrated out, at one minimum in the unit cube.
+
+    The variance of the uniform prior, 1/12, bounds it where the data see nothing.
+    """
+    problem = weighed.problem
+    at = [jax.device_get(local(*view.program, unit[list(view.takes)])) for view in problem.views]
+    jacobian = scaled(problem, at, [m.variance for m in weighed.met]).jacobian
+    size = len(unit)
+    uniform = np.where(np.arange(jacobian.shape[1]) < size, 12.0, 0.0)
+    information = jacobian.T @ jacobian + np.diag(uniform)
+    return np.linalg.inv(information)[:size, :size]

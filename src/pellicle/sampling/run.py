@@ -1,0 +1,76 @@
+"""Lengthen a chain until it carries its intervals, a limit is reached, or the user has had enough."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from pellicle.fitting.search import Progress
+from pellicle.sampling.chain import Chain
+from pellicle.sampling.checks import Checks, check
+from pellicle.sampling.density import Target
+from pellicle.sampling.modes import Modes
+from pellicle.sampling.moves import moves
+
+BLOCK = 100
+"""Steps between two looks at the clock and the keyboard."""
+_LOOK = 1.25
+"""The checks are made again when the chain has grown by this factor."""
+
+
+def run(
+    target: Target,
+    modes: Modes,
+    chain: Chain,
+    steps: int,
+    keep: Callable[[Chain], None],
+    progress: Progress,
+) -> tuple[Chain, Checks]:
+    """The chain lengthened to at most `steps`, and what its checks say.
+
+    `keep` is called with the chain after every block. Ctrl-C ends the chain with what it has; before the
+    first block it is raised again.
+    """
+    checks, looked = None, 0
+    try:
+        while chain.steps < steps:
+            if chain.steps >= 2 * BLOCK and chain.steps >= _LOOK * looked:
+                checks, looked = check(chain, modes), chain.steps
+                if checks.trusted:
+                    break
+            chain = _lengthened(target, modes, chain, min(BLOCK, steps - chain.steps))
+            keep(chain)
+            progress("sample", chain.steps, steps)
+    except KeyboardInterrupt:
+        if not chain.steps:
+            raise
+    if checks is None or chain.steps != looked:
+        checks = check(chain, modes)
+    return chain, checks
+
+
+def _lengthened(target: Target, modes: Modes, chain: Chain, steps: int) -> Chain:
+    import emcee
+
+    walkers, size = chain.draws.shape[1:]
+    sampler = emcee.EnsembleSampler(walkers, size, target, moves=moves(modes), vectorize=True)
+    sampler.run_mcmc(_state(target, modes, chain), steps, skip_initial_state_check=True)
+    more = Chain(
+        np.asarray(sampler.get_chain()),
+        np.asarray(sampler.get_log_prob()),
+        np.asarray(sampler.backend.accepted),
+        tuple(sampler.random_state),
+    )
+    return chain.extended(more)
+
+
+def _state(target: Target, modes: Modes, chain: Chain):
+    from emcee import State
+
+    if chain.steps:
+        return State(chain.draws[-1], log_prob=chain.log_density[-1], random_state=chain.random)
+    random = np.random.RandomState()
+    random.set_state(chain.random)
+    start = modes.start(chain.draws.shape[1], random)
+    return State(start, log_prob=target(start), random_state=random.get_state(legacy=True))
