@@ -11,6 +11,7 @@ from pellicle.cli.cost import cost
 from pellicle.cli.fit import fit
 from pellicle.cli.materials import materials
 from pellicle.cli.plan import plan
+from pellicle.cli.sample import sample
 from pellicle.cli.simulate import simulate
 from pellicle.errors import DataError, UsageError
 
@@ -26,6 +27,7 @@ app = App(
     result_action="return_value",
 )
 app.command(fit)
+app.command(sample)
 app.command(simulate)
 app.command(plan)
 app.command(cost)
@@ -34,7 +36,10 @@ app.command(materials)
 
 
 def main() -> int:
-    """Run the command line and return its exit code: 0 good, 2 wrong usage, 3 bad data, 4 no clear answer."""
+    """Run the command line and return its exit code.
+
+    0 good, 2 wrong usage, 3 bad data, 4 no clear answer, 5 a chain too short to trust.
+    """
     from cyclopts import CycloptsError
 
     try:

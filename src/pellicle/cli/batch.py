@@ -6,12 +6,17 @@ import json as json_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from pellicle.cli.options import ReadWords, read
+from pellicle.cli.flags import ReadWords
+from pellicle.cli.options import read
 from pellicle.cli.session import Progress, say
 
 if TYPE_CHECKING:
     from pellicle.fitting.result import Fit
+    from pellicle.sampling.result import Posterior
     from pellicle.scene import Scene
+
+TOO_SHORT = 5
+"""The exit code of a chain that carries no interval."""
 
 
 class Look(NamedTuple):
@@ -26,14 +31,26 @@ class Look(NamedTuple):
     rescaled: bool = False
 
 
+class Sampler(NamedTuple):
+    """How posteriors are sampled; None leaves a number to the library."""
+
+    walkers: int | None = None
+    steps: int | None = None
+    seed: int = 0
+
+
 class Batch:
     """Fits group after group of files; one that fails does not stop the others.
 
-    A joint batch has one group, whose files are fitted together; else every group is one file.
+    A joint batch has one group, whose files are fitted together; else every group is one file. With a
+    `sampler` every fit is followed by its posterior.
     """
 
-    def __init__(self, out: str | None, as_json: bool, joint: bool, tolerance: float):
+    def __init__(
+        self, out: str | None, as_json: bool, joint: bool, tolerance: float, sampler: Sampler | None = None
+    ):
         self.out, self.as_json, self.joint, self.tolerance = out, as_json, joint, tolerance
+        self.sampler = sampler
         self.done: list[Any] = []
 
     def __call__(self, groups: list[list[Look]]) -> int:
@@ -64,7 +81,7 @@ class Batch:
         label = ", ".join(paths)
         progress = Progress(label)
         try:
-            found = self._fit(looks, progress)
+            found, posterior = self._found(looks, folder, progress)
         except ValueError as error:
             progress.clear()
             message = str(error) if any(path in str(error) for path in paths) else f"{label}: {error}"
@@ -75,23 +92,28 @@ class Batch:
             return 3  # a failed file is 3, whatever would mend it
         progress.clear()
         self.done.append(found)
-        self._show(found, folder)
+        self._show(found, posterior, folder)
+        if posterior is not None and not posterior.trusted:
+            return TOO_SHORT
         return 0 if found.status == "converged" else 4
 
-    def _show(self, found: Fit, folder: Path | None) -> None:
-        from pellicle.io.results import to_json, write_fit
-        from pellicle.report.text import report
+    def _show(self, found: Fit, posterior: Posterior | None, folder: Path | None) -> None:
+        from pellicle.io.posteriors import record, text, write_posterior
+        from pellicle.io.results import write_fit
 
-        print(
-            json_module.dumps(to_json(found), allow_nan=False) if self.as_json else report(found), flush=True
-        )
-        if folder is not None:
+        written = json_module.dumps(record(found, posterior), allow_nan=False) if self.as_json else None
+        print(written or text(found, posterior), flush=True)
+        if folder is None:
+            return
+        if posterior is None:
             write_fit(folder, found, figure=True)
-            say(f"{folder}: report, figure and tables written")
+        else:
+            write_posterior(folder, posterior)
+        say(f"{folder}: report, figures and tables written")
 
-    def _fit(self, looks: list[Look], progress: Progress) -> Fit:
-        from pellicle.fitting.fit import fit as run
-
+    def _found(
+        self, looks: list[Look], folder: Path | None, progress: Progress
+    ) -> tuple[Fit, Posterior | None]:
         spectra, scenes = [], []
         for look in looks:
             spectrum, scene = _seen(look, own=look.rescaled or len(looks) == 1)
@@ -99,7 +121,28 @@ class Batch:
             scenes.append(scene)
             say(*(f"{look.path}: {note}" for note in spectrum.notes))
         what = (spectra, scenes) if self.joint else (spectra[0], scenes[0])
-        return run(*what, tolerance=self.tolerance, progress=progress)
+        if self.sampler is not None:
+            posterior = self._sampled(what, self.sampler, folder, progress)
+            return posterior.fit, posterior
+        from pellicle.fitting.fit import fit
+
+        return fit(*what, tolerance=self.tolerance, progress=progress), None
+
+    def _sampled(
+        self, what: tuple[Any, Any], sampler: Sampler, folder: Path | None, progress: Progress
+    ) -> Posterior:
+        from pellicle.io.posteriors import chain_in
+        from pellicle.sampling.sample import STEPS, sample
+
+        return sample(
+            *what,
+            walkers=sampler.walkers,
+            steps=sampler.steps or STEPS,
+            seed=sampler.seed,
+            chain=None if folder is None else chain_in(folder),
+            tolerance=self.tolerance,
+            progress=progress,
+        )
 
 
 def _seen(look: Look, own: bool) -> tuple[Any, Scene]:

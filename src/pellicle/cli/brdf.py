@@ -10,7 +10,7 @@ from pellicle.cli.session import Progress, say, start
 from pellicle.errors import DataError, UsageError
 
 if TYPE_CHECKING:
-    from pellicle.cli.options import ReadWords
+    from pellicle.cli.flags import ReadWords
     from pellicle.io.surface_recipe import SurfaceRecipe
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf
 from typing import TYPE_CHECKING, Any
 
+from pellicle.cli.flags import ReadWords, SceneWords
 from pellicle.errors import UsageError
 
 if TYPE_CHECKING:
@@ -13,46 +14,6 @@ if TYPE_CHECKING:
     from pellicle.scene import Light, Scene
 
 DEFAULT_THICKNESS = "1:5000"
-
-
-@dataclass(frozen=True)
-class SceneWords:
-    """The flags that describe a scene, None where not given."""
-
-    layer: str | None = None
-    substrate: str | None = None
-    ambient: str | None = None
-    thickness: str | None = None
-    free: str | None = None
-    back: str | None = None
-    plate_mm: float | None = None
-    scale: str | None = None
-    offset: str | None = None
-    bandwidth: str | None = None
-
-    def given(self) -> list[str]:
-        """The flags that were used."""
-        return [f"--{name.replace('_', '-')}" for name, value in vars(self).items() if value is not None]
-
-
-@dataclass(frozen=True)
-class ReadWords:
-    """The flags that say how a file is read; a recipe's [data] fills what was not given."""
-
-    signal: str | None = None
-    angle: float | None = None
-    polarisation: str | None = None
-    range: tuple[float, float] | None = None
-    noise: float | None = None
-    columns: str | list[str] | None = None
-    wavelength_unit: str | None = None
-    signal_unit: str | None = None
-    reference: str | None = None
-    reference_material: str = "Si"
-    dark: str | None = None
-    folded: bool | None = None
-    analyser: float | None = None
-    spot: int | None = None
 
 
 def scene_from_words(words: SceneWords, read: ReadWords) -> tuple[Scene, list[str]]:
@@ -118,7 +79,7 @@ def read(path: str, words: ReadWords, *, scaled: bool) -> Any:
         columns=words.columns,
         wavelength_unit=words.wavelength_unit,
         signal_unit=words.signal_unit,
-        range=words.range,
+        range=spanned(words.range),
         noise=words.noise,
         polarisation=words.polarisation,
         calibrated=False if scaled else None,
@@ -126,6 +87,15 @@ def read(path: str, words: ReadWords, *, scaled: bool) -> Any:
         analyser=words.analyser,
         spot=words.spot,
     )
+
+
+def spanned(given: str | tuple[float, float] | None) -> tuple[float, float] | None:
+    """The wavelengths to keep (nm), however they were written. Raises UsageError."""
+    if not isinstance(given, str):
+        return given
+    from pellicle.io.span import span
+
+    return span(given, "--range")
 
 
 def _from_counts(path: str, words: ReadWords) -> Any:
@@ -139,7 +109,7 @@ def _from_counts(path: str, words: ReadWords) -> Any:
     if words.signal not in (None, "R"):
         raise UsageError("--reference turns counts into reflectance: leave --signal out, or give R")
     options: dict[str, Any] = {"columns": words.columns, "wavelength_unit": words.wavelength_unit}
-    sample = read_counts(path, range=words.range, **options)
+    sample = read_counts(path, range=spanned(words.range), **options)
     reference = read_counts(str(words.reference), **options)
     dark = None if words.dark is None else read_counts(words.dark, **options)
     material = medium(words.reference_material, what="--reference-material")

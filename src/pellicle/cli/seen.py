@@ -34,7 +34,8 @@ def _as_measured(recipe: Recipe) -> tuple[Any, np.ndarray]:
     import equinox as eqx
     import numpy as np
 
-    from pellicle.cli.options import ReadWords, light, merged, read
+    from pellicle.cli.flags import ReadWords
+    from pellicle.cli.options import light, merged, read
     from pellicle.scene import Drift, Light
 
     path = recipe.files[0]

@@ -137,3 +137,19 @@ def local(plan: Plan, scene: Scene, data: Data, box: Box, unit: Any) -> Local:
     slope, layer_slope = jax.vmap(push, out_axes=-1)(jnp.eye(len(values)))
     solved = nuisance.solve(signal, data, scene.instrument)
     return Local(signal, slope, solved.model, solved.gain, solved.offset, layer, layer_slope)
+
+
+class Curves(NamedTuple):
+    """The model of each candidate, scale and offset at their best, (candidates, data values)."""
+
+    model: Any
+
+
+@kept
+def curves(plan: Plan, scene: Scene, data: Data, box: Box, units: Any) -> Curves:
+    """What one view would have measured at candidates `units` (candidates, its parameters)."""
+
+    def one(unit):
+        return _solve(plan, scene, data, list(box.values(unit))).model
+
+    return Curves(jax.vmap(one)(units))

@@ -82,7 +82,7 @@ def _curve(view: View, met: Met, found: Errors) -> Curve:
     sigma = 1 / view.data.weight[keep].reshape(shape)[:, 0]
     angles = {}
     if view.channels > 1:
-        (data, delta_data), (model, delta_model) = _psi_delta(data), _psi_delta(model)
+        (data, delta_data), (model, delta_model) = psi_delta(data), psi_delta(model)
         sigma, angles = np.rad2deg(sigma) / 2, {"delta_data": delta_data, "delta_model": delta_model}
     return Curve(
         wavelength=np.asarray(view.scene.light.wavelength)[:rows],
@@ -97,8 +97,8 @@ def _curve(view: View, met: Met, found: Errors) -> Curve:
     )
 
 
-def _psi_delta(sphere: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Ψ and Δ in degrees from N, C, S (points, 3), or from N and C (points, 2): then Δ is in 0 to 180."""
-    n, c, *seen = sphere.T
+def psi_delta(sphere: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Ψ and Δ in degrees from N, C, S (..., 3), or from N and C (..., 2): then Δ is in 0 to 180."""
+    n, c, *seen = np.moveaxis(sphere, -1, 0)
     s = seen[0] if seen else np.sqrt(np.maximum(1 - n**2 - c**2, 0.0))
     return np.rad2deg(np.arctan2(np.hypot(c, s), n)) / 2, np.rad2deg(np.arctan2(s, c)) % 360.0

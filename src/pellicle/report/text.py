@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-import textwrap
-from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from pellicle.fitting.result import Estimate, Fit, Part, Rival, Status
 from pellicle.fitting.status import RIVAL, describe
+from pellicle.report.page import COLUMNS, INDENT, block, facts, table, wrapped
 
-COLUMNS = 100
 LEAST_CORRELATION = 0.5
 MOST_CORRELATIONS = 10
 MOST_RIVALS = 6
@@ -29,7 +27,6 @@ ADVICE = {
 }
 """What to do next, for every status."""
 
-_INDENT = "    "
 _NUISANCE = re.compile(r"instrument\.(scale|offset)(_\d+)?(\..+)?")
 
 
@@ -45,9 +42,9 @@ def report(fit: Fit) -> str:
             _rivals(fit),
         ),
         ("Plan: what was simulated", _plan(fit)),
-        ("Warnings", [line for warning in fit.warnings for line in _wrap(warning, "- ", "  ")]),
+        ("Warnings", [line for warning in fit.warnings for line in wrapped(warning, "- ", "  ")]),
     ]
-    return "\n".join("\n".join([f"[[{title}]]", *lines]) for title, lines in blocks if lines) + "\n"
+    return "".join(block(title, lines) for title, lines in blocks if lines)
 
 
 def summary_line(fit: Fit) -> str:
@@ -60,26 +57,10 @@ def summary_line(fit: Fit) -> str:
     return f"{' and '.join(names)}: {fit.status}, {', '.join([*told, *more, *rms])}"
 
 
-def _wrap(text: str, first: str = "", rest: str = "") -> list[str]:
-    return textwrap.wrap(
-        text,
-        COLUMNS,
-        initial_indent=_INDENT + first,
-        subsequent_indent=_INDENT + rest,
-        break_on_hyphens=False,
-    )
-
-
-def _facts(rows: Iterable[tuple[str, str]]) -> list[str]:
-    rows = list(rows)
-    width = max((len(label) for label, _ in rows), default=0)
-    return [line for label, text in rows for line in _wrap(text, f"{label:<{width}}  ", " " * (width + 2))]
-
-
 def _verdict(fit: Fit) -> list[str]:
     status = f"{fit.status}. {ADVICE[fit.status]}"
     files = [row for part in fit.parts for row in _file(part)]
-    return [*_wrap(fit.verdict), *_facts([("status", status), *files])]
+    return [*wrapped(fit.verdict), *facts([("status", status), *files])]
 
 
 def _file(part: Part) -> list[tuple[str, str]]:
@@ -108,12 +89,12 @@ def _degrees(part: Part) -> str:
 
 def _shortened(path: str) -> str:
     """The end of a long path, with an ellipsis for what is left out."""
-    room = COLUMNS - 2 * len(_INDENT) - len("status")
+    room = COLUMNS - 2 * len(INDENT) - len("status")
     return path if len(path) <= room else "…" + path[1 - room :]
 
 
 def _statistics(fit: Fit) -> list[str]:
-    return _facts(
+    return facts(
         [
             *(row for part in fit.parts for row in _rms(part)),
             ("reduced chi-square", f"{fit.chi2_reduced:.4g}"),
@@ -138,7 +119,7 @@ def _parameters(fit: Fit) -> list[str]:
     width = max((len(name) for name in fit.parameters), default=0) + 1
     rows = [(f"{p.name + ':':<{width}}", _value(p) if p.free else _fixed(p), _bounds(p)) for p in _all(fit)]
     middle = max((len(value) for _, value, bounds in rows if bounds), default=0)
-    return [f"{_INDENT}{name}  {value:<{middle}}  {bounds}".rstrip() for name, value, bounds in rows]
+    return [f"{INDENT}{name}  {value:<{middle}}  {bounds}".rstrip() for name, value, bounds in rows]
 
 
 def _all(fit: Fit) -> list[Estimate]:
@@ -197,14 +178,14 @@ def _correlations(fit: Fit) -> list[str]:
     ]
     pairs.sort(key=lambda pair: -abs(pair[0]))
     shown = pairs[:MOST_CORRELATIONS]
-    lines = _table([(f"C({one}, {other})", f"{value:+.3f}") for value, one, other in shown])
+    lines = table([(f"C({one}, {other})", f"{value:+.3f}") for value, one, other in shown])
     return lines + _left_out(len(pairs) - len(shown))
 
 
 def _rivals(fit: Fit) -> list[str]:
     shown = sorted(fit.rivals, key=lambda rival: rival.delta_chi2)[:MOST_RIVALS]
     rows = [(f"Δχ² {rival.delta_chi2:.3g}", *_of_rival(fit, rival)) for rival in shown]
-    return _table(rows) + _left_out(len(fit.rivals) - len(shown))
+    return table(rows) + _left_out(len(fit.rivals) - len(shown))
 
 
 def _of_rival(fit: Fit, rival: Rival) -> list[str]:
@@ -213,21 +194,14 @@ def _of_rival(fit: Fit, rival: Rival) -> list[str]:
     return [f"{name} {rival.parameters[name]:.5g}{_unit(fit.parameters[name])}" for name in names]
 
 
-def _table(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Aligned columns; a row that is too long goes on below itself."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines = ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows]
-    return [part for line in lines for part in _wrap(line, "", _INDENT)]
-
-
 def _left_out(count: int) -> list[str]:
-    return [f"{_INDENT}... and {count} more in the JSON"] if count > 0 else []
+    return [f"{INDENT}... and {count} more in the JSON"] if count > 0 else []
 
 
 def _plan(fit: Fit) -> list[str]:
     lines = []
     for part in fit.parts:
-        lines += _wrap(f"{part.name}:") if part.name else []
+        lines += wrapped(f"{part.name}:") if part.name else []
         rows = part.plan.rows
-        lines += _facts((f"{row.effect:<13} {'on' if row.on else 'off':<3}", row.why) for row in rows)
+        lines += facts((f"{row.effect:<13} {'on' if row.on else 'off':<3}", row.why) for row in rows)
     return lines

@@ -7,9 +7,11 @@ from functools import cached_property
 
 import numpy as np
 
+from pellicle.fitting.problem import Problem
 from pellicle.fitting.result import Fit
 from pellicle.sampling.checks import Checks
 from pellicle.sampling.modes import Modes
+from pellicle.sampling.predict import Prediction, predictions
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,12 @@ class Posterior:
     log_density: np.ndarray
     modes: Modes
     checks: Checks
+    problem: Problem
     seconds: float
+
+    def predictions(self, seed: int = 0) -> tuple[Prediction, ...]:
+        """What draws from the posterior say of each spectrum."""
+        return predictions(self.problem, self.units, seed)
 
     @property
     def trusted(self) -> bool:

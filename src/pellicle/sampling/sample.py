@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Sequence
+from importlib.util import find_spec
 from pathlib import Path
 
 import jax
@@ -55,6 +56,7 @@ def sample(
     more than the machine's memory holds; DataError for a chain of another problem.
     """
     began = time.perf_counter()
+    _installed()
     fit, weighed = fitted(data, scene, tolerance, progress)
     path = None if chain is None else Path(chain)
     whose = fingerprint(measurements(data, scene), tolerance)
@@ -76,6 +78,7 @@ def sample(
         log_density=grown.log_density[checks.discard :],
         modes=found,
         checks=checks,
+        problem=weighed.problem,
         seconds=time.perf_counter() - began,
     )
 
@@ -107,6 +110,15 @@ def _begun(path: Path | None, whose: str, walkers: int, parameters: int, seed: i
             " or name another folder"
         )
     return found
+
+
+def _installed() -> None:
+    """UsageError where the sampler's packages are missing."""
+    missing = [name for name in ("emcee", "arviz", "corner", "h5py") if find_spec(name) is None]
+    if missing:
+        raise UsageError(
+            f"posteriors need {', '.join(missing)}, not installed here: pip install 'pellicle[posterior]'"
+        )
 
 
 def _walkers(given: int | None, steps: int, weighed: Weighed) -> int:

@@ -1,0 +1,158 @@
+"""A posterior as files: the fit's own, and beside them chain, NetCDF and two figures."""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pellicle.io.atomic import MARKER, new_folder, replacing, write_text
+from pellicle.io.records import indented, one_line, to_json, versions
+from pellicle.io.results import write_fit
+
+if TYPE_CHECKING:
+    from pellicle.fitting.result import Fit
+    from pellicle.sampling.predict import Prediction
+    from pellicle.sampling.result import Marginal, Posterior
+
+CHAIN = "chain.h5"
+CHAIN_SCHEMA = "pellicle.chain/1"
+
+
+def chain_in(folder: str | os.PathLike[str]) -> Path:
+    """Where the chain of a fit in `folder` is kept; the folder is made and marked. Raises UsageError."""
+    target = new_folder(folder)
+    if not (target / MARKER).exists():
+        begun = {"schema": CHAIN_SCHEMA, "status": "sampling", "versions": versions()}
+        write_text(target / MARKER, indented(begun))
+    return target / CHAIN
+
+
+def record(fit: Fit, posterior: Posterior | None) -> dict[str, Any]:
+    """A fit as `to_json`, with its posterior where it has one."""
+    return to_json(fit) if posterior is None else to_json(fit) | {"posterior": posterior_to_json(posterior)}
+
+
+def posterior_to_json(posterior: Posterior) -> dict[str, Any]:
+    """A posterior as plain dictionaries; no numbers of parameters where the chain carries none."""
+    c = posterior.checks
+    shown = posterior.parameters
+    return {
+        "parameters": {name: _marginal(shown.get(name)) for name in posterior.marginals()},
+        "checks": {
+            "n_over_tau": _finite(c.n_over_tau),
+            "rhat": _finite(c.rhat),
+            "acceptance": _finite(c.acceptance),
+            "minima_found": c.minima_found,
+            "minima_visited": c.minima_visited,
+            "steps": c.steps,
+            "discard": c.discard,
+            "walkers": posterior.draws.shape[1],
+            "autocorrelation_time": _finite(c.autocorrelation_time),
+            "independent": c.independent,
+        },
+        "trusted": c.trusted,
+        "doubts": list(c.doubts),
+    }
+
+
+def _marginal(m: Marginal | None) -> dict[str, Any]:
+    if m is None:
+        return {**dict.fromkeys(("mean", "sd", "q025", "q50", "q975")), "modes": []}
+    return {
+        "mean": m.mean,
+        "sd": m.sd,
+        "q025": m.q025,
+        "q50": m.q50,
+        "q975": m.q975,
+        "modes": [{"value": mode.value, "mass": mode.mass} for mode in m.modes],
+    }
+
+
+def _finite(x: float) -> float | None:
+    return x if math.isfinite(x) else None
+
+
+def text(fit: Fit, posterior: Posterior | None) -> str:
+    """The report of a fit, with its posterior's under it."""
+    from pellicle.report.text import report
+
+    if posterior is None:
+        return report(fit)
+    from pellicle.report.posterior import posterior_report
+
+    return report(fit) + posterior_report(posterior)
+
+
+def write_posterior(folder: str | os.PathLike[str], posterior: Posterior) -> Path:
+    """Write what `write_fit` does, and posterior.nc, corner.png and predictive.png; returns the folder.
+
+    result.json and report.txt hold the posterior too. Raises UsageError as `write_fit` does.
+    """
+    from pellicle.report.posterior import corner_figure, predictive_figure
+
+    target = write_fit(folder, posterior.fit, figure=True)
+    predicted = posterior.predictions()
+    write_text(target / MARKER, indented(record(posterior.fit, posterior)), overwrite=True)
+    write_text(target / "report.txt", text(posterior.fit, posterior), overwrite=True)
+    write_netcdf(target / "posterior.nc", posterior, predicted, overwrite=True)
+    corner_figure(posterior, target / "corner.png", overwrite=True)
+    predictive_figure(posterior, predicted, target / "predictive.png", overwrite=True)
+    return target
+
+
+def write_netcdf(
+    path: str | os.PathLike[str],
+    posterior: Posterior,
+    predicted: tuple[Prediction, ...],
+    *,
+    overwrite: bool = False,
+) -> Path:
+    """Write ArviZ's InferenceData as NetCDF: draws in the parameters' units, each walker a chain.
+
+    Groups: posterior, sample_stats (lp), posterior_predictive (repeated measurements), observed_data. An
+    untrusted chain is written too, its attribute `trusted` 0. Raises UsageError where it cannot be.
+    """
+    target = Path(path)
+    data = inference_data(posterior, predicted)
+    with replacing(target, overwrite=overwrite) as draft:
+        data.to_netcdf(str(draft), engine="h5netcdf")
+    return target
+
+
+def inference_data(posterior: Posterior, predicted: tuple[Prediction, ...]) -> Any:
+    """The posterior as ArviZ's InferenceData."""
+    from pellicle.sampling.checks import arviz
+
+    by_walker = np.moveaxis(posterior.draws, 0, 1)
+    observed, repeated, coords, dims = {}, {}, {}, {}
+    for part, found in zip(posterior.fit.parts, predicted, strict=True):
+        own = f"_{part.name}" if part.name else ""
+        coords[f"wavelength_nm{own}"] = part.curve.wavelength
+        for name, data, noisy in _observed(part, found):
+            observed[name + own], repeated[name + own] = data, noisy[None]
+            dims[name + own] = [f"wavelength_nm{own}"]
+    attributes = {
+        "inference_library": "pellicle",
+        "trusted": int(posterior.trusted),
+        "doubts": "; ".join(posterior.checks.doubts),
+        "record": one_line(posterior_to_json(posterior)),
+    }
+    return arviz().from_dict(
+        posterior={name: by_walker[:, :, i] for i, name in enumerate(posterior.names)},
+        sample_stats={"lp": posterior.log_density.T},
+        posterior_predictive=repeated,
+        observed_data=observed,
+        coords=coords,
+        dims=dims,
+        attrs=attributes,
+    )
+
+
+def _observed(part: Any, found: Prediction) -> list[tuple[str, np.ndarray, np.ndarray]]:
+    if found.delta_noisy is None:
+        return [(part.spectrum.signal, part.curve.data, found.noisy)]
+    return [("psi", part.curve.data, found.noisy), ("delta", part.curve.delta_data, found.delta_noisy)]

@@ -1,0 +1,152 @@
+"""A posterior as text and as figures: marginals, minima, checks; corner plot and predictive band."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pellicle.io.atomic import replacing
+from pellicle.report.page import block, table, wrapped
+from pellicle.report.style import BLACK, BLUE, ORANGE, marker_size
+from pellicle.sampling.predict import Prediction
+from pellicle.sampling.result import Marginal, Posterior, verdict
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from pellicle.fitting.result import Part
+
+DPI = 150
+_LEAST_MASS = 0.005
+"""Minima with less of the posterior are not listed."""
+_SIGNALS = {"R": "reflectance", "T": "transmittance", "psi-delta": "Ψ (degrees)"}
+
+
+def posterior_report(posterior: Posterior) -> str:
+    """The posterior's block of the report, under the fit's own."""
+    lines = wrapped(verdict(posterior))
+    if posterior.trusted:
+        lines += ["", *_marginals(posterior)]
+    return block("Posterior", [*lines, "", *_checks(posterior)])
+
+
+def _marginals(posterior: Posterior) -> list[str]:
+    head = ("", "median", "2.5 %", "97.5 %", "mean", "sd", "")
+    rows = [
+        (m.name, *(_number(x, m) for x in (m.q50, m.q025, m.q975, m.mean)), f"{m.sd:.2g}", m.unit)
+        for m in posterior.parameters.values()
+    ]
+    told = table([head, *rows])
+    lead = next(iter(posterior.parameters.values()))
+    several = [mode for mode in lead.modes if mode.mass >= _LEAST_MASS]
+    if len(several) > 1:
+        rows = [
+            (f"{lead.name} near", _number(mode.value, lead), f"{100 * mode.mass:.1f} %") for mode in several
+        ]
+        told += ["", *table([("minimum", "", "share"), *rows])]
+    return told
+
+
+def _number(x: float, m: Marginal) -> str:
+    """With two digits of the standard deviation."""
+    digits = 6 if not m.sd > 0 else int(np.clip(1 - np.floor(np.log10(m.sd)), 0, 12))
+    return f"{x:.{digits}f}"
+
+
+def _checks(posterior: Posterior) -> list[str]:
+    c = posterior.checks
+    walkers = posterior.draws.shape[1]
+    return wrapped(
+        f"{walkers} walkers, {c.steps} steps, {c.discard} of them burn-in: {c.n_over_tau:.0f}"
+        f" autocorrelation times, about {c.independent} independent draws; split R̂ {c.rhat:.3f};"
+        f" {100 * c.acceptance:.0f} % of moves accepted; {c.minima_visited} of {c.minima_found} minima that"
+        " matter visited."
+    )
+
+
+def corner_figure(posterior: Posterior, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+    """Draw every pair of parameters into `path`. Raises UsageError where it cannot be written."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # it imports ArviZ, which warns of its next version
+        import corner
+
+    size = len(posterior.names)
+    units = [posterior.fit.parameters[name].unit for name in posterior.names]
+    labels = [f"{name} ({unit})" if unit else name for name, unit in zip(posterior.names, units, strict=True)]
+    sheet = Figure(figsize=(2.4 * size + 1.2, 2.4 * size + 1.2))
+    FigureCanvasAgg(sheet)
+    flat = posterior.draws.reshape(-1, size)
+    moving = np.ptp(flat, axis=0) > 0
+    corner.corner(
+        flat[:, moving],
+        labels=[label for label, moves in zip(labels, moving, strict=True) if moves],
+        fig=sheet,
+        quantiles=[0.025, 0.5, 0.975],
+        color=BLUE,
+        plot_datapoints=False,
+        fill_contours=True,
+        levels=(0.393, 0.865),  # one and two standard deviations of a normal distribution in the plane
+        label_kwargs={"fontsize": 9},
+    )
+    target = Path(path)
+    with replacing(target, overwrite=overwrite) as draft:
+        sheet.savefig(draft, dpi=DPI, bbox_inches="tight")
+    return target
+
+
+def predictive_figure(
+    posterior: Posterior,
+    predicted: tuple[Prediction, ...],
+    path: str | os.PathLike[str],
+    *,
+    overwrite: bool = False,
+) -> Path:
+    """Draw the data over the band where 95 % of the model's curves, and of repeated data, lie."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    each = zip(posterior.fit.parts, predicted, strict=True)
+    panels = [panel for part, found in each for panel in _panels(part, found)]
+    sheet = Figure(figsize=(8.0, 0.6 + 3.0 * len(panels)), layout="constrained")
+    FigureCanvasAgg(sheet)
+    for axes, panel in zip(np.ravel(sheet.subplots(len(panels), squeeze=False)), panels, strict=True):
+        _band(axes, *panel)
+    target = Path(path)
+    with replacing(target, overwrite=overwrite) as draft:
+        sheet.savefig(draft, dpi=DPI)
+    return target
+
+
+_Panel = tuple[str, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+"""Label, wavelength, data, model and noisy model."""
+
+
+def _panels(part: Part, found: Prediction) -> list[_Panel]:
+    """One for each quantity of a spectrum."""
+    curve, own = part.curve, f"{part.name}: " if part.name else ""
+    label = own + _SIGNALS[part.spectrum.signal]
+    rows = [(label, curve.wavelength, curve.data, found.model, found.noisy)]
+    if found.delta is not None and found.delta_noisy is not None and curve.delta_data is not None:
+        rows.append((f"{own}Δ (degrees)", curve.wavelength, curve.delta_data, found.delta, found.delta_noisy))
+    return rows
+
+
+def _band(
+    axes: Axes, label: str, wavelength: np.ndarray, data: np.ndarray, model: np.ndarray, noisy: np.ndarray
+) -> None:
+    order = np.argsort(wavelength, kind="stable")
+    at = wavelength[order]
+    for draws, alpha, name in ((noisy, 0.25, "repeated measurements, 95 %"), (model, 0.8, "model, 95 %")):
+        low, high = np.quantile(draws, [0.025, 0.975], axis=0)[:, order]
+        axes.fill_between(at, low, high, color=ORANGE, alpha=alpha, linewidth=0, label=name)
+    axes.plot(at, data[order], ".", color=BLACK, markersize=marker_size(len(at)), label="data")
+    axes.set_xlabel("wavelength (nm)")
+    axes.set_ylabel(label)
+    axes.legend(frameon=False, fontsize="small")
