@@ -1,0 +1,101 @@
+"""Chains on disk: resumed after a kill as if nothing had happened, and refused where they do not belong."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import jax
+import numpy as np
+import pytest
+
+import pellicle as pl
+from pellicle.errors import DataError, UsageError
+
+HERE = Path(__file__).parent
+RUN = """
+import runpy, jax
+jax.config.update("jax_enable_x64", True)
+import pellicle.sampling.checks as checks, pellicle.sampling.sample as sample
+checks.LONG_ENOUGH = 1e9  # to the last step
+sample._PATIENCE = 0.0
+example = runpy.run_path({example!r})
+sample.sample(example["bands"](), example["film"](), steps=10**6, chain={path!r})
+"""
+
+
+def test_a_killed_chain_goes_on_as_if_nothing_had_happened(bands, film, tmp_path, monkeypatch):
+    """A real process, killed without warning while it samples, against one that was left alone."""
+    path = tmp_path / "chain.h5"
+    code = RUN.format(example=str(HERE / "conftest.py"), path=str(path))
+    cache = {"JAX_COMPILATION_CACHE_DIR": str(jax.config.jax_compilation_cache_dir)}
+    process = subprocess.Popen([sys.executable, "-c", code], env={**os.environ, **cache})
+    deadline = time.monotonic() + 120
+    while not path.exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    time.sleep(0.2)
+    process.send_signal(signal.SIGKILL)
+    assert process.wait() == -signal.SIGKILL
+    before = _draws(path)
+    monkeypatch.setattr("pellicle.sampling.checks.LONG_ENOUGH", 1e9)
+    steps = len(before) + 150
+    resumed = pl.sample(bands(), film(), steps=steps, chain=path)
+    whole = pl.sample(bands(), film(), steps=steps)
+    after = _draws(path)
+    assert len(after) == steps
+    np.testing.assert_array_equal(after[: len(before)], before)
+    np.testing.assert_array_equal(resumed.draws, whole.draws)
+
+
+def _draws(path: os.PathLike[str]) -> np.ndarray:
+    """By emcee's own reader: the file is one of its kind."""
+    from emcee.backends import HDFBackend
+
+    return HDFBackend(str(path), read_only=True).get_chain()
+
+
+@pytest.fixture(scope="module")
+def kept(bands, film, tmp_path_factory):
+    path = tmp_path_factory.mktemp("chain") / "chain.h5"
+    pl.sample(bands(), film(), chain=path)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("data", "scene"),
+    [({"seed": 4}, {}), ({}, {"upper": 1400.0}), ({}, {"prior": pl.Normal(600.0, 200.0)})],
+    ids=["data", "bounds", "prior"],
+)
+def test_a_chain_of_another_problem_is_refused(bands, film, kept, data, scene):
+    before = kept.read_bytes()
+    with pytest.raises(DataError, match="is the chain of another problem"):
+        pl.sample(bands(**data), film(**scene), chain=kept)
+    assert kept.read_bytes() == before
+
+
+def test_a_chain_of_other_walkers_is_refused(bands, film, kept):
+    with pytest.raises(UsageError, match="is a chain of 32 walkers"):
+        pl.sample(bands(), film(), walkers=40, chain=kept)
+
+
+def test_what_is_no_chain_is_refused(bands, film, tmp_path):
+    path = tmp_path / "chain.h5"
+    path.write_text("notes of mine")
+    with pytest.raises(DataError, match="is no chain that pellicle wrote"):
+        pl.sample(bands(), film(), chain=path)
+    assert path.read_text() == "notes of mine"
+
+
+def test_an_interrupted_chain_keeps_what_it_has(bands, film, tmp_path):
+    def impatient(what, done, total):
+        if what == "sample" and done >= 200:
+            raise KeyboardInterrupt
+
+    path = tmp_path / "chain.h5"
+    found = pl.sample(bands(), film(), chain=path, progress=impatient)
+    assert found.checks.steps == 200
+    assert len(_draws(path)) == 200
