@@ -1,6 +1,8 @@
 """Free numbers as a point of the unit cube: logarithms of what spans decades, a tilt as a plane vector.
 
 A deviation of the normal is searched as (x, y) in a disc, for at zero its azimuth means nothing.
+Samples in one plane see y² alone, the tilt out of it: y itself has no slope at 0, where a solver would
+rest on the saddle between its two signs and call what trades with y² better known than it is.
 """
 
 from __future__ import annotations
@@ -13,6 +15,8 @@ import numpy as np
 from pellicle.surfaces.surface import Leaf
 
 _TILT = ("deviation", "azimuth")
+_LEAST = 1e-6
+"""Of y² in the disc: a fiftieth of a degree off the plane, where y² → y still has a slope."""
 
 
 class Coordinates(NamedTuple):
@@ -23,6 +27,7 @@ class Coordinates(NamedTuple):
     channels: tuple[int | None, ...]
     log: tuple[bool, ...]
     tilt: tuple[int, int] | None  # positions of deviation and azimuth where they are x and y of a disc
+    folded: bool = False  # y² in the place of y
 
 
 class Box(NamedTuple):
@@ -36,7 +41,7 @@ class Box(NamedTuple):
 def coordinates(leaves: tuple[Leaf, ...], in_plane: bool) -> tuple[Coordinates, Box]:
     """Coordinates and box of the nonlinear free numbers.
 
-    Samples in one plane cannot tell a tilt to one side of it from one to the other: only one is
+    Samples in one plane cannot tell a tilt to one side of it from one to the other: its square is
     searched.
     """
     names = tuple(leaf.name for leaf in leaves)
@@ -52,10 +57,11 @@ def coordinates(leaves: tuple[Leaf, ...], in_plane: bool) -> tuple[Coordinates, 
     upper = np.array([f(leaf.free.upper) for f, leaf in zip(take, leaves, strict=True)])
     reach = upper[tilt[0]] if tilt else 0.0
     if tilt is not None:
-        lower[list(tilt)], upper[list(tilt)] = (-1.0, 0.0 if in_plane else -1.0), 1.0
+        lower[list(tilt)], upper[list(tilt)] = (-1.0, _LEAST if in_plane else -1.0), 1.0
     keys = tuple(leaf.key for leaf in leaves)
     channels = tuple(leaf.channel for leaf in leaves)
-    return Coordinates(names, keys, channels, log, tilt), Box(lower, upper, np.float64(reach))
+    folded = in_plane and tilt is not None
+    return Coordinates(names, keys, channels, log, tilt, folded), Box(lower, upper, np.float64(reach))
 
 
 def values(c: Coordinates, box: Box, unit: Any) -> Any:
@@ -66,8 +72,9 @@ def values(c: Coordinates, box: Box, unit: Any) -> Any:
     if c.tilt is None:
         return x
     a, b = c.tilt
+    y = jnp.sqrt(x[b]) if c.folded else x[b]
     # the square onto the disc, smoothly and edge to edge
-    u, v = x[a] * jnp.sqrt(1 - 0.5 * x[b] ** 2), x[b] * jnp.sqrt(1 - 0.5 * x[a] ** 2)
+    u, v = x[a] * jnp.sqrt(1 - 0.5 * y**2), y * jnp.sqrt(1 - 0.5 * x[a] ** 2)
     u = jnp.where(u * u + v * v < 1e-20, 1e-10, u)  # its azimuth has a slope everywhere but at the centre
     return x.at[a].set(box.reach * jnp.sqrt(u * u + v * v)).at[b].set(jnp.rad2deg(jnp.arctan2(v, u)))
 

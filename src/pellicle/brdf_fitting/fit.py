@@ -20,7 +20,7 @@ from pellicle.brdf_fitting.residuals import RESIDUALS
 from pellicle.brdf_fitting.result import Baseline, BrdfFit
 from pellicle.brdf_fitting.search import FEW, SMOOTH, THOROUGH, Effort, Minima, polish, search
 from pellicle.errors import UsageError
-from pellicle.fitting.result import Estimate, Status
+from pellicle.fitting.result import Estimate, Rival, Status
 from pellicle.fitting.search import Progress, quiet
 from pellicle.fitting.status import judge, misfits, verdict
 from pellicle.io.samples import BrdfSamples, spread
@@ -115,6 +115,32 @@ def _fit(samples: BrdfSamples, surface: Surface, residual: str, progress: Progre
     return _report(samples, surface, whole, minima, held_out, baselines, began)
 
 
+def judged(
+    minima: Minima,
+    at: Local,
+    parameters: dict[str, Estimate],
+    others: tuple[Rival, ...],
+    sigma_known: bool,
+) -> Status:
+    """What the fit of the layer says of itself, before it is weighed against the baselines."""
+    misfit = misfits(
+        chi2_reduced=at.chi2_reduced,
+        sigma_known=sigma_known,
+        drifting=False,
+        effective_share=1 / at.length,
+        rms=float(np.sqrt(np.mean(at.residuals**2))),
+        span=at.span,
+        calibrated=False,
+    )
+    return judge(
+        converged=bool(minima.converged[0]),
+        misfit=misfit,
+        parameters=parameters,
+        rivals=others,
+        natural=_NATURAL,
+    )
+
+
 def _unlayered(parameters: dict[str, Estimate]) -> dict[str, Estimate]:
     """Without evidence of a layer its thickness has no finite error."""
     depth = parameters.get("thickness")
@@ -137,22 +163,7 @@ def _report(
     others = rivals(whole, minima, at)
     found = evidence.weigh(parameters, others, held_out, baselines)
     rms = float(np.sqrt(np.mean(at.residuals**2)))
-    misfit = misfits(
-        chi2_reduced=at.chi2_reduced,
-        sigma_known=samples.sigma is not None,
-        drifting=False,
-        effective_share=1 / at.length,
-        rms=rms,
-        span=at.span,
-        calibrated=False,
-    )
-    status = judge(
-        converged=bool(minima.converged[0]),
-        misfit=misfit,
-        parameters=parameters,
-        rivals=others,
-        natural=_NATURAL,
-    )
+    status = judged(minima, at, parameters, others, samples.sigma is not None)
     sentence = verdict(status, parameters, others, rms)
     if not found.layered:
         sentence = found.verdict
