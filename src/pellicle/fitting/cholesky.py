@@ -1,16 +1,29 @@
-"""Small positive definite systems, unrolled: under vmap they fuse where LAPACK calls would not."""
+"""Small positive definite systems: the smallest unrolled, for under vmap they fuse, the others by LAPACK."""
 
 from __future__ import annotations
 
 import jax.numpy as jnp
+from jax.scipy.linalg import cho_solve
+
+UNROLLED = 4
+"""Rows: beyond it the unrolled form's n³ scalar steps take a second and more to compile."""
 
 
 def solve_positive(matrix, b):
     """x with `matrix` x = b, for a positive definite matrix of a few rows.
 
-    A pivot below rounding is held at the smallest number, so a singular matrix gives a large step,
-    never a NaN.
+    A matrix that is singular to rounding gives a large step or b itself, never a NaN.
     """
+    return _unrolled(matrix, b) if b.shape[0] <= UNROLLED else _lapack(matrix, b)
+
+
+def _lapack(matrix, b):
+    x = cho_solve((jnp.linalg.cholesky(matrix), True), b)
+    return jnp.where(jnp.all(jnp.isfinite(x)), x, b)
+
+
+def _unrolled(matrix, b):
+    """A pivot below rounding is held at the smallest number."""
     n, tiny = b.shape[0], jnp.finfo(matrix.dtype).tiny
     lower: dict = {}
     for i in range(n):
