@@ -1,0 +1,269 @@
+"""Do intervals hold what they promise, and is what cannot be known said to be unknown?
+
+First: simulated data sets over seven kinds of film, three noise levels, with sigma told and not told. The truth
+is drawn from the bounds, uniformly, and the share of truths inside the 68 % and 95 % intervals is counted, of
+the covariance of the best fit and of the sampled posterior. Second: sixty cases, thirty of which a scan of the
+likelihood in plain NumPy calls decided, and thirty undecided; does the fit say the same?
+
+    python benchmarks/calibration.py [--sets 1000] [--cases 60] [--write FILE.md]
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+
+jax.config.update("jax_enable_x64", True)
+
+import pellicle as pl  # noqa: E402
+from pellicle.fitting.parameters import parameters  # noqa: E402
+from pellicle.instrument import Drift  # noqa: E402
+from pellicle.scene import insert  # noqa: E402
+from pellicle.synthetic import synthesise, synthesise_angles  # noqa: E402
+
+WAVELENGTH = np.linspace(400.0, 900.0, 101)
+SILICON = pl.Constant(3.9, 0.02)
+LEVELS = {"R": (0.001, 0.004, 0.015), "T": (0.001, 0.004, 0.015), "psi-delta": (0.02, 0.1, 0.5)}
+
+
+def thickness(lower: float = 50.0, upper: float = 1200.0) -> pl.Free:
+    return pl.Free(None, lower, upper)
+
+
+def kinds() -> dict[str, pl.Scene]:
+    """Scenes whose free parameters are drawn uniformly from their bounds."""
+    index, extinction = pl.Free(None, 1.3, 1.8), pl.Free(None, 0.0, 0.05)
+    glass, t = pl.Constant(1.52, 0.0), pl.Light(None, 0.0, "T", "unpolarised")
+    plate = pl.Substrate(glass, pl.Constant(1.0, 0.0))
+    scaled = pl.Instrument(scale=Drift(0))
+    return {
+        "R: d": pl.Scene(pl.Layer(1.46, thickness()), SILICON),
+        "R: d, n": pl.Scene(pl.Layer(pl.Constant(index, 0.0), thickness()), SILICON),
+        "R: d, n, k": pl.Scene(pl.Layer(pl.Constant(index, extinction), thickness()), SILICON),
+        "R: d, Cauchy A, B": pl.Scene(
+            pl.Layer(pl.Cauchy(pl.Free(None, 1.4, 1.7), pl.Free(None, 0.0, 1e4)), thickness()), SILICON
+        ),
+        "R: d, n, scale": pl.Scene(
+            pl.Layer(pl.Constant(index, 0.0), thickness()), SILICON, instrument=scaled
+        ),
+        "T: d, n, k": pl.Scene(
+            pl.Layer(pl.Constant(pl.Free(None, 1.8, 2.4), extinction), thickness()), plate, light=t
+        ),
+        "psi-delta: d, n": pl.Scene(
+            pl.Layer(pl.Constant(index, 0.0), thickness(5.0, 400.0)),
+            SILICON,
+            light=pl.Light(None, 70.0, "psi-delta", "unpolarised"),
+        ),
+    }
+
+
+class Count(NamedTuple):
+    """Of one parameter of one data set: whether its intervals hold the truth; None where none was given."""
+
+    kind: str
+    level: int
+    known: bool
+    name: str
+    covariance: tuple[bool, bool] | None
+    posterior: tuple[bool, bool] | None
+
+
+def simulated(scene: pl.Scene, truth: np.ndarray, noise: float, known: bool, seed: int) -> pl.Spectrum:
+    fixed = insert(scene, truth)
+    sigma = np.full(WAVELENGTH.size, noise) if known else None
+    if scene.light.signal != "psi-delta":
+        values = synthesise(fixed, WAVELENGTH, noise, seed).values
+        return pl.Spectrum(WAVELENGTH, values, scene.light.signal, sigma=sigma)
+    psi, delta = synthesise_angles(fixed, WAVELENGTH, noise, seed).values.T
+    angle = np.full(WAVELENGTH.size, 70.0)
+    return pl.Spectrum(WAVELENGTH, psi, "psi-delta", sigma=sigma, delta=delta, delta_sigma=sigma, angle=angle)
+
+
+def coverage(sets: int, seed: int = 0) -> list[Count]:
+    found, random = [], np.random.default_rng(seed)
+    named = list(kinds().items())
+    for i in range(sets):
+        kind, scene = named[i % len(named)]
+        level, known = (i // len(named)) % 3, (i // (3 * len(named))) % 2 == 0
+        free = parameters(scene)
+        truth = np.array([random.uniform(p.lower, p.upper) for p in free])
+        noise = LEVELS[scene.light.signal][level]
+        posterior = pl.sample(simulated(scene, truth, noise, known, seed + i), scene, seed=i)
+        for p, value in zip(free, truth, strict=True):
+            found.append(_count(posterior, p.name, float(value), (kind, level, known)))
+        told(i + 1, sets, "data sets")
+    return found
+
+
+def _count(posterior: pl.Posterior, name: str, truth: float, of: tuple[str, int, bool]) -> Count:
+    estimate = posterior.fit[name]
+    normal = sampled = None
+    if np.isfinite(estimate.stderr) and posterior.fit.status == "converged":
+        away = abs(estimate.value - truth)
+        normal = (bool(away < 0.9945 * estimate.stderr), bool(away < 1.96 * estimate.stderr))
+    if posterior.trusted:
+        column = posterior.draws[..., posterior.names.index(name)]
+        limits = np.quantile(column, [0.16, 0.84, 0.025, 0.975])
+        sampled = (bool(limits[0] < truth < limits[1]), bool(limits[2] < truth < limits[3]))
+    return Count(*of, name, normal, sampled)
+
+
+class Case(NamedTuple):
+    """A film whose thickness and index are free, and what the likelihood alone says of its thickness."""
+
+    thickness: float
+    n: float
+    k: float
+    wavelength: np.ndarray
+    noise: float
+    decided: bool
+
+
+SUBSTRATE = 3.9 + 0.02j
+
+
+def reflectance(thickness: Any, index: Any, wavelength: np.ndarray) -> np.ndarray:
+    """R at normal incidence in NumPy; `thickness` and `index` are arrays that broadcast."""
+    thickness, index = np.asarray(thickness)[..., None], np.asarray(index, dtype=complex)[..., None]
+    r01, r12 = (1 - index) / (1 + index), (index - SUBSTRATE) / (index + SUBSTRATE)
+    turn = np.exp(4j * np.pi * index * thickness / wavelength)
+    return np.abs((r01 + r12 * turn) / (1 + r01 * r12 * turn)) ** 2
+
+
+def cases(count: int, seed: int = 0) -> list[Case]:
+    """As many decided as undecided films, in the order in which they were drawn; those between are left out.
+
+    Films of 5 to 1500 nm, index 1.3 to 2.5 free by ± 0.3, transparent or opaque, 4 to 101 wavelengths.
+    """
+    random, found = np.random.default_rng(seed), {True: [], False: []}
+    while min(map(len, found.values())) < count // 2:
+        d = float(np.exp(random.uniform(np.log(5), np.log(1500))))
+        n = random.uniform(1.3, 2.5)
+        k = 0.0 if random.random() < 0.7 else float(np.exp(random.uniform(np.log(0.1), np.log(4))))
+        points = int(random.choice([4, 8, 30, 101]))
+        noise = float(random.choice([0.001, 0.005, 0.02, 0.05]))
+        case = Case(d, n, k, np.linspace(400, 900, points), noise, True)
+        width = _undecided_width(case)
+        decided = True if width < 0.05 * d else False if width > 0.3 * d else None
+        if decided is not None and len(found[decided]) < count // 2:
+            found[decided].append(case._replace(decided=decided))
+    return [case for pair in zip(found[True], found[False], strict=True) for case in pair]
+
+
+def _undecided_width(case: Case) -> float:
+    """How far apart thicknesses lie whose misfit to data without noise is below 4, whatever the index (nm)."""
+    clean = reflectance(case.thickness, case.n + 1j * case.k, case.wavelength)
+    thick = np.unique(
+        np.concatenate([np.linspace(1, 3000, 1500), case.thickness * np.linspace(0.8, 1.2, 401)])
+    )
+    index = case.n + np.linspace(-0.3, 0.3, 61)
+    possible = [
+        np.any(
+            np.sum(((reflectance(d, index + 1j * case.k, case.wavelength) - clean) / case.noise) ** 2, -1) < 4
+        )
+        for d in thick
+    ]
+    inside = thick[np.array(possible)]
+    return float(np.ptp(inside))
+
+
+class Verdict(NamedTuple):
+    case: Case
+    status: str
+    stderr: float
+    claimed: bool  # converged, with an error that calls the thickness decided
+
+
+def honesty(count: int) -> list[Verdict]:
+    found = []
+    drawn = cases(count)
+    for i, case in enumerate(drawn):
+        random = np.random.default_rng(1000 + i)
+        clean = reflectance(case.thickness, case.n + 1j * case.k, case.wavelength)
+        values = clean + random.normal(0, case.noise, clean.size)
+        index = pl.Constant(pl.Free(None, max(case.n - 0.3, 1.0), case.n + 0.3), case.k)
+        scene = pl.Scene(pl.Layer(index, pl.Free(None, 1.0, 3000.0)), SILICON)
+        data = pl.Spectrum(case.wavelength, values, "R", sigma=np.full(clean.size, case.noise))
+        fit = pl.fit(data, scene)
+        error = fit["thickness"].stderr
+        claimed = fit.status in ("converged", "at-bound") and error < 0.1 * fit["thickness"].value
+        found.append(Verdict(case, str(fit.status), error, bool(claimed)))
+        told(i + 1, count, "cases")
+    return found
+
+
+def told(done: int, total: int, what: str) -> None:
+    if sys.stderr.isatty() or done == total or done % 50 == 0:
+        print(f"{done} of {total} {what}", file=sys.stderr, flush=True)
+
+
+def share(counts: list[Count], way: str, which: int) -> str:
+    held = [getattr(c, way)[which] for c in counts if getattr(c, way) is not None]
+    if not held:
+        return "     -"
+    p, size = float(np.mean(held)), len(held)
+    return f"{100 * p:5.1f} ± {100 * np.sqrt(max(p * (1 - p), 1 / size**2) / size):.1f} ({size})"
+
+
+def coverage_table(counts: list[Count]) -> list[str]:
+    """Shares of truths inside, in per cent, their binomial standard error, and of how many."""
+    head = "| data sets | covariance 68 % | covariance 95 % | posterior 68 % | posterior 95 % |"
+    rows: list[tuple[str, Callable[[Count], bool]]] = [("all", lambda c: True)]
+    rows += [(kind, lambda c, kind=kind: c.kind == kind) for kind in kinds()]
+    rows += [(f"noise level {i + 1}", lambda c, i=i: c.level == i) for i in range(3)]
+    rows += [("sigma told", lambda c: c.known), ("sigma not told", lambda c: not c.known)]
+    lines = [head, "|---|---|---|---|---|"]
+    for label, chosen in rows:
+        some = [c for c in counts if chosen(c)]
+        cells = [share(some, way, which) for way in ("covariance", "posterior") for which in (0, 1)]
+        lines.append(f"| {label} | {' | '.join(cells)} |")
+    return lines
+
+
+def honesty_table(found: list[Verdict]) -> list[str]:
+    lines = ["| likelihood in NumPy | fit: decided | fit: not decided |", "|---|---|---|"]
+    for decided in (True, False):
+        claims = [v.claimed for v in found if v.case.decided is decided]
+        label = "decided" if decided else "undecided"
+        lines.append(f"| {label} | {sum(claims)} | {len(claims) - sum(claims)} |")
+    wrong = [v for v in found if v.claimed is not v.case.decided]
+    for v in wrong:
+        c = v.case
+        label = "decided" if c.decided else "undecided"
+        lines.append(
+            f"\n{label}, but {v.status} ± {v.stderr:.3g} nm: {c.thickness:.4g} nm, n {c.n:.3f}, k {c.k:.3g},"
+            f" {c.wavelength.size} wavelengths, noise {c.noise:g}"
+        )
+    return lines
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--sets", type=int, default=1000)
+    parser.add_argument("--cases", type=int, default=60)
+    parser.add_argument("--write", type=Path)
+    given = parser.parse_args()
+    began, lines = time.perf_counter(), []
+    if given.sets:
+        counts = coverage(given.sets)
+        trusted = np.mean([c.posterior is not None for c in counts])
+        lines += coverage_table(counts) + [
+            f"\n{given.sets} data sets; {100 * trusted:.1f} % of chains trusted."
+        ]
+    if given.cases:
+        lines += ["", *honesty_table(honesty(given.cases))]
+    print("\n".join(lines))
+    print(f"{time.perf_counter() - began:.0f} s", file=sys.stderr)
+    if given.write:
+        given.write.write_text("\n".join(lines) + "\n")
+
+
+if __name__ == "__main__":
+    main()
