@@ -1,9 +1,9 @@
 """Do intervals hold what they promise, and is what cannot be known said to be unknown?
 
-First: simulated data sets over seven kinds of film, three noise levels, with sigma told and not told. The truth
-is drawn from the bounds, uniformly, and the share of truths inside the 68 % and 95 % intervals is counted, of
-the covariance of the best fit and of the sampled posterior. Second: sixty cases, thirty of which a scan of the
-likelihood in plain NumPy calls decided, and thirty undecided; does the fit say the same?
+First: simulated data sets over seven kinds of film, three noise levels, with sigma told and not told. The
+truth is drawn from the bounds, uniformly, and the share of truths inside the 68 % and 95 % intervals is
+counted, of the covariance of the best fit and of the sampled posterior. Second: sixty cases, thirty of
+which a scan of the likelihood in plain NumPy calls decided, and thirty undecided; does the fit say so?
 
     python benchmarks/calibration.py [--sets 1000] [--cases 60] [--write FILE.md]
 """
@@ -158,7 +158,7 @@ def cases(count: int, seed: int = 0) -> list[Case]:
 
 
 def _undecided_width(case: Case) -> float:
-    """How far apart thicknesses lie whose misfit to data without noise is below 4, whatever the index (nm)."""
+    """How far apart thicknesses lie whose misfit to data without noise is below 4 at some index (nm)."""
     clean = reflectance(case.thickness, case.n + 1j * case.k, case.wavelength)
     thick = np.unique(
         np.concatenate([np.linspace(1, 3000, 1500), case.thickness * np.linspace(0.8, 1.2, 401)])
@@ -254,9 +254,8 @@ def main() -> None:
     if given.sets:
         counts = coverage(given.sets)
         trusted = np.mean([c.posterior is not None for c in counts])
-        lines += coverage_table(counts) + [
-            f"\n{given.sets} data sets; {100 * trusted:.1f} % of chains trusted."
-        ]
+        lines += coverage_table(counts)
+        lines += [f"\n{given.sets} data sets; {100 * trusted:.1f} % of chains trusted."]
     if given.cases:
         lines += ["", *honesty_table(honesty(given.cases))]
     print("\n".join(lines))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -43,6 +45,28 @@ def test_oxides_thin_and_thick(thickness):
     assert 0.7 < found.chi2_reduced < 1.4
     assert found.rms < 0.05  # degrees
     assert np.max(np.abs(found.curve.delta_residual)) < 6 * DELTA_SIGMA
+
+
+@pytest.mark.parametrize(("psi_sigma", "delta_sigma"), [(0.02, 0.05), (0.2, 0.02), (0.002, 0.5)])
+def test_the_error_is_that_of_both_angles_with_their_own_noise(psi_sigma, delta_sigma):
+    """Cramér and Rao's bound from differences of Ψ and Δ themselves: neither noise is spread over the other.
+
+    Residuals of alternating sign, which no correlation widens.
+    """
+    psi, delta = (np.asarray(x) for x in pl.ellipsometry(WAVELENGTH, 100.0, "SiO2", "Si", angle=70.0))
+    sign = (-1.0) ** np.arange(WAVELENGTH.size)
+    spectrum = replace(
+        measured(100.0),
+        values=psi + psi_sigma * sign,
+        delta=(delta + delta_sigma * sign) % 360,
+        sigma=np.full(64, psi_sigma),
+        delta_sigma=np.full(64, delta_sigma),
+    )
+    above, below = (pl.ellipsometry(WAVELENGTH, d, "SiO2", "Si", angle=70.0) for d in (100.01, 99.99))
+    slopes = [np.asarray(a - b) / 0.02 for a, b in zip(above, below, strict=True)]
+    noises = (psi_sigma, delta_sigma)
+    information = sum(np.sum((slope / noise) ** 2) for slope, noise in zip(slopes, noises, strict=True))
+    assert pl.fit(spectrum, scene())["thickness"].stderr == pytest.approx(information**-0.5, rel=0.03)
 
 
 def test_several_angles_in_one_file():

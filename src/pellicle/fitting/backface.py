@@ -48,7 +48,7 @@ def worth(spectra: Sequence[Measured], weighed: Weighed) -> Worth | None:
 
 def _bare(spectrum: Measured, view: View) -> Measured:
     """The spectrum as it was weighed, of a sample without a back face."""
-    sigma = 1 / view.data.weight[: view.points : view.channels]
+    sigma = 1 / view.data.weight[: view.points].reshape(view.rows, view.channels)
     return spectrum._replace(scene=_half_space(spectrum.scene), sigma=sigma, temper=float(view.data.temper))
 
 

@@ -28,6 +28,8 @@ def _simulated(plan: Plan, numbers: Scene, data: Data) -> Any:
     if channels == 3 and _depolarises(plan):
         square = jnp.sum(signal**2, axis=1, keepdims=True)
         signal = signal * jnp.where(square > 0, jax.lax.rsqrt(jnp.where(square > 0, square, 1.0)), 0.0)
+    if data.frame is not None:
+        signal = jnp.einsum("pij,pj->pi", data.frame, signal)
     return signal[:, :channels].reshape(-1)
 
 

@@ -25,7 +25,8 @@ class Measured(NamedTuple):
 
     `values` are fractions (points,), or N, C, S (points, 3) for ellipsometry, which have no wrap-around,
     or N and C alone (points, 2) where Δ is folded;
-    `wavelength` (nm) and `sigma` are (points,); `temper` is how many independent points each counts for.
+    `wavelength` (nm) is (points,), `sigma` too or the shape of `values`; `temper` is how many independent
+    points each counts for. With a `frame` (points, 3, 3) the values are those of N, C, S in it.
     """
 
     scene: Scene
@@ -35,6 +36,7 @@ class Measured(NamedTuple):
     temper: float = 1.0
     noise: Noise = Noise()
     name: str = ""  # that of one among several
+    frame: np.ndarray | None = None
 
 
 def measured(data: Spectrum, scene: Scene, name: str = "") -> Measured:
@@ -43,7 +45,11 @@ def measured(data: Spectrum, scene: Scene, name: str = "") -> Measured:
     _check(data, scene)
     source = Noise(data.sigma is not None, data.sigma is None and drifts(scene))
     temper = 1 / noise.DRIFT_CORRELATION if source.drifting else 1.0
-    return Measured(scene, data.wavelength, _values(data), _sigma(data, source), temper, source, name)
+    values, sigma, frame = _values(data), _sigma(data, source), None
+    if data.delta is not None and data.sigma is not None and not data.folded:
+        frame = _frame(data)
+        values = np.einsum("pij,pj->pi", frame, values)
+    return Measured(scene, data.wavelength, values, sigma, temper, source, name, frame)
 
 
 def seen_as(scene: Scene, data: Spectrum) -> Scene:
@@ -92,12 +98,27 @@ def _values(data: Spectrum) -> np.ndarray:
     return sphere[:, :2] if data.folded else sphere
 
 
+def _frame(data: Spectrum) -> np.ndarray:
+    """At each measured point of the sphere of N, C, S: along Ψ, along Δ, and outwards, (points, 3, 3).
+
+    There the measured point is (0, 0, 1), and errors of Ψ and of Δ are errors of one component each.
+    """
+    psi, delta = 2 * np.deg2rad(data.values), np.deg2rad(np.asarray(data.delta))
+    sine, cosine, zero = np.sin(psi), np.cos(psi), np.zeros_like(psi)
+    along = [-sine, cosine * np.cos(delta), cosine * np.sin(delta)]
+    across = [zero, -np.sin(delta), np.cos(delta)]
+    outwards = [cosine, sine * np.cos(delta), sine * np.sin(delta)]
+    return np.moveaxis(np.array([along, across, outwards]), 2, 0)
+
+
 def _sigma(data: Spectrum, source: Noise) -> np.ndarray:
     """σ of each point: given, the model's own error, or a guess that the residuals will replace."""
     if data.sigma is not None and data.delta is not None:
-        across = data.sigma if data.delta_sigma is None else data.delta_sigma
-        psi, delta, psi_sigma, delta_sigma = np.deg2rad([data.values, data.delta, data.sigma, across])
-        return _sigma_of_angles(psi, delta, psi_sigma, delta_sigma, data.folded)
+        given = data.sigma if data.delta_sigma is None else data.delta_sigma
+        psi, delta, psi_sigma, delta_sigma = np.deg2rad([data.values, data.delta, data.sigma, given])
+        if not data.folded:
+            return _sigma_in_frame(psi, psi_sigma, delta_sigma)
+        return _sigma_folded(psi, delta, psi_sigma, delta_sigma)
     if data.sigma is not None:
         return data.sigma
     if data.delta is not None:
@@ -108,17 +129,24 @@ def _sigma(data: Spectrum, source: Noise) -> np.ndarray:
     return np.full(len(data), guess)
 
 
-def _sigma_of_angles(
-    psi: np.ndarray, delta: np.ndarray, psi_sigma: np.ndarray, delta_sigma: np.ndarray, folded: bool
-) -> np.ndarray:
-    """On the sphere of N, C, S an error of Ψ moves a point by 2σ_Ψ and one of Δ by sin(2Ψ) σ_Δ; their
-    mean square serves for all directions. All in radians.
+def _sigma_in_frame(psi: np.ndarray, psi_sigma: np.ndarray, delta_sigma: np.ndarray) -> np.ndarray:
+    """Along Ψ, along Δ and outwards, (points, 3), all in radians.
 
-    Where only N and C are seen, an error of Δ at 0 or 180° moves neither to first order; the second order
-    of σ_Ψ keeps σ above zero.
+    An error of Ψ moves a point of the sphere by 2σ_Ψ along its meridian, one of Δ by sin(2Ψ) σ_Δ across it,
+    of which Ψ's own error leaves something at the poles. Outwards there is no first order: the mean serves.
+    """
+    along = 2 * psi_sigma
+    across = np.hypot(np.sin(2 * psi), along) * delta_sigma
+    return np.stack([along, across, np.sqrt(0.5 * (along**2 + across**2))], axis=1)
+
+
+def _sigma_folded(
+    psi: np.ndarray, delta: np.ndarray, psi_sigma: np.ndarray, delta_sigma: np.ndarray
+) -> np.ndarray:
+    """Where only N and C are seen: the mean square of what errors of Ψ and of Δ move, all in radians.
+
+    An error of Δ at 0 or 180° moves neither to first order; the second order of σ_Ψ keeps σ above zero.
     """
     along, across = 2 * psi_sigma, np.sin(2 * psi) * delta_sigma
-    if not folded:
-        return np.sqrt(0.5 * (along**2 + across**2))
     seen = np.sin(2 * psi) ** 2 + (np.cos(2 * psi) * np.cos(delta)) ** 2
     return np.sqrt(0.5 * (seen * along**2 + (across * np.sin(delta)) ** 2 + along**4))

@@ -37,6 +37,7 @@ class Data(NamedTuple):
     position: Any  # wavelength mapped to −1..1
     temper: Any  # effective points per point: correlated errors count less
     level: Any  # median of the values: the size an offset is measured in
+    frame: Any = None  # of N, C, S at each point, where Ψ and Δ have errors of their own
 
 
 class Solved(NamedTuple):

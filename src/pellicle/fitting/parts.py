@@ -56,7 +56,7 @@ def missed(found: tuple[Part, ...], weighed: Weighed) -> tuple[Part, ...]:
 
 
 def _misses(part: Part, view: View, met: Met, several: bool) -> bool:
-    values = view.data.values[: view.points].reshape(view.rows, view.channels)
+    values = view.in_columns(view.data.values)
     rms = part.rms if view.channels == 1 else math.radians(2 * part.rms)
     floor = np.sqrt(np.mean([np.median(noise.local_noise(column)) ** 2 for column in values.T]))
     # beside others a spectrum may be given up, its σ growing with its residuals, without much structure
@@ -77,9 +77,8 @@ def _curve(view: View, met: Met, found: Errors) -> Curve:
     at, rows, held = met.at, view.rows, list(view.takes)
     n_stderr, k_stderr = layer_errors(at, found.covariance[np.ix_(held, held)], rows)
     n, k = np.asarray(at.layer)[:, :rows]
-    keep, shape = slice(view.points), (rows, view.channels)
-    data, model = view.data.values[keep].reshape(shape), np.asarray(at.model)[keep].reshape(shape)
-    sigma = 1 / view.data.weight[keep].reshape(shape)[:, 0]
+    data, model = view.in_columns(view.data.values), view.in_columns(at.model)
+    sigma = 1 / view.data.weight[: view.points : view.channels]
     angles = {}
     if view.channels > 1:
         (data, delta_data), (model, delta_model) = psi_delta(data), psi_delta(model)

@@ -75,6 +75,15 @@ class View(NamedTuple):
         """Data values that are independent: N, C and S lie on a sphere, so two of the three."""
         return self.points if self.channels < 3 else 2 * self.rows
 
+    def in_columns(self, values: Any) -> np.ndarray:
+        """Data values or a model of them (..., data values) as signals, or as N, C and S, of the real points,
+        (..., rows, channels)."""
+        values = np.asarray(values)[..., : self.points]
+        columns = values.reshape(*values.shape[:-1], self.rows, self.channels)
+        if self.data.frame is None:
+            return columns
+        return np.einsum("pij,...pi->...pj", np.asarray(self.data.frame)[: self.rows], columns)
+
     def rms(self, model: Any) -> float:
         """rms of the residuals. For ellipsometry it is in degrees of Ψ: half the distance on the sphere, in
         each of its two directions."""
@@ -146,13 +155,15 @@ def _view(spectrum: Measured, box: Box, takes: tuple[int, ...], tolerance: float
     scene = with_wavelength(scene, wavelength, _pad_angle(scene.light.angle, extra))
     chosen = plan(scene, tolerance, _STAY)
     span = max(wavelength.max() - wavelength.min(), 1e-9)  # one wavelength at many angles has none
-    weight = np.concatenate([1 / np.broadcast_to(spectrum.sigma, points), np.zeros(extra)])
+    sigma = np.reshape(spectrum.sigma, (-1, 1)) if np.ndim(spectrum.sigma) < 2 else spectrum.sigma
+    weight = np.concatenate([1 / np.broadcast_to(sigma, (points, channels)), np.zeros((extra, channels))])
     data = Data(
         values=values.reshape(-1),
-        weight=np.repeat(weight, channels),
+        weight=weight.reshape(-1),
         position=np.repeat(2 * (wavelength - wavelength.min()) / span - 1, channels),
         temper=np.float64(spectrum.temper),
         level=np.float64(max(float(np.median(np.abs(values[:points]))), 1e-12)),
+        frame=None if spectrum.frame is None else _pad(spectrum.frame, extra),
     )
     scene = sampled(scene, chosen.on("coherence"))
     steepest = max((largest_index(x.material, wavelength) for x in coherent_layers(scene)), default=1.0)
@@ -197,9 +208,10 @@ def thin(view: View, most: int) -> View:
     take = np.concatenate([kept, np.full(padding, size - 1)])
 
     def pick(x):
-        if np.ndim(x) != 1 or len(x) not in (size, size * channels):
+        if np.ndim(x) not in (1, 3) or len(x) not in (size, size * channels):
             return x
-        return x.reshape(size, -1)[take].reshape(-1)
+        taken = x.reshape(size, -1)[take]
+        return taken.reshape(-1) if np.ndim(x) == 1 else taken.reshape(-1, *x.shape[1:])
 
     scene, data = jax.tree_util.tree_map(pick, (view.scene, view.data))
     real = np.repeat(np.concatenate([np.ones(len(kept)), np.zeros(padding)]), channels)

@@ -100,6 +100,8 @@ def _residual(problem: Problem, view: View, unit: np.ndarray) -> _Residual:
     sees = [sum(v.independent for v in problem.views if i in v.takes) for i in view.takes]
     used = sum(view.independent / total for total in sees) + len(linear_coefficients(view, at))
     columns = residual.reshape(-1, view.channels).T
+    if view.data.frame is not None:
+        columns = columns[:2]  # outwards from the sphere nothing is measured
     length = float(np.mean([noise.correlation_length(column) for column in columns]))
     return _Residual(float(residual @ residual), max(view.independent - used, 1), length)
 

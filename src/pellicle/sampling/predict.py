@@ -42,6 +42,5 @@ def _of(view: View, units: np.ndarray, random: np.random.Generator) -> Predictio
     noisy = model + sigma * random.standard_normal(model.shape)
     if view.channels == 1:
         return Prediction(model, noisy)
-    shape = (len(units), view.rows, view.channels)
-    (psi, delta), (psi_noisy, delta_noisy) = (psi_delta(x.reshape(shape)) for x in (model, noisy))
+    (psi, delta), (psi_noisy, delta_noisy) = (psi_delta(view.in_columns(x)) for x in (model, noisy))
     return Prediction(psi, psi_noisy, delta, delta_noisy)
