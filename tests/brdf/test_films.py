@@ -111,7 +111,7 @@ def test_the_shader_counts_its_phase_twice():
     assert float(blinn_phong_film.published(SHADER, up)[0]) == pytest.approx(0.0942, abs=5e-5)
     truth = tmm.unpolarized_RT([1, 1.5, 2], [np.inf, 250, np.inf], 0, 550)["R"]
     assert truth == pytest.approx(0.0239, abs=5e-5)
-    assert float(blinn_phong_film.corrected(SHADER, up)[0]) == pytest.approx(truth, rel=1e-12)
+    assert float(film_colour.reflectance(SHADER, up)[0]) == pytest.approx(truth, rel=1e-12)
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.9])
@@ -119,7 +119,7 @@ def test_phase_average_is_the_mean_over_a_period(angle):
     cosine = np.sqrt(1 - np.sin(angle) ** 2 / 1.5**2)
     heights = np.arange(200) / 200 * 550 / (2 * 1.5 * cosine)
     angles = jnp.full(200, angle)
-    mean = blinn_phong_film.corrected({**SHADER, "thickness": heights}, angles).mean()
+    mean = film_colour.reflectance({**SHADER, "thickness": heights}, angles).mean()
     found = blinn_phong_film.phase_average(SHADER, jnp.array(angle))
     assert float(found[0]) == pytest.approx(float(mean), rel=1e-12)
 
@@ -143,7 +143,7 @@ def test_light_that_never_returns_has_met_one_face():
 def test_total_reflection_is_total():
     glass = {**SHADER, "ambient_n": 1.5, "n": 1.3, "base_n": 1.0}
     for reflectance in (
-        blinn_phong_film.corrected,
+        film_colour.reflectance,
         blinn_phong_film.published,
         blinn_phong_film.phase_average,
     ):

@@ -14,18 +14,13 @@ from typing import Any
 
 import jax.numpy as jnp
 
-from pellicle.brdf import film_colour, lobes
-from pellicle.brdf.directions import angle_to_half
-from pellicle.brdf.shapes import Parameters, column
+from pellicle.brdf import film_colour
+from pellicle.brdf.lobes import blinn_phong
+from pellicle.brdf.shapes import Parameters, column, summed
 from pellicle.optics.orders import Bounces, bounces
 
 PUBLISHED_WAVELENGTHS = (650.0, 510.0, 475.0)
 """Its R, G and B in nm."""
-
-
-def corrected(parameters: Parameters, angle: Any) -> Any:
-    """Airy's reflectance of the film, unpolarised."""
-    return film_colour.reflectance(parameters, angle)
 
 
 def published(parameters: Parameters, angle: Any) -> Any:
@@ -57,12 +52,13 @@ def _one_minus(transmitted: Callable[[Bounces], Any], parameters: Parameters, an
     return jnp.where(total, 1.0, 1 - 0.5 * (s + p))
 
 
-def blinn_phong_film(reflectance: Callable = corrected) -> Callable:
+def blinn_phong_film(colour: film_colour.Colour = film_colour.exact) -> Callable:
     """specular · ⟨n, h⟩₊^e R(⟨o, h⟩) + diffuse; the lobe is not normalised, as published."""
 
     def evaluate(parameters, i, o):
-        lobe = column(lobes.blinn_phong(i, o, parameters["exponent"]))
-        colour = film_colour.rgb(parameters, reflectance(parameters, angle_to_half(i, o)))
-        return column(parameters["specular"]) * lobe * colour + column(parameters["diffuse"])
+        def lobes():
+            return column(blinn_phong(i, o, parameters["exponent"])) * colour(parameters, i, o)
+
+        return summed(parameters, lobes)
 
     return evaluate

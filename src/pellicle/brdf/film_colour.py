@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeAlias
 
 import jax.numpy as jnp
 import numpy as np
@@ -38,25 +38,48 @@ def index(n: Any, k: Any) -> Number:
     return n if k is None else Pair(n, k)
 
 
-def _lit(parameters: Parameters, angle: Any) -> tuple[Any, Any, Any, Any, Any]:
+Reflectance: TypeAlias = Callable[[Parameters, Any], Any]
+"""(parameters, angle in radians (...), None for normal incidence) → (..., wavelengths)."""
+
+Colour: TypeAlias = Callable[[Parameters, Any, Any], Any]
+"""(parameters, i, o) → (..., 3), or a channel for each wavelength."""
+
+
+def _lit(
+    parameters: Parameters, angle: Any, enter: Callable[[Number], Number] = allow_tunnelling
+) -> tuple[Any, Any, Any, Any, Any]:
     """Ambient, film, base, 2πd/λ and angle, (..., wavelengths)."""
     return (
         parameters.get("ambient_n", 1.0),
         index(parameters["n"], parameters.get("k")),
-        allow_tunnelling(index(parameters["base_n"], parameters.get("base_k"))),
+        enter(index(parameters["base_n"], parameters.get("base_k"))),
         2 * jnp.pi / parameters["wavelengths"] * column(parameters["thickness"]),
-        angle[..., None],
+        None if angle is None else angle[..., None],
     )
 
 
-def reflectance(parameters: Parameters, angle: Any) -> Any:
-    """Unpolarised Airy reflectance (..., wavelengths) at angles (...) in radians, in air.
+def airy(
+    polarisations: str = "sp", through: Callable = film.through, enter: Callable = allow_tunnelling
+) -> Reflectance:
+    """Airy's reflectance, the mean over `polarisations`, of a film in air.
 
-    Reads `thickness` (nm), `n`, `k`, `base_n`, `base_k`, `wavelengths` (nm), and `ambient_n` where
-    the ambient is not air.
+    It reads `thickness` (nm), `n`, `k`, `base_n`, `base_k`, `wavelengths` (nm), and `ambient_n` where
+    the ambient is not air; without `k` or `base_k` the medium cannot absorb. `through` is as in
+    `film.film`; `enter` that leaves an index as it is promises that no wave is totally reflected.
     """
-    s, p = film.film(*_lit(parameters, angle), sincos=sincos_poly)
-    return 0.5 * (film.reflectance(s) + film.reflectance(p))
+
+    def reflectance(parameters: Parameters, angle: Any) -> Any:
+        waves = film.film(
+            *_lit(parameters, angle, enter), polarisations=polarisations, through=through, sincos=sincos_poly
+        )
+        found = [film.reflectance(wave) for wave in waves]
+        return found[0] if len(found) == 1 else 0.5 * (found[0] + found[1])
+
+    return reflectance
+
+
+reflectance = airy()
+"""The unpolarised one, whatever the media."""
 
 
 def without_interference(parameters: Parameters, angle: Any) -> Any:
@@ -72,17 +95,21 @@ def rgb(parameters: Parameters, spectrum: Any) -> Any:
     return spectrum if weights is None else spectrum @ weights
 
 
-def exact(parameters: Parameters, i: Any, o: Any) -> Any:
+def at_each(reflectance: Reflectance) -> Colour:
     """The film's RGB reflectance for light from i to o, computed for each sample."""
-    return rgb(parameters, reflectance(parameters, angle_to_half(i, o)))
+    return lambda parameters, i, o: rgb(parameters, reflectance(parameters, angle_to_half(i, o)))
 
 
-def incoherent(parameters: Parameters, i: Any, o: Any) -> Any:
-    """The same without interference."""
-    return rgb(parameters, without_interference(parameters, angle_to_half(i, o)))
+exact = at_each(reflectance)
+incoherent = at_each(without_interference)
 
 
-def coefficients(parameters: Parameters, dtype: Any, count: int) -> Any:
+def head_on(reflectance: Reflectance) -> Colour:
+    """The same as if light always met the facets along their normals."""
+    return lambda parameters, i, o: rgb(parameters, reflectance(parameters, None))
+
+
+def coefficients(parameters: Parameters, dtype: Any, count: int, reflectance: Reflectance) -> Any:
     """Chebyshev coefficients (count, 3) of the film's RGB reflectance in 2⟨i, h⟩ − 1."""
     turn = np.pi * (np.arange(count) + 0.5) / count
     angle = jnp.asarray(np.arccos(0.5 + 0.5 * np.cos(turn)), dtype)
@@ -91,22 +118,26 @@ def coefficients(parameters: Parameters, dtype: Any, count: int) -> Any:
     return jnp.asarray(transform, dtype) @ rgb(parameters, reflectance(parameters, angle))
 
 
-def chebyshev(thickest: float) -> Callable[[Parameters, Any, Any], Any]:
-    """`exact` by a polynomial, for films of at most `thickest` nm; with a thickness map, `exact` itself.
+def by_nodes(count: int, reflectance: Reflectance = reflectance) -> Colour:
+    """`at_each` by a polynomial through so many nodes; with a thickness map, `at_each` itself.
 
     For values: a Jacobian through `exact` costs less than through a long polynomial.
     """
-    count = nodes(thickest)
 
     def colour(parameters, i, o):
         if jnp.ndim(parameters["thickness"]) > 0:
-            return exact(parameters, i, o)
+            return at_each(reflectance)(parameters, i, o)
         cosine = cosine_to_half(i, o)
-        series = coefficients(parameters, cosine.dtype, count)
+        series = coefficients(parameters, cosine.dtype, count, reflectance)
         # one channel after the other: a last axis of three would keep the processor's lanes empty
         return jnp.stack([_clenshaw(channel, 4 * cosine - 2) for channel in series.T], axis=-1)
 
     return colour
+
+
+def chebyshev(thickest: float) -> Colour:
+    """`exact` by as many nodes as films of at most `thickest` nm take."""
+    return by_nodes(nodes(thickest))
 
 
 def _clenshaw(series: Any, twice_x: Any) -> Any:

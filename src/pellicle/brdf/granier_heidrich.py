@@ -27,7 +27,7 @@ import jax.numpy as jnp
 
 from pellicle.brdf.directions import cosine_inside, cosine_to_half, direction
 from pellicle.brdf.lobes import cosine_to_mirror, power
-from pellicle.brdf.shapes import Parameters, column
+from pellicle.brdf.shapes import Parameters, column, summed
 from pellicle.optics.number import sincos_poly, sqrt
 
 
@@ -51,16 +51,18 @@ class Amplitudes(NamedTuple):
     phase: Any
 
 
-def paths(i: Any, o: Any, n: Any, normal: Any) -> Paths:
+def paths(i: Any, o: Any, n: Any, normal: Any = None) -> Paths:
     """The cosines for a layer of index n ≥ 1 (scalar or per channel) over a boundary with this normal.
 
+    None is the upper boundary's own: parallel boundaries.
     With u = −t_i and w = −t_o the lobe of eq. 10 is ⟨r_ti, w⟩ = 2⟨u, n₁⟩⟨w, n₁⟩ − ⟨u, w⟩.
     """
     (xi, yi, zi), (xo, yo, zo) = ((v[..., 0:1], v[..., 1:2], v[..., 2:3]) for v in (i, o))
-    x, y, z = (normal[..., k : k + 1] for k in range(3))
     down_i, down_o = cosine_inside(zi, n), cosine_inside(zo, n)
-    toward_i = (xi * x + yi * y) / n + down_i * z
-    toward_o = (xo * x + yo * y) / n + down_o * z
+    toward_i, toward_o = down_i, down_o
+    if normal is not None:
+        x, y, z = (normal[..., k : k + 1] for k in range(3))
+        toward_i, toward_o = (xi * x + yi * y) / n + down_i * z, (xo * x + yo * y) / n + down_o * z
     between = (xi * xo + yi * yo) / (n * n) + down_i * down_o
     meets = (toward_i > 0) & (toward_o > 0)
     return Paths(
@@ -103,7 +105,8 @@ def reciprocal(p: Paths, n: Any) -> tuple[Any, Any]:
 def amplitudes(parameters: Parameters, i: Any, o: Any, fresnel: Callable = published) -> Amplitudes:
     """√R, √T and Φ. The roots are products of roots: √(lobe^e) itself has no slope at the lobe's edge."""
     n = parameters["n"]
-    p = paths(i, o, n, direction(parameters["deviation"], parameters["azimuth"]))
+    tilted = "deviation" in parameters
+    p = paths(i, o, n, direction(parameters["deviation"], parameters["azimuth"]) if tilted else None)
     F, through = fresnel(p, n)
     e0, e1 = column(parameters["exponent_reflection"]), column(parameters["exponent_transmission"])
     per_wavelength = jnp.pi * n * column(parameters["thickness"]) / parameters["wavelengths"]
@@ -157,8 +160,7 @@ def specular(fresnel: Callable = published, join: Callable = interfering) -> Cal
     """The Phong-like model over a grey diffuse base: specular · (eq. 5) + diffuse."""
 
     def evaluate(parameters, i, o):
-        lobes = join(amplitudes(parameters, i, o, fresnel))
-        return column(parameters["specular"]) * lobes + column(parameters["diffuse"])
+        return summed(parameters, lambda: join(amplitudes(parameters, i, o, fresnel)))
 
     return evaluate
 
@@ -177,8 +179,10 @@ def full(fresnel: Callable = published, join: Callable = interfering) -> Callabl
     """Both: specular · (eq. 5) + diffuse · ρ_d (eq. 16), as in the paper's figures 3 and 5."""
 
     def evaluate(parameters, i, o):
-        lobes = join(amplitudes(parameters, i, o, fresnel))
-        below = column(parameters["diffuse"]) * layered_diffuse(parameters, join)
-        return column(parameters["specular"]) * lobes + below
+        return summed(
+            parameters,
+            lambda: join(amplitudes(parameters, i, o, fresnel)),
+            lambda: layered_diffuse(parameters, join),
+        )
 
     return evaluate

@@ -8,16 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from pellicle.brdf import film_colour, lobes
-from pellicle.brdf.shapes import column
+from pellicle.brdf import film_colour
+from pellicle.brdf.lobes import microfacets
+from pellicle.brdf.shapes import column, summed
 
 
 def microfacet(colour: Callable = film_colour.exact) -> Callable:
     """specular · D G₂ R(⟨i, h⟩)/(4 cos θ_i cos θ_o) + diffuse, with R the film's RGB reflectance."""
 
     def evaluate(parameters, i, o):
-        facets = column(lobes.microfacets(i, o, parameters["roughness"]))
-        mirrored = column(parameters["specular"]) * facets * colour(parameters, i, o)
-        return mirrored + column(parameters["diffuse"])
+        def lobes():
+            return column(microfacets(i, o, parameters["roughness"])) * colour(parameters, i, o)
+
+        return summed(parameters, lobes)
 
     return evaluate

@@ -55,21 +55,24 @@ class Model(NamedTuple):
     evaluate: Evaluate
     incoherent: Evaluate  # without interference: what a layer must beat
     wavelengths: tuple[float, ...] = RGB
-    planned: Callable[[float], Evaluate] | None = None  # `evaluate` for films no thicker than so many nm
+    coloured: Callable[[film_colour.Colour], Evaluate] | None = None  # `evaluate` by a film's colour
 
     def up_to(self, thickest: float) -> Model:
         """The same model for layers of at most `thickest` nm, and as quick as that allows."""
-        return self if self.planned is None else self._replace(evaluate=self.planned(thickest))
+        if self.coloured is None:
+            return self
+        return self._replace(evaluate=self.coloured(film_colour.chebyshev(thickest)))
 
     def without_interference(self) -> Model:
         """The same model with its phase averaged away, or its lobes added as intensities."""
-        return self._replace(evaluate=self.incoherent, planned=None)
+        return self._replace(evaluate=self.incoherent, coloured=None)
 
     def __call__(self, parameters: Parameters, i: Any, o: Any) -> Float[Array, "... channels"]:
         """The BRDF for light from `i` to `o`, unit vectors (..., 3) with the normal as third axis.
 
         `parameters` has every key of the model, each a number or a map (...) that broadcasts with
-        the directions, and may have `wavelengths` (nm, one a channel, of R, G and B by default). A
+        the directions; without `k`, `base_k`, `deviation`, `specular` or `diffuse` that effect is absent,
+        and costs nothing. It may have `wavelengths` (nm, one a channel, of R, G and B by default). A
         film's model also takes `weights` (wavelengths, 3): its reflectance at any wavelengths is then
         weighted to RGB. Below the horizon the BRDF is 0.
         """
@@ -124,10 +127,12 @@ def _granier_heidrich(name: str, description: str, make: Callable, fresnel: Call
     )
 
 
-def _shader(name: str, description: str, reflectance: Callable) -> Model:
-    average = blinn_phong_film.blinn_phong_film(blinn_phong_film.phase_average)
-    made = blinn_phong_film.blinn_phong_film(reflectance)
-    return Model(name, description, _SHADER, made, average, blinn_phong_film.PUBLISHED_WAVELENGTHS)
+def _shader(name: str, description: str, colour: film_colour.Colour, coloured: Callable | None) -> Model:
+    average = blinn_phong_film.blinn_phong_film(film_colour.at_each(blinn_phong_film.phase_average))
+    made = blinn_phong_film.blinn_phong_film(colour)
+    return Model(
+        name, description, _SHADER, made, average, blinn_phong_film.PUBLISHED_WAVELENGTHS, coloured=coloured
+    )
 
 
 _ALL = (
@@ -163,13 +168,19 @@ _ALL = (
         _FACETS,
         microfacet(),
         microfacet(film_colour.incoherent),
-        planned=lambda thickest: microfacet(film_colour.chebyshev(thickest)),
+        coloured=microfacet,
     ),
-    _shader("blinn-phong-film", "a transparent film in a Blinn-Phong lobe", blinn_phong_film.corrected),
+    _shader(
+        "blinn-phong-film",
+        "a transparent film in a Blinn-Phong lobe",
+        film_colour.exact,
+        blinn_phong_film.blinn_phong_film,
+    ),
     _shader(
         "blinn-phong-film-published",
         "the same with the shader's phase counted twice",
-        blinn_phong_film.published,
+        film_colour.at_each(blinn_phong_film.published),
+        None,
     ),
 )
 

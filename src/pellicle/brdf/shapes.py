@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, TypeAlias
 
 import jax.numpy as jnp
@@ -15,3 +15,12 @@ Parameters: TypeAlias = Mapping[str, Any]
 def column(map_: Any) -> Any:
     """A map (...) as (..., 1), to broadcast with channels; a number as it is."""
     return map_ if jnp.ndim(map_) == 0 else jnp.asarray(map_)[..., None]
+
+
+def summed(parameters: Parameters, lobes: Callable[[], Any], below: Callable[[], Any] | None = None) -> Any:
+    """specular · lobes + diffuse · below; a weight that is not among the parameters leaves its part out."""
+    parts = [column(parameters["specular"]) * lobes()] if "specular" in parameters else []
+    if "diffuse" in parameters:
+        weight = column(parameters["diffuse"])
+        parts.append(weight if below is None else weight * below())
+    return sum(parts[1:], parts[0])
