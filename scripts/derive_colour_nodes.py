@@ -1,9 +1,10 @@
 """Write src/pellicle/colour/data: the centres and widths of optimised samples and Gaussians.
 
-The transforms of the bands are brought as near as can be to those of the CIE 1931 observer under
-illuminant E, at all optical paths up to a reach; the difference is weighted as L*, a* and b* weight
-X, Y and Z near grey. Weights are linear, so only places and widths are searched; the library solves
-them anew for each observer and illuminant. Run: python scripts/derive_colour_nodes.py
+The transforms of the bands are brought as near as can be to those of the CIE 1931 observer, at all
+optical paths up to a reach; the difference is weighted as L*, a* and b* weight X, Y and Z near grey.
+Samples are for illuminant E; Gaussians are for several lamps at once, of which four can serve but two.
+Weights are linear, so only places and widths are searched; the library solves them anew for each
+observer and illuminant. Run: python scripts/derive_colour_nodes.py
 """
 
 import csv
@@ -16,16 +17,21 @@ from pellicle.colour.bands import LONGEST_PATH, fit_weights, reach_of, transform
 from pellicle.colour.observers import sensor
 
 DATA = Path(__file__).parents[1] / "src/pellicle/colour/data"
-TARGET = sensor("1931", "E")
+EQUAL = sensor("1931", "E")
 TO_LAB = np.array([[0, 116, 0], [500, -500, 0], [0, 200, -200]]).T / 200
 NODES = {500: (3, 4, 6, 8, 12), 1000: (8, 12, 16)}
-GAUSSIANS = (4, 6)
-STARTS = 12
+LAMPS = ("E", "D50", "D65", "A")
+GAUSSIANS = {4: ("E", "D65"), 5: LAMPS, 6: LAMPS, 8: LAMPS, 10: LAMPS}
+STARTS = 60
 
 
-def residual(wavelength, width, target):
-    weights = fit_weights(wavelength, width, target)
-    return ((target.columns(wavelength, width) @ weights - target.exact) @ TO_LAB).ravel()
+def residual(wavelength, width, targets):
+    left = []
+    for target in targets:
+        weights = fit_weights(wavelength, width, target)
+        apart = target.columns(wavelength, width) @ weights - target.exact
+        left.append((apart / target.white @ TO_LAB).ravel())
+    return np.concatenate(left)
 
 
 def split(x, gaussian):
@@ -36,14 +42,17 @@ def split(x, gaussian):
     return 1000 / frequency, np.exp(width) * 1e-4
 
 
-def derive(count, reach, gaussian):
-    rng, best, target = np.random.default_rng(0), None, transforms(TARGET, reach)
-    share = np.cumsum(TARGET.weights.sum(axis=1)) / TARGET.weights.sum()
-    starts = [1000 / np.interp((np.arange(count) + 0.5) / count, share, TARGET.wavelength)]
-    starts += [np.sort(rng.uniform(1.45, 2.45, count)) for _ in range(STARTS if gaussian else 0)]
+def derive(count, reach, lamps, gaussian):
+    rng, best = np.random.default_rng(0), None
+    targets = [transforms(sensor("1931", lamp), reach) for lamp in lamps]
+    share = np.cumsum(EQUAL.weights.sum(axis=1)) / EQUAL.weights.sum()
+    starts = [1000 / np.interp((np.arange(count) + 0.5) / count, share, EQUAL.wavelength)]
+    if gaussian:
+        starts += [np.linspace(2.55, 1.42, count)]
+        starts += [np.sort(rng.uniform(1.45, 2.45, count)) for _ in range(STARTS)]
     for start in starts:
         x = np.concatenate([start, rng.uniform(-0.5, 0.2, count)]) if gaussian else start
-        found = least_squares(lambda x: residual(*split(x, gaussian), target), x, max_nfev=100)
+        found = least_squares(lambda x: residual(*split(x, gaussian), targets), x, max_nfev=100)
         best = found if best is None or found.cost < best.cost else best
     wavelength, width = split(best.x, gaussian)
     order = np.argsort(wavelength)
@@ -63,7 +72,8 @@ def write(name, rows):
 
 
 if __name__ == "__main__":
-    write("gaussians.csv", [row for n in GAUSSIANS for row in derive(n, LONGEST_PATH, True)])
     write(
-        "nodes.csv", [r for d, sizes in NODES.items() for n in sizes for r in derive(n, reach_of(d), False)]
+        "gaussians.csv", [r for n, lamps in GAUSSIANS.items() for r in derive(n, LONGEST_PATH, lamps, True)]
     )
+    sizes = [(n, reach_of(thickest)) for thickest, counts in NODES.items() for n in counts]
+    write("nodes.csv", [row for n, reach in sizes for row in derive(n, reach, ("E",), False)])

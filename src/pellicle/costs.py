@@ -14,6 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from pellicle.differences import design, largest_difference, signals
+from pellicle.economy import See
 from pellicle.effects.without import CAN_BE_LEFT_OUT
 from pellicle.errors import UsageError
 from pellicle.free import insert, start_values
@@ -53,23 +54,33 @@ class Saving(NamedTuple):
 def work(plan: Plan, scene: Scene) -> Work:
     """The operations of one evaluation of the scene at its start values, as XLA counts them."""
     with jax.enable_x64(True):
-        numbers = insert(sampled(scene), start_values(scene))
-        counted = jax.jit(build(plan.wordless)).lower(numbers).cost_analysis() or {}
-    return Work(float(counted.get("flops", 0.0)), float(counted.get("transcendentals", 0.0)))
+        return counted(build(plan.wordless), insert(sampled(scene), start_values(scene)))
+
+
+def counted(simulate: Callable[[Any], Any], numbers: Any) -> Work:
+    """The same of any function of one pytree of numbers."""
+    found = jax.jit(simulate).lower(numbers).cost_analysis() or {}
+    return Work(float(found.get("flops", 0.0)), float(found.get("transcendentals", 0.0)))
 
 
 def savings(scene: Scene, calibration: Calibration) -> dict[str, Saving]:
     """For each effect that could be left out: what that would change and save, all else being exact."""
     with jax.enable_x64(True):
-        whole, points, exactly = sampled(scene), design(scene), reference(scene)
-        truth = signals(exactly, whole, points)
-        found = {}
-        for effect in CAN_BE_LEFT_OUT:
-            for plan in alternatives(effect, scene)[:1]:
-                error = largest_difference(signals(plan, whole, points), truth, plan.signal)
-                saved = calibration.seconds(work(exactly, scene)) - calibration.seconds(work(plan, scene))
-                found[effect] = Saving(error, saved)
-    return found
+        see = partial(signals, scene=sampled(scene), points=design(scene))
+        cheaper = {effect: alternatives(effect, scene)[:1] for effect in CAN_BE_LEFT_OUT}
+        return saved(reference(scene), cheaper, see, lambda plan: calibration.seconds(work(plan, scene)))
+
+
+def saved(
+    exactly: Plan, cheaper: dict[str, list[Plan]], see: See, seconds: Callable[[Plan], float]
+) -> dict[str, Saving]:
+    """What each cheaper plan changes, by `see`, and saves, by `seconds`; none where there is no plan."""
+    truth, whole = see(exactly), seconds(exactly)
+    return {
+        effect: Saving(largest_difference(see(plan), truth, exactly.signal), whole - seconds(plan))
+        for effect, plans in cheaper.items()
+        for plan in plans
+    }
 
 
 def calibrated(folder: Path | None) -> Calibration:

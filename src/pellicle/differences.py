@@ -1,4 +1,4 @@
-"""How much two plans differ over the bounds of a scene, measured."""
+"""How much two plans differ over the bounds of a scene, a film's or a surface's, measured."""
 
 from __future__ import annotations
 
@@ -14,14 +14,16 @@ import numpy as np
 from pellicle.free import free_leaves, insert, is_free, start_values
 from pellicle.model import build
 from pellicle.planning import Plan
-from pellicle.scene import Scene
+
+Builder = Callable[[Plan], Callable[[Any], Any]]
+"""A plan → what simulates a scene by it: `model.build`, or that of a surface."""
 
 POINTS = 256
 CORNERS = 64
 _BATCH = 16
 
 
-def design(scene: Scene) -> np.ndarray:
+def design(scene: Any) -> np.ndarray:
     """Where plans are compared: the corners of the bounds (at most 64), the start, and 256 points of a
     Sobol sequence between, (points, parameters). Without free parameters it is the scene itself."""
     free = [leaf for _, leaf in free_leaves(scene)]
@@ -36,14 +38,14 @@ def design(scene: Scene) -> np.ndarray:
     return np.concatenate([corners, start, lower + between * (upper - lower)])
 
 
-def signals(plan: Plan, scene: Scene, points: np.ndarray) -> np.ndarray:
+def signals(plan: Plan, scene: Any, points: np.ndarray, builder: Builder = build) -> np.ndarray:
     """The signal at each of the points, (points, wavelengths), N, C and S of each for ellipsometry."""
-    return np.asarray(_signals(plan.wordless, *_split(scene, points)), dtype=float)
+    return np.asarray(_signals(builder, plan.wordless, *_split(scene, points)), dtype=float)
 
 
-def gradients(plan: Plan, scene: Scene, points: np.ndarray) -> np.ndarray:
+def gradients(plan: Plan, scene: Any, points: np.ndarray, builder: Builder = build) -> np.ndarray:
     """Its derivatives in the free parameters, (points, wavelengths, parameters)."""
-    return np.asarray(_gradients(plan.wordless, *_split(scene, points)), dtype=float)
+    return np.asarray(_gradients(builder, plan.wordless, *_split(scene, points)), dtype=float)
 
 
 def largest_difference(one: np.ndarray, other: np.ndarray, signal: str) -> float:
@@ -61,7 +63,7 @@ def largest_slope_change(one: np.ndarray, other: np.ndarray) -> float:
     return float(np.max(apart / np.where(size > 0, size, 1.0), initial=0.0))
 
 
-def _split(scene: Scene, points: np.ndarray) -> tuple[Any, tuple[bool, ...], list[Any], np.ndarray]:
+def _split(scene: Any, points: np.ndarray) -> tuple[Any, tuple[bool, ...], list[Any], np.ndarray]:
     """What a program is compiled for (structure, and which leaves are free), and its numbers."""
     marked = jax.tree_util.tree_leaves(scene, is_leaf=is_free)
     fixed, structure = jax.tree_util.tree_flatten(insert(scene, points[0]))
@@ -69,21 +71,25 @@ def _split(scene: Scene, points: np.ndarray) -> tuple[Any, tuple[bool, ...], lis
     return structure, free, [x for x, f in zip(fixed, free, strict=True) if not f], points
 
 
-def _filled(structure: Any, free: tuple[bool, ...], fixed: list[Any], values: Any) -> Scene:
+def _filled(structure: Any, free: tuple[bool, ...], fixed: list[Any], values: Any) -> Any:
     moving, standing = iter(values), iter(fixed)
     leaves = [next(moving) if f else next(standing) for f in free]
     return jax.tree_util.tree_unflatten(structure, leaves)
 
 
-@partial(jax.jit, static_argnums=(0, 1, 2))
-def _signals(plan: Plan, structure: Any, free: tuple[bool, ...], fixed: list[Any], points: Any) -> Any:
-    simulate = build(plan)
+@partial(jax.jit, static_argnums=(0, 1, 2, 3))
+def _signals(
+    builder: Builder, plan: Plan, structure: Any, free: tuple[bool, ...], fixed: list[Any], points: Any
+) -> Any:
+    simulate = builder(plan)
     return _at_each(lambda v: jnp.ravel(simulate(_filled(structure, free, fixed, v))), points)
 
 
-@partial(jax.jit, static_argnums=(0, 1, 2))
-def _gradients(plan: Plan, structure: Any, free: tuple[bool, ...], fixed: list[Any], points: Any) -> Any:
-    simulate = build(plan)
+@partial(jax.jit, static_argnums=(0, 1, 2, 3))
+def _gradients(
+    builder: Builder, plan: Plan, structure: Any, free: tuple[bool, ...], fixed: list[Any], points: Any
+) -> Any:
+    simulate = builder(plan)
     return _at_each(jax.jacfwd(lambda v: jnp.ravel(simulate(_filled(structure, free, fixed, v)))), points)
 
 

@@ -3,10 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, Protocol, runtime_checkable
 
 from pellicle.effects import EFFECTS, Row
-from pellicle.effects.without import LeftOut
 from pellicle.scene import Scene
+
+
+@runtime_checkable
+class LeaveOut(Protocol):
+    """Makes a scene simpler by one effect; frozen and hashable."""
+
+    @property
+    def effect(self) -> str: ...
+
+    def __call__(self, scene: Any, /) -> Any: ...
 
 
 @dataclass(frozen=True)
@@ -21,7 +31,7 @@ class Plan:
     rows: tuple[Row, ...]
     signal: str
     polarisation: str
-    left_out: tuple[LeftOut, ...] = ()
+    left_out: tuple[LeaveOut, ...] = ()
     tolerance: float = 0.0
     gradient_error: float = 0.0
 

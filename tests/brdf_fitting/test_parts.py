@@ -9,7 +9,6 @@ from scipy.optimize import nnls
 
 from pellicle.brdf_fitting import doubts, evidence, residuals
 from pellicle.brdf_fitting.coordinates import coordinates, named, values
-from pellicle.brdf_fitting.plan import plan
 from pellicle.brdf_fitting.problem import _nonnegative
 from pellicle.brdf_fitting.result import Baseline
 from pellicle.errors import UsageError

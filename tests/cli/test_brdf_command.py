@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from pellicle.brdf_fitting import fit as fitting
-from pellicle.brdf_fitting.plan import plan
 from pellicle.brdf_fitting.result import Baseline, BrdfFit
 from pellicle.fitting.result import Estimate, Rival, Status
 from pellicle.io.surface_recipe import read_surface_recipe
+from pellicle.surfaces.effects import exact
+from pellicle.surfaces.lit import lit
 
 RECIPE = """
 [data]
@@ -62,7 +63,7 @@ def told(monkeypatch):
             effective_points=90.0,
             correlation_names=("thickness",),
             correlation=np.eye(1),
-            plan=plan(surface),
+            plan=exact(lit(surface, samples)),
             warnings=("a warning",),
             model=np.zeros_like(samples.values),
             seconds=0.1,

@@ -59,7 +59,7 @@ def _lit(
 
 
 def airy(
-    polarisations: str = "sp", through: Callable = film.through, enter: Callable = allow_tunnelling
+    polarisations: str = "sp", through: Any = film.through, enter: Callable = allow_tunnelling
 ) -> Reflectance:
     """Airy's reflectance, the mean over `polarisations`, of a film in air.
 

@@ -14,7 +14,6 @@ from pellicle.brdf_fitting import doubts, evidence
 from pellicle.brdf_fitting.baselines import plain
 from pellicle.brdf_fitting.coordinates import coordinates
 from pellicle.brdf_fitting.estimates import Local, estimates, local, rivals
-from pellicle.brdf_fitting.plan import plan
 from pellicle.brdf_fitting.problem import Form, Problem, chi_square, data, seeing
 from pellicle.brdf_fitting.residuals import RESIDUALS
 from pellicle.brdf_fitting.result import Baseline, BrdfFit
@@ -24,6 +23,10 @@ from pellicle.fitting.result import Estimate, Rival, Status
 from pellicle.fitting.search import Progress, quiet
 from pellicle.fitting.status import judge, misfits, verdict
 from pellicle.io.samples import BrdfSamples, spread
+from pellicle.planning import Plan
+from pellicle.surfaces.effects import exact
+from pellicle.surfaces.lit import lit, present
+from pellicle.surfaces.model import composed
 from pellicle.surfaces.surface import Surface
 
 HELD_OUT = 0.2
@@ -77,7 +80,8 @@ def problem(samples: BrdfSamples, surface: Surface, residual: str, evaluate: Any
     chosen, box = coordinates(steep, doubts.in_plane(samples))
     form = Form(evaluate, chosen, tuple(leaf.key for leaf in linear), False, residual)
     most = np.array([leaf.free.upper for leaf in linear])
-    return Problem(form, data(samples, residual), surface.fixed(), box, most, len(samples))
+    fixed = {key: x for key, x in present(surface).items() if key in surface.fixed()}
+    return Problem(form, data(samples, residual), fixed, box, most, len(samples))
 
 
 class Split(NamedTuple):
@@ -104,7 +108,8 @@ def _rate(whole: Problem, split: Split, effort: Effort, progress: Progress) -> t
 def _fit(samples: BrdfSamples, surface: Surface, residual: str, progress: Progress) -> BrdfFit:
     began = time.perf_counter()
     split, brdf = _split(samples), surface.brdf
-    whole = problem(samples, surface, residual, brdf.evaluate)
+    plan = exact(lit(surface, samples, len(samples)))
+    whole = problem(samples, surface, residual, composed(plan.wordless, surface.model))
     flat = whole._replace(form=whole.form._replace(evaluate=brdf.incoherent))
     minima, held_out = _rate(whole, split, THOROUGH, progress)
     baselines = (
@@ -112,7 +117,7 @@ def _fit(samples: BrdfSamples, surface: Surface, residual: str, progress: Progre
         Baseline(_PLAIN, _rate(plain(whole), split, FEW, progress)[1]),
     )
     minima = polish(whole, minima.units, THOROUGH, progress)
-    return _report(samples, surface, whole, minima, held_out, baselines, began)
+    return _report(samples, surface, plan, whole, minima, held_out, baselines, began)
 
 
 def judged(
@@ -152,6 +157,7 @@ def _unlayered(parameters: dict[str, Estimate]) -> dict[str, Estimate]:
 def _report(
     samples: BrdfSamples,
     surface: Surface,
+    plan: Plan,
     whole: Problem,
     minima: Minima,
     held_out: float,
@@ -171,8 +177,7 @@ def _report(
         status = status if status in (Status.NOT_CONVERGED, Status.MISFIT) else Status.NOT_IDENTIFIABLE
     elif status is Status.CONVERGED:
         sentence = found.verdict
-    fitted = {p.key: np.asarray(at.parameters[p.key]) for p in surface.brdf.parameters}
-    fitted["wavelengths"] = np.array(surface.seen_at)
+    fitted = surface.fixed() | {key: np.asarray(value) for key, value in at.parameters.items()}
     return BrdfFit(
         samples=samples,
         surface=surface,
@@ -189,7 +194,7 @@ def _report(
         effective_points=at.residuals.size / at.length,
         correlation_names=at.names,
         correlation=at.correlation,
-        plan=plan(surface),
+        plan=plan,
         warnings=(*doubts.directions(samples, surface), *doubts.numbers(surface, parameters, fitted)),
         model=at.model,
         seconds=time.perf_counter() - began,

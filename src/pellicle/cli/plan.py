@@ -26,10 +26,15 @@ def plan(
     """
     from pellicle.cli.seen import seen
     from pellicle.io.recipe import read_recipe
+    from pellicle.io.recipe_kind import describes_surface
     from pellicle.scene import with_wavelength
 
     if not 0 < tolerance < inf:
         raise UsageError(f"--tolerance must be above zero, got {tolerance:g}: what error is small enough?")
+    if describes_surface(recipe):
+        from pellicle.cli.surfaces import plan_surface
+
+        return plan_surface(recipe, tolerance, json)
     scene = with_wavelength(*seen(read_recipe(recipe)))
     start()
     from pellicle import costs, thrift

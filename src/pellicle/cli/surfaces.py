@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pellicle.cli.session import say, start
+from pellicle.cli.session import cache_folder, say, start
 
 if TYPE_CHECKING:
     from pellicle.io.samples import BrdfSamples
@@ -52,3 +53,27 @@ def directions(recipe: SurfaceRecipe) -> Directions | BrdfSamples:
 
 def _listed(number) -> str:
     return " ".join(f"{x:.10g}" for x in number.reshape(-1))
+
+
+def plan_surface(recipe: str, tolerance: float, as_json: bool) -> int:
+    """Print the plan of the recipe's surface. Returns the exit code."""
+    from pellicle.io.surface_recipe import read_surface_recipe
+
+    found = read_surface_recipe(recipe)
+    looked = directions(found)
+    start()
+    from pellicle import costs
+    from pellicle.report import plans
+    from pellicle.surfaces import thrift
+    from pellicle.surfaces.effects import exact
+    from pellicle.surfaces.lit import lit
+
+    seen = lit(found.surface, looked)
+    chosen, calibration = thrift.plan(seen, tolerance), costs.calibrated(cache_folder())
+    savings = thrift.savings(seen, calibration)
+    whole, planned = (calibration.seconds(thrift.work(p, seen)) for p in (exact(seen), chosen))
+    if as_json:
+        print(json.dumps(plans.record(chosen, savings), allow_nan=False), flush=True)
+    else:
+        print(plans.table(chosen, savings, whole, planned), end="", flush=True)
+    return 0

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-
-from pellicle.scene import Scene
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -27,7 +26,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Effect:
-    """A name that plans know, and the judge of whether a scene calls for it."""
+    """A name that plans know, and the judge of whether a scene, a film's or a surface's, calls for it."""
 
     name: str
-    judge: Callable[[Scene], Row]
+    judge: Callable[[Any], Row]

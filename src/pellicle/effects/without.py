@@ -135,6 +135,10 @@ def _flat(material: AbstractDispersion, wavelength: Any) -> AbstractDispersion:
 
 
 def _precision(scene: Scene, _: LeftOut) -> Scene:
+    return in_single(scene)
+
+
+def in_single(scene: Any) -> Any:
     """Arrays in single precision; plain numbers take on theirs."""
 
     def single(x: Any) -> Any:

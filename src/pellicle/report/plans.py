@@ -7,6 +7,10 @@ from typing import Any
 from pellicle.costs import Saving
 from pellicle.planning import Plan
 
+UNITS = {
+    "psi-delta": "degrees on the sphere of N, C, S",
+    "brdf": "of each value of the BRDF (of 0.01/π where that is more)",
+}
 HEADINGS = ("effect", "", "off by", "without it", "saves", "why")
 
 
@@ -19,7 +23,7 @@ def table(plan: Plan, savings: dict[str, Saving], whole: float, planned: float) 
     rows = [HEADINGS, *(_row(row, savings.get(row.effect)) for row in plan.rows)]
     widths = [max(len(row[i]) for row in rows) for i in range(len(HEADINGS) - 1)]
     lines = ["  ".join([*(c.ljust(w) for c, w in zip(row, widths, strict=False)), row[-1]]) for row in rows]
-    unit = "degrees on the sphere of N, C, S" if plan.signal == "psi-delta" else f"of {plan.signal}"
+    unit = UNITS.get(plan.signal, f"of {plan.signal}")
     told = [
         "",
         f"off by at most {plan.error_bound:.1e} {unit}; the tolerance is {plan.tolerance:g}",
