@@ -68,3 +68,34 @@ def test_noise_seed_and_the_directions_of_a_file(pellicle, tmp_path):
     for found in (one, other):
         assert 0.017 < np.std(found.values - truth) < 0.023
     assert np.std(one.values - other.values) > 0.02
+
+
+PAINT = """
+[data]
+files = ["seen.csv"]
+[scene.surface]
+model = "granier-heidrich-full"
+thickness = { lower = 200, upper = 300 }
+deviation = 1e-4
+diffuse = 0.2
+"""
+
+
+def test_a_plan_names_the_effects_of_a_surface(pellicle, tmp_path):
+    rows = "".join(f"30,0,{t},180,0.1,0.2,0.3\n" for t in range(0, 80, 10))
+    (tmp_path / "seen.csv").write_text("theta_i,phi_i,theta_o,phi_o,R,G,B\n" + rows)
+    (tmp_path / "paint.toml").write_text(PAINT)
+    (record,) = pellicle("plan", tmp_path / "paint.toml", "--tolerance", 1e-3, "--json").objects
+    assert (record["schema"], record["tolerance"]) == ("pellicle.plan/1", 1e-3)
+    found = {row["effect"]: row for row in record["effects"]}
+    assert list(found) == [
+        *("spectral-sampling", "roughness", "deviation", "diffuse", "coherence", "precision")
+    ]
+    assert sum(row["error_bound"] for row in found.values()) == record["error_bound"] <= 1e-3
+    assert not found["deviation"]["on"]
+    assert found["deviation"]["cost"] > 0
+    assert 0 < found["deviation"]["error_without"] < 1e-3 < found["diffuse"]["error_without"]
+    (tmp_path / "paint.toml").write_text(PAINT.replace("0.2", "0\nspecular = 0"))
+    ran = pellicle("plan", tmp_path / "paint.toml")
+    assert (ran.code, ran.out) == (2, "")
+    assert "nothing to compute" in ran.err

@@ -40,7 +40,7 @@ def simulate(
     if describes_surface(recipe):
         from pellicle.cli.surfaces import simulate_surface
 
-        return simulate_surface(recipe, out, noise, seed)
+        return simulate_surface(recipe, out, noise, seed, tolerance)
     found = read_recipe(recipe)
     scene = found.scene()
     start()

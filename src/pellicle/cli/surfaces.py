@@ -1,4 +1,4 @@
-"""`pellicle simulate` of a surface: samples of its BRDF, where the recipe's data files have theirs."""
+"""`pellicle simulate`, `plan` and `cost` of a surface, seen along the directions of the recipe's data."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from pellicle.surfaces.sampling import Directions
 
 
-def simulate_surface(recipe: str, out: str, noise: float | None, seed: int) -> int:
+def simulate_surface(recipe: str, out: str, noise: float | None, seed: int, tolerance: float) -> int:
     """Write the recipe's BRDF as CSV. Returns the exit code."""
     from pellicle import __version__
     from pellicle.io.brdf_writers import write_brdf_samples
@@ -25,7 +25,7 @@ def simulate_surface(recipe: str, out: str, noise: float | None, seed: int) -> i
     looked = directions(found)
     noise = (found.data.noise or 0.0) if noise is None else noise
     start()
-    samples = synthesise(found.surface, looked, noise, seed)
+    samples, plan = synthesise(found.surface, looked, noise, seed, tolerance)
     numbers = found.surface.start()
     units = {about.key: about.unit for about in found.surface.brdf.parameters}
     truth = (f"{key} = {_listed(x)} {units.get(key, 'nm')}".strip() for key, x in numbers.items())
@@ -35,7 +35,7 @@ def simulate_surface(recipe: str, out: str, noise: float | None, seed: int) -> i
         f"truth: model {found.surface.model}, {', '.join(truth)}",
     ]
     write_brdf_samples(out, samples, said=said)
-    say(f"{out}: {len(samples)} samples of {', '.join(samples.channels)}", *samples.notes)
+    say(f"{out}: {len(samples)} samples of {', '.join(samples.channels)}", *samples.notes, str(plan))
     return 0
 
 

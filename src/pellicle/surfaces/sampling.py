@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import jax
 import numpy as np
 from scipy.stats import qmc
 
-from pellicle.brdf.directions import direction
 from pellicle.errors import UsageError
 from pellicle.io.directions import angles, from_half_difference
 from pellicle.io.samples import CHANNELS, BrdfSamples
+from pellicle.planning import Plan
+from pellicle.surfaces import thrift
+from pellicle.surfaces.lit import lit
+from pellicle.surfaces.model import build
 from pellicle.surfaces.surface import Surface
 
 SAMPLES = 1000
@@ -43,29 +47,42 @@ def default_directions(count: int = SAMPLES) -> Directions:
     return Directions(*found)
 
 
+class Synthetic(NamedTuple):
+    """Samples with noise, and the plan that they went through."""
+
+    samples: BrdfSamples
+    plan: Plan
+
+
 def synthesise(
-    surface: Surface, looked: Directions | BrdfSamples, noise: float = 0.0, seed: int = 0
-) -> BrdfSamples:
+    surface: Surface,
+    looked: Directions | BrdfSamples,
+    noise: float = 0.0,
+    seed: int = 0,
+    tolerance: float = 0.0,
+) -> Synthetic:
     """The BRDF at where free numbers start, with normal noise of standard deviation `noise` (1/sr).
 
-    What noise takes below zero is 0, and a note counts it. **Raises:** UsageError unless the surface
-    has one channel, or R, G and B.
+    What noise takes below zero is 0, and a note counts it. Effects that change less than the `tolerance`
+    are left out (`surfaces.thrift`). **Raises:** UsageError unless the surface has one channel, or R, G
+    and B, and for a black one.
     """
     channels = {len(names): names for names in CHANNELS}.get(surface.channels)
     if channels is None:
         raise UsageError(f"samples have one channel or R, G and B: {surface.channels} wavelengths were given")
-    theta_i, phi_i, theta_o, phi_o = (
-        np.asarray(getattr(looked, name), dtype=float) for name in Directions._fields
-    )
+    numbers = {key: x.tolist() for key, x in surface.start().items() if key != "wavelengths"}
+    fixed = replace(surface, numbers=numbers)
+    plan = thrift.plan(lit(fixed, looked), tolerance)
     with jax.enable_x64(True):
-        clean = surface.brdf(surface.start(), direction(theta_i, phi_i), direction(theta_o, phi_o))
-    clean = np.asarray(clean)
+        seen = jax.jit(build(plan.wordless))(lit(fixed, looked, len(looked.theta_i)))
+    clean = np.asarray(seen, dtype=float)
     noisy = clean + np.random.default_rng(seed).normal(0.0, 1.0, clean.shape) * noise
     below = int(np.sum(noisy < 0))
-    return BrdfSamples(
-        *(theta_i, phi_i, theta_o, phi_o),
+    samples = BrdfSamples(
+        **{name: getattr(looked, name) for name in Directions._fields},
         values=np.maximum(noisy, 0.0),
         channels=channels,
         sigma=np.full(clean.shape, noise) if noise > 0 else None,
         notes=(f"{below} values that noise took below zero are 0",) if below else (),
     )
+    return Synthetic(samples, plan)
