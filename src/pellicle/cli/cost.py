@@ -5,15 +5,12 @@ from __future__ import annotations
 import json as json_module
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from cyclopts import Parameter
 
 from pellicle.cli.session import Progress, say, start
 from pellicle.errors import UsageError
-
-if TYPE_CHECKING:
-    pass
 
 
 def cost(
@@ -24,7 +21,7 @@ def cost(
     ] = "float64",
     tolerance: Annotated[
         float | None,
-        Parameter(help="The error that is small enough, in R, T or degrees (the recipe's noise, or 0.001)."),
+        Parameter(help="The error that is small enough, in R, T, degrees or, of a surface, ΔE2000."),
     ] = None,
     datasets: Annotated[
         int, Parameter(help="Simulated spectra that every solver fits; 0 leaves the solvers out.")
@@ -39,11 +36,20 @@ def cost(
     from pellicle.cli.seen import seen
     from pellicle.io.atomic import new_folder
     from pellicle.io.recipe import read_recipe
+    from pellicle.io.recipe_kind import describes_surface
 
     if tolerance is not None and not 0 < tolerance < inf:
         raise UsageError(f"--tolerance must be above zero, got {tolerance:g}: what error is small enough?")
     if datasets < 0:
         raise UsageError(f"--datasets must not be negative, got {datasets}")
+    if describes_surface(recipe):
+        if reference != "float64":
+            raise UsageError(
+                "--reference is for films: a surface is measured against steps of 1 nm in float64"
+            )
+        from pellicle.cli.surfaces import cost_surface
+
+        return cost_surface(recipe, tolerance, out, json)
     found = read_recipe(recipe)
     scene, wavelength = seen(found)
     if out is not None and Path(out).exists():

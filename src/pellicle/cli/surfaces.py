@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pellicle.cli.session import cache_folder, say, start
+from pellicle.cli.session import Progress, cache_folder, say, start
 
 if TYPE_CHECKING:
     from pellicle.io.samples import BrdfSamples
@@ -77,3 +77,30 @@ def plan_surface(recipe: str, tolerance: float, as_json: bool) -> int:
     else:
         print(plans.table(chosen, savings, whole, planned), end="", flush=True)
     return 0
+
+
+def cost_surface(recipe: str, tolerance: float | None, out: str | None, as_json: bool) -> int:
+    """Print what accuracy costs for the recipe's surface. Returns the exit code."""
+    from pellicle.io.atomic import new_folder
+    from pellicle.io.surface_recipe import read_surface_recipe
+
+    found = read_surface_recipe(recipe)
+    looked = directions(found)
+    if out is not None and Path(out).exists():
+        new_folder(out)  # refuses a stranger's folder before the work, not after
+    start(keep=False)
+    from pellicle.io.costs import surface_to_json, write_surface_cost
+    from pellicle.ladder.surface import cost
+    from pellicle.report.cost import surface_text
+    from pellicle.surfaces.lit import lit
+
+    progress = Progress(recipe)
+    try:
+        result = cost(lit(found.surface, looked), tolerance=tolerance, progress=progress)
+    finally:
+        progress.clear()
+    record = surface_to_json(result, recipe)
+    print(json.dumps(record, allow_nan=False) if as_json else surface_text(result, recipe), flush=True)
+    if out is not None:
+        say(f"{write_surface_cost(out, result, recipe)}: report, figure and tables written")
+    return 130 if result.interrupted else 0

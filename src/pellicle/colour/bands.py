@@ -119,12 +119,16 @@ _WORD = re.compile(r"(points|uniform|frequency|nodes|gaussians)-(\d+(?:-\d+)*)")
 
 
 @cache
-def way(name: str = "gaussians-6", observer: str = "1931", illuminant: str = "D65") -> Bands:
+def way(name: str = "gaussians-8", observer: str = "1931", illuminant: str = "D65") -> Bands:
     """The bands of a way by its name.
 
     `points-645-525-445` (any three, in nm), `uniform-32` (steps in λ), `frequency-32` (steps in
     1/λ), `nodes-8-500` (8 optimised samples for layers up to 500 nm), `belcour-barla` (as
-    published), `gaussians-4` and `gaussians-6` (ours). Raises ValueError for another name.
+    published), `gaussians-4`, `-5`, `-6`, `-8` and `-10` (ours). Raises ValueError for another name.
+
+    Gaussians serve any thickness, and any lamp but for the four, whose centres are for E and daylight.
+    There is no table of the sensors' transforms: `gaussians-8` come as near without one, and follow what
+    the layer absorbs and how its index varies.
     """
     target = sensor(observer, illuminant)
     if name == "belcour-barla":
@@ -141,7 +145,7 @@ def way(name: str = "gaussians-6", observer: str = "1931", illuminant: str = "D6
         case "gaussians", [count]:
             return _derived("gaussians", count, LONGEST_PATH, target)
     raise ValueError(
-        f"way {name!r} is unknown: expected belcour-barla, gaussians-4, gaussians-6, uniform-N, "
+        f"way {name!r} is unknown: expected belcour-barla, gaussians-N, uniform-N, "
         "frequency-N, nodes-N-THICKEST or points-RED-GREEN-BLUE"
     )
 

@@ -49,7 +49,7 @@ def film_colour(
     *,
     ambient: Any = 1.0,
     angle: Any = 0.0,
-    way: str = "gaussians-6",
+    way: str = "gaussians-8",
     illuminant: str = "D65",
     observer: str = "1931",
 ) -> Colour:
@@ -59,11 +59,10 @@ def film_colour(
     `substrate` are numbers n + ik, arrays of such, or materials (`pl.material("Fe2O3")`); `ambient`
     is real; for `way` see `pellicle.colour.way`.
 
-    **How exact:** against steps of 1 nm, the mean ΔE2000 of `gaussians-6` over the sweep of
-    `benchmarks/colour.py` is 0.08 under E, for which its centres are derived, and 0.35 to 0.38 under D50
-    to D75 (2.9 at most). Under A it is 0.60 (3.8 at most): prefer `uniform-64` there. Gaussians take a
+    **How exact:** against steps of 1 nm, the mean ΔE2000 of `gaussians-8` over the sweep of
+    `benchmarks/colour.py` is 0.06 to 0.09 under E, D50, D65, D75 and A (0.7 at most). Gaussians take a
     material's index at their centres and its slope there, which does not do for media that change much
-    within 30 nm: 140 nm of Fe2O3 on glass are 3.8 off, and by `uniform-64` 0.005.
+    within 30 nm: 140 nm of Fe2O3 on glass are 3.6 off, and by `uniform-64` 0.005.
 
     **Raises:** ValueError for an unknown way, observer or illuminant, and for an absorbing layer by
     `belcour-barla`, which has none.
@@ -89,7 +88,7 @@ def reflectance(thickness, layer, substrate, bands: Bands, *, ambient: Any = 1.0
         raise ValueError("the ambient must not absorb: give it a real index")
     n1 = _index(layer, wavelength)
     if not bands.absorbs and not is_real(n1):
-        raise ValueError("belcour-barla knows no absorbing layer: use gaussians-6 or uniform-64")
+        raise ValueError("belcour-barla knows no absorbing layer: use gaussians-8 or uniform-64")
     k0d = 2 * jnp.pi / wavelength * thickness
     if bands.width is None:
         waves = film.film(n0, n1, n2, k0d, theta, sincos=sincos_poly)

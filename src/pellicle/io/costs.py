@@ -6,13 +6,16 @@ import csv
 import math
 import os
 from dataclasses import asdict
+from functools import partial
 from io import StringIO
 from pathlib import Path
 from typing import Any
 
 from pellicle.io.atomic import MARKER, new_folder, write_text
 from pellicle.io.records import indented, versions
+from pellicle.ladder.climb import Ladder
 from pellicle.ladder.cost import Cost
+from pellicle.ladder.surface import SurfaceCost
 
 SCHEMA = "pellicle.cost/1"
 COLUMNS = (
@@ -53,12 +56,50 @@ def to_json(cost: Cost, recipe: str) -> dict[str, Any]:
     }
 
 
-def to_csv(cost: Cost) -> str:
-    """Every rung as a row; a column that a kind of rung does not have is empty."""
+def surface_to_json(cost: SurfaceCost, recipe: str) -> dict[str, Any]:
+    """The record of a surface: rungs of the `kind` "colour" (errors are mean ΔE2000) and "brdf" (relative).
+
+    `reference`, `tolerance`, `unit`, `recommended` and `within` are those of colours where there are any;
+    `brdf` has those of values.
+    """
+    first = cost.values if cost.colours is None else cost.colours
+    kinds = (
+        [("brdf", cost.values)] if cost.colours is None else [("colour", cost.colours), ("brdf", cost.values)]
+    )
+    return {
+        "schema": SCHEMA,
+        "recipe": recipe,
+        **_summary(first),
+        "draws": first.draws,
+        "rungs": [
+            {"kind": kind, **asdict(rung), "error": rung.error if math.isfinite(rung.error) else None}
+            for kind, ladder in kinds
+            for rung in ladder.rungs
+        ],
+        "brdf": _summary(cost.values),
+        "left_out": {name: why for _, ladder in kinds for name, why in ladder.left_out.items()},
+        "no_colours": cost.no_colours or None,
+        "interrupted": cost.interrupted,
+        "versions": versions(),
+    }
+
+
+def _summary(ladder: Ladder) -> dict[str, Any]:
+    return {
+        "reference": ladder.reference,
+        "tolerance": ladder.tolerance,
+        "unit": ladder.unit,
+        "recommended": ladder.recommended,
+        "within": ladder.within,
+    }
+
+
+def to_csv(rungs: list[dict[str, Any]]) -> str:
+    """Every rung of a record as a row; a column that a kind of rung does not have is empty."""
     text = StringIO()
     writer = csv.DictWriter(text, COLUMNS, lineterminator="\n", restval="")
     writer.writeheader()
-    writer.writerows(to_json(cost, "")["rungs"])
+    writer.writerows(rungs)
     return text.getvalue()
 
 
@@ -69,9 +110,24 @@ def write_cost(folder: str | os.PathLike[str], cost: Cost, recipe: str) -> Path:
     """
     from pellicle.report.cost import figure, text
 
-    target, name = new_folder(folder), Path(recipe).name
-    write_text(target / MARKER, indented(to_json(cost, recipe)), overwrite=True)  # first: it marks the folder
-    write_text(target / "report.txt", text(cost, name), overwrite=True)
-    write_text(target / "cost.csv", to_csv(cost), overwrite=True)
-    figure(cost, name, target / "cost.png", overwrite=True)
+    name = Path(recipe).name
+    record, report = to_json(cost, recipe), text(cost, name)
+    return _written(folder, record, report, partial(figure, cost, name))
+
+
+def write_surface_cost(folder: str | os.PathLike[str], cost: SurfaceCost, recipe: str) -> Path:
+    """The same of a surface."""
+    from pellicle.report.cost import surface_figure, surface_text
+
+    name = Path(recipe).name
+    record, report = surface_to_json(cost, recipe), surface_text(cost, name)
+    return _written(folder, record, report, partial(surface_figure, cost, name))
+
+
+def _written(folder: str | os.PathLike[str], record: dict[str, Any], report: str, figure: Any) -> Path:
+    target = new_folder(folder)
+    write_text(target / MARKER, indented(record), overwrite=True)  # first: it marks the folder
+    write_text(target / "report.txt", report, overwrite=True)
+    write_text(target / "cost.csv", to_csv(record["rungs"]), overwrite=True)
+    figure(target / "cost.png", overwrite=True)
     return target

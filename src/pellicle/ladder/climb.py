@@ -6,13 +6,13 @@ import statistics
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from pellicle.errors import UsageError
 from pellicle.ladder.case import Case
-from pellicle.ladder.program import compiled
+from pellicle.ladder.program import Program, compiled
 from pellicle.ladder.reference import Reference, reference
 from pellicle.ladder.rungs import FORWARD, Rung
 
@@ -27,8 +27,8 @@ ROUNDS, SECONDS = 40, 15.0
 class Standing:
     """What a rung costs and how far off it is.
 
-    `error` is in the signal's unit; `seconds` is the median time of one spectrum, compilation apart;
-    `flops` is XLA's count for one spectrum.
+    `error` is in the signal's unit; `seconds` is the median time of one spectrum, colour or sample,
+    compilation apart; `flops` is XLA's count for it.
     """
 
     name: str
@@ -42,13 +42,17 @@ class Standing:
 
 @dataclass
 class Ladder:
-    """The forward rungs of one case, the fastest first, and those that make no sense for it, with why."""
+    """The forward rungs of one case, the fastest first, and those that make no sense for it, with why.
+
+    A `sample` is what one evaluation gives: a spectrum of so many wavelengths, a colour, a BRDF.
+    """
 
     reference: str
     tolerance: float
     unit: str
     wavelengths: int
     draws: int
+    sample: str = "spectrum"
     rungs: list[Standing] = field(default_factory=list)
     left_out: dict[str, str] = field(default_factory=dict)
     interrupted: bool = False
@@ -68,7 +72,7 @@ class Ladder:
 
 
 def climb(case: Case, against: str, progress: Progress, rungs: Sequence[Rung] = FORWARD) -> Ladder:
-    """Measure every rung of a case. Ctrl-C ends it, and keeps what was measured.
+    """Measure every rung of a case.
 
     Raises UsageError for a reference that the case cannot be computed with, ValueError where a material
     has no data at a wavelength.
@@ -77,9 +81,36 @@ def climb(case: Case, against: str, progress: Progress, rungs: Sequence[Rung] = 
     _check(truth, case)
     unit = "degrees" if case.ellipsometric else case.plan.signal
     ladder = Ladder(truth.name, case.tolerance, unit, len(truth.wavelengths), len(truth.draws))
+
+    def prepare(rung: Rung) -> Program | str:
+        way = rung.way(case)
+        return way if isinstance(way, str) else compiled(case, way)
+
+    return measured(ladder, rungs, prepare, lambda answer: truth.error(case, answer), progress)
+
+
+@runtime_checkable
+class Named(Protocol):
+    """A rung by its name, and what it leaves out."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def leaves_out(self) -> str: ...
+
+
+def measured(
+    ladder: Ladder,
+    rungs: Sequence[Any],
+    prepare: Callable[[Any], Program | str],
+    error: Callable[[np.ndarray], float],
+    progress: Progress,
+) -> Ladder:
+    """The ladder with every rung measured: its program, or why there is none, by `prepare`, and the error
+    of its answer. Ctrl-C ends it, and keeps what was measured."""
     runs: list[_Run] = []
     try:
-        _compile(case, truth, rungs, runs, ladder, progress)
+        _compile(ladder, rungs, prepare, error, runs, progress)
         _take_turns(runs, progress)
     except KeyboardInterrupt:
         ladder.interrupted = True
@@ -103,8 +134,8 @@ def _check(truth: Reference, case: Case) -> None:
 class _Run:
     """A rung while it is measured."""
 
-    rung: Rung
-    program: Any
+    rung: Named
+    program: Program
     error: float
     times: list[float] = field(default_factory=list)
 
@@ -121,17 +152,21 @@ class _Run:
 
 
 def _compile(
-    case: Case, truth: Reference, rungs: Sequence[Rung], runs: list[_Run], ladder: Ladder, progress: Progress
+    ladder: Ladder,
+    rungs: Sequence[Any],
+    prepare: Callable[[Any], Program | str],
+    error: Callable[[np.ndarray], float],
+    runs: list[_Run],
+    progress: Progress,
 ) -> None:
     """Compile and run each rung once. It counts as measured from then on."""
     for done, rung in enumerate(rungs):
         progress(f"compile {rung.name}", done, len(rungs))
-        way = rung.way(case)
-        if isinstance(way, str):
-            ladder.left_out[rung.name] = way
+        program = prepare(rung)
+        if isinstance(program, str):
+            ladder.left_out[rung.name] = program
             continue
-        program = compiled(case, way)
-        runs.append(_Run(rung, program, truth.error(case, program.run())))
+        runs.append(_Run(rung, program, error(program.run())))
         runs[-1].times.append(program.seconds())
 
 

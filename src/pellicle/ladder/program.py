@@ -21,13 +21,14 @@ from pellicle.scene import Plate, Scene, insert
 
 @dataclass(frozen=True)
 class Program:
-    """All draws of a case in one call. `flops` is XLA's own count for one spectrum, None if it has none."""
+    """All draws of a case in one call, of so many `samples`. `flops` is XLA's own count for one of them,
+    None if it has none."""
 
     call: Any
     finish: Any
     arguments: tuple[Any, ...]
     double: bool
-    spectra: int
+    samples: int
     compile_seconds: float
     flops: float | None
 
@@ -37,11 +38,11 @@ class Program:
             return np.asarray(self.finish(self.call(*self.arguments)))
 
     def seconds(self) -> float:
-        """How long one spectrum takes, from one call."""
+        """How long one sample takes, from one call."""
         with _precision(self.double):
             began = time.perf_counter()
             self.finish(self.call(*self.arguments)).block_until_ready()
-            return (time.perf_counter() - began) / self.spectra
+            return (time.perf_counter() - began) / self.samples
 
 
 def compiled(case: Case, way: Way) -> Program:
@@ -56,21 +57,29 @@ def compiled(case: Case, way: Way) -> Program:
 
         return jax.vmap(one)(values, nothing)
 
-    with _precision(way.double):
-        number = jnp.float64 if way.double else jnp.float32
-        arguments = jax.tree_util.tree_map(lambda x: jnp.asarray(x, number), (scene, values))
-        arguments = (*arguments, jnp.zeros(len(values), number))
+    arguments = (scene, values, np.zeros(len(values)))
+    finish = None if way.finish is None else jax.vmap(way.finish)
+    return compiled_function(signals, arguments, len(values), way.double, finish)
+
+
+def compiled_function(
+    function: Any, arguments: tuple[Any, ...], samples: int, double: bool = True, finish: Any = None
+) -> Program:
+    """Compile a function for arguments of this shape, in double or single precision.
+
+    What `finish` makes of its answer is a program of its own: within the first, XLA would compute a point
+    again for all that is made of it.
+    """
+    with _precision(double):
+        number = jnp.float64 if double else jnp.float32
+        given = jax.tree_util.tree_map(lambda x: jnp.asarray(x, number), arguments)
         began = time.perf_counter()
-        call = jax.jit(signals).lower(*arguments).compile()
-        finish = _unchanged if way.finish is None else _after(way, jax.eval_shape(signals, *arguments))
+        call = jax.jit(function).lower(*given).compile()
+        after = _unchanged
+        if finish is not None:
+            after = jax.jit(finish).lower(jax.eval_shape(function, *given)).compile()
         took = time.perf_counter() - began
-    return Program(call, finish, arguments, way.double, len(values), took, _flops(call, len(values)))
-
-
-def _after(way: Way, signals: Any) -> Any:
-    """A program of its own: within the first, XLA simulates a point again for all that is made of it."""
-    assert way.finish is not None
-    return jax.jit(jax.vmap(way.finish)).lower(signals).compile()
+    return Program(call, after, given, double, samples, took, _flops(call, samples))
 
 
 def _unchanged(signals: Any) -> Any:
@@ -91,7 +100,7 @@ def _precision(double: bool) -> contextlib.AbstractContextManager:
     return jax.enable_x64(double)
 
 
-def _flops(call: Any, spectra: int) -> float | None:
+def _flops(call: Any, samples: int) -> float | None:
     counted = call.cost_analysis() or {}
     counted = counted[0] if isinstance(counted, list) else counted
-    return float(counted["flops"]) / spectra if "flops" in counted else None
+    return float(counted["flops"]) / samples if "flops" in counted else None

@@ -13,6 +13,7 @@ from pellicle.io.atomic import replacing
 from pellicle.ladder.climb import Ladder
 from pellicle.ladder.cost import Cost
 from pellicle.ladder.race import Race
+from pellicle.ladder.surface import SurfaceCost
 from pellicle.report.style import BLUE, GREY, ORANGE
 
 if TYPE_CHECKING:
@@ -37,33 +38,62 @@ def text(cost: Cost, name: str) -> str:
     return "\n".join(blocks)
 
 
-def unit_of(ladder: Ladder) -> str:
-    """The unit of the errors, as it is written behind a number."""
-    return " degrees" if ladder.unit == "degrees" else f" in {ladder.unit}"
+def surface_text(cost: SurfaceCost, name: str) -> str:
+    """The table of colours, if there are any, and that of values."""
+    blocks = [] if cost.colours is None else [_ladder(cost.colours, name)]
+    blocks.append(_ladder(cost.values, name))
+    if cost.no_colours:
+        blocks.append(f"No colours: {cost.no_colours}.\n")
+    if cost.interrupted:
+        blocks.append("Interrupted: this is what was measured until then.\n")
+    return "\n".join(blocks)
+
+
+def error_of(ladder: Ladder, size: str = "") -> str:
+    """What the errors are, or one of this size, with their unit."""
+    of = f" of {size}" if size else ""
+    if ladder.unit == "relative":
+        return f"relative error{of}"
+    if size and ladder.unit == "degrees":
+        return f"error{of} degrees"
+    return f"error{of} in {ladder.unit}"
+
+
+def clock_of(ladder: Ladder) -> tuple[str, float]:
+    """The unit of the times of one sample, and how many of them a second has."""
+    return ("µs", 1e6) if ladder.sample == "spectrum" else ("ns", 1e9)
+
+
+def _about(ladder: Ladder) -> str:
+    if ladder.sample != "spectrum":
+        seen = f"{ladder.wavelengths} {'angles' if ladder.sample == 'colour' else 'pairs of directions'}"
+        which = "mean" if ladder.sample == "colour" else "largest"
+        return f"{ladder.draws} surfaces between the bounds along {seen}, the {which} error"
+    several = "s" * (ladder.wavelengths > 1)
+    draws = "draws between the bounds" if ladder.draws > 1 else "spectrum"
+    return f"{ladder.wavelengths} wavelength{several}, the largest error of {ladder.draws} {draws}"
 
 
 def _ladder(ladder: Ladder, name: str) -> str:
-    several = "s" * (ladder.wavelengths > 1)
-    draws = "draws between the bounds" if ladder.draws > 1 else "spectrum"
-    said = (
-        f"{name}: {ladder.wavelengths} wavelength{several}, the largest error of {ladder.draws} {draws} "
-        f"against {ladder.reference}"
-    )
-    rows = [("", "rung", "leaves out", f"error in {ladder.unit}", "µs/spectrum", "compile s", "kflop")]
+    said = f"{name}: {_about(ladder)} against {ladder.reference}"
+    clock, scale = clock_of(ladder)
+    timed = f"{clock}/{ladder.sample}"
+    rows = [("", "rung", "leaves out", error_of(ladder), timed, "compile s", "kflop")]
     rows += [
         (
             _mark(rung, ladder.recommended),
             rung.name,
             rung.leaves_out,
             f"{rung.error:.1e}",
-            f"{rung.seconds * 1e6:.2f}",
+            f"{rung.seconds * scale:.{2 if scale < 1e9 else 0}f}",
             f"{rung.compile_seconds:.2f}",
-            "" if rung.flops is None else f"{rung.flops / 1e3:.1f}",
+            "" if rung.flops is None else f"{rung.flops / 1e3:.{1 if scale < 1e9 else 2}f}",
         )
         for rung in ladder.rungs
     ]
     found = ladder.recommended
-    within = f"an error of {ladder.tolerance:g}{unit_of(ladder)}"
+    size = error_of(ladder, f"{ladder.tolerance:g}")
+    within = f"{'a' if size.startswith('r') else 'an'} {size}"
     advice = f"→ {found} is the fastest within {within}"
     if not ladder.within:
         advice = f"→ no rung is within {within}; {found} comes nearest"
@@ -125,23 +155,45 @@ def figure(cost: Cost, name: str, path: str | os.PathLike[str], *, overwrite: bo
         draw(cost, name).savefig(draft, dpi=DPI)
 
 
-def draw(cost: Cost, name: str) -> Figure:
-    """The figure itself, bound to no window and to no global state."""
+def surface_figure(
+    cost: SurfaceCost, name: str, path: str | os.PathLike[str], *, overwrite: bool = False
+) -> None:
+    """The same of a surface: its colours above its values."""
+    ladders = [ladder for ladder in (cost.colours, cost.values) if ladder is not None]
+    drawn, axes = _panels(len(ladders))
+    for at, ladder in zip(axes, ladders, strict=True):
+        _panel(at, ladder, name)
+    with replacing(path, overwrite=overwrite) as draft:
+        drawn.savefig(draft, dpi=DPI)
+
+
+def _panels(count: int) -> tuple[Figure, Any]:
+    """A figure, bound to no window and to no global state, of panels one above the other."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    raced = cost.race is not None and bool(cost.race.solvers)
-    drawn = Figure(figsize=(8.0, 9.6 if raced else 5.0), layout="constrained")
+    drawn = Figure(figsize=(8.0, 0.4 + 4.6 * count), layout="constrained")
     FigureCanvasAgg(drawn)
-    axes = np.atleast_1d(drawn.subplots(2 if raced else 1, 1))
-    ladder = cost.ladder
-    _scatter(axes[0], ladder.rungs, ladder.recommended, 1e6)
-    axes[0].axhline(ladder.tolerance, color=BLUE, linewidth=0.8, linestyle=":")
-    axes[0].set(
-        xlabel="time of one spectrum (µs)",
-        ylabel=f"largest error in {ladder.unit}, against {ladder.reference}",
+    return drawn, np.atleast_1d(drawn.subplots(count, 1))
+
+
+def _panel(axes: Axes, ladder: Ladder, name: str) -> None:
+    clock, scale = clock_of(ladder)
+    _scatter(axes, ladder.rungs, ladder.recommended, scale)
+    axes.axhline(ladder.tolerance, color=BLUE, linewidth=0.8, linestyle=":")
+    which = "mean" if ladder.sample == "colour" else "largest"
+    axes.set(
+        xlabel=f"time of one {ladder.sample} ({clock})",
+        ylabel=f"{which} {error_of(ladder)}, against {ladder.reference}",
         title=name.replace("$", r"\$"),
     )
+
+
+def draw(cost: Cost, name: str) -> Figure:
+    """The figure itself."""
+    raced = cost.race is not None and bool(cost.race.solvers)
+    drawn, axes = _panels(2 if raced else 1)
+    _panel(axes[0], cost.ladder, name)
     if raced:
         assert cost.race is not None
         _scatter(axes[1], cost.race.solvers, cost.race.recommended, 1e3)
