@@ -1,4 +1,7 @@
-"""Draws docs/figures: the examples of Gerardin, Holzschuch and Martinetto 2019, from our model.
+"""Draws docs/figures: examples of published systems, from our model.
+
+The thin conductors of Gerardin, Holzschuch and Martinetto 2019, and the tempered steel and water-like
+films of an account of Belcour and Barla 2017.
 
 python scripts/make_figures.py
 """
@@ -12,7 +15,7 @@ import matplotlib
 import numpy as np
 
 import pellicle as pl
-from pellicle.colour import film_colour
+from pellicle.colour import film_colour, srgb
 
 matplotlib.use("Agg")
 from matplotlib.figure import Figure
@@ -50,7 +53,7 @@ def hematite() -> Figure:
         (right, pl.transmittance, "transmittance"),
     ):
         map_of(axes, thickness, film(function, "Fe2O3", thickness), "thickness (nm)", title, 1.0)
-    swatches = film_colour(thickness, pl.material("Fe2O3"), GLASS).srgb
+    swatches = film_colour(thickness, pl.material("Fe2O3"), GLASS, way="uniform-64").srgb
     beside = left.inset_axes((-0.32, 0, 0.07, 1), sharey=left)
     beside.imshow(
         np.asarray(swatches)[:, None], extent=(0, 1, 0, 300), origin="lower", aspect="auto", rasterized=True
@@ -86,12 +89,37 @@ def copper_oxide_on_aluminium() -> Figure:
     return figure
 
 
+STEEL = 2.7 + 2.8j
+"""The base of the tempered steel; its oxide has an index of 2.9."""
+
+
+def swatch(axes, most: float, index: float, base: complex, title: str, exposure=1.0, steepest=80.0) -> None:
+    """A film's colours under D65 against its thickness and the angle of incidence."""
+    nm, degrees = np.linspace(0.0, most, 401), np.linspace(0.0, steepest, 81)
+    seen = film_colour(nm, index, base, angle=degrees[:, None], way="uniform-64")
+    shown = srgb(exposure * np.asarray(seen.linear_srgb))
+    axes.imshow(shown, origin="lower", aspect="auto", extent=(0, most, 0, steepest), rasterized=True)
+    axes.set(xlabel="thickness (nm)", ylabel="angle of incidence (°)", title=title)
+
+
+def tempered_steel() -> Figure:
+    """The oxide that runs through straw, purple and blue, and films of 1.33 on the same base and on glass."""
+    figure, (steel, water, glass) = canvas("Colours under D65", 3)
+    swatch(steel, 80.0, 2.9, STEEL, "film 2.9 on 2.7 + 2.8i")
+    for nm, name in ((20, "straw"), (30, "purple"), (40, "blue")):
+        steel.annotate(name, (nm, 2), color="white", rotation=90, ha="center", fontsize="small")
+    swatch(water, 600.0, 1.33, STEEL, "film 1.33 on 2.7 + 2.8i")
+    swatch(glass, 600.0, 1.33, 1.5, "film 1.33 on glass 1.5, ten times brighter", 10.0, 60.0)
+    return figure
+
+
 def main() -> None:
     FOLDER.mkdir(parents=True, exist_ok=True)
     drawn = {
         "hematite_on_glass": hematite,
         "gold_and_cds_on_glass": gold_and_cadmium_sulfide,
         "cuo_on_aluminium": copper_oxide_on_aluminium,
+        "tempered_steel": tempered_steel,
     }
     with jax.enable_x64(True):
         for name, draw in drawn.items():

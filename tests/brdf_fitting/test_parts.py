@@ -183,21 +183,3 @@ def test_what_directions_cannot_decide_is_told():
     assert "within 12 degrees of the normal" in told
     assert "one channel" in told
     assert "base_n and base_k are both free" in told
-
-
-def test_the_plan_names_what_is_there():
-    on = {row.effect: row.on for row in plan(TILTED).rows}
-    assert on == {
-        "spectral-sampling": True,
-        "roughness": True,
-        "deviation": True,
-        "diffuse": True,
-        "precision": True,
-    }
-    flat = plan(Surface("granier-heidrich", {"deviation": 0.0, "diffuse": 0.0}))
-    assert not flat.on("deviation")
-    assert not flat.on("diffuse")
-    assert not plan(Surface("microfacet-film", {})).on("absorption")
-    absorbing = plan(Surface("microfacet-film", {"k": between(0, 1)})).row("absorption")
-    assert absorbing.on
-    assert absorbing.why == "the film's extinction is free"
