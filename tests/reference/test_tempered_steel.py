@@ -42,11 +42,8 @@ def by_colour_science(index, base, thickness):
     turn = np.exp(4j * np.pi / at * index * thickness[:, None])
     above, below = (1 - index) / (1 + index), (index - base) / (index + base)
     seen = np.abs((above + below * turn) / (1 + above * below * turn)) ** 2
-    eye = (
-        colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]
-        .copy()
-        .align(colour.SpectralShape(380, 780, 5))
-    )
+    shape = colour.SpectralShape(380, 780, 5)
+    eye = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"].copy().align(shape)
     lamp = colour.SDS_ILLUMINANTS["D65"].copy().align(shape)
     weights = eye.values * lamp.values[:, None]
     xyz = seen @ weights / weights[:, 1].sum()
