@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import doctest
+from functools import partial
 
 import colour
 import jax
@@ -47,12 +48,15 @@ def truth(layer, substrate, illuminant="D65", thickness=THICKNESS, angle=ANGLE):
     return np.asarray(lab(airy(eye.wavelength, thickness, layer, substrate, angle) @ eye.weights, eye.white))
 
 
+@partial(jax.jit, static_argnames=("way", "illuminant"))
+def seen(thickness, layer, substrate, angle, way, illuminant):
+    return film_colour(thickness, layer, substrate, angle=angle, way=way, illuminant=illuminant).lab
+
+
 def error(layer, substrate, name, illuminant="D65", **films):
     films = {"thickness": THICKNESS, "angle": ANGLE} | films
-    found = film_colour(
-        films["thickness"], layer, substrate, angle=films["angle"], way=name, illuminant=illuminant
-    )
-    return delta_e2000(np.asarray(found.lab), truth(layer, substrate, illuminant, **films))
+    found = seen(films["thickness"], layer, substrate, films["angle"], name, illuminant)
+    return delta_e2000(np.asarray(found), truth(layer, substrate, illuminant, **films))
 
 
 @pytest.mark.parametrize("film", MEDIA)
@@ -129,7 +133,7 @@ def test_gradients(name):
 
     x, h = jnp.array([230.0, 1.8, 0.02, 35.0]), 1e-5 * np.eye(4)
     values = jax.jit(jax.vmap(seen))(jnp.concatenate([x + h, x - h]))
-    np.testing.assert_allclose(jax.jacfwd(seen)(x), (values[:4] - values[4:]).T / 2e-5, rtol=1e-5, atol=1e-6)
+    np.testing.assert_allclose(jax.jit(jax.jacfwd(seen))(x), (values[:4] - values[4:]).T / 2e-5, rtol=1e-5, atol=1e-6)
 
 
 def test_total_reflection_inside_is_no_special_case():

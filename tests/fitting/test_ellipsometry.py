@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import jax
 import numpy as np
 import pytest
 
@@ -12,13 +13,14 @@ from pellicle.errors import UsageError
 
 WAVELENGTH = np.linspace(300.0, 900.0, 64)
 PSI_SIGMA, DELTA_SIGMA = 0.02, 0.05
+seen = jax.jit(pl.ellipsometry, static_argnums=(2, 3))
 
 
 def measured(thickness: float, angles=(70.0,), seed: int = 0) -> pl.Spectrum:
     """Noisy Ψ and Δ of an oxide on silicon at one or several angles."""
     rng = np.random.default_rng(seed)
     wavelength, angle = np.tile(WAVELENGTH, len(angles)), np.repeat(angles, WAVELENGTH.size)
-    psi, delta = pl.ellipsometry(wavelength, thickness, "SiO2", "Si", angle=angle)
+    psi, delta = seen(wavelength, thickness, "SiO2", "Si", angle=angle)
     size = wavelength.size
     return pl.Spectrum(
         wavelength,

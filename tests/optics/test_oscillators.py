@@ -168,60 +168,66 @@ HARD = {
 }
 
 
+# of a term's numbers and E or λ, so that terms of one kind share a program; Python's floats stay weak in it
+epsilon = jax.jit(lambda term, energy: jnp.stack(_parts(term, energy)))
+epsilon_slopes = jax.jit(jax.jacrev(lambda term, energy: jnp.stack(_parts(term, energy)), argnums=(0, 1)))
+index_of = jax.jit(lambda term, wavelength: Oscillators(2.0, (term,))(wavelength))
+
+
+def _parts(term, energy):
+    found = term.epsilon(energy)
+    return found.re, found.im
+
+
 @pytest.mark.parametrize("precision", [np.float64, np.float32])
 @pytest.mark.parametrize("name", HARD)
 def test_value_and_gradient_are_finite_at_the_hard_points(name, precision):
     """At the gap, on resonance, and at zero strength; in every parameter and in energy, under jit."""
     leaves, structure = jax.tree.flatten(TERMS[name])
     leaves = [precision(x) for x in leaves]
-
-    def both(leaves, energy):
-        found = jax.tree.unflatten(structure, leaves).epsilon(energy)
-        return jnp.stack([found.re, found.im])
-
-    values = jax.jit(both)
-    slopes = jax.jit(jax.jacrev(both, argnums=(0, 1)))
     for energy in HARD[name]:
         energy = precision(energy if energy else 2.0)
         for strength in (leaves[0], precision(0.0)):
-            at = [strength, *leaves[1:]]
-            assert values(at, energy).dtype == precision
-            assert np.all(np.isfinite(values(at, energy)))
-            assert all(np.all(np.isfinite(s)) for s in jax.tree.leaves(slopes(at, energy)))
+            at = jax.tree.unflatten(structure, [strength, *leaves[1:]])
+            assert epsilon(at, energy).dtype == precision
+            assert np.all(np.isfinite(epsilon(at, energy)))
+            assert all(np.all(np.isfinite(s)) for s in jax.tree.leaves(epsilon_slopes(at, energy)))
+
+
+def _mixed(term, energy):
+    index = Oscillators(1.7, (term,)).index(HC / energy)
+    return jnp.sum(jnp.sin(real(index)) + jnp.cos(3 * imag(index)))
+
+
+mixed, mixed_slopes = jax.jit(_mixed), jax.jit(jax.grad(_mixed, argnums=(0, 1)))
 
 
 @EVERY_TERM
 def test_gradients_against_central_differences(term):
     leaves, structure = jax.tree.flatten(term)
-    leaves = [np.float64(x) for x in leaves]
-
-    def value(leaves, energy):
-        index = Oscillators(1.7, (jax.tree.unflatten(structure, leaves),)).index(HC / energy)
-        return jnp.sum(jnp.sin(real(index)) + jnp.cos(3 * imag(index)))
-
     at = np.array([0.9, 2.3, 3.7])
-    call = jax.jit(value)
-    slopes, along = jax.jit(jax.grad(value, argnums=(0, 1)))(leaves, at)
-    for i, leaf in enumerate(leaves):
+    slopes, along = mixed_slopes(term, at)
+    for i, (leaf, slope) in enumerate(zip(leaves, jax.tree.leaves(slopes), strict=True)):
         if leaf == 0:  # a bound: one side only, and the tail has a corner there
             continue
-        h = 1e-6 * leaf
-        up, down = ([*leaves[:i], leaf + s, *leaves[i + 1 :]] for s in (h, -h))
-        numeric = (call(up, at) - call(down, at)) / (2 * h)
-        assert float(slopes[i]) == pytest.approx(float(numeric), rel=2e-6, abs=1e-8)
-    numeric = (call(leaves, at + 1e-6) - call(leaves, at - 1e-6)) / 2e-6
+        h = 1e-5 * leaf  # rounding is divided by it: of 0.05 a millionth would leave 1e-8
+        up, down = (
+            mixed(jax.tree.unflatten(structure, [*leaves[:i], leaf + s, *leaves[i + 1 :]]), at)
+            for s in (h, -h)
+        )
+        assert float(slope) == pytest.approx(float(up - down) / (2 * h), rel=2e-6, abs=1e-8)
+    numeric = (mixed(term, at + 1e-6) - mixed(term, at - 1e-6)) / 2e-6
     assert float(jnp.sum(along)) == pytest.approx(float(numeric), rel=2e-6, abs=1e-7)
 
 
 @EVERY_TERM
 def test_index_absorbs_and_keeps_its_precision(term):
-    model = Oscillators(2.0, (term,))
     wavelength = np.linspace(250.0, 2500.0, 301)
-    index = np.asarray(jax.jit(model)(wavelength))
+    index = np.asarray(index_of(term, wavelength))
     assert np.all(np.isfinite(index))
     assert np.all(index.imag >= 0)
     assert np.all(index.real >= 0)
-    single = jax.jit(model)(wavelength.astype(np.float32))
+    single = index_of(term, wavelength.astype(np.float32))
     assert single.dtype == np.complex64
     np.testing.assert_allclose(single, index, rtol=3e-4, atol=3e-4)
 
