@@ -133,7 +133,9 @@ def test_gradients(name):
 
     x, h = jnp.array([230.0, 1.8, 0.02, 35.0]), 1e-5 * np.eye(4)
     values = jax.jit(jax.vmap(seen))(jnp.concatenate([x + h, x - h]))
-    np.testing.assert_allclose(jax.jit(jax.jacfwd(seen))(x), (values[:4] - values[4:]).T / 2e-5, rtol=1e-5, atol=1e-6)
+    np.testing.assert_allclose(
+        jax.jit(jax.jacfwd(seen))(x), (values[:4] - values[4:]).T / 2e-5, rtol=1e-5, atol=1e-6
+    )
 
 
 def test_total_reflection_inside_is_no_special_case():
