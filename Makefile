@@ -12,7 +12,7 @@ SOONER := XLA_FLAGS="--xla_backend_optimization_level=0 --xla_llvm_disable_expen
 EXACT := tests/hard tests/fitting/test_nist.py
 PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
 
-.PHONY: fit fits test coverage lint bench peers properties tolerance measurements slow clean figures
+.PHONY: fit fits test coverage docs lint bench peers properties tolerance measurements slow clean figures
 
 # Debian splits venv's pip into a package of its own: without it, the system's pip does
 $(VENV)/bin/python:
@@ -31,6 +31,10 @@ $(VENV)/.dev: pyproject.toml | $(VENV)/bin/python
 	$(BIN)/python -m pip install --quiet --editable ".[dev]"
 	@touch $@ $(VENV)/.fit
 
+$(VENV)/.docs: pyproject.toml | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet --editable ".[docs]"
+	@touch $@ $(VENV)/.fit
+
 fit: $(VENV)/.fit
 	$(BIN)/pellicle fit --recipe $(EXAMPLE) --out results/hematite_on_glass_140nm
 
@@ -44,6 +48,10 @@ test: $(VENV)/.dev lint
 
 coverage: $(VENV)/.dev
 	$(PYTEST) --cov --cov-report=term
+
+# into site/; a warning is an error
+docs: $(VENV)/.docs
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 slow: $(VENV)/.dev
 	$(BIN)/python -m pytest -m slow
@@ -76,4 +84,4 @@ measurements: $(VENV)/.fit
 	$(BIN)/python scripts/make_measurements.py
 
 clean:
-	rm -rf $(VENV) .venv-peers results .pytest_cache .ruff_cache .hypothesis .coverage
+	rm -rf $(VENV) .venv-peers results site .pytest_cache .ruff_cache .hypothesis .coverage

@@ -74,7 +74,7 @@ def transmittance(
 ) -> Float[Array, "..."]:
     """Power transmittance of a layer into its substrate, as a fraction; arguments as `reflectance`.
 
-    With an absorbing substrate this is the power that enters it. Seed paper 001 (eq. 21) weights
+    With an absorbing substrate this is the power that enters it. Gerardin et al. 2019 (eq. 21) weight
     both polarisations alike, which is wrong for p there; here each has its own factor.
     """
     waves = _waves(wavelength, thickness, layer, substrate, ambient, angle, polarisation)
