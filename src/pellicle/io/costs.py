@@ -20,19 +20,22 @@ from pellicle.ladder.surface import SurfaceCost
 SCHEMA = "pellicle.cost/1"
 COLUMNS = (
     *("kind", "name", "leaves_out", "error", "seconds", "compile_seconds", "flops", "pareto"),
-    *("median_error", "failures", "datasets"),
+    *("median_error", "failures", "datasets", "coverage", "doubt", "width"),
 )
 
 
 def to_json(cost: Cost, recipe: str) -> dict[str, Any]:
-    """The record: forward and inverse rungs in one list, told by their `kind`.
+    """The record: forward and inverse rungs, and those of intervals, in one list, told by their `kind`.
 
-    An error is null where it is infinite. `recommended` is a forward rung's name, `recommended_solver` an
-    inverse one's; `within` says whether the first meets the tolerance.
+    An error is null where it is infinite; an interval's is how far its coverage is from 95 %. `recommended`
+    is a forward rung's name, `recommended_solver` an inverse one's, `recommended_interval` that of a way to
+    an interval; `within` says whether the first meets the tolerance.
     """
-    ladder, race = cost.ladder, cost.race
+    ladder, race, held = cost.ladder, cost.race, cost.intervals
     forward = [{"kind": "forward", **asdict(rung)} for rung in ladder.rungs]
     inverse = [] if race is None else [{"kind": "inverse", **asdict(solver)} for solver in race.solvers]
+    ways = [] if held is None else [{"kind": "interval", **asdict(way)} for way in held.ways]
+    absent = [part.left_out for part in (ladder, race, held) if part is not None]
     return {
         "schema": SCHEMA,
         "recipe": recipe,
@@ -43,13 +46,14 @@ def to_json(cost: Cost, recipe: str) -> dict[str, Any]:
         "draws": ladder.draws,
         "rungs": [
             rung | {"error": rung["error"] if math.isfinite(rung["error"]) else None}
-            for rung in [*forward, *inverse]
+            for rung in [*forward, *inverse, *ways]
         ],
         "recommended": ladder.recommended,
         "within": ladder.within,
         "recommended_solver": None if race is None else race.recommended,
+        "recommended_interval": None if held is None else held.recommended,
         "noise": None if race is None else race.noise,
-        "left_out": ladder.left_out | ({} if race is None else race.left_out),
+        "left_out": {name: why for left_out in absent for name, why in left_out.items()},
         "no_fits": cost.no_race or None,
         "interrupted": cost.interrupted,
         "versions": versions(),

@@ -11,6 +11,7 @@ import numpy as np
 from pellicle.errors import UsageError
 from pellicle.ladder.case import case
 from pellicle.ladder.climb import Ladder, Progress, climb
+from pellicle.ladder.intervals import Intervals, intervals
 from pellicle.ladder.race import Race, race
 from pellicle.ladder.trial import trials
 from pellicle.scene import Scene, free_leaves
@@ -22,15 +23,16 @@ DEFAULT_TOLERANCE = 1e-3
 
 @dataclass
 class Cost:
-    """`race` is None where no solver took part, and `no_race` says why."""
+    """`race` is None where no solver took part, and `no_race` says why; `intervals` follow it."""
 
     ladder: Ladder
     race: Race | None
     no_race: str = ""
+    intervals: Intervals | None = None
 
     @property
     def interrupted(self) -> bool:
-        return self.ladder.interrupted or (self.race is not None and self.race.interrupted)
+        return any(part is not None and part.interrupted for part in (self.ladder, self.race, self.intervals))
 
 
 def cost(
@@ -67,4 +69,6 @@ def cost(
             return Cost(ladder, None, "nothing is free to fit")
         noise = tolerance if noise is None else noise
         own = eqx.tree_at(lambda s: s.instrument, here.scene, scene.instrument)
-        return Cost(ladder, race(trials(here, own, noise, datasets), noise, progress))
+        sets = trials(here, own, noise, datasets)
+        raced = race(sets, noise, progress)
+        return Cost(ladder, raced, intervals=None if raced.interrupted else intervals(sets, progress))

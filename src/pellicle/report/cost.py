@@ -12,6 +12,7 @@ import numpy as np
 from pellicle.io.atomic import replacing
 from pellicle.ladder.climb import Ladder
 from pellicle.ladder.cost import Cost
+from pellicle.ladder.intervals import Intervals
 from pellicle.ladder.race import Race
 from pellicle.ladder.surface import SurfaceCost
 from pellicle.report.style import BLUE, GREY, ORANGE
@@ -33,6 +34,8 @@ def text(cost: Cost, name: str) -> str:
         blocks.append(f"No fits: {cost.no_race}.\n")
     else:
         blocks.append(_race(cost.race))
+    if cost.intervals is not None:
+        blocks.append(_intervals(cost.intervals))
     if cost.interrupted:
         blocks.append("Interrupted: this is what was measured until then.\n")
     return "\n".join(blocks)
@@ -125,6 +128,30 @@ def _race(race: Race) -> str:
     advice = f"→ {race.recommended} is the fastest of those that failed least"
     lines = [*textwrap.wrap(said, COLUMNS), "", *_aligned(rows, left=3), ""]
     return "\n".join([*lines, *([advice] if race.solvers else []), *_left_out(race.left_out)]) + "\n"
+
+
+def _intervals(found: Intervals) -> str:
+    count = max((way.datasets for way in found.ways), default=0)
+    said = (
+        f"95 % intervals of the same {count} data sets: how often they hold a parameter's truth, how wide "
+        "they are as a share of the bounds, and their time after the fit"
+    )
+    rows = [("", "interval", "leaves out", "holds the truth", "width", "ms", "compile s")]
+    rows += [
+        (
+            _mark(way, found.recommended),
+            way.name,
+            way.leaves_out,
+            f"{100 * way.coverage:.0f} ± {100 * way.doubt:.0f} %",
+            f"{way.width:.1e}",
+            f"{way.seconds * 1e3:.1f}",
+            f"{way.compile_seconds:.1f}",
+        )
+        for way in found.ways
+    ]
+    advice = f"→ {found.recommended} is the fastest whose share is 95 % within two standard deviations"
+    lines = [*textwrap.wrap(said, COLUMNS), "", *_aligned(rows, left=3), ""]
+    return "\n".join([*lines, *([advice] if found.ways else []), *_left_out(found.left_out)]) + "\n"
 
 
 def _mark(rung: Any, recommended: str | None) -> str:
