@@ -16,7 +16,7 @@ PAGES = {str(path.relative_to(ROOT / "docs")): path for path in sorted((ROOT / "
 FILE = re.compile(r"[\w./-]+\.(csv|txt|dat|toml)$")
 #: Words of commands whose fits end in doubt (exit code 4), as their pages say.
 DOUBTFUL = (
-    "gold_on_glass_300nm.toml",
+    "--recipe measurements/recipes/gold_on_glass_300nm.toml",
     "window.csv --layer TiO2 --substrate SiO2 --thickness",
     "oxide.csv --layer SiO2 --substrate Si --thickness 1000",
 )

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
 from pellicle.brdf.directions import direction, frame
+from pellicle.brdf.models import Model
 from pellicle.free import Free
 from pellicle.surfaces.surface import Surface
 
@@ -38,10 +41,10 @@ def render(
     inside = x * x + y * y < 1
     normal = np.stack([x[inside], y[inside], np.sqrt(1 - x[inside] ** 2 - y[inside] ** 2)], axis=-1)
     theta, phi = np.rad2deg(np.arccos(normal[:, 2])), np.rad2deg(np.arctan2(normal[:, 1], normal[:, 0]))
-    axes = np.asarray(frame(theta, phi))
+    axes = np.asarray(jax.jit(frame)(theta, phi))
     i, o = (axes @ np.asarray(direction(*at)) for at in (light, (0.0, 0.0)))
     parameters = numbers(surface, relief(normal, axes, np.random.default_rng(seed)))
-    seen = np.asarray(surface.brdf(parameters, jnp.asarray(i), jnp.asarray(o)))
+    seen = np.asarray(_sent(surface.brdf, parameters, i, o))
     image = np.full((size, size, seen.shape[-1]), np.nan)
     image[inside] = np.pi * seen * np.clip(i[:, 2:], 0.0, None)
     return image
@@ -51,7 +54,12 @@ def in_plane(surface: Surface, incidence: float, leaving: np.ndarray) -> np.ndar
     """The BRDF (angles, channels) in the plane of incidence; a positive angle is on the mirror's side."""
     i = direction(incidence, 0.0)
     o = direction(np.abs(leaving), np.where(leaving >= 0, 180.0, 0.0))
-    return np.asarray(surface.brdf(numbers(surface, None), jnp.broadcast_to(i, o.shape), o))
+    return np.asarray(_sent(surface.brdf, numbers(surface, None), jnp.broadcast_to(i, o.shape), o))
+
+
+@partial(jax.jit, static_argnums=0)  # as one program: its operations one by one take seconds to compile
+def _sent(brdf: Model, parameters: dict[str, Any], i: Any, o: Any) -> Any:
+    return brdf(parameters, i, o)
 
 
 def relief(normal: np.ndarray, axes: np.ndarray, rng: np.random.Generator) -> Relief:

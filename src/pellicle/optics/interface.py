@@ -81,7 +81,7 @@ def allow_tunnelling(index: Number) -> Number:
 
 
 def fresnel(n1: Number, q1: Number, n2: Number, q2: Number, polarisation: str) -> Number:
-    """Amplitude reflection coefficient from medium 1 to 2, 's' or 'p' (seed paper 001, section 3.1)."""
+    """Amplitude reflection coefficient from medium 1 to 2, 's' or 'p' (Gerardin et al. 2019, section 3.1)."""
     if polarisation == "s":
         return (q1 - q2) / (q1 + q2)
     u, v = n2 * n2 * q1, n1 * n1 * q2
