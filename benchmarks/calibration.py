@@ -127,6 +127,10 @@ class Case(NamedTuple):
 
 
 SUBSTRATE = 3.9 + 0.02j
+DECIDED, UNDECIDED = 0.05, 0.3
+"""Shares of the thickness: a likelihood narrower than the first decides it, one wider than the second not."""
+MIDDLE = float(np.sqrt(DECIDED * UNDECIDED))
+"""A fit that gives four standard errors less than this claims to know the thickness."""
 
 
 def reflectance(thickness: Any, index: Any, wavelength: np.ndarray) -> np.ndarray:
@@ -150,8 +154,8 @@ def cases(count: int, seed: int = 0) -> list[Case]:
         points = int(random.choice([4, 8, 30, 101]))
         noise = float(random.choice([0.001, 0.005, 0.02, 0.05]))
         case = Case(d, n, k, np.linspace(400, 900, points), noise, True)
-        width = _undecided_width(case)
-        decided = True if width < 0.05 * d else False if width > 0.3 * d else None
+        width = _undecided_width(case) / d
+        decided = True if width < DECIDED else False if width > UNDECIDED else None
         if decided is not None and len(found[decided]) < count // 2:
             found[decided].append(case._replace(decided=decided))
     return [case for pair in zip(found[True], found[False], strict=True) for case in pair]
@@ -193,7 +197,7 @@ def honesty(count: int) -> list[Verdict]:
         data = pl.Spectrum(case.wavelength, values, "R", sigma=np.full(clean.size, case.noise))
         fit = pl.fit(data, scene)
         error = fit["thickness"].stderr
-        claimed = fit.status in ("converged", "at-bound") and error < 0.1 * fit["thickness"].value
+        claimed = fit.status in ("converged", "at-bound") and 4 * error < MIDDLE * fit["thickness"].value
         found.append(Verdict(case, str(fit.status), error, bool(claimed)))
         told(i + 1, count, "cases")
     return found

@@ -19,6 +19,7 @@ DOUBTFUL = (
     "--recipe measurements/recipes/gold_on_glass_300nm.toml",
     "window.csv --layer TiO2 --substrate SiO2 --thickness",
     "oxide.csv --layer SiO2 --substrate Si --thickness 1000",
+    "five_bands.toml",
 )
 
 

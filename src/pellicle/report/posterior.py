@@ -88,6 +88,7 @@ def corner_figure(posterior: Posterior, path: str | os.PathLike[str], *, overwri
         flat[:, moving],
         labels=[label for label, moves in zip(labels, moving, strict=True) if moves],
         fig=sheet,
+        bins=40,
         quantiles=[0.025, 0.5, 0.975],
         color=BLUE,
         plot_datapoints=False,
