@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 
 from pellicle.io.brdf_samples import read_brdf_samples
@@ -99,3 +101,48 @@ def test_a_plan_names_the_effects_of_a_surface(pellicle, tmp_path):
     ran = pellicle("plan", tmp_path / "paint.toml")
     assert (ran.code, ran.out) == (2, "")
     assert "nothing to compute" in ran.err
+
+
+DIFFUSE = """
+[data]
+files = ["seen.csv"]
+[scene.surface]
+model = "granier-heidrich-diffuse"
+thickness = { lower = 200, upper = 300 }
+"""
+
+
+def test_what_accuracy_costs_for_a_surface(pellicle, tmp_path):
+    rows = "".join(f"30,0,{t},180,0.1,0.2,0.3\n" for t in range(0, 80, 10))
+    (tmp_path / "seen.csv").write_text("theta_i,phi_i,theta_o,phi_o,R,G,B\n" + rows)
+    (tmp_path / "base.toml").write_text(DIFFUSE)
+    ran = pellicle("cost", tmp_path / "base.toml", "--json", "--out", tmp_path / "cost", "--tolerance", 1e-5)
+    assert ran.code == 0
+    (record,) = ran.objects
+    assert record == json.loads((tmp_path / "cost" / "result.json").read_text())
+    assert (record["schema"], record["unit"], record["tolerance"]) == ("pellicle.cost/1", "relative", 1e-5)
+    found = {rung["name"]: rung for rung in record["rungs"]}
+    assert {"float64", "float32", "planned", "without interference", "one wavelength"} == found.keys()
+    assert record["recommended"] in found
+    assert found["float64"]["error"] == 0.0
+    assert 1e-9 < found["float32"]["error"] < 1e-5 < found["one wavelength"]["error"]
+    assert all(rung["seconds"] > 0 for rung in found.values())
+    assert record["left_out"]["no diffuse part"] == "it is all there is"
+    assert "no other colour" in record["no_colours"]
+    assert (tmp_path / "cost" / "cost.png").read_bytes().startswith(b"\x89PNG")
+    assert "No colours:" in (tmp_path / "cost" / "report.txt").read_text()
+    assert len((tmp_path / "cost" / "cost.csv").read_text().splitlines()) == 1 + len(found)
+
+
+def test_what_cannot_be_asked_of_a_surface(pellicle, tmp_path):
+    (tmp_path / "bare.toml").write_text(RECIPE)
+    for command, flags, said in (
+        ("cost", ("--reference", "mpmath"), "--reference is for films"),
+        ("cost", ("--tolerance", 0), "--tolerance must be above zero"),
+        ("plan", ("--tolerance", -1), "--tolerance must be above zero"),
+        ("simulate", ("--out", tmp_path / "x.csv", "--noise", -1), "--noise must not be negative"),
+    ):
+        ran = pellicle(command, tmp_path / "bare.toml", *flags)
+        assert (ran.code, ran.out) == (2, "")
+        assert said in ran.err
+        assert len(ran.err.strip().splitlines()) == 1

@@ -1,0 +1,125 @@
+"""Draws surfaces with bounds and tolerances, plans them, and looks whether the stated bound holds.
+
+At fresh random points of each surface's bounds, and along directions that the plan did not look at, the
+planned BRDF is compared with the exact one. Run as `python benchmarks/surface_tolerance.py [--surfaces 100]`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import collections
+import sys
+import time
+from typing import Any
+
+import jax
+import numpy as np
+
+from pellicle.differences import signals
+from pellicle.free import Free, free_leaves
+from pellicle.surfaces import thrift
+from pellicle.surfaces.effects import exact
+from pellicle.surfaces.lit import lit
+from pellicle.surfaces.model import build
+from pellicle.surfaces.sampling import default_directions
+from pellicle.surfaces.surface import Surface
+
+FRESH = 64
+"""Points of each surface's bounds at which the bound is tried."""
+LOOKED = default_directions(1000)
+
+
+def weak(rng: np.random.Generator) -> float:
+    """Small over many decades."""
+    return float(10 ** rng.uniform(-8, 0))
+
+
+def between(rng: np.random.Generator, low: float, high: float) -> Free:
+    lower, upper = sorted(rng.uniform(low, high, 2))
+    return Free(lower=lower, upper=upper + 1e-3 * (high - low))
+
+
+def facets(rng: np.random.Generator) -> Surface:
+    numbers: dict[str, Any] = {
+        "thickness": between(rng, 0, 1500),
+        "n": rng.uniform(1.2, 2.9),
+        "k": weak(rng),
+        "base_n": rng.uniform(1.1, 4),
+        "base_k": rng.choice([0.0, rng.uniform(0, 6)]),
+        "roughness": between(rng, 0.05, 0.8),
+        "diffuse": weak(rng),
+    }
+    return Surface("microfacet-film", numbers)
+
+
+def shader(rng: np.random.Generator) -> Surface:
+    numbers = {
+        "thickness": between(rng, 0, 1500),
+        "n": between(rng, 1.1, 2.5),
+        "base_n": rng.uniform(1.1, 2.5),
+        "exponent": rng.uniform(1, 200),
+        "diffuse": weak(rng),
+    }
+    return Surface("blinn-phong-film", numbers)
+
+
+def lobes(rng: np.random.Generator) -> Surface:
+    numbers = {
+        "thickness": between(rng, 0, 1000),
+        "n": rng.uniform(1.2, 2.2, 3).tolist(),
+        "exponent_reflection": between(rng, 1, 200),
+        "exponent_transmission": rng.uniform(1, 200),
+        "deviation": 10 * weak(rng),
+        "azimuth": rng.uniform(-180, 180),
+        "diffuse": weak(rng),
+    }
+    kinds = ["granier-heidrich", "granier-heidrich-reciprocal", "granier-heidrich-full"]
+    return Surface(str(rng.choice(kinds)), numbers)
+
+
+KINDS = {"facets": facets, "shader": shader, "lobes": lobes}
+
+
+def tried(rng: np.random.Generator, surface: Surface, tolerance: float) -> tuple[set[str], float, float]:
+    """What the plan leaves out, how far it is off, and how far it says to be."""
+    plan = thrift.plan(lit(surface, LOOKED), tolerance)
+    whole = lit(surface, LOOKED, len(LOOKED.theta_i))
+    free = [leaf for _, leaf in free_leaves(whole)]
+    low, high = (np.array([getattr(f, side) for f in free]) for side in ("lower", "upper"))
+    points = rng.uniform(low, high, (FRESH, len(free)))
+    with jax.enable_x64(True):
+        true, found = (signals(each, whole, points, build) for each in (exact(whole), plan))
+    off = np.max(np.abs(found - true) / np.maximum(true, thrift.FLOOR))
+    gone = {left_out.effect for left_out in plan.left_out}
+    gone |= {f"{row.count} angles" for row in plan.rows if row.effect == "oblique" and row.count}
+    return gone, float(off), plan.error_bound
+
+
+def main(surfaces: int, seed: int) -> int:
+    rng, began = np.random.default_rng(seed), time.perf_counter()
+    left_out: collections.Counter[str] = collections.Counter()
+    failures, shares = [], []
+    for number in range(surfaces):
+        kind, tolerance = str(rng.choice(list(KINDS))), 10 ** rng.uniform(-5, -1)
+        gone, off, bound = tried(rng, KINDS[kind](rng), tolerance)
+        left_out.update(gone)
+        if gone:
+            shares.append(off / bound)
+        if off > bound or bound > tolerance:
+            failures.append(
+                f"{number} {kind}: off by {off:.2g}, bound {bound:.2g}, tolerance {tolerance:.2g}"
+            )
+    took = time.perf_counter() - began
+    print(f"{surfaces} surfaces in {took:.0f} s; left out: {dict(left_out.most_common())}")
+    print(f"error over bound: median {np.median(shares):.2f}, largest {np.max(shares):.2f}")
+    print(*failures, sep="\n")
+    print(f"{len(failures)} beyond their bound or tolerance")
+    return bool(failures)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--surfaces", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=0)
+    given = parser.parse_args()
+    sys.exit(main(given.surfaces, given.seed))
