@@ -50,7 +50,9 @@ def test_a_rung_is_as_far_off_as_it_says(films):
     with jax.enable_x64(True):
         for name, least, most in (("points-645-525-445", 1.0, 10.0), ("uniform-16", 1e-3, 0.2)):
             found = RUNGS[name].program(films).run()
-            off = np.mean(delta_e2000(*(np.asarray(lab(np.asarray(x), eye.white)) for x in (found, true))))
+            off = np.mean(
+                delta_e2000(*(np.asarray(lab(np.asarray(x, float), eye.white)) for x in (found, true)))
+            )
             assert least < off < most
             assert colours.error(eye, true, found) == pytest.approx(off)
 

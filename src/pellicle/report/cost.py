@@ -230,6 +230,8 @@ def draw(cost: Cost, name: str) -> Figure:
 
 def _scatter(axes: Axes, rungs: Sequence[Any], recommended: str | None, scale: float) -> None:
     """Points with their names, the Pareto front joined, an error of nothing at the foot."""
+    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+
     seen = [(rung.seconds * scale, max(rung.error, FLOOR)) for rung in rungs]
     front = sorted(point for point, rung in zip(seen, rungs, strict=True) if rung.pareto)
     axes.plot(*zip(*front, strict=True), color=ORANGE, linewidth=1.0, zorder=1)
@@ -249,5 +251,8 @@ def _scatter(axes: Axes, rungs: Sequence[Any], recommended: str | None, scale: f
             color=colour,
         )
     axes.set(xscale="log", yscale="log")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
     axes.margins(x=0.12, y=0.08)
     axes.grid(alpha=0.2)

@@ -101,9 +101,8 @@ def _by_nodes(stage: Stage) -> Iterator[Step]:
     for count in NODES:
         if 4 * count > len(stage.scene.i):
             break
-        row = replace(
-            rows["oblique"], count=count, why=f"{rows['oblique'].why}: its colour at {count} angles"
-        )
+        why = f"{rows['oblique'].why}: the film's colour at {count} angles"
+        row = replace(rows["oblique"], count=count, why=why)
         chosen = [row if r.effect == "oblique" else r for r in stage.plan.rows]
         yield Step(replace(stage.plan, rows=tuple(chosen)), stage.scene, row)
 
