@@ -8,6 +8,7 @@ from cyclopts import App
 
 from pellicle.cli.chart import chart
 from pellicle.cli.cost import cost
+from pellicle.cli.demo import demo
 from pellicle.cli.fit import fit
 from pellicle.cli.materials import materials
 from pellicle.cli.plan import plan
@@ -33,6 +34,7 @@ app.command(plan)
 app.command(cost)
 app.command(chart)
 app.command(materials)
+app.command(demo)
 
 
 def main() -> int:
