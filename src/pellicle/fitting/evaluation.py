@@ -88,19 +88,25 @@ class Polished(NamedTuple):
 
 @kept
 def polish(looks: Looks, scenes: tuple[Scene, ...], data: tuple[Data, ...], box: Box, units: Any) -> Polished:
-    """The local minimum below each start (starts, parameters), in all views together."""
+    """The local minimum below each start (starts, parameters), in all views together.
+
+    The box may be one for all, or (starts, parameters): where its bounds meet a parameter is held.
+    """
     from pellicle.fitting.solve import least_squares  # a kept program needs no solver
 
-    def residual(unit):
-        views, prior = explained(looks, scenes, data, box, unit)
-        return jnp.concatenate([*(view.residual for view in views), prior])
+    def one(unit, lower, upper):
+        own = box._replace(lower=lower, upper=upper)
 
-    def one(unit):
+        def residual(unit):
+            views, prior = explained(looks, scenes, data, own, unit)
+            return jnp.concatenate([*(view.residual for view in views), prior])
+
         best, converged = least_squares(residual, unit)
-        views, prior = explained(looks, scenes, data, box, best)
+        views, prior = explained(looks, scenes, data, own, best)
         return Polished(best, sum(view.evidence for view in views) + jnp.sum(prior**2), converged)
 
-    return jax.vmap(one)(units)
+    sides = (jnp.broadcast_to(side, units.shape) for side in (box.lower, box.upper))
+    return jax.vmap(one)(units, *sides)
 
 
 class Local(NamedTuple):

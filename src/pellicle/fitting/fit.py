@@ -10,13 +10,13 @@ import equinox as eqx
 import jax
 
 from pellicle.errors import UsageError
-from pellicle.fitting import backface, parts, summary
+from pellicle.fitting import backface, identifiability, parts, summary
 from pellicle.fitting.measured import Measured, measured, unscaled
 from pellicle.fitting.problem import Problem, beyond, make
 from pellicle.fitting.result import Fit
 from pellicle.fitting.search import Progress, quiet, search
 from pellicle.fitting.status import judge, verdict
-from pellicle.fitting.uncertainty import errors
+from pellicle.fitting.uncertainty import errors, scaled
 from pellicle.fitting.weigh import Weighed, weigh
 from pellicle.io.spectrum import Spectrum
 from pellicle.scene import Scene, free_leaves
@@ -134,7 +134,8 @@ def _report(
 ) -> Fit:
     problem = weighed.problem
     profile = summary.profile(problem, weighed)
-    found = errors(problem, [m.at for m in weighed.met], [m.variance for m in weighed.met])
+    around = problem, [m.at for m in weighed.met], [m.variance for m in weighed.met]
+    found = errors(*around)
     parameters = summary.estimates(spectra, weighed, found, profile)
     others = summary.rivals(weighed)
     each = parts.parts(data, weighed, found)
@@ -146,8 +147,11 @@ def _report(
         rivals=others,
         natural=frozenset(p.name for p in problem.parameters if p.natural_lower),
     )
-    shown = (missed or each)[0]
-    said = verdict(status, parameters, others, shown.rms, shown.name or "the data")
+    shown, dark = (missed or each)[0], summary.opaque(spectra, weighed)
+    trading = identifiability.trades(scaled(*around), parameters)
+    of_lead = identifiability.of(next(iter(parameters)), trading)
+    said = verdict(status, parameters, others, shown.rms, shown.name or "the data", dark, of_lead)
+    unclear = [*identifiability.bounded(parameters, dark), *trading]
     return Fit(
         parts=each,
         status=status,
@@ -159,7 +163,7 @@ def _report(
         effective_points=sum(part.effective_points for part in each),
         correlation_names=found.names,
         correlation=found.correlation,
-        warnings=(*warnings, *summary.warnings(spectra, weighed, found)),
+        warnings=(*warnings, *summary.warnings(spectra, weighed, unclear)),
         profile=profile,
         seconds=time.perf_counter() - began,
     )

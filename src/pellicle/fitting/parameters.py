@@ -137,10 +137,17 @@ def _owner(scene: Scene, path: tuple) -> list[str]:
     first = path[0].name
     if first != "layers":
         return [] if first == "light" else [first]
-    if len(scene.layers) == 1:
-        return []
-    position = path[1].idx
-    return [scene.layers[position].name or f"layer{position + 1}"]
+    return _layer(scene, path[1].idx)
+
+
+def _layer(scene: Scene, position: int) -> list[str]:
+    """What a layer's parameters begin with: nothing if it is the only one."""
+    return [] if len(scene.layers) == 1 else [scene.layers[position].name or f"layer{position + 1}"]
+
+
+def thickness_name(scene: Scene, position: int) -> str:
+    """The full name of a layer's thickness."""
+    return ".".join([*_layer(scene, position), "thickness"])
 
 
 def bounds(parameters: tuple[Parameter, ...]) -> tuple[np.ndarray, np.ndarray]:

@@ -64,14 +64,14 @@ def search(problem: Problem, progress: Progress) -> Minima:
     units = np.repeat(design, max(len(grid), 1), axis=0)
     if depth is not None:
         units[:, depth] = np.tile(grid, len(design))
-    table = _scan(thinned, units, progress).reshape(len(design), max(len(grid), 1), -1)
+    table = scanned(thinned, units, progress).reshape(len(design), max(len(grid), 1), -1)
     batches = 1 if len(design) == 1 else 3 if len(problem.parameters) < 4 else 6
     starts = units[_local_minima(table.sum(-1), most=batches * LANES)]
     minima = polished(problem, starts, progress)
     if depth is None:
         return minima
     p = problem.parameters[depth]
-    seen = np.concatenate([_scan(thinned, minima.units[:1], quiet), table.reshape(len(units), -1)])
+    seen = np.concatenate([scanned(thinned, minima.units[:1], quiet), table.reshape(len(units), -1)])
     lowest = seen[np.argmin(seen.sum(-1))]
     return replace(minima, scan=Scan(p.lower + grid * (p.upper - p.lower), table - lowest))
 
@@ -157,7 +157,7 @@ def _dispersion_fringes(p: Parameter, problem: Problem) -> float:
     return 2 * min(thickest, 2000.0) / blue * (p.upper - p.lower) * (1 / blue**2 - 1 / red**2)
 
 
-def _scan(problem: Problem, units: np.ndarray, progress: Progress) -> np.ndarray:
+def scanned(problem: Problem, units: np.ndarray, progress: Progress) -> np.ndarray:
     """Evidence of every candidate in each view, in chunks of one shape: one program, and room for Ctrl-C."""
     found = np.empty((len(units), len(problem.views)))
     for first in range(0, len(units), _CHUNK):
@@ -178,14 +178,34 @@ def _local_minima(table: np.ndarray, most: int) -> np.ndarray:
     return lowest[np.argsort(table.ravel()[lowest])][:most]
 
 
-def _polish(problem: Problem, starts: np.ndarray, progress: Progress):
-    looks, *arguments = problem.program
+def held(problem: Problem, which: int, values: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    """The least evidence, (values,), with one parameter held at each value and the others polished.
+
+    `starts` (values, starts, parameters) are in the unit cube.
+    """
+    at = np.repeat(values, starts.shape[1])
+    _, evidence, _ = _polish(problem, starts.reshape(len(at), -1), quiet, (which, at))
+    return evidence.reshape(len(values), -1).min(axis=1)
+
+
+def _polish(
+    problem: Problem, starts: np.ndarray, progress: Progress, hold: tuple[int, np.ndarray] | None = None
+):
+    """Minima below the starts, in lanes of one shape: one program. `hold` fixes one parameter of each."""
+    looks, scenes, data, box = problem.program
+    lower, upper = np.tile(box.lower, (len(starts), 1)), np.tile(box.upper, (len(starts), 1))
+    if hold is not None:
+        lower[:, hold[0]] = upper[:, hold[0]] = hold[1]
     pieces = []
     for first in range(0, len(starts), LANES):
-        lanes = starts[first : first + LANES]
-        padded = np.concatenate([lanes, np.repeat(lanes[-1:], LANES - len(lanes), axis=0)])
-        result = jax.device_get(polish(looks, *arguments, padded))
-        pieces.append([column[: len(lanes)] for column in result])
+        lanes = [_padded(x[first : first + LANES]) for x in (starts, lower, upper)]
+        own = box._replace(lower=lanes[1], upper=lanes[2])
+        result = jax.device_get(polish(looks, scenes, data, own, lanes[0]))
+        pieces.append([column[: len(starts) - first] for column in result])
         progress("polish", min(first + LANES, len(starts)), len(starts))
     units, evidence, converged = (np.concatenate(column) for column in zip(*pieces, strict=True))
     return units, np.where(np.isfinite(evidence), evidence, np.inf), converged
+
+
+def _padded(lanes: np.ndarray) -> np.ndarray:
+    return np.concatenate([lanes, np.repeat(lanes[-1:], LANES - len(lanes), axis=0)])

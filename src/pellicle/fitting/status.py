@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Container, Mapping, Sequence
 
 from pellicle.fitting.result import Estimate, Rival, Status
 
@@ -79,36 +79,53 @@ def verdict(
     rivals: tuple[Rival, ...],
     rms: float,
     missed: str = "the data",
+    opaque: Container[str] = (),
+    trading: Sequence[str] = (),
 ) -> str:
     """One or two sentences for a reader who is no statistician.
 
-    `missed` is what the scene does not explain, by `rms`, where it explains too little.
+    `missed` is what the scene does not explain, by `rms`, where it explains too little; `opaque` are
+    thicknesses of layers that absorb, and `trading` sentences of what the leading parameter trades with.
     """
     lead = next((p for p in parameters.values() if p.free), None)
     if lead is None:
         return "Nothing was free to fit."
-    told = describe(lead)
+    told, best = describe(lead), f"{lead.name} {lead.value:.4g}{_unit(lead)}"
+    besides = "".join(f" But {sentence}." for sentence in trading[:1])
     if status is Status.CONVERGED:
-        return f"The data decide: {told}."
+        return f"The data decide: {told}.{besides}"
     if status is Status.AT_BOUND:
         resting = [p for p in parameters.values() if p.free and p.at_bound]
         names = " and ".join(f"{p.name} ({p.value:.6g}{_unit(p)})" for p in resting)
-        return f"{told} fits best, but {names} rests on a bound: widen it, or the scene is another."
-    if status is Status.AMBIGUOUS:
-        other = distinct_rivals(parameters, rivals)[0]
-        value = other.parameters.get(lead.name, math.nan)
         return (
-            f"The data do not decide: {told} fits best, but"
-            f" {value:.4g}{_unit(lead)} fits nearly as well (Δχ² {other.delta_chi2:.1f})."
+            f"The best fit, {told}, lies at the edge of what was allowed: {names} rests on a bound."
+            " Widen it; if it only moves on, the scene is another."
         )
+    if status is Status.AMBIGUOUS:
+        other = _other(parameters, rivals, lead)
+        return f"The data do not decide: {told} fits best, but {other} fits nearly as well."
     if status is Status.NOT_IDENTIFIABLE:
-        return f"The data do not determine {lead.name}: {_limits(lead)}."
+        if lead.name in opaque and lead.lower_limit is not None:
+            return f"The layer is opaque: {lead.name} {limits_in_words(lead)}."
+        return f"The data do not determine {lead.name}: it {limits_in_words(lead)}.{besides}"
     if status is Status.MISFIT:
         return (
-            f"The scene does not explain {missed} (rms {rms:.4f} with structured residuals): the best fit,"
-            f" {told}, should not be used."
+            f"The scene does not explain {missed}: even the best fit misses by {rms:.2g} on average, far more"
+            f" than noise would. Its {best} should not be used."
         )
-    return f"The solver did not settle; its best point, {told}, should not be used."
+    return f"The fit did not settle on an answer: its best point so far, {best}, should not be used."
+
+
+def _other(parameters: Mapping[str, Estimate], rivals: tuple[Rival, ...], lead: Estimate) -> str:
+    """The best distinct rival, by its leading parameter, or by those that set it apart if that does not."""
+    rival = distinct_rivals(parameters, rivals)[0]
+    apart = [
+        name for name in rival.parameters if _outside(parameters, Rival({name: rival.parameters[name]}, 0.0))
+    ]
+    value = rival.parameters.get(lead.name, math.nan)
+    if lead.name in apart or not apart:
+        return f"{value:.4g}{_unit(lead)}"
+    return " and ".join(f"{name} {rival.parameters[name]:.4g}{_unit(parameters[name])}" for name in apart[:2])
 
 
 def describe(p: Estimate) -> str:
@@ -123,9 +140,15 @@ def _unit(p: Estimate) -> str:
     return f" {p.unit}" if p.unit else ""
 
 
-def _limits(p: Estimate) -> str:
+def limits_in_words(p: Estimate) -> str:
+    """`is at least 145 nm (95 %)`, of a parameter that is bounded on one side or on none."""
     if p.lower_limit is not None and p.upper_limit is None:
-        return f"it is at least {p.lower_limit:.4g}{_unit(p)} (95 %)"
+        return f"is at least {_rounded(p.lower_limit)}{_unit(p)} (95 %)"
     if p.upper_limit is not None and p.lower_limit is None:
-        return f"it is at most {p.upper_limit:.4g}{_unit(p)} (95 %)"
-    return f"any value between {p.lower:.6g} and {p.upper:.6g}{_unit(p)} fits about as well"
+        return f"is at most {_rounded(p.upper_limit)}{_unit(p)} (95 %)"
+    return f"may be anything between {p.lower:.6g} and {p.upper:.6g}{_unit(p)}"
+
+
+def _rounded(limit: float) -> str:
+    """Two digits of what is small, nothing behind the point of what is large."""
+    return f"{limit:.2g}" if abs(limit) < 10 else f"{limit:.4g}"

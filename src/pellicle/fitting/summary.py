@@ -7,20 +7,22 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pellicle.fitting.limits import limits
+from pellicle.fitting.limits import ONE_SIDED, Limits, limits
 from pellicle.fitting.measured import Measured, drifts
 from pellicle.fitting.nuisance import Data
-from pellicle.fitting.parameters import Parameter, fixed_numbers
+from pellicle.fitting.parameters import Parameter, fixed_numbers, thickness_name
 from pellicle.fitting.problem import Problem, View
 from pellicle.fitting.result import Estimate, Profile, Rival
-from pellicle.fitting.uncertainty import UNSEEN, Errors, linear_coefficients
+from pellicle.fitting.uncertainty import Errors, Linear, linear_coefficients
 from pellicle.fitting.weigh import Met, Weighed
 from pellicle.materials import materials_in
-from pellicle.scene import Scene
+from pellicle.scene import Layer, Scene, insert
 
 _RULED_OUT = 1e8
 _ON_BOUND = 1e-6
 _MOST_RIVALS = 10
+_ABSORBS = 1e-3
+"""An extinction above this is what makes a layer opaque."""
 FEWEST_FRINGES = 0.75
 """Fringes that a spectrum must span where scale and offset drift: with fewer, drift can imitate the film.
 On real soap films from 510 to 910 nm this is 330 nm, below which no single spectrum was decided."""
@@ -33,27 +35,16 @@ def estimates(
     problem, unit = weighed.problem, weighed.minima.units[0]
     values = problem.box.values(unit)
     least = _least(spectra, weighed)
-    scanned = problem.thickness_axis
     order = sorted(range(len(values)), key=lambda i: problem.parameters[i].key != "thickness")
-    free = [
-        _estimate(
-            problem.parameters[i],
-            values[i],
-            found.stderr[i],
-            unit[i],
-            profile if i == scanned else None,
-            least,
-        )
-        for i in order
-    ]
+    bounded = limits(weighed, found.covariance, profile)
+    free = [_estimate(problem.parameters[i], values[i], unit[i], bounded[i], least) for i in order]
     coefficients = [
         c
         for view, met in zip(problem.views, weighed.met, strict=True)
         for c in linear_coefficients(view, met.at)
     ]
     linear = [
-        Estimate(c.name, c.value, float(sd), "", -math.inf, math.inf, True)
-        for c, sd in zip(coefficients, found.stderr[len(values) :], strict=True)
+        _coefficient(c, float(sd)) for c, sd in zip(coefficients, found.stderr[len(values) :], strict=True)
     ]
     fixed = [
         Estimate(name, value, 0.0, unit_, value, value, False)
@@ -78,32 +69,21 @@ def thinnest(view: View, met: Met) -> float:
     return float(FEWEST_FRINGES / max(np.ptp(order), 1e-12))
 
 
-def _estimate(
-    p: Parameter, value: float, stderr: float, position: float, profile: Profile | None, least: float
-) -> Estimate:
-    at_low, at_high = bool(position <= _ON_BOUND), bool(position >= 1 - _ON_BOUND)
-    lower_limit = upper_limit = None
-    if p.key == "thickness" and profile is not None:
-        lower_limit, upper_limit, bounded = limits(profile, float(value))
-        if bounded and value < least:
-            upper_limit, bounded = least, False
-        stderr = stderr if bounded else math.inf
-    elif at_low and p.natural_lower:
-        upper_limit = float(min(value + 1.645 * stderr, p.upper))
-    if stderr > UNSEEN * (p.upper - p.lower):
-        stderr = math.inf
+def _estimate(p: Parameter, value: float, position: float, found: Limits, least: float) -> Estimate:
+    stderr, lower, upper = found
+    if p.key == "thickness" and math.isfinite(stderr) and value < least:
+        stderr, upper = math.inf, least
+    at_bound = bool(position <= _ON_BOUND or position >= 1 - _ON_BOUND)
     return Estimate(
-        p.name,
-        float(value),
-        float(stderr),
-        p.unit,
-        p.lower,
-        p.upper,
-        True,
-        at_low or at_high,
-        lower_limit,
-        upper_limit,
+        p.name, float(value), float(stderr), p.unit, p.lower, p.upper, True, at_bound, lower, upper
     )
+
+
+def _coefficient(c: Linear, sd: float) -> Estimate:
+    """Of the scale or the offset; an offset that may as well be 0 has an upper limit."""
+    reach = ONE_SIDED**0.5 * sd
+    upper = c.value + reach if c.not_negative and c.value < reach else None
+    return Estimate(c.name, c.value, sd, "", -math.inf, math.inf, True, upper_limit=upper)
 
 
 def rivals(weighed: Weighed) -> tuple[Rival, ...]:
@@ -135,13 +115,26 @@ def _reweighed(before: Data, after: Data) -> float:
     return float((after.weight[0] / before.weight[0]) ** 2 * after.temper / before.temper)
 
 
-def warnings(spectra: Sequence[Measured], weighed: Weighed, found: Errors) -> tuple[str, ...]:
-    """What the reader should know before using the numbers."""
+def opaque(spectra: Sequence[Measured], weighed: Weighed) -> frozenset[str]:
+    """Names of the thicknesses of layers that absorb at the best fit."""
+    view, values = weighed.problem.views[0], weighed.problem.box.values(weighed.minima.units[0])
+    scene = insert(spectra[0].scene, values[list(view.takes)])
+    wavelength = np.asarray(spectra[0].wavelength)
+    found = [
+        thickness_name(scene, i)
+        for i, layer in enumerate(scene.layers)
+        if isinstance(layer, Layer) and np.median(layer.material(wavelength).imag) > _ABSORBS
+    ]
+    return frozenset(found)
+
+
+def warnings(spectra: Sequence[Measured], weighed: Weighed, unclear: Sequence[str]) -> tuple[str, ...]:
+    """What the reader should know before using the numbers; `unclear` is what the data do not decide."""
     told = [w for m in spectra for material in materials_in(m.scene) for w in material.warnings()]
     for spectrum, view, met in zip(spectra, weighed.problem.views, weighed.met, strict=True):
         own = f"{view.name}: " if view.name else ""
         told += [own + sentence for sentence in _of_view(spectrum.scene, view, met.length)]
-    return tuple(dict.fromkeys([*told, *_trades(weighed, found)]))
+    return tuple(dict.fromkeys([*told, *unclear]))
 
 
 def _of_view(scene: Scene, view: View, length: float) -> list[str]:
@@ -159,13 +152,3 @@ def _of_view(scene: Scene, view: View, length: float) -> list[str]:
             "transmittance into the substrate, as if the detector were inside it: add --back air for a plate"
         )
     return told
-
-
-def _trades(weighed: Weighed, found: Errors) -> list[str]:
-    names, matrix = found.names[: len(weighed.problem.parameters)], found.correlation
-    return [
-        f"{names[i]} and {names[j]} trade against each other (correlation {matrix[i, j]:+.3f})"
-        for i in range(len(names))
-        for j in range(i)
-        if abs(matrix[i, j]) > 0.99
-    ]

@@ -1,0 +1,152 @@
+"""What the data decide and what they do not, in words.
+
+The Jacobian in units of the noise and of a meaningful step of each parameter: a singular value below 1
+says that along its direction the parameters may move by more than a step before one standard deviation
+of the noise is reached. Where several parameters make up such a direction they trade against each other.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Container, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from pellicle.fitting.result import Estimate
+from pellicle.fitting.status import limits_in_words
+from pellicle.fitting.uncertainty import Scaled
+
+STEPS = {
+    "thickness": 1.0,  # nm, or 1 % where that is more
+    "roughness": 1.0,
+    "thickness_spread": 1.0,
+    "bandwidth": 1.0,
+    "angle": 0.1,  # degrees
+    "n": 0.01,
+    "A": 0.01,
+    "n_inf": 0.01,
+    "k": 0.001,
+    "k0": 0.001,
+    "fraction": 0.01,
+    "scale": 0.01,  # of a signal that is 1
+    "offset": 0.001,
+}
+"""What is worth knowing of a parameter, by the last part of its name; of others 1 % of their range."""
+_SHARE = 0.01
+_WORTH = 0.3
+"""Steps that a parameter must move along a direction to be named in it."""
+_BETTER = 3.0
+"""How much better a parameter would be known with the others known, before they are said to trade."""
+_LEAST = 1e-100
+_LAW = 0.15
+"""How well a direction must follow n·d = const or n/d = const, in logarithms, to be called so."""
+_NUISANCE = re.compile(r"instrument\.(scale|offset)(_\d+)?(\..+)?$")
+
+
+def step(name: str, estimate: Estimate) -> float:
+    """The meaningful step of a parameter, in its own unit."""
+    key = _key(name)
+    if key == "thickness":
+        return max(STEPS[key], _SHARE * abs(estimate.value))
+    if key in STEPS and estimate.upper - estimate.lower > STEPS[key]:
+        return STEPS[key]
+    span = estimate.upper - estimate.lower
+    return _SHARE * (span if math.isfinite(span) else max(abs(estimate.value), 1e-12))
+
+
+def _key(name: str) -> str:
+    """The last part of a parameter's name, without the name of a spectrum that it belongs to."""
+    parts = name.split(".")
+    return parts[1] if parts[0] == "instrument" else parts[-1]
+
+
+def trades(found: Scaled, parameters: Mapping[str, Estimate]) -> list[str]:
+    """A sentence for each set of parameters of which the data decide a combination only.
+
+    Scale and offset are eliminated first, and said to trade where the others suffer from it.
+    """
+    steps = np.array([step(name, parameters[name]) for name in found.names])
+    matrix = found.jacobian * (steps / found.unit)
+    nuisance = np.array([bool(_NUISANCE.match(name)) for name in found.names])
+    own, linear = matrix[:, ~nuisance], matrix[:, nuisance]
+    triangle: Any = np.linalg.qr(np.hstack([linear, own]), mode="r")
+    left = triangle[linear.shape[1] :, linear.shape[1] :]
+    free = [parameters[name] for name, aside in zip(found.names, nuisance, strict=True) if not aside]
+    told = [_trade([free[i] for i in part], moves) for part, moves in _directions(left, steps[~nuisance])]
+    drowned = (_spread(left) > 1) & (_spread(left) > _BETTER * _spread(own))
+    if linear.size and drowned.any():
+        names = " and ".join(p.name for p, lost in zip(free, drowned, strict=True) if lost)
+        told.append(f"{names} would be known far better with a known scale and offset of the instrument")
+    return told
+
+
+def _directions(matrix: np.ndarray, steps: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Which parameters (columns) move together unseen by more than a step, and by how much in their units.
+
+    A parameter belongs to the direction that most of its variance comes from (D. Belsley, E. Kuh and
+    R. Welsch, 1980, Regression Diagnostics), if it would be known far better with the others known.
+    """
+    _, sizes, rows = np.linalg.svd(matrix, full_matrices=False)
+    moved = rows / np.maximum(sizes, _LEAST)[:, None]
+    share = moved**2 / np.sum(moved**2, axis=0)
+    suffers = _spread(matrix) * np.linalg.norm(matrix, axis=0) > _BETTER
+    found = []
+    for move, of_all in zip(moved, share, strict=True):
+        part = np.flatnonzero((of_all > 0.5) & suffers & (np.abs(move) > _WORTH))
+        if np.linalg.norm(move) > 1 and len(part) > 1:
+            found.append((part, move[part] * steps[part]))
+    return found
+
+
+def _spread(matrix: np.ndarray) -> np.ndarray:
+    """Standard error of each parameter (column), the others being free."""
+    _, sizes, rows = np.linalg.svd(matrix, full_matrices=False)
+    return np.linalg.norm(rows / np.maximum(sizes, _LEAST)[:, None], axis=0)
+
+
+def _trade(found: Sequence[Estimate], moves: np.ndarray) -> str:
+    """`moves` says how far each goes along the direction that the data do not see, in its own unit."""
+    order = sorted(range(len(found)), key=lambda i: _key(found[i].name) == "thickness")
+    found, moves = [found[i] for i in order], moves[order]
+    names = [p.name for p in found]
+    if len(found) > 2:
+        every = f"{', '.join(names[:-1])} and {names[-1]}"
+        return f"{every} trade against each other: none of them is known alone"
+    moves = moves * step(names[0], found[0]) / moves[0]
+    amounts = f"{_amount(moves[0], found[0])} against {_amount(abs(moves[1]), found[1])}"
+    if law := _law(found, moves):
+        return f"only {law} is determined: {names[0]} and {names[1]} trade against each other, {amounts}"
+    way = "one rises as the other does" if moves[1] > 0 else "one rises as the other falls"
+    return f"{names[0]} and {names[1]} trade against each other, {amounts} ({way}): neither is known alone"
+
+
+def _law(found: Sequence[Estimate], moves: np.ndarray) -> str:
+    """The product or the quotient that stays as it is along the direction, if one does."""
+    relative = moves / np.array([p.value or math.inf for p in found])
+    names, near = [p.name for p in found], _LAW * np.max(np.abs(relative))
+    if abs(relative.sum()) < near:
+        return f"the product {names[0]}·{names[1]}"
+    return f"the quotient {names[0]}/{names[1]}" if abs(relative[0] - relative[1]) < near else ""
+
+
+def _amount(size: float, p: Estimate) -> str:
+    return f"{size:.2g}{f' {p.unit}' if p.unit else ''}"
+
+
+def of(lead: str, trading: Sequence[str]) -> list[str]:
+    """The sentences that name the leading parameter."""
+    return [sentence for sentence in trading if re.search(rf"(?<![\w.]){re.escape(lead)}(?![\w.])", sentence)]
+
+
+def bounded(parameters: Mapping[str, Estimate], opaque: Container[str]) -> list[str]:
+    """A sentence for each free parameter that the data bound on one side only, or not at all."""
+    told = []
+    for name, p in parameters.items():
+        if p.free and p.upper_limit is not None and math.isfinite(p.stderr):
+            told.append(f"{name} is compatible with 0: it {limits_in_words(p)}")
+        elif p.free and not math.isfinite(p.stderr):
+            opening = "the layer is opaque: " if name in opaque and p.lower_limit is not None else ""
+            told.append(f"{opening}{name} {limits_in_words(p)}")
+    return told
