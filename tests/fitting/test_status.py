@@ -41,7 +41,9 @@ def test_a_natural_bound_gives_an_upper_limit_and_stays_converged(film, measured
         pytest.fail("k never came to rest on zero in eight noises")
     assert 0 < fit["k"].upper_limit < 0.01
     assert fit["k"].lower_limit is None
-    assert fit["k"].upper_limit == pytest.approx(1.645 * fit["k"].stderr)
+    # resting on the bound against a slope it is known better than a parabola from 0 would have it
+    assert 0.2 < fit["k"].upper_limit / fit["k"].stderr <= 1.645
+    assert any(w.startswith("k is compatible with 0: it is at most") for w in fit.warnings)
 
 
 def test_bounds_that_only_look_natural_are_the_users(film, measured):
@@ -71,7 +73,7 @@ def test_misfit_where_sigma_is_known(film, measured):
     fit = pl.fit(data, film(material=1.6))
     assert fit.chi2_reduced > 4
     assert fit.status is pl.Status.MISFIT
-    assert "does not explain the data" in fit.verdict
+    assert "does not explain the data: even the best fit misses by" in fit.verdict
     assert "should not be used" in fit.verdict
 
 
@@ -91,7 +93,7 @@ def test_not_identifiable(film, measured):
     fit = pl.fit(measured(scene, 500.0), scene)
     assert fit.status is pl.Status.NOT_IDENTIFIABLE
     limit = fit["thickness"].lower_limit
-    assert fit.verdict == f"The data do not determine thickness: it is at least {limit:.4g} nm (95 %)."
+    assert fit.verdict == f"The layer is opaque: thickness is at least {limit:.4g} nm (95 %)."
 
 
 def test_not_converged(film, measured, monkeypatch):
@@ -199,7 +201,7 @@ def test_sentences_of_limits():
 
     assert told(lower_limit=145.37).endswith("it is at least 145.4 nm (95 %).")
     assert told(upper_limit=161.6).endswith("it is at most 161.6 nm (95 %).")
-    assert told().endswith("any value between 0 and 1000 nm fits about as well.")
+    assert told().endswith("it may be anything between 0 and 1000 nm.")
 
 
 @pytest.mark.parametrize(

@@ -111,7 +111,7 @@ def test_opaque_gold_is_not_known_to_zero_nanometres(film, measured, truth, sigm
     assert fit["thickness"].stderr == float("inf")
     assert 50 < fit["thickness"].lower_limit < truth
     assert fit["thickness"].upper_limit is None
-    assert "at least" in fit.verdict
+    assert fit.verdict.startswith("The layer is opaque: thickness is at least")
 
 
 def test_a_film_that_is_everywhere_opaque(film, measured):
@@ -121,7 +121,7 @@ def test_a_film_that_is_everywhere_opaque(film, measured):
     assert fit.status == "not-identifiable"
     assert fit["thickness"].stderr == float("inf")
     assert fit["thickness"].lower_limit is None
-    assert "any value" in fit.verdict
+    assert "may be anything between 1000 and 4000 nm" in fit.verdict
 
 
 def test_index_and_thickness_of_a_thin_film_trade(film, measured):
@@ -140,10 +140,8 @@ def test_a_very_strong_trade_is_warned_of(film, measured):
     scene = film(pl.Free(None, 1, 60), pl.Constant(pl.Free(None, 1.2, 1.8)))
     fit = pl.fit(measured(scene, 1.46, 15.0, noise=1e-3, sigma=True), scene)
     names = list(fit.correlation_names)
-    if abs(fit.correlation[names.index("n"), names.index("thickness")]) > 0.99:
-        assert any("trade against each other" in warning for warning in fit.warnings)
-    else:
-        pytest.fail(f"expected a correlation above 0.99, got {fit.correlation}")
+    assert abs(fit.correlation[names.index("n"), names.index("thickness")]) > 0.99
+    assert any("n and thickness trade against each other" in warning for warning in fit.warnings)
 
 
 def test_a_parameter_without_effect_has_an_infinite_error(film, measured):
@@ -175,7 +173,7 @@ def test_a_direction_that_the_data_do_not_see_keeps_its_variance(film, measured)
 
 
 def test_a_lower_limit_is_where_chi2_has_risen_by_2_71(film, measured):
-    """A 95 % limit, interpolated on the grid of the scan; at half of it the film is far out."""
+    """A 95 % limit; at half of it the film is far out."""
     scene = film(pl.Free(None, 1, 1000), "Au")
     data = measured(scene, 500.0, noise=0.005, sigma=True)
     fit = pl.fit(data, scene)
@@ -183,8 +181,8 @@ def test_a_lower_limit_is_where_chi2_has_risen_by_2_71(film, measured):
     def rise(thickness):
         model = synthesise(film(thickness, "Au"), data.wavelength).clean
         chi2 = np.sum(((data.values - model) / data.sigma) ** 2)
-        return (chi2 - fit.chi2_reduced * (len(data) - 1)) * fit.effective_points / len(data)
+        return chi2 - fit.chi2_reduced * (len(data) - 1)
 
     limit = fit["thickness"].lower_limit
-    assert 2 < rise(limit) < 3.5
+    assert rise(limit) == pytest.approx(2.71, abs=0.05)
     assert rise(limit / 2) > 30

@@ -30,7 +30,9 @@ _FLAT, _CURVED = 0.5, 4.0
 """The misfit at that reach as a share of the parabola's: outside of these a profile is made."""
 _NEAR = 1e-3
 """A best thickness this close (nm) to a bound rests on it; the side is open if the misfit is flat there."""
-_ON_BOUND = 1e-6
+_STEEP = 3.3
+"""A limit nearer than this many standard errors to a bound on which the best value rests: the misfit rises
+from there, as it would not for a parameter that the data do not see."""
 _STEPS = 7
 """Values on each side of the best one at which a profile is looked at, and again around a limit."""
 
@@ -82,6 +84,11 @@ class _Best(NamedTuple):
         """The standard error, infinite where it says no more than the bounds."""
         return self.sd if self.sd <= UNSEEN * (self.upper - self.lower) else np.inf
 
+    @property
+    def rests(self) -> bool:
+        """Whether the best value is one of the bounds."""
+        return min(self.value - self.lower, self.upper - self.value) <= 1e-6 * (self.upper - self.lower)
+
 
 class _Side(NamedTuple):
     """Where the misfit has not ruled a value out yet, and where it has."""
@@ -114,8 +121,7 @@ def _doubted(problem: Problem, best: np.ndarray, covariance: np.ndarray) -> np.n
     own = np.concatenate([np.diag(half - best) for half in np.split(ends, 2)])
     moved = np.abs(own) * np.tile(span / stderr, 2)
     share = (evidence[1:] - evidence[0]) / np.maximum(moved, 1e-100) ** 2
-    held = np.tile((best <= _ON_BOUND) | (best >= 1 - _ON_BOUND), 2)
-    wrong = (moved > 0.5) & ((share < _FLAT) | ((share > _CURVED) & ~held))
+    wrong = (moved > 0.5) & ((share < _FLAT) | (share > _CURVED))
     return (stderr > UNSEEN * span) | wrong.reshape(2, count).any(axis=0)
 
 
@@ -153,6 +159,9 @@ def _profiled(rise: Rise, at: _Best, flat: tuple[bool, bool]) -> Limits:
         low, high = (_crossing(rise, side, TWO_SIDED) for side in (below, above))
         return Limits((high - low) / (2 * TWO_SIDED**0.5))
     lower, upper = (None if side is None else _crossing(rise, side, ONE_SIDED) for side in (below, above))
+    limit = upper if lower is None else lower
+    if at.rests and limit is not None and abs(limit - at.value) < _STEEP * at.error and not any(flat):
+        return Limits(at.error)  # the data push against that bound: they see the parameter well enough
     return Limits(np.inf, lower, upper)
 
 

@@ -26,6 +26,7 @@ class Linear:
     basis: np.ndarray  # what it multiplies at each point
     prior_sd: float
     on_signal: bool
+    not_negative: bool  # one number that cannot be below zero
 
 
 def correlation(covariance: np.ndarray) -> np.ndarray:
@@ -72,8 +73,9 @@ def _series(name: str, view: View, curve, sd: np.ndarray, size: float | None) ->
     prior_sd = sd * (abs(coefficients[0]) if size is None else size)
     own = f".{view.name}" if view.name else ""
     names = [f"instrument.{name}" + (f"_{j}" if j else "") + own for j in range(degree + 1)]
+    not_negative = name == "offset" and degree == 0
     return [
-        Linear(*row, name == "scale")
+        Linear(*row, name == "scale", not_negative)
         for row in zip(names, coefficients.tolist(), basis, prior_sd, strict=True)
     ]
 

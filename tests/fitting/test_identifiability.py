@@ -1,0 +1,131 @@
+"""What trades with what, of Jacobians whose answer is known beforehand."""
+
+import math
+
+import numpy as np
+import pytest
+
+import pellicle as pl
+from pellicle.fitting.identifiability import bounded, of, step, trades
+from pellicle.fitting.result import Estimate
+from pellicle.fitting.uncertainty import Scaled
+
+NM = np.linspace(400.0, 900.0, 128)
+
+
+def estimate(name, value, lower, upper, stderr=1.0, unit="", **more):
+    return Estimate(name, value, stderr, unit, lower, upper, True, **more)
+
+
+N = estimate("n", 1.5, 1.2, 2.0)
+D = estimate("thickness", 480.0, 10.0, 1000.0, unit="nm")
+SCALE = estimate("instrument.scale", 1.0, -math.inf, math.inf)
+OFFSET = estimate("instrument.offset_1", 0.0, -math.inf, math.inf)
+
+
+def of_columns(noise, **columns):
+    """A problem whose model has these derivatives, in each parameter's own unit."""
+    names = tuple(columns)
+    return Scaled(np.column_stack(list(columns.values())) / noise, np.ones(len(names)), names)
+
+
+def fringes(noise, share=0.0):
+    """cos(4π n d/λ), which depends on n·d alone, and a `share` of n's own."""
+    phase = 4 * np.pi * N.value * D.value / NM
+    by_product = -np.sin(phase) * 4 * np.pi / NM
+    return of_columns(noise, n=by_product * D.value + share * np.cos(phase), thickness=by_product * N.value)
+
+
+def test_only_the_product_is_determined():
+    """d n/n = −d d/d: 0.01 of 1.5 is 3.2 nm of 480."""
+    [told] = trades(fringes(0.01), {"n": N, "thickness": D})
+    assert told == (
+        "only the product n·thickness is determined: n and thickness trade against each other,"
+        " 0.01 against 3.2 nm"
+    )
+
+
+def test_what_is_known_well_enough_does_not_trade():
+    """The same valley, but its length is below a step: the data tell n to 0.001."""
+    assert trades(fringes(0.01, share=10.0), {"n": N, "thickness": D}) == []
+
+
+def test_only_the_quotient_is_determined():
+    column = np.cos(NM / 50)
+    found = of_columns(0.01, n=column / D.value, thickness=-column * N.value / D.value**2)
+    [told] = trades(found, {"n": N, "thickness": D})
+    assert told.startswith("only the quotient n/thickness is determined")
+
+
+def test_another_valley_is_told_by_its_direction():
+    column = np.cos(NM / 50)
+    [told] = trades(of_columns(0.01, n=column, thickness=-column / 100), {"n": N, "thickness": D})
+    assert told == (
+        "n and thickness trade against each other, 0.01 against 1 nm (one rises as the other does):"
+        " neither is known alone"
+    )
+
+
+def test_two_that_are_not_seen_do_not_trade():
+    """Both columns are zero: any combination is as unseen as any other."""
+    assert trades(of_columns(0.01, n=0.0 * NM, thickness=0.0 * NM), {"n": N, "thickness": D}) == []
+
+
+def test_three_together():
+    a, b = np.cos(NM / 50), np.sin(NM / 50)
+    found = of_columns(0.001, A=a, B=b * 1e-3, thickness=(a + b) / 100)
+    names = {"A": estimate("A", 1.5, 1.2, 2.0), "B": estimate("B", 100.0, 0.0, 5000.0), "thickness": D}
+    [told] = trades(found, names)
+    assert told == "A, B and thickness trade against each other: none of them is known alone"
+
+
+def test_scale_and_offset_are_eliminated_and_told_of_apart():
+    column = np.cos(NM / 50)
+    found = of_columns(0.001, n=column, **{"instrument.scale": 2 * column, "instrument.offset_1": NM / 900})
+    names = {"n": N, "instrument.scale": SCALE, "instrument.offset_1": OFFSET}
+    assert trades(found, names) == [
+        "n would be known far better with a known scale and offset of the instrument"
+    ]
+    assert trades(of_columns(0.001, n=column, **{"instrument.scale": NM / 900}), names) == []
+
+
+def test_a_real_fit_says_so(film, measured):
+    """Two weak reflections of unknown scale and offset: a + b cos(4π n d/λ) shows n·d and nothing else."""
+    scene = film(
+        pl.Free(None, 10, 2000),
+        pl.Constant(pl.Free(None, 1.3, 1.7)),
+        substrate=pl.Constant(1.52),
+        instrument=pl.Instrument("free", "free"),
+    )
+    fit = pl.fit(measured(scene, 1.46, 1000.0, noise=1e-3, sigma=True), scene)
+    assert "only the product n·thickness is determined" in fit.verdict
+    assert "0.01 against 6.8 nm" in fit.verdict  # 1000 · 0.01 / 1.46
+    assert fit["n"].stderr == math.inf
+    assert fit["instrument.offset"].upper_limit > 0
+
+
+def test_steps_are_what_is_worth_knowing():
+    assert step("thickness", D) == pytest.approx(4.8)
+    assert step("film.thickness", estimate("film.thickness", 20.0, 1, 100)) == 1.0
+    assert step("instrument.bandwidth.film_R", estimate("instrument.bandwidth.film_R", 2.0, 0, 20)) == 1.0
+    assert step("n", estimate("n", 1.5, 1.499, 1.501)) == pytest.approx(2e-5)  # 1 % of narrow bounds
+    assert step("E0", estimate("E0", 4.0, 1, 10)) == pytest.approx(0.09)
+
+
+def test_sentences_of_bounds():
+    unseen = estimate("n", 1.5, 1.2, 2.0, math.inf)
+    small = estimate("k", 0.0, 0.0, 1.0, 1e-4, upper_limit=2.04e-4)
+    thick = estimate("au.thickness", 300.0, 1.0, 4000.0, math.inf, "nm", lower_limit=180.2)
+    known = {p.name: p for p in (unseen, small, thick, D)}
+    assert bounded(known, {"au.thickness"}) == [
+        "n may be anything between 1.2 and 2",
+        "k is compatible with 0: it is at most 0.0002 (95 %)",
+        "the layer is opaque: au.thickness is at least 180.2 nm (95 %)",
+    ]
+    assert bounded({"au.thickness": thick}, ())[0].startswith("au.thickness is at least")
+
+
+def test_sentences_of_the_leading_parameter():
+    told = ["A and au.thickness trade against each other", "n and thickness trade against each other"]
+    assert of("thickness", told) == told[1:]
+    assert of("au.thickness", told) == told[:1]
