@@ -10,7 +10,8 @@ import equinox as eqx
 import jax
 
 from pellicle.errors import UsageError
-from pellicle.fitting import backface, identifiability, parts, summary
+from pellicle.fitting import backface, identifiability, parts, structure, summary
+from pellicle.fitting.losses import LEAST_SQUARES, LOSSES
 from pellicle.fitting.measured import Measured, measured, unscaled
 from pellicle.fitting.problem import Problem, beyond, make
 from pellicle.fitting.result import Fit
@@ -27,6 +28,7 @@ def fit(
     scene: Scene | Sequence[Scene],
     *,
     tolerance: float = 0.0,
+    loss: str = LEAST_SQUARES,
     progress: Progress = quiet,
 ) -> Fit:
     """Fit the free parameters of `scene` to a spectrum, in float64 whatever the caller's setting.
@@ -40,24 +42,32 @@ def fit(
     With a `tolerance`, in the unit of each signal, effects that change less are left out (`pellicle.plan`);
     where the best fit turns out to lie beyond it, all of them are put back and the fit is done again.
 
+    With the `loss` "huber" or "student-t" a few outliers hardly count; it is "least-squares" otherwise.
+
     `progress` is called with a stage's name, how much is done and how much there is. Returns a
     `Fit`: best parameters with errors, rivals, a status and what was simulated.
 
-    **Raises:** UsageError where nothing is free, where scenes are not of one sample, or an
-    uncalibrated signal is given a fixed scale; ValueError where a material has no data at a
+    **Raises:** UsageError where nothing is free, where scenes are not of one sample, an uncalibrated
+    signal is given a fixed scale or the loss is unknown; ValueError where a material has no data at a
     wavelength, naming it.
     """
-    return fitted(data, scene, tolerance, progress)[0]
+    return fitted(data, scene, tolerance, progress, loss)[0]
 
 
 def fitted(
-    data: Spectrum | Sequence[Spectrum], scene: Scene | Sequence[Scene], tolerance: float, progress: Progress
+    data: Spectrum | Sequence[Spectrum],
+    scene: Scene | Sequence[Scene],
+    tolerance: float,
+    progress: Progress,
+    loss: str = LEAST_SQUARES,
 ) -> tuple[Fit, Weighed]:
     """What `fit` returns, and the minima and weights that it rests on, for whoever goes on from there."""
+    if loss not in (LEAST_SQUARES, *LOSSES):
+        raise UsageError(f"loss must be one of {', '.join([LEAST_SQUARES, *LOSSES])}, not {loss!r}")
     with jax.enable_x64(True):
         found = measurements(data, scene)
         spectra = [data] if isinstance(data, Spectrum) else list(data)
-        return _fit(spectra, found, tolerance, progress)
+        return _fit(spectra, found, tolerance, loss, progress)
 
 
 def measurements(data: Spectrum | Sequence[Spectrum], scene: Scene | Sequence[Scene]) -> list[Measured]:
@@ -111,22 +121,22 @@ def _scenes(spectra: list[Spectrum], scene: Scene | Sequence[Scene]) -> list[Sce
 
 
 def _fit(
-    data: list[Spectrum], spectra: list[Measured], tolerance: float, progress: Progress
+    data: list[Spectrum], spectra: list[Measured], tolerance: float, loss: str, progress: Progress
 ) -> tuple[Fit, Weighed]:
     began = time.perf_counter()
-    weighed, warnings = _weighed(make(*spectra, tolerance=tolerance), progress), []
+    weighed, warnings = _weighed(make(*spectra, tolerance=tolerance), loss, progress), []
     off = max(beyond(view, weighed.minima.units[0]) for view in weighed.problem.views)
     if off > tolerance:
         warnings = [
             f"at the best fit what was left out changes the signal by {off:.2g}, more than the tolerance "
             f"{tolerance:g}: fitted again with every effect"
         ]
-        weighed = _weighed(make(*spectra), progress)
+        weighed = _weighed(make(*spectra), loss, progress)
     return _report(data, spectra, weighed, warnings, began), weighed
 
 
-def _weighed(problem: Problem, progress: Progress) -> Weighed:
-    return weigh(problem, search(problem, progress))
+def _weighed(problem: Problem, loss: str, progress: Progress) -> Weighed:
+    return weigh(problem, search(problem, progress), loss)
 
 
 def _report(
@@ -150,7 +160,9 @@ def _report(
     shown, dark = (missed or each)[0], summary.opaque(spectra, weighed)
     trading = identifiability.trades(scaled(*around), parameters)
     of_lead = identifiability.of(next(iter(parameters)), trading)
-    said = verdict(status, parameters, others, shown.rms, shown.name or "the data", dark, of_lead)
+    at = next(i for i, part in enumerate(each) if part is shown)
+    where = structure.missed(problem.views[at], weighed.met[at])
+    said = verdict(status, parameters, others, shown.rms, shown.name or "the data", where, dark, of_lead)
     unclear = [*identifiability.bounded(parameters, dark), *trading]
     return Fit(
         parts=each,

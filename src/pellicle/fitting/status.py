@@ -79,12 +79,13 @@ def verdict(
     rivals: tuple[Rival, ...],
     rms: float,
     missed: str = "the data",
+    where: str = "",
     opaque: Container[str] = (),
     trading: Sequence[str] = (),
 ) -> str:
     """One or two sentences for a reader who is no statistician.
 
-    `missed` is what the scene does not explain, by `rms`, where it explains too little; `opaque` are
+    `missed` is what the scene does not explain, by `rms` and `where`, if it explains too little; `opaque` are
     thicknesses of layers that absorb, and `trading` sentences of what the leading parameter trades with.
     """
     lead = next((p for p in parameters.values() if p.free), None)
@@ -111,7 +112,7 @@ def verdict(
     if status is Status.MISFIT:
         return (
             f"The scene does not explain {missed}: even the best fit misses by {rms:.2g} on average, far more"
-            f" than noise would. Its {best} should not be used."
+            f" than noise would{f', most of all {where}' if where else ''}. Its {best} should not be used."
         )
     return f"The fit did not settle on an answer: its best point so far, {best}, should not be used."
 

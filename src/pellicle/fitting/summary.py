@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pellicle.fitting import structure
 from pellicle.fitting.limits import ONE_SIDED, Limits, limits
 from pellicle.fitting.measured import Measured, drifts
 from pellicle.fitting.nuisance import Data
@@ -16,7 +17,7 @@ from pellicle.fitting.result import Estimate, Profile, Rival
 from pellicle.fitting.uncertainty import Errors, Linear, linear_coefficients
 from pellicle.fitting.weigh import Met, Weighed
 from pellicle.materials import materials_in
-from pellicle.scene import Layer, Scene, insert
+from pellicle.scene import Layer, insert
 
 _RULED_OUT = 1e8
 _ON_BOUND = 1e-6
@@ -112,7 +113,9 @@ def profile(problem: Problem, weighed: Weighed) -> Profile | None:
 
 
 def _reweighed(before: Data, after: Data) -> float:
-    return float((after.weight[0] / before.weight[0]) ** 2 * after.temper / before.temper)
+    # a robust loss lowers the weights of some points
+    ratio = np.max(after.weight / np.where(before.weight > 0, before.weight, np.inf))
+    return float(ratio**2 * after.temper / before.temper)
 
 
 def opaque(spectra: Sequence[Measured], weighed: Weighed) -> frozenset[str]:
@@ -133,12 +136,12 @@ def warnings(spectra: Sequence[Measured], weighed: Weighed, unclear: Sequence[st
     told = [w for m in spectra for material in materials_in(m.scene) for w in material.warnings()]
     for spectrum, view, met in zip(spectra, weighed.problem.views, weighed.met, strict=True):
         own = f"{view.name}: " if view.name else ""
-        told += [own + sentence for sentence in _of_view(spectrum.scene, view, met.length)]
+        told += [own + sentence for sentence in _of_view(spectrum, view, met)]
     return tuple(dict.fromkeys([*told, *unclear]))
 
 
-def _of_view(scene: Scene, view: View, length: float) -> list[str]:
-    told = []
+def _of_view(spectrum: Measured, view: View, met: Met) -> list[str]:
+    told, scene, length = [], spectrum.scene, met.length
     orders = view.plan.row("orders")
     if orders.on and orders.error_bound > max(1e-4, view.plan.tolerance):
         told.append(f"{orders.count} orders leave an error of up to {orders.error_bound:.1g}: |q| is near 1")
@@ -147,6 +150,10 @@ def _of_view(scene: Scene, view: View, length: float) -> list[str]:
             f"residuals are correlated over {length:.0f} points: {view.rows} points"
             f" count as {view.rows / length:.0f}"
         )
+    if where := structure.missed(view, met):
+        told.append(f"the model misses structure {where}")
+    if met.outliers:
+        told.append(f"{met.outliers} of {view.rows} points lie so far off that they count for less than half")
     if scene.light.signal == "T" and scene.substrate.back is None:
         told.append(
             "transmittance into the substrate, as if the detector were inside it: add --back air for a plate"

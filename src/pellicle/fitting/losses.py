@@ -1,0 +1,62 @@
+"""Robust losses by name: how much a residual counts that is larger than noise should be.
+
+With z the residual in standard deviations and ρ(z) the loss, ψ = ρ'. Least squares have ψ = z; a loss
+whose ψ stops growing, or falls again, is not moved by a few outliers. They are fitted by least squares
+with weights ψ(z)/z, again and again (P. Huber and E. Ronchetti, 2009, Robust Statistics, 7.8).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+LEAST_SQUARES = "least-squares"
+
+_HUBER = 1.345
+"""Where Huber's loss turns straight: 95 % of the efficiency of least squares where noise is normal."""
+_FREEDOM = 4.0
+"""Degrees of freedom of Student's t (Lange, Little and Taylor, 1989, J. Am. Stat. Assoc. 84, 881)."""
+_MAD = 1.4826
+"""From the median of |z| to the standard deviation of a normal distribution."""
+
+
+class Loss(NamedTuple):
+    """A loss ρ, its weight ψ/z and its curvature ψ'."""
+
+    loss: Callable[[np.ndarray], np.ndarray]
+    weight: Callable[[np.ndarray], np.ndarray]
+    curvature: Callable[[np.ndarray], np.ndarray]
+
+
+def _inside(z: np.ndarray) -> np.ndarray:
+    return np.abs(z) <= _HUBER
+
+
+LOSSES = {
+    "huber": Loss(
+        lambda z: np.where(_inside(z), 0.5 * z**2, _HUBER * (np.abs(z) - 0.5 * _HUBER)),
+        lambda z: _HUBER / np.maximum(np.abs(z), _HUBER),
+        lambda z: _inside(z).astype(float),
+    ),
+    "student-t": Loss(
+        lambda z: 0.5 * (_FREEDOM + 1) * np.log1p(z**2 / _FREEDOM),
+        lambda z: (_FREEDOM + 1) / (_FREEDOM + z**2),
+        lambda z: (_FREEDOM + 1) * (_FREEDOM - z**2) / (_FREEDOM + z**2) ** 2,
+    ),
+}
+"""Losses that a fit may be asked for beside least squares."""
+
+
+def spread(residual: np.ndarray) -> float:
+    """The standard deviation of the bulk of the residuals, whatever the rest may be."""
+    return float(max(_MAD * np.median(np.abs(residual)), 1e-300))
+
+
+def inflation(loss: Loss, z: np.ndarray) -> float:
+    """What multiplies the variance that the reweighted Jacobian gives: E[w] E[ψ²] / E[ψ']², of residuals
+    whose bulk has a standard deviation of 1."""
+    weight = loss.weight(z)
+    curvature = max(float(np.mean(loss.curvature(z))), 0.1)
+    return float(np.mean(weight) * np.mean((weight * z) ** 2) / curvature**2)
