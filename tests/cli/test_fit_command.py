@@ -240,3 +240,33 @@ def test_flags_reach_the_scene(pellicle, spectrum_file):
     assert (p["n"]["lower"], p["n"]["upper"], p["n"]["free"]) == (1.4, 1.5, True)
     assert p["instrument.scale"]["free"]
     assert p["instrument.offset"]["free"]
+
+
+def test_outliers_hardly_count_with_a_robust_loss(pellicle, spectrum_file, scene, tmp_path):
+    """By flag and by recipe; a name that is none is refused, and so is a posterior of it."""
+    path = spectrum_file()
+    lines = path.read_text().splitlines()
+    for row in range(10, 100, 9):
+        nm, value = lines[row].split(",")
+        lines[row] = f"{nm},{float(value) + 0.2:.6f}"
+    path.write_text("\n".join(lines) + "\n")
+    plain = pellicle("fit", path, *scene, "--json").objects[0]
+    ran = pellicle("fit", path, *scene, "--json", "--loss", "student-t")
+    [robust] = ran.objects
+    assert ran.code == 0
+    assert plain["data"]["sigma"] > 10 * robust["data"]["sigma"]
+    assert robust["data"]["sigma"] == pytest.approx(0.002, rel=0.4)
+    assert robust["data"]["sigma_from"] == "residuals"
+    recipe = tmp_path / "robust.toml"
+    recipe.write_text(
+        f'[data]\nfiles = ["{path.name}"]\nloss = "student-t"\n[scene]\nsubstrate = "3.9+0.02j"\n'
+        "[[scene.layer]]\nmaterial = 1.46\nthickness = { lower = 10, upper = 800 }\n"
+    )
+    [again] = pellicle("fit", "--recipe", recipe, "--json").objects
+    assert again["parameters"]["thickness"]["value"] == robust["parameters"]["thickness"]["value"]
+    wrong = pellicle("fit", path, *scene, "--loss", "cauchy")
+    assert wrong.code == 2
+    assert "--loss must be one of least-squares, huber, student-t, not 'cauchy'" in wrong.err
+    both = pellicle("fit", path, *scene, "--loss", "huber", "--posterior")
+    assert both.code == 2
+    assert "leave the loss out, or the posterior" in both.err

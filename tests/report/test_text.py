@@ -112,6 +112,7 @@ def test_plan_warnings_and_statistics(fit):
     assert block(text, "Warnings")[0].startswith("- SiO2 has no data for k")
     assert block(text, "Fit statistics") == [
         "rms residual        0.00141",
+        "noise               sigma 0.002, as given",
         "reduced chi-square  1.02",
         "seconds             0.42",
     ]
@@ -171,3 +172,14 @@ def test_the_summary_of_a_joint_fit_without_a_common_unit_has_no_rms(fit, spectr
 def joint(fit, other):
     parts = (replace(fit.parts[0], name="film"), replace(other.parts[0], name="angles"))
     return replace(fit, parts=parts, rms=None)
+
+
+@pytest.mark.parametrize(
+    ("source", "told"),
+    [
+        ("residuals", "sigma 0.002, estimated from the residuals: none was given"),
+        ("model", "sigma 0.002, the error that a drifting lamp is allowed: none was given"),
+    ],
+)
+def test_it_says_where_the_noise_comes_from(fit, with_part, source, told):
+    assert f"noise               {told}" in block(report(with_part(fit, sigma_from=source)), "Fit statistics")

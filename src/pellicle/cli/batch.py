@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from pellicle.cli.flags import ReadWords
 from pellicle.cli.options import read
 from pellicle.cli.session import Progress, say
+from pellicle.errors import UsageError
 
 if TYPE_CHECKING:
     from pellicle.fitting.result import Fit
@@ -57,6 +58,10 @@ class Batch:
         from pellicle.io.atomic import new_folder
         from pellicle.io.results import several, write_summary
 
+        if self.sampler is not None and any(
+            looks[0].reading.loss not in (None, "least-squares") for looks in groups
+        ):
+            raise UsageError("a posterior needs least squares: leave the loss out, or the posterior")
         folders = [None] * len(groups)
         if self.out is not None:
             root = Path(self.out)
@@ -125,8 +130,10 @@ class Batch:
             posterior = self._sampled(what, self.sampler, folder, progress)
             return posterior.fit, posterior
         from pellicle.fitting.fit import fit
+        from pellicle.fitting.losses import LEAST_SQUARES
 
-        return fit(*what, tolerance=self.tolerance, progress=progress), None
+        loss = looks[0].reading.loss or LEAST_SQUARES
+        return fit(*what, tolerance=self.tolerance, loss=loss, progress=progress), None
 
     def _sampled(
         self, what: tuple[Any, Any], sampler: Sampler, folder: Path | None, progress: Progress

@@ -67,6 +67,9 @@ class ReadWords:
     noise: Annotated[
         float | None, flag(READING, "Standard deviation of every point; degrees for psi-delta.")
     ] = None
+    loss: Annotated[
+        str | None, flag(READING, "least-squares, or huber or student-t: outliers hardly count.")
+    ] = None
     columns: Annotated[
         str | list[str] | None,
         Parameter(

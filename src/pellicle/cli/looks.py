@@ -45,6 +45,10 @@ def _check(reading: ReadWords) -> None:
         raise UsageError(f"--polarisation must be s, p or unpolarised, not {reading.polarisation!r}")
     if reading.noise is not None and not 0 < reading.noise < inf:
         raise UsageError(f"--noise must be a standard deviation above zero, got {reading.noise:g}")
+    if reading.loss is not None:
+        from pellicle.fitting.losses import check_loss
+
+        check_loss(reading.loss, "--loss")
     if reading.dark is not None and reading.reference is None:
         raise UsageError("--dark needs --reference: the counts of a sample of known reflectance")
     _check_units(reading)

@@ -11,7 +11,7 @@ import jax
 
 from pellicle.errors import UsageError
 from pellicle.fitting import backface, identifiability, parts, structure, summary
-from pellicle.fitting.losses import LEAST_SQUARES, LOSSES
+from pellicle.fitting.losses import LEAST_SQUARES, check_loss
 from pellicle.fitting.measured import Measured, measured, unscaled
 from pellicle.fitting.problem import Problem, beyond, make
 from pellicle.fitting.result import Fit
@@ -62,8 +62,7 @@ def fitted(
     loss: str = LEAST_SQUARES,
 ) -> tuple[Fit, Weighed]:
     """What `fit` returns, and the minima and weights that it rests on, for whoever goes on from there."""
-    if loss not in (LEAST_SQUARES, *LOSSES):
-        raise UsageError(f"loss must be one of {', '.join([LEAST_SQUARES, *LOSSES])}, not {loss!r}")
+    check_loss(loss)
     with jax.enable_x64(True):
         found = measurements(data, scene)
         spectra = [data] if isinstance(data, Spectrum) else list(data)

@@ -12,6 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pellicle.errors import UsageError
+
 LEAST_SQUARES = "least-squares"
 
 _HUBER = 1.345
@@ -47,6 +49,12 @@ LOSSES = {
     ),
 }
 """Losses that a fit may be asked for beside least squares."""
+
+
+def check_loss(name: str, what: str = "loss") -> None:
+    """UsageError for a name that is no loss."""
+    if name not in (LEAST_SQUARES, *LOSSES):
+        raise UsageError(f"{what} must be one of {', '.join([LEAST_SQUARES, *LOSSES])}, not {name!r}")
 
 
 def spread(residual: np.ndarray) -> float:

@@ -34,6 +34,7 @@ def _part(spectrum: Spectrum, view: View, met: Met, found: Errors) -> Part:
         rms=view.rms(met.at.model),
         chi2_reduced=met.chi2 / met.freedom,
         effective_points=view.rows / met.length,
+        sigma_from="given" if view.noise.given else "model" if view.noise.drifting else "residuals",
     )
 
 

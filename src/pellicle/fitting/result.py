@@ -110,7 +110,8 @@ class Part:
     """One spectrum of a fit, and how the best scene explains it.
 
     `name` is what its own parameters end in, empty where the fit is no joint one; `rms` is in the unit of
-    the signal: a fraction, or degrees of Ψ.
+    the signal: a fraction, or degrees of Ψ. `sigma_from` says where the curve's σ comes from: "given",
+    "residuals", or "model", the error of one whose lamp drifts.
     """
 
     name: str
@@ -120,6 +121,12 @@ class Part:
     rms: float
     chi2_reduced: float
     effective_points: float
+    sigma_from: str = "given"
+
+    @property
+    def sigma(self) -> float:
+        """The median σ of the points, in the unit of the signal."""
+        return float(np.median(self.curve.sigma))
 
 
 @dataclass(frozen=True)

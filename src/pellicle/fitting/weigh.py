@@ -85,7 +85,10 @@ def weigh(problem: Problem, minima: Minima, loss: str = LEAST_SQUARES) -> Weighe
         best, scan = minima.units[0], minima.scan
         minima = replace(polished(_reweighted(problem, found), minima.units, quiet), scan=scan)
         again = _residuals(problem, minima.units[0], robust)
-        if np.allclose(minima.units[0], best, atol=1e-3) and _agree(problem, found, again):
+        near = 1e-3 if robust is None else 1e-6
+        if np.allclose(minima.units[0], best, atol=near) and _agree(
+            problem, found, again, robust is not None
+        ):
             break
         found = again
     ranked = _reweighted(problem, found)
@@ -152,10 +155,11 @@ def _length(view: View, residual: np.ndarray) -> float:
     return float(np.mean([noise.correlation_length(column) for column in columns]))
 
 
-def _agree(problem: Problem, one: list[_Residual], other: list[_Residual]) -> bool:
-    """Whether the views weigh each other alike, within 2 %."""
+def _agree(problem: Problem, one: list[_Residual], other: list[_Residual], absolute: bool) -> bool:
+    """Whether the views weigh each other alike, within 2 %; `absolute` asks the same of their noise."""
     a, b = ([_rescale(v, r) for v, r in zip(problem.views, rs, strict=True)] for rs in (one, other))
-    return bool(np.allclose(np.divide(a, a[0]), np.divide(b, b[0]), rtol=0.02))
+    alike = bool(np.allclose(np.divide(a, a[0]), np.divide(b, b[0]), rtol=0.02))
+    return alike and (not absolute or bool(np.allclose(a, b, rtol=0.02)))
 
 
 def _rescale(view: View, found: _Residual) -> float:

@@ -137,6 +137,7 @@ class DataTable(_Reading):
     file: list[FileTable] = []
     wavelengths: GridTable | list[float] | None = None
     joint: bool = False
+    loss: Literal["least-squares", "huber", "student-t"] | None = None
 
     @model_validator(mode="after")
     def _one_list(self):

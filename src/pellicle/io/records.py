@@ -79,7 +79,8 @@ def _data(fit: Fit) -> dict[str, Any] | list[dict[str, Any]]:
 def _source(part: Part) -> dict[str, Any]:
     data = part.spectrum
     points = int(part.curve.wavelength.size)
-    return {"path": data.path, "sha256": data.sha256, "signal": data.signal, "points": points}
+    noise = {"sigma": _number(part.sigma), "sigma_from": part.sigma_from}
+    return {"path": data.path, "sha256": data.sha256, "signal": data.signal, "points": points, **noise}
 
 
 def _part(part: Part) -> dict[str, Any]:

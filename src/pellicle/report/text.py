@@ -27,6 +27,13 @@ ADVICE = {
 }
 """What to do next, for every status."""
 
+_SIGMA = {
+    "given": "sigma {}, as given",
+    "residuals": "sigma {}, estimated from the residuals: none was given",
+    "model": "sigma {}, the error that a drifting lamp is allowed: none was given",
+}
+"""Where the noise comes from that errors rest on."""
+
 _NUISANCE = re.compile(r"instrument\.(scale|offset)(_\d+)?(\..+)?")
 
 
@@ -106,9 +113,11 @@ def _statistics(fit: Fit) -> list[str]:
 def _rms(part: Part) -> list[tuple[str, str]]:
     """How far the model is from one spectrum; of several also the reduced χ², as each has its noise."""
     rows = [("rms residual", f"{part.rms:.4g}{_degrees(part)}")]
+    rows.append(("noise", _SIGMA[part.sigma_from].format(f"{part.sigma:.2g}{_degrees(part)}")))
     if part.name:
         chi2 = f"reduced chi-square {part.chi2_reduced:.4g}"
-        rows = [(f"{label} of {part.name}", f"{rms}, {chi2}") for label, rms in rows]
+        (label, rms), (noise, sigma) = rows
+        rows = [(f"{label} of {part.name}", f"{rms}, {chi2}"), (f"{noise} of {part.name}", sigma)]
     if part.curve.delta_data is not None:
         psi, delta = (np.sqrt(np.mean(r**2)) for r in (part.curve.residual, part.curve.delta_residual))
         rows.append(("of psi and of delta", f"{psi:.4g} and {delta:.4g} degrees"))
