@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from pellicle.brdf_fitting.fit import fit_brdf as fit_brdf
     from pellicle.brdf_fitting.result import BrdfFit as BrdfFit
+    from pellicle.fitting.compare import compare as compare
     from pellicle.fitting.fit import fit as fit
     from pellicle.fitting.result import Fit as Fit
     from pellicle.fitting.result import Status as Status
@@ -59,6 +60,7 @@ _HOME = {
     "pellicle.brdf_fitting.fit": ("fit_brdf",),
     "pellicle.brdf_fitting.result": ("BrdfFit",),
     "pellicle.surfaces.surface": ("Surface",),
+    "pellicle.fitting.compare": ("compare",),
     "pellicle.fitting.fit": ("fit",),
     "pellicle.fitting.result": ("Fit", "Status"),
     "pellicle.io.brdf_samples": ("read_brdf_samples",),

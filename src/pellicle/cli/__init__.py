@@ -7,6 +7,7 @@ import sys
 from cyclopts import App
 
 from pellicle.cli.chart import chart
+from pellicle.cli.compare import compare
 from pellicle.cli.cost import cost
 from pellicle.cli.demo import demo
 from pellicle.cli.fit import fit
@@ -31,6 +32,7 @@ app.command(fit)
 app.command(sample)
 app.command(simulate)
 app.command(plan)
+app.command(compare)
 app.command(cost)
 app.command(chart)
 app.command(materials)

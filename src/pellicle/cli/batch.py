@@ -119,13 +119,7 @@ class Batch:
     def _found(
         self, looks: list[Look], folder: Path | None, progress: Progress
     ) -> tuple[Fit, Posterior | None]:
-        spectra, scenes = [], []
-        for look in looks:
-            spectrum, scene = _seen(look, own=look.rescaled or len(looks) == 1)
-            spectra.append(spectrum)
-            scenes.append(scene)
-            say(*(f"{look.path}: {note}" for note in spectrum.notes))
-        what = (spectra, scenes) if self.joint else (spectra[0], scenes[0])
+        what = measurements(looks, self.joint)
         if self.sampler is not None:
             posterior = self._sampled(what, self.sampler, folder, progress)
             return posterior.fit, posterior
@@ -150,6 +144,17 @@ class Batch:
             tolerance=self.tolerance,
             progress=progress,
         )
+
+
+def measurements(looks: list[Look], joint: bool) -> tuple[Any, Any]:
+    """What is fitted, and its scenes: lists where the fit is joint. Says what was read into the files."""
+    spectra, scenes = [], []
+    for look in looks:
+        spectrum, scene = _seen(look, own=look.rescaled or len(looks) == 1)
+        spectra.append(spectrum)
+        scenes.append(scene)
+        say(*(f"{look.path}: {note}" for note in spectrum.notes))
+    return (spectra, scenes) if joint else (spectra[0], scenes[0])
 
 
 def _seen(look: Look, own: bool) -> tuple[Any, Scene]:

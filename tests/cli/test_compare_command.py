@@ -1,0 +1,109 @@
+"""`pellicle compare`: which recipe the data call for, against criteria computed by hand."""
+
+import math
+
+import numpy as np
+import pytest
+
+from pellicle import Constant
+from pellicle.signals import reflectance
+
+PLAIN = """[data]
+{data}
+[scene]
+substrate = "3.9+0.02j"
+[[scene.layer]]
+material = {material}
+thickness = {{ lower = 10, upper = 800 }}
+"""
+
+
+@pytest.fixture
+def recipe(tmp_path):
+    def write(name, material="1.46", data=""):
+        path = tmp_path / name
+        path.write_text(PLAIN.format(material=material, data=data))
+        return path
+
+    return write
+
+
+@pytest.fixture
+def wrong_index(tmp_path):
+    """A film of 1.52, which a recipe with 1.46 misses."""
+    nm = np.linspace(400.0, 796.0, 100)
+    clean = np.asarray(reflectance(nm, 300.0, Constant(1.52), Constant(3.9, 0.02)))
+    values = clean + np.random.default_rng(0).normal(0, 0.002, nm.size)
+    path = tmp_path / "film.csv"
+    path.write_text(
+        "wavelength_nm,R\n" + "".join(f"{w:g},{r:.6f}\n" for w, r in zip(nm, values, strict=True))
+    )
+    return path
+
+
+def test_data_that_call_for_one_more_parameter(pellicle, recipe, wrong_index, tmp_path):
+    a, b = (
+        recipe("a.toml"),
+        recipe("b.toml", "{ model = 'cauchy', A = { lower = 1.3, upper = 1.7 }, B = 0.0 }"),
+    )
+    ran = pellicle("compare", wrong_index, "--recipe", a, "--recipe", b, "--json", "--out", tmp_path / "out")
+    assert ran.code == 0, ran.err
+    [again] = ran.objects
+    assert (again["schema"], again["best"]) == ("pellicle.compare/1", "b.toml")
+    assert again["verdict"].startswith("b.toml is better than a.toml by ΔBIC")
+    assert again["verdict"].endswith("the data call for A.")
+    first, second = again["recipes"]
+    # σ is not known: n ln(RSS / n) with the points that count, and the price of each free number
+    points, size = again["effective_points"], 100
+    for found, free in ((first, 1), (second, 2)):
+        deviance = points * math.log(found["rms"] ** 2)
+        assert found["free"] == free
+        assert found["bic"] == pytest.approx(deviance + free * math.log(points), rel=1e-9)
+        assert found["aic"] == pytest.approx(deviance + 2 * free, rel=1e-9)
+    assert 0.5 * size < points <= size
+    assert second["delta_bic"] == 0
+    assert first["delta_bic"] > 100
+    assert (tmp_path / "out" / "a" / "result.json").exists()
+    text = (tmp_path / "out" / "report.txt").read_text()
+    assert text.startswith("[[Verdict]]\n    b.toml is better")
+    [row] = [line for line in text.splitlines() if line.strip().startswith("* ")]
+    assert row.split()[:4] == ["*", "b.toml", "0.0", "0.0"]
+
+
+def test_data_that_do_not(pellicle, recipe, spectrum_file):
+    """The film is 1.46: a free index gains next to nothing, and costs ln n."""
+    path = spectrum_file()
+    a, b = (
+        recipe("a.toml"),
+        recipe("b.toml", "{ model = 'cauchy', A = { lower = 1.3, upper = 1.7 }, B = 0.0 }"),
+    )
+    [found] = pellicle("compare", path, "--recipe", a, "--recipe", b, "--json").objects
+    assert found["best"] == "a.toml"
+    assert 0 < found["recipes"][1]["delta_bic"] <= math.log(100) + 0.1
+    assert "the data do not call for A" in found["verdict"] or "prefer a.toml" in found["verdict"]
+
+
+def test_bad_input_in_one_sentence(pellicle, recipe, spectrum_file, tmp_path):
+    path, a = spectrum_file(), recipe("a.toml")
+
+    def said(*arguments):
+        ran = pellicle("compare", *arguments)
+        return ran.code, ran.err
+
+    code, err = said(path, "--recipe", a)
+    assert code == 2
+    assert "needs two recipes or more" in err
+    code, err = said(path, "--recipe", a, "--recipe", a)
+    assert code == 2
+    assert "given twice" in err
+    code, err = said(path, "--recipe", a, "--recipe", tmp_path / "none.toml")
+    assert code == 3
+    assert "none.toml: cannot be read" in err
+    other = recipe("narrow.toml", data="range = [500, 700]")
+    code, err = said(path, "--recipe", a, "--recipe", other)
+    assert code == 3
+    assert "a.toml and narrow.toml do not look at the same points" in err
+    robust = recipe("robust.toml", data='loss = "huber"')
+    code, err = said(path, "--recipe", a, "--recipe", robust)
+    assert code == 3
+    assert "robust.toml: a comparison needs least squares" in err
