@@ -146,14 +146,14 @@ class Batch:
         )
 
 
-def measurements(looks: list[Look], joint: bool) -> tuple[Any, Any]:
-    """What is fitted, and its scenes: lists where the fit is joint. Says what was read into the files."""
+def measurements(looks: list[Look], joint: bool, talk: bool = True) -> tuple[Any, Any]:
+    """What is fitted, and its scenes: lists where the fit is joint. Says how the files were understood."""
     spectra, scenes = [], []
     for look in looks:
         spectrum, scene = _seen(look, own=look.rescaled or len(looks) == 1)
         spectra.append(spectrum)
         scenes.append(scene)
-        say(*(f"{look.path}: {note}" for note in spectrum.notes))
+        say(*(f"{look.path}: {note}" for note in spectrum.notes if talk))
     return (spectra, scenes) if joint else (spectra[0], scenes[0])
 
 

@@ -76,9 +76,9 @@ def _one(label: str, looks: dict[str, list[Look]], folder: Path | None, as_json:
     from pellicle.io.comparisons import failure, to_json, write_comparison
     from pellicle.report.comparison import report
 
-    progress = Progress(label)
+    progress, first = Progress(label), next(iter(looks))
     try:
-        found = compared({name: _fit(group, progress) for name, group in looks.items()})
+        found = compared({name: _fit(looks[name], progress, talk=name == first) for name in looks})
     except ValueError as error:
         progress.clear()
         message = str(error) if label in str(error) else f"{label}: {error}"
@@ -93,11 +93,11 @@ def _one(label: str, looks: dict[str, list[Look]], folder: Path | None, as_json:
     return _code(found)
 
 
-def _fit(looks: list[Look], progress: Progress) -> Any:
+def _fit(looks: list[Look], progress: Progress, talk: bool) -> Any:
     from pellicle.cli.batch import measurements
     from pellicle.fitting.fit import fit
 
-    return fit(*measurements(looks, joint=len(looks) > 1), progress=progress)
+    return fit(*measurements(looks, joint=len(looks) > 1, talk=talk), progress=progress)
 
 
 def _code(found: Comparison) -> int:

@@ -160,7 +160,8 @@ def _report(
     trading = identifiability.trades(scaled(*around), parameters)
     of_lead = identifiability.of(next(iter(parameters)), trading)
     at = next(i for i, part in enumerate(each) if part is shown)
-    where = structure.missed(problem.views[at], weighed.met[at])
+    places = structure.missed(problem.views[at], weighed.met[at])
+    where = places.place if places else ""
     said = verdict(status, parameters, others, shown.rms, shown.name or "the data", where, dark, of_lead)
     unclear = [*identifiability.bounded(parameters, dark), *trading]
     return Fit(

@@ -74,8 +74,27 @@ def _merged(found: list[Window]) -> list[Window]:
     return sorted(merged, key=lambda w: -w.score)
 
 
-def missed(view: View, met: Met) -> str:
-    """Where the model misses something, in words: `at 480-520 nm (by 0.011 on average)`; else empty."""
+class Missed(NamedTuple):
+    """Where the model misses something, the strongest place first, and by how much (None for Ψ and Δ)."""
+
+    spans: tuple[str, ...]
+    size: float | None
+    everywhere: bool
+
+    @property
+    def place(self) -> str:
+        """`at 480-520 nm`, empty where it is most of the spectrum."""
+        return "" if self.everywhere else f"at {' and '.join(self.spans[:_SHOWN])}"
+
+    @property
+    def words(self) -> str:
+        """`at 480-520 nm (by 0.011 on average)`."""
+        by = "" if self.size is None else f" (by {self.size:.2g} on average)"
+        return f"{self.place or 'over most of the spectrum'}{by}"
+
+
+def missed(view: View, met: Met) -> Missed | None:
+    """Where the residuals of the best fit are no noise, None where they may be."""
     shape = (view.rows, view.channels)
     left = (view.data.values - np.asarray(met.at.model))[: view.points].reshape(shape)
     sigma = 1 / view.data.weight[: view.points].reshape(shape)[:, 0]
@@ -83,20 +102,18 @@ def missed(view: View, met: Met) -> str:
     told, covered = [], 0
     for part in _sweeps(nm):
         for column in left[part].T:
-            noise = sigma[part] if view.noise.given or view.noise.drifting else np.median(local_noise(column))
+            known = view.noise.given or view.noise.drifting
+            noise = sigma[part] if known else np.median(local_noise(column))
             for w in windows(column / np.maximum(noise, 1e-300)):
                 inside = nm[part][w.first : w.last + 1]
                 size = float(np.mean(np.abs(column[w.first : w.last + 1])))
                 covered += len(inside)
-                told.append((w.score, float(inside.min()), float(inside.max()), size))
-    told.sort(reverse=True)
+                told.append((w.score, f"{inside.min():.0f}-{inside.max():.0f} nm", size))
     if not told:
-        return ""
-    by = "" if view.channels > 1 else f" (by {told[0][3]:.2g} on average)"
-    if covered > _EVERYWHERE * left.size:
-        return f"over most of the spectrum{by}"
-    spans = dict.fromkeys(f"{lo:.0f}-{hi:.0f} nm" for _, lo, hi, _ in told)
-    return f"at {' and '.join(list(spans)[:_SHOWN])}{by}"
+        return None
+    told.sort(reverse=True)
+    spans = tuple(dict.fromkeys(span for _, span, _ in told))
+    return Missed(spans, told[0][2] if view.channels == 1 else None, covered > _EVERYWHERE * left.size)
 
 
 def _sweeps(nm: np.ndarray) -> list[slice]:

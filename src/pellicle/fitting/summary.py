@@ -151,7 +151,7 @@ def _of_view(spectrum: Measured, view: View, met: Met) -> list[str]:
             f" count as {view.rows / length:.0f}"
         )
     if where := structure.missed(view, met):
-        told.append(f"the model misses structure {where}")
+        told.append(f"the model misses structure {where.words}")
     if met.outliers:
         told.append(f"{met.outliers} of {view.rows} points lie so far off that they count for less than half")
     if scene.light.signal == "T" and scene.substrate.back is None:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from pellicle.fitting.compare import Candidate, Comparison
-from pellicle.fitting.result import Estimate
 from pellicle.fitting.status import describe
 from pellicle.report.page import INDENT, block, table, wrapped
 
 _SHOWN = 3
-"""Parameters in a row."""
+"""Parameters that are told of each fit."""
 
 
 def report(found: Comparison) -> str:
@@ -17,10 +16,10 @@ def report(found: Comparison) -> str:
     points = sum(part.curve.wavelength.size for part in parts)
     of = ", ".join(part.spectrum.path.replace("\\", "/").rsplit("/", 1)[-1] or "spectrum" for part in parts)
     counted = f"{of}: {points} points, worth {found.effective_points:.3g} independent ones"
-    rows = [("", "recipe", "ΔBIC", "ΔAIC", "free", "chi-square", "rms", "status", "parameters")]
+    rows = [("", "recipe", "ΔBIC", "ΔAIC", "free", "chi-square", "rms", "status")]
     rows += [_row(c, found.best) for c in found.candidates]
     notes = ["", f"{INDENT}* the least BIC; the criteria are above those of that recipe"]
-    fits = [line for c in found.candidates for line in wrapped(f"{c.name}: {c.fit.verdict}", "", "  ")]
+    fits = [line for c in found.candidates for line in wrapped(_told(c), "", "  ")]
     return block("Verdict", [*wrapped(found.verdict), *wrapped(counted)]) + "".join(
         [block("Comparison", [*table(rows), *notes]), block("Fits", fits)]
     )
@@ -28,8 +27,6 @@ def report(found: Comparison) -> str:
 
 def _row(c: Candidate, best: Candidate) -> tuple[str, ...]:
     rms = "" if c.fit.rms is None else f"{c.fit.rms:.3g}"
-    steep = [p for p in c.fit.free if not p.name.startswith("instrument.")]
-    told = ", ".join(_parameter(p) for p in steep[:_SHOWN]) + (", ..." if len(steep) > _SHOWN else "")
     return (
         "*" if c is best else "",
         c.name,
@@ -39,9 +36,11 @@ def _row(c: Candidate, best: Candidate) -> tuple[str, ...]:
         f"{c.fit.chi2_reduced:.3g}",
         rms,
         c.fit.status,
-        told,
     )
 
 
-def _parameter(p: Estimate) -> str:
-    return describe(p)
+def _told(c: Candidate) -> str:
+    """A fit's leading parameters and its verdict."""
+    steep = [p for p in c.fit.free if not p.name.startswith("instrument.")]
+    told = ", ".join(describe(p) for p in steep[:_SHOWN]) + (", ..." if len(steep) > _SHOWN else "")
+    return f"{c.name}: {told}. {c.fit.verdict}"
