@@ -121,10 +121,10 @@ def _reweighed(before: Data, after: Data) -> float:
 def opaque(spectra: Sequence[Measured], weighed: Weighed) -> frozenset[str]:
     """Names of the thicknesses of layers that absorb at the best fit."""
     view, values = weighed.problem.views[0], weighed.problem.box.values(weighed.minima.units[0])
-    scene = insert(spectra[0].scene, values[list(view.takes)])
-    wavelength = np.asarray(spectra[0].wavelength)
+    scene = insert(view.scene, values[list(view.takes)])
+    wavelength = scene.light.wavelength  # of a padded length, so that nothing is compiled for it again
     found = [
-        thickness_name(scene, i)
+        thickness_name(spectra[0].scene, i)
         for i, layer in enumerate(scene.layers)
         if isinstance(layer, Layer) and np.median(layer.material(wavelength).imag) > _ABSORBS
     ]
