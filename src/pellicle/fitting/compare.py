@@ -109,12 +109,16 @@ def _alike(one: Part, other: Part) -> bool:
 
 
 def _residual(part: Part) -> np.ndarray:
-    """Residuals over a given σ, else as they are, (points, channels); of Ψ and Δ on the sphere."""
-    c, given = part.curve, part.spectrum.sigma is not None
+    """Residuals over a given σ, else as they are, (points, channels): of Ψ and Δ on the sphere."""
+    c, sigma = part.curve, part.spectrum.sigma
     if c.delta_data is None or c.delta_model is None:
-        return (c.residual / (c.sigma if given else 1.0))[:, None]
-    left = _sphere(c.data, c.delta_data) - _sphere(c.model, c.delta_model)
-    return left / (2 * np.deg2rad(c.sigma)[:, None] if given else 1.0)
+        return (c.residual if sigma is None else c.residual / sigma)[:, None]
+    if sigma is None:
+        return _sphere(c.data, c.delta_data) - _sphere(c.model, c.delta_model)
+    across = sigma if part.spectrum.delta_sigma is None else part.spectrum.delta_sigma
+    # at the poles, where Δ has no meaning, the error of Ψ leaves some to it
+    sine = np.sin(2 * np.deg2rad(c.data)) / np.hypot(np.sin(2 * np.deg2rad(c.data)), 2 * np.deg2rad(sigma))
+    return np.stack([c.residual / sigma, sine * c.delta_residual / across], axis=1)
 
 
 def _sphere(psi: np.ndarray, delta: np.ndarray) -> np.ndarray:

@@ -95,16 +95,16 @@ class Missed(NamedTuple):
 
 def missed(view: View, met: Met) -> Missed | None:
     """Where the residuals of the best fit are no noise, None where they may be."""
-    shape = (view.rows, view.channels)
-    left = (view.data.values - np.asarray(met.at.model))[: view.points].reshape(shape)
-    sigma = 1 / view.data.weight[: view.points].reshape(shape)[:, 0]
+    shape, seen = (view.rows, view.channels), slice(None) if view.data.frame is None else slice(2)
+    weight = np.asarray(view.data.weight)[: view.points].reshape(shape)[:, seen]
+    left = (view.data.values - np.asarray(met.at.model))[: view.points].reshape(shape)[:, seen]
     nm = np.asarray(view.scene.light.wavelength)[: view.rows]
     told, covered = [], 0
     for part in _sweeps(nm):
-        for column in left[part].T:
+        for column, inverse in zip(left[part].T, weight[part].T, strict=True):
             known = view.noise.given or view.noise.drifting
-            noise = sigma[part] if known else np.median(local_noise(column))
-            for w in windows(column / np.maximum(noise, 1e-300)):
+            scale = inverse if known else 1 / max(np.median(local_noise(column)), 1e-300)
+            for w in windows(column * scale):
                 inside = nm[part][w.first : w.last + 1]
                 size = float(np.mean(np.abs(column[w.first : w.last + 1])))
                 covered += len(inside)
