@@ -66,7 +66,7 @@ def test_data_that_call_for_one_more_parameter(pellicle, recipe, wrong_index, tm
     assert (tmp_path / "out" / "a" / "result.json").exists()
     text = (tmp_path / "out" / "report.txt").read_text()
     assert text.startswith("[[Verdict]]\n    b.toml is better")
-    [row] = [line for line in text.splitlines() if line.strip().startswith("* ")]
+    row, _ = [line for line in text.splitlines() if line.strip().startswith("* ")]
     assert row.split()[:4] == ["*", "b.toml", "0.0", "0.0"]
 
 

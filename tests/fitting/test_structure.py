@@ -43,7 +43,12 @@ def test_a_fit_says_where(film, measured, sigma):
 
 
 def test_a_misfit_says_so_too(film, measured):
+    """A band that is no film's at one place; a wrong index is seen over most of the spectrum."""
     data = measured(film(), 430.0, sigma=True)
-    fit = pl.fit(data, film(material=1.6))
+    band = 0.04 * np.exp(-(((data.wavelength - 700) / 8) ** 2))
+    fit = pl.fit(dataclasses.replace(data, values=data.values + band), film())
     assert fit.status == "misfit"
-    assert "far more than noise would, most of all " in fit.verdict
+    assert "far more than noise would, most of all at 6" in fit.verdict
+    wrong = pl.fit(data, film(material=1.6))
+    assert "far more than noise would. Its thickness" in wrong.verdict
+    assert any("structure over most of the spectrum (by 0.0" in warning for warning in wrong.warnings)
