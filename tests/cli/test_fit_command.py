@@ -254,9 +254,9 @@ def test_outliers_hardly_count_with_a_robust_loss(pellicle, spectrum_file, scene
     ran = pellicle("fit", path, *scene, "--json", "--loss", "student-t")
     [robust] = ran.objects
     assert ran.code == 0
-    assert plain["data"]["sigma"] > 10 * robust["data"]["sigma"]
-    assert robust["data"]["sigma"] == pytest.approx(0.002, rel=0.4)
-    assert robust["data"]["sigma_from"] == "residuals"
+    assert plain["noise"]["sigma"] > 10 * robust["noise"]["sigma"]
+    assert robust["noise"]["sigma"] == pytest.approx(0.002, rel=0.4)
+    assert robust["noise"]["source"] == "residuals"
     recipe = tmp_path / "robust.toml"
     recipe.write_text(
         f'[data]\nfiles = ["{path.name}"]\nloss = "student-t"\n[scene]\nsubstrate = "3.9+0.02j"\n'

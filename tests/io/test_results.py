@@ -93,10 +93,10 @@ def strictly(text: str):
 
 def test_the_record_of_a_fit_has_the_keys_of_the_schema(fit):
     record = strictly(one_line(to_json(fit)))
-    assert list(record) == KEYS.split()
+    assert list(record) == [*KEYS.split(), "noise"]
     assert record["schema"] == "pellicle.fit/1"
-    source = {"path": "/data/film.csv", "sha256": "ab" * 32, "signal": "R", "points": 41}
-    assert record["data"] == source | {"sigma": 0.002, "sigma_from": "given"}
+    assert record["data"] == {"path": "/data/film.csv", "sha256": "ab" * 32, "signal": "R", "points": 41}
+    assert record["noise"] == {"sigma": 0.002, "source": "given"}
     assert record["status"] == "converged"
     assert record["verdict"] == fit.verdict
     assert record["rivals"] == [{"parameters": {"thickness": 242.87, "k": 0.1}, "delta_chi2": 8.5}]

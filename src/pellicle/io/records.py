@@ -26,7 +26,9 @@ _PACKAGES = ("jax", "optimistix", "numpy")
 
 def to_json(fit: Fit) -> dict[str, Any]:
     """A fit as plain dictionaries of the schema; what is infinite or undefined is None."""
-    return _record(fit, _data(fit), [row for part in fit.parts for row in _plan(part.plan, part.name)])
+    plan = [row for part in fit.parts for row in _plan(part.plan, part.name)]
+    noise = [{"sigma": _number(part.sigma), "source": part.sigma_from} for part in fit.parts]
+    return _record(fit, _data(fit), plan) | {"noise": noise if fit.joint else noise[0]}
 
 
 def brdf_to_json(fit: BrdfFit) -> dict[str, Any]:
@@ -79,8 +81,7 @@ def _data(fit: Fit) -> dict[str, Any] | list[dict[str, Any]]:
 def _source(part: Part) -> dict[str, Any]:
     data = part.spectrum
     points = int(part.curve.wavelength.size)
-    noise = {"sigma": _number(part.sigma), "sigma_from": part.sigma_from}
-    return {"path": data.path, "sha256": data.sha256, "signal": data.signal, "points": points, **noise}
+    return {"path": data.path, "sha256": data.sha256, "signal": data.signal, "points": points}
 
 
 def _part(part: Part) -> dict[str, Any]:
