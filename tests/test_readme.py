@@ -54,7 +54,7 @@ def test_there_are_commands_once_the_readme_shows_a_fit():
 
 def test_every_flag_that_it_names_exists(monkeypatch, capsys):
     helps = []
-    for command in ("fit", "sample", "simulate", "plan", "cost", "chart", "materials"):
+    for command in ("fit", "sample", "simulate", "plan", "compare", "cost", "chart", "materials"):
         monkeypatch.setattr(sys, "argv", ["pellicle", command, "--help"])
         main()
         helps.append(capsys.readouterr().out)
