@@ -24,7 +24,7 @@ from scipy.stats import binomtest
 from pellicle.brdf import direction
 from pellicle.brdf_fitting.estimates import estimates, local, rivals
 from pellicle.brdf_fitting.fit import judged, problem
-from pellicle.brdf_fitting.search import THOROUGH, search
+from pellicle.brdf_fitting.search import THOROUGH, search, settle
 from pellicle.fitting.result import Status
 from pellicle.fitting.search import quiet
 from pellicle.free import Free
@@ -112,7 +112,7 @@ def run(surface: Surface, noise: float, seed: int) -> Run:
     samples = seen(surface, truth, noise, rng)
     began = time.perf_counter()
     whole = problem(samples, surface, "linear", surface.brdf.evaluate)
-    minima = search(whole, THOROUGH, quiet)
+    minima = settle(whole, search(whole, THOROUGH, quiet), quiet)
     at = local(whole, minima.units[0], sigma_known=True)
     found = estimates(surface, whole, minima.units[0], at)
     status = judged(minima, at, found, rivals(whole, minima, at), sigma_known=True)

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-from pellicle.brdf_fitting import doubts, evidence, residuals
+from pellicle.brdf_fitting import doubts, evidence, fit, residuals, search
 from pellicle.brdf_fitting.coordinates import coordinates, named, values
 from pellicle.brdf_fitting.problem import _nonnegative
 from pellicle.brdf_fitting.result import Baseline
 from pellicle.errors import UsageError
 from pellicle.fitting.result import Estimate, Rival
+from pellicle.fitting.search import quiet
 from pellicle.free import Free
 from pellicle.io.samples import BrdfSamples
 from pellicle.surfaces.surface import Surface
@@ -89,6 +91,55 @@ def test_a_tilt_is_a_disc_and_in_a_plane_half_of_one():
         deviation, azimuth = found.T
         assert deviation.max() <= 20
         assert (azimuth.min() >= 0) == in_plane
+
+
+def test_in_a_plane_the_square_of_the_tilt_out_of_it_is_searched():
+    """Such samples see cos δ alone: at no tilt along the plane it falls in proportion to the square."""
+    chosen, box = steep(TILTED, in_plane=True)
+    reach = np.deg2rad(20)
+
+    def upright(square):
+        numbers = values(chosen, box, jnp.full(7, 0.5).at[6].set(square))
+        return jnp.cos(jnp.deg2rad(numbers[5]))
+
+    found, slope = jax.jit(jax.vmap(jax.value_and_grad(upright)))(jnp.array([0.0, 1e-4, 0.25]))
+    np.testing.assert_allclose(slope[:2], -(reach**2) / 2, rtol=1e-4)
+    np.testing.assert_allclose(found, np.cos([0, reach / 100, reach / 2]), atol=1e-6)
+
+
+@pytest.fixture
+def grey():
+    """A problem of five numbers, one of them a weight."""
+    free = ("thickness", "n", "exponent_reflection", "deviation", "specular")
+    surface = Surface("granier-heidrich", {key: TILTED.numbers[key] for key in free}, (550.0,))
+    seen = samples(30.0, 0.0, np.arange(10.0, 60.0), 180.0, ("value",))
+    return fit.problem(seen, surface, "linear", surface.brdf.evaluate)
+
+
+def test_later_candidates_keep_the_lobes_and_draw_the_fringes(grey):
+    parents = np.array([[0.5] * 4 + [0.1], [0.25] * 4 + [0.2]])
+    drawn = search.candidates(grey, 5, seed=1)
+    found = search._other_fringes(grey, parents, drawn.copy())
+    np.testing.assert_array_equal(found[:, :2], drawn[:, :2])
+    np.testing.assert_array_equal(found[:, 2:], np.tile([[0.5] * 2, [0.25] * 2], (3, 1))[:5])
+
+
+def test_the_best_minimum_is_polished_until_it_settles(grey, monkeypatch):
+    """Only where it has not, and the others stay."""
+    two = search.Minima(np.array([[0.3], [0.6]]), np.array([4.0, 5.0]), np.array([False, True]))
+    asked = []
+
+    def solver(*given):
+        asked.append((given[-2].tolist(), given[-1]))
+        return np.array([[0.4]]), np.array([3.0]), np.array([True])
+
+    monkeypatch.setattr(search, "polished", solver)
+    found = search.settle(grey, two, quiet)
+    assert asked == [([[0.3]], search._LONG)]
+    assert (found.units.tolist(), found.chi2.tolist()) == ([[0.4], [0.6]], [3.0, 5.0])
+    assert found.converged.all()
+    assert search.settle(grey, found, quiet) is found
+    assert len(asked) == 1
 
 
 @pytest.mark.parametrize("name", residuals.RESIDUALS)

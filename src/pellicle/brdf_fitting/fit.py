@@ -17,7 +17,7 @@ from pellicle.brdf_fitting.estimates import Local, estimates, local, rivals
 from pellicle.brdf_fitting.problem import Form, Problem, chi_square, data, seeing
 from pellicle.brdf_fitting.residuals import RESIDUALS
 from pellicle.brdf_fitting.result import Baseline, BrdfFit
-from pellicle.brdf_fitting.search import FEW, SMOOTH, THOROUGH, Effort, Minima, polish, search
+from pellicle.brdf_fitting.search import FEW, SMOOTH, THOROUGH, Effort, Minima, polish, search, settle
 from pellicle.errors import UsageError
 from pellicle.fitting.result import Estimate, Rival, Status
 from pellicle.fitting.search import Progress, quiet
@@ -116,7 +116,7 @@ def _fit(samples: BrdfSamples, surface: Surface, residual: str, progress: Progre
         Baseline(_FLAT, _rate(flat, split, SMOOTH, progress)[1]),
         Baseline(_PLAIN, _rate(plain(whole), split, FEW, progress)[1]),
     )
-    minima = polish(whole, minima.units, THOROUGH, progress)
+    minima = settle(whole, polish(whole, minima.units, THOROUGH, progress), progress)
     return _report(samples, surface, plan, whole, minima, held_out, baselines, began)
 
 

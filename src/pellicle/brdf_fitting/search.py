@@ -105,18 +105,24 @@ def polish(problem: Problem, starts: np.ndarray, effort: Effort, progress: Progr
     """The distinct minima below `starts`, best first; there are at most `effort.starts` of them."""
     progress("polish", 0, len(starts))
     lanes = np.concatenate([starts, np.repeat(starts[-1:], effort.starts - len(starts), axis=0)])
-    units, chi2, converged = (np.array(x)[: len(starts)] for x in polished(*problem.program, lanes))
+    units, chi2, converged = (np.asarray(x)[: len(starts)] for x in polished(*problem.program, lanes))
     chi2 = np.where(np.isfinite(chi2), chi2, np.inf)
-    best = slice(int(np.argmin(chi2)), int(np.argmin(chi2)) + 1)
-    if not converged[best].all() and np.isfinite(chi2[best]).all():
-        progress("long polish", 0, 1)
-        units[best], chi2[best], converged[best] = polished(*problem.program, units[best], _LONG)
     kept: list[int] = []
     for at in np.argsort(chi2, kind="stable"):
         if all(apart(problem, units[at], units[other]) for other in kept):
             kept.append(int(at))
     progress("polish", len(starts), len(starts))
     return Minima(units[kept], chi2[kept], converged[kept])
+
+
+def settle(problem: Problem, minima: Minima, progress: Progress) -> Minima:
+    """The same minima with the best one polished until it converges, where it has not."""
+    if minima.converged[0] or not np.isfinite(minima.chi2[0]):
+        return minima
+    progress("long polish", 0, 1)
+    found = polished(*problem.program, minima.units[:1], _LONG)
+    better = (np.concatenate([new, old[1:]]) for new, old in zip(found, minima, strict=True))
+    return Minima(*better)
 
 
 def candidates(problem: Problem, count: int, seed: int = 0) -> np.ndarray:

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from typing import Any, final
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import optimistix as optx
 from jaxtyping import ScalarLike
@@ -148,10 +149,29 @@ class BoundedLevenbergMarquardt(optx.AbstractGaussNewton):
         return ~going & (done | stuck), results.where(going, results.successful, result)
 
 
+def _dense(residual: Callable) -> Callable:
+    """The same residuals with a Jacobian that is one matrix wherever they are linearised.
+
+    Optimistix keeps a linearised function in its loop and chooses between the old and the new one; left
+    to itself that is every intermediate of the model, and choosing between hundreds of arrays was most
+    of what there was to compile.
+    """
+    held = jax.custom_jvp(residual)
+
+    @held.defjvp
+    def _slope(primals, tangents):
+        (y,), (change,) = primals, tangents
+        left, along = jax.linearize(residual, y)
+        return left, jax.vmap(along, out_axes=1)(jnp.eye(y.size, dtype=y.dtype)) @ change
+
+    return held
+
+
 def least_squares(residual: Callable, start, *, rtol: float = 1e-8, steps: int = 100):
     """Minimise ‖residual(y)‖² for y in the unit box from `start`; returns (y, converged)."""
+    held = _dense(residual)
     solution = optx.least_squares(
-        lambda y, _: residual(y),
+        lambda y, _: held(y),
         BoundedLevenbergMarquardt(rtol=rtol, atol=0.0),
         start,
         options={"lower": 0.0, "upper": 1.0},
