@@ -103,6 +103,7 @@ def main(surfaces: int, seed: int) -> int:
         kind, tolerance = str(rng.choice(list(KINDS))), 10 ** rng.uniform(-5, -1)
         gone, off, bound = tried(rng, KINDS[kind](rng), tolerance)
         left_out.update(gone)
+        print(f"{number + 1} of {surfaces}: {kind}, off by {off:.1e}", file=sys.stderr, flush=True)
         if gone:
             shares.append(off / bound)
         if off > bound or bound > tolerance:

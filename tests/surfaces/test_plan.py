@@ -76,10 +76,17 @@ def test_light_that_returns_has_no_angle():
     assert [found[name].on for name in ("oblique", "polarisation", "tunnelling")] == [False] * 3
 
 
-@pytest.mark.parametrize("name", MODELS)
-def test_what_is_composed_is_the_model(name):
+COMPOSED = [
+    *((name, {}) for name in MODELS),
+    ("microfacet-film", {"k": 0.1}),
+    ("blinn-phong-film", {"ambient_n": 1.6, "n": 1.3, "base_n": 1.2}),  # totally reflected, and tunnelling
+]
+
+
+@pytest.mark.parametrize(("name", "numbers"), COMPOSED)
+def test_what_is_composed_is_the_model(name, numbers):
     """Whatever its effects: the exact plan is the BRDF as its own module computes it."""
-    surface = Surface(name, {})
+    surface = Surface(name, numbers)
     numbers, looked = surface.start(), lit(surface, LOOKED)
     with jax.enable_x64(True):
         expected = jax.jit(surface.brdf.evaluate)(numbers, looked.i, looked.o)
