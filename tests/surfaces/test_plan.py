@@ -152,6 +152,16 @@ def test_what_is_absent_leaves_no_trace():
     assert len(set(counts)) == 4
 
 
+def test_a_lobe_that_is_too_weak_goes_with_its_layer():
+    """What is left is the diffuse part, in every channel."""
+    seen = lit(Surface("microfacet-film", {"specular": 1e-9, "diffuse": 0.2}), LOOKED)
+    (plan,) = thrift.alternatives("roughness", seen)
+    assert [row.effect for row in plan.rows if row.on] == ["diffuse", "precision"]
+    with jax.enable_x64(True):
+        found = jax.jit(build(plan.wordless))(seen)
+    np.testing.assert_array_equal(found, np.full((96, 3), 0.2))
+
+
 def test_nothing_to_compute():
     with pytest.raises(UsageError, match="nothing to compute"):
         lit(Surface("granier-heidrich", {"specular": 0.0, "diffuse": 0.0}), LOOKED)

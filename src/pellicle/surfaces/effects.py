@@ -16,9 +16,13 @@ from pellicle.surfaces.lit import Lit
 ALONG = 1e-6
 """Radians between light and eye, halved, below which they are one."""
 
+NO_LAYER = "nothing of the layer is seen"
+
 
 def spectral_sampling(lit: Lit) -> Row:
     """On where channels differ."""
+    if not lit.layered:
+        return Row("spectral-sampling", False, "the diffuse part alone is grey", count=1)
     at = np.asarray(lit.numbers["wavelengths"])
     listed = ", ".join(f"{nm:g}" for nm in at)
     if len(at) == 1:
@@ -62,7 +66,9 @@ def _of_number(lit: Lit, key: str, what: str, absent: str) -> Row | None:
 
 
 def coherence(lit: Lit) -> Row:
-    """On: what the layer's two faces reflect interferes."""
+    """On where anything of the layer is seen: what its two faces reflect interferes."""
+    if not lit.layered:
+        return Row("coherence", False, NO_LAYER)
     return Row("coherence", lit.coherent, "what the layer's two faces reflect interferes")
 
 
@@ -70,6 +76,8 @@ def oblique(lit: Lit) -> Row | None:
     """On where a facet is lit at an angle; only of a film."""
     if lit.brdf.coloured is None:
         return None
+    if not lit.layered:
+        return Row("oblique", False, NO_LAYER)
     steepest = largest_angle(lit)
     if not lit.oblique or steepest < ALONG:
         return Row("oblique", False, "the light returns to where it comes from")
@@ -80,7 +88,8 @@ def polarisation(lit: Lit) -> Row | None:
     """On where s and p differ."""
     row = oblique(lit)
     if row is None or not row.on:
-        return None if row is None else Row("polarisation", False, "s and p are one at normal incidence")
+        why = "s and p are one at normal incidence" if lit.layered else NO_LAYER
+        return None if row is None else Row("polarisation", False, why)
     return Row("polarisation", lit.polarisation == "unpolarised", "unpolarised light: the mean of s and p")
 
 
@@ -90,7 +99,8 @@ def tunnelling(lit: Lit) -> Row | None:
         return None
     row = oblique(lit)
     if row is not None and not row.on:
-        return Row("tunnelling", False, "normal incidence: every wave propagates")
+        why = "normal incidence: every wave propagates" if lit.layered else NO_LAYER
+        return Row("tunnelling", False, why)
     transverse = _bound(lit.numbers.get("ambient_n", 1.0), "upper") * np.sin(largest_angle(lit)) * (1 + 1e-6)
     real = [("film", "n", "k"), ("base", "base_n", "base_k")]
     unsure = [

@@ -15,6 +15,8 @@ from pellicle.surfaces.surface import Surface
 
 MOST = 256
 """Pairs of directions that a plan compares models at, spread over those given."""
+LAYERED = ("granier-heidrich-diffuse", "granier-heidrich-full")
+"""Models whose diffuse part has met the layer."""
 ZERO_IS_ABSENT = ("k", "base_k", "deviation", "specular", "diffuse")
 
 
@@ -51,6 +53,11 @@ class Lit(eqx.Module):
     @property
     def brdf(self) -> Model:
         return model(self.model)
+
+    @property
+    def layered(self) -> bool:
+        """Whether anything of the layer is seen: a grey diffuse part alone shows none."""
+        return "specular" in self.numbers or self.model in LAYERED
 
     @property
     def channels(self) -> int:

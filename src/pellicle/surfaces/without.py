@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pellicle.effects.without import in_single
-from pellicle.surfaces.lit import Lit
+from pellicle.surfaces.lit import LAYERED, Lit
 
 _LOBES = ("specular", "roughness", "exponent", "exponent_reflection", "exponent_transmission")
 _NORMALS = ("deviation", "azimuth")
@@ -27,7 +27,7 @@ class LeftOut:
 
 def _roughness(lit: Lit) -> Lit:
     """The diffuse part alone; where that is grey nothing of the layer is left."""
-    if lit.model.startswith("granier-heidrich-full"):
+    if lit.model in LAYERED:
         return _dropped(lit, *_LOBES, *_NORMALS)
     kept = {"wavelengths", "diffuse"}
     return _dropped(lit, *(lit.numbers.keys() - kept))
