@@ -30,14 +30,19 @@ def drifting_sigma(values: np.ndarray) -> np.ndarray:
 
 
 def correlation_length(residual: np.ndarray) -> float:
-    """How many neighbouring residuals count as one: the integrated autocorrelation time, at least 1.
+    """How many neighbouring residuals count as one: the integrated autocorrelation time, at least 1."""
+    return integrated_time(residual[:, None])
+
+
+def integrated_time(series: np.ndarray) -> float:
+    """The integrated autocorrelation time of series (steps, series) around zero, at least 1.
 
     The window closes at five times the estimate (A. Sokal, 1997, Monte Carlo methods in statistical
-    mechanics).
+    mechanics); where it does not close, the time is a fifth of the steps.
     """
-    size = len(residual)
-    spectrum = np.fft.rfft(residual, 2 * size)
-    covariance = np.fft.irfft(np.abs(spectrum) ** 2)[:size]
+    size = len(series)
+    spectrum = np.abs(np.fft.rfft(series, 2 * size, axis=0)) ** 2
+    covariance = np.fft.irfft(spectrum.sum(axis=1))[:size]
     if not covariance[0] > 0:
         return 1.0
     times = 2 * np.cumsum(covariance / covariance[0]) - 1

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pellicle.fitting.noise import integrated_time
 from pellicle.sampling.chain import Chain
 from pellicle.sampling.modes import Modes
 
@@ -67,7 +68,7 @@ class Checks:
 def check(chain: Chain, modes: Modes) -> Checks:
     """Every check of a chain of at least a few steps."""
     tau = autocorrelation_time(chain.draws, modes)
-    discard = min(int(np.ceil(_BURNED * tau)), chain.steps // 2)
+    discard = int(min(np.ceil(_BURNED * tau), chain.steps // 2))
     kept = chain.draws[discard:]
     home = modes.nearest(kept.reshape(-1, kept.shape[-1]))
     found = np.flatnonzero(modes.matter)
@@ -84,21 +85,21 @@ def check(chain: Chain, modes: Modes) -> Checks:
 
 
 def autocorrelation_time(draws: np.ndarray, modes: Modes) -> float:
-    """The longest integrated autocorrelation time (steps), of parameters and of the minima's shares."""
-    from emcee.autocorr import integrated_time
+    """The longest integrated autocorrelation time (steps), of parameters and of the minima's shares;
+    infinite where nothing moves.
 
-    columns = draws
+    Distances are from the ensemble's mean. `emcee.autocorr` takes those from each walker's own, which are
+    0/0 for a walker that stays in one minimum, and too short a time for one that nearly stays.
+    """
+    columns = list(np.moveaxis(draws, 2, 0))
+    if not all(np.ptp(column) > 0 for column in columns):
+        return float("inf")
     several = np.flatnonzero(modes.matter)
     if len(several) > 1:
         home = modes.nearest(draws.reshape(-1, draws.shape[-1])).reshape(draws.shape[:2])
-        columns = np.concatenate([draws, home[..., None] == several[:-1]], axis=2)
-    moving = columns[..., np.ptp(columns, axis=(0, 1)) > 0]
-    if not moving.shape[-1]:
-        return float("inf")
-    with warnings.catch_warnings(), np.errstate(invalid="ignore", divide="ignore"):
-        warnings.simplefilter("ignore")  # a walker that never moved has no autocorrelation
-        times = integrated_time(moving, tol=0)
-    return float(max(np.max(times), 1.0)) if np.isfinite(times).all() else float("inf")
+        there = [(home == mode).astype(float) for mode in several[:-1]]
+        columns += [share for share in there if np.ptp(share) > 0]
+    return max(integrated_time(column - column.mean()) for column in columns)
 
 
 def split_rhat(draws: np.ndarray) -> float:
