@@ -51,7 +51,8 @@ class Instrument(eqx.Module):
     `scale` and `offset` are numbers, "free" or "slow"; `bandwidth` is the full width at half maximum
     in nm and `thickness_spread` the standard deviation of the only layer's thickness over the spot in
     nm. The light's cone is given by `angle_spread`, its half angle in degrees, or by
-    `numerical_aperture`, n₀ times the sine of that. None or 0 is absent.
+    `numerical_aperture`, n₀ times the sine of that. `wavelength_shift` is what the true wavelength is
+    above the one that the instrument tells, in nm. None or 0 is absent.
     """
 
     scale: float | Drift = eqx.field(converter=scale_word, default=1.0)
@@ -60,6 +61,7 @@ class Instrument(eqx.Module):
     thickness_spread: Quantity | None = eqx.field(converter=none_if_zero, default=None)
     angle_spread: Quantity | None = eqx.field(converter=none_if_zero, default=None)
     numerical_aperture: Quantity | None = eqx.field(converter=none_if_zero, default=None)
+    wavelength_shift: Quantity | None = eqx.field(converter=none_if_zero, default=None)
 
     def __check_init__(self):
         check_not_negative("bandwidth", self.bandwidth, "nm")

@@ -71,7 +71,18 @@ def build(plan: Plan) -> Simulate:
         mix = averages.unmixed if ellipsometric else averages.mixed(plan.polarisation)
         rows = averages.over_cone(rows, cone.count, cone.around, mix)
     finish = _on_sphere if ellipsometric else _mean
-    return lambda scene: finish(rows(_simplified(plan, scene)))
+    return lambda scene: finish(rows(_simplified(plan, _shifted(scene))))
+
+
+def _shifted(scene: Scene) -> Scene:
+    """The scene at the wavelengths that the light had, where the instrument tells them wrong.
+
+    A sampled medium follows by its slope, which is enough for the few nm of a calibration.
+    """
+    shift = scene.instrument.wavelength_shift
+    if shift is None:
+        return scene
+    return eqx.tree_at(lambda s: s.light.wavelength, scene, scene.light.wavelength + shift)
 
 
 def _simplified(plan: Plan, scene: Scene) -> Scene:

@@ -107,3 +107,18 @@ def test_hafnia(shared_data):
     found = pl.fit(spectrum, pl.Scene(pl.Layer(layer, pl.Free(lower=1, upper=1000)), "SiO2"))
     assert found.status == "converged"
     assert found["thickness"].value == pytest.approx(109.0, abs=2.0)
+
+
+def test_a_free_angle_goes_before_the_one_that_the_file_tells():
+    """The stage stood at 70.4 degrees where the file says 70."""
+    nm = np.linspace(400.0, 900.0, 64)
+    seen = [np.asarray(x) for x in pl.ellipsometry(nm, 100.0, "SiO2", "Si", angle=70.4)]
+    data = pl.Spectrum(
+        nm, seen[0], "psi-delta", delta=seen[1], angle=np.full(64, 70.0), sigma=np.full(64, 0.02)
+    )
+    layer = pl.Layer("SiO2", pl.Free(None, 10, 300))
+    fit = pl.fit(
+        data, pl.Scene(layer, "Si", light=pl.Light(angle=pl.Free(None, 69.0, 71.0), signal="psi-delta"))
+    )
+    assert fit["angle"].value == pytest.approx(70.4, abs=1e-3)
+    assert fit["thickness"].value == pytest.approx(100.0, abs=0.01)

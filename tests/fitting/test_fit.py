@@ -6,7 +6,8 @@ import pytest
 
 import pellicle as pl
 from pellicle.errors import UsageError
-from pellicle.scene import free_leaves
+from pellicle.model import build
+from pellicle.scene import free_leaves, with_wavelength
 from pellicle.synthetic import synthesise
 
 NM = np.linspace(400.0, 900.0, 128)
@@ -222,3 +223,26 @@ def test_rivals_cost_what_a_fit_there_costs(film, measured):
     expected = (there.chi2_reduced - fit.chi2_reduced) * (128 - 1)
     share = fit.effective_points / 128
     assert rival.delta_chi2 == pytest.approx(expected * share, rel=1e-3)
+
+
+def test_a_shift_of_the_wavelengths(film):
+    """The instrument tells 3 nm too little: the film is seen at λ + 3, its tabled substrate too."""
+    nm = np.linspace(400.0, 900.0, 128)
+    seen = synthesise(film(480.0, substrate="Si"), nm + 3.0, 0.002, 1).values
+    shift = pl.Instrument(wavelength_shift=pl.Free(None, -10.0, 10.0))
+    fit = pl.fit(pl.Spectrum(nm, seen, "R"), film(substrate="Si", instrument=shift))
+    agrees(fit, {"thickness": 480.0, "instrument.wavelength_shift": 3.0})
+    assert fit["instrument.wavelength_shift"].unit == "nm"
+    assert abs(pl.fit(pl.Spectrum(nm, seen, "R"), film(substrate="Si"))["thickness"].value - 480) > 1
+
+
+def test_no_shift_leaves_no_trace(film):
+    """A shift of 0 is none; one that is there costs an addition."""
+    plain, zero = (film(480.0, instrument=pl.Instrument(wavelength_shift=s)) for s in (None, 0.0))
+    assert zero.instrument.wavelength_shift is None
+    simulate = build(pl.plan(plain))
+    at = [
+        with_wavelength(s, NM) for s in (plain, film(480.0, instrument=pl.Instrument(wavelength_shift=1.0)))
+    ]
+    without, shifted = (len(str(jax.make_jaxpr(simulate)(scene)).splitlines()) for scene in at)
+    assert without < shifted <= without + 3

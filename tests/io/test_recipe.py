@@ -308,3 +308,29 @@ def test_bad_words_of_a_file(tmp_path):
         )
         with pytest.raises(DataError, match=said):
             read_recipe(path)
+
+
+def test_calibration_errors_as_parameters(tmp_path):
+    """The angle of incidence and the wavelengths of an instrument that is off."""
+    path = tmp_path / "off.toml"
+    text = """[data]
+signal = "psi-delta"
+angle = {angle}
+[scene]
+substrate = "Si"
+[[scene.layer]]
+material = "SiO2"
+thickness = {{ lower = 10, upper = 300 }}
+[instrument]
+wavelength_shift = {{ lower = -2, upper = 2 }}
+"""
+    path.write_text(text.format(angle="{ lower = 69, upper = 71 }"))
+    scene = read_recipe(path).scene()
+    assert (scene.light.angle.lower, scene.light.angle.upper) == (69, 71)
+    assert scene.instrument.wavelength_shift.value == 0
+    path.write_text(text.format(angle="{ lower = 69, upper = 91 }"))
+    with pytest.raises(DataError, match="must lie in 0 to 90 degrees, got 91"):
+        read_recipe(path).scene()
+    path.write_text(text.format(angle="91"))
+    with pytest.raises(DataError, match="angle"):
+        read_recipe(path)

@@ -49,9 +49,12 @@ def scene_from_words(words: SceneWords, read: ReadWords) -> tuple[Scene, list[st
 
 def light(read: ReadWords) -> Light:
     """How the scene is looked at, where the file does not say."""
+    from pellicle.io.recipe import optional
     from pellicle.scene import Light
 
-    return Light(None, read.angle or 0.0, read.signal or "R", read.polarisation or "unpolarised")
+    return Light(
+        None, optional(read.angle, "angle") or 0.0, read.signal or "R", read.polarisation or "unpolarised"
+    )
 
 
 def merged(read: ReadWords, recipe: Recipe | None) -> ReadWords:
@@ -108,6 +111,8 @@ def _from_counts(path: str, words: ReadWords) -> Any:
 
     if words.signal not in (None, "R"):
         raise UsageError("--reference turns counts into reflectance: leave --signal out, or give R")
+    if not isinstance(words.angle, float | int | None):
+        raise UsageError("--reference needs a known angle of incidence: give one number")
     options: dict[str, Any] = {"columns": words.columns, "wavelength_unit": words.wavelength_unit}
     sample = read_counts(path, range=spanned(words.range), **options)
     reference = read_counts(str(words.reference), **options)

@@ -23,6 +23,7 @@ STEPS = {
     "roughness": 1.0,
     "thickness_spread": 1.0,
     "bandwidth": 1.0,
+    "wavelength_shift": 0.1,
     "angle": 0.1,  # degrees
     "n": 0.01,
     "A": 0.01,

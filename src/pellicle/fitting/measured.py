@@ -10,7 +10,7 @@ import numpy as np
 from pellicle.errors import UsageError
 from pellicle.fitting import noise
 from pellicle.io.spectrum import Spectrum
-from pellicle.scene import Drift, Instrument, Light, Scene, free_leaves
+from pellicle.scene import Drift, Instrument, Light, Scene, free_leaves, is_free
 
 
 class Noise(NamedTuple):
@@ -55,7 +55,10 @@ def measured(data: Spectrum, scene: Scene, name: str = "") -> Measured:
 def seen_as(scene: Scene, data: Spectrum) -> Scene:
     """The scene looked at as the spectrum was: its signal, wavelengths, polarisation and angles."""
     angle: Any = scene.light.angle
-    if data.angle is not None:
+    if data.angle is not None and is_free(angle):
+        if np.ptp(data.angle) > 0:
+            raise UsageError(f"{data.path}: has several angles of incidence, which one free angle cannot be")
+    elif data.angle is not None:
         angle = float(data.angle[0]) if np.ptp(data.angle) == 0 else data.angle
     stated = data.polarisation != "unpolarised"
     polarisation = data.polarisation if stated else scene.light.polarisation

@@ -19,7 +19,7 @@ from pellicle.optics.spline import Spline
 from pellicle.scene import Free, Scene, free_leaves, insert, is_free
 
 _WIDTHS = {"bandwidth": "nm", "thickness_spread": "nm", "roughness": "nm", "angle_spread": "deg"}
-_UNITS = {"thickness": "nm", "plate_mm": "mm", "angle": "deg", **_WIDTHS}
+_UNITS = {"thickness": "nm", "wavelength_shift": "nm", "plate_mm": "mm", "angle": "deg", **_WIDTHS}
 _NATURAL_ZERO = ("k", "k0", "fraction", "offset", "numerical_aperture", *_WIDTHS)
 _STRENGTHS = (Lorentz, Gaussian, TaucLorentz, CodyLorentz)
 """Their A is a strength, which cannot be negative; the A of Cauchy is an index."""

@@ -165,7 +165,7 @@ def _view(spectrum: Measured, box: Box, takes: tuple[int, ...], tolerance: float
         level=np.float64(max(float(np.median(np.abs(values[:points]))), 1e-12)),
         frame=None if spectrum.frame is None else _pad(spectrum.frame, extra),
     )
-    scene = sampled(scene, chosen.on("coherence"))
+    scene = sampled(scene, chosen.on("coherence") or scene.instrument.wavelength_shift is not None)
     steepest = max((largest_index(x.material, wavelength) for x in coherent_layers(scene)), default=1.0)
     return View(
         spectrum.name,

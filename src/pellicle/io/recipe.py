@@ -88,6 +88,7 @@ _KEYS: dict[str, type[BaseModel]] = {
     "roughness": FreeTable,
     "angle_spread": FreeTable,
     "numerical_aperture": FreeTable,
+    "wavelength_shift": FreeTable,
     "prior": PriorTable,
 }
 
@@ -120,7 +121,9 @@ def _scene(tables: RecipeTable, folder: Path) -> Scene:
         layers,
         _substrate(scene.substrate, folder),
         ambient=medium(scene.ambient, folder),
-        light=Light(None, data.angle or 0.0, data.signal or "R", data.polarisation or "unpolarised"),
+        light=Light(
+            None, optional(data.angle, "angle") or 0.0, data.signal or "R", data.polarisation or "unpolarised"
+        ),
         instrument=Instrument(
             instrument.scale,
             instrument.offset,
@@ -128,6 +131,7 @@ def _scene(tables: RecipeTable, folder: Path) -> Scene:
             optional(instrument.thickness_spread, "thickness_spread"),
             optional(instrument.angle_spread, "angle_spread"),
             optional(instrument.numerical_aperture, "numerical_aperture"),
+            optional(instrument.wavelength_shift, "wavelength_shift", natural=None),
         ),
     )
 
@@ -152,6 +156,6 @@ def _substrate(given: Medium | PlateTable, folder: Path) -> Substrate:
     return Substrate(medium(given.material, folder), back, plate_mm, optional(given.roughness, "roughness"))
 
 
-def optional(given: Number | None, what: str) -> float | Free | None:
+def optional(given: Number | None, what: str, natural: float | None = 0.0) -> float | Free | None:
     """A number that may be absent."""
-    return None if given is None else number(given, what, natural=0.0)
+    return None if given is None else number(given, what, natural=natural)

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
-from pellicle.io.media import Medium, Number
+from pellicle.io.media import FreeTable, Medium, Number
 from pellicle.io.units import SIGNAL_UNITS, WAVELENGTH_UNITS, signal_unit, wavelength_unit
 
 
@@ -92,13 +92,14 @@ class InstrumentTable(_Table):
     thickness_spread: Number | None = None
     angle_spread: Number | None = None
     numerical_aperture: Number | None = None
+    wavelength_shift: Number | None = None
 
 
 class _Reading(_Table):
     """How files are read and looked at: the words of the command line's flags."""
 
     signal: Literal["R", "T", "psi-delta"] | None = None
-    angle: float | None = Field(default=None, ge=0, le=90)
+    angle: Annotated[float, Field(ge=0, le=90)] | FreeTable | None = None
     polarisation: Literal["unpolarised", "s", "p"] | None = None
     noise: float | None = Field(default=None, gt=0)
     columns: str | list[str] | None = None
