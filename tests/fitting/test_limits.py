@@ -5,6 +5,10 @@ import pytest
 from scipy.optimize import brentq, minimize_scalar
 
 import pellicle as pl
+from pellicle.fitting.fit import fitted
+from pellicle.fitting.limits import interval
+from pellicle.fitting.search import quiet
+from pellicle.fitting.uncertainty import errors
 
 SUBSTRATE = 3.9 + 0.02j
 
@@ -79,3 +83,20 @@ def test_pushed_against_a_bound_and_unseen_beside_one(film, measured):
     fit = pl.fit(measured(unseen, 1.6, 15.0, noise=0.001, sigma=True), unseen)
     assert fit["n"].value == 1.3
     assert fit["n"].stderr == float("inf")
+
+
+def test_an_interval_by_profile_is_that_of_a_scan(film, measured):
+    """Both ends of the thickness, its index fitted again by SciPy, where χ² is 3.84 above the best."""
+    scene = film(material=pl.Constant(pl.Free(None, 1.3, 1.7), 0.0))
+    data = measured(scene, 1.46, 430.0, sigma=True)
+    fit, weighed = fitted(data, scene, 0.0, quiet)
+    found = errors(weighed.problem, [m.at for m in weighed.met], [m.variance for m in weighed.met])
+    low, high = interval(weighed, found.covariance, fit.correlation_names.index("thickness"))
+
+    def profile(d):
+        return least(data, lambda n: chi2(data, d, n), 1.46, 0.03) * weighed.met[0].variance ** -1
+
+    best = profile(fit["thickness"].value)
+    for end in (low, high):
+        assert profile(end) - best == pytest.approx(3.84, abs=0.1)
+    assert low < fit["thickness"].value < high

@@ -71,6 +71,24 @@ def limits(weighed: Weighed, covariance: np.ndarray, seen: Profile | None) -> li
     return found
 
 
+def interval(weighed: Weighed, covariance: np.ndarray, which: int) -> tuple[float, float]:
+    """The 95 % interval of one nonlinear parameter by profile likelihood, whatever its status.
+
+    An end is the bound where the misfit never rises on the way to it.
+    """
+    problem, best = _as_in_covariance(weighed), weighed.minima.units[0]
+    p = problem.parameters[which]
+    value, sd = float(problem.box.values(best)[which]), float(np.sqrt(covariance[which, which]))
+    rise = _rise(problem, best, covariance, which)
+    bounds = [p.lower, p.upper]
+    sides = _sides(rise, _Best(value, p.lower, p.upper, sd), bounds, TWO_SIDED)
+    low, high = (
+        bound if side is None else _crossing(rise, side, TWO_SIDED)
+        for bound, side in zip(bounds, sides, strict=True)
+    )
+    return low, high
+
+
 class _Best(NamedTuple):
     """A parameter's best value, its bounds and its standard error by the parabola."""
 

@@ -12,6 +12,7 @@ from importlib.util import find_spec
 
 import numpy as np
 
+from pellicle.fitting.limits import interval
 from pellicle.fitting.search import quiet, search
 from pellicle.fitting.uncertainty import errors
 from pellicle.fitting.weigh import Weighed, weigh
@@ -138,9 +139,21 @@ class _Run:
 
 def _covariance(fit: Weighed) -> Interval:
     problem, best = fit.problem, fit.minima.units[0]
-    found = errors(problem, [m.at for m in fit.met], [m.variance for m in fit.met])
+    found = errors(problem, [m.at for m in fit.met], _variances(fit))
     sd = found.stderr[: len(best)] / (problem.box.upper - problem.box.lower)
     return best - _WIDE * sd, best + _WIDE * sd
+
+
+def _profile(fit: Weighed) -> Interval:
+    box = fit.problem.box
+    covariance = errors(fit.problem, [m.at for m in fit.met], _variances(fit)).covariance
+    ends = np.array([interval(fit, covariance, i) for i in range(len(fit.problem.parameters))])
+    lower, upper = (ends.T - box.lower) / (box.upper - box.lower)
+    return lower, upper
+
+
+def _variances(fit: Weighed) -> list[float]:
+    return [m.variance for m in fit.met]
 
 
 def _sampled(steps: int, fit: Weighed) -> Interval:
@@ -172,6 +185,7 @@ def _quantiles(draws: np.ndarray) -> Interval:
 _MISSING = next((name for name in ("emcee", "arviz") if not find_spec(name)), None)
 WAYS = (
     Way("covariance", "curvature, bounds, other minima", _covariance),
+    Way("profile", "other minima", _profile),
     Way("emcee, 25 steps", "most of the chain", partial(_sampled, 25), _MISSING),
     Way("emcee, 100 steps", "half of the chain", partial(_sampled, 100), _MISSING),
     Way("emcee, until it is long enough", "nothing: pellicle sample", partial(_sampled, _STEPS), _MISSING),
