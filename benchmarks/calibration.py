@@ -254,14 +254,12 @@ SHOWN = (("covariance", 0), ("covariance", 1), ("profile", 1), ("posterior", 0),
 
 def coverage_table(counts: list[Count]) -> list[str]:
     """Shares of truths inside, in per cent, their binomial standard error, and of how many."""
-    head = (
-        "| data sets | covariance 68 % | covariance 95 % | profile 95 % | posterior 68 % | posterior 95 % |"
-    )
+    ways = " | ".join(f"{way} {'95 %' if which else '68 %'}" for way, which in SHOWN)
     rows: list[tuple[str, Callable[[Count], bool]]] = [("all", lambda c: True)]
     rows += [(kind, lambda c, kind=kind: c.kind == kind) for kind in kinds()]
     rows += [(f"noise level {i + 1}", lambda c, i=i: c.level == i) for i in range(3)]
     rows += [("sigma told", lambda c: c.known), ("sigma not told", lambda c: not c.known)]
-    lines = [head, "|---|---|---|---|---|---|"]
+    lines = [f"| data sets | {ways} |", "|---|---|---|---|---|---|"]
     for label, chosen in rows:
         some = [c for c in counts if chosen(c)]
         cells = [share(some, way, which) for way, which in SHOWN]
