@@ -12,7 +12,7 @@ SOONER := XLA_FLAGS="--xla_backend_optimization_level=0 --xla_llvm_disable_expen
 EXACT := tests/hard tests/fitting/test_nist.py
 PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
 
-.PHONY: fit fits test coverage docs lint bench peers properties tolerance measurements slow clean figures
+.PHONY: schema fit fits test coverage docs lint bench peers properties tolerance measurements slow clean figures
 
 # Debian splits venv's pip into a package of its own: without it, the system's pip does
 $(VENV)/bin/python:
@@ -79,6 +79,9 @@ properties: $(VENV)/.dev
 
 figures: $(VENV)/.fit
 	$(BIN)/python scripts/make_figures.py
+
+schema: $(VENV)/.fit
+	$(BIN)/python scripts/make_schema.py
 
 measurements: $(VENV)/.fit
 	$(BIN)/python scripts/make_measurements.py

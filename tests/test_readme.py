@@ -54,8 +54,8 @@ def test_there_are_commands_once_the_readme_shows_a_fit():
 
 def test_every_flag_that_it_names_exists(monkeypatch, capsys):
     helps = []
-    for command in ("fit", "sample", "simulate", "plan", "compare", "cost", "chart", "materials"):
-        monkeypatch.setattr(sys, "argv", ["pellicle", command, "--help"])
+    for command in ("", "fit", "sample", "simulate", "plan", "compare", "cost", "chart", "materials"):
+        monkeypatch.setattr(sys, "argv", ["pellicle", *command.split(), "--help"])
         main()
         helps.append(capsys.readouterr().out)
     known = set(re.findall(r"--[a-z][\w-]*", " ".join(helps)))

@@ -37,6 +37,7 @@ app.command(cost)
 app.command(chart)
 app.command(materials)
 app.command(demo)
+app.register_install_completion_command(help="Complete commands and flags in this shell from now on.")
 
 
 def main() -> int:

@@ -1,0 +1,41 @@
+"""The kept JSON schema of recipes: the one that the models give, and true of the repository's recipes."""
+
+from __future__ import annotations
+
+import json
+import runpy
+import tomllib
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+ROOT = Path(__file__).parents[2]
+KEPT = json.loads((ROOT / "docs" / "recipe.schema.json").read_text(encoding="utf-8"))
+RECIPES = sorted(
+    path for folder in ("docs", "fits", "measurements") for path in (ROOT / folder).rglob("*.toml")
+)
+
+
+def test_it_is_what_the_models_say():
+    """Else run `make schema`."""
+    assert runpy.run_path(str(ROOT / "scripts" / "make_schema.py"))["schema"]() == KEPT
+
+
+@pytest.mark.parametrize("path", RECIPES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_recipes_of_the_repository_are_valid(path):
+    jsonschema.validate(tomllib.loads(path.read_text(encoding="utf-8")), KEPT)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        "[scene]\nsubstrat = 'Si'\n[[scene.layer]]\nmaterial = 1.46\nthickness = 100",
+        "[scene]\nsubstrate = 'Si'\n[[scene.layer]]\nmaterial = 1.46\nthickness = 'thick'",
+        "[data]\nsignal = 'X'\n[scene]\nsubstrate = 'Si'\n[[scene.layer]]\nmaterial = 1.46\nthickness = 100",
+    ],
+    ids=["key", "type", "word"],
+)
+def test_wrong_recipes_are_not(wrong):
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(tomllib.loads(wrong), KEPT)
