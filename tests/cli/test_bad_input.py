@@ -6,7 +6,7 @@ from pellicle.cli.session import say
 
 
 @pytest.fixture
-def refused(pellicle, tmp_path):
+def check_refused(pellicle, tmp_path):
     """Runs a command that must fail: exactly one line of complaint, no result, nothing written."""
 
     def run(*arguments, code: int, said: tuple[str, ...]):
@@ -44,25 +44,25 @@ ROWS = "".join(f"{400 + 10 * i},0.{20 + i}\n" for i in range(10))
         pytest.param("wavelength,R\n" + ROWS + "500,1.7\n", ("line 12", "1.7", "1.5"), id="above 1.5"),
     ],
 )
-def test_data(refused, tmp_path, scene, text, said):
+def test_data(check_refused, tmp_path, scene, text, said):
     file = tmp_path / "film.csv"
     file.write_text(text)
-    refused("fit", file, *scene, code=3, said=(str(file), *said))
+    check_refused("fit", file, *scene, code=3, said=(str(file), *said))
 
 
-def test_missing_file_and_folder(refused, tmp_path, scene):
-    refused("fit", tmp_path / "gone.csv", *scene, code=3, said=("gone.csv", "no such file"))
+def test_missing_file_and_folder(check_refused, tmp_path, scene):
+    check_refused("fit", tmp_path / "gone.csv", *scene, code=3, said=("gone.csv", "no such file"))
     folder = tmp_path / "folder"
     folder.mkdir()
-    refused("fit", folder, *scene, code=3, said=(str(folder), "is a folder"))
+    check_refused("fit", folder, *scene, code=3, said=(str(folder), "is a folder"))
 
 
-def test_outside_a_materials_table(refused, spectrum_file):
+def test_outside_a_materials_table(check_refused, spectrum_file):
     file = spectrum_file()
     text = file.read_text().replace("400,", "200,").replace("404,", "201,")
     file.write_text(text)
     flags = ("--layer", "HfO2", "--substrate", "3.9", "--thickness", "10:800")
-    refused("fit", file, *flags, code=3, said=(str(file), "HfO2", "250 to 900 nm", "--range"))
+    check_refused("fit", file, *flags, code=3, said=(str(file), "HfO2", "250 to 900 nm", "--range"))
 
 
 @pytest.mark.parametrize(
@@ -97,29 +97,31 @@ def test_outside_a_materials_table(refused, spectrum_file):
     ],
     ids=lambda value: " ".join(value),
 )
-def test_flags(refused, spectrum_file, flags, said):
+def test_flags(check_refused, spectrum_file, flags, said):
     base = {"--layer": "1.46", "--substrate": "3.9", "--thickness": "10:800"}
     given = base | dict(zip(flags[::2], flags[1::2], strict=True))
-    refused("fit", spectrum_file(), *(x for pair in given.items() for x in pair), code=2, said=said)
+    check_refused("fit", spectrum_file(), *(x for pair in given.items() for x in pair), code=2, said=said)
 
 
-def test_missing_layer_substrate_and_data(refused, spectrum_file):
-    refused("fit", spectrum_file(), "--substrate", "Si", code=2, said=("--layer is missing",))
-    refused("fit", spectrum_file(), "--layer", "SiO2", code=2, said=("--substrate is missing",))
-    refused("fit", code=2, said=("no data",))
+def test_missing_layer_substrate_and_data(check_refused, spectrum_file):
+    check_refused("fit", spectrum_file(), "--substrate", "Si", code=2, said=("--layer is missing",))
+    check_refused("fit", spectrum_file(), "--layer", "SiO2", code=2, said=("--substrate is missing",))
+    check_refused("fit", code=2, said=("no data",))
 
 
 @pytest.mark.parametrize("layer", ["SiO3", "hematit", "Unobtainium"])
-def test_unknown_material_suggests_the_nearest(refused, spectrum_file, layer):
+def test_unknown_material_suggests_the_nearest(check_refused, spectrum_file, layer):
     nearest = {"SiO3": "SiO2", "hematit": "hematite"}.get(layer, "pellicle materials")
-    refused("fit", spectrum_file(), "--layer", layer, "--substrate", "Si", code=2, said=(layer, nearest))
+    check_refused(
+        "fit", spectrum_file(), "--layer", layer, "--substrate", "Si", code=2, said=(layer, nearest)
+    )
 
 
-def test_an_intensity_without_a_scale(refused, tmp_path, scene):
+def test_an_intensity_without_a_scale(check_refused, tmp_path, scene):
     file = tmp_path / "counts.csv"
     file.write_text("wavelength,intensity\n" + ROWS)
     said = (str(file), "--scale slow")
-    refused("fit", file, *scene, "--signal", "R", code=3, said=said)
+    check_refused("fit", file, *scene, "--signal", "R", code=3, said=said)
 
 
 @pytest.mark.parametrize(
@@ -144,10 +146,10 @@ def test_an_intensity_without_a_scale(refused, tmp_path, scene):
         ),
     ],
 )
-def test_recipes(refused, tmp_path, recipe, said):
+def test_recipes(check_refused, tmp_path, recipe, said):
     path = tmp_path / "film.toml"
     path.write_text(recipe)
-    refused("fit", "a.csv", "--recipe", path, code=3, said=(str(path), *said))
+    check_refused("fit", "a.csv", "--recipe", path, code=3, said=(str(path), *said))
 
 
 GOOD = {
@@ -202,7 +204,7 @@ GOOD = {
     ],
     ids=lambda value: next(iter(value.values())) if isinstance(value, dict) else "",
 )
-def test_impossible_numbers_in_recipes(refused, spectrum_file, tmp_path, part, said):
+def test_impossible_numbers_in_recipes(check_refused, spectrum_file, tmp_path, part, said):
     text = GOOD | part
     path = tmp_path / "film.toml"
     path.write_text(
@@ -210,7 +212,7 @@ def test_impossible_numbers_in_recipes(refused, spectrum_file, tmp_path, part, s
         f"[[scene.layer]]\nmaterial = {text['material']}\nthickness = {text['thickness']}\n"
         f"[instrument]\n{text['instrument']}\n"
     )
-    refused("fit", spectrum_file(), "--recipe", path, code=3, said=(str(path), *said))
+    check_refused("fit", spectrum_file(), "--recipe", path, code=3, said=(str(path), *said))
 
 
 PSI_DELTA = "".join(f"{400 + 10 * i},70,{20 + i},{100 + i}\n" for i in range(10))
@@ -226,10 +228,10 @@ PSI_DELTA = "".join(f"{400 + 10 * i},70,{20 + i},{100 + i}\n" for i in range(10)
     ],
     ids=["psi above 90", "psi below 0", "an angle missing", "every angle missing"],
 )
-def test_psi_and_delta(refused, tmp_path, scene, text, said):
+def test_psi_and_delta(check_refused, tmp_path, scene, text, said):
     file = tmp_path / "psi.csv"
     file.write_text(text)
-    refused("fit", file, *scene, code=3, said=(str(file), *said))
+    check_refused("fit", file, *scene, code=3, said=(str(file), *said))
 
 
 @pytest.mark.parametrize("step", ["1e-9", "0.1, stop = inf"])
@@ -248,24 +250,28 @@ def test_a_grid_without_end(pellicle, tmp_path, step):
     assert len(ran.err.splitlines()) == 1
 
 
-def test_a_missing_recipe(refused, tmp_path):
-    refused("fit", "--recipe", tmp_path / "gone.toml", code=3, said=("gone.toml",))
+def test_a_missing_recipe(check_refused, tmp_path):
+    check_refused("fit", "--recipe", tmp_path / "gone.toml", code=3, said=("gone.toml",))
 
 
-def test_a_recipe_with_nothing_free(refused, tmp_path, spectrum_file):
+def test_a_recipe_with_nothing_free(check_refused, tmp_path, spectrum_file):
     path = tmp_path / "film.toml"
     path.write_text("[scene]\nsubstrate = 'Si'\n[[scene.layer]]\nmaterial = 'SiO2'\nthickness = 300\n")
-    refused("fit", spectrum_file(), "--recipe", path, code=3, said=("film.toml: nothing is free to fit",))
+    check_refused(
+        "fit", spectrum_file(), "--recipe", path, code=3, said=("film.toml: nothing is free to fit",)
+    )
 
 
-def test_a_plate_without_thickness(refused, tmp_path, spectrum_file, scene):
+def test_a_plate_without_thickness(check_refused, tmp_path, spectrum_file, scene):
     path, file = tmp_path / "film.toml", spectrum_file()
     path.write_text(
         "[scene]\nsubstrate = { material = 'SiO2', back = 'air', plate_mm = 0 }\n[[scene.layer]]\n"
         "material = 1.46\nthickness = { lower = 1, upper = 9 }\n"
     )
-    refused("fit", file, "--recipe", path, code=3, said=("film.toml: plate_mm must be above 0 mm",))
-    refused("fit", file, *scene, "--back", "air", "--plate-mm", 0, code=2, said=("--plate-mm", "above zero"))
+    check_refused("fit", file, "--recipe", path, code=3, said=("film.toml: plate_mm must be above 0 mm",))
+    check_refused(
+        "fit", file, *scene, "--back", "air", "--plate-mm", 0, code=2, said=("--plate-mm", "above zero")
+    )
 
 
 def test_unknown_flags_and_commands_are_2(pellicle, spectrum_file, scene):

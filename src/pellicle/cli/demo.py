@@ -42,6 +42,7 @@ def demo(
     from pellicle.cli.looks import groups
     from pellicle.cli.simulate import simulate
     from pellicle.io.atomic import write_text
+    from pellicle.sampling.extra import missing
 
     folder = _unused(Path(out))
     folder.mkdir(parents=True)
@@ -50,7 +51,7 @@ def demo(
     say(f"{recipe}: a recipe, to be changed and tried again")
     _told(f"pellicle simulate {recipe} --out {data} --seed 1")
     simulate(str(recipe), out=str(data), seed=1)
-    sampler, command = (Sampler(), "sample") if _can_sample() else (None, "fit")
+    sampler, command = (None, "fit") if missing() else (Sampler(), "sample")
     _told(f"pellicle {command} --recipe {recipe} --out {folder / 'result'}")
     found, together = groups([], str(recipe), SceneWords(), ReadWords(), joint=False)
     start()
@@ -65,12 +66,6 @@ def demo(
 
 def _told(command: str) -> None:
     say("", f"$ {command}")
-
-
-def _can_sample() -> bool:
-    from importlib.util import find_spec
-
-    return all(find_spec(name) for name in ("emcee", "arviz", "corner", "h5py"))
 
 
 def _unused(folder: Path) -> Path:

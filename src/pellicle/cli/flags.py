@@ -15,6 +15,7 @@ OUTPUT = Group("Output", sort_key=5)
 
 
 def flag(group: Group, help: str) -> Parameter:
+    """A flag that takes a value, and what `--help` says of it."""
     return Parameter(group=group, help=help)
 
 

@@ -36,6 +36,7 @@ def start(keep: bool = True) -> None:
 
 
 def cache_folder() -> Path | None:
+    """Where compiled programs are kept between runs, None where they are not to be."""
     chosen = os.environ.get(CACHE_VARIABLE, "")
     if chosen.lower() == "off":
         return None

@@ -93,6 +93,10 @@ ORDERS_ERROR = 1e-6
 
 
 def orders(scene: Scene) -> Row:
+    """How many orders of interference are summed where fringes are damped, and the error of the rest.
+
+    Raises ValueError where the light has no wavelengths.
+    """
     if not coherence(scene).on:
         return Row("orders", False, "the closed form sums all orders")
     if _unresolved(scene) is not None:
@@ -150,6 +154,10 @@ def _need_wavelengths(scene: Scene) -> None:
 
 
 def angle_spread(scene: Scene) -> Row:
+    """How many rays stand for a cone of light, and the error of so many.
+
+    Raises ValueError where the light has no wavelengths.
+    """
     if not scene.instrument.has_cone:
         return Row("angle-spread", False, "no cone of light was given: one angle of incidence")
     if scene.light.wavelength is None:

@@ -8,7 +8,6 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from importlib.util import find_spec
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from pellicle.ladder.climb import Progress, mark_pareto
 from pellicle.ladder.trial import Trial
 from pellicle.sampling.chain import empty
 from pellicle.sampling.density import Target
+from pellicle.sampling.extra import missing
 from pellicle.sampling.modes import modes
 from pellicle.sampling.run import run
 
@@ -182,7 +182,7 @@ def _quantiles(draws: np.ndarray) -> Interval:
     return lower, upper
 
 
-_MISSING = next((name for name in ("emcee", "arviz") if not find_spec(name)), None)
+_MISSING = next(iter(missing()), None)
 WAYS = (
     Way("covariance", "curvature, bounds, other minima", _covariance),
     Way("profile", "other minima", _profile),

@@ -8,6 +8,7 @@ random numbers in it, a resumed chain is the one that an undisturbed run would h
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -59,7 +60,7 @@ def save(path: Path, chain: Chain, fingerprint: str, names: tuple[str, ...]) -> 
     with replacing(path, overwrite=True) as draft, h5py.File(draft, "w") as file:
         group: Any = file.create_group(GROUP)
         steps, walkers, size = chain.draws.shape
-        facts = {"version": "3.1.6", "nwalkers": walkers, "ndim": size, "has_blobs": False}
+        facts = {"version": version("emcee"), "nwalkers": walkers, "ndim": size, "has_blobs": False}
         random = {f"random_state_{i}": value for i, value in enumerate(chain.random)}
         ours = {"fingerprint": fingerprint, "names": list(names)}
         for key, value in (facts | {"iteration": steps} | random | ours).items():

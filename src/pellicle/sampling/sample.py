@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Sequence
-from importlib.util import find_spec
 from pathlib import Path
 
 import jax
@@ -19,6 +18,7 @@ from pellicle.io.spectrum import Spectrum
 from pellicle.sampling import chain as chains
 from pellicle.sampling.chain import Chain
 from pellicle.sampling.density import Target, fingerprint
+from pellicle.sampling.extra import missing
 from pellicle.sampling.modes import modes
 from pellicle.sampling.result import Posterior
 from pellicle.sampling.run import run
@@ -114,10 +114,10 @@ def _begun(path: Path | None, whose: str, walkers: int, parameters: int, seed: i
 
 def _installed() -> None:
     """UsageError where the sampler's packages are missing."""
-    missing = [name for name in ("emcee", "arviz", "corner", "h5py") if find_spec(name) is None]
-    if missing:
+    absent = missing()
+    if absent:
         raise UsageError(
-            f"posteriors need {', '.join(missing)}, not installed here: pip install 'pellicle[posterior]'"
+            f"posteriors need {', '.join(absent)}, not installed here: pip install 'pellicle[posterior]'"
         )
 
 
