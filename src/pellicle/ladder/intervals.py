@@ -16,6 +16,7 @@ from pellicle.fitting.search import quiet, search
 from pellicle.fitting.uncertainty import errors
 from pellicle.fitting.weigh import Weighed, weigh
 from pellicle.ladder.climb import Progress, mark_pareto
+from pellicle.ladder.entrants import entrants
 from pellicle.ladder.trial import Trial
 from pellicle.sampling.chain import empty
 from pellicle.sampling.density import Target
@@ -84,14 +85,8 @@ def intervals(trials: Sequence[Trial], progress: Progress) -> Intervals:
     found, runs = Intervals(), []
     try:
         fits = [_fitted(trial) for trial in trials]
-        for done, way in enumerate(WAYS):
-            progress(f"compile {way.name}", done, len(WAYS))
-            if way.missing:
-                found.left_out[way.name] = f"{way.missing} is not installed"
-                continue
-            began = time.perf_counter()
-            way.intervals(fits[0])
-            runs.append(_Run(way, time.perf_counter() - began))
+        for way, seconds in entrants(WAYS, lambda way: way.intervals(fits[0]), found.left_out, progress):
+            runs.append(_Run(way, seconds))
         for done, (trial, fit) in enumerate(zip(trials, fits, strict=True)):
             progress("intervals", done, len(trials))
             for each in runs:

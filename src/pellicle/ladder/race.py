@@ -11,6 +11,7 @@ import numpy as np
 
 from pellicle.fitting.status import RIVAL
 from pellicle.ladder.climb import Progress, mark_pareto
+from pellicle.ladder.entrants import entrants
 from pellicle.ladder.solvers import SOLVERS, Solver, from_truth
 from pellicle.ladder.trial import Trial, misfits
 
@@ -94,14 +95,8 @@ def race(
     """Let every solver fit every data set, taking turns. Ctrl-C ends it, and keeps what was finished."""
     found, runs = Race(noise), []
     try:
-        for done, solver in enumerate(solvers):
-            progress(f"compile {solver.name}", done, len(solvers))
-            if solver.missing:
-                found.left_out[solver.name] = f"{solver.missing} is not installed"
-                continue
-            began = time.perf_counter()
-            solver.find(trials[0])
-            runs.append(_Run(solver, time.perf_counter() - began))
+        for solver, seconds in entrants(solvers, lambda s: s.find(trials[0]), found.left_out, progress):
+            runs.append(_Run(solver, seconds))
         for done, trial in enumerate(trials):
             progress("data sets", done, len(trials))
             least = _misfit(trial, from_truth(trial))
