@@ -12,7 +12,10 @@ SOONER := XLA_FLAGS="--xla_backend_optimization_level=0 --xla_llvm_disable_expen
 EXACT := tests/hard tests/fitting/test_nist.py
 PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
 
-.PHONY: schema fit fits test coverage docs lint bench peers properties tolerance measurements slow clean figures
+NOTEBOOKS := $(wildcard notebooks/*.ipynb)
+EXECUTED := executed/done
+
+.PHONY: schema fit fits notebooks test coverage docs lint bench peers properties tolerance measurements slow clean figures
 
 # Debian splits venv's pip into a package of its own: without it, the system's pip does
 $(VENV)/bin/python:
@@ -49,8 +52,20 @@ test: $(VENV)/.dev lint
 coverage: $(VENV)/.dev
 	$(PYTEST) --cov --cov-report=term
 
-# into site/; a warning is an error
-docs: $(VENV)/.docs
+# run once, for the reader and for the documentation; PELLICLE_SHORT=1 is for tests: fewer points, faster compiling
+notebooks: $(VENV)/.dev
+	rm -rf executed && mkdir executed && cp notebooks/*.ipynb notebooks/matplotlibrc executed
+	$(if $(PELLICLE_SHORT),$(SOONER)) PYTHONWARNINGS="ignore:Error reading persistent compilation cache entry" \
+	  JAX_COMPILATION_CACHE_DIR=$(CURDIR)/executed/compiled \
+	  JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS=0 PELLICLE_CACHE=$(CURDIR)/executed/compiled \
+	  $(BIN)/python -m pytest -n 2 --nbmake --nbmake-timeout 300 --overwrite --durations 8 executed
+	@touch $(EXECUTED)
+
+$(EXECUTED): $(NOTEBOOKS)
+	$(MAKE) notebooks
+
+# into site/, with the notebooks as they were executed; a warning is an error
+docs: $(VENV)/.docs $(EXECUTED)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 slow: $(VENV)/.dev
@@ -87,4 +102,4 @@ measurements: $(VENV)/.fit
 	$(BIN)/python scripts/make_measurements.py
 
 clean:
-	rm -rf $(VENV) .venv-peers results site .pytest_cache .ruff_cache .hypothesis .coverage
+	rm -rf $(VENV) .venv-peers results executed site .pytest_cache .ruff_cache .hypothesis .coverage
