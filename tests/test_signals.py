@@ -187,6 +187,15 @@ def test_names_are_materials(function):
     assert 0 < float(found[0]) < 1
 
 
+def test_the_index_of_whatever_a_layer_may_be():
+    np.testing.assert_array_equal(pl.refractive_index(np.array([500.0, 600.0]), 1.5 + 0.1j), 1.5 + 0.1j)
+    assert pl.refractive_index(np.array([500.0, 600.0]), 1.5).shape == (2,)
+    n = pl.refractive_index(550.0, pl.Cauchy(1.5, 3000.0))
+    assert complex(n) == pytest.approx(1.5 + 3000 / 550**2)
+    with pytest.raises(ValueError, match="not at 90"):
+        pl.refractive_index(90.0, "Au")
+
+
 @BOTH
 def test_an_unknown_material_is_refused(function):
     with pytest.raises(ValueError, match="Unobtainium"):

@@ -43,6 +43,24 @@ def test_noise_and_seed():
     assert abs(np.corrcoef(one.values - one.clean, other.values - other.clean)[0, 1]) < 0.3
 
 
+def test_a_spectrum_to_fit():
+    """With σ and angle as the fit wants them; points of a rising wavelength."""
+    light = pl.Light(angle=35.0, signal="T", polarisation="p")
+    seen = pl.simulate(pl.Scene(FILM, 1.5, light=light), NM, noise=0.01, seed=1)
+    made = synthesise(pl.Scene(FILM, 1.5, light=light), NM, 0.01, 1)
+    np.testing.assert_array_equal(seen.values, made.values)
+    assert (seen.signal, seen.polarisation, set(seen.angle), set(seen.sigma)) == ("T", "p", {35.0}, {0.01})
+    assert pl.simulate(pl.Scene(FILM, 3.9), NM).sigma is None
+
+
+def test_a_spectrum_of_angles():
+    light = pl.Light(angle=pl.Free(70.0, 69, 71), signal="psi-delta")
+    seen = pl.simulate(pl.Scene(FILM, 3.9, light=light), NM)
+    psi, delta = pl.ellipsometry(NM, 430.0, 1.46, 3.9, angle=70.0)
+    np.testing.assert_allclose(seen.values, psi, rtol=1e-9)
+    np.testing.assert_allclose(seen.delta, delta, rtol=1e-9)
+
+
 def test_default_wavelengths_stay_where_every_material_has_data(tmp_path):
     np.testing.assert_array_equal(default_wavelengths(pl.Scene(FILM, 3.9)), np.arange(380.0, 781.0, 2.0))
     table = tmp_path / "resin.csv"

@@ -52,14 +52,20 @@ if TYPE_CHECKING:
     from pellicle.scene import Scene as Scene
     from pellicle.signals import ellipsometry as ellipsometry
     from pellicle.signals import reflectance as reflectance
+    from pellicle.signals import refractive_index as refractive_index
     from pellicle.signals import transmittance as transmittance
+    from pellicle.surfaces.sampling import Directions as Directions
+    from pellicle.surfaces.sampling import simulate_brdf as simulate_brdf
     from pellicle.surfaces.surface import Surface as Surface
+    from pellicle.synthetic import simulate as simulate
     from pellicle.thrift import plan as plan
 
 _HOME = {
     "pellicle.brdf_fitting.fit": ("fit_brdf",),
     "pellicle.brdf_fitting.result": ("BrdfFit",),
+    "pellicle.surfaces.sampling": ("Directions", "simulate_brdf"),
     "pellicle.surfaces.surface": ("Surface",),
+    "pellicle.synthetic": ("simulate",),
     "pellicle.fitting.compare": ("compare",),
     "pellicle.fitting.fit": ("fit",),
     "pellicle.fitting.result": ("Fit", "Status"),
@@ -88,7 +94,7 @@ _HOME = {
     "pellicle.sampling.result": ("Posterior",),
     "pellicle.sampling.sample": ("sample",),
     "pellicle.scene": ("Light", "Scene"),
-    "pellicle.signals": ("ellipsometry", "reflectance", "transmittance"),
+    "pellicle.signals": ("ellipsometry", "reflectance", "refractive_index", "transmittance"),
 }
 _MODULE = {name: module for module, names in _HOME.items() for name in names}
 _RENAMED = {"material": "lookup"}

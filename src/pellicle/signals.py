@@ -13,12 +13,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
-from jaxtyping import Array, Float
+from jaxtyping import Array, Complex, Float
 
 from pellicle.optics import film, interface, stack
 from pellicle.optics.dispersion import AbstractDispersion
 from pellicle.optics.ellipsometry import angles, normalised, stokes
-from pellicle.optics.number import Number, is_real, sincos_poly, to_pair
+from pellicle.optics.number import Number, is_real, sincos_poly, to_complex, to_pair
 from pellicle.scene import check_polarisation, medium, surroundings
 
 Medium = Any
@@ -99,6 +99,22 @@ def ellipsometry(
     angle = _floating(angle)  # also at 0 both polarisations are needed
     s, p = _waves(wavelength, thickness, layer, substrate, ambient, angle, "unpolarised")
     return angles(*normalised(stokes(s, p)))
+
+
+def refractive_index(wavelength: Any, what: Medium) -> Complex[Array, "..."]:
+    """n + ik of a material, or of what else a layer may be, at `wavelength` (nm).
+
+    **Raises:** ValueError for an unknown material and for wavelengths outside its data.
+
+    ```python
+    >>> print(f"{complex(refractive_index(550.0, 'Au')):.2f}")
+    0.42+2.47j
+
+    ```
+    """
+    wavelength = _floating(wavelength)
+    value = to_complex(_index(what, wavelength))
+    return jnp.broadcast_to(value, jnp.broadcast_shapes(value.shape, wavelength.shape))
 
 
 def _mean(signals: list[Any]) -> Any:

@@ -9,6 +9,7 @@ import equinox as eqx
 import jax
 import numpy as np
 
+from pellicle.io.spectrum import Spectrum
 from pellicle.model import build, sampled
 from pellicle.optics.dispersion import AbstractDispersion
 from pellicle.optics.ellipsometry import angles
@@ -27,6 +28,34 @@ class Synthetic(NamedTuple):
     values: np.ndarray
     clean: np.ndarray
     plan: Plan
+
+
+def simulate(scene: Scene, wavelength: Any = None, *, noise: float = 0.0, seed: int = 0) -> Spectrum:
+    """The spectrum that a scene would give, ready to be fitted.
+
+    **Arguments:** `wavelength` in nm (380 to 780 every 2 nm where the materials have data); `noise` the
+    standard deviation of normal noise, in the unit of the signal (a fraction; degrees for Ψ and Δ), which
+    becomes the spectrum's σ; `seed` of the noise. Free parameters take their values, and a free scale or
+    offset is 1 or 0.
+
+    **Raises:** ValueError where a material has no data at a wavelength.
+    """
+    wavelength = default_wavelengths(scene) if wavelength is None else np.asarray(wavelength, dtype=float)
+    light, ellipsometric = scene.light, scene.light.signal == "psi-delta"
+    made = (synthesise_angles if ellipsometric else synthesise)(scene, wavelength, noise, seed)
+    psi_or_power, delta = made.values.T if ellipsometric else (made.values, None)
+    sigma = np.full(wavelength.shape, noise) if noise > 0 else None
+    angle = getattr(light.angle, "value", light.angle)
+    return Spectrum(
+        wavelength,
+        psi_or_power,
+        light.signal,
+        sigma=sigma,
+        polarisation=light.polarisation,
+        angle=np.broadcast_to(angle, wavelength.shape),
+        delta=delta,
+        delta_sigma=sigma if ellipsometric else None,
+    )
 
 
 def synthesise(

@@ -7,7 +7,7 @@ import pytest
 
 from pellicle.errors import UsageError
 from pellicle.free import Free
-from pellicle.surfaces.sampling import Directions, default_directions, synthesise
+from pellicle.surfaces.sampling import Directions, default_directions, simulate_brdf, synthesise
 from pellicle.surfaces.surface import Surface
 
 
@@ -33,6 +33,9 @@ def test_no_noise_takes_a_value_below_zero():
     dark = Surface("granier-heidrich-diffuse", {"diffuse": 1e-3}, (550.0,))
     found, _ = synthesise(dark, default_directions(200), noise=0.1, seed=3)
     assert found.channels == ("value",)
+    np.testing.assert_array_equal(
+        simulate_brdf(dark, default_directions(200), noise=0.1, seed=3).values, found.values
+    )
     assert found.values.min() == 0.0
     assert found.notes == (f"{np.sum(found.values == 0)} values that noise took below zero are 0",)
 

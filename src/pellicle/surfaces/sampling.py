@@ -47,6 +47,22 @@ def default_directions(count: int = SAMPLES) -> Directions:
     return Directions(*found)
 
 
+def simulate_brdf(
+    surface: Surface,
+    directions: Directions | BrdfSamples | None = None,
+    *,
+    noise: float = 0.0,
+    seed: int = 0,
+) -> BrdfSamples:
+    """The samples that a surface would give, ready to be fitted; for `directions` see `synthesise`.
+
+    Without directions there are 1000 pairs, spread over the lobe and around it. `noise` (1/sr) is the
+    standard deviation of normal noise, and becomes the samples' σ.
+    """
+    looked = default_directions() if directions is None else directions
+    return synthesise(surface, looked, noise, seed).samples
+
+
 class Synthetic(NamedTuple):
     """Samples with noise, and the plan that they went through."""
 
