@@ -85,7 +85,7 @@ def test_a_closed_pipe_is_no_error(monkeypatch):
     def closed(*_):
         raise BrokenPipeError
 
-    monkeypatch.setattr("pellicle.cli.app", closed)
+    monkeypatch.setattr("pellicle.cli.command", closed)
     assert main() == 0
 
 
@@ -93,6 +93,6 @@ def test_ctrl_c_anywhere(monkeypatch, capsys):
     def pressed(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("pellicle.cli.app", pressed)
+    monkeypatch.setattr("pellicle.cli.command", pressed)
     assert main() == 130
     assert capsys.readouterr().err == "pellicle: interrupted\n"

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import sys
+from contextlib import nullcontext
+from typing import Annotated
 
-from cyclopts import App
+from cyclopts import App, Parameter
 
+from pellicle.cli.aloud import aloud
 from pellicle.cli.chart import chart
 from pellicle.cli.compare import compare
 from pellicle.cli.cost import cost
@@ -39,6 +42,21 @@ app.command(materials)
 app.command(demo)
 app.register_install_completion_command(help="Complete commands and flags in this shell from now on.")
 
+command = app.meta
+"""What is typed: a command of `app`, and the flags that all of them share."""
+
+
+@command.default
+def _any(
+    *words: Annotated[str, Parameter(show=False, allow_leading_hyphen=True)],
+    verbose: Annotated[
+        bool,
+        Parameter(negative="", help="Tell on stderr, step by step, what is understood, and why."),
+    ] = False,
+) -> int:
+    with aloud() if verbose else nullcontext():
+        return int(app(words) or 0)
+
 
 def main() -> int:
     """Run the command line and return its exit code.
@@ -48,7 +66,7 @@ def main() -> int:
     from cyclopts import CycloptsError
 
     try:
-        return int(app(sys.argv[1:]) or 0)
+        return int(command(sys.argv[1:]) or 0)
     except CycloptsError:
         return 2  # cyclopts has said what is wrong
     except UsageError as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json as json_module
+from logging import getLogger
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,6 +16,8 @@ from pellicle.errors import DataError, UsageError
 if TYPE_CHECKING:
     from pellicle.cli.batch import Look
     from pellicle.fitting.compare import Comparison
+
+log = getLogger(__name__)
 
 
 def compare(
@@ -78,7 +81,7 @@ def _one(label: str, looks: dict[str, list[Look]], folder: Path | None, as_json:
 
     progress, first = Progress(label), next(iter(looks))
     try:
-        found = compared({name: _fit(looks[name], progress, talk=name == first) for name in looks})
+        found = compared({name: _fit(name, looks[name], progress, talk=name == first) for name in looks})
     except ValueError as error:
         progress.clear()
         message = str(error) if label in str(error) else f"{label}: {error}"
@@ -93,10 +96,11 @@ def _one(label: str, looks: dict[str, list[Look]], folder: Path | None, as_json:
     return _code(found)
 
 
-def _fit(looks: list[Look], progress: Progress, talk: bool) -> Any:
+def _fit(name: str, looks: list[Look], progress: Progress, talk: bool) -> Any:
     from pellicle.cli.batch import measurements
     from pellicle.fitting.fit import fit
 
+    log.info("comparison: now %s", name)
     return fit(*measurements(looks, joint=len(looks) > 1, talk=talk), progress=progress)
 
 

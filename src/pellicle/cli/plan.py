@@ -38,8 +38,10 @@ def plan(
     scene = with_wavelength(*seen(read_recipe(recipe)))
     start()
     from pellicle import costs, thrift
+    from pellicle.fitting import spoken
     from pellicle.report import plans
 
+    spoken.of_scene(scene)
     chosen, calibration = thrift.plan(scene, tolerance), costs.calibrated(cache_folder())
     savings = costs.savings(scene, calibration)
     whole, planned = (calibration.seconds(costs.work(p, scene)) for p in (thrift.reference(scene), chosen))

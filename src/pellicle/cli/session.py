@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import os
 import sys
+from logging import INFO
 from math import inf
 from pathlib import Path
 
+from pellicle.cli.aloud import LOG
 from pellicle.errors import UsageError
 
 CACHE_VARIABLE = "PELLICLE_CACHE"
@@ -62,13 +64,13 @@ def say(*sentences: str) -> None:
 
 
 class Progress:
-    """One line on stderr that is written over; silent where nobody watches."""
+    """One line on stderr that is written over; silent where nobody watches, or where each step is told."""
 
     def __init__(self, label: str):
         self.label, self.shown = label, False
 
     def __call__(self, what: str, done: int, total: int) -> None:
-        if sys.stderr.isatty():
+        if sys.stderr.isatty() and not LOG.isEnabledFor(INFO):
             print(f"\r{self.label}: {what} {done}/{total}\033[K", end="", file=sys.stderr, flush=True)
             self.shown = True
 

@@ -44,8 +44,10 @@ def simulate(
     found = read_recipe(recipe)
     scene = found.scene()
     start()
+    from pellicle.fitting import spoken
     from pellicle.synthetic import synthesise, synthesise_angles
 
+    spoken.of_scene(scene)
     ellipsometric = scene.light.signal == "psi-delta"
     if ellipsometric and found.tables.data.angle is None:
         raise DataError(f"{found.path}: ellipsometry needs an angle of incidence: give [data] angle = 70")

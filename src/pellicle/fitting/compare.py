@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from logging import getLogger
 
 import numpy as np
 
@@ -20,6 +21,8 @@ from pellicle.fitting.result import Fit, Part, Status
 from pellicle.fitting.search import Progress, quiet
 from pellicle.io.spectrum import Spectrum
 from pellicle.scene import Scene
+
+log = getLogger(__name__)
 
 UNDECIDED, STRONG = 2.0, 6.0
 """ΔBIC below which two descriptions cannot be told apart, and from which the evidence is strong (R. Kass and
@@ -84,6 +87,10 @@ def compared(fits: Mapping[str, Fit]) -> Comparison:
     for name, rows in left.items():
         free, deviance = len(fits[name].free), _deviance(rows, lengths, fits)
         bic = deviance + free * math.log(max(points, 2.0))
+        log.info(
+            "comparison: %s has %d free numbers and -2 ln L %.6g on %.4g points: BIC %.6g",
+            *(name, free, deviance, points, bic),
+        )
         found.append(Candidate(name, fits[name], free, deviance, deviance + 2 * free, bic))
     return Comparison(tuple(found), points, _verdict(found))
 

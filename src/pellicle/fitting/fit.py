@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from logging import getLogger
 from pathlib import Path
 
 import equinox as eqx
 import jax
 
 from pellicle.errors import UsageError
-from pellicle.fitting import backface, identifiability, parts, structure, summary
+from pellicle.fitting import backface, identifiability, parts, spoken, structure, summary
 from pellicle.fitting.losses import LEAST_SQUARES, check_loss
 from pellicle.fitting.measured import Measured, measured, unscaled
 from pellicle.fitting.problem import Problem, beyond, make
@@ -21,6 +22,8 @@ from pellicle.fitting.uncertainty import errors, scaled
 from pellicle.fitting.weigh import Weighed, weigh
 from pellicle.io.spectrum import Spectrum
 from pellicle.scene import Scene, free_leaves
+
+log = getLogger(__name__)
 
 
 def fit(
@@ -123,9 +126,12 @@ def _fit(
     data: list[Spectrum], spectra: list[Measured], tolerance: float, loss: str, progress: Progress
 ) -> tuple[Fit, Weighed]:
     began = time.perf_counter()
-    weighed, warnings = _weighed(make(*spectra, tolerance=tolerance), loss, progress), []
+    problem, warnings = make(*spectra, tolerance=tolerance), []
+    spoken.of_problem(spectra, problem)
+    weighed = _weighed(problem, loss, progress)
     off = max(beyond(view, weighed.minima.units[0]) for view in weighed.problem.views)
     if off > tolerance:
+        log.info("plan: off by %.2g at the best fit, beyond the tolerance: again with every effect", off)
         warnings = [
             f"at the best fit what was left out changes the signal by {off:.2g}, more than the tolerance "
             f"{tolerance:g}: fitted again with every effect"
@@ -156,6 +162,7 @@ def _report(
         rivals=others,
         natural=frozenset(p.name for p in problem.parameters if p.natural_lower),
     )
+    log.info("status: %s", status)
     shown, dark = (missed or each)[0], summary.opaque(spectra, weighed)
     trading = identifiability.trades(scaled(*around), parameters)
     of_lead = identifiability.of(next(iter(parameters)), trading)

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import jax
 import numpy as np
 
+from pellicle.fitting import spoken
 from pellicle.fitting.evaluation import evidences, polish
 from pellicle.fitting.parameters import Parameter
 from pellicle.fitting.problem import Problem, thin
@@ -62,12 +63,14 @@ def search(problem: Problem, progress: Progress) -> Minima:
     grid = _thickness_grid(problem)
     design = _design(problem)
     units = np.repeat(design, max(len(grid), 1), axis=0)
+    spoken.of_scan(problem, len(grid), len(design))
     if depth is not None:
         units[:, depth] = np.tile(grid, len(design))
     table = scanned(thinned, units, progress).reshape(len(design), max(len(grid), 1), -1)
     batches = 1 if len(design) == 1 else 3 if len(problem.parameters) < 4 else 6
     starts = units[_local_minima(table.sum(-1), most=batches * LANES)]
     minima = polished(problem, starts, progress)
+    spoken.of_minima(problem, len(starts), minima.units, minima.converged)
     if depth is None:
         return minima
     p = problem.parameters[depth]

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Container, Mapping, Sequence
+from logging import getLogger
 
 from pellicle.fitting.result import Estimate, Rival, Status
+
+log = getLogger(__name__)
 
 RIVAL = 6.0
 """A distinct rival closer than this in χ² on the effective points leaves the answer open."""
@@ -49,15 +52,30 @@ def judge(
     depths = [p for p in free if p.name.split(".")[-1] == "thickness"]
     unseen = [p for p in (depths or free) if not math.isfinite(p.stderr)]
     at_bound = [p for p in free if p.at_bound and p.name not in natural]
+    close = distinct_rivals(parameters, rivals)
+    for question, answer in (
+        ("did the solver settle?", converged),
+        ("does the scene miss the data?", misfit),
+        ("is something of the sample not seen?", [p.name for p in unseen]),
+        (f"does a rival come within Δχ² {RIVAL:g}, outside the errors?", len(close)),
+        ("does a number rest on a bound that was set?", [p.name for p in at_bound]),
+    ):
+        log.info("status: %s %s", question, _answer(answer))
     if not converged:
         return Status.NOT_CONVERGED
     if misfit:
         return Status.MISFIT
     if unseen and (depths or len(unseen) == len(free)):
         return Status.NOT_IDENTIFIABLE
-    if distinct_rivals(parameters, rivals):
+    if close:
         return Status.AMBIGUOUS
     return Status.AT_BOUND if at_bound else Status.CONVERGED
+
+
+def _answer(found: bool | int | list[str]) -> str:
+    if isinstance(found, list):
+        return ", ".join(found) or "no"
+    return str(found) if found and not isinstance(found, bool) else "yes" if found else "no"
 
 
 def distinct_rivals(parameters: Mapping[str, Estimate], rivals: tuple[Rival, ...]) -> list[Rival]:

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
-from pellicle.fitting import noise
+from pellicle.fitting import noise, spoken
 from pellicle.fitting.evaluation import Local, local
 from pellicle.fitting.losses import LEAST_SQUARES, LOSSES, Loss, inflation, spread
 from pellicle.fitting.problem import Problem, View
@@ -92,6 +92,7 @@ def weigh(problem: Problem, minima: Minima, loss: str = LEAST_SQUARES) -> Weighe
             break
         found = again
     ranked = _reweighted(problem, found)
+    spoken.of_weights(ranked.views, [r.length for r in found])
     met = tuple(_met(view, minima.units[0], r) for view, r in zip(ranked.views, found, strict=True))
     return Weighed(ranked, minima, met)
 

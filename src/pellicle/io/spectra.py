@@ -7,6 +7,7 @@ import math
 import os
 from collections.abc import Sequence
 from functools import partial
+from logging import getLogger
 
 import numpy as np
 
@@ -18,6 +19,8 @@ from pellicle.io.ellipsometry import SIGNAL, is_ellipsometry, read_ellipsometry
 from pellicle.io.exports import find_export
 from pellicle.io.spectrum import Spectrum
 from pellicle.io.table import read_table
+
+log = getLogger(__name__)
 
 
 def read_spectrum(
@@ -60,7 +63,7 @@ def read_spectrum(
     table = read_table(path, partial(find_export, spot=spot))
     if is_ellipsometry(table, named_columns(table, columns), signal):
         _refuse_flags(table.path, signal_unit, polarisation)
-        return read_ellipsometry(table, columns, wavelength_unit, noise, range, folded, analyser)
+        return _told(read_ellipsometry(table, columns, wavelength_unit, noise, range, folded, analyser))
     _refuse_ellipsometry(table.path, folded, analyser)
     chosen = choose_spectrum(table, columns, signal, polarisation)
     axis = axis_unit(table, chosen.wavelength, wavelength_unit)
@@ -89,6 +92,20 @@ def read_spectrum(
     if range is not None:
         spectrum = spectrum.cut(*range)
     check_signal(spectrum, table.label(chosen.signal.position), stated=scale.stated)
+    return _told(spectrum)
+
+
+def _told(spectrum: Spectrum) -> Spectrum:
+    log.info(
+        "%s: %d rows used: %s from %g to %g nm, values from %.4g to %.4g",
+        spectrum.path,
+        len(spectrum),
+        spectrum.signal,
+        spectrum.wavelength.min(),
+        spectrum.wavelength.max(),
+        spectrum.values.min(),
+        spectrum.values.max(),
+    )
     return spectrum
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from logging import getLogger
 
 import numpy as np
 
@@ -12,6 +13,8 @@ from pellicle.sampling.checks import Checks, check
 from pellicle.sampling.density import Target
 from pellicle.sampling.modes import Modes
 from pellicle.sampling.moves import moves
+
+log = getLogger(__name__)
 
 BLOCK = 100
 """Steps between two looks at the clock and the keyboard."""
@@ -37,6 +40,7 @@ def run(
         while chain.steps < steps:
             if chain.steps >= 2 * BLOCK and chain.steps >= _LOOK * looked:
                 checks, looked = check(chain, modes), chain.steps
+                log.info("chain: %d steps: %s", chain.steps, "; ".join(checks.doubts) or "long enough")
                 if checks.trusted:
                     break
             chain = _lengthened(target, modes, chain, min(BLOCK, steps - chain.steps))

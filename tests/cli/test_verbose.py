@@ -1,0 +1,67 @@
+"""`--verbose` tells on stderr what was understood and why; without it the library is silent."""
+
+from __future__ import annotations
+
+import logging
+import re
+
+import jax
+
+from pellicle.cli.aloud import aloud
+
+
+def test_every_step_of_a_fit_is_told(pellicle, spectrum_file, scene):
+    ran = pellicle("fit", spectrum_file(), *scene, "--verbose")
+    sentences = re.findall(r"^ *\d+\.\d\d s  (.*)$", ran.err, re.MULTILINE)
+    heads = [re.split(r":| of ", sentence)[0] for sentence in sentences if "oxide.csv" not in sentence]
+    assert list(dict.fromkeys(heads)) == [
+        *("scene", "free", "data", "plan", "scan", "refined", "weights", "status", "time")
+    ]
+    assert "oxide.csv: 100 rows used: R from 400 to 796 nm" in ran.err
+    assert "scene: from air (exactly 1): index 1.46, 10 to 800 nm, on index 3.9 + 0.02i" in sentences
+    assert "free: thickness between 10 and 800 nm" in sentences
+    assert any("no noise is given" in sentence for sentence in sentences)
+    # 790 nm in steps of at most 400 nm / 1.46 / 8
+    assert any(s.startswith("scan: 25 values of thickness, 32.9 nm apart") for s in sentences)
+    assert "status: converged" in sentences
+    quiet = pellicle("fit", spectrum_file("again.csv"), *scene)
+    assert quiet.code == ran.code == 0
+    assert not re.search(r"^ *\d+\.\d\d s", quiet.err, re.MULTILINE)
+
+
+def test_where_the_time_went(capsys):
+    with aloud():
+        jax.jit(lambda x: x + 11.5)(1.0)
+    said = capsys.readouterr().err
+    whole, making, programs = re.search(
+        r"time: (\S+) s in all, (\S+) s of it .* (\d+) programs", said
+    ).groups()
+    assert 0 < float(making) <= float(whole)
+    assert int(programs) == 1
+
+
+def test_why_a_fit_is_no_answer(pellicle, spectrum_file):
+    ran = pellicle(
+        "fit", spectrum_file(), "--layer", "1.46", "--substrate", "3.9+0.02j", "--thickness", "10:250", "-v"
+    )
+    assert ran.code == 2  # there is no short form
+    ran = pellicle(
+        *("fit", spectrum_file(), "--layer", "1.46", "--substrate", "3.9+0.02j", "--thickness", "10:250"),
+        *("--noise", "0.002", "--verbose"),
+    )
+    assert ran.code == 4
+    assert "status: does the scene miss the data? yes" in ran.err
+    assert "its noise is given" in ran.err
+
+
+def test_other_commands_tell_their_scene(pellicle, tmp_path):
+    recipe = tmp_path / "film.toml"
+    recipe.write_text(
+        '[data]\nsignal = "R"\nwavelengths = [500, 600]\n[scene]\nsubstrate = 1.5\n'
+        "[[scene.layer]]\nmaterial = 1.33\nthickness = 100\n"
+    )
+    ran = pellicle("simulate", recipe, "--out", tmp_path / "film.csv", "--verbose")
+    assert ran.code == 0
+    assert "scene: from index 1: index 1.33, 100 nm, on index 1.5" in ran.err
+    assert logging.getLogger("pellicle").handlers == []
+    assert "--verbose" in pellicle("materials", "--help").out
