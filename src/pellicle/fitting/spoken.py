@@ -62,7 +62,7 @@ def of_scan(problem: Problem, thicknesses: int, others: int) -> None:
         return
     p = problem.parameters[depth]
     log.info(
-        "scan: %d values of %s, %.3g nm apart (at most an eighth of the shortest wavelength in a layer, %.3g), "
+        "scan: %d values of %s, %.3g nm apart (an eighth of the shortest wavelength in a layer, %.3g), "
         "with %d choice%s of the rest each: %d candidates",
         thicknesses,
         p.name,
