@@ -142,7 +142,7 @@ losses = np.array([one.fun for one in designs])
 best = designs[int(np.argmin(losses))]
 
 bare = spectrum(np.zeros(3))
-quarter = 550 / 4 / float(STACK[0].index(jnp.asarray(550.0)))
+quarter = 550 / 4 / float(pl.refractive_index(550.0, "MgF2").real)
 single = spectrum(np.array([quarter, 0.0, 0.0]))
 print(
     f"mean reflectance: bare {100 * bare.mean():.2f} %, {quarter:.0f} nm of MgF2 {100 * single.mean():.2f} %,"
@@ -264,7 +264,7 @@ plt.show()
 
 # %%
 nm = np.linspace(400.0, 800.0, 41 if SHORT else 201)
-WAFER = jnp.asarray(SILICON.index(nm).re + 1j * SILICON.index(nm).im)
+WAFER = pl.refractive_index(nm, "Si")
 R_NOISE = 0.002
 
 slopes = jax.jit(jax.jacfwd(lambda p: pl.reflectance(nm, p[0], p[1] + 1j * p[2], WAFER)))(TRUTH)
@@ -356,15 +356,11 @@ assert limits["Ψ and Δ at 70°"][0] < 0.2 * limits["R at 0°"][0]
 # knowing d, n and k, and compare: the error that the fit states, and how the answers scatter.
 
 # %%
-clean = np.asarray(pl.reflectance(nm, 80.0, 1.8 + 0.02j, WAFER))
-scene = pl.Scene(
-    pl.Layer(pl.Constant(pl.Free(None, 1.5, 2.2), pl.Free(None, 0.0, 0.2)), pl.Free(None, 20, 200)), "Si"
-)
+# each Free holds a value, which is simulated, and bounds; a fit scans all between these
+film = pl.Layer(pl.Constant(pl.Free(1.8, 1.5, 2.2), pl.Free(0.02, 0.0, 0.2)), pl.Free(80.0, 20, 200))
+scene = pl.Scene(film, "Si")
 NAMES = ("thickness", "n", "k")
-fits = []
-for _ in range(8 if SHORT else 60):
-    values = clean + random.normal(0.0, R_NOISE, nm.size)
-    fits.append(pl.fit(pl.Spectrum(nm, values, "R", sigma=np.full(nm.size, R_NOISE)), scene))
+fits = [pl.fit(pl.simulate(scene, nm, noise=R_NOISE, seed=seed), scene) for seed in range(8 if SHORT else 60)]
 print(fits[0], "\n")
 
 there = [abs(fit["thickness"].value - 80) < 5 for fit in fits]
@@ -390,5 +386,5 @@ assert all(fit.status == "ambiguous" for fit in far)
 # %% [markdown]
 # The errors that a fit states are the bound, within what differs from one noisy spectrum to the next, and
 # the answers scatter by about as much. But the bound looks at one answer and its neighbourhood only. This
-# film has a rival: a thinner one with a higher index. Now and then noise makes that one fit best. A fit
-# says so by its status (`ambiguous`); the bound cannot. Notebook 6 goes on from here.
+# film has a rival: a thinner one with a higher index. Once in a while noise makes that one fit best. A
+# fit says so by its status (`ambiguous`); the bound cannot. Notebook 6 goes on from here.
