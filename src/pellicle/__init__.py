@@ -19,9 +19,11 @@ if TYPE_CHECKING:
     from pellicle.free import Normal as Normal
     from pellicle.instrument import Instrument as Instrument
     from pellicle.io.brdf_samples import read_brdf_samples as read_brdf_samples
+    from pellicle.io.recipe import read_recipe as read_recipe
     from pellicle.io.samples import BrdfSamples as BrdfSamples
     from pellicle.io.spectra import read_spectrum as read_spectrum
     from pellicle.io.spectrum import Spectrum as Spectrum
+    from pellicle.ladder.cost import cost as cost
     from pellicle.layers import Interface as Interface
     from pellicle.layers import Layer as Layer
     from pellicle.layers import Plate as Plate
@@ -70,6 +72,7 @@ _HOME = {
     "pellicle.fitting.fit": ("fit",),
     "pellicle.fitting.result": ("Fit", "Status"),
     "pellicle.io.brdf_samples": ("read_brdf_samples",),
+    "pellicle.io.recipe": ("read_recipe",),
     "pellicle.io.samples": ("BrdfSamples",),
     "pellicle.io.spectra": ("read_spectrum",),
     "pellicle.io.spectrum": ("Spectrum",),
@@ -89,6 +92,7 @@ _HOME = {
     "pellicle.optics.spline": ("KramersKronigSpline", "Spline"),
     "pellicle.thrift": ("plan",),
     "pellicle.instrument": ("Instrument",),
+    "pellicle.ladder.cost": ("cost",),
     "pellicle.layers": ("Interface", "Layer", "Plate", "Substrate"),
     "pellicle.free": ("Free", "HalfNormal", "LogUniform", "Normal"),
     "pellicle.sampling.result": ("Posterior",),
