@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from pellicle.io.spectra import read_spectrum as read_spectrum
     from pellicle.io.spectrum import Spectrum as Spectrum
     from pellicle.ladder.cost import cost as cost
+    from pellicle.io.words import medium as medium
     from pellicle.layers import Interface as Interface
     from pellicle.layers import Layer as Layer
     from pellicle.layers import Plate as Plate
@@ -76,6 +77,7 @@ _HOME = {
     "pellicle.io.samples": ("BrdfSamples",),
     "pellicle.io.spectra": ("read_spectrum",),
     "pellicle.io.spectrum": ("Spectrum",),
+    "pellicle.io.words": ("medium",),
     "pellicle.materials": ("material",),
     "pellicle.optics.cody_lorentz": ("CodyLorentz",),
     "pellicle.optics.dispersion": (
