@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from pellicle.io.samples import BrdfSamples as BrdfSamples
     from pellicle.io.spectra import read_spectrum as read_spectrum
     from pellicle.io.spectrum import Spectrum as Spectrum
-    from pellicle.ladder.cost import cost as cost
     from pellicle.io.words import medium as medium
+    from pellicle.ladder.cost import cost as cost
     from pellicle.layers import Interface as Interface
     from pellicle.layers import Layer as Layer
     from pellicle.layers import Plate as Plate
