@@ -31,6 +31,7 @@ from pellicle.fitting.limits import interval  # noqa: E402
 from pellicle.fitting.parameters import parameters  # noqa: E402
 from pellicle.fitting.search import quiet  # noqa: E402
 from pellicle.fitting.uncertainty import errors  # noqa: E402
+from pellicle.fitting.valley import valley  # noqa: E402
 from pellicle.instrument import Drift  # noqa: E402
 from pellicle.scene import insert  # noqa: E402
 from pellicle.synthetic import synthesise, synthesise_angles  # noqa: E402
@@ -124,7 +125,7 @@ def _profiles(data: pl.Spectrum, scene: pl.Scene) -> dict[str, tuple[float, floa
         _, weighed = fitted(data, scene, 0.0, quiet)
         problem, met = weighed.problem, weighed.met
         covariance = errors(problem, [m.at for m in met], [m.variance for m in met]).covariance
-        return {p.name: interval(weighed, covariance, i) for i, p in enumerate(problem.parameters)}
+        return {p.name: interval(valley(weighed, covariance), i) for i, p in enumerate(problem.parameters)}
 
 
 def _count(

@@ -9,6 +9,7 @@ from pellicle.fitting.fit import fitted
 from pellicle.fitting.limits import interval
 from pellicle.fitting.search import quiet
 from pellicle.fitting.uncertainty import errors
+from pellicle.fitting.valley import valley
 
 SUBSTRATE = 3.9 + 0.02j
 
@@ -91,7 +92,7 @@ def test_an_interval_by_profile_is_that_of_a_scan(film, measured):
     data = measured(scene, 1.46, 430.0, sigma=True)
     fit, weighed = fitted(data, scene, 0.0, quiet)
     found = errors(weighed.problem, [m.at for m in weighed.met], [m.variance for m in weighed.met])
-    low, high = interval(weighed, found.covariance, fit.correlation_names.index("thickness"))
+    low, high = interval(valley(weighed, found.covariance), fit.correlation_names.index("thickness"))
 
     def profile(d):
         return least(data, lambda n: chi2(data, d, n), 1.46, 0.03) * weighed.met[0].variance ** -1

@@ -8,17 +8,15 @@ A. López and J. Conrad, 2005, Nucl. Instrum. Methods A 551, 493).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from pellicle.fitting.problem import Problem, View, thin
 from pellicle.fitting.result import Profile
-from pellicle.fitting.search import SCAN_POINTS, held, quiet, scanned
 from pellicle.fitting.status import RIVAL
 from pellicle.fitting.uncertainty import UNSEEN
-from pellicle.fitting.weigh import Met, Weighed
+from pellicle.fitting.valley import Valley
 
 ONE_SIDED, TWO_SIDED = 2.71, 3.84
 """χ² above the best at a 95 % limit: where one side is bounded, and where both are."""
@@ -49,21 +47,17 @@ class Limits(NamedTuple):
     upper: float | None = None
 
 
-def limits(weighed: Weighed, covariance: np.ndarray, seen: Profile | None) -> list[Limits]:
-    """Limits of each nonlinear parameter, in the order of the problem's.
-
-    `covariance` has these parameters first; `seen` is the search's scan of the thickness.
-    """
-    problem, best = _as_in_covariance(weighed), weighed.minima.units[0]
-    doubted, values = _doubted(problem, best, covariance), problem.box.values(best)
-    stderr = np.sqrt(np.diag(covariance))
+def limits(valley: Valley, scans: Mapping[int, Profile] | None = None) -> list[Limits]:
+    """Limits of each parameter of the valley; `scans` are what a search saw of some of them."""
+    doubted, scans = _doubted(valley), scans or {}
     found = []
-    for i, p in enumerate(problem.parameters):
-        at = _Best(float(values[i]), p.lower, p.upper, float(stderr[i]))
-        rise = _rise(problem, best, covariance, i)
-        flat = _flat(seen, at.value) if seen is not None and i == problem.thickness_axis else (False, False)
-        if p.natural_lower and at.value - at.lower < _REACH * at.sd:
-            found.append(_beside_zero(rise, at))
+    for i, natural in enumerate(valley.natural):
+        at, rise = _best(valley, i), _rise(valley, i)
+        flat = _flat(scans[i], at.value) if i in scans else (False, False)
+        ends = [end for end, is_one in zip((at.lower, at.upper), natural, strict=True) if is_one]
+        beside = next((end for end in ends if abs(at.value - end) < _REACH * at.sd), None)
+        if beside is not None:
+            found.append(_beside(rise, at, beside))
         elif doubted[i] or any(flat):
             found.append(_profiled(rise, at, flat))
         else:
@@ -71,17 +65,14 @@ def limits(weighed: Weighed, covariance: np.ndarray, seen: Profile | None) -> li
     return found
 
 
-def interval(weighed: Weighed, covariance: np.ndarray, which: int) -> tuple[float, float]:
-    """The 95 % interval of one nonlinear parameter by profile likelihood, whatever its status.
+def interval(valley: Valley, which: int) -> tuple[float, float]:
+    """The 95 % interval of one parameter by profile likelihood, whatever its status.
 
     An end is the bound where the misfit never rises on the way to it.
     """
-    problem, best = _as_in_covariance(weighed), weighed.minima.units[0]
-    p = problem.parameters[which]
-    value, sd = float(problem.box.values(best)[which]), float(np.sqrt(covariance[which, which]))
-    rise = _rise(problem, best, covariance, which)
-    bounds = [p.lower, p.upper]
-    sides = _sides(rise, _Best(value, p.lower, p.upper, sd), bounds, TWO_SIDED)
+    at, rise = _best(valley, which), _rise(valley, which)
+    bounds = [at.lower, at.upper]
+    sides = _sides(rise, at, bounds, TWO_SIDED)
     low, high = (
         bound if side is None else _crossing(rise, side, TWO_SIDED)
         for bound, side in zip(bounds, sides, strict=True)
@@ -115,58 +106,54 @@ class _Side(NamedTuple):
     outside: float
 
 
-def _as_in_covariance(weighed: Weighed) -> Problem:
-    """The problem with each point counting for as much as it does in the covariance."""
-    views = zip(weighed.problem.views, weighed.met, strict=True)
-    return weighed.problem._replace(views=tuple(_counted(view, met) for view, met in views))
+def _best(valley: Valley, which: int) -> _Best:
+    lower, upper = float(valley.lower[which]), float(valley.upper[which])
+    return _Best(float(valley.values[which]), lower, upper, float(valley.stderr[which]))
 
 
-def _counted(view: View, met: Met) -> View:
-    return view._replace(data=view.data._replace(temper=np.float64(1 / met.variance)))
-
-
-def _doubted(problem: Problem, best: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+def _doubted(valley: Valley) -> np.ndarray:
     """Which parameters the parabola may have wrong, (parameters,), by a look along the axis of each.
 
     Two standard errors out, with the others where the covariance expects them, it says 4.
     """
-    box, count = problem.box, len(best)
-    span, stderr = box.upper - box.lower, np.sqrt(np.diag(covariance))[:count]
-    along = _REACH * covariance[:count, :count] / stderr[:, None] / span
+    best, span, stderr = valley.best, valley.upper - valley.lower, valley.stderr
+    along = _REACH * valley.covariance / stderr[:, None] / span
     ends = np.clip(best + np.concatenate([along, -along]), 0.0, 1.0)
-    thinned = problem._replace(views=tuple(thin(view, SCAN_POINTS) for view in problem.views))
-    evidence = scanned(thinned, np.concatenate([best[None], ends]), quiet).sum(-1)
+    misfit = valley.misfit(np.concatenate([best[None], ends]))
     own = np.concatenate([np.diag(half - best) for half in np.split(ends, 2)])
     moved = np.abs(own) * np.tile(span / stderr, 2)
-    share = (evidence[1:] - evidence[0]) / np.maximum(moved, 1e-100) ** 2
+    share = (misfit[1:] - misfit[0]) / np.maximum(moved, 1e-100) ** 2
     wrong = (moved > 0.5) & ((share < _FLAT) | (share > _CURVED))
-    return (stderr > UNSEEN * span) | wrong.reshape(2, count).any(axis=0)
+    return (stderr > UNSEEN * span) | wrong.reshape(2, len(best)).any(axis=0)
 
 
-def _rise(problem: Problem, best: np.ndarray, covariance: np.ndarray, which: int) -> Rise:
+def _rise(valley: Valley, which: int) -> Rise:
     """The profile of one parameter: the others start at their best values, and where the covariance
     expects them, which follows a valley."""
-    box, count = problem.box, len(best)
-    slope = covariance[which, :count] / covariance[which, which] / (box.upper - box.lower)
-    value = box.values(best)[which]
+    covariance, best = valley.covariance, valley.best
+    slope = covariance[which] / covariance[which, which] / (valley.upper - valley.lower)
+    value = valley.values[which]
 
     def rise(values: np.ndarray) -> np.ndarray:
         values = np.append(values, value)
         moved = np.clip(best + (values - value)[:, None] * slope, 0.0, 1.0)
         starts = np.stack([moved, np.broadcast_to(best, moved.shape)], axis=1)
-        found = held(problem, which, values, starts)
+        found = valley.held(which, values, starts)
         return np.maximum(found[:-1] - found[-1], 0.0)
 
     return rise
 
 
-def _beside_zero(rise: Rise, at: _Best) -> Limits:
-    """Of a parameter that physics bounds from below, where its best value may as well be that bound."""
-    [side] = _sides(rise, at, [at.upper], ONE_SIDED)
-    zero = rise(np.array([at.lower]))[0]
-    if zero > ONE_SIDED:
+def _beside(rise: Rise, at: _Best, end: float) -> Limits:
+    """Of a parameter that physics bounds, where its best value may as well be that bound."""
+    below = end == at.lower
+    [side] = _sides(rise, at, [at.upper if below else at.lower], ONE_SIDED)
+    if rise(np.array([end]))[0] > ONE_SIDED:
         return Limits(at.error)
-    return Limits(np.inf) if side is None else Limits(at.error, None, _crossing(rise, side, ONE_SIDED))
+    if side is None:
+        return Limits(np.inf)
+    limit = _crossing(rise, side, ONE_SIDED)
+    return Limits(at.error, None, limit) if below else Limits(at.error, limit, None)
 
 
 def _profiled(rise: Rise, at: _Best, flat: tuple[bool, bool]) -> Limits:

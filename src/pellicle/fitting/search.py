@@ -8,8 +8,9 @@ go on to the solver: otherwise the best starts are all neighbours.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import jax
 import numpy as np
@@ -81,7 +82,8 @@ def search(problem: Problem, progress: Progress) -> Minima:
 
 def polished(problem: Problem, starts: np.ndarray, progress: Progress) -> Minima:
     """The distinct local minima reached from `starts`, best first."""
-    units, evidence, converged = _polish(problem, starts, progress)
+    bounds = problem.box.lower, problem.box.upper
+    units, evidence, converged = in_lanes(solver(problem), bounds, starts, progress)
     order = np.argsort(evidence, kind="stable")
     kept: list[int] = []
     for i in order:
@@ -181,33 +183,50 @@ def _local_minima(table: np.ndarray, most: int) -> np.ndarray:
     return lowest[np.argsort(table.ravel()[lowest])][:most]
 
 
-def held(problem: Problem, which: int, values: np.ndarray, starts: np.ndarray) -> np.ndarray:
-    """The least evidence, (values,), with one parameter held at each value and the others polished.
+Solve = Callable[[np.ndarray, np.ndarray, np.ndarray], Sequence[Any]]
+"""(lower, upper, starts), each (lanes, parameters) → (points in the unit cube, misfits, converged)."""
 
-    `starts` (values, starts, parameters) are in the unit cube.
+
+def held(
+    solve: Solve, bounds: tuple[np.ndarray, np.ndarray], which: int, values: np.ndarray, starts: np.ndarray
+) -> np.ndarray:
+    """The least misfit, (values,), with one parameter held at each value and the others polished.
+
+    `starts` (values, starts, parameters) are in the unit cube between the `bounds`.
     """
     at = np.repeat(values, starts.shape[1])
-    _, evidence, _ = _polish(problem, starts.reshape(len(at), -1), quiet, (which, at))
-    return evidence.reshape(len(values), -1).min(axis=1)
+    _, misfit, _ = in_lanes(solve, bounds, starts.reshape(len(at), -1), quiet, (which, at))
+    return misfit.reshape(len(values), -1).min(axis=1)
 
 
-def _polish(
-    problem: Problem, starts: np.ndarray, progress: Progress, hold: tuple[int, np.ndarray] | None = None
+def in_lanes(
+    solve: Solve,
+    bounds: tuple[np.ndarray, np.ndarray],
+    starts: np.ndarray,
+    progress: Progress,
+    hold: tuple[int, np.ndarray] | None = None,
 ):
     """Minima below the starts, in lanes of one shape: one program. `hold` fixes one parameter of each."""
-    looks, scenes, data, box = problem.program
-    lower, upper = np.tile(box.lower, (len(starts), 1)), np.tile(box.upper, (len(starts), 1))
+    lower, upper = (np.tile(side, (len(starts), 1)) for side in bounds)
     if hold is not None:
         lower[:, hold[0]] = upper[:, hold[0]] = hold[1]
     pieces = []
     for first in range(0, len(starts), LANES):
-        lanes = [_padded(x[first : first + LANES]) for x in (starts, lower, upper)]
-        own = box._replace(lower=lanes[1], upper=lanes[2])
-        result = jax.device_get(polish(looks, scenes, data, own, lanes[0]))
-        pieces.append([column[: len(starts) - first] for column in result])
+        lanes = [_padded(x[first : first + LANES]) for x in (lower, upper, starts)]
+        pieces.append([np.asarray(column)[: len(starts) - first] for column in solve(*lanes)])
         progress("polish", min(first + LANES, len(starts)), len(starts))
-    units, evidence, converged = (np.concatenate(column) for column in zip(*pieces, strict=True))
-    return units, np.where(np.isfinite(evidence), evidence, np.inf), converged
+    units, misfit, converged = (np.concatenate(column) for column in zip(*pieces, strict=True))
+    return units, np.where(np.isfinite(misfit), misfit, np.inf), converged
+
+
+def solver(problem: Problem) -> Solve:
+    """The polish of a problem of spectra."""
+    looks, scenes, data, box = problem.program
+
+    def solve(lower: np.ndarray, upper: np.ndarray, units: np.ndarray) -> Sequence[Any]:
+        return jax.device_get(polish(looks, scenes, data, box._replace(lower=lower, upper=upper), units))
+
+    return solve
 
 
 def _padded(lanes: np.ndarray) -> np.ndarray:

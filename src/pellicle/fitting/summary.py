@@ -15,6 +15,7 @@ from pellicle.fitting.parameters import Parameter, fixed_numbers, thickness_name
 from pellicle.fitting.problem import Problem, View
 from pellicle.fitting.result import Estimate, Profile, Rival
 from pellicle.fitting.uncertainty import Errors, Linear, linear_coefficients
+from pellicle.fitting.valley import valley
 from pellicle.fitting.weigh import Met, Weighed
 from pellicle.materials import materials_in
 from pellicle.scene import Layer, insert
@@ -37,7 +38,8 @@ def estimates(
     values = problem.box.values(unit)
     least = _least(spectra, weighed)
     order = sorted(range(len(values)), key=lambda i: problem.parameters[i].key != "thickness")
-    bounded = limits(weighed, found.covariance, profile)
+    seen = {} if profile is None or problem.thickness_axis is None else {problem.thickness_axis: profile}
+    bounded = limits(valley(weighed, found.covariance), seen)
     free = [_estimate(problem.parameters[i], values[i], unit[i], bounded[i], least) for i in order]
     coefficients = [
         c

@@ -14,6 +14,7 @@ import numpy as np
 from pellicle.fitting.limits import interval
 from pellicle.fitting.search import quiet, search
 from pellicle.fitting.uncertainty import errors
+from pellicle.fitting.valley import valley
 from pellicle.fitting.weigh import Weighed, weigh
 from pellicle.ladder.climb import Progress, mark_pareto
 from pellicle.ladder.entrants import entrants
@@ -142,7 +143,8 @@ def _covariance(fit: Weighed) -> Interval:
 def _profile(fit: Weighed) -> Interval:
     box = fit.problem.box
     covariance = errors(fit.problem, [m.at for m in fit.met], _variances(fit)).covariance
-    ends = np.array([interval(fit, covariance, i) for i in range(len(fit.problem.parameters))])
+    around = valley(fit, covariance)
+    ends = np.array([interval(around, i) for i in range(len(fit.problem.parameters))])
     lower, upper = (ends.T - box.lower) / (box.upper - box.lower)
     return lower, upper
 
