@@ -114,7 +114,7 @@ def run(surface: Surface, noise: float, seed: int) -> Run:
     whole = problem(samples, surface, "linear", surface.brdf.evaluate)
     minima = settle(whole, search(whole, THOROUGH, quiet), quiet)
     at = local(whole, minima.units[0], sigma_known=True)
-    found = estimates(surface, whole, minima.units[0], at)
+    found = estimates(surface, whole, at)
     status = judged(minima, at, found, rivals(whole, minima, at), sigma_known=True)
     seconds = time.perf_counter() - began
     true = {leaf.name: float(np.ravel(truth[leaf.key])[leaf.channel or 0]) for leaf in surface.leaves()}

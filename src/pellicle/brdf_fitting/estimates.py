@@ -8,23 +8,31 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
+from pellicle.brdf_fitting.coordinates import Coordinates
 from pellicle.brdf_fitting.problem import Problem, around, compared, parameters
 from pellicle.brdf_fitting.search import Minima
+from pellicle.brdf_fitting.valley import valley
+from pellicle.fitting.limits import Limits, limits
 from pellicle.fitting.noise import correlation_length
 from pellicle.fitting.result import Estimate, Rival
-from pellicle.fitting.uncertainty import UNSEEN, correlation
-from pellicle.surfaces.surface import Surface
+from pellicle.fitting.status import RIVAL
+from pellicle.fitting.uncertainty import Scaled, correlation
+from pellicle.surfaces.surface import Leaf, Surface
 
 _ON_BOUND = 1e-6
 _MOST_RIVALS = 10
 
 
 class Local(NamedTuple):
-    """A fit around its best point. `variance` multiplies χ²: the noise, and its correlation."""
+    """A fit around its best point. `variance` multiplies χ²: the noise, and its correlation.
+
+    `slope` is the Jacobian of the residuals by the free numbers, each in its own unit.
+    """
 
     names: tuple[str, ...]
     numbers: np.ndarray
     covariance: np.ndarray
+    slope: np.ndarray
     parameters: dict[str, Any]
     residuals: np.ndarray  # (samples, channels)
     model: np.ndarray
@@ -63,6 +71,7 @@ def local(problem: Problem, unit: np.ndarray, sigma_known: bool) -> Local:
         names=(*c.names, *problem.form.weights),
         numbers=numbers,
         covariance=stretch @ _covariance(slope) @ stretch.T * variance,
+        slope=slope @ np.linalg.pinv(stretch),
         parameters=parameters(problem.form, problem.fixed, problem.box, problem.most, unit),
         residuals=residuals,
         model=rho[keep],
@@ -88,17 +97,24 @@ def _covariance(slope: np.ndarray) -> np.ndarray:
     return spread @ spread.T
 
 
-def estimates(surface: Surface, problem: Problem, unit: np.ndarray, at: Local) -> dict[str, Estimate]:
-    """Every parameter, free ones first, the thickness before all."""
+def scaled(surface: Surface, at: Local) -> Scaled:
+    """The Jacobian by each number's range, in units of the noise."""
+    bounds = {leaf.name: leaf.free.upper - leaf.free.lower for leaf in surface.leaves()}
+    span = np.array([bounds[name] for name in at.names])
+    return Scaled(at.slope * span / math.sqrt(at.variance), span, at.names)
+
+
+def estimates(
+    surface: Surface, problem: Problem, at: Local, others: tuple[Rival, ...] = ()
+) -> dict[str, Estimate]:
+    """Every parameter, free ones first, the thickness before all; limits look at the rivals too."""
     leaves = {leaf.name: leaf for leaf in surface.leaves()}
-    found = []
-    for name, value, stderr in zip(at.names, at.numbers, at.stderr, strict=True):
-        free = leaves[name].free
-        near = _ON_BOUND * (free.upper - free.lower)
-        bound = bool(min(value - free.lower, free.upper - value) <= near)
-        error = math.inf if stderr > UNSEEN * (free.upper - free.lower) else float(stderr)
-        unit_ = leaves[name].about.unit
-        found.append(Estimate(name, float(value), error, unit_, free.lower, free.upper, True, bound))
+    near = [list(rival.parameters.values()) for rival in others if rival.delta_chi2 < RIVAL]
+    bounded = _bounded(surface, problem, at, np.array([at.numbers, *near]))
+    found = [
+        _estimate(leaves[name], float(value), bounded[name], problem.form.coordinates)
+        for name, value in zip(at.names, at.numbers, strict=True)
+    ]
     found.sort(key=lambda e: e.name != "thickness")
     fixed = [
         Estimate(name, x, 0.0, about.unit, x, x, False)
@@ -107,6 +123,35 @@ def estimates(surface: Surface, problem: Problem, unit: np.ndarray, at: Local) -
         for name, x in _each(about.key, numbers[about.key])
     ]
     return {e.name: e for e in [*found, *fixed]}
+
+
+def _bounded(surface: Surface, problem: Problem, at: Local, minima: np.ndarray) -> dict[str, Limits]:
+    """Errors and limits by name. An azimuth has no bounds to lie beside, and of no tilt it has no meaning."""
+    around = valley(surface, problem, minima, at.covariance, at.variance)
+    found = dict(zip(at.names, limits(around), strict=True))
+    tilt, azimuth = found.get("deviation"), found.get("azimuth")
+    if tilt is not None and azimuth is not None and problem.form.coordinates.tilt is not None:
+        upright = tilt.upper is not None or not math.isfinite(tilt.stderr)
+        one_sided = (azimuth.lower is None) != (azimuth.upper is None)
+        if upright or (one_sided and not problem.form.coordinates.folded):
+            found["azimuth"] = Limits(math.inf)
+    return found
+
+
+def _estimate(leaf: Leaf, value: float, limit: Limits, searched: Coordinates) -> Estimate:
+    lower, upper, turns = (
+        leaf.free.lower,
+        leaf.free.upper,
+        leaf.key == "azimuth" and searched.tilt is not None,
+    )
+    if turns and searched.folded:
+        lower, upper = 0.0, 180.0
+    # a whole turn has no ends
+    at_bound = not turns and min(value - lower, upper - value) <= _ON_BOUND * (upper - lower)
+    stderr = float(limit.stderr)
+    return Estimate(
+        leaf.name, value, stderr, leaf.about.unit, lower, upper, True, at_bound, limit.lower, limit.upper
+    )
 
 
 def _each(key: str, value: np.ndarray) -> list[tuple[str, float]]:

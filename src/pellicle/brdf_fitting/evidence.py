@@ -32,10 +32,13 @@ def weigh(
     baselines: tuple[Baseline, ...],
 ) -> Evidence:
     """The rule: better than both baselines by `GAIN`, one thickness, and parameters that mean something."""
-    doubts = [*_no_better(held_out, baselines), *_other_thickness(parameters, rivals), *_empty(parameters)]
+    others = _other_thickness(parameters, rivals)
+    doubts = [*_no_better(held_out, baselines), *others, *_empty(parameters)]
+    depth = parameters.get("thickness")
+    if doubts == others and doubts and depth is not None and math.isfinite(depth.stderr):
+        return Evidence(False, f"The samples do not decide the thickness of a layer: {others[0]}.")
     if doubts:
         return Evidence(False, f"No evidence of a layer: {'; '.join(doubts)}.")
-    depth = parameters.get("thickness")
     gains = " and ".join(f"{100 * (1 - held_out / b.held_out):.0f} % below {b.name}" for b in baselines)
     lead = f"{describe(depth)}. The" if depth is not None else "the"
     return Evidence(True, f"The samples call for a layer: {lead} held-out error is {gains}.")

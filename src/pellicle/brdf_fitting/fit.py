@@ -13,12 +13,14 @@ import numpy as np
 from pellicle.brdf_fitting import doubts, evidence
 from pellicle.brdf_fitting.baselines import plain
 from pellicle.brdf_fitting.coordinates import coordinates
-from pellicle.brdf_fitting.estimates import Local, estimates, local, rivals
-from pellicle.brdf_fitting.problem import Form, Problem, chi_square, data, seeing
+from pellicle.brdf_fitting.estimates import Local, estimates, local, rivals, scaled
+from pellicle.brdf_fitting.problem import Form, Problem, chi_squares, data, seeing
 from pellicle.brdf_fitting.residuals import RESIDUALS
 from pellicle.brdf_fitting.result import Baseline, BrdfFit
 from pellicle.brdf_fitting.search import FEW, SMOOTH, THOROUGH, Effort, Minima, polish, search, settle
+from pellicle.brdf_fitting.valley import NATURAL
 from pellicle.errors import UsageError
+from pellicle.fitting import identifiability
 from pellicle.fitting.result import Estimate, Rival, Status
 from pellicle.fitting.search import Progress, quiet
 from pellicle.fitting.status import judge, misfits, verdict
@@ -32,8 +34,6 @@ from pellicle.surfaces.surface import Surface
 HELD_OUT = 0.2
 """The share of the samples that no fit sees until it is judged."""
 FEWEST = 20
-_NATURAL = frozenset({"thickness", "k", "base_k", "deviation", "specular", "diffuse"})
-"""Their lower bound, 0, is physics': resting on it is no fault of the bounds."""
 _FLAT, _PLAIN = "the surface without interference", "two lobes without a layer"
 
 
@@ -101,7 +101,7 @@ def _split(samples: BrdfSamples) -> Split:
 def _rate(whole: Problem, split: Split, effort: Effort, progress: Progress) -> tuple[Minima, float]:
     """Minima on the fitted rows, and the best one's error on the others."""
     minima = search(seeing(whole, split.fitted), effort, progress)
-    chi2 = chi_square(*seeing(whole, split.judging).program, minima.units[0])
+    [chi2] = chi_squares(*seeing(whole, split.judging).program, minima.units[:1])
     return minima, float(np.sqrt(chi2 / split.size))
 
 
@@ -142,16 +142,19 @@ def judged(
         misfit=misfit,
         parameters=parameters,
         rivals=others,
-        natural=_NATURAL,
+        natural=frozenset(
+            p.name for p in parameters.values() if p.name in NATURAL and p.value == p.lower == 0
+        ),
     )
 
 
 def _unlayered(parameters: dict[str, Estimate]) -> dict[str, Estimate]:
-    """Without evidence of a layer its thickness has no finite error."""
+    """Without evidence of a layer its thickness has no finite error, and no limit."""
     depth = parameters.get("thickness")
     if depth is None or not depth.free:
         return parameters
-    return {**parameters, "thickness": dataclasses.replace(depth, stderr=math.inf)}
+    unseen = dataclasses.replace(depth, stderr=math.inf, lower_limit=None, upper_limit=None)
+    return {**parameters, "thickness": unseen}
 
 
 def _report(
@@ -165,18 +168,22 @@ def _report(
     began: float,
 ) -> BrdfFit:
     at: Local = local(whole, minima.units[0], samples.sigma is not None)
-    parameters = estimates(surface, whole, minima.units[0], at)
     others = rivals(whole, minima, at)
+    parameters = estimates(surface, whole, at, others)
     found = evidence.weigh(parameters, others, held_out, baselines)
     rms = float(np.sqrt(np.mean(at.residuals**2)))
     status = judged(minima, at, parameters, others, samples.sigma is not None)
-    sentence = verdict(status, parameters, others, rms)
+    if not found.layered and status not in (Status.NOT_CONVERGED, Status.MISFIT, Status.AMBIGUOUS):
+        status = Status.NOT_IDENTIFIABLE
+    trading = identifiability.trades(scaled(surface, at), parameters)
+    if status is Status.NOT_IDENTIFIABLE and not found.layered:
+        parameters = _unlayered(parameters)
+    of_lead = identifiability.of(next(iter(parameters)), trading)
+    sentence = verdict(status, parameters, others, rms, trading=of_lead)
     if not found.layered:
         sentence = found.verdict
-        parameters = _unlayered(parameters)
-        status = status if status in (Status.NOT_CONVERGED, Status.MISFIT) else Status.NOT_IDENTIFIABLE
     elif status is Status.CONVERGED:
-        sentence = found.verdict
+        sentence = " ".join([found.verdict, *(f"But {trade}." for trade in of_lead[:1])])
     fitted = surface.fixed() | {key: np.asarray(value) for key, value in at.parameters.items()}
     return BrdfFit(
         samples=samples,
@@ -195,7 +202,12 @@ def _report(
         correlation_names=at.names,
         correlation=at.correlation,
         plan=plan,
-        warnings=(*doubts.directions(samples, surface), *doubts.numbers(surface, parameters, fitted)),
+        warnings=(
+            *doubts.directions(samples, surface),
+            *doubts.numbers(surface, parameters, fitted),
+            *identifiability.bounded(parameters, ()),
+            *trading,
+        ),
         model=at.model,
         seconds=time.perf_counter() - began,
     )

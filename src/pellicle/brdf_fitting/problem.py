@@ -172,23 +172,24 @@ def scanned(form: Form, data: Data, fixed: dict[str, Any], box: Box, most: Any, 
 def polished(
     form: Form, data: Data, fixed: dict[str, Any], box: Box, most: Any, units: Any, steps: int = 100
 ) -> Any:
-    """(points, χ², converged) of the local minimum below each start (starts, coordinates and weights)."""
+    """(points, χ², converged) of the local minimum below each start (starts, coordinates and weights).
 
-    def one(unit):
-        best, converged = least_squares(
-            lambda u: residual(form, data, fixed, box, most, u), unit, steps=steps
-        )
-        left = residual(form, data, fixed, box, most, best)
-        return best, left @ left, converged
+    The box may be one for all, or (starts, coordinates): where its bounds meet a coordinate is held.
+    """
 
-    return jax.vmap(one)(units)
+    def one(unit, lower, upper):
+        left = partial(residual, form, data, fixed, box._replace(lower=lower, upper=upper), most)
+        best, converged = least_squares(left, unit, steps=steps)
+        return best, jnp.sum(left(best) ** 2), converged
+
+    shape = units.shape[0], len(form.coordinates.names)
+    return jax.vmap(one)(units, *(jnp.broadcast_to(side, shape) for side in (box.lower, box.upper)))
 
 
 @partial(jax.jit, static_argnums=0)
-def chi_square(form: Form, data: Data, fixed: dict[str, Any], box: Box, most: Any, unit: Any) -> Any:
-    """χ² at one point."""
-    left = residual(form, data, fixed, box, most, unit)
-    return left @ left
+def chi_squares(form: Form, data: Data, fixed: dict[str, Any], box: Box, most: Any, units: Any) -> Any:
+    """χ² at each point (points, coordinates and weights)."""
+    return jax.vmap(lambda unit: jnp.sum(residual(form, data, fixed, box, most, unit) ** 2))(units)
 
 
 @partial(jax.jit, static_argnums=0)

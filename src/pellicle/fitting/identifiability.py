@@ -35,7 +35,11 @@ STEPS = {
     "offset": 0.001,
 }
 """What is worth knowing of a parameter, by the last part of its name; of others 1 % of their range."""
+_RELATIVE = ("exponent", "exponent_reflection", "exponent_transmission", "specular", "diffuse")
+"""Of these 1 % of the value is worth knowing."""
 _SHARE = 0.01
+_FINEST = 1e-4
+"""The least step of those, as a share of their range."""
 _WORTH = 0.3
 """Steps that a parameter must move along a direction to be named in it."""
 _BETTER = 3.0
@@ -43,6 +47,7 @@ _BETTER = 3.0
 _LEAST = 1e-100
 _LAW = 0.15
 """How well a direction must follow n·d = const or n/d = const, in logarithms, to be called so."""
+_CHANNEL = re.compile(r"(?<=^n)_(r|g|b|\d+)$")
 _NUISANCE = re.compile(r"instrument\.(scale|offset)(_\d+)?(\..+)?$")
 
 
@@ -54,13 +59,15 @@ def step(name: str, estimate: Estimate) -> float:
     if key in STEPS and estimate.upper - estimate.lower > STEPS[key]:
         return STEPS[key]
     span = estimate.upper - estimate.lower
+    if key in _RELATIVE:
+        return max(_SHARE * abs(estimate.value), _FINEST * span)
     return _SHARE * (span if math.isfinite(span) else max(abs(estimate.value), 1e-12))
 
 
 def _key(name: str) -> str:
-    """The last part of a parameter's name, without the name of a spectrum that it belongs to."""
+    """The last part of a parameter's name, without the name of a spectrum or a channel that it belongs to."""
     parts = name.split(".")
-    return parts[1] if parts[0] == "instrument" else parts[-1]
+    return parts[1] if parts[0] == "instrument" else re.sub(_CHANNEL, "", parts[-1])
 
 
 def trades(found: Scaled, parameters: Mapping[str, Estimate]) -> list[str]:
@@ -145,8 +152,11 @@ def bounded(parameters: Mapping[str, Estimate], opaque: Container[str]) -> list[
     """A sentence for each free parameter that the data bound on one side only, or not at all."""
     told = []
     for name, p in parameters.items():
-        if p.free and p.upper_limit is not None and math.isfinite(p.stderr):
-            told.append(f"{name} is compatible with 0: it {limits_in_words(p)}")
+        if p.free and math.isfinite(p.stderr) and (p.lower_limit, p.upper_limit) != (None, None):
+            end = p.lower if p.upper_limit is not None else p.upper
+            told.append(
+                f"{name} is compatible with {end if math.isfinite(end) else 0:g}: it {limits_in_words(p)}"
+            )
         elif p.free and not math.isfinite(p.stderr):
             opening = "the layer is opaque: " if name in opaque and p.lower_limit is not None else ""
             told.append(f"{opening}{name} {limits_in_words(p)}")

@@ -128,8 +128,8 @@ def _doubted(valley: Valley) -> np.ndarray:
 
 
 def _rise(valley: Valley, which: int) -> Rise:
-    """The profile of one parameter: the others start at their best values, and where the covariance
-    expects them, which follows a valley."""
+    """The profile of one parameter: the others start at their best values, where the covariance expects
+    them, which follows a valley, and at further minima."""
     covariance, best = valley.covariance, valley.best
     slope = covariance[which] / covariance[which, which] / (valley.upper - valley.lower)
     value = valley.values[which]
@@ -137,7 +137,7 @@ def _rise(valley: Valley, which: int) -> Rise:
     def rise(values: np.ndarray) -> np.ndarray:
         values = np.append(values, value)
         moved = np.clip(best + (values - value)[:, None] * slope, 0.0, 1.0)
-        starts = np.stack([moved, np.broadcast_to(best, moved.shape)], axis=1)
+        starts = np.stack([moved, *(np.broadcast_to(x, moved.shape) for x in (best, *valley.others))], axis=1)
         found = valley.held(which, values, starts)
         return np.maximum(found[:-1] - found[-1], 0.0)
 

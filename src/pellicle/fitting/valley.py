@@ -20,7 +20,8 @@ class Valley(NamedTuple):
     `best` is in the unit cube between `lower` and `upper`; `covariance` (parameters, parameters);
     `natural` says of each lower and each upper bound whether it is physics'. `misfit` gives χ² at points
     (points, parameters) of the cube, `held(which, values, starts)` the least χ² with one parameter held at
-    each value and the others polished from `starts` (values, starts, parameters).
+    each value and the others polished from `starts` (values, starts, parameters). `others` (points,
+    parameters) are further minima from which a profile may be reached.
     """
 
     best: np.ndarray
@@ -30,6 +31,7 @@ class Valley(NamedTuple):
     natural: tuple[tuple[bool, bool], ...]
     misfit: Callable[[np.ndarray], np.ndarray]
     held: Callable[[int, np.ndarray, np.ndarray], np.ndarray]
+    others: np.ndarray = np.zeros((0, 0))
 
     @property
     def values(self) -> np.ndarray:
