@@ -14,6 +14,7 @@ from pellicle.brdf_fitting.fit import fit_brdf
 from pellicle.errors import UsageError
 from pellicle.fitting.result import Status
 from pellicle.free import Free
+from pellicle.io.records import brdf_to_json
 from pellicle.io.samples import BrdfSamples
 from pellicle.surfaces.surface import Surface
 
@@ -77,7 +78,10 @@ def test_a_known_surface_is_found_within_its_errors(known):
         assert abs(p.value - TRUTH[name]) < 4 * p.stderr < 0.1 * p.value
     assert known.chi2_reduced == pytest.approx(1, abs=0.25)
     assert all(known.held_out < 0.5 * b.held_out for b in known.baselines)
-    assert "specular is a weight and no albedo" in " ".join(known.warnings)
+    told = " ".join(known.warnings)
+    assert "specular is a weight and no albedo" in told
+    assert "95 %" not in told
+    assert all((p.lower_limit, p.upper_limit) == (None, None) for p in known.free)
 
 
 def test_errors_are_those_of_the_inverse_hessian(known):
@@ -104,6 +108,21 @@ def test_a_lambertian_surface_has_no_layer():
     assert found.verdict.startswith("No evidence of a layer: ")
     assert found.status is Status.NOT_IDENTIFIABLE
     assert found["thickness"].stderr == np.inf
+
+
+def test_one_colour_for_all_directions_decides_nothing():
+    """The layered diffuse part has three numbers for a thickness, three indices and a weight."""
+    free = {"thickness": Free(lower=0, upper=1000), "n": Free(lower=1.05, upper=2.5)}
+    surface = Surface("granier-heidrich-diffuse", free | {"diffuse": Free(lower=0, upper=2)})
+    found = fit_brdf(noisy(np.broadcast_to([0.3, 0.2, 0.25], (200, 3)), seed=1), surface)
+    assert found.status is Status.NOT_IDENTIFIABLE
+    assert found.verdict.endswith("the thickness has no finite error.")
+    assert {p.stderr for p in found.free} == {np.inf}
+    assert "thickness may be anything between 0 and 1000 nm" in found.warnings
+    assert any("trade against each other" in sentence for sentence in found.warnings)
+    record = brdf_to_json(found)
+    assert record["parameters"]["n_g"]["stderr"] is None
+    assert record["noise"] == {"sigma": pytest.approx(0.0025), "source": "given"}
 
 
 def test_what_cannot_be_fitted_is_refused_in_words():

@@ -189,7 +189,7 @@ def test_a_layer_that_passes_every_doubt():
     [
         ({}, (), 1.84, "8 % below no interference"),
         ({}, (), 3.3, "1.10 times that of two lobes"),
-        ({}, (Rival({"thickness": 500.0}, 3.0),), 1.0, "500 nm fits as well as 300 nm"),
+        ({}, (Rival({"thickness": 500.0}, 3.0),), 1.84, "500 nm fits as well as 300 nm"),
         ({"thickness": estimate("thickness", 300.0, np.inf)}, (), 1.0, "no finite error"),
         ({"exponent_reflection": estimate("exponent_reflection", 1.5)}, (), 1.0, "is no lobe"),
         ({"exponent_reflection": estimate("exponent_reflection", 1e3, at_bound=True)}, (), 1.0, "its bound"),
@@ -204,6 +204,14 @@ def test_each_doubt_alone_denies_a_layer(changed, rivals, held_out, why):
     assert not found.layered
     assert found.verdict.startswith("No evidence of a layer: ")
     assert why in found.verdict
+
+
+def test_a_layer_of_several_thicknesses_is_not_no_layer():
+    found = evidence.weigh(GOOD, (Rival({"thickness": 500.0}, 3.0),), 1.0, WORSE)
+    assert (found.layered, found.several) == (False, True)
+    assert found.verdict == (
+        "The samples do not decide the thickness of the layer: 500 nm fits as well as 300 nm (Δχ² 3.0)."
+    )
 
 
 def samples(theta_i, phi_i, theta_o, phi_o, channels=("R", "G", "B")):

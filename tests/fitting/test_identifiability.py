@@ -110,6 +110,9 @@ def test_steps_are_what_is_worth_knowing():
     assert step("instrument.bandwidth.film_R", estimate("instrument.bandwidth.film_R", 2.0, 0, 20)) == 1.0
     assert step("n", estimate("n", 1.5, 1.499, 1.501)) == pytest.approx(2e-5)  # 1 % of narrow bounds
     assert step("E0", estimate("E0", 4.0, 1, 10)) == pytest.approx(0.09)
+    assert step("n_g", estimate("n_g", 1.5, 1.05, 2.5)) == 0.01
+    assert step("exponent_reflection", estimate("exponent_reflection", 60.0, 1, 1000)) == pytest.approx(0.6)
+    assert step("specular", estimate("specular", 0.0, 0, 100)) == pytest.approx(0.01)
 
 
 def test_sentences_of_bounds():
@@ -123,6 +126,17 @@ def test_sentences_of_bounds():
         "the layer is opaque: au.thickness is at least 180.2 nm (95 %)",
     ]
     assert bounded({"au.thickness": thick}, ())[0].startswith("au.thickness is at least")
+
+
+def test_sentences_beside_a_bound_that_is_not_zero():
+    smooth = estimate("roughness", 0.01, 0.003, 1.0, 0.01, upper_limit=0.0213)
+    narrow = estimate("exponent", 950.0, 1.0, 1000.0, 90.0, lower_limit=771.2)
+    offset = estimate("instrument.offset", 0.001, -math.inf, math.inf, 0.01, upper_limit=0.02)
+    assert bounded({p.name: p for p in (smooth, narrow, offset)}, ()) == [
+        "roughness is compatible with 0.003: it is at most 0.021 (95 %)",
+        "exponent is compatible with 1000: it is at least 771.2 (95 %)",
+        "instrument.offset is compatible with 0: it is at most 0.02 (95 %)",
+    ]
 
 
 def test_sentences_of_the_leading_parameter():

@@ -20,7 +20,7 @@ from pellicle.fitting.uncertainty import Scaled, correlation
 from pellicle.surfaces.surface import Leaf, Surface
 
 _ON_BOUND = 1e-6
-_MOST_RIVALS = 10
+_MOST_RIVALS, _MOST_LOOKED_AT = 10, 3
 
 
 class Local(NamedTuple):
@@ -109,7 +109,7 @@ def estimates(
 ) -> dict[str, Estimate]:
     """Every parameter, free ones first, the thickness before all; limits look at the rivals too."""
     leaves = {leaf.name: leaf for leaf in surface.leaves()}
-    near = [list(rival.parameters.values()) for rival in others if rival.delta_chi2 < RIVAL]
+    near = [list(r.parameters.values()) for r in others[:_MOST_LOOKED_AT] if r.delta_chi2 < RIVAL]
     bounded = _bounded(surface, problem, at, np.array([at.numbers, *near]))
     found = [
         _estimate(leaves[name], float(value), bounded[name], problem.form.coordinates)

@@ -19,10 +19,12 @@ ROUGHEST = 0.7
 
 
 class Evidence(NamedTuple):
-    """Whether there is a layer, and in words why, or why not."""
+    """Whether there is a layer, and in words why, or why not; `several` says that nothing but its thickness
+    is in doubt, which is one of several."""
 
     layered: bool
     verdict: str
+    several: bool = False
 
 
 def weigh(
@@ -36,7 +38,7 @@ def weigh(
     doubts = [*_no_better(held_out, baselines), *others, *_empty(parameters)]
     depth = parameters.get("thickness")
     if doubts == others and doubts and depth is not None and math.isfinite(depth.stderr):
-        return Evidence(False, f"The samples do not decide the thickness of a layer: {others[0]}.")
+        return Evidence(False, f"The samples do not decide the thickness of the layer: {others[0]}.", True)
     if doubts:
         return Evidence(False, f"No evidence of a layer: {'; '.join(doubts)}.")
     gains = " and ".join(f"{100 * (1 - held_out / b.held_out):.0f} % below {b.name}" for b in baselines)

@@ -173,11 +173,10 @@ def _report(
     found = evidence.weigh(parameters, others, held_out, baselines)
     rms = float(np.sqrt(np.mean(at.residuals**2)))
     status = judged(minima, at, parameters, others, samples.sigma is not None)
-    if not found.layered and status not in (Status.NOT_CONVERGED, Status.MISFIT, Status.AMBIGUOUS):
-        status = Status.NOT_IDENTIFIABLE
     trading = identifiability.trades(scaled(surface, at), parameters)
-    if status is Status.NOT_IDENTIFIABLE and not found.layered:
+    if not found.layered and not found.several:
         parameters = _unlayered(parameters)
+        status = status if status in (Status.NOT_CONVERGED, Status.MISFIT) else Status.NOT_IDENTIFIABLE
     of_lead = identifiability.of(next(iter(parameters)), trading)
     sentence = verdict(status, parameters, others, rms, trading=of_lead)
     if not found.layered:

@@ -56,5 +56,15 @@ class BrdfFit:
         return in_short(self.status, self.verdict, self.free)
 
     @property
+    def sigma_from(self) -> str:
+        """Where the noise comes from that errors rest on: "given", or "residuals"."""
+        return "residuals" if self.samples.sigma is None else "given"
+
+    @property
+    def sigma(self) -> float:
+        """The median σ in 1/sr as given, or the rms of the residuals, in their unit."""
+        return self.rms if self.samples.sigma is None else float(np.median(self.samples.sigma))
+
+    @property
     def free(self) -> tuple[Estimate, ...]:
         return tuple(p for p in self.parameters.values() if p.free)

@@ -59,7 +59,7 @@ def limits(valley: Valley, scans: Mapping[int, Profile] | None = None) -> list[L
         if beside is not None:
             found.append(_beside(rise, at, beside))
         elif doubted[i] or any(flat):
-            found.append(_profiled(rise, at, flat))
+            found.append(_profiled(rise, at, flat, natural))
         else:
             found.append(Limits(at.error))
     return found
@@ -156,8 +156,9 @@ def _beside(rise: Rise, at: _Best, end: float) -> Limits:
     return Limits(at.error, None, limit) if below else Limits(at.error, limit, None)
 
 
-def _profiled(rise: Rise, at: _Best, flat: tuple[bool, bool]) -> Limits:
-    """Of a parameter whose misfit is no parabola; `flat` are sides known to be open."""
+def _profiled(rise: Rise, at: _Best, flat: tuple[bool, bool], natural: tuple[bool, bool]) -> Limits:
+    """Of a parameter whose misfit is no parabola; `flat` are sides known to be open, and an open side with a
+    `natural` bound is closed by physics."""
     found = _sides(rise, at, [at.lower, at.upper], _OPEN)
     below, above = (None if known else side for known, side in zip(flat, found, strict=True))
     if below is not None and above is not None:
@@ -165,6 +166,9 @@ def _profiled(rise: Rise, at: _Best, flat: tuple[bool, bool]) -> Limits:
         return Limits((high - low) / (2 * TWO_SIDED**0.5))
     lower, upper = (None if side is None else _crossing(rise, side, ONE_SIDED) for side in (below, above))
     limit = upper if lower is None else lower
+    closed = natural[0] or below is not None, natural[1] or above is not None
+    if all(closed) and limit is not None:
+        return Limits(at.error, lower, upper)
     if at.rests and limit is not None and abs(limit - at.value) < _STEEP * at.error and not any(flat):
         return Limits(at.error)  # the data push against that bound: they see the parameter well enough
     return Limits(np.inf, lower, upper)

@@ -40,6 +40,7 @@ def brdf_to_json(fit: BrdfFit) -> dict[str, Any]:
         "layered": fit.layered,
         "held_out": _number(fit.held_out),
         "baselines": [{"name": b.name, "held_out": _number(b.held_out)} for b in fit.baselines],
+        "noise": {"sigma": _number(fit.sigma), "source": fit.sigma_from},
     }
     return _record(fit, {**data, "points": int(fit.samples.values.size)}, _plan(fit.plan)) | judged
 

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import math
 import re
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pellicle.fitting.result import Estimate, Fit, Part, Rival, Status
 from pellicle.fitting.status import RIVAL, describe
 from pellicle.report.page import COLUMNS, INDENT, block, facts, table, wrapped
+
+if TYPE_CHECKING:
+    from pellicle.brdf_fitting.result import BrdfFit
+    from pellicle.planning import Plan
 
 LEAST_CORRELATION = 0.5
 MOST_CORRELATIONS = 10
@@ -27,6 +32,10 @@ ADVICE = {
 }
 """What to do next, for every status."""
 
+CORRELATIONS = f"Correlations above {LEAST_CORRELATION:g}"
+RIVALS = f"Rivals: other minima and how much worse they fit (Δχ² below {RIVAL:g}: about as well)"
+PLAN, WARNINGS = "Plan: what was simulated", "Warnings"
+
 _SIGMA = {
     "given": "sigma {}, as given",
     "residuals": "sigma {}, estimated from the residuals: none was given",
@@ -42,14 +51,11 @@ def report(fit: Fit) -> str:
     blocks = [
         ("Verdict", _verdict(fit)),
         ("Fit statistics", _statistics(fit)),
-        ("Parameters", _parameters(fit)),
-        (f"Correlations above {LEAST_CORRELATION:g}", _correlations(fit)),
-        (
-            f"Rivals: other minima and how much worse they fit (Δχ² below {RIVAL:g}: about as well)",
-            _rivals(fit),
-        ),
-        ("Plan: what was simulated", _plan(fit)),
-        ("Warnings", [line for warning in fit.warnings for line in wrapped(warning, "- ", "  ")]),
+        ("Parameters", parameters(fit)),
+        (CORRELATIONS, correlations(fit)),
+        (RIVALS, rivals(fit)),
+        (PLAN, [line for part in fit.parts for line in plan(part.plan, part.name)]),
+        (WARNINGS, warnings(fit)),
     ]
     return "".join(block(title, lines) for title, lines in blocks if lines)
 
@@ -124,14 +130,14 @@ def _rms(part: Part) -> list[tuple[str, str]]:
     return rows
 
 
-def _parameters(fit: Fit) -> list[str]:
+def parameters(fit: Fit | BrdfFit) -> list[str]:
     width = max((len(name) for name in fit.parameters), default=0) + 1
     rows = [(f"{p.name + ':':<{width}}", _value(p) if p.free else _fixed(p), _bounds(p)) for p in _all(fit)]
     middle = max((len(value) for _, value, bounds in rows if bounds), default=0)
     return [f"{INDENT}{name}  {value:<{middle}}  {bounds}".rstrip() for name, value, bounds in rows]
 
 
-def _all(fit: Fit) -> list[Estimate]:
+def _all(fit: Fit | BrdfFit) -> list[Estimate]:
     """Free parameters before fixed ones, each in the fit's own order."""
     return sorted(fit.parameters.values(), key=lambda p: not p.free)
 
@@ -171,7 +177,7 @@ def _bounds(p: Estimate) -> str:
     return f"[{p.lower:g}, {p.upper:g}]" + (f"  AT ITS {side.upper()} BOUND" if p.at_bound else "")
 
 
-def _correlations(fit: Fit) -> list[str]:
+def correlations(fit: Fit | BrdfFit) -> list[str]:
     """The largest ones.
 
     The coefficients of the scale's and the offset's polynomials are left out among themselves: they
@@ -191,13 +197,14 @@ def _correlations(fit: Fit) -> list[str]:
     return lines + _left_out(len(pairs) - len(shown))
 
 
-def _rivals(fit: Fit) -> list[str]:
+def rivals(fit: Fit | BrdfFit) -> list[str]:
+    """Other minima, the nearest first."""
     shown = sorted(fit.rivals, key=lambda rival: rival.delta_chi2)[:MOST_RIVALS]
     rows = [(f"Δχ² {rival.delta_chi2:.3g}", *_of_rival(fit, rival)) for rival in shown]
     return table(rows) + _left_out(len(fit.rivals) - len(shown))
 
 
-def _of_rival(fit: Fit, rival: Rival) -> list[str]:
+def _of_rival(fit: Fit | BrdfFit, rival: Rival) -> list[str]:
     """The rival's parameters, the thickness first as in the table of parameters."""
     names = [name for name in fit.parameters if name in rival.parameters]
     return [f"{name} {rival.parameters[name]:.5g}{_unit(fit.parameters[name])}" for name in names]
@@ -207,10 +214,11 @@ def _left_out(count: int) -> list[str]:
     return [f"{INDENT}... and {count} more in the JSON"] if count > 0 else []
 
 
-def _plan(fit: Fit) -> list[str]:
-    lines = []
-    for part in fit.parts:
-        lines += wrapped(f"{part.name}:") if part.name else []
-        rows = part.plan.rows
-        lines += facts((f"{row.effect:<13} {'on' if row.on else 'off':<3}", row.why) for row in rows)
-    return lines
+def plan(made: Plan, name: str = "") -> list[str]:
+    """Every effect, on or off, and why; under the name of the spectrum where it is one of several."""
+    rows = facts((f"{row.effect:<13} {'on' if row.on else 'off':<3}", row.why) for row in made.rows)
+    return [*(wrapped(f"{name}:") if name else []), *rows]
+
+
+def warnings(fit: Fit | BrdfFit) -> list[str]:
+    return [line for warning in fit.warnings for line in wrapped(warning, "- ", "  ")]
