@@ -82,9 +82,9 @@ bench: $(VENV)/.dev
 	$(BIN)/python benchmarks/film.py
 	$(BIN)/python benchmarks/cold_start.py
 
-# several GB: the other packages, in an environment of their own; writes the table of README.md
+# several GB: the other packages, in an environment of their own; writes the tables of docs/hard_cases.md
 peers: $(VENV)/.dev
-	$(BIN)/python benchmarks/peers --write-readme
+	$(BIN)/python benchmarks/peers --write
 
 # a thousand random scenes: does what a plan leaves out stay within the bound that it states?
 tolerance: $(VENV)/.dev

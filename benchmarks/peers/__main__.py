@@ -2,7 +2,7 @@
 
 Makes a virtual environment in .venv-peers (several GB: torch), installs each package by name, and
 runs each in a process of its own, so that one that cannot be installed, crashes or hangs is an entry of
-the table and not its end. Prints Markdown; with --write-readme the README gets the same text.
+the table and not its end. Prints Markdown; with --write docs/hard_cases.md gets the same text.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from truth import truth
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 VENV = ROOT / ".venv-peers"
+PAGE = ROOT / "docs" / "hard_cases.md"
 SECONDS = 300  # for all the cases that a process has left
 BEGIN, END = "<!-- peers: written by make peers -->", "<!-- /peers -->"
 
@@ -104,8 +105,7 @@ def main(whole: bool, write: bool) -> None:
     text = report(columns, truths, notes, whole)
     print(text)
     if write:
-        readme = ROOT / "README.md"
-        readme.write_text(inserted(readme.read_text(encoding="utf-8"), text), encoding="utf-8")
+        PAGE.write_text(inserted(PAGE.read_text(encoding="utf-8"), text), encoding="utf-8")
 
 
 def refusals(answers: dict[str, Any]) -> list[str]:
@@ -134,18 +134,18 @@ def report(columns: dict[str, Any], truths: dict[str, Any], notes: list[str], wh
     )
 
 
-def inserted(readme: str, text: str) -> str:
-    """The README with `text` between its two markers."""
-    before, begin, rest = readme.partition(BEGIN)
+def inserted(page: str, text: str) -> str:
+    """The page with `text` between its two markers."""
+    before, begin, rest = page.partition(BEGIN)
     _, end, after = rest.partition(END)
     if not begin or not end:
-        raise SystemExit(f"README.md has no {BEGIN} … {END} to write between")
+        raise SystemExit(f"{PAGE.name} has no {BEGIN} … {END} to write between")
     return f"{before}{begin}\n\n{text}\n\n{end}{after}"
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("--all", action="store_true", help="every case, not only those with a failure")
-    parser.add_argument("--write-readme", action="store_true", help="put the tables into README.md too")
+    parser.add_argument("--write", action="store_true", help="put the tables into docs/hard_cases.md too")
     given = parser.parse_args()
-    main(given.all, given.write_readme)
+    main(given.all, given.write)
