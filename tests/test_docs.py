@@ -1,69 +1,213 @@
-"""The documentation's commands and Python: they can be parsed, their files are there, and (slow) they run."""
+"""What the README and the documentation show to be typed can be typed: commands, Python, TOML.
+
+Every command of pellicle that a page shows is run here, in the page's order. One of another program has a
+line in `ELSEWHERE`, one that takes too long for every day a line in `SLOW`; each says why.
+"""
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 import sys
+import tomllib
 from pathlib import Path
 
+import jsonschema
 import pytest
 
 from pellicle.cli import app, main
 
 ROOT = Path(__file__).parents[1]
-PAGES = {str(path.relative_to(ROOT / "docs")): path for path in sorted((ROOT / "docs").rglob("*.md"))}
+_PATHS = [
+    *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "fits/README.md", "measurements/README.md")),
+    *sorted((ROOT / "docs").rglob("*.md")),
+]
+PAGES = {path.relative_to(ROOT).as_posix(): path.read_text("utf-8") for path in _PATHS}
+TYPED = re.compile(r"(?:\.venv/bin/)?(?:pellicle|make|python|pip|source) \S.*")
+PLACE = re.compile(r"\.\.\.|\b[A-Z]{3,}\b")
+FENCE = re.compile(r"^```([a-z]*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 FILE = re.compile(r"[\w./-]+\.(csv|txt|dat|toml)$")
-#: Words of commands whose fits end in doubt (exit code 4), as their pages say.
+
 DOUBTFUL = (
-    "--recipe measurements/recipes/gold_on_glass_300nm.toml",
-    "window.csv --layer TiO2 --substrate SiO2 --thickness",
-    "oxide.csv --layer SiO2 --substrate Si --thickness 1000",
-    "five_bands.toml",
+    "pellicle fit --recipe measurements/recipes/gold_on_glass_300nm.toml",
+    "pellicle fit window.csv --layer TiO2 --substrate SiO2 --thickness 10:500",
+    "pellicle fit oxide.csv --layer SiO2 --substrate Si --thickness 1000:3000",
+    "pellicle sample --recipe docs/examples/five_bands.toml --out five_bands",
 )
+"""Their fits end in doubt (exit code 4), as their pages say."""
+SLOW = {
+    "pellicle cost docs/cost/soap_film.toml --out cost": "fits by many solvers: a minute or two",
+    "pellicle cost docs/cost/cuo_on_aluminium.toml --datasets 0": "twenty compilations; the soap film's run",
+    "pellicle cost docs/examples/coated_window.toml --datasets 0": "as for CuO",
+    "pellicle cost docs/examples/microscope.toml --datasets 0": "as for CuO",
+    "pellicle cost docs/surfaces/tempered_steel.toml --out cost": "forty compilations, and half a minute",
+    "pellicle fit steel.csv --recipe docs/surfaces/tempered_steel.toml": "10 s to compile; "
+    "tests/cli/test_brdf_command.py fits another",
+}
+_REPEATED = "a study of hours, whose tables are kept; its parts are tested in their own modules"
+ELSEWHERE = {
+    **dict.fromkeys(("make fit", "make test", "make docs"), "CI itself: .ci/run"),
+    "make notebooks": "make docs, which needs them",
+    "make fits": "tests/test_fits.py: one study every day, all of them slow",
+    **dict.fromkeys(("make slow", "make coverage"), "these tests"),
+    "make bench": "speed is shown, never tested",
+    "make properties": "tests/properties: the same on a hundred scenes",
+    "make peers": "several GB of other packages; tests/test_peers.py does without them",
+    "make figures": "tests/reference has the numbers; the pictures are kept",
+    "source .venv/bin/activate": "a shell's own; make fit makes the folder",
+    "pellicle demo": "tests/cli/test_demo_command.py",
+    "pellicle --install-completion": "would write to this user's shell: cyclopts' own",
+    "python benchmarks/calibration.py": _REPEATED,
+    "python benchmarks/posterior.py": _REPEATED,
+    "python benchmarks/colour.py": _REPEATED,
+    "python benchmarks/brdf_recovery.py": _REPEATED,
+    "python -m pytest": "this is it",
+    "python scripts/make_measurements.py": "tests/test_measurements.py: two of the files",
+    "python scripts/index_materials.py": "tests/materials/test_catalogue.py: the kept index",
+}
 
 
-def commands(page: str) -> list[list[str]]:
-    """The words of each indented `pellicle ...` line, without `pellicle`."""
-    lines = re.findall(r"^    pellicle (.*)$", PAGES[page].read_text("utf-8"), re.MULTILINE)
-    return [shlex.split(line) for line in lines]
+def commands(text: str) -> list[str]:
+    """What can be typed: lines of indented blocks and of fences without a language, and code spans.
+
+    A span of two words, `pellicle cost`, is a mention, and one with a place to fill in (`NAME`, `...`) a
+    pattern.
+    """
+    fenced = "".join(inside for kind, inside in FENCE.findall(text) if kind in ("", "sh"))
+    prose = FENCE.sub("", text)
+    lines = [*re.findall(r"^    (\S.*)$", prose, re.MULTILINE), *fenced.splitlines()]
+    spans = re.findall(r"`([^`\n]+)`", re.sub(r"^    .*$", "", prose, flags=re.MULTILINE))
+    spans = [span for span in spans if not re.fullmatch(r"pellicle [a-z]+", span)]
+    typed = [re.sub(r"\s+# .*", "", line).strip() for line in [*lines, *spans]]
+    return list(dict.fromkeys(line for line in typed if TYPED.fullmatch(line) and not PLACE.search(line)))
 
 
-def python(page: str) -> list[str]:
-    return re.findall(r"^```python\n(.*?)^```", PAGES[page].read_text("utf-8"), re.MULTILINE | re.DOTALL)
+def ours(page: str) -> list[str]:
+    """The commands of pellicle that are run here."""
+    return [c for c in commands(PAGES[page]) if c.startswith("pellicle ") and c not in ELSEWHERE]
 
 
-SHOWING = [page for page in PAGES if commands(page) or python(page)]
+SHOWING = [page for page in PAGES if ours(page)]
 
 
-def test_pages_show_commands():
-    assert {"tour.md", "howto/units.md", "explanation/effects.md"} <= set(SHOWING)
+def blocks(page: str, language: str) -> list[str]:
+    return [text for kind, text in FENCE.findall(PAGES[page]) if kind == language]
+
+
+def run(command: str, monkeypatch, capsys) -> None:
+    monkeypatch.setattr(sys, "argv", shlex.split(command))
+    assert main() == (4 if command in DOUBTFUL else 0), (command, capsys.readouterr())
+
+
+@pytest.fixture
+def clone(tmp_path, monkeypatch):
+    """A folder that has what a clone has, and that may be written to."""
+    for folder in ("docs", "fits", "measurements"):
+        (tmp_path / folder).symlink_to(ROOT / folder)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PELLICLE_CACHE", "off")
+
+
+def test_what_is_typed_is_found():
+    page = (
+        "Type\n\n    pellicle fit a.csv  # first\n    make fit\n    no command\n\nor `pellicle plan b.toml`, "
+        "not `pellicle plan` or `pellicle fit NAME`\n\n```\npip install x\n```\n```python\nmake = 1\n```\n"
+    )
+    assert commands(page) == ["pellicle fit a.csv", "make fit", "pip install x", "pellicle plan b.toml"]
+    assert len(ours("README.md")) > 5
+    assert {"docs/tour.md", "docs/howto/units.md", "docs/explanation/effects.md"} <= set(SHOWING)
+
+
+def test_whatever_is_shown_is_run_by_a_test():
+    shown = {command for text in PAGES.values() for command in commands(text)}
+    others = {c for c in shown if not c.startswith("pellicle ") or c in ELSEWHERE}
+    extras = set(
+        tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["optional-dependencies"]
+    )
+    targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE))
+    for command in others:
+        program, what = command.split()[:2]
+        if program == "pip":
+            assert set(re.findall(r"'\.\[(\w+)\]'", command)) <= extras, command
+            continue
+        assert any(command.startswith(line) for line in ELSEWHERE), f"who runs {command}?"
+        assert program != "make" or what in targets, command
+        assert program != "python" or what == "-m" or (ROOT / what).is_file(), command
+    stale = [line for line in (*ELSEWHERE, *SLOW, *DOUBTFUL) if not any(c.startswith(line) for c in shown)]
+    assert not stale
 
 
 @pytest.mark.parametrize("page", SHOWING)
 def test_commands_are_known_and_their_files_are_there(page):
     """In the repository, or written by a command before."""
     written = set()
-    for words in commands(page):
+    for command in ours(page):
+        words = [word for word in shlex.split(command)[1:] if word != "--verbose"]
         _, _, ignored = app.parse_args(words, exit_on_error=False, print_error=False)
         assert not ignored
         out = words[words.index("--out") + 1] if "--out" in words else None
         read = {word for word in words if FILE.match(word) and word != out}
-        assert all(word in written or (ROOT / word).is_file() for word in read), words
+        assert all(word in written or (ROOT / word).is_file() for word in read), command
         written.add(out)
 
 
-@pytest.mark.slow  # some thirty fits; the test above sees every misspelt word and file
+@pytest.fixture(scope="module")
+def done():
+    """Commands that a page before has run."""
+    return set()
+
+
 @pytest.mark.parametrize("page", SHOWING)
-def test_they_run(page, tmp_path, monkeypatch, capsys):
-    """In a folder of their own that has the repository's files."""
-    for folder in ("docs", "fits", "measurements"):
-        (tmp_path / folder).symlink_to(ROOT / folder)
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("PELLICLE_CACHE", "off")
-    for words in commands(page):
-        monkeypatch.setattr(sys, "argv", ["pellicle", *words])
-        expected = 4 if any(doubt in " ".join(words) for doubt in DOUBTFUL) else 0
-        assert main() == expected, (words, capsys.readouterr())
-    for block in python(page):
-        exec(compile(block, page, "exec"), {})
+@pytest.mark.usefixtures("clone")
+def test_commands_run(page, done, monkeypatch, capsys):
+    """A second page need not run a command again, unless it reads what that writes."""
+    shown = ours(page)
+    for i, command in enumerate(shown):
+        out = command.partition("--out ")[2].partition(" ")[0]
+        wanted = out and any(out in later.split() for later in shown[i + 1 :])
+        if command not in SLOW and (wanted or command not in done):
+            run(command, monkeypatch, capsys)
+            done.add(command)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", [page for page in SHOWING if not SLOW.keys().isdisjoint(ours(page))])
+@pytest.mark.usefixtures("clone")
+def test_slow_commands_run(page, monkeypatch, capsys):
+    """With all of their page, as they may read what others write."""
+    for command in ours(page):
+        run(command, monkeypatch, capsys)
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "python")])
+@pytest.mark.usefixtures("clone")
+def test_python_runs(page):
+    """The blocks of a page one after the other, as one would type them."""
+    names: dict[str, object] = {}
+    for block in blocks(page, "python"):
+        exec(compile(block, page, "exec"), names)
+
+
+SCHEMA = json.loads((ROOT / "docs" / "recipe.schema.json").read_text("utf-8"))
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "toml")])
+def test_toml_is_toml_and_a_recipe_where_it_is_whole(page):
+    for block in blocks(page, "toml"):
+        found = tomllib.loads(block)
+        if "data" in found and "scene" in found:
+            jsonschema.validate(found, SCHEMA)
+
+
+def test_every_flag_that_is_named_exists(monkeypatch, capsys):
+    helps = []
+    for command in ("", "fit", "sample", "simulate", "plan", "compare", "cost", "chart", "materials"):
+        monkeypatch.setattr(sys, "argv", ["pellicle", *command.split(), "--help"])
+        main()
+        helps.append(capsys.readouterr().out)
+    flag = re.compile(r"(?<![\w-])--[a-z][\w-]*")
+    known = set(flag.findall(" ".join(helps)))
+    for page, text in PAGES.items():
+        spans = [span for span in re.findall(r"`([^`\n]+)`", text) if not span.startswith("python ")]
+        assert {found for span in spans for found in flag.findall(span)} <= known, page

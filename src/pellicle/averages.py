@@ -7,7 +7,7 @@ truth. Intensities are averaged (rows, wavelengths), never amplitudes or ratios.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -74,6 +74,12 @@ class Directions(NamedTuple):
     s_share: Any
 
 
+@lru_cache(maxsize=64)
+def _legendre_rule(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Gauss-Legendre nodes and weights; a plan asks for the same few again and again, at 50 ms each."""
+    return np.polynomial.legendre.leggauss(count)
+
+
 def directions(angle: Any, sine: Any, count: int, around: int) -> Directions:
     """Rays that fill a pupil evenly, as an aplanatic lens does, in half a turn (the rest is its mirror).
 
@@ -82,7 +88,7 @@ def directions(angle: Any, sine: Any, count: int, around: int) -> Directions:
     about the axis perpendicular to its own meridian, and its polarisation with it (Richards and Wolf
     1959, Proc. R. Soc. A 253, 358).
     """
-    nodes, weights = np.polynomial.legendre.leggauss(count)
+    nodes, weights = _legendre_rule(count)
     radius = np.sqrt(0.5 * (nodes + 1))
     if around == 1:
         return Directions(jnp.arcsin(_first(radius, sine) * sine), 0.5 * weights, 0.5)
