@@ -38,9 +38,13 @@ DOUBTFUL = (
 """Their fits end in doubt (exit code 4), as their pages say."""
 SLOW = {
     "pellicle cost docs/cost/soap_film.toml --out cost": "fits by many solvers: a minute or two",
-    "pellicle cost docs/cost/cuo_on_aluminium.toml --datasets 0": "twenty compilations; the soap film's run",
-    "pellicle cost docs/examples/coated_window.toml --datasets 0": "as for CuO",
-    "pellicle cost docs/examples/microscope.toml --datasets 0": "as for CuO",
+    **{
+        f"pellicle cost docs/{scene}.toml --datasets 0": "twenty compilations; tests/cli/test_cost_command.py"
+        for scene in (
+            *("cost/soap_film", "cost/cuo_on_aluminium"),
+            *("examples/coated_window", "examples/microscope"),
+        )
+    },
     "pellicle cost docs/surfaces/tempered_steel.toml --out cost": "forty compilations, and half a minute",
     "pellicle fit steel.csv --recipe docs/surfaces/tempered_steel.toml": "10 s to compile; "
     "tests/cli/test_brdf_command.py fits another",

@@ -25,8 +25,8 @@ def test_folder(tmp_path, refused):
 
 
 def test_binary(tmp_path, refused):
-    for content in (b"\x89PNG\r\n\x1a\n\x00\x00", b"PK\x03\x04\xff\xfe\x00", b"\xff\xfe\x00"):
-        path = tmp_path / "picture.png"
+    for content in (b"spc\x00\x01\n\x00\x00", b"\xff\xfe\x00"):
+        path = tmp_path / "spectrum.spc"
         path.write_bytes(content)
         refused(path, DataError, "binary", "export")
 

@@ -71,7 +71,10 @@ def _what(
     """The files with their scenes, and whether they are of one sample, from a recipe or from flags."""
     if recipe is None:
         if not files:
-            raise UsageError("no data: name the file to fit, as in pellicle fit oxide.csv --layer SiO2 ...")
+            raise UsageError(
+                "no data: name the file, as in pellicle fit oxide.csv --layer SiO2 --substrate Si, or give a "
+                "--recipe that does; pellicle demo shows it all, --help every flag"
+            )
         scene, assumed = scene_from_words(words, reading)
         say(*assumed)
         return [Look(file, scene, reading) for file in files], False

@@ -23,7 +23,10 @@ def scene_from_words(words: SceneWords, read: ReadWords) -> tuple[Scene, list[st
 
     if words.layer is None or words.substrate is None:
         missing = "--layer" if words.layer is None else "--substrate"
-        raise UsageError(f"{missing} is missing: give --layer and --substrate, or a --recipe")
+        raise UsageError(
+            f"{missing} is missing: say what the layer is and what it lies on, as in "
+            "--layer SiO2 --substrate Si, or give a --recipe"
+        )
     if words.plate_mm is not None and words.back is None:
         raise UsageError("--plate-mm needs --back: which medium lies behind the plate, as in --back air")
     if words.plate_mm is not None and not 0 < words.plate_mm < inf:

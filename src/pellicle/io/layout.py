@@ -52,7 +52,7 @@ def find_layout(lines: Sequence[Line], comments: Sequence[Line], path: str) -> L
     if first is None:
         raise DataError(
             f"{path}: line {lines[-1].number} ends the file without any row of two numbers; "
-            "expected rows of numbers below the header"
+            "expected rows of a wavelength and a value, as 550,0.21"
         )
     width = len(split(lines[first].bare, delimiter))
     start, header = _rows_begin(lines, first, width, delimiter, decimal)

@@ -64,8 +64,10 @@ def read_recipe(path: str | os.PathLike[str]) -> Recipe:
         raise DataError(f"{name}: cannot be read ({error.strerror}); check the recipe's path") from None
     try:
         loaded = tomllib.loads(raw.decode("utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise DataError(f"{name}: is not TOML: {error}") from None
+    except UnicodeDecodeError:
+        raise DataError(f"{name}: is no text, and a recipe is a TOML file; data go before --recipe") from None
+    except tomllib.TOMLDecodeError as error:
+        raise DataError(f"{name}: is not TOML, as a recipe must be: {error}") from None
     try:
         return Recipe(path=name, tables=RecipeTable.model_validate(loaded))
     except ValidationError as error:

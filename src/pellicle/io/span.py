@@ -7,12 +7,12 @@ import math
 from pellicle.errors import UsageError
 
 
-def number(text: str, what: str) -> float:
-    """A finite number, or a UsageError that says what it is for."""
+def number(text: str, what: str, expected: str = "a number") -> float:
+    """A finite number, or a UsageError that says what it is for, and what was expected."""
     try:
         value = float(text)
     except ValueError:
-        raise UsageError(f"{what} must be a number, not {text!r}") from None
+        raise UsageError(f"{what} must be {expected}, not {text!r}") from None
     if not math.isfinite(value):
         raise UsageError(f"{what} must be a finite number, not {text!r}")
     return value

@@ -13,6 +13,7 @@ from io import BufferedReader
 from pathlib import Path
 
 from pellicle.errors import DataError
+from pellicle.io.kinds import no_measurement
 
 _NUMBER = re.compile(
     r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|nan|inf(?:inity)?)", re.IGNORECASE | re.ASCII
@@ -49,10 +50,12 @@ def opened(path: str | os.PathLike[str]) -> Iterator[BufferedReader]:
 def read_text(path: str | os.PathLike[str]) -> tuple[str, str]:
     """Text and SHA-256 of a file: UTF-8, UTF-16 with its mark, or Latin-1 as older instruments write.
 
-    Raises DataError as `opened` does, and for a binary or empty file.
+    Raises DataError as `opened` does, and for an empty file or one that is no table.
     """
     with opened(path) as file:
         content = file.read()
+    if advice := no_measurement(content):
+        raise DataError(f"{path}: is {advice}")
     digest = hashlib.sha256(content).hexdigest()
     marked = content.startswith((b"\xff\xfe", b"\xfe\xff"))
     try:

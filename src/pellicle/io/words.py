@@ -26,7 +26,7 @@ _CALL = re.compile(r"\s*([A-Za-z][\w-]*)\s*(?:\((.*)\))?\s*")
 def thickness(text: str) -> Free | float:
     """`LO:HI` in nm as a free thickness, or one number as a fixed one."""
     if ":" not in text:
-        fixed = number(text, "--thickness")
+        fixed = number(text, "--thickness", "LO:HI in nm, as in 10:3000, or a number")
         if fixed < 0:
             raise UsageError(f"--thickness must not be negative, got {text} nm")
         return fixed
