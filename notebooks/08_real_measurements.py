@@ -1,0 +1,309 @@
+# ---
+# jupyter:
+#   kernelspec:
+#     display_name: Python 3
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # Real measurements, end to end
+#
+# From an instrument's file to the sentence in a paper. The data are ellipsometric angles of polymer
+# brushes (chains tied to a surface by one end) on oxidised silicon, measured with an imaging
+# ellipsometer. They come from the tests of the program refellips (H. Robertson, I. Gresham and A. Nelson,
+# BSD licence): `measurements/README.md` says more. Nobody tells us how thick these layers are. That is
+# the usual case, and what this notebook is about.
+#
+# An ellipsometer compares how light polarised in the plane of incidence (p) and across it (s) is
+# reflected. Ψ tells the ratio of the two amplitudes, Δ the difference of the two phases, both in degrees.
+
+# %%
+import os
+import textwrap
+from dataclasses import replace
+
+import jax
+import matplotlib.pyplot as plt
+import numpy as np
+
+import pellicle as pl
+
+jax.config.update("jax_enable_x64", True)  # 16 digits in place of JAX's usual 7
+SHORT = os.environ.get("PELLICLE_SHORT") == "1"  # the automatic tests take fewer points
+FOLDER = "../measurements/ellipsometry/"
+
+# %% [markdown]
+# ## Read the file
+#
+# The file is read as the instrument wrote it. `notes` says how it was understood: always worth a look.
+
+# %%
+with open(FOLDER + "15-1-1.dat", encoding="utf-8") as file:
+    print("".join(line.expandtabs(10)[:80] + "\n" for line in file.read().splitlines()[:6]))
+thin = pl.read_spectrum(FOLDER + "15-1-1.dat")
+print(thin)
+for note in thin.notes:
+    print("  -", note)
+
+# %% [markdown]
+# One wavelength, several angles of incidence. The file gives no errors of its angles, so their size has
+# to be estimated from what the fit leaves over.
+#
+# ## Write down the scene
+#
+# What is there, from the air down: the brush, about 2 nm of native oxide that every silicon wafer has,
+# silicon. What we do not measure we have to assume, and to say so: the oxide's thickness, and the
+# polymer's index n = 1.47 + 4950/λ² (λ in nm, from refellips).
+
+
+# %%
+def brush(index=1.47, oxide=2.0):
+    """A scene with a brush of unknown thickness; the index is the first coefficient of its Cauchy formula."""
+    layers = [
+        pl.Layer(pl.Cauchy(index, 4950.0), pl.Free(None, 0, 300), name="brush"),
+        pl.Layer("SiO2", oxide, name="oxide"),
+    ]
+    return pl.Scene(layers, "Si")
+
+
+fit = pl.fit(thin, brush())
+print(fit)
+assert fit.status == "converged"
+
+# %% [markdown]
+# ## Look at the residuals
+#
+# A verdict is not enough. What the fit leaves over should look like noise.
+
+
+# %%
+def draw(found):
+    """Ψ and Δ with the fit, and what is left, against the angle of incidence."""
+    curve, angle = found.curve, found.spectrum.angle
+    _, (above, below) = plt.subplots(2, 1, figsize=(7, 5), sharex=True, height_ratios=[2, 1])
+    above.plot(angle, curve.data, "o", color="C0", label="Ψ")
+    above.plot(angle, curve.model, "-", color="C0")
+    above.set_ylabel("Ψ (degrees)", color="C0")
+    beside = above.twinx()
+    beside.plot(angle, curve.delta_data, "s", color="C1", label="Δ")
+    beside.plot(angle, curve.delta_model, "-", color="C1")
+    beside.set_ylabel("Δ (degrees)", color="C1")
+    beside.spines.right.set_visible(True)
+    below.plot(angle, curve.residual, "o-", color="C0")
+    below.plot(angle, curve.delta_residual, "s-", color="C1")
+    below.axhline(0, color="0.7", zorder=0)
+    below.set(xlabel="angle of incidence (degrees)", ylabel="data − fit (degrees)")
+    plt.show()
+
+
+draw(fit)
+rms = [float(np.sqrt(np.mean(x**2))) for x in (fit.curve.residual, fit.curve.delta_residual)]
+print(f"rms of Ψ {rms[0]:.2f}°, of Δ {rms[1]:.2f}°")
+print(f"{len(thin)} points, worth {fit.parts[0].effective_points:.1f} independent ones")
+signs = np.sign(fit.curve.delta_residual)
+print("signs of what is left of Δ:", "".join("+" if x > 0 else "−" for x in signs))
+assert fit.parts[0].effective_points < len(thin)
+
+# %% [markdown]
+# The points lie close to the curve, but what is left runs smoothly with the angle. Noise would jump.
+# Something is not quite as we wrote: the index, the oxide, a small error of the angles. pellicle cannot
+# tell what, but it counts such points as fewer, and widens the error to match.
+#
+# ## Try another description
+#
+# Is it the index? `pl.compare` fits both descriptions and weighs them by BIC (Bayesian information
+# criterion: misfit, plus a price for every free number; a difference below 2 is no evidence, one above 6
+# is strong).
+
+# %%
+free_index = pl.Free(None, 1.3, 1.7)
+compared = pl.compare(thin, {"index assumed": brush(), "index free": brush(free_index)})
+print(compared)
+for candidate in compared.candidates:
+    found = candidate.fit
+    told = f"{found['brush.thickness'].value:.2f} ± {found['brush.thickness'].stderr:.2f} nm"
+    print(f"  {candidate.name}: {told}, n at 658 nm = {float(found.curve.n[0]):.3f}, rms {found.rms:.3f}°")
+either = [candidate.fit["brush.thickness"] for candidate in compared.candidates]
+apart = abs(either[0].value - either[1].value)
+print(f"the two thicknesses are {apart:.1f} nm apart")
+assert apart > 3 * max(estimate.stderr for estimate in either)
+
+# %% [markdown]
+# The criterion is clear, and by that the brush is thinner. But an index above 1.6 is not believable for
+# this polymer, and both answers claim errors far smaller than the distance between them. A criterion
+# chooses among the descriptions that we offer. The right one may not be among them.
+#
+# What else could it be? Suppose that the instrument's angles are all off by a little. We shift them, keep
+# the assumed index, and see how well the data are met, for this brush and for a thinner one of the same
+# series.
+
+# %%
+shifts = np.linspace(-0.2, 0.3, 6 if SHORT else 26)
+thinner = pl.read_spectrum(FOLDER + "19-1-1.dat")
+
+
+def shifted(spectrum):
+    """The fits of a spectrum whose angles of incidence are off by each of the shifts (degrees)."""
+    return [pl.fit(replace(spectrum, angle=spectrum.angle + shift), brush()) for shift in shifts]
+
+
+series = {"15-1-1": shifted(thin), "19-1-1": shifted(thinner)}
+figure, axes = plt.subplots(figsize=(7, 3.4))
+for (name, fits), style in zip(series.items(), ("C0o-", "C1s-"), strict=True):
+    axes.plot(shifts, [found.rms for found in fits], style, label=f"{name}, index assumed")
+axes.axhline(compared.best.fit.rms, color="C0", linestyle=":", label="15-1-1, index free, no shift")
+axes.set(
+    xlabel="shift of all angles of incidence (degrees)",
+    ylabel="rms of what is left (degrees)",
+    ylim=(0, None),
+)
+axes.legend()
+plt.show()
+
+best = {name: int(np.argmin([found.rms for found in fits])) for name, fits in series.items()}
+for name, fits in series.items():
+    found, before = fits[best[name]], fits[int(np.argmin(abs(shifts)))]
+    print(
+        f"{name}: {shifts[best[name]]:+.2f}° leaves {found.rms:.3f}° in place of {before.rms:.3f}°,"
+        f" thickness {found['brush.thickness'].value:.2f} ± {found['brush.thickness'].stderr:.2f} nm"
+    )
+assert all(0 < shifts[at] < 0.2 for at in best.values())
+assert series["15-1-1"][best["15-1-1"]].rms < 1.05 * compared.best.fit.rms
+
+# %% [markdown]
+# A shift of about a tenth of a degree explains the data as well as a free index does, with a believable
+# index, and both samples ask for about the same. So the angles are the likelier culprit, and the brush
+# has some 16 nm, not 15. That is an argument, not a proof. What would decide: the instrument's own
+# calibration of the angle, or a second wavelength.
+#
+# ## A thicker brush
+#
+# The third file holds 32 spots of one wafer with a thicker brush. A thicker layer gives more: here its
+# index can be left free.
+
+# %%
+SPOTS = FOLDER + "post_synthesis.dat"
+first = pl.read_spectrum(SPOTS, spot=1)
+thick = pl.fit(first, brush(free_index))
+print(thick)
+draw(thick)
+shift = {s: pl.fit(replace(first, angle=first.angle + s), brush()).rms for s in (-0.1, 0.0, 0.1)}
+print("rms with all angles shifted:", ", ".join(f"{s:+.1f}°: {rms:.3f}°" for s, rms in shift.items()))
+assert thick.status == "converged"
+assert abs(thick["brush.A"].value - 1.47) < 0.003
+assert min(shift, key=shift.get) == 0
+assert thick.rms < 0.5 * fit.rms
+
+# %% [markdown]
+# The index comes out as the one that we assumed before, without having been told, and these angles need
+# no shift. What is left is no pure noise either, but far less than before. This description can be
+# trusted further than the last.
+#
+# ## How sure, with what was assumed
+#
+# The stated error takes the oxide as exactly 2 nm thick. It is not. The two layers look nearly alike to
+# light, so every nanometre of oxide too much is a nanometre of brush too little. Instead of fixing the
+# oxide, we free it and say what we believe: 2.0 ± 0.5 nm, a normal *prior*. Then we sample the posterior,
+# the probability of every set of numbers, given data and belief.
+
+# %%
+believed = brush(free_index, pl.Free(None, 0, 5, prior=pl.Normal(2.0, 0.5)))
+posterior = pl.sample(first, believed)
+print(posterior)
+checks = posterior.checks
+print(f"  {checks.independent} independent draws, split R̂ {checks.rhat:.3f}")
+assert posterior.trusted
+
+thickness, oxide = posterior["brush.thickness"], posterior["oxide.thickness"]
+grew = thickness.sd / thick["brush.thickness"].stderr
+print(f"the error of the thickness is {grew:.1f} times that with the oxide fixed")
+assert grew > 3
+
+# %%
+draws = {name: posterior.draws[..., i].ravel() for i, name in enumerate(posterior.names)}
+figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6))
+left.plot(draws["oxide.thickness"], draws["brush.thickness"], ".", markersize=2, alpha=0.3)
+left.set(xlabel="oxide (nm)", ylabel="brush (nm)")
+right.hist(draws["brush.thickness"], 40, density=True, alpha=0.5, label="oxide 2.0 ± 0.5 nm")
+middle, error = thick["brush.thickness"].value, thick["brush.thickness"].stderr
+at = np.linspace(68, 72, 400)
+right.plot(
+    at,
+    np.exp(-0.5 * ((at - middle) / error) ** 2) / (error * np.sqrt(2 * np.pi)),
+    "k",
+    label="oxide fixed at 2 nm",
+)
+right.set(xlabel="brush (nm)", ylabel="probability density (1/nm)")
+right.legend(loc="upper right", fontsize="small")
+plt.show()
+
+# %% [markdown]
+# Most of the uncertainty is not noise, but what we do not know of the oxide. More precise angles would
+# not help; measuring the bare wafer before it is coated would.
+#
+# ## One spot is not the wafer
+#
+# All 32 spots, fitted one by one by the same scene.
+
+# %%
+columns = np.genfromtxt(SPOTS, skip_header=2, usecols=(5, 11, 12))  # zone, x and y in mm
+places = columns[columns[:, 0] == 0][::5, 1:]  # five angles a spot
+fits = [pl.fit(pl.read_spectrum(SPOTS, spot=spot), brush(free_index)) for spot in range(1, len(places) + 1)]
+values = np.array([found["brush.thickness"].value for found in fits])
+errors = np.array([found["brush.thickness"].stderr for found in fits])
+index = np.array([float(found.curve.n[0]) for found in fits])
+print(f"{len(fits)} spots, of which {sum(found.status == 'converged' for found in fits)} converged")
+spread = values.std(ddof=1)
+print(f"thickness from {values.min():.1f} to {values.max():.1f} nm, standard deviation {spread:.1f} nm")
+print(f"median error of one spot {np.median(errors):.2f} nm, with the oxide's {thickness.sd:.2f} nm")
+print(f"n at 658 nm from {index.min():.4f} to {index.max():.4f}")
+assert spread > 5 * thickness.sd
+
+figure, axes = plt.subplots(figsize=(5.5, 4.5))
+dots = axes.scatter(*places.T, c=values, s=120, cmap="viridis")
+axes.set(xlabel="x (mm)", ylabel="y (mm)", aspect="equal")
+axes.margins(0.12)
+figure.colorbar(dots, label="thickness of the brush (nm)")
+plt.show()
+
+# %% [markdown]
+# The layer is uneven by far more than any error bar of a single spot. Both numbers are right; they answer
+# different questions. "How thick is the brush here?" has an error of a fraction of a nanometre, "how
+# thick is the brush on this wafer?" one of several.
+#
+# ## What one writes
+#
+# A reader must be able to judge the number and to repeat it: what was measured, the scene with all that
+# was assumed, how it was fitted, how large the error is and what it contains, and what the data did not
+# decide. The numbers are filled in by the program, so that they cannot differ from the results.
+
+# %%
+low, high = first.angle.min(), first.angle.max()
+nearest = min(rival.delta_chi2 for rival in thick.rivals)
+sentences = [
+    f"Ψ and Δ were measured at {first.wavelength[0]:.0f} nm and {len(first)} angles of incidence from",
+    f"{low:.1f}° to {high:.1f}° at {len(fits)} spots of one wafer, and fitted with pellicle",
+    f"{pl.__version__}. The scene was air, the polymer, native oxide and silicon",
+    f"(n and k of {pl.material('Si').citation}).",
+    "The polymer's thickness and index were free (n = A + 4950 nm²/λ²); the oxide was taken as",
+    "2.0 ± 0.5 nm and marginalised over. No noise was stated, so it was estimated from the residuals,",
+    f"which are {thick.rms:.2f}° rms. At the first spot the thickness is {thickness.q50:.1f} nm, with a",
+    f"95 % interval from {thickness.q025:.1f} to {thickness.q975:.1f} nm. Over the wafer it is",
+    f"{values.mean():.1f} nm with a standard deviation of {spread:.1f} nm, with the oxide at 2 nm.",
+    f"The index at 658 nm is {index.mean():.3f} ± {index.std(ddof=1):.3f} (standard deviation over the",
+    "spots). No other thickness between 0 and 300 nm fits: the next best is worse by",
+    f"Δχ² = {nearest:.0f}.",
+]
+print(textwrap.fill(" ".join(sentences), 100))
+print("\nsha256 of the data:", first.sha256[:16], "…")
+
+# %% [markdown]
+# Beside the sentence belong the data and the recipe. `fits/brush_post_synthesis` in the repository holds
+# both for the first spot; this repeats its fit, from Python or with `pellicle fit --recipe`:
+
+# %%
+recipe = pl.read_recipe("../fits/brush_post_synthesis/recipe.toml")
+again = pl.fit(pl.read_spectrum(recipe.files[0]), recipe.scene())
+print(again)
+assert np.isclose(again["brush.thickness"].value, thick["brush.thickness"].value, atol=0.01)
