@@ -33,7 +33,7 @@ DOUBTFUL = (
     "pellicle fit --recipe measurements/recipes/gold_on_glass_300nm.toml",
     "pellicle fit window.csv --layer TiO2 --substrate SiO2 --thickness 10:500",
     "pellicle fit oxide.csv --layer SiO2 --substrate Si --thickness 1000:3000",
-    "pellicle sample --recipe docs/examples/five_bands.toml --out five_bands",
+    "pellicle sample --recipe docs/examples/five_bands.toml --out results/five_bands",
 )
 """Their fits end in doubt (exit code 4), as their pages say."""
 SLOW = {
@@ -49,10 +49,10 @@ SLOW = {
     "pellicle fit steel.csv --recipe docs/surfaces/tempered_steel.toml": "10 s to compile; "
     "tests/cli/test_brdf_command.py fits another",
 }
+CI = ("make fit", "make test", "make notebooks", "make docs")
 _REPEATED = "a study of hours, whose tables are kept; its parts are tested in their own modules"
 ELSEWHERE = {
-    **dict.fromkeys(("make fit", "make test", "make docs"), "CI itself: .ci/run"),
-    "make notebooks": "make docs, which needs them",
+    **dict.fromkeys(CI, "CI itself: .ci/run"),
     "make fits": "tests/test_fits.py: one study every day, all of them slow",
     **dict.fromkeys(("make slow", "make coverage"), "these tests"),
     "make bench": "speed is shown, never tested",
@@ -138,6 +138,8 @@ def test_whatever_is_shown_is_run_by_a_test():
         assert any(command.startswith(line) for line in ELSEWHERE), f"who runs {command}?"
         assert program != "make" or what in targets, command
         assert program != "python" or what == "-m" or (ROOT / what).is_file(), command
+    typed_by_ci = (ROOT / ".ci" / "run").read_text("utf-8").splitlines()
+    assert all(any(line.startswith(command) for line in typed_by_ci) for command in CI)
     stale = [line for line in (*ELSEWHERE, *SLOW, *DOUBTFUL) if not any(c.startswith(line) for c in shown)]
     assert not stale
 
@@ -213,5 +215,7 @@ def test_every_flag_that_is_named_exists(monkeypatch, capsys):
     flag = re.compile(r"(?<![\w-])--[a-z][\w-]*")
     known = set(flag.findall(" ".join(helps)))
     for page, text in PAGES.items():
-        spans = [span for span in re.findall(r"`([^`\n]+)`", text) if not span.startswith("python ")]
+        spans = [
+            span for span in re.findall(r"`([^`\n]+)`", text) if not span.startswith(("python ", "pip "))
+        ]
         assert {found for span in spans for found in flag.findall(span)} <= known, page

@@ -54,8 +54,9 @@ def simulate(
     noise = (found.tables.data.noise or 0.0) if noise is None else noise
     wavelength = wavelengths(found, scene)
     result = (synthesise_angles if ellipsometric else synthesise)(scene, wavelength, noise, seed, tolerance)
+    spoken.of_plan(result.plan)
     write_text(out, _csv(found, scene, result, noise, seed))
-    say(f"{out}: {len(wavelength)} points, {wavelength[0]:g} to {wavelength[-1]:g} nm", str(result.plan))
+    say(f"{out}: {len(wavelength)} points, {wavelength[0]:g} to {wavelength[-1]:g} nm")
     return 0
 
 

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 def simulate_surface(recipe: str, out: str, noise: float | None, seed: int, tolerance: float) -> int:
     """Write the recipe's BRDF as CSV. Returns the exit code."""
     from pellicle import __version__
+    from pellicle.fitting.spoken import of_plan
     from pellicle.io.brdf_writers import write_brdf_samples
     from pellicle.io.surface_recipe import read_surface_recipe
     from pellicle.surfaces.sampling import synthesise
@@ -26,6 +27,7 @@ def simulate_surface(recipe: str, out: str, noise: float | None, seed: int, tole
     noise = (found.data.noise or 0.0) if noise is None else noise
     start()
     samples, plan = synthesise(found.surface, looked, noise, seed, tolerance)
+    of_plan(plan)
     numbers = found.surface.start()
     units = {about.key: about.unit for about in found.surface.brdf.parameters}
     truth = (f"{key} = {_listed(x)} {units.get(key, 'nm')}".strip() for key, x in numbers.items())
@@ -35,7 +37,7 @@ def simulate_surface(recipe: str, out: str, noise: float | None, seed: int, tole
         f"truth: model {found.surface.model}, {', '.join(truth)}",
     ]
     write_brdf_samples(out, samples, said=said)
-    say(f"{out}: {len(samples)} samples of {', '.join(samples.channels)}", *samples.notes, str(plan))
+    say(f"{out}: {len(samples)} samples of {', '.join(samples.channels)}", *samples.notes)
     return 0
 
 

@@ -85,7 +85,7 @@ def read_spectrum(
         lines=table.lines,
     )
     if noise is not None:
-        replaced = ("the sigma column gives way to --noise",) if sigma is not None else ()
+        replaced = ("the noise that was given goes before the sigma column",) if sigma is not None else ()
         spectrum = dataclasses.replace(
             spectrum, sigma=np.full(len(spectrum), noise), notes=(*spectrum.notes, *replaced)
         )
