@@ -230,9 +230,9 @@ for lamps in (LAMPS, (30,), (10,)):
 # %% [markdown]
 # Refraction makes the path through the layer depend on the angle, and that dependence is what tells
 # thickness from index. Under one lamp less of it is seen, and the errors grow, the more so the steeper the
-# light falls. Other thicknesses stay far behind here because wide lobes let even one lamp be seen from many
-# sides; with a smoother surface, more noise or a single channel they would come near, and the fit would say
-# `ambiguous`.
+# light falls. Other thicknesses stay far behind here, because wide lobes let even one lamp be seen from
+# many sides. Narrow lobes, more noise or a single channel bring them nearer; where one comes too near, the
+# fit says `ambiguous`.
 #
 # ## A surface without a layer
 #
