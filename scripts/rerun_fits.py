@@ -31,8 +31,13 @@ SHARE = 0.1
 
 
 def studies(folder: Path = FITS) -> list[Path]:
-    """The folders that have a recipe, of one data file each."""
-    return sorted(recipe.parent for recipe in folder.glob("*/recipe.toml"))
+    """The folders that have a recipe, of one data file each: films, and surfaces under `brdf`."""
+    return sorted(recipe.parent for recipe in folder.glob("**/recipe.toml"))
+
+
+def called(study: Path) -> str:
+    """What a study is called: its folder below `fits/`."""
+    return study.relative_to(FITS).as_posix()
 
 
 def run(study: Path, out: Path) -> dict[str, Any]:
@@ -101,7 +106,7 @@ def rerun(study: Path, keeping: bool = False) -> list[str]:
 
 def main() -> int:
     """0 if all is as kept, or is kept now."""
-    known = {study.name: study for study in studies()}
+    known = {called(study): study for study in studies()}
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("study", nargs="*", help="folders of fits/ (all)")
     parser.add_argument("--keep", action="store_true", help="write the new results into the studies")

@@ -98,6 +98,7 @@ def test_a_recipe_says_what_is_fitted_and_how(folder, told, pellicle):
     table = (folder / "out" / "fit.csv").read_text().splitlines()
     assert table[3].endswith("R,G,B,model_R,model_G,model_B")
     assert len(table) == 34
+    assert (folder / "out" / "figure.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_flags_go_before_the_recipe_and_a_bad_file_does_not_stop_the_others(folder, told, pellicle):

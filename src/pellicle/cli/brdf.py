@@ -105,5 +105,5 @@ def _one(recipe: SurfaceRecipe, path: str, folder: Path | None, as_json: bool) -
     print(one_line(record) if as_json else brdf_report(fit), flush=True)
     if folder is not None:
         write_brdf_fit(folder, fit)
-        say(f"{folder}: report and tables written")
+        say(f"{folder}: report, figure and tables written")
     return record, 0 if fit.status == "converged" else 4

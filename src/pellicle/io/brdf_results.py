@@ -19,16 +19,18 @@ if TYPE_CHECKING:
 
 
 def write_brdf_fit(folder: str | os.PathLike[str], fit: BrdfFit) -> Path:
-    """Write report.txt, result.json and fit.csv into a folder, each whole or not at all.
+    """Write report.txt, result.json, fit.csv and figure.png into a folder, each whole or not at all.
 
     Raises UsageError where it holds anything that pellicle did not write, or cannot be written.
     """
     from pellicle.report.brdf import brdf_report
+    from pellicle.report.brdf_figure import brdf_figure
 
     target = new_folder(folder)
     write_text(target / MARKER, indented(brdf_to_json(fit)), overwrite=True)
     write_text(target / "report.txt", brdf_report(fit), overwrite=True)
     write_text(target / "fit.csv", brdf_csv(fit), overwrite=True)
+    brdf_figure(fit, target / "figure.png", overwrite=True)
     return target
 
 

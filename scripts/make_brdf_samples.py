@@ -1,0 +1,45 @@
+"""Write the simulated samples of the studies in `fits/brdf`: what each recipe's surface would give.
+
+Run `python scripts/make_brdf_samples.py [FOLDER]` (default: fits/brdf). Files that exist are left alone:
+remove one to have it made again.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pellicle
+from pellicle.io.brdf_writers import write_brdf_samples
+from pellicle.io.surface_recipe import read_surface_recipe
+from pellicle.surfaces.sampling import default_directions, simulate_brdf
+
+STUDIES = Path(__file__).resolve().parents[1] / "fits" / "brdf"
+SAMPLES, NOISE = 250, 0.002
+"""Pairs of directions, and the standard deviation of the noise (1/sr)."""
+
+
+def main(folder: Path = STUDIES) -> None:
+    """The seed is the study's place in the alphabet, from 1."""
+    for seed, recipe in enumerate(sorted(STUDIES.glob("*/recipe.toml")), start=1):
+        target = folder / recipe.parent.name / "samples.csv"
+        if target.exists():
+            continue
+        target.parent.mkdir(parents=True, exist_ok=True)
+        surface = read_surface_recipe(recipe).surface
+        samples = simulate_brdf(surface, default_directions(SAMPLES), noise=NOISE, seed=seed)
+        start = ", ".join(f"{key} = {' '.join(f'{x:g}' for x in number)}" for key, number in _truth(surface))
+        said = [
+            "SYNTHETIC: simulated, not measured",
+            f"seed {seed}, noise {NOISE:g}, pellicle {pellicle.__version__}",
+            f"truth: model {surface.model}, {start}",
+        ]
+        write_brdf_samples(target, samples, said=said)
+
+
+def _truth(surface):
+    return [(key, number.reshape(-1)) for key, number in surface.start().items()]
+
+
+if __name__ == "__main__":
+    main(*map(Path, sys.argv[1:]))
