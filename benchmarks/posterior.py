@@ -24,7 +24,7 @@ import pellicle as pl  # noqa: E402
 from pellicle.fitting.fit import fitted  # noqa: E402
 from pellicle.fitting.search import quiet  # noqa: E402
 from pellicle.sampling.chain import empty  # noqa: E402
-from pellicle.sampling.density import Target  # noqa: E402
+from pellicle.sampling.density import log_density  # noqa: E402
 from pellicle.sampling.modes import modes  # noqa: E402
 from pellicle.sampling.run import run  # noqa: E402
 from pellicle.synthetic import synthesise  # noqa: E402
@@ -130,7 +130,7 @@ class Ours:
     def __call__(self, seed: int, steps: int = 20_000) -> Sampled:
         began = time.process_time()
         found = modes(self.weighed)
-        target = Target(self.weighed.problem, WALKERS // 2)
+        target = Target(log_density(self.weighed.problem), WALKERS // 2)
         chain = empty(WALKERS, len(self.order), seed)
         chain, checks = run(target, found, chain, steps, lambda chain: None, quiet)
         seconds = time.process_time() - began

@@ -133,7 +133,8 @@ class Batch:
         self, what: tuple[Any, Any], sampler: Sampler, folder: Path | None, progress: Progress
     ) -> Posterior:
         from pellicle.io.posteriors import chain_in
-        from pellicle.sampling.sample import STEPS, sample
+        from pellicle.sampling.ensemble import STEPS
+        from pellicle.sampling.sample import sample
 
         return sample(
             *what,

@@ -128,13 +128,7 @@ def inference_data(posterior: Posterior, predicted: tuple[Prediction, ...]) -> A
     from pellicle.sampling.checks import arviz
 
     by_walker = np.moveaxis(posterior.draws, 0, 1)
-    observed, repeated, coords, dims = {}, {}, {}, {}
-    for part, found in zip(posterior.fit.parts, predicted, strict=True):
-        own = f"_{part.name}" if part.name else ""
-        coords[f"wavelength_nm{own}"] = part.curve.wavelength
-        for name, data, noisy in _observed(part, found):
-            observed[name + own], repeated[name + own] = data, noisy[None]
-            dims[name + own] = [f"wavelength_nm{own}"]
+    axes = {found.axis.name: found.axis.values for found in predicted}
     attributes = {
         "inference_library": "pellicle",
         "trusted": int(posterior.trusted),
@@ -144,15 +138,9 @@ def inference_data(posterior: Posterior, predicted: tuple[Prediction, ...]) -> A
     return arviz().from_dict(
         posterior={name: by_walker[:, :, i] for i, name in enumerate(posterior.names)},
         sample_stats={"lp": posterior.log_density.T},
-        posterior_predictive=repeated,
-        observed_data=observed,
-        coords=coords,
-        dims=dims,
+        posterior_predictive={found.name: found.noisy[None] for found in predicted},
+        observed_data={found.name: found.data for found in predicted},
+        coords=axes,
+        dims={found.name: [found.axis.name] for found in predicted},
         attrs=attributes,
     )
-
-
-def _observed(part: Any, found: Prediction) -> list[tuple[str, np.ndarray, np.ndarray]]:
-    if found.delta_noisy is None:
-        return [(part.spectrum.signal, part.curve.data, found.noisy)]
-    return [("psi", part.curve.data, found.noisy), ("delta", part.curve.delta_data, found.delta_noisy)]

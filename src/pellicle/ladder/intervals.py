@@ -20,10 +20,11 @@ from pellicle.ladder.climb import Progress, mark_pareto
 from pellicle.ladder.entrants import entrants
 from pellicle.ladder.trial import Trial
 from pellicle.sampling.chain import empty
-from pellicle.sampling.density import Target
+from pellicle.sampling.density import log_density
 from pellicle.sampling.extra import missing
 from pellicle.sampling.modes import modes
 from pellicle.sampling.run import run
+from pellicle.sampling.target import Target
 
 PROMISED = 0.95
 _WIDE = 1.959964
@@ -156,7 +157,7 @@ def _variances(fit: Weighed) -> list[float]:
 def _sampled(steps: int, fit: Weighed) -> Interval:
     """By `pellicle.sample`'s own chain, of that many steps or until it is long enough."""
     size = len(fit.problem.parameters)
-    target = Target(fit.problem, _WALKERS // 2)
+    target = Target(log_density(fit.problem), _WALKERS // 2)
     chain, checks = run(target, modes(fit), empty(_WALKERS, size, 0), steps, lambda chain: None, quiet)
     return _quantiles(chain.draws[checks.discard :])
 
@@ -166,7 +167,7 @@ def _usual(steps: int, fit: Weighed) -> Interval:
     import emcee
 
     size = len(fit.problem.parameters)
-    target = Target(fit.problem, _WALKERS // 2)
+    target = Target(log_density(fit.problem), _WALKERS // 2)
     random = np.random.default_rng(0)
     start = np.clip(fit.minima.units[0] + 1e-4 * random.standard_normal((_WALKERS, size)), 1e-9, 1 - 1e-9)
     sampler = emcee.EnsembleSampler(_WALKERS, size, target, vectorize=True)

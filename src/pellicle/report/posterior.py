@@ -18,12 +18,9 @@ from pellicle.sampling.result import Marginal, Posterior, verdict
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from pellicle.fitting.result import Part
-
 DPI = 150
 _LEAST_MASS = 0.005
 """Minima with less of the posterior are not listed."""
-_SIGNALS = {"R": "reflectance", "T": "transmittance", "psi-delta": "Ψ (degrees)"}
 
 
 def posterior_report(posterior: Posterior) -> str:
@@ -113,41 +110,26 @@ def predictive_figure(
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    each = zip(posterior.fit.parts, predicted, strict=True)
-    panels = [panel for part, found in each for panel in _panels(part, found)]
-    sheet = Figure(figsize=(8.0, 0.6 + 3.0 * len(panels)), layout="constrained")
+    sheet = Figure(figsize=(8.0, 0.6 + 3.0 * len(predicted)), layout="constrained")
     FigureCanvasAgg(sheet)
-    for axes, panel in zip(np.ravel(sheet.subplots(len(panels), squeeze=False)), panels, strict=True):
-        _band(axes, *panel)
+    for axes, found in zip(np.ravel(sheet.subplots(len(predicted), squeeze=False)), predicted, strict=True):
+        _band(axes, found)
     target = Path(path)
     with replacing(target, overwrite=overwrite) as draft:
         sheet.savefig(draft, dpi=DPI)
     return target
 
 
-_Panel = tuple[str, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
-"""Label, wavelength, data, model and noisy model."""
-
-
-def _panels(part: Part, found: Prediction) -> list[_Panel]:
-    """One for each quantity of a spectrum."""
-    curve, own = part.curve, f"{part.name}: " if part.name else ""
-    label = own + _SIGNALS[part.spectrum.signal]
-    rows = [(label, curve.wavelength, curve.data, found.model, found.noisy)]
-    if found.delta is not None and found.delta_noisy is not None and curve.delta_data is not None:
-        rows.append((f"{own}Δ (degrees)", curve.wavelength, curve.delta_data, found.delta, found.delta_noisy))
-    return rows
-
-
-def _band(
-    axes: Axes, label: str, wavelength: np.ndarray, data: np.ndarray, model: np.ndarray, noisy: np.ndarray
-) -> None:
-    order = np.argsort(wavelength, kind="stable")
-    at = wavelength[order]
-    for draws, alpha, name in ((noisy, 0.25, "repeated measurements, 95 %"), (model, 0.8, "model, 95 %")):
+def _band(axes: Axes, found: Prediction) -> None:
+    order = np.argsort(found.axis.values, kind="stable")
+    at, several = (
+        found.axis.values[order],
+        ((found.noisy, 0.25, "repeated measurements"), (found.model, 0.8, "model")),
+    )
+    for draws, alpha, name in several:
         low, high = np.quantile(draws, [0.025, 0.975], axis=0)[:, order]
-        axes.fill_between(at, low, high, color=ORANGE, alpha=alpha, linewidth=0, label=name)
-    axes.plot(at, data[order], ".", color=BLACK, markersize=marker_size(len(at)), label="data")
-    axes.set_xlabel("wavelength (nm)")
-    axes.set_ylabel(label)
+        axes.fill_between(at, low, high, color=ORANGE, alpha=alpha, linewidth=0, label=f"{name}, 95 %")
+    axes.plot(at, found.data[order], ".", color=BLACK, markersize=marker_size(len(at)), label="data")
+    axes.set_xlabel(found.axis.label)
+    axes.set_ylabel(found.label)
     axes.legend(frameon=False, fontsize="small")

@@ -11,10 +11,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from pellicle.fitting.evaluation import Looks, explained
-from pellicle.fitting.measured import Measured
 from pellicle.fitting.nuisance import Data
 from pellicle.fitting.problem import Box, Problem
 from pellicle.fitting.programs import kept
+from pellicle.sampling.target import LogDensity
 from pellicle.scene import Scene
 
 
@@ -30,43 +30,38 @@ def density(looks: Looks, scenes: tuple[Scene, ...], data: tuple[Data, ...], box
     out, times the priors. A prior is one on the parameter in its own unit."""
 
     def one(unit):
-        views, prior = explained(looks, scenes, data, box, unit)
-        value = box.values(unit)
-        logarithm = jnp.log(jnp.where(box.logarithmic > 0, value, 1.0))
-        chi2 = sum(view.evidence for view in views) + jnp.sum(prior**2)
-        log = -0.5 * chi2 - jnp.sum(box.logarithmic * logarithm)
-        inside = jnp.all((unit >= 0) & (unit <= 1)) & jnp.isfinite(log)
-        return jnp.where(inside, log, -jnp.inf)
+        views, _ = explained(looks, scenes, data, box, unit)
+        return bounded(unit, -0.5 * sum(view.evidence for view in views) + log_prior(box, unit))
 
     return Density(jax.vmap(one)(units))
 
 
-class Target:
-    """ln posterior of a weighed problem as a function of NumPy arrays (walkers, parameters).
-
-    Batches are padded to `lanes` points, so that all of them share one program.
-    """
-
-    def __init__(self, problem: Problem, lanes: int):
-        looks, *rest = problem.program
-        self.looks, self.rest, self.lanes = looks, jax.device_put(tuple(rest)), lanes
-
-    def __call__(self, units: np.ndarray) -> np.ndarray:
-        inside = np.clip(units, 0.0, 1.0)  # nothing is simulated where it has no meaning
-        found = [self._batch(inside[i : i + self.lanes]) for i in range(0, len(units), self.lanes)]
-        within = np.all((units >= 0) & (units <= 1), axis=1)
-        return np.where(within, np.concatenate(found), -np.inf)
-
-    def _batch(self, units: np.ndarray) -> np.ndarray:
-        padded = np.concatenate([units, np.repeat(units[-1:], self.lanes - len(units), axis=0)])
-        return np.asarray(density(self.looks, *self.rest, padded).log)[: len(units)]
+def log_prior(box: Box, unit: Any) -> Any:
+    """ln of the priors at a point of the unit cube."""
+    value = box.values(unit)
+    normal = (value - box.prior_mean) * box.prior_weight
+    logarithm = jnp.log(jnp.where(box.logarithmic > 0, value, 1.0))
+    return -0.5 * jnp.sum(normal**2) - jnp.sum(box.logarithmic * logarithm)
 
 
-def fingerprint(spectra: Sequence[Measured], tolerance: float) -> str:
-    """A hash of the data, the scenes with bounds and priors, and the tolerance: whose chain a chain is."""
-    found = hashlib.sha256(repr(tolerance).encode())
-    for spectrum in spectra:
-        leaves, structure = jax.tree_util.tree_flatten(tuple(spectrum))
+def bounded(unit: Any, log: Any) -> Any:
+    """`log` inside the unit cube and where it is a number, else −∞."""
+    return jnp.where(jnp.all((unit >= 0) & (unit <= 1)) & jnp.isfinite(log), log, -jnp.inf)
+
+
+def log_density(problem: Problem) -> LogDensity:
+    """ln posterior of a weighed problem of spectra."""
+    looks, *rest = problem.program
+    held = jax.device_put(tuple(rest))
+    return lambda units: np.asarray(density(looks, *held, units).log)
+
+
+def fingerprint(parts: Sequence[tuple[Any, ...]], *settings: Any) -> str:
+    """A hash of what a posterior depends on: data and scenes with bounds and priors, as pytrees of numbers and
+    strings, and settings. It says whose chain a chain is."""
+    found = hashlib.sha256(",".join(map(repr, settings)).encode())
+    for part in parts:
+        leaves, structure = jax.tree_util.tree_flatten(tuple(part))
         found.update(str(structure).encode())
         for leaf in leaves:
             found.update(leaf.encode() if isinstance(leaf, str) else np.asarray(leaf).tobytes())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import jax
@@ -86,27 +87,35 @@ class Modes:
         return -0.5 * (FREEDOM + size) * np.log1p(square / FREEDOM) - log_volume
 
 
-def modes(weighed: Weighed) -> Modes:
-    """The minima that a fit has ranked, each with the covariance of its own Jacobian."""
-    minima = weighed.minima
-    kept = minima.evidence - minima.evidence[0] < _HOPELESS
-    centre = minima.units[kept]
-    factor = np.array([np.linalg.cholesky(_covariance(weighed, unit)) for unit in centre])
-    log = -0.5 * (minima.evidence[kept] - minima.evidence[0])
+def mixture(centre: np.ndarray, chi2: np.ndarray, covariance: Callable[[np.ndarray], np.ndarray]) -> Modes:
+    """Minima `centre` (minima, parameters) of `chi2`, −2 ln posterior, best first, each with its `covariance`,
+    all in the unit cube."""
+    kept = chi2 - chi2[0] < _HOPELESS
+    factor = np.array([np.linalg.cholesky(covariance(unit)) for unit in centre[kept]])
+    log = -0.5 * (chi2[kept] - chi2[0])
     log += np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
     share = np.exp(log - log.max())
-    return Modes(centre, factor, share / share.sum())
+    return Modes(centre[kept], factor, share / share.sum())
 
 
-def _covariance(weighed: Weighed, unit: np.ndarray) -> np.ndarray:
-    """Of the nonlinear parameters, scale and offset integrated out, at one minimum in the unit cube.
+def confined(jacobian: np.ndarray, size: int) -> np.ndarray:
+    """The covariance of the first `size` parameters, in the unit cube, by the Jacobian in units of the noise;
+    the others are integrated out.
 
     The variance of the uniform prior, 1/12, bounds it where the data see nothing.
     """
+    uniform = np.where(np.arange(jacobian.shape[1]) < size, 12.0, 0.0)
+    return np.linalg.inv(jacobian.T @ jacobian + np.diag(uniform))[:size, :size]
+
+
+def modes(weighed: Weighed) -> Modes:
+    """The minima that a fit of spectra has ranked, each with the covariance of its own Jacobian."""
+    minima = weighed.minima
+    return mixture(minima.units, minima.evidence, lambda unit: _covariance(weighed, unit))
+
+
+def _covariance(weighed: Weighed, unit: np.ndarray) -> np.ndarray:
+    """Of the nonlinear parameters, scale and offset integrated out."""
     problem = weighed.problem
     at = [jax.device_get(local(*view.program, unit[list(view.takes)])) for view in problem.views]
-    jacobian = scaled(problem, at, [m.variance for m in weighed.met]).jacobian
-    size = len(unit)
-    uniform = np.where(np.arange(jacobian.shape[1]) < size, 12.0, 0.0)
-    information = jacobian.T @ jacobian + np.diag(uniform)
-    return np.linalg.inv(information)[:size, :size]
+    return confined(scaled(problem, at, [m.variance for m in weighed.met]).jacobian, len(unit))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import jax
@@ -10,37 +11,61 @@ import numpy as np
 from pellicle.fitting.evaluation import curves
 from pellicle.fitting.parts import psi_delta
 from pellicle.fitting.problem import Problem, View
+from pellicle.fitting.result import Part
 
 DRAWS = 256
 """Curves behind a band: 2.5 % of them are six."""
+_SIGNALS = {"R": "reflectance", "T": "transmittance"}
+
+
+class Axis(NamedTuple):
+    """What data are drawn against: its name in files, its label in figures, and its values (points,)."""
+
+    name: str
+    label: str
+    values: np.ndarray
 
 
 class Prediction(NamedTuple):
-    """Curves of one spectrum for draws from the posterior, (draws, points), and the same with noise.
+    """One measured quantity: `data` (points,), and draws from the posterior, (draws, points): `model`, and
+    `noisy`, as it would be measured again."""
 
-    For ellipsometry they are Ψ, and `delta` and `delta_noisy` Δ, in degrees.
-    """
-
+    name: str
+    label: str
+    axis: Axis
+    data: np.ndarray
     model: np.ndarray
     noisy: np.ndarray
-    delta: np.ndarray | None = None
-    delta_noisy: np.ndarray | None = None
 
 
-def predictions(problem: Problem, units: np.ndarray, seed: int = 0) -> tuple[Prediction, ...]:
-    """One for each spectrum, from draws (steps, walkers, parameters) in the unit cube."""
-    random = np.random.default_rng(seed)
+def chosen(units: np.ndarray, random: np.random.Generator) -> np.ndarray:
+    """`DRAWS` draws (draws, parameters) from those of a chain (steps, walkers, parameters)."""
     flat = units.reshape(-1, units.shape[-1])
-    chosen = flat[random.integers(len(flat), size=DRAWS)]
+    return flat[random.integers(len(flat), size=DRAWS)]
+
+
+def predictions(
+    problem: Problem, parts: tuple[Part, ...], units: np.ndarray, seed: int
+) -> tuple[Prediction, ...]:
+    """Of each spectrum one, or Ψ and Δ, from draws (steps, walkers, parameters) in the unit cube."""
+    random = np.random.default_rng(seed)
+    drawn = chosen(units, random)
     with jax.enable_x64(True):
-        return tuple(_of(view, chosen[:, list(view.takes)], random) for view in problem.views)
+        each = zip(problem.views, parts, strict=True)
+        return tuple(found for view, part in each for found in _of(view, part, drawn, random))
 
 
-def _of(view: View, units: np.ndarray, random: np.random.Generator) -> Prediction:
-    model = np.asarray(curves(*view.program, units).model)[:, : view.points]
+def _of(view: View, part: Part, drawn: np.ndarray, random: np.random.Generator) -> Iterator[Prediction]:
+    model = np.asarray(curves(*view.program, drawn[:, list(view.takes)]).model)[:, : view.points]
     sigma = 1 / np.asarray(view.data.weight)[: view.points]
     noisy = model + sigma * random.standard_normal(model.shape)
-    if view.channels == 1:
-        return Prediction(model, noisy)
-    (psi, delta), (psi_noisy, delta_noisy) = (psi_delta(view.in_columns(x)) for x in (model, noisy))
-    return Prediction(psi, psi_noisy, delta, delta_noisy)
+    curve, (prefix, suffix) = part.curve, (f"{part.name}: ", f"_{part.name}") if part.name else ("", "")
+    axis = Axis(f"wavelength_nm{suffix}", "wavelength (nm)", curve.wavelength)
+    if curve.delta_data is None:
+        signal = part.spectrum.signal
+        yield Prediction(signal + suffix, prefix + _SIGNALS[signal], axis, curve.data, model, noisy)
+        return
+    angles = zip(*(psi_delta(view.in_columns(x)) for x in (model, noisy)), strict=True)
+    names, data = (("psi", "Ψ"), ("delta", "Δ")), (curve.data, curve.delta_data)
+    for (name, sign), measured, drawn_angles in zip(names, data, angles, strict=True):
+        yield Prediction(f"{name}{suffix}", f"{prefix}{sign} (degrees)", axis, measured, *drawn_angles)

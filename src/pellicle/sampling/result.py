@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from pellicle.fitting.problem import Problem
-from pellicle.fitting.result import Fit
 from pellicle.sampling.checks import Checks
 from pellicle.sampling.modes import Modes
-from pellicle.sampling.predict import Prediction, predictions
+from pellicle.sampling.predict import Prediction
 
 
 @dataclass(frozen=True)
@@ -38,26 +38,28 @@ class Marginal:
 
 @dataclass(frozen=True)
 class Posterior:
-    """Draws from the posterior of a fit's nonlinear parameters; scale and offset are integrated out.
+    """Draws from the posterior of a fit's free parameters; a spectrum's scale and offset are integrated out.
 
     `draws` (steps, walkers, parameters) in the parameters' own units, without burn-in, `log_density`
     (steps, walkers) beside them. `parameters` holds each one's marginal, or nothing where the checks do
     not carry an interval: `checks.doubts` says why. `units` is the same as `draws` between 0 and 1.
+    `granted` is what the posterior takes for granted though the fit doubts it, empty if nothing.
     """
 
-    fit: Fit
+    fit: Any  # a Fit, or a BrdfFit
     names: tuple[str, ...]
     draws: np.ndarray
     units: np.ndarray
     log_density: np.ndarray
     modes: Modes
     checks: Checks
-    problem: Problem
+    predict: Callable[[np.ndarray, int], tuple[Prediction, ...]]
     seconds: float
+    granted: str = ""
 
     def predictions(self, seed: int = 0) -> tuple[Prediction, ...]:
-        """What draws from the posterior say of each spectrum."""
-        return predictions(self.problem, self.units, seed)
+        """What draws from the posterior say of each measured quantity."""
+        return self.predict(self.units, seed)
 
     @property
     def trusted(self) -> bool:
@@ -108,7 +110,8 @@ def verdict(posterior: Posterior) -> str:
         return f"The chain does not carry an interval: {'; '.join(checks.doubts)}."
     lead = next(iter(posterior.parameters.values()))
     unit = f" {lead.unit}" if lead.unit else ""
-    told = f"With 95 % probability {lead.name} lies between {lead.q025:.5g} and {lead.q975:.5g}{unit}"
+    opening = f"If {posterior.granted}, with" if posterior.granted else "With"
+    told = f"{opening} 95 % probability {lead.name} lies between {lead.q025:.5g} and {lead.q975:.5g}{unit}"
     several = [mode for mode in lead.modes if mode.mass >= 0.05]
     if len(several) < 2:
         return f"{told}."

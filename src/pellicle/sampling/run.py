@@ -10,9 +10,9 @@ import numpy as np
 from pellicle.fitting.search import Progress
 from pellicle.sampling.chain import Chain
 from pellicle.sampling.checks import Checks, check
-from pellicle.sampling.density import Target
 from pellicle.sampling.modes import Modes
 from pellicle.sampling.moves import moves
+from pellicle.sampling.target import Target
 
 log = getLogger(__name__)
 
