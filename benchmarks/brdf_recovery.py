@@ -6,6 +6,7 @@ docs/brdf_recovery.md. A surface is drawn at random, seen in 200 directions in t
 its reduced χ² is below 1.3, and `claimed` where it says `converged`. Within two reported errors
 are 95.4 % of numbers whose errors are what they say; the bracket is the 95 % interval of the share that
 so many runs allow. A number without a finite error is not counted: the fit says that it was not seen.
+With `--posterior` posteriors are sampled, and what their intervals hold is counted.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from scipy.stats import binomtest
 from pellicle.brdf import direction
 from pellicle.brdf_fitting.estimates import estimates, local, rivals
 from pellicle.brdf_fitting.fit import judged, problem
+from pellicle.brdf_fitting.sample import sample_brdf
 from pellicle.brdf_fitting.search import THOROUGH, search, settle
 from pellicle.fitting.result import Status
 from pellicle.fitting.search import quiet
@@ -151,6 +153,25 @@ def study(name: str, runs: int, noise: float) -> None:
         print(f"| {leaf.name} | {' | '.join(cells)} | {np.sqrt(np.mean(z[sure] ** 2)):.2f} |", flush=True)
 
 
+def intervals(name: str, runs: int, noise: float) -> None:
+    """How often the central 68 and 95 % of one model's posterior hold the truth, and its width by the fit's."""
+    surface, inside, widths, refused = SURFACES[name], [], [], 0
+    for seed in range(runs):
+        rng = np.random.default_rng(seed)
+        truth = drawn(rng, surface)
+        found = sample_brdf(seen(surface, truth, noise, rng), surface, seed=seed)
+        refused += not found.trusted
+        for leaf in surface.leaves() if found.trusted else ():
+            values = found.draws[..., found.names.index(leaf.name)].ravel()
+            below = np.mean(values < float(np.ravel(truth[leaf.key])[leaf.channel or 0]))
+            inside.append(abs(2 * below - 1))
+            widths.append(np.std(values) / found.fit[leaf.name].stderr)
+    near, wide = np.array(inside), np.array([w for w in widths if w > 0])  # 0: the fit gives no error
+    low, middle, high = np.quantile(wide, [0.05, 0.5, 0.95])
+    print(f"| {name} | {runs} | {refused} | {share(near < 0.68)} | {share(near < 0.95)} |", end=" ")
+    print(f"{middle:.2f} ({low:.2f} to {high:.2f}) |", flush=True)
+
+
 def _median(results: list[Run]) -> float:
     return float(np.median([r.seconds for r in results]))
 
@@ -162,6 +183,13 @@ if __name__ == "__main__":
     parser.add_argument("models", nargs="*", choices=[[], *SURFACES], default=[])
     parser.add_argument("--runs", type=int, default=100)
     parser.add_argument("--noise", type=float, default=0.01)
+    parser.add_argument("--posterior", action="store_true", help="sample, and count what intervals hold")
     given = parser.parse_args()
+    if given.posterior:
+        print("| surface | runs | no interval | 68 % | 95 % | sd by the fit's error (5 to 95 % of them) |")
+        print("|---|---|---|---|---|---|")
+        for each in given.models or SURFACES:
+            intervals(each, given.runs, given.noise)
+        raise SystemExit
     for each in given.models or SURFACES:
         study(each, given.runs, given.noise)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from pellicle.brdf_fitting.fit import fit_brdf as fit_brdf
     from pellicle.brdf_fitting.result import BrdfFit as BrdfFit
+    from pellicle.brdf_fitting.sample import sample_brdf as sample_brdf
     from pellicle.fitting.compare import compare as compare
     from pellicle.fitting.fit import fit as fit
     from pellicle.fitting.result import Fit as Fit
@@ -66,6 +67,7 @@ if TYPE_CHECKING:
 _HOME = {
     "pellicle.brdf_fitting.fit": ("fit_brdf",),
     "pellicle.brdf_fitting.result": ("BrdfFit",),
+    "pellicle.brdf_fitting.sample": ("sample_brdf",),
     "pellicle.surfaces.sampling": ("Directions", "simulate_brdf"),
     "pellicle.surfaces.surface": ("Surface",),
     "pellicle.synthetic": ("simulate",),

@@ -20,7 +20,7 @@ HERE = Path(__file__).parent
 RUN = """
 import runpy, jax
 jax.config.update("jax_enable_x64", True)
-import pellicle.sampling.checks as checks, pellicle.sampling.ensemble as ensemble, pellicle.sampling.sample as sample
+from pellicle.sampling import checks, ensemble, sample
 checks.LONG_ENOUGH = 1e9  # to the last step
 ensemble._PATIENCE = 0.0
 example = runpy.run_path({example!r})

@@ -73,10 +73,19 @@ def values(c: Coordinates, box: Box, unit: Any) -> Any:
         return x
     a, b = c.tilt
     y = jnp.sqrt(x[b]) if c.folded else x[b]
-    # the square onto the disc, smoothly and edge to edge
+    # the square onto the disc, smoothly and edge to edge: see `log_area`
     u, v = x[a] * jnp.sqrt(1 - 0.5 * y**2), y * jnp.sqrt(1 - 0.5 * x[a] ** 2)
     u = jnp.where(u * u + v * v < 1e-20, 1e-10, u)  # its azimuth has a slope everywhere but at the centre
     return x.at[a].set(box.reach * jnp.sqrt(u * u + v * v)).at[b].set(jnp.rad2deg(jnp.arctan2(v, u)))
+
+
+def log_area(c: Coordinates, box: Box, unit: Any) -> Any:
+    """ln of how much of the disc of tilts a step in the unit cube sweeps, up to a constant; not folded."""
+    if c.tilt is None:
+        return 0.0
+    x, y = (box.lower[at] + unit[at] * (box.upper[at] - box.lower[at]) for at in c.tilt)
+    sides = jnp.sqrt((1 - 0.5 * y**2) * (1 - 0.5 * x**2))
+    return jnp.log(sides - (0.5 * x * y) ** 2 / sides)
 
 
 def named(c: Coordinates, numbers: Any) -> dict[str, Any]:

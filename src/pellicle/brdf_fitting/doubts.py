@@ -49,6 +49,12 @@ def directions(samples: BrdfSamples, surface: Surface) -> list[str]:
     return told
 
 
+def priors(surface: Surface) -> list[str]:
+    """Which priors the fit left aside."""
+    keys = dict.fromkeys(leaf.key for leaf in surface.leaves() if leaf.free.prior is not None)
+    return [f"the prior of {key} counts in a posterior only: a fit of a surface takes none" for key in keys]
+
+
 def numbers(surface: Surface, parameters: Mapping[str, Estimate], fitted: Mapping[str, Any]) -> list[str]:
     """What the fitted numbers themselves give away."""
     told = []

@@ -49,6 +49,21 @@ def fit_brdf(
     **Raises:** UsageError where nothing is free, a residual or the wavelengths do not match, or the
     samples are too few.
     """
+    return fitted(samples, surface, residual, progress)[0]
+
+
+class Found(NamedTuple):
+    """What a fit rests on: its problem, the minima, and what is around the best one."""
+
+    problem: Problem
+    minima: Minima
+    at: Local
+
+
+def fitted(
+    samples: BrdfSamples, surface: Surface, residual: str | None, progress: Progress
+) -> tuple[BrdfFit, Found]:
+    """What `fit_brdf` returns, and what it rests on, for whoever goes on from there."""
     name = residual or ("linear" if samples.sigma is not None else "cube-root")
     if name not in RESIDUALS:
         raise UsageError(f"residual must be one of {', '.join(RESIDUALS)}, not {name!r}")
@@ -105,7 +120,7 @@ def _rate(whole: Problem, split: Split, effort: Effort, progress: Progress) -> t
     return minima, float(np.sqrt(chi2 / split.size))
 
 
-def _fit(samples: BrdfSamples, surface: Surface, residual: str, progress: Progress) -> BrdfFit:
+def _fit(samples: BrdfSamples, surface: Surface, residual: str, progress: Progress) -> tuple[BrdfFit, Found]:
     began = time.perf_counter()
     split, brdf = _split(samples), surface.brdf
     plan = exact(lit(surface, samples, len(samples)))
@@ -117,7 +132,8 @@ def _fit(samples: BrdfSamples, surface: Surface, residual: str, progress: Progre
         Baseline(_PLAIN, _rate(plain(whole), split, FEW, progress)[1]),
     )
     minima = settle(whole, polish(whole, minima.units, THOROUGH, progress), progress)
-    return _report(samples, surface, plan, whole, minima, held_out, baselines, began)
+    found = Found(whole, minima, local(whole, minima.units[0], samples.sigma is not None))
+    return _report(samples, surface, plan, found, held_out, baselines, began), found
 
 
 def judged(
@@ -161,28 +177,27 @@ def _report(
     samples: BrdfSamples,
     surface: Surface,
     plan: Plan,
-    whole: Problem,
-    minima: Minima,
+    found: Found,
     held_out: float,
     baselines: tuple[Baseline, ...],
     began: float,
 ) -> BrdfFit:
-    at: Local = local(whole, minima.units[0], samples.sigma is not None)
+    whole, minima, at = found
     others = rivals(whole, minima, at)
     parameters = estimates(surface, whole, at, others)
-    found = evidence.weigh(parameters, others, held_out, baselines)
+    layer = evidence.weigh(parameters, others, held_out, baselines)
     rms = float(np.sqrt(np.mean(at.residuals**2)))
     status = judged(minima, at, parameters, others, samples.sigma is not None)
     trading = identifiability.trades(scaled(surface, at), parameters)
-    if not found.layered and not found.several:
+    if not layer.layered and not layer.several:
         parameters = _unlayered(parameters)
         status = status if status in (Status.NOT_CONVERGED, Status.MISFIT) else Status.NOT_IDENTIFIABLE
     of_lead = identifiability.of(next(iter(parameters)), trading)
     sentence = verdict(status, parameters, others, rms, trading=of_lead)
-    if not found.layered:
-        sentence = found.verdict
+    if not layer.layered:
+        sentence = layer.verdict
     elif status is Status.CONVERGED:
-        sentence = " ".join([found.verdict, *(f"But {trade}." for trade in of_lead[:1])])
+        sentence = " ".join([layer.verdict, *(f"But {trade}." for trade in of_lead[:1])])
     fitted = surface.fixed() | {key: np.asarray(value) for key, value in at.parameters.items()}
     return BrdfFit(
         samples=samples,
@@ -190,7 +205,7 @@ def _report(
         residual=whole.form.residual,
         status=status,
         verdict=sentence,
-        layered=found.layered,
+        layered=layer.layered,
         parameters=parameters,
         rivals=others,
         baselines=baselines,
@@ -203,6 +218,7 @@ def _report(
         plan=plan,
         warnings=(
             *doubts.directions(samples, surface),
+            *doubts.priors(surface),
             *doubts.numbers(surface, parameters, fitted),
             *identifiability.bounded(parameters, ()),
             *trading,

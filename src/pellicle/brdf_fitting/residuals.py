@@ -24,6 +24,14 @@ RESIDUALS: dict[str, Transform] = {
     "cube-root": lambda rho, cosine, floor: jnp.cbrt(rho + floor),
 }
 
+INVERSES: dict[str, Transform] = {
+    "linear": lambda seen, cosine, floor: seen,
+    "cosine": lambda seen, cosine, floor: seen / cosine,
+    "log": lambda seen, cosine, floor: jnp.expm1(seen) / cosine,
+    "cube-root": lambda seen, cosine, floor: seen**3 - floor,
+}
+"""(number that is compared, cos θ_i, floor) → ρ."""
+
 
 def slope(transform: Transform, rho: Any, cosine: Any, floor: Any) -> Any:
     """d transform/dρ at each value."""

@@ -20,24 +20,38 @@ _MIRROR = frozenset({"exponent", "exponent_reflection", "exponent_transmission"}
 """Beyond their upper bound lies a mirror, which samples at some distance cannot tell from a narrow lobe."""
 
 
-def in_own_units(surface: Surface, problem: Problem, values: np.ndarray) -> Problem:
-    """The same problem with each free number, a weight too, as a coordinate between its own bounds.
-
-    A free azimuth goes half a turn to either side of its best value; seen in one plane alone, where its
-    sign means nothing, from 0 to 180 degrees.
-    """
+def affine(surface: Surface, problem: Problem) -> Problem:
+    """The same problem with each free number, a weight too, as a coordinate that goes evenly between its own
+    bounds; a tilt stays a disc, half a one where samples in one plane cannot see its sign."""
     order = problem.form.coordinates
     known = {leaf.name: leaf for leaf in surface.leaves()}
     leaves = [known[name] for name in (*order.names, *problem.form.weights)]
     lower, upper = (np.array([getattr(leaf.free, side) for leaf in leaves]) for side in ("lower", "upper"))
     if order.tilt is not None:
-        at = order.tilt[1]
-        lower[at], upper[at] = (0.0, 180.0) if order.folded else values[at] + np.array([-180.0, 180.0])
+        lower[list(order.tilt)], upper[list(order.tilt)] = (-1.0, 0.0 if order.folded else -1.0), 1.0
     names, keys = tuple(leaf.name for leaf in leaves), tuple(leaf.key for leaf in leaves)
     channels = tuple(leaf.channel for leaf in leaves)
-    coordinates = Coordinates(names, keys, channels, (False,) * len(leaves), None)
+    coordinates = Coordinates(names, keys, channels, (False,) * len(leaves), order.tilt)
     form = problem.form._replace(coordinates=coordinates, weights=())
-    return problem._replace(form=form, box=Box(lower, upper, np.float64(0.0)), most=np.zeros(0))
+    return problem._replace(form=form, box=Box(lower, upper, problem.box.reach), most=np.zeros(0))
+
+
+def in_own_units(surface: Surface, problem: Problem, values: np.ndarray) -> Problem:
+    """The same, with deviation and azimuth for the disc.
+
+    A free azimuth goes half a turn to either side of its best value; seen in one plane alone, where its
+    sign means nothing, from 0 to 180 degrees.
+    """
+    found, order = affine(surface, problem), problem.form.coordinates
+    if order.tilt is None:
+        return found
+    (lower, upper, reach), (deviation, azimuth) = found.box, order.tilt
+    lower[deviation], upper[deviation] = 0.0, reach
+    lower[azimuth], upper[azimuth] = (
+        (0.0, 180.0) if order.folded else values[azimuth] + np.array([-180.0, 180.0])
+    )
+    coordinates = found.form.coordinates._replace(tilt=None)
+    return found._replace(form=found.form._replace(coordinates=coordinates))
 
 
 def valley(

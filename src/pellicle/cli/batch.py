@@ -39,6 +39,14 @@ class Sampler(NamedTuple):
     steps: int | None = None
     seed: int = 0
 
+    def settings(self, folder: Path | None) -> dict[str, Any]:
+        """What the library takes, for a chain that is kept in `folder`."""
+        from pellicle.io.posteriors import chain_in
+        from pellicle.sampling.ensemble import STEPS
+
+        chain = None if folder is None else chain_in(folder)
+        return {"walkers": self.walkers, "steps": self.steps or STEPS, "seed": self.seed, "chain": chain}
+
 
 class Batch:
     """Fits group after group of files; one that fails does not stop the others.
@@ -103,17 +111,13 @@ class Batch:
         return 0 if found.status == "converged" else 4
 
     def _show(self, found: Fit, posterior: Posterior | None, folder: Path | None) -> None:
-        from pellicle.io.posteriors import record, text, write_posterior
-        from pellicle.io.results import write_fit
+        from pellicle.io.posteriors import record, text, write
 
         written = json_module.dumps(record(found, posterior), allow_nan=False) if self.as_json else None
         print(written or text(found, posterior), flush=True)
         if folder is None:
             return
-        if posterior is None:
-            write_fit(folder, found, figure=True)
-        else:
-            write_posterior(folder, posterior)
+        write(folder, found, posterior)
         say(f"{folder}: report, figures and tables written")
 
     def _found(
@@ -132,19 +136,9 @@ class Batch:
     def _sampled(
         self, what: tuple[Any, Any], sampler: Sampler, folder: Path | None, progress: Progress
     ) -> Posterior:
-        from pellicle.io.posteriors import chain_in
-        from pellicle.sampling.ensemble import STEPS
         from pellicle.sampling.sample import sample
 
-        return sample(
-            *what,
-            walkers=sampler.walkers,
-            steps=sampler.steps or STEPS,
-            seed=sampler.seed,
-            chain=None if folder is None else chain_in(folder),
-            tolerance=self.tolerance,
-            progress=progress,
-        )
+        return sample(*what, **sampler.settings(folder), tolerance=self.tolerance, progress=progress)
 
 
 def measurements(looks: list[Look], joint: bool, talk: bool = True) -> tuple[Any, Any]:

@@ -6,12 +6,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pellicle.cli.batch import TOO_SHORT
 from pellicle.cli.session import Progress, say, start
 from pellicle.errors import DataError, UsageError
 
 if TYPE_CHECKING:
-    from pellicle.cli.flags import ReadWords
+    from pellicle.brdf_fitting.result import BrdfFit
+    from pellicle.cli.batch import Sampler
+    from pellicle.cli.flags import ReadWords, SceneWords
+    from pellicle.io.samples import BrdfSamples
     from pellicle.io.surface_recipe import SurfaceRecipe
+    from pellicle.sampling.result import Posterior
 
 
 def wanted(recipe: str | None, signal: str | None) -> bool:
@@ -27,10 +32,22 @@ def wanted(recipe: str | None, signal: str | None) -> bool:
     return describes_surface(recipe)
 
 
+def of_films(words: SceneWords, joint: bool, tolerance: float) -> list[str]:
+    """The flags given that only films have."""
+    others = {"--joint": joint, "--tolerance": tolerance}
+    return [*words.given(), *(name for name, value in others.items() if value)]
+
+
 def fit_surface(
-    files: list[str], recipe: str, flags: list[str], reading: ReadWords, out: str | None, as_json: bool
+    files: list[str],
+    recipe: str,
+    flags: list[str],
+    reading: ReadWords,
+    out: str | None,
+    as_json: bool,
+    sampler: Sampler | None = None,
 ) -> int:
-    """Fit the recipe's surface to each file. Returns the exit code."""
+    """Fit the recipe's surface to each file, and with a sampler its posterior too. Returns the exit code."""
     from pellicle.io.surface_recipe import read_surface_recipe
 
     others = {name: value for name, value in vars(reading).items() if value is not None}
@@ -54,10 +71,12 @@ def fit_surface(
     if not files:
         raise UsageError(f"{recipe}: names no data files: give them on the command line or in [data] files")
     start()
-    return _each(found, files, out, as_json)
+    return _each(found, files, out, as_json, sampler)
 
 
-def _each(recipe: SurfaceRecipe, files: list[str], out: str | None, as_json: bool) -> int:
+def _each(
+    recipe: SurfaceRecipe, files: list[str], out: str | None, as_json: bool, sampler: Sampler | None
+) -> int:
     from pellicle.io.atomic import new_folder
     from pellicle.io.results import several, write_summary
 
@@ -70,7 +89,7 @@ def _each(recipe: SurfaceRecipe, files: list[str], out: str | None, as_json: boo
     worst = 0
     try:
         for path, folder in zip(files, folders, strict=True):
-            record, code = _one(recipe, path, folder, as_json)
+            record, code = _one(recipe, path, folder, as_json, sampler)
             records.append(record)
             worst = max(worst, code)
     except KeyboardInterrupt:
@@ -81,29 +100,49 @@ def _each(recipe: SurfaceRecipe, files: list[str], out: str | None, as_json: boo
     return worst
 
 
-def _one(recipe: SurfaceRecipe, path: str, folder: Path | None, as_json: bool) -> tuple[dict[str, Any], int]:
-    from pellicle.brdf_fitting.fit import fit_brdf
-    from pellicle.io.brdf_results import brdf_to_json, write_brdf_fit
+def _one(
+    recipe: SurfaceRecipe, path: str, folder: Path | None, as_json: bool, sampler: Sampler | None
+) -> tuple[dict[str, Any], int]:
+    from pellicle.io.posteriors import record, text, write
     from pellicle.io.results import failure, one_line
-    from pellicle.report.brdf import brdf_report
 
     progress = Progress(path)
     try:
         samples = recipe.read(path)
         say(*(f"{path}: {note}" for note in samples.notes))
-        fit = fit_brdf(samples, recipe.surface, residual=recipe.data.residual, progress=progress)
+        fit, posterior = _found(recipe, samples, folder, sampler, progress)
     except ValueError as error:
         progress.clear()
         message = str(error) if path in str(error) else f"{path}: {error}"
         say(f"pellicle: {message}")
-        record = failure(path, message)
+        failed = failure(path, message)
         if as_json:
-            print(one_line(record), flush=True)
-        return record, 3
+            print(one_line(failed), flush=True)
+        return failed, 3
     progress.clear()
-    record = brdf_to_json(fit)
-    print(one_line(record) if as_json else brdf_report(fit), flush=True)
+    found = record(fit, posterior)
+    print(one_line(found) if as_json else text(fit, posterior), flush=True)
     if folder is not None:
-        write_brdf_fit(folder, fit)
+        write(folder, fit, posterior)
         say(f"{folder}: report, figure and tables written")
-    return record, 0 if fit.status == "converged" else 4
+    if posterior is not None and not posterior.trusted:
+        return found, TOO_SHORT
+    return found, 0 if fit.status == "converged" else 4
+
+
+def _found(
+    recipe: SurfaceRecipe,
+    samples: BrdfSamples,
+    folder: Path | None,
+    sampler: Sampler | None,
+    progress: Progress,
+) -> tuple[BrdfFit, Posterior | None]:
+    compared = {"residual": recipe.data.residual, "progress": progress}
+    if sampler is None:
+        from pellicle.brdf_fitting.fit import fit_brdf
+
+        return fit_brdf(samples, recipe.surface, **compared), None
+    from pellicle.brdf_fitting.sample import sample_brdf
+
+    posterior = sample_brdf(samples, recipe.surface, **sampler.settings(folder), **compared)
+    return posterior.fit, posterior

@@ -30,14 +30,13 @@ def fit(
     Example: pellicle fit oxide.csv --layer SiO2 --substrate Si --thickness 10:3000
     """
     words, reading = words or SceneWords(), reading or ReadWords()
+    sampler = Sampler() if posterior else None
     if brdf.wanted(recipe, reading.signal):
-        of_films = {"--joint": joint, "--tolerance": tolerance, "--posterior": posterior}
-        given = [*words.given(), *(name for name, value in of_films.items() if value)]
-        return brdf.fit_surface(list(data), str(recipe), given, reading, out, json)
+        given = brdf.of_films(words, joint, tolerance)
+        return brdf.fit_surface(list(data), str(recipe), given, reading, out, json, sampler)
     not_negative("--tolerance", tolerance)
     from pellicle.cli.looks import groups
 
     found, together = groups(list(data), recipe, words, reading, joint)
     start()
-    sampler = Sampler() if posterior else None
     return Batch(out, json, together, tolerance, sampler)(found)

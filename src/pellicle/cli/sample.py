@@ -6,6 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from pellicle.cli import brdf
 from pellicle.cli.batch import Batch, Sampler
 from pellicle.cli.flags import OUTPUT, SAMPLER, SCENE, ReadWords, SceneWords, flag, switch
 from pellicle.cli.session import not_negative, start
@@ -38,25 +39,21 @@ def sample(
 
     Example: pellicle sample oxide.csv --layer SiO2 --substrate Si --free n --out results/oxide
     """
-    from pellicle.cli.looks import groups
-
     words, reading = words or SceneWords(), reading or ReadWords()
     not_negative("--tolerance", tolerance)
     if steps is not None and steps < FEWEST_STEPS:
         raise UsageError(f"--steps must be at least {FEWEST_STEPS}, got {steps}")
     if not 0 <= seed < 2**32:
         raise UsageError(f"--seed must lie in 0 to 4294967295, got {seed}")
-    if recipe is not None and _describes_surface(recipe):
-        raise UsageError(f"{recipe}: describes a surface; posteriors are of films: pellicle fit fits it")
+    sampler = Sampler(walkers, steps, seed)
+    if brdf.wanted(recipe, reading.signal):
+        given = brdf.of_films(words, joint, tolerance)
+        return brdf.fit_surface(list(data), str(recipe), given, reading, out, json, sampler)
+    from pellicle.cli.looks import groups
+
     found, together = groups(list(data), recipe, words, reading, joint)
     start()
-    return Batch(out, json, together, tolerance, Sampler(walkers, steps, seed))(found)
+    return Batch(out, json, together, tolerance, sampler)(found)
 
 
 FEWEST_STEPS = 10
-
-
-def _describes_surface(recipe: str) -> bool:
-    from pellicle.io.recipe_kind import describes_surface
-
-    return describes_surface(recipe)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import jax
@@ -12,7 +13,7 @@ from pellicle.effects.box import largest_index
 from pellicle.fitting.measured import Measured, Noise
 from pellicle.fitting.nuisance import Data
 from pellicle.fitting.parameters import Parameter, anonymous, bounds, shared
-from pellicle.free import LogUniform
+from pellicle.free import LogUniform, Prior
 from pellicle.model import sampled
 from pellicle.planning import Plan
 from pellicle.scene import Scene, coherent_layers, with_wavelength
@@ -41,6 +42,14 @@ class Box(NamedTuple):
 
     def values(self, unit):
         return self.lower + unit * (self.upper - self.lower)
+
+
+def boxed(lower: np.ndarray, upper: np.ndarray, priors: Sequence[Prior | None]) -> Box:
+    """The box between bounds (parameters,), with the prior of each parameter."""
+    rows = [prior.row if prior else (0.0, 0.0) for prior in priors]
+    logarithmic = np.array([float(isinstance(prior, LogUniform)) for prior in priors])
+    mean, weight = np.reshape(rows, (-1, 2)).T
+    return Box(lower, upper, mean, weight, logarithmic)
 
 
 class View(NamedTuple):
@@ -130,14 +139,7 @@ def make(*spectra: Measured, tolerance: float = 0.0) -> Problem:
     """
     scenes, names = [m.scene for m in spectra], [m.name for m in spectra]
     free, held = shared(scenes, names)
-    lower, upper = bounds(free)
-    box = Box(
-        lower,
-        upper,
-        np.array([p.prior.row[0] if p.prior else 0.0 for p in free]),
-        np.array([p.prior.row[1] if p.prior else 0.0 for p in free]),
-        np.array([float(isinstance(p.prior, LogUniform)) for p in free]),
-    )
+    box = boxed(*bounds(free), [p.prior for p in free])
     views, told = [], set()
     for spectrum, takes in zip(spectra, held, strict=True):
         first = np.array([i not in told for i in takes], dtype=float)

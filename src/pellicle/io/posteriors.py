@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-import math
 import os
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from pellicle.io.atomic import MARKER, new_folder, replacing, write_text
-from pellicle.io.records import indented, one_line, to_json, versions
+from pellicle.io.brdf_results import write_brdf_fit
+from pellicle.io.records import brdf_to_json, indented, number, one_line, to_json, versions
 from pellicle.io.results import write_fit
 
 if TYPE_CHECKING:
+    from pellicle.brdf_fitting.result import BrdfFit
     from pellicle.fitting.result import Fit
     from pellicle.sampling.predict import Prediction
     from pellicle.sampling.result import Marginal, Posterior
@@ -31,9 +33,30 @@ def chain_in(folder: str | os.PathLike[str]) -> Path:
     return target / CHAIN
 
 
-def record(fit: Fit, posterior: Posterior | None) -> dict[str, Any]:
-    """A fit as `to_json`, with its posterior where it has one."""
-    return to_json(fit) if posterior is None else to_json(fit) | {"posterior": posterior_to_json(posterior)}
+def record(fit: Fit | BrdfFit, posterior: Posterior | None) -> dict[str, Any]:
+    """A fit as a record of the schema, with its posterior where it has one."""
+    found = _ways(fit).to_json(fit)
+    return found if posterior is None else found | {"posterior": posterior_to_json(posterior)}
+
+
+class _Ways(NamedTuple):
+    """How a kind of fit is written: as a record, as text, and as files in a folder."""
+
+    to_json: Callable[[Any], dict[str, Any]]
+    report: Callable[[Any], str]
+    write: Callable[[str | os.PathLike[str], Any], Path]
+
+
+def _ways(fit: Fit | BrdfFit) -> _Ways:
+    from pellicle.brdf_fitting.result import BrdfFit
+
+    if isinstance(fit, BrdfFit):
+        from pellicle.report.brdf import brdf_report
+
+        return _Ways(brdf_to_json, brdf_report, write_brdf_fit)
+    from pellicle.report.text import report
+
+    return _Ways(to_json, report, write_fit)
 
 
 def posterior_to_json(posterior: Posterior) -> dict[str, Any]:
@@ -43,15 +66,15 @@ def posterior_to_json(posterior: Posterior) -> dict[str, Any]:
     return {
         "parameters": {name: _marginal(shown.get(name)) for name in posterior.marginals()},
         "checks": {
-            "n_over_tau": _finite(c.n_over_tau),
-            "rhat": _finite(c.rhat),
-            "acceptance": _finite(c.acceptance),
+            "n_over_tau": number(c.n_over_tau),
+            "rhat": number(c.rhat),
+            "acceptance": number(c.acceptance),
             "minima_found": c.minima_found,
             "minima_visited": c.minima_visited,
             "steps": c.steps,
             "discard": c.discard,
             "walkers": posterior.draws.shape[1],
-            "autocorrelation_time": _finite(c.autocorrelation_time),
+            "autocorrelation_time": number(c.autocorrelation_time),
             "independent": c.independent,
         },
         "trusted": c.trusted,
@@ -72,29 +95,28 @@ def _marginal(m: Marginal | None) -> dict[str, Any]:
     }
 
 
-def _finite(x: float) -> float | None:
-    return x if math.isfinite(x) else None
-
-
-def text(fit: Fit, posterior: Posterior | None) -> str:
+def text(fit: Fit | BrdfFit, posterior: Posterior | None) -> str:
     """The report of a fit, with its posterior's under it."""
-    from pellicle.report.text import report
-
     if posterior is None:
-        return report(fit)
+        return _ways(fit).report(fit)
     from pellicle.report.posterior import posterior_report
 
-    return report(fit) + posterior_report(posterior)
+    return _ways(fit).report(fit) + posterior_report(posterior)
+
+
+def write(folder: str | os.PathLike[str], fit: Fit | BrdfFit, posterior: Posterior | None) -> Path:
+    """Write a fit's files, and its posterior's where it has one; returns the folder. Raises UsageError."""
+    return _ways(fit).write(folder, fit) if posterior is None else write_posterior(folder, posterior)
 
 
 def write_posterior(folder: str | os.PathLike[str], posterior: Posterior) -> Path:
-    """Write what `write_fit` does, and posterior.nc, corner.png and predictive.png; returns the folder.
+    """Write the fit's own files, and posterior.nc, corner.png and predictive.png; returns the folder.
 
     result.json and report.txt hold the posterior too. Raises UsageError as `write_fit` does.
     """
     from pellicle.report.posterior import corner_figure, predictive_figure
 
-    target = write_fit(folder, posterior.fit, figure=True)
+    target = _ways(posterior.fit).write(folder, posterior.fit)
     predicted = posterior.predictions()
     write_text(target / MARKER, indented(record(posterior.fit, posterior)), overwrite=True)
     write_text(target / "report.txt", text(posterior.fit, posterior), overwrite=True)

@@ -27,7 +27,7 @@ _PACKAGES = ("jax", "optimistix", "numpy")
 def to_json(fit: Fit) -> dict[str, Any]:
     """A fit as plain dictionaries of the schema; what is infinite or undefined is None."""
     plan = [row for part in fit.parts for row in _plan(part.plan, part.name)]
-    noise = [{"sigma": _number(part.sigma), "source": part.sigma_from} for part in fit.parts]
+    noise = [{"sigma": number(part.sigma), "source": part.sigma_from} for part in fit.parts]
     return _record(fit, _data(fit), plan) | {"noise": noise if fit.joint else noise[0]}
 
 
@@ -38,9 +38,9 @@ def brdf_to_json(fit: BrdfFit) -> dict[str, Any]:
         "model": fit.surface.model,
         "residual": fit.residual,
         "layered": fit.layered,
-        "held_out": _number(fit.held_out),
-        "baselines": [{"name": b.name, "held_out": _number(b.held_out)} for b in fit.baselines],
-        "noise": {"sigma": _number(fit.sigma), "source": fit.sigma_from},
+        "held_out": number(fit.held_out),
+        "baselines": [{"name": b.name, "held_out": number(b.held_out)} for b in fit.baselines],
+        "noise": {"sigma": number(fit.sigma), "source": fit.sigma_from},
     }
     return _record(fit, {**data, "points": int(fit.samples.values.size)}, _plan(fit.plan)) | judged
 
@@ -55,22 +55,22 @@ def _record(fit: Fit | BrdfFit, data: Any, plan: list[dict[str, Any]]) -> dict[s
         "parameters": {name: _parameter(p) for name, p in fit.parameters.items()},
         "rivals": [
             {
-                "parameters": {name: _number(value) for name, value in rival.parameters.items()},
-                "delta_chi2": _number(rival.delta_chi2),
+                "parameters": {name: number(value) for name, value in rival.parameters.items()},
+                "delta_chi2": number(rival.delta_chi2),
             }
             for rival in fit.rivals
         ],
-        "chi2_reduced": _number(fit.chi2_reduced),
-        "rms": None if fit.rms is None else _number(fit.rms),
-        "effective_points": _number(fit.effective_points),
+        "chi2_reduced": number(fit.chi2_reduced),
+        "rms": None if fit.rms is None else number(fit.rms),
+        "effective_points": number(fit.effective_points),
         "correlation": {
             "names": list(fit.correlation_names),
-            "matrix": [[_number(value) for value in row] for row in matrix],
+            "matrix": [[number(value) for value in row] for row in matrix],
         },
         "plan": plan,
         "warnings": list(fit.warnings),
         "versions": versions(),
-        "seconds": _number(fit.seconds),
+        "seconds": number(fit.seconds),
     }
 
 
@@ -90,9 +90,9 @@ def _part(part: Part) -> dict[str, Any]:
     return {
         "name": part.name,
         **_source(part),
-        "rms": _number(part.rms),
-        "chi2_reduced": _number(part.chi2_reduced),
-        "effective_points": _number(part.effective_points),
+        "rms": number(part.rms),
+        "chi2_reduced": number(part.chi2_reduced),
+        "effective_points": number(part.effective_points),
     }
 
 
@@ -104,7 +104,7 @@ def _plan(plan: Plan, name: str = "") -> list[dict[str, Any]]:
             "effect": row.effect,
             "on": bool(row.on),
             "why": row.why,
-            "error_bound": _number(row.error_bound),
+            "error_bound": number(row.error_bound),
         }
         for row in plan.rows
     ]
@@ -165,19 +165,20 @@ def _version(name: str) -> str | None:
         return None
 
 
-def _number(value: Any) -> float | None:
-    number = float(value)
-    return number if math.isfinite(number) else None
+def number(value: Any) -> float | None:
+    """A number of the schema: what is infinite or undefined is null."""
+    found = float(value)
+    return found if math.isfinite(found) else None
 
 
 def _parameter(p: Estimate) -> dict[str, Any]:
     written = {
-        "value": _number(p.value),
-        "stderr": _number(p.stderr),
+        "value": number(p.value),
+        "stderr": number(p.stderr),
         "unit": p.unit,
-        "lower": _number(p.lower),
-        "upper": _number(p.upper),
+        "lower": number(p.lower),
+        "upper": number(p.upper),
         "free": bool(p.free),
     }
     limits = {"lower_limit": p.lower_limit, "upper_limit": p.upper_limit}
-    return written | {name: _number(value) for name, value in limits.items() if value is not None}
+    return written | {name: number(value) for name, value in limits.items() if value is not None}

@@ -122,14 +122,12 @@ def predictive_figure(
 
 def _band(axes: Axes, found: Prediction) -> None:
     order = np.argsort(found.axis.values, kind="stable")
-    at, several = (
-        found.axis.values[order],
-        ((found.noisy, 0.25, "repeated measurements"), (found.model, 0.8, "model")),
-    )
-    for draws, alpha, name in several:
+    at = found.axis.values[order]
+    for draws, alpha, name in ((found.noisy, 0.25, "repeated measurements"), (found.model, 0.8, "model")):
         low, high = np.quantile(draws, [0.025, 0.975], axis=0)[:, order]
         axes.fill_between(at, low, high, color=ORANGE, alpha=alpha, linewidth=0, label=f"{name}, 95 %")
     axes.plot(at, found.data[order], ".", color=BLACK, markersize=marker_size(len(at)), label="data")
     axes.set_xlabel(found.axis.label)
     axes.set_ylabel(found.label)
+    axes.set_yscale("log" if found.decades else "linear")
     axes.legend(frameon=False, fontsize="small")

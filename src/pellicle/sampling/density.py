@@ -31,14 +31,13 @@ def density(looks: Looks, scenes: tuple[Scene, ...], data: tuple[Data, ...], box
 
     def one(unit):
         views, _ = explained(looks, scenes, data, box, unit)
-        return bounded(unit, -0.5 * sum(view.evidence for view in views) + log_prior(box, unit))
+        return bounded(unit, -0.5 * sum(view.evidence for view in views) + log_prior(box, box.values(unit)))
 
     return Density(jax.vmap(one)(units))
 
 
-def log_prior(box: Box, unit: Any) -> Any:
-    """ln of the priors at a point of the unit cube."""
-    value = box.values(unit)
+def log_prior(box: Box, value: Any) -> Any:
+    """ln of the priors at values of the parameters, in their own units."""
     normal = (value - box.prior_mean) * box.prior_weight
     logarithm = jnp.log(jnp.where(box.logarithmic > 0, value, 1.0))
     return -0.5 * jnp.sum(normal**2) - jnp.sum(box.logarithmic * logarithm)
@@ -57,8 +56,8 @@ def log_density(problem: Problem) -> LogDensity:
 
 
 def fingerprint(parts: Sequence[tuple[Any, ...]], *settings: Any) -> str:
-    """A hash of what a posterior depends on: data and scenes with bounds and priors, as pytrees of numbers and
-    strings, and settings. It says whose chain a chain is."""
+    """A hash of what a posterior depends on, which says whose chain a chain is: data and scenes with bounds
+    and priors, as pytrees of numbers and strings, and settings."""
     found = hashlib.sha256(",".join(map(repr, settings)).encode())
     for part in parts:
         leaves, structure = jax.tree_util.tree_flatten(tuple(part))

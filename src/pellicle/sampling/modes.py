@@ -88,7 +88,7 @@ class Modes:
 
 
 def mixture(centre: np.ndarray, chi2: np.ndarray, covariance: Callable[[np.ndarray], np.ndarray]) -> Modes:
-    """Minima `centre` (minima, parameters) of `chi2`, −2 ln posterior, best first, each with its `covariance`,
+    """Minima `centre` (minima, parameters) of −2 ln posterior, `chi2`, best first, each with its covariance;
     all in the unit cube."""
     kept = chi2 - chi2[0] < _HOPELESS
     factor = np.array([np.linalg.cholesky(covariance(unit)) for unit in centre[kept]])

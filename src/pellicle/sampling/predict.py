@@ -28,7 +28,7 @@ class Axis(NamedTuple):
 
 class Prediction(NamedTuple):
     """One measured quantity: `data` (points,), and draws from the posterior, (draws, points): `model`, and
-    `noisy`, as it would be measured again."""
+    `noisy`, as it would be measured again; `decades` says that it spans several."""
 
     name: str
     label: str
@@ -36,6 +36,7 @@ class Prediction(NamedTuple):
     data: np.ndarray
     model: np.ndarray
     noisy: np.ndarray
+    decades: bool = False
 
 
 def chosen(units: np.ndarray, random: np.random.Generator) -> np.ndarray:
