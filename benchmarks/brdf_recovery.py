@@ -154,7 +154,7 @@ def study(name: str, runs: int, noise: float) -> None:
 
 
 def intervals(name: str, runs: int, noise: float) -> None:
-    """How often the central 68 and 95 % of one model's posterior hold the truth, and its width by the fit's."""
+    """How often the central 68 and 95 % of posteriors hold the truth, and their width by the fit's."""
     surface, inside, widths, refused = SURFACES[name], [], [], 0
     for seed in range(runs):
         rng = np.random.default_rng(seed)

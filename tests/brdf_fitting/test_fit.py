@@ -10,9 +10,11 @@ import pytest
 
 import pellicle as pl
 from pellicle.brdf import direction, model
-from pellicle.brdf_fitting.fit import fit_brdf
-from pellicle.errors import UsageError
+from pellicle.brdf_fitting import doubts, sample
+from pellicle.brdf_fitting.fit import fit_brdf, fitted
+from pellicle.errors import DataError, UsageError
 from pellicle.fitting.result import Status
+from pellicle.fitting.search import quiet
 from pellicle.free import Free
 from pellicle.io.records import brdf_to_json
 from pellicle.io.samples import BrdfSamples
@@ -62,11 +64,17 @@ def noisy(rho, seed):
 
 
 @pytest.fixture(scope="module")
-def known():
+def found():
+    """A fit of samples of the truth, and what it rests on."""
     empty = arcs(np.ones((200, 3)), None)
     i, o = direction(empty.theta_i, empty.phi_i), direction(empty.theta_o, empty.phi_o)
     rho = np.asarray(jax.jit(lambda: model("granier-heidrich")(TRUTH, i, o))())
-    return fit_brdf(noisy(rho, seed=3), FREE)
+    return fitted(noisy(rho, seed=3), FREE, None, quiet)
+
+
+@pytest.fixture(scope="module")
+def known(found):
+    return found[0]
 
 
 def test_a_known_surface_is_found_within_its_errors(known):
@@ -135,6 +143,64 @@ def test_what_cannot_be_fitted_is_refused_in_words():
         fit_brdf(flat, FREE, residual="cubic")
     with pytest.raises(UsageError, match="5 samples are too few"):
         fit_brdf(flat.at(np.arange(5)), FREE)
+
+
+@pytest.fixture
+def fitted_before(monkeypatch, found):
+    """Posteriors of the samples that were fitted, without another fit."""
+    monkeypatch.setattr(sample, "fitted", lambda *asked: found)
+
+
+def test_a_posterior_is_as_wide_as_the_errors_say(fitted_before, known, tmp_path):
+    """Every number is decided and far from its bounds: the posterior is normal."""
+    drawn = pl.sample_brdf(known.samples, FREE, chain=tmp_path / "chain.h5")
+    assert drawn.trusted
+    assert list(drawn.parameters) == [p.name for p in known.free]
+    for name in FOUND:
+        at, p = drawn[name], known[name]
+        assert at.sd == pytest.approx(p.stderr, rel=0.15)
+        assert at.mean == pytest.approx(p.value, abs=0.2 * p.stderr)
+        assert at.q975 - at.q025 == pytest.approx(2 * 1.96 * p.stderr, rel=0.15)
+    assert str(drawn).startswith("With 95 % probability thickness lies between 3")
+    for c, band in enumerate(drawn.predictions()):
+        np.testing.assert_array_equal(band.data, known.samples.values[:, c])
+        low, high = np.quantile(band.noisy, [0.025, 0.975], axis=0)
+        assert 0.88 <= np.mean((band.data >= low) & (band.data <= high)) <= 0.995
+        assert np.all(np.diff(np.median(band.model, axis=0)[np.argsort(band.axis.values)]) > -1e-3)
+
+
+def test_a_chain_goes_on_and_belongs_to_its_problem(fitted_before, known, tmp_path):
+    path = tmp_path / "chain.h5"
+    assert not pl.sample_brdf(known.samples, FREE, chain=path, steps=20).trusted
+    resumed = pl.sample_brdf(known.samples, FREE, chain=path, steps=40)
+    whole = pl.sample_brdf(known.samples, FREE, steps=40)
+    np.testing.assert_array_equal(resumed.draws, whole.draws)
+    assert resumed.checks.steps == 40
+    for other, changed in (
+        (dataclasses.replace(known.samples, values=1.01 * known.samples.values), {}),
+        (known.samples, {"thickness": Free(lower=0, upper=900)}),
+    ):
+        surface = dataclasses.replace(FREE, numbers={**FREE.numbers, **changed})
+        with pytest.raises(DataError, match="is the chain of another problem"):
+            pl.sample_brdf(other, surface, chain=path)
+
+
+def test_a_prior_narrows_a_posterior_and_not_the_fit(fitted_before, known):
+    """Two independent measurements of one number: their inverse variances add."""
+    p = known["specular"]
+    prior = pl.Normal(p.value, p.stderr)
+    free = {**FREE.numbers, "specular": Free(lower=0, upper=100, prior=prior)}
+    drawn = pl.sample_brdf(known.samples, dataclasses.replace(FREE, numbers=free))
+    assert drawn["specular"].sd == pytest.approx(p.stderr / np.sqrt(2), rel=0.12)
+    told = doubts.priors(dataclasses.replace(FREE, numbers=free))
+    assert told == ["the prior of specular counts in a posterior only: a fit of a surface takes none"]
+
+
+def test_a_posterior_grants_the_layer_that_the_fit_does_not_see(found, known):
+    fit, rest = found
+    assert sample._subject(known.samples, FREE, fit, rest).granted == ""
+    blind = dataclasses.replace(fit, layered=False, status=Status.NOT_IDENTIFIABLE)
+    assert sample._subject(known.samples, FREE, blind, rest).granted == "there is a layer"
 
 
 @pytest.mark.slow

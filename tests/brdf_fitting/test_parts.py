@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-from pellicle.brdf_fitting import doubts, evidence, fit, residuals, search
-from pellicle.brdf_fitting.coordinates import coordinates, named, values
+from pellicle.brdf_fitting import doubts, evidence, fit, residuals, sample, search
+from pellicle.brdf_fitting.coordinates import coordinates, log_area, named, values
 from pellicle.brdf_fitting.problem import _nonnegative
 from pellicle.brdf_fitting.result import Baseline
+from pellicle.brdf_fitting.valley import affine
 from pellicle.errors import UsageError
 from pellicle.fitting.result import Estimate, Rival
 from pellicle.fitting.search import quiet
@@ -107,6 +108,41 @@ def test_in_a_plane_the_square_of_the_tilt_out_of_it_is_searched():
     np.testing.assert_allclose(found, np.cos([0, reach / 100, reach / 2]), atol=1e-6)
 
 
+def test_how_much_of_the_disc_a_step_sweeps():
+    """The determinant of the map onto the plane of tilts, by finite differences."""
+    chosen, box = steep(TILTED)
+
+    def tilt(x, y):
+        deviation, azimuth = values(chosen, box, jnp.full(7, 0.5).at[5].set(x).at[6].set(y))[5:]
+        return np.array(deviation * np.exp(1j * np.deg2rad(azimuth)))
+
+    def area(x, y, step=1e-5):
+        along, across = tilt(x + step, y) - tilt(x - step, y), tilt(x, y + step) - tilt(x, y - step)
+        return abs((np.conj(along) * across).imag)
+
+    found = [log_area(chosen, box, jnp.full(7, 0.5).at[5].set(x).at[6].set(y)) for x, y in PLACES]
+    areas = np.array([area(x, y) for x, y in PLACES])
+    np.testing.assert_allclose(np.exp(np.subtract(found, found[0])), areas / areas[0], rtol=1e-6)
+
+
+PLACES = ((0.6, 0.3), (0.1, 0.9), (0.5, 0.95))
+
+
+@pytest.mark.parametrize("in_plane", [False, True])
+def test_a_point_that_was_searched_is_the_same_where_it_is_sampled(in_plane):
+    """In their own units, with the azimuth within half a turn of the best one's."""
+    seen = samples(30.0, 0.0, np.arange(10.0, 60.0), 180.0 if in_plane else np.arange(100.0, 150.0))
+    searched = fit.problem(seen, TILTED, "linear", TILTED.brdf.evaluate)
+    own = affine(TILTED, searched)
+    for unit in np.random.default_rng(0).random((5, 8)):
+        numbers = np.array([*values(searched.form.coordinates, searched.box, unit[:7]), 100 * unit[7]])
+        moved = sample._moved(searched, own, unit)
+        again = sample._values(own, numbers, moved[None])[0]
+        np.testing.assert_allclose(again, numbers, rtol=1e-9)
+        turned = sample._values(own, numbers + 350, moved[None])[0]
+        np.testing.assert_allclose(turned - numbers, [0] * 6 + [360, 0], atol=1e-6)
+
+
 @pytest.fixture
 def grey():
     """A problem of five numbers, one of them a weight."""
@@ -153,6 +189,7 @@ def test_residuals_by_name(name):
     }[name]
     transform = residuals.RESIDUALS[name]
     np.testing.assert_allclose(transform(rho, cosine, 1e-3), expected, rtol=1e-12)
+    np.testing.assert_allclose(residuals.INVERSES[name](expected, cosine, 1e-3), rho, atol=1e-12)
     step = 1e-6
     slope = (transform(rho + step, cosine, 1e-3) - transform(rho - step, cosine, 1e-3)) / (2 * step)
     np.testing.assert_allclose(residuals.slope(transform, jnp.asarray(rho), cosine, 1e-3), slope, rtol=1e-5)
