@@ -196,6 +196,15 @@ def test_a_prior_narrows_a_posterior_and_not_the_fit(fitted_before, known):
     assert told == ["the prior of specular counts in a posterior only: a fit of a surface takes none"]
 
 
+def test_samples_that_are_alike_count_as_fewer(monkeypatch, found, known):
+    """Four of a kind leave a posterior that is twice as wide."""
+    fit, rest = found
+    wider = rest._replace(at=rest.at._replace(variance=4 * rest.at.variance))
+    monkeypatch.setattr(sample, "fitted", lambda *asked: (fit, wider))
+    drawn = pl.sample_brdf(known.samples, FREE)
+    assert drawn["specular"].sd == pytest.approx(2 * known["specular"].stderr, rel=0.15)
+
+
 def test_a_posterior_grants_the_layer_that_the_fit_does_not_see(found, known):
     fit, rest = found
     assert sample._subject(known.samples, FREE, fit, rest).granted == ""
