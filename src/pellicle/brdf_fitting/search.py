@@ -8,12 +8,15 @@ draws the fringes anew. Of 100 surfaces of ten free numbers (`benchmarks/brdf_re
 
 from __future__ import annotations
 
+from logging import getLogger
 from typing import NamedTuple
 
 import numpy as np
 
 from pellicle.brdf_fitting.problem import Problem, polished, scanned
 from pellicle.fitting.search import Progress
+
+log = getLogger(__name__)
 
 SCAN_SAMPLES = 150
 _CHUNK = 512
@@ -57,6 +60,7 @@ def search(problem: Problem, effort: Effort, progress: Progress) -> Minima:
     """Rounds of candidates and short polishes on few samples, then a polish of the best of all."""
     few = problem._replace(data=thin(problem))
     units, chi2 = _scan(few, candidates(problem, effort.candidates), progress)
+    log.info("scan: %d random candidates; the best has χ² %.4g on a few samples", len(units), chi2.min())
     if effort.short:
         units, chi2 = _short(problem, few, units, chi2, effort.short, progress)
         for again in range(1, _ROUNDS if problem.thickness is not None else 1):
@@ -65,6 +69,7 @@ def search(problem: Problem, effort: Effort, progress: Progress) -> Minima:
             found = _short(problem, few, *_scan(few, drawn, progress), effort.short, progress)
             done = found[1].min() > _BETTER * chi2.min()
             units, chi2 = np.vstack([units, found[0]]), np.concatenate([chi2, found[1]])
+            log.info("scan: fringes drawn anew, %d polished a little; χ² %.4g", len(found[1]), chi2.min())
             if done:
                 break
     return polish(problem, _best(problem, units, chi2, effort.starts), effort, progress)
