@@ -99,9 +99,18 @@ def blocks(page: str, language: str) -> list[str]:
     return [text for kind, text in FENCE.findall(PAGES[page]) if kind == language]
 
 
-def run(command: str, monkeypatch, capsys) -> None:
+def run(command: str, monkeypatch, capsys) -> str:
+    """What it printed."""
     monkeypatch.setattr(sys, "argv", shlex.split(command))
-    assert main() == (4 if command in DOUBTFUL else 0), (command, capsys.readouterr())
+    capsys.readouterr()
+    code, said = main(), capsys.readouterr()
+    assert code == (4 if command in DOUBTFUL else 0), (command, said)
+    return said.out
+
+
+def results(text: str) -> list[tuple[float, float]]:
+    """Every value ± error."""
+    return [(float(a), float(b)) for a, b in re.findall(r"(\d[\d.]*\d) ± (\d[\d.]*\d)", text)]
 
 
 @pytest.fixture
@@ -160,8 +169,8 @@ def test_commands_are_known_and_their_files_are_there(page):
 
 @pytest.fixture(scope="module")
 def done():
-    """Commands that a page before has run."""
-    return set()
+    """Commands that a page before has run, and what they printed."""
+    return {}
 
 
 @pytest.mark.parametrize("page", SHOWING)
@@ -173,8 +182,19 @@ def test_commands_run(page, done, monkeypatch, capsys):
         out = command.partition("--out ")[2].partition(" ")[0]
         wanted = out and any(out in later.split() for later in shown[i + 1 :])
         if command not in SLOW and (wanted or command not in done):
-            run(command, monkeypatch, capsys)
-            done.add(command)
+            done[command] = run(command, monkeypatch, capsys)
+
+
+@pytest.mark.parametrize("page", [page for page in SHOWING if results(PAGES[page])])
+def test_results_that_a_page_tells_are_what_came_out(page, done):
+    """Of whichever page's command: a second one did not run it again."""
+    if not done:
+        pytest.skip("no command was run before")
+    found = results("".join(done.values()))
+    for value, error in results(PAGES[page]):
+        assert any(abs(value - v) < 0.3 * error and abs(error - e) < 0.2 * error for v, e in found), (
+            f"{value} ± {error}"
+        )
 
 
 @pytest.mark.slow
