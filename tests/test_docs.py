@@ -48,6 +48,8 @@ SLOW = {
     "pellicle cost docs/surfaces/tempered_steel.toml --out cost": "forty compilations, and half a minute",
     "pellicle fit steel.csv --recipe docs/surfaces/tempered_steel.toml": "10 s to compile; "
     "tests/cli/test_brdf_command.py fits another",
+    "pellicle sample --recipe fits/brdf/tempered_steel/recipe.toml --out results/steel": "20 s to compile; "
+    "tests/sampling samples another",
 }
 CI = ("make fit", "make test", "make notebooks", "make docs")
 _REPEATED = "a study of hours, whose tables are kept; its parts are tested in their own modules"
