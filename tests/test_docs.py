@@ -15,6 +15,7 @@ from pathlib import Path
 
 import jsonschema
 import pytest
+import yaml
 
 from pellicle.cli import app, main
 
@@ -29,6 +30,8 @@ PLACE = re.compile(r"\.\.\.|\b[A-Z]{3,}\b")
 FENCE = re.compile(r"^```([a-z]*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 FILE = re.compile(r"[\w./-]+\.(csv|txt|dat|toml)$")
 
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+
 DOUBTFUL = (
     "pellicle fit --recipe measurements/recipes/gold_on_glass_300nm.toml",
     "pellicle fit window.csv --layer TiO2 --substrate SiO2 --thickness 10:500",
@@ -37,6 +40,15 @@ DOUBTFUL = (
 )
 """Their fits end in doubt (exit code 4), as their pages say."""
 SLOW = {
+    **{
+        f"pellicle chart docs/surfaces/{name}.toml --out {name}.png": "one sphere of eight is drawn every day"
+        for name in (
+            *("figure_2_coloured", "figure_2_clay", "figure_3_parallel", "figure_3_deviated"),
+            *("figure_4", "figure_5_low", "figure_5_high"),
+        )
+    },
+    "pellicle compare film.csv --recipe docs/examples/smooth_film.toml --recipe docs/examples/rough_film.toml": "6 s to compile; tests/cli/test_compare_command.py compares others",
+    "pellicle fit --recipe fits/cauchy_100nm/recipe.toml": "one of the studies of tests/test_fits.py",
     "pellicle cost docs/cost/soap_film.toml --out cost": "fits by many solvers: a minute or two",
     **{
         f"pellicle cost docs/{scene}.toml --datasets 0": "twenty compilations; tests/cli/test_cost_command.py"
@@ -137,9 +149,7 @@ def test_what_is_typed_is_found():
 def test_whatever_is_shown_is_run_by_a_test():
     shown = {command for text in PAGES.values() for command in commands(text)}
     others = {c for c in shown if not c.startswith("pellicle ") or c in ELSEWHERE}
-    extras = set(
-        tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["optional-dependencies"]
-    )
+    extras = PROJECT["optional-dependencies"].keys()
     targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE))
     for command in others:
         program, what = command.split()[:2]
@@ -215,6 +225,19 @@ def test_python_runs(page):
     names: dict[str, object] = {}
     for block in blocks(page, "python"):
         exec(compile(block, page, "exec"), names)
+
+
+def test_the_citation_is_whole_and_of_this_version():
+    """What the Citation File Format 1.2.0 requires, of the file and of each reference."""
+    cited = yaml.safe_load((ROOT / "CITATION.cff").read_text("utf-8"))
+    assert cited["cff-version"] == "1.2.0"
+    assert {"message", "title", "authors"} <= cited.keys()
+    assert cited["version"] == PROJECT["version"]
+    for reference in cited["references"]:
+        assert {"type", "title", "authors", "year"} <= reference.keys(), reference
+        assert not reference.get("doi", "10.1/x").startswith("http"), reference
+        family = reference["authors"][0]["family-names"]
+        assert reference.get("doi", family) in PAGES["docs/sources.md"], reference["title"]
 
 
 SCHEMA = json.loads((ROOT / "docs" / "recipe.schema.json").read_text("utf-8"))

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.errors import UsageError
+from pellicle.errors import DataError, UsageError
 from pellicle.model import build
 from pellicle.scene import free_leaves, with_wavelength
 from pellicle.synthetic import synthesise
@@ -164,6 +164,11 @@ def test_a_second_file_compiles_nothing(film, measured, compilations):
 def test_nothing_free(film, measured):
     with pytest.raises(UsageError, match="nothing is free"):
         pl.fit(measured(film(), 480.0), film(480.0))
+
+
+def test_one_point_is_no_spectrum(film):
+    with pytest.raises(DataError, match=r"spot\.csv: holds one point of R"):
+        pl.fit(pl.Spectrum(np.array([550.0]), np.array([0.2]), "R", path="spot.csv"), film())
 
 
 def test_an_uncalibrated_intensity_needs_a_scale(film, measured):

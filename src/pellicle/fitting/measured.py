@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import numpy as np
 
-from pellicle.errors import UsageError
+from pellicle.errors import DataError, UsageError
 from pellicle.fitting import noise
 from pellicle.io.spectrum import Spectrum
 from pellicle.scene import Drift, Instrument, Light, Scene, free_leaves, is_free
@@ -77,6 +77,8 @@ def drifts(scene: Scene) -> bool:
 
 
 def _check(data: Spectrum, scene: Scene) -> None:
+    if data.delta is None and len(data) < 2:
+        raise DataError(f"{data.path}: holds one point of {data.signal}; a fit needs a spectrum")
     drifting = [x for x in (scene.instrument.scale, scene.instrument.offset) if isinstance(x, Drift)]
     if data.delta is None and not data.calibrated and scene.instrument.scale not in drifting:
         raise UsageError(
