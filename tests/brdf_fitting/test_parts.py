@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -207,6 +209,10 @@ def estimate(name, value, stderr=0.1, lower=0.0, upper=1000.0, at_bound=False):
     return Estimate(name, value, stderr, "", lower, upper, True, at_bound)
 
 
+def none_at_all(most):
+    return dataclasses.replace(estimate("thickness", 0.2), upper_limit=most)
+
+
 GOOD = {
     "thickness": estimate("thickness", 300.0),
     "exponent_reflection": estimate("exponent_reflection", 50.0),
@@ -225,6 +231,7 @@ def test_a_layer_that_passes_every_doubt():
     ("changed", "rivals", "held_out", "why"),
     [
         ({}, (), 1.84, "8 % below no interference"),
+        ({"thickness": none_at_all(1.2)}, (), 1.0, "0 fits as well, for it is at most 1.2 (95 %)"),
         ({}, (), 3.3, "1.10 times that of two lobes"),
         ({}, (Rival({"thickness": 500.0}, 3.0),), 1.84, "500 nm fits as well as 300 nm"),
         ({"thickness": estimate("thickness", 300.0, np.inf)}, (), 1.0, "no finite error"),

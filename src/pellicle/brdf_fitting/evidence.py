@@ -1,4 +1,4 @@
-"""Whether the samples call for a layer: three doubts, and the sentences that say so."""
+"""Whether the samples call for a layer: four doubts, and the sentences that say so."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from pellicle.brdf_fitting.result import Baseline
 from pellicle.fitting.result import Estimate, Rival
-from pellicle.fitting.status import RIVAL, describe
+from pellicle.fitting.status import RIVAL, describe, limits_in_words
 
 GAIN = 0.10
 """The held-out error must fall by more than this share against every baseline."""
@@ -35,7 +35,7 @@ def weigh(
 ) -> Evidence:
     """The rule: better than both baselines by `GAIN`, one thickness, and parameters that mean something."""
     others = _other_thickness(parameters, rivals)
-    doubts = [*_no_better(held_out, baselines), *others, *_empty(parameters)]
+    doubts = [*_none_at_all(parameters), *_no_better(held_out, baselines), *others, *_empty(parameters)]
     depth = parameters.get("thickness")
     if doubts == others and doubts and depth is not None and math.isfinite(depth.stderr):
         return Evidence(False, f"The samples do not decide the thickness of the layer: {others[0]}.", True)
@@ -44,6 +44,13 @@ def weigh(
     gains = " and ".join(f"{100 * (1 - held_out / b.held_out):.0f} % below {b.name}" for b in baselines)
     lead = f"{describe(depth)}. The" if depth is not None else "the"
     return Evidence(True, f"The samples call for a layer: {lead} held-out error is {gains}.")
+
+
+def _none_at_all(parameters: Mapping[str, Estimate]) -> list[str]:
+    depth = parameters.get("thickness")
+    if depth is None or depth.lower != 0 or depth.upper_limit is None or depth.lower_limit is not None:
+        return []
+    return [f"a thickness of 0 fits as well, for it {limits_in_words(depth)}"]
 
 
 def _no_better(held_out: float, baselines: tuple[Baseline, ...]) -> list[str]:

@@ -165,11 +165,11 @@ def judged(
 
 
 def _unlayered(parameters: dict[str, Estimate]) -> dict[str, Estimate]:
-    """Without evidence of a layer its thickness has no finite error, and no limit."""
+    """Without evidence of a layer its thickness has no finite error, and none that it must have."""
     depth = parameters.get("thickness")
     if depth is None or not depth.free:
         return parameters
-    unseen = dataclasses.replace(depth, stderr=math.inf, lower_limit=None, upper_limit=None)
+    unseen = dataclasses.replace(depth, stderr=math.inf, lower_limit=None)
     return {**parameters, "thickness": unseen}
 
 
