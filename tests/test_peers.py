@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import math
+import runpy
 import sys
 from pathlib import Path
 
@@ -37,6 +38,14 @@ def test_the_truth_and_pellicle_agree(peers):
         ), name
         if smooth:
             assert table.error(ours.slopes(case, np.float64), truth["slopes"], "slopes") < 1e-9, name
+
+
+def test_the_page_has_a_place_for_the_tables(peers):
+    script = runpy.run_path(str(HERE / "__main__.py"), run_name="peers")
+    page = script["PAGE"].read_text("utf-8")
+    again = script["inserted"](page, "new tables")
+    before, begin, rest = page.partition(script["BEGIN"])
+    assert again == before + begin + "\n\nnew tables\n\n" + rest[rest.index(script["END"]) :]
 
 
 def test_every_package_has_its_adapter(peers):

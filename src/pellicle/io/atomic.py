@@ -31,6 +31,11 @@ def replacing(path: str | os.PathLike[str], *, overwrite: bool = False) -> Itera
     _refuse_existing(target, overwrite)
     try:
         handle, name = tempfile.mkstemp(prefix=f".{target.stem}.", suffix=target.suffix, dir=target.parent)
+    except FileNotFoundError:
+        raise UsageError(
+            f"{target}: cannot be written (there is no folder {target.parent}); make it, or choose another "
+            "place with --out"
+        ) from None
     except OSError as error:
         raise UsageError(
             f"{target}: cannot be written ({error.strerror}); choose another place with --out"
