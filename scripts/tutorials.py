@@ -21,6 +21,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     """The documentation's files, and tutorials/NAME.md with its figures for each executed/NAME.ipynb."""
     for path in sorted(EXECUTED.glob("*.ipynb")):
         page, resources = MarkdownExporter().from_filename(str(path), {"output_files_dir": path.stem})
+        page = page.replace("![png]", "![what the code above draws]")
         content = {f"{path.stem}.md": page, **resources["outputs"]}
         for name, text_or_bytes in content.items():
             files.append(File.generated(config, f"tutorials/{name}", content=text_or_bytes))
