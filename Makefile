@@ -65,9 +65,9 @@ notebooks: $(VENV)/.dev
 $(EXECUTED): $(NOTEBOOKS)
 	$(MAKE) notebooks
 
-# into site/, with the notebooks as they were executed; a warning is an error
+# into site/, with the notebooks as they were executed; a warning is an error (and --quiet would hide it from --strict)
 docs: $(VENV)/.docs $(EXECUTED)
-	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 slow: $(VENV)/.dev
 	$(BIN)/python -m pytest -m slow
