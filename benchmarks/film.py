@@ -12,6 +12,7 @@ tmm-faster`); those that are slow get fewer points.
 from __future__ import annotations
 
 import argparse
+import ctypes
 import importlib.metadata
 import os
 import platform
@@ -37,6 +38,7 @@ jax.config.update("jax_enable_x64", True)
 ANGLE = 45.0
 WAVELENGTH = np.linspace(400.0, 800.0, 401)
 ABSORBING, TRANSPARENT, SUBSTRATE = 2.9 + 0.2j, 1.46, 1.52
+DISPERSING = ABSORBING + (0.3 + 0.1j) * (550.0 / WAVELENGTH[None, :]) ** 2
 TMM_POINTS = 20
 
 Run = Callable[[np.ndarray, np.ndarray], Any]
@@ -48,13 +50,13 @@ class Runner(NamedTuple):
 
     run: Run
     thickness: np.ndarray
-    layer: complex
+    layer: complex | np.ndarray
     tolerance: float
     floor: str = "floor float64"
 
 
 def numpy_airy(
-    layer: complex, wavelength: np.ndarray, thickness: np.ndarray
+    layer: complex | np.ndarray, wavelength: np.ndarray, thickness: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """The textbook Airy formula in complex NumPy, the transmitted power weighted for each polarisation."""
     q0, a = np.cos(np.deg2rad(ANGLE)), np.sin(np.deg2rad(ANGLE))
@@ -90,18 +92,26 @@ def _compiled(both: Callable, dtype: type) -> Run:
     return run
 
 
+def by_pellicle_table(layer: np.ndarray, dtype: type) -> Run:
+    """The same with an index for each wavelength, known when the program runs and not before."""
+    program, index = jax.jit(partial(_both, dtype)), layer.astype(np.result_type(dtype, np.complex64))
+
+    def run(wavelength, thickness):
+        return program(wavelength.astype(dtype), thickness.astype(dtype), index).block_until_ready()
+
+    return run
+
+
 def by_pellicle(layer: complex, dtype: type) -> Run:
     """The library's front door; a layer without an imaginary part is a real number."""
     kind = (np.complex64 if dtype is np.float32 else np.complex128) if isinstance(layer, complex) else dtype
+    return _compiled(partial(_both, dtype, layer=kind(layer)), dtype)
 
-    def both(wavelength, thickness):
-        media = (kind(layer), dtype(SUBSTRATE))
-        R, T = (
-            f(wavelength, thickness, *media, angle=dtype(ANGLE)) for f in (pl.reflectance, pl.transmittance)
-        )
-        return jax.lax.complex(R, T)
 
-    return _compiled(both, dtype)
+def _both(dtype: type, wavelength, thickness, layer):
+    media = (layer, dtype(SUBSTRATE))
+    R, T = (f(wavelength, thickness, *media, angle=dtype(ANGLE)) for f in (pl.reflectance, pl.transmittance))
+    return jax.lax.complex(R, T)
 
 
 def floor(dtype: type) -> Run:
@@ -180,6 +190,16 @@ def by_tmm_faster() -> Run:
     return run
 
 
+def keep_pages() -> None:
+    """What is freed stays with the process (glibc): fresh pages cost more than a film, and luck decides
+    who gets them."""
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
+    if mallopt is not None:
+        trim_threshold, mmap_threshold = -1, -3  # malloc.h
+        mallopt(trim_threshold, 2**31 - 1)
+        mallopt(mmap_threshold, 2**25)
+
+
 def installed(make: Callable[[], Run]) -> Run | None:
     """The competitor, or None, and a line that says so, where its package is missing."""
     try:
@@ -199,6 +219,8 @@ def competitors(thicknesses: int) -> dict[str, Runner]:
         for layer, kind in ((ABSORBING, "absorbing"), (TRANSPARENT, "transparent")):
             run = by_pellicle(layer, dtype)
             found[f"pellicle {name}, {kind}"] = Runner(run, thickness, layer, tolerance, f"floor {name}")
+        run = by_pellicle_table(DISPERSING, dtype)
+        found[f"pellicle {name}, dispersing"] = Runner(run, thickness, DISPERSING, tolerance, f"floor {name}")
     found["NumPy complex Airy"] = Runner(partial(numpy_airy, ABSORBING), thickness, ABSORBING, 1e-12)
     tenth, fiftieth = (thickness[:: max(1, thicknesses // n)] + 1.0 for n in (100, 20))
     for name, make, some, tolerance in (
@@ -217,6 +239,7 @@ def wavelengths(name: str) -> np.ndarray:
 
 
 def main(rounds: int, thicknesses: int) -> None:
+    keep_pages()
     runners, first = competitors(thicknesses), {}
     for name, runner in runners.items():
         began = time.perf_counter()

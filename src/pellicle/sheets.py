@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from pellicle.optics import film, interface, orders, plate, stack
+from pellicle.optics import film, interface, orders, passage, plate, stack
 from pellicle.optics.number import Number, imag, is_real, real, sincos_poly
 from pellicle.planning import Plan
 from pellicle.scene import Group, Layer, Scene, groups, thickness_spread
@@ -109,7 +109,7 @@ def wave_of(plan: Plan, sheet: Sheet, polarisation: str) -> film.Wave:
     ends = (sheet.angle, polarisation)
     if len(sheet.layers) == 1 and not _rough(sheet):
         only_waves = not plan.on("absorption") and not plan.on("tunnelling") and is_real(sheet.layers[0])
-        through = film.through_wave if only_waves else film.through
+        through = passage.through_wave if only_waves else passage.through
         one = (sheet.above, sheet.layers[0], sheet.below, sheet.phases[0])
         (wave,) = film.film(*one, *ends, through=through, sincos=sincos_poly)
         return wave

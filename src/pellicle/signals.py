@@ -19,7 +19,10 @@ from pellicle.optics import film, interface, stack
 from pellicle.optics.dispersion import AbstractDispersion
 from pellicle.optics.ellipsometry import angles, normalised, stokes
 from pellicle.optics.number import Number, is_real, sincos_poly, to_complex, to_pair
+from pellicle.optics.passage import through, through_wave
 from pellicle.scene import check_polarisation, medium, surroundings
+
+NUMBERS = int | float | complex | np.ndarray | np.generic | jax.Array
 
 Medium = Any
 """A number (n + ik), an array of them, a material, or a material's name."""
@@ -58,8 +61,7 @@ def reflectance(
 
     ```
     """
-    waves = _waves(wavelength, thickness, layer, substrate, ambient, angle, polarisation)
-    return _mean([film.reflectance(w) for w in waves])
+    return film.reflectance(*_waves(wavelength, thickness, layer, substrate, ambient, angle, polarisation))
 
 
 def transmittance(
@@ -77,8 +79,7 @@ def transmittance(
     With an absorbing substrate this is the power that enters it. Gerardin et al. 2019 (eq. 21) weight
     both polarisations alike, which is wrong for p there; here each has its own factor.
     """
-    waves = _waves(wavelength, thickness, layer, substrate, ambient, angle, polarisation)
-    return _mean([film.transmittance(w) for w in waves])
+    return film.transmittance(*_waves(wavelength, thickness, layer, substrate, ambient, angle, polarisation))
 
 
 def ellipsometry(
@@ -117,22 +118,18 @@ def refractive_index(wavelength: Any, what: Medium) -> Complex[Array, "..."]:
     return jnp.broadcast_to(value, jnp.broadcast_shapes(value.shape, wavelength.shape))
 
 
-def _mean(signals: list[Any]) -> Any:
-    return signals[0] if len(signals) == 1 else 0.5 * (signals[0] + signals[1])
-
-
 def _waves(wavelength, thickness, layer, substrate, ambient, angle, polarisation):
     check_polarisation(polarisation)
     _warn_of_lost_precision(wavelength, thickness, layer, substrate, ambient, angle)
     wavelength = _floating(wavelength)
     normal = isinstance(angle, int | float) and angle == 0
+    promised = through_wave if normal or _propagates(layer, ambient, angle) else through
+    enter = (lambda n: n) if normal or _propagates(substrate, ambient, angle) else interface.allow_tunnelling
     named = isinstance(ambient, str | AbstractDispersion)
     ambient = _index(surroundings(ambient) if named else ambient, wavelength)
-    substrate = _index(substrate, wavelength)
+    substrate = enter(_index(substrate, wavelength))
     if not is_real(ambient):
         raise ValueError("the ambient must not absorb: give it a real index")
-    if not normal:
-        substrate = interface.allow_tunnelling(substrate)
     theta = None if normal else jnp.deg2rad(_floating(angle))
     letters = "sp" if polarisation == "unpolarised" else polarisation
     if isinstance(layer, list | tuple):
@@ -145,9 +142,18 @@ def _waves(wavelength, thickness, layer, substrate, ambient, angle, polarisation
         2 * jnp.pi / wavelength * thickness,
         theta,
         letters,
-        through=film.through_wave if normal and is_real(layer) else film.through,
+        through=promised if is_real(layer) else through,
         sincos=sincos_poly,
     )
+
+
+def _propagates(medium: Any, ambient: Any, angle: Any) -> bool:
+    """Whether numbers known before anything is traced say that no wave is totally reflected at the medium:
+    what then need not be computed is most of a transparent film."""
+    given = (medium, ambient, angle)
+    if any(isinstance(x, Tracer) or not isinstance(x, NUMBERS) for x in given):
+        return False
+    return bool(np.all(np.real(medium) > np.abs(ambient * np.sin(np.deg2rad(angle)))))
 
 
 def _stack_waves(wavelength, thickness, layers, substrate, ambient, theta, letters):

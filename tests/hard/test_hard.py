@@ -160,7 +160,8 @@ def test_nothing_between_equal_media_reflects_nothing_at_90_degrees_too(letter, 
     row = np.array([0.0, 2.1, 0.0, 1.0, 0.0, 1.0, 90.0, 550.0], dtype=dtype)
     for signal, truth in (("R", 0.0), ("T", 1.0)):
         value, forward, reverse = alone(signal, letter, row)
-        assert value == truth
+        # T is a quotient: no light is made of a rounding, as R would have it
+        assert value == (truth if signal == "R" else pytest.approx(truth, abs=2 * float(np.finfo(dtype).eps)))
         assert np.all(np.isfinite(forward))
         assert np.all(np.isfinite(reverse))
         row[0] = 1e-3

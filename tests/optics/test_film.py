@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import mpmath
@@ -10,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pellicle.optics import film, interface
+from pellicle.optics import film, interface, passage
 from pellicle.optics.number import Pair, sincos, sincos_poly, to_pair
 
 SINES = pytest.mark.parametrize("sines", [sincos, sincos_poly])
@@ -29,18 +31,18 @@ def exact(Q, k):
 @jax.jit
 def pair_jvp(re, im, k):
     one, none = jnp.ones_like(re), jnp.zeros_like(re)
-    return jax.jvp(film.through, (Pair(re, im), k), (Pair(one, none), none))
+    return jax.jvp(passage.through, (Pair(re, im), k), (Pair(one, none), none))
 
 
 @jax.jit
 def complex_jvp(re, im, k):
     Q = jax.lax.complex(re, im)
-    return jax.jvp(film.through, (Q, k), (jnp.ones_like(Q), jnp.zeros_like(k)))
+    return jax.jvp(passage.through, (Q, k), (jnp.ones_like(Q), jnp.zeros_like(k)))
 
 
 @jax.jit
 def real_jvp(re, k):
-    return jax.jvp(film.through, (re, k), (jnp.ones_like(re), jnp.zeros_like(k)))
+    return jax.jvp(passage.through, (re, k), (jnp.ones_like(re), jnp.zeros_like(k)))
 
 
 def as_complex(z):
@@ -105,7 +107,7 @@ def test_through_at_zero():
 
 def test_second_derivatives_are_finite_at_zero():
     def c_and_f(Q, k):
-        c, f, _, _ = film.through(Q, k)
+        c, f, _, _ = passage.through(Q, k)
         return jnp.stack([c, f])
 
     for Q, k in ((0.0, 2.0), (2.0, 0.0), (-1e4, 100.0)):
@@ -136,7 +138,7 @@ def test_through_wave_is_through_where_the_wave_propagates(sines):
         return jax.jvp(lambda Q, k: fn(Q, k, sines), (Q, k), (np.ones_like(Q), np.full_like(k, 0.3)))
 
     for one, two in zip(
-        jax.tree.leaves(both(film.through_wave)), jax.tree.leaves(both(film.through)), strict=True
+        jax.tree.leaves(both(passage.through_wave)), jax.tree.leaves(both(passage.through)), strict=True
     ):
         np.testing.assert_allclose(one, two, rtol=1e-13, atol=1e-12)
 
@@ -148,7 +150,7 @@ REAL_LAYER, REAL_SUBSTRATE = RNG.uniform(1.7, 3, (2, N))
 PHASE, ANGLE = RNG.uniform(0, 8, N), RNG.uniform(0, np.pi / 2 - 0.05, N)
 
 
-def signals(layer, substrate, angle=ANGLE, through=film.through, ambient=AMBIENT):
+def signals(layer, substrate, angle=ANGLE, through=passage.through, ambient=AMBIENT):
     waves = film.film(ambient, layer, substrate, PHASE, angle, through=through, sincos=sincos_poly)
     functions = (film.reflectance, film.transmittance, film.reflectance_below)
     return np.array([f(w) for w in waves for f in functions])
@@ -162,7 +164,7 @@ def test_number_types_agree(k, angle):
     versions = [signals(layer, substrate, angle), signals(to_pair(layer), to_pair(substrate), angle)]
     if k == 0:
         versions.append(signals(REAL_LAYER, REAL_SUBSTRATE, angle))
-        versions.append(signals(REAL_LAYER, REAL_SUBSTRATE, angle, film.through_wave))
+        versions.append(signals(REAL_LAYER, REAL_SUBSTRATE, angle, passage.through_wave))
         versions.append(signals(REAL_LAYER, interface.allow_tunnelling(REAL_SUBSTRATE), angle))
     for version in versions[1:]:
         np.testing.assert_allclose(version, versions[0], rtol=1e-11, atol=1e-13)
@@ -193,3 +195,38 @@ def test_a_layer_that_turns_evanescent_is_smooth():
     for one, two in zip(real, full, strict=True):
         np.testing.assert_allclose(film.reflectance(one), film.reflectance(two), atol=1e-13)
     assert np.max(np.abs(np.diff(film.reflectance(real[0])))) < 0.05
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize(
+    ("layer", "substrate", "angle"),
+    [
+        (2.1 + 0.3j, 1.52 + 0j, 0.7),
+        (1.52 + 0j, 1.52 + 0j, 0.9593),  # matched to the substrate, at Brewster's angle of it
+        (1.0 + 0j, 1.52 + 0j, 0.7),  # matched to the ambient
+        (1.7 + 0.1j, 1.7 + 0.1j, 0.7),  # to an absorbing substrate
+        (0.05 + 4j, 0.9 + 0j, 1.4),  # a metal over total reflection
+        (1.0 + 0j, 1.0 + 0j, 1.55),  # next to nothing, next to grazing
+    ],
+)
+def test_a_grid_is_its_points(layer, substrate, angle, dtype):
+    """What a grid computes once for all thicknesses changes no value and no slope."""
+    kind = np.result_type(dtype, np.complex64).type
+    depth = np.linspace(0, 20, 9).astype(dtype)[:, None]
+    spread = np.array([1.0, 1.0 + 1e-6, 1.1]).astype(dtype)
+    below = to_pair(np.broadcast_to(kind(substrate), 3))
+
+    def signals(n, whole):
+        n, k = (jnp.broadcast_to(x, (9, 3)) if whole else x for x in (n, 0 * n + kind(layer).imag))
+        waves = film.film(dtype(1), Pair(n, k), below, depth, dtype(angle), sincos=sincos_poly)
+        return jnp.stack([f(w) for w in waves for f in (film.reflectance, film.transmittance)])
+
+    @partial(jax.jit, static_argnums=1)
+    def both(n, whole):
+        return jax.jvp(lambda n: signals(n, whole), (n,), (jnp.ones_like(n),))
+
+    n = kind(layer).real * spread
+    tolerance = 100 * float(np.finfo(dtype).eps)
+    for grid, points in zip(both(n, False), both(n, True), strict=True):
+        size = 1 + np.abs(points)
+        np.testing.assert_allclose(grid / size, points / size, atol=tolerance)

@@ -142,10 +142,3 @@ def test_slope_of_sincos_poly():
     _, (ds, dc) = jax.jvp(number.sincos_poly, (x,), (np.ones_like(x),))
     np.testing.assert_allclose(ds, np.cos(x), atol=1e-13)
     np.testing.assert_allclose(dc, -np.sin(x), atol=1e-13)
-
-
-def test_hold_changes_nothing():
-    z = Pair(np.arange(3.0), None)
-    (held,) = number.hold(z)
-    assert number.is_real(held.im) if held.im is not None else True
-    np.testing.assert_array_equal(held.re, z.re)

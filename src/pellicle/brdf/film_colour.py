@@ -15,7 +15,7 @@ import numpy as np
 
 from pellicle.brdf.directions import angle_to_half, cosine_to_half
 from pellicle.brdf.shapes import Parameters, column
-from pellicle.optics import film, orders
+from pellicle.optics import film, orders, passage
 from pellicle.optics.interface import allow_tunnelling
 from pellicle.optics.number import Number, Pair, sincos_poly
 
@@ -59,7 +59,7 @@ def _lit(
 
 
 def airy(
-    polarisations: str = "sp", through: Any = film.through, enter: Callable = allow_tunnelling
+    polarisations: str = "sp", through: Any = passage.through, enter: Callable = allow_tunnelling
 ) -> Reflectance:
     """Airy's reflectance, the mean over `polarisations`, of a film in air.
 
@@ -72,8 +72,7 @@ def airy(
         waves = film.film(
             *_lit(parameters, angle, enter), polarisations=polarisations, through=through, sincos=sincos_poly
         )
-        found = [film.reflectance(wave) for wave in waves]
-        return found[0] if len(found) == 1 else 0.5 * (found[0] + found[1])
+        return film.reflectance(*waves)
 
     return reflectance
 

@@ -92,7 +92,7 @@ def reflectance(thickness, layer, substrate, bands: Bands, *, ambient: Any = 1.0
     k0d = 2 * jnp.pi / wavelength * thickness
     if bands.width is None:
         waves = film.film(n0, n1, n2, k0d, theta, sincos=sincos_poly)
-        return 0.5 * (film.reflectance(waves[0]) + film.reflectance(waves[1]))
+        return film.reflectance(*waves)
     if not _propagates(ambient, layer):
         n1 = interface.allow_tunnelling(n1)
     turns = _turn_slope(layer, n0, n1, theta, wavelength)

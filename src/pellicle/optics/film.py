@@ -1,11 +1,9 @@
 """One coherent layer on a substrate, with value and gradient finite everywhere.
 
-The layer enters only through two entire functions of Q = q₁², c = cos(k₀d √Q) and
-f = sin(k₀d √Q)/√Q, both times a scale that keeps them finite and cancels in r, R and T. So
-zero thickness, grazing incidence, an exactly critical film, a matched index, a millimetre of metal
-and tunnelling need no special case, and no root of the film's is ever differentiated. This is the
-Airy formula of Gerardin et al. 2019 (eqs. 11 and 12) multiplied out; each line below is the same
-for real, complex and Pair numbers.
+The layer enters only through the two entire functions of `pellicle.optics.passage`. So zero thickness,
+grazing incidence, an exactly critical film, a matched index, a millimetre of metal and tunnelling need
+no special case. This is the Airy formula of Gerardin et al. 2019 (eqs. 11 and 12) multiplied out; each
+line below is the same for real, complex and Pair numbers.
 """
 
 from __future__ import annotations
@@ -17,165 +15,133 @@ import jax
 import jax.numpy as jnp
 from jax.custom_derivatives import SymbolicZero
 
-from pellicle.optics.exponentials import exponentials
+from pellicle.optics.holding import hold, used_again
 from pellicle.optics.interface import carried, normal, normal_square, nothing_where, power, same, transverse
 from pellicle.optics.number import (
     Number,
-    Pair,
     SinCos,
     abs2,
-    hold,
-    imag,
+    conj,
+    is_real,
     real,
     sincos,
-    sqrt,
     times_i,
     where,
 )
+from pellicle.optics.passage import half_turn, is_real_array, root, slopes, through, through_wave
 
 
-class Passage(NamedTuple):
-    """A layer's two functions, both times a scale that cancels in r and in T."""
+class Three(NamedTuple):
+    """Something of light from the ambient, of light from the substrate, and of their common denominator."""
 
-    c: Number  # cos(kq), q = √Q
-    f: Number  # sin(kq)/q
-    scale_square: Any  # |scale|²
-    rise: Number  # ∂f/∂k, for derivatives only: cos(kq), or e^{2ikq} where the scale moves
+    reflected: Any
+    below: Any
+    denominator: Any
 
 
-@partial(jax.custom_jvp, nondiff_argnums=(2,))
-def through(Q: Number, k: Any, sincos: SinCos = sincos) -> Passage:
-    """c and f times e^{ikq}: c = 1 + M/2 and f = −iM/2q with M = e^{2ikq} − 1.
+class Around(NamedTuple):
+    """Amplitudes A c − iB f of one polarisation, and their squared moduli, found for less than from them."""
 
-    A real Q may have either sign: negative is a tunnelling layer, and where the wave propagates the
-    scale of a real Q is 1.
+    values: Three
+    squares: Three
+
+
+class Wave(NamedTuple):
+    """One polarisation of the light around a layer: amplitudes over a common denominator."""
+
+    reflected: Number  # r = reflected / denominator, for light from the ambient
+    below: Number  # the same for light from the substrate
+    denominator: Number
+    squares: Three  # their squared moduli
+    flux: Any  # power into the substrate: T = flux · scale² / squares.denominator
+    scale_square: Any
+
+
+@partial(jax.custom_jvp, nondiff_argnums=(3, 4))
+def _around(
+    sides: tuple[Three, ...], Q: Number, k: Any, through: Any, sincos: SinCos
+) -> tuple[tuple[Around, ...], Any]:
+    """What `sides`, a pair (A, B) for each amplitude of each polarisation, make of a layer; and |scale|².
+
+    A grid of thicknesses spends its time in multiplications at each point: in the functions of the
+    phase, and here. So what knows nothing of the thickness is multiplied out and held, and squares are
+    taken of what is left.
     """
-    if _real_array(Q):
-        return _through_real(Q, k, sincos)
-    q = _root(Q)
-    half, scale_square = _half(q, k, sincos)
-    c, f = 1 + half, times_i(-half) * (1 / q)
-    return Passage(c, f, scale_square, where(_near(Q, k), c, 1 + 2 * half))
-
-
-def _root(Q: Number) -> Number:
-    """√Q; one of exactly 0 is replaced by one whose distance from 0 is beneath all digits."""
-    q = sqrt(Q)
-    return hold(where(abs2(q) == 0, 1e-15 + 0.0 * q, q))[0]
-
-
-def _half(q: Number, k: Any, sincos: SinCos) -> tuple[Number, Any]:
-    """½(e^{2ikq} − 1), to the last digit where it is small, and |e^{ikq}|²."""
-    scale_square, m = exponentials(-2 * (k * imag(q)))  # 1 + m would lose a transmittance of 1e-22
-    sine, cosine = sincos(k * real(q))
-    square, product = sine * sine, sine * cosine
-    join = Pair if isinstance(q, Pair) else jax.lax.complex
-    return join(m * (0.5 - square) - square, product + m * product), scale_square
-
-
-def _through_real(Q, k, sincos):
-    q = jnp.sqrt(jnp.abs(Q))
-    flat = q == 0
-    over, wave, q, flat = hold(1 / jnp.where(flat, 1.0, q), Q >= 0, q, flat)
-    sine, cosine = sincos(k * q)
-    scale_square, m = exponentials(jnp.where(wave, 0.0, -2 * (k * q)))
-    c = jnp.where(wave, cosine, 1 + 0.5 * m)
-    f = jnp.where(flat, k, jnp.where(wave, sine, -0.5 * m) * over)
-    return Passage(c, f, scale_square, jnp.where(wave | _near(Q, k), c, scale_square))
-
-
-@partial(jax.custom_jvp, nondiff_argnums=(2,))
-def through_wave(Q: Number, k: Any, sincos: SinCos = sincos) -> Passage:
-    """The same where Q is real and positive: the wave always propagates."""
-    (q,) = hold(jnp.sqrt(Q))
-    sine, cosine = sincos(k * q)
-    return Passage(cosine, sine * hold(1 / q)[0], jnp.ones_like(cosine), cosine)
-
-
-def _near(Q, k):
-    """Where the derivative of the scale would be infinite, or nearly."""
-    return abs2(k * k * Q) < 1e-4
-
-
-def _slopes(fn, sincos, primal, tangent):
-    """Derivatives by hand: no root of the film's is differentiated where it is small.
-
-    The scale cancels in R and T, so its derivative is ours to choose. It counts as a constant near
-    zero and where a real wave propagates: dc = −f (Q dk + k dQ/2) and df = c dk + (kc − f)/2Q dQ, the
-    last slope by Taylor near zero. Elsewhere it moves: dc = i e^{2ikq}/q (Q dk + k dQ/2) and
-    df = e^{2ikq} dk + (k e^{2ikq} − f)/2Q dQ. So under a millimetre of metal, or across a wide gap,
-    no derivatives as large as k remain that would have to cancel.
-    """
-    (Q, k), (dQ, dk) = primal, tangent
-    c, f, scale_square, rise = out = fn(Q, k, sincos)
-    w, near = k * k * Q, _near(Q, k)
-    small, far = where(near, w, 0.0 * w), where(near, 1.0 + 0.0 * w, Q + 0.0 * w)
-    taylor = 1.0 + 0.0 * small  # (tan φ/φ − 1) 3/φ² with φ² = w: times c, so that the scale is c's
-    for ratio in (10922 / 26949, 691 / 1705, 62 / 153, 17 / 42, 2 / 5):
-        taylor = 1 + small * taylor * ratio
-    slope = where(near, taylor * c * (k * k * k * (-1 / 6)), (k * rise - f) * (0.5 / far))
-    way, df = Q * dk + 0.5 * k * dQ, rise * dk + slope * dQ
-    if fn is through_wave:
-        dc = -f * way
-        return out, Passage(dc, df, jnp.zeros_like(scale_square), dc)
-    held = near | (Q >= 0) if _real_array(Q) else near
-    over = _over_root(Q)
-    over = where(held, 0.0 * over, over)
-    dc, turn = where(held, -f, rise * over) * way, over * way  # the turn is i d(kq)
-    return out, Passage(dc, df, 2 * real(turn) * scale_square, where(held, dc, 2 * rise * turn))
-
-
-def _over_root(Q: Number) -> Number:
-    """i/√Q, finite at 0; of a real Q 1/√−Q, for it serves only a tunnelling layer."""
-    q = jnp.sqrt(jnp.abs(Q)) if _real_array(Q) else sqrt(Q)
-    over = 1 / where(abs2(q) == 0, 1.0 + 0.0 * q, q)
-    return hold(over if _real_array(Q) else times_i(over))[0]
-
-
-def _real_array(Q: Number) -> bool:
-    return not isinstance(Q, Pair) and not jnp.iscomplexobj(Q)
-
-
-through.defjvp(lambda s, p, t: _slopes(through, s, p, t))
-through_wave.defjvp(lambda s, p, t: _slopes(through_wave, s, p, t))
-
-
-Sides = tuple[tuple[Number, Number], ...]
-
-
-def _combined(sides: Sides, Q: Number, k: Any, through, sincos: SinCos) -> tuple[list[Number], Any]:
-    """A c − iB f for each (A, B), and the scale squared."""
-    if through is through_wave or _real_array(Q):
+    if through is through_wave:
+        return _by_wave(sides, Q, k, sincos)
+    if is_real_array(Q):
         c, f, scale_square, _ = through(Q, k, sincos)
         g = times_i(-f)
-        return [A * c + B * g for A, B in sides], scale_square
-    found, scale_square = _amplitudes(sides, Q, k, sincos)
-    return list(found), scale_square
+        return tuple(_plain([A * c + B * g for A, B in hold(three, k)]) for three in sides), scale_square
+    q = root(Q)
+    half, scale_square = half_turn(q, k, sincos)
+    pairs = [[(A, A - B / q) for A, B in three] for three in sides]
+    if used_again(pairs, k):
+        return tuple(_on_grid(three, half, k) for three in pairs), scale_square
+    return tuple(_plain([A + half * C for A, C in three]) for three in pairs), scale_square
 
 
-@partial(jax.custom_jvp, nondiff_argnums=(3,))
-def _amplitudes(sides: Sides, Q: Number, k: Any, sincos: SinCos) -> tuple[tuple[Number, ...], Any]:
-    """The same where Q is no real array: as c = 1 + M/2 and −if = −M/2q, it is A + M/2 (A − B/q), whose
-    bracket knows nothing of the thickness: one product at each point."""
-    q = _root(Q)
-    over = 1 / q
-    half, scale_square = _half(q, k, sincos)
-    return tuple(A + half * (A - B * over) for A, B in sides), scale_square
+def _plain(values: list[Number]) -> Around:
+    return Around(Three(*values), Three(*(abs2(x) for x in values)))
 
 
-def _amplitudes_slope(sincos, primal, tangent):
+def _by_wave(sides: tuple[Three, ...], Q: Any, k: Any, sincos: SinCos) -> tuple[tuple[Around, ...], Any]:
+    """Where the wave propagates without loss: |A c − iB f|² of real A and B is a sum of two squares."""
+    q = jnp.sqrt(Q)
+    sine, cosine = sincos(k * hold(q, k))
+    cosine_square, sine_square = cosine * cosine, sine * sine
+
+    def one(three: Three) -> Around:
+        pairs = hold([(A, B / q) for A, B in three], k)
+        found = _plain([A * cosine + times_i(-sine) * V for A, V in pairs])
+        if not all(is_real(x) for pair in pairs for x in pair):
+            return found
+        weights = hold([(A * A, V * V) for A, V in pairs], k)
+        return Around(found.values, Three(*(a * cosine_square + b * sine_square for a, b in weights)))
+
+    return tuple(one(three) for three in sides), jnp.ones_like(cosine)
+
+
+def _on_grid(pairs: list[tuple[Number, Number]], half: Number, k: Any) -> Around:
+    """A + half C for each (A, C). The squares are those of A e^{−iθ} + half |C|, with θ the phase of C.
+
+    Where C is nothing but rounding, so is θ: all that is made of C must be made of the same C, which
+    holds because it is held.
+    """
+    pairs = hold(pairs, k)
+    squares = (abs2(turned + half * size) for turned, size in hold([_turned(*pair) for pair in pairs], k))
+    return Around(Three(*(A + half * C for A, C in pairs)), Three(*squares))
+
+
+def _turned(A: Number, C: Number) -> tuple[Number, Any]:
+    """A e^{−iθ} and |C|; where C is 0, θ may be anything."""
+    square = abs2(C)
+    nothing = square == 0
+    size = jnp.sqrt(jnp.where(nothing, 1.0, square))
+    return where(nothing, A + 0.0 * C, A * conj(C) / size), jnp.where(nothing, 0.0, size)
+
+
+def _around_slope(through, sincos, primal, tangent):
     """By the derivatives of c and f. What is known not to vary costs nothing."""
     (sides, Q, k), (dsides, dQ, dk) = primal, tangent
     dQ, dk = jax.tree.map(_filled, (dQ, dk), is_leaf=_is_nothing)
-    (c, f, _, _), (dc, df, dscale, _) = _slopes(through, sincos, (Q, k), (dQ, dk))
+    (c, f, _, _), (dc, df, dscale, _) = slopes(through, sincos, (Q, k), (dQ, dk))
     g, dg = times_i(-f), times_i(-df)
-    moved = []
-    for (A, B), turns in zip(sides, dsides, strict=True):
-        dA, dB = (None if _all_nothing(x) else jax.tree.map(_filled, x, is_leaf=_is_nothing) for x in turns)
-        slope = A * dc + B * dg
-        slope = slope if dA is None else slope + dA * c
-        moved.append(slope if dB is None else slope + dB * g)
-    return _amplitudes(sides, Q, k, sincos), (tuple(moved), dscale)
+
+    def slope(side, turn):
+        dA, dB = (None if _all_nothing(x) else jax.tree.map(_filled, x, is_leaf=_is_nothing) for x in turn)
+        found = side[0] * dc + side[1] * dg
+        found = found if dA is None else found + dA * c
+        return found if dB is None else found + dB * g
+
+    def slopes_of(found: Around, three, turns) -> Around:
+        moved = [slope(side, turn) for side, turn in zip(three, turns, strict=True)]
+        squares = (2 * real(conj(x) * dx) for x, dx in zip(found.values, moved, strict=True))
+        return Around(Three(*moved), Three(*squares))
+
+    found, scale_square = _around(sides, Q, k, through, sincos)
+    moved = tuple(slopes_of(*each) for each in zip(found, sides, dsides, strict=True))
+    return (found, scale_square), (moved, dscale)
 
 
 def _is_nothing(x: Any) -> bool:
@@ -190,16 +156,7 @@ def _all_nothing(x: Any) -> bool:
     return all(map(_is_nothing, jax.tree.leaves(x, is_leaf=_is_nothing)))
 
 
-_amplitudes.defjvp(_amplitudes_slope, symbolic_zeros=True)
-
-
-class Wave(NamedTuple):
-    """One polarisation of the light around a layer: amplitudes over a common denominator."""
-
-    reflected: Number  # r = reflected / denominator, for light from the ambient
-    below: Number  # the same for light from the substrate
-    denominator: Number
-    transmitted: Any  # power into the substrate, times |denominator|²
+_around.defjvp(_around_slope, symbolic_zeros=True)
 
 
 def film(
@@ -230,7 +187,7 @@ def film(
     q2 = normal(substrate, a)
     bare, empty = same(ambient, substrate), same(ambient, layer, substrate)
     letters = polarisations[:1] if angle is None else polarisations
-    sides, powers = [], []
+    sides, fluxes = [], []
     for polarisation in letters:
         if polarisation == "s":
             A, B, A_, B_ = q0 + q2, q0 * q2 + q1_square, q0 - q2, q0 * q2 - q1_square
@@ -238,23 +195,32 @@ def film(
             u, v = e0 * e2 * q1_square / e1, e1 * q0 * q2
             A, B, A_, B_ = e0 * q2 + e2 * q0, u + v, e2 * q0 - e0 * q2, v - u
         A_, B_ = nothing_where(bare, A_), nothing_where(empty, B_)
-        sides += [(A_, B_), (-A_, B_), (A, B)]
-        powers.append(carried(ambient, q0, polarisation) * power(substrate, q2, polarisation))
-    found, scale_square = _combined(tuple(sides), q1_square, phase, through, sincos)
-    trios = zip(found[0::3], found[1::3], found[2::3], powers, strict=True)
-    return tuple(Wave(down, below, whole, into * scale_square) for down, below, whole, into in trios)
+        flux = carried(ambient, q0, polarisation) * power(substrate, q2, polarisation)
+        if is_real(A):  # and positive: over A, which cancels, a product less at each point
+            over = 1 / A
+            A, A_, B, B_, flux = 1.0, A_ * over, B * over, B_ * over, flux * over * over
+        sides.append(Three((A_, B_), (-A_, B_), (A, B)))
+        fluxes.append(flux)
+    found, scale_square = _around(tuple(sides), q1_square, phase, through, sincos)
+    waves = []
+    for (values, squares), flux in zip(found, fluxes, strict=True):
+        down, below, whole = values
+        waves.append(Wave(down, below, whole, squares, hold(flux, scale_square), scale_square))
+    return tuple(waves)
 
 
-def reflectance(wave: Wave):
-    """R = |r|² for light from the ambient."""
-    return abs2(wave.reflected) / abs2(wave.denominator)
+def reflectance(*waves: Wave) -> Any:
+    """R = |r|² for light from the ambient: the mean over the polarisations given."""
+    share = 1 / len(waves)
+    return sum(wave.squares.reflected * (share / wave.squares.denominator) for wave in waves)
 
 
 def reflectance_below(wave: Wave):
     """R for light from the substrate."""
-    return abs2(wave.below) / abs2(wave.denominator)
+    return wave.squares.below / wave.squares.denominator
 
 
-def transmittance(wave: Wave):
-    """T, the power into the substrate. A lossless substrate sends the same fraction back."""
-    return wave.transmitted / abs2(wave.denominator)
+def transmittance(*waves: Wave) -> Any:
+    """T, the power into the substrate, likewise. A lossless substrate sends the same fraction back."""
+    share = 1 / len(waves)
+    return waves[0].scale_square * sum(wave.flux * (share / wave.squares.denominator) for wave in waves)

@@ -192,11 +192,6 @@ def _sqrt_slope(primal, tangent):
     return root, where(at_zero, 0.0 * tangent[0], tangent[0] * (0.5 / safe))
 
 
-def hold(*values):
-    """Compute these once, outside the loop over thickness (XLA would repeat them at every point)."""
-    return jax.lax.optimization_barrier(values)
-
-
 def sincos(x):
     """Sine and cosine from the library."""
     return jnp.sin(x), jnp.cos(x)
@@ -242,8 +237,8 @@ def sincos_poly(x):
     for piece in reduction:
         r = r - quarter * x.dtype.type(piece)
     z = r * r
-    s = c = jnp.zeros_like(x)
-    for a, b in zip(odd, even, strict=True):
+    s, c = x.dtype.type(odd[0]), x.dtype.type(even[0])
+    for a, b in zip(odd[1:], even[1:], strict=True):
         s, c = s * z + x.dtype.type(a), c * z + x.dtype.type(b)
     s, c = r + r * z * s, 1 - 0.5 * z + z * z * c
     turn = quarter - 4 * jnp.floor(quarter * 0.25)

@@ -1,7 +1,7 @@
 """Several coherent layers: the product of characteristic matrices, each held to size.
 
 The fields (E, H) at a layer's lower face give those at its upper face through the same two entire
-functions as one film (`film.through`), both times a scale; after each layer the fields are
+functions as one film (`passage.through`), both times a scale; after each layer the fields are
 divided by their own size. So 50 layers with an opaque one among them stay finite, and nothing is
 clamped. Complex arithmetic: on separate real arrays a stack gains nothing. One `lax.scan` over the
 layers: unrolled, 50 of them do not compile in minutes.
@@ -17,9 +17,10 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
-from pellicle.optics.film import Wave, through
+from pellicle.optics.film import Three, Wave
 from pellicle.optics.interface import carried, normal, normal_square, nothing_where, power, same, transverse
 from pellicle.optics.number import Number, SinCos, abs2, sincos, to_complex
+from pellicle.optics.passage import through
 
 
 def stack(
@@ -67,11 +68,13 @@ def stack(
         (E, H), scale_square = _fields(*below, a, polarisation, sincos)
         (E_, H_), _ = _fields(index, depth, q_top / e0, up_faces, a, polarisation, sincos)
         down, up = q_top * E / e0, q_bottom * E_ / e2
-        into = carried(ambient, q0, polarisation) * power(bottom, q_bottom, polarisation) * scale_square
+        flux = carried(ambient, q0, polarisation) * power(bottom, q_bottom, polarisation)
         denominator = down + H
         # the two directions share their denominator but for scale: bring the second to the first
         reversed_ = (up - H_) / (up + H_) * denominator
-        waves.append(Wave(nothing_where(empty, down - H), reversed_, denominator, into / abs2(e0 * e2)))
+        found = (nothing_where(empty, down - H), reversed_, denominator)
+        squares = Three(*(abs2(amplitude) for amplitude in found))
+        waves.append(Wave(*found, squares, flux / abs2(e0 * e2), scale_square))
     return tuple(waves)
 
 

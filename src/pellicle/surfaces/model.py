@@ -10,7 +10,7 @@ import jax.numpy as jnp
 
 from pellicle.brdf import film_colour
 from pellicle.brdf.models import Evaluate, model
-from pellicle.optics import film
+from pellicle.optics import passage
 from pellicle.planning import Plan
 from pellicle.surfaces.lit import Lit
 
@@ -58,5 +58,5 @@ def _reflectance(plan: Plan) -> film_colour.Reflectance:
     if plan.on("tunnelling"):
         return film_colour.airy(polarisations)
     absorbs = any(row.effect == "absorption" and row.on for row in plan.rows)
-    through = film.through if absorbs else film.through_wave
+    through = passage.through if absorbs else passage.through_wave
     return film_colour.airy(polarisations, through, enter=lambda index: index)
