@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from logging import getLogger
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
     from pellicle.io.samples import BrdfSamples
     from pellicle.io.surface_recipe import SurfaceRecipe
     from pellicle.sampling.result import Posterior
+
+log = getLogger(__name__)
 
 
 def wanted(recipe: str | None, signal: str | None) -> bool:
@@ -110,6 +113,14 @@ def _one(
     try:
         samples = recipe.read(path)
         say(*(f"{path}: {note}" for note in samples.notes))
+        log.info(
+            "surface: %s, by %d samples of %s",
+            recipe.surface.model,
+            len(samples),
+            ", ".join(samples.channels),
+        )
+        for leaf in recipe.surface.leaves():
+            log.info("free: %s between %g and %g", leaf.name, leaf.free.lower, leaf.free.upper)
         fit, posterior = _found(recipe, samples, folder, sampler, progress)
     except ValueError as error:
         progress.clear()
