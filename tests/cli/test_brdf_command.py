@@ -78,8 +78,10 @@ def told(monkeypatch):
 
 
 def test_a_recipe_says_what_is_fitted_and_how(folder, told, pellicle):
-    ran = pellicle("fit", "--recipe", folder / "paint.toml", "--json", "--out", folder / "out")
+    ran = pellicle("fit", "--recipe", folder / "paint.toml", "--json", "--verbose", "--out", folder / "out")
     assert ran.code == 4
+    assert "surface: microfacet-film, by 30 samples of R, G, B\n" in ran.err
+    assert "free: thickness between 10 and 700\n" in ran.err
     (found,) = ran.objects
     assert found["schema"] == "pellicle.fit/1"
     assert found["data"]["signal"] == "brdf"
