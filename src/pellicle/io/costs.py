@@ -112,7 +112,8 @@ def write_cost(folder: str | os.PathLike[str], cost: Cost, recipe: str) -> Path:
 
     Raises UsageError where it holds anything that pellicle did not write, or cannot be written.
     """
-    from pellicle.report.cost import figure, text
+    from pellicle.report.cost import text
+    from pellicle.report.cost_figure import figure
 
     name = Path(recipe).name
     record, report = to_json(cost, recipe), text(cost, name)
@@ -121,7 +122,8 @@ def write_cost(folder: str | os.PathLike[str], cost: Cost, recipe: str) -> Path:
 
 def write_surface_cost(folder: str | os.PathLike[str], cost: SurfaceCost, recipe: str) -> Path:
     """The same of a surface."""
-    from pellicle.report.cost import surface_figure, surface_text
+    from pellicle.report.cost import surface_text
+    from pellicle.report.cost_figure import surface_figure
 
     name = Path(recipe).name
     record, report = surface_to_json(cost, recipe), surface_text(cost, name)

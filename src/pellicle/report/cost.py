@@ -1,30 +1,17 @@
-"""What accuracy costs, as text for people and as a figure of error against time."""
+"""What accuracy costs, as text for people."""
 
 from __future__ import annotations
 
-import os
 import textwrap
-from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
 
-import numpy as np
-
-from pellicle.io.atomic import replacing
 from pellicle.ladder.climb import Ladder
 from pellicle.ladder.cost import Cost
 from pellicle.ladder.intervals import Intervals
 from pellicle.ladder.race import Race
 from pellicle.ladder.surface import SurfaceCost
-from pellicle.report.style import BLUE, GREY, ORANGE
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-COLUMNS = 100
-DPI = 150
-FLOOR = 1e-17
-"""Where an error of nothing is drawn."""
+from pellicle.report.page import COLUMNS
 
 
 def text(cost: Cost, name: str) -> str:
@@ -78,31 +65,25 @@ def _about(ladder: Ladder) -> str:
 
 
 def _ladder(ladder: Ladder, name: str) -> str:
-    said = f"{name}: {_about(ladder)} against {ladder.reference}"
     clock, scale = clock_of(ladder)
-    timed = f"{clock}/{ladder.sample}"
-    rows = [("", "rung", "leaves out", error_of(ladder), timed, "compile s", "kflop")]
-    rows += [
-        (
-            _mark(rung, ladder.recommended),
-            rung.name,
-            rung.leaves_out,
-            f"{rung.error:.1e}",
-            f"{rung.seconds * scale:.{2 if scale < 1e9 else 0}f}",
-            f"{rung.compile_seconds:.2f}",
-            "" if rung.flops is None else f"{rung.flops / 1e3:.{1 if scale < 1e9 else 2}f}",
-        )
-        for rung in ladder.rungs
-    ]
+    few, more = (2, 1) if scale < 1e9 else (0, 2)
+    columns: _Columns = {
+        "rung": lambda rung: rung.name,
+        "leaves out": lambda rung: rung.leaves_out,
+        error_of(ladder): lambda rung: f"{rung.error:.1e}",
+        f"{clock}/{ladder.sample}": lambda rung: f"{rung.seconds * scale:.{few}f}",
+        "compile s": lambda rung: f"{rung.compile_seconds:.2f}",
+        "kflop": lambda rung: "" if rung.flops is None else f"{rung.flops / 1e3:.{more}f}",
+    }
     found = ladder.recommended
     size = error_of(ladder, f"{ladder.tolerance:g}")
     within = f"{'a' if size.startswith('r') else 'an'} {size}"
-    advice = f"→ {found} is the fastest within {within}"
+    advice = f"{found} is the fastest within {within}"
     if not ladder.within:
-        advice = f"→ no rung is within {within}; {found} comes nearest"
-    notes = ["* no other is both faster and as accurate", advice, *_left_out(ladder.left_out)]
-    table = _aligned(rows, left=3)
-    return "\n".join([*textwrap.wrap(said, COLUMNS), "", *table, "", *notes]) + "\n"
+        advice = f"no rung is within {within}; {found} comes nearest"
+    said = f"{name}: {_about(ladder)} against {ladder.reference}"
+    notes = ["* no other is both faster and as accurate", f"→ {advice}", *_left_out(ladder.left_out)]
+    return _block(said, ladder.rungs, found, columns, notes)
 
 
 def _race(race: Race) -> str:
@@ -111,23 +92,17 @@ def _race(race: Race) -> str:
         f"Fits of {count} simulated spectra with noise {race.noise:g}, their truths anywhere between the "
         "bounds; errors as a share of the bounds"
     )
-    rows = [("", "solver", "leaves out", "failed", "mean error", "median", "ms/fit", "compile s")]
-    rows += [
-        (
-            _mark(solver, race.recommended),
-            solver.name,
-            solver.leaves_out,
-            f"{solver.failures}/{solver.datasets}",
-            f"{solver.error:.1e}",
-            f"{solver.median_error:.1e}",
-            f"{solver.seconds * 1e3:.1f}",
-            f"{solver.compile_seconds:.1f}",
-        )
-        for solver in race.solvers
-    ]
-    advice = f"→ {race.recommended} is the fastest of those that failed least"
-    lines = [*textwrap.wrap(said, COLUMNS), "", *_aligned(rows, left=3), ""]
-    return "\n".join([*lines, *([advice] if race.solvers else []), *_left_out(race.left_out)]) + "\n"
+    columns: _Columns = {
+        "solver": lambda solver: solver.name,
+        "leaves out": lambda solver: solver.leaves_out,
+        "failed": lambda solver: f"{solver.failures}/{solver.datasets}",
+        "mean error": lambda solver: f"{solver.error:.1e}",
+        "median": lambda solver: f"{solver.median_error:.1e}",
+        "ms/fit": lambda solver: f"{solver.seconds * 1e3:.1f}",
+        "compile s": lambda solver: f"{solver.compile_seconds:.1f}",
+    }
+    advice = [f"→ {race.recommended} is the fastest of those that failed least"] if race.solvers else []
+    return _block(said, race.solvers, race.recommended, columns, [*advice, *_left_out(race.left_out)])
 
 
 def _intervals(found: Intervals) -> str:
@@ -136,22 +111,30 @@ def _intervals(found: Intervals) -> str:
         f"95 % intervals of the same {count} data sets: how often they hold a parameter's truth, how wide "
         "they are as a share of the bounds, and their time after the fit"
     )
-    rows = [("", "interval", "leaves out", "holds the truth", "width", "ms", "compile s")]
-    rows += [
-        (
-            _mark(way, found.recommended),
-            way.name,
-            way.leaves_out,
-            f"{100 * way.coverage:.0f} ± {100 * way.doubt:.0f} %",
-            f"{way.width:.1e}",
-            f"{way.seconds * 1e3:.1f}",
-            f"{way.compile_seconds:.1f}",
-        )
-        for way in found.ways
-    ]
-    advice = f"→ {found.recommended} is the fastest whose share is 95 % within two standard deviations"
-    lines = [*textwrap.wrap(said, COLUMNS), "", *_aligned(rows, left=3), ""]
-    return "\n".join([*lines, *([advice] if found.ways else []), *_left_out(found.left_out)]) + "\n"
+    columns: _Columns = {
+        "interval": lambda way: way.name,
+        "leaves out": lambda way: way.leaves_out,
+        "holds the truth": lambda way: f"{100 * way.coverage:.0f} ± {100 * way.doubt:.0f} %",
+        "width": lambda way: f"{way.width:.1e}",
+        "ms": lambda way: f"{way.seconds * 1e3:.1f}",
+        "compile s": lambda way: f"{way.compile_seconds:.1f}",
+    }
+    best = f"→ {found.recommended} is the fastest whose share is 95 % within two standard deviations"
+    notes = [*([best] if found.ways else []), *_left_out(found.left_out)]
+    return _block(said, found.ways, found.recommended, columns, notes)
+
+
+_Columns = Mapping[str, Callable[[Any], str]]
+"""What a table says of each of those compared, under its head."""
+
+
+def _block(
+    said: str, compared: Sequence[Any], recommended: str | None, columns: _Columns, notes: Sequence[str]
+) -> str:
+    """What is compared, the table, and what follows from it."""
+    rows = [(_mark(each, recommended), *(tell(each) for tell in columns.values())) for each in compared]
+    table = _aligned([("", *columns), *rows], left=3)
+    return "\n".join([*textwrap.wrap(said, COLUMNS), "", *table, "", *notes]) + "\n"
 
 
 def _mark(rung: Any, recommended: str | None) -> str:
@@ -174,85 +157,3 @@ def _left_out(given: Mapping[str, str]) -> list[str]:
         reasons.setdefault(why, []).append(name)
     told = [f"not here: {', '.join(names)}: {why}" for why, names in reasons.items()]
     return [line for one in told for line in textwrap.wrap(one, COLUMNS, subsequent_indent="    ")]
-
-
-def figure(cost: Cost, name: str, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
-    """Draw error against time into `path` (.png, .pdf or .svg), complete or not at all."""
-    with replacing(path, overwrite=overwrite) as draft:
-        draw(cost, name).savefig(draft, dpi=DPI)
-
-
-def surface_figure(
-    cost: SurfaceCost, name: str, path: str | os.PathLike[str], *, overwrite: bool = False
-) -> None:
-    """The same of a surface: its colours above its values."""
-    ladders = [ladder for ladder in (cost.colours, cost.values) if ladder is not None]
-    drawn, axes = _panels(len(ladders))
-    for at, ladder in zip(axes, ladders, strict=True):
-        _panel(at, ladder, name)
-    with replacing(path, overwrite=overwrite) as draft:
-        drawn.savefig(draft, dpi=DPI)
-
-
-def _panels(count: int) -> tuple[Figure, Any]:
-    """A figure, bound to no window and to no global state, of panels one above the other."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    drawn = Figure(figsize=(8.0, 0.4 + 4.6 * count), layout="constrained")
-    FigureCanvasAgg(drawn)
-    return drawn, np.atleast_1d(drawn.subplots(count, 1))
-
-
-def _panel(axes: Axes, ladder: Ladder, name: str) -> None:
-    clock, scale = clock_of(ladder)
-    _scatter(axes, ladder.rungs, ladder.recommended, scale)
-    axes.axhline(ladder.tolerance, color=BLUE, linewidth=0.8, linestyle=":")
-    which = "mean" if ladder.sample == "colour" else "largest"
-    axes.set(
-        xlabel=f"time of one {ladder.sample} ({clock})",
-        ylabel=f"{which} {error_of(ladder)}, against {ladder.reference}",
-        title=name.replace("$", r"\$"),
-    )
-
-
-def draw(cost: Cost, name: str) -> Figure:
-    """The figure itself."""
-    raced = cost.race is not None and bool(cost.race.solvers)
-    drawn, axes = _panels(2 if raced else 1)
-    _panel(axes[0], cost.ladder, name)
-    if raced:
-        assert cost.race is not None
-        _scatter(axes[1], cost.race.solvers, cost.race.recommended, 1e3)
-        axes[1].set(xlabel="time of one fit (ms)", ylabel="mean error of the parameters, share of the bounds")
-    return drawn
-
-
-def _scatter(axes: Axes, rungs: Sequence[Any], recommended: str | None, scale: float) -> None:
-    """Points with their names, the Pareto front joined, an error of nothing at the foot."""
-    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
-
-    seen = [(rung.seconds * scale, max(rung.error, FLOOR)) for rung in rungs]
-    front = sorted(point for point, rung in zip(seen, rungs, strict=True) if rung.pareto)
-    axes.plot(*zip(*front, strict=True), color=ORANGE, linewidth=1.0, zorder=1)
-    for i, (point, rung) in enumerate(
-        zip(seen, rungs, strict=True)
-    ):  # neighbours in time, as they are sorted
-        if not np.isfinite(point[1]):
-            continue
-        colour = ORANGE if rung.pareto else GREY
-        axes.plot(*point, "D" if rung.name == recommended else "o", color=colour, markersize=5)
-        axes.annotate(
-            rung.name,
-            point,
-            xytext=(5, -8 if i % 2 else 3),
-            textcoords="offset points",
-            fontsize="x-small",
-            color=colour,
-        )
-    axes.set(xscale="log", yscale="log")
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
-    axes.margins(x=0.12, y=0.08)
-    axes.grid(alpha=0.2)
