@@ -23,7 +23,7 @@ import numpy as np
 from scipy.stats import binomtest
 
 from pellicle.brdf import direction
-from pellicle.brdf_fitting.estimates import estimates, local, rivals
+from pellicle.brdf_fitting.estimates import local, rivals
 from pellicle.brdf_fitting.fit import judged, problem
 from pellicle.brdf_fitting.sample import sample_brdf
 from pellicle.brdf_fitting.search import THOROUGH, search, settle
@@ -116,8 +116,7 @@ def run(surface: Surface, noise: float, seed: int) -> Run:
     whole = problem(samples, surface, "linear", surface.brdf.evaluate)
     minima = settle(whole, search(whole, THOROUGH, quiet), quiet)
     at = local(whole, minima.units[0], sigma_known=True)
-    found = estimates(surface, whole, at)
-    status = judged(minima, at, found, rivals(whole, minima, at), sigma_known=True)
+    status, found = judged(surface, whole, minima, at, rivals(whole, minima, at), sigma_known=True)
     seconds = time.perf_counter() - began
     true = {leaf.name: float(np.ravel(truth[leaf.key])[leaf.channel or 0]) for leaf in surface.leaves()}
     scores = {k: ((found[k].value - x) / found[k].stderr, found[k].stderr) for k, x in true.items()}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import jax
@@ -12,7 +13,9 @@ from scipy.optimize import brentq, least_squares
 from pellicle.brdf import direction, model
 from pellicle.brdf_fitting import estimates, fit
 from pellicle.brdf_fitting.problem import polished
+from pellicle.brdf_fitting.search import Minima
 from pellicle.fitting.limits import Limits
+from pellicle.fitting.result import Status
 from pellicle.free import Free
 from pellicle.io.samples import BrdfSamples
 from pellicle.surfaces.surface import Surface
@@ -57,7 +60,8 @@ def found(seen):
     units, _, converged = polished(*whole.program, np.full((1, 3), 0.3))
     assert converged[0]
     at = estimates.local(whole, np.asarray(units[0]), sigma_known=True)
-    return estimates.estimates(surface, whole, at), at
+    known = estimates.by_profile(surface, whole, at)
+    return estimates.estimates(surface, whole, at, known), at
 
 
 def profile(seen, name):
@@ -117,6 +121,25 @@ def test_the_azimuth_of_a_tilt(monkeypatch, tilt, azimuth, stderr):
     whole = fit.problem(samples, TILTED, "linear", TILTED.brdf.evaluate)
     at = estimates.local(whole, np.array([0.7, 0.5]), sigma_known=False)
     monkeypatch.setattr(estimates, "limits", lambda around: [tilt, azimuth])
-    found = estimates.estimates(TILTED, whole, at)["azimuth"]
+    known = estimates.by_profile(TILTED, whole, at)
+    found = estimates.estimates(TILTED, whole, at, known)["azimuth"]
     assert found.stderr == stderr
     assert (found.lower_limit, found.upper_limit, found.at_bound) == (None, None, False)
+
+
+def test_of_a_misfit_no_limits_are_sought(monkeypatch, seen):
+    """Values of another shape altogether, with a σ that no model can reach."""
+    samples, _ = seen
+    surface = Surface("granier-heidrich", {**HELD, **FREE}, (550.0,))
+    off = dataclasses.replace(samples, values=np.random.default_rng(0).random((120, 1)) * 100)
+    whole = fit.problem(off, surface, "linear", surface.brdf.evaluate)
+    units, chi2, _ = polished(*whole.program, np.full((1, 3), 0.3))
+    minima = Minima(np.asarray(units), np.asarray(chi2), np.array([True]))
+    at = estimates.local(whole, minima.units[0], sigma_known=True)
+    monkeypatch.setattr(estimates, "limits", lambda around: pytest.fail("a profile was made"))
+    status, parameters = fit.judged(surface, whole, minima, at, (), sigma_known=True)
+    assert status is Status.MISFIT
+    for name in BOUNDS:
+        assert (parameters[name].lower_limit, parameters[name].upper_limit) == (None, None)
+    expected = at.stderr[at.names.index("specular")]
+    assert parameters["specular"].stderr in (expected, math.inf)

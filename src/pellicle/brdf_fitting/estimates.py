@@ -16,7 +16,7 @@ from pellicle.fitting.limits import Limits, limits
 from pellicle.fitting.noise import correlation_length
 from pellicle.fitting.result import Estimate, Rival
 from pellicle.fitting.status import RIVAL
-from pellicle.fitting.uncertainty import Scaled, correlation
+from pellicle.fitting.uncertainty import UNSEEN, Scaled, correlation
 from pellicle.surfaces.surface import Leaf, Surface
 
 _ON_BOUND = 1e-6
@@ -104,15 +104,11 @@ def scaled(surface: Surface, at: Local) -> Scaled:
     return Scaled(at.slope * span / math.sqrt(at.variance), span, at.names)
 
 
-def estimates(
-    surface: Surface, problem: Problem, at: Local, others: tuple[Rival, ...] = ()
-) -> dict[str, Estimate]:
-    """Every parameter, free ones first, the thickness before all; limits look at the rivals too."""
+def estimates(surface: Surface, problem: Problem, at: Local, known: dict[str, Limits]) -> dict[str, Estimate]:
+    """Every parameter, free ones first, the thickness before all; `known` by name, of the free ones."""
     leaves = {leaf.name: leaf for leaf in surface.leaves()}
-    near = [list(r.parameters.values()) for r in others[:_MOST_LOOKED_AT] if r.delta_chi2 < RIVAL]
-    bounded = _bounded(surface, problem, at, np.array([at.numbers, *near]))
     found = [
-        _estimate(leaves[name], float(value), bounded[name], problem.form.coordinates)
+        _estimate(leaves[name], float(value), known[name], problem.form.coordinates)
         for name, value in zip(at.names, at.numbers, strict=True)
     ]
     found.sort(key=lambda e: e.name != "thickness")
@@ -125,9 +121,21 @@ def estimates(
     return {e.name: e for e in [*found, *fixed]}
 
 
-def _bounded(surface: Surface, problem: Problem, at: Local, minima: np.ndarray) -> dict[str, Limits]:
-    """Errors and limits by name. An azimuth has no bounds to lie beside, and of no tilt it has no meaning."""
-    around = valley(surface, problem, minima, at.covariance, at.variance)
+def by_curvature(surface: Surface, at: Local) -> dict[str, Limits]:
+    """Errors by the covariance alone, for a fit whose numbers should not be used: profiles of it would mean
+    nothing, and cost most where the model misses the samples."""
+    span = {leaf.name: leaf.free.upper - leaf.free.lower for leaf in surface.leaves()}
+    each = zip(at.names, at.stderr, strict=True)
+    return {name: Limits(float(sd) if sd <= UNSEEN * span[name] else math.inf) for name, sd in each}
+
+
+def by_profile(
+    surface: Surface, problem: Problem, at: Local, others: tuple[Rival, ...] = ()
+) -> dict[str, Limits]:
+    """Errors and limits, which look at the rivals too. An azimuth has no bounds to lie beside, and of no tilt
+    it has no meaning."""
+    near = [list(r.parameters.values()) for r in others[:_MOST_LOOKED_AT] if r.delta_chi2 < RIVAL]
+    around = valley(surface, problem, np.array([at.numbers, *near]), at.covariance, at.variance)
     found = dict(zip(at.names, limits(around), strict=True))
     tilt, azimuth = found.get("deviation"), found.get("azimuth")
     if tilt is not None and azimuth is not None and problem.form.coordinates.tilt is not None:

@@ -13,7 +13,7 @@ import numpy as np
 from pellicle.brdf_fitting import doubts, evidence
 from pellicle.brdf_fitting.baselines import plain
 from pellicle.brdf_fitting.coordinates import coordinates
-from pellicle.brdf_fitting.estimates import Local, estimates, local, rivals, scaled
+from pellicle.brdf_fitting.estimates import Local, by_curvature, by_profile, estimates, local, rivals, scaled
 from pellicle.brdf_fitting.problem import Form, Problem, chi_squares, data, seeing
 from pellicle.brdf_fitting.residuals import RESIDUALS
 from pellicle.brdf_fitting.result import Baseline, BrdfFit
@@ -137,14 +137,25 @@ def _fit(samples: BrdfSamples, surface: Surface, residual: str, progress: Progre
 
 
 def judged(
-    minima: Minima,
-    at: Local,
-    parameters: dict[str, Estimate],
-    others: tuple[Rival, ...],
-    sigma_known: bool,
-) -> Status:
-    """What the fit of the layer says of itself, before it is weighed against the baselines."""
-    misfit = misfits(
+    surface: Surface, whole: Problem, minima: Minima, at: Local, others: tuple[Rival, ...], sigma_known: bool
+) -> tuple[Status, dict[str, Estimate]]:
+    """What the fit of the layer says of itself, not yet weighed against the baselines, and its numbers."""
+    converged, misfit = bool(minima.converged[0]), _misses(at, sigma_known)
+    usable = converged and not misfit
+    known = by_profile(surface, whole, at, others) if usable else by_curvature(surface, at)
+    parameters = estimates(surface, whole, at, known)
+    status = judge(
+        converged=converged,
+        misfit=misfit,
+        parameters=parameters,
+        rivals=others,
+        natural=frozenset(name for name in NATURAL & parameters.keys() if parameters[name].value == 0),
+    )
+    return status, parameters
+
+
+def _misses(at: Local, sigma_known: bool) -> bool:
+    return misfits(
         chi2_reduced=at.chi2_reduced,
         sigma_known=sigma_known,
         drifting=False,
@@ -152,15 +163,6 @@ def judged(
         rms=float(np.sqrt(np.mean(at.residuals**2))),
         span=at.span,
         calibrated=False,
-    )
-    return judge(
-        converged=bool(minima.converged[0]),
-        misfit=misfit,
-        parameters=parameters,
-        rivals=others,
-        natural=frozenset(
-            p.name for p in parameters.values() if p.name in NATURAL and p.value == p.lower == 0
-        ),
     )
 
 
@@ -184,10 +186,9 @@ def _report(
 ) -> BrdfFit:
     whole, minima, at = found
     others = rivals(whole, minima, at)
-    parameters = estimates(surface, whole, at, others)
+    status, parameters = judged(surface, whole, minima, at, others, samples.sigma is not None)
     layer = evidence.weigh(parameters, others, held_out, baselines)
     rms = float(np.sqrt(np.mean(at.residuals**2)))
-    status = judged(minima, at, parameters, others, samples.sigma is not None)
     trading = identifiability.trades(scaled(surface, at), parameters)
     if not layer.layered and not layer.several:
         parameters = _unlayered(parameters)

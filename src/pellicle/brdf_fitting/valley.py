@@ -18,6 +18,8 @@ NATURAL = frozenset({"k", "base_k", "deviation", "specular", "diffuse"})
 """Their lower bound, 0, is physics'."""
 _MIRROR = frozenset({"exponent", "exponent_reflection", "exponent_transmission"})
 """Beyond their upper bound lies a mirror, which samples at some distance cannot tell from a narrow lobe."""
+_STEPS = 40
+"""Of a polish with one number held, which starts near where it ends."""
 
 
 def affine(surface: Surface, problem: Problem) -> Problem:
@@ -63,7 +65,9 @@ def valley(
     form, data, fixed, box, most = own.program
 
     def solve(lower: np.ndarray, upper: np.ndarray, units: np.ndarray) -> Sequence[Any]:
-        found, chi2, converged = polished(form, data, fixed, Box(lower, upper, box.reach), most, units)
+        found, chi2, converged = polished(
+            form, data, fixed, Box(lower, upper, box.reach), most, units, _STEPS
+        )
         return found, np.asarray(chi2) / variance, converged
 
     known = {leaf.name: leaf for leaf in surface.leaves()}
