@@ -221,7 +221,7 @@ def test_range_cuts_before_values_are_judged(write):
 def test_noise_is_the_sigma_of_every_point(write):
     spectrum = read_spectrum(write("wavelength,R,sigma\n500,0.1,0.5\n600,0.2,0.5\n"), noise=0.005)
     np.testing.assert_array_equal(spectrum.sigma, 0.005)
-    assert any("--noise" in note for note in spectrum.notes)
+    assert any("goes before the sigma column" in note for note in spectrum.notes)
 
 
 def test_small_negative_values_are_noise(write):
