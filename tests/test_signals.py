@@ -271,3 +271,17 @@ def test_the_examples_in_the_docstrings():
     tried = doctest.testmod(signals, extraglobs={"pl": pl, "np": np, "jnp": jnp, "jax": jax} | vars(signals))
     assert tried.failed == 0
     assert tried.attempted > 0
+
+
+@pytest.mark.parametrize("whole", [np.asarray, jnp.asarray])
+def test_known_media_are_known_under_jit_too(whole):
+    """Arrays that a traced function closes over, of NumPy and of JAX, above and below the critical angle."""
+    wavelength, angle = np.array([500.0, 600.0]), whole(np.array([30.0, 70.0]))
+    layer, substrate = whole(np.array([1.3, 1.4])), whole(np.array([1.46, 1.1]))
+
+    def signal(thickness):
+        return pl.reflectance(wavelength, thickness, layer, substrate, ambient=1.5, angle=angle)
+
+    given = pl.reflectance(wavelength, 100.0, layer + 0j, substrate + 0j, ambient=1.5, angle=angle)
+    np.testing.assert_allclose(jax.jit(signal)(100.0), given, rtol=1e-12)
+    np.testing.assert_allclose(signal(100.0), given, rtol=1e-12)

@@ -153,7 +153,8 @@ def _propagates(medium: Any, ambient: Any, angle: Any) -> bool:
     given = (medium, ambient, angle)
     if any(isinstance(x, Tracer) or not isinstance(x, NUMBERS) for x in given):
         return False
-    return bool(np.all(np.real(medium) > np.abs(ambient * np.sin(np.deg2rad(angle)))))
+    index, n0, theta = map(np.asarray, given)  # where JAX traces, it would trace an array of its own too
+    return bool(np.all(np.real(index) > np.abs(n0 * np.sin(np.deg2rad(theta)))))
 
 
 def _stack_waves(wavelength, thickness, layers, substrate, ambient, theta, letters):

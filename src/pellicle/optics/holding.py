@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import jax
@@ -12,12 +13,13 @@ from pellicle.optics.number import Number
 
 
 def used_again(value: Number, beside: Any) -> bool:
-    """Whether each element of `value` meets several of `beside`, which is larger."""
-    return all(jnp.size(x) < jnp.size(beside) for x in jax.tree.leaves(value))
+    """Whether each element of `value` meets so many of `beside` that holding it takes little memory."""
+    own = jnp.broadcast_shapes(*(jnp.shape(x) for x in jax.tree.leaves(value)))
+    return 8 * math.prod(own) <= math.prod(jnp.broadcast_shapes(own, jnp.shape(beside)))
 
 
 def hold(value: Number, beside: Any) -> Number:
-    """The same numbers, computed once and not again at every point of a larger array `beside`.
+    """The same numbers, computed once and not again at every point of an array `beside` that they meet.
 
     XLA moves what it takes for cheap into the loop that uses it and repeats it there at each point; where
     two loops use it, each computes it anew, and not always to the same rounding. It does not look into
