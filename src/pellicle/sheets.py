@@ -9,7 +9,8 @@ import jax
 import jax.numpy as jnp
 
 from pellicle.optics import film, interface, orders, passage, plate, stack
-from pellicle.optics.number import Number, imag, is_real, real, sincos_poly
+from pellicle.optics.number import Number, imag, is_real, real
+from pellicle.optics.sines import sincos_poly
 from pellicle.planning import Plan
 from pellicle.scene import Group, Layer, Scene, groups, thickness_spread
 

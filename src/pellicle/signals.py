@@ -18,8 +18,9 @@ from jaxtyping import Array, Complex, Float
 from pellicle.optics import film, interface, stack
 from pellicle.optics.dispersion import AbstractDispersion
 from pellicle.optics.ellipsometry import angles, normalised, stokes
-from pellicle.optics.number import Number, is_real, sincos_poly, to_complex, to_pair
+from pellicle.optics.number import Number, is_real, to_complex, to_pair
 from pellicle.optics.passage import through, through_wave
+from pellicle.optics.sines import sincos_poly
 from pellicle.scene import check_polarisation, medium, surroundings
 
 NUMBERS = int | float | complex | np.ndarray | np.generic | jax.Array

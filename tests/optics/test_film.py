@@ -13,7 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pellicle.optics import film, interface, passage
-from pellicle.optics.number import Pair, sincos, sincos_poly, to_pair
+from pellicle.optics.number import Pair, to_pair
+from pellicle.optics.sines import sincos, sincos_poly
 
 SINES = pytest.mark.parametrize("sines", [sincos, sincos_poly])
 

@@ -6,7 +6,6 @@ import operator
 
 import jax
 import jax.numpy as jnp
-import mpmath
 import numpy as np
 import pytest
 from hypothesis import given
@@ -121,24 +120,3 @@ def test_slope_of_sqrt_at_zero_is_zero():
     for zero, one in ((0.0, 1.0), (Pair(0.0, 0.0), Pair(1.0, 1.0)), (0j, 1 + 1j)):
         root, slope = jax.jvp(number.sqrt, (zero,), (one,))
         assert value(root) == value(slope) == 0
-
-
-@mpmath.workdps(30)
-@pytest.mark.parametrize(("dtype", "worst"), [(np.float64, 2.3e-16), (np.float32, 9.5e-8)])
-def test_sincos_poly_to_1e5_radians(dtype, worst):
-    spread = np.random.default_rng(1).uniform(-1, 1, 1500) * np.logspace(-6, 5, 1500)
-    quarters = np.arange(-8, 9) * np.pi / 4  # where the branches of the reduction meet
-    x = np.concatenate([spread, quarters, [0.0, 1e5, -1e5]]).astype(dtype)
-    sine, cosine = (np.asarray(column) for column in jax.jit(number.sincos_poly)(x))
-    assert sine.dtype == cosine.dtype == dtype
-    for at, s, c in zip(x, sine, cosine, strict=True):
-        exact = mpmath.mpf(float(at))
-        assert abs(mpmath.sin(exact) - float(s)) <= worst
-        assert abs(mpmath.cos(exact) - float(c)) <= worst
-
-
-def test_slope_of_sincos_poly():
-    x = np.linspace(-50, 50, 401)
-    _, (ds, dc) = jax.jvp(number.sincos_poly, (x,), (np.ones_like(x),))
-    np.testing.assert_allclose(ds, np.cos(x), atol=1e-13)
-    np.testing.assert_allclose(dc, -np.sin(x), atol=1e-13)

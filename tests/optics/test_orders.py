@@ -8,7 +8,8 @@ import pytest
 
 from pellicle.optics import film, interface, orders
 from pellicle.optics.dispersion import Cauchy
-from pellicle.optics.number import Pair, abs2, imag, real, sincos_poly
+from pellicle.optics.number import Pair, abs2, imag, real
+from pellicle.optics.sines import sincos_poly
 
 WAVELENGTH = np.linspace(420.0, 900.0, 25)
 # a Gaussian blur by the trapezoidal rule: as good as exact for what is smooth on a scale of σ/20

@@ -17,7 +17,8 @@ from pellicle.brdf.directions import angle_to_half, cosine_to_half
 from pellicle.brdf.shapes import Parameters, column
 from pellicle.optics import film, orders, passage
 from pellicle.optics.interface import allow_tunnelling
-from pellicle.optics.number import Number, Pair, sincos_poly
+from pellicle.optics.number import Number, Pair
+from pellicle.optics.sines import sincos_poly
 
 SHORTEST = 400.0
 """Wavelength (nm) at which `nodes` counts: eyes and cameras see next to nothing below."""

@@ -16,7 +16,8 @@ from pellicle.colour.bands import way as bands_of
 from pellicle.colour.observers import sensor
 from pellicle.optics import film, interface, orders
 from pellicle.optics.dispersion import AbstractDispersion
-from pellicle.optics.number import is_real, real, sincos_poly, to_pair
+from pellicle.optics.number import is_real, real, to_pair
+from pellicle.optics.sines import sincos_poly
 
 
 @final

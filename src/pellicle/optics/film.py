@@ -17,18 +17,9 @@ from jax.custom_derivatives import SymbolicZero
 
 from pellicle.optics.holding import hold, used_again
 from pellicle.optics.interface import carried, normal, normal_square, nothing_where, power, same, transverse
-from pellicle.optics.number import (
-    Number,
-    SinCos,
-    abs2,
-    conj,
-    is_real,
-    real,
-    sincos,
-    times_i,
-    where,
-)
+from pellicle.optics.number import Number, abs2, conj, is_real, real, times_i, where
 from pellicle.optics.passage import half_turn, is_real_array, root, slopes, through, through_wave
+from pellicle.optics.sines import SinCos, sincos, sincos_squares
 
 
 class Three(NamedTuple):
@@ -88,8 +79,9 @@ def _plain(values: list[Number]) -> Around:
 def _by_wave(sides: tuple[Three, ...], Q: Any, k: Any, sincos: SinCos) -> tuple[tuple[Around, ...], Any]:
     """Where the wave propagates without loss: |A c − iB f|² of real A and B is a sum of two squares."""
     q = jnp.sqrt(Q)
-    sine, cosine = sincos(k * hold(q, k))
-    cosine_square, sine_square = cosine * cosine, sine * sine
+    phase = k * hold(q, k)
+    sine, cosine = sincos(phase)
+    sine_square, cosine_square = sincos_squares(phase, sincos)
 
     def one(three: Three) -> Around:
         pairs = hold([(A, B / q) for A, B in three], k)

@@ -8,7 +8,6 @@ formulas are written once, over the functions below, which take a real array, a 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, TypeAlias
 
 import jax
@@ -16,8 +15,6 @@ import jax.numpy as jnp
 
 Number: TypeAlias = Any
 """A real array, a complex array or a `Pair`."""
-
-SinCos: TypeAlias = Callable[[Any], tuple[Any, Any]]
 
 
 @jax.tree_util.register_pytree_node_class
@@ -190,58 +187,3 @@ def _sqrt_slope(primal, tangent):
     at_zero = abs2(root) == 0
     safe = where(at_zero, 1.0 + 0.0 * root, root)
     return root, where(at_zero, 0.0 * tangent[0], tangent[0] * (0.5 / safe))
-
-
-def sincos(x):
-    """Sine and cosine from the library."""
-    return jnp.sin(x), jnp.cos(x)
-
-
-def sincos_poly(x):
-    """Sine and cosine by Cody-Waite reduction and a polynomial: no branches, one pass.
-
-    Worst error up to 1e5 rad: 2.0e-16 in float64, 9.1e-8 in float32. Coefficients: Cephes
-    (S. Moshier), sin.c and sinf.c.
-    """
-    if x.dtype == jnp.float64:
-        two_over_pi, reduction = (
-            0.6366197723675814,
-            (
-                1.5707963267341256,
-                6.0771005063039007e-11,
-                2.0222662487959506e-21,
-            ),
-        )
-        odd = (
-            1.58969099521155010221e-10,
-            -2.50507602534068634195e-08,
-            2.75573137070700676789e-06,
-            -1.98412698298579493134e-04,
-            8.33333333332248946124e-03,
-            -1.66666666666666324348e-01,
-        )
-        even = (
-            -1.13596475577881948265e-11,
-            2.08757232129817482790e-09,
-            -2.75573143513906633035e-07,
-            2.48015872894767294178e-05,
-            -1.38888888888741095749e-03,
-            4.16666666666666019037e-02,
-        )
-    else:
-        two_over_pi, reduction = 0.63661977, (1.5703125, 4.837512969970703125e-4, 7.54978995489188216e-8)
-        odd = (-1.9515295891e-4, 8.3321608736e-3, -1.6666654611e-1)
-        even = (2.443315711809948e-5, -1.388731625493765e-3, 4.166664568298827e-2)
-    quarter = jnp.round(x * x.dtype.type(two_over_pi))
-    r = x
-    for piece in reduction:
-        r = r - quarter * x.dtype.type(piece)
-    z = r * r
-    s, c = x.dtype.type(odd[0]), x.dtype.type(even[0])
-    for a, b in zip(odd[1:], even[1:], strict=True):
-        s, c = s * z + x.dtype.type(a), c * z + x.dtype.type(b)
-    s, c = r + r * z * s, 1 - 0.5 * z + z * z * c
-    turn = quarter - 4 * jnp.floor(quarter * 0.25)
-    swap = (turn == 1) | (turn == 3)
-    sine, cosine = jnp.where(swap, c, s), jnp.where(swap, s, c)
-    return jnp.where(turn >= 2, -sine, sine), jnp.where((turn == 1) | (turn == 2), -cosine, cosine)

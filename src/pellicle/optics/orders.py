@@ -18,7 +18,8 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 
 from pellicle.optics.interface import carried, fresnel, normal, power, transverse
-from pellicle.optics.number import Number, Pair, SinCos, abs2, conj, imag, real, sincos
+from pellicle.optics.number import Number, Pair, abs2, conj, imag, real
+from pellicle.optics.sines import SinCos, sincos
 
 Window = Callable[[int], Any]
 """m → W_m, the factor that order m keeps."""

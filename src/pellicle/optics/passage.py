@@ -14,7 +14,8 @@ import jax.numpy as jnp
 
 from pellicle.optics.exponentials import exponentials
 from pellicle.optics.holding import hold
-from pellicle.optics.number import Number, Pair, SinCos, abs2, imag, real, sincos, sqrt, times_i, where
+from pellicle.optics.number import Number, Pair, abs2, imag, real, sqrt, times_i, where
+from pellicle.optics.sines import SinCos, sincos
 
 
 class Passage(NamedTuple):

@@ -19,8 +19,9 @@ import jax.numpy as jnp
 
 from pellicle.optics.film import Three, Wave
 from pellicle.optics.interface import carried, normal, normal_square, nothing_where, power, same, transverse
-from pellicle.optics.number import Number, SinCos, abs2, sincos, to_complex
+from pellicle.optics.number import Number, abs2, to_complex
 from pellicle.optics.passage import through
+from pellicle.optics.sines import SinCos, sincos
 
 
 def stack(
