@@ -23,7 +23,8 @@ OURS = (
     Package("pellicle32", "pellicle float32", (), "the same functions on float32 input"),
 )
 PEERS = (
-    Package("tmm", "tmm", ("tmm",), "float64; clamps layers under T = 1e-30, and says so"),
+    # tmm 0.2.0 needs NumPy and does not tell pip
+    Package("tmm", "tmm", ("tmm", "numpy"), "float64; clamps layers under T = 1e-30, and says so"),
     Package("tmm_fast", "tmm_fast", ("tmm_fast",), "float64; asks for real indices outside the stack"),
     Package(
         "tmmax",
