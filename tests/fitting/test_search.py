@@ -8,6 +8,7 @@ import pytest
 
 import pellicle as pl
 from pellicle.fitting import evaluation
+from pellicle.fitting import search as fit_search
 from pellicle.fitting.measured import measured as as_numbers
 from pellicle.fitting.problem import make
 from pellicle.fitting.search import polished, quiet, search
@@ -73,6 +74,27 @@ def test_one_minimum_from_many_starts_is_one(film, measured):
     found = polished(problem, near, quiet)
     assert len(found.units) == 1
     assert 10 + 990 * found.units[0, 0] == pytest.approx(700, abs=1)
+
+
+def test_the_best_goes_on_until_it_settles(film, measured, monkeypatch):
+    """A solver that gets a third of the way at each call, and settles within a thousandth of a nanometre."""
+    problem = built(film(), measured(film(), 700.0))
+    p = problem.parameters[0]
+    home, calls = (700.0 - p.lower) / (p.upper - p.lower), []
+
+    def third(lower, upper, units):
+        calls.append(len(units))
+        nearer = home + (units - home) / 3
+        left = np.abs(nearer - home)[:, 0] * (p.upper - p.lower)
+        return nearer, left, left < 1e-3
+
+    monkeypatch.setattr(fit_search, "solver", lambda _: third)
+    start = home + 3.0 / (p.upper - p.lower)
+    minima = polished(problem, np.array([[start]]), quiet)
+    assert minima.converged[0]
+    assert len(calls) == 8  # 3 nm / 3⁸ < 1e-3 nm
+    far = polished(problem, np.array([[0.01]]), quiet)  # 690 nm / 3⁹: not yet
+    assert not far.converged[0]
 
 
 def test_progress_is_told(film, measured):
