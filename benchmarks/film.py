@@ -82,24 +82,19 @@ def by_tmm(wavelength: np.ndarray, thickness: np.ndarray) -> tuple[np.ndarray, n
     return tuple(np.array([p[key] for p in answers]).reshape(shape) for key in "RT")  # type: ignore[return-value]
 
 
-def _compiled(both: Callable, dtype: type) -> Run:
+def _compiled(both: Callable, dtype: type, *media: np.ndarray) -> Run:
     """One program whose two answers are packed in one complex array: two outputs cost twice."""
     program = jax.jit(both)
 
     def run(wavelength, thickness):
-        return program(wavelength.astype(dtype), thickness.astype(dtype)).block_until_ready()
+        return program(wavelength.astype(dtype), thickness.astype(dtype), *media).block_until_ready()
 
     return run
 
 
 def by_pellicle_table(layer: np.ndarray, dtype: type) -> Run:
     """The same with an index for each wavelength, known when the program runs and not before."""
-    program, index = jax.jit(partial(_both, dtype)), layer.astype(np.result_type(dtype, np.complex64))
-
-    def run(wavelength, thickness):
-        return program(wavelength.astype(dtype), thickness.astype(dtype), index).block_until_ready()
-
-    return run
+    return _compiled(partial(_both, dtype), dtype, layer.astype(np.result_type(dtype, np.complex64)))
 
 
 def by_pellicle(layer: complex, dtype: type) -> Run:

@@ -23,8 +23,6 @@ from pellicle.optics.passage import through, through_wave
 from pellicle.optics.sines import sincos_poly
 from pellicle.scene import check_polarisation, medium, surroundings
 
-NUMBERS = int | float | complex | np.ndarray | np.generic | jax.Array
-
 Medium = Any
 """A number (n + ik), an array of them, a material, or a material's name."""
 
@@ -124,13 +122,15 @@ def _waves(wavelength, thickness, layer, substrate, ambient, angle, polarisation
     _warn_of_lost_precision(wavelength, thickness, layer, substrate, ambient, angle)
     wavelength = _floating(wavelength)
     normal = isinstance(angle, int | float) and angle == 0
-    promised = through_wave if normal or _propagates(layer, ambient, angle) else through
-    enter = (lambda n: n) if normal or _propagates(substrate, ambient, angle) else interface.allow_tunnelling
+    promised = through_wave if normal or interface.propagates(layer, ambient, angle) else through
+    into_below = normal or interface.propagates(substrate, ambient, angle)
     named = isinstance(ambient, str | AbstractDispersion)
     ambient = _index(surroundings(ambient) if named else ambient, wavelength)
-    substrate = enter(_index(substrate, wavelength))
+    substrate = _index(substrate, wavelength)
     if not is_real(ambient):
         raise ValueError("the ambient must not absorb: give it a real index")
+    if not into_below:
+        substrate = interface.allow_tunnelling(substrate)
     theta = None if normal else jnp.deg2rad(_floating(angle))
     letters = "sp" if polarisation == "unpolarised" else polarisation
     if isinstance(layer, list | tuple):
@@ -146,16 +146,6 @@ def _waves(wavelength, thickness, layer, substrate, ambient, angle, polarisation
         through=promised if is_real(layer) else through,
         sincos=sincos_poly,
     )
-
-
-def _propagates(medium: Any, ambient: Any, angle: Any) -> bool:
-    """Whether numbers known before anything is traced say that no wave is totally reflected at the medium:
-    what then need not be computed is most of a transparent film."""
-    given = (medium, ambient, angle)
-    if any(isinstance(x, Tracer) or not isinstance(x, NUMBERS) for x in given):
-        return False
-    index, n0, theta = map(np.asarray, given)  # where JAX traces, it would trace an array of its own too
-    return bool(np.all(np.real(index) > np.abs(n0 * np.sin(np.deg2rad(theta)))))
 
 
 def _stack_waves(wavelength, thickness, layers, substrate, ambient, theta, letters):

@@ -7,7 +7,6 @@ from typing import Any, final
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Float
 
 from pellicle.colour import spaces
@@ -94,7 +93,7 @@ def reflectance(thickness, layer, substrate, bands: Bands, *, ambient: Any = 1.0
     if bands.width is None:
         waves = film.film(n0, n1, n2, k0d, theta, sincos=sincos_poly)
         return film.reflectance(*waves)
-    if not _propagates(ambient, layer):
+    if not interface.propagates(layer, ambient, 90.0):  # nor at any other angle
         n1 = interface.allow_tunnelling(n1)
     turns = _turn_slope(layer, n0, n1, theta, wavelength)
     spread = 2 * jnp.pi * jnp.asarray(bands.width, wavelength.dtype) * 2 * thickness * turns
@@ -116,13 +115,6 @@ def _index(what: Any, wavelength):
     if isinstance(what, AbstractDispersion):
         return what.index(wavelength)
     return to_pair(jnp.asarray(what)[..., None] * 1.0)
-
-
-def _propagates(ambient, layer) -> bool:
-    """True where plain numbers say so before the program is traced: the layer cannot tunnel."""
-    if not all(isinstance(n, int | float | np.ndarray) and np.isrealobj(n) for n in (ambient, layer)):
-        return False
-    return bool(np.min(layer) >= np.max(ambient))
 
 
 def _turn_slope(layer, ambient, index, theta, wavelength):

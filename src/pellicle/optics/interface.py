@@ -11,8 +11,12 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
 
 from pellicle.optics.number import Number, Pair, abs2, conj, is_real, real, sqrt, where
+
+_NUMBERS = int | float | complex | np.ndarray | np.generic | jax.Array
 
 
 class Transverse(NamedTuple):
@@ -73,6 +77,16 @@ def nothing_where(test, amplitude: Number) -> Number:
 def normal(index: Number, a: Any) -> Number:
     """q = √(n² − a²), Im q ≥ 0. A real index is a promise that the wave propagates (n ≥ a)."""
     return index if isinstance(a, float) and a == 0.0 else sqrt(normal_square(index, a))
+
+
+def propagates(medium: Any, ambient: Any, angle: Any) -> bool:
+    """Whether numbers that are known before anything is traced say that no wave is totally reflected at
+    the medium, at an angle of incidence in degrees: then most of a transparent film need not be computed."""
+    given = (medium, ambient, angle)
+    if any(isinstance(x, Tracer) or not isinstance(x, _NUMBERS) for x in given):
+        return False
+    index, n0, theta = map(np.asarray, given)  # where JAX traces, it would trace an array of its own too
+    return bool(np.all(np.real(index) > np.abs(n0 * np.sin(np.deg2rad(theta)))))
 
 
 def allow_tunnelling(index: Number) -> Number:

@@ -117,6 +117,7 @@ def _over_root(Q: Number) -> Number:
 
 
 def is_real_array(Q: Number) -> bool:
+    """Whether its type says that it has no imaginary part, and it is no Pair."""
     return not isinstance(Q, Pair) and not jnp.iscomplexobj(Q)
 
 

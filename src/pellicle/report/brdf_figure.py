@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pellicle.brdf_fitting.result import BrdfFit
-from pellicle.io.atomic import replacing
 from pellicle.io.directions import vectors
+from pellicle.report.drawing import blank, saved
 from pellicle.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, marker_size
 
 if TYPE_CHECKING:
@@ -27,19 +27,12 @@ def brdf_figure(fit: BrdfFit, path: str | os.PathLike[str], *, overwrite: bool =
     The file appears complete or not at all. Raises UsageError where it exists, without `overwrite`,
     or cannot be written.
     """
-    target = Path(path)
-    with replacing(target, overwrite=overwrite) as draft:
-        draw(fit).savefig(draft, dpi=DPI)
-    return target
+    return saved(draw(fit), path, overwrite=overwrite, dpi=DPI)
 
 
 def draw(fit: BrdfFit) -> Figure:
     """The figure itself, bound to no window and to no global state."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    drawn = Figure(figsize=(8.0, 5.6), layout="constrained")
-    FigureCanvasAgg(drawn)
+    drawn = blank(8.0, 5.6)
     above, below = drawn.subplots(2, 1, sharex=True, height_ratios=(3, 1.3))
     _samples(above, fit)
     _left(below, fit)

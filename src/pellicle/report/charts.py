@@ -10,7 +10,7 @@ import numpy as np
 
 from pellicle.appearance import interference_colours
 from pellicle.errors import UsageError
-from pellicle.io.atomic import replacing
+from pellicle.report.drawing import blank, saved
 from pellicle.scene import Scene
 
 if TYPE_CHECKING:
@@ -42,20 +42,15 @@ def chart(
     nm, degrees = np.linspace(*thickness, ACROSS), np.linspace(*angle, UP)
     colours = interference_colours(scene, nm, degrees, layer, observer=observer, illuminant=illuminant)
     linear = np.asarray(colours.linear_srgb)
-    with replacing(target) as draft:
-        _draw(np.clip(np.asarray(colours.srgb), 0, 1), thickness, angle, f"{title}   {illuminant}").savefig(
-            draft, dpi=150
-        )
+    shown = np.clip(np.asarray(colours.srgb), 0, 1)
+    saved(_draw(shown, thickness, angle, f"{title}   {illuminant}"), target)
     return float(np.mean(np.any((linear < -1e-3) | (linear > 1 + 1e-3), axis=-1)))
 
 
 def _draw(srgb: np.ndarray, thickness: tuple[float, float], angle: tuple[float, float], title: str) -> Figure:
     """The swatch over all angles, and under it a strip of the first one alone."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
 
-    drawn = Figure(figsize=(8, 4), layout="constrained")
-    FigureCanvasAgg(drawn)
+    drawn = blank(8, 4)
     swatch, strip = drawn.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [4, 1]})
     swatch.imshow(srgb, origin="lower", aspect="auto", extent=(*thickness, *angle))
     swatch.set(ylabel="angle of incidence (°)")

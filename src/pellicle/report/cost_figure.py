@@ -8,26 +8,24 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pellicle.io.atomic import replacing
 from pellicle.ladder.climb import Ladder
 from pellicle.ladder.cost import Cost
 from pellicle.ladder.surface import SurfaceCost
 from pellicle.report.cost import clock_of, error_of
+from pellicle.report.drawing import blank, saved
 from pellicle.report.style import BLUE, GREY, ORANGE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-DPI = 150
 FLOOR = 1e-17
 """Where an error of nothing is drawn."""
 
 
 def figure(cost: Cost, name: str, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
     """Draw error against time into `path` (.png, .pdf or .svg), complete or not at all."""
-    with replacing(path, overwrite=overwrite) as draft:
-        draw(cost, name).savefig(draft, dpi=DPI)
+    saved(draw(cost, name), path, overwrite=overwrite)
 
 
 def surface_figure(
@@ -38,17 +36,12 @@ def surface_figure(
     drawn, axes = _panels(len(ladders))
     for at, ladder in zip(axes, ladders, strict=True):
         _panel(at, ladder, name)
-    with replacing(path, overwrite=overwrite) as draft:
-        drawn.savefig(draft, dpi=DPI)
+    saved(drawn, path, overwrite=overwrite)
 
 
 def _panels(count: int) -> tuple[Figure, Any]:
-    """A figure, bound to no window and to no global state, of panels one above the other."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    drawn = Figure(figsize=(8.0, 0.4 + 4.6 * count), layout="constrained")
-    FigureCanvasAgg(drawn)
+    """A figure of panels one above the other."""
+    drawn = blank(8.0, 0.4 + 4.6 * count)
     return drawn, np.atleast_1d(drawn.subplots(count, 1))
 
 

@@ -12,8 +12,8 @@ import numpy as np
 
 from pellicle.fitting.result import Fit, Profile
 from pellicle.fitting.status import RIVAL
-from pellicle.io.atomic import replacing
 from pellicle.report import psi_delta
+from pellicle.report.drawing import blank, saved
 from pellicle.report.style import BLACK, BLUE, FITTED, GAP, GREY, ORANGE, marker_size
 
 if TYPE_CHECKING:
@@ -49,17 +49,11 @@ def figure(fit: Fit, path: str | os.PathLike[str], *, overwrite: bool = False) -
     The file appears complete or not at all. Raises UsageError where it exists, without `overwrite`,
     or cannot be written.
     """
-    target = Path(path)
-    with replacing(target, overwrite=overwrite) as draft:
-        draw(fit).savefig(draft, dpi=DPI)
-    return target
+    return saved(draw(fit), path, overwrite=overwrite, dpi=DPI)
 
 
 def draw(fit: Fit) -> Figure:
     """The figure itself, bound to no window and to no global state."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     panels: list[tuple[Callable[[Axes, Fit], None], float, Fit]] = []
     for part in fit.parts:
         alone = fit.alone(part)
@@ -70,8 +64,7 @@ def draw(fit: Fit) -> Figure:
     if _index_is_free(fit):
         panels.append((_index, 1.5, fit))
     heights = [height for _, height, _ in panels]
-    drawn = Figure(figsize=(WIDTH_INCHES, sum(heights) + 1.2), layout="constrained")
-    FigureCanvasAgg(drawn)
+    drawn = blank(WIDTH_INCHES, sum(heights) + 1.2)
     axes = drawn.subplots(len(panels), 1, squeeze=False, height_ratios=heights)[:, 0]
     for above, below, one, other in zip(axes, axes[1:of_data], panels, panels[1:of_data], strict=False):
         if one[2] is other[2]:

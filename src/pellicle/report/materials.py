@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pellicle.errors import UsageError
-from pellicle.io.atomic import replacing
 from pellicle.materials import Material, index, lookup
+from pellicle.report.drawing import blank, saved
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -114,22 +114,17 @@ def figure(name: str, path: str | os.PathLike[str]) -> Path:
     target = Path(path)
     if target.suffix.lower() not in FORMATS:
         raise UsageError(f"--out {target}: expected a name ending in {', '.join(FORMATS)}")
-    with replacing(target) as draft:
-        _draw(name).savefig(draft, dpi=150)
-    return target
+    return saved(_draw(name), target)
 
 
 def _draw(name: str) -> Figure:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
 
     material = lookup(name)
     low, high = shown_range(material) if isinstance(material, Material) else SHOWN_NM
     nm = np.clip(np.linspace(low, high, POINTS), low, high)
     values = np.asarray(material(nm))
     n, k = np.real(values), np.imag(values)
-    drawn = Figure(figsize=(7, 4), layout="constrained")
-    FigureCanvasAgg(drawn)
+    drawn = blank(7, 4)
     axes = drawn.add_subplot()
     lines = axes.plot(nm, n, color="C0", label="n")
     axes.set(xlabel="wavelength (nm)", ylabel="n", xlim=(low, high))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pellicle.io.atomic import replacing
+from pellicle.report.drawing import blank, saved
 from pellicle.report.page import block, table, wrapped
 from pellicle.report.style import BLACK, BLUE, ORANGE, marker_size
 from pellicle.sampling.predict import Prediction
@@ -18,7 +18,6 @@ from pellicle.sampling.result import Marginal, Posterior, verdict
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-DPI = 150
 _LEAST_MASS = 0.005
 """Minima with less of the posterior are not listed."""
 
@@ -67,8 +66,6 @@ def _checks(posterior: Posterior) -> list[str]:
 
 def corner_figure(posterior: Posterior, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
     """Draw every pair of parameters into `path`. Raises UsageError where it cannot be written."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # it imports ArviZ, which warns of its next version
@@ -77,8 +74,7 @@ def corner_figure(posterior: Posterior, path: str | os.PathLike[str], *, overwri
     size = len(posterior.names)
     units = [posterior.fit.parameters[name].unit for name in posterior.names]
     labels = [f"{name} ({unit})" if unit else name for name, unit in zip(posterior.names, units, strict=True)]
-    sheet = Figure(figsize=(2.4 * size + 1.2, 2.4 * size + 1.2))
-    FigureCanvasAgg(sheet)
+    sheet = blank(2.4 * size + 1.2, 2.4 * size + 1.2, constrained=False)
     flat = posterior.draws.reshape(-1, size)
     moving = np.ptp(flat, axis=0) > 0
     corner.corner(
@@ -93,10 +89,7 @@ def corner_figure(posterior: Posterior, path: str | os.PathLike[str], *, overwri
         levels=(0.393, 0.865),  # one and two standard deviations of a normal distribution in the plane
         label_kwargs={"fontsize": 9},
     )
-    target = Path(path)
-    with replacing(target, overwrite=overwrite) as draft:
-        sheet.savefig(draft, dpi=DPI, bbox_inches="tight")
-    return target
+    return saved(sheet, path, overwrite=overwrite, bbox_inches="tight")
 
 
 def predictive_figure(
@@ -107,17 +100,11 @@ def predictive_figure(
     overwrite: bool = False,
 ) -> Path:
     """Draw the data over the band where 95 % of the model's curves, and of repeated data, lie."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
 
-    sheet = Figure(figsize=(8.0, 0.6 + 3.0 * len(predicted)), layout="constrained")
-    FigureCanvasAgg(sheet)
+    sheet = blank(8.0, 0.6 + 3.0 * len(predicted))
     for axes, found in zip(np.ravel(sheet.subplots(len(predicted), squeeze=False)), predicted, strict=True):
         _band(axes, found)
-    target = Path(path)
-    with replacing(target, overwrite=overwrite) as draft:
-        sheet.savefig(draft, dpi=DPI)
-    return target
+    return saved(sheet, path, overwrite=overwrite)
 
 
 def _band(axes: Axes, found: Prediction) -> None:

@@ -12,8 +12,8 @@ import numpy as np
 
 from pellicle.colour import srgb
 from pellicle.errors import UsageError
-from pellicle.io.atomic import replacing
 from pellicle.report.charts import FORMATS
+from pellicle.report.drawing import blank, saved
 from pellicle.sphere import in_plane, render
 from pellicle.surfaces.surface import Surface
 
@@ -43,8 +43,7 @@ def sphere(
     with jax.enable_x64(True):
         seen = render(surface, light)
         lobes = {angle: in_plane(surface, angle, LEAVING) for angle in INCIDENCES}
-    with replacing(target) as draft:
-        _draw(shown(seen), lobes, title).savefig(draft, dpi=150)
+    saved(_draw(shown(seen), lobes, title), target)
 
 
 def shown(radiance: np.ndarray) -> np.ndarray:
@@ -56,12 +55,9 @@ def shown(radiance: np.ndarray) -> np.ndarray:
 
 
 def _draw(image: np.ndarray, lobes: dict[float, np.ndarray], title: str) -> Figure:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
     from matplotlib.ticker import MaxNLocator
 
-    drawn = Figure(figsize=(10, 6), layout="constrained")
-    FigureCanvasAgg(drawn)
+    drawn = blank(10, 6)
     grid = drawn.add_gridspec(len(lobes), 2, width_ratios=[2, 1])
     ball = drawn.add_subplot(grid[:, 0])
     ball.imshow(image)

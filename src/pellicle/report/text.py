@@ -131,6 +131,7 @@ def _rms(part: Part) -> list[tuple[str, str]]:
 
 
 def parameters(fit: Fit | BrdfFit) -> list[str]:
+    """A line for each, in columns: name, value ± error or limit, unit and bounds."""
     width = max((len(name) for name in fit.parameters), default=0) + 1
     rows = [(f"{p.name + ':':<{width}}", _value(p) if p.free else _fixed(p), _bounds(p)) for p in _all(fit)]
     middle = max((len(value) for _, value, bounds in rows if bounds), default=0)
@@ -221,4 +222,5 @@ def plan(made: Plan, name: str = "") -> list[str]:
 
 
 def warnings(fit: Fit | BrdfFit) -> list[str]:
+    """Each as an item of a list, wrapped."""
     return [line for warning in fit.warnings for line in wrapped(warning, "- ", "  ")]
