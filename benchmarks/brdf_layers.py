@@ -14,7 +14,7 @@ import jax
 import numpy as np
 
 import pellicle as pl
-from pellicle.io.samples import BrdfSamples
+from pellicle.data.brdf_samples import BrdfSamples
 
 jax.config.update("jax_enable_x64", True)
 

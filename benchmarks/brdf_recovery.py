@@ -23,15 +23,15 @@ import numpy as np
 from scipy.stats import binomtest
 
 from pellicle.brdf import direction
-from pellicle.brdf_fitting.estimates import local, rivals
-from pellicle.brdf_fitting.fit import judged, problem
-from pellicle.brdf_fitting.sample import sample_brdf
-from pellicle.brdf_fitting.search import THOROUGH, search, settle
+from pellicle.data.brdf_samples import BrdfSamples
+from pellicle.fitting.brdf.estimates import local, rivals
+from pellicle.fitting.brdf.fit import judged, problem
+from pellicle.fitting.brdf.search import THOROUGH, search, settle
 from pellicle.fitting.result import Status
-from pellicle.fitting.search import quiet
-from pellicle.free import Free
-from pellicle.io.samples import BrdfSamples
-from pellicle.surfaces.surface import Surface
+from pellicle.fitting.spectra.search import quiet
+from pellicle.sampling.brdf import sample_brdf
+from pellicle.scene.free import Free
+from pellicle.scene.surface import Surface
 
 jax.config.update("jax_enable_x64", True)
 

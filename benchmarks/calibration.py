@@ -26,15 +26,15 @@ import numpy as np
 jax.config.update("jax_enable_x64", True)
 
 import pellicle as pl  # noqa: E402
-from pellicle.fitting.fit import fitted  # noqa: E402
-from pellicle.fitting.limits import interval  # noqa: E402
-from pellicle.fitting.parameters import parameters  # noqa: E402
-from pellicle.fitting.search import quiet  # noqa: E402
-from pellicle.fitting.uncertainty import errors  # noqa: E402
-from pellicle.fitting.valley import valley  # noqa: E402
-from pellicle.instrument import Drift  # noqa: E402
-from pellicle.scene import insert  # noqa: E402
-from pellicle.synthetic import synthesise, synthesise_angles  # noqa: E402
+from pellicle.fitting.neighbourhood import valley  # noqa: E402
+from pellicle.fitting.profile_likelihood import interval  # noqa: E402
+from pellicle.fitting.spectra.covariance import errors  # noqa: E402
+from pellicle.fitting.spectra.fit import fitted  # noqa: E402
+from pellicle.fitting.spectra.parameters import parameters  # noqa: E402
+from pellicle.fitting.spectra.search import quiet  # noqa: E402
+from pellicle.scene.free import insert  # noqa: E402
+from pellicle.scene.instrument import Drift  # noqa: E402
+from pellicle.synthetic.spectra import synthesise, synthesise_angles  # noqa: E402
 
 WAVELENGTH = np.linspace(400.0, 900.0, 101)
 SILICON = pl.Constant(3.9, 0.02)

@@ -31,7 +31,7 @@ import numpy as np
 import tmm
 
 import pellicle as pl
-from pellicle.optics.sines import sincos_poly
+from pellicle.optics.elementary import sincos_poly
 
 jax.config.update("jax_enable_x64", True)
 

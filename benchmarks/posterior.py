@@ -21,13 +21,13 @@ from emcee.autocorr import integrated_time
 jax.config.update("jax_enable_x64", True)
 
 import pellicle as pl  # noqa: E402
-from pellicle.fitting.fit import fitted  # noqa: E402
-from pellicle.fitting.search import quiet  # noqa: E402
+from pellicle.fitting.spectra.fit import fitted  # noqa: E402
+from pellicle.fitting.spectra.search import quiet  # noqa: E402
 from pellicle.sampling.chain import empty  # noqa: E402
 from pellicle.sampling.density import log_density  # noqa: E402
 from pellicle.sampling.modes import modes  # noqa: E402
 from pellicle.sampling.run import run  # noqa: E402
-from pellicle.synthetic import synthesise  # noqa: E402
+from pellicle.synthetic.spectra import synthesise  # noqa: E402
 
 WALKERS, STEPS, BURN = 32, 2000, 500
 SILICON = 3.9 + 0.02j

@@ -20,8 +20,8 @@ import numpy as np
 
 import pellicle as pl
 from pellicle.optics.ellipsometry import Stokes, normalised, stokes
-from pellicle.optics.number import abs2
-from pellicle.signals import _waves as signals_of_waves
+from pellicle.optics.pair import abs2
+from pellicle.simulation.functions import _waves as signals_of_waves
 
 CHUNK = 5000
 

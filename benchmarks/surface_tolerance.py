@@ -15,14 +15,13 @@ from typing import Any
 import jax
 import numpy as np
 
-from pellicle.differences import signals
-from pellicle.free import Free, free_leaves
-from pellicle.surfaces import thrift
-from pellicle.surfaces.effects import exact
-from pellicle.surfaces.lit import lit
-from pellicle.surfaces.model import build
-from pellicle.surfaces.sampling import default_directions
-from pellicle.surfaces.surface import Surface
+from pellicle.effects.surface import exact
+from pellicle.planning import surface as thrift
+from pellicle.planning.differences import signals
+from pellicle.scene.free import Free, free_leaves
+from pellicle.scene.surface import Surface, lit
+from pellicle.simulation.surface import build
+from pellicle.synthetic.brdf import default_directions
 
 FRESH = 64
 """Points of each surface's bounds at which the bound is tried."""

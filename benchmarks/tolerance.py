@@ -16,11 +16,11 @@ import jax
 import numpy as np
 
 import pellicle as pl
-from pellicle.differences import largest_difference, signals
-from pellicle.free import free_leaves
-from pellicle.model import sampled
-from pellicle.planning import Plan
-from pellicle.thrift import reference
+from pellicle.effects.plan import Plan
+from pellicle.planning.differences import largest_difference, signals
+from pellicle.planning.film import reference
+from pellicle.scene.free import free_leaves
+from pellicle.simulation.film import sampled
 
 FRESH = 400
 """Points of each scene at which the bound is tried."""

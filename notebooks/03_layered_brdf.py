@@ -24,8 +24,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import pellicle as pl
-from pellicle.report.spheres import shown
-from pellicle.sphere import in_plane, render
+from pellicle.report.colour_figures import shown
+from pellicle.synthetic.sphere import in_plane, render
 
 jax.config.update("jax_enable_x64", True)  # JAX counts in single precision unless told
 SHORT = os.environ.get("PELLICLE_SHORT") == "1"  # smaller pictures, for a quick run

@@ -25,8 +25,8 @@ import numpy as np
 
 import pellicle as pl
 from pellicle.colour import delta_e2000, film_colour, lab
-from pellicle.report.spheres import shown
-from pellicle.sphere import render
+from pellicle.report.colour_figures import shown
+from pellicle.synthetic.sphere import render
 
 jax.config.update("jax_enable_x64", True)  # JAX counts in single precision unless told
 SHORT = os.environ.get("PELLICLE_SHORT") == "1"  # fewer points, for a quick run

@@ -6,8 +6,7 @@ Run after adding a page: python scripts/index_materials.py
 import csv
 from pathlib import Path
 
-from pellicle.materials.citation import plain_text, short_citation
-from pellicle.materials.database_page import contents, csv_contents, load_yaml
+from pellicle.materials.page import contents, csv_contents, load_yaml, plain_text, short_citation
 
 DATA = Path(__file__).parents[1] / "src/pellicle/materials/data"
 SHELVES = ("glass", "main", "other", "popular_glass")

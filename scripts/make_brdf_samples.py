@@ -10,9 +10,9 @@ import sys
 from pathlib import Path
 
 import pellicle
-from pellicle.io.brdf_writers import write_brdf_samples
-from pellicle.io.surface_recipe import read_surface_recipe
-from pellicle.surfaces.sampling import default_directions, simulate_brdf
+from pellicle.data.write_brdf import write_brdf_samples
+from pellicle.recipes.surface import read_surface_recipe
+from pellicle.synthetic.brdf import default_directions, simulate_brdf
 
 STUDIES = Path(__file__).resolve().parents[1] / "fits" / "brdf"
 SAMPLES, NOISE = 250, 0.002

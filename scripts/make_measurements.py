@@ -15,7 +15,7 @@ import tomllib
 from pathlib import Path
 
 from pellicle.cli.simulate import simulate
-from pellicle.io.atomic import write_text
+from pellicle.files import write_text
 
 ROOT = Path(__file__).resolve().parents[1]
 COLUMNS = ("file", "kind", "recipe", "seed", "truth", "sample", "source", "licence")

@@ -11,14 +11,15 @@ from typing import Any
 
 from pydantic.json_schema import models_json_schema
 
-from pellicle.io import recipe_tables, surface_recipe
+from pellicle.recipes import schema as recipe_tables
+from pellicle.recipes import surface
 
 SCHEMA = Path(__file__).resolve().parents[1] / "docs" / "recipe.schema.json"
 
 
 def schema() -> dict[str, Any]:
     """One schema for both kinds of recipe."""
-    kinds = (recipe_tables.RecipeTable, surface_recipe.RecipeTable)
+    kinds = (recipe_tables.RecipeTable, surface.RecipeTable)
     found, definitions = models_json_schema([(kind, "validation") for kind in kinds])
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -19,8 +19,8 @@ from pathlib import Path
 from typing import Any
 
 from pellicle.cli.fit import fit
-from pellicle.io.atomic import replacing, write_text
-from pellicle.io.records import indented
+from pellicle.files import replacing, write_text
+from pellicle.report.json_record import indented
 
 FITS = Path(__file__).resolve().parents[1] / "fits"
 KEPT = ("result.json", "report.txt", "figure.png")

@@ -6,8 +6,8 @@ import inspect
 import pytest
 
 import pellicle as pl
-from pellicle.optics import dispersion, mixtures, oscillators, spline
-from pellicle.optics.cody_lorentz import CodyLorentz
+from pellicle.dispersion import effective_medium, empirical, oscillators, spline
+from pellicle.dispersion.cody_lorentz import CodyLorentz
 
 
 def test_every_name_loads_and_type_checkers_see_the_same():
@@ -27,12 +27,12 @@ def test_every_name_loads_and_type_checkers_see_the_same():
 
 def test_every_model_of_a_medium_is_offered():
     """All but `Sampled`, which is made of another model for the fit."""
-    kinds = (dispersion.AbstractDispersion, oscillators.AbstractOscillator)
+    kinds = (empirical.AbstractDispersion, oscillators.AbstractOscillator)
     models = {
         value
-        for module in (dispersion, oscillators, mixtures, spline)
+        for module in (empirical, oscillators, effective_medium, spline)
         for value in vars(module).values()
         if inspect.isclass(value) and issubclass(value, kinds) and value not in kinds
     } | {CodyLorentz}
     offered = {getattr(pl, name) for name in pl.__all__}
-    assert models - offered == {dispersion.Sampled}
+    assert models - offered == {empirical.Sampled}

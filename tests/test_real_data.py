@@ -10,7 +10,7 @@ import pytest
 
 import pellicle as pl
 from pellicle.cli import main
-from pellicle.io import read_counts, reflectance_from_counts
+from pellicle.data.read_counts import read_counts, reflectance_from_counts
 
 CAUCHY = pl.Cauchy(pl.Free(None, 1.2, 3.0), pl.Free(None, 0.0, 1e5))
 

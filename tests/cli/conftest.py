@@ -13,7 +13,7 @@ import pytest
 
 from pellicle import Constant
 from pellicle.cli import main
-from pellicle.signals import reflectance
+from pellicle.simulation.functions import reflectance
 
 
 @dataclass(frozen=True)

@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pellicle.brdf_fitting import fit as fitting
-from pellicle.brdf_fitting import sample as sampling
-from pellicle.brdf_fitting.result import Baseline, BrdfFit
+from pellicle.effects.surface import exact
+from pellicle.fitting.brdf import fit as fitting
+from pellicle.fitting.brdf.result import Baseline, BrdfFit
 from pellicle.fitting.result import Estimate, Rival, Status
-from pellicle.io.surface_recipe import read_surface_recipe
+from pellicle.recipes.surface import read_surface_recipe
+from pellicle.sampling import brdf as sampling
 from pellicle.sampling.ensemble import Subject, sampled
 from pellicle.sampling.modes import mixture
 from pellicle.sampling.predict import Axis, Prediction
-from pellicle.surfaces.effects import exact
-from pellicle.surfaces.lit import lit
+from pellicle.scene.surface import lit
 
 RECIPE = """
 [data]

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.appearance import interference_colours
 from pellicle.colour import delta_e2000, film_colour
 from pellicle.errors import UsageError
+from pellicle.synthetic.colours import interference_colours
 
 NM, DEGREES = np.linspace(0.0, 600.0, 7), np.array([0.0, 30.0, 60.0])
 FREE = pl.Free(lower=0, upper=600)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pellicle import Constant
-from pellicle.signals import reflectance
+from pellicle.simulation.functions import reflectance
 
 PLAIN = """[data]
 {data}

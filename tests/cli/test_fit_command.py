@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from pellicle.fitting import fit as fitting
+from pellicle.fitting.spectra import fit as fitting
 
 RESULT_KEYS = [
     "schema",

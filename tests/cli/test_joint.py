@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from pellicle.errors import DataError
-from pellicle.scene import Drift
+from pellicle.scene.instrument import Drift
 
 ROOT = Path(__file__).parents[2]
 
@@ -62,7 +62,7 @@ def asked(monkeypatch):
         calls.append((spectra, scenes))
         raise DataError("not fitted here")
 
-    monkeypatch.setattr("pellicle.fitting.fit.fit", fit)
+    monkeypatch.setattr("pellicle.fitting.spectra.fit.fit", fit)
     return calls
 
 

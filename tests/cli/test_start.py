@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from pellicle.cli import main, session
-from pellicle.io.models import MODELS
+from pellicle.recipes.dispersion_models import MODELS
 
 TELL = "import sys; from pellicle.cli import main; code = main(); print(*sys.modules, file=sys.stderr); "
 

@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 
-from pellicle.io.brdf_samples import read_brdf_samples
+from pellicle.data.read_brdf import read_brdf_samples
 
 RECIPE = """
 [data]

@@ -7,7 +7,7 @@ import re
 
 import jax
 
-from pellicle.cli.aloud import aloud
+from pellicle.cli.verbose import aloud
 
 
 def test_every_step_of_a_fit_is_told(pellicle, spectrum_file, scene):

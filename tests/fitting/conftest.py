@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.scene import insert
-from pellicle.synthetic import synthesise
+from pellicle.scene.free import insert
+from pellicle.synthetic.spectra import synthesise
 
 WAVELENGTH = np.linspace(400.0, 900.0, 128)
 SUBSTRATE = pl.Constant(3.9, 0.02)

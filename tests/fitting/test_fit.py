@@ -6,9 +6,10 @@ import pytest
 
 import pellicle as pl
 from pellicle.errors import DataError, UsageError
-from pellicle.model import build
-from pellicle.scene import free_leaves, with_wavelength
-from pellicle.synthetic import synthesise
+from pellicle.scene.film import with_wavelength
+from pellicle.scene.free import free_leaves
+from pellicle.simulation.film import build
+from pellicle.synthetic.spectra import synthesise
 
 NM = np.linspace(400.0, 900.0, 128)
 N, K = pl.Free(None, 1.3, 1.9), pl.Free(None, 0.0, 0.5)

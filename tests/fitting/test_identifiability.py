@@ -8,7 +8,7 @@ import pytest
 import pellicle as pl
 from pellicle.fitting.identifiability import bounded, of, step, trades
 from pellicle.fitting.result import Estimate
-from pellicle.fitting.uncertainty import Scaled
+from pellicle.fitting.spectra.covariance import Scaled
 
 NM = np.linspace(400.0, 900.0, 128)
 

@@ -10,12 +10,12 @@ import tmm
 from scipy.optimize import least_squares
 
 import pellicle as pl
+from pellicle.dispersion.empirical import CauchyUrbach
 from pellicle.errors import UsageError
-from pellicle.fitting import fit as fitting
-from pellicle.fitting.fit import labels
-from pellicle.fitting.measured import measured
-from pellicle.fitting.problem import make
-from pellicle.optics.dispersion import CauchyUrbach
+from pellicle.fitting.spectra import fit as fitting
+from pellicle.fitting.spectra.fit import labels
+from pellicle.fitting.spectra.problem import make
+from pellicle.fitting.spectra.targets import measured
 
 WAVELENGTH = np.linspace(400.0, 900.0, 60)
 GLASS = 1.52

@@ -16,14 +16,15 @@ import numpy as np
 import optimistix as optx
 import pytest
 
-from pellicle.fitting.evaluation import Local
-from pellicle.fitting.nuisance import Data
-from pellicle.fitting.parameters import Parameter
-from pellicle.fitting.problem import Box, View
-from pellicle.fitting.problem import Problem as FitProblem
-from pellicle.fitting.solve import BoundedLevenbergMarquardt
-from pellicle.fitting.uncertainty import errors
-from pellicle.scene import Layer, Scene
+from pellicle.fitting.levenberg_marquardt import BoundedLevenbergMarquardt
+from pellicle.fitting.spectra.covariance import errors
+from pellicle.fitting.spectra.evaluation import Local
+from pellicle.fitting.spectra.nuisance import Data
+from pellicle.fitting.spectra.parameters import Parameter
+from pellicle.fitting.spectra.problem import Box, View
+from pellicle.fitting.spectra.problem import Problem as FitProblem
+from pellicle.scene.film import Scene
+from pellicle.scene.layers import Layer
 
 FOLDER = Path(__file__).parent / "nist_strd"
 

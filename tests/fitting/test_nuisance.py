@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
-from pellicle.fitting.nuisance import Data, solve
-from pellicle.scene import Instrument
+from pellicle.fitting.spectra.nuisance import Data, solve
+from pellicle.scene.instrument import Instrument
 
 POINTS, LEVEL, TEMPER = 64, 0.4, 0.5
 POSITION = np.linspace(-1.0, 1.0, POINTS)

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.fitting.evaluation import local
-from pellicle.fitting.measured import measured
-from pellicle.fitting.problem import make
-from pellicle.model import build
+from pellicle.fitting.spectra.evaluation import local
+from pellicle.fitting.spectra.problem import make
+from pellicle.fitting.spectra.targets import measured
 from pellicle.optics.ellipsometry import angles
-from pellicle.scene import with_wavelength
+from pellicle.scene.film import with_wavelength
+from pellicle.simulation.film import build
 
 NM = np.linspace(400.0, 800.0, 40)
 PLATE = pl.Substrate(1.52, back=1.0)

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.fitting import evaluation
-from pellicle.fitting import search as fit_search
-from pellicle.fitting.measured import measured as as_numbers
-from pellicle.fitting.problem import make
-from pellicle.fitting.search import polished, quiet, search
+from pellicle.fitting.spectra import evaluation
+from pellicle.fitting.spectra import search as fit_search
+from pellicle.fitting.spectra.problem import make
+from pellicle.fitting.spectra.search import polished, quiet, search
+from pellicle.fitting.spectra.targets import measured as as_numbers
 
 NM = np.linspace(400.0, 900.0, 128)
 
@@ -44,7 +44,7 @@ def test_only_local_minima_are_polished_and_all_of_them_are_kept(film, measured,
         starts.append(np.asarray(arguments[-1]))
         return real(*arguments)
 
-    monkeypatch.setattr("pellicle.fitting.search.polish", watched)
+    monkeypatch.setattr("pellicle.fitting.spectra.search.polish", watched)
     found = search(problem, quiet)
     scan = found.scan
     evidence = np.concatenate([[np.inf], scan.evidence[0, :, 0], [np.inf]])

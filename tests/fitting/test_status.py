@@ -98,7 +98,7 @@ def test_not_identifiable(film, measured):
 
 def test_not_converged(film, measured, monkeypatch):
     """A solver that may take no step has not arrived."""
-    from pellicle.fitting import search
+    from pellicle.fitting.spectra import search
 
     real = search.polish
 

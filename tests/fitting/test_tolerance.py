@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.effects.without import LeftOut
-from pellicle.fitting import fit as fitting
-from pellicle.planning import exact
-from pellicle.synthetic import synthesise
+from pellicle.effects.film import exact
+from pellicle.effects.removal import LeftOut
+from pellicle.fitting.spectra import fit as fitting
+from pellicle.synthetic.spectra import synthesise
 
 NM = np.linspace(450.0, 850.0, 41)
 NOISE = 1e-3
@@ -47,7 +47,9 @@ def test_a_fit_beyond_its_tolerance_is_done_again(monkeypatch):
     def careless(scene, tolerance, keep):
         return replace(exact(scene), left_out=(LeftOut("absorption"),), tolerance=tolerance)
 
-    monkeypatch.setattr("pellicle.fitting.problem.plan", lambda s, t, k: careless(s, t, k) if t else exact(s))
+    monkeypatch.setattr(
+        "pellicle.fitting.spectra.problem.plan", lambda s, t, k: careless(s, t, k) if t else exact(s)
+    )
     found = fitting.fit(data, thing, tolerance=1e-3)
     assert found.plan.on("absorption")
     assert "fitted again with every effect" in found.warnings[0]

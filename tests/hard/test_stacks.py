@@ -21,11 +21,11 @@ import pytest
 from mpmath import mp
 
 import pellicle as pl
-from pellicle.model import build
 from pellicle.optics import film
 from pellicle.optics.ellipsometry import angles, normalised, stokes
-from pellicle.scene import insert
-from pellicle.signals import _waves
+from pellicle.scene.free import insert
+from pellicle.simulation.film import build
+from pellicle.simulation.functions import _waves
 
 TABLE = json.loads(Path(__file__).with_name("stacks.json").read_text(encoding="utf-8"))
 SIGNALS = TABLE["signals"]

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 from pellicle.errors import DataError
-from pellicle.materials import Material, UnknownMaterial, index, lookup, names, pages
+from pellicle.materials import Material, UnknownMaterial, lookup, names, pages
 from pellicle.materials import catalogue as catalogue_module
-from pellicle.materials.database_page import contents, csv_contents, load_yaml
-from pellicle.optics.number import Pair, imag, is_real, real
+from pellicle.materials import contents as index
+from pellicle.materials.page import contents, csv_contents, load_yaml
+from pellicle.optics.pair import Pair, imag, is_real, real
 
 NAMES = [entry.name for entry in names()]
 PAGES = [page.path for page in pages()]
@@ -264,11 +265,11 @@ class TestWithIndicio:
 
     @pytest.mark.parametrize("path", ["main/Au/Johnson", "main/ZnO/Bond-o", "popular_glass/BK7/SCHOTT"])
     def test_the_same_page_from_either_place_agrees(self, path):
-        from pellicle.materials import full_database
+        from pellicle.materials import refractiveindex_database
 
         ours = lookup(path)
-        [entry] = full_database.find(path)
-        theirs = full_database.entry_contents(entry)
+        [entry] = refractiveindex_database.find(path)
+        theirs = refractiveindex_database.entry_contents(entry)
         assert theirs.wavelength_range == pytest.approx(ours.wavelength_range)
         nm = np.linspace(500, 1500, 64)
         np.testing.assert_allclose(theirs.dispersion(nm), ours(nm), atol=3e-6)

@@ -1,6 +1,6 @@
 """References from HTML to text."""
 
-from pellicle.materials.citation import plain_text, short_citation
+from pellicle.materials.page import plain_text, short_citation
 
 REFERENCE = (
     'P. B. Johnson and R. W. Christy.\nOptical constants of the noble metals.\n<a href="https://doi.org/10.1/x">'

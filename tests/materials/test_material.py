@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
+from pellicle.dispersion.empirical import Constant, Shifted
 from pellicle.errors import DataError
 from pellicle.materials import Material, lookup, materials_in
-from pellicle.optics.dispersion import Constant, Shifted
-from pellicle.optics.number import is_real
+from pellicle.optics.pair import is_real
 
 
 def test_inside_the_range_nothing_happens():

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from pellicle.optics.exponentials import exponentials
+from pellicle.optics.elementary import exponentials
 
 
 @pytest.mark.parametrize(("dtype", "tolerance"), [(np.float64, 2e-16), (np.float32, 1.2e-7)])

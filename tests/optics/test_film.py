@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pellicle.optics import film, interface, passage
-from pellicle.optics.number import Pair, to_pair
-from pellicle.optics.sines import sincos, sincos_poly
+from pellicle.optics import characteristic, film, interface
+from pellicle.optics.elementary import sincos, sincos_poly
+from pellicle.optics.pair import Pair, to_pair
 
 SINES = pytest.mark.parametrize("sines", [sincos, sincos_poly])
 
@@ -32,18 +32,18 @@ def exact(Q, k):
 @jax.jit
 def pair_jvp(re, im, k):
     one, none = jnp.ones_like(re), jnp.zeros_like(re)
-    return jax.jvp(passage.through, (Pair(re, im), k), (Pair(one, none), none))
+    return jax.jvp(characteristic.through, (Pair(re, im), k), (Pair(one, none), none))
 
 
 @jax.jit
 def complex_jvp(re, im, k):
     Q = jax.lax.complex(re, im)
-    return jax.jvp(passage.through, (Q, k), (jnp.ones_like(Q), jnp.zeros_like(k)))
+    return jax.jvp(characteristic.through, (Q, k), (jnp.ones_like(Q), jnp.zeros_like(k)))
 
 
 @jax.jit
 def real_jvp(re, k):
-    return jax.jvp(passage.through, (re, k), (jnp.ones_like(re), jnp.zeros_like(k)))
+    return jax.jvp(characteristic.through, (re, k), (jnp.ones_like(re), jnp.zeros_like(k)))
 
 
 def as_complex(z):
@@ -108,7 +108,7 @@ def test_through_at_zero():
 
 def test_second_derivatives_are_finite_at_zero():
     def c_and_f(Q, k):
-        c, f, _, _ = passage.through(Q, k)
+        c, f, _, _ = characteristic.through(Q, k)
         return jnp.stack([c, f])
 
     for Q, k in ((0.0, 2.0), (2.0, 0.0), (-1e4, 100.0)):
@@ -139,7 +139,9 @@ def test_through_wave_is_through_where_the_wave_propagates(sines):
         return jax.jvp(lambda Q, k: fn(Q, k, sines), (Q, k), (np.ones_like(Q), np.full_like(k, 0.3)))
 
     for one, two in zip(
-        jax.tree.leaves(both(passage.through_wave)), jax.tree.leaves(both(passage.through)), strict=True
+        jax.tree.leaves(both(characteristic.through_wave)),
+        jax.tree.leaves(both(characteristic.through)),
+        strict=True,
     ):
         np.testing.assert_allclose(one, two, rtol=1e-13, atol=1e-12)
 
@@ -151,7 +153,7 @@ REAL_LAYER, REAL_SUBSTRATE = RNG.uniform(1.7, 3, (2, N))
 PHASE, ANGLE = RNG.uniform(0, 8, N), RNG.uniform(0, np.pi / 2 - 0.05, N)
 
 
-def signals(layer, substrate, angle=ANGLE, through=passage.through, ambient=AMBIENT):
+def signals(layer, substrate, angle=ANGLE, through=characteristic.through, ambient=AMBIENT):
     waves = film.film(ambient, layer, substrate, PHASE, angle, through=through, sincos=sincos_poly)
     functions = (film.reflectance, film.transmittance, film.reflectance_below)
     return np.array([f(w) for w in waves for f in functions])
@@ -165,7 +167,7 @@ def test_number_types_agree(k, angle):
     versions = [signals(layer, substrate, angle), signals(to_pair(layer), to_pair(substrate), angle)]
     if k == 0:
         versions.append(signals(REAL_LAYER, REAL_SUBSTRATE, angle))
-        versions.append(signals(REAL_LAYER, REAL_SUBSTRATE, angle, passage.through_wave))
+        versions.append(signals(REAL_LAYER, REAL_SUBSTRATE, angle, characteristic.through_wave))
         versions.append(signals(REAL_LAYER, interface.allow_tunnelling(REAL_SUBSTRATE), angle))
     for version in versions[1:]:
         np.testing.assert_allclose(version, versions[0], rtol=1e-11, atol=1e-13)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pellicle.optics import interface
-from pellicle.optics.number import Pair, imag, is_real, real, to_complex, to_pair
+from pellicle.optics.pair import Pair, imag, is_real, real, to_complex, to_pair
 
 TYPES = {"real": np.real, "pair": to_pair, "complex": lambda z: z}
 

@@ -6,10 +6,10 @@ import jax
 import numpy as np
 import pytest
 
+from pellicle.dispersion.empirical import Cauchy
 from pellicle.optics import film, interface, orders
-from pellicle.optics.dispersion import Cauchy
-from pellicle.optics.number import Pair, abs2, imag, real
-from pellicle.optics.sines import sincos_poly
+from pellicle.optics.elementary import sincos_poly
+from pellicle.optics.pair import Pair, abs2, imag, real
 
 WAVELENGTH = np.linspace(420.0, 900.0, 25)
 # a Gaussian blur by the trapezoidal rule: as good as exact for what is smooth on a scale of σ/20

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import pellicle as pl
 from pellicle.optics import interface
-from pellicle.optics.number import to_pair
+from pellicle.optics.pair import to_pair
 
 SIGNALS = {"R": pl.reflectance, "T": pl.transmittance}
 

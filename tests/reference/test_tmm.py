@@ -7,7 +7,7 @@ import pytest
 import tmm
 
 import pellicle as pl
-from pellicle.model import build
+from pellicle.simulation.film import build
 
 RNG = np.random.default_rng(20)
 COUNT = 60

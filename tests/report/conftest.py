@@ -6,10 +6,9 @@ import math
 import numpy as np
 import pytest
 
-from pellicle.effects import Row
+from pellicle.data.spectrum import Spectrum
+from pellicle.effects.plan import Plan, Row
 from pellicle.fitting.result import Curve, Estimate, Fit, Part, Profile, Rival, Status
-from pellicle.io.spectrum import Spectrum
-from pellicle.planning import Plan
 
 
 @pytest.fixture

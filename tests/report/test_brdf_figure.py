@@ -7,13 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pellicle.brdf_fitting.result import BrdfFit
+from pellicle.data.brdf_samples import BrdfSamples
+from pellicle.effects.surface import exact
+from pellicle.fitting.brdf.result import BrdfFit
 from pellicle.fitting.result import Status
-from pellicle.io.samples import BrdfSamples
 from pellicle.report.brdf_figure import draw, half_angle
-from pellicle.surfaces.effects import exact
-from pellicle.surfaces.lit import lit
-from pellicle.surfaces.surface import Surface
+from pellicle.scene.surface import Surface, lit
 
 
 @pytest.fixture

@@ -4,10 +4,10 @@ import dataclasses
 
 import numpy as np
 
-from pellicle.io import read_spectrum
-from pellicle.io.results import fit_csv, to_json
-from pellicle.report.figures import draw, figure
-from pellicle.report.text import report, summary_line
+from pellicle.data.read_spectrum import read_spectrum
+from pellicle.report.fit_figure import draw, figure
+from pellicle.report.fit_text import report, summary_line
+from pellicle.report.folders import fit_csv, to_json
 
 
 def labels(drawn) -> list[str]:

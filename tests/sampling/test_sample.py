@@ -8,7 +8,7 @@ import tmm
 
 import pellicle as pl
 from pellicle.errors import UsageError
-from pellicle.instrument import Drift
+from pellicle.scene.instrument import Drift
 
 BANDS = np.array([450.0, 520.0, 600.0, 690.0, 800.0])
 SUBSTRATE = 3.9 + 0.02j

@@ -11,7 +11,7 @@ from typing import Any
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from pellicle.optics.number import sqrt
+from pellicle.optics.pair import sqrt
 
 Vectors = Float[Array, "*shape 3"]
 

@@ -15,10 +15,10 @@ import numpy as np
 
 from pellicle.brdf.directions import angle_to_half, cosine_to_half
 from pellicle.brdf.shapes import Parameters, column
-from pellicle.optics import film, orders, passage
+from pellicle.optics import characteristic, film, orders
+from pellicle.optics.elementary import sincos_poly
 from pellicle.optics.interface import allow_tunnelling
-from pellicle.optics.number import Number, Pair
-from pellicle.optics.sines import sincos_poly
+from pellicle.optics.pair import Number, Pair
 
 SHORTEST = 400.0
 """Wavelength (nm) at which `nodes` counts: eyes and cameras see next to nothing below."""
@@ -60,7 +60,7 @@ def _lit(
 
 
 def airy(
-    polarisations: str = "sp", through: Any = passage.through, enter: Callable = allow_tunnelling
+    polarisations: str = "sp", through: Any = characteristic.through, enter: Callable = allow_tunnelling
 ) -> Reflectance:
     """Airy's reflectance, the mean over `polarisations`, of a film in air.
 

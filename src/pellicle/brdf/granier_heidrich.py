@@ -28,8 +28,8 @@ import jax.numpy as jnp
 from pellicle.brdf.directions import cosine_inside, cosine_to_half, direction
 from pellicle.brdf.lobes import cosine_to_mirror, power
 from pellicle.brdf.shapes import Parameters, column, summed
-from pellicle.optics.number import sqrt
-from pellicle.optics.sines import sincos_poly
+from pellicle.optics.elementary import sincos_poly
+from pellicle.optics.pair import sqrt
 
 
 class Paths(NamedTuple):

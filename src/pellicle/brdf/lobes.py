@@ -11,7 +11,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from pellicle.brdf.directions import half
-from pellicle.optics.number import sqrt
+from pellicle.optics.pair import sqrt
 
 
 def power(cosine: Any, exponent: Any) -> Float[Array, "..."]:

@@ -8,7 +8,6 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
-from pellicle.cli.aloud import aloud
 from pellicle.cli.chart import chart
 from pellicle.cli.compare import compare
 from pellicle.cli.cost import cost
@@ -18,6 +17,7 @@ from pellicle.cli.materials import materials
 from pellicle.cli.plan import plan
 from pellicle.cli.sample import sample
 from pellicle.cli.simulate import simulate
+from pellicle.cli.verbose import aloud
 from pellicle.errors import DataError, UsageError
 
 INTERRUPTED = 130

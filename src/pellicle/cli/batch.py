@@ -14,7 +14,7 @@ from pellicle.errors import UsageError
 if TYPE_CHECKING:
     from pellicle.fitting.result import Fit
     from pellicle.sampling.result import Posterior
-    from pellicle.scene import Scene
+    from pellicle.scene.film import Scene
 
 TOO_SHORT = 5
 """The exit code of a chain that carries no interval."""
@@ -41,7 +41,7 @@ class Sampler(NamedTuple):
 
     def settings(self, folder: Path | None) -> dict[str, Any]:
         """What the library takes, for a chain that is kept in `folder`."""
-        from pellicle.io.posteriors import chain_in
+        from pellicle.report.posterior_files import chain_in
         from pellicle.sampling.ensemble import STEPS
 
         chain = None if folder is None else chain_in(folder)
@@ -63,8 +63,8 @@ class Batch:
         self.done: list[Any] = []
 
     def __call__(self, groups: list[list[Look]]) -> int:
-        from pellicle.io.atomic import new_folder
-        from pellicle.io.results import several, write_summary
+        from pellicle.files import new_folder
+        from pellicle.report.folders import several, write_summary
 
         if self.sampler is not None and any(
             looks[0].reading.loss not in (None, "least-squares") for looks in groups
@@ -88,7 +88,7 @@ class Batch:
         return worst
 
     def _one(self, looks: list[Look], folder: Path | None) -> int:
-        from pellicle.io.results import failure
+        from pellicle.report.folders import failure
 
         paths = [look.path for look in looks]
         label = ", ".join(paths)
@@ -111,7 +111,7 @@ class Batch:
         return 0 if found.status == "converged" else 4
 
     def _show(self, found: Fit, posterior: Posterior | None, folder: Path | None) -> None:
-        from pellicle.io.posteriors import record, text, write
+        from pellicle.report.posterior_files import record, text, write
 
         written = json_module.dumps(record(found, posterior), allow_nan=False) if self.as_json else None
         print(written or text(found, posterior), flush=True)
@@ -127,8 +127,8 @@ class Batch:
         if self.sampler is not None:
             posterior = self._sampled(what, self.sampler, folder, progress)
             return posterior.fit, posterior
-        from pellicle.fitting.fit import fit
-        from pellicle.fitting.losses import LEAST_SQUARES
+        from pellicle.fitting.robust_losses import LEAST_SQUARES
+        from pellicle.fitting.spectra.fit import fit
 
         loss = looks[0].reading.loss or LEAST_SQUARES
         return fit(*what, tolerance=self.tolerance, loss=loss, progress=progress), None
@@ -136,7 +136,7 @@ class Batch:
     def _sampled(
         self, what: tuple[Any, Any], sampler: Sampler, folder: Path | None, progress: Progress
     ) -> Posterior:
-        from pellicle.sampling.sample import sample
+        from pellicle.sampling.spectra import sample
 
         return sample(*what, **sampler.settings(folder), tolerance=self.tolerance, progress=progress)
 
@@ -154,8 +154,8 @@ def measurements(looks: list[Look], joint: bool, talk: bool = True) -> tuple[Any
 
 def _seen(look: Look, own: bool) -> tuple[Any, Scene]:
     """The spectrum, and its scene: Ψ and Δ leave out a scale and an offset that are not their own."""
-    from pellicle.fitting.measured import unscaled
-    from pellicle.scene import Drift
+    from pellicle.fitting.spectra.targets import unscaled
+    from pellicle.scene.instrument import Drift
 
     scaled = isinstance(look.scene.instrument.scale, Drift)
     spectrum = read(look.path, look.reading, scaled=scaled)

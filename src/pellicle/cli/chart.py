@@ -12,7 +12,7 @@ from pellicle.cli.session import say, start
 from pellicle.errors import UsageError
 
 if TYPE_CHECKING:
-    from pellicle.scene import Scene
+    from pellicle.scene.film import Scene
 
 
 def chart(
@@ -34,8 +34,8 @@ def chart(
 
     Example: pellicle chart film.toml --out colours.png --thickness 0:1000
     """
-    from pellicle.io.recipe import read_recipe
-    from pellicle.io.recipe_kind import describes_surface
+    from pellicle.recipes.film import read_recipe
+    from pellicle.recipes.kind import describes_surface
 
     if describes_surface(recipe):
         if layer is not None or thickness is not None:
@@ -46,9 +46,9 @@ def chart(
     angles = _range("--angle", angle, 90.0)
     nm = _bounds(scene, layer) if thickness is None else _range("--thickness", thickness, inf)
     start()
-    from pellicle.report import charts
+    from pellicle.report import colour_figures
 
-    lost = charts.chart(
+    lost = colour_figures.chart(
         scene, out, nm, angles, layer, observer=observer, illuminant=illuminant, title=Path(recipe).stem
     )
     say(f"{out}: {nm[0]:g} to {nm[1]:g} nm, {angles[0]:g} to {angles[1]:g} degrees")
@@ -58,13 +58,13 @@ def chart(
 
 
 def _surface(recipe: str, out: str, light: float) -> int:
-    from pellicle.io.surface_recipe import read_surface_recipe
+    from pellicle.recipes.surface import read_surface_recipe
 
     if not 0 <= light <= 180:
         raise UsageError(f"--light must lie in 0 to 180 degrees, got {light:g}")
     surface = read_surface_recipe(recipe).surface
     start()
-    from pellicle.report.spheres import sphere
+    from pellicle.report.colour_figures import sphere
 
     sphere(surface, out, (light, 60.0), title=Path(recipe).stem)
     say(f"{out}: a sphere of {surface.model}, the light {light:g} degrees from the line of sight")
@@ -72,7 +72,7 @@ def _surface(recipe: str, out: str, light: float) -> int:
 
 
 def _range(flag: str, text: str, most: float) -> tuple[float, float]:
-    from pellicle.io.span import span
+    from pellicle.data.tabular.numbers import span
 
     low, high = span(text, flag)
     if low < 0 or high > most:
@@ -82,8 +82,8 @@ def _range(flag: str, text: str, most: float) -> tuple[float, float]:
 
 def _bounds(scene: Scene, layer: str | None) -> tuple[float, float]:
     """The recipe's own bounds, or 0 to twice a thickness that is fixed."""
-    from pellicle.appearance import varied
-    from pellicle.free import Free
+    from pellicle.scene.free import Free
+    from pellicle.synthetic.colours import varied
 
     chosen: Any = scene.layers[varied(scene, layer)]
     if isinstance(chosen.thickness, Free):

@@ -15,7 +15,7 @@ from pellicle.errors import DataError, UsageError
 
 if TYPE_CHECKING:
     from pellicle.cli.batch import Look
-    from pellicle.fitting.compare import Comparison
+    from pellicle.fitting.spectra.compare import Comparison
 
 log = getLogger(__name__)
 
@@ -43,7 +43,7 @@ def compare(
     if any(other != paths[0] for other in paths[1:]):
         raise UsageError("the recipes name different files: give the files on the command line")
     if out is not None and Path(out).exists():
-        from pellicle.io.atomic import new_folder
+        from pellicle.files import new_folder
 
         new_folder(out)  # refuses a stranger's folder before the work, not after
     start()
@@ -57,8 +57,8 @@ def compare(
 
 
 def _groups(data: list[str], recipe: str) -> list[list[Look]]:
-    from pellicle.cli.looks import groups
-    from pellicle.io.recipe_kind import describes_surface
+    from pellicle.cli.inputs import groups
+    from pellicle.recipes.kind import describes_surface
 
     if describes_surface(recipe):
         raise UsageError(f"{recipe}: describes a surface; a comparison is of films")
@@ -75,9 +75,8 @@ def _names(recipes: list[str]) -> list[str]:
 
 
 def _one(label: str, looks: dict[str, list[Look]], folder: Path | None, as_json: bool) -> int:
-    from pellicle.fitting.compare import compared
-    from pellicle.io.comparisons import failure, to_json, write_comparison
-    from pellicle.report.comparison import report
+    from pellicle.fitting.spectra.compare import compared
+    from pellicle.report.comparison import failure, report, to_json, write_comparison
 
     progress, first = Progress(label), next(iter(looks))
     try:
@@ -98,7 +97,7 @@ def _one(label: str, looks: dict[str, list[Look]], folder: Path | None, as_json:
 
 def _fit(name: str, looks: list[Look], progress: Progress, talk: bool) -> Any:
     from pellicle.cli.batch import measurements
-    from pellicle.fitting.fit import fit
+    from pellicle.fitting.spectra.fit import fit
 
     log.info("comparison: now %s", name)
     return fit(*measurements(looks, joint=len(looks) > 1, talk=talk), progress=progress)

@@ -33,10 +33,10 @@ def cost(
 
     Example: pellicle cost film.toml --tolerance 0.001 --out cost
     """
-    from pellicle.cli.seen import seen
-    from pellicle.io.atomic import new_folder
-    from pellicle.io.recipe import read_recipe
-    from pellicle.io.recipe_kind import describes_surface
+    from pellicle.cli.wavelengths import seen
+    from pellicle.files import new_folder
+    from pellicle.recipes.film import read_recipe
+    from pellicle.recipes.kind import describes_surface
 
     if tolerance is not None and not 0 < tolerance < inf:
         raise UsageError(f"--tolerance must be above zero, got {tolerance:g}: what error is small enough?")
@@ -47,7 +47,7 @@ def cost(
             raise UsageError(
                 "--reference is for films: a surface is measured against steps of 1 nm in float64"
             )
-        from pellicle.cli.surfaces import cost_surface
+        from pellicle.cli.surface_commands import cost_surface
 
         return cost_surface(recipe, tolerance, out, json)
     found = read_recipe(recipe)
@@ -55,9 +55,9 @@ def cost(
     if out is not None and Path(out).exists():
         new_folder(out)  # refuses a stranger's folder before the work, not after
     start(keep=False)
-    from pellicle.io.costs import to_json, write_cost
-    from pellicle.ladder.cost import cost as measure
+    from pellicle.accuracy.cost import cost as measure
     from pellicle.report.cost import text
+    from pellicle.report.cost_files import to_json, write_cost
 
     progress = Progress(found.path)
     try:

@@ -39,10 +39,10 @@ def demo(
     Makes a folder with a recipe, a spectrum, and results, and says which commands did it.
     """
     from pellicle.cli.chart import chart
-    from pellicle.cli.looks import groups
+    from pellicle.cli.inputs import groups
     from pellicle.cli.simulate import simulate
-    from pellicle.io.atomic import write_text
-    from pellicle.sampling.extra import missing
+    from pellicle.files import write_text
+    from pellicle.sampling.checks import missing
 
     folder = _unused(Path(out))
     folder.mkdir(parents=True)

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from pellicle.cli import brdf
+from pellicle.cli import fit_brdf
 from pellicle.cli.batch import Batch, Sampler
 from pellicle.cli.flags import OUTPUT, SAMPLER, SCENE, ReadWords, SceneWords, flag, switch
 from pellicle.cli.session import not_negative, start
@@ -31,11 +31,11 @@ def fit(
     """
     words, reading = words or SceneWords(), reading or ReadWords()
     sampler = Sampler() if posterior else None
-    if brdf.wanted(recipe, reading.signal):
-        given = brdf.of_films(words, joint, tolerance)
-        return brdf.fit_surface(list(data), str(recipe), given, reading, out, json, sampler)
+    if fit_brdf.wanted(recipe, reading.signal):
+        given = fit_brdf.of_films(words, joint, tolerance)
+        return fit_brdf.fit_surface(list(data), str(recipe), given, reading, out, json, sampler)
     not_negative("--tolerance", tolerance)
-    from pellicle.cli.looks import groups
+    from pellicle.cli.inputs import groups
 
     found, together = groups(list(data), recipe, words, reading, joint)
     start()

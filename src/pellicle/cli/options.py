@@ -10,16 +10,18 @@ from pellicle.cli.flags import ReadWords, SceneWords
 from pellicle.errors import UsageError
 
 if TYPE_CHECKING:
-    from pellicle.io.recipe import Recipe
-    from pellicle.scene import Light, Scene
+    from pellicle.recipes.film import Recipe
+    from pellicle.scene.film import Light, Scene
 
 DEFAULT_THICKNESS = "1:5000"
 
 
 def scene_from_words(words: SceneWords, read: ReadWords) -> tuple[Scene, list[str]]:
     """The scene that the flags describe, and what was assumed. Raises UsageError."""
-    from pellicle.io import words as w
-    from pellicle.scene import Instrument, Layer, Scene, Substrate
+    from pellicle.recipes import media_words as w
+    from pellicle.scene.film import Scene
+    from pellicle.scene.instrument import Instrument
+    from pellicle.scene.layers import Layer, Substrate
 
     if words.layer is None or words.substrate is None:
         missing = "--layer" if words.layer is None else "--substrate"
@@ -52,8 +54,8 @@ def scene_from_words(words: SceneWords, read: ReadWords) -> tuple[Scene, list[st
 
 def light(read: ReadWords) -> Light:
     """How the scene is looked at, where the file does not say."""
-    from pellicle.io.recipe import optional
-    from pellicle.scene import Light
+    from pellicle.recipes.film import optional
+    from pellicle.scene.film import Light
 
     return Light(
         None, optional(read.angle, "angle") or 0.0, read.signal or "R", read.polarisation or "unpolarised"
@@ -75,7 +77,7 @@ def read(path: str, words: ReadWords, *, scaled: bool) -> Any:
 
     Raises DataError or UsageError.
     """
-    from pellicle.io.spectra import read_spectrum
+    from pellicle.data.read_spectrum import read_spectrum
 
     if words.reference is not None:
         return _from_counts(path, words)
@@ -99,7 +101,7 @@ def spanned(given: str | tuple[float, float] | None) -> tuple[float, float] | No
     """The wavelengths to keep (nm), however they were written. Raises UsageError."""
     if not isinstance(given, str):
         return given
-    from pellicle.io.span import span
+    from pellicle.data.tabular.numbers import span
 
     return span(given, "--range")
 
@@ -108,9 +110,9 @@ def _from_counts(path: str, words: ReadWords) -> Any:
     """Reflectance from raw counts of a sample and of a bare reference (a polished surface)."""
     import numpy as np
 
-    from pellicle.io.reference import read_counts, reflectance_from_counts
-    from pellicle.io.words import medium
-    from pellicle.signals import reflectance
+    from pellicle.data.read_counts import read_counts, reflectance_from_counts
+    from pellicle.recipes.media_words import medium
+    from pellicle.simulation.functions import reflectance
 
     if words.signal not in (None, "R"):
         raise UsageError("--reference turns counts into reflectance: leave --signal out, or give R")

@@ -24,27 +24,27 @@ def plan(
 
     Example: pellicle plan film.toml --tolerance 1e-3
     """
-    from pellicle.cli.seen import seen
-    from pellicle.io.recipe import read_recipe
-    from pellicle.io.recipe_kind import describes_surface
-    from pellicle.scene import with_wavelength
+    from pellicle.cli.wavelengths import seen
+    from pellicle.recipes.film import read_recipe
+    from pellicle.recipes.kind import describes_surface
+    from pellicle.scene.film import with_wavelength
 
     if not 0 < tolerance < inf:
         raise UsageError(f"--tolerance must be above zero, got {tolerance:g}: what error is small enough?")
     if describes_surface(recipe):
-        from pellicle.cli.surfaces import plan_surface
+        from pellicle.cli.surface_commands import plan_surface
 
         return plan_surface(recipe, tolerance, json)
     scene = with_wavelength(*seen(read_recipe(recipe)))
     start()
-    from pellicle import costs, thrift
-    from pellicle.fitting import spoken
+    from pellicle.fitting.spectra import logging
+    from pellicle.planning import cost_model, film
     from pellicle.report import plans
 
-    spoken.of_scene(scene)
-    chosen, calibration = thrift.plan(scene, tolerance), costs.calibrated(cache_folder())
-    savings = costs.savings(scene, calibration)
-    whole, planned = (calibration.seconds(costs.work(p, scene)) for p in (thrift.reference(scene), chosen))
+    logging.of_scene(scene)
+    chosen, calibration = film.plan(scene, tolerance), cost_model.calibrated(cache_folder())
+    savings = cost_model.savings(scene, calibration)
+    whole, planned = (calibration.seconds(cost_model.work(p, scene)) for p in (film.reference(scene), chosen))
     if json:
         print(json_module.dumps(plans.record(chosen, savings), allow_nan=False), flush=True)
         return 0

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from pellicle.cli import brdf
+from pellicle.cli import fit_brdf
 from pellicle.cli.batch import Batch, Sampler
 from pellicle.cli.flags import OUTPUT, SAMPLER, SCENE, ReadWords, SceneWords, flag, switch
 from pellicle.cli.session import not_negative, start
@@ -46,10 +46,10 @@ def sample(
     if not 0 <= seed < 2**32:
         raise UsageError(f"--seed must lie in 0 to 4294967295, got {seed}")
     sampler = Sampler(walkers, steps, seed)
-    if brdf.wanted(recipe, reading.signal):
-        given = brdf.of_films(words, joint, tolerance)
-        return brdf.fit_surface(list(data), str(recipe), given, reading, out, json, sampler)
-    from pellicle.cli.looks import groups
+    if fit_brdf.wanted(recipe, reading.signal):
+        given = fit_brdf.of_films(words, joint, tolerance)
+        return fit_brdf.fit_surface(list(data), str(recipe), given, reading, out, json, sampler)
+    from pellicle.cli.inputs import groups
 
     found, together = groups(list(data), recipe, words, reading, joint)
     start()

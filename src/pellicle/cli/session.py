@@ -8,7 +8,7 @@ from logging import INFO
 from math import inf
 from pathlib import Path
 
-from pellicle.cli.aloud import LOG
+from pellicle.cli.verbose import LOG
 from pellicle.errors import UsageError
 
 CACHE_VARIABLE = "PELLICLE_CACHE"

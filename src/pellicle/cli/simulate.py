@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,7 +12,7 @@ from pellicle.cli.session import not_negative, say, start
 from pellicle.errors import DataError
 
 if TYPE_CHECKING:
-    from pellicle.io.recipe import Recipe
+    from pellicle.recipes.film import Recipe
 
 
 def simulate(
@@ -30,31 +31,31 @@ def simulate(
 
     Example: pellicle simulate film.toml --out film.csv --noise 0.002 --seed 1
     """
-    from pellicle.cli.seen import wavelengths
-    from pellicle.io.atomic import write_text
-    from pellicle.io.recipe import read_recipe
-    from pellicle.io.recipe_kind import describes_surface
+    from pellicle.cli.wavelengths import wavelengths
+    from pellicle.files import write_text
+    from pellicle.recipes.film import read_recipe
+    from pellicle.recipes.kind import describes_surface
 
     not_negative("--noise", noise or 0.0)
     not_negative("--tolerance", tolerance)
     if describes_surface(recipe):
-        from pellicle.cli.surfaces import simulate_surface
+        from pellicle.cli.surface_commands import simulate_surface
 
         return simulate_surface(recipe, out, noise, seed, tolerance)
     found = read_recipe(recipe)
     scene = found.scene()
     start()
-    from pellicle.fitting import spoken
-    from pellicle.synthetic import synthesise, synthesise_angles
+    from pellicle.fitting.spectra import logging
+    from pellicle.synthetic.spectra import synthesise, synthesise_angles
 
-    spoken.of_scene(scene)
+    logging.of_scene(scene)
     ellipsometric = scene.light.signal == "psi-delta"
     if ellipsometric and found.tables.data.angle is None:
         raise DataError(f"{found.path}: ellipsometry needs an angle of incidence: give [data] angle = 70")
     noise = (found.tables.data.noise or 0.0) if noise is None else noise
     wavelength = wavelengths(found, scene)
     result = (synthesise_angles if ellipsometric else synthesise)(scene, wavelength, noise, seed, tolerance)
-    spoken.of_plan(result.plan)
+    logging.of_plan(result.plan)
     write_text(out, _csv(found, scene, result, noise, seed))
     say(f"{out}: {len(wavelength)} points, {wavelength[0]:g} to {wavelength[-1]:g} nm")
     return 0
@@ -62,14 +63,13 @@ def simulate(
 
 def _csv(recipe: Recipe, scene: Any, result: Any, noise: float, seed: int) -> str:
     """The file's text: what it is, from which recipe and seed, the truth, then the numbers."""
-    from pellicle import __version__
-    from pellicle.fitting.parameters import fixed_numbers, parameters
+    from pellicle.fitting.spectra.parameters import fixed_numbers, parameters
 
     light = scene.light
     truth = [(p.name, p.value, p.unit) for p in parameters(scene)] + fixed_numbers(scene)
     head = [
         "SYNTHETIC: simulated, not measured",
-        f"recipe {Path(recipe.path).name}, seed {seed}, noise {noise:g}, pellicle {__version__}",
+        f"recipe {Path(recipe.path).name}, seed {seed}, noise {noise:g}, pellicle {version('pellicle')}",
         f"signal {light.signal}, angle {_angle(light.angle)} degrees, {light.polarisation}",
         "truth: "
         + ", ".join(f"{name} = {value:.10g}{' ' + unit if unit else ''}" for name, value, unit in truth),

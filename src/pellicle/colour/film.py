@@ -13,10 +13,10 @@ from pellicle.colour import spaces
 from pellicle.colour.bands import Bands
 from pellicle.colour.bands import way as bands_of
 from pellicle.colour.observers import sensor
+from pellicle.dispersion.base import AbstractDispersion
 from pellicle.optics import film, interface, orders
-from pellicle.optics.dispersion import AbstractDispersion
-from pellicle.optics.number import is_real, real, to_pair
-from pellicle.optics.sines import sincos_poly
+from pellicle.optics.elementary import sincos_poly
+from pellicle.optics.pair import is_real, real, to_pair
 
 
 @final

@@ -4,14 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from pellicle import averages
-from pellicle.effects.box import is_zero, largest_index, largest_ratio, least_ambient, smallest_index, upper
+from pellicle.effects.bounds import (
+    is_zero,
+    largest_index,
+    largest_ratio,
+    least_ambient,
+    smallest_index,
+    upper,
+)
+from pellicle.effects.plan import Row
 from pellicle.effects.presence import roughness
-from pellicle.effects.row import Row
-from pellicle.free import Free
-from pellicle.layers import Layer, absorbs
 from pellicle.optics import orders as series
-from pellicle.scene import Scene, coherent_layers, thickness_spread
+from pellicle.optics import quadrature
+from pellicle.scene.film import Scene, coherent_layers, thickness_spread
+from pellicle.scene.free import Free
+from pellicle.scene.layers import Layer, absorbs
 
 
 def coherence(scene: Scene) -> Row:
@@ -126,7 +133,7 @@ def _nodes(scene: Scene) -> tuple[int, float]:
     at, layers = _seen_layers(scene)
     blurs = [_path(at, layers) / np.min(at) * upper(scene.instrument.bandwidth) / series.FWHM]
     blurs += [4 * np.pi / np.min(at) * index * upper(thickness_spread(scene, x)) for x, index in layers]
-    tried = [(n, float(sum(averages.normal_error(blur, n) for blur in blurs))) for n in NODES]
+    tried = [(n, float(sum(quadrature.normal_error(blur, n) for blur in blurs))) for n in NODES]
     return next((found for found in tried if found[1] < NODES_ERROR), tried[-1])
 
 
@@ -185,7 +192,7 @@ def _rays(scene: Scene) -> tuple[int, int, float]:
 
     def rays(count: int) -> tuple[int, int, float]:
         around = 1 if is_zero(scene.light.angle) else count
-        return count, around, averages.cone_error(phase, float(axis), float(sine), count, around)
+        return count, around, quadrature.cone_error(phase, float(axis), float(sine), count, around)
 
     tried = map(rays, RAYS)
     return next((found for found in tried if found[2] < CONE_ERROR), rays(RAYS[-1]))

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from pellicle.effects.box import is_zero, upper
-from pellicle.effects.row import Row
-from pellicle.free import Free, free_leaves
-from pellicle.layers import Interface, absorbs
+from pellicle.dispersion.base import AbstractDispersion
+from pellicle.dispersion.empirical import Constant
+from pellicle.effects.bounds import is_zero, upper
+from pellicle.effects.plan import Row
 from pellicle.materials import Material
-from pellicle.optics.dispersion import AbstractDispersion, Constant
-from pellicle.scene import Scene, coherent_layers, groups
+from pellicle.scene.film import Scene, coherent_layers, groups
+from pellicle.scene.free import Free, free_leaves
+from pellicle.scene.layers import Interface, absorbs
 
 
 def absorption(scene: Scene) -> Row:
@@ -140,10 +141,10 @@ def _constant(material: AbstractDispersion) -> bool:
 
 
 def opaque(scene: Scene) -> Row:
-    """Off: only a tolerance says that a layer hides what lies beneath (`pellicle.thrift`)."""
+    """Off: only a tolerance says that a layer hides what lies beneath (`pellicle.planning.film`)."""
     return Row("opaque", False, "light may reach everything, down to the substrate")
 
 
 def precision(scene: Scene) -> Row:
-    """On: only a tolerance says that single precision will do (`pellicle.thrift`)."""
+    """On: only a tolerance says that single precision will do (`pellicle.planning.film`)."""
     return Row("precision", True, "double, as far as JAX is set to it")

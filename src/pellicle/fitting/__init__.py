@@ -1,1 +1,1 @@
-"""Fits: a scene run backwards."""
+"""Least-squares fits: minima, uncertainties, identifiability and status."""

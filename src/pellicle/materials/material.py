@@ -10,10 +10,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from pellicle.dispersion.base import AbstractDispersion
 from pellicle.errors import DataError
-from pellicle.materials.index import covering
-from pellicle.optics.dispersion import AbstractDispersion
-from pellicle.optics.number import Pair, imag, is_real, real
+from pellicle.materials.contents import covering
+from pellicle.optics.pair import Pair, imag, is_real, real
 
 CLEAR = 1e-5
 """Largest k of an ambient that is taken as transparent. In the coefficients of the sample's faces k changes

@@ -1,1 +1,1 @@
-"""One layer and its light: pure functions of arrays, no files and no options."""
+"""Light in thin layers: interfaces, films, stacks and plates."""

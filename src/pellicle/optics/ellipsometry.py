@@ -14,7 +14,7 @@ import jax
 import jax.numpy as jnp
 
 from pellicle.optics.film import Wave, transmittance
-from pellicle.optics.number import abs2, conj, imag, real, to_complex
+from pellicle.optics.pair import abs2, conj, imag, real, to_complex
 
 
 class Stokes(NamedTuple):

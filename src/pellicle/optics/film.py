@@ -1,6 +1,6 @@
 """One coherent layer on a substrate, with value and gradient finite everywhere.
 
-The layer enters only through the two entire functions of `pellicle.optics.passage`. So zero thickness,
+The layer enters only through the two entire functions of `pellicle.optics.characteristic`. So zero thickness,
 grazing incidence, an exactly critical film, a matched index, a millimetre of metal and tunnelling need
 no special case. This is the Airy formula of Gerardin et al. 2019 (eqs. 11 and 12) multiplied out; each
 line below is the same for real, complex and Pair numbers.
@@ -15,11 +15,11 @@ import jax
 import jax.numpy as jnp
 from jax.custom_derivatives import SymbolicZero
 
-from pellicle.optics.holding import hold, used_again
+from pellicle.optics.characteristic import half_turn, is_real_array, root, slopes, through, through_wave
+from pellicle.optics.elementary import SinCos, sincos, sincos_squares
+from pellicle.optics.hoisting import hold, used_again
 from pellicle.optics.interface import carried, normal, normal_square, nothing_where, power, same, transverse
-from pellicle.optics.number import Number, abs2, conj, is_real, real, times_i, where
-from pellicle.optics.passage import half_turn, is_real_array, root, slopes, through, through_wave
-from pellicle.optics.sines import SinCos, sincos, sincos_squares
+from pellicle.optics.pair import Number, abs2, conj, is_real, real, times_i, where
 
 
 class Three(NamedTuple):

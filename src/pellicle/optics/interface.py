@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 
-from pellicle.optics.number import Number, Pair, abs2, conj, is_real, real, sqrt, where
+from pellicle.optics.pair import Number, Pair, abs2, conj, is_real, real, sqrt, where
 
 _NUMBERS = int | float | complex | np.ndarray | np.generic | jax.Array
 

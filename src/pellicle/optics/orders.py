@@ -17,9 +17,9 @@ from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
+from pellicle.optics.elementary import SinCos, sincos
 from pellicle.optics.interface import carried, fresnel, normal, power, transverse
-from pellicle.optics.number import Number, Pair, abs2, conj, imag, real
-from pellicle.optics.sines import SinCos, sincos
+from pellicle.optics.pair import Number, Pair, abs2, conj, imag, real
 
 Window = Callable[[int], Any]
 """m → W_m, the factor that order m keeps."""

@@ -17,11 +17,11 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
+from pellicle.optics.characteristic import through
+from pellicle.optics.elementary import SinCos, sincos
 from pellicle.optics.film import Three, Wave
 from pellicle.optics.interface import carried, normal, normal_square, nothing_where, power, same, transverse
-from pellicle.optics.number import Number, abs2, to_complex
-from pellicle.optics.passage import through
-from pellicle.optics.sines import SinCos, sincos
+from pellicle.optics.pair import Number, abs2, to_complex
 
 
 def stack(

@@ -1,1 +1,1 @@
-"""What is told of a result: text, figures, tables of materials."""
+"""Reports: text, figures, tables and result folders."""

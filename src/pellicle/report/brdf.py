@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from pellicle.brdf_fitting.result import BrdfFit
-from pellicle.report import text
-from pellicle.report.page import block, facts, wrapped
+from pellicle.fitting.brdf.result import BrdfFit
+from pellicle.report import fit_text
+from pellicle.report.plain_text import block, facts, wrapped
 
 _COMPARED = {
     "linear": "ρ",
@@ -21,7 +21,7 @@ _SIGMA = {
 def brdf_report(fit: BrdfFit) -> str:
     """Everything a fit found, as text of at most 100 columns without colour codes."""
     samples = fit.samples
-    status = f"{fit.status}. {text.ADVICE[fit.status]}"
+    status = f"{fit.status}. {fit_text.ADVICE[fit.status]}"
     data = f"{len(samples)} samples of {', '.join(samples.channels)}"
     if fit.effective_points < 0.95 * samples.values.size:
         data += f", {samples.values.size} values, worth {fit.effective_points:.3g} independent ones"
@@ -42,10 +42,10 @@ def brdf_report(fit: BrdfFit) -> str:
         ("Verdict", [*wrapped(fit.verdict), *facts(row for row in seen if row[1])]),
         ("With and without a layer", facts(errors)),
         ("Fit statistics", facts(statistics)),
-        ("Parameters", text.parameters(fit)),
-        (text.CORRELATIONS, text.correlations(fit)),
-        (text.RIVALS, text.rivals(fit)),
-        (text.PLAN, text.plan(fit.plan)),
-        (text.WARNINGS, text.warnings(fit)),
+        ("Parameters", fit_text.parameters(fit)),
+        (fit_text.CORRELATIONS, fit_text.correlations(fit)),
+        (fit_text.RIVALS, fit_text.rivals(fit)),
+        (fit_text.PLAN, fit_text.plan(fit.plan)),
+        (fit_text.WARNINGS, fit_text.warnings(fit)),
     ]
     return "".join(block(title, lines) for title, lines in blocks if lines)

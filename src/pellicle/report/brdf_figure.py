@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pellicle.brdf_fitting.result import BrdfFit
-from pellicle.io.directions import vectors
-from pellicle.report.drawing import blank, saved
-from pellicle.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, marker_size
+from pellicle.data.half_angles import vectors
+from pellicle.fitting.brdf.result import BrdfFit
+from pellicle.report.drawing import BLACK, BLUE, GREEN, GREY, ORANGE, blank, marker_size, saved
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,12 +6,12 @@ import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-from pellicle.ladder.climb import Ladder
-from pellicle.ladder.cost import Cost
-from pellicle.ladder.intervals import Intervals
-from pellicle.ladder.race import Race
-from pellicle.ladder.surface import SurfaceCost
-from pellicle.report.page import COLUMNS
+from pellicle.accuracy.cost import Cost
+from pellicle.accuracy.interval_coverage import Intervals
+from pellicle.accuracy.measure import Ladder
+from pellicle.accuracy.solver_comparison import Race
+from pellicle.accuracy.surface import SurfaceCost
+from pellicle.report.plain_text import COLUMNS
 
 
 def text(cost: Cost, name: str) -> str:

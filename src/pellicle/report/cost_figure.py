@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pellicle.ladder.climb import Ladder
-from pellicle.ladder.cost import Cost
-from pellicle.ladder.surface import SurfaceCost
+from pellicle.accuracy.cost import Cost
+from pellicle.accuracy.measure import Ladder
+from pellicle.accuracy.surface import SurfaceCost
 from pellicle.report.cost import clock_of, error_of
-from pellicle.report.drawing import blank, saved
-from pellicle.report.style import BLUE, GREY, ORANGE
+from pellicle.report.drawing import BLUE, GREY, ORANGE, blank, saved
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

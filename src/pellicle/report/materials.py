@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pellicle.errors import UsageError
-from pellicle.materials import Material, index, lookup
+from pellicle.materials import Material, contents, lookup
 from pellicle.report.drawing import blank, saved
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ def _range(low: float, high: float) -> str:
     return f"{low:.5g}-{high:.6g}"
 
 
-def _row(name: str, page: index.Page | None) -> tuple[str, ...]:
+def _row(name: str, page: contents.Page | None) -> tuple[str, ...]:
     if page is None:
         return name, "n = 1 exactly", "all", "yes", ""
     return name, page.path, _range(page.low, page.high), "yes" if page.has_extinction else "no", page.short
@@ -45,9 +45,9 @@ def table(pattern: str | None = None) -> str:
 
     `pattern` keeps the lines that hold it in name, alias, page or source, whatever the case.
     """
-    default = {entry.page for entry in index.names()}
-    entries = [(_row(e.name, e.page), e.aliases) for e in index.names()]
-    entries += [(_row(f"{p.book}/{p.page}", p), ()) for p in index.pages() if p not in default]
+    default = {entry.page for entry in contents.names()}
+    entries = [(_row(e.name, e.page), e.aliases) for e in contents.names()]
+    entries += [(_row(f"{p.book}/{p.page}", p), ()) for p in contents.pages() if p not in default]
     entries.sort(key=lambda entry: entry[0][0].lower())
     if pattern:
         wanted = pattern.lower()
@@ -71,14 +71,14 @@ def describe(name: str) -> str:
         ("range", "all wavelengths" if high == np.inf else f"{_range(low, high)} nm"),
         ("k data", "yes" if material.has_extinction else "no: taken as transparent"),
         ("caution", material.caution),
-        ("why" if index.find_name(name) else "sample", material.note),
+        ("why" if contents.find_name(name) else "sample", material.note),
         ("reference", material.citation),
         ("aliases", ", ".join(_aliases(name))),
         ("pages", ""),
     ]
     text = [material.name, *(_fact(label, value) for label, value in facts if value)]
     parts = material.page.split("/")
-    others = index.pages_of_book(parts[1]) if len(parts) == 3 else []
+    others = contents.pages_of_book(parts[1]) if len(parts) == 3 else []
     if others:
         rows = (_row(f"{p.book}/{p.page}", p)[:1] + _row("", p)[2:] + (p.comments[:60],) for p in others)
         text += ["", f"pages of {parts[1]} that ship:", textwrap.indent(_align(rows), "  ").rstrip()]
@@ -86,7 +86,7 @@ def describe(name: str) -> str:
 
 
 def _aliases(name: str) -> tuple[str, ...]:
-    entry = index.find_name(name)
+    entry = contents.find_name(name)
     return entry.aliases if entry else ()
 
 

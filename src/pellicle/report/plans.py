@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from pellicle.costs import Saving
-from pellicle.planning import Plan
+from pellicle.effects.plan import Plan
+from pellicle.planning.cost_model import Saving
 
 UNITS = {
     "psi-delta": "degrees on the sphere of N, C, S",

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pellicle.report.drawing import blank, saved
-from pellicle.report.page import block, table, wrapped
-from pellicle.report.style import BLACK, BLUE, ORANGE, marker_size
+from pellicle.report.drawing import BLACK, BLUE, ORANGE, blank, marker_size, saved
+from pellicle.report.plain_text import block, table, wrapped
 from pellicle.sampling.predict import Prediction
 from pellicle.sampling.result import Marginal, Posterior, verdict
 

@@ -1,1 +1,1 @@
-"""Posteriors: what the data leave of each parameter, by ensemble sampling over every minimum that matters."""
+"""Posterior sampling by an affine-invariant ensemble (emcee)."""

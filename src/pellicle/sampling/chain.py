@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from pellicle.errors import DataError
-from pellicle.io.atomic import replacing
+from pellicle.files import replacing
 
 GROUP = "mcmc"
 

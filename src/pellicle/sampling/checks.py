@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
+from importlib.util import find_spec
 
 import numpy as np
 
-from pellicle.fitting.noise import integrated_time
+from pellicle.fitting.spectra.noise import integrated_time
 from pellicle.sampling.chain import Chain
 from pellicle.sampling.modes import Modes
 
@@ -116,3 +117,11 @@ def arviz():
         import arviz
 
         return arviz
+
+
+PACKAGES = ("emcee", "arviz", "corner", "h5py")
+
+
+def missing() -> list[str]:
+    """The packages that are not installed; none of them is imported."""
+    return [name for name in PACKAGES if find_spec(name) is None]

@@ -10,12 +10,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.fitting.evaluation import Looks, explained
-from pellicle.fitting.nuisance import Data
-from pellicle.fitting.problem import Box, Problem
-from pellicle.fitting.programs import kept
+from pellicle.fitting.program_cache import kept
+from pellicle.fitting.spectra.evaluation import Looks, explained
+from pellicle.fitting.spectra.nuisance import Data
+from pellicle.fitting.spectra.problem import Box, Problem
 from pellicle.sampling.target import LogDensity
-from pellicle.scene import Scene
+from pellicle.scene.film import Scene
 
 
 class Density(NamedTuple):

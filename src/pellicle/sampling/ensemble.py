@@ -12,10 +12,10 @@ import jax
 import numpy as np
 
 from pellicle.errors import UsageError
-from pellicle.fitting.search import Progress
+from pellicle.fitting.spectra.search import Progress
 from pellicle.sampling import chain as chains
 from pellicle.sampling.chain import Chain
-from pellicle.sampling.extra import missing
+from pellicle.sampling.checks import missing
 from pellicle.sampling.modes import Modes
 from pellicle.sampling.predict import Prediction
 from pellicle.sampling.result import Posterior

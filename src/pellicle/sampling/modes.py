@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import jax
 import numpy as np
 
-from pellicle.fitting.evaluation import local
-from pellicle.fitting.uncertainty import scaled
-from pellicle.fitting.weigh import Weighed
+from pellicle.fitting.spectra.covariance import scaled
+from pellicle.fitting.spectra.evaluation import local
+from pellicle.fitting.spectra.reweighting import Weighed
 
 FREEDOM = 5.0
 """Degrees of freedom of the t distributions: their tails are heavier than those of what is sampled."""

@@ -8,10 +8,10 @@ from typing import NamedTuple
 import jax
 import numpy as np
 
-from pellicle.fitting.evaluation import curves
-from pellicle.fitting.parts import psi_delta
-from pellicle.fitting.problem import Problem, View
 from pellicle.fitting.result import Part
+from pellicle.fitting.spectra.evaluation import curves
+from pellicle.fitting.spectra.parts import psi_delta
+from pellicle.fitting.spectra.problem import Problem, View
 
 DRAWS = 256
 """Curves behind a band: 2.5 % of them are six."""

@@ -1,0 +1,161 @@
+"""The rungs to a film's colour: ways to integrate over the eye and the lamp, and to spare angles.
+
+They run in single precision, as colours do; what they are measured against runs in double.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from pellicle.accuracy.compiled import Program, compiled_function
+from pellicle.brdf import film_colour
+from pellicle.colour import delta_e2000, lab, sensor, way
+from pellicle.colour.bands import Bands
+from pellicle.colour.film import reflectance
+from pellicle.colour.observers import Sensor
+from pellicle.dispersion.empirical import Table
+
+EYE = ("1931", "D65")
+FINE = "uniform-64"
+"""Whose colours are as good as exact: what is spared in angles is measured with it."""
+
+
+class Films(NamedTuple):
+    """Films in air and the angles (radians, (angles,)) at which each of them is seen.
+
+    `numbers` holds for each of a film's keys, `k` and `base_k` only where there are any, an array (draws,)
+    or, for what differs from channel to channel, a dispersion.
+    """
+
+    numbers: dict[str, Any]
+    angle: np.ndarray
+    thickest: float
+
+    @property
+    def absorbs(self) -> bool:
+        return "k" in self.numbers
+
+
+def along_the_spectrum(number: Any, at: tuple[float, ...]) -> Any:
+    """A number; one a channel as a straight line between the channels' wavelengths, level beyond them."""
+    if np.ndim(number) == 0:
+        return number
+    order = np.argsort(at)
+    nm, values = np.asarray(at, float)[order], np.asarray(number, float)[order]
+    return Table(np.array([1.0, *nm, 1e5]), np.array([values[0], *values, values[-1]]))
+
+
+@dataclass(frozen=True)
+class ColourRung:
+    """One way to a colour; `program` gives it, or the reason why it makes no sense for these films."""
+
+    name: str
+    leaves_out: str
+    program: Callable[[Films], Program | str]
+
+
+def xyz(bands: Bands, numbers: dict[str, Any], angle: Any) -> Any:
+    """XYZ (angles, 3) of one film."""
+    index, base = (_index(numbers, *keys) for keys in (("n", "k"), ("base_n", "base_k")))
+    ambient = numbers.get("ambient_n", 1.0)
+    degrees = jnp.rad2deg(angle)
+    seen = jnp.asarray(reflectance(numbers["thickness"], index, base, bands, ambient=ambient, angle=degrees))
+    return seen @ jnp.asarray(bands.weights, seen.dtype)
+
+
+def _index(numbers: dict[str, Any], n: str, k: str) -> Any:
+    found, extinction = numbers[n], numbers.get(k)
+    if isinstance(found, Table):
+        return found if extinction is None else Table(found.wavelength, found.n, _table(extinction, found))
+    return found if extinction is None else jax.lax.complex(*jnp.broadcast_arrays(found, extinction))
+
+
+def _table(extinction: Any, like: Table) -> Any:
+    return extinction.n if isinstance(extinction, Table) else extinction * jnp.ones_like(like.n)
+
+
+def _by_way(name: str, films: Films, double: bool = False) -> Program | str:
+    bands = way(name, *EYE)
+    if films.absorbs and not bands.absorbs:
+        return "it knows no absorbing layer"
+    return _compiled(partial(xyz, bands), films, double)
+
+
+def _by_nodes(count: int, thickest: float, films: Films) -> Program | str:
+    if films.thickest > thickest:
+        return f"its wavelengths are for films up to {thickest:g} nm"
+    return _by_way(f"nodes-{count}-{thickest:g}", films)
+
+
+def _by_angles(count: int, films: Films) -> Program | str:
+    """A polynomial in the cosine through the colours at some angles."""
+    if 2 * count > films.angle.size:
+        return "it is seen at too few angles"
+    if any(isinstance(x, Table) for x in films.numbers.values()):
+        return "its index is a table"
+    bands, colour = way(FINE, *EYE), film_colour.by_nodes(count)
+
+    def at_angles(numbers: dict[str, Any], angle: Any) -> Any:
+        i = jnp.stack([jnp.sin(angle), 0 * angle, jnp.cos(angle)], axis=-1)
+        o = jnp.stack([-jnp.sin(angle), 0 * angle, jnp.cos(angle)], axis=-1)
+        given = {"wavelengths": bands.wavelength, "weights": bands.weights}
+        return colour(numbers | {key: jnp.asarray(x, i.dtype) for key, x in given.items()}, i, o)
+
+    return _compiled(at_angles, films)
+
+
+def _compiled(colour: Callable, films: Films, double: bool = False) -> Program:
+    draws = max(np.size(x) for x in films.numbers.values() if not isinstance(x, Table))
+    tables = {key: None if isinstance(x, Table) else 0 for key, x in films.numbers.items()}
+    call = jax.vmap(colour, in_axes=(tables, None))
+    return compiled_function(call, (films.numbers, films.angle), draws * films.angle.size, double)
+
+
+def error(eye: Sensor, truth: np.ndarray, answer: np.ndarray) -> float:
+    """The mean ΔE2000 of colours (draws, angles, 3) from what they are; infinite where one is no colour."""
+    apart = delta_e2000(*(np.asarray(lab(np.asarray(x, float), eye.white)) for x in (answer, truth)))
+    return float(np.mean(apart)) if np.all(np.isfinite(apart)) else math.inf
+
+
+def truth(films: Films) -> np.ndarray:
+    """Colours by steps of 1 nm, in double precision."""
+    eye = sensor(*EYE)
+    return _compiled(partial(xyz, Bands(eye.wavelength, None, eye.weights)), films, double=True).run()
+
+
+_SAMPLES = "the spectrum between them"
+COLOURS = (
+    *(
+        ColourRung(f"points-{rgb}", "all but three wavelengths", partial(_by_way, f"points-{rgb}"))
+        for rgb in ("650-510-475", "645-525-445")
+    ),
+    ColourRung("belcour-barla", "the sensors' shape: 4 Gaussians", partial(_by_way, "belcour-barla")),
+    *(
+        ColourRung(f"gaussians-{n}", f"the sensors' shape: {n} Gaussians", partial(_by_way, f"gaussians-{n}"))
+        for n in (4, 5, 6, 8, 10)
+    ),
+    ColourRung("gaussians-8 in float64", "as gaussians-8", partial(_by_way, "gaussians-8", double=True)),
+    *(
+        ColourRung(f"nodes-{n}-{d}", _SAMPLES, partial(_by_nodes, n, d))
+        for d, counts in ((500, (3, 4, 6, 8, 12)), (1000, (8, 12, 16)))
+        for n in counts
+    ),
+    *(
+        ColourRung(f"{kind}-{n}", _SAMPLES, partial(_by_way, f"{kind}-{n}"))
+        for kind in ("uniform", "frequency")
+        for n in (8, 16, 32, 64)
+    ),
+    *(
+        ColourRung(f"{FINE} at {n} angles", "the angles between them", partial(_by_angles, n))
+        for n in (8, 16, 32)
+    ),
+)
+"""Every rung to a colour, in the order of the table."""

@@ -1,0 +1,159 @@
+"""`pellicle fit` of BRDF samples: one file after the other, each with its verdict."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from logging import getLogger
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pellicle.cli.batch import TOO_SHORT
+from pellicle.cli.session import Progress, say, start
+from pellicle.errors import DataError, UsageError
+
+if TYPE_CHECKING:
+    from pellicle.cli.batch import Sampler
+    from pellicle.cli.flags import ReadWords, SceneWords
+    from pellicle.data.brdf_samples import BrdfSamples
+    from pellicle.fitting.brdf.result import BrdfFit
+    from pellicle.recipes.surface import SurfaceRecipe
+    from pellicle.sampling.result import Posterior
+
+log = getLogger(__name__)
+
+
+def wanted(recipe: str | None, signal: str | None) -> bool:
+    """Whether what is to be fitted is a BRDF. Raises UsageError for one without a recipe."""
+    if recipe is None:
+        if signal == "brdf":
+            raise UsageError(
+                "--signal brdf needs a --recipe that describes the surface under [scene.surface]"
+            )
+        return False
+    from pellicle.recipes.kind import describes_surface
+
+    return describes_surface(recipe)
+
+
+def of_films(words: SceneWords, joint: bool, tolerance: float) -> list[str]:
+    """The flags given that only films have."""
+    others = {"--joint": joint, "--tolerance": tolerance}
+    return [*words.given(), *(name for name, value in others.items() if value)]
+
+
+def fit_surface(
+    files: list[str],
+    recipe: str,
+    flags: list[str],
+    reading: ReadWords,
+    out: str | None,
+    as_json: bool,
+    sampler: Sampler | None = None,
+) -> int:
+    """Fit the recipe's surface to each file, and with a sampler its posterior too. Returns the exit code."""
+    from pellicle.recipes.surface import read_surface_recipe
+
+    others = {name: value for name, value in vars(reading).items() if value is not None}
+    for allowed in ("columns", "noise", "signal", "reference_material"):
+        others.pop(allowed, None)
+    if flags or others:
+        refused = [*flags, *(f"--{name.replace('_', '-')}" for name in others)]
+        raise UsageError(f"{', '.join(refused)} cannot be used on a BRDF; the recipe describes the surface")
+    if reading.signal not in (None, "brdf"):
+        raise UsageError(f"{recipe}: describes a surface, whose signal is brdf and not {reading.signal}")
+    found = read_surface_recipe(recipe)
+    said = {
+        name: getattr(reading, name) for name in ("columns", "noise") if getattr(reading, name) is not None
+    }
+    found = replace(found, data=found.data.model_copy(update=said))
+    if not found.surface.leaves():
+        raise DataError(
+            f"{recipe}: nothing is free to fit: give bounds, as in thickness = {{ lower = 0, upper = 1000 }}"
+        )
+    files = files or found.files
+    if not files:
+        raise UsageError(f"{recipe}: names no data files: give them on the command line or in [data] files")
+    start()
+    return _each(found, files, out, as_json, sampler)
+
+
+def _each(
+    recipe: SurfaceRecipe, files: list[str], out: str | None, as_json: bool, sampler: Sampler | None
+) -> int:
+    from pellicle.files import new_folder
+    from pellicle.report.folders import several, write_summary
+
+    folders: list[Path | None] = [None] * len(files)
+    if out is not None:
+        folders = [*several(Path(out), files)]
+        if Path(out).exists():
+            new_folder(Path(out))  # refuses a stranger's folder before the work, not after
+    records: list[dict[str, Any]] = []
+    worst = 0
+    try:
+        for path, folder in zip(files, folders, strict=True):
+            record, code = _one(recipe, path, folder, as_json, sampler)
+            records.append(record)
+            worst = max(worst, code)
+    except KeyboardInterrupt:
+        say(f"interrupted after {len(records)} of {len(files)} files; what is done is kept")
+        worst = 130
+    if out is not None and len(files) > 1 and records:
+        write_summary(Path(out) / "summary.csv", records)
+    return worst
+
+
+def _one(
+    recipe: SurfaceRecipe, path: str, folder: Path | None, as_json: bool, sampler: Sampler | None
+) -> tuple[dict[str, Any], int]:
+    from pellicle.report.folders import failure, one_line
+    from pellicle.report.posterior_files import record, text, write
+
+    progress = Progress(path)
+    try:
+        samples = recipe.read(path)
+        say(*(f"{path}: {note}" for note in samples.notes))
+        log.info(
+            "surface: %s, by %d samples of %s",
+            recipe.surface.model,
+            len(samples),
+            ", ".join(samples.channels),
+        )
+        for leaf in recipe.surface.leaves():
+            log.info("free: %s between %g and %g", leaf.name, leaf.free.lower, leaf.free.upper)
+        fit, posterior = _found(recipe, samples, folder, sampler, progress)
+    except ValueError as error:
+        progress.clear()
+        message = str(error) if path in str(error) else f"{path}: {error}"
+        say(f"pellicle: {message}")
+        failed = failure(path, message)
+        if as_json:
+            print(one_line(failed), flush=True)
+        return failed, 3
+    progress.clear()
+    found = record(fit, posterior)
+    print(one_line(found) if as_json else text(fit, posterior), flush=True)
+    if folder is not None:
+        write(folder, fit, posterior)
+        say(f"{folder}: report, figure and tables written")
+    if posterior is not None and not posterior.trusted:
+        return found, TOO_SHORT
+    return found, 0 if fit.status == "converged" else 4
+
+
+def _found(
+    recipe: SurfaceRecipe,
+    samples: BrdfSamples,
+    folder: Path | None,
+    sampler: Sampler | None,
+    progress: Progress,
+) -> tuple[BrdfFit, Posterior | None]:
+    compared = {"residual": recipe.data.residual, "progress": progress}
+    if sampler is None:
+        from pellicle.fitting.brdf.fit import fit_brdf
+
+        return fit_brdf(samples, recipe.surface, **compared), None
+    from pellicle.sampling.brdf import sample_brdf
+
+    posterior = sample_brdf(samples, recipe.surface, **sampler.settings(folder), **compared)
+    return posterior.fit, posterior

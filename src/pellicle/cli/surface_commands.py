@@ -1,0 +1,107 @@
+"""`pellicle simulate`, `plan` and `cost` of a surface, seen along the directions of the recipe's data."""
+
+from __future__ import annotations
+
+import json
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pellicle.cli.session import Progress, cache_folder, say, start
+
+if TYPE_CHECKING:
+    from pellicle.data.brdf_samples import BrdfSamples
+    from pellicle.recipes.surface import SurfaceRecipe
+    from pellicle.synthetic.brdf import Directions
+
+
+def simulate_surface(recipe: str, out: str, noise: float | None, seed: int, tolerance: float) -> int:
+    """Write the recipe's BRDF as CSV. Returns the exit code."""
+    from pellicle.data.write_brdf import write_brdf_samples
+    from pellicle.fitting.spectra.logging import of_plan
+    from pellicle.recipes.surface import read_surface_recipe
+    from pellicle.synthetic.brdf import synthesise
+
+    found = read_surface_recipe(recipe)
+    looked = directions(found)
+    noise = (found.data.noise or 0.0) if noise is None else noise
+    start()
+    samples, plan = synthesise(found.surface, looked, noise, seed, tolerance)
+    of_plan(plan)
+    numbers = found.surface.start()
+    units = {about.key: about.unit for about in found.surface.brdf.parameters}
+    truth = (f"{key} = {_listed(x)} {units.get(key, 'nm')}".strip() for key, x in numbers.items())
+    said = [
+        "SYNTHETIC: simulated, not measured",
+        f"recipe {Path(recipe).name}, seed {seed}, noise {noise:g}, pellicle {version('pellicle')}",
+        f"truth: model {found.surface.model}, {', '.join(truth)}",
+    ]
+    write_brdf_samples(out, samples, said=said)
+    say(f"{out}: {len(samples)} samples of {', '.join(samples.channels)}", *samples.notes)
+    return 0
+
+
+def directions(recipe: SurfaceRecipe) -> Directions | BrdfSamples:
+    """Where the recipe's first file was measured, or, as is said, directions spread over the lobes."""
+    from pellicle.synthetic.brdf import default_directions
+
+    if recipe.files:
+        say(f"directions: those of {recipe.files[0]}")
+        return recipe.read(recipe.files[0])
+    found = default_directions()
+    say(f"directions: {len(found.theta_i)} spread over the lobe and around it (the recipe names no files)")
+    return found
+
+
+def _listed(number) -> str:
+    return " ".join(f"{x:.10g}" for x in number.reshape(-1))
+
+
+def plan_surface(recipe: str, tolerance: float, as_json: bool) -> int:
+    """Print the plan of the recipe's surface. Returns the exit code."""
+    from pellicle.recipes.surface import read_surface_recipe
+
+    found = read_surface_recipe(recipe)
+    looked = directions(found)
+    start()
+    from pellicle.effects.surface import exact
+    from pellicle.planning import cost_model, surface
+    from pellicle.report import plans
+    from pellicle.scene.surface import lit
+
+    seen = lit(found.surface, looked)
+    chosen, calibration = surface.plan(seen, tolerance), cost_model.calibrated(cache_folder())
+    savings = surface.savings(seen, calibration)
+    whole, planned = (calibration.seconds(surface.work(p, seen)) for p in (exact(seen), chosen))
+    if as_json:
+        print(json.dumps(plans.record(chosen, savings), allow_nan=False), flush=True)
+    else:
+        print(plans.table(chosen, savings, whole, planned), end="", flush=True)
+    return 0
+
+
+def cost_surface(recipe: str, tolerance: float | None, out: str | None, as_json: bool) -> int:
+    """Print what accuracy costs for the recipe's surface. Returns the exit code."""
+    from pellicle.files import new_folder
+    from pellicle.recipes.surface import read_surface_recipe
+
+    found = read_surface_recipe(recipe)
+    looked = directions(found)
+    if out is not None and Path(out).exists():
+        new_folder(out)  # refuses a stranger's folder before the work, not after
+    start(keep=False)
+    from pellicle.accuracy.surface import cost
+    from pellicle.report.cost import surface_text
+    from pellicle.report.cost_files import surface_to_json, write_surface_cost
+    from pellicle.scene.surface import lit
+
+    progress = Progress(recipe)
+    try:
+        result = cost(lit(found.surface, looked), tolerance=tolerance, progress=progress)
+    finally:
+        progress.clear()
+    record = surface_to_json(result, recipe)
+    print(json.dumps(record, allow_nan=False) if as_json else surface_text(result, recipe), flush=True)
+    if out is not None:
+        say(f"{write_surface_cost(out, result, recipe)}: report, figure and tables written")
+    return 130 if result.interrupted else 0

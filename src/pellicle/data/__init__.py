@@ -1,0 +1,1 @@
+"""Measured data: spectra, BRDF samples, and readers of their files."""

@@ -1,0 +1,1 @@
+"""Tables in text files: from characters to named columns with units."""

@@ -1,0 +1,176 @@
+"""Where the numbers are in a text file: delimiter, decimal mark, preamble, header, rows.
+
+An instrument's preamble is any text before the first row of numbers. A line of column names may
+end it. Once the rows have begun, text is an error, except a closing `>>>>>` line.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from pellicle.data.tabular.columns import is_header, is_unit_row, recognise_all
+from pellicle.data.tabular.text import Line, is_number, split
+from pellicle.errors import DataError
+
+DELIMITERS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}
+_BLANK_NAMES = re.compile(r"[^\s(\[]+(?:\s*[(\[][^)\]]*[)\]])?|\S+")  # keeps `R (%)` one name
+_MARKER = ">>>>>"  # Ocean Optics puts such lines around the rows
+_SAMPLE = 60  # lines that decide, spread over the file so that a preamble cannot outvote the rows
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Delimiter and decimal mark, column names or None, number of columns, and the rows.
+
+    `raw_width` also counts empty cells at the end of a row, after a closing delimiter.
+    """
+
+    delimiter: str
+    decimal: str
+    names: tuple[str, ...] | None
+    width: int
+    raw_width: int
+    rows: Sequence[Line]
+    notes: tuple[str, ...]
+
+
+def plain_columns(
+    names: Sequence[str], rows: Sequence[tuple[Line, Sequence[str]]], notes: Sequence[str]
+) -> Layout:
+    """The layout of columns that a reader has picked out: cells with the lines they came from."""
+    width = len(names)
+    written = [Line(line.number, line.text, "\t".join(cells)) for line, cells in rows]
+    return Layout("\t", ".", tuple(names), width, width, written, tuple(notes))
+
+
+def find_layout(lines: Sequence[Line], comments: Sequence[Line], path: str) -> Layout:
+    """The layout of a file's lines. Raises DataError if no line holds two numbers."""
+    delimiter, decimal = _dialect(lines, path)
+    first = _first_numeric(lines, delimiter, decimal)
+    if first is None:
+        raise DataError(
+            f"{path}: line {lines[-1].number} ends the file without any row of two numbers; "
+            "expected rows of a wavelength and a value, as 550,0.21"
+        )
+    width = len(split(lines[first].bare, delimiter))
+    start, header = _rows_begin(lines, first, width, delimiter, decimal)
+    notes = []
+    if header is not None:
+        names = _header_cells(lines[header].text, delimiter, width)
+        if header + 1 < start:  # a row of units below the names
+            written = split(lines[header + 1].text, delimiter)
+            names = [f"{n} ({u})" if u else n for n, u in zip(names, written, strict=False)] + names[
+                len(written) :
+            ]
+    else:
+        names = _commented_header(lines[start], comments, delimiter, width)
+        if names:
+            notes.append("column names taken from the comment above the first row")
+    if names and width > len(names):
+        raise DataError(
+            f"{path}: line {lines[first].number} has {width} values but the header on line "
+            f"{lines[header or 0].number} names {len(names)} columns; make them agree"
+        )
+    skipped = start if header is None else header
+    if skipped:
+        notes.insert(0, f"{skipped} line{'s' * (skipped > 1)} of preamble skipped")
+    rows = [line for line in lines[start:] if not line.text.startswith(_MARKER)]
+    trailing = len(lines[first].bare.split(delimiter)) if delimiter != " " else width
+    return Layout(
+        delimiter,
+        decimal,
+        tuple(names) if names else None,
+        max(width, len(names or ())),
+        max(width, len(names or ()), trailing),
+        rows,
+        tuple(notes),
+    )
+
+
+def _numbers_in(line: Line, delimiter: str, decimal: str = ",") -> tuple[int, int]:
+    """How many cells of a line are numbers, and how many cells it has."""
+    if line.text.startswith(_MARKER):
+        return 0, 0
+    decimal = "." if delimiter == "," else decimal
+    cells = split(line.bare, delimiter)
+    return sum(is_number(cell, decimal) for cell in cells), len(cells)
+
+
+def _dialect(lines: Sequence[Line], path: str) -> tuple[str, str]:
+    """Delimiter under which most lines are numbers throughout (ties: tab, `;`, `,`, blank), decimal mark."""
+    sample = lines[:: max(1, len(lines) // _SAMPLE)]
+
+    def votes(delimiter: str) -> tuple[int, int]:
+        counted = [_numbers_in(line, delimiter) for line in sample]
+        return sum(n == cells >= 2 for n, cells in counted), sum(n >= 2 for n, cells in counted)
+
+    delimiter = max(DELIMITERS, key=votes)
+    if delimiter == ",":
+        return delimiter, "."
+    cells = [
+        cell
+        for line in sample
+        if (counted := _numbers_in(line, delimiter))[0] == counted[1] >= 2
+        for cell in split(line.bare, delimiter)
+    ]
+    comma = next((cell for cell in cells if "," in cell), None)
+    point = next((cell for cell in cells if "." in cell), None)
+    if comma and point:
+        raise DataError(
+            f"{path}: writes {comma!r} with a comma and {point!r} with a point, so the "
+            "decimal mark is unclear; export it again with one of them and no thousands separators"
+        )
+    return delimiter, "," if comma else "."
+
+
+def _first_numeric(lines: Sequence[Line], delimiter: str, decimal: str) -> int | None:
+    """Index of the first line that is all numbers, or failing that of the first with two numbers."""
+    counted = [_numbers_in(line, delimiter, decimal) for line in lines]
+    full = next((i for i, (n, cells) in enumerate(counted) if n == cells >= 2), None)
+    return full if full is not None else next((i for i, (n, _) in enumerate(counted) if n >= 2), None)
+
+
+def _rows_begin(
+    lines: Sequence[Line], first: int, width: int, delimiter: str, decimal: str
+) -> tuple[int, int | None]:
+    """Index of the first row and of the header line above it, or None.
+
+    `first` is the first faultless row; faulty ones may lie between it and the header, and they
+    must not pass for preamble.
+    """
+    for header in range(first - 1, -1, -1):
+        if is_header(_header_cells(lines[header].text, delimiter, width)):
+            units_below = header + 1 < first and is_unit_row(split(lines[header + 1].text, delimiter))
+            return header + (2 if units_below else 1), header
+    start = first
+    while start and _is_faulty_row(lines[start - 1], width, delimiter, decimal):
+        start -= 1
+    if start and not lines[start - 1].text.startswith(_MARKER):
+        cells = split(lines[start - 1].text, delimiter)
+        # two words of free text are as many as two names; only a name of ours tells them apart
+        words = delimiter == " " and not any(column.role != "other" for column in recognise_all(cells))
+        if len(cells) >= width and not words and not any(is_number(cell, decimal) for cell in cells):
+            return start, start - 1
+    return start, None
+
+
+def _is_faulty_row(line: Line, width: int, delimiter: str, decimal: str) -> bool:
+    cells = split(line.bare, delimiter)
+    return len(cells) == width and is_number(cells[0], decimal)
+
+
+def _header_cells(text: str, delimiter: str, width: int) -> list[str]:
+    """Column names of a header line, which may be separated otherwise than the rows are."""
+    written = [_BLANK_NAMES.findall(text) if d == " " else split(text, d) for d in (delimiter, *DELIMITERS)]
+    return next((names for names in written if len(names) == width), written[0])
+
+
+def _commented_header(
+    first_row: Line, comments: Sequence[Line], delimiter: str, width: int
+) -> list[str] | None:
+    """Names in the last comment above the rows, as numpy.savetxt writes them, if they are a header."""
+    above = [comment for comment in comments if comment.number < first_row.number]
+    names = _header_cells(above[-1].text, delimiter, width) if above else []
+    return names if len(names) == width and is_header(names) else None

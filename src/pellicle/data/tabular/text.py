@@ -1,0 +1,117 @@
+"""A file as lines and cells of text: decoding, comments, what counts as a number."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from io import BufferedReader
+from pathlib import Path
+
+from pellicle.errors import DataError
+
+_NUMBER = re.compile(
+    r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|nan|inf(?:inity)?)", re.IGNORECASE | re.ASCII
+)
+_COMMA_NUMBER = re.compile(r"[+-]?\d+,\d+(?:e[+-]?\d+)?", re.IGNORECASE | re.ASCII)
+_CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line that holds something: its number from 1, its text, and the text before any `#`."""
+
+    number: int
+    text: str
+    bare: str
+
+
+@contextmanager
+def opened(path: str | os.PathLike[str]) -> Iterator[BufferedReader]:
+    """A file open for reading bytes. Raises DataError for a missing or unreadable file, or a folder."""
+    try:
+        with Path(path).open("rb") as file:
+            yield file
+    except FileNotFoundError:
+        raise DataError(f"{path}: no such file; check the name and the folder") from None
+    except IsADirectoryError:
+        raise DataError(f"{path}: is a folder, not a file; name the file in it") from None
+    except OSError as error:
+        raise DataError(
+            f"{path}: cannot be read ({error.strerror}); check its name and permissions"
+        ) from None
+
+
+def read_text(path: str | os.PathLike[str]) -> tuple[str, str]:
+    """Text and SHA-256 of a file: UTF-8, UTF-16 with its mark, or Latin-1 as older instruments write.
+
+    Raises DataError as `opened` does, and for an empty file or one that is no table.
+    """
+    with opened(path) as file:
+        content = file.read()
+    if advice := no_measurement(content):
+        raise DataError(f"{path}: is {advice}")
+    digest = hashlib.sha256(content).hexdigest()
+    marked = content.startswith((b"\xff\xfe", b"\xfe\xff"))
+    try:
+        text = content.decode("utf-16" if marked else "utf-8-sig")
+    except UnicodeDecodeError:
+        text = content.decode("latin-1")
+    if _CONTROL.search(text):
+        raise DataError(f"{path}: is a binary file; export it as text (CSV) first")
+    if not text.strip():
+        raise DataError(f"{path}: is empty; expected rows of numbers")
+    return text, digest
+
+
+def content_lines(text: str) -> tuple[list[Line], list[Line]]:
+    """Lines that hold something, and the comment lines (without their `#`), both in file order."""
+    lines, comments = [], []
+    for number, raw in enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), start=1):
+        plain = raw.strip(" ")
+        if plain.startswith("#"):
+            comments.append(Line(number, plain.lstrip("# "), ""))
+        elif plain.strip():
+            lines.append(Line(number, plain, plain.partition("#")[0].rstrip(" ")))
+    return lines, comments
+
+
+def is_number(text: str, decimal: str = ".") -> bool:
+    """True if the whole of `text` is a number, NaN and infinity included."""
+    return bool(_NUMBER.fullmatch(text) or (decimal == "," and _COMMA_NUMBER.fullmatch(text)))
+
+
+def split(text: str, delimiter: str) -> list[str]:
+    """The cells of a line without blanks and quotes around them, nor empty cells at its end."""
+    if '"' in text:
+        cells = next(csv.reader([text], delimiter=delimiter, skipinitialspace=True))
+    else:
+        cells = text.split(None if delimiter == " " else delimiter)
+    cells = [cell.strip() for cell in cells]
+    while cells and not cells[-1]:
+        cells.pop()
+    return cells
+
+
+_KINDS = {
+    rb"\x89PNG|\xff\xd8\xff|GIF8|II\*\x00|MM\x00\*": "a picture; give the numbers behind it, as a CSV",
+    rb"%PDF": "a PDF; give the numbers in it as a CSV",
+    rb"\xd0\xcf\x11\xe0|PK\x03\x04.*(\[Content_Types|spreadsheet)": "an office file; save its sheet as CSV",
+    rb"PK\x03\x04|\x1f\x8b|BZh|7z\xbc\xaf|Rar!": "packed; unpack it and give the file inside",
+    rb"\{\\rtf": "a word processor's file; save it as plain text",
+    rb"\s*<(!doctype|html|\?xml|svg)": "a web page or XML; export the spectrum as a CSV",
+    rb"\s*(\{|\[\s*[\{\[\"])": "JSON; give a CSV with columns as wavelength_nm,R",
+    rb"(?=.*\[\[?scene[.\]])(\s*#[^\n]*\n|\s)*\[": "a recipe; give it with --recipe",
+}
+"""Patterns of how contents begin, the narrower first, and what such a file is."""
+
+
+def no_measurement(content: bytes) -> str | None:
+    """What the file is instead of a table of numbers, and what to do; None if it may be one."""
+    head = content[:4096]
+    flags = re.DOTALL | re.IGNORECASE
+    return next((advice for pattern, advice in _KINDS.items() if re.match(pattern, head, flags)), None)

@@ -1,0 +1,1 @@
+"""Dispersion: complex refractive index n + ik as a function of wavelength."""

@@ -1,0 +1,54 @@
+"""Base class of dispersions, and the bounds of their parameters."""
+
+from __future__ import annotations
+
+import abc
+from typing import Any, ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Complex
+
+from pellicle.optics.pair import Number, to_complex
+
+HC = 1239.841984
+"""Photon energy times wavelength, in eV nm (CODATA 2018): models in eV convert here, and only here."""
+
+
+class AbstractDispersion(eqx.Module):
+    """n + ik as a function of wavelength. Subclasses are final.
+
+    `units` names the unit of each parameter that has one.
+    """
+
+    units: ClassVar[dict[str, str]] = {}
+
+    @abc.abstractmethod
+    def index(self, wavelength: Any) -> Number:
+        """Index at `wavelength` (nm, any shape): a real array, or a Pair where it may absorb."""
+
+    def __call__(self, wavelength: Any) -> Complex[Array, "..."]:
+        """n + ik as a complex array at `wavelength` (nm, any shape)."""
+        return to_complex(self.index(jnp.asarray(wavelength, dtype=jnp.result_type(float, wavelength))))
+
+
+def bounds_of(number: Any) -> tuple[float, float] | None:
+    """The least and the largest value of a parameter, free or fixed; None for an array or a tracer."""
+    if isinstance(number, int | float):
+        return number, number
+    if hasattr(number, "lower") and hasattr(number, "upper"):
+        return number.lower, number.upper
+    return None
+
+
+def not_negative(model: str, **parameters: Any) -> None:
+    """ValueError for a parameter that can be below zero."""
+    for name, number in parameters.items():
+        found = bounds_of(number)
+        if found is not None and found[0] < 0:
+            raise ValueError(f"{model}: {name} must not be negative, got {found[0]:g}")
+
+
+def like(values: Any, wavelength: Any):
+    """A table's column in the precision of the wavelengths, so that float32 stays float32."""
+    return jnp.asarray(values, dtype=jnp.result_type(float, wavelength))

@@ -1,0 +1,156 @@
+"""Refractive index n + ik against wavelength (nm), each model a small pytree of its parameters.
+
+A dispersion answers `index(wavelength)` with a real array where it cannot absorb and a `Pair`
+where it can: that type is what tells the rest of the code whether there is absorption to compute.
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, final
+
+import jax.numpy as jnp
+
+from pellicle.dispersion.base import HC, AbstractDispersion, bounds_of, like, not_negative
+from pellicle.optics.pair import Number, Pair, imag, is_real, real
+
+
+@final
+class Constant(AbstractDispersion):
+    """The same index at every wavelength; `k=None` means that the medium cannot absorb."""
+
+    n: Any
+    k: Any = None
+
+    def index(self, wavelength):
+        one = jnp.ones_like(wavelength)
+        return self.n * one if self.k is None else Pair(self.n * one, self.k * one)
+
+
+@final
+class Table(AbstractDispersion):
+    """Linear interpolation between measured points; NaN outside them, never an extrapolation.
+
+    `wavelength` (nm) rises strictly; `n` and `k` have its length, and `k=None` says that the
+    source gives no extinction.
+    """
+
+    wavelength: Any
+    n: Any
+    k: Any = None
+
+    def index(self, wavelength):
+        def column(values):
+            at = like(self.wavelength, wavelength)
+            return jnp.interp(wavelength, at, like(values, wavelength), left=jnp.nan, right=jnp.nan)
+
+        return column(self.n) if self.k is None else Pair(column(self.n), column(self.k))
+
+
+@final
+class Cauchy(AbstractDispersion):
+    """n = A + B/λ² + C/λ⁴ with λ in nm, B in nm² and C in nm⁴ (A. Cauchy, 1836); no absorption."""
+
+    units: ClassVar = {"B": "nm^2", "C": "nm^4"}
+    A: Any
+    B: Any = 0.0
+    C: Any = 0.0
+
+    def index(self, wavelength):
+        u = 1 / (wavelength * wavelength)
+        return self.A + u * (self.B + u * self.C)
+
+
+@final
+class CauchyUrbach(AbstractDispersion):
+    """Cauchy's n = A + B/λ² + C/λ⁴ with an absorption edge k = k0 exp((E − Eb)/Eu).
+
+    λ in nm, B in nm², C in nm⁴; E = hc/λ, Eb and Eu in eV: k is `k0` at the photon energy `Eb`
+    and grows by e with every `Eu` (F. Urbach, Phys. Rev. 92, 1324 (1953)). `Eb` only says where
+    `k0` is meant: fix it. Not Kramers-Kronig consistent. Elsewhere the exponent is written
+    β·12400(1/λ − 1/γ) with λ and γ in Å: β = 1/Eu and 12400/γ = Eb.
+    """
+
+    units: ClassVar = {"B": "nm^2", "C": "nm^4", "Eu": "eV", "Eb": "eV"}
+    A: Any
+    B: Any = 0.0
+    C: Any = 0.0
+    k0: Any = 0.01
+    Eu: Any = 0.5
+    Eb: Any = 3.1
+
+    def __check_init__(self):
+        not_negative("cauchy-urbach", k0=self.k0)
+        found = bounds_of(self.Eu)
+        if found is not None and not found[0] > 0:
+            raise ValueError(f"cauchy-urbach: the Urbach energy Eu must be positive, got {found[0]:g} eV")
+
+    def index(self, wavelength):
+        u = 1 / (wavelength * wavelength)
+        edge = self.k0 * jnp.exp((HC / wavelength - self.Eb) / self.Eu)
+        return Pair(self.A + u * (self.B + u * self.C), edge)
+
+
+@final
+class Sellmeier(AbstractDispersion):
+    """n² = 1 + Σ Bᵢ λ²/(λ² − Cᵢ) with λ in nm and Cᵢ in nm² (W. Sellmeier, 1871); no absorption.
+
+    `B` and `C` are tuples of the same length. Between the resonances √Cᵢ the formula has poles;
+    a negative n² gives NaN.
+    """
+
+    units: ClassVar = {"C": "nm^2"}
+    B: tuple[Any, ...]
+    C: tuple[Any, ...]
+
+    def index(self, wavelength):
+        square = wavelength * wavelength
+        return jnp.sqrt(1 + sum(b * square / (square - c) for b, c in zip(self.B, self.C, strict=True)))
+
+
+@final
+class WithExtinction(AbstractDispersion):
+    """The real index of one model with the extinction coefficient of another (its imaginary part)."""
+
+    base: AbstractDispersion
+    extinction: AbstractDispersion
+
+    def index(self, wavelength):
+        return Pair(real(self.base.index(wavelength)), imag(self.extinction.index(wavelength)))
+
+
+@final
+class Shifted(AbstractDispersion):
+    """A known dispersion plus a constant: what is fitted when a table is nearly right.
+
+    `n` and `k` are added; None adds nothing.
+    """
+
+    base: AbstractDispersion
+    n: Any = None
+    k: Any = None
+
+    def index(self, wavelength):
+        known = self.base.index(wavelength)
+        n = real(known) if self.n is None else real(known) + self.n
+        if self.k is None and is_real(known):
+            return n
+        return Pair(n, imag(known) if self.k is None else imag(known) + self.k)
+
+
+@final
+class Sampled(AbstractDispersion):
+    """Another dispersion known at the very wavelengths of a measurement, with its slope there.
+
+    A medium without free parameters is evaluated once, before a fit, and stands for itself as this.
+    The first-order expansion returns the samples exactly and hands their slope (1/nm) to whoever
+    differentiates in wavelength: the group index needs it. `slope=None` says that nobody does.
+    """
+
+    wavelength: Any
+    value: Number
+    slope: Number | None
+
+    def index(self, wavelength):
+        if self.slope is None:
+            return self.value
+        return self.value + self.slope * (wavelength - self.wavelength)

@@ -1,0 +1,89 @@
+"""What the bounds of a scene's free parameters allow: the largest and the smallest of what matters."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from pellicle.dispersion.base import AbstractDispersion
+from pellicle.dispersion.empirical import Sampled
+from pellicle.optics import interface, orders
+from pellicle.optics.pair import abs2, real
+from pellicle.scene.film import Scene, groups
+from pellicle.scene.free import Free, free_leaves, insert, start_values
+
+
+def is_zero(number: Any) -> bool:
+    """Fixed, and exactly nothing."""
+    return number is None or (not isinstance(number, Free) and np.ndim(number) == 0 and float(number) == 0.0)
+
+
+def least_ambient(scene: Scene) -> float:
+    """The ambient's smallest index at the light's wavelengths."""
+    ambient = insert(scene.ambient, start_values(scene.ambient))
+    return float(np.min(np.real(ambient(np.atleast_1d(scene.light.wavelength)))))
+
+
+def upper(number: Any) -> float:
+    """The largest value that a number or a free one's bounds allow; 0 where it is absent."""
+    return float(number.upper if isinstance(number, Free) else number or 0.0)
+
+
+@jax.jit
+def _real_index(material: AbstractDispersion, wavelength: Any) -> Any:
+    return real(material.index(wavelength))
+
+
+def largest_index(material: AbstractDispersion, wavelength: np.ndarray) -> float:
+    """The largest real index at these wavelengths (nm) over the corners of the bounds (at most 64)."""
+    return float(np.nanmax(_corner_indices(material, wavelength)))
+
+
+def smallest_index(material: AbstractDispersion, wavelength: np.ndarray) -> float:
+    """The smallest likewise, but not below 0.1: a metal has no fringes to count."""
+    return max(float(np.nanmin(_corner_indices(material, wavelength))), 0.1)
+
+
+def _corner_indices(material: AbstractDispersion, wavelength: np.ndarray) -> np.ndarray:
+    if isinstance(material, Sampled):
+        return np.asarray(real(material.value))
+    free = [leaf for _, leaf in free_leaves(material)]
+    corners = itertools.islice(itertools.product(*[(f.lower, f.upper) for f in free]), 64)
+    return np.stack([np.asarray(_real_index(insert(material, c), wavelength)) for c in corners])
+
+
+def largest_ratio(scene: Scene) -> float:
+    """The largest |q| = |r₁₂ r₂₃| over the corners of the box of bounds, at most 64 of them.
+
+    Measured, not proved: the corners and the start values, times 1.05.
+    """
+    free = [leaf for _, leaf in free_leaves(scene)]
+    corners = itertools.islice(itertools.product(*[(f.lower, f.upper) for f in free]), 64)
+    return 1.05 * max(_ratio(insert(scene, values)) for values in [*corners, start_values(scene)])
+
+
+def _ratio(scene: Scene) -> float:
+    at = jnp.asarray(scene.light.wavelength, dtype=float)
+    group = next(group for group in groups(scene)[0] if group.layers)
+    above, layer, below = (m.index(at) for m in (group.above, group.layers[0].material, group.below))
+    found = []
+    for angle in _extreme_angles(scene):
+        a, _ = interface.transverse(scene.ambient.index(at), angle)
+        inside = None if angle is None else interface.Inside(a)
+        for polarisation in "s" if angle is None else "sp":
+            b = orders.bounces(above, layer, below, 0.0 * at, inside, polarisation)
+            found.append(np.asarray(abs2(b.upper * b.lower)))
+    return float(np.sqrt(np.nanmax(np.stack(found))))
+
+
+def _extreme_angles(scene: Scene) -> list[Any]:
+    """The angles of incidence in radians, and those at the rim of a cone; None is normal incidence."""
+    angle = None if is_zero(scene.light.angle) else jnp.deg2rad(scene.light.angle)
+    if not scene.instrument.has_cone:
+        return [angle]
+    rim = (0.0 if angle is None else angle) + scene.instrument.largest_half_angle(least_ambient(scene))
+    return [angle, jnp.minimum(rim, jnp.pi / 2)]

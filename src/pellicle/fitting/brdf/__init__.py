@@ -1,0 +1,1 @@
+"""Fits of layered surfaces to BRDF samples."""

@@ -1,0 +1,1 @@
+"""Fits of layer stacks to reflectance, transmittance and ellipsometry spectra."""

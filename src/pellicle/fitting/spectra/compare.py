@@ -1,0 +1,191 @@
+"""Rival descriptions of one sample: which of them the data call for, by information criteria.
+
+With L the likelihood on the points that count, k the free numbers and n those points,
+AIC = −2 ln L + 2 k (H. Akaike 1974, IEEE Trans. Automat. Contr. 19, 716) and
+BIC = −2 ln L + k ln n (G. Schwarz 1978, Ann. Stat. 6, 461).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from logging import getLogger
+
+import numpy as np
+
+from pellicle.data.spectrum import Spectrum
+from pellicle.errors import UsageError
+from pellicle.fitting.result import Fit, Part, Status
+from pellicle.fitting.spectra.fit import fit
+from pellicle.fitting.spectra.noise import correlation_length
+from pellicle.fitting.spectra.search import Progress, quiet
+from pellicle.scene.film import Scene
+
+log = getLogger(__name__)
+
+UNDECIDED, STRONG = 2.0, 6.0
+"""ΔBIC below which two descriptions cannot be told apart, and from which the evidence is strong (R. Kass and
+A. Raftery 1995, J. Am. Stat. Assoc. 90, 773)."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One description and its fit; `free` counts what was fitted, `deviance` is −2 ln L."""
+
+    name: str
+    fit: Fit
+    free: int
+    deviance: float
+    aic: float
+    bic: float
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Descriptions of the same data, in the order given, and what is to be said of them."""
+
+    candidates: tuple[Candidate, ...]
+    effective_points: float
+    verdict: str
+
+    @property
+    def best(self) -> Candidate:
+        """The one of least BIC."""
+        return min(self.candidates, key=lambda c: c.bic)
+
+    def __str__(self) -> str:
+        rows = [f"  {c.name}: BIC {c.bic - self.best.bic:+.1f}, {c.fit.status}" for c in self.candidates]
+        return "\n".join([self.verdict, *rows])
+
+
+def compare(
+    data: Spectrum | Sequence[Spectrum],
+    scenes: Mapping[str, Scene | Sequence[Scene]],
+    *,
+    tolerance: float = 0.0,
+    progress: Progress = quiet,
+) -> Comparison:
+    """Fit every scene to the same data, as `pellicle.fit` does, and say which the data call for.
+
+    `scenes` are named. **Raises:** UsageError for fewer than two scenes, and as `fit` does.
+    """
+    fits = {name: fit(data, scene, tolerance=tolerance, progress=progress) for name, scene in scenes.items()}
+    return compared(fits)
+
+
+def compared(fits: Mapping[str, Fit]) -> Comparison:
+    """The comparison of fits that were done. Raises UsageError where they are not of the same data."""
+    if len(fits) < 2:
+        raise UsageError("a comparison needs two descriptions or more")
+    _check_same(fits)
+    left = {name: [_residual(part) for part in found.parts] for name, found in fits.items()}
+    nearest = min(left.values(), key=lambda rows: _deviance(rows, [1.0] * len(rows), fits))
+    lengths = [float(np.mean([correlation_length(c) for c in rows.T])) for rows in nearest]
+    points = sum(_independent(rows) / length for rows, length in zip(nearest, lengths, strict=True))
+    found = []
+    for name, rows in left.items():
+        free, deviance = len(fits[name].free), _deviance(rows, lengths, fits)
+        bic = deviance + free * math.log(max(points, 2.0))
+        log.info(
+            "comparison: %s has %d free numbers and -2 ln L %.6g on %.4g points: BIC %.6g",
+            *(name, free, deviance, points, bic),
+        )
+        found.append(Candidate(name, fits[name], free, deviance, deviance + 2 * free, bic))
+    return Comparison(tuple(found), points, _verdict(found))
+
+
+def _check_same(fits: Mapping[str, Fit]) -> None:
+    first, *others = fits
+    for other in others:
+        pairs = zip(fits[first].parts, fits[other].parts, strict=False)
+        same = len(fits[first].parts) == len(fits[other].parts) and all(_alike(a, b) for a, b in pairs)
+        if not same:
+            raise UsageError(
+                f"{first} and {other} do not look at the same points with the same noise: give both the same"
+                " range, noise and signal, or their criteria mean nothing"
+            )
+
+
+def _alike(one: Part, other: Part) -> bool:
+    a, b = one.spectrum, other.spectrum
+    columns = ((a.wavelength, b.wavelength), (a.values, b.values), (a.delta, b.delta), (a.sigma, b.sigma))
+    return a.signal == b.signal and all(
+        x is y if x is None or y is None else np.array_equal(x, y) for x, y in columns
+    )
+
+
+def _residual(part: Part) -> np.ndarray:
+    """Residuals over a given σ, else as they are, (points, channels): of Ψ and Δ on the sphere."""
+    c, sigma = part.curve, part.spectrum.sigma
+    if c.delta_data is None or c.delta_model is None:
+        return (c.residual if sigma is None else c.residual / sigma)[:, None]
+    if sigma is None:
+        return _sphere(c.data, c.delta_data) - _sphere(c.model, c.delta_model)
+    across = sigma if part.spectrum.delta_sigma is None else part.spectrum.delta_sigma
+    # at the poles, where Δ has no meaning, the error of Ψ leaves some to it
+    sine = np.sin(2 * np.deg2rad(c.data)) / np.hypot(np.sin(2 * np.deg2rad(c.data)), 2 * np.deg2rad(sigma))
+    return np.stack([c.residual / sigma, sine * c.delta_residual / across], axis=1)
+
+
+def _sphere(psi: np.ndarray, delta: np.ndarray) -> np.ndarray:
+    psi, delta = 2 * np.deg2rad(psi), np.deg2rad(delta)
+    return np.stack([np.cos(psi), np.sin(psi) * np.cos(delta), np.sin(psi) * np.sin(delta)], axis=-1)
+
+
+def _independent(rows: np.ndarray) -> int:
+    """Numbers that are independent: three on a sphere are two."""
+    return rows.shape[0] * min(rows.shape[1], 2)
+
+
+def _deviance(rows: Sequence[np.ndarray], lengths: Sequence[float], fits: Mapping[str, Fit]) -> float:
+    """−2 ln L up to a constant, each point counting for 1/length; an unknown σ takes its best value."""
+    parts = next(iter(fits.values())).parts
+    total = 0.0
+    for part, left, length in zip(parts, rows, lengths, strict=True):
+        square, count = float(np.sum(left**2)), _independent(left)
+        known = part.spectrum.sigma is not None
+        total += (square if known else count * math.log(max(square / count, 1e-300))) / length
+    return total
+
+
+def _verdict(found: Sequence[Candidate]) -> str:
+    best, second, *_ = sorted(found, key=lambda c: c.bic)
+    apart = second.bic - best.bic
+    if apart < UNDECIDED:
+        told = f"The data do not tell {best.name} from {second.name} (ΔBIC {apart:.1f})"
+        simpler = min((best, second), key=lambda c: c.free)
+        told += (
+            f": prefer {simpler.name}, which has fewer free parameters" if best.free != second.free else ""
+        )
+    else:
+        told = f"{best.name} is better than {second.name} by ΔBIC {apart:.3g}: {_why(best, second, apart)}"
+    if best.fit.status is Status.MISFIT:
+        return f"{told}. But even {best.name} does not explain the data."
+    if best.fit.status is not Status.CONVERGED:
+        return f"{told}. But the fit of {best.name} is {best.fit.status}."
+    return f"{told}."
+
+
+def _why(best: Candidate, second: Candidate, apart: float) -> str:
+    """What sets the two apart: free parameters and effects that only one of them has."""
+    more, less = (_extra(a.fit, b.fit) for a, b in ((best, second), (second, best)))
+    verb = "call for" if apart >= STRONG else "lean towards"
+    if more and less:
+        return f"the data {verb} {' and '.join(more)} rather than {' and '.join(less)}"
+    if more:
+        return f"the data {verb} {' and '.join(more)}"
+    if less:
+        return f"the data do not call for {' and '.join(less)}"
+    return f"the data {verb} its materials"
+
+
+def _extra(one: Fit, other: Fit) -> list[str]:
+    """Names of the free parameters that only the first has, else of effects that only it simulates."""
+    names = [p.name for p in one.free if p.name not in {q.name for q in other.free}]
+    if names:
+        return names[:4]
+    on = [{row.effect for row in part.plan.rows if row.on} for fit in (one, other) for part in fit.parts[:1]]
+    return [
+        effect for effect in ("roughness", "back-face", "absorption", "coherence") if effect in on[0] - on[1]
+    ]

@@ -1,0 +1,190 @@
+"""Fit a scene to spectra of one sample: scan, polish, compare, and say how sure the answer is."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from logging import getLogger
+from pathlib import Path
+
+import equinox as eqx
+import jax
+
+from pellicle.data.spectrum import Spectrum
+from pellicle.errors import UsageError
+from pellicle.fitting import identifiability
+from pellicle.fitting.result import Fit
+from pellicle.fitting.robust_losses import LEAST_SQUARES, check_loss
+from pellicle.fitting.spectra import backface, estimates, logging, parts, residual_structure
+from pellicle.fitting.spectra.covariance import errors, scaled
+from pellicle.fitting.spectra.problem import Problem, beyond, make
+from pellicle.fitting.spectra.reweighting import Weighed, weigh
+from pellicle.fitting.spectra.search import Progress, quiet, search
+from pellicle.fitting.spectra.targets import Measured, measured, unscaled
+from pellicle.fitting.status import judge, verdict
+from pellicle.scene.film import Scene
+from pellicle.scene.free import free_leaves
+
+log = getLogger(__name__)
+
+
+def fit(
+    data: Spectrum | Sequence[Spectrum],
+    scene: Scene | Sequence[Scene],
+    *,
+    tolerance: float = 0.0,
+    loss: str = LEAST_SQUARES,
+    progress: Progress = quiet,
+) -> Fit:
+    """Fit the free parameters of `scene` to a spectrum, in float64 whatever the caller's setting.
+
+    The signal, and the polarisation and angle where the file has them, come from the spectrum. A list
+    of spectra of one sample is fitted jointly: layers and substrate are shared, what is free of the
+    light and the instrument is each spectrum's own (`instrument.scale.R`). `scene` may then be a list
+    too, of one scene for each, that differ in light, instrument and back face only; of a single scene,
+    Ψ and Δ leave out scale and offset.
+
+    With a `tolerance`, in the unit of each signal, effects that change less are left out (`pellicle.plan`);
+    where the best fit turns out to lie beyond it, all of them are put back and the fit is done again.
+
+    With the `loss` "huber" or "student-t" a few outliers hardly count; it is "least-squares" otherwise.
+
+    `progress` is called with a stage's name, how much is done and how much there is. Returns a
+    `Fit`: best parameters with errors, rivals, a status and what was simulated.
+
+    **Raises:** UsageError where nothing is free, where scenes are not of one sample, an uncalibrated
+    signal is given a fixed scale or the loss is unknown; ValueError where a material has no data at a
+    wavelength, naming it.
+    """
+    return fitted(data, scene, tolerance, progress, loss)[0]
+
+
+def fitted(
+    data: Spectrum | Sequence[Spectrum],
+    scene: Scene | Sequence[Scene],
+    tolerance: float,
+    progress: Progress,
+    loss: str = LEAST_SQUARES,
+) -> tuple[Fit, Weighed]:
+    """What `fit` returns, and the minima and weights that it rests on, for whoever goes on from there."""
+    check_loss(loss)
+    with jax.enable_x64(True):
+        found = measurements(data, scene)
+        spectra = [data] if isinstance(data, Spectrum) else list(data)
+        return _fit(spectra, found, tolerance, loss, progress)
+
+
+def measurements(data: Spectrum | Sequence[Spectrum], scene: Scene | Sequence[Scene]) -> list[Measured]:
+    """The numbers and the scene of each spectrum. Raises UsageError as `fit` does."""
+    spectra = [data] if isinstance(data, Spectrum) else list(data)
+    scenes = _scenes(spectra, scene)
+    for each in scenes:
+        check_free(each)
+    names = [""] if isinstance(data, Spectrum) else labels(spectra)
+    return [measured(*each) for each in zip(spectra, scenes, names, strict=True)]
+
+
+def check_free(scene: Scene) -> None:
+    """UsageError where a scene has nothing to fit."""
+    if not free_leaves(scene):
+        raise UsageError(
+            "nothing is free to fit: give bounds to the thickness, as in --thickness 10:3000, or in a recipe "
+            "thickness = { lower = 10, upper = 3000 }"
+        )
+
+
+def labels(spectra: Sequence[Spectrum]) -> list[str]:
+    """What tells spectra apart, without dots: files' stems, else with their signals, else numbered.
+
+    Where a name would read as a parameter's it is numbered.
+    """
+    stems = [Path(s.path).stem.replace(".", "_") or s.signal for s in spectra]
+    signals = [f"{stem}-{s.signal}" for stem, s in zip(stems, spectra, strict=True)]
+    numbers = [f"{stem}-{i}" for i, stem in enumerate(stems, start=1)]
+    for names in (stems, signals):
+        if len(set(names)) == len(names) and "thickness" not in names:
+            return names
+    return numbers
+
+
+def _scenes(spectra: list[Spectrum], scene: Scene | Sequence[Scene]) -> list[Scene]:
+    """A scene for each spectrum, checked to be of one sample."""
+    if not spectra:
+        raise UsageError("there is no spectrum to fit: give one, or a list of some")
+    if isinstance(scene, Scene):
+        alone = len(spectra) == 1
+        return [scene if alone or s.delta is None else unscaled(scene) for s in spectra]
+    scenes = list(scene)
+    if len(scenes) != len(spectra):
+        raise UsageError(f"{len(spectra)} spectra need as many scenes, or one for all, not {len(scenes)}")
+    of = [(s.substrate.material, s.substrate.plate_mm, s.substrate.roughness) for s in scenes]
+    samples = [(s.layers, s.ambient, substrate) for s, substrate in zip(scenes, of, strict=True)]
+    if not all(eqx.tree_equal(sample, samples[0]) is True for sample in samples):
+        raise UsageError("the scenes of a joint fit must have the same layers, ambient and substrate")
+    return scenes
+
+
+def _fit(
+    data: list[Spectrum], spectra: list[Measured], tolerance: float, loss: str, progress: Progress
+) -> tuple[Fit, Weighed]:
+    began = time.perf_counter()
+    problem, warnings = make(*spectra, tolerance=tolerance), []
+    logging.of_problem(spectra, problem)
+    weighed = _weighed(problem, loss, progress)
+    off = max(beyond(view, weighed.minima.units[0]) for view in weighed.problem.views)
+    if off > tolerance:
+        log.info("plan: off by %.2g at the best fit, beyond the tolerance: again with every effect", off)
+        warnings = [
+            f"at the best fit what was left out changes the signal by {off:.2g}, more than the tolerance "
+            f"{tolerance:g}: fitted again with every effect"
+        ]
+        weighed = _weighed(make(*spectra), loss, progress)
+    return _report(data, spectra, weighed, warnings, began), weighed
+
+
+def _weighed(problem: Problem, loss: str, progress: Progress) -> Weighed:
+    return weigh(problem, search(problem, progress), loss)
+
+
+def _report(
+    data: list[Spectrum], spectra: list[Measured], weighed: Weighed, warnings: list[str], began: float
+) -> Fit:
+    problem = weighed.problem
+    profile = estimates.profile(problem, weighed)
+    around = problem, [m.at for m in weighed.met], [m.variance for m in weighed.met]
+    found = errors(*around)
+    parameters = estimates.estimates(spectra, weighed, found, profile)
+    others = estimates.rivals(weighed)
+    each = parts.parts(data, weighed, found)
+    missed = parts.missed(each, weighed)
+    status = judge(
+        converged=bool(weighed.minima.converged[0]),
+        misfit=bool(missed),
+        parameters=parameters,
+        rivals=others,
+        natural=frozenset(p.name for p in problem.parameters if p.natural_lower),
+    )
+    log.info("status: %s", status)
+    shown, dark = (missed or each)[0], estimates.opaque(spectra, weighed)
+    trading = identifiability.trades(scaled(*around), parameters)
+    of_lead = identifiability.of(next(iter(parameters)), trading)
+    at = next(i for i, part in enumerate(each) if part is shown)
+    places = residual_structure.missed(problem.views[at], weighed.met[at])
+    where = places.place if places else ""
+    said = verdict(status, parameters, others, shown.rms, shown.name or "the data", where, dark, of_lead)
+    unclear = [*identifiability.bounded(parameters, dark), *trading]
+    return Fit(
+        parts=each,
+        status=status,
+        verdict=said + backface.told(backface.worth(spectra, weighed)),
+        parameters=parameters,
+        rivals=others,
+        chi2_reduced=weighed.chi2_reduced,
+        rms=parts.together(each),
+        effective_points=sum(part.effective_points for part in each),
+        correlation_names=found.names,
+        correlation=found.correlation,
+        warnings=(*warnings, *estimates.warnings(spectra, weighed, unclear)),
+        profile=profile,
+        seconds=time.perf_counter() - began,
+    )

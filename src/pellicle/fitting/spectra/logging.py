@@ -1,0 +1,151 @@
+"""What a fit says of itself while it works: one record of the logger for each step, silent unless heard.
+
+`pellicle ... --verbose` listens; so does anyone with `logging.getLogger("pellicle").setLevel("INFO")`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from logging import INFO, getLogger
+from typing import Any
+
+import numpy as np
+
+from pellicle.dispersion.base import AbstractDispersion
+from pellicle.dispersion.empirical import Constant
+from pellicle.effects.plan import Plan
+from pellicle.fitting.spectra.problem import Problem, View
+from pellicle.fitting.spectra.targets import Measured
+from pellicle.materials import Material
+from pellicle.scene.film import Scene
+from pellicle.scene.free import free_leaves, is_free
+from pellicle.scene.layers import Interface, Layer, Plate
+
+log = getLogger(__name__)
+
+
+def of_problem(spectra: Sequence[Measured], problem: Problem) -> None:
+    """The scene, the numbers that are free, each spectrum with its noise, and what is simulated of it."""
+    if not log.isEnabledFor(INFO):
+        return
+    of_scene(spectra[0].scene)
+    for p in problem.parameters:
+        log.info("free: %s between %g and %g%s", p.name, p.lower, p.upper, f" {p.unit}" if p.unit else "")
+    for spectrum, view in zip(spectra, problem.views, strict=True):
+        log.info("data%s: %s; %s", _of(view.name), _looked(spectrum), _noise(spectrum))
+        of_plan(view.plan, view.name)
+
+
+def of_scene(scene: Scene) -> None:
+    """`from air: Fe2O3 (main/Fe2O3/Querry-o), 1 to 1000 nm, on BK7 (...)`, from the ambient down."""
+    if log.isEnabledFor(INFO):
+        layers = ", then ".join(_layer(layer) for layer in scene.layers)
+        on, back = medium_in_words(scene.substrate.material), scene.substrate.back
+        behind = "" if back is None else f", a plate with {medium_in_words(back)} behind it"
+        log.info("scene: from %s: %s, on %s%s", medium_in_words(scene.ambient), layers, on, behind)
+
+
+def of_plan(plan: Plan, name: str = "") -> None:
+    """What is computed, with its reason, and what is not."""
+    for row in plan.rows:
+        if row.on:
+            log.info("plan%s: %s is computed: %s", _of(name), row.effect, row.why)
+    small = [out.effect for out in plan.left_out]
+    if small:
+        log.info("plan%s: left out within the tolerance %g: %s", _of(name), plan.tolerance, ", ".join(small))
+    absent = ", ".join(row.effect for row in plan.rows if not row.on and row.effect not in small)
+    log.info("plan%s: not called for, so not computed: %s", _of(name), absent or "nothing")
+
+
+def of_scan(problem: Problem, thicknesses: int, others: int) -> None:
+    """How finely the box is scanned."""
+    depth = problem.thickness_axis
+    if depth is None:
+        log.info("scan: no thickness is free; %d starting points for the other parameters", others)
+        return
+    p = problem.parameters[depth]
+    log.info(
+        "scan: %d values of %s, %.3g nm apart (an eighth of the shortest wavelength in a layer, %.3g), "
+        "with %d choice%s of the rest each: %d candidates",
+        thicknesses,
+        p.name,
+        (p.upper - p.lower) / max(thicknesses - 1, 1),
+        problem.shortest,
+        others,
+        "s" * (others != 1),
+        thicknesses * others,
+    )
+
+
+def of_minima(problem: Problem, starts: int, units: np.ndarray, converged: np.ndarray) -> None:
+    """How many candidates were refined, and where they ended."""
+    best = zip(problem.parameters, problem.box.values(units[0]), strict=True)
+    log.info(
+        "refined: %d minima of the scan; %d distinct ones are left, the solver settled on %d; best: %s",
+        starts,
+        len(units),
+        int(np.sum(converged)),
+        ", ".join(f"{p.name} {value:.6g}" for p, value in best),
+    )
+
+
+def of_weights(views: Sequence[View], lengths: Sequence[float]) -> None:
+    """How many points the residuals of the best minimum count as."""
+    for view, length in zip(views, lengths, strict=True):
+        log.info(
+            "weights%s: residuals run alike over %.3g points, so that %d count as %.3g",
+            _of(view.name),
+            length,
+            view.rows,
+            view.rows / length,
+        )
+
+
+def medium_in_words(medium: AbstractDispersion) -> str:
+    """A material by its name and page, an index by its numbers, anything else by its kind."""
+    if isinstance(medium, Material):
+        return medium.name if medium.page == medium.name else f"{medium.name} ({medium.page})"
+    if isinstance(medium, Constant) and not free_leaves(medium):
+        k = 0.0 if medium.k is None else float(medium.k)
+        return f"index {float(medium.n):g}{f' + {k:g}i' * bool(k)}"
+    inside = [value for value in vars(medium).values() if isinstance(value, AbstractDispersion)]
+    of = f" of {' and '.join(medium_in_words(part) for part in inside)}" if inside else ""
+    free = ", its numbers free" if free_leaves(medium) else ""
+    return f"{type(medium).__name__}{of}{free}"
+
+
+def _layer(layer: Layer | Interface | Plate) -> str:
+    if isinstance(layer, Interface):
+        return f"a mixed interface, {_number(layer.thickness, 'nm')}"
+    if isinstance(layer, Plate):
+        return f"a plate of {medium_in_words(layer.material)}, {_number(layer.plate_mm, 'mm')}"
+    return f"{medium_in_words(layer.material)}, {_number(layer.thickness, 'nm')}"
+
+
+def _number(number: Any, unit: str) -> str:
+    if is_free(number):
+        return f"{number.lower:g} to {number.upper:g} {unit}"
+    return f"{float(number):g} {unit}"
+
+
+def _looked(spectrum: Measured) -> str:
+    light, nm = spectrum.scene.light, spectrum.wavelength
+    at = "free angle" if is_free(light.angle) else f"{_span(np.atleast_1d(light.angle))} degrees"
+    return f"{light.signal} at {len(nm)} points, {_span(nm)} nm, {at}, {light.polarisation}"
+
+
+def _span(values: np.ndarray) -> str:
+    low, high = values.min(), values.max()
+    return f"{low:g} to {high:g}" if low < high else f"{low:g}"
+
+
+def _noise(spectrum: Measured) -> str:
+    if spectrum.noise.given:
+        return "its noise is given, and errors are absolute"
+    if spectrum.noise.drifting:
+        return "no noise is given; scale drifts, so weights are the error that a lamp is allowed"
+    return "no noise is given: equal weights, and σ from the residuals of the best fit"
+
+
+def _of(name: str) -> str:
+    return f" of {name}" if name else ""

@@ -1,0 +1,175 @@
+"""The free parameters of a scene: their names, units and bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import equinox as eqx
+import jax
+import numpy as np
+
+from pellicle.dispersion.base import AbstractDispersion
+from pellicle.dispersion.cody_lorentz import CodyLorentz
+from pellicle.dispersion.oscillators import AbstractOscillator, Gaussian, Lorentz, Oscillators, TaucLorentz
+from pellicle.dispersion.parameter_names import Place, place
+from pellicle.dispersion.spline import Spline
+from pellicle.scene.film import Scene
+from pellicle.scene.free import Free, Prior, free_leaves, insert, is_free
+
+_WIDTHS = {"bandwidth": "nm", "thickness_spread": "nm", "roughness": "nm", "angle_spread": "deg"}
+_UNITS = {"thickness": "nm", "wavelength_shift": "nm", "plate_mm": "mm", "angle": "deg", **_WIDTHS}
+_NATURAL_ZERO = ("k", "k0", "fraction", "offset", "numerical_aperture", *_WIDTHS)
+_STRENGTHS = (Lorentz, Gaussian, TaucLorentz, CodyLorentz)
+"""Their A is a strength, which cannot be negative; the A of Cauchy is an index."""
+_SEARCHED = ("thickness", "n", "A", "B", "k", "B1", "Ep", "E0", "Eg", "eps_inf", "fraction")
+"""Parameters that change where the fringes lie, or whether there are any: a start in the middle fails."""
+_FEW = 3
+"""Levels of an oscillator's parameter, of which there are many at once."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One nonlinear parameter; `key` is its last name (`thickness`, `n`, `A`), `name` its full one.
+
+    `field` is the key without the number of a tuple (`k` for `k2`), `owner` whose number it is.
+    """
+
+    name: str
+    key: str
+    unit: str
+    value: float
+    lower: float
+    upper: float
+    prior: Prior | None
+    field: str = ""
+    owner: type = object
+
+    @property
+    def natural_lower(self) -> bool:
+        """A lower bound that physics sets: resting on it gives a one-sided limit, not a warning."""
+        strength = self.key == "A" and issubclass(self.owner, _STRENGTHS)
+        return (strength or (self.field or self.key) in _NATURAL_ZERO) and self.lower == 0
+
+    @property
+    def searched(self) -> bool:
+        return self.key in _SEARCHED or (self.owner is Spline and self.field == "n")
+
+    @property
+    def together(self) -> str:
+        """What a search moves together: a spline's index as a whole, anything else alone."""
+        return self.name.removesuffix(self.key) + self.field if self.owner is Spline else self.name
+
+    @property
+    def levels(self) -> int | None:
+        """How many values a search should try, None to leave it to the width of the bounds."""
+        if self.owner is Oscillators or issubclass(self.owner, AbstractOscillator):
+            return _FEW
+        return None
+
+
+def parameters(scene: Scene) -> tuple[Parameter, ...]:
+    """Every free parameter, in the order of the scene's pytree."""
+    return shared([scene], [""])[0]
+
+
+def shared(
+    scenes: Sequence[Scene], names: Sequence[str]
+) -> tuple[tuple[Parameter, ...], list[tuple[int, ...]]]:
+    """The free parameters of one sample looked at in several ways, and which of them each scene holds.
+
+    Layers, substrate and ambient are shared; light and instrument are each scene's own, and bear its name.
+    """
+    found: dict[tuple[str, str], Parameter] = {}
+    held: list[list[tuple[str, str]]] = []
+    for scene, name in zip(scenes, names, strict=True):
+        held.append([])
+        for path, free in free_leaves(scene):
+            key = _own(path, name), jax.tree_util.keystr(path)
+            found.setdefault(key, _parameter(scene, path, free, name))
+            held[-1].append(key)
+    order = {key: i for i, key in enumerate(found)}
+    return tuple(found.values()), [tuple(order[key] for key in keys) for keys in held]
+
+
+def _own(path: tuple, name: str) -> str:
+    """The name of the scene that a number belongs to, empty where all share it."""
+    return name if path[0].name in ("light", "instrument") else ""
+
+
+def _full_name(scene: Scene, path: tuple, last: str, name: str) -> str:
+    return ".".join(part for part in (*_owner(scene, path), last, _own(path, name)) if part)
+
+
+def _parameter(scene: Scene, path: tuple, free: Free, name: str) -> Parameter:
+    found = _place(scene, path)
+    return Parameter(
+        name=_full_name(scene, path, found.name, name),
+        key=found.key,
+        unit=_unit(found),
+        value=free.value,
+        lower=free.lower,
+        upper=free.upper,
+        prior=free.prior,
+        field=found.field,
+        owner=type(found.owner),
+    )
+
+
+def _place(scene: Scene, path: tuple) -> Place:
+    """What the number at `path` is called inside its medium, or inside the scene if it has none."""
+    node: Any = scene
+    for depth, step in enumerate(path):
+        node = getattr(node, step.name) if hasattr(step, "name") else node[step.idx]
+        if isinstance(node, AbstractDispersion):
+            return place(node, path[depth + 1 :])
+    key = path[-1].name
+    return Place(key, key, key, None)
+
+
+def _unit(found: Place) -> str:
+    return found.unit or _UNITS.get(found.key, "")
+
+
+def _owner(scene: Scene, path: tuple) -> list[str]:
+    """What goes in front of a name: nothing for the only layer of a scene."""
+    first = path[0].name
+    if first != "layers":
+        return [] if first == "light" else [first]
+    return _layer(scene, path[1].idx)
+
+
+def _layer(scene: Scene, position: int) -> list[str]:
+    """What a layer's parameters begin with: nothing if it is the only one."""
+    return [] if len(scene.layers) == 1 else [scene.layers[position].name or f"layer{position + 1}"]
+
+
+def thickness_name(scene: Scene, position: int) -> str:
+    """The full name of a layer's thickness."""
+    return ".".join([*_layer(scene, position), "thickness"])
+
+
+def bounds(parameters: tuple[Parameter, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper bounds, each of shape (parameters,)."""
+    return np.array([p.lower for p in parameters]), np.array([p.upper for p in parameters])
+
+
+def anonymous(scene: Scene) -> Scene:
+    """The scene without bounds and layers' names: neither may make a new program."""
+    scene = insert(scene, [Free(0.5, 0.0, 1.0)] * len(free_leaves(scene)))
+    return eqx.tree_at(lambda s: s.layers, scene, tuple(replace(layer, name=None) for layer in scene.layers))
+
+
+def fixed_numbers(scene: Scene, name: str = "") -> list[tuple[str, float, str]]:
+    """(name, value, unit) of the layer's numbers and the instrument's that are not free.
+
+    `name` is the scene's where it is one of several.
+    """
+    found = []
+    for path, leaf in jax.tree_util.tree_leaves_with_path(scene, is_leaf=is_free):
+        if path[0].name not in ("layers", "instrument") or not isinstance(leaf, int | float):
+            continue
+        at = _place(scene, path)
+        found.append((_full_name(scene, path, at.name, name), float(leaf), _unit(at)))
+    return found

@@ -1,0 +1,104 @@
+"""How the best scene explains each spectrum of a fit."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pellicle.data.spectrum import Spectrum
+from pellicle.fitting.result import Curve, Part
+from pellicle.fitting.spectra import noise
+from pellicle.fitting.spectra.covariance import Errors, layer_errors
+from pellicle.fitting.spectra.problem import View
+from pellicle.fitting.spectra.reweighting import Met, Weighed
+from pellicle.fitting.status import MISFIT_CHI2, misfits
+
+FAR = math.sqrt(MISFIT_CHI2)
+"""Residuals of a spectrum among several above this many times its noise count as structured: what its
+neighbouring points differ by serves as the σ that nobody gave, and the bound is that of a known one."""
+
+
+def parts(data: list[Spectrum], weighed: Weighed, found: Errors) -> tuple[Part, ...]:
+    """One part for each spectrum, in their order."""
+    views = zip(data, weighed.problem.views, weighed.met, strict=True)
+    return tuple(_part(spectrum, view, met, found) for spectrum, view, met in views)
+
+
+def _part(spectrum: Spectrum, view: View, met: Met, found: Errors) -> Part:
+    return Part(
+        name=view.name,
+        spectrum=spectrum,
+        curve=_curve(view, met, found),
+        plan=view.plan,
+        rms=view.rms(met.at.model),
+        chi2_reduced=met.chi2 / met.freedom,
+        effective_points=view.rows / met.length,
+        sigma_from="given" if view.noise.given else "model" if view.noise.drifting else "residuals",
+    )
+
+
+def together(found: tuple[Part, ...]) -> float | None:
+    """rms over all spectra, None where they have no unit in common."""
+    if len(found) == 1:
+        return found[0].rms
+    units = {part.spectrum.signal == "psi-delta" for part in found}
+    if len(units) > 1 or not all(part.spectrum.calibrated for part in found):
+        return None
+    sizes = [part.curve.wavelength.size for part in found]
+    return math.sqrt(np.average([part.rms**2 for part in found], weights=sizes))
+
+
+def missed(found: tuple[Part, ...], weighed: Weighed) -> tuple[Part, ...]:
+    """The spectra that the scene does not explain."""
+    views = zip(found, weighed.problem.views, weighed.met, strict=True)
+    several = len(found) > 1
+    return tuple(part for part, view, met in views if _misses(part, view, met, several))
+
+
+def _misses(part: Part, view: View, met: Met, several: bool) -> bool:
+    values = view.in_columns(view.data.values)
+    rms = part.rms if view.channels == 1 else math.radians(2 * part.rms)
+    floor = np.sqrt(np.mean([np.median(noise.local_noise(column)) ** 2 for column in values.T]))
+    # beside others a spectrum may be given up, its σ growing with its residuals, without much structure
+    given_up = several and rms > FAR * floor
+    return misfits(
+        chi2_reduced=part.chi2_reduced,
+        sigma_known=view.noise.given,
+        drifting=view.noise.drifting,
+        effective_share=0.0 if given_up else 1 / met.length,
+        rms=rms,
+        span=float(np.max(np.ptp(values, axis=0))),
+        calibrated=part.spectrum.calibrated,
+    )
+
+
+def _curve(view: View, met: Met, found: Errors) -> Curve:
+    """Data, model and the layer's index with errors, at the real points."""
+    at, rows, held = met.at, view.rows, list(view.takes)
+    n_stderr, k_stderr = layer_errors(at, found.covariance[np.ix_(held, held)], rows)
+    n, k = np.asarray(at.layer)[:, :rows]
+    data, model = view.in_columns(view.data.values), view.in_columns(at.model)
+    sigma = 1 / view.data.weight[: view.points : view.channels]
+    angles = {}
+    if view.channels > 1:
+        (data, delta_data), (model, delta_model) = psi_delta(data), psi_delta(model)
+        sigma, angles = np.rad2deg(sigma) / 2, {"delta_data": delta_data, "delta_model": delta_model}
+    return Curve(
+        wavelength=np.asarray(view.scene.light.wavelength)[:rows],
+        data=np.ravel(data),
+        sigma=sigma,
+        model=np.ravel(model),
+        n=n,
+        k=k,
+        n_stderr=n_stderr,
+        k_stderr=k_stderr,
+        **angles,
+    )
+
+
+def psi_delta(sphere: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Ψ and Δ in degrees from N, C, S (..., 3), or from N and C (..., 2): then Δ is in 0 to 180."""
+    n, c, *seen = np.moveaxis(sphere, -1, 0)
+    s = seen[0] if seen else np.sqrt(np.maximum(1 - n**2 - c**2, 0.0))
+    return np.rad2deg(np.arctan2(np.hypot(c, s), n)) / 2, np.rad2deg(np.arctan2(s, c)) % 360.0

@@ -1,0 +1,124 @@
+"""Where the residuals are no noise: the wavelengths at which the model misses something."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from pellicle.fitting.spectra.noise import local_noise
+from pellicle.fitting.spectra.problem import View
+from pellicle.fitting.spectra.reweighting import Met
+
+_NARROWEST = 5
+"""Points in the narrowest window whose mean is tested."""
+_CHANCE = 0.01
+"""How often a spectrum of pure noise may be said to have structure."""
+_CLIP = 4.0
+"""A residual counts for no more than this: a lone outlier is no structure."""
+_MOST, _SHOWN = 12, 2
+_EVERYWHERE = 0.6
+"""Windows that cover this share of a spectrum are called most of it."""
+
+
+class Window(NamedTuple):
+    """Points `first` to `last` (included) whose mean residual noise cannot explain, by `score` sigmas."""
+
+    first: int
+    last: int
+    score: float
+
+
+def windows(z: np.ndarray) -> list[Window]:
+    """Stretches of residuals `z`, in standard deviations of white noise, of one sign too long for it.
+
+    Means over windows of all positions and of widths that grow by half are compared with the largest
+    that noise of as many points would show by chance. The strongest is taken first; neighbours merge.
+    """
+    z, size, found = np.clip(z, -_CLIP, _CLIP), len(z), []
+    bar = math.sqrt(2 * math.log(max(size, 2) / _CHANCE))
+    for _ in range(_MOST):
+        best = max((_strongest(z, width) for width in _widths(size)), key=lambda w: w.score, default=None)
+        if best is None or best.score < bar:
+            break
+        found.append(best)
+        z[best.first : best.last + 1] = 0.0
+    return _merged(sorted(found))
+
+
+def _widths(size: int) -> list[int]:
+    widths, width = [], float(_NARROWEST)
+    while width <= size / 2:
+        widths.append(int(width))
+        width *= 1.5
+    return widths
+
+
+def _strongest(z: np.ndarray, width: int) -> Window:
+    sums = np.convolve(z, np.ones(width), mode="valid") / math.sqrt(width)
+    at = int(np.argmax(np.abs(sums)))
+    return Window(at, at + width - 1, float(abs(sums[at])))
+
+
+def _merged(found: list[Window]) -> list[Window]:
+    """Neighbours closer than the narrower one is wide are one stretch: a wave has two signs."""
+    merged: list[Window] = []
+    for window in found:
+        last = merged[-1] if merged else None
+        if last and window.first - last.last <= min(last.last - last.first, window.last - window.first) + 1:
+            merged[-1] = Window(last.first, max(last.last, window.last), max(last.score, window.score))
+        else:
+            merged.append(window)
+    return sorted(merged, key=lambda w: -w.score)
+
+
+class Missed(NamedTuple):
+    """Where the model misses something, the strongest place first, and by how much (None for Ψ and Δ)."""
+
+    spans: tuple[str, ...]
+    size: float | None
+    everywhere: bool
+
+    @property
+    def place(self) -> str:
+        """`at 480-520 nm`, empty where it is most of the spectrum."""
+        return "" if self.everywhere else f"at {' and '.join(self.spans[:_SHOWN])}"
+
+    @property
+    def words(self) -> str:
+        """`at 480-520 nm (by 0.011 on average)`."""
+        by = "" if self.size is None else f" (by {self.size:.2g} on average)"
+        return f"{self.place or 'over most of the spectrum'}{by}"
+
+
+def missed(view: View, met: Met) -> Missed | None:
+    """Where the residuals of the best fit are no noise, None where they may be."""
+    shape, seen = (view.rows, view.channels), slice(None) if view.data.frame is None else slice(2)
+    weight = np.asarray(view.data.weight)[: view.points].reshape(shape)[:, seen]
+    left = (view.data.values - np.asarray(met.at.model))[: view.points].reshape(shape)[:, seen]
+    nm = np.asarray(view.scene.light.wavelength)[: view.rows]
+    told, covered = [], 0
+    for part in _sweeps(nm):
+        for column, inverse in zip(left[part].T, weight[part].T, strict=True):
+            known = view.noise.given or view.noise.drifting
+            scale = inverse if known else 1 / max(np.median(local_noise(column)), 1e-300)
+            for w in windows(column * scale):
+                inside = nm[part][w.first : w.last + 1]
+                size = float(np.mean(np.abs(column[w.first : w.last + 1])))
+                covered += len(inside)
+                told.append((w.score, f"{inside.min():.0f}-{inside.max():.0f} nm", size))
+    if not told:
+        return None
+    told.sort(reverse=True)
+    spans = tuple(dict.fromkeys(span for _, span, _ in told))
+    return Missed(spans, told[0][2] if view.channels == 1 else None, covered > _EVERYWHERE * left.size)
+
+
+def _sweeps(nm: np.ndarray) -> list[slice]:
+    """Runs of wavelengths that go one way: one for each angle of incidence."""
+    steps = np.sign(np.diff(nm))
+    turns = np.flatnonzero(steps != steps[0]) + 1 if len(nm) > 1 else np.zeros(0, int)
+    edges = [0, *turns.tolist(), len(nm)]
+    return [slice(a, b) for a, b in pairwise(edges) if b - a >= 2 * _NARROWEST]

@@ -1,1 +1,0 @@
-"""A ladder of ways to one answer: what each leaves out, how far off it is, and what it costs."""

@@ -1,0 +1,1 @@
+"""Plans within a tolerance: effects left out, the error made, and the time saved."""

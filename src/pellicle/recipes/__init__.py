@@ -1,0 +1,1 @@
+"""Recipes: TOML files and command-line words to scenes and surfaces."""

@@ -1,0 +1,176 @@
+"""The tables of a recipe, and what may stand in them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+
+from pellicle.data.tabular.units import SIGNAL_UNITS, WAVELENGTH_UNITS, signal_unit, wavelength_unit
+from pellicle.recipes.media import FreeTable, Medium, Number
+
+
+def _unit(known: Sequence[str], find: Callable[[str], str | None]) -> AfterValidator:
+    """Refuses what is no unit, as the flags do."""
+
+    def check(given: str) -> str:
+        if find(given) is None:
+            raise ValueError(f"must be one of {', '.join(known)}, not {given!r}")
+        return given
+
+    return AfterValidator(check)
+
+
+WavelengthUnit = Annotated[str, _unit(WAVELENGTH_UNITS, wavelength_unit)]
+SignalUnit = Annotated[str, _unit(SIGNAL_UNITS, signal_unit)]
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=False, allow_inf_nan=False)
+
+
+class PlateTable(_Table):
+    """A substrate that is a plate with an incoherent back face."""
+
+    material: Medium
+    back: Medium | None = None
+    plate_mm: Number = 1.0
+    roughness: Number | None = None
+
+
+class LayerTable(_Table):
+    """One `[[scene.layer]]`: a material with a thickness, or with plate_mm where it is incoherent, or
+    `between`, a mixing rule for the media above and below, in `steps` slices."""
+
+    name: str | None = None
+    material: Medium | None = None
+    between: str | None = None
+    steps: int | None = None
+    thickness: Number | None = None
+    plate_mm: Number | None = None
+    thickness_spread: Number | None = None
+    roughness: Number | None = None
+    free: list[str] = []
+
+    @model_validator(mode="after")
+    def _one_kind(self):
+        if (self.material is None) == (self.between is None):
+            raise ValueError('a layer has a material, or between = "bruggeman" to mix its neighbours')
+        if (self.thickness is None) == (self.plate_mm is None):
+            raise ValueError("a layer has a thickness in nm, or plate_mm where it is an incoherent plate")
+        rejected = self.model_fields_set & self._foreign()
+        if rejected:
+            raise ValueError(f"{' and '.join(sorted(rejected))} does not go with {self._kind()}")
+        return self
+
+    def _kind(self) -> str:
+        if self.between is not None:
+            return "between, a mixed interface"
+        return "plate_mm, an incoherent plate" if self.plate_mm is not None else "a coherent layer"
+
+    def _foreign(self) -> set[str]:
+        if self.between is not None:
+            return {"plate_mm", "thickness_spread", "roughness", "free"}
+        return {"steps", "thickness_spread", "roughness"} if self.plate_mm is not None else {"steps"}
+
+
+class GridTable(_Table):
+    """Evenly spaced wavelengths in nm."""
+
+    start: float = Field(gt=0)
+    stop: float
+    step: float = Field(gt=0)
+
+
+class InstrumentTable(_Table):
+    """`[instrument]`."""
+
+    scale: Literal["free", "slow"] | float = 1.0
+    offset: Literal["free", "slow"] | float = 0.0
+    bandwidth: Number | None = None
+    thickness_spread: Number | None = None
+    angle_spread: Number | None = None
+    numerical_aperture: Number | None = None
+    wavelength_shift: Number | None = None
+
+
+class _Reading(_Table):
+    """How files are read and looked at: the words of the command line's flags."""
+
+    signal: Literal["R", "T", "psi-delta"] | None = None
+    angle: Annotated[float, Field(ge=0, le=90)] | FreeTable | None = None
+    polarisation: Literal["unpolarised", "s", "p"] | None = None
+    noise: float | None = Field(default=None, gt=0)
+    columns: str | list[str] | None = None
+    wavelength_unit: WavelengthUnit | None = None
+    signal_unit: SignalUnit | None = None
+    range: tuple[float, float] | None = None
+    folded: bool | None = None
+    analyser: float | None = Field(default=None, gt=0, lt=90)
+    spot: int | None = Field(default=None, ge=1)
+
+
+class FileTable(_Reading):
+    """One `[[data.file]]`: what is said here goes before `[data]` and `[instrument]`."""
+
+    path: str
+    instrument: InstrumentTable = InstrumentTable()
+    back: Literal[False] | None = None
+
+    @property
+    def rescales(self) -> bool:
+        """Whether it gives this file a scale or an offset of its own."""
+        return self.instrument.scale != 1.0 or self.instrument.offset != 0.0
+
+    @model_validator(mode="before")
+    @classmethod
+    def _table(cls, given):
+        if isinstance(given, str):
+            raise ValueError(f"a table with a path was expected, not {given!r}: names alone go into files")
+        return given
+
+
+class DataTable(_Reading):
+    """`[data]`."""
+
+    files: list[str] = []
+    file: list[FileTable] = []
+    wavelengths: GridTable | list[float] | None = None
+    joint: bool = False
+    loss: Literal["least-squares", "huber", "student-t"] | None = None
+
+    @model_validator(mode="after")
+    def _one_list(self):
+        if self.files and self.file:
+            raise ValueError("files and [[data.file]] exclude each other: name every file in one of them")
+        return self
+
+
+class SceneTable(_Table):
+    """`[scene]`."""
+
+    ambient: Medium = 1.0
+    substrate: Medium | PlateTable
+    layer: list[LayerTable] = Field(min_length=1)
+
+
+class RecipeTable(_Table):
+    """A whole recipe."""
+
+    data: DataTable = DataTable()
+    scene: SceneTable
+    instrument: InstrumentTable = InstrumentTable()
+
+
+def of_file(tables: RecipeTable, file: FileTable) -> RecipeTable:
+    """The recipe of one file: with its own signal, angle, noise and so on, and no other file."""
+    words = {name: getattr(file, name) for name in _Reading.model_fields}
+    said = {name: value for name, value in words.items() if value is not None}
+    data = tables.data.model_copy(update={**said, "file": [file]})
+    own = {name: getattr(file.instrument, name) for name in file.instrument.model_fields_set}
+    instrument = tables.instrument.model_copy(update=own)
+    scene, plate = tables.scene, tables.scene.substrate
+    if file.back is False and isinstance(plate, PlateTable):
+        scene = scene.model_copy(update={"substrate": plate.model_copy(update={"back": None})})
+    return tables.model_copy(update={"data": data, "instrument": instrument, "scene": scene})

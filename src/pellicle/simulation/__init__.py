@@ -1,0 +1,1 @@
+"""Forward models: signals of scenes and surfaces, with the effects of their plan."""

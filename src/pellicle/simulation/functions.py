@@ -1,0 +1,184 @@
+"""What a film does to light, as functions of numbers: the library's front door.
+
+Every argument broadcasts and may be traced: `jit`, `vmap`, `grad` and `jacfwd` work through all of
+them. The precision follows the input, float32 or float64.
+"""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+from jaxtyping import Array, Complex, Float
+
+from pellicle.dispersion.base import AbstractDispersion
+from pellicle.optics import film, interface, stack
+from pellicle.optics.characteristic import through, through_wave
+from pellicle.optics.elementary import sincos_poly
+from pellicle.optics.ellipsometry import angles, normalised, stokes
+from pellicle.optics.pair import Number, is_real, to_complex, to_pair
+from pellicle.scene.film import check_polarisation
+from pellicle.scene.layers import medium, surroundings
+
+Medium = Any
+"""A number (n + ik), an array of them, a material, or a material's name."""
+
+
+def reflectance(
+    wavelength: Any,
+    thickness: Any,
+    layer: Medium,
+    substrate: Medium,
+    *,
+    ambient: Medium = 1.0,
+    angle: Any = 0.0,
+    polarisation: str = "unpolarised",
+) -> Float[Array, "..."]:
+    """Power reflectance of a layer on a half space, as a fraction.
+
+    **Arguments:** `wavelength` and `thickness` in nm, `angle` of incidence in degrees, all of any
+    shape; `layer` and `substrate` as numbers n + ik (k ≥ 0 absorbs), arrays, materials or names;
+    `ambient` real; `polarisation` "s", "p" or "unpolarised" (the mean of both). For several coherent
+    layers `layer` is a list from the ambient down and `thickness` a list as long.
+
+    At 90° R is 1 and T is 0, save where nothing lies between equal media: that reflects nothing at any
+    angle. Where the substrate is exactly critical, its derivatives are truly infinite; those returned
+    are finite.
+
+    **Raises:** ValueError for an absorbing ambient, an unknown polarisation or material, and
+    wavelengths outside a material's data. Under `jit`, where wavelengths are unknown, the result is
+    NaN there.
+
+    **Source:** Gerardin et al. 2019, eqs. 11-17, in the form of `pellicle.optics.film`.
+
+    ```python
+    >>> round(float(reflectance(550.0, 100.0, 1.46, 4.07 + 0.03j)), 4)
+    0.1015
+
+    ```
+    """
+    return film.reflectance(*_waves(wavelength, thickness, layer, substrate, ambient, angle, polarisation))
+
+
+def transmittance(
+    wavelength: Any,
+    thickness: Any,
+    layer: Medium,
+    substrate: Medium,
+    *,
+    ambient: Medium = 1.0,
+    angle: Any = 0.0,
+    polarisation: str = "unpolarised",
+) -> Float[Array, "..."]:
+    """Power transmittance of a layer into its substrate, as a fraction; arguments as `reflectance`.
+
+    With an absorbing substrate this is the power that enters it. Gerardin et al. 2019 (eq. 21) weight
+    both polarisations alike, which is wrong for p there; here each has its own factor.
+    """
+    return film.transmittance(*_waves(wavelength, thickness, layer, substrate, ambient, angle, polarisation))
+
+
+def ellipsometry(
+    wavelength: Any,
+    thickness: Any,
+    layer: Medium,
+    substrate: Medium,
+    *,
+    ambient: Medium = 1.0,
+    angle: Any,
+) -> tuple[Float[Array, "..."], Float[Array, "..."]]:
+    """Ψ (0 to 90) and Δ (0 to 360) in degrees; arguments as `reflectance`, the angle in degrees.
+
+    tan(Ψ) exp(iΔ) = conj(r_p / r_s) for n + ik, as instruments write it: Δ is near 180 for bare
+    silicon at small angles. Δ wraps around: fit N, C, S instead (`pellicle.optics.ellipsometry`).
+    Where r_p or r_s is 0, Δ has no meaning and is 0; where both are, Ψ is 0 too.
+    """
+    angle = _floating(angle)  # also at 0 both polarisations are needed
+    s, p = _waves(wavelength, thickness, layer, substrate, ambient, angle, "unpolarised")
+    return angles(*normalised(stokes(s, p)))
+
+
+def refractive_index(wavelength: Any, what: Medium) -> Complex[Array, "..."]:
+    """n + ik of a material, or of what else a layer may be, at `wavelength` (nm).
+
+    **Raises:** ValueError for an unknown material and for wavelengths outside its data.
+
+    ```python
+    >>> print(f"{complex(refractive_index(550.0, 'Au')):.2f}")
+    0.42+2.47j
+
+    ```
+    """
+    wavelength = _floating(wavelength)
+    value = to_complex(_index(what, wavelength))
+    return jnp.broadcast_to(value, jnp.broadcast_shapes(value.shape, wavelength.shape))
+
+
+def _waves(wavelength, thickness, layer, substrate, ambient, angle, polarisation):
+    check_polarisation(polarisation)
+    _warn_of_lost_precision(wavelength, thickness, layer, substrate, ambient, angle)
+    wavelength = _floating(wavelength)
+    normal = isinstance(angle, int | float) and angle == 0
+    promised = through_wave if normal or interface.propagates(layer, ambient, angle) else through
+    into_below = normal or interface.propagates(substrate, ambient, angle)
+    named = isinstance(ambient, str | AbstractDispersion)
+    ambient = _index(surroundings(ambient) if named else ambient, wavelength)
+    substrate = _index(substrate, wavelength)
+    if not is_real(ambient):
+        raise ValueError("the ambient must not absorb: give it a real index")
+    if not into_below:
+        substrate = interface.allow_tunnelling(substrate)
+    theta = None if normal else jnp.deg2rad(_floating(angle))
+    letters = "sp" if polarisation == "unpolarised" else polarisation
+    if isinstance(layer, list | tuple):
+        return _stack_waves(wavelength, thickness, layer, substrate, ambient, theta, letters)
+    layer = _index(layer, wavelength)
+    return film.film(
+        ambient,
+        layer,
+        substrate,
+        2 * jnp.pi / wavelength * thickness,
+        theta,
+        letters,
+        through=promised if is_real(layer) else through,
+        sincos=sincos_poly,
+    )
+
+
+def _stack_waves(wavelength, thickness, layers, substrate, ambient, theta, letters):
+    count = len(thickness) if isinstance(thickness, list | tuple) else np.shape(thickness)[:1]
+    if count not in (len(layers), (len(layers),)):
+        raise ValueError(f"thickness: expected one for each of {len(layers)} layers, got {count}")
+    phases = [2 * jnp.pi / wavelength * thickness[i] for i in range(len(layers))]
+    indices = [_index(n, wavelength) for n in layers]
+    return stack.stack(ambient, indices, substrate, phases, theta, letters, sincos=sincos_poly)
+
+
+def _floating(x: Any):
+    return jnp.asarray(x) * 1.0
+
+
+def _index(what: Medium, wavelength) -> Number:
+    """The index at the wavelengths: arrays and numbers as they are, materials evaluated."""
+    if isinstance(what, str | AbstractDispersion):
+        material = medium(what)
+        check = getattr(material, "check_range", None)
+        if check is not None and not isinstance(wavelength, Tracer):
+            check(np.asarray(wavelength))
+        return material.index(wavelength)
+    return to_pair(_floating(what))
+
+
+def _warn_of_lost_precision(*arguments: Any) -> None:
+    if jax.config.jax_enable_x64:  # pyright: ignore[reportAttributeAccessIssue]
+        return
+    double = (np.float64, np.complex128)
+    if any(isinstance(a, np.ndarray | np.generic) and a.dtype in double for a in arguments):
+        warnings.warn(
+            "float64 input is computed in float32: jax.config.update('jax_enable_x64', True) keeps it",
+            stacklevel=4,
+        )

@@ -1,0 +1,101 @@
+"""What an instrument averages: a band of wavelengths, a spot of uneven thickness, a cone of light.
+
+Each average is a wrapper of a model, and each rule says how far a fringe averaged by it is from the
+truth. Intensities are averaged (rows, wavelengths), never amplitudes or ratios.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from pellicle.optics.orders import FWHM
+from pellicle.optics.quadrature import directions, normal_rule
+from pellicle.scene.film import Scene
+
+Intensities = Callable[[Scene], Any]
+"""A scene in numbers → intensities, (rows, wavelengths)."""
+
+
+def _weighted(at: Callable[[Any], Any], nodes: Any, weights: np.ndarray, wavelength: Any) -> Any:
+    """Σ weights · at(nodes), in the precision of the wavelengths."""
+    like = jnp.result_type(wavelength)
+    return jnp.tensordot(jnp.asarray(weights, like), jax.vmap(at)(jnp.asarray(nodes, like)), 1)
+
+
+def over_bandwidth(simulate: Intensities, count: int) -> Intensities:
+    """The mean over a spectrometer's window, a normal distribution of the given full width."""
+    nodes, weights = normal_rule(count)
+
+    def average(scene: Scene):
+        bandwidth: Any = scene.instrument.bandwidth
+
+        def at(node):
+            shifted = scene.light.wavelength + node * (bandwidth / FWHM)
+            return simulate(eqx.tree_at(lambda s: s.light.wavelength, scene, shifted))
+
+        return _weighted(at, nodes, weights, scene.light.wavelength)
+
+    return average
+
+
+def over_thickness(simulate: Intensities, count: int, position: int, spread: Callable[[Scene], Any]):
+    """The mean over a layer's uneven thickness, a normal distribution cut off at no thickness."""
+    nodes, weights = normal_rule(count)
+
+    def average(scene: Scene):
+        def at(node):
+            thickness: Any = scene.layers[position].thickness  # pyright: ignore[reportAttributeAccessIssue]
+            uneven = jnp.maximum(thickness + node * spread(scene), 0.0)
+            return simulate(eqx.tree_at(lambda s: s.layers[position].thickness, scene, uneven))
+
+        return _weighted(at, nodes, weights, scene.light.wavelength)
+
+    return average
+
+
+def cone_sine(scene: Scene) -> Any:
+    """The sine of the cone's half angle, at each wavelength if the ambient disperses."""
+    aperture, spread = scene.instrument.numerical_aperture, scene.instrument.angle_spread
+    if aperture is not None:
+        return aperture / scene.ambient.index(scene.light.wavelength)
+    return jnp.sin(jnp.deg2rad(spread))  # pyright: ignore[reportArgumentType]
+
+
+def over_cone(simulate: Intensities, count: int, around: int, mix: Callable[[Any, Any], Any]) -> Intensities:
+    """The mean over the light's cone. `mix(rows, s_share)` puts the polarisations of a ray together."""
+
+    def average(scene: Scene):
+        like = jnp.result_type(scene.light.wavelength)
+        rays = directions(jnp.deg2rad(scene.light.angle), cone_sine(scene), count, around)
+
+        def at(angle, s_share):
+            turned = eqx.tree_at(lambda s: s.light.angle, scene, jnp.rad2deg(angle))
+            return mix(simulate(turned), s_share)
+
+        share = jnp.broadcast_to(jnp.asarray(rays.s_share, like), jnp.shape(rays.angle))
+        return jnp.tensordot(
+            jnp.asarray(rays.weight, like), jax.vmap(at)(jnp.asarray(rays.angle, like), share), 1
+        )
+
+    return average
+
+
+def mixed(polarisation: str) -> Callable[[Any, Any], Any]:
+    """How a ray's s and p add: halves where light is unpolarised, else by what the lens made of it."""
+
+    def mix(rows, s_share):
+        share = {"s": s_share, "p": 1 - s_share, "unpolarised": 0.5}[polarisation]
+        return (share * rows[0] + (1 - share) * rows[1])[None]
+
+    return mix
+
+
+def unmixed(rows: Any, s_share: Any) -> Any:
+    """For an ellipsometer, which keeps s and p apart; that the lens turns them is left out."""
+    return rows

@@ -1,0 +1,62 @@
+"""From a plan to a function that gives a surface's BRDF: it composes what the plan names, nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any
+
+import jax.numpy as jnp
+
+from pellicle.brdf import film_colour
+from pellicle.brdf.models import Evaluate, model
+from pellicle.effects.plan import Plan
+from pellicle.optics import characteristic
+from pellicle.scene.surface import Lit
+
+
+@lru_cache(maxsize=64)
+def build(plan: Plan) -> Callable[[Lit], Any]:
+    """simulate(lit) → the BRDF (samples, channels) in 1/sr, of a `Lit` that holds numbers only.
+
+    The function is pure and can be traced.
+    """
+
+    def simulate(lit: Lit) -> Any:
+        shape = (*lit.i.shape[:-1], lit.channels)
+        for leave_out in plan.left_out:
+            lit = leave_out(lit)
+        numbers = {key: jnp.stack(x) if isinstance(x, list) else x for key, x in lit.numbers.items()}
+        return jnp.broadcast_to(composed(plan, lit.model)(numbers, lit.i, lit.o), shape)
+
+    return simulate
+
+
+@lru_cache(maxsize=64)
+def composed(plan: Plan, name: str) -> Evaluate:
+    """The evaluation of the model of that name, as far as a wordless plan calls for it.
+
+    It takes numbers as `lit.present` gives them: an effect that has one is absent with it.
+    """
+    brdf = model(name)
+    if not plan.on("coherence"):
+        return brdf.incoherent
+    return brdf.evaluate if brdf.coloured is None else brdf.coloured(_colour(plan))
+
+
+def _colour(plan: Plan) -> film_colour.Colour:
+    """The film's colour: at nodes of the angle, at each sample, or at none."""
+    reflectance = _reflectance(plan)
+    if not plan.on("oblique"):
+        return film_colour.head_on(reflectance)
+    count = plan.row("oblique").count
+    return film_colour.by_nodes(count, reflectance) if count else film_colour.at_each(reflectance)
+
+
+def _reflectance(plan: Plan) -> film_colour.Reflectance:
+    polarisations = "sp" if plan.on("polarisation") else "s"
+    if plan.on("tunnelling"):
+        return film_colour.airy(polarisations)
+    absorbs = any(row.effect == "absorption" and row.on for row in plan.rows)
+    through = characteristic.through if absorbs else characteristic.through_wave
+    return film_colour.airy(polarisations, through, enter=lambda index: index)

@@ -1,1 +1,0 @@
-"""Layered surfaces, RGB: what a recipe says of one, and its samples."""

@@ -1,0 +1,1 @@
+"""Simulated measurements and pictures: spectra, BRDF samples, colours, spheres."""

@@ -1,0 +1,28 @@
+"""Small scenes to climb ladders on: few wavelengths, few draws."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pellicle as pl
+from pellicle.accuracy.case import Case, case
+
+NM = np.linspace(420.0, 740.0, 9)
+
+
+def few(scene: pl.Scene, wavelength: np.ndarray = NM, draws: int = 3) -> Case:
+    """A case with few draws."""
+    found = case(scene, wavelength)
+    return found._replace(draws=found.draws[:draws])
+
+
+@pytest.fixture(scope="session")
+def oblique() -> Case:
+    """A dispersing film that absorbs, seen at 60 degrees, its thickness and k free."""
+    film = pl.Layer(
+        pl.Shifted(pl.Cauchy(1.9, 12000.0), k=pl.Free(0.05, 0.0, 0.2)),
+        thickness=pl.Free(120.0, 50.0, 400.0),
+    )
+    light = pl.Light(angle=60.0)
+    return few(pl.Scene(film, substrate=pl.Constant(1.5, 0.4), light=light))

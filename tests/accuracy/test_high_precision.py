@@ -1,0 +1,91 @@
+"""The reference of 50 digits against the tmm package, and what it refuses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import tmm
+
+import pellicle as pl
+from pellicle.accuracy.high_precision import signal
+from pellicle.accuracy.reference import reference
+from pellicle.errors import UsageError
+from pellicle.scene.instrument import Instrument
+
+from .conftest import NM, few
+
+AT = np.array([0, 4, 8])
+STACK = [pl.Layer(pl.Constant(2.1, 0.05), 120.0), pl.Layer(pl.Constant(0.2, 3.4), 15.0)]
+INDICES, DEPTHS = [1.0, 2.1 + 0.05j, 0.2 + 3.4j, 1.5], [np.inf, 120.0, 15.0, np.inf]
+THETA = np.deg2rad(50.0)
+
+
+def seen(light, layers=STACK, substrate: object = 1.5):
+    case = few(pl.Scene(layers, substrate, light=light))
+    return signal(case, case.draws[0], AT)
+
+
+@pytest.mark.parametrize("letter", ["s", "p"])
+@pytest.mark.parametrize("kind", ["R", "T"])
+def test_powers(kind, letter):
+    found = seen(pl.Light(angle=50.0, signal=kind, polarisation=letter))[:, 0]
+    truth = [tmm.coh_tmm(letter, INDICES, DEPTHS, THETA, nm)[kind] for nm in NM[AT]]
+    np.testing.assert_allclose(found, truth, atol=1e-14)
+
+
+def test_ellipsometry():
+    found = seen(pl.Light(angle=50.0, signal="psi-delta"))
+    for row, nm in zip(found, NM[AT], strict=True):
+        angles = tmm.ellips(INDICES, DEPTHS, THETA, nm)
+        psi, delta = angles["psi"], np.pi - angles["Delta"]  # r_p has the other sign in tmm's Δ
+        sphere = [np.cos(2 * psi), np.sin(2 * psi) * np.cos(delta), np.sin(2 * psi) * np.sin(delta)]
+        np.testing.assert_allclose(np.abs(row), np.abs(sphere), atol=1e-13)
+    exact = pl.ellipsometry(NM[AT], [120.0, 15.0], [2.1 + 0.05j, 0.2 + 3.4j], 1.5, angle=50.0)
+    twice, delta = 2 * np.deg2rad(exact[0]), np.deg2rad(exact[1])
+    np.testing.assert_allclose(
+        found, np.stack([np.cos(twice), np.sin(twice) * np.cos(delta), np.sin(twice) * np.sin(delta)], 1),
+        atol=1e-13,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ["R", "T"])
+def test_a_plate_adds_intensities(kind):
+    glass = pl.Substrate(pl.Constant(1.5, 1e-5), back=1.0, plate_mm=0.5)
+    found = seen(pl.Light(angle=50.0, signal=kind, polarisation="p"), substrate=glass)[:, 0]
+    indices = [*INDICES[:3], 1.5 + 1e-5j, 1.0]
+    depths = [*DEPTHS[:3], 5e5, np.inf]
+    truth = [tmm.inc_tmm("p", indices, depths, ["i", "c", "c", "i", "i"], THETA, nm)[kind] for nm in NM[AT]]
+    np.testing.assert_allclose(found, truth, atol=1e-8)  # tmm leaves the plate's k out at its faces
+
+
+def test_ellipsometry_through_a_plate():
+    """The model has the plate transparent at its faces, and is held against Mueller matrices elsewhere."""
+    plate = pl.Substrate(pl.Constant(1.5, 1e-8), back=1.0, plate_mm=0.5)
+    case = few(pl.Scene(STACK[:1], plate, light=pl.Light(angle=50.0, signal="psi-delta")))
+    truth = signal(case, case.draws[0], np.arange(9)).ravel()
+    np.testing.assert_allclose(reference("float64", case).values[0].ravel(), truth, atol=1e-7)
+
+
+def test_the_model_is_within_rounding(oblique):
+    truth = reference("mpmath", oblique)
+    assert truth.values.shape == (3, 9, 1)
+    assert reference("float64", oblique).error(oblique, truth.values[:, :, 0]) < 1e-14
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"instrument": Instrument(bandwidth=2.0)}, "bandwidth"),
+        ({"instrument": Instrument(angle_spread=2.0)}, "cone"),
+        ({"layers": pl.Layer(2.0, 100.0, roughness=2.0)}, "rough"),
+        ({"layers": pl.Layer(2.0, 100.0, thickness_spread=2.0)}, "uneven"),
+        ({"layers": pl.Layer(2.0, 250e3)}, "narrower than the sampling"),
+    ],
+)
+def test_what_it_cannot_compute_is_refused(given, said):
+    case = few(pl.Scene(**({"layers": pl.Layer(2.0, 100.0), "substrate": 1.5} | given)))
+    with pytest.raises(UsageError, match=said) as refused:
+        reference("mpmath", case)
+    assert "--reference float64" in str(refused.value)
+    with pytest.raises(UsageError, match="float64 or mpmath"):
+        reference("tmm", case)

@@ -1,0 +1,122 @@
+"""The ladder of a surface: which ways there are, and what they are off by."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import jax
+import numpy as np
+import pytest
+
+from pellicle.accuracy import colour_methods
+from pellicle.accuracy.measure import Ladder, Standing
+from pellicle.accuracy.surface import COLOURS, VALUES, SurfaceCost, coloured, drawn
+from pellicle.colour import delta_e2000, lab, sensor
+from pellicle.report.cost import surface_text
+from pellicle.report.cost_files import surface_to_json
+from pellicle.scene.free import Free
+from pellicle.scene.surface import Surface, lit
+from pellicle.synthetic.brdf import default_directions
+
+STEEL = lit(
+    Surface("microfacet-film", {"thickness": Free(lower=10, upper=70), "n": 2.9}), default_directions(), 40
+)
+PAINT = lit(Surface("granier-heidrich", {"thickness": Free(lower=10, upper=70)}), default_directions(), 40)
+RUNGS = {rung.name: rung for rung in COLOURS}
+
+
+def airy(wavelength, thickness, n, base, angle):
+    """The textbook formula, unpolarised, wavelengths last."""
+    thickness, sine = thickness[:, None, None], np.sin(angle)[None, :, None]
+    q0, q1, q2 = (np.sqrt(m**2 - sine**2 + 0j) for m in (1.0, n, base))
+    turn, total = np.exp(4j * np.pi / wavelength * q1 * thickness), 0.0
+    for e1, e2 in ((1, 1), (n**2, base**2)):
+        above, below = (e1 * q0 - q1) / (e1 * q0 + q1), (e2 * q1 - e1 * q2) / (e2 * q1 + e1 * q2)
+        total = total + 0.5 * np.abs((above + below * turn) / (1 + above * below * turn)) ** 2
+    return total
+
+
+@pytest.fixture(scope="module")
+def films():
+    with jax.enable_x64(True):
+        return coloured(STEEL, drawn(STEEL, 8))
+
+
+def test_a_rung_is_as_far_off_as_it_says(films):
+    """Against the textbook formula at steps of 1 nm."""
+    eye = sensor("1931", "D65")
+    true = airy(eye.wavelength, films.numbers["thickness"], 2.9, 2.7 + 2.8j, films.angle) @ eye.weights
+    with jax.enable_x64(True):
+        for name, least, most in (("points-645-525-445", 1.0, 10.0), ("uniform-16", 1e-3, 0.2)):
+            found = RUNGS[name].program(films).run()
+            off = np.mean(
+                delta_e2000(*(np.asarray(lab(np.asarray(x, float), eye.white)) for x in (found, true)))
+            )
+            assert least < off < most
+            assert colour_methods.error(eye, true, found) == pytest.approx(off)
+
+
+def test_angles_may_be_spared(films):
+    with jax.enable_x64(True):
+        exact, few = (RUNGS[name].program(films).run() for name in ("uniform-64", "uniform-64 at 16 angles"))
+    # 1.04e-4: `film_colour.nodes` asks for 32 angles where 1e-4 is to be kept
+    np.testing.assert_allclose(few, exact, atol=2e-4)
+
+
+def test_what_makes_no_sense_says_why(films):
+    absorbing = films._replace(numbers={**films.numbers, "k": np.full(8, 0.1)})
+    assert RUNGS["belcour-barla"].program(absorbing) == "it knows no absorbing layer"
+    thick = films._replace(thickest=800.0)
+    assert RUNGS["nodes-6-500"].program(thick) == "its wavelengths are for films up to 500 nm"
+    assert "too few angles" in RUNGS["uniform-64 at 32 angles"].program(films)
+    assert "made for three wavelengths" in coloured(PAINT, drawn(PAINT))
+    each = lit(Surface("blinn-phong-film", {}), default_directions(), 8)
+    free = dataclasses.replace(each, numbers={**each.numbers, "n": [Free(lower=1.4, upper=1.5)] * 3})
+    assert "nothing says what it is between" in coloured(free, drawn(free))
+
+
+def test_values_of_three_wavelengths_lie_on_a_line():
+    """And are level beyond: what a metal given for R, G and B is taken for elsewhere."""
+    table = colour_methods.along_the_spectrum(np.array([2.9, 2.8, 2.6]), (645.0, 525.0, 445.0))
+    found = np.asarray(table.index(np.array([380.0, 445.0, 485.0, 645.0, 730.0])))
+    np.testing.assert_allclose(found, [2.6, 2.6, 2.7, 2.9, 2.9])
+    assert colour_methods.along_the_spectrum(2.0, (645.0, 525.0)) == 2.0
+
+
+def test_values_leave_out_what_is_there():
+    plans = {rung.name: rung.plan(PAINT, 1e-3) for rung in VALUES if rung.name != "planned"}
+    missing = {name for name, plan in plans.items() if isinstance(plan, str)}
+    assert missing == {
+        *("8 angles", "16 angles", "32 angles", "normal incidence", "s alone", "transparent film"),
+        "parallel boundaries",
+    }
+    assert not plans["without interference"].on("coherence")
+
+
+def test_record_and_report_say_the_same():
+    seen = Ladder(
+        "steps of 1 nm",
+        0.5,
+        "ΔE2000",
+        40,
+        64,
+        "colour",
+        [Standing("nodes-6-500", "x", 0.2, 1e-7, 1.0, 900.0)],
+    )
+    values = Ladder(
+        "float64", 1e-3, "relative", 40, 64, "sample", [Standing("float64", "y", 0.0, 9e-8, 1.0, None)]
+    )
+    record = surface_to_json(SurfaceCost(seen, values), "steel.toml")
+    assert (record["schema"], record["unit"], record["recommended"]) == (
+        "pellicle.cost/1",
+        "ΔE2000",
+        "nodes-6-500",
+    )
+    assert [rung["kind"] for rung in record["rungs"]] == ["colour", "brdf"]
+    assert record["brdf"]["recommended"] == "float64"
+    report = surface_text(SurfaceCost(seen, values), "steel.toml")
+    assert "nodes-6-500 is the fastest within an error of 0.5 in ΔE2000" in report
+    assert "float64 is the fastest within a relative error of 0.001" in report
+    assert "100" in report  # ns
+    alone = surface_to_json(SurfaceCost(None, values, "no film"), "paint.toml")
+    assert (alone["unit"], alone["no_colours"]) == ("relative", "no film")

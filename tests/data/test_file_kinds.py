@@ -1,0 +1,58 @@
+"""Files that are no measurement are named, with what to do; files that are one are not."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+
+import pytest
+
+from pellicle.data.read_spectrum import read_spectrum
+from pellicle.data.tabular.text import no_measurement
+from pellicle.errors import DataError
+
+
+def packed(*names: str) -> bytes:
+    whole = io.BytesIO()
+    with zipfile.ZipFile(whole, "w") as archive:
+        for name in names:
+            archive.writestr(name, "1,2\n")
+    return whole.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"\x89PNG\r\n\x1a\n\x00\x00", "a picture"),
+        (b"\xff\xd8\xff\xe0\x00\x10JFIF", "a picture"),
+        (b"%PDF-1.7\n", "a PDF"),
+        (packed("[Content_Types].xml", "xl/workbook.xml"), "an office file; save its sheet as CSV"),
+        (packed("spectrum.csv"), "packed; unpack it"),
+        (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "an office file"),
+        (b"{\\rtf1\\ansi 1,2}", "a word processor's file"),
+        (b"<!DOCTYPE html>\n<html>", "a web page"),
+        (b'<?xml version="1.0"?>', "a web page or XML"),
+        (b'{"wavelength": [400, 500]}', "JSON"),
+        (b'[{"R": 0.1}]', "JSON"),
+        (b"# a film\n[data]\nsignal = 'R'\n\n[scene]\nsubstrate = 'Si'\n", "a recipe; give it with --recipe"),
+    ],
+)
+def test_what_is_none_is_named(content, said, refusal, tmp_path):
+    path = tmp_path / "film.dat"
+    path.write_bytes(content)
+    refusal(read_spectrum, path, DataError, f"is {said}", signal="R")
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"wavelength_nm,R\n400,0.1\n",
+        b"\xef\xbb\xbf400;0,1\n",
+        b"[Data]\nnm %R\n400 12\n",
+        b"# <html>\n400 0.1\n",
+        b"BM 1\n400 0.1\n",
+        b"\xff\xfe4\x000\x000\x00",
+    ],
+)
+def test_what_may_be_one_passes(content):
+    assert no_measurement(content) is None

@@ -1,0 +1,245 @@
+"""Ψ and Δ from plain columns: every way they are written, and one sentence where they cannot be."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+from pellicle.data.read_spectrum import read_spectrum
+from pellicle.data.spectrum import Spectrum
+from pellicle.errors import DataError, UsageError
+
+NM = np.array([400.0, 500.0, 600.0])
+PSI = np.array([20.0, 25.5, 31.0])
+DELTA = np.array([170.0, 179.5, 190.25])
+
+
+@pytest.fixture
+def refused(refusal):
+    return partial(refusal, read_spectrum)
+
+
+def rows(*columns, separator=","):
+    return "".join(
+        separator.join(f"{cell:.12g}" for cell in row) + "\n" for row in zip(*columns, strict=True)
+    )
+
+
+def assert_film(spectrum):
+    assert spectrum.signal == "psi-delta"
+    assert spectrum.calibrated
+    assert spectrum.polarisation == "unpolarised"
+    np.testing.assert_allclose(spectrum.wavelength, NM, rtol=1e-11)
+    np.testing.assert_allclose(spectrum.values, PSI, rtol=1e-12)
+    np.testing.assert_allclose(spectrum.delta, DELTA, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "header", ["wavelength_nm,psi_deg,delta_deg", "wl,psi,delta", "λ [nm],Psi (deg),Delta [°]", "nm,Ψ,Δ"]
+)
+def test_names(write, header):
+    spectrum = read_spectrum(write(f"{header}\n{rows(NM, PSI, DELTA)}"))
+    assert_film(spectrum)
+    assert spectrum.angle is None  # then it is for the fit to ask
+    assert spectrum.sigma is None
+    assert spectrum.delta_sigma is None
+    assert "psi and delta in degrees" in spectrum.notes
+
+
+@pytest.mark.parametrize("name", ["angle_deg", "angle", "aoi_deg", "aoi", "AOI"])
+def test_angles(write, name):
+    spectrum = read_spectrum(write(f"delta,psi,{name},wavelength\n{rows(DELTA, PSI, [70, 70, 70], NM)}"))
+    assert_film(spectrum)
+    np.testing.assert_array_equal(spectrum.angle, [70, 70, 70])
+
+
+def test_energies(write):
+    spectrum = read_spectrum(write(f"energy,psi,delta\n{rows(1239.8419843320026 / NM, PSI, DELTA)}"))
+    assert_film(spectrum)
+
+
+@pytest.mark.parametrize("given", [DELTA - 360 * (DELTA > 180), DELTA, DELTA - 360 * (DELTA > 185)])
+def test_delta_from_minus_180_or_from_0(write, given):
+    assert_film(read_spectrum(write(f"wl,psi,delta\n{rows(NM, PSI, given)}")))
+
+
+def test_delta_is_stored_from_0_to_below_360(write):
+    spectrum = read_spectrum(write("wl,psi,delta\n400,20,-180\n500,20,-0.5\n600,20,360\n"))
+    np.testing.assert_array_equal(spectrum.delta, [180, 359.5, 0])
+
+
+def test_errors_of_both(write):
+    text = f"wl,psi,sigma_psi,delta,sigma_delta\n{rows(NM, PSI, [0.1, 0.2, 0.3], DELTA, [1, 2, 3])}"
+    for path in (
+        write(text),
+        write(text.replace("sigma_psi", "psi_err").replace("sigma_delta", "delta_err_deg"), "b"),
+    ):
+        spectrum = read_spectrum(path)
+        assert_film(spectrum)
+        np.testing.assert_array_equal(spectrum.sigma, [0.1, 0.2, 0.3])
+        np.testing.assert_array_equal(spectrum.delta_sigma, [1, 2, 3])
+    spectrum = read_spectrum(path, noise=0.05)
+    np.testing.assert_array_equal(spectrum.sigma, [0.05] * 3)
+    np.testing.assert_array_equal(spectrum.delta_sigma, [0.05] * 3)
+    assert "the columns of errors give way to --noise" in spectrum.notes
+
+
+def test_one_sigma_for_both(write):
+    spectrum = read_spectrum(write(f"wl,psi,delta,sigma\n{rows(NM, PSI, DELTA, [0.1, 0.2, 0.3])}"))
+    np.testing.assert_array_equal(spectrum.sigma, spectrum.delta_sigma)
+    np.testing.assert_array_equal(spectrum.sigma, [0.1, 0.2, 0.3])
+
+
+def test_everything_is_sorted_and_cut_together(write):
+    nm = np.linspace(800.0, 400.0, 21)
+    text = f"wl,psi,delta,sigma_psi,sigma_delta\n{rows(nm, nm / 20, nm / 4, nm / 1000, nm / 500)}"
+    spectrum = read_spectrum(write(text), range=(500, 700))
+    assert len(spectrum) == 11
+    for values, per in (
+        (spectrum.values, 20),
+        (spectrum.delta, 4),
+        (spectrum.sigma, 1000),
+        (spectrum.delta_sigma, 500),
+    ):
+        np.testing.assert_allclose(values, spectrum.wavelength / per, rtol=1e-12)
+
+
+def test_one_wavelength_at_many_angles(write):
+    spectrum = read_spectrum(write("wl,aoi,psi,delta\n658,70,10,160\n658,60,23,172\n658,50,31,176\n"))
+    np.testing.assert_array_equal(spectrum.angle, [50, 60, 70])
+    np.testing.assert_array_equal(spectrum.values, [31, 23, 10])
+    assert str(spectrum).endswith("3 points of psi-delta, 658 nm")
+
+
+def test_ncs_are_turned_into_psi_and_delta(write):
+    psi, delta = np.deg2rad(2 * PSI), np.deg2rad(DELTA)
+    n, c, s = 0.99 * np.array([np.cos(psi), np.sin(psi) * np.cos(delta), np.sin(psi) * np.sin(delta)])
+    spectrum = read_spectrum(write(f"wavelength,N,C,S\n{rows(NM, n, c, s)}"))
+    np.testing.assert_allclose(spectrum.values, PSI, rtol=1e-9)
+    np.testing.assert_allclose(spectrum.delta, DELTA, rtol=1e-9)
+    assert any("0.99 to 0.99, was divided out" in note for note in spectrum.notes)
+
+
+def test_psi_and_delta_go_before_ncs_beside_them(write):
+    text = "wl,psi,delta,N,C,S\n400,20,170,0.1,0.2,0.3\n500,21,171,0.1,0.2,0.3\n"
+    spectrum = read_spectrum(write(text))
+    np.testing.assert_array_equal(spectrum.values, [20, 21])
+    assert "ignored: 'N', 'C', 'S'" in spectrum.notes
+
+
+def test_three_columns_without_a_header(write, refused):
+    path = write(rows(NM, PSI, DELTA, separator=" "))
+    assert_film(read_spectrum(path, signal="psi-delta"))
+    refused(path, UsageError, "no header", "--signal")
+
+
+def test_four_columns_without_a_header_need_names(write, refused):
+    path = write(rows(NM, [70, 70, 70], PSI, DELTA))
+    refused(path, UsageError, "4 columns and no header", "--columns", signal="psi-delta")
+    spectrum = read_spectrum(path, columns="wavelength,angle,psi,delta")
+    assert_film(spectrum)
+    np.testing.assert_array_equal(spectrum.angle, [70, 70, 70])
+
+
+def test_the_signal_settles_what_to_read(write, refused):
+    path = write("wl,R,psi,delta\n400,0.1,20,170\n500,0.2,21,171\n")
+    refused(path, UsageError, "psi and delta as well as R", "--signal")
+    assert read_spectrum(path, signal="R").signal == "R"
+    np.testing.assert_array_equal(read_spectrum(path, signal="psi-delta").values, [20, 21])
+
+
+@pytest.mark.parametrize(
+    ("row", "said"),
+    [
+        ("500,90.5,171", ("line 3, column 'psi': 90.5", "0 to 90 degrees")),
+        ("500,-0.1,171", ("line 3, column 'psi': -0.1", "0 to 90 degrees")),
+        ("500,21,361", ("line 3, column 'delta': 361", "-180 to 360 degrees")),
+        ("500,21,-181", ("line 3, column 'delta': -181", "-180 to 360 degrees")),
+        ("500,nan,171", ("line 3, column 'psi': nan is not a finite number",)),
+        ("500,21,", ("line 3, column 'delta' is empty",)),
+        ("400,21,171", ("line 3", "400 repeats 400 of line 2", "within one angle")),
+    ],
+)
+def test_impossible_rows(write, row, said, refused):
+    refused(write(f"wl,psi,delta\n400,20,170\n{row}\n600,22,172\n"), DataError, *said)
+
+
+def test_an_impossible_end_may_be_cut_off(write, refused):
+    nm = np.arange(400.0, 500.0, 10)
+    bent = write(f"wl,psi,delta\n{rows(nm, np.where(nm < 420, 95.0, 20.0), nm - 300)}")
+    refused(bent, DataError, "line 2", "95")
+    assert len(read_spectrum(bent, range=(420, 500))) == 8
+
+
+def test_errors_that_are_none(write, refused):
+    text = "wl,psi,delta,sigma_psi,sigma_delta\n400,20,170,0.1,1\n500,21,171,0.1,0\n"
+    refused(write(text), DataError, "line 3, column 'sigma_delta': 0", "above zero")
+    refused(write(text.replace("sigma_delta", "x")), DataError, "only one of psi and delta")
+
+
+@pytest.mark.parametrize("header", ["wl,psi,x", "wl,delta,x", "wl,N,C", "wl,R,x"])
+def test_missing_columns(write, header, refused):
+    path = write(f"{header}\n400,0.20,0.70\n500,0.21,0.71\n")
+    refused(path, DataError, "not all among", "--columns", signal="psi-delta")
+
+
+def test_missing_delta_without_a_flag(write, refused):
+    refused(write("wl,psi\n400,20\n500,21\n"), DataError, "'psi'", "--columns wavelength,angle,psi,delta")
+
+
+def test_missing_wavelength(write, refused):
+    refused(write("x,psi,delta\n400,20,170\n"), DataError, "no column is a wavelength", "angle,psi,delta")
+
+
+def test_radians_are_not_taken_for_degrees(write, refused):
+    small = write("wl,psi,delta\n400,0.35,2.9\n500,0.36,3.0\n")
+    refused(small, DataError, "look like radians", "psi_deg")
+    refused(write("wl,psi (rad),delta (rad)\n400,0.35,2.9\n500,0.36,3.0\n"), DataError, "'rad'", "degrees")
+    stated = read_spectrum(write("wl,psi_deg,delta_deg\n400,0.35,2.9\n500,0.36,3.0\n"))
+    np.testing.assert_array_equal(stated.values, [0.35, 0.36])
+
+
+@pytest.mark.parametrize("row", ["0.1,0.1,0.1", "1,0.5,0.5"])
+def test_impossible_ncs(write, row, refused):
+    refused(
+        write(f"wl,N,C,S\n400,1,0,0\n500,{row}\n"), DataError, "line 3, column 'N'", "degree of polarisation"
+    )
+
+
+def test_angles_of_incidence(write, refused):
+    refused(write("wl,aoi,psi,delta\n400,90,20,170\n"), DataError, "line 2, column 'aoi': 90", "below 90")
+    refused(write("wl,aoi (rad),psi,delta\n400,1,20,170\n"), DataError, "'rad'", "angles in degrees")
+
+
+def test_flags_without_a_meaning(write, refused):
+    path = write(f"wl,psi,delta\n{rows(NM, PSI, DELTA)}")
+    refused(path, UsageError, "--signal-unit", signal_unit="percent")
+    refused(path, UsageError, "--polarisation", polarisation="p")
+    with pytest.raises(UsageError, match=r"R, T, psi-delta"):
+        read_spectrum(path, signal="psi")
+
+
+def test_what_is_written_is_read_again(write):
+    rng = np.random.default_rng(3)
+    nm, angle = np.repeat(np.linspace(300, 900, 30), 3), np.tile([55.0, 65.0, 75.0], 30)
+    made = Spectrum(
+        nm,
+        rng.uniform(0, 90, 90),
+        "psi-delta",
+        sigma=rng.uniform(0.01, 1, 90),
+        angle=angle,
+        delta=rng.uniform(0, 359, 90),
+        delta_sigma=rng.uniform(0.01, 1, 90),
+    )
+    names = {
+        "wavelength_nm": "wavelength",
+        "angle_deg": "angle",
+        "psi_deg": "values",
+        "delta_deg": "delta",
+        "sigma_psi": "sigma",
+        "sigma_delta": "delta_sigma",
+    }
+    table = rows(*(getattr(made, name) for name in names.values()))
+    again = read_spectrum(write(",".join(names) + "\n" + table))
+    for name in names.values():
+        np.testing.assert_allclose(getattr(again, name), getattr(made, name), rtol=1e-11)

@@ -1,0 +1,31 @@
+"""Units of files."""
+
+import numpy as np
+import pytest
+
+from pellicle.data.tabular.units import HC_EV_NM, to_nm, wavelength_unit
+
+
+def test_product_of_the_constants():
+    # CODATA 2018: hc = 1.239841984... eV µm, exact
+    assert pytest.approx(1239.8419843320026, rel=1e-15) == HC_EV_NM
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "nm"),
+    [
+        (500.0, "nm", 500),
+        (0.5, "um", 500),
+        (5000.0, "A", 500),
+        (HC_EV_NM / 500, "eV", 500),
+        (20000.0, "cm-1", 500),
+    ],
+)
+def test_one_wavelength_in_every_unit(value, unit, nm):
+    assert to_nm(np.array([value]), unit)[0] == pytest.approx(nm, rel=1e-15)
+
+
+def test_an_unknown_unit_is_none_as_text_and_an_error_as_a_unit():
+    assert wavelength_unit("furlong") is None
+    with pytest.raises(ValueError, match="expected one of nm, um, A, eV, cm-1, got 'furlong'"):
+        to_nm(np.ones(1), "furlong")

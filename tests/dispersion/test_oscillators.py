@@ -1,0 +1,292 @@
+"""Oscillators: published numbers, Kramers-Kronig by quadrature, gradients at the hard points."""
+
+from __future__ import annotations
+
+import itertools
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy import special as scipy_special
+from scipy.integrate import quad
+
+from pellicle.dispersion.base import HC
+from pellicle.dispersion.cody_lorentz import CodyLorentz
+from pellicle.dispersion.empirical import CauchyUrbach
+from pellicle.dispersion.oscillators import Drude, Gaussian, Lorentz, Oscillators, TaucLorentz
+from pellicle.optics.pair import imag, real
+from pellicle.optics.special import arctan_over_root, dawson, scaled_ei
+
+ENERGY = np.array([0.8, 1.5, 2.2, 3.3, 4.5])
+# amorphous silicon, G. E. Jellison and F. A. Modine (1996), table I
+SILICON = TaucLorentz(122.0, 3.45, 2.54, 1.20)
+TERMS = {
+    "lorentz": Lorentz(2.0, 3.0, 0.5),
+    "drude": Drude(4.0, 0.3),
+    "gaussian": Gaussian(2.0, 3.0, 0.5),
+    "gaussian, wider than its energy": Gaussian(2.0, 0.8, 3.0),
+    "tauc-lorentz": SILICON,
+    "tauc-lorentz, narrow": TaucLorentz(60.0, 3.1, 0.3, 2.9),
+    "tauc-lorentz, critically damped": TaucLorentz(60.0, 3.0, 6.0, 1.2),
+    "tauc-lorentz, overdamped": TaucLorentz(60.0, 3.0, 6.5, 1.2),
+    "tauc-lorentz, no gap": TaucLorentz(60.0, 3.0, 1.0, 0.0),
+    "cody-lorentz": CodyLorentz(122.0, 3.45, 2.54, 1.2, 1.0),
+    "cody-lorentz with a tail": CodyLorentz(122.0, 3.45, 2.54, 1.2, 1.0, 0.4, 0.08),
+    "cody-lorentz, critically damped": CodyLorentz(60.0, 3.0, 6.0, 1.2, 2.0, 0.35, 0.2),
+    "cody-lorentz, overdamped": CodyLorentz(60.0, 3.0, 6.5, 1.2, 0.3, 0.1, 0.05),
+}
+EVERY_TERM = pytest.mark.parametrize("term", TERMS.values(), ids=TERMS)
+
+
+def epsilon_2(t):
+    """ε₂ in plain numbers, and where it has corners or peaks."""
+    lorentzian = lambda E: (E * E - t.E0**2) ** 2 + t.C**2 * E * E  # noqa: E731
+    if isinstance(t, Lorentz):
+        return lambda E: t.A * t.E0**2 * t.gamma * E / ((t.E0**2 - E * E) ** 2 + t.gamma**2 * E * E), [t.E0]
+    if isinstance(t, Gaussian):
+        s = t.fwhm / (2 * np.sqrt(np.log(2)))
+        return lambda E: t.A * (np.exp(-(((E - t.E0) / s) ** 2)) - np.exp(-(((E + t.E0) / s) ** 2))), [t.E0]
+    if isinstance(t, TaucLorentz):
+        return lambda E: t.A * t.E0 * t.C * max(E - t.Eg, 0) ** 2 / lorentzian(E) / E, [t.Eg, t.E0]
+    onset = t.Eg + t.Et
+    product = lambda E: (  # noqa: E731
+        (E - t.Eg) ** 2 / ((E - t.Eg) ** 2 + t.Ep**2) * t.A * t.E0 * t.C * E / lorentzian(E)
+    )
+    tail = onset * product(onset)
+    return lambda E: product(E) if onset < E else tail / E * np.exp((E - onset) / t.Eu), [onset, t.E0]
+
+
+def kramers_kronig(f, E, corners):
+    """(2/π) P∫ ξ f(ξ)/(ξ² − E²) dξ, with the pole in a window that holds no corner."""
+    half = 0.5 * min([0.4, E, *(abs(E - c) for c in corners if abs(E - c) > 0)])
+    share = lambda x: x * f(x) / (x + E)  # noqa: E731
+    total = quad(share, E - half, E + half, weight="cauchy", wvar=E, epsabs=1e-10, limit=200)[0]
+    nodes = sorted({1e-9, E - half, E + half, *corners, *(c - 0.2 for c in corners if c > 0.3), 20.0})
+    for a, b in itertools.pairwise(nodes):
+        if not a < E < b and not (a >= E - half and b <= E + half):
+            total += quad(lambda x: share(x) / (x - E), a, b, epsabs=1e-10, limit=200)[0]
+    return 2 / np.pi * (total + quad(lambda x: share(x) / (x - E), 20.0, np.inf, epsabs=1e-10)[0])
+
+
+@EVERY_TERM
+def test_kramers_and_kronig(term):
+    found = term.epsilon(ENERGY)
+    if isinstance(term, Drude):  # ε₂ diverges at 0: by the closed complex form instead
+        exact = -(term.Ep**2) / (ENERGY * (ENERGY + 1j * term.gamma))
+        np.testing.assert_allclose(np.asarray(found.re) + 1j * np.asarray(found.im), exact, rtol=1e-13)
+        return
+    f, corners = epsilon_2(term)
+    np.testing.assert_allclose(found.im, [f(E) for E in ENERGY], rtol=1e-12, atol=1e-13)
+    np.testing.assert_allclose(
+        found.re, [kramers_kronig(f, E, corners) for E in ENERGY], rtol=1e-8, atol=1e-8
+    )
+
+
+def test_tauc_lorentz_as_printed():
+    """Jellison and Modine's eq. 6 with the erratum, term by term, in the form that divides by α."""
+    t, E = SILICON, ENERGY
+    alpha, gamma2 = np.sqrt(4 * t.E0**2 - t.C**2), t.E0**2 - t.C**2 / 2
+    zeta4 = (E**2 - gamma2) ** 2 + alpha**2 * t.C**2 / 4
+    a_ln = (t.Eg**2 - t.E0**2) * E**2 + t.Eg**2 * t.C**2 - t.E0**2 * (t.E0**2 + 3 * t.Eg**2)
+    a_atan = (E**2 - t.E0**2) * (t.E0**2 + t.Eg**2) + t.Eg**2 * t.C**2
+    sum_, product = t.E0**2 + t.Eg**2, alpha * t.Eg
+    up, down = np.arctan((2 * t.Eg + alpha) / t.C), np.arctan((alpha - 2 * t.Eg) / t.C)
+    printed = (
+        t.A * t.C * a_ln / (2 * np.pi * zeta4 * alpha * t.E0) * np.log((sum_ + product) / (sum_ - product))
+        - t.A * a_atan / (np.pi * zeta4 * t.E0) * (np.pi - up + down)
+        + 4 * t.A * t.E0 * t.Eg * (E**2 - gamma2) / (np.pi * zeta4 * alpha) * (up + down)
+        - t.A * t.E0 * t.C * (E**2 + t.Eg**2) / (np.pi * zeta4 * E) * np.log(np.abs(E - t.Eg) / (E + t.Eg))
+        + 2 * t.A * t.E0 * t.C * t.Eg / (np.pi * zeta4)
+        * np.log(np.abs(E - t.Eg) * (E + t.Eg) / np.sqrt((t.E0**2 - t.Eg**2) ** 2 + t.Eg**2 * t.C**2))
+    )  # fmt: skip
+    # the paper writes π − atan[(2Eg + α)/C] + atan[(−2Eg + α)/C], and atan[(α + 2Eg)/C] + atan[(α − 2Eg)/C]
+    np.testing.assert_allclose(t.epsilon(E).re, printed, rtol=1e-12)
+
+
+# pyElli's regression data (tests/test_dispersions, MIT): ε at wavelengths in nm. Its hc differs in the
+# ninth digit; its own A of Lorentz is A E0² here; its sums of Gaussian and Tauc-Lorentz start at 0.
+PYELLI = [
+    (
+        Oscillators(
+            0.0,
+            (
+                TaucLorentz(100.0, 2.5, 0.1, 2.0),
+                TaucLorentz(150.0, 3.0, 0.05, 2.0),
+                TaucLorentz(300.0, 4.5, 0.02, 2.0),
+            ),
+        ),
+        {
+            400.0: -40.67006475806415 + 23.276498948468173j,
+            602.0040080160321: 41.165694501532954 + 0.012442129451629407j,
+        },
+    ),
+    (
+        Oscillators(0.0, (Gaussian(100.0, 3.0, 0.1), Gaussian(150.0, 1.5, 0.05), Gaussian(300.0, 0.3, 0.02))),
+        {
+            400.0: -43.91081577811 + 6.388144540964682j,
+            418.0360721442886: 51.20927844853897 + 72.40416913349478j,
+        },
+    ),
+    (
+        Oscillators(
+            1.0,
+            (Lorentz(100 / 9, 3.0, 0.1), Lorentz(150 / 2.25, 1.5, 0.05), Lorentz(300 / 0.09, 0.3, 0.02)),
+        ),
+        {
+            400.0: -181.49928350212207 + 67.26497574126284j,
+            602.0040080160321: -125.39109062943506 + 5.508474601780596j,
+        },
+    ),
+    (
+        CauchyUrbach(1.5, 0.005 * HC**2, 0.0001 * HC**4, 0.0001, 0.4, 3.0),  # there in powers of E
+        {
+            400.0: 2.425084410892506 + 0.0003995196444084635j,
+            602.0040080160321: 2.319551409465513 + 2.9015072602160455e-05j,
+        },
+    ),
+]
+
+
+@pytest.mark.parametrize(
+    ("model", "published"), PYELLI, ids=["tauc-lorentz", "gaussian", "lorentz", "urbach"]
+)
+def test_published_numbers(model, published):
+    for wavelength, value in published.items():
+        found = complex(model(wavelength)) ** 2
+        assert found.real == pytest.approx(value.real, rel=1e-8)
+        assert found.imag == pytest.approx(value.imag, rel=2e-8)
+
+
+HARD = {
+    "lorentz": (3.0, 0.0),
+    "gaussian": (3.0, 0.0),
+    "tauc-lorentz": (1.2, 3.45, 0.0, 1.2 + 1e-12, 1.2 - 1e-9),
+    "tauc-lorentz, critically damped": (1.2, 3.0),
+    "tauc-lorentz, no gap": (3.0, 1e-3),
+    "cody-lorentz": (1.2, 3.45),
+    "cody-lorentz with a tail": (1.2, 1.6, 1.6 + 1e-12, 3.45),
+}
+
+
+# of a term's numbers and E or λ, so that terms of one kind share a program; Python's floats stay weak in it
+epsilon = jax.jit(lambda term, energy: jnp.stack(_parts(term, energy)))
+epsilon_slopes = jax.jit(jax.jacrev(lambda term, energy: jnp.stack(_parts(term, energy)), argnums=(0, 1)))
+index_of = jax.jit(lambda term, wavelength: Oscillators(2.0, (term,))(wavelength))
+
+
+def _parts(term, energy):
+    found = term.epsilon(energy)
+    return found.re, found.im
+
+
+@pytest.mark.parametrize("precision", [np.float64, np.float32])
+@pytest.mark.parametrize("name", HARD)
+def test_value_and_gradient_are_finite_at_the_hard_points(name, precision):
+    """At the gap, on resonance, and at zero strength; in every parameter and in energy, under jit."""
+    leaves, structure = jax.tree.flatten(TERMS[name])
+    leaves = [precision(x) for x in leaves]
+    for energy in HARD[name]:
+        energy = precision(energy if energy else 2.0)
+        for strength in (leaves[0], precision(0.0)):
+            at = jax.tree.unflatten(structure, [strength, *leaves[1:]])
+            assert epsilon(at, energy).dtype == precision
+            assert np.all(np.isfinite(epsilon(at, energy)))
+            assert all(np.all(np.isfinite(s)) for s in jax.tree.leaves(epsilon_slopes(at, energy)))
+
+
+def _mixed(term, energy):
+    index = Oscillators(1.7, (term,)).index(HC / energy)
+    return jnp.sum(jnp.sin(real(index)) + jnp.cos(3 * imag(index)))
+
+
+mixed, mixed_slopes = jax.jit(_mixed), jax.jit(jax.grad(_mixed, argnums=(0, 1)))
+
+
+@EVERY_TERM
+def test_gradients_against_central_differences(term):
+    leaves, structure = jax.tree.flatten(term)
+    at = np.array([0.9, 2.3, 3.7])
+    slopes, along = mixed_slopes(term, at)
+    for i, (leaf, slope) in enumerate(zip(leaves, jax.tree.leaves(slopes), strict=True)):
+        if leaf == 0:  # a bound: one side only, and the tail has a corner there
+            continue
+        h = 1e-5 * leaf  # rounding is divided by it: of 0.05 a millionth would leave 1e-8
+        up, down = (
+            mixed(jax.tree.unflatten(structure, [*leaves[:i], leaf + s, *leaves[i + 1 :]]), at)
+            for s in (h, -h)
+        )
+        assert float(slope) == pytest.approx(float(up - down) / (2 * h), rel=2e-6, abs=1e-8)
+    numeric = (mixed(term, at + 1e-6) - mixed(term, at - 1e-6)) / 2e-6
+    assert float(jnp.sum(along)) == pytest.approx(float(numeric), rel=2e-6, abs=1e-7)
+
+
+@EVERY_TERM
+def test_index_absorbs_and_keeps_its_precision(term):
+    wavelength = np.linspace(250.0, 2500.0, 301)
+    index = np.asarray(index_of(term, wavelength))
+    assert np.all(np.isfinite(index))
+    assert np.all(index.imag >= 0)
+    assert np.all(index.real >= 0)
+    single = index_of(term, wavelength.astype(np.float32))
+    assert single.dtype == np.complex64
+    np.testing.assert_allclose(single, index, rtol=3e-4, atol=3e-4)
+
+
+def test_a_sum_is_the_sum():
+    pair = Oscillators(1.5, (TERMS["lorentz"], SILICON))
+    shares = [t.epsilon(2.1) for t in pair.terms]
+    assert complex(pair(HC / 2.1)) ** 2 == pytest.approx(
+        1.5 + sum(float(s.re) + 1j * float(s.im) for s in shares), rel=1e-13
+    )
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: Lorentz(-1.0, 3.0, 0.5), "A must not be negative, got -1"),
+        (lambda: Drude(-1.0, 0.1), "Ep must not be negative"),
+        (lambda: Gaussian(1.0, 3.0, -0.5), "fwhm must not be negative"),
+        (lambda: TaucLorentz(10.0, 2.0, 1.0, 2.5), "Eg must lie below the resonance E0, got Eg 2.5 and E0 2"),
+        (lambda: CodyLorentz(10.0, 4.0, 1.0, 2.5, 0.0), "Ep must be positive"),
+        (lambda: CauchyUrbach(1.5, k0=-0.1), "k0 must not be negative"),
+        (lambda: CauchyUrbach(1.5, Eu=0.0), "Eu must be positive"),
+    ],
+)
+def test_impossible_parameters(make, said):
+    with pytest.raises(ValueError, match=said):
+        make()
+
+
+def test_dawson():
+    x = np.concatenate([np.linspace(-12, 12, 4001), np.logspace(1, 8, 50), [0.0, 1e-300]])
+    np.testing.assert_allclose(jax.jit(dawson)(x), scipy_special.dawsn(x), rtol=2e-14, atol=3e-16)
+    slope = jax.jit(jax.vmap(jax.grad(dawson)))(x)
+    np.testing.assert_allclose(slope, 1 - 2 * x * scipy_special.dawsn(x), atol=1e-13)
+    single = dawson(x[:4001].astype(np.float32))
+    assert single.dtype == np.float32
+    np.testing.assert_allclose(single, scipy_special.dawsn(x[:4001]), atol=2e-7)
+
+
+def test_scaled_exponential_integral():
+    x = np.concatenate([-np.logspace(-3, 2.5, 200), np.logspace(-3, 2.5, 200)])
+    x = x[np.abs(x - 0.3725) > 0.02]  # its zero
+    exact = np.exp(-x) * scipy_special.expi(x)
+    np.testing.assert_allclose(jax.jit(scaled_ei)(x), exact, rtol=2e-13)
+    slope = jax.jit(jax.vmap(jax.grad(scaled_ei)))(x)
+    np.testing.assert_allclose(slope, 1 / x - exact, rtol=1e-10, atol=1e-12)
+
+
+@pytest.mark.parametrize("u", [-4.0, -1e-2, -1e-5, -1e-300, 0.0, 1e-300, 1e-5, 1e-2, 4.0])
+def test_arctangent_through_zero(u):
+    """Against the complex function, in value and slope."""
+    exact = lambda u: (np.arctan(0.3 * np.sqrt(u + 0j) / 1.1) / np.sqrt(u + 0j)).real  # noqa: E731
+    value = exact(u) if abs(u) > 1e-12 else 0.3 / 1.1
+    assert float(arctan_over_root(u, 0.3, 1.1)) == pytest.approx(value, rel=1e-13)
+    slope = float(jax.grad(arctan_over_root)(u, 0.3, 1.1))
+    h = 1e-3 if abs(u) < 1e-3 else 1e-4 * abs(u)
+    assert slope == pytest.approx((exact(u + h) - exact(u - h)) / (2 * h), rel=1e-5)
+
+
+def test_arctangent_beyond_the_right_angle():
+    assert float(arctan_over_root(4.0, 1.0, -1.0)) == pytest.approx(np.arctan2(2.0, -1.0) / 2)

@@ -1,0 +1,228 @@
+"""Plans: each effect on and off with its reason, judged from bounds and never from values."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import jax
+import numpy as np
+import pytest
+
+import pellicle as pl
+from pellicle.effects.averaging import MOST_ORDERS, ORDERS_ERROR
+from pellicle.effects.film import EFFECTS
+from pellicle.scene.free import free_leaves, insert
+from pellicle.simulation.film import build
+
+WAVELENGTH = np.linspace(450.0, 850.0, 9)
+FREE_K = pl.Free(0.0, lower=0, upper=1)
+FREE_ANGLE = pl.Free(0.0, lower=0, upper=60)
+
+
+def scene(layer=1.46, substrate=3.9 + 0.02j, thickness=300.0, ambient=1.0, instrument=None, **light):
+    light = {"wavelength": WAVELENGTH} | light
+    layer = layer if isinstance(layer, pl.Layer) else pl.Layer(layer, thickness)
+    return pl.Scene(layer, substrate, ambient, pl.Light(**light), instrument or pl.Instrument())
+
+
+BANDWIDTH = pl.Instrument(bandwidth=5.0)
+TABLE = [
+    ("absorption", False, "no layer has any extinction", scene()),
+    ("absorption", False, "no layer has any extinction", scene(pl.Constant(1.46, 0.0))),
+    ("absorption", False, "no layer has any extinction", scene(pl.Cauchy(pl.Free(lower=1.4, upper=1.6)))),
+    ("absorption", True, "extinction is free, or not zero", scene(1.46 + 0.1j)),
+    ("stack", False, "one layer", scene()),
+    ("stack", True, "2 coherent layers", pl.Scene([pl.Layer(1.46, 10.0), pl.Layer(2.0, 20.0)], 1.5)),
+    ("absorption", True, "extinction is free, or not zero", scene(pl.Constant(1.46, FREE_K))),
+    ("absorption", True, "extinction is free, or not zero", scene(pl.Shifted(pl.Constant(1.46), k=FREE_K))),
+    ("tunnelling", False, "normal incidence", scene()),
+    ("tunnelling", False, "no real index can fall below", scene(angle=60.0)),
+    ("tunnelling", True, "in the layer is not ruled out", scene(1.33, ambient=1.52, angle=65.0)),
+    ("tunnelling", True, "in the substrate is not", scene(2.1, 1.0, ambient=1.52, angle=65.0)),
+    ("tunnelling", True, "layer and substrate", scene(1.2, 1.0, ambient=1.52, angle=65.0)),
+    ("tunnelling", False, "no real index", scene(1.33 + 0.1j, ambient=1.52, angle=65.0)),
+    ("tunnelling", True, "in the layer", scene(pl.Cauchy(pl.Free(lower=1.3, upper=2)), angle=65.0)),
+    ("tunnelling", True, "in the layer", scene(angle=FREE_ANGLE)),
+    ("tunnelling", True, "in the layer", scene(angle=60.0, wavelength=None)),
+    ("oblique", False, "normal incidence, and the angle is not free", scene()),
+    ("oblique", True, "incidence at 30°", scene(angle=30)),
+    ("oblique", True, "incidence at 10 to 50°", scene(angle=np.linspace(10, 50, 9))),
+    ("oblique", True, "the angle of incidence is free", scene(angle=FREE_ANGLE)),
+    ("polarisation", False, "s and p are one at normal incidence", scene()),
+    ("polarisation", False, "only p is asked for", scene(angle=30.0, polarisation="p")),
+    ("polarisation", True, "the mean of s and p", scene(angle=30.0)),
+    ("polarisation", True, "the mean of s and p", scene(angle=FREE_ANGLE)),
+    ("transmission", False, "the signal is a reflectance", scene()),
+    ("transmission", True, "the signal is a transmittance", scene(signal="T")),
+    ("transmission", True, "reaches the back face", scene(substrate=pl.Substrate(1.5, "air"))),
+    ("back-face", False, "no back face was given", scene()),
+    ("back-face", True, "a plate", scene(substrate=pl.Substrate(1.5, "air"))),
+    ("coherence", False, "monochromatic", scene()),
+    ("coherence", False, "monochromatic", scene(instrument=pl.Instrument(bandwidth=0, thickness_spread=0.0))),
+    ("coherence", True, "damped by bandwidth", scene(instrument=BANDWIDTH)),
+    ("coherence", True, "by uneven thickness", scene(instrument=pl.Instrument(thickness_spread=3))),
+    (
+        "coherence",
+        True,
+        "by bandwidth and uneven thickness",
+        scene(instrument=pl.Instrument("free", 0.0, 1, 1)),
+    ),
+    (
+        "coherence",
+        True,
+        "bandwidth",
+        scene(instrument=pl.Instrument(bandwidth=pl.Free(0.0, lower=0, upper=9))),
+    ),
+    (
+        "coherence",
+        True,
+        "each averaged over 15 nodes",
+        scene(signal="psi-delta", angle=60.0, instrument=BANDWIDTH),
+    ),
+    (
+        "orders",
+        False,
+        "nodes of the closed form",
+        scene(signal="psi-delta", angle=60.0, instrument=BANDWIDTH),
+    ),
+    (
+        "coherence",
+        True,
+        "fringes every 0.99 nm are narrower than the sampling of 50 nm",
+        scene(thickness=2.5e5),
+    ),
+    ("coherence", False, "monochromatic", scene(thickness=pl.Free(lower=10, upper=2.5e5))),
+    ("coherence", False, "monochromatic", scene(thickness=2.5e5, wavelength=np.array([600.0]))),
+    ("orders", True, "no order is left", scene(thickness=2.5e5)),
+    ("roughness", False, "no face", scene()),
+    ("roughness", True, "1 rough: up to 3 nm", scene(pl.Layer(1.46, 300.0, roughness=3.0))),
+    ("stack", True, "rough faces", scene(pl.Layer(1.46, 300.0, roughness=FREE_K))),
+    ("angle-spread", False, "one angle of incidence", scene()),
+    (
+        "angle-spread",
+        True,
+        "within 17.5° of its axis",
+        scene(instrument=pl.Instrument(numerical_aperture=0.3)),
+    ),
+    ("oblique", True, "the light's cone has oblique rays", scene(instrument=pl.Instrument(angle_spread=5.0))),
+    ("polarisation", True, "cone has s and p", scene(instrument=pl.Instrument(angle_spread=5.0))),
+    (
+        "back-face",
+        True,
+        "2 incoherent",
+        pl.Scene([pl.Plate(1.5), pl.Layer(1.46, 9.0)], pl.Substrate(1.5, "air")),
+    ),
+    ("dispersion", False, "no index varies", scene()),
+    ("dispersion", False, "one wavelength", scene(pl.Cauchy(1.4, 1e4), wavelength=np.array([600.0]))),
+    ("dispersion", True, "the index of layer and substrate varies", scene("SiO2", "Si")),
+    ("dispersion", True, "the index of layer varies", scene(pl.Cauchy(1.4, pl.Free(lower=0, upper=1)))),
+    ("opaque", False, "light may reach everything", scene(0.2 + 3j)),
+    ("precision", True, "double", scene()),
+    (
+        "coherence",
+        True,
+        "by uneven thickness, each averaged over 15 nodes",
+        scene(2 + 0.1j, instrument=pl.Instrument(thickness_spread=3)),
+    ),
+    ("orders", False, "the closed form sums all orders", scene()),
+    ("orders", True, "over the bounds", scene(instrument=BANDWIDTH)),
+]
+
+
+@pytest.mark.parametrize(("effect", "on", "why", "thing"), TABLE)
+def test_each_effect_and_its_reason(effect, on, why, thing):
+    row = pl.plan(thing).row(effect)
+    assert row.on is on
+    assert why in row.why
+
+
+def test_the_table_covers_every_effect_both_ways():
+    """But for what only a tolerance decides (test_thrift.py)."""
+    both = {(e.name, on) for e in EFFECTS for on in (True, False)}
+    assert {(effect, on) for effect, on, *_ in TABLE} == both - {("opaque", True), ("precision", False)}
+
+
+def test_a_plan_lists_every_effect_in_order():
+    plan = pl.plan(scene())
+    assert [row.effect for row in plan.rows] == [effect.name for effect in EFFECTS]
+    lines = str(plan).splitlines()
+    assert len(lines) == len(EFFECTS)
+    assert lines[0].split()[:2] == ["absorption", "off"]
+    with pytest.raises(KeyError, match="magic"):
+        plan.row("magic")
+
+
+def test_plans_are_values():
+    """Equal scenes give equal plans, which share one compiled model."""
+    one, two = pl.plan(scene(angle=30.0)), pl.plan(scene(thickness=500.0, angle=30.0))
+    assert one == two
+    assert hash(one) == hash(two)
+    assert build(one) is build(two)
+    assert pl.plan(scene(angle=31.0)) != one
+    with pytest.raises(AttributeError):
+        one.signal = "T"
+
+
+def test_a_start_value_decides_nothing():
+    """Only bounds do: the trap is an extinction, an angle or a bandwidth that starts at exactly 0."""
+
+    def plan(value):
+        free = [pl.Free(value * upper, lower=0, upper=upper) for upper in (1.0, 60.0, 9.0)]
+        return pl.plan(
+            scene(pl.Constant(1.46, free[0]), angle=free[1], instrument=pl.Instrument(bandwidth=free[2]))
+        )
+
+    for row, same in zip(plan(0.0).rows, plan(0.5).rows, strict=True):
+        assert (row.effect, row.on) == (same.effect, same.on)
+
+
+def test_orders_need_wavelengths():
+    with pytest.raises(ValueError, match="give the light its wavelengths"):
+        pl.plan(scene(wavelength=None, instrument=BANDWIDTH))
+
+
+ORDERS = {
+    "oxide on silicon": scene(
+        pl.Constant(pl.Free(lower=1.3, upper=1.7)),
+        thickness=pl.Free(lower=10, upper=900),
+        instrument=BANDWIDTH,
+    ),
+    "titania on silicon, oblique": scene(
+        2.5, thickness=pl.Free(lower=10, upper=900), angle=pl.Free(lower=0, upper=60), instrument=BANDWIDTH
+    ),
+    "absorbing on metal": scene(
+        pl.Constant(2.1, pl.Free(lower=0, upper=0.2)),
+        0.2 + 3.4j,
+        pl.Free(lower=10, upper=900),
+        instrument=BANDWIDTH,
+    ),
+    "polymer on glass": scene(1.6, 1.52, pl.Free(lower=10, upper=900), instrument=BANDWIDTH),
+}
+
+
+@pytest.mark.parametrize("name", ORDERS)
+@pytest.mark.parametrize("signal", "RT")
+def test_the_bound_on_what_the_orders_leave_out_is_true(name, signal):
+    """Without a bandwidth, where every order counts in full, over random draws of the free parameters."""
+    thing = replace(ORDERS[name], light=replace(ORDERS[name].light, signal=signal))
+    row = pl.plan(thing).row("orders")
+    sharp = replace(thing, instrument=pl.Instrument(bandwidth=0.0))
+    series, closed = build(pl.plan(thing)), build(pl.plan(sharp))
+    rng = np.random.default_rng(5)
+    free = [f for _, f in free_leaves(thing)]
+    draws = np.stack([rng.uniform(f.lower, f.upper, 100) for f in free], axis=1)
+
+    def left_out(values):
+        filled = insert(sharp, values)
+        return series(filled) - closed(filled)
+
+    worst = np.max(np.abs(jax.jit(jax.vmap(left_out))(draws)))
+    assert 0 < worst <= row.error_bound
+    assert row.error_bound <= 2 * ORDERS_ERROR or row.count == MOST_ORDERS
+
+
+def test_stronger_reflections_need_more_orders():
+    counts = [pl.plan(ORDERS[name]).row("orders").count for name in ("polymer on glass", "oxide on silicon")]
+    counts.append(pl.plan(ORDERS["absorbing on metal"]).row("orders").count)
+    assert counts == sorted(counts)
+    assert counts[0] < 5 < counts[-1] <= MOST_ORDERS

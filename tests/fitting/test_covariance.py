@@ -1,0 +1,188 @@
+"""Errors against lmfit and SciPy, and the films that the data do not see."""
+
+import jax
+import jax.numpy as jnp
+import lmfit
+import numpy as np
+import pytest
+from scipy.optimize import curve_fit
+
+import pellicle as pl
+from pellicle.fitting.spectra.covariance import errors
+from pellicle.fitting.spectra.evaluation import local
+from pellicle.fitting.spectra.problem import make
+from pellicle.fitting.spectra.targets import measured as as_numbers
+from pellicle.simulation.functions import reflectance
+from pellicle.synthetic.spectra import synthesise
+
+CAUCHY = (pl.Free(None, 1.3, 1.7), pl.Free(None, 0.0, 2e4))
+TRUTH = (1.45, 4000.0, 480.0)  # A, B, thickness
+
+
+@pytest.fixture(scope="module")
+def model():
+    @jax.jit
+    def model(nm, d, a, b):
+        return reflectance(nm, d, a + b / nm**2, 3.9 + 0.02j)
+
+    return lambda nm, *p: np.asarray(model(jnp.asarray(nm), *map(jnp.asarray, p)))
+
+
+@pytest.fixture
+def scene(film):
+    return film(material=pl.Cauchy(*CAUCHY))
+
+
+def covariance(fit):
+    stderr = np.array([fit[name].stderr for name in fit.correlation_names])
+    return fit.correlation_names, fit.correlation * np.outer(stderr, stderr)
+
+
+def ordered(names):
+    return [names.index(name) for name in ("thickness", "A", "B")]
+
+
+def test_absolute_sigma_as_scipy_has_it(scene, measured, model):
+    data = measured(scene, *TRUTH, sigma=True)
+    fit = pl.fit(data, scene)
+    p0 = [fit[name].value for name in ("thickness", "A", "B")]
+    # steps of its own finite differences would cost three digits: give it units of order one
+    best, theirs = curve_fit(
+        lambda nm, d, a, b: model(nm, 100 * d, a, 1e4 * b),
+        data.wavelength,
+        data.values,
+        [p0[0] / 100, p0[1], p0[2] / 1e4],
+        sigma=data.sigma,
+        absolute_sigma=True,
+        xtol=1e-12,
+        ftol=1e-12,
+    )
+    unit = np.array([100, 1, 1e4])
+    names, ours = covariance(fit)
+    take = ordered(names)
+    np.testing.assert_allclose(ours[np.ix_(take, take)], theirs * np.outer(unit, unit), rtol=1e-3)
+    np.testing.assert_allclose(best * unit, p0, rtol=1e-5)
+    assert fit.status == "converged"
+    assert fit.chi2_reduced == pytest.approx(1, abs=0.3)
+
+
+def test_relative_sigma_as_lmfit_has_it(scene, measured, model):
+    """σ from the residuals; where their correlation counts, errors grow by its square root."""
+    data = measured(scene, *TRUTH)
+    fit = pl.fit(data, scene)
+    start = lmfit.Parameters()
+    for name, unit in (("thickness", 100), ("A", 1), ("B", 1e4)):
+        start.add(name, fit[name].value / unit)
+    theirs = lmfit.minimize(
+        lambda p: model(data.wavelength, 100 * p["thickness"], p["A"] + 0, 1e4 * p["B"]) - data.values, start
+    )
+    share = fit.effective_points / len(data)
+    assert share > 0.7  # white noise, as far as 128 points can tell
+    for name, unit in (("thickness", 100), ("A", 1), ("B", 1e4)):
+        expected = theirs.params[name].stderr * unit / np.sqrt(share)
+        assert fit[name].stderr == pytest.approx(expected, rel=1e-3), name
+    names = list(fit.correlation_names)
+    found = fit.correlation[names.index("thickness"), names.index("A")]
+    assert found == pytest.approx(theirs.params["thickness"].correl["A"], abs=1e-3)
+
+
+def test_twice_the_noise_twice_the_error(scene, measured):
+    one, two = (pl.fit(measured(scene, *TRUTH, noise=s, sigma=True), scene) for s in (0.002, 0.004))
+    assert two["thickness"].stderr == pytest.approx(2 * one["thickness"].stderr, rel=0.02)
+
+
+def test_errors_cover_the_truth(film, measured):
+    """95 % intervals over 40 noises: 38 expected, fewer than 33 would be a chance of 1 in 500."""
+    scene = film()
+    inside = 0
+    for seed in range(40):
+        fit = pl.fit(measured(scene, 430.0, seed=seed, sigma=True), scene)
+        inside += abs(fit["thickness"].value - 430) < 1.96 * fit["thickness"].stderr
+    assert inside >= 33
+
+
+@pytest.mark.parametrize("truth", [1000.0, 3000.0])
+@pytest.mark.parametrize("sigma", [True, False])
+def test_opaque_gold_is_not_known_to_zero_nanometres(film, measured, truth, sigma):
+    """A pseudo-inverse gave 'sd 0.00' here. The error is infinite, with a lower limit and no upper one."""
+    scene = film(pl.Free(None, 1, 4000), "Au")
+    fit = pl.fit(measured(scene, truth, noise=0.005, sigma=sigma), scene)
+    assert fit.status == "not-identifiable"
+    assert fit["thickness"].stderr == float("inf")
+    assert 50 < fit["thickness"].lower_limit < truth
+    assert fit["thickness"].upper_limit is None
+    assert fit.verdict.startswith("The layer is opaque: thickness is at least")
+
+
+def test_a_film_that_is_everywhere_opaque(film, measured):
+    """Not even the thinnest that the bounds allow lets light through: any value fits as well."""
+    scene = film(pl.Free(None, 1000, 4000), "Au")
+    fit = pl.fit(measured(scene, 2000.0, noise=0.005, sigma=True), scene)
+    assert fit.status == "not-identifiable"
+    assert fit["thickness"].stderr == float("inf")
+    assert fit["thickness"].lower_limit is None
+    assert "may be anything between 1000 and 4000 nm" in fit.verdict
+
+
+def test_index_and_thickness_of_a_thin_film_trade(film, measured):
+    """20 nm of something like titania: n·d is known, n and d are not."""
+    scene = film(pl.Free(None, 1, 100), pl.Constant(pl.Free(None, 1.8, 2.8)))
+    fit = pl.fit(measured(scene, 2.4, 20.0, noise=0.005, sigma=True), scene)
+    names = list(fit.correlation_names)
+    assert fit.correlation[names.index("n"), names.index("thickness")] < -0.95
+    assert fit["thickness"].stderr > 0.2
+    known = film(pl.Free(None, 1, 100), 2.4)
+    alone = pl.fit(measured(known, 20.0, noise=0.005, sigma=True), known)
+    assert fit["thickness"].stderr > 3 * alone["thickness"].stderr
+
+
+def test_a_very_strong_trade_is_warned_of(film, measured):
+    scene = film(pl.Free(None, 1, 60), pl.Constant(pl.Free(None, 1.2, 1.8)))
+    fit = pl.fit(measured(scene, 1.46, 15.0, noise=1e-3, sigma=True), scene)
+    names = list(fit.correlation_names)
+    assert abs(fit.correlation[names.index("n"), names.index("thickness")]) > 0.99
+    assert any("n and thickness trade against each other" in warning for warning in fit.warnings)
+
+
+def test_a_parameter_without_effect_has_an_infinite_error(film, measured):
+    """k of a layer of no thickness."""
+    scene = film(0.0, pl.Constant(1.46, pl.Free(None, 0.0, 1.0)))
+    fit = pl.fit(measured(film(0.0), noise=0.003), scene)
+    assert fit["k"].stderr == float("inf")
+    assert fit.status == "not-identifiable"
+
+
+def test_index_errors_follow_from_the_covariance(scene, measured):
+    """Errors of n(λ) = A + B/λ²."""
+    fit = pl.fit(measured(scene, *TRUTH, sigma=True), scene)
+    names, matrix = covariance(fit)
+    a, b = names.index("A"), names.index("B")
+    u = 1 / fit.curve.wavelength**2
+    expected = np.sqrt(matrix[a, a] + 2 * u * matrix[a, b] + u**2 * matrix[b, b])
+    np.testing.assert_allclose(fit.curve.n_stderr, expected, rtol=1e-6)
+    np.testing.assert_array_equal(fit.curve.k_stderr, 0)
+
+
+def test_a_direction_that_the_data_do_not_see_keeps_its_variance(film, measured):
+    """The covariance itself, before any profile: a pseudo-inverse would drop the direction and say 0."""
+    scene = film(pl.Free(None, 1, 4000), "Au")
+    data = measured(scene, 3000.0, noise=0.005, sigma=True)
+    problem = make(as_numbers(data, scene))
+    at = jax.device_get(local(*problem.views[0].program, np.array([3000.0 / 4000])))
+    assert errors(problem, [at], [1.0]).stderr[0] > 1e6
+
+
+def test_a_lower_limit_is_where_chi2_has_risen_by_2_71(film, measured):
+    """A 95 % limit; at half of it the film is far out."""
+    scene = film(pl.Free(None, 1, 1000), "Au")
+    data = measured(scene, 500.0, noise=0.005, sigma=True)
+    fit = pl.fit(data, scene)
+
+    def rise(thickness):
+        model = synthesise(film(thickness, "Au"), data.wavelength).clean
+        chi2 = np.sum(((data.values - model) / data.sigma) ** 2)
+        return chi2 - fit.chi2_reduced * (len(data) - 1)
+
+    limit = fit["thickness"].lower_limit
+    assert rise(limit) == pytest.approx(2.71, abs=0.05)
+    assert rise(limit / 2) > 30

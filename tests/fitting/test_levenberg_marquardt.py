@@ -1,0 +1,198 @@
+"""The bounded solver against SciPy's, on films whose k may rest on zero, and at its own limits."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import lineax
+import numpy as np
+import optimistix as optx
+import pytest
+from scipy.optimize import least_squares as scipy_least_squares
+
+from pellicle.fitting.levenberg_marquardt import BoundedLevenbergMarquardt, Trust, least_squares
+from pellicle.simulation.functions import reflectance
+
+WAVELENGTH = np.linspace(400.0, 900.0, 64)
+LOWER, UPPER = np.array([10.0, 1.2, 0.0]), np.array([1000.0, 2.6, 0.2])
+SIGMA = 0.005
+FITS = 24
+
+
+def model(y):
+    """Reflectance of a film of thickness, n and k (in units of the box) on silicon-like 3.9 + 0.02i."""
+    d, n, k = jnp.asarray(LOWER, y.dtype) + y * jnp.asarray(UPPER - LOWER, y.dtype)
+    return reflectance(jnp.asarray(WAVELENGTH, y.dtype), d, n + 1j * k, 3.9 + 0.02j)
+
+
+class Films(NamedTuple):
+    data: np.ndarray  # (fits, wavelengths)
+    start: np.ndarray  # (fits, 3) in the unit box
+
+
+@pytest.fixture(scope="module")
+def films() -> Films:
+    """Films with k = 0 and noise, so that in about half of the fits k ends on its bound."""
+    random = np.random.default_rng(0)
+    truth = np.column_stack([random.uniform(0.05, 0.9, FITS), random.uniform(0.1, 0.9, FITS), np.zeros(FITS)])
+    clean = np.asarray(jax.jit(jax.vmap(model))(truth))
+    start = np.column_stack(
+        [truth[:, 0] * random.uniform(0.99, 1.01, FITS), truth[:, 1], np.full(FITS, 0.05)]
+    )
+    return Films(clean + random.normal(0, SIGMA, clean.shape), start)
+
+
+def residual(y, data):
+    return (model(y) - data) / SIGMA
+
+
+@pytest.fixture(scope="module")
+def solved(films):
+    """Ours for every film at once: (y, converged, χ²)."""
+    y, converged = jax.jit(jax.vmap(lambda s, d: least_squares(lambda u: residual(u, d), s)))(
+        films.start, films.data
+    )
+    chi2 = np.sum(np.asarray(jax.jit(jax.vmap(residual))(y, films.data)) ** 2, axis=1)
+    return np.asarray(y), np.asarray(converged), chi2
+
+
+def test_the_same_chi2_as_scipy_with_k_on_its_bound_or_not(films, solved):
+    y, converged, chi2 = solved
+    function, slope = jax.jit(residual), jax.jit(jax.jacfwd(residual))
+    theirs = [
+        scipy_least_squares(
+            lambda u, d=d: np.asarray(function(u, d)),
+            np.clip(start, 1e-9, 1 - 1e-9),
+            lambda u, d=d: np.asarray(slope(u, d)),
+            bounds=(0.0, 1.0),
+            method="trf",
+            xtol=1e-12,
+            ftol=1e-12,
+            gtol=1e-12,
+        )
+        for start, d in zip(films.start, films.data, strict=True)
+    ]
+    assert converged.all()
+    active = y[:, 2] == 0
+    assert 0.25 < active.mean() < 0.75  # both kinds were tried
+    # n against d at constant n·d has minima of its own: the two may end in neighbouring ones, seldom
+    same = np.abs(y[:, 0] - [fit.x[0] for fit in theirs]) < 1e-3
+    assert same.mean() > 0.9
+    np.testing.assert_allclose(chi2[same], np.array([2 * fit.cost for fit in theirs])[same], rtol=1e-4)
+    # the interior-point method only nears a bound, ours is on it
+    assert all(fit.x[2] < 1e-3 for fit in np.array(theirs)[active])
+
+
+def test_inside_the_box_always(solved):
+    y, _, _ = solved
+    assert (y >= 0).all()
+    assert (y <= 1).all()
+
+
+def test_an_active_bound_is_a_constrained_minimum(films, solved):
+    """On the bound the gradient pushes outward, and in the other directions there is none."""
+    y, _, _ = solved
+    slope = np.asarray(jax.jit(jax.vmap(jax.jacfwd(residual)))(y, films.data))
+    gradient = 2 * np.einsum("fw,fwp->fp", np.asarray(jax.jit(jax.vmap(residual))(y, films.data)), slope)
+    active = y[:, 2] == 0
+    assert (gradient[active, 2] > 0).all()
+    size = np.abs(slope).sum(axis=1)
+    assert np.max(np.abs(gradient[:, :2]) / size[:, :2]) < 1e-3
+    assert np.max(np.abs(gradient[~active, 2]) / size[~active, 2]) < 1e-3
+
+
+def test_one_by_one_as_all_at_once(films, solved):
+    y, _, _ = solved
+    alone = jax.jit(lambda s, d: least_squares(lambda u: residual(u, d), s))
+    for i in range(4):
+        found, converged = alone(films.start[i], films.data[i])
+        assert converged
+        np.testing.assert_allclose(found, y[i], atol=1e-7)
+
+
+def test_never_an_increase(films):
+    """χ² after n steps falls with n, from starts that are far off, where trial steps are rejected."""
+    far = np.tile([0.9, 0.9, 0.9], (4, 1))
+
+    @jax.jit
+    @jax.vmap
+    def course(start, data):
+        tags = frozenset()
+        solver, options = BoundedLevenbergMarquardt(1e-8, 0.0), {"lower": 0.0, "upper": 1.0}
+        fn = lambda y, _: (residual(y, data), None)  # noqa: E731
+        shapes = jax.eval_shape(lambda: fn(start, None))
+        state = solver.init(fn, start, None, options, *shapes, tags)
+
+        arrays, rest = eqx.partition(state, eqx.is_array)  # the state holds the model's own trace
+
+        def step(carry, _):
+            y, arrays = carry
+            y, state, _ = solver.step(fn, y, None, options, eqx.combine(arrays, rest), tags)
+            return (y, eqx.filter(state, eqx.is_array)), jnp.sum(residual(y, data) ** 2)
+
+        return jax.lax.scan(step, (start, arrays), None, length=25)[1]
+
+    chi2 = np.asarray(course(far, films.data[:4]))
+    assert (np.diff(chi2, axis=1) <= 1e-9 * chi2[:, :-1]).all()
+    assert (chi2[:, -1] < chi2[:, 0]).all()
+    assert (np.diff(chi2, axis=1) == 0).any()  # some steps were rejected
+
+
+def test_a_step_that_the_box_has_bent_uphill_promises_nothing():
+    """Optimistix would accept a small increase where the linear model predicts a larger one."""
+    jacobian = lineax.MatrixLinearOperator(jnp.eye(2))
+    info = optx.FunctionInfo.ResidualJac(jnp.array([1.0, 1.0]), jacobian)
+    assert Trust().predict_reduction(jnp.array([0.5, 0.5]), info) == 0
+    assert Trust().predict_reduction(jnp.array([-0.5, -0.5]), info) < 0
+
+
+def test_a_start_outside_the_box_is_brought_in():
+    found, converged = least_squares(lambda y: y - jnp.array([0.5, 2.0]), jnp.array([-3.0, 7.0]))
+    assert converged
+    np.testing.assert_allclose(found, [0.5, 1.0])
+
+
+def test_nan_is_reported():
+    solution = optx.least_squares(
+        lambda y, _: jnp.where(y > 0.2, jnp.nan, y - 1.0),
+        BoundedLevenbergMarquardt(1e-8, 0.0),
+        jnp.array([0.5]),
+        options={"lower": 0.0, "upper": 1.0},
+        max_steps=20,
+        throw=False,
+    )
+    assert solution.result == optx.RESULTS.nonfinite
+    _, converged = least_squares(lambda y: y * jnp.nan, jnp.array([0.5]))
+    assert not converged
+
+
+def test_a_step_into_nan_is_not_taken():
+    """log y − log 0.1 from 0.9: the full step lands below zero, where there is no logarithm."""
+    found, converged = least_squares(lambda y: jnp.log(y - 0.05) - jnp.log(0.05), jnp.array([0.9]))
+    assert converged
+    np.testing.assert_allclose(found, [0.1], rtol=1e-6)
+
+
+def test_too_few_steps_are_reported(films):
+    _, converged = least_squares(
+        lambda y: residual(y, films.data[0]), jnp.asarray(films.start[0]), rtol=1e-12, steps=2
+    )
+    assert not converged
+
+
+def test_float32_stays_float32(films, solved):
+    """Under x64, where Optimistix's own solver fails on float32."""
+    y, _, _ = solved
+    start = jnp.asarray(films.start[0], jnp.float32)
+    data = jnp.asarray(films.data[0], jnp.float32)
+    found, converged = least_squares(lambda u: residual(u, data), start, rtol=1e-4)
+    assert found.dtype == jnp.float32
+    assert converged
+    np.testing.assert_allclose(found, y[0], atol=2e-3)
+
+
+def test_a_parameter_without_effect_does_not_disturb_the_others():
+    found, converged = least_squares(lambda y: jnp.array([y[0] - 0.3, 0.0 * y[1]]), jnp.array([0.9, 0.4]))
+    assert converged
+    np.testing.assert_allclose(found, [0.3, 0.4])

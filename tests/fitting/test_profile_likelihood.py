@@ -1,0 +1,103 @@
+"""Limits by profile likelihood against SciPy's minima of Airy's formula written out here."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq, minimize_scalar
+
+import pellicle as pl
+from pellicle.fitting.neighbourhood import valley
+from pellicle.fitting.profile_likelihood import interval
+from pellicle.fitting.spectra.covariance import errors
+from pellicle.fitting.spectra.fit import fitted
+from pellicle.fitting.spectra.search import quiet
+
+SUBSTRATE = 3.9 + 0.02j
+
+
+def airy(nm, d, n):
+    """Reflectance of a layer at normal incidence."""
+    r1, r2 = (1 - n) / (1 + n), (n - SUBSTRATE) / (n + SUBSTRATE)
+    turn = r2 * np.exp(4j * np.pi * n * d / nm)
+    return np.abs((r1 + turn) / (1 + r1 * turn)) ** 2
+
+
+def chi2(data, d, n):
+    return float(np.sum(((data.values - airy(data.wavelength, d, n)) / data.sigma) ** 2))
+
+
+def least(data, at, near, width):
+    """The least χ² over one parameter, near a value."""
+    grid = np.linspace(near - width, near + width, 81)
+    best = grid[np.argmin([at(x) for x in grid])]
+    return minimize_scalar(at, bounds=(best - width / 40, best + width / 40), method="bounded").fun
+
+
+def test_an_extinction_beside_zero(film, measured):
+    """k is 0; its upper limit is where χ², the thickness fitted again, is 2.71 above the best."""
+    scene = film(material=pl.Constant(1.46, pl.Free(None, 0.0, 1.0)))
+    for seed in (1, 2):
+        data = measured(scene, 0.0, 430.0, seed=seed, sigma=True)
+
+        def profile(k, data=data):
+            return least(data, lambda d: chi2(data, d, 1.46 + 1j * k), 430.0, 5.0)
+
+        fit = pl.fit(data, scene)
+        best = profile(fit["k"].value)
+        truth = brentq(lambda k, best=best: profile(k) - best - 2.71, fit["k"].value, 0.01)
+        assert fit["k"].upper_limit == pytest.approx(truth, rel=0.01)
+        assert fit["k"].lower_limit is None
+        assert np.isfinite(fit["k"].stderr)
+
+
+def test_an_extinction_that_is_seen_has_no_limit(film, measured):
+    scene = film(material=pl.Constant(1.46, pl.Free(None, 0.0, 1.0)))
+    fit = pl.fit(measured(scene, 0.01, 430.0, sigma=True), scene)
+    assert (fit["k"].lower_limit, fit["k"].upper_limit) == (None, None)
+    assert fit["k"].stderr < 1e-3
+
+
+def test_an_index_with_one_open_side(film, measured):
+    """A film of 25 nm: any large index will do with another thickness, a small one will not."""
+    scene = film(pl.Free(None, 1, 100), pl.Constant(pl.Free(None, 1.3, 1.9)))
+    data = measured(scene, 1.6, 25.0, noise=0.001, sigma=True)
+
+    def profile(n):
+        return least(data, lambda d: chi2(data, d, n), 28.0, 10.0)
+
+    fit = pl.fit(data, scene)
+    best = chi2(data, fit["thickness"].value, fit["n"].value)
+    truth = brentq(lambda n: profile(n) - best - 2.71, 1.35, 1.5)
+    assert profile(1.9) - best < 6
+    assert fit["n"].lower_limit == pytest.approx(truth, abs=1e-3)
+    assert fit["n"].upper_limit is None
+    assert fit["n"].stderr == float("inf")
+    assert f"n is at least {fit['n'].lower_limit:.2g} (95 %)" in fit.warnings
+
+
+def test_pushed_against_a_bound_and_unseen_beside_one(film, measured):
+    """Both rest on a bound; of one the data see that the truth is beyond it."""
+    pushed = film(material=pl.Constant(pl.Free(None, 1.47, 1.6)))
+    fit = pl.fit(measured(film(), 430.0, sigma=True), pushed)
+    assert fit["n"].value == 1.47
+    assert fit["n"].stderr < 0.01
+    unseen = film(pl.Free(None, 1, 100), pl.Constant(pl.Free(None, 1.3, 1.9)))
+    fit = pl.fit(measured(unseen, 1.6, 15.0, noise=0.001, sigma=True), unseen)
+    assert fit["n"].value == 1.3
+    assert fit["n"].stderr == float("inf")
+
+
+def test_an_interval_by_profile_is_that_of_a_scan(film, measured):
+    """Both ends of the thickness, its index fitted again by SciPy, where χ² is 3.84 above the best."""
+    scene = film(material=pl.Constant(pl.Free(None, 1.3, 1.7), 0.0))
+    data = measured(scene, 1.46, 430.0, sigma=True)
+    fit, weighed = fitted(data, scene, 0.0, quiet)
+    found = errors(weighed.problem, [m.at for m in weighed.met], [m.variance for m in weighed.met])
+    low, high = interval(valley(weighed, found.covariance), fit.correlation_names.index("thickness"))
+
+    def profile(d):
+        return least(data, lambda n: chi2(data, d, n), 1.46, 0.03) * weighed.met[0].variance ** -1
+
+    best = profile(fit["thickness"].value)
+    for end in (low, high):
+        assert profile(end) - best == pytest.approx(3.84, abs=0.1)
+    assert low < fit["thickness"].value < high

@@ -1,0 +1,54 @@
+"""Where a model misses something: bumps whose place is known, and noise that has none."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import pellicle as pl
+from pellicle.fitting.spectra.residual_structure import windows
+
+
+def test_noise_has_no_structure():
+    """One spectrum of a hundred may be said to have some."""
+    random = np.random.default_rng(5)
+    assert sum(bool(windows(random.normal(size=200))) for _ in range(300)) <= 8
+
+
+@pytest.mark.parametrize(("first", "last", "height"), [(40, 59, 2.0), (100, 139, -1.5), (10, 14, 4.0)])
+def test_a_step_is_found_where_it_is(first, last, height):
+    z = np.random.default_rng(6).normal(size=200)
+    z[first : last + 1] += height
+    [found] = windows(z)
+    assert abs(found.first - first) <= 6
+    assert abs(found.last - last) <= 6
+
+
+def test_an_outlier_is_no_structure():
+    z = np.random.default_rng(7).normal(size=200)
+    z[77] = 60.0
+    assert windows(z) == []
+
+
+@pytest.mark.parametrize("sigma", [True, False])
+def test_a_fit_says_where(film, measured, sigma):
+    scene = film(material=pl.Constant(pl.Free(None, 1.3, 1.7)))
+    data = measured(scene, 1.46, 430.0, sigma=sigma)
+    bump = 0.012 * np.exp(-(((data.wavelength - 500) / 15) ** 2))
+    fit = pl.fit(dataclasses.replace(data, values=data.values + bump), scene)
+    [told] = [warning for warning in fit.warnings if "misses structure" in warning]
+    low, high = (float(x) for x in told.split("at ")[1].split(" nm")[0].split("-"))
+    assert 470 <= low <= 500 <= high <= 530
+    assert not any("misses structure" in warning for warning in pl.fit(data, scene).warnings)
+
+
+def test_a_misfit_says_so_too(film, measured):
+    """A band that is no film's at one place; a wrong index is seen over most of the spectrum."""
+    data = measured(film(), 430.0, sigma=True)
+    band = 0.04 * np.exp(-(((data.wavelength - 700) / 8) ** 2))
+    fit = pl.fit(dataclasses.replace(data, values=data.values + band), film())
+    assert fit.status == "misfit"
+    assert "far more than noise would, most of all at 6" in fit.verdict
+    wrong = pl.fit(data, film(material=1.6))
+    assert "far more than noise would. Its thickness" in wrong.verdict
+    assert any("structure over most of the spectrum (by 0.0" in warning for warning in wrong.warnings)

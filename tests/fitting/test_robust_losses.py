@@ -1,0 +1,88 @@
+"""A few outliers move a plain fit and not a robust one; errors stay honest."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+import pellicle as pl
+from pellicle.errors import UsageError
+from pellicle.fitting.robust_losses import LOSSES, inflation, spread
+
+INDEX = pl.Constant(pl.Free(None, 1.3, 1.7))
+TRUTH = (1.46, 430.0)
+
+
+def spoiled(data, seed):
+    """13 of 128 points (10 %) too bright by 0.1 to 0.3."""
+    random = np.random.default_rng(seed)
+    values = data.values.copy()
+    values[random.choice(values.size, 13, replace=False)] += random.uniform(0.1, 0.3, 13)
+    return dataclasses.replace(data, values=values)
+
+
+@pytest.mark.parametrize("loss", ["huber", "student-t"])
+@pytest.mark.parametrize("sigma", [True, False])
+def test_outliers_move_the_plain_fit_and_not_the_robust_one(film, measured, loss, sigma):
+    scene = film(material=INDEX)
+    data = spoiled(measured(scene, *TRUTH, sigma=sigma), 1)
+    plain, robust = pl.fit(data, scene), pl.fit(data, scene, loss=loss)
+    assert abs(plain["thickness"].value - 430) > 10
+    assert robust.status == "converged"
+    assert robust["thickness"].stderr < 1
+    for name, truth in zip(("n", "thickness"), TRUTH, strict=True):
+        assert abs(robust[name].value - truth) < 3 * robust[name].stderr
+    assert any("count for less than half" in warning for warning in robust.warnings)
+
+
+@pytest.mark.parametrize("loss", ["huber", "student-t"])
+def test_without_outliers_hardly_anything_is_lost(film, measured, loss):
+    """95 % of the efficiency: errors larger by a few per cent, and answers that agree."""
+    scene = film(material=INDEX)
+    data = measured(scene, *TRUTH, sigma=True)
+    plain, robust = pl.fit(data, scene), pl.fit(data, scene, loss=loss)
+    for name in ("n", "thickness"):
+        assert 0.95 < robust[name].stderr / plain[name].stderr < 1.2
+        assert abs(robust[name].value - plain[name].value) < plain[name].stderr
+
+
+def test_huber_as_scipy_has_it(film, measured):
+    """The same minimum as SciPy's own Huber loss finds, of Airy's formula written out."""
+    scene = film(material=INDEX)
+    data = spoiled(measured(scene, *TRUTH, sigma=True), 2)
+
+    def residual(p):
+        n, d = p[0], 100 * p[1]
+        below = 3.9 + 0.02j
+        r1, r2 = (1 - n) / (1 + n), (n - below) / (n + below)
+        turn = r2 * np.exp(4j * np.pi * n * d / data.wavelength)
+        return (data.values - np.abs((r1 + turn) / (1 + r1 * turn)) ** 2) / data.sigma
+
+    theirs = least_squares(residual, [1.46, 4.3], loss="huber", f_scale=1.345, xtol=1e-12, ftol=1e-12).x
+    ours = pl.fit(data, scene, loss="huber")
+    assert ours["n"].value == pytest.approx(theirs[0], abs=0.05 * ours["n"].stderr)
+    assert ours["thickness"].value == pytest.approx(100 * theirs[1], abs=0.05 * ours["thickness"].stderr)
+
+
+@pytest.mark.parametrize("name", list(LOSSES))
+def test_weight_and_curvature_are_derivatives_of_the_loss(name):
+    loss, z, step = LOSSES[name], np.array([-7.0, -1.5, -0.3, 0.2, 1.1, 4.0]), 1e-5
+    slope = (loss.loss(z + step) - loss.loss(z - step)) / (2 * step)
+    np.testing.assert_allclose(loss.weight(z) * z, slope, rtol=1e-6)
+    bent = (loss.weight(z + step) * (z + step) - loss.weight(z - step) * (z - step)) / (2 * step)
+    np.testing.assert_allclose(loss.curvature(z), bent, atol=1e-6)
+
+
+def test_spread_and_inflation_of_normal_noise():
+    z = np.random.default_rng(3).normal(size=100_000)
+    assert spread(5 * z) == pytest.approx(5, rel=0.02)
+    # the mean of a normal sample by Huber's loss has a variance of 1/0.95 (Huber 1981, exhibit 4.1)
+    huber = LOSSES["huber"]
+    variance = inflation(huber, z) / np.mean(huber.weight(z))
+    assert variance == pytest.approx(1 / 0.95, rel=0.01)
+
+
+def test_an_unknown_loss_is_refused(film, measured):
+    with pytest.raises(UsageError, match=r"loss must be one of least-squares, huber, student-t, not 'L1'"):
+        pl.fit(measured(film(), 430.0), film(), loss="L1")

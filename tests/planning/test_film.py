@@ -1,0 +1,172 @@
+"""What a tolerance leaves out: within the bound it states, never with a gradient, and for less work."""
+
+from __future__ import annotations
+
+import importlib.util
+from dataclasses import replace
+from pathlib import Path
+
+import jax
+import numpy as np
+import pytest
+
+import pellicle as pl
+from pellicle.effects.removal import CAN_BE_LEFT_OUT, LeftOut
+from pellicle.planning.cost_model import work
+from pellicle.planning.differences import design, gradients, largest_difference, signals
+from pellicle.planning.film import alternatives, reference
+from pellicle.scene.free import free_leaves, insert
+from pellicle.simulation.film import build, sampled
+
+WAVELENGTH = np.linspace(450.0, 850.0, 7)
+FREE = pl.Free(lower=100.0, upper=400.0)
+
+
+def scene(layer=1.46, substrate=3.9 + 0.02j, thickness=FREE, instrument=None, **light):
+    layers = layer if isinstance(layer, list) else [pl.Layer(layer, thickness)]
+    light = {"wavelength": WAVELENGTH} | light
+    return pl.Scene(layers, substrate, light=pl.Light(**light), instrument=instrument or pl.Instrument())
+
+
+GOLD = pl.Layer(0.2 + 3.4j, 500.0, name="gold")
+OVER_GOLD = scene([pl.Layer(1.46, FREE), GOLD])
+FAINT = scene(
+    [pl.Layer(1.46 + 1e-7j, FREE, roughness=0.05)],
+    pl.Cauchy(1.5, 0.1),
+    angle=0.3,
+    instrument=pl.Instrument(bandwidth=0.2),
+)
+ABSORBING_PLATE = scene(substrate=pl.Substrate(1.5 + 1e-3j, "air"))
+THICK = scene(thickness=pl.Free(lower=3000, upper=3300), angle=3.0)
+MICROSCOPE = scene(instrument=pl.Instrument(numerical_aperture=0.01))
+LEFT_OUT = {
+    "faint": (FAINT, {"absorption", "oblique", "roughness", "coherence", "dispersion", "precision"}),
+    "absorbing plate": (ABSORBING_PLATE, {"back-face", "precision"}),
+    "thick": (THICK, {"polarisation", "precision"}),
+    "microscope": (MICROSCOPE, {"angle-spread", "precision"}),
+    "over gold": (OVER_GOLD, {"opaque", "precision"}),
+}
+TOLERANCE = 1e-3
+
+
+@pytest.fixture(scope="module")
+def plans():
+    return {name: pl.plan(thing, TOLERANCE) for name, (thing, _) in LEFT_OUT.items()}
+
+
+@pytest.mark.parametrize("name", LEFT_OUT)
+def test_what_changes_little_is_left_out(plans, name):
+    """With its error told, and less to compute."""
+    plan, (thing, effects) = plans[name], LEFT_OUT[name]
+    assert {left_out.effect for left_out in plan.left_out} == effects
+    for effect in effects:
+        assert 0 <= plan.row(effect).error_bound <= TOLERANCE
+        assert "left out" in plan.row(effect).why
+    assert 0 < plan.error_bound <= TOLERANCE
+    assert work(plan, thing).flops < work(reference(thing), thing).flops
+
+
+@pytest.mark.parametrize("name", LEFT_OUT)
+def test_the_bound_holds_and_no_gradient_is_lost(plans, name):
+    """At thicknesses that the plan did not look at."""
+    plan, (thing, _) = plans[name], LEFT_OUT[name]
+    ((_, thickness),) = free_leaves(thing)
+    points = np.random.default_rng(2).uniform(thickness.lower, thickness.upper, (160, 1))
+    with jax.enable_x64(True):
+        whole = sampled(thing)
+        one, other = (signals(p, whole, points) for p in (plan, reference(thing)))
+        slopes = gradients(plan, whole, points[:16])
+    assert largest_difference(one, other, "R") <= plan.error_bound
+    assert np.all(np.any(slopes != 0, axis=(0, 1)))
+
+
+TINY = pl.Free(0.0, lower=0, upper=1e-6)
+ALL_FREE = scene(
+    [pl.Layer(pl.Constant(1.46, TINY), FREE, roughness=TINY)],
+    pl.Substrate(pl.Cauchy(1.5, TINY), "air", plate_mm=FREE),
+    angle=TINY,
+    instrument=pl.Instrument(bandwidth=TINY),
+)
+
+
+@pytest.mark.parametrize("effect", [effect for effect in CAN_BE_LEFT_OUT if effect != "precision"])
+def test_an_effect_with_a_free_parameter_is_not_even_tried(effect):
+    """However little it changes: its gradient is what a fit needs."""
+    cone = pl.Instrument(bandwidth=TINY, angle_spread=TINY)
+    thing = replace(ALL_FREE, instrument=cone) if effect == "angle-spread" else ALL_FREE
+    assert alternatives(effect, thing) == []
+
+
+def test_an_opaque_layer_that_may_be_thin_stays_transparent(plans):
+    thin = scene([pl.Layer(1.46, 100.0), pl.Layer(0.2 + 3.4j, pl.Free(lower=400.0, upper=900.0))])
+    assert not pl.plan(thin, 1e-2).on("opaque")
+    row = plans["over gold"].row("opaque")
+    assert row.on
+    assert "gold lets nothing through" in row.why
+
+
+def test_no_tolerance_is_an_exact_plan():
+    assert pl.plan(OVER_GOLD).left_out == ()
+    assert pl.plan(OVER_GOLD).error_bound == 0.0
+
+
+def test_what_must_stay_stays():
+    assert pl.plan(OVER_GOLD, 1e-2, keep=["precision", "opaque"]).left_out == ()
+
+
+def test_single_precision_is_single_throughout():
+    """But for scalars, whose type bends."""
+    thing = scene(1.46 + 0.1j, instrument=pl.Instrument(bandwidth=3.0), angle=20.0)
+    plan = replace(reference(thing), left_out=(LeftOut("precision"),))
+    with jax.enable_x64(True):
+        whole = sampled(thing)
+        jaxpr = jax.make_jaxpr(lambda t: build(plan)(insert(whole, [t])))(200.0)
+    wide = [e for e in jaxpr.eqns for v in e.outvars if v.aval.dtype == np.float64 and v.aval.shape]
+    assert wide == []
+    assert jaxpr.out_avals[0].dtype == np.float32
+
+
+@pytest.mark.parametrize("tolerance", [-1e-3, np.nan, np.inf])
+def test_a_tolerance_that_is_none_is_refused(tolerance):
+    with pytest.raises(ValueError, match="the tolerance must be positive"):
+        pl.plan(OVER_GOLD, tolerance)
+
+
+def test_a_tolerance_needs_wavelengths():
+    with pytest.raises(ValueError, match="give the light its wavelengths"):
+        pl.plan(scene(wavelength=None), 1e-3)
+
+
+def test_ellipsometry_counts_in_degrees():
+    thing = scene(1.46 + 1e-4j, signal="psi-delta", angle=70.0)
+    plan = pl.plan(thing, 0.5)
+    assert {left_out.effect for left_out in plan.left_out} >= {"absorption", "precision"}
+    points = design(thing)
+    with jax.enable_x64(True):
+        whole = sampled(thing)
+        one, other = (signals(p, whole, points).reshape(-1, 3) for p in (plan, reference(thing)))
+    psi = [0.5 * np.rad2deg(np.arctan2(np.hypot(x[:, 1], x[:, 2]), x[:, 0])) for x in (one, other)]
+    assert np.max(np.abs(psi[0] - psi[1])) <= 0.5 * plan.error_bound
+
+
+@pytest.fixture(scope="module")
+def drawing():
+    path = Path(__file__).parents[2] / "benchmarks" / "tolerance.py"
+    spec = importlib.util.spec_from_file_location("tolerance", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("kind", ["fitted index"])
+def test_random_scenes_keep_their_bounds(drawing, kind):
+    """One of the thousand that `make tolerance` draws."""
+    rng = np.random.default_rng(11)
+    thing = drawing.KINDS[kind](rng, WAVELENGTH)
+    plan = pl.plan(thing, 1e-3)
+    points = drawing.fresh(rng, thing)
+    with jax.enable_x64(True):
+        assert drawing.measured(plan, thing, points) <= plan.error_bound <= 1e-3
+    assert points.shape == (drawing.FRESH, len(free_leaves(thing)))

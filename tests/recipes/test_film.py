@@ -1,0 +1,337 @@
+"""Recipes: every form that the contract allows, and one telling sentence for what it does not."""
+
+import numpy as np
+import pytest
+
+from pellicle.dispersion.empirical import Cauchy, Constant
+from pellicle.errors import DataError
+from pellicle.recipes.film import read_recipe
+from pellicle.scene.free import Free
+from pellicle.scene.instrument import Drift
+
+AT = np.array([500.0, 700.0])
+LAYER = '[[scene.layer]]\nmaterial = "SiO2"\nthickness = { lower = 10, upper = 3000 }\n'
+BASE = f'[scene]\nsubstrate = "Si"\n{LAYER}'
+
+
+@pytest.fixture
+def read(tmp_path):
+    def read(text: str):
+        path = tmp_path / "film.toml"
+        path.write_text(text)
+        return read_recipe(path)
+
+    return read
+
+
+@pytest.fixture
+def scene(read):
+    return lambda text: read(text).scene()
+
+
+@pytest.fixture
+def refused(read, tmp_path):
+    def refused(text: str, *said: str):
+        with pytest.raises(DataError) as caught:
+            read(text).scene()
+        message = str(caught.value)
+        assert message.startswith(f"{tmp_path / 'film.toml'}: ")
+        assert "\n" not in message
+        for words in said:
+            assert words in message, message
+
+    return refused
+
+
+def test_the_contracts_recipe(read):
+    """All of DESIGN's example that exists by now."""
+    recipe = read(
+        """
+        [data]
+        files = ["quartz.csv", "deep/../oxide.csv"]
+        signal = "R"
+        angle = 20.0
+        polarisation = "s"
+        noise = 0.005
+        range = [400, 900]
+        wavelengths = { start = 380, stop = 780, step = 2 }
+        joint = false
+        [scene]
+        ambient = "air"
+        substrate = { material = "SiO2", back = "air", plate_mm = 0.5 }
+        [[scene.layer]]
+        name = "oxide"
+        material = { model = "cauchy", A = { value = 1.45, lower = 1.3, upper = 1.7 }, B = 3000.0 }
+        thickness = { lower = 10, upper = 3000 }
+        [instrument]
+        scale = "slow"
+        offset = "free"
+        bandwidth = { lower = 0, upper = 20 }
+        thickness_spread = 1.5
+        """
+    )
+    data, scene = recipe.tables.data, recipe.scene()
+    assert (data.noise, data.range, data.joint) == (0.005, (400, 900), False)
+    assert (scene.light.signal, scene.light.angle, scene.light.polarisation) == ("R", 20, "s")
+    assert scene.substrate.plate_mm == 0.5
+    np.testing.assert_allclose(scene.substrate.back(AT), 1)
+    layer = scene.layers[0]
+    assert layer.name == "oxide"
+    assert isinstance(layer.material, Cauchy)
+    assert (layer.material.A.value, layer.material.A.lower, layer.material.A.upper) == (1.45, 1.3, 1.7)
+    assert (layer.material.B, layer.material.C) == (3000, 0)
+    assert (layer.thickness.value, layer.thickness.lower, layer.thickness.upper) == (1505, 10, 3000)
+    assert scene.instrument.scale == Drift(3)
+    assert scene.instrument.offset == Drift(0)
+    assert scene.instrument.bandwidth.upper == 20
+    assert scene.instrument.thickness_spread == 1.5
+
+
+def test_defaults(read):
+    recipe = read(BASE)
+    scene = recipe.scene()
+    assert recipe.files == []
+    assert (scene.instrument.scale, scene.instrument.offset) == (1, 0)
+    assert scene.instrument.bandwidth is None
+    assert scene.substrate.back is None
+    assert (scene.light.signal, scene.light.angle) == ("R", 0)
+    np.testing.assert_allclose(scene.ambient(AT), 1)
+
+
+def test_files_are_relative_to_the_recipe(read, tmp_path):
+    recipe = read('[data]\nfiles = ["a.csv", "../b.csv"]\n' + BASE)
+    assert recipe.files == [str(tmp_path / "a.csv"), str(tmp_path.parent / "b.csv")]
+
+
+def test_tables_are_relative_to_the_recipe(scene, tmp_path):
+    (tmp_path / "resin.csv").write_text("wavelength_nm,n,k\n400,1.6,0.1\n900,1.6,0.1\n")
+    found = scene(BASE.replace('"SiO2"', '"resin.csv"'))
+    np.testing.assert_allclose(found.layers[0].material(AT), 1.6 + 0.1j)
+
+
+@pytest.mark.parametrize(
+    ("material", "index"),
+    [("1.46", 1.46), ("2", 2.0), ('"2.9+0.1j"', 2.9 + 0.1j), ('{ model = "cauchy", A = 1.4 }', 1.4)],
+)
+def test_media(scene, material, index):
+    for text in (BASE.replace('"SiO2"', material), BASE.replace('"Si"', material)):
+        found = scene(text)
+        medium = found.layers[0].material if '"Si"' in text else found.substrate.material
+        np.testing.assert_allclose(medium(AT), index)
+
+
+def test_a_thickness_may_be_a_number_or_a_value(scene):
+    thickness = lambda text: scene(BASE.replace("{ lower = 10, upper = 3000 }", text)).layers[0].thickness  # noqa: E731
+    assert thickness("120") == 120
+    assert thickness("{ value = 120 }") == 120
+    free = thickness("{ value = 120, lower = 10, upper = 300, prior = { mean = 100, sd = 5 } }")
+    assert isinstance(free, Free)
+    assert (free.value, free.lower, free.upper) == (120, 10, 300)
+    assert (free.prior.mean, free.prior.sd) == (100, 5)
+
+
+def test_free_words_in_a_layer(scene):
+    layer = scene(BASE + 'free = ["n", "k=0:0.1"]\n').layers[0]
+    assert layer.material.n.lower < 0 < layer.material.n.upper
+    assert layer.material.k.upper == 0.1
+    assert isinstance(scene(BASE.replace('"SiO2"', "1.46") + 'free = ["n"]\n').layers[0].material, Constant)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[dat]\n" + BASE, ("'dat'", "'data'")),
+        ("[data]\nfilles = ['a.csv']\n" + BASE, ("'data.filles'", "'files'")),
+        (BASE.replace("substrate", "substrat"), ("'scene.substrat'", "'substrate'")),
+        (BASE.replace("thickness", "thicknes"), ("thicknes", "'thickness'")),
+        (BASE.replace("upper", "uper"), ("uper", "'upper'")),
+        (BASE + "[instrument]\nbandwith = 3\n", ("'instrument.bandwith'", "'bandwidth'")),
+        (BASE.replace('"Si"', '{ material = "Si", plate = 1 }'), ("plate", "'plate_mm'")),
+        ("[data]\nwavelengths = { start = 1, stop = 2, stepp = 1 }\n" + BASE, ("stepp", "'step'")),
+    ],
+)
+def test_an_unknown_key_names_the_nearest(refused, text, said):
+    refused(text, "unknown key", *said)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[data]\nsignal = 'X'\n" + BASE, ("data.signal", "'X'")),
+        ("[data]\nangle = 95\n" + BASE, ("data.angle", "90")),
+        ("[data]\nnoise = 0\n" + BASE, ("data.noise", "greater than 0")),
+        ("[data]\nnoise = 'low'\n" + BASE, ("data.noise", "'low'")),
+        ("[data]\nrange = [400]\n" + BASE, ("data.range",)),
+        ("[data]\njoint = 'maybe'\n" + BASE, ("data.joint",)),
+        (BASE.replace("{ lower = 10, upper = 3000 }", "'thick'"), ("thickness", "'thick'")),
+        (BASE.replace("lower = 10", "lower = -10"), ("thickness", "-10")),
+        (BASE.replace("lower = 10", "lower = 5000"), ("thickness", "reversed")),
+        (BASE.replace("lower = 10, ", ""), ("thickness", "lower and upper")),
+        (BASE.replace("lower = 10", "value = 5, lower = 10"), ("thickness", "start value 5")),
+        (BASE.replace('"SiO2"', '"SiO3"'), ("SiO3", "SiO2")),
+        (BASE.replace('"SiO2"', '{ model = "cauchi" }'), ("cauchi", "'cauchy'")),
+        (BASE.replace('"SiO2"', '{ model = "cauchy", D = 3 }'), ("'D'", "A, B, C")),
+        (BASE.replace('"SiO2"', '{ model = "cauchy", A = "high" }'), ("A must be", "'high'")),
+        (BASE.replace('"SiO2"', "-1.5"), ("-1.5",)),
+        (BASE.replace('"SiO2"', '"gone.csv"'), ("gone.csv",)),
+        (BASE + "[instrument]\nscale = 'loose'\n", ("instrument.scale", "'loose'")),
+        (BASE + "[instrument]\nbandwidth = -1\n", ("bandwidth", "-1")),
+        ('[scene]\nsubstrate = "Si"\nlayer = []\n', ("scene.layer",)),
+        ("[scene\n", ("is not TOML", "line 1")),
+    ],
+)
+def test_refused_in_one_sentence(refused, text, said):
+    refused(text, *said)
+
+
+def test_missing_keys(refused):
+    refused("", "scene is missing")
+    refused(LAYER, "scene.substrate is missing")
+    refused('[scene]\nsubstrate = "Si"\n', "scene.layer is missing")
+    refused(BASE.replace('material = "SiO2"\n', ""), "scene.layer.0: a layer has a material, or between")
+
+
+def test_files_that_are_no_recipe(tmp_path):
+    with pytest.raises(DataError, match="is a folder"):
+        read_recipe(tmp_path)
+    with pytest.raises(DataError, match="No such file"):
+        read_recipe(tmp_path / "gone.toml")
+    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(DataError, match=r"is no text, .* data go before --recipe"):
+        read_recipe(tmp_path / "binary.toml")
+
+
+def test_what_a_real_sample_adds(scene):
+    found = scene(
+        """
+        [scene]
+        substrate = { material = "Si", roughness = 1.5 }
+        [[scene.layer]]
+        between = "linear"
+        steps = 10
+        thickness = { lower = 0, upper = 20 }
+        [[scene.layer]]
+        name = "oxide"
+        material = "SiO2"
+        thickness = 300
+        thickness_spread = { lower = 0, upper = 9 }
+        roughness = 2
+        [[scene.layer]]
+        material = 1.52
+        plate_mm = 2
+        [instrument]
+        numerical_aperture = 0.3
+        """
+    )
+    top, oxide, plate = found.layers
+    assert (top.mix, top.steps, top.thickness.upper) == ("linear", 10, 20)
+    assert (oxide.name, oxide.thickness_spread.upper, oxide.roughness) == ("oxide", 9, 2)
+    assert plate.plate_mm == 2
+    assert found.substrate.roughness == 1.5
+    assert found.instrument.numerical_aperture == 0.3
+
+
+@pytest.mark.parametrize(
+    ("layer", "said"),
+    [
+        ("thickness = 5", 'a layer has a material, or between = "bruggeman"'),
+        ('material = 1.5\nbetween = "bruggeman"\nthickness = 5', "a layer has a material, or between"),
+        ("material = 1.5", "a thickness in nm, or plate_mm"),
+        ("material = 1.5\nthickness = 5\nplate_mm = 1", "a thickness in nm, or plate_mm"),
+        ("material = 1.5\nthickness = 5\nsteps = 3", "steps does not go with a coherent layer"),
+        ("material = 1.5\nplate_mm = 1\nroughness = 3", "roughness does not go with plate_mm"),
+        ('between = "brugeman"\nthickness = 5', "no mix 'brugeman'"),
+        ('between = "linear"\nthickness = 5\nsteps = 0', "1 to 100 steps"),
+    ],
+)
+def test_layers_that_make_no_sense(refused, layer, said):
+    refused(f'[scene]\nsubstrate = "Si"\n[[scene.layer]]\n{layer}\n', said)
+
+
+def test_a_file_has_its_own_words(tmp_path):
+    """What a file does not say is that of the recipe; `back = false` makes the plate a half space."""
+    path = tmp_path / "film.toml"
+    path.write_text(
+        "[data]\nangle = 10.0\nnoise = 0.01\n[[data.file]]\npath = 'r.csv'\n"
+        "[[data.file]]\npath = 'e.csv'\nsignal = 'psi-delta'\nangle = 70.0\nback = false\n"
+        "instrument = { bandwidth = 2.0, scale = 1.0 }\n"
+        "[scene]\nsubstrate = { material = 'SiO2', back = 'air', plate_mm = 2.0 }\n"
+        "[[scene.layer]]\nmaterial = 1.46\nthickness = 10\n[instrument]\nscale = 'free'\nbandwidth = 3.0\n"
+    )
+    found = read_recipe(path)
+    assert found.files == [str(tmp_path / name) for name in ("r.csv", "e.csv")]
+    first, second = found.each
+    assert (first.tables.data.angle, second.tables.data.angle) == (10.0, 70.0)
+    assert (first.tables.data.noise, second.tables.data.noise) == (0.01, 0.01)
+    assert (first.tables.instrument.scale, second.tables.instrument.scale) == ("free", 1.0)
+    assert (first.scene().instrument.bandwidth, second.scene().instrument.bandwidth) == (3.0, 2.0)
+    assert first.scene().substrate.back is not None
+    assert second.scene().substrate.back is None
+    assert second.scene().substrate.plate_mm == 2.0
+
+
+def test_how_files_are_read(tmp_path):
+    """The words of the flags, of all files or of one."""
+    path = tmp_path / "film.toml"
+    path.write_text(
+        "[data]\ncolumns = 'wavelength,R,_'\nwavelength_unit = 'µm'\n[[data.file]]\npath = 'a.csv'\n"
+        "[[data.file]]\npath = 'b.dat'\ncolumns = ['energy', 'T']\nsignal_unit = '%'\nspot = 2\n" + BASE
+    )
+    first, second = (found.tables.data for found in read_recipe(path).each)
+    assert (first.columns, second.columns) == ("wavelength,R,_", ["energy", "T"])
+    assert (first.wavelength_unit, second.wavelength_unit) == ("µm", "µm")
+    assert (first.signal_unit, second.signal_unit, first.spot, second.spot) == (None, "%", None, 2)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("wavelength_unit = 'mm'", "data.wavelength_unit: must be one of nm, um, A, eV, cm-1, not 'mm'"),
+        ("signal_unit = 'permille'", "data.signal_unit: must be one of fraction, percent, not 'permille'"),
+        ("spot = 0", "data.spot: "),
+        ("analyser = 90", "data.analyser: "),
+    ],
+)
+def test_what_is_no_way_to_read(refused, words, said):
+    refused(f"[data]\n{words}\n{BASE}", said)
+
+
+def test_bad_words_of_a_file(tmp_path):
+    path = tmp_path / "film.toml"
+    for words, said in (
+        ("files = ['b.csv']\n[[data.file]]\npath = 'a.csv'", "exclude each other"),
+        ("[[data.file]]\npath = 'a.csv'\nnoize = 1", "did you mean 'noise'"),
+        ("[[data.file]]\nsignal = 'R'", "data.file.0.path is missing"),
+        ("[[data.file]]\npath = 'a.csv'\ninstrument = { scal = 1 }", "scale"),
+    ):
+        path.write_text(
+            f"[data]\n{words}\n[scene]\nsubstrate = 'Si'\n[[scene.layer]]\nmaterial = 1.46\nthickness = 10\n"
+        )
+        with pytest.raises(DataError, match=said):
+            read_recipe(path)
+
+
+def test_calibration_errors_as_parameters(tmp_path):
+    """The angle of incidence and the wavelengths of an instrument that is off."""
+    path = tmp_path / "off.toml"
+    text = """[data]
+signal = "psi-delta"
+angle = {angle}
+[scene]
+substrate = "Si"
+[[scene.layer]]
+material = "SiO2"
+thickness = {{ lower = 10, upper = 300 }}
+[instrument]
+wavelength_shift = {{ lower = -2, upper = 2 }}
+"""
+    path.write_text(text.format(angle="{ lower = 69, upper = 71 }"))
+    scene = read_recipe(path).scene()
+    assert (scene.light.angle.lower, scene.light.angle.upper) == (69, 71)
+    assert scene.instrument.wavelength_shift.value == 0
+    path.write_text(text.format(angle="{ lower = 69, upper = 91 }"))
+    with pytest.raises(DataError, match="must lie in 0 to 90 degrees, got 91"):
+        read_recipe(path).scene()
+    path.write_text(text.format(angle="91"))
+    with pytest.raises(DataError, match="angle"):
+        read_recipe(path)

@@ -1,0 +1,179 @@
+"""Words of the command line and of recipes: what each stands for, and what is refused."""
+
+import numpy as np
+import pytest
+
+from pellicle.dispersion.empirical import Cauchy, Constant, Sellmeier, Shifted
+from pellicle.errors import UsageError
+from pellicle.recipes import media_words
+from pellicle.scene.free import Free
+
+AT = np.array([450.0, 633.0, 850.0])
+
+
+def free_part(free: Free):
+    return free.value, free.lower, free.upper
+
+
+def test_a_range_is_a_free_thickness_and_a_number_a_fixed_one():
+    assert free_part(media_words.thickness("10:3000")) == (1505, 10, 3000)
+    assert media_words.thickness("120.5") == 120.5
+    assert media_words.thickness("0") == 0
+    assert free_part(media_words.thickness("0:1e3"))[1:] == (0, 1000)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("800:10", "reversed"),
+        ("10:10", "reversed"),
+        ("-10:800", "negative"),
+        ("-5", "negative"),
+        ("a:b", "'a'"),
+        ("1:2:3", "LO:HI"),
+        ("nan", "finite"),
+        ("1:inf", "finite"),
+        (":", "number"),
+    ],
+)
+def test_thickness_refused(text, said):
+    with pytest.raises(UsageError, match=said):
+        media_words.thickness(text)
+
+
+def test_numbers_are_media():
+    assert media_words.medium("1.46") == Constant(1.46)
+    for text in ("2.9+0.1j", "2.9 + 0.1j", "2.9+0.1i"):
+        np.testing.assert_allclose(media_words.medium(text)(AT), 2.9 + 0.1j)
+
+
+@pytest.mark.parametrize("text", ["-1.5", "1.5-0.1j", "nan"])
+def test_impossible_indices(text):
+    with pytest.raises(UsageError, match="--layer"):
+        media_words.medium(text)
+
+
+def test_names_and_tables(tmp_path):
+    np.testing.assert_allclose(media_words.medium("SiO2")(np.array([633.0])), 1.457, atol=1e-3)
+    np.testing.assert_allclose(media_words.medium("air")(AT), 1.0)
+    table = tmp_path / "resin.csv"
+    table.write_text("wavelength_nm,n,k\n400,1.6,0.02\n600,1.5,0.0\n900,1.5,0.0\n")
+    np.testing.assert_allclose(
+        media_words.medium(str(table))(np.array([400.0, 500.0])), [1.6 + 0.02j, 1.55 + 0.01j]
+    )
+    with pytest.raises(UsageError, match="SiO2"):
+        media_words.medium("SiO3")
+
+
+def test_a_bare_model_frees_its_parameters_within_documented_bounds():
+    cauchy = media_words.medium("cauchy")
+    assert isinstance(cauchy, Cauchy)
+    assert free_part(cauchy.A)[1:] == (1.2, 3.0)
+    assert free_part(cauchy.B)[1:] == (0.0, 1e5)
+    assert cauchy.C == 0
+    sellmeier = media_words.medium("sellmeier")
+    assert isinstance(sellmeier, Sellmeier)
+    assert free_part(sellmeier.B[0])[1:] == (0.1, 6.0)
+
+
+def test_a_call_fixes_them():
+    n = 1.324188 + 3102.06 / AT**2
+    np.testing.assert_allclose(media_words.medium("cauchy(1.324188,3102.06)")(AT), n)
+    np.testing.assert_allclose(
+        media_words.medium("Cauchy( 1.4 , 3000 , 1e8 )")(AT), 1.4 + 3000 / AT**2 + 1e8 / AT**4
+    )
+    np.testing.assert_allclose(media_words.medium("cauchy(1.4)")(AT), 1.4)
+    um2 = AT**2
+    np.testing.assert_allclose(
+        media_words.medium("sellmeier(1.1,8000)")(AT) ** 2, 1 + 1.1 * um2 / (um2 - 8000)
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [("cauchy(1,2,3,4)", "1 to 3 numbers"), ("cauchy()", "got 0"), ("cauchy(a)", "'a'")],
+)
+def test_calls_refused(text, said):
+    with pytest.raises(UsageError, match=said):
+        media_words.medium(text)
+
+
+def test_models_by_name():
+    assert free_part(media_words.model("cauchy", {"B": Free(None, 0.0, 10.0)}).B) == (5, 0, 10)
+    assert media_words.model("cauchy", {}).A == 1.5  # not written: its documented default, fixed
+    with pytest.raises(UsageError, match="did you mean 'cauchy'"):
+        media_words.model("cauchi", {})
+    with pytest.raises(UsageError, match=r"has no parameter 'D'.*A, B, C"):
+        media_words.model("cauchy", {"D": 1.0})
+
+
+def test_freeing_a_number_replaces_it():
+    """n ± 0.5 but at least 1, k from 0 to 1, started where the number was."""
+    layer = media_words.medium("1.46", ["n", "k"])
+    assert isinstance(layer, Constant)
+    assert free_part(layer.n) == pytest.approx((1.46, 1.0, 1.96))
+    assert free_part(layer.k)[1:] == (0, 1)
+    assert free_part(media_words.medium("2.9+0.1j", ["n", "k"]).n) == pytest.approx((2.9, 2.4, 3.4))
+    assert media_words.medium("2.9+0.1j", ["k"]).k.value == 0.1
+    assert media_words.medium("2.9+0.1j", ["n"]).k == 0.1
+    assert free_part(media_words.medium("0.2+3j", ["n"]).n)[1:] == (1.0, 1.5)
+
+
+def test_own_bounds():
+    assert free_part(media_words.medium("1.46", ["n=1.3:1.7"]).n) == (1.46, 1.3, 1.7)
+    assert free_part(media_words.medium("1.2", ["n=1.3:1.7"]).n) == (1.3, 1.3, 1.7)
+    assert free_part(media_words.medium("1.46", ["k=0:0.01"]).k)[1:] == (0, 0.01)
+    cauchy = media_words.medium("cauchy(1.4,3000)", ["A=1.3:1.5"])
+    assert free_part(cauchy.A)[1:] == (1.3, 1.5)
+    assert cauchy.B == 3000
+    assert free_part(media_words.medium("cauchy(1.4)", ["C"]).C)[1:] == (-1e10, 1e10)
+
+
+def test_freeing_a_table_adds_a_constant():
+    """As far as the sum stays at least 1."""
+    layer = media_words.medium("SiO2", ["n", "k"])
+    assert isinstance(layer, Shifted)
+    value, lower, upper = free_part(layer.n)
+    assert (value, upper) == (0, 0.5)
+    assert lower == pytest.approx(1 - 1.44, abs=0.01)
+    assert free_part(layer.k)[1:] == (0, 1)
+    titania = media_words.medium("TiO2", ["n"])
+    assert free_part(titania.n) == (0, -0.5, 0.5)
+    gold = media_words.medium("Au", ["n"])  # below 1 as it is
+    assert -0.5 < gold.n.lower < 0
+    assert free_part(media_words.medium("SiO2", ["n=0.01:0.1"]).n) == (0.01, 0.01, 0.1)
+
+
+@pytest.mark.parametrize(
+    ("layer", "item", "said"),
+    [
+        ("1.46", "q", "n and k can be freed"),
+        ("SiO2", "A", "n and k can be freed"),
+        ("cauchy", "D", "A, B and C"),
+        ("1.46", "k=-1:1", "negative"),
+        ("1.46", "n=1.7:1.3", "reversed"),
+        ("1.46", "n=1.7", "LO:HI"),
+    ],
+)
+def test_freeing_refused(layer, item, said):
+    with pytest.raises(UsageError, match=said):
+        media_words.medium(layer, [item])
+
+
+def test_scale_and_offset():
+    assert media_words.drift("free", "--scale") == "free"
+    assert media_words.drift("slow", "--scale") == "slow"
+    assert media_words.drift("0.98", "--scale") == 0.98
+    with pytest.raises(UsageError, match="--scale must be a number, not 'loose'"):
+        media_words.drift("loose", "--scale")
+
+
+def test_free_or_a_number():
+    assert free_part(media_words.free_or_number("free", "--bandwidth", 0.0, 20.0, 2.0)) == (2, 0, 20)
+    assert free_part(media_words.free_or_number("1:3", "--bandwidth", 0.0, 20.0, 2.0)) == (2, 1, 3)
+    assert media_words.free_or_number("4", "--bandwidth", 0.0, 20.0, 2.0) == 4
+
+
+def test_nearest():
+    assert media_words.nearest("thicknes", ["thickness", "angle"]) == " (did you mean 'thickness'?)"
+    assert media_words.nearest("zzz", ["thickness", "angle"]) == ""

@@ -1,0 +1,339 @@
+"""Results as files: strict JSON, tables that can be read again, and nothing of the user's lost."""
+
+import json
+import math
+import os
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from pellicle.data.read_spectrum import read_spectrum
+from pellicle.data.spectrum import Spectrum
+from pellicle.effects.plan import Plan, Row
+from pellicle.errors import UsageError
+from pellicle.fitting.result import Curve, Estimate, Fit, Part, Profile, Rival, Status
+from pellicle.materials import lookup
+from pellicle.report.folders import (
+    failure,
+    fit_csv,
+    nk_csv,
+    one_line,
+    several,
+    to_json,
+    write_fit,
+    write_summary,
+)
+
+FILES = ["fit.csv", "nk.csv", "report.txt", "result.json"]
+KEYS = (
+    "schema data status verdict parameters rivals chi2_reduced rms effective_points correlation plan"
+    " warnings versions seconds"
+)
+
+
+@pytest.fixture
+def fit() -> Fit:
+    nm = np.linspace(400.0, 800.0, 41)
+    model = 0.3 + 0.1 * np.cos(nm / 30)
+    data = model + 0.002 * np.sin(nm)
+    return Fit(
+        parts=(
+            Part(
+                name="",
+                spectrum=Spectrum(nm, data, "R", path="/data/film.csv", sha256="ab" * 32),
+                curve=Curve(
+                    wavelength=nm,
+                    data=data,
+                    sigma=np.full(41, 0.002),
+                    model=model,
+                    n=np.linspace(1.4, 1.3, 41),
+                    k=np.linspace(0.02, 0.01, 41),
+                    n_stderr=np.linspace(0.0, 0.001, 41),
+                    k_stderr=np.where(nm < 600, np.inf, 0.001),
+                ),
+                plan=Plan((Row("absorption", True, "k is free", np.float64(0.0)),), "R", "unpolarised"),
+                rms=0.00141,
+                chi2_reduced=math.nan,
+                effective_points=12.0,
+            ),
+        ),
+        status=Status.CONVERGED,
+        verdict="The data decide: thickness 486.28 ± 0.12 nm.",
+        parameters={
+            "thickness": Estimate("thickness", 486.28, 0.12, "nm", 10.0, 3000.0, True),
+            "k": Estimate("k", 0.0, 0.001, "", 0.0, 1.0, True, True, None, 0.0016),
+            "instrument.scale": Estimate("instrument.scale", 4.5, math.inf, "", -math.inf, math.inf, True),
+            "B": Estimate("B", 3102.06, 0.0, "nm^2", 3102.06, 3102.06, False),
+        },
+        rivals=(Rival({"thickness": 242.87, "k": 0.1}, 8.5),),
+        chi2_reduced=math.nan,
+        rms=0.00141,
+        effective_points=12.0,
+        correlation_names=("thickness", "k"),
+        correlation=np.array([[1.0, np.nan], [np.nan, 1.0]]),
+        warnings=("a warning",),
+        profile=Profile(np.linspace(10.0, 3000.0, 30), np.linspace(5.0, 400.0, 30)),
+        seconds=0.42,
+    )
+
+
+def strictly(text: str):
+    """JSON without the constants that Python would let pass."""
+
+    def refuse(constant):
+        raise AssertionError(f"{constant} is no JSON")
+
+    return json.loads(text, parse_constant=refuse)
+
+
+def test_the_record_of_a_fit_has_the_keys_of_the_schema(fit):
+    record = strictly(one_line(to_json(fit)))
+    assert list(record) == [*KEYS.split(), "noise"]
+    assert record["schema"] == "pellicle.fit/1"
+    assert record["data"] == {"path": "/data/film.csv", "sha256": "ab" * 32, "signal": "R", "points": 41}
+    assert record["noise"] == {"sigma": 0.002, "source": "given"}
+    assert record["status"] == "converged"
+    assert record["verdict"] == fit.verdict
+    assert record["rivals"] == [{"parameters": {"thickness": 242.87, "k": 0.1}, "delta_chi2": 8.5}]
+    assert record["plan"] == [{"effect": "absorption", "on": True, "why": "k is free", "error_bound": 0.0}]
+    assert record["warnings"] == ["a warning"]
+    assert record["effective_points"] == 12.0
+    assert list(record["versions"]) == ["pellicle", "python", "jax", "optimistix", "numpy"]
+    assert record["versions"]["numpy"] == np.__version__
+
+
+def test_parameters_keep_limits_only_where_there_are_any(fit):
+    parameters = to_json(fit)["parameters"]
+    assert parameters["thickness"] == {
+        "value": 486.28,
+        "stderr": 0.12,
+        "unit": "nm",
+        "lower": 10.0,
+        "upper": 3000.0,
+        "free": True,
+    }
+    assert parameters["k"]["upper_limit"] == 0.0016
+    assert "lower_limit" not in parameters["k"]
+    assert parameters["B"]["free"] is False
+
+
+def test_what_is_infinite_or_undefined_is_null(fit):
+    record = strictly(one_line(to_json(fit)))
+    scale = record["parameters"]["instrument.scale"]
+    assert (scale["stderr"], scale["lower"], scale["upper"]) == (None, None, None)
+    assert record["chi2_reduced"] is None
+    assert record["correlation"] == {"names": ["thickness", "k"], "matrix": [[1.0, None], [None, 1.0]]}
+    with pytest.raises(ValueError, match="JSON"):
+        one_line({"stderr": math.inf})
+
+
+def test_one_line_is_one_line_of_ascii(fit):
+    line = one_line(to_json(replace(fit, verdict="± two\nlines")))
+    assert "\n" not in line
+    assert line.isascii()
+
+
+def test_a_file_that_cannot_be_read_has_the_same_keys_and_an_error(fit):
+    record = strictly(one_line(failure("bad.csv", ValueError("bad.csv: is empty"))))
+    assert set(record) == {*KEYS.split(), "error"}
+    assert record["status"] == Status.FAILED
+    assert record["error"] == "bad.csv: is empty"
+    assert record["data"] == {"path": "bad.csv", "sha256": None, "signal": None, "points": 0}
+    assert record["parameters"] == {}
+    assert failure("bad.csv", "no", "cd" * 32)["data"]["sha256"] == "cd" * 32
+
+
+def test_a_folder_holds_report_json_tables_and_figure(fit, tmp_path):
+    assert write_fit(tmp_path / "out", fit, True) == tmp_path / "out"
+    assert sorted(os.listdir(tmp_path / "out")) == sorted([*FILES, "figure.png"])
+    assert (tmp_path / "out" / "figure.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "out" / "report.txt").read_text().startswith("[[Verdict]]")
+    record = strictly((tmp_path / "out" / "result.json").read_text())
+    assert record["parameters"]["thickness"]["value"] == 486.28
+
+
+def test_a_second_fit_replaces_the_first_and_leaves_the_rest(fit, tmp_path):
+    write_fit(tmp_path, fit, True)
+    (tmp_path / "diary.txt").write_text("mine")
+    write_fit(tmp_path, replace(fit, rms=0.5), False)
+    assert sorted(os.listdir(tmp_path)) == sorted([*FILES, "diary.txt"])  # the old figure showed another fit
+    assert (tmp_path / "diary.txt").read_text() == "mine"
+    assert strictly((tmp_path / "result.json").read_text())["rms"] == 0.5
+
+
+@pytest.mark.parametrize("name", ["diary.txt", "figure.png", "fit.csv", "summary.csv"])
+def test_a_folder_of_the_users_stays_as_it_is(fit, tmp_path, name):
+    (tmp_path / name).write_text("mine")
+    for write in (
+        lambda: write_fit(tmp_path, fit, False),
+        lambda: write_summary(tmp_path / "summary.csv", [fit]),
+        lambda: several(tmp_path, ["a.csv", "b.csv"]),
+    ):
+        with pytest.raises(UsageError, match="did not write"):
+            write()
+    assert os.listdir(tmp_path) == [name]
+    assert (tmp_path / name).read_text() == "mine"
+
+
+def test_a_plain_fit_imports_no_matplotlib_and_a_record_no_jax():
+    heavy = "{'jax', 'matplotlib', 'pandas'}"
+    code = f"import sys, pellicle.report.folders; sys.exit(bool({heavy} & {{*sys.modules}}))"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_fit_csv_says_what_it_is_and_is_read_again(fit, tmp_path):
+    path = tmp_path / "fit.csv"
+    path.write_text(fit_csv(fit), encoding="utf-8")
+    comments = [line for line in path.read_text().splitlines() if line.startswith("#")]
+    assert any("/data/film.csv" in line and "ab" * 32 in line for line in comments)
+    assert any("pellicle 0." in line for line in comments)
+    frame = pd.read_csv(path, comment="#")
+    assert list(frame) == ["wavelength_nm", "data", "model", "residual", "sigma"]
+    np.testing.assert_allclose(frame["data"] - frame["model"], frame["residual"], atol=1e-9)
+    [told] = [line for line in comments if "--columns" in line]
+    again = read_spectrum(path, columns=told.split("--columns ")[1])
+    np.testing.assert_allclose(again.wavelength, fit.curve.wavelength, rtol=1e-9)
+    np.testing.assert_allclose(again.values, fit.curve.data, rtol=1e-9)
+    assert again.sigma is not None
+    np.testing.assert_allclose(again.sigma, fit.curve.sigma, rtol=1e-9)
+
+
+def test_uncalibrated_data_at_angles_are_read_again_as_such(fit, with_part, tmp_path):
+    path = tmp_path / "fit.csv"
+    curve = replace(fit.curve, data=50 * fit.curve.data)
+    angled = replace(fit.spectrum, values=curve.data, angle=np.full(41, 30.0), calibrated=False)
+    path.write_text(fit_csv(with_part(fit, spectrum=angled, curve=curve)), encoding="utf-8")
+    assert "wavelength,intensity,_,_,sigma,angle" in path.read_text()
+    again = read_spectrum(path, columns="wavelength,intensity,_,_,sigma,angle", signal="R")
+    assert not again.calibrated
+    assert again.angle is not None
+    np.testing.assert_array_equal(again.angle, 30.0)
+
+
+def test_nk_csv_is_a_material(fit, tmp_path):
+    path = tmp_path / "nk.csv"
+    path.write_text(nk_csv(fit), encoding="utf-8")
+    frame = pd.read_csv(path, comment="#")
+    assert list(frame) == ["wavelength_nm", "n", "k", "n_stderr", "k_stderr"]
+    assert frame["k_stderr"].isna().sum() == 20  # infinite below 600 nm
+    index = np.asarray(lookup(str(path))(fit.curve.wavelength))
+    np.testing.assert_allclose(index, fit.curve.n + 1j * fit.curve.k, rtol=1e-9)
+
+
+def test_nk_csv_of_several_angles_holds_each_wavelength_once(fit, with_part, tmp_path):
+    path = tmp_path / "nk.csv"
+    twice = {name: np.repeat(getattr(fit.curve, name), 2) for name in vars(fit.curve)}
+    path.write_text(nk_csv(with_part(fit, curve=Curve(**twice))), encoding="utf-8")
+    assert path.read_text() == nk_csv(fit)
+    lookup(str(path))
+
+
+@pytest.mark.parametrize("everywhere", [["n_stderr"], ["k_stderr"], ["n_stderr", "k_stderr"]])
+def test_nk_csv_is_a_material_whatever_errors_are_infinite(fit, with_part, tmp_path, everywhere):
+    path = tmp_path / "nk.csv"
+    unseen = replace(fit.curve, **{name: np.full(41, np.inf) for name in everywhere})
+    path.write_text(nk_csv(with_part(fit, curve=unseen)), encoding="utf-8")
+    index = np.asarray(lookup(str(path))(fit.curve.wavelength))
+    np.testing.assert_allclose(index, fit.curve.n + 1j * fit.curve.k, rtol=1e-9)
+
+
+def test_a_path_cannot_break_out_of_its_comment(fit, with_part, tmp_path):
+    odd = with_part(fit, spectrum=replace(fit.spectrum, path="a\n1,2\r3.csv"))
+    assert "# from a 1,2 3.csv, sha256" in fit_csv(odd)
+
+
+def test_the_summary_has_a_row_per_file_and_the_union_of_free_parameters(fit, tmp_path):
+    other = replace(
+        fit,
+        parameters={"thickness": fit["thickness"], "n": Estimate("n", 1.5, 0.01, "", 1.3, 1.7, True)},
+        chi2_reduced=1.5,
+    )
+    several(tmp_path, ["a.csv", "b.csv", "c.csv"])
+    write_summary(tmp_path / "summary.csv", [fit, failure("c, d.csv", "no such file"), other])
+    assert (tmp_path / "summary.csv").read_text().startswith("# ")
+    frame = pd.read_csv(tmp_path / "summary.csv", comment="#")
+    names = ("thickness", "k", "instrument.scale", "n")
+    columns = [column for name in names for column in (name, f"{name}_stderr")]
+    assert list(frame) == [
+        "path",
+        "status",
+        "verdict",
+        *columns,
+        "rms",
+        "chi2_reduced",
+        "sha256",
+        "error",
+    ]
+    assert list(frame["status"]) == ["converged", "failed", "converged"]
+    assert frame["path"][1] == "c, d.csv"
+    assert frame["error"][1] == "no such file"
+    np.testing.assert_array_equal(frame["n"], [np.nan, np.nan, 1.5])
+    np.testing.assert_array_equal(frame["thickness_stderr"], [0.12, np.nan, 0.12])
+    assert frame["instrument.scale_stderr"].isna().all()  # infinite
+    write_summary(tmp_path / "summary.csv", [fit])
+    assert len(pd.read_csv(tmp_path / "summary.csv", comment="#")) == 1
+
+
+def test_folders_of_several_files(tmp_path):
+    paths = ["x/a.csv", "y/A.txt", "a-2.csv", "b.csv", "summary.csv.csv", "z/a.csv"]
+    root = tmp_path / "out"
+    folders = several(root, paths)
+    assert [folder.name for folder in folders] == ["a", "A-2", "a-2-2", "b", "summary.csv-2", "a-3"]
+    assert all(folder.parent == root for folder in folders)
+    index = strictly((root / "result.json").read_text())
+    assert index["schema"] == "pellicle.fits/1"
+    assert index["files"][1] == {"path": "y/A.txt", "folder": "A-2"}
+    assert several(root, paths) == folders  # and again, in a folder that is ours
+
+
+def test_one_file_has_the_folder_to_itself(tmp_path):
+    assert several(tmp_path / "out", ["a.csv"]) == [tmp_path / "out"]
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.fixture
+def joint(fit) -> Fit:
+    """A joint fit: the spectrum, and Ψ and Δ at four points of it, without a common unit."""
+    [one] = fit.parts
+    few = {name: array[:4] for name, array in vars(one.curve).items() if array is not None}
+    curve = Curve(**few | {"delta_data": np.full(4, 359.0), "delta_model": np.full(4, 1.0)})
+    spectrum = Spectrum(few["wavelength"], few["data"], "psi-delta", path="b,c.csv", delta=np.full(4, 359.0))
+    other = replace(one, name="b,c", spectrum=spectrum, curve=curve, rms=0.1)
+    return replace(fit, parts=(replace(one, name="film"), other), rms=None)
+
+
+def test_json_of_a_joint_fit_lists_its_data(joint):
+    record = strictly(one_line(to_json(joint)))
+    assert [(d["name"], d["path"], d["signal"], d["points"], d["rms"]) for d in record["data"]] == [
+        ("film", "/data/film.csv", "R", 41, 0.00141),
+        ("b,c", "b,c.csv", "psi-delta", 4, 0.1),
+    ]
+    assert record["rms"] is None
+    assert [row["name"] for row in record["plan"]] == ["film", "b,c"]
+    alone = to_json(replace(joint, parts=joint.parts[:1]))
+    assert [d["name"] for d in alone["data"]] == ["film"]
+
+
+def test_tables_of_a_joint_fit(joint, fit, tmp_path):
+    write_fit(tmp_path / "out", joint, True)
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == sorted([*FILES, "figure.png"])
+    frame = pd.read_csv(tmp_path / "out" / "fit.csv", comment="#")
+    assert frame.groupby(["file", "signal"]).size().to_dict() == {
+        ("film", "R"): 41,
+        ("b,c", "psi"): 4,
+        ("b,c", "delta"): 4,
+    }
+    np.testing.assert_allclose(frame["data"][:41], fit.curve.data, rtol=1e-9)
+    assert set(frame["residual"][frame["signal"] == "delta"]) == {-2.0}
+    without = [line for line in nk_csv(joint).splitlines() if not line.startswith("#")]
+    assert without == [line for line in nk_csv(fit).splitlines() if not line.startswith("#")]
+
+
+def test_a_joint_fit_that_failed_lists_its_files():
+    record = failure(["a.csv", "b.csv"], "no such file")
+    assert [d["path"] for d in record["data"]] == ["a.csv", "b.csv"]
+    assert record["status"] == "failed"
