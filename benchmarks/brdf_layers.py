@@ -23,7 +23,7 @@ MOST = 1000
 
 
 def between(lower: float, upper: float) -> pl.Free:
-    return pl.Free(lower=lower, upper=upper)
+    return pl.Free(lower, upper)
 
 
 SHARED = {"specular": between(0, 100), "diffuse": between(0, 2)}

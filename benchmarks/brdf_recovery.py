@@ -50,7 +50,7 @@ class Run(NamedTuple):
 
 
 def between(lower: float, upper: float) -> Free:
-    return Free(lower=lower, upper=upper)
+    return Free(lower, upper)
 
 
 KINDS = ("", "-reciprocal", "-full")

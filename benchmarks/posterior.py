@@ -113,7 +113,7 @@ class Ours:
     """`pellicle.sample` without its fit, from the same best fit."""
 
     def __init__(self, p: Problem):
-        bounds = [pl.Free(None, a, b) if b > a else float(a) for a, b in zip(p.lower, p.upper, strict=True)]
+        bounds = [pl.Free(a, b) if b > a else float(a) for a, b in zip(p.lower, p.upper, strict=True)]
         thickness, n, k = bounds
         scene = pl.Scene(pl.Layer(pl.Constant(n, k), thickness), pl.Constant(SILICON.real, SILICON.imag))
         data = pl.Spectrum(p.wavelength, p.values, "R", sigma=np.full(p.wavelength.size, p.noise))

@@ -35,7 +35,7 @@ def weak(rng: np.random.Generator) -> float:
 
 def between(rng: np.random.Generator, low: float, high: float) -> Free:
     lower, upper = sorted(rng.uniform(low, high, 2))
-    return Free(lower=lower, upper=upper + 1e-3 * (high - low))
+    return Free(lower, upper + 1e-3 * (high - low))
 
 
 def facets(rng: np.random.Generator) -> Surface:

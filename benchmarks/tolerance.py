@@ -45,7 +45,7 @@ def draw(rng: np.random.Generator) -> Drawn:
 
 def free(rng: np.random.Generator, low: float, high: float) -> pl.Free:
     lower, upper = sorted(rng.uniform(low, high, 2))
-    return pl.Free(lower=lower, upper=upper + 1e-3 * (high - low))
+    return pl.Free(lower, upper + 1e-3 * (high - low))
 
 
 def weak(rng: np.random.Generator) -> float:

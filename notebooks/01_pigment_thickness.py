@@ -122,7 +122,7 @@ for word in mean:
 
 # %%
 spectrum = pl.read_spectrum("../measurements/hematite_on_glass_140nm.csv")
-scene = pl.Scene(pl.Layer(hematite, thickness=pl.Free(lower=1, upper=1000)), substrate=glass)
+scene = pl.Scene(pl.Layer(hematite, thickness=pl.Free(1, 1000)), substrate=glass)
 fit = pl.fit(spectrum, scene)
 print(fit)
 
@@ -162,8 +162,8 @@ print("other minima:", ", ".join(f"{r.parameters['thickness']:.0f} nm" for r in 
 # n and k may be off by a constant (`pl.Shifted`), the same spectrum says less:
 
 # %%
-shifted = pl.Shifted(hematite, pl.Free(0.0, -0.5, 0.5), pl.Free(0.0, 0.0, 1.0))
-freer = pl.fit(spectrum, pl.Scene(pl.Layer(shifted, pl.Free(lower=1, upper=1000)), glass))
+shifted = pl.Shifted(hematite, pl.Free(-0.5, 0.5, start=0.0), pl.Free(0.0, 1.0, start=0.0))
+freer = pl.fit(spectrum, pl.Scene(pl.Layer(shifted, pl.Free(1, 1000)), glass))
 print(freer)
 print(f"error of the thickness: {freer['thickness'].stderr / fit['thickness'].stderr:.1f} times as large")
 
@@ -179,7 +179,7 @@ for name, material in (
     ("gold_on_glass_300nm", "Au"),
 ):
     measured = pl.read_spectrum(f"../measurements/{name}.csv")
-    found = pl.fit(measured, pl.Scene(pl.Layer(material, pl.Free(lower=1, upper=2000)), glass))
+    found = pl.fit(measured, pl.Scene(pl.Layer(material, pl.Free(1, 2000)), glass))
     print(f"{name}: {found.status}. {found.verdict}")
 
 # %% [markdown]

@@ -77,7 +77,7 @@ plt.show()
 # is the misfit plus a price for each free number.
 
 # %%
-thickness = pl.Free(lower=10, upper=1000)
+thickness = pl.Free(10, 1000)
 media = {
     "SOPRA TIO2": "TiO2/TIO2",
     "SOPRA TIO2B": "TiO2/TIO2B",

@@ -126,14 +126,14 @@ print(samples)
 unknown = pl.Surface(
     "granier-heidrich",
     {
-        "thickness": pl.Free(lower=0, upper=1000),
-        "n": pl.Free(lower=1.05, upper=2.5),  # one for each channel
-        "exponent_reflection": pl.Free(lower=1, upper=1000),
-        "exponent_transmission": pl.Free(lower=1, upper=1000),
-        "deviation": pl.Free(lower=0, upper=20),
-        "azimuth": pl.Free(lower=-180, upper=180),
-        "specular": pl.Free(lower=0, upper=100),
-        "diffuse": pl.Free(lower=0, upper=2),
+        "thickness": pl.Free(0, 1000),
+        "n": pl.Free(1.05, 2.5),  # one for each channel
+        "exponent_reflection": pl.Free(1, 1000),
+        "exponent_transmission": pl.Free(1, 1000),
+        "deviation": pl.Free(0, 20),
+        "azimuth": pl.Free(-180, 180),
+        "specular": pl.Free(0, 100),
+        "diffuse": pl.Free(0, 2),
     },
 )
 fit = pl.fit_brdf(samples, unknown)

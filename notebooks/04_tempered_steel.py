@@ -223,11 +223,11 @@ noise = sigma * np.random.default_rng(3).standard_normal(sigma.shape)
 samples = replace(exact, values=exact.values + noise, sigma=sigma)
 
 unknown = {
-    "thickness": pl.Free(lower=0, upper=300),
-    "n": pl.Free(lower=1.5, upper=3.0),
-    "roughness": pl.Free(lower=0.003, upper=1),
-    "specular": pl.Free(lower=0, upper=100),
-    "diffuse": pl.Free(lower=0, upper=2),
+    "thickness": pl.Free(0, 300),
+    "n": pl.Free(1.5, 3.0),
+    "roughness": pl.Free(0.003, 1),
+    "specular": pl.Free(0, 100),
+    "diffuse": pl.Free(0, 2),
 }
 fit = pl.fit_brdf(samples, pl.Surface("microfacet-film", truth | unknown))
 print(fit)
@@ -240,7 +240,7 @@ print("other minima:", ", ".join(f"{r.parameters['thickness']:.0f} nm" for r in 
 # What a renderer makes of such a surface, where the oxide is uneven between 10 and 70 nm:
 
 # %%
-uneven = pl.Surface("microfacet-film", truth | {"thickness": pl.Free(lower=10, upper=70)})
+uneven = pl.Surface("microfacet-film", truth | {"thickness": pl.Free(10, 70)})
 image = render(uneven, size=100 if SHORT else 300)
 figure, axes = plt.subplots(figsize=(3.6, 3.6))
 axes.imshow(shown(image / np.nanpercentile(image, 99.5)), origin="upper")

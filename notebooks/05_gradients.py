@@ -358,7 +358,9 @@ assert limits["Ψ and Δ at 70°"][0] < 0.2 * limits["R at 0°"][0]
 
 # %%
 # each Free holds a value, which is simulated, and bounds; a fit scans all between these
-film = pl.Layer(pl.Constant(pl.Free(1.8, 1.5, 2.2), pl.Free(0.02, 0.0, 0.2)), pl.Free(80.0, 20, 200))
+film = pl.Layer(
+    pl.Constant(pl.Free(1.5, 2.2, start=1.8), pl.Free(0.0, 0.2, start=0.02)), pl.Free(20, 200, start=80.0)
+)
 scene = pl.Scene(film, "Si")
 NAMES = ("thickness", "n", "k")
 fits = [pl.fit(pl.simulate(scene, nm, noise=R_NOISE, seed=seed), scene) for seed in range(8 if SHORT else 60)]

@@ -98,7 +98,7 @@ def measured(thickness):
     return pl.simulate(pl.Scene(pl.Layer(1.46, thickness), "Si"), nm, noise=NOISE, seed=1)
 
 
-both_free = pl.Scene(pl.Layer(pl.Free(None, 1.3, 1.7), pl.Free(None, 0, 200)), "Si")
+both_free = pl.Scene(pl.Layer(pl.Free(1.3, 1.7), pl.Free(0, 200)), "Si")
 for thickness in (15.0, 120.0):
     fit = pl.fit(measured(thickness), both_free)
     print(f"{thickness:.0f} nm, both free: {fit}")
@@ -110,7 +110,7 @@ for thickness in (15.0, 120.0):
 # the thickness:
 
 # %%
-fixed = pl.Scene(pl.Layer(1.46, pl.Free(None, 0, 200)), "Si")
+fixed = pl.Scene(pl.Layer(1.46, pl.Free(0, 200)), "Si")
 fit = pl.fit(measured(15.0), fixed)
 print(f"n fixed: {fit}")
 assert fit.status == "converged"
@@ -169,7 +169,7 @@ assert places[0] > places[-1] == 1
 
 # %%
 five = pl.read_spectrum("../docs/examples/five_bands.csv")
-scene = pl.Scene(pl.Layer(1.46, pl.Free(None, 50, 1500)), "Si")
+scene = pl.Scene(pl.Layer(1.46, pl.Free(50, 1500)), "Si")
 ambiguous = pl.fit(five, scene)
 print(ambiguous)
 for rival in sorted(ambiguous.rivals, key=lambda rival: rival.delta_chi2)[:3]:
@@ -188,7 +188,7 @@ assert ambiguous.status == "ambiguous"
 
 # %%
 gold = pl.read_spectrum("../measurements/gold_on_glass_300nm.csv")
-opaque = pl.fit(gold, pl.Scene(pl.Layer("Au", pl.Free(None, 10, 1000)), "BK7"))
+opaque = pl.fit(gold, pl.Scene(pl.Layer("Au", pl.Free(10, 1000)), "BK7"))
 print(opaque)
 limit = opaque["thickness"].lower_limit
 assert opaque.status == "not-identifiable"
@@ -304,7 +304,7 @@ plt.show()
 # 50 nm. Written beside the bounds, that knowledge changes the answer:
 
 # %%
-believed = pl.Scene(pl.Layer(1.46, pl.Free(None, 50, 1500, prior=pl.Normal(430, 100))), "Si")
+believed = pl.Scene(pl.Layer(1.46, pl.Free(50, 1500, prior=pl.Normal(430, 100))), "Si")
 informed = pl.sample(five, believed)
 prior = np.exp(-0.5 * ((grid - 430) / 100) ** 2)
 exact = float((weight * prior)[abs(grid - 438) < 80].sum() / (weight * prior).sum())

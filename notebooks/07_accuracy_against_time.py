@@ -48,15 +48,13 @@ film = np.arange(510, 910 + step / 2, step)
 visible = np.arange(420, 780 + step / 2, step)
 scenes = {
     "soap film": pl.Scene(
-        pl.Layer(pl.Cauchy(1.332, 3100.0), pl.Free(None, 100, 3000)),
+        pl.Layer(pl.Cauchy(1.332, 3100.0), pl.Free(100, 3000)),
         "air",
         light=pl.Light(film),
         instrument=pl.Instrument(bandwidth=2.0),
     ),
-    "hematite on glass": pl.Scene(pl.Layer("Fe2O3", pl.Free(None, 1, 1000)), "BK7", light=pl.Light(visible)),
-    "CuO on aluminium": pl.Scene(
-        pl.Layer("CuO", pl.Free(None, 1, 300)), "Al", light=pl.Light(visible, angle=60.0)
-    ),
+    "hematite on glass": pl.Scene(pl.Layer("Fe2O3", pl.Free(1, 1000)), "BK7", light=pl.Light(visible)),
+    "CuO on aluminium": pl.Scene(pl.Layer("CuO", pl.Free(1, 300)), "Al", light=pl.Light(visible, angle=60.0)),
 }
 
 # %% [markdown]

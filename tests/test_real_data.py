@@ -12,7 +12,7 @@ import pellicle as pl
 from pellicle.cli import main
 from pellicle.data.read_counts import read_counts, reflectance_from_counts
 
-CAUCHY = pl.Cauchy(pl.Free(None, 1.2, 3.0), pl.Free(None, 0.0, 1e5))
+CAUCHY = pl.Cauchy(pl.Free(1.2, 3.0), pl.Free(0.0, 1e5))
 
 
 @pytest.fixture
@@ -54,7 +54,7 @@ def test_fluorinated_oxide_with_its_index_free(fitted):
 def plate(shared_data, name: str, back):
     """An oxide on fused silica in transmittance, above where its own absorption begins."""
     spectrum = pl.read_spectrum(shared_data / "thinfilmstools_oxides" / name, range=(300, 1000))
-    scene = pl.Scene(pl.Layer(CAUCHY, pl.Free(None, 10, 1000)), pl.Substrate("SiO2", back))
+    scene = pl.Scene(pl.Layer(CAUCHY, pl.Free(10, 1000)), pl.Substrate("SiO2", back))
     return pl.fit(spectrum, scene)
 
 

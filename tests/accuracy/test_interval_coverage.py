@@ -22,7 +22,7 @@ def quiet(what, done, total):
 
 @pytest.fixture(scope="module")
 def several():
-    scene = pl.Scene(pl.Layer(2.2, pl.Free(75.0, 50.0, 100.0)), substrate=1.5)
+    scene = pl.Scene(pl.Layer(2.2, pl.Free(50.0, 100.0, start=75.0)), substrate=1.5)
     return trials(case(scene, NM), scene, 0.002, 4)
 
 

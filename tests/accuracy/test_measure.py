@@ -7,7 +7,7 @@ import pytest
 
 import pellicle as pl
 from pellicle.accuracy.cost import cost
-from pellicle.accuracy.measure import Standing, climb, mark_pareto
+from pellicle.accuracy.measure import MethodResult, climb, mark_pareto
 from pellicle.accuracy.methods import FORWARD, Rung
 from pellicle.errors import UsageError
 
@@ -23,11 +23,11 @@ def quiet(what, done, total):
 
 @pytest.fixture(scope="module")
 def film():
-    return few(pl.Scene(pl.Layer(2.2, pl.Free(100.0, 50.0, 400.0)), substrate=3.9))
+    return few(pl.Scene(pl.Layer(2.2, pl.Free(50.0, 400.0, start=100.0)), substrate=3.9))
 
 
 def standing(error, seconds):
-    return Standing("", "", error, seconds, 0.0, None)
+    return MethodResult("", "", error, seconds, 0.0, None)
 
 
 def test_the_front_is_what_nobody_beats():
@@ -80,7 +80,7 @@ def test_an_interruption_keeps_what_was_measured(film):
 
 
 def test_what_cannot_be_asked(film):
-    nothing = pl.Scene(pl.Layer(1.0, pl.Free(100.0, 50.0, 400.0)), substrate=1.0)
+    nothing = pl.Scene(pl.Layer(1.0, pl.Free(50.0, 400.0, start=100.0)), substrate=1.0)
     with pytest.raises(UsageError, match="nothing to compute: R is 0"):
         cost(nothing, NM)
     for tolerance in (0.0, -1e-3, np.nan, np.inf):

@@ -85,7 +85,7 @@ def test_orders_converge_as_a_geometric_series(oblique):
 
 def test_incoherent_is_the_mean_over_the_phase(oblique):
     """Over one period of a film that does not absorb, as thicknesses."""
-    scene = pl.Scene(pl.Layer(2.2, pl.Free(100.0, 50.0, 400.0)), substrate=1.5)
+    scene = pl.Scene(pl.Layer(2.2, pl.Free(50.0, 400.0, start=100.0)), substrate=1.5)
     case = few(scene)
     periods = np.arange(16)[:, None] / 16 * NM / (2 * 2.2)
     mean = np.asarray(pl.reflectance(NM, 100.0 + periods, 2.2, 1.5)).mean(axis=0)

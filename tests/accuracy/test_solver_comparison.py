@@ -20,7 +20,7 @@ def quiet(what, done, total):
 
 
 def datasets(lower, upper, count):
-    scene = pl.Scene(pl.Layer(2.2, pl.Free(0.5 * (lower + upper), lower, upper)), substrate=1.5)
+    scene = pl.Scene(pl.Layer(2.2, pl.Free(lower, upper, start=0.5 * (lower + upper))), substrate=1.5)
     return trials(case(scene, NM), scene, NOISE, count)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pellicle.accuracy import colour_methods
-from pellicle.accuracy.measure import Ladder, Standing
+from pellicle.accuracy.measure import Ladder, MethodResult
 from pellicle.accuracy.surface import COLOURS, VALUES, SurfaceCost, coloured, drawn
 from pellicle.colour import delta_e2000, lab, sensor
 from pellicle.report.cost import surface_text
@@ -18,10 +18,8 @@ from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface, lit
 from pellicle.synthetic.brdf import default_directions
 
-STEEL = lit(
-    Surface("microfacet-film", {"thickness": Free(lower=10, upper=70), "n": 2.9}), default_directions(), 40
-)
-PAINT = lit(Surface("granier-heidrich", {"thickness": Free(lower=10, upper=70)}), default_directions(), 40)
+STEEL = lit(Surface("microfacet-film", {"thickness": Free(10, 70), "n": 2.9}), default_directions(), 40)
+PAINT = lit(Surface("granier-heidrich", {"thickness": Free(10, 70)}), default_directions(), 40)
 RUNGS = {rung.name: rung for rung in COLOURS}
 
 
@@ -71,7 +69,7 @@ def test_what_makes_no_sense_says_why(films):
     assert "too few angles" in RUNGS["uniform-64 at 32 angles"].program(films)
     assert "made for three wavelengths" in coloured(PAINT, drawn(PAINT))
     each = lit(Surface("blinn-phong-film", {}), default_directions(), 8)
-    free = dataclasses.replace(each, numbers={**each.numbers, "n": [Free(lower=1.4, upper=1.5)] * 3})
+    free = dataclasses.replace(each, numbers={**each.numbers, "n": [Free(1.4, 1.5)] * 3})
     assert "nothing says what it is between" in coloured(free, drawn(free))
 
 
@@ -101,10 +99,10 @@ def test_record_and_report_say_the_same():
         40,
         64,
         "colour",
-        [Standing("nodes-6-500", "x", 0.2, 1e-7, 1.0, 900.0)],
+        [MethodResult("nodes-6-500", "x", 0.2, 1e-7, 1.0, 900.0)],
     )
     values = Ladder(
-        "float64", 1e-3, "relative", 40, 64, "sample", [Standing("float64", "y", 0.0, 9e-8, 1.0, None)]
+        "float64", 1e-3, "relative", 40, 64, "sample", [MethodResult("float64", "y", 0.0, 9e-8, 1.0, None)]
     )
     record = surface_to_json(SurfaceCost(seen, values), "steel.toml")
     assert (record["schema"], record["unit"], record["recommended"]) == (

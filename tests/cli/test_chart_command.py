@@ -9,7 +9,7 @@ from pellicle.errors import UsageError
 from pellicle.synthetic.colours import interference_colours
 
 NM, DEGREES = np.linspace(0.0, 600.0, 7), np.array([0.0, 30.0, 60.0])
-FREE = pl.Free(lower=0, upper=600)
+FREE = pl.Free(0, 600)
 
 
 @pytest.fixture(scope="module")

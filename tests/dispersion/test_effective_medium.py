@@ -133,7 +133,7 @@ def test_materials_keep_their_names_and_ranges():
 
 
 @EVERY_RULE
-@pytest.mark.parametrize("fraction", [-0.1, 1.1, pl.Free(lower=-0.5, upper=0.5), pl.Free(lower=0, upper=2)])
+@pytest.mark.parametrize("fraction", [-0.1, 1.1, pl.Free(-0.5, 0.5), pl.Free(0, 2)])
 def test_fractions_outside_0_to_1(rule, fraction):
     with pytest.raises(ValueError, match="fraction must lie in 0 to 1, got"):
         rule(Constant(1.46), Constant(1.0), fraction)
@@ -155,7 +155,7 @@ def test_a_fit_finds_the_porosity(tmp_path):
     fit = _fit(
         tmp_path,
         pl.Layer(porous(0.35), 230.0),
-        pl.Layer(porous(pl.Free(lower=0, upper=0.9)), pl.Free(lower=50, upper=500)),
+        pl.Layer(porous(pl.Free(0, 0.9)), pl.Free(50, 500)),
     )
     found = fit.parameters
     assert fit.status.value == "converged"
@@ -170,7 +170,7 @@ def test_a_fit_finds_a_tauc_lorentz_layer(tmp_path):
     fit = _fit(
         tmp_path,
         pl.Layer(media_words.medium("tauc-lorentz(120,4.1,2.3,2.2,1.5)"), 120.0),
-        pl.Layer(media_words.medium("tauc-lorentz"), pl.Free(lower=50, upper=300)),
+        pl.Layer(media_words.medium("tauc-lorentz"), pl.Free(50, 300)),
     )
     assert fit.status.value == "converged"
     for name, value in truth.items():

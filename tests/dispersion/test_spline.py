@@ -128,8 +128,8 @@ def test_a_fit_scans_a_spline_as_a_whole(tmp_path):
     measured = synthesise(pl.Scene(pl.Layer(truth, 120.0), "Si"), wavelength, 0.001, 1)
     path = tmp_path / "data.csv"
     np.savetxt(path, np.c_[wavelength, measured.values], delimiter=",", header="wavelength_nm,R", comments="")
-    free = tuple(pl.Free(1.5, 1.2, 4.0) for _ in truth.n)
-    layer = pl.Layer(Spline(truth.knots, free), pl.Free(lower=110, upper=130))
+    free = tuple(pl.Free(1.2, 4.0, start=1.5) for _ in truth.n)
+    layer = pl.Layer(Spline(truth.knots, free), pl.Free(110, 130))
     assert {p.together for p in parameters(pl.Scene(layer, "Si"))} == {"n", "thickness"}
     fit = pl.fit(pl.read_spectrum(path, noise=0.001), pl.Scene(layer, "Si"))
     for i, n in enumerate(truth.n):

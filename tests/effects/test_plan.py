@@ -15,8 +15,8 @@ from pellicle.scene.free import free_leaves, insert
 from pellicle.simulation.film import build
 
 WAVELENGTH = np.linspace(450.0, 850.0, 9)
-FREE_K = pl.Free(0.0, lower=0, upper=1)
-FREE_ANGLE = pl.Free(0.0, lower=0, upper=60)
+FREE_K = pl.Free(0, 1, start=0.0)
+FREE_ANGLE = pl.Free(0, 60, start=0.0)
 
 
 def scene(layer=1.46, substrate=3.9 + 0.02j, thickness=300.0, ambient=1.0, instrument=None, **light):
@@ -29,7 +29,7 @@ BANDWIDTH = pl.Instrument(bandwidth=5.0)
 TABLE = [
     ("absorption", False, "no layer has any extinction", scene()),
     ("absorption", False, "no layer has any extinction", scene(pl.Constant(1.46, 0.0))),
-    ("absorption", False, "no layer has any extinction", scene(pl.Cauchy(pl.Free(lower=1.4, upper=1.6)))),
+    ("absorption", False, "no layer has any extinction", scene(pl.Cauchy(pl.Free(1.4, 1.6)))),
     ("absorption", True, "extinction is free, or not zero", scene(1.46 + 0.1j)),
     ("stack", False, "one layer", scene()),
     ("stack", True, "2 coherent layers", pl.Scene([pl.Layer(1.46, 10.0), pl.Layer(2.0, 20.0)], 1.5)),
@@ -41,7 +41,7 @@ TABLE = [
     ("tunnelling", True, "in the substrate is not", scene(2.1, 1.0, ambient=1.52, angle=65.0)),
     ("tunnelling", True, "layer and substrate", scene(1.2, 1.0, ambient=1.52, angle=65.0)),
     ("tunnelling", False, "no real index", scene(1.33 + 0.1j, ambient=1.52, angle=65.0)),
-    ("tunnelling", True, "in the layer", scene(pl.Cauchy(pl.Free(lower=1.3, upper=2)), angle=65.0)),
+    ("tunnelling", True, "in the layer", scene(pl.Cauchy(pl.Free(1.3, 2)), angle=65.0)),
     ("tunnelling", True, "in the layer", scene(angle=FREE_ANGLE)),
     ("tunnelling", True, "in the layer", scene(angle=60.0, wavelength=None)),
     ("oblique", False, "normal incidence, and the angle is not free", scene()),
@@ -71,7 +71,7 @@ TABLE = [
         "coherence",
         True,
         "bandwidth",
-        scene(instrument=pl.Instrument(bandwidth=pl.Free(0.0, lower=0, upper=9))),
+        scene(instrument=pl.Instrument(bandwidth=pl.Free(0, 9, start=0.0))),
     ),
     (
         "coherence",
@@ -91,7 +91,7 @@ TABLE = [
         "fringes every 0.99 nm are narrower than the sampling of 50 nm",
         scene(thickness=2.5e5),
     ),
-    ("coherence", False, "monochromatic", scene(thickness=pl.Free(lower=10, upper=2.5e5))),
+    ("coherence", False, "monochromatic", scene(thickness=pl.Free(10, 2.5e5))),
     ("coherence", False, "monochromatic", scene(thickness=2.5e5, wavelength=np.array([600.0]))),
     ("orders", True, "no order is left", scene(thickness=2.5e5)),
     ("roughness", False, "no face", scene()),
@@ -115,7 +115,7 @@ TABLE = [
     ("dispersion", False, "no index varies", scene()),
     ("dispersion", False, "one wavelength", scene(pl.Cauchy(1.4, 1e4), wavelength=np.array([600.0]))),
     ("dispersion", True, "the index of layer and substrate varies", scene("SiO2", "Si")),
-    ("dispersion", True, "the index of layer varies", scene(pl.Cauchy(1.4, pl.Free(lower=0, upper=1)))),
+    ("dispersion", True, "the index of layer varies", scene(pl.Cauchy(1.4, pl.Free(0, 1)))),
     ("opaque", False, "light may reach everything", scene(0.2 + 3j)),
     ("precision", True, "double", scene()),
     (
@@ -167,7 +167,7 @@ def test_a_start_value_decides_nothing():
     """Only bounds do: the trap is an extinction, an angle or a bandwidth that starts at exactly 0."""
 
     def plan(value):
-        free = [pl.Free(value * upper, lower=0, upper=upper) for upper in (1.0, 60.0, 9.0)]
+        free = [pl.Free(0, upper, start=value * upper) for upper in (1.0, 60.0, 9.0)]
         return pl.plan(
             scene(pl.Constant(1.46, free[0]), angle=free[1], instrument=pl.Instrument(bandwidth=free[2]))
         )
@@ -183,20 +183,20 @@ def test_orders_need_wavelengths():
 
 ORDERS = {
     "oxide on silicon": scene(
-        pl.Constant(pl.Free(lower=1.3, upper=1.7)),
-        thickness=pl.Free(lower=10, upper=900),
+        pl.Constant(pl.Free(1.3, 1.7)),
+        thickness=pl.Free(10, 900),
         instrument=BANDWIDTH,
     ),
     "titania on silicon, oblique": scene(
-        2.5, thickness=pl.Free(lower=10, upper=900), angle=pl.Free(lower=0, upper=60), instrument=BANDWIDTH
+        2.5, thickness=pl.Free(10, 900), angle=pl.Free(0, 60), instrument=BANDWIDTH
     ),
     "absorbing on metal": scene(
-        pl.Constant(2.1, pl.Free(lower=0, upper=0.2)),
+        pl.Constant(2.1, pl.Free(0, 0.2)),
         0.2 + 3.4j,
-        pl.Free(lower=10, upper=900),
+        pl.Free(10, 900),
         instrument=BANDWIDTH,
     ),
-    "polymer on glass": scene(1.6, 1.52, pl.Free(lower=10, upper=900), instrument=BANDWIDTH),
+    "polymer on glass": scene(1.6, 1.52, pl.Free(10, 900), instrument=BANDWIDTH),
 }
 
 

@@ -18,7 +18,7 @@ SUBSTRATE = pl.Constant(3.9, 0.02)
 
 def film(thickness: Any = None, material: Any = 1.46, **more: Any) -> pl.Scene:
     """A layer on something like silicon; by default its thickness is free in 10 to 1000 nm."""
-    thickness = pl.Free(None, 10, 1000) if thickness is None else thickness
+    thickness = pl.Free(10, 1000) if thickness is None else thickness
     more.setdefault("substrate", SUBSTRATE)
     return pl.Scene(pl.Layer(material, thickness), **more)
 

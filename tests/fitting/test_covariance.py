@@ -15,7 +15,7 @@ from pellicle.fitting.spectra.targets import measured as as_numbers
 from pellicle.simulation.functions import reflectance
 from pellicle.synthetic.spectra import synthesise
 
-CAUCHY = (pl.Free(None, 1.3, 1.7), pl.Free(None, 0.0, 2e4))
+CAUCHY = (pl.Free(1.3, 1.7), pl.Free(0.0, 2e4))
 TRUTH = (1.45, 4000.0, 480.0)  # A, B, thickness
 
 
@@ -105,7 +105,7 @@ def test_errors_cover_the_truth(film, measured):
 @pytest.mark.parametrize("sigma", [True, False])
 def test_opaque_gold_is_not_known_to_zero_nanometres(film, measured, truth, sigma):
     """A pseudo-inverse gave 'sd 0.00' here. The error is infinite, with a lower limit and no upper one."""
-    scene = film(pl.Free(None, 1, 4000), "Au")
+    scene = film(pl.Free(1, 4000), "Au")
     fit = pl.fit(measured(scene, truth, noise=0.005, sigma=sigma), scene)
     assert fit.status == "not-identifiable"
     assert fit["thickness"].stderr == float("inf")
@@ -116,7 +116,7 @@ def test_opaque_gold_is_not_known_to_zero_nanometres(film, measured, truth, sigm
 
 def test_a_film_that_is_everywhere_opaque(film, measured):
     """Not even the thinnest that the bounds allow lets light through: any value fits as well."""
-    scene = film(pl.Free(None, 1000, 4000), "Au")
+    scene = film(pl.Free(1000, 4000), "Au")
     fit = pl.fit(measured(scene, 2000.0, noise=0.005, sigma=True), scene)
     assert fit.status == "not-identifiable"
     assert fit["thickness"].stderr == float("inf")
@@ -126,18 +126,18 @@ def test_a_film_that_is_everywhere_opaque(film, measured):
 
 def test_index_and_thickness_of_a_thin_film_trade(film, measured):
     """20 nm of something like titania: n·d is known, n and d are not."""
-    scene = film(pl.Free(None, 1, 100), pl.Constant(pl.Free(None, 1.8, 2.8)))
+    scene = film(pl.Free(1, 100), pl.Constant(pl.Free(1.8, 2.8)))
     fit = pl.fit(measured(scene, 2.4, 20.0, noise=0.005, sigma=True), scene)
     names = list(fit.correlation_names)
     assert fit.correlation[names.index("n"), names.index("thickness")] < -0.95
     assert fit["thickness"].stderr > 0.2
-    known = film(pl.Free(None, 1, 100), 2.4)
+    known = film(pl.Free(1, 100), 2.4)
     alone = pl.fit(measured(known, 20.0, noise=0.005, sigma=True), known)
     assert fit["thickness"].stderr > 3 * alone["thickness"].stderr
 
 
 def test_a_very_strong_trade_is_warned_of(film, measured):
-    scene = film(pl.Free(None, 1, 60), pl.Constant(pl.Free(None, 1.2, 1.8)))
+    scene = film(pl.Free(1, 60), pl.Constant(pl.Free(1.2, 1.8)))
     fit = pl.fit(measured(scene, 1.46, 15.0, noise=1e-3, sigma=True), scene)
     names = list(fit.correlation_names)
     assert abs(fit.correlation[names.index("n"), names.index("thickness")]) > 0.99
@@ -146,7 +146,7 @@ def test_a_very_strong_trade_is_warned_of(film, measured):
 
 def test_a_parameter_without_effect_has_an_infinite_error(film, measured):
     """k of a layer of no thickness."""
-    scene = film(0.0, pl.Constant(1.46, pl.Free(None, 0.0, 1.0)))
+    scene = film(0.0, pl.Constant(1.46, pl.Free(0.0, 1.0)))
     fit = pl.fit(measured(film(0.0), noise=0.003), scene)
     assert fit["k"].stderr == float("inf")
     assert fit.status == "not-identifiable"
@@ -165,7 +165,7 @@ def test_index_errors_follow_from_the_covariance(scene, measured):
 
 def test_a_direction_that_the_data_do_not_see_keeps_its_variance(film, measured):
     """The covariance itself, before any profile: a pseudo-inverse would drop the direction and say 0."""
-    scene = film(pl.Free(None, 1, 4000), "Au")
+    scene = film(pl.Free(1, 4000), "Au")
     data = measured(scene, 3000.0, noise=0.005, sigma=True)
     problem = make(as_numbers(data, scene))
     at = jax.device_get(local(*problem.views[0].program, np.array([3000.0 / 4000])))
@@ -174,7 +174,7 @@ def test_a_direction_that_the_data_do_not_see_keeps_its_variance(film, measured)
 
 def test_a_lower_limit_is_where_chi2_has_risen_by_2_71(film, measured):
     """A 95 % limit; at half of it the film is far out."""
-    scene = film(pl.Free(None, 1, 1000), "Au")
+    scene = film(pl.Free(1, 1000), "Au")
     data = measured(scene, 500.0, noise=0.005, sigma=True)
     fit = pl.fit(data, scene)
 

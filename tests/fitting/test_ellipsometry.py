@@ -35,7 +35,7 @@ def measured(thickness: float, angles=(70.0,), seed: int = 0) -> pl.Spectrum:
 
 
 def scene(**options) -> pl.Scene:
-    return pl.Scene(pl.Layer("SiO2", pl.Free(lower=0, upper=1000)), "Si", **options)
+    return pl.Scene(pl.Layer("SiO2", pl.Free(0, 1000)), "Si", **options)
 
 
 @pytest.mark.parametrize("thickness", [2.0, 100.0])
@@ -103,8 +103,8 @@ def test_hafnia(shared_data):
     spectrum = pl.Spectrum(
         wavelength[keep], psi[keep], "psi-delta", angle=angle[keep], delta=delta[keep], path=path.name
     )
-    layer = pl.Cauchy(pl.Free(lower=1.2, upper=3.0), pl.Free(lower=0, upper=1e5))
-    found = pl.fit(spectrum, pl.Scene(pl.Layer(layer, pl.Free(lower=1, upper=1000)), "SiO2"))
+    layer = pl.Cauchy(pl.Free(1.2, 3.0), pl.Free(0, 1e5))
+    found = pl.fit(spectrum, pl.Scene(pl.Layer(layer, pl.Free(1, 1000)), "SiO2"))
     assert found.status == "converged"
     assert found["thickness"].value == pytest.approx(109.0, abs=2.0)
 
@@ -116,9 +116,7 @@ def test_a_free_angle_goes_before_the_one_that_the_file_tells():
     data = pl.Spectrum(
         nm, seen[0], "psi-delta", delta=seen[1], angle=np.full(64, 70.0), sigma=np.full(64, 0.02)
     )
-    layer = pl.Layer("SiO2", pl.Free(None, 10, 300))
-    fit = pl.fit(
-        data, pl.Scene(layer, "Si", light=pl.Light(angle=pl.Free(None, 69.0, 71.0), signal="psi-delta"))
-    )
+    layer = pl.Layer("SiO2", pl.Free(10, 300))
+    fit = pl.fit(data, pl.Scene(layer, "Si", light=pl.Light(angle=pl.Free(69.0, 71.0), signal="psi-delta")))
     assert fit["angle"].value == pytest.approx(70.4, abs=1e-3)
     assert fit["thickness"].value == pytest.approx(100.0, abs=0.01)

@@ -12,8 +12,8 @@ from pellicle.simulation.film import build
 from pellicle.synthetic.spectra import synthesise
 
 NM = np.linspace(400.0, 900.0, 128)
-N, K = pl.Free(None, 1.3, 1.9), pl.Free(None, 0.0, 0.5)
-THICKNESS = pl.Free(None, 10, 1000)
+N, K = pl.Free(1.3, 1.9), pl.Free(0.0, 0.5)
+THICKNESS = pl.Free(10, 1000)
 
 
 def agrees(fit, truth, sigmas=4.0):
@@ -59,7 +59,7 @@ def test_two_angles_in_one_spectrum(film):
 
 
 def test_a_free_angle(film, measured):
-    scene = film(light=pl.Light(angle=pl.Free(None, 0.0, 60.0), polarisation="s"))
+    scene = film(light=pl.Light(angle=pl.Free(0.0, 60.0), polarisation="s"))
     agrees(pl.fit(measured(scene, 480.0, 35.0), scene), {"thickness": 480.0, "angle": 35.0})
 
 
@@ -75,7 +75,7 @@ def test_a_plate_with_its_back_face(film, measured):
 
 
 def test_bandwidth(film, measured):
-    scene = film(instrument=pl.Instrument(bandwidth=pl.Free(None, 0.0, 40.0)))
+    scene = film(instrument=pl.Instrument(bandwidth=pl.Free(0.0, 40.0)))
     fit = pl.fit(measured(scene, 900.0, 25.0), scene)
     agrees(fit, {"thickness": 900.0, "instrument.bandwidth": 25.0})
     sharp = pl.fit(measured(film(), 900.0), film())
@@ -84,7 +84,7 @@ def test_bandwidth(film, measured):
 
 
 def test_uneven_thickness(film, measured):
-    scene = film(instrument=pl.Instrument(thickness_spread=pl.Free(None, 0.0, 60.0)))
+    scene = film(instrument=pl.Instrument(thickness_spread=pl.Free(0.0, 60.0)))
     fit = pl.fit(measured(scene, 900.0, 30.0), scene)
     agrees(fit, {"thickness": 900.0, "instrument.thickness_spread": 30.0})
 
@@ -105,8 +105,8 @@ def test_a_prior_pulls_and_sharpens(film, measured):
     data = measured(film(12.0, 1.46), noise=0.003, sigma=True)
 
     def fit(prior):
-        index = pl.Constant(pl.Free(None, 1.2, 1.9, prior))
-        return pl.fit(data, film(pl.Free(None, 1, 60), index))
+        index = pl.Constant(pl.Free(1.2, 1.9, prior=prior))
+        return pl.fit(data, film(pl.Free(1, 60), index))
 
     free, held = fit(None), fit(pl.Normal(1.46, 0.01))
     assert free["n"].stderr > 0.03
@@ -146,7 +146,7 @@ def compilations():
 
 
 def test_a_second_file_compiles_nothing(film, measured, compilations):
-    scene = film(material=pl.Cauchy(pl.Free(None, 1.3, 1.7), pl.Free(None, 0.0, 3e4)))
+    scene = film(material=pl.Cauchy(pl.Free(1.3, 1.7), pl.Free(0.0, 3e4)))
     nm = np.linspace(400.0, 900.0, 192)  # a length of its own: programs of other tests do not serve
     pl.fit(measured(scene, 1.46, 3000.0, 480.0, wavelength=nm), scene)
     assert compilations
@@ -157,7 +157,7 @@ def test_a_second_file_compiles_nothing(film, measured, compilations):
     assert not compilations
     pl.fit(shorter, scene)
     assert not compilations
-    bounds = film(pl.Free(None, 50, 900), pl.Cauchy(pl.Free(1.4, 1.2, 1.8), pl.Free(None, 0.0, 2e4)))
+    bounds = film(pl.Free(50, 900), pl.Cauchy(pl.Free(1.2, 1.8, start=1.4), pl.Free(0.0, 2e4)))
     pl.fit(other, bounds)
     assert not compilations
 
@@ -225,7 +225,7 @@ def test_rivals_cost_what_a_fit_there_costs(film, measured):
     fit = pl.fit(data, scene)
     rival = fit.rivals[0]
     at = rival.parameters["thickness"]
-    there = pl.fit(data, film(pl.Free(None, at - 20, at + 20)))
+    there = pl.fit(data, film(pl.Free(at - 20, at + 20)))
     expected = (there.chi2_reduced - fit.chi2_reduced) * (128 - 1)
     share = fit.effective_points / 128
     assert rival.delta_chi2 == pytest.approx(expected * share, rel=1e-3)
@@ -235,7 +235,7 @@ def test_a_shift_of_the_wavelengths(film):
     """The instrument tells 3 nm too little: the film is seen at λ + 3, its tabled substrate too."""
     nm = np.linspace(400.0, 900.0, 128)
     seen = synthesise(film(480.0, substrate="Si"), nm + 3.0, 0.002, 1).values
-    shift = pl.Instrument(wavelength_shift=pl.Free(None, -10.0, 10.0))
+    shift = pl.Instrument(wavelength_shift=pl.Free(-10.0, 10.0))
     fit = pl.fit(pl.Spectrum(nm, seen, "R"), film(substrate="Si", instrument=shift))
     agrees(fit, {"thickness": 480.0, "instrument.wavelength_shift": 3.0})
     assert fit["instrument.wavelength_shift"].unit == "nm"

@@ -14,8 +14,8 @@ COMPUTED = Path(__file__).parents[2] / "measurements" / "wvase" / "cauchy_100nm.
 
 def test_a_film_whose_delta_was_folded():
     spectrum = pl.read_spectrum(COMPUTED, folded=True, noise=0.01)
-    film = pl.Cauchy(pl.Free(lower=1.3, upper=1.7), pl.Free(lower=0, upper=2e4))
-    found = pl.fit(spectrum, pl.Scene(pl.Layer(film, pl.Free(lower=10, upper=500)), "Si/Aspnes"))
+    film = pl.Cauchy(pl.Free(1.3, 1.7), pl.Free(0, 2e4))
+    found = pl.fit(spectrum, pl.Scene(pl.Layer(film, pl.Free(10, 500)), "Si/Aspnes"))
     assert found.status == "converged"
     assert found["thickness"].value == pytest.approx(100.0, abs=0.02)
     assert found["A"].value == pytest.approx(1.47, abs=2e-4)
@@ -34,7 +34,7 @@ def test_errors_of_n_and_c_by_finite_differences():
         data = pl.Spectrum(
             np.arange(400.0, 405.0), psi, "psi-delta", spread, angle=angle, delta=delta, folded=True
         )
-        return measured(data, pl.Scene(pl.Layer(1.46, pl.Free(lower=1, upper=9)), 1.5))
+        return measured(data, pl.Scene(pl.Layer(1.46, pl.Free(1, 9)), 1.5))
 
     at, step = seen(psi, delta), 1e-4
     assert at.values.shape == (5, 2)

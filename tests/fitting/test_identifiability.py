@@ -92,8 +92,8 @@ def test_scale_and_offset_are_eliminated_and_told_of_apart():
 def test_a_real_fit_says_so(film, measured):
     """Two weak reflections of unknown scale and offset: a + b cos(4π n d/λ) shows n·d and nothing else."""
     scene = film(
-        pl.Free(None, 10, 2000),
-        pl.Constant(pl.Free(None, 1.3, 1.7)),
+        pl.Free(10, 2000),
+        pl.Constant(pl.Free(1.3, 1.7)),
         substrate=pl.Constant(1.52),
         instrument=pl.Instrument("free", "free"),
     )

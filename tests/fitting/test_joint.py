@@ -23,7 +23,7 @@ SIZE = np.array([100.0, 1.0, 1e4, 1.0, 1.0])
 """What thickness, A, B and the scales of R and T are measured in."""
 TRUTH = np.array([150.0, 2.0, 2e4, 1.1, 0.9])
 NOISE = {"R": 0.002, "T": 0.001, "psi": 0.05, "delta": 0.1}
-FREE = (pl.Free(lower=20, upper=600), pl.Free(lower=1.6, upper=2.6), pl.Free(lower=0, upper=5e4))
+FREE = (pl.Free(20, 600), pl.Free(1.6, 2.6), pl.Free(0, 5e4))
 
 
 def films(thickness, a, b, scale_r, scale_t) -> dict[str, np.ndarray]:
@@ -104,7 +104,7 @@ def test_a_part_for_each_spectrum(together, spectra):
         together.curve  # noqa: B018
 
 
-OXIDE = pl.Scene(pl.Layer("SiO2", pl.Free(lower=10, upper=400)), "Si")
+OXIDE = pl.Scene(pl.Layer("SiO2", pl.Free(10, 400)), "Si")
 ARRAYS = ("wavelength", "values", "sigma")
 
 
@@ -166,8 +166,8 @@ def test_a_spectrum_of_another_sample_is_not_given_up_in_silence():
 
 def test_layers_are_shared_and_the_instrument_is_each_spectrums_own():
     """A prior of what is shared counts once."""
-    width = pl.Free(lower=0, upper=20, prior=pl.Normal(5.0, 1.0))
-    thickness = pl.Free(lower=10, upper=400, prior=pl.Normal(100.0, 2.0))
+    width = pl.Free(0, 20, prior=pl.Normal(5.0, 1.0))
+    thickness = pl.Free(10, 400, prior=pl.Normal(100.0, 2.0))
     scene = pl.Scene(pl.Layer(1.46, thickness), "Si", instrument=pl.Instrument(bandwidth=width))
     problem = make(*(measured(oxide(), scene, name) for name in "ab"))
     names = [p.name for p in problem.parameters]
@@ -222,7 +222,7 @@ def test_an_absorbing_film_on_a_plate_from_both_its_faces():
         )
         for x in "RT"
     ]
-    k0, width = pl.Free(lower=0, upper=1), pl.Free(lower=0.1, upper=1)
+    k0, width = pl.Free(0, 1), pl.Free(0.1, 1)
     film = CauchyUrbach(FREE[1], FREE[2], 0.0, k0, width, 2.5)
     found = pl.fit(measured, pl.Scene(pl.Layer(film, FREE[0]), pl.Substrate(GLASS, "air")))
     assert found.status == "converged"

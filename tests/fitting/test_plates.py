@@ -17,7 +17,7 @@ from pellicle.simulation.film import build
 
 NM = np.linspace(400.0, 800.0, 40)
 PLATE = pl.Substrate(1.52, back=1.0)
-SCENE = pl.Scene(pl.Layer(2.1, pl.Free(120.0, 10, 400)), PLATE)
+SCENE = pl.Scene(pl.Layer(2.1, pl.Free(10, 400, start=120.0)), PLATE)
 
 
 @pytest.fixture(scope="module")

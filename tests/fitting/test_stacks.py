@@ -30,7 +30,7 @@ def test_both_thicknesses_come_out(bandwidth, oxide, nitride):
     truth = {"oxide.thickness": 350.0, "nitride.thickness": 120.0}
     values = synthesise(scene(350.0, 120.0, instrument=instrument), WAVELENGTH, NOISE, 1).values
     spectrum = pl.Spectrum(WAVELENGTH, values, "R", sigma=np.full(WAVELENGTH.size, NOISE))
-    free = scene(pl.Free(None, *oxide), pl.Free(None, *nitride), instrument=instrument)
+    free = scene(pl.Free(*oxide), pl.Free(*nitride), instrument=instrument)
     found = pl.fit(spectrum, free)
     assert found.status == "converged"
     for name, value in truth.items():

@@ -18,7 +18,7 @@ NOISE = 1e-3
 
 
 def scene(extinction):
-    layer = pl.Layer(1.46 + 1j * extinction, pl.Free(237.0, lower=150, upper=350))
+    layer = pl.Layer(1.46 + 1j * extinction, pl.Free(150, 350, start=237.0))
     return pl.Scene(layer, 3.9 + 0.02j)
 
 

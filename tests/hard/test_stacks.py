@@ -145,14 +145,14 @@ def test_a_roughness_free_from_zero_is_smooth_and_flat_there(angle):
     light = pl.Light(np.linspace(400.0, 800.0, 5), angle=angle, polarisation="p" if angle else "unpolarised")
 
     def compiled(**rough):
-        layers = [pl.Layer(1.46, pl.Free(100.0, lower=0, upper=300), **rough), pl.Layer(2.1 + 0.1j, 50.0)]
+        layers = [pl.Layer(1.46, pl.Free(0, 300, start=100.0), **rough), pl.Layer(2.1 + 0.1j, 50.0)]
         scene = pl.Scene(layers, 0.2 + 3.4j, light=light)
         model = build(pl.plan(scene))
         both = jax.jit(lambda x: (model(insert(scene, x)), jax.jacfwd(lambda x: model(insert(scene, x)))(x)))
         return both(jnp.array([100.0, 0.0]) if rough else jnp.array([100.0]))
 
     smooth, slope = compiled()
-    value, slopes = compiled(roughness=pl.Free(0.0, lower=0, upper=5))
+    value, slopes = compiled(roughness=pl.Free(0, 5, start=0.0))
     np.testing.assert_allclose(value, smooth, rtol=1e-13)
     np.testing.assert_allclose(slopes[:, 0], slope[:, 0], rtol=1e-10, atol=1e-15)
     assert np.all(slopes[:, 1] == 0)

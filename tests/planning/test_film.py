@@ -19,7 +19,7 @@ from pellicle.scene.free import free_leaves, insert
 from pellicle.simulation.film import build, sampled
 
 WAVELENGTH = np.linspace(450.0, 850.0, 7)
-FREE = pl.Free(lower=100.0, upper=400.0)
+FREE = pl.Free(100.0, 400.0)
 
 
 def scene(layer=1.46, substrate=3.9 + 0.02j, thickness=FREE, instrument=None, **light):
@@ -37,7 +37,7 @@ FAINT = scene(
     instrument=pl.Instrument(bandwidth=0.2),
 )
 ABSORBING_PLATE = scene(substrate=pl.Substrate(1.5 + 1e-3j, "air"))
-THICK = scene(thickness=pl.Free(lower=3000, upper=3300), angle=3.0)
+THICK = scene(thickness=pl.Free(3000, 3300), angle=3.0)
 MICROSCOPE = scene(instrument=pl.Instrument(numerical_aperture=0.01))
 LEFT_OUT = {
     "faint": (FAINT, {"absorption", "oblique", "roughness", "coherence", "dispersion", "precision"}),
@@ -80,7 +80,7 @@ def test_the_bound_holds_and_no_gradient_is_lost(plans, name):
     assert np.all(np.any(slopes != 0, axis=(0, 1)))
 
 
-TINY = pl.Free(0.0, lower=0, upper=1e-6)
+TINY = pl.Free(0, 1e-6, start=0.0)
 ALL_FREE = scene(
     [pl.Layer(pl.Constant(1.46, TINY), FREE, roughness=TINY)],
     pl.Substrate(pl.Cauchy(1.5, TINY), "air", plate_mm=FREE),
@@ -98,7 +98,7 @@ def test_an_effect_with_a_free_parameter_is_not_even_tried(effect):
 
 
 def test_an_opaque_layer_that_may_be_thin_stays_transparent(plans):
-    thin = scene([pl.Layer(1.46, 100.0), pl.Layer(0.2 + 3.4j, pl.Free(lower=400.0, upper=900.0))])
+    thin = scene([pl.Layer(1.46, 100.0), pl.Layer(0.2 + 3.4j, pl.Free(400.0, 900.0))])
     assert not pl.plan(thin, 1e-2).on("opaque")
     row = plans["over gold"].row("opaque")
     assert row.on

@@ -20,11 +20,11 @@ from pellicle.synthetic.brdf import Directions, default_directions
 
 LOOKED = default_directions(96)
 TOLERANCE = 1e-3
-HEIGHT = Free(lower=40.0, upper=300.0)
+HEIGHT = Free(40.0, 300.0)
 FACETS = Surface(
     "microfacet-film",
     {
-        "thickness": Free(lower=40.0, upper=300.0),
+        "thickness": Free(40.0, 300.0),
         "n": 1.5,
         "k": 1e-6,
         "base_n": 1.9,
@@ -35,7 +35,7 @@ FACETS = Surface(
 LOBES = Surface(
     "granier-heidrich-reciprocal",
     {
-        "thickness": Free(lower=40.0, upper=300.0),
+        "thickness": Free(40.0, 300.0),
         "n": 1.5,
         "deviation": 1e-4,
         "azimuth": 30.0,
@@ -53,17 +53,17 @@ def rows(surface, looked=LOOKED):
 
 
 def test_effects_are_judged_from_bounds_and_not_from_values():
-    found = rows(Surface("granier-heidrich", {"deviation": Free(0.0, 0.0, 5.0), "diffuse": 0.0}))
+    found = rows(Surface("granier-heidrich", {"deviation": Free(0.0, 5.0, start=0.0), "diffuse": 0.0}))
     assert {name: row.on for name, row in found.items()} == {
         **{"spectral-sampling": True, "roughness": True, "deviation": True, "diffuse": False},
         **{"coherence": True, "precision": True},
     }
-    film = rows(Surface("microfacet-film", {"k": Free(0.0, 0.0, 1.0)}))
+    film = rows(Surface("microfacet-film", {"k": Free(0.0, 1.0, start=0.0)}))
     assert film["absorption"].why == "the film's extinction is free"
     assert film["tunnelling"].on is False
     assert film["polarisation"].on
     assert not rows(Surface("microfacet-film", {}))["absorption"].on
-    assert rows(Surface("microfacet-film", {"n": Free(lower=0.9, upper=2.0)}))["tunnelling"].on
+    assert rows(Surface("microfacet-film", {"n": Free(0.9, 2.0)}))["tunnelling"].on
     assert not rows(Surface("granier-heidrich-diffuse", {}))["roughness"].on
     assert not rows(Surface("granier-heidrich-diffuse", {}, (550.0,)))["spectral-sampling"].on
 
@@ -108,7 +108,7 @@ def test_what_changes_little_is_left_out_within_the_bound(plans, name):
     with jax.enable_x64(True):
         true, found = (
             np.stack([np.asarray(simulate(insert(seen, [np.float64(d)]))) for d in points[:, 0]])
-            for simulate in (jax.jit(build(exact(seen))), jax.jit(build(plan.wordless)))
+            for simulate in (jax.jit(build(exact(seen))), jax.jit(build(plan.static_key)))
         )
         slopes = gradients(plan, seen, points[:16], build)
     off = np.abs(found - true) / np.maximum(true, FLOOR)
@@ -117,14 +117,14 @@ def test_what_changes_little_is_left_out_within_the_bound(plans, name):
     assert work(plan, seen).flops < work(exact(seen), seen).flops
 
 
-FREE = {key: Free(0.0, 0.0, 1e-9) for key in ("k", "base_k", "diffuse")}
+FREE = {key: Free(0.0, 1e-9, start=0.0) for key in ("k", "base_k", "diffuse")}
 
 
 @pytest.mark.parametrize("effect", CAN_BE_LEFT_OUT)
 def test_an_effect_whose_number_is_free_stays(effect):
     """However little it changes: its gradient is what a fit needs."""
-    thin = {"thickness": Free(0.0, 0.0, 1e-6), "specular": Free(1.0, 0.9, 1.1)}
-    tilt = {"deviation": Free(0.0, 0.0, 1e-9), "n": Free(lower=1.4, upper=1.5)}
+    thin = {"thickness": Free(0.0, 1e-6, start=0.0), "specular": Free(0.9, 1.1, start=1.0)}
+    tilt = {"deviation": Free(0.0, 1e-9, start=0.0), "n": Free(1.4, 1.5)}
     if effect in ("deviation", "spectral-sampling"):
         surface = Surface("granier-heidrich", thin | tilt)
     else:
@@ -156,7 +156,7 @@ def test_a_lobe_that_is_too_weak_goes_with_its_layer():
     (plan,) = thrift.alternatives("roughness", seen)
     assert [row.effect for row in plan.rows if row.on] == ["diffuse", "precision"]
     with jax.enable_x64(True):
-        found = jax.jit(build(plan.wordless))(seen)
+        found = jax.jit(build(plan.static_key))(seen)
     np.testing.assert_array_equal(found, np.full((96, 3), 0.2))
 
 

@@ -78,9 +78,9 @@ def test_the_contracts_recipe(read):
     layer = scene.layers[0]
     assert layer.name == "oxide"
     assert isinstance(layer.material, Cauchy)
-    assert (layer.material.A.value, layer.material.A.lower, layer.material.A.upper) == (1.45, 1.3, 1.7)
+    assert (layer.material.A.start, layer.material.A.lower, layer.material.A.upper) == (1.45, 1.3, 1.7)
     assert (layer.material.B, layer.material.C) == (3000, 0)
-    assert (layer.thickness.value, layer.thickness.lower, layer.thickness.upper) == (1505, 10, 3000)
+    assert (layer.thickness.start, layer.thickness.lower, layer.thickness.upper) == (1505, 10, 3000)
     assert scene.instrument.scale == Drift(3)
     assert scene.instrument.offset == Drift(0)
     assert scene.instrument.bandwidth.upper == 20

@@ -99,7 +99,7 @@ def test_calls_refused(text, said):
 
 
 def test_models_by_name():
-    assert free_part(media_words.model("cauchy", {"B": Free(None, 0.0, 10.0)}).B) == (5, 0, 10)
+    assert free_part(media_words.model("cauchy", {"B": Free(0.0, 10.0)}).B) == (5, 0, 10)
     assert media_words.model("cauchy", {}).A == 1.5  # not written: its documented default, fixed
     with pytest.raises(UsageError, match="did you mean 'cauchy'"):
         media_words.model("cauchi", {})

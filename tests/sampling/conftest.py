@@ -13,7 +13,7 @@ BANDS = np.array([450.0, 520.0, 600.0, 690.0, 800.0])
 
 def film(lower: float = 50.0, upper: float = 1500.0, prior=None) -> pl.Scene:
     """A layer of index 1.46 whose thickness is free."""
-    return pl.Scene(pl.Layer(1.46, pl.Free(None, lower, upper, prior)), pl.Constant(3.9, 0.02))
+    return pl.Scene(pl.Layer(1.46, pl.Free(lower, upper, prior=prior)), pl.Constant(3.9, 0.02))
 
 
 def bands(thickness: float = 650.0, noise: float = 0.04, seed: int = 3) -> pl.Spectrum:

@@ -107,7 +107,7 @@ def test_impossible_walkers_are_refused(bands, film, walkers, sentence):
 def test_every_view_counts_and_scale_is_integrated_out(bands):
     """Two spectra of one film with a free scale each: the posterior is as wide as least squares say."""
     scene = pl.Scene(
-        pl.Layer(1.46, pl.Free(None, 500.0, 560.0)),
+        pl.Layer(1.46, pl.Free(500.0, 560.0)),
         pl.Constant(3.9, 0.02),
         instrument=pl.Instrument(scale=Drift(0)),
     )

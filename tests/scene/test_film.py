@@ -14,7 +14,7 @@ from pellicle.scene.free import free_leaves, insert, start_values
 from pellicle.scene.instrument import ONE_NUMBER, SLOW_OFFSET, SLOW_SCALE
 from pellicle.scene.layers import absorbs, medium
 
-FREE = pl.Free(lower=10, upper=3000)
+FREE = pl.Free(10, 3000)
 
 
 def scene(**changes):
@@ -24,8 +24,8 @@ def scene(**changes):
 
 def test_a_free_number_starts_in_the_middle_unless_told():
     assert FREE.value == 1505
-    assert pl.Free(20, lower=10, upper=30).value == 20
-    assert pl.Free(10, lower=10, upper=30).value == 10
+    assert pl.Free(10, 30, start=20).start == 20
+    assert pl.Free(10, 30, start=10).start == 10
 
 
 @pytest.mark.parametrize(
@@ -34,10 +34,9 @@ def test_a_free_number_starts_in_the_middle_unless_told():
         ({"lower": 20, "upper": 10}, "bounds are reversed or equal: lower 20 is not below upper 10"),
         ({"lower": 10, "upper": 10}, "bounds are reversed or equal: lower 10 is not below upper 10"),
         ({"lower": math.nan, "upper": 10}, "bounds are reversed or equal"),
-        ({"lower": 20}, "a free parameter needs two finite bounds: give lower and upper"),
-        ({}, "a free parameter needs two finite bounds"),
-        ({"value": 5, "lower": 10, "upper": 20}, "the start value 5 is outside its bounds 10 to 20"),
-        ({"value": math.nan, "lower": 10, "upper": 20}, "the start value nan is outside its bounds"),
+        ({"lower": 20, "upper": math.inf}, "a free parameter needs two finite bounds: give lower and upper"),
+        ({"start": 5, "lower": 10, "upper": 20}, "the start value 5 is outside its bounds 10 to 20"),
+        ({"start": math.nan, "lower": 10, "upper": 20}, "the start value nan is outside its bounds"),
     ],
 )
 def test_impossible_bounds_are_refused(arguments, message):
@@ -50,7 +49,7 @@ def test_impossible_bounds_are_refused(arguments, message):
     [
         (lambda: pl.Normal(1.0, 0.0), "a prior's standard deviation must be positive, not 0"),
         (lambda: pl.Layer(1.46, -5), "thickness must not be negative, got -5 nm"),
-        (lambda: pl.Layer(1.46, pl.Free(lower=-5, upper=5)), "thickness must not be negative, got -5 nm"),
+        (lambda: pl.Layer(1.46, pl.Free(-5, 5)), "thickness must not be negative, got -5 nm"),
         (lambda: pl.Layer(1.46 - 0.1j, 5), "negative imaginary part, which is gain"),
         (lambda: pl.Layer("Unobtainium", 5), "Unobtainium"),
         (lambda: pl.Substrate(1.5, "air", -1), "plate_mm must not be negative, got -1 mm"),
@@ -60,7 +59,7 @@ def test_impossible_bounds_are_refused(arguments, message):
         (lambda: pl.Light(polarisation="TE"), "polarisation must be one of unpolarised, s, p, not 'TE'"),
         (lambda: pl.Light(angle=95), "the angle of incidence must lie in 0 to 90 degrees, got 95"),
         (lambda: pl.Light(angle=np.array([0.0, -5.0])), "must lie in 0 to 90 degrees, got -5"),
-        (lambda: pl.Light(angle=pl.Free(lower=80, upper=91)), "must lie in 0 to 90 degrees, got 91"),
+        (lambda: pl.Light(angle=pl.Free(80, 91)), "must lie in 0 to 90 degrees, got 91"),
         (lambda: pl.Instrument(scale="often"), "scale must be 'free', 'slow' or a number, not 'often'"),
         (lambda: pl.Instrument(offset="never"), "offset must be 'free', 'slow' or a number, not 'never'"),
         (lambda: pl.Instrument(bandwidth=-1), "bandwidth must not be negative, got -1 nm"),
@@ -91,8 +90,8 @@ def test_words_stand_for_linear_nuisances():
 
 def test_free_parameters_are_found_and_filled_in_the_same_order():
     thing = scene(
-        layers=pl.Layer(pl.Constant(pl.Free(lower=1, upper=2), pl.Free(lower=0, upper=1)), FREE),
-        instrument=pl.Instrument(bandwidth=pl.Free(lower=0, upper=20)),
+        layers=pl.Layer(pl.Constant(pl.Free(1, 2), pl.Free(0, 1)), FREE),
+        instrument=pl.Instrument(bandwidth=pl.Free(0, 20)),
     )
     found = free_leaves(thing)
     assert [free.upper for _, free in found] == [2, 1, 3000, 20]
@@ -123,8 +122,8 @@ def test_a_medium_is_a_number_a_name_or_a_material():
         (complex(1.46, -0.0), False),
         (np.array(1.46 + 0.1j), True),
         (pl.Constant(1.46, 0), False),
-        (pl.Constant(1.46, pl.Free(0.0, lower=0, upper=1)), True),
-        (pl.Shifted(pl.Constant(1.46), None, pl.Free(0.0, lower=0, upper=1)), True),
+        (pl.Constant(1.46, pl.Free(0, 1, start=0.0)), True),
+        (pl.Shifted(pl.Constant(1.46), None, pl.Free(0, 1, start=0.0)), True),
         (pl.Cauchy(FREE), False),
         ("Si", True),
         ("air", False),

@@ -134,7 +134,7 @@ def test_k_fixed_at_zero_costs_what_no_k_costs():
 
 def test_k_free_from_zero_keeps_its_slope():
     """The trap of judging by values: at k = 0 the model must still know that R falls with k."""
-    thing = scene(pl.Constant(1.46, pl.Free(0.0, lower=0, upper=1)))
+    thing = scene(pl.Constant(1.46, pl.Free(0, 1, start=0.0)))
     model = build(pl.plan(thing))
     predict = jax.jit(lambda k: model(insert(thing, [k])))
     slope = jax.jacfwd(predict)(0.0)
@@ -145,9 +145,7 @@ def test_k_free_from_zero_keeps_its_slope():
 
 def test_a_model_is_pure_and_can_be_traced():
     """jit, vmap and gradients through the free parameters, in their own order."""
-    thing = scene(
-        pl.Constant(pl.Free(lower=1.3, upper=1.7)), thickness=pl.Free(lower=10, upper=900), angle=30.0
-    )
+    thing = scene(pl.Constant(pl.Free(1.3, 1.7)), thickness=pl.Free(10, 900), angle=30.0)
     model = build(pl.plan(thing))
 
     @jax.jit

@@ -29,7 +29,7 @@ PLATE = pl.Substrate(1.52, back=1.0)
 
 def test_a_window_of_nothing_changes_nothing():
     """A free bandwidth at 0 is the closed form, to the bound of the orders."""
-    free = pl.Instrument(bandwidth=pl.Free(0.0, lower=0, upper=9))
+    free = pl.Instrument(bandwidth=pl.Free(0, 9, start=0.0))
     thing = scene(instrument=free)
     bound = pl.plan(thing).row("orders").error_bound
     found = build(pl.plan(thing))(insert(thing, [0.0]))
@@ -38,7 +38,7 @@ def test_a_window_of_nothing_changes_nothing():
 
 @pytest.mark.parametrize("which", ["bandwidth", "thickness_spread"])
 def test_a_free_window_has_a_finite_slope_at_zero(which):
-    thing = scene(thickness=2000.0, instrument=pl.Instrument(**{which: pl.Free(0.0, lower=0, upper=9)}))
+    thing = scene(thickness=2000.0, instrument=pl.Instrument(**{which: pl.Free(0, 9, start=0.0)}))
     model = build(pl.plan(thing))
 
     @jax.jit

@@ -93,7 +93,7 @@ def test_films_on_both_faces():
 
 def test_its_slope_is_that_of_differences():
     scene = with_wavelength(
-        pl.Scene(pl.Layer(2.2 + 0.05j, pl.Free(120.0, 1, 500)), PLATE, light=LIGHT), NM, ANGLE
+        pl.Scene(pl.Layer(2.2 + 0.05j, pl.Free(1, 500, start=120.0)), PLATE, light=LIGHT), NM, ANGLE
     )
     run = build(pl.plan(scene))
 

@@ -214,7 +214,7 @@ def _rotation(axis, angle):
 
 @pytest.mark.parametrize("angle", [0.0, 40.0])
 def test_a_free_cone_has_a_finite_slope_at_zero(angle):
-    free = pl.Instrument(angle_spread=pl.Free(0.0, lower=0, upper=15))
+    free = pl.Instrument(angle_spread=pl.Free(0, 15, start=0.0))
     thing = scene(pl.Layer(1.46, 900.0), angle=angle, instrument=free)
     model = build(pl.plan(thing))
     predict = jax.jit(lambda x: model(insert(thing, [x])))
@@ -231,7 +231,7 @@ def test_a_microscope_reads_a_wrong_thickness_without_its_cone():
     truth = pl.Scene(pl.Layer(1.46, 2000.0), "Si", instrument=pl.Instrument(numerical_aperture=0.5))
     values = synthesise(truth, wavelength, 0.002, 1).values
     spectrum = pl.Spectrum(wavelength, values, "R", sigma=np.full(128, 0.002))
-    thickness = pl.Free(lower=1500, upper=2500)
+    thickness = pl.Free(1500, 2500)
     cone = pl.Scene(pl.Layer(1.46, thickness), "Si", instrument=pl.Instrument(numerical_aperture=0.5))
     found = pl.fit(spectrum, cone)
     assert abs(found["thickness"].value - 2000) < 4 * found["thickness"].stderr < 4.0

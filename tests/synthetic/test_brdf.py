@@ -52,7 +52,7 @@ def test_the_fit_of_what_was_simulated_finds_the_truth():
 
     steel = Surface(
         "microfacet-film",
-        {"thickness": Free(45.0, 10.0, 70.0), "n": 2.9, "roughness": 0.35, "diffuse": 0.0},
+        {"thickness": Free(10.0, 70.0, start=45.0), "n": 2.9, "roughness": 0.35, "diffuse": 0.0},
     )
     looked = Directions(*(x[:200] for x in default_directions()))
     found = fit_brdf(synthesise(steel, looked, noise=0.01).samples, steel)

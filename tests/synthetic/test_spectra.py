@@ -8,7 +8,7 @@ import pellicle as pl
 from pellicle.synthetic.spectra import default_wavelengths, synthesise
 
 NM = np.linspace(400.0, 900.0, 128)
-FILM = pl.Layer(1.46, pl.Free(430.0, 10, 1000))
+FILM = pl.Layer(1.46, pl.Free(10, 1000, start=430.0))
 
 
 def test_the_signal_of_the_scene():
@@ -54,7 +54,7 @@ def test_a_spectrum_to_fit():
 
 
 def test_a_spectrum_of_angles():
-    light = pl.Light(angle=pl.Free(70.0, 69, 71), signal="psi-delta")
+    light = pl.Light(angle=pl.Free(69, 71, start=70.0), signal="psi-delta")
     seen = pl.simulate(pl.Scene(FILM, 3.9, light=light), NM)
     psi, delta = pl.ellipsometry(NM, 430.0, 1.46, 3.9, angle=70.0)
     np.testing.assert_allclose(seen.values, psi, rtol=1e-9)

@@ -11,7 +11,7 @@ from pellicle.synthetic.sphere import in_plane, numbers, render
 
 STEEL = {"n": 2.9, "base_n": 2.7, "base_k": 2.8, "roughness": 0.3, "diffuse": 0.0}
 FIXED = pl.Surface("microfacet-film", STEEL | {"thickness": 40.0})
-UNEVEN = pl.Surface("microfacet-film", STEEL | {"thickness": pl.Free(lower=10, upper=70)})
+UNEVEN = pl.Surface("microfacet-film", STEEL | {"thickness": pl.Free(10, 70)})
 
 
 def test_the_middle_of_the_sphere_faces_the_eye():

@@ -16,7 +16,7 @@ from pellicle.accuracy.simulated_data import Trial
 from pellicle.fitting.neighbourhood import valley
 from pellicle.fitting.profile_likelihood import interval
 from pellicle.fitting.spectra.covariance import errors
-from pellicle.fitting.spectra.reweighting import Weighed, weigh
+from pellicle.fitting.spectra.reweighting import RankedMinima, weigh
 from pellicle.fitting.spectra.search import quiet, search
 from pellicle.sampling.chain import empty
 from pellicle.sampling.checks import missing
@@ -41,7 +41,7 @@ class Way:
 
     name: str
     leaves_out: str
-    intervals: Callable[[Weighed], Interval]
+    intervals: Callable[[RankedMinima], Interval]
     missing: str | None = None
 
 
@@ -99,7 +99,7 @@ def intervals(trials: Sequence[Trial], progress: Progress) -> Intervals:
     return found
 
 
-def _fitted(trial: Trial) -> Weighed:
+def _fitted(trial: Trial) -> RankedMinima:
     return weigh(trial.problem, search(trial.problem, quiet))
 
 
@@ -111,7 +111,7 @@ class _Run:
     inside: list[bool] = field(default_factory=list)
     widths: list[float] = field(default_factory=list)
 
-    def take(self, trial: Trial, fit: Weighed) -> None:
+    def take(self, trial: Trial, fit: RankedMinima) -> None:
         began = time.perf_counter()
         lower, upper = self.way.intervals(fit)
         self.times.append(time.perf_counter() - began)
@@ -133,14 +133,14 @@ class _Run:
         )
 
 
-def _covariance(fit: Weighed) -> Interval:
+def _covariance(fit: RankedMinima) -> Interval:
     problem, best = fit.problem, fit.minima.units[0]
     found = errors(problem, [m.at for m in fit.met], _variances(fit))
     sd = found.stderr[: len(best)] / (problem.box.upper - problem.box.lower)
     return best - _WIDE * sd, best + _WIDE * sd
 
 
-def _profile(fit: Weighed) -> Interval:
+def _profile(fit: RankedMinima) -> Interval:
     box = fit.problem.box
     covariance = errors(fit.problem, [m.at for m in fit.met], _variances(fit)).covariance
     around = valley(fit, covariance)
@@ -149,11 +149,11 @@ def _profile(fit: Weighed) -> Interval:
     return lower, upper
 
 
-def _variances(fit: Weighed) -> list[float]:
+def _variances(fit: RankedMinima) -> list[float]:
     return [m.variance for m in fit.met]
 
 
-def _sampled(steps: int, fit: Weighed) -> Interval:
+def _sampled(steps: int, fit: RankedMinima) -> Interval:
     """By `pellicle.sample`'s own chain, of that many steps or until it is long enough."""
     size = len(fit.problem.parameters)
     target = Target(log_density(fit.problem), _WALKERS // 2)
@@ -161,7 +161,7 @@ def _sampled(steps: int, fit: Weighed) -> Interval:
     return _quantiles(chain.draws[checks.discard :])
 
 
-def _usual(steps: int, fit: Weighed) -> Interval:
+def _usual(steps: int, fit: RankedMinima) -> Interval:
     """What is often done: stretch moves from a ball around the best fit, the first half thrown away."""
     import emcee
 

@@ -24,7 +24,7 @@ ROUNDS, SECONDS = 40, 15.0
 
 
 @dataclass
-class Standing:
+class MethodResult:
     """What a rung costs and how far off it is.
 
     `error` is in the signal's unit; `seconds` is the median time of one spectrum, colour or sample,
@@ -53,7 +53,7 @@ class Ladder:
     wavelengths: int
     draws: int
     sample: str = "spectrum"
-    rungs: list[Standing] = field(default_factory=list)
+    rungs: list[MethodResult] = field(default_factory=list)
     left_out: dict[str, str] = field(default_factory=dict)
     interrupted: bool = False
 
@@ -139,9 +139,9 @@ class _Run:
     error: float
     times: list[float] = field(default_factory=list)
 
-    def standing(self) -> Standing:
+    def standing(self) -> MethodResult:
         program = self.program
-        return Standing(
+        return MethodResult(
             self.rung.name,
             self.rung.leaves_out,
             self.error,

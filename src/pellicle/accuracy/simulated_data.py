@@ -45,7 +45,7 @@ def trials(case: Case, scene: Scene, noise: float, count: int, seed: int = 0) ->
     """
     free = [leaf for _, leaf in free_leaves(case.scene)]
     low, high = np.array([f.lower for f in free]), np.array([f.upper for f in free])
-    start = (np.array([f.value for f in free]) - low) / (high - low)
+    start = (np.array([f.start for f in free]) - low) / (high - low)
     random = np.random.default_rng(seed)
     units = random.uniform(size=(count, len(free)))
     clean = compiled(case._replace(draws=low + units * (high - low)), Way(case.plan, case.scene)).run()

@@ -16,7 +16,7 @@ from pellicle.fitting.status import RIVAL
 
 
 @dataclass
-class Finish:
+class SolverResult:
     """How a solver did.
 
     `error` is the mean over the data sets of the worst parameter's distance from the truth, as a share
@@ -40,7 +40,7 @@ class Race:
     """The solvers of one case, the fastest first, and those that took no part, with why."""
 
     noise: float
-    solvers: list[Finish] = field(default_factory=list)
+    solvers: list[SolverResult] = field(default_factory=list)
     left_out: dict[str, str] = field(default_factory=dict)
     interrupted: bool = False
 
@@ -70,8 +70,8 @@ class _Run:
         self.errors.append(float(np.max(np.abs(inside - trial.truth))))
         self.failures += bool(_misfit(trial, inside) > least + RIVAL)
 
-    def finish(self) -> Finish:
-        return Finish(
+    def finish(self) -> SolverResult:
+        return SolverResult(
             self.solver.name,
             self.solver.leaves_out,
             float(np.mean(self.errors)),

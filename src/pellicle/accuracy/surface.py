@@ -23,7 +23,7 @@ from pellicle.errors import UsageError
 from pellicle.planning import surface
 from pellicle.planning.surface import FLOOR
 from pellicle.scene.free import free_leaves, insert, start_values
-from pellicle.scene.surface import Lit
+from pellicle.scene.surface import SurfaceView
 from pellicle.simulation.surface import build
 
 DRAWS = 64
@@ -46,7 +46,7 @@ class SurfaceCost:
 
 
 def cost(
-    lit: Lit, *, tolerance: float | None = None, progress: Progress = lambda what, done, total: None
+    lit: SurfaceView, *, tolerance: float | None = None, progress: Progress = lambda what, done, total: None
 ) -> SurfaceCost:
     """Measure every way to a surface's colours (`tolerance` in mean ΔE2000), and to its BRDF.
 
@@ -65,7 +65,7 @@ def cost(
         return SurfaceCost(found, values, films if isinstance(films, str) else "")
 
 
-def drawn(lit: Lit, count: int = DRAWS, seed: int = 0) -> np.ndarray:
+def drawn(lit: SurfaceView, count: int = DRAWS, seed: int = 0) -> np.ndarray:
     """Values of the free numbers, (draws, numbers), uniform between the bounds; the first are the start."""
     free = [leaf for _, leaf in free_leaves(lit)]
     low, high = (np.array([getattr(f, side) for f in free]) for side in ("lower", "upper"))
@@ -77,7 +77,7 @@ def drawn(lit: Lit, count: int = DRAWS, seed: int = 0) -> np.ndarray:
 FILM = ("thickness", "n", "k", "base_n", "base_k", "ambient_n")
 
 
-def coloured(lit: Lit, draws: np.ndarray) -> Films | str:
+def coloured(lit: SurfaceView, draws: np.ndarray) -> Films | str:
     """The films of these draws, or why they have no colour of their own."""
     if lit.brdf.coloured is None:
         return f"{lit.model} is made for three wavelengths and has no other colour"
@@ -112,11 +112,11 @@ class ValueRung:
 
     name: str
     leaves_out: str
-    plan: Callable[[Lit, float], Plan | str]
+    plan: Callable[[SurfaceView, float], Plan | str]
     double: bool = True
 
 
-def _left_out(effect: str, absent: str, lit: Lit, tolerance: float) -> Plan | str:
+def _left_out(effect: str, absent: str, lit: SurfaceView, tolerance: float) -> Plan | str:
     judged = exact(lit)
     if not any(row.effect == effect and row.on for row in judged.rows):
         return absent
@@ -127,7 +127,7 @@ def _left_out(effect: str, absent: str, lit: Lit, tolerance: float) -> Plan | st
     return replace(exact(leave_out(lit)), left_out=(leave_out,))
 
 
-def _by_angles(count: int, lit: Lit, tolerance: float) -> Plan | str:
+def _by_angles(count: int, lit: SurfaceView, tolerance: float) -> Plan | str:
     judged = {row.effect: row for row in exact(lit).rows}
     if "oblique" not in judged or not judged["oblique"].on:
         return "no film whose colour depends on the angle"
@@ -135,7 +135,7 @@ def _by_angles(count: int, lit: Lit, tolerance: float) -> Plan | str:
     return replace(exact(lit), rows=tuple(rows))
 
 
-def _absent(effect: str, absent: str) -> Callable[[Lit, float], Plan | str]:
+def _absent(effect: str, absent: str) -> Callable[[SurfaceView, float], Plan | str]:
     return partial(_left_out, effect, absent)
 
 
@@ -159,13 +159,13 @@ VALUES = (
 """Every rung to the values of a BRDF, in the order of the table."""
 
 
-def _values(lit: Lit, draws: np.ndarray, tolerance: float, progress: Progress) -> Ladder:
+def _values(lit: SurfaceView, draws: np.ndarray, tolerance: float, progress: Progress) -> Ladder:
     truth = _program(lit, draws, exact(lit)).run()
     scale = np.maximum(np.abs(truth), FLOOR)
 
     def prepare(rung: ValueRung) -> Program | str:
         plan = rung.plan(lit, tolerance)
-        return plan if isinstance(plan, str) else _program(lit, draws, plan.wordless, rung.double)
+        return plan if isinstance(plan, str) else _program(lit, draws, plan.static_key, rung.double)
 
     def error(answer: np.ndarray) -> float:
         worst = float(np.max(np.abs(np.asarray(answer, float) - truth) / scale))
@@ -175,7 +175,7 @@ def _values(lit: Lit, draws: np.ndarray, tolerance: float, progress: Progress) -
     return measured(ladder, VALUES, prepare, error, progress)
 
 
-def _program(lit: Lit, draws: np.ndarray, plan: Plan, double: bool = True) -> Program:
+def _program(lit: SurfaceView, draws: np.ndarray, plan: Plan, double: bool = True) -> Program:
     """The BRDF of every draw, (draws, directions, channels)."""
     simulate = build(plan)
 

@@ -17,7 +17,7 @@ import jax.numpy as jnp
 from pellicle.brdf import film_colour
 from pellicle.brdf.lobes import blinn_phong
 from pellicle.brdf.shapes import Parameters, column, summed
-from pellicle.optics.orders import Bounces, bounces
+from pellicle.optics.orders import AirySeries, bounces
 
 PUBLISHED_WAVELENGTHS = (650.0, 510.0, 475.0)
 """Its R, G and B in nm."""
@@ -28,7 +28,7 @@ def published(parameters: Parameters, angle: Any) -> Any:
     n0, n1, n2 = (parameters[key] for key in ("ambient_n", "n", "base_n"))
     half_turns = jnp.pi * (jnp.where(n1 < n0, 1, 0) + jnp.where(n1 < n2, 1, 0))
 
-    def transmitted(b: Bounces):
+    def transmitted(b: AirySeries):
         alpha = -b.upper * b.lower
         return b.direct / (1 + alpha * alpha - 2 * alpha * jnp.cos(b.phase + half_turns))
 
@@ -40,7 +40,7 @@ def phase_average(parameters: Parameters, angle: Any) -> Any:
     return _one_minus(lambda b: b.direct / (1 - (b.upper * b.lower) ** 2), parameters, angle)
 
 
-def _one_minus(transmitted: Callable[[Bounces], Any], parameters: Parameters, angle: Any) -> Any:
+def _one_minus(transmitted: Callable[[AirySeries], Any], parameters: Parameters, angle: Any) -> Any:
     """1 − T, the mean of s and p; 1 where there is total reflection at either face, as in the shader."""
     n0, n1, n2 = (parameters[key] for key in ("ambient_n", "n", "base_n"))
     angle = angle[..., None]

@@ -65,7 +65,7 @@ class Plan:
         return sum(row.error_bound for row in self.rows)
 
     @property
-    def wordless(self) -> Plan:
+    def static_key(self) -> Plan:
         """The same without reasons and bounds: all that a compiled program depends on."""
         rows = tuple(Row(row.effect, row.on, "", count=row.count, around=row.around) for row in self.rows)
         return Plan(rows, self.signal, self.polarisation, self.left_out)

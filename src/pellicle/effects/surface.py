@@ -13,7 +13,7 @@ from pellicle.brdf.directions import angle_to_half
 from pellicle.effects.plan import Plan, Row
 from pellicle.effects.removal import in_single
 from pellicle.scene.free import Free, is_free
-from pellicle.scene.surface import LAYERED, Lit
+from pellicle.scene.surface import LAYERED, SurfaceView
 
 ALONG = 1e-6
 """Radians between light and eye, halved, below which they are one."""
@@ -21,7 +21,7 @@ ALONG = 1e-6
 NO_LAYER = "nothing of the layer is seen"
 
 
-def spectral_sampling(lit: Lit) -> Row:
+def spectral_sampling(lit: SurfaceView) -> Row:
     """On where channels differ."""
     if not lit.layered:
         return Row("spectral-sampling", False, "the diffuse part alone is grey", count=1)
@@ -32,7 +32,7 @@ def spectral_sampling(lit: Lit) -> Row:
     return Row("spectral-sampling", True, f"one wavelength a channel: {listed} nm", count=len(at))
 
 
-def roughness(lit: Lit) -> Row:
+def roughness(lit: SurfaceView) -> Row:
     """On where there is a lobe."""
     if "specular" not in {p.key for p in lit.brdf.parameters}:
         return Row("roughness", False, "the diffuse part alone: no lobe")
@@ -43,23 +43,23 @@ def roughness(lit: Lit) -> Row:
     )
 
 
-def deviation(lit: Lit) -> Row | None:
+def deviation(lit: SurfaceView) -> Row | None:
     """On where the two normals differ, or may; only a model of two boundaries has them."""
     return _of_number(lit, "deviation", "the angle between the two normals", "the boundaries are parallel")
 
 
-def diffuse(lit: Lit) -> Row | None:
+def diffuse(lit: SurfaceView) -> Row | None:
     """On where there is a diffuse part, or may be."""
     return _of_number(lit, "diffuse", "the diffuse part", "there is no diffuse part")
 
 
-def absorption(lit: Lit) -> Row | None:
+def absorption(lit: SurfaceView) -> Row | None:
     """On where the film's extinction is free, or not zero; only microfacets know one."""
     row = _of_number(lit, "k", "the film's extinction", "the film has no extinction")
     return None if row is None else Row("absorption", row.on, row.why)
 
 
-def _of_number(lit: Lit, key: str, what: str, absent: str) -> Row | None:
+def _of_number(lit: SurfaceView, key: str, what: str, absent: str) -> Row | None:
     if key not in {p.key for p in lit.brdf.parameters}:
         return None
     if key not in lit.numbers:
@@ -67,14 +67,14 @@ def _of_number(lit: Lit, key: str, what: str, absent: str) -> Row | None:
     return Row(key, True, f"{what} is {'free' if _free(lit.numbers[key]) else 'not zero'}")
 
 
-def coherence(lit: Lit) -> Row:
+def coherence(lit: SurfaceView) -> Row:
     """On where anything of the layer is seen: what its two faces reflect interferes."""
     if not lit.layered:
         return Row("coherence", False, NO_LAYER)
     return Row("coherence", lit.coherent, "what the layer's two faces reflect interferes")
 
 
-def oblique(lit: Lit) -> Row | None:
+def oblique(lit: SurfaceView) -> Row | None:
     """On where a facet is lit at an angle; only of a film."""
     if lit.brdf.coloured is None:
         return None
@@ -86,7 +86,7 @@ def oblique(lit: Lit) -> Row | None:
     return Row("oblique", True, f"facets are lit at up to {np.rad2deg(steepest):.3g}°")
 
 
-def polarisation(lit: Lit) -> Row | None:
+def polarisation(lit: SurfaceView) -> Row | None:
     """On where s and p differ."""
     row = oblique(lit)
     if row is None or not row.on:
@@ -95,7 +95,7 @@ def polarisation(lit: Lit) -> Row | None:
     return Row("polarisation", lit.polarisation == "unpolarised", "unpolarised light: the mean of s and p")
 
 
-def tunnelling(lit: Lit) -> Row | None:
+def tunnelling(lit: SurfaceView) -> Row | None:
     """Off where no index can fall below n₀ sin θ: then a root needs no branch."""
     if lit.brdf.coloured is None:
         return None
@@ -113,7 +113,7 @@ def tunnelling(lit: Lit) -> Row | None:
     return Row("tunnelling", False, "no real index can fall below n₀ sin θ")
 
 
-def precision(lit: Lit) -> Row:
+def precision(lit: SurfaceView) -> Row:
     """On: only a tolerance says that single precision will do."""
     return Row("precision", True, "double, as far as JAX is set to it")
 
@@ -126,13 +126,13 @@ JUDGES = (
 model cannot have it."""
 
 
-def exact(lit: Lit) -> Plan:
+def exact(lit: SurfaceView) -> Plan:
     """The effects that a surface calls for; one is off only where it is provably absent."""
     rows = [judge(lit) for judge in JUDGES]
     return Plan(tuple(row for row in rows if row is not None), "brdf", lit.polarisation)
 
 
-def largest_angle(lit: Lit) -> float:
+def largest_angle(lit: SurfaceView) -> float:
     """The largest angle (radians) at which a facet that mirrors the light to the eye is lit."""
     with jax.enable_x64(True):
         return float(np.max(np.asarray(angle_to_half(lit.i, lit.o)), initial=0.0))
@@ -161,11 +161,11 @@ class LeftOut:
 
     effect: str
 
-    def __call__(self, lit: Lit) -> Lit:
+    def __call__(self, lit: SurfaceView) -> SurfaceView:
         return _WITHOUT[self.effect](lit)
 
 
-def _roughness(lit: Lit) -> Lit:
+def _roughness(lit: SurfaceView) -> SurfaceView:
     """The diffuse part alone; where that is grey nothing of the layer is left."""
     if lit.model in LAYERED:
         return _dropped(lit, *_LOBES, *_NORMALS)
@@ -173,7 +173,7 @@ def _roughness(lit: Lit) -> Lit:
     return _dropped(lit, *(lit.numbers.keys() - kept))
 
 
-def _spectral_sampling(lit: Lit) -> Lit:
+def _spectral_sampling(lit: SurfaceView) -> SurfaceView:
     """The middle channel for all of them."""
     middle = lit.channels // 2
 
@@ -185,11 +185,11 @@ def _spectral_sampling(lit: Lit) -> Lit:
     return replace(lit, numbers={key: one(number) for key, number in lit.numbers.items()})
 
 
-def _dropped(lit: Lit, *keys: str) -> Lit:
+def _dropped(lit: SurfaceView, *keys: str) -> SurfaceView:
     return replace(lit, numbers={key: x for key, x in lit.numbers.items() if key not in keys})
 
 
-_WITHOUT: dict[str, Callable[[Lit], Lit]] = {
+_WITHOUT: dict[str, Callable[[SurfaceView], SurfaceView]] = {
     "roughness": _roughness,
     "spectral-sampling": _spectral_sampling,
     "coherence": lambda lit: replace(lit, coherent=False),

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pellicle.fitting.spectra.problem import Problem, View, thin
-from pellicle.fitting.spectra.reweighting import Met, Weighed
+from pellicle.fitting.spectra.reweighting import RankedMinima, SpectrumFit
 from pellicle.fitting.spectra.search import SCAN_POINTS, held, quiet, scanned, solver
 
 
@@ -43,7 +43,7 @@ class Valley(NamedTuple):
         return np.sqrt(np.diag(self.covariance))
 
 
-def valley(weighed: Weighed, covariance: np.ndarray) -> Valley:
+def valley(weighed: RankedMinima, covariance: np.ndarray) -> Valley:
     """That of spectra; `covariance` has the problem's nonlinear parameters first."""
     problem, best = _as_in_covariance(weighed), weighed.minima.units[0]
     few = problem._replace(views=tuple(thin(view, SCAN_POINTS) for view in problem.views))
@@ -58,11 +58,11 @@ def valley(weighed: Weighed, covariance: np.ndarray) -> Valley:
     )
 
 
-def _as_in_covariance(weighed: Weighed) -> Problem:
+def _as_in_covariance(weighed: RankedMinima) -> Problem:
     """The problem with each point counting for as much as it does in the covariance."""
     views = zip(weighed.problem.views, weighed.met, strict=True)
     return weighed.problem._replace(views=tuple(_counted(view, met) for view, met in views))
 
 
-def _counted(view: View, met: Met) -> View:
-    return view._replace(data=view.data._replace(temper=np.float64(1 / met.variance)))
+def _counted(view: View, met: SpectrumFit) -> View:
+    return view._replace(data=view.data._replace(independent_fraction=np.float64(1 / met.variance)))

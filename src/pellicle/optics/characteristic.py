@@ -17,7 +17,7 @@ from pellicle.optics.hoisting import hold
 from pellicle.optics.pair import Number, Pair, abs2, imag, real, sqrt, times_i, where
 
 
-class Passage(NamedTuple):
+class Characteristic(NamedTuple):
     """A layer's two functions, both times a scale that cancels in r and in T."""
 
     c: Number  # cos(kq), q = √Q
@@ -27,7 +27,7 @@ class Passage(NamedTuple):
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(2,))
-def through(Q: Number, k: Any, sincos: SinCos = sincos) -> Passage:
+def through(Q: Number, k: Any, sincos: SinCos = sincos) -> Characteristic:
     """c and f times e^{ikq}: c = 1 + M/2 and f = −iM/2q with M = e^{2ikq} − 1.
 
     A real Q may have either sign: negative is a tunnelling layer, and where the wave propagates the
@@ -38,7 +38,7 @@ def through(Q: Number, k: Any, sincos: SinCos = sincos) -> Passage:
     q = root(Q)
     half, scale_square = half_turn(q, k, sincos)
     c, f = 1 + half, times_i(-half) * hold(1 / q, k)
-    return Passage(c, f, scale_square, where(_near(Q, k), c, 1 + 2 * half))
+    return Characteristic(c, f, scale_square, where(_near(Q, k), c, 1 + 2 * half))
 
 
 def root(Q: Number) -> Number:
@@ -64,15 +64,15 @@ def _through_real(Q, k, sincos):
     scale_square, m = exponentials(jnp.where(wave, 0.0, -2 * (k * q)))
     c = jnp.where(wave, cosine, 1 + 0.5 * m)
     f = jnp.where(flat, k, jnp.where(wave, sine, -0.5 * m) * over)
-    return Passage(c, f, scale_square, jnp.where(wave | _near(Q, k), c, scale_square))
+    return Characteristic(c, f, scale_square, jnp.where(wave | _near(Q, k), c, scale_square))
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(2,))
-def through_wave(Q: Number, k: Any, sincos: SinCos = sincos) -> Passage:
+def through_wave(Q: Number, k: Any, sincos: SinCos = sincos) -> Characteristic:
     """The same where Q is real and positive: the wave always propagates."""
     q = jnp.sqrt(Q)
     sine, cosine = sincos(k * hold(q, k))
-    return Passage(cosine, sine * hold(1 / q, k), jnp.ones_like(cosine), cosine)
+    return Characteristic(cosine, sine * hold(1 / q, k), jnp.ones_like(cosine), cosine)
 
 
 def _near(Q, k):
@@ -100,12 +100,12 @@ def slopes(fn, sincos, primal, tangent):
     way, df = Q * dk + 0.5 * k * dQ, rise * dk + slope * dQ
     if fn is through_wave:
         dc = -f * way
-        return out, Passage(dc, df, jnp.zeros_like(scale_square), dc)
+        return out, Characteristic(dc, df, jnp.zeros_like(scale_square), dc)
     held = near | (Q >= 0) if is_real_array(Q) else near
     over = hold(_over_root(Q), k)
     over = where(held, 0.0 * over, over)
     dc, turn = where(held, -f, rise * over) * way, over * way  # the turn is i d(kq)
-    return out, Passage(dc, df, 2 * real(turn) * scale_square, where(held, dc, 2 * rise * turn))
+    return out, Characteristic(dc, df, 2 * real(turn) * scale_square, where(held, dc, 2 * rise * turn))
 
 
 def _over_root(Q: Number) -> Number:

@@ -29,7 +29,7 @@ FWHM = 2.3548200450309493
 """Full width at half maximum of a normal distribution, in standard deviations: 2√(2 ln 2)."""
 
 
-class Bounces(NamedTuple):
+class AirySeries(NamedTuple):
     """What one polarisation's series is made of."""
 
     upper: Number  # r from the ambient at the layer's upper face
@@ -41,7 +41,7 @@ class Bounces(NamedTuple):
 
 def bounces(
     ambient: Any, layer: Number, substrate: Number, phase: Any, angle: Any, polarisation: str
-) -> Bounces:
+) -> AirySeries:
     """Arguments as for `film.film`; `phase` is k₀d = 2πd/λ, so that φ = 2 k₀d q₁."""
     a, q0 = transverse(ambient, angle)
     q1, q2 = normal(layer, a), normal(substrate, a)
@@ -50,7 +50,7 @@ def bounces(
         direct = 4 * abs2(q1) / abs2((q0 + q1) * (q1 + q2))
     else:
         direct = 4 * abs2(e1 * q1) / abs2((e1 * q0 + e0 * q1) * (e2 * q1 + e1 * q2))
-    return Bounces(
+    return AirySeries(
         upper=fresnel(ambient, q0, layer, q1, polarisation),
         lower=fresnel(layer, q1, substrate, q2, polarisation),
         damping=jnp.exp(-2 * phase * imag(q1)),
@@ -59,7 +59,7 @@ def bounces(
     )
 
 
-def reversed_bounces(b: Bounces) -> Bounces:
+def reversed_bounces(b: AirySeries) -> AirySeries:
     """The same layer with the light coming from the substrate."""
     return b._replace(upper=-b.lower, lower=-b.upper)
 
@@ -75,7 +75,7 @@ def _series(first: Number, q: Number, phase, window: Window, count: int, sincos:
     return 2 * total
 
 
-def reflectance(b: Bounces, window: Window, count: int, sincos: SinCos = sincos):
+def reflectance(b: AirySeries, window: Window, count: int, sincos: SinCos = sincos):
     """|r|² with `count` orders through the window."""
     beta = b.lower * b.damping
     into = 1 - b.upper * b.upper
@@ -84,7 +84,7 @@ def reflectance(b: Bounces, window: Window, count: int, sincos: SinCos = sincos)
     return abs2(b.upper) + echo + _series(first, -(b.upper * beta), b.phase, window, count, sincos)
 
 
-def transmittance(b: Bounces, window: Window, count: int, sincos: SinCos = sincos):
+def transmittance(b: AirySeries, window: Window, count: int, sincos: SinCos = sincos):
     """Power into the substrate with `count` orders through the window."""
     q = -(b.upper * b.lower * b.damping)
     return b.direct * b.damping / (1 - abs2(q)) * (1 + _series(q, q, b.phase, window, count, sincos))

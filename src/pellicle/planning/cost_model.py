@@ -54,7 +54,7 @@ class Saving(NamedTuple):
 def work(plan: Plan, scene: Scene) -> Work:
     """The operations of one evaluation of the scene at its start values, as XLA counts them."""
     with jax.enable_x64(True):
-        return counted(build(plan.wordless), insert(sampled(scene), start_values(scene)))
+        return counted(build(plan.static_key), insert(sampled(scene), start_values(scene)))
 
 
 def counted(simulate: Callable[[Any], Any], numbers: Any) -> Work:

@@ -40,12 +40,12 @@ def design(scene: Any) -> np.ndarray:
 
 def signals(plan: Plan, scene: Any, points: np.ndarray, builder: Builder = build) -> np.ndarray:
     """The signal at each of the points, (points, wavelengths), N, C and S of each for ellipsometry."""
-    return np.asarray(_signals(builder, plan.wordless, *_split(scene, points)), dtype=float)
+    return np.asarray(_signals(builder, plan.static_key, *_split(scene, points)), dtype=float)
 
 
 def gradients(plan: Plan, scene: Any, points: np.ndarray, builder: Builder = build) -> np.ndarray:
     """Its derivatives in the free parameters, (points, wavelengths, parameters)."""
-    return np.asarray(_gradients(builder, plan.wordless, *_split(scene, points)), dtype=float)
+    return np.asarray(_gradients(builder, plan.static_key, *_split(scene, points)), dtype=float)
 
 
 def largest_difference(one: np.ndarray, other: np.ndarray, signal: str) -> float:

@@ -29,7 +29,7 @@ from pellicle.planning.tolerance import (
     without,
 )
 from pellicle.scene.free import insert, is_free, start_values
-from pellicle.scene.surface import Lit
+from pellicle.scene.surface import SurfaceView
 from pellicle.simulation.surface import build
 
 FLOOR = 0.01 / math.pi
@@ -39,7 +39,7 @@ NODES = (8, 16, 24, 32, 48, 64, 96, 128)
 """Angles at which a film's colour may be computed, in place of every sample's own."""
 
 
-def plan(lit: Lit, tolerance: float = 0.0, keep: Iterable[str] = ()) -> Plan:
+def plan(lit: SurfaceView, tolerance: float = 0.0, keep: Iterable[str] = ()) -> Plan:
     """The effects to simulate so that the BRDF is within `tolerance`, relative, of the whole truth.
 
     At 0 an effect is left out only where it is provably absent. `keep` names effects that must stay.
@@ -53,7 +53,7 @@ def plan(lit: Lit, tolerance: float = 0.0, keep: Iterable[str] = ()) -> Plan:
         return _economised(lit, tolerance, set(keep))
 
 
-def _economised(lit: Lit, tolerance: float, keep: set[str]) -> Plan:
+def _economised(lit: SurfaceView, tolerance: float, keep: set[str]) -> Plan:
     exactly, points = exact(lit), design(lit)
     see = seeing(lit, points)
     leave_out = [partial(_leave_out, effect) for effect in CAN_BE_LEFT_OUT if effect not in keep]
@@ -63,14 +63,14 @@ def _economised(lit: Lit, tolerance: float, keep: set[str]) -> Plan:
     return replace(stage.plan, rows=stage.rows, tolerance=tolerance, gradient_error=lost)
 
 
-def seeing(lit: Lit, points: np.ndarray) -> See:
+def seeing(lit: SurfaceView, points: np.ndarray) -> See:
     """What a plan of the surface measures at these points, over what is truly there (or `FLOOR`)."""
     truth = signals(exact(lit), lit, points, build)
     scale = np.maximum(np.abs(truth), FLOOR)
     return lambda plan: signals(plan, lit, points, build) / scale
 
 
-def _gradient_error(exactly: Plan, chosen: Plan, lit: Lit, points: np.ndarray) -> float:
+def _gradient_error(exactly: Plan, chosen: Plan, lit: SurfaceView, points: np.ndarray) -> float:
     if not points.shape[1]:
         return 0.0
     some = points[-SLOPE_POINTS:]
@@ -106,18 +106,18 @@ def _by_nodes(stage: Stage) -> Iterator[Step]:
         yield Step(replace(stage.plan, rows=tuple(chosen)), stage.scene, row)
 
 
-def alternatives(effect: str, lit: Lit) -> list[Plan]:
+def alternatives(effect: str, lit: SurfaceView) -> list[Plan]:
     """Plans of the surface without one effect, all else exact; none where it is absent or must stay."""
     return [step.plan for step in _leave_out(effect, Stage(exact(lit), lit, np.zeros(0), {}))]
 
 
-def work(plan: Plan, lit: Lit) -> cost_model.Work:
+def work(plan: Plan, lit: SurfaceView) -> cost_model.Work:
     """The operations of one evaluation along all directions, at the start values."""
     with jax.enable_x64(True):
-        return cost_model.counted(build(plan.wordless), insert(lit, start_values(lit)))
+        return cost_model.counted(build(plan.static_key), insert(lit, start_values(lit)))
 
 
-def savings(lit: Lit, calibration: cost_model.Calibration) -> dict[str, cost_model.Saving]:
+def savings(lit: SurfaceView, calibration: cost_model.Calibration) -> dict[str, cost_model.Saving]:
     """For each effect that could be left out: what that would change and save, all else being exact."""
     with jax.enable_x64(True):
         see = seeing(lit, design(lit))

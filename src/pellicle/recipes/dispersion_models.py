@@ -98,10 +98,10 @@ KNOTS = (300.0, 400.0, 500.0, 650.0, 850.0, 1100.0)
 
 def bare(name: str) -> AbstractDispersion:
     """The model with its parameters free within their default bounds."""
-    free = {key: Free(own.value, own.lower, own.upper) for key, own in MODELS[name].items() if own.free}
+    free = {key: Free(own.lower, own.upper, start=own.value) for key, own in MODELS[name].items() if own.free}
     if name in ("cauchy", "sellmeier"):
         # their bounds are narrow: the middle is as good a start as any
-        free = {key: Free(None, own.lower, own.upper) for key, own in MODELS[name].items() if own.free}
+        free = {key: Free(own.lower, own.upper) for key, own in MODELS[name].items() if own.free}
     return model(name, free)
 
 
@@ -109,7 +109,7 @@ def called(name: str, numbers: list[float], what: str) -> AbstractDispersion:
     """`name(numbers)`: the parameters in their order, fixed; for a spline its knots. Raises UsageError."""
     own = MODELS[name]
     if name in ("spline", "spline-kk"):
-        free = {key: Free(o.value, o.lower, o.upper) for key, o in own.items()}
+        free = {key: Free(o.lower, o.upper, start=o.value) for key, o in own.items()}
         return model(name, {"knots": numbers, **free})
     if not 0 < len(numbers) <= len(own):
         raise UsageError(

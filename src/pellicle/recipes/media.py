@@ -89,7 +89,7 @@ def number(given: Number, what: str, natural: float | None = None) -> float | Fr
     else:
         try:
             prior = None if given.prior is None else given.prior.prior()
-            result = Free(given.value, given.lower, given.upper, prior)
+            result = Free(given.lower, given.upper, start=given.value, prior=prior)
         except ValueError as error:
             raise UsageError(f"{what}: {error}") from None
         lowest = given.lower

@@ -34,15 +34,15 @@ def thickness(text: str) -> Free | float:
     low, high = span(text, "--thickness")
     if low < 0:
         raise UsageError(f"--thickness must not be negative: its lower bound is {low:g} nm")
-    return Free(lower=low, upper=high)
+    return Free(low, high)
 
 
 def free_or_number(text: str, what: str, lower: float, upper: float, start: float) -> Free | float:
     """`free`, `LO:HI` or a number."""
     if text == "free":
-        return Free(start, lower, upper)
+        return Free(lower, upper, start=start)
     if ":" in text:
-        return Free(None, *span(text, what))
+        return Free(*span(text, what))
     return number(text, what)
 
 
@@ -129,10 +129,10 @@ def _free_own(dispersion: AbstractDispersion, name: str, limits: tuple[float, fl
     bounds = limits or default_bounds(place(dispersion, path), leaf)
     if bounds is None:
         raise UsageError(f"--free {name}: give bounds, as in --free {name}=LO:HI")
-    value = leaf.value if is_free(leaf) else leaf
+    value = leaf.start if is_free(leaf) else leaf
     start = value if limits is None and bounds[0] <= value <= bounds[1] and not is_free(leaf) else None
     numbers = [leaf for _, leaf in leaves]
-    numbers[known[name]] = Free(start, *bounds)
+    numbers[known[name]] = Free(*bounds, start=start)
     freed = jax.tree_util.tree_unflatten(structure, numbers)
     return checked(freed, f"--free {name}")
 
@@ -143,12 +143,12 @@ def _free_index(dispersion: AbstractDispersion, name: str, limits: tuple[float, 
             return Constant(dispersion.n, _free_k(dispersion.k or 0.0, limits))
         n = float(dispersion.n)
         low, high = limits or (max(1.0, n - 0.5), max(1.0, n) + 0.5)
-        return Constant(Free(min(max(n, low), high), low, high), dispersion.k)
+        return Constant(Free(low, high, start=min(max(n, low), high)), dispersion.k)
     shifted = dispersion if isinstance(dispersion, Shifted) else Shifted(dispersion)
     if name == "k":
         return Shifted(shifted.base, shifted.n, _free_k(0.0, limits))
     low, high = limits or _room(dispersion)
-    return Shifted(shifted.base, Free(min(max(0.0, low), high), low, high), shifted.k)
+    return Shifted(shifted.base, Free(low, high, start=min(max(0.0, low), high)), shifted.k)
 
 
 def _free_k(value: float, limits: tuple[float, float] | None) -> Free:
@@ -156,7 +156,7 @@ def _free_k(value: float, limits: tuple[float, float] | None) -> Free:
     if low < 0:
         raise UsageError(f"--free k: an extinction coefficient must not be negative, got {low:g}")
     start = value if value > low else low + 0.05 * (high - low)
-    return Free(min(start, high), low, high)
+    return Free(low, high, start=min(start, high))
 
 
 def _room(dispersion: AbstractDispersion) -> tuple[float, float]:

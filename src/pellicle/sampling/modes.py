@@ -10,7 +10,7 @@ import numpy as np
 
 from pellicle.fitting.spectra.covariance import scaled
 from pellicle.fitting.spectra.evaluation import local
-from pellicle.fitting.spectra.reweighting import Weighed
+from pellicle.fitting.spectra.reweighting import RankedMinima
 
 FREEDOM = 5.0
 """Degrees of freedom of the t distributions: their tails are heavier than those of what is sampled."""
@@ -108,13 +108,13 @@ def confined(jacobian: np.ndarray, size: int) -> np.ndarray:
     return np.linalg.inv(jacobian.T @ jacobian + np.diag(uniform))[:size, :size]
 
 
-def modes(weighed: Weighed) -> Modes:
+def modes(weighed: RankedMinima) -> Modes:
     """The minima that a fit of spectra has ranked, each with the covariance of its own Jacobian."""
     minima = weighed.minima
     return mixture(minima.units, minima.evidence, lambda unit: _covariance(weighed, unit))
 
 
-def _covariance(weighed: Weighed, unit: np.ndarray) -> np.ndarray:
+def _covariance(weighed: RankedMinima, unit: np.ndarray) -> np.ndarray:
     """Of the nonlinear parameters, scale and offset integrated out."""
     problem = weighed.problem
     at = [jax.device_get(local(*view.program, unit[list(view.takes)])) for view in problem.views]

@@ -62,34 +62,35 @@ def _positive(sd: float) -> None:
 
 @final
 class Free(eqx.Module):
-    """A parameter to be fitted, standing where its number would.
+    """A parameter to be fitted, placed where its number would stand.
 
-    **Arguments:** `value` to start from (the middle of the bounds if None), `lower` and `upper`
-    bounds, and an optional `prior` (uniform between the bounds if None); all in the parameter's own
-    unit. Raises ValueError where the bounds are reversed, or the value or the prior is outside them.
+    **Arguments:** `lower` and `upper` bounds, `start` value (the middle of the bounds if None) and `prior`
+    (uniform between the bounds if None), all in the parameter's own unit.
+
+    **Raises:** ValueError where bounds are reversed or infinite, or the start or the prior is outside them.
+
+    ```python
+    >>> Free(10, 3000).start
+    1505.0
+
+    ```
     """
 
-    value: float = eqx.field(static=True)
     lower: float = eqx.field(static=True)
     upper: float = eqx.field(static=True)
+    start: float = eqx.field(static=True)
     prior: Prior | None
 
-    def __init__(
-        self,
-        value: float | None = None,
-        lower: float = -math.inf,
-        upper: float = math.inf,
-        prior: Prior | None = None,
-    ):
+    def __init__(self, lower: float, upper: float, *, start: float | None = None, prior: Prior | None = None):
         if not lower < upper:
             raise ValueError(f"bounds are reversed or equal: lower {lower:g} is not below upper {upper:g}")
         if not (math.isfinite(lower) and math.isfinite(upper)):
             raise ValueError("a free parameter needs two finite bounds: give lower and upper")
-        value = 0.5 * (lower + upper) if value is None else value
-        if not lower <= value <= upper:
-            raise ValueError(f"the start value {value:g} is outside its bounds {lower:g} to {upper:g}")
+        start = 0.5 * (lower + upper) if start is None else start
+        if not lower <= start <= upper:
+            raise ValueError(f"the start value {start:g} is outside its bounds {lower:g} to {upper:g}")
         _check_prior(prior, lower, upper)
-        self.value, self.lower, self.upper, self.prior = float(value), float(lower), float(upper), prior
+        self.lower, self.upper, self.start, self.prior = float(lower), float(upper), float(start), prior
 
 
 def _check_prior(prior: Prior | None, lower: float, upper: float) -> None:
@@ -120,5 +121,5 @@ def insert(tree: Any, values: Any) -> Any:
 
 
 def start_values(tree: Any) -> np.ndarray:
-    """The value of each free parameter, shape (parameters,)."""
-    return np.array([free.value for _, free in free_leaves(tree)])
+    """The start value of each free parameter, shape (parameters,)."""
+    return np.array([free.start for _, free in free_leaves(tree)])

@@ -120,7 +120,7 @@ class Interface(eqx.Module):
 def share(thickness: Any, parts: int) -> Any:
     """One of several equal parts of a thickness; a free one keeps its bounds, divided."""
     if isinstance(thickness, Free):
-        return Free(thickness.value / parts, thickness.lower / parts, thickness.upper / parts)
+        return Free(thickness.lower / parts, thickness.upper / parts, start=thickness.start / parts)
     return thickness / parts
 
 

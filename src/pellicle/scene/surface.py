@@ -19,7 +19,7 @@ from pellicle.scene.free import Free
 LETTERS = ("r", "g", "b")
 
 
-class Leaf(NamedTuple):
+class FreeNumber(NamedTuple):
     """One free number: `n_g` of the key `n`, its bounds and how it is searched."""
 
     name: str
@@ -75,18 +75,18 @@ class Surface:
     def channels(self) -> int:
         return len(self.seen_at)
 
-    def leaves(self) -> tuple[Leaf, ...]:
+    def leaves(self) -> tuple[FreeNumber, ...]:
         """Every free number, in the model's order."""
         return tuple(leaf for about in self.brdf.parameters for leaf in self._of(about))
 
-    def _of(self, about: Parameter) -> list[Leaf]:
+    def _of(self, about: Parameter) -> list[FreeNumber]:
         given = self.numbers.get(about.key)
         if not isinstance(given, Free):
             return []
         if not about.per_channel or self.channels == 1:
-            return [Leaf(about.key, about.key, None, given, about)]
+            return [FreeNumber(about.key, about.key, None, given, about)]
         names = LETTERS if self.channels == 3 else [str(c + 1) for c in range(self.channels)]
-        return [Leaf(f"{about.key}_{name}", about.key, c, given, about) for c, name in enumerate(names)]
+        return [FreeNumber(f"{about.key}_{name}", about.key, c, given, about) for c, name in enumerate(names)]
 
     def fixed(self) -> dict[str, np.ndarray]:
         """Every fixed number as an array () or (channels,), and the wavelengths."""
@@ -101,7 +101,7 @@ class Surface:
 
     def start(self) -> dict[str, np.ndarray]:
         """Every number as an array: fixed ones, and where free ones start."""
-        free = {key: np.asarray(x.value) for key, x in self.numbers.items() if isinstance(x, Free)}
+        free = {key: np.asarray(x.start) for key, x in self.numbers.items() if isinstance(x, Free)}
         return self.fixed() | free
 
 
@@ -131,7 +131,7 @@ class HasDirections(Protocol):
 
 
 @final
-class Lit(eqx.Module):
+class SurfaceView(eqx.Module):
     """Numbers of a BRDF's model, some of them `Free`, and unit vectors to light and eye (samples, 3).
 
     What is fixed at zero is not among `numbers`. A number a channel is an array, or a list where it is
@@ -160,7 +160,7 @@ class Lit(eqx.Module):
         return np.shape(self.numbers["wavelengths"])[0]
 
 
-def lit(surface: Surface, looked: HasDirections, most: int = MOST) -> Lit:
+def lit(surface: Surface, looked: HasDirections, most: int = MOST) -> SurfaceView:
     """The surface as seen along at most so many of these directions. UsageError for a black one."""
     numbers = present(surface)
     if not {"specular", "diffuse"} & numbers.keys():
@@ -170,7 +170,7 @@ def lit(surface: Surface, looked: HasDirections, most: int = MOST) -> Lit:
         np.asarray(direction(theta[at], phi[at]))
         for theta, phi in ((looked.theta_i, looked.phi_i), (looked.theta_o, looked.phi_o))
     )
-    return Lit(surface.model, numbers, i, o)
+    return SurfaceView(surface.model, numbers, i, o)
 
 
 def present(surface: Surface) -> dict[str, Any]:

@@ -12,17 +12,17 @@ from pellicle.brdf import film_colour
 from pellicle.brdf.models import Evaluate, model
 from pellicle.effects.plan import Plan
 from pellicle.optics import characteristic
-from pellicle.scene.surface import Lit
+from pellicle.scene.surface import SurfaceView
 
 
 @lru_cache(maxsize=64)
-def build(plan: Plan) -> Callable[[Lit], Any]:
-    """simulate(lit) → the BRDF (samples, channels) in 1/sr, of a `Lit` that holds numbers only.
+def build(plan: Plan) -> Callable[[SurfaceView], Any]:
+    """simulate(lit) → the BRDF (samples, channels) in 1/sr, of a `SurfaceView` that holds numbers only.
 
     The function is pure and can be traced.
     """
 
-    def simulate(lit: Lit) -> Any:
+    def simulate(lit: SurfaceView) -> Any:
         shape = (*lit.i.shape[:-1], lit.channels)
         for leave_out in plan.left_out:
             lit = leave_out(lit)
@@ -34,7 +34,7 @@ def build(plan: Plan) -> Callable[[Lit], Any]:
 
 @lru_cache(maxsize=64)
 def composed(plan: Plan, name: str) -> Evaluate:
-    """The evaluation of the model of that name, as far as a wordless plan calls for it.
+    """The evaluation of the model of that name, as far as a static_key plan calls for it.
 
     It takes numbers as `lit.present` gives them: an effect that has one is absent with it.
     """

@@ -89,7 +89,7 @@ def synthesise(
     fixed = replace(surface, numbers=numbers)
     plan = thrift.plan(lit(fixed, looked), tolerance)
     with jax.enable_x64(True):
-        seen = jax.jit(build(plan.wordless))(lit(fixed, looked, len(looked.theta_i)))
+        seen = jax.jit(build(plan.static_key))(lit(fixed, looked, len(looked.theta_i)))
     clean = np.asarray(seen, dtype=float)
     noisy = clean + np.random.default_rng(seed).normal(0.0, 1.0, clean.shape) * noise
     below = int(np.sum(noisy < 0))

@@ -79,4 +79,4 @@ def _over(scene: Scene, thickness: np.ndarray, angle: np.ndarray, position: int)
 
 def _between(values: np.ndarray) -> Free:
     low, high = float(values[0]), float(values[-1])
-    return Free(lower=low, upper=high if high > low else low + 1e-9)
+    return Free(low, high if high > low else low + 1e-9)

@@ -34,12 +34,12 @@ TRUTH = {
 FREE = Surface(
     "granier-heidrich",
     {
-        "thickness": Free(lower=0, upper=1000),
+        "thickness": Free(0, 1000),
         "n": (1.48, 1.5, 1.53),
-        "exponent_reflection": Free(lower=1, upper=1000),
-        "exponent_transmission": Free(lower=1, upper=1000),
-        "specular": Free(lower=0, upper=100),
-        "diffuse": Free(lower=0, upper=2),
+        "exponent_reflection": Free(1, 1000),
+        "exponent_transmission": Free(1, 1000),
+        "specular": Free(0, 100),
+        "diffuse": Free(0, 2),
     },
 )
 FOUND = ("thickness", "exponent_reflection", "exponent_transmission", "specular", "diffuse")
@@ -121,8 +121,8 @@ def test_a_lambertian_surface_has_no_layer():
 
 def test_one_colour_for_all_directions_decides_nothing():
     """The layered diffuse part has three numbers for a thickness, three indices and a weight."""
-    free = {"thickness": Free(lower=0, upper=1000), "n": Free(lower=1.05, upper=2.5)}
-    surface = Surface("granier-heidrich-diffuse", free | {"diffuse": Free(lower=0, upper=2)})
+    free = {"thickness": Free(0, 1000), "n": Free(1.05, 2.5)}
+    surface = Surface("granier-heidrich-diffuse", free | {"diffuse": Free(0, 2)})
     found = fit_brdf(noisy(np.broadcast_to([0.3, 0.2, 0.25], (200, 3)), seed=1), surface)
     assert found.status is Status.NOT_IDENTIFIABLE
     assert found.verdict.endswith("the thickness has no finite error.")
@@ -179,7 +179,7 @@ def test_a_chain_goes_on_and_belongs_to_its_problem(fitted_before, known, tmp_pa
     assert resumed.checks.steps == 40
     for other, changed in (
         (dataclasses.replace(known.samples, values=1.01 * known.samples.values), {}),
-        (known.samples, {"thickness": Free(lower=0, upper=900)}),
+        (known.samples, {"thickness": Free(0, 900)}),
     ):
         surface = dataclasses.replace(FREE, numbers={**FREE.numbers, **changed})
         with pytest.raises(DataError, match="is the chain of another problem"):
@@ -190,7 +190,7 @@ def test_a_prior_narrows_a_posterior_and_not_the_fit(fitted_before, known):
     """Two independent measurements of one number: their inverse variances add."""
     p = known["specular"]
     prior = pl.Normal(p.value, p.stderr)
-    free = {**FREE.numbers, "specular": Free(lower=0, upper=100, prior=prior)}
+    free = {**FREE.numbers, "specular": Free(0, 100, prior=prior)}
     drawn = pl.sample_brdf(known.samples, dataclasses.replace(FREE, numbers=free))
     assert drawn["specular"].sd == pytest.approx(p.stderr / np.sqrt(2), rel=0.12)
     told = evidence.priors(dataclasses.replace(FREE, numbers=free))
@@ -218,11 +218,11 @@ def test_a_posterior_grants_the_layer_that_the_fit_does_not_see(found, known):
 def test_ptfe_has_no_layer(shared_data, name):
     """Sintered PTFE, measured by NIST: a white diffuser without any film, that interference fits well."""
     ptfe = pl.read_brdf_samples(shared_data / "brdf" / "nist_ptfe_633_532.csv")
-    free = {"thickness": Free(lower=0, upper=1000), "n": Free(lower=1.05, upper=2.5)}
-    free |= {"specular": Free(lower=0, upper=100), "diffuse": Free(lower=0, upper=2)}
+    free = {"thickness": Free(0, 1000), "n": Free(1.05, 2.5)}
+    free |= {"specular": Free(0, 100), "diffuse": Free(0, 2)}
     if name == "granier-heidrich":
-        free |= {f"exponent_{side}": Free(lower=1, upper=1000) for side in ("reflection", "transmission")}
+        free |= {f"exponent_{side}": Free(1, 1000) for side in ("reflection", "transmission")}
     else:
-        free["roughness"] = Free(lower=0.003, upper=1)
+        free["roughness"] = Free(0.003, 1)
     found = fit_brdf(ptfe, Surface(name, free, (633.0, 532.0, 532.0)))
     assert found.verdict.startswith("No evidence of a layer: ")

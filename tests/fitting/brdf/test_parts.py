@@ -25,7 +25,7 @@ from pellicle.scene.surface import Surface
 
 
 def between(lower, upper):
-    return Free(lower=lower, upper=upper)
+    return Free(lower, upper)
 
 
 TILTED = Surface(

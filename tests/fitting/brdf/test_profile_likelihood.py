@@ -32,7 +32,7 @@ TRUTH = {
     "wavelengths": (550.0,),
 }
 BOUNDS = {"exponent_transmission": (1.0, 1000.0), "deviation": (0.0, 20.0), "specular": (0.0, 100.0)}
-FREE = {key: Free(lower=lower, upper=upper) for key, (lower, upper) in BOUNDS.items()}
+FREE = {key: Free(lower, upper) for key, (lower, upper) in BOUNDS.items()}
 HELD = {key: x for key, x in TRUTH.items() if key not in (*FREE, "wavelengths")}
 SIGMA = 0.1
 
@@ -101,7 +101,7 @@ def test_a_limit_is_where_the_profile_has_risen(seen, found, name, side):
 
 TILTED = Surface(
     "granier-heidrich",
-    {"deviation": Free(lower=0, upper=20), "azimuth": Free(lower=-180, upper=180)},
+    {"deviation": Free(0, 20), "azimuth": Free(-180, 180)},
     (550.0,),
 )
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.scene.surface import Leaf
+from pellicle.scene.surface import FreeNumber
 
 _TILT = ("deviation", "azimuth")
 _LEAST = 1e-6
@@ -38,7 +38,7 @@ class Box(NamedTuple):
     reach: Any
 
 
-def coordinates(leaves: tuple[Leaf, ...], in_plane: bool) -> tuple[Coordinates, Box]:
+def coordinates(leaves: tuple[FreeNumber, ...], in_plane: bool) -> tuple[Coordinates, Box]:
     """Coordinates and box of the nonlinear free numbers.
 
     Samples in one plane cannot tell a tilt to one side of it from one to the other: its square is

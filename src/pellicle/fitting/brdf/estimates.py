@@ -17,7 +17,7 @@ from pellicle.fitting.result import Estimate, Rival
 from pellicle.fitting.spectra.covariance import UNSEEN, Scaled, correlation
 from pellicle.fitting.spectra.noise import correlation_length
 from pellicle.fitting.status import RIVAL
-from pellicle.scene.surface import Leaf, Surface
+from pellicle.scene.surface import FreeNumber, Surface
 
 _ON_BOUND = 1e-6
 _MOST_RIVALS, _MOST_LOOKED_AT = 10, 3
@@ -146,7 +146,7 @@ def by_profile(
     return found
 
 
-def _estimate(leaf: Leaf, value: float, limit: Limits, searched: Coordinates) -> Estimate:
+def _estimate(leaf: FreeNumber, value: float, limit: Limits, searched: Coordinates) -> Estimate:
     lower, upper, turns = (
         leaf.free.lower,
         leaf.free.upper,

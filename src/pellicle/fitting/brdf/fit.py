@@ -123,7 +123,7 @@ def _fit(samples: BrdfSamples, surface: Surface, residual: str, progress: Progre
     began = time.perf_counter()
     split, brdf = _split(samples), surface.brdf
     plan = exact(lit(surface, samples, len(samples)))
-    whole = problem(samples, surface, residual, composed(plan.wordless, surface.model))
+    whole = problem(samples, surface, residual, composed(plan.static_key, surface.model))
     flat = whole._replace(form=whole.form._replace(evaluate=brdf.incoherent))
     minima, held_out = _rate(whole, split, THOROUGH, progress)
     baselines = (

@@ -12,7 +12,7 @@ from pellicle.fitting.brdf.coordinates import Box, Coordinates
 from pellicle.fitting.brdf.problem import Problem, chi_squares, polished
 from pellicle.fitting.neighbourhood import Valley
 from pellicle.fitting.spectra.search import held
-from pellicle.scene.surface import Leaf, Surface
+from pellicle.scene.surface import FreeNumber, Surface
 
 NATURAL = frozenset({"k", "base_k", "deviation", "specular", "diffuse"})
 """Their lower bound, 0, is physics'."""
@@ -84,7 +84,7 @@ def valley(
     )
 
 
-def _natural(leaf: Leaf, searched: Coordinates) -> tuple[bool, bool]:
+def _natural(leaf: FreeNumber, searched: Coordinates) -> tuple[bool, bool]:
     """Whether the lower and the upper bound are physics': resting there gives a limit on the other side."""
     if leaf.key == "azimuth" and searched.folded:
         return True, True

@@ -11,7 +11,7 @@ import numpy as np
 
 from pellicle.fitting.spectra.evaluation import Local, local
 from pellicle.fitting.spectra.problem import Problem, View, make
-from pellicle.fitting.spectra.reweighting import Weighed
+from pellicle.fitting.spectra.reweighting import RankedMinima
 from pellicle.fitting.spectra.search import polished, quiet
 from pellicle.fitting.spectra.targets import Measured
 from pellicle.scene.film import Scene
@@ -26,7 +26,7 @@ class Worth(NamedTuple):
     without: float
 
 
-def worth(spectra: Sequence[Measured], weighed: Weighed) -> Worth | None:
+def worth(spectra: Sequence[Measured], weighed: RankedMinima) -> Worth | None:
     """How well substrates as half spaces would fit, from the same minima.
 
     None where no plate has a back face, or where it has free parameters: without it they would have
@@ -50,7 +50,11 @@ def worth(spectra: Sequence[Measured], weighed: Weighed) -> Worth | None:
 def _bare(spectrum: Measured, view: View) -> Measured:
     """The spectrum as it was weighed, of a sample without a back face."""
     sigma = 1 / view.data.weight[: view.points].reshape(view.rows, view.channels)
-    return spectrum._replace(scene=_half_space(spectrum.scene), sigma=sigma, temper=float(view.data.temper))
+    return spectrum._replace(
+        scene=_half_space(spectrum.scene),
+        sigma=sigma,
+        independent_fraction=float(view.data.independent_fraction),
+    )
 
 
 def _half_space(scene: Scene) -> Scene:

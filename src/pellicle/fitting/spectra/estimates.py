@@ -15,7 +15,7 @@ from pellicle.fitting.spectra.covariance import Errors, Linear, linear_coefficie
 from pellicle.fitting.spectra.nuisance import Data
 from pellicle.fitting.spectra.parameters import Parameter, fixed_numbers, thickness_name
 from pellicle.fitting.spectra.problem import Problem, View
-from pellicle.fitting.spectra.reweighting import Met, Weighed
+from pellicle.fitting.spectra.reweighting import RankedMinima, SpectrumFit
 from pellicle.fitting.spectra.targets import Measured, drifts
 from pellicle.materials import materials_in
 from pellicle.scene.free import insert
@@ -32,7 +32,7 @@ On real soap films from 510 to 910 nm this is 330 nm, below which no single spec
 
 
 def estimates(
-    spectra: Sequence[Measured], weighed: Weighed, found: Errors, profile: Profile | None
+    spectra: Sequence[Measured], weighed: RankedMinima, found: Errors, profile: Profile | None
 ) -> dict[str, Estimate]:
     """Every parameter, free ones first, the thickness before all."""
     problem, unit = weighed.problem, weighed.minima.units[0]
@@ -58,14 +58,14 @@ def estimates(
     return {e.name: e for e in [*free, *linear, *fixed]}
 
 
-def _least(spectra: Sequence[Measured], weighed: Weighed) -> float:
+def _least(spectra: Sequence[Measured], weighed: RankedMinima) -> float:
     """The thickness (nm) of the only layer below which drift could imitate it, zero without drift."""
     if not all(drifts(m.scene) and len(m.scene.layers) == 1 for m in spectra):
         return 0.0
     return min(thinnest(view, met) for view, met in zip(weighed.problem.views, weighed.met, strict=True))
 
 
-def thinnest(view: View, met: Met) -> float:
+def thinnest(view: View, met: SpectrumFit) -> float:
     """The thickness (nm) of which the spectrum spans `FEWEST_FRINGES`."""
     keep = slice(view.rows)
     wavelength, n = np.asarray(view.scene.light.wavelength)[keep], np.asarray(met.at.layer)[0, keep]
@@ -90,7 +90,7 @@ def _coefficient(c: Linear, sd: float) -> Estimate:
     return Estimate(c.name, c.value, sd, "", -math.inf, math.inf, True, upper_limit=upper)
 
 
-def rivals(weighed: Weighed) -> tuple[Rival, ...]:
+def rivals(weighed: RankedMinima) -> tuple[Rival, ...]:
     """Every other minimum with its Δχ² on the effective points, best first."""
     problem, minima = weighed.problem, weighed.minima
     above = minima.evidence - minima.evidence[0]
@@ -104,7 +104,7 @@ def rivals(weighed: Weighed) -> tuple[Rival, ...]:
     )
 
 
-def profile(problem: Problem, weighed: Weighed) -> Profile | None:
+def profile(problem: Problem, weighed: RankedMinima) -> Profile | None:
     """The scan against thickness, in χ² on the effective points; `problem` has the scan's weights."""
     scan = weighed.minima.scan
     if scan is None:
@@ -118,10 +118,10 @@ def profile(problem: Problem, weighed: Weighed) -> Profile | None:
 def _reweighed(before: Data, after: Data) -> float:
     # a robust loss lowers the weights of some points
     ratio = np.max(after.weight / np.where(before.weight > 0, before.weight, np.inf))
-    return float(ratio**2 * after.temper / before.temper)
+    return float(ratio**2 * after.independent_fraction / before.independent_fraction)
 
 
-def opaque(spectra: Sequence[Measured], weighed: Weighed) -> frozenset[str]:
+def opaque(spectra: Sequence[Measured], weighed: RankedMinima) -> frozenset[str]:
     """Names of the thicknesses of layers that absorb at the best fit."""
     view, values = weighed.problem.views[0], weighed.problem.box.values(weighed.minima.units[0])
     scene = insert(view.scene, values[list(view.takes)])
@@ -134,7 +134,7 @@ def opaque(spectra: Sequence[Measured], weighed: Weighed) -> frozenset[str]:
     return frozenset(found)
 
 
-def warnings(spectra: Sequence[Measured], weighed: Weighed, unclear: Sequence[str]) -> tuple[str, ...]:
+def warnings(spectra: Sequence[Measured], weighed: RankedMinima, unclear: Sequence[str]) -> tuple[str, ...]:
     """What the reader should know before using the numbers; `unclear` is what the data do not decide."""
     told = [w for m in spectra for material in materials_in(m.scene) for w in material.warnings()]
     for spectrum, view, met in zip(spectra, weighed.problem.views, weighed.met, strict=True):
@@ -143,7 +143,7 @@ def warnings(spectra: Sequence[Measured], weighed: Weighed, unclear: Sequence[st
     return tuple(dict.fromkeys([*told, *unclear]))
 
 
-def _of_view(spectrum: Measured, view: View, met: Met) -> list[str]:
+def _of_view(spectrum: Measured, view: View, met: SpectrumFit) -> list[str]:
     told, scene, length = [], spectrum.scene, met.length
     orders = view.plan.row("orders")
     if orders.on and orders.error_bound > max(1e-4, view.plan.tolerance):

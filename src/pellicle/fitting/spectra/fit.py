@@ -18,7 +18,7 @@ from pellicle.fitting.robust_losses import LEAST_SQUARES, check_loss
 from pellicle.fitting.spectra import backface, estimates, logging, parts, residual_structure
 from pellicle.fitting.spectra.covariance import errors, scaled
 from pellicle.fitting.spectra.problem import Problem, beyond, make
-from pellicle.fitting.spectra.reweighting import Weighed, weigh
+from pellicle.fitting.spectra.reweighting import RankedMinima, weigh
 from pellicle.fitting.spectra.search import Progress, quiet, search
 from pellicle.fitting.spectra.targets import Measured, measured, unscaled
 from pellicle.fitting.status import judge, verdict
@@ -65,7 +65,7 @@ def fitted(
     tolerance: float,
     progress: Progress,
     loss: str = LEAST_SQUARES,
-) -> tuple[Fit, Weighed]:
+) -> tuple[Fit, RankedMinima]:
     """What `fit` returns, and the minima and weights that it rests on, for whoever goes on from there."""
     check_loss(loss)
     with jax.enable_x64(True):
@@ -126,7 +126,7 @@ def _scenes(spectra: list[Spectrum], scene: Scene | Sequence[Scene]) -> list[Sce
 
 def _fit(
     data: list[Spectrum], spectra: list[Measured], tolerance: float, loss: str, progress: Progress
-) -> tuple[Fit, Weighed]:
+) -> tuple[Fit, RankedMinima]:
     began = time.perf_counter()
     problem, warnings = make(*spectra, tolerance=tolerance), []
     logging.of_problem(spectra, problem)
@@ -142,12 +142,12 @@ def _fit(
     return _report(data, spectra, weighed, warnings, began), weighed
 
 
-def _weighed(problem: Problem, loss: str, progress: Progress) -> Weighed:
+def _weighed(problem: Problem, loss: str, progress: Progress) -> RankedMinima:
     return weigh(problem, search(problem, progress), loss)
 
 
 def _report(
-    data: list[Spectrum], spectra: list[Measured], weighed: Weighed, warnings: list[str], began: float
+    data: list[Spectrum], spectra: list[Measured], weighed: RankedMinima, warnings: list[str], began: float
 ) -> Fit:
     problem = weighed.problem
     profile = estimates.profile(problem, weighed)

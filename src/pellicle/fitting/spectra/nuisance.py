@@ -35,7 +35,7 @@ class Data(NamedTuple):
     values: Any
     weight: Any  # 1/σ, 0 for padding
     position: Any  # wavelength mapped to −1..1
-    temper: Any  # effective points per point: correlated errors count less
+    independent_fraction: Any  # effective points per point: correlated errors count less
     level: Any  # median of the values: the size an offset is measured in
     frame: Any = None  # of N, C, S at each point, where Ψ and Δ have errors of their own
 
@@ -60,7 +60,7 @@ def chebyshev(position, degree: int) -> list:
 
 def solve(signal, data: Data, instrument: Instrument) -> Solved:
     """The best scale and offset for a simulated signal, and the evidence left."""
-    weight = data.weight * jnp.sqrt(data.temper)
+    weight = data.weight * jnp.sqrt(data.independent_fraction)
     gains, scale = _split(instrument.scale, lambda drift: _gains(signal, weight, data, drift))
     shifts, offset = _split(instrument.offset, lambda drift: _shifts(data, drift))
     one = jnp.ones_like(signal)

@@ -108,7 +108,7 @@ def _parameter(scene: Scene, path: tuple, free: Free, name: str) -> Parameter:
         name=_full_name(scene, path, found.name, name),
         key=found.key,
         unit=_unit(found),
-        value=free.value,
+        value=free.start,
         lower=free.lower,
         upper=free.upper,
         prior=free.prior,
@@ -157,7 +157,7 @@ def bounds(parameters: tuple[Parameter, ...]) -> tuple[np.ndarray, np.ndarray]:
 
 def anonymous(scene: Scene) -> Scene:
     """The scene without bounds and layers' names: neither may make a new program."""
-    scene = insert(scene, [Free(0.5, 0.0, 1.0)] * len(free_leaves(scene)))
+    scene = insert(scene, [Free(0.0, 1.0, start=0.5)] * len(free_leaves(scene)))
     return eqx.tree_at(lambda s: s.layers, scene, tuple(replace(layer, name=None) for layer in scene.layers))
 
 

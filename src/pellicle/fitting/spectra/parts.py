@@ -11,7 +11,7 @@ from pellicle.fitting.result import Curve, Part
 from pellicle.fitting.spectra import noise
 from pellicle.fitting.spectra.covariance import Errors, layer_errors
 from pellicle.fitting.spectra.problem import View
-from pellicle.fitting.spectra.reweighting import Met, Weighed
+from pellicle.fitting.spectra.reweighting import RankedMinima, SpectrumFit
 from pellicle.fitting.status import MISFIT_CHI2, misfits
 
 FAR = math.sqrt(MISFIT_CHI2)
@@ -19,13 +19,13 @@ FAR = math.sqrt(MISFIT_CHI2)
 neighbouring points differ by serves as the σ that nobody gave, and the bound is that of a known one."""
 
 
-def parts(data: list[Spectrum], weighed: Weighed, found: Errors) -> tuple[Part, ...]:
+def parts(data: list[Spectrum], weighed: RankedMinima, found: Errors) -> tuple[Part, ...]:
     """One part for each spectrum, in their order."""
     views = zip(data, weighed.problem.views, weighed.met, strict=True)
     return tuple(_part(spectrum, view, met, found) for spectrum, view, met in views)
 
 
-def _part(spectrum: Spectrum, view: View, met: Met, found: Errors) -> Part:
+def _part(spectrum: Spectrum, view: View, met: SpectrumFit, found: Errors) -> Part:
     return Part(
         name=view.name,
         spectrum=spectrum,
@@ -49,14 +49,14 @@ def together(found: tuple[Part, ...]) -> float | None:
     return math.sqrt(np.average([part.rms**2 for part in found], weights=sizes))
 
 
-def missed(found: tuple[Part, ...], weighed: Weighed) -> tuple[Part, ...]:
+def missed(found: tuple[Part, ...], weighed: RankedMinima) -> tuple[Part, ...]:
     """The spectra that the scene does not explain."""
     views = zip(found, weighed.problem.views, weighed.met, strict=True)
     several = len(found) > 1
     return tuple(part for part, view, met in views if _misses(part, view, met, several))
 
 
-def _misses(part: Part, view: View, met: Met, several: bool) -> bool:
+def _misses(part: Part, view: View, met: SpectrumFit, several: bool) -> bool:
     values = view.in_columns(view.data.values)
     rms = part.rms if view.channels == 1 else math.radians(2 * part.rms)
     floor = np.sqrt(np.mean([np.median(noise.local_noise(column)) ** 2 for column in values.T]))
@@ -73,7 +73,7 @@ def _misses(part: Part, view: View, met: Met, several: bool) -> bool:
     )
 
 
-def _curve(view: View, met: Met, found: Errors) -> Curve:
+def _curve(view: View, met: SpectrumFit, found: Errors) -> Curve:
     """Data, model and the layer's index with errors, at the real points."""
     at, rows, held = met.at, view.rows, list(view.takes)
     n_stderr, k_stderr = layer_errors(at, found.covariance[np.ix_(held, held)], rows)

@@ -104,7 +104,7 @@ class View(NamedTuple):
     @property
     def program(self) -> tuple[Any, ...]:
         """The arguments that the compiled functions take, the plan first (static)."""
-        return self.plan.wordless, self.scene, self.data, self.box
+        return self.plan.static_key, self.scene, self.data, self.box
 
 
 class Problem(NamedTuple):
@@ -128,7 +128,7 @@ class Problem(NamedTuple):
     @property
     def program(self) -> tuple[Any, ...]:
         """The arguments of `polish`, what is static first."""
-        looks = tuple((v.plan.wordless, v.takes) for v in self.views)
+        looks = tuple((v.plan.static_key, v.takes) for v in self.views)
         return looks, tuple(v.scene for v in self.views), tuple(v.data for v in self.views), self.box
 
 
@@ -163,7 +163,7 @@ def _view(spectrum: Measured, box: Box, takes: tuple[int, ...], tolerance: float
         values=values.reshape(-1),
         weight=weight.reshape(-1),
         position=np.repeat(2 * (wavelength - wavelength.min()) / span - 1, channels),
-        temper=np.float64(spectrum.temper),
+        independent_fraction=np.float64(spectrum.independent_fraction),
         level=np.float64(max(float(np.median(np.abs(values[:points]))), 1e-12)),
         frame=None if spectrum.frame is None else _pad(spectrum.frame, extra),
     )
@@ -217,5 +217,5 @@ def thin(view: View, most: int) -> View:
 
     scene, data = jax.tree_util.tree_map(pick, (view.scene, view.data))
     real = np.repeat(np.concatenate([np.ones(len(kept)), np.zeros(padding)]), channels)
-    data = data._replace(weight=data.weight * real, temper=data.temper * stride)
+    data = data._replace(weight=data.weight * real, independent_fraction=data.independent_fraction * stride)
     return view._replace(scene=scene, data=data, points=len(kept) * channels)

@@ -24,7 +24,7 @@ _ROUNDS, _ROBUST_ROUNDS = 3, 12
 
 
 @dataclass(frozen=True)
-class Met:
+class SpectrumFit:
     """How the best minimum meets one view.
 
     `at` is the model there; `variance` multiplies the σ² of the weights in the covariance; `length` is
@@ -41,12 +41,12 @@ class Met:
 
 
 @dataclass(frozen=True)
-class Weighed:
+class RankedMinima:
     """Minima ranked on the effective points; `problem` carries the weights that the ranking used."""
 
     problem: Problem
     minima: Minima
-    met: tuple[Met, ...]
+    met: tuple[SpectrumFit, ...]
 
     @property
     def chi2_reduced(self) -> float:
@@ -70,7 +70,7 @@ class _Residual(NamedTuple):
         return max(self.chi2 / self.freedom, 1e-12)
 
 
-def weigh(problem: Problem, minima: Minima, loss: str = LEAST_SQUARES) -> Weighed:
+def weigh(problem: Problem, minima: Minima, loss: str = LEAST_SQUARES) -> RankedMinima:
     """Estimate σ and the effective points of each view from the best fit's residuals, and rank again.
 
     A given σ stays. An unknown one becomes the rms of the residuals. Where scale and offset drift,
@@ -94,7 +94,7 @@ def weigh(problem: Problem, minima: Minima, loss: str = LEAST_SQUARES) -> Weighe
     ranked = _reweighted(problem, found)
     logging.of_weights(ranked.views, [r.length for r in found])
     met = tuple(_met(view, minima.units[0], r) for view, r in zip(ranked.views, found, strict=True))
-    return Weighed(ranked, minima, met)
+    return RankedMinima(ranked, minima, met)
 
 
 def _typical(problem: Problem, minima: Minima, loss: Loss) -> np.ndarray:
@@ -115,13 +115,13 @@ def _left(view: View, at: Local) -> np.ndarray:
     return ((view.data.values - np.asarray(at.model)) * view.data.weight)[: view.points]
 
 
-def _met(view: View, unit: np.ndarray, found: _Residual) -> Met:
+def _met(view: View, unit: np.ndarray, found: _Residual) -> SpectrumFit:
     at = _around(view, unit)
     chi2 = found.chi2 if view.noise.given or view.noise.drifting else found.freedom
     # the ranked weights hold the rms already, so only the correlation is left to count
     variance = 1.0 if view.noise.given else found.length * (found.reduced if view.noise.drifting else 1.0)
     outliers = int(np.sum(np.square(found.factor) < 0.5))
-    return Met(at, variance * found.inflation, found.length, chi2, found.freedom, outliers)
+    return SpectrumFit(at, variance * found.inflation, found.length, chi2, found.freedom, outliers)
 
 
 def _residuals(problem: Problem, unit: np.ndarray, loss: Loss | None) -> list[_Residual]:
@@ -177,5 +177,5 @@ def _weighted(view: View, found: _Residual) -> View:
     least = noise.DRIFT_CORRELATION if view.noise.drifting else 1.0
     weight = view.data.weight * _rescale(view, found) * found.factor
     return view._replace(
-        data=view.data._replace(weight=weight, temper=np.float64(1 / max(found.length, least)))
+        data=view.data._replace(weight=weight, independent_fraction=np.float64(1 / max(found.length, least)))
     )

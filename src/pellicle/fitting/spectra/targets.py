@@ -27,15 +27,16 @@ class Measured(NamedTuple):
 
     `values` are fractions (points,), or N, C, S (points, 3) for ellipsometry, which have no wrap-around,
     or N and C alone (points, 2) where Δ is folded;
-    `wavelength` (nm) is (points,), `sigma` too or the shape of `values`; `temper` is how many independent
-    points each counts for. With a `frame` (points, 3, 3) the values are those of N, C, S in it.
+    `wavelength` (nm) is (points,), `sigma` too or the shape of `values`; `independent_fraction` is
+    how many independent points each counts for. With a `frame` (points, 3, 3) the values are those of
+    N, C, S in it.
     """
 
     scene: Scene
     wavelength: np.ndarray
     values: np.ndarray
     sigma: np.ndarray
-    temper: float = 1.0
+    independent_fraction: float = 1.0
     noise: Noise = Noise()
     name: str = ""  # that of one among several
     frame: np.ndarray | None = None
@@ -46,12 +47,12 @@ def measured(data: Spectrum, scene: Scene, name: str = "") -> Measured:
     scene = seen_as(scene, data)
     _check(data, scene)
     source = Noise(data.sigma is not None, data.sigma is None and drifts(scene))
-    temper = 1 / noise.DRIFT_CORRELATION if source.drifting else 1.0
+    independent_fraction = 1 / noise.DRIFT_CORRELATION if source.drifting else 1.0
     values, sigma, frame = _values(data), _sigma(data, source), None
     if data.delta is not None and data.sigma is not None and not data.folded:
         frame = _frame(data)
         values = np.einsum("pij,pj->pi", frame, values)
-    return Measured(scene, data.wavelength, values, sigma, temper, source, name, frame)
+    return Measured(scene, data.wavelength, values, sigma, independent_fraction, source, name, frame)
 
 
 def seen_as(scene: Scene, data: Spectrum) -> Scene:
