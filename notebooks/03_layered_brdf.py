@@ -24,7 +24,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import pellicle as pl
-from pellicle.report.colour_figures import shown
+from pellicle.reporting.colour_figures import shown
 from pellicle.synthetic.sphere import in_plane, render
 
 jax.config.update("jax_enable_x64", True)  # JAX counts in single precision unless told

@@ -25,7 +25,7 @@ import numpy as np
 
 import pellicle as pl
 from pellicle.colour import delta_e2000, film_colour, lab
-from pellicle.report.colour_figures import shown
+from pellicle.reporting.colour_figures import shown
 from pellicle.synthetic.sphere import render
 
 jax.config.update("jax_enable_x64", True)  # JAX counts in single precision unless told

@@ -20,7 +20,7 @@ from typing import Any
 
 from pellicle.cli.fit import fit
 from pellicle.files import replacing, write_text
-from pellicle.report.json_record import indented
+from pellicle.reporting.json_record import indented
 
 FITS = Path(__file__).resolve().parents[1] / "fits"
 KEPT = ("result.json", "report.txt", "figure.png")

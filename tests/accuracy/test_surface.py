@@ -12,8 +12,8 @@ from pellicle.accuracy import colour_methods
 from pellicle.accuracy.measure import Ladder, MethodResult
 from pellicle.accuracy.surface import COLOURS, VALUES, SurfaceCost, coloured, drawn
 from pellicle.colour import delta_e2000, lab, sensor
-from pellicle.report.cost import surface_text
-from pellicle.report.cost_files import surface_to_json
+from pellicle.reporting.cost import surface_text
+from pellicle.reporting.cost_files import surface_to_json
 from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface, lit
 from pellicle.synthetic.brdf import default_directions

@@ -6,7 +6,7 @@ import pytest
 import pellicle as pl
 from pellicle.brdf.directions import direction
 from pellicle.errors import UsageError
-from pellicle.report.colour_figures import shown, sphere
+from pellicle.reporting.colour_figures import shown, sphere
 from pellicle.synthetic.sphere import in_plane, numbers, render
 
 STEEL = {"n": 2.9, "base_n": 2.7, "base_k": 2.8, "roughness": 0.3, "diffuse": 0.0}

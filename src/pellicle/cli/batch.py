@@ -41,7 +41,7 @@ class Sampler(NamedTuple):
 
     def settings(self, folder: Path | None) -> dict[str, Any]:
         """What the library takes, for a chain that is kept in `folder`."""
-        from pellicle.report.posterior_files import chain_in
+        from pellicle.reporting.posterior_files import chain_in
         from pellicle.sampling.ensemble import STEPS
 
         chain = None if folder is None else chain_in(folder)
@@ -64,7 +64,7 @@ class Batch:
 
     def __call__(self, groups: list[list[Look]]) -> int:
         from pellicle.files import new_folder
-        from pellicle.report.folders import several, write_summary
+        from pellicle.reporting.folders import several, write_summary
 
         if self.sampler is not None and any(
             looks[0].reading.loss not in (None, "least-squares") for looks in groups
@@ -88,7 +88,7 @@ class Batch:
         return worst
 
     def _one(self, looks: list[Look], folder: Path | None) -> int:
-        from pellicle.report.folders import failure
+        from pellicle.reporting.folders import failure
 
         paths = [look.path for look in looks]
         label = ", ".join(paths)
@@ -111,7 +111,7 @@ class Batch:
         return 0 if found.status == "converged" else 4
 
     def _show(self, found: Fit, posterior: Posterior | None, folder: Path | None) -> None:
-        from pellicle.report.posterior_files import record, text, write
+        from pellicle.reporting.posterior_files import record, text, write
 
         written = json_module.dumps(record(found, posterior), allow_nan=False) if self.as_json else None
         print(written or text(found, posterior), flush=True)

@@ -46,7 +46,7 @@ def chart(
     angles = _range("--angle", angle, 90.0)
     nm = _bounds(scene, layer) if thickness is None else _range("--thickness", thickness, inf)
     start()
-    from pellicle.report import colour_figures
+    from pellicle.reporting import colour_figures
 
     lost = colour_figures.chart(
         scene, out, nm, angles, layer, observer=observer, illuminant=illuminant, title=Path(recipe).stem
@@ -64,7 +64,7 @@ def _surface(recipe: str, out: str, light: float) -> int:
         raise UsageError(f"--light must lie in 0 to 180 degrees, got {light:g}")
     surface = read_surface_recipe(recipe).surface
     start()
-    from pellicle.report.colour_figures import sphere
+    from pellicle.reporting.colour_figures import sphere
 
     sphere(surface, out, (light, 60.0), title=Path(recipe).stem)
     say(f"{out}: a sphere of {surface.model}, the light {light:g} degrees from the line of sight")

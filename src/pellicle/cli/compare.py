@@ -76,7 +76,7 @@ def _names(recipes: list[str]) -> list[str]:
 
 def _one(label: str, looks: dict[str, list[Look]], folder: Path | None, as_json: bool) -> int:
     from pellicle.fitting.spectra.compare import compared
-    from pellicle.report.comparison import failure, report, to_json, write_comparison
+    from pellicle.reporting.comparison import failure, report, to_json, write_comparison
 
     progress, first = Progress(label), next(iter(looks))
     try:

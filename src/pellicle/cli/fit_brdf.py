@@ -81,7 +81,7 @@ def _each(
     recipe: SurfaceRecipe, files: list[str], out: str | None, as_json: bool, sampler: Sampler | None
 ) -> int:
     from pellicle.files import new_folder
-    from pellicle.report.folders import several, write_summary
+    from pellicle.reporting.folders import several, write_summary
 
     folders: list[Path | None] = [None] * len(files)
     if out is not None:
@@ -106,8 +106,8 @@ def _each(
 def _one(
     recipe: SurfaceRecipe, path: str, folder: Path | None, as_json: bool, sampler: Sampler | None
 ) -> tuple[dict[str, Any], int]:
-    from pellicle.report.folders import failure, one_line
-    from pellicle.report.posterior_files import record, text, write
+    from pellicle.reporting.folders import failure, one_line
+    from pellicle.reporting.posterior_files import record, text, write
 
     progress = Progress(path)
     try:

@@ -20,7 +20,7 @@ def materials(
     """
     from pellicle.errors import UsageError
     from pellicle.materials import UnknownMaterial
-    from pellicle.report import materials as catalogue
+    from pellicle.reporting import materials as catalogue
 
     if name is None:
         if out is not None:

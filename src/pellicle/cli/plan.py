@@ -39,7 +39,7 @@ def plan(
     start()
     from pellicle.fitting.spectra import logging
     from pellicle.planning import cost_model, film
-    from pellicle.report import plans
+    from pellicle.reporting import plans
 
     logging.of_scene(scene)
     chosen, calibration = film.plan(scene, tolerance), cost_model.calibrated(cache_folder())

@@ -66,7 +66,7 @@ def plan_surface(recipe: str, tolerance: float, as_json: bool) -> int:
     start()
     from pellicle.effects.surface import exact
     from pellicle.planning import cost_model, surface
-    from pellicle.report import plans
+    from pellicle.reporting import plans
     from pellicle.scene.surface import lit
 
     seen = lit(found.surface, looked)
@@ -91,8 +91,8 @@ def cost_surface(recipe: str, tolerance: float | None, out: str | None, as_json:
         new_folder(out)  # refuses a stranger's folder before the work, not after
     start(keep=False)
     from pellicle.accuracy.surface import cost
-    from pellicle.report.cost import surface_text
-    from pellicle.report.cost_files import surface_to_json, write_surface_cost
+    from pellicle.reporting.cost import surface_text
+    from pellicle.reporting.cost_files import surface_to_json, write_surface_cost
     from pellicle.scene.surface import lit
 
     progress = Progress(recipe)

@@ -134,7 +134,7 @@ class Fit:
     """The outcome of fitting a spectrum, or several of one sample together: `parts`.
 
     `rms` is None where the spectra have no unit in common.
-    `print(fit)` gives the verdict and the parameters; `pellicle.report.fit_text.report(fit)` everything.
+    `print(fit)` gives the verdict and the parameters; `pellicle.reporting.fit_text.report(fit)` everything.
     """
 
     parts: tuple[Part, ...]

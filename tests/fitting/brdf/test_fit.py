@@ -16,7 +16,7 @@ from pellicle.fitting.brdf import evidence
 from pellicle.fitting.brdf.fit import fit_brdf, fitted
 from pellicle.fitting.result import Status
 from pellicle.fitting.spectra.search import quiet
-from pellicle.report.json_record import brdf_to_json
+from pellicle.reporting.json_record import brdf_to_json
 from pellicle.sampling import brdf
 from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface

@@ -11,7 +11,7 @@ from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.effects.surface import exact
 from pellicle.fitting.brdf.result import BrdfFit
 from pellicle.fitting.result import Status
-from pellicle.report.brdf_figure import draw, half_angle
+from pellicle.reporting.brdf_figure import draw, half_angle
 from pellicle.scene.surface import Surface, lit
 
 

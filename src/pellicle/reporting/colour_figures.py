@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pellicle.errors import UsageError
-from pellicle.report.drawing import blank, saved
+from pellicle.reporting.drawing import blank, saved
 from pellicle.scene.film import Scene
 from pellicle.synthetic.colours import interference_colours
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from pellicle.fitting.brdf.result import BrdfFit
-from pellicle.report import fit_text
-from pellicle.report.plain_text import block, facts, wrapped
+from pellicle.reporting import fit_text
+from pellicle.reporting.plain_text import block, facts, wrapped
 
 _COMPARED = {
     "linear": "ρ",

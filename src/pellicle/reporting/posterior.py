@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pellicle.report.drawing import BLACK, BLUE, ORANGE, blank, marker_size, saved
-from pellicle.report.plain_text import block, table, wrapped
+from pellicle.reporting.drawing import BLACK, BLUE, ORANGE, blank, marker_size, saved
+from pellicle.reporting.plain_text import block, table, wrapped
 from pellicle.sampling.predict import Prediction
 from pellicle.sampling.result import Marginal, Posterior, verdict
 

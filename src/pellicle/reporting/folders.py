@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pellicle.files import MARKER, new_folder, write_text
-from pellicle.report.csv_tables import fit_csv as fit_csv
-from pellicle.report.csv_tables import nk_csv as nk_csv
-from pellicle.report.json_record import failure as failure
-from pellicle.report.json_record import indented, versions
-from pellicle.report.json_record import one_line as one_line
-from pellicle.report.json_record import to_json as to_json
+from pellicle.reporting.csv_tables import fit_csv as fit_csv
+from pellicle.reporting.csv_tables import nk_csv as nk_csv
+from pellicle.reporting.json_record import failure as failure
+from pellicle.reporting.json_record import indented, versions
+from pellicle.reporting.json_record import one_line as one_line
+from pellicle.reporting.json_record import to_json as to_json
 
 if TYPE_CHECKING:
     from pellicle.fitting.result import Fit
@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pellicle.data.tabular.columns import DIRECTIONS
-from pellicle.report.json_record import brdf_to_json as brdf_to_json
+from pellicle.reporting.json_record import brdf_to_json as brdf_to_json
 
 if TYPE_CHECKING:
     from pellicle.fitting.brdf.result import BrdfFit
@@ -43,7 +43,7 @@ def write_fit(folder: str | os.PathLike[str], fit: Fit, figure: bool = True) -> 
     its figure goes if none is asked for: it would show another fit. Returns the folder; raises
     UsageError where it holds anything that pellicle did not write, or cannot be written.
     """
-    from pellicle.report.fit_text import report
+    from pellicle.reporting.fit_text import report
 
     target = new_folder(folder)
     write_text(target / MARKER, indented(to_json(fit)), overwrite=True)  # first: it marks the folder as ours
@@ -51,7 +51,7 @@ def write_fit(folder: str | os.PathLike[str], fit: Fit, figure: bool = True) -> 
     write_text(target / "fit.csv", fit_csv(fit), overwrite=True)
     write_text(target / "nk.csv", nk_csv(fit), overwrite=True)
     if figure:
-        from pellicle.report.fit_figure import figure as draw  # matplotlib only if a figure is asked for
+        from pellicle.reporting.fit_figure import figure as draw  # matplotlib only if a figure is asked for
 
         draw(fit, target / FIGURE, overwrite=True)
     else:
@@ -126,8 +126,8 @@ def write_brdf_fit(folder: str | os.PathLike[str], fit: BrdfFit) -> Path:
 
     Raises UsageError where it holds anything that pellicle did not write, or cannot be written.
     """
-    from pellicle.report.brdf import brdf_report
-    from pellicle.report.brdf_figure import brdf_figure
+    from pellicle.reporting.brdf import brdf_report
+    from pellicle.reporting.brdf_figure import brdf_figure
 
     target = new_folder(folder)
     write_text(target / MARKER, indented(brdf_to_json(fit)), overwrite=True)

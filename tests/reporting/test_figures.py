@@ -10,7 +10,7 @@ import pytest
 
 from pellicle.errors import UsageError
 from pellicle.fitting.result import Profile
-from pellicle.report.fit_figure import draw, figure
+from pellicle.reporting.fit_figure import draw, figure
 
 
 def labels(drawn) -> list[str]:
@@ -129,7 +129,7 @@ def test_odd_fits_are_drawn_too(fit, with_part, tmp_path):
 
 def test_matplotlib_waits_until_a_figure_is_drawn():
     code = (
-        "import sys, pellicle.report.fit_figure, pellicle.report.fit_text, pellicle.report.folders;"
+        "import sys, pellicle.reporting.fit_figure, pellicle.reporting.fit_text, pellicle.reporting.folders;"
         "sys.exit('matplotlib' in sys.modules)"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

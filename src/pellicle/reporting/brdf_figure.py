@@ -10,7 +10,7 @@ import numpy as np
 
 from pellicle.data.half_angles import vectors
 from pellicle.fitting.brdf.result import BrdfFit
-from pellicle.report.drawing import BLACK, BLUE, GREEN, GREY, ORANGE, blank, marker_size, saved
+from pellicle.reporting.drawing import BLACK, BLUE, GREEN, GREY, ORANGE, blank, marker_size, saved
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

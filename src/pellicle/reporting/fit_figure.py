@@ -12,8 +12,8 @@ import numpy as np
 
 from pellicle.fitting.result import Fit, Profile
 from pellicle.fitting.status import RIVAL
-from pellicle.report import psi_delta
-from pellicle.report.drawing import BLACK, BLUE, FITTED, GAP, GREY, ORANGE, blank, marker_size, saved
+from pellicle.reporting import psi_delta
+from pellicle.reporting.drawing import BLACK, BLUE, FITTED, GAP, GREY, ORANGE, blank, marker_size, saved
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pellicle.fitting.result import Fit
-from pellicle.report.drawing import BLACK, BLUE, FITTED, GAP, GREEN, GREY, ORANGE, marker_size
+from pellicle.reporting.drawing import BLACK, BLUE, FITTED, GAP, GREEN, GREY, ORANGE, marker_size
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

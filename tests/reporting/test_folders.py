@@ -17,7 +17,7 @@ from pellicle.effects.plan import Plan, Row
 from pellicle.errors import UsageError
 from pellicle.fitting.result import Curve, Estimate, Fit, Part, Profile, Rival, Status
 from pellicle.materials import lookup
-from pellicle.report.folders import (
+from pellicle.reporting.folders import (
     failure,
     fit_csv,
     nk_csv,
@@ -181,7 +181,7 @@ def test_a_folder_of_the_users_stays_as_it_is(fit, tmp_path, name):
 
 def test_a_plain_fit_imports_no_matplotlib_and_a_record_no_jax():
     heavy = "{'jax', 'matplotlib', 'pandas'}"
-    code = f"import sys, pellicle.report.folders; sys.exit(bool({heavy} & {{*sys.modules}}))"
+    code = f"import sys, pellicle.reporting.folders; sys.exit(bool({heavy} & {{*sys.modules}}))"
     subprocess.run([sys.executable, "-c", code], check=True)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from pellicle.errors import UsageError
 from pellicle.materials import Material, contents, lookup
-from pellicle.report.drawing import blank, saved
+from pellicle.reporting.drawing import blank, saved
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

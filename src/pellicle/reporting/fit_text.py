@@ -10,7 +10,7 @@ import numpy as np
 
 from pellicle.fitting.result import Estimate, Fit, Part, Rival, Status
 from pellicle.fitting.status import RIVAL, describe
-from pellicle.report.plain_text import COLUMNS, INDENT, block, facts, table, wrapped
+from pellicle.reporting.plain_text import COLUMNS, INDENT, block, facts, table, wrapped
 
 if TYPE_CHECKING:
     from pellicle.effects.plan import Plan

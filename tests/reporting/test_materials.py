@@ -7,7 +7,7 @@ import pytest
 
 from pellicle.errors import UsageError
 from pellicle.materials import UnknownMaterial, names, pages
-from pellicle.report.materials import describe, figure, table
+from pellicle.reporting.materials import describe, figure, table
 
 
 def test_the_table_lists_every_name_and_every_page():
@@ -74,7 +74,7 @@ def test_a_failed_figure_leaves_nothing(tmp_path, monkeypatch):
 
 def test_text_needs_no_plotting_library():
     program = (
-        "import sys; from pellicle.report.materials import table, describe; table(); describe('HfO2');"
+        "import sys; from pellicle.reporting.materials import table, describe; table(); describe('HfO2');"
         "print('matplotlib' in sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)

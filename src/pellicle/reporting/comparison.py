@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 from pellicle.files import MARKER, new_folder, write_text
 from pellicle.fitting.spectra.compare import Candidate, Comparison
 from pellicle.fitting.status import describe
-from pellicle.report.json_record import indented, versions
-from pellicle.report.json_record import to_json as fit_to_json
-from pellicle.report.plain_text import INDENT, block, table, wrapped
+from pellicle.reporting.json_record import indented, versions
+from pellicle.reporting.json_record import to_json as fit_to_json
+from pellicle.reporting.plain_text import INDENT, block, table, wrapped
 
 if TYPE_CHECKING:
     from pellicle.fitting.spectra.compare import Candidate, Comparison
@@ -91,8 +91,8 @@ def write_comparison(folder: str | os.PathLike[str], found: Comparison) -> Path:
 
     Returns the folder. Raises UsageError as `write_fit` does.
     """
-    from pellicle.report.comparison import report
-    from pellicle.report.folders import several, write_fit
+    from pellicle.reporting.comparison import report
+    from pellicle.reporting.folders import several, write_fit
 
     target = new_folder(folder)
     folders = several(target, [c.name for c in found.candidates])

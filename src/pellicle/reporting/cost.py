@@ -11,7 +11,7 @@ from pellicle.accuracy.interval_coverage import Intervals
 from pellicle.accuracy.measure import Ladder
 from pellicle.accuracy.solver_comparison import Race
 from pellicle.accuracy.surface import SurfaceCost
-from pellicle.report.plain_text import COLUMNS
+from pellicle.reporting.plain_text import COLUMNS
 
 
 def text(cost: Cost, name: str) -> str:

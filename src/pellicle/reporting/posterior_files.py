@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from pellicle.files import MARKER, new_folder, replacing, write_text
-from pellicle.report.folders import write_brdf_fit, write_fit
-from pellicle.report.json_record import brdf_to_json, indented, number, one_line, to_json, versions
+from pellicle.reporting.folders import write_brdf_fit, write_fit
+from pellicle.reporting.json_record import brdf_to_json, indented, number, one_line, to_json, versions
 
 if TYPE_CHECKING:
     from pellicle.fitting.brdf.result import BrdfFit
@@ -50,10 +50,10 @@ def _ways(fit: Fit | BrdfFit) -> _Ways:
     from pellicle.fitting.brdf.result import BrdfFit
 
     if isinstance(fit, BrdfFit):
-        from pellicle.report.brdf import brdf_report
+        from pellicle.reporting.brdf import brdf_report
 
         return _Ways(brdf_to_json, brdf_report, write_brdf_fit)
-    from pellicle.report.fit_text import report
+    from pellicle.reporting.fit_text import report
 
     return _Ways(to_json, report, write_fit)
 
@@ -98,7 +98,7 @@ def text(fit: Fit | BrdfFit, posterior: Posterior | None) -> str:
     """The report of a fit, with its posterior's under it."""
     if posterior is None:
         return _ways(fit).report(fit)
-    from pellicle.report.posterior import posterior_report
+    from pellicle.reporting.posterior import posterior_report
 
     return _ways(fit).report(fit) + posterior_report(posterior)
 
@@ -113,7 +113,7 @@ def write_posterior(folder: str | os.PathLike[str], posterior: Posterior) -> Pat
 
     result.json and report.txt hold the posterior too. Raises UsageError as `write_fit` does.
     """
-    from pellicle.report.posterior import corner_figure, predictive_figure
+    from pellicle.reporting.posterior import corner_figure, predictive_figure
 
     target = _ways(posterior.fit).write(folder, posterior.fit)
     predicted = posterior.predictions()

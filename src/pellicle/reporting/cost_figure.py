@@ -11,8 +11,8 @@ import numpy as np
 from pellicle.accuracy.cost import Cost
 from pellicle.accuracy.measure import Ladder
 from pellicle.accuracy.surface import SurfaceCost
-from pellicle.report.cost import clock_of, error_of
-from pellicle.report.drawing import BLUE, GREY, ORANGE, blank, saved
+from pellicle.reporting.cost import clock_of, error_of
+from pellicle.reporting.drawing import BLUE, GREY, ORANGE, blank, saved
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

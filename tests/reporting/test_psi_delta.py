@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 
 from pellicle.data.read_spectrum import read_spectrum
-from pellicle.report.fit_figure import draw, figure
-from pellicle.report.fit_text import report, summary_line
-from pellicle.report.folders import fit_csv, to_json
+from pellicle.reporting.fit_figure import draw, figure
+from pellicle.reporting.fit_text import report, summary_line
+from pellicle.reporting.folders import fit_csv, to_json
 
 
 def labels(drawn) -> list[str]:

@@ -15,7 +15,7 @@ from pellicle.accuracy.cost import Cost
 from pellicle.accuracy.measure import Ladder
 from pellicle.accuracy.surface import SurfaceCost
 from pellicle.files import MARKER, new_folder, write_text
-from pellicle.report.json_record import indented, versions
+from pellicle.reporting.json_record import indented, versions
 
 SCHEMA = "pellicle.cost/1"
 COLUMNS = (
@@ -112,8 +112,8 @@ def write_cost(folder: str | os.PathLike[str], cost: Cost, recipe: str) -> Path:
 
     Raises UsageError where it holds anything that pellicle did not write, or cannot be written.
     """
-    from pellicle.report.cost import text
-    from pellicle.report.cost_figure import figure
+    from pellicle.reporting.cost import text
+    from pellicle.reporting.cost_figure import figure
 
     name = Path(recipe).name
     record, report = to_json(cost, recipe), text(cost, name)
@@ -122,8 +122,8 @@ def write_cost(folder: str | os.PathLike[str], cost: Cost, recipe: str) -> Path:
 
 def write_surface_cost(folder: str | os.PathLike[str], cost: SurfaceCost, recipe: str) -> Path:
     """The same of a surface."""
-    from pellicle.report.cost import surface_text
-    from pellicle.report.cost_figure import surface_figure
+    from pellicle.reporting.cost import surface_text
+    from pellicle.reporting.cost_figure import surface_figure
 
     name = Path(recipe).name
     record, report = surface_to_json(cost, recipe), surface_text(cost, name)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pellicle.fitting.result import Estimate, Rival, Status
-from pellicle.report.fit_text import ADVICE, report, summary_line
+from pellicle.reporting.fit_text import ADVICE, report, summary_line
 
 
 def block(text: str, title: str) -> list[str]:
