@@ -16,6 +16,7 @@ from pellicle.cli.fit import fit
 from pellicle.cli.materials import materials
 from pellicle.cli.plan import plan
 from pellicle.cli.sample import sample
+from pellicle.cli.session import say
 from pellicle.cli.simulate import simulate
 from pellicle.cli.verbose import aloud
 from pellicle.errors import DataError, UsageError
@@ -70,13 +71,13 @@ def main() -> int:
     except CycloptsError:
         return 2  # cyclopts has said what is wrong
     except UsageError as error:
-        print(f"pellicle: {error}", file=sys.stderr)
+        say(f"pellicle: {error}")
         return 2
     except (DataError, ValueError) as error:
-        print(f"pellicle: {error}", file=sys.stderr)
+        say(f"pellicle: {error}")
         return 3
     except KeyboardInterrupt:
-        print("pellicle: interrupted", file=sys.stderr)
+        say("pellicle: interrupted")
         return INTERRUPTED
     except BrokenPipeError:
         return 0

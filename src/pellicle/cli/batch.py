@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json as json_module
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pellicle.cli.flags import ReadWords
+from pellicle.cli.messages import as_flags, with_flags
 from pellicle.cli.options import read
 from pellicle.cli.session import Progress, say
 from pellicle.errors import UsageError
@@ -97,13 +99,16 @@ class Batch:
             found, posterior = self._found(looks, folder, progress)
         except ValueError as error:
             progress.clear()
-            message = str(error) if any(path in str(error) for path in paths) else f"{label}: {error}"
+            message = as_flags(str(error))
+            message = message if any(path in message for path in paths) else f"{label}: {message}"
             say(f"pellicle: {message}")
             self.done.append(failure(paths if self.joint else paths[0], message))
             if self.as_json:
                 print(json_module.dumps(self.done[-1], allow_nan=False), flush=True)
             return 3  # a failed file is 3, whatever would mend it
         progress.clear()
+        found = with_flags(found)
+        posterior = None if posterior is None else replace(posterior, fit=found)
         self.done.append(found)
         self._show(found, posterior, folder)
         if posterior is not None and not posterior.trusted:

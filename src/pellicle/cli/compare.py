@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from pellicle.cli.flags import OUTPUT, SCENE, ReadWords, SceneWords, flag, switch
+from pellicle.cli.messages import as_flags, with_flags
 from pellicle.cli.session import Progress, say, start
 from pellicle.errors import DataError, UsageError
 
@@ -83,7 +84,8 @@ def _one(label: str, looks: dict[str, list[Look]], folder: Path | None, as_json:
         found = compared({name: _fit(name, looks[name], progress, talk=name == first) for name in looks})
     except ValueError as error:
         progress.clear()
-        message = str(error) if label in str(error) else f"{label}: {error}"
+        message = as_flags(str(error))
+        message = message if label in message else f"{label}: {message}"
         say(f"pellicle: {message}")
         if as_json:
             print(json_module.dumps(failure(label, message), allow_nan=False), flush=True)
@@ -100,7 +102,7 @@ def _fit(name: str, looks: list[Look], progress: Progress, talk: bool) -> Any:
     from pellicle.fitting.spectra.fit import fit
 
     log.info("comparison: now %s", name)
-    return fit(*measurements(looks, joint=len(looks) > 1, talk=talk), progress=progress)
+    return with_flags(fit(*measurements(looks, joint=len(looks) > 1, talk=talk), progress=progress))
 
 
 def _code(found: Comparison) -> int:

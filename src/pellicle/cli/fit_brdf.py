@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pellicle.cli.batch import TOO_SHORT
+from pellicle.cli.messages import as_flags, with_flags
 from pellicle.cli.session import Progress, say, start
 from pellicle.errors import DataError, UsageError
 
@@ -124,13 +125,16 @@ def _one(
         fit, posterior = _found(recipe, samples, folder, sampler, progress)
     except ValueError as error:
         progress.clear()
-        message = str(error) if path in str(error) else f"{path}: {error}"
+        message = as_flags(str(error))
+        message = message if path in message else f"{path}: {message}"
         say(f"pellicle: {message}")
         failed = failure(path, message)
         if as_json:
             print(one_line(failed), flush=True)
         return failed, 3
     progress.clear()
+    fit = with_flags(fit)
+    posterior = None if posterior is None else replace(posterior, fit=fit)
     found = record(fit, posterior)
     print(one_line(found) if as_json else text(fit, posterior), flush=True)
     if folder is not None:

@@ -8,6 +8,7 @@ from logging import INFO
 from math import inf
 from pathlib import Path
 
+from pellicle.cli.messages import as_flags
 from pellicle.cli.verbose import LOG
 from pellicle.errors import UsageError
 
@@ -58,9 +59,9 @@ def not_negative(flag: str, number: float) -> None:
 
 
 def say(*sentences: str) -> None:
-    """Talk goes to stderr."""
+    """Print to stderr; arguments in backticks become flags."""
     for sentence in sentences:
-        print(sentence, file=sys.stderr)
+        print(as_flags(sentence), file=sys.stderr)
 
 
 class Progress:

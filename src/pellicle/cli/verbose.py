@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from pellicle.cli.messages import as_flags
+
 LOG = logging.getLogger("pellicle")
 _MAKING, _DONE = "/jax/core/compile/", "/jax/core/compile/backend_compile_duration"
 """What JAX calls the times of tracing, lowering and compiling a program, and of the last of these."""
@@ -46,7 +48,7 @@ class _Clock(logging.Formatter):
         return time.perf_counter() - self.began
 
     def format(self, record: logging.LogRecord) -> str:
-        return f"{self.seconds:6.2f} s  {record.getMessage()}"
+        return f"{self.seconds:6.2f} s  {as_flags(record.getMessage())}"
 
 
 class _Making:

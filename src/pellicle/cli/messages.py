@@ -1,0 +1,120 @@
+"""Translation of Python arguments in messages into the flags of the command line.
+
+The library names arguments in backticks, as a Python caller writes them: `` `scale="slow"` ``. The
+command line prints the flag: `--scale slow`. Other text in backticks is not changed.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+import shlex
+from dataclasses import replace
+from typing import TYPE_CHECKING, TypeVar
+
+if TYPE_CHECKING:
+    from pellicle.fitting.brdf.result import BrdfFit
+    from pellicle.fitting.result import Fit
+
+AnyFit = TypeVar("AnyFit", "Fit", "BrdfFit")
+
+FLAGS = {
+    "ambient": "--ambient",
+    "analyser": "--analyser",
+    "angle": "--angle",
+    "back": "--back",
+    "bandwidth": "--bandwidth",
+    "columns": "--columns",
+    "dark": "--dark",
+    "datasets": "--datasets",
+    "folded": "--folded",
+    "folder": "--out",
+    "free": "--free",
+    "illuminant": "--illuminant",
+    "joint": "--joint",
+    "layer": "--layer",
+    "light": "--light",
+    "loss": "--loss",
+    "noise": "--noise",
+    "observer": "--observer",
+    "offset": "--offset",
+    "out": "--out",
+    "path": "--out",
+    "plate_mm": "--plate-mm",
+    "polarisation": "--polarisation",
+    "range": "--range",
+    "recipe": "--recipe",
+    "reference": "--reference",
+    "reference_material": "--reference-material",
+    "scale": "--scale",
+    "seed": "--seed",
+    "signal": "--signal",
+    "signal_unit": "--signal-unit",
+    "spot": "--spot",
+    "steps": "--steps",
+    "substrate": "--substrate",
+    "thickness": "--thickness",
+    "tolerance": "--tolerance",
+    "walkers": "--walkers",
+    "wavelength_unit": "--wavelength-unit",
+}
+"""The flag of each argument that a message may name."""
+
+_QUOTED = re.compile(r"`([^`]+)`")
+
+
+def as_flags(text: str) -> str:
+    """Replace arguments in backticks by flags.
+
+    `` `thickness` `` becomes `--thickness`, `` `angle=70` `` `--angle 70`, `` `range=(400, 900)` `` and
+    `` `thickness=Free(10, 3000)` `` bounds (`--range 400:900`), `` `columns=["wavelength", "R"]` `` a list
+    (`--columns wavelength,R`), and `` `folded=True` `` a flag without a value.
+    """
+    return _QUOTED.sub(lambda quoted: _flags(quoted[1]) or quoted[0], text)
+
+
+def _flags(code: str) -> str | None:
+    """The flags of the arguments in `code`, None where one of them has no flag."""
+    call = f"f({code})"
+    try:
+        parsed = ast.parse(call, mode="eval").body
+    except SyntaxError:
+        return None
+    if not isinstance(parsed, ast.Call):
+        return None
+    words = []
+    for name in parsed.args:
+        if not isinstance(name, ast.Name) or name.id not in FLAGS:
+            return None
+        words.append(FLAGS[name.id])
+    for keyword in parsed.keywords:
+        value = _word(keyword.value, call)
+        if keyword.arg not in FLAGS or value is None:
+            return None
+        words.append(f"{FLAGS[keyword.arg]} {value}".rstrip())
+    return " ".join(words)
+
+
+def _word(value: ast.expr, source: str) -> str | None:
+    """A value as it is typed after its flag: empty for True, None where no flag says it."""
+    match value:
+        case ast.Constant(value=True):
+            return ""
+        case ast.Constant(value=False | None):
+            return None
+        case ast.Constant(value=str(text)):
+            return shlex.quote(text)
+        case ast.Tuple(elts=items) | ast.Call(func=ast.Name(id="Free"), args=items, keywords=[]):
+            words = [_word(item, source) for item in items]
+            return None if None in words else ":".join(map(str, words))
+        case ast.List(elts=items):
+            words = [_word(item, source) for item in items]
+            return None if None in words else ",".join(map(str, words))
+        case ast.Call():
+            return None
+    return ast.get_source_segment(source, value)
+
+
+def with_flags(fit: AnyFit) -> AnyFit:
+    """A copy of a fit whose verdict and warnings name flags."""
+    return replace(fit, verdict=as_flags(fit.verdict), warnings=tuple(map(as_flags, fit.warnings)))

@@ -1,0 +1,128 @@
+"""Arguments in messages of the library become flags on the command line."""
+
+from __future__ import annotations
+
+import json
+import logging
+from dataclasses import fields
+
+import pytest
+
+from pellicle.cli import main
+from pellicle.cli.flags import ReadWords, SceneWords
+from pellicle.cli.messages import FLAGS, as_flags
+from pellicle.cli.session import say
+from pellicle.cli.verbose import aloud
+
+COMMANDS = ("fit", "sample", "simulate", "plan", "compare", "cost", "chart", "materials")
+
+
+@pytest.mark.parametrize(
+    ("argument", "flag"),
+    [
+        ("thickness", "--thickness"),
+        ("reference_material", "--reference-material"),
+        ("folder", "--out"),
+        ("angle=70", "--angle 70"),
+        ("noise=5e-3", "--noise 5e-3"),
+        ('scale="slow"', "--scale slow"),
+        ("scale='slow'", "--scale slow"),
+        ('wavelength_unit="nm"', "--wavelength-unit nm"),
+        ('substrate="2.9+0.1j"', "--substrate 2.9+0.1j"),
+        ("substrate=2.9+0.1j", "--substrate 2.9+0.1j"),
+        ('layer="cauchy(1.46,3000)"', "--layer 'cauchy(1.46,3000)'"),
+        ('columns="wavelength,R,_,sigma"', "--columns wavelength,R,_,sigma"),
+        ('columns=["wavelength", "R"]', "--columns wavelength,R"),
+        ("range=(400, 900)", "--range 400:900"),
+        ("range=(400, inf)", "--range 400:inf"),
+        ("thickness=Free(10, 3000)", "--thickness 10:3000"),
+        ("folded=True", "--folded"),
+        ("columns=...", "--columns ..."),
+        ('layer="SiO2", substrate="Si"', "--layer SiO2 --substrate Si"),
+    ],
+)
+def test_an_argument_becomes_its_flag(argument, flag):
+    assert as_flags(f"film.csv: give `{argument}`, or more") == f"film.csv: give {flag}, or more"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "`thicknes`",
+        "`weight=3`",
+        '`angle=70, weight="slow"`',
+        "`folded=False`",
+        "`noise=None`",
+        "`scene.thickness`",
+        "`[data] angle = 70`",
+        "`angle=`",
+        "`f(`",
+        "`thickness=Free(10, 3000, start=5)`",
+        "`Free(10, 3000)`",
+        "a ` alone",
+        "an angle, a layer and thickness=3 in plain words",
+    ],
+)
+def test_any_other_text_stays(text):
+    assert as_flags(text) == text
+
+
+def test_several_arguments_in_one_sentence():
+    assert as_flags('give `signal="R"` or `signal="T"`') == "give --signal R or --signal T"
+
+
+def test_every_flag_of_the_table_exists_and_no_flag_of_a_scene_or_a_file_is_missing(pellicle):
+    helps = "".join(pellicle(command, "--help").out for command in COMMANDS).replace("--", " --").split()
+    assert {flag for flag in FLAGS.values() if flag not in helps} == set()
+    assert {field.name for kind in (SceneWords, ReadWords) for field in fields(kind)} <= FLAGS.keys()
+
+
+def test_messages_on_stderr(monkeypatch, capsys):
+    """Errors of any command, talk, and steps of --verbose."""
+
+    def refused(*_):
+        raise ValueError('film.csv: uncalibrated: give `scale="slow"`')
+
+    say("counts.csv: `signal` is not given")
+    with aloud():
+        logging.getLogger("pellicle").info("give `angle=70`")
+    monkeypatch.setattr("pellicle.cli.command", refused)
+    assert main() == 3
+    assert capsys.readouterr().err.splitlines()[-1] == "pellicle: film.csv: uncalibrated: give --scale slow"
+
+
+@pytest.fixture
+def doubtful(monkeypatch):
+    """Makes every fit of spectra warn, and name an argument in its verdict."""
+    from dataclasses import replace
+
+    import pellicle.fitting.spectra.fit as module
+
+    real = module.fit
+
+    def fit(*arguments, **options):
+        result = real(*arguments, **options)
+        return replace(result, verdict="Give `angle=70`.", warnings=("noise: give `noise=0.01`",))
+
+    monkeypatch.setattr(module, "fit", fit)
+
+
+@pytest.mark.usefixtures("doubtful")
+def test_verdict_and_warnings_of_a_fit(pellicle, spectrum_file, scene, tmp_path):
+    ran = pellicle("fit", spectrum_file(), *scene, "--out", tmp_path / "out")
+    assert "Give --angle 70." in ran.out
+    assert "noise: give --noise 0.01" in ran.out
+    assert (tmp_path / "out" / "report.txt").read_text() == ran.out.removesuffix("\n")
+    record = json.loads((tmp_path / "out" / "result.json").read_text())
+    assert (record["verdict"], record["warnings"]) == ("Give --angle 70.", ["noise: give --noise 0.01"])
+
+
+def test_the_error_of_a_file_that_fails(pellicle, spectrum_file, scene, monkeypatch):
+    def refused(*_, **__):
+        raise ValueError("too few points: give a wider `range`")
+
+    monkeypatch.setattr("pellicle.data.read_spectrum.read_spectrum", refused)
+    ran = pellicle("fit", spectrum_file(), *scene, "--json")
+    assert ran.code == 3
+    assert "give a wider --range" in ran.err
+    assert ran.objects[0]["error"].endswith("give a wider --range")
