@@ -31,7 +31,7 @@ import numpy as np
 import tmm
 
 import pellicle as pl
-from pellicle.optics.elementary import sincos_poly
+from pellicle.optics.elementary import sincos
 
 jax.config.update("jax_enable_x64", True)
 
@@ -114,7 +114,7 @@ def floor(dtype: type) -> Run:
 
     def both(wavelength, thickness):
         phase = dtype(2 * np.pi * 2.8) / wavelength * thickness
-        sine, cosine = sincos_poly(phase)
+        sine, cosine = sincos(phase)
         damping = jnp.exp(dtype(-0.07) * phase)
         return jax.lax.complex(damping * sine, damping * cosine)
 

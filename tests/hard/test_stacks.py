@@ -21,33 +21,36 @@ import pytest
 from mpmath import mp
 
 import pellicle as pl
-from pellicle.optics import film
+from pellicle.optics import coherent, response
 from pellicle.optics.ellipsometry import angles, normalised, stokes
+from pellicle.optics.pair import to_pair
+from pellicle.optics.stack import stack
 from pellicle.scene.free import insert
 from pellicle.simulation.film import build
-from pellicle.simulation.functions import _waves
 
 TABLE = json.loads(Path(__file__).with_name("stacks.json").read_text(encoding="utf-8"))
 SIGNALS = TABLE["signals"]
 VALUE, SLOPE = 8, 32
-# what is computed: one film by itself, the same as a list of one, a list of three
-WAYS = {"film": ("films", None), "list of one": ("films", 1), "list of three": ("stacks", 3)}
+WAYS = {
+    "one film": ("films", 1, coherent.responses),
+    "one film by matrices": ("films", 1, stack),
+    "three layers": ("stacks", 3, coherent.responses),
+}
+"""What is computed: table, number of layers, function."""
 
 
-def signals(row, count):
-    """Rs, Rp, Ts, Tp, N, C, S; N, C and S from the Ψ and Δ that the user gets.
+def signals(row, layers, respond):
+    """Return Rs, Rp, Ts, Tp, N, C, S of one row; N, C and S from the Ψ and Δ that the user gets.
 
-    What `pl.reflectance`, `pl.transmittance` and `pl.ellipsometry` do with the waves, compiled once.
+    `pl.reflectance`, `pl.transmittance` and `pl.ellipsometry` compute the same, one at a time.
     """
-    layers = count or 1
     d, n, k = row[: 3 * layers].reshape(3, layers)
     n2, k2, ambient, angle, wavelength = row[-5:]
-    media = list(jax.lax.complex(n, k))
-    below = jax.lax.complex(n2, k2)
-    stacked = (d, media) if count else (d[0], media[0])
-    waves = _waves(wavelength, *stacked, below, ambient, angle, "unpolarised")
-    powers = [f(wave) for f in (film.reflectance, film.transmittance) for wave in waves]
-    psi, delta = map(jnp.deg2rad, angles(*normalised(stokes(*waves))))
+    media = [to_pair(index) for index in jax.lax.complex(n, k)]
+    below = to_pair(jax.lax.complex(n2, k2))
+    responses = respond(ambient, media, below, list(2 * jnp.pi / wavelength * d), jnp.deg2rad(angle))
+    powers = [f(x) for f in (response.reflectance, response.transmittance) for x in responses]
+    psi, delta = map(jnp.deg2rad, angles(*normalised(stokes(*responses))))
     across = jnp.sin(2 * psi)
     dark = jnp.where(psi == 0, 0.0, 1.0)  # nothing is reflected
     return jnp.stack([*powers, dark * jnp.cos(2 * psi), across * jnp.cos(delta), across * jnp.sin(delta)])
@@ -55,8 +58,8 @@ def signals(row, count):
 
 @cache
 def computed(way, dtype):
-    table, count = WAYS[way]
-    one = partial(signals, count=count)
+    table, layers, respond = WAYS[way]
+    one = partial(signals, layers=layers, respond=respond)
     both = jax.jit(jax.vmap(lambda row: (one(row), jax.jacfwd(one)(row))))
     rows = np.array([case["at"] for case in TABLE[table].values()], dtype)
     values, slopes = map(np.asarray, both(rows))
@@ -72,11 +75,11 @@ def ratios(case, value, slope, dtype):
 
 
 RUNS = [
-    ("film", np.float64),
-    ("film", np.float32),
-    ("list of one", np.float32),
-    ("list of three", np.float64),
-    ("list of three", np.float32),
+    ("one film", np.float64),
+    ("one film", np.float32),
+    ("one film by matrices", np.float32),
+    ("three layers", np.float64),
+    ("three layers", np.float32),
 ]
 
 

@@ -17,7 +17,7 @@ import jax.numpy as jnp
 from pellicle.brdf import film_colour
 from pellicle.brdf.lobes import blinn_phong
 from pellicle.brdf.shapes import Parameters, column, summed
-from pellicle.optics.orders import AirySeries, bounces
+from pellicle.optics.orders import AirySeries, airy_series
 
 PUBLISHED_WAVELENGTHS = (650.0, 510.0, 475.0)
 """Its R, G and B in nm."""
@@ -48,7 +48,7 @@ def _one_minus(transmitted: Callable[[AirySeries], Any], parameters: Parameters,
     total = (a >= n1) | (a >= n2)
     safe = jnp.where(total, 0.0, angle)
     phase = 2 * jnp.pi / parameters["wavelengths"] * column(parameters["thickness"])
-    s, p = (transmitted(bounces(n0, n1, n2, phase, safe, letter)) for letter in "sp")
+    s, p = (transmitted(airy_series(n0, n1, n2, phase, safe, letter)) for letter in "sp")
     return jnp.where(total, 1.0, 1 - 0.5 * (s + p))
 
 

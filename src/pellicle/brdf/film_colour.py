@@ -15,8 +15,7 @@ import numpy as np
 
 from pellicle.brdf.directions import angle_to_half, cosine_to_half
 from pellicle.brdf.shapes import Parameters, column
-from pellicle.optics import characteristic, film, orders
-from pellicle.optics.elementary import sincos_poly
+from pellicle.optics import coherent, orders, response
 from pellicle.optics.interface import allow_tunnelling
 from pellicle.optics.pair import Number, Pair
 
@@ -46,34 +45,33 @@ Colour: TypeAlias = Callable[[Parameters, Any, Any], Any]
 """(parameters, i, o) → (..., 3), or a channel for each wavelength."""
 
 
-def _lit(
-    parameters: Parameters, angle: Any, enter: Callable[[Number], Number] = allow_tunnelling
-) -> tuple[Any, Any, Any, Any, Any]:
+def _lit(parameters: Parameters, angle: Any, tunnelling: bool) -> tuple[Any, Any, Any, Any, Any]:
     """Ambient, film, base, 2πd/λ and angle, (..., wavelengths)."""
+    base = index(parameters["base_n"], parameters.get("base_k"))
     return (
         parameters.get("ambient_n", 1.0),
         index(parameters["n"], parameters.get("k")),
-        enter(index(parameters["base_n"], parameters.get("base_k"))),
+        allow_tunnelling(base) if tunnelling else base,
         2 * jnp.pi / parameters["wavelengths"] * column(parameters["thickness"]),
         None if angle is None else angle[..., None],
     )
 
 
-def airy(
-    polarisations: str = "sp", through: Any = characteristic.through, enter: Callable = allow_tunnelling
-) -> Reflectance:
+def airy(polarisations: str = "sp", tunnelling: bool = True) -> Reflectance:
     """Airy's reflectance, the mean over `polarisations`, of a film in air.
 
     It reads `thickness` (nm), `n`, `k`, `base_n`, `base_k`, `wavelengths` (nm), and `ambient_n` where
-    the ambient is not air; without `k` or `base_k` the medium cannot absorb. `through` is as in
-    `film.film`; `enter` that leaves an index as it is promises that no wave is totally reflected.
+    the ambient is not air; without `k` or `base_k` the medium cannot absorb. `tunnelling=False`
+    promises that no wave is totally reflected.
     """
 
     def reflectance(parameters: Parameters, angle: Any) -> Any:
-        waves = film.film(
-            *_lit(parameters, angle, enter), polarisations=polarisations, through=through, sincos=sincos_poly
+        ambient, layer, base, phase, theta = _lit(parameters, angle, tunnelling)
+        return response.reflectance(
+            *coherent.responses(
+                ambient, [layer], base, [phase], theta, polarisations, propagating=not tunnelling
+            )
         )
-        return film.reflectance(*waves)
 
     return reflectance
 
@@ -84,8 +82,8 @@ reflectance = airy()
 
 def without_interference(parameters: Parameters, angle: Any) -> Any:
     """The same averaged over the film's phase: order 0 of its Fourier series."""
-    lit = _lit(parameters, angle)
-    s, p = (orders.reflectance(orders.bounces(*lit, letter), lambda _: 1.0, count=0) for letter in "sp")
+    lit = _lit(parameters, angle, tunnelling=True)
+    s, p = (orders.reflectance(orders.airy_series(*lit, letter), lambda _: 1.0, count=0) for letter in "sp")
     return 0.5 * (s + p)
 
 

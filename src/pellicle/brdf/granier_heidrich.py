@@ -28,7 +28,7 @@ import jax.numpy as jnp
 from pellicle.brdf.directions import cosine_inside, cosine_to_half, direction
 from pellicle.brdf.lobes import cosine_to_mirror, power
 from pellicle.brdf.shapes import Parameters, column, summed
-from pellicle.optics.elementary import sincos_poly
+from pellicle.optics.elementary import sincos
 from pellicle.optics.pair import sqrt
 
 
@@ -120,7 +120,7 @@ def amplitudes(parameters: Parameters, i: Any, o: Any, fresnel: Callable = publi
 
 def interfering(a: Amplitudes) -> Any:
     """R + T + 2 cos 2Φ √(RT), eq. 5, as (√R − √T)² + 4 √R √T cos² Φ: never negative."""
-    cosine = sincos_poly(a.phase)[1]
+    cosine = sincos(a.phase)[1]
     return (a.reflected - a.transmitted) ** 2 + 4 * a.reflected * a.transmitted * cosine * cosine
 
 

@@ -14,8 +14,7 @@ from pellicle.colour.bands import Bands
 from pellicle.colour.bands import way as bands_of
 from pellicle.colour.observers import sensor
 from pellicle.dispersion.base import AbstractDispersion
-from pellicle.optics import film, interface, orders
-from pellicle.optics.elementary import sincos_poly
+from pellicle.optics import coherent, interface, orders, response
 from pellicle.optics.pair import is_real, real, to_pair
 
 
@@ -91,8 +90,7 @@ def reflectance(thickness, layer, substrate, bands: Bands, *, ambient: Any = 1.0
         raise ValueError("belcour-barla knows no absorbing layer: use gaussians-8 or uniform-64")
     k0d = 2 * jnp.pi / wavelength * thickness
     if bands.width is None:
-        waves = film.film(n0, n1, n2, k0d, theta, sincos=sincos_poly)
-        return film.reflectance(*waves)
+        return response.reflectance(*coherent.responses(n0, [n1], n2, [k0d], theta))
     if not interface.propagates(layer, ambient, 90.0):  # nor at any other angle
         n1 = interface.allow_tunnelling(n1)
     turns = _turn_slope(layer, n0, n1, theta, wavelength)
@@ -100,10 +98,7 @@ def reflectance(thickness, layer, substrate, bands: Bands, *, ambient: Any = 1.0
     kept = jnp.exp(-0.5 * spread * spread)
     both = [
         orders.reflectance(
-            orders.bounces(n0, n1, n2, k0d, theta, letter),
-            lambda m: kept ** (m * m),
-            bands.orders,
-            sincos_poly,
+            orders.airy_series(n0, n1, n2, k0d, theta, letter), lambda m: kept ** (m * m), bands.orders
         )
         for letter in "sp"
     ]

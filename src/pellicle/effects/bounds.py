@@ -75,7 +75,7 @@ def _ratio(scene: Scene) -> float:
         a, _ = interface.transverse(scene.ambient.index(at), angle)
         inside = None if angle is None else interface.Inside(a)
         for polarisation in "s" if angle is None else "sp":
-            b = orders.bounces(above, layer, below, 0.0 * at, inside, polarisation)
+            b = orders.airy_series(above, layer, below, 0.0 * at, inside, polarisation)
             found.append(np.asarray(abs2(b.upper * b.lower)))
     return float(np.sqrt(np.nanmax(np.stack(found))))
 

@@ -6,13 +6,13 @@ and T. No root of the film's is ever differentiated where it is small.
 
 from __future__ import annotations
 
-from functools import partial
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 
-from pellicle.optics.elementary import SinCos, exponentials, sincos
+from pellicle.optics.elementary import exponentials, sincos
 from pellicle.optics.hoisting import hold
 from pellicle.optics.pair import Number, Pair, abs2, imag, real, sqrt, times_i, where
 
@@ -26,17 +26,17 @@ class Characteristic(NamedTuple):
     rise: Number  # ∂f/∂k, for derivatives only: cos(kq), or e^{2ikq} where the scale moves
 
 
-@partial(jax.custom_jvp, nondiff_argnums=(2,))
-def through(Q: Number, k: Any, sincos: SinCos = sincos) -> Characteristic:
+@jax.custom_jvp
+def matrix_elements(Q: Number, k: Any) -> Characteristic:
     """c and f times e^{ikq}: c = 1 + M/2 and f = −iM/2q with M = e^{2ikq} − 1.
 
     A real Q may have either sign: negative is a tunnelling layer, and where the wave propagates the
     scale of a real Q is 1.
     """
     if is_real_array(Q):
-        return _through_real(Q, k, sincos)
+        return _real_elements(Q, k)
     q = root(Q)
-    half, scale_square = half_turn(q, k, sincos)
+    half, scale_square = half_expm1(q, k)
     c, f = 1 + half, times_i(-half) * hold(1 / q, k)
     return Characteristic(c, f, scale_square, where(_near(Q, k), c, 1 + 2 * half))
 
@@ -47,7 +47,7 @@ def root(Q: Number) -> Number:
     return where(abs2(q) == 0, 1e-15 + 0.0 * q, q)
 
 
-def half_turn(q: Number, k: Any, sincos: SinCos) -> tuple[Number, Any]:
+def half_expm1(q: Number, k: Any) -> tuple[Number, Any]:
     """½(e^{2ikq} − 1), to the last digit where it is small, and |e^{ikq}|²."""
     scale_square, m = exponentials(k * hold(-2 * imag(q), k))  # 1 + m would lose a transmittance of 1e-22
     sine, cosine = sincos(k * hold(real(q), k))
@@ -56,7 +56,7 @@ def half_turn(q: Number, k: Any, sincos: SinCos) -> tuple[Number, Any]:
     return join(m * (0.5 - square) - square, product + m * product), scale_square
 
 
-def _through_real(Q, k, sincos):
+def _real_elements(Q, k):
     q = jnp.sqrt(jnp.abs(Q))
     flat = q == 0
     wave, over, q = Q >= 0, hold(1 / jnp.where(flat, 1.0, q), k), hold(q, k)
@@ -67,8 +67,8 @@ def _through_real(Q, k, sincos):
     return Characteristic(c, f, scale_square, jnp.where(wave | _near(Q, k), c, scale_square))
 
 
-@partial(jax.custom_jvp, nondiff_argnums=(2,))
-def through_wave(Q: Number, k: Any, sincos: SinCos = sincos) -> Characteristic:
+@jax.custom_jvp
+def propagating_elements(Q: Any, k: Any) -> Characteristic:
     """The same where Q is real and positive: the wave always propagates."""
     q = jnp.sqrt(Q)
     sine, cosine = sincos(k * hold(q, k))
@@ -80,7 +80,7 @@ def _near(Q, k):
     return abs2(k * k * Q) < 1e-4
 
 
-def slopes(fn, sincos, primal, tangent):
+def slopes(fn: Callable[[Number, Any], Characteristic], primal: Any, tangent: Any):
     """Derivatives by hand: no root of the film's is differentiated where it is small.
 
     The scale cancels in R and T, so its derivative is ours to choose. It counts as a constant near
@@ -90,7 +90,7 @@ def slopes(fn, sincos, primal, tangent):
     no derivatives as large as k remain that would have to cancel.
     """
     (Q, k), (dQ, dk) = primal, tangent
-    c, f, scale_square, rise = out = fn(Q, k, sincos)
+    c, f, scale_square, rise = out = fn(Q, k)
     w, near = k * k * Q, _near(Q, k)
     small, far = where(near, w, 0.0 * w), where(near, 1.0 + 0.0 * w, Q + 0.0 * w)
     taylor = 1.0 + 0.0 * small  # (tan φ/φ − 1) 3/φ² with φ² = w: times c, so that the scale is c's
@@ -98,7 +98,7 @@ def slopes(fn, sincos, primal, tangent):
         taylor = 1 + small * taylor * ratio
     slope = where(near, taylor * c * (k * k * k * (-1 / 6)), (k * rise - f) * (0.5 / far))
     way, df = Q * dk + 0.5 * k * dQ, rise * dk + slope * dQ
-    if fn is through_wave:
+    if fn is propagating_elements:
         dc = -f * way
         return out, Characteristic(dc, df, jnp.zeros_like(scale_square), dc)
     held = near | (Q >= 0) if is_real_array(Q) else near
@@ -120,5 +120,5 @@ def is_real_array(Q: Number) -> bool:
     return not isinstance(Q, Pair) and not jnp.iscomplexobj(Q)
 
 
-through.defjvp(lambda s, p, t: slopes(through, s, p, t))
-through_wave.defjvp(lambda s, p, t: slopes(through_wave, s, p, t))
+matrix_elements.defjvp(lambda p, t: slopes(matrix_elements, p, t))
+propagating_elements.defjvp(lambda p, t: slopes(propagating_elements, p, t))

@@ -1,15 +1,12 @@
-"""Sine and cosine, from the library or by polynomials: what a film spends most of its time in."""
+"""Sine, cosine and exponentials by polynomials, faster than the library's at the same precision."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any, TypeAlias
+from typing import Any
 
 import jax
 import jax.numpy as jnp
-
-SinCos: TypeAlias = Callable[[Any], tuple[Any, Any]]
 
 _QUARTER = (1.5707963267341256, 6.0771005063039007e-11, 2.0222662487959506e-21)
 _QUARTER_32 = (1.5703125, 4.837512969970703125e-4, 7.54978995489188216e-8)
@@ -36,11 +33,6 @@ _EVEN_32 = (2.443315711809948e-5, -1.388731625493765e-3, 4.166664568298827e-2)
 
 
 def sincos(x: Any) -> tuple[Any, Any]:
-    """Sine and cosine from the library."""
-    return jnp.sin(x), jnp.cos(x)
-
-
-def sincos_poly(x: Any) -> tuple[Any, Any]:
     """Sine and cosine by Cody-Waite reduction and a polynomial: no branches, one pass.
 
     Worst error up to 1e5 rad: 2.0e-16 in float64, 9.1e-8 in float32. Coefficients: Cephes
@@ -60,15 +52,12 @@ def sincos_poly(x: Any) -> tuple[Any, Any]:
     return jnp.where(turn >= 2, -sine, sine), jnp.where((turn == 1) | (turn == 2), -cosine, cosine)
 
 
-def sincos_squares(x: Any, sincos: SinCos) -> tuple[Any, Any]:
-    """sin² and cos²; where sines are polynomials, by half of what both take.
+def sincos_squares(x: Any) -> tuple[Any, Any]:
+    """sin² and cos² by one polynomial, for half the work of `sincos`.
 
     With |r| ≤ π/4 left of x, sin² r = Σ (−1)ⁿ⁺¹ 2²ⁿ⁻¹ r²ⁿ/(2n)!, and cos² r = 1 − sin² r loses nothing,
     being ½ at least. Of the turns only their parity counts.
     """
-    if sincos is not sincos_poly:
-        sine, cosine = sincos(x)
-        return sine * sine, cosine * cosine
     quarter, r = _reduced(x)
     z = r * r
     terms = 10 if x.dtype == jnp.float64 else 6

@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from pellicle.optics.film import Wave, transmittance
 from pellicle.optics.pair import abs2, conj, imag, real, to_complex
+from pellicle.optics.response import Response, transmittance
 
 
 class Stokes(NamedTuple):
@@ -29,8 +29,8 @@ class Stokes(NamedTuple):
     intensity: Any
 
 
-def stokes(s: Wave, p: Wave) -> Stokes:
-    """From the waves of both polarisations around the same layers."""
+def stokes(s: Response, p: Response) -> Stokes:
+    """From the responses of the same layers to both polarisations."""
     rs, rp = s.reflected / s.denominator, p.reflected / p.denominator
     both = 2 * (conj(rp) * rs)
     return Stokes(abs2(rs) - abs2(rp), real(both), imag(both), abs2(rs) + abs2(rp))
@@ -44,8 +44,8 @@ class Crossed(NamedTuple):
     below: Any
 
 
-def crossed(s: Wave, p: Wave) -> Crossed:
-    """From the waves of both polarisations around the same layers, between media that absorb next to nothing.
+def crossed(s: Response, p: Response) -> Crossed:
+    """From the responses of the same layers to both polarisations, between media that absorb next to nothing.
 
     Their t t′ has the size T and, but for what s and p have in common, twice the phase of 1/denominator.
     """

@@ -15,86 +15,77 @@ import jax
 import jax.numpy as jnp
 from jax.custom_derivatives import SymbolicZero
 
-from pellicle.optics.characteristic import half_turn, is_real_array, root, slopes, through, through_wave
-from pellicle.optics.elementary import SinCos, sincos, sincos_squares
+from pellicle.optics.characteristic import (
+    half_expm1,
+    is_real_array,
+    matrix_elements,
+    propagating_elements,
+    root,
+    slopes,
+)
+from pellicle.optics.elementary import sincos, sincos_squares
 from pellicle.optics.hoisting import hold, used_again
 from pellicle.optics.interface import carried, normal, normal_square, nothing_where, power, same, transverse
 from pellicle.optics.pair import Number, abs2, conj, is_real, real, times_i, where
+from pellicle.optics.response import Amplitudes, Response
 
 
-class Three(NamedTuple):
-    """Something of light from the ambient, of light from the substrate, and of their common denominator."""
+class AmplitudesAndSquares(NamedTuple):
+    """Amplitudes A c − iB f of one polarisation, and their squared moduli, which cost less on their own."""
 
-    reflected: Any
-    below: Any
-    denominator: Any
-
-
-class Around(NamedTuple):
-    """Amplitudes A c − iB f of one polarisation, and their squared moduli, found for less than from them."""
-
-    values: Three
-    squares: Three
+    values: Amplitudes
+    squares: Amplitudes
 
 
-class Wave(NamedTuple):
-    """One polarisation of the light around a layer: amplitudes over a common denominator."""
-
-    reflected: Number  # r = reflected / denominator, for light from the ambient
-    below: Number  # the same for light from the substrate
-    denominator: Number
-    squares: Three  # their squared moduli
-    flux: Any  # power into the substrate: T = flux · scale² / squares.denominator
-    scale_square: Any
-
-
-@partial(jax.custom_jvp, nondiff_argnums=(3, 4))
-def _around(
-    sides: tuple[Three, ...], Q: Number, k: Any, through: Any, sincos: SinCos
-) -> tuple[tuple[Around, ...], Any]:
+@partial(jax.custom_jvp, nondiff_argnums=(3,))
+def _amplitudes(
+    sides: tuple[Amplitudes, ...], Q: Number, k: Any, propagating: bool
+) -> tuple[tuple[AmplitudesAndSquares, ...], Any]:
     """What `sides`, a pair (A, B) for each amplitude of each polarisation, make of a layer; and |scale|².
 
     A grid of thicknesses spends its time in multiplications at each point: in the functions of the
     phase, and here. So what knows nothing of the thickness is multiplied out and held, and squares are
     taken of what is left.
     """
-    if through is through_wave:
-        return _by_wave(sides, Q, k, sincos)
+    if propagating:
+        return _by_wave(sides, Q, k)
     if is_real_array(Q):
-        c, f, scale_square, _ = through(Q, k, sincos)
+        c, f, scale_square, _ = matrix_elements(Q, k)
         g = times_i(-f)
         return tuple(_plain([A * c + B * g for A, B in hold(three, k)]) for three in sides), scale_square
     q = root(Q)
-    half, scale_square = half_turn(q, k, sincos)
+    half, scale_square = half_expm1(q, k)
     pairs = [[(A, A - B / q) for A, B in three] for three in sides]
     if used_again(pairs, k):
         return tuple(_on_grid(three, half, k) for three in pairs), scale_square
     return tuple(_plain([A + half * C for A, C in three]) for three in pairs), scale_square
 
 
-def _plain(values: list[Number]) -> Around:
-    return Around(Three(*values), Three(*(abs2(x) for x in values)))
+def _plain(values: list[Number]) -> AmplitudesAndSquares:
+    return AmplitudesAndSquares(Amplitudes(*values), Amplitudes(*(abs2(x) for x in values)))
 
 
-def _by_wave(sides: tuple[Three, ...], Q: Any, k: Any, sincos: SinCos) -> tuple[tuple[Around, ...], Any]:
+def _by_wave(sides: tuple[Amplitudes, ...], Q: Any, k: Any) -> tuple[tuple[AmplitudesAndSquares, ...], Any]:
     """Where the wave propagates without loss: |A c − iB f|² of real A and B is a sum of two squares."""
     q = jnp.sqrt(Q)
     phase = k * hold(q, k)
     sine, cosine = sincos(phase)
-    sine_square, cosine_square = sincos_squares(phase, sincos)
+    sine_square, cosine_square = sincos_squares(phase)
 
-    def one(three: Three) -> Around:
+    def one(three: Amplitudes) -> AmplitudesAndSquares:
         pairs = hold([(A, B / q) for A, B in three], k)
         found = _plain([A * cosine + times_i(-sine) * V for A, V in pairs])
         if not all(is_real(x) for pair in pairs for x in pair):
             return found
         weights = hold([(A * A, V * V) for A, V in pairs], k)
-        return Around(found.values, Three(*(a * cosine_square + b * sine_square for a, b in weights)))
+        return AmplitudesAndSquares(
+            found.values, Amplitudes(*(a * cosine_square + b * sine_square for a, b in weights))
+        )
 
     return tuple(one(three) for three in sides), jnp.ones_like(cosine)
 
 
-def _on_grid(pairs: list[tuple[Number, Number]], half: Number, k: Any) -> Around:
+def _on_grid(pairs: list[tuple[Number, Number]], half: Number, k: Any) -> AmplitudesAndSquares:
     """A + half C for each (A, C). The squares are those of A e^{−iθ} + half |C|, with θ the phase of C.
 
     Where C is nothing but rounding, so is θ: all that is made of C must be made of the same C, which
@@ -102,7 +93,7 @@ def _on_grid(pairs: list[tuple[Number, Number]], half: Number, k: Any) -> Around
     """
     pairs = hold(pairs, k)
     squares = (abs2(turned + half * size) for turned, size in hold([_turned(*pair) for pair in pairs], k))
-    return Around(Three(*(A + half * C for A, C in pairs)), Three(*squares))
+    return AmplitudesAndSquares(Amplitudes(*(A + half * C for A, C in pairs)), Amplitudes(*squares))
 
 
 def _turned(A: Number, C: Number) -> tuple[Number, Any]:
@@ -113,11 +104,13 @@ def _turned(A: Number, C: Number) -> tuple[Number, Any]:
     return where(nothing, A + 0.0 * C, A * conj(C) / size), jnp.where(nothing, 0.0, size)
 
 
-def _around_slope(through, sincos, primal, tangent):
+def _amplitudes_slope(propagating, primal, tangent):
     """By the derivatives of c and f. What is known not to vary costs nothing."""
     (sides, Q, k), (dsides, dQ, dk) = primal, tangent
     dQ, dk = jax.tree.map(_filled, (dQ, dk), is_leaf=_is_nothing)
-    (c, f, _, _), (dc, df, dscale, _) = slopes(through, sincos, (Q, k), (dQ, dk))
+    (c, f, _, _), (dc, df, dscale, _) = slopes(
+        propagating_elements if propagating else matrix_elements, (Q, k), (dQ, dk)
+    )
     g, dg = times_i(-f), times_i(-df)
 
     def slope(side, turn):
@@ -126,12 +119,12 @@ def _around_slope(through, sincos, primal, tangent):
         found = found if dA is None else found + dA * c
         return found if dB is None else found + dB * g
 
-    def slopes_of(found: Around, three, turns) -> Around:
+    def slopes_of(found: AmplitudesAndSquares, three, turns) -> AmplitudesAndSquares:
         moved = [slope(side, turn) for side, turn in zip(three, turns, strict=True)]
         squares = (2 * real(conj(x) * dx) for x, dx in zip(found.values, moved, strict=True))
-        return Around(Three(*moved), Three(*squares))
+        return AmplitudesAndSquares(Amplitudes(*moved), Amplitudes(*squares))
 
-    found, scale_square = _around(sides, Q, k, through, sincos)
+    found, scale_square = _amplitudes(sides, Q, k, propagating)
     moved = tuple(slopes_of(*each) for each in zip(found, sides, dsides, strict=True))
     return (found, scale_square), (moved, dscale)
 
@@ -148,7 +141,7 @@ def _all_nothing(x: Any) -> bool:
     return all(map(_is_nothing, jax.tree.leaves(x, is_leaf=_is_nothing)))
 
 
-_around.defjvp(_around_slope, symbolic_zeros=True)
+_amplitudes.defjvp(_amplitudes_slope, symbolic_zeros=True)
 
 
 def film(
@@ -158,16 +151,15 @@ def film(
     phase: Any,
     angle: Any = None,
     polarisations: str = "sp",
-    through=through,
-    sincos: SinCos = sincos,
-) -> tuple[Wave, ...]:
-    """Waves around one layer, one for each letter of `polarisations`.
+    propagating: bool = False,
+) -> tuple[Response, ...]:
+    """Return the response of one layer, one for each letter of `polarisations`.
 
     Arguments broadcast. `ambient`, `layer` and `substrate` are numbers of any type, the ambient real
     but for light from within a plate (`interface.Inside` in place of the angle); `phase` is
     k₀d = 2πd/λ; `angle` is in radians, None being normal incidence, where s and p are one and only
-    the first polarisation is computed. `through` is `through`, or `through_wave`
-    where the layer is real and total reflection impossible.
+    the first polarisation is computed. `propagating` promises that no wave is totally reflected in
+    a layer of real index.
 
     With A, B, A′, B′ below, D = A c − iB f and N = A′ c − iB′ f; reversing the light turns the sign
     of A′. Denominators carry no division: at grazing incidence T is 0, not 0/0.
@@ -191,28 +183,12 @@ def film(
         if is_real(A):  # and positive: over A, which cancels, a product less at each point
             over = 1 / A
             A, A_, B, B_, flux = 1.0, A_ * over, B * over, B_ * over, flux * over * over
-        sides.append(Three((A_, B_), (-A_, B_), (A, B)))
+        sides.append(Amplitudes((A_, B_), (-A_, B_), (A, B)))
         fluxes.append(flux)
-    found, scale_square = _around(tuple(sides), q1_square, phase, through, sincos)
-    waves = []
-    for (values, squares), flux in zip(found, fluxes, strict=True):
-        down, below, whole = values
-        waves.append(Wave(down, below, whole, squares, hold(flux, scale_square), scale_square))
-    return tuple(waves)
-
-
-def reflectance(*waves: Wave) -> Any:
-    """R = |r|² for light from the ambient: the mean over the polarisations given."""
-    share = 1 / len(waves)
-    return sum(wave.squares.reflected * (share / wave.squares.denominator) for wave in waves)
-
-
-def reflectance_below(wave: Wave):
-    """R for light from the substrate."""
-    return wave.squares.below / wave.squares.denominator
-
-
-def transmittance(*waves: Wave) -> Any:
-    """T, the power into the substrate, likewise. A lossless substrate sends the same fraction back."""
-    share = 1 / len(waves)
-    return waves[0].scale_square * sum(wave.flux * (share / wave.squares.denominator) for wave in waves)
+    results, scale_square = _amplitudes(tuple(sides), q1_square, phase, propagating and is_real(layer))
+    responses = []
+    for (values, squares), flux in zip(results, fluxes, strict=True):
+        reflected, below, denominator = values
+        passed = hold(flux, scale_square)
+        responses.append(Response(reflected, below, denominator, squares, passed, scale_square))
+    return tuple(responses)

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
-from pellicle.optics.elementary import SinCos, sincos
+from pellicle.optics.elementary import sincos
 from pellicle.optics.interface import carried, fresnel, normal, power, transverse
 from pellicle.optics.pair import Number, Pair, abs2, conj, imag, real
 
@@ -39,7 +39,7 @@ class AirySeries(NamedTuple):
     direct: Any  # |t₁₂ t₂₃|² with the power factor into the substrate
 
 
-def bounces(
+def airy_series(
     ambient: Any, layer: Number, substrate: Number, phase: Any, angle: Any, polarisation: str
 ) -> AirySeries:
     """Arguments as for `film.film`; `phase` is k₀d = 2πd/λ, so that φ = 2 k₀d q₁."""
@@ -59,12 +59,12 @@ def bounces(
     )
 
 
-def reversed_bounces(b: AirySeries) -> AirySeries:
+def reversed_series(b: AirySeries) -> AirySeries:
     """The same layer with the light coming from the substrate."""
     return b._replace(upper=-b.lower, lower=-b.upper)
 
 
-def _series(first: Number, q: Number, phase, window: Window, count: int, sincos: SinCos):
+def _series(first: Number, q: Number, phase, window: Window, count: int):
     """2 Re Σ_{m=1..count} first·q^{m−1} e^{imϕ} W_m."""
     sine, cosine = sincos(phase)
     turn = Pair(cosine, sine)
@@ -75,19 +75,19 @@ def _series(first: Number, q: Number, phase, window: Window, count: int, sincos:
     return 2 * total
 
 
-def reflectance(b: AirySeries, window: Window, count: int, sincos: SinCos = sincos):
+def reflectance(b: AirySeries, window: Window, count: int):
     """|r|² with `count` orders through the window."""
     beta = b.lower * b.damping
     into = 1 - b.upper * b.upper
     echo = abs2(into) * abs2(beta) / (1 - abs2(b.upper * beta))
     first = beta * (into * conj(b.upper) - b.upper * echo)
-    return abs2(b.upper) + echo + _series(first, -(b.upper * beta), b.phase, window, count, sincos)
+    return abs2(b.upper) + echo + _series(first, -(b.upper * beta), b.phase, window, count)
 
 
-def transmittance(b: AirySeries, window: Window, count: int, sincos: SinCos = sincos):
+def transmittance(b: AirySeries, window: Window, count: int):
     """Power into the substrate with `count` orders through the window."""
     q = -(b.upper * b.lower * b.damping)
-    return b.direct * b.damping / (1 - abs2(q)) * (1 + _series(q, q, b.phase, window, count, sincos))
+    return b.direct * b.damping / (1 - abs2(q)) * (1 + _series(q, q, b.phase, window, count))
 
 
 def monochromatic(order: int) -> float:

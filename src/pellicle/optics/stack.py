@@ -1,7 +1,7 @@
 """Several coherent layers: the product of characteristic matrices, each held to size.
 
 The fields (E, H) at a layer's lower face give those at its upper face through the same two entire
-functions as one film (`passage.through`), both times a scale; after each layer the fields are
+functions as one film (`characteristic.matrix_elements`), both times a scale; after each layer the fields are
 divided by their own size. So 50 layers with an opaque one among them stay finite, and nothing is
 clamped. Complex arithmetic: on separate real arrays a stack gains nothing. One `lax.scan` over the
 layers: unrolled, 50 of them do not compile in minutes.
@@ -17,11 +17,10 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
-from pellicle.optics.characteristic import through
-from pellicle.optics.elementary import SinCos, sincos
-from pellicle.optics.film import Three, Wave
+from pellicle.optics.characteristic import matrix_elements
 from pellicle.optics.interface import carried, normal, normal_square, nothing_where, power, same, transverse
 from pellicle.optics.pair import Number, abs2, to_complex
+from pellicle.optics.response import Amplitudes, Response
 
 
 def stack(
@@ -31,10 +30,9 @@ def stack(
     phases: Sequence[Any],
     angle: Any = None,
     polarisations: str = "sp",
-    sincos: SinCos = sincos,
     roughness: Sequence[Any] | None = None,
-) -> tuple[Wave, ...]:
-    """Waves around a stack, one for each letter of `polarisations`.
+) -> tuple[Response, ...]:
+    """Return the response of a stack, one for each letter of `polarisations`.
 
     `layers` and `phases` (k₀d = 2πd/λ of each) run from the ambient down; `roughness` is k₀σ of each
     face from the top down, one more than there are layers, or None where all are smooth; the other
@@ -55,7 +53,7 @@ def stack(
     bottom, top, q_top = full(substrate), full(ambient), full(q0)
     q_bottom = normal(bottom, a)
     empty = same(ambient, substrate, *layers)
-    waves = []
+    responses = []
     for polarisation in polarisations[:1] if angle is None else polarisations:
         e0, e2 = _weight(top, polarisation), _weight(bottom, polarisation)
         down_faces = up_faces = None
@@ -66,17 +64,17 @@ def stack(
             down_faces = _rough_faces(q[:-1], weight[:-1], q[1:], weight[1:], rough)[:, ::-1]
             up_faces = _rough_faces(q[1:], weight[1:], q[:-1], weight[:-1], rough)
         below = (index[::-1], depth[::-1], q_bottom / e2, down_faces)
-        (E, H), scale_square = _fields(*below, a, polarisation, sincos)
-        (E_, H_), _ = _fields(index, depth, q_top / e0, up_faces, a, polarisation, sincos)
+        (E, H), scale_square = _fields(*below, a, polarisation)
+        (E_, H_), _ = _fields(index, depth, q_top / e0, up_faces, a, polarisation)
         down, up = q_top * E / e0, q_bottom * E_ / e2
         flux = carried(ambient, q0, polarisation) * power(bottom, q_bottom, polarisation)
         denominator = down + H
         # the two directions share their denominator but for scale: bring the second to the first
         reversed_ = (up - H_) / (up + H_) * denominator
-        found = (nothing_where(empty, down - H), reversed_, denominator)
-        squares = Three(*(abs2(amplitude) for amplitude in found))
-        waves.append(Wave(*found, squares, flux / abs2(e0 * e2), scale_square))
-    return tuple(waves)
+        amplitudes = (nothing_where(empty, down - H), reversed_, denominator)
+        squares = Amplitudes(*(abs2(amplitude) for amplitude in amplitudes))
+        responses.append(Response(*amplitudes, squares, flux / abs2(e0 * e2), scale_square))
+    return tuple(responses)
 
 
 def _weight(index, polarisation: str):
@@ -109,7 +107,7 @@ def _damped(x):
     return jnp.where(near, taylor, (1 - jnp.exp(-far)) / far)
 
 
-def _fields(index, depth, admittance, faces, a, polarisation: str, sincos: SinCos):
+def _fields(index, depth, admittance, faces, a, polarisation: str):
     """(E, H) at the far face for a unit wave in the last medium, layer after layer, and the scale²."""
 
     def through_layer(carry, layer):
@@ -118,7 +116,7 @@ def _fields(index, depth, admittance, faces, a, polarisation: str, sincos: SinCo
         if face is not None:
             E, H = E * face[0], H * face[1]
         square, e = normal_square(n, a), _weight(n, polarisation)
-        c, f, layer_scale, _ = through(square, k, sincos)
+        c, f, layer_scale, _ = matrix_elements(square, k)
         E, H = E * c - 1j * f * e * H, H * c - 1j * f * (square / e) * E
         size = jax.lax.stop_gradient(abs2(E) + abs2(H))
         shrink = jax.lax.rsqrt(size)

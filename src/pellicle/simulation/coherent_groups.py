@@ -9,9 +9,8 @@ import jax
 import jax.numpy as jnp
 
 from pellicle.effects.plan import Plan
-from pellicle.optics import characteristic, film, interface, orders, plate, stack
-from pellicle.optics.elementary import sincos_poly
-from pellicle.optics.pair import Number, imag, is_real, real
+from pellicle.optics import coherent, interface, orders, plate, response
+from pellicle.optics.pair import Number, imag, real
 from pellicle.scene.film import Group, Scene, groups, thickness_spread
 from pellicle.scene.layers import Layer
 
@@ -87,11 +86,11 @@ def _faces(plan: Plan, sheet: Sheet, polarisation: str) -> dict[str, Any]:
         return _bare_faces(sheet, polarisation)
     if plan.on("orders"):
         return _windowed_faces(plan, sheet, polarisation)
-    wave = wave_of(plan, sheet, polarisation)
+    sheet_response = response_of(plan, sheet, polarisation)
     return {
-        "R": partial(film.reflectance, wave),
-        "T": partial(film.transmittance, wave),
-        "below": partial(film.reflectance_below, wave),
+        "R": partial(response.reflectance, sheet_response),
+        "T": partial(response.transmittance, sheet_response),
+        "below": partial(response.reflectance_below, sheet_response),
     }
 
 
@@ -106,34 +105,35 @@ def _rough(sheet: Sheet) -> bool:
     return any(face is not None for face in sheet.group.roughness)
 
 
-def wave_of(plan: Plan, sheet: Sheet, polarisation: str) -> film.Wave:
-    """The reflected and transmitted wave of a sheet, by the closed form or by matrices."""
-    ends = (sheet.angle, polarisation)
-    if len(sheet.layers) == 1 and not _rough(sheet):
-        only_waves = not plan.on("absorption") and not plan.on("tunnelling") and is_real(sheet.layers[0])
-        through = characteristic.through_wave if only_waves else characteristic.through
-        one = (sheet.above, sheet.layers[0], sheet.below, sheet.phases[0])
-        (wave,) = film.film(*one, *ends, through=through, sincos=sincos_poly)
-        return wave
+def response_of(plan: Plan, sheet: Sheet, polarisation: str) -> response.Response:
+    """The response of a sheet to one polarisation."""
     wavenumber = 2 * jnp.pi / sheet.scene.light.wavelength
     faces = [0.0 if x is None else wavenumber * x for x in sheet.group.roughness] if _rough(sheet) else None
-    several = (sheet.above, sheet.layers, sheet.below, sheet.phases)
-    (wave,) = stack.stack(*several, *ends, sincos=sincos_poly, roughness=faces)
-    return wave
+    (sheet_response,) = coherent.responses(
+        sheet.above,
+        sheet.layers,
+        sheet.below,
+        sheet.phases,
+        sheet.angle,
+        polarisation,
+        propagating=not plan.on("tunnelling"),
+        roughness=faces,
+    )
+    return sheet_response
 
 
 def _windowed_faces(plan: Plan, sheet: Sheet, polarisation: str) -> dict[str, Any]:
     """The same, order by order through the instrument's window."""
     layer = interface.allow_tunnelling(sheet.layers[0]) if plan.on("tunnelling") else sheet.layers[0]
-    b = orders.bounces(sheet.above, layer, sheet.below, sheet.phases[0], sheet.angle, polarisation)
+    b = orders.airy_series(sheet.above, layer, sheet.below, sheet.phases[0], sheet.angle, polarisation)
     widths = (sheet.scene.instrument.bandwidth, thickness_spread(sheet.scene, sheet.group.layers[0]))
     window = orders.monochromatic if widths == (None, None) else orders.gaussian(_blur(plan, sheet))
     count = plan.row("orders").count
-    back = orders.reversed_bounces(b)
+    back = orders.reversed_series(b)
     return {
-        "R": lambda: orders.reflectance(b, window, count, sincos_poly),
-        "T": lambda: orders.transmittance(b, window, count, sincos_poly),
-        "below": lambda: orders.reflectance(back, window, count, sincos_poly),
+        "R": lambda: orders.reflectance(b, window, count),
+        "T": lambda: orders.transmittance(b, window, count),
+        "below": lambda: orders.reflectance(back, window, count),
     }
 
 

@@ -20,7 +20,7 @@ from pellicle.scene.film import Scene, thickness_spread
 from pellicle.scene.free import free_leaves
 from pellicle.scene.layers import Interface, Layer
 from pellicle.simulation import instrument
-from pellicle.simulation.coherent_groups import Sheet, reflected, sheets_of, transmitted, wave_of
+from pellicle.simulation.coherent_groups import Sheet, reflected, response_of, sheets_of, transmitted
 from pellicle.simulation.instrument import Intensities
 
 Simulate = Callable[[Scene], Any]
@@ -140,7 +140,9 @@ def _ellipsometer(plan: Plan) -> Intensities:
     def simulate(scene: Scene):
         sheet, *under = sheets = sheets_of(plan, scene)
         if not under:
-            return jnp.stack(ellipsometry.stokes(wave_of(plan, sheet, "s"), wave_of(plan, sheet, "p")))
+            return jnp.stack(
+                ellipsometry.stokes(response_of(plan, sheet, "s"), response_of(plan, sheet, "p"))
+            )
         s, p = (reflected(plan, sheets, polarisation) for polarisation in "sp")
         return jnp.stack(ellipsometry.summed(s, p, _crossed(plan, sheets)))
 
@@ -150,7 +152,7 @@ def _ellipsometer(plan: Plan) -> Intensities:
 def _crossed(plan: Plan, sheets: list[Sheet]):
     """conj(r_p) r_s of the first sheet and everything under it."""
     sheet, *under = sheets
-    front = ellipsometry.crossed(wave_of(plan, sheet, "s"), wave_of(plan, sheet, "p"))
+    front = ellipsometry.crossed(response_of(plan, sheet, "s"), response_of(plan, sheet, "p"))
     if not under:
         return front.reflected
     return plate.bounced(*front, _crossed(plan, under), sheet.internal)

@@ -16,9 +16,7 @@ from jax.core import Tracer
 from jaxtyping import Array, Complex, Float
 
 from pellicle.dispersion.base import AbstractDispersion
-from pellicle.optics import film, interface, stack
-from pellicle.optics.characteristic import through, through_wave
-from pellicle.optics.elementary import sincos_poly
+from pellicle.optics import coherent, interface, response
 from pellicle.optics.ellipsometry import angles, normalised, stokes
 from pellicle.optics.pair import Number, is_real, to_complex, to_pair
 from pellicle.scene.film import check_polarisation
@@ -61,7 +59,9 @@ def reflectance(
 
     ```
     """
-    return film.reflectance(*_waves(wavelength, thickness, layer, substrate, ambient, angle, polarisation))
+    return response.reflectance(
+        *_responses(wavelength, thickness, layer, substrate, ambient, angle, polarisation)
+    )
 
 
 def transmittance(
@@ -79,7 +79,9 @@ def transmittance(
     With an absorbing substrate this is the power that enters it. Gerardin et al. 2019 (eq. 21) weight
     both polarisations alike, which is wrong for p there; here each has its own factor.
     """
-    return film.transmittance(*_waves(wavelength, thickness, layer, substrate, ambient, angle, polarisation))
+    return response.transmittance(
+        *_responses(wavelength, thickness, layer, substrate, ambient, angle, polarisation)
+    )
 
 
 def ellipsometry(
@@ -98,7 +100,7 @@ def ellipsometry(
     Where r_p or r_s is 0, Δ has no meaning and is 0; where both are, Ψ is 0 too.
     """
     angle = _floating(angle)  # also at 0 both polarisations are needed
-    s, p = _waves(wavelength, thickness, layer, substrate, ambient, angle, "unpolarised")
+    s, p = _responses(wavelength, thickness, layer, substrate, ambient, angle, "unpolarised")
     return angles(*normalised(stokes(s, p)))
 
 
@@ -118,12 +120,12 @@ def refractive_index(wavelength: Any, what: Medium) -> Complex[Array, "..."]:
     return jnp.broadcast_to(value, jnp.broadcast_shapes(value.shape, wavelength.shape))
 
 
-def _waves(wavelength, thickness, layer, substrate, ambient, angle, polarisation):
+def _responses(wavelength, thickness, layer, substrate, ambient, angle, polarisation):
     check_polarisation(polarisation)
     _warn_of_lost_precision(wavelength, thickness, layer, substrate, ambient, angle)
     wavelength = _floating(wavelength)
     normal = isinstance(angle, int | float) and angle == 0
-    promised = through_wave if normal or interface.propagates(layer, ambient, angle) else through
+    propagating = normal or interface.propagates(layer, ambient, angle)
     into_below = normal or interface.propagates(substrate, ambient, angle)
     named = isinstance(ambient, str | AbstractDispersion)
     ambient = _index(surroundings(ambient) if named else ambient, wavelength)
@@ -134,28 +136,15 @@ def _waves(wavelength, thickness, layer, substrate, ambient, angle, polarisation
         substrate = interface.allow_tunnelling(substrate)
     theta = None if normal else jnp.deg2rad(_floating(angle))
     letters = "sp" if polarisation == "unpolarised" else polarisation
+    layers, thicknesses = [layer], [thickness]
     if isinstance(layer, list | tuple):
-        return _stack_waves(wavelength, thickness, layer, substrate, ambient, theta, letters)
-    layer = _index(layer, wavelength)
-    return film.film(
-        ambient,
-        layer,
-        substrate,
-        2 * jnp.pi / wavelength * thickness,
-        theta,
-        letters,
-        through=promised if is_real(layer) else through,
-        sincos=sincos_poly,
-    )
-
-
-def _stack_waves(wavelength, thickness, layers, substrate, ambient, theta, letters):
-    count = len(thickness) if isinstance(thickness, list | tuple) else np.shape(thickness)[:1]
-    if count not in (len(layers), (len(layers),)):
-        raise ValueError(f"thickness: expected one for each of {len(layers)} layers, got {count}")
-    phases = [2 * jnp.pi / wavelength * thickness[i] for i in range(len(layers))]
+        layers, thicknesses = layer, thickness
+        count = len(thickness) if isinstance(thickness, list | tuple) else np.shape(thickness)[:1]
+        if count not in (len(layers), (len(layers),)):
+            raise ValueError(f"thickness: expected one for each of {len(layers)} layers, got {count}")
     indices = [_index(n, wavelength) for n in layers]
-    return stack.stack(ambient, indices, substrate, phases, theta, letters, sincos=sincos_poly)
+    phases = [2 * jnp.pi / wavelength * thicknesses[i] for i in range(len(layers))]
+    return coherent.responses(ambient, indices, substrate, phases, theta, letters, propagating=propagating)
 
 
 def _floating(x: Any):

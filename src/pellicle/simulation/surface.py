@@ -11,7 +11,6 @@ import jax.numpy as jnp
 from pellicle.brdf import film_colour
 from pellicle.brdf.models import Evaluate, model
 from pellicle.effects.plan import Plan
-from pellicle.optics import characteristic
 from pellicle.scene.surface import SurfaceView
 
 
@@ -57,6 +56,4 @@ def _reflectance(plan: Plan) -> film_colour.Reflectance:
     polarisations = "sp" if plan.on("polarisation") else "s"
     if plan.on("tunnelling"):
         return film_colour.airy(polarisations)
-    absorbs = any(row.effect == "absorption" and row.on for row in plan.rows)
-    through = characteristic.through if absorbs else characteristic.through_wave
-    return film_colour.airy(polarisations, through, enter=lambda index: index)
+    return film_colour.airy(polarisations, tunnelling=False)

@@ -1,0 +1,55 @@
+"""Response of any number of coherent layers: the closed form of a film, or the matrices of a stack."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from pellicle.optics.film import film
+from pellicle.optics.pair import Number
+from pellicle.optics.response import Response
+from pellicle.optics.stack import stack
+
+
+def responses(
+    ambient: Number,
+    layers: Sequence[Number],
+    substrate: Number,
+    phases: Sequence[Any],
+    angle: Any = None,
+    polarisations: str = "sp",
+    *,
+    propagating: bool = False,
+    roughness: Sequence[Any] | None = None,
+) -> tuple[Response, ...]:
+    """Return the response of coherent layers between two half spaces, for each polarisation.
+
+    One smooth layer takes the closed form of `pellicle.optics.film`; several layers, none, or rough
+    interfaces take the characteristic matrices of `pellicle.optics.stack`.
+
+    **Arguments:** all arrays broadcast.
+
+    - `ambient`, `substrate`: refractive indices. A real index promises that the wave propagates there;
+      `interface.allow_tunnelling` turns it into one that may be totally reflected. The ambient is real,
+      except for light from within a plate.
+    - `layers`: refractive indices from the ambient down. In a real one the wave may be evanescent.
+    - `phases`: k₀d = 2πd/λ of each layer.
+    - `angle`: of incidence in radians, or `interface.Inside` for light from within a plate. None is
+      normal incidence, where s and p are equal and only the first polarisation is computed.
+    - `polarisations`: "s", "p" or "sp".
+    - `propagating`: promises that no wave is totally reflected in a real layer, which makes a film of
+      real index cheaper.
+    - `roughness`: k₀σ of each interface from the top down, one more than there are layers.
+
+    **Returns:** one `Response` for each polarisation, in their order.
+
+    ```python
+    >>> from pellicle.optics.response import reflectance
+    >>> round(float(reflectance(*responses(1.0, [1.38], 1.52, [1.138]))), 4)
+    0.0126
+
+    ```
+    """
+    if len(layers) == 1 and roughness is None:
+        return film(ambient, layers[0], substrate, phases[0], angle, polarisations, propagating)
+    return stack(ambient, layers, substrate, phases, angle, polarisations, roughness)

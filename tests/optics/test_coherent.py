@@ -1,0 +1,59 @@
+"""The entry for coherent layers: which formula it takes, and that both agree."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pellicle.optics import coherent, film, interface, response, stack
+from pellicle.optics.pair import Pair, to_complex
+
+AMBIENT, SUBSTRATE, ANGLE = 1.3, Pair(np.array([1.7, 4.0]), np.array([0.0, 0.1])), 0.7
+POWERS = (response.reflectance, response.reflectance_below, response.transmittance)
+
+
+def amplitudes(responses):
+    return [np.asarray(to_complex(x)) for r in responses for x in (r.reflected, r.below, r.denominator)]
+
+
+@pytest.mark.parametrize("propagating", [False, True])
+def test_one_smooth_layer_takes_the_closed_form(propagating):
+    layer, phase = np.array([2.1, 1.9]), np.array([0.3, 5.0])
+    result = coherent.responses(AMBIENT, [layer], SUBSTRATE, [phase], ANGLE, propagating=propagating)
+    expected = film.film(AMBIENT, layer, SUBSTRATE, phase, ANGLE, propagating=propagating)
+    np.testing.assert_array_equal(amplitudes(result), amplitudes(expected))
+
+
+@pytest.mark.parametrize("count", [0, 2, 3])
+def test_other_numbers_of_layers_take_matrices(count):
+    layers, phases = [2.1, Pair(1.5, 0.2), 1.4][:count], [0.3, 1.0, 2.0][:count]
+    result = coherent.responses(AMBIENT, layers, SUBSTRATE, phases, ANGLE)
+    expected = stack.stack(AMBIENT, layers, SUBSTRATE, phases, ANGLE)
+    np.testing.assert_array_equal(amplitudes(result), amplitudes(expected))
+
+
+def test_no_layer_is_the_bare_interface():
+    a, q0 = interface.transverse(AMBIENT, ANGLE)
+    for result, letter in zip(coherent.responses(AMBIENT, [], SUBSTRATE, [], ANGLE), "sp", strict=True):
+        face = (AMBIENT, q0, SUBSTRATE, interface.normal(SUBSTRATE, a), letter)
+        np.testing.assert_allclose(response.reflectance(result), interface.reflectance(*face), atol=1e-15)
+        np.testing.assert_allclose(response.transmittance(result), interface.transmittance(*face), rtol=1e-14)
+
+
+def test_zero_roughness_by_matrices_equals_the_smooth_film():
+    layer, phase = Pair(2.1, 0.3), 1.2
+    smooth = coherent.responses(AMBIENT, [layer], SUBSTRATE, [phase], ANGLE)
+    rough = coherent.responses(AMBIENT, [layer], SUBSTRATE, [phase], ANGLE, roughness=[0.0, 0.0])
+    for one, two in zip(smooth, rough, strict=True):
+        for power in POWERS:
+            np.testing.assert_allclose(power(one), power(two), atol=1e-14)
+
+
+def test_rough_interfaces_reflect_less():
+    layer, phase = Pair(2.1, 0.3), 1.2
+    for power in (response.reflectance, response.reflectance_below):
+        smooth, rough = (
+            power(coherent.responses(AMBIENT, [layer], SUBSTRATE, [phase], None, roughness=sigma)[0])
+            for sigma in (None, [0.05, 0.05])
+        )
+        assert np.all(np.asarray(rough) < np.asarray(smooth))
