@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pellicle
 from pellicle.data.write_brdf import write_brdf_samples
-from pellicle.recipes.surface import read_surface_recipe
+from pellicle.recipes import read_recipe
 from pellicle.synthetic.brdf import default_directions, simulate_brdf
 
 STUDIES = Path(__file__).resolve().parents[1] / "fits" / "brdf"
@@ -26,7 +26,7 @@ def main(folder: Path = STUDIES) -> None:
         if target.exists():
             continue
         target.parent.mkdir(parents=True, exist_ok=True)
-        surface = read_surface_recipe(recipe).surface
+        surface = read_recipe(recipe).scene()
         samples = simulate_brdf(surface, default_directions(SAMPLES), noise=NOISE, seed=seed)
         start = ", ".join(f"{key} = {' '.join(f'{x:g}' for x in number)}" for key, number in _truth(surface))
         said = [

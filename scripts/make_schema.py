@@ -19,7 +19,7 @@ SCHEMA = Path(__file__).resolve().parents[1] / "docs" / "recipe.schema.json"
 
 def schema() -> dict[str, Any]:
     """One schema for both kinds of recipe."""
-    kinds = (recipe_tables.RecipeTable, surface.RecipeTable)
+    kinds = (recipe_tables.RecipeTable, surface.SurfaceRecipeTable)
     found, definitions = models_json_schema([(kind, "validation") for kind in kinds])
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

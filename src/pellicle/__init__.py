@@ -40,8 +40,8 @@ if TYPE_CHECKING:
     from pellicle.fitting.spectra.fit import fit as fit
     from pellicle.materials import lookup as material  # noqa: F401
     from pellicle.planning.film import plan as plan
-    from pellicle.recipes.film import read_recipe as read_recipe
     from pellicle.recipes.media_words import medium as medium
+    from pellicle.recipes.read import read_recipe as read_recipe
     from pellicle.sampling.brdf import sample_brdf as sample_brdf
     from pellicle.sampling.result import Posterior as Posterior
     from pellicle.sampling.spectra import sample as sample
@@ -76,7 +76,7 @@ _HOME = {
     "pellicle.fitting.spectra.fit": ("fit",),
     "pellicle.fitting.result": ("Fit", "Status"),
     "pellicle.data.read_brdf": ("read_brdf_samples",),
-    "pellicle.recipes.film": ("read_recipe",),
+    "pellicle.recipes.read": ("read_recipe",),
     "pellicle.data.brdf_samples": ("BrdfSamples",),
     "pellicle.data.read_spectrum": ("read_spectrum",),
     "pellicle.data.spectrum": ("Spectrum",),

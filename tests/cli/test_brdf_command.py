@@ -9,7 +9,7 @@ from pellicle.effects.surface import exact
 from pellicle.fitting.brdf import fit as fitting
 from pellicle.fitting.brdf.result import Baseline, BrdfFit
 from pellicle.fitting.result import Estimate, Rival, Status
-from pellicle.recipes.surface import read_surface_recipe
+from pellicle.recipes import read_recipe
 from pellicle.sampling import brdf as sampling
 from pellicle.sampling.ensemble import Subject, sampled
 from pellicle.sampling.modes import mixture
@@ -213,6 +213,6 @@ def test_flags_that_a_surface_has_no_use_for(folder, pellicle):
 
 def test_a_metal_from_the_catalogue_is_the_base(folder):
     (folder / "paint.toml").write_text(RECIPE.replace('"3.9+0.02j"', '"Fe"'))
-    fixed = read_surface_recipe(folder / "paint.toml").surface.fixed()
+    fixed = read_recipe(folder / "paint.toml").scene().fixed()
     assert fixed["base_n"].shape == (3,)
     assert np.all((fixed["base_n"] > 2) & (fixed["base_n"] < 3.2) & (fixed["base_k"] > 2))

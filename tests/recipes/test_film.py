@@ -5,7 +5,7 @@ import pytest
 
 from pellicle.dispersion.empirical import Cauchy, Constant
 from pellicle.errors import DataError
-from pellicle.recipes.film import read_recipe
+from pellicle.recipes import read_recipe
 from pellicle.scene.free import Free
 from pellicle.scene.instrument import Drift
 
@@ -126,7 +126,7 @@ def test_a_thickness_may_be_a_number_or_a_value(scene):
     assert thickness("{ value = 120 }") == 120
     free = thickness("{ value = 120, lower = 10, upper = 300, prior = { mean = 100, sd = 5 } }")
     assert isinstance(free, Free)
-    assert (free.value, free.lower, free.upper) == (120, 10, 300)
+    assert (free.start, free.lower, free.upper) == (120, 10, 300)
     assert (free.prior.mean, free.prior.sd) == (100, 5)
 
 
@@ -197,7 +197,7 @@ def test_files_that_are_no_recipe(tmp_path):
     with pytest.raises(DataError, match="No such file"):
         read_recipe(tmp_path / "gone.toml")
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(DataError, match=r"is no text, .* data go before --recipe"):
+    with pytest.raises(DataError, match=r"is not UTF-8 text.* arguments of their own"):
         read_recipe(tmp_path / "binary.toml")
 
 
@@ -328,7 +328,7 @@ wavelength_shift = {{ lower = -2, upper = 2 }}
     path.write_text(text.format(angle="{ lower = 69, upper = 71 }"))
     scene = read_recipe(path).scene()
     assert (scene.light.angle.lower, scene.light.angle.upper) == (69, 71)
-    assert scene.instrument.wavelength_shift.value == 0
+    assert scene.instrument.wavelength_shift.start == 0
     path.write_text(text.format(angle="{ lower = 69, upper = 91 }"))
     with pytest.raises(DataError, match="must lie in 0 to 90 degrees, got 91"):
         read_recipe(path).scene()

@@ -12,7 +12,7 @@ AT = np.array([450.0, 633.0, 850.0])
 
 
 def free_part(free: Free):
-    return free.value, free.lower, free.upper
+    return free.start, free.lower, free.upper
 
 
 def test_a_range_is_a_free_thickness_and_a_number_a_fixed_one():

@@ -23,7 +23,7 @@ def scene(**changes):
 
 
 def test_a_free_number_starts_in_the_middle_unless_told():
-    assert FREE.value == 1505
+    assert FREE.start == 1505
     assert pl.Free(10, 30, start=20).start == 20
     assert pl.Free(10, 30, start=10).start == 10
 

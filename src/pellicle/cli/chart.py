@@ -12,6 +12,7 @@ from pellicle.cli.session import say, start
 from pellicle.errors import UsageError
 
 if TYPE_CHECKING:
+    from pellicle.recipes.surface import SurfaceRecipe
     from pellicle.scene.film import Scene
 
 
@@ -34,14 +35,14 @@ def chart(
 
     Example: pellicle chart film.toml --out colours.png --thickness 0:1000
     """
-    from pellicle.recipes.film import read_recipe
-    from pellicle.recipes.kind import describes_surface
+    from pellicle.recipes import read_recipe
+    from pellicle.recipes.surface import SurfaceRecipe
 
-    if describes_surface(recipe):
+    found = read_recipe(recipe)
+    if isinstance(found, SurfaceRecipe):
         if layer is not None or thickness is not None:
             raise UsageError("--layer and --thickness are for films: a surface has its own thickness")
-        return _surface(recipe, out, light)
-    found = read_recipe(recipe)
+        return _surface(found, out, light)
     scene = found.scene()
     angles = _range("--angle", angle, 90.0)
     nm = _bounds(scene, layer) if thickness is None else _range("--thickness", thickness, inf)
@@ -57,16 +58,14 @@ def chart(
     return 0
 
 
-def _surface(recipe: str, out: str, light: float) -> int:
-    from pellicle.recipes.surface import read_surface_recipe
-
+def _surface(recipe: SurfaceRecipe, out: str, light: float) -> int:
     if not 0 <= light <= 180:
         raise UsageError(f"--light must lie in 0 to 180 degrees, got {light:g}")
-    surface = read_surface_recipe(recipe).surface
+    surface = recipe.scene()
     start()
     from pellicle.reporting.colour_figures import sphere
 
-    sphere(surface, out, (light, 60.0), title=Path(recipe).stem)
+    sphere(surface, out, (light, 60.0), title=Path(recipe.path).stem)
     say(f"{out}: a sphere of {surface.model}, the light {light:g} degrees from the line of sight")
     return 0
 

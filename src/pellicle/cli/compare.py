@@ -59,11 +59,13 @@ def compare(
 
 def _groups(data: list[str], recipe: str) -> list[list[Look]]:
     from pellicle.cli.inputs import groups
-    from pellicle.recipes.kind import describes_surface
+    from pellicle.recipes import read_recipe
+    from pellicle.recipes.surface import SurfaceRecipe
 
-    if describes_surface(recipe):
+    of_film = read_recipe(recipe)
+    if isinstance(of_film, SurfaceRecipe):
         raise UsageError(f"{recipe}: describes a surface; a comparison is of films")
-    found, _ = groups(data, recipe, SceneWords(), ReadWords(), False)
+    found, _ = groups(data, of_film, SceneWords(), ReadWords(), False)
     if any(look.reading.loss not in (None, "least-squares") for looks in found for look in looks):
         raise DataError(f"{recipe}: a comparison needs least squares: leave the loss out")
     return found

@@ -35,22 +35,22 @@ def cost(
     """
     from pellicle.cli.wavelengths import seen
     from pellicle.files import new_folder
-    from pellicle.recipes.film import read_recipe
-    from pellicle.recipes.kind import describes_surface
+    from pellicle.recipes import read_recipe
+    from pellicle.recipes.surface import SurfaceRecipe
 
     if tolerance is not None and not 0 < tolerance < inf:
         raise UsageError(f"--tolerance must be above zero, got {tolerance:g}: what error is small enough?")
     if datasets < 0:
         raise UsageError(f"--datasets must not be negative, got {datasets}")
-    if describes_surface(recipe):
+    found = read_recipe(recipe)
+    if isinstance(found, SurfaceRecipe):
         if reference != "float64":
             raise UsageError(
                 "--reference is for films: a surface is measured against steps of 1 nm in float64"
             )
         from pellicle.cli.surface_commands import cost_surface
 
-        return cost_surface(recipe, tolerance, out, json)
-    found = read_recipe(recipe)
+        return cost_surface(found, tolerance, out, json)
     scene, wavelength = seen(found)
     if out is not None and Path(out).exists():
         new_folder(out)  # refuses a stranger's folder before the work, not after

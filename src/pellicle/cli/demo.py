@@ -42,6 +42,8 @@ def demo(
     from pellicle.cli.inputs import groups
     from pellicle.cli.simulate import simulate
     from pellicle.files import write_text
+    from pellicle.recipes import read_recipe
+    from pellicle.recipes.film import FilmRecipe
     from pellicle.sampling.checks import missing
 
     folder = _unused(Path(out))
@@ -53,7 +55,9 @@ def demo(
     simulate(str(recipe), out=str(data), seed=1)
     sampler, command = (None, "fit") if missing() else (Sampler(), "sample")
     _told(f"pellicle {command} --recipe {recipe} --out {folder / 'result'}")
-    found, together = groups([], str(recipe), SceneWords(), ReadWords(), joint=False)
+    described = read_recipe(recipe)
+    assert isinstance(described, FilmRecipe)
+    found, together = groups([], described, SceneWords(), ReadWords(), joint=False)
     start()
     code = Batch(str(folder / "result"), False, together, 0.0, sampler)(found)
     _told(f"pellicle chart {recipe} --out {picture} --thickness 0:600")

@@ -9,6 +9,7 @@ from cyclopts import Parameter
 from pellicle.cli import fit_brdf
 from pellicle.cli.batch import Batch, Sampler
 from pellicle.cli.flags import OUTPUT, SAMPLER, SCENE, ReadWords, SceneWords, flag, switch
+from pellicle.cli.inputs import described_by, groups
 from pellicle.cli.session import not_negative, start
 
 
@@ -31,12 +32,13 @@ def fit(
     """
     words, reading = words or SceneWords(), reading or ReadWords()
     sampler = Sampler() if posterior else None
-    if fit_brdf.wanted(recipe, reading.signal):
-        given = fit_brdf.of_films(words, joint, tolerance)
-        return fit_brdf.fit_surface(list(data), str(recipe), given, reading, out, json, sampler)
-    not_negative("--tolerance", tolerance)
-    from pellicle.cli.inputs import groups
+    from pellicle.recipes.surface import SurfaceRecipe
 
-    found, together = groups(list(data), recipe, words, reading, joint)
+    described = described_by(recipe, reading.signal)
+    if isinstance(described, SurfaceRecipe):
+        given = fit_brdf.of_films(words, joint, tolerance)
+        return fit_brdf.fit_surface(list(data), described, given, reading, out, json, sampler)
+    not_negative("--tolerance", tolerance)
+    found, together = groups(list(data), described, words, reading, joint)
     start()
     return Batch(out, json, together, tolerance, sampler)(found)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from logging import getLogger
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,21 +18,9 @@ if TYPE_CHECKING:
     from pellicle.fitting.brdf.result import BrdfFit
     from pellicle.recipes.surface import SurfaceRecipe
     from pellicle.sampling.result import Posterior
+    from pellicle.scene.surface import Surface
 
 log = getLogger(__name__)
-
-
-def wanted(recipe: str | None, signal: str | None) -> bool:
-    """Whether what is to be fitted is a BRDF. Raises UsageError for one without a recipe."""
-    if recipe is None:
-        if signal == "brdf":
-            raise UsageError(
-                "--signal brdf needs a --recipe that describes the surface under [scene.surface]"
-            )
-        return False
-    from pellicle.recipes.kind import describes_surface
-
-    return describes_surface(recipe)
 
 
 def of_films(words: SceneWords, joint: bool, tolerance: float) -> list[str]:
@@ -44,7 +31,7 @@ def of_films(words: SceneWords, joint: bool, tolerance: float) -> list[str]:
 
 def fit_surface(
     files: list[str],
-    recipe: str,
+    recipe: SurfaceRecipe,
     flags: list[str],
     reading: ReadWords,
     out: str | None,
@@ -52,8 +39,6 @@ def fit_surface(
     sampler: Sampler | None = None,
 ) -> int:
     """Fit the recipe's surface to each file, and with a sampler its posterior too. Returns the exit code."""
-    from pellicle.recipes.surface import read_surface_recipe
-
     others = {name: value for name, value in vars(reading).items() if value is not None}
     for allowed in ("columns", "noise", "signal", "reference_material"):
         others.pop(allowed, None)
@@ -61,21 +46,23 @@ def fit_surface(
         refused = [*flags, *(f"--{name.replace('_', '-')}" for name in others)]
         raise UsageError(f"{', '.join(refused)} cannot be used on a BRDF; the recipe describes the surface")
     if reading.signal not in (None, "brdf"):
-        raise UsageError(f"{recipe}: describes a surface, whose signal is brdf and not {reading.signal}")
-    found = read_surface_recipe(recipe)
+        raise UsageError(f"{recipe.path}: describes a surface, whose signal is brdf and not {reading.signal}")
     said = {
         name: getattr(reading, name) for name in ("columns", "noise") if getattr(reading, name) is not None
     }
-    found = replace(found, data=found.data.model_copy(update=said))
-    if not found.surface.leaves():
+    recipe = recipe.with_data(**said)
+    if not recipe.scene().leaves():
         raise DataError(
-            f"{recipe}: nothing is free to fit: give bounds, as in thickness = {{ lower = 0, upper = 1000 }}"
+            f"{recipe.path}: nothing is free to fit: give bounds, as in"
+            " thickness = { lower = 0, upper = 1000 }"
         )
-    files = files or found.files
+    files = files or recipe.files
     if not files:
-        raise UsageError(f"{recipe}: names no data files: give them on the command line or in [data] files")
+        raise UsageError(
+            f"{recipe.path}: names no data files: give them on the command line or in [data] files"
+        )
     start()
-    return _each(found, files, out, as_json, sampler)
+    return _each(recipe, files, out, as_json, sampler)
 
 
 def _each(
@@ -112,17 +99,17 @@ def _one(
 
     progress = Progress(path)
     try:
-        samples = recipe.read(path)
+        samples, surface = recipe.read(path), recipe.scene()
         say(*(f"{path}: {note}" for note in samples.notes))
         log.info(
             "surface: %s, by %d samples of %s",
-            recipe.surface.model,
+            surface.model,
             len(samples),
             ", ".join(samples.channels),
         )
-        for leaf in recipe.surface.leaves():
+        for leaf in surface.leaves():
             log.info("free: %s between %g and %g", leaf.name, leaf.free.lower, leaf.free.upper)
-        fit, posterior = _found(recipe, samples, folder, sampler, progress)
+        fit, posterior = _found(recipe, surface, samples, folder, sampler, progress)
     except ValueError as error:
         progress.clear()
         message = as_flags(str(error))
@@ -147,17 +134,18 @@ def _one(
 
 def _found(
     recipe: SurfaceRecipe,
+    surface: Surface,
     samples: BrdfSamples,
     folder: Path | None,
     sampler: Sampler | None,
     progress: Progress,
 ) -> tuple[BrdfFit, Posterior | None]:
-    compared = {"residual": recipe.data.residual, "progress": progress}
+    compared = {"residual": recipe.tables.data.residual, "progress": progress}
     if sampler is None:
         from pellicle.fitting.brdf.fit import fit_brdf
 
-        return fit_brdf(samples, recipe.surface, **compared), None
+        return fit_brdf(samples, surface, **compared), None
     from pellicle.sampling.brdf import sample_brdf
 
-    posterior = sample_brdf(samples, recipe.surface, **sampler.settings(folder), **compared)
+    posterior = sample_brdf(samples, surface, **sampler.settings(folder), **compared)
     return posterior.fit, posterior

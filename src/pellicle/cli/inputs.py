@@ -13,11 +13,23 @@ from pellicle.cli.session import say
 from pellicle.errors import DataError, UsageError
 
 if TYPE_CHECKING:
-    from pellicle.recipes.film import Recipe
+    from pellicle.recipes.film import FilmRecipe
+    from pellicle.recipes.surface import SurfaceRecipe
+
+
+def described_by(path: str | None, signal: str | None) -> FilmRecipe | SurfaceRecipe | None:
+    """Read the recipe, if there is one. Raises DataError, and UsageError for the signal brdf without one."""
+    if path is not None:
+        from pellicle.recipes import read_recipe
+
+        return read_recipe(path)
+    if signal == "brdf":
+        raise UsageError("--signal brdf needs a --recipe that describes the surface under [scene.surface]")
+    return None
 
 
 def groups(
-    files: list[str], recipe: str | None, words: SceneWords, reading: ReadWords, joint: bool
+    files: list[str], recipe: FilmRecipe | None, words: SceneWords, reading: ReadWords, joint: bool
 ) -> tuple[list[list[Look]], bool]:
     """Files that are fitted together, and whether more than one may be. Raises UsageError or DataError."""
     _check(reading)
@@ -31,7 +43,7 @@ def groups(
     except UsageError as error:
         if recipe is None:
             raise
-        raise DataError(f"{recipe}: {error}") from None
+        raise DataError(f"{recipe.path}: {error}") from None
     joint = joint or together
     return [looks] if joint else [[look] for look in looks], joint
 
@@ -66,7 +78,7 @@ def _check_units(reading: ReadWords) -> None:
 
 
 def _what(
-    files: list[str], recipe: str | None, words: SceneWords, reading: ReadWords
+    files: list[str], recipe: FilmRecipe | None, words: SceneWords, reading: ReadWords
 ) -> tuple[list[Look], bool]:
     """The files with their scenes, and whether they are of one sample, from a recipe or from flags."""
     if recipe is None:
@@ -78,22 +90,21 @@ def _what(
         scene, assumed = scene_from_words(words, reading)
         say(*assumed)
         return [Look(file, scene, reading) for file in files], False
-    from pellicle.recipes.film import read_recipe
-
     if words.given():
         raise UsageError(f"{', '.join(words.given())} and --recipe exclude each other: put it in the recipe")
-    found = read_recipe(recipe)
-    if found.each and files:
-        raise UsageError(f"{recipe}: [[data.file]] and files on the command line exclude each other")
-    files = files or found.files
+    if recipe.each and files:
+        raise UsageError(f"{recipe.path}: [[data.file]] and files on the command line exclude each other")
+    files = files or recipe.files
     if not files:
-        raise UsageError(f"{recipe}: names no data files: give them on the command line or in [data] files")
-    recipes = found.each or [found] * len(files)
+        raise UsageError(
+            f"{recipe.path}: names no data files: give them on the command line or in [data] files"
+        )
+    recipes = recipe.each or [recipe] * len(files)
     looks = [_look(file, one, reading) for file, one in zip(files, recipes, strict=True)]
-    return looks, found.tables.data.joint
+    return looks, recipe.tables.data.joint
 
 
-def _look(file: str, recipe: Recipe, reading: ReadWords) -> Look:
+def _look(file: str, recipe: FilmRecipe, reading: ReadWords) -> Look:
     import equinox as eqx
 
     reading = merged(reading, recipe)

@@ -10,7 +10,7 @@ from pellicle.cli.flags import ReadWords, SceneWords
 from pellicle.errors import UsageError
 
 if TYPE_CHECKING:
-    from pellicle.recipes.film import Recipe
+    from pellicle.recipes.film import FilmRecipe
     from pellicle.scene.film import Light, Scene
 
 DEFAULT_THICKNESS = "1:5000"
@@ -62,7 +62,7 @@ def light(read: ReadWords) -> Light:
     )
 
 
-def merged(read: ReadWords, recipe: Recipe | None) -> ReadWords:
+def merged(read: ReadWords, recipe: FilmRecipe | None) -> ReadWords:
     """What the flags say, and else the recipe."""
     if recipe is None:
         return read

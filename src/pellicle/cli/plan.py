@@ -25,17 +25,18 @@ def plan(
     Example: pellicle plan film.toml --tolerance 1e-3
     """
     from pellicle.cli.wavelengths import seen
-    from pellicle.recipes.film import read_recipe
-    from pellicle.recipes.kind import describes_surface
+    from pellicle.recipes import read_recipe
+    from pellicle.recipes.surface import SurfaceRecipe
     from pellicle.scene.film import with_wavelength
 
     if not 0 < tolerance < inf:
         raise UsageError(f"--tolerance must be above zero, got {tolerance:g}: what error is small enough?")
-    if describes_surface(recipe):
+    found = read_recipe(recipe)
+    if isinstance(found, SurfaceRecipe):
         from pellicle.cli.surface_commands import plan_surface
 
-        return plan_surface(recipe, tolerance, json)
-    scene = with_wavelength(*seen(read_recipe(recipe)))
+        return plan_surface(found, tolerance, json)
+    scene = with_wavelength(*seen(found))
     start()
     from pellicle.fitting.spectra import logging
     from pellicle.planning import cost_model, film

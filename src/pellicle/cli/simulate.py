@@ -12,7 +12,7 @@ from pellicle.cli.session import not_negative, say, start
 from pellicle.errors import DataError
 
 if TYPE_CHECKING:
-    from pellicle.recipes.film import Recipe
+    from pellicle.recipes.film import FilmRecipe
 
 
 def simulate(
@@ -33,16 +33,16 @@ def simulate(
     """
     from pellicle.cli.wavelengths import wavelengths
     from pellicle.files import write_text
-    from pellicle.recipes.film import read_recipe
-    from pellicle.recipes.kind import describes_surface
+    from pellicle.recipes import read_recipe
+    from pellicle.recipes.surface import SurfaceRecipe
 
     not_negative("--noise", noise or 0.0)
     not_negative("--tolerance", tolerance)
-    if describes_surface(recipe):
+    found = read_recipe(recipe)
+    if isinstance(found, SurfaceRecipe):
         from pellicle.cli.surface_commands import simulate_surface
 
-        return simulate_surface(recipe, out, noise, seed, tolerance)
-    found = read_recipe(recipe)
+        return simulate_surface(found, out, noise, seed, tolerance)
     scene = found.scene()
     start()
     from pellicle.fitting.spectra import logging
@@ -61,7 +61,7 @@ def simulate(
     return 0
 
 
-def _csv(recipe: Recipe, scene: Any, result: Any, noise: float, seed: int) -> str:
+def _csv(recipe: FilmRecipe, scene: Any, result: Any, noise: float, seed: int) -> str:
     """The file's text: what it is, from which recipe and seed, the truth, then the numbers."""
     from pellicle.fitting.spectra.parameters import fixed_numbers, parameters
 
@@ -84,4 +84,4 @@ def _csv(recipe: Recipe, scene: Any, result: Any, noise: float, seed: int) -> st
 
 
 def _angle(angle: Any) -> str:
-    return f"{getattr(angle, 'value', angle):g}"
+    return f"{getattr(angle, 'start', angle):g}"

@@ -15,26 +15,26 @@ if TYPE_CHECKING:
     from pellicle.synthetic.brdf import Directions
 
 
-def simulate_surface(recipe: str, out: str, noise: float | None, seed: int, tolerance: float) -> int:
+def simulate_surface(
+    recipe: SurfaceRecipe, out: str, noise: float | None, seed: int, tolerance: float
+) -> int:
     """Write the recipe's BRDF as CSV. Returns the exit code."""
     from pellicle.data.write_brdf import write_brdf_samples
     from pellicle.fitting.spectra.logging import of_plan
-    from pellicle.recipes.surface import read_surface_recipe
     from pellicle.synthetic.brdf import synthesise
 
-    found = read_surface_recipe(recipe)
-    looked = directions(found)
-    noise = (found.data.noise or 0.0) if noise is None else noise
+    surface, looked = recipe.scene(), directions(recipe)
+    noise = (recipe.tables.data.noise or 0.0) if noise is None else noise
     start()
-    samples, plan = synthesise(found.surface, looked, noise, seed, tolerance)
+    samples, plan = synthesise(surface, looked, noise, seed, tolerance)
     of_plan(plan)
-    numbers = found.surface.start()
-    units = {about.key: about.unit for about in found.surface.brdf.parameters}
+    numbers = surface.start()
+    units = {about.key: about.unit for about in surface.brdf.parameters}
     truth = (f"{key} = {_listed(x)} {units.get(key, 'nm')}".strip() for key, x in numbers.items())
     said = [
         "SYNTHETIC: simulated, not measured",
-        f"recipe {Path(recipe).name}, seed {seed}, noise {noise:g}, pellicle {version('pellicle')}",
-        f"truth: model {found.surface.model}, {', '.join(truth)}",
+        f"recipe {Path(recipe.path).name}, seed {seed}, noise {noise:g}, pellicle {version('pellicle')}",
+        f"truth: model {surface.model}, {', '.join(truth)}",
     ]
     write_brdf_samples(out, samples, said=said)
     say(f"{out}: {len(samples)} samples of {', '.join(samples.channels)}", *samples.notes)
@@ -57,22 +57,21 @@ def _listed(number) -> str:
     return " ".join(f"{x:.10g}" for x in number.reshape(-1))
 
 
-def plan_surface(recipe: str, tolerance: float, as_json: bool) -> int:
+def plan_surface(recipe: SurfaceRecipe, tolerance: float, as_json: bool) -> int:
     """Print the plan of the recipe's surface. Returns the exit code."""
-    from pellicle.recipes.surface import read_surface_recipe
 
-    found = read_surface_recipe(recipe)
-    looked = directions(found)
+    surface, looked = recipe.scene(), directions(recipe)
     start()
     from pellicle.effects.surface import exact
-    from pellicle.planning import cost_model, surface
+    from pellicle.planning import cost_model
+    from pellicle.planning import surface as planning
     from pellicle.reporting import plans
     from pellicle.scene.surface import lit
 
-    seen = lit(found.surface, looked)
-    chosen, calibration = surface.plan(seen, tolerance), cost_model.calibrated(cache_folder())
-    savings = surface.savings(seen, calibration)
-    whole, planned = (calibration.seconds(surface.work(p, seen)) for p in (exact(seen), chosen))
+    seen = lit(surface, looked)
+    chosen, calibration = planning.plan(seen, tolerance), cost_model.calibrated(cache_folder())
+    savings = planning.savings(seen, calibration)
+    whole, planned = (calibration.seconds(planning.work(p, seen)) for p in (exact(seen), chosen))
     if as_json:
         print(json.dumps(plans.record(chosen, savings), allow_nan=False), flush=True)
     else:
@@ -80,13 +79,11 @@ def plan_surface(recipe: str, tolerance: float, as_json: bool) -> int:
     return 0
 
 
-def cost_surface(recipe: str, tolerance: float | None, out: str | None, as_json: bool) -> int:
+def cost_surface(recipe: SurfaceRecipe, tolerance: float | None, out: str | None, as_json: bool) -> int:
     """Print what accuracy costs for the recipe's surface. Returns the exit code."""
     from pellicle.files import new_folder
-    from pellicle.recipes.surface import read_surface_recipe
 
-    found = read_surface_recipe(recipe)
-    looked = directions(found)
+    surface, looked = recipe.scene(), directions(recipe)
     if out is not None and Path(out).exists():
         new_folder(out)  # refuses a stranger's folder before the work, not after
     start(keep=False)
@@ -95,13 +92,13 @@ def cost_surface(recipe: str, tolerance: float | None, out: str | None, as_json:
     from pellicle.reporting.cost_files import surface_to_json, write_surface_cost
     from pellicle.scene.surface import lit
 
-    progress = Progress(recipe)
+    progress = Progress(recipe.path)
     try:
-        result = cost(lit(found.surface, looked), tolerance=tolerance, progress=progress)
+        result = cost(lit(surface, looked), tolerance=tolerance, progress=progress)
     finally:
         progress.clear()
-    record = surface_to_json(result, recipe)
-    print(json.dumps(record, allow_nan=False) if as_json else surface_text(result, recipe), flush=True)
+    record = surface_to_json(result, recipe.path)
+    print(json.dumps(record, allow_nan=False) if as_json else surface_text(result, recipe.path), flush=True)
     if out is not None:
-        say(f"{write_surface_cost(out, result, recipe)}: report, figure and tables written")
+        say(f"{write_surface_cost(out, result, recipe.path)}: report, figure and tables written")
     return 130 if result.interrupted else 0

@@ -10,13 +10,13 @@ from pellicle.errors import DataError
 if TYPE_CHECKING:
     import numpy as np
 
-    from pellicle.recipes.film import Recipe
+    from pellicle.recipes.film import FilmRecipe
 
 MOST = 1_000_000
 """Most wavelengths that are simulated at once: more is a slip of the step."""
 
 
-def seen(recipe: Recipe) -> tuple[Any, np.ndarray]:
+def seen(recipe: FilmRecipe) -> tuple[Any, np.ndarray]:
     """The scene, looked at as the recipe says, and its wavelengths: the recipe's, or its first file's."""
     data = recipe.tables.data
     if recipe.files and data.wavelengths is None:
@@ -29,7 +29,7 @@ def seen(recipe: Recipe) -> tuple[Any, np.ndarray]:
     return scene, wavelength
 
 
-def _as_measured(recipe: Recipe) -> tuple[Any, np.ndarray]:
+def _as_measured(recipe: FilmRecipe) -> tuple[Any, np.ndarray]:
     """The scene seen as the recipe's first file was, at the first of its angles."""
     import equinox as eqx
     import numpy as np
@@ -52,7 +52,7 @@ def _as_measured(recipe: Recipe) -> tuple[Any, np.ndarray]:
     return eqx.tree_at(lambda s: s.light, scene, looked), np.sort(spectrum.wavelength[same])
 
 
-def wavelengths(recipe: Recipe, scene: Any) -> np.ndarray:
+def wavelengths(recipe: FilmRecipe, scene: Any) -> np.ndarray:
     """The recipe's wavelengths, or the visible ones that every material has data for."""
     import numpy as np
 

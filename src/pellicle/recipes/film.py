@@ -1,18 +1,17 @@
-"""Recipes: a TOML file that says what is there, how it was looked at and what to fit."""
+"""Recipes of films: tables of a TOML file to a scene."""
 
 from __future__ import annotations
 
 import os
-import tomllib
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel
 
 from pellicle.errors import DataError
 from pellicle.recipes import media_words
 from pellicle.recipes.media import FreeTable, Medium, Number, PriorTable, medium, number
-from pellicle.recipes.media_words import nearest
 from pellicle.recipes.schema import (
     DataTable,
     FileTable,
@@ -29,55 +28,7 @@ from pellicle.scene.free import Free
 from pellicle.scene.instrument import Instrument
 from pellicle.scene.layers import Interface, Layer, Plate, Substrate
 
-
-class Recipe(BaseModel):
-    """A recipe that was read: its tables and where it lies."""
-
-    path: str
-    tables: RecipeTable
-
-    @property
-    def files(self) -> list[str]:
-        """Data files, relative to the recipe."""
-        data = self.tables.data
-        names = [*data.files, *(file.path for file in data.file)]
-        return [os.path.normpath(Path(self.path).parent / name) for name in names]
-
-    @property
-    def each(self) -> list[Recipe]:
-        """The recipe as each `[[data.file]]` changes it, none where there are no such tables."""
-        return [Recipe(path=self.path, tables=of_file(self.tables, file)) for file in self.tables.data.file]
-
-    def scene(self) -> Scene:
-        """The scene it describes. Raises DataError with the recipe's name in front."""
-        try:
-            return _scene(self.tables, Path(self.path).parent)
-        except ValueError as error:
-            raise DataError(f"{self.path}: {error}") from None
-
-
-def read_recipe(path: str | os.PathLike[str]) -> Recipe:
-    """Read and check a recipe. Raises DataError: which key, what was expected, the nearest known one."""
-    name = str(path)
-    try:
-        raw = Path(path).read_bytes()
-    except IsADirectoryError:
-        raise DataError(f"{name}: is a folder; give the recipe's TOML file") from None
-    except OSError as error:
-        raise DataError(f"{name}: cannot be read ({error.strerror}); check the recipe's path") from None
-    try:
-        loaded = tomllib.loads(raw.decode("utf-8"))
-    except UnicodeDecodeError:
-        raise DataError(f"{name}: is no text, and a recipe is a TOML file; data go before --recipe") from None
-    except tomllib.TOMLDecodeError as error:
-        raise DataError(f"{name}: is not TOML, as a recipe must be: {error}") from None
-    try:
-        return Recipe(path=name, tables=RecipeTable.model_validate(loaded))
-    except ValidationError as error:
-        raise DataError(f"{name}: {_first(error)}") from None
-
-
-_KEYS: dict[str, type[BaseModel]] = {
+TABLES: dict[str, type[BaseModel]] = {
     "": RecipeTable,
     "data": DataTable,
     "file": FileTable,
@@ -96,26 +47,36 @@ _KEYS: dict[str, type[BaseModel]] = {
     "wavelength_shift": FreeTable,
     "prior": PriorTable,
 }
+"""The table under each key of a recipe, for messages that list the known keys."""
 
 
-def _first(error: ValidationError) -> str:
-    """The most telling error in one sentence: an unknown key or an infinity before what unions made of it."""
-    found = error.errors(include_url=False)
-    telling = (e for kind in ("extra_forbidden", "finite_number") for e in found if e["type"] == kind)
-    chosen = next(telling, found[0])
-    # unions put the name of the branch they tried into the location
-    branches = ("str", "float", "list[float]")
-    where = [str(part) for part in chosen["loc"] if not str(part)[:1].isupper() and part not in branches]
-    key = ".".join(where)
-    if chosen["type"] == "extra_forbidden":
-        owner = next((part for part in reversed(where[:-1]) if not part.isdigit()), "")
-        known = list(_KEYS.get(owner, RecipeTable).model_fields)
-        return f"unknown key {key!r}{nearest(where[-1], known)}; known here: {', '.join(known)}"
-    if chosen["type"] == "missing":
-        return f"{key} is missing"
-    if chosen["type"] == "value_error":
-        return f"{key}: {chosen.get('ctx', {}).get('error', chosen['msg'])}"
-    return f"{key}: {chosen['msg'][0].lower()}{chosen['msg'][1:]}, got {chosen['input']!r}"
+@dataclass(frozen=True)
+class FilmRecipe:
+    """A recipe of a film: its path and its checked tables."""
+
+    path: str
+    tables: RecipeTable
+
+    @property
+    def files(self) -> list[str]:
+        """Data files, relative to the recipe."""
+        data = self.tables.data
+        names = [*data.files, *(file.path for file in data.file)]
+        return [os.path.normpath(Path(self.path).parent / name) for name in names]
+
+    @property
+    def each(self) -> list[FilmRecipe]:
+        """One recipe for each `[[data.file]]`, with the keys of that table; empty without such tables."""
+        return [FilmRecipe(self.path, of_file(self.tables, file)) for file in self.tables.data.file]
+
+    def scene(self) -> Scene:
+        """Build the scene. Raises DataError, the recipe's path in front."""
+        try:
+            return _scene(self.tables, Path(self.path).parent)
+        except ValueError as error:
+            raise DataError(f"{self.path}: {error}") from None
+        except RecursionError:
+            raise DataError(f"{self.path}: its materials are nested too deeply") from None
 
 
 def _scene(tables: RecipeTable, folder: Path) -> Scene:

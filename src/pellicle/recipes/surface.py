@@ -1,9 +1,8 @@
-"""Recipes of surfaces: a TOML file that names a BRDF's model and what of it is free."""
+"""Recipes of surfaces: tables of a TOML file to a BRDF whose numbers are fixed or free."""
 
 from __future__ import annotations
 
 import os
-import tomllib
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -14,7 +13,6 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.read_brdf import read_brdf_samples
 from pellicle.errors import DataError, UsageError
-from pellicle.recipes.dispersion_models import nearest
 from pellicle.recipes.media import Medium, Number, medium, number
 from pellicle.scene.surface import Surface
 
@@ -25,8 +23,8 @@ class _Table(BaseModel):
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
 
-class DataTable(_Table):
-    """`[data]`: `residual` is what is compared, `samples` the most that are kept of a file."""
+class SurfaceDataTable(_Table):
+    """`[data]`: `residual` is the scale of the comparison, `samples` the most to keep of a file."""
 
     signal: Literal["brdf"] = "brdf"
     files: list[str] = []
@@ -37,7 +35,7 @@ class DataTable(_Table):
 
 
 class SurfaceTable(_Table):
-    """`[scene.surface]`: what else it holds are the keys of the model."""
+    """`[scene.surface]`: further keys are the model's own numbers."""
 
     model_config = ConfigDict(extra="allow", allow_inf_nan=False)
     model: str
@@ -45,64 +43,60 @@ class SurfaceTable(_Table):
     base: Medium | None = None
 
 
-class SceneTable(_Table):
+class SurfaceSceneTable(_Table):
     """`[scene]`."""
 
     surface: SurfaceTable
 
 
-class RecipeTable(_Table):
+class SurfaceRecipeTable(_Table):
     """A whole recipe of a surface."""
 
-    data: DataTable = DataTable()
-    scene: SceneTable
+    data: SurfaceDataTable = SurfaceDataTable()
+    scene: SurfaceSceneTable
 
 
-_KEYS = {"data": DataTable, "scene": SceneTable, "": RecipeTable}
+TABLES: dict[str, type[BaseModel]] = {
+    "": SurfaceRecipeTable,
+    "data": SurfaceDataTable,
+    "scene": SurfaceSceneTable,
+}
+"""The table under each key of a recipe, for messages that list the known keys."""
 
 
 @dataclass(frozen=True)
 class SurfaceRecipe:
-    """A recipe that was read: its surface, and how the samples are read and compared."""
+    """A recipe of a surface: its path and its checked tables."""
 
     path: str
-    files: list[str]
-    surface: Surface
-    data: DataTable
+    tables: SurfaceRecipeTable
+
+    @property
+    def files(self) -> list[str]:
+        """Data files, relative to the recipe."""
+        return [os.path.normpath(Path(self.path).parent / name) for name in self.tables.data.files]
+
+    def scene(self) -> Surface:
+        """Build the surface. Raises DataError, the recipe's path in front."""
+        try:
+            return _surface(self.tables.scene.surface, Path(self.path).parent)
+        except ValueError as error:
+            raise DataError(f"{self.path}: scene.surface: {error}") from None
+        except RecursionError:
+            raise DataError(f"{self.path}: scene.surface: its base is nested too deeply") from None
 
     def read(self, file: str) -> BrdfSamples:
-        """Samples of a BRDF, with σ where `noise` gives one. Raises DataError or UsageError."""
-        found = read_brdf_samples(file, columns=self.data.columns, samples=self.data.samples)
-        if self.data.noise is None:
-            return found
-        return replace(found, sigma=np.full_like(found.values, self.data.noise))
+        """Read samples as `[data]` says, with σ where it gives `noise`. Raises DataError or UsageError."""
+        data = self.tables.data
+        samples = read_brdf_samples(file, columns=data.columns, samples=data.samples)
+        if data.noise is None:
+            return samples
+        return replace(samples, sigma=np.full_like(samples.values, data.noise))
 
-
-def read_surface_recipe(path: str | os.PathLike[str]) -> SurfaceRecipe:
-    """Read and check a recipe. Raises DataError: which key, what was expected, the nearest known one."""
-    name, folder = str(path), Path(path).parent
-    try:
-        tables = RecipeTable.model_validate(tomllib.loads(Path(path).read_text("utf-8")))
-    except ValidationError as error:
-        raise DataError(f"{name}: {_told(error)}") from None
-    files = [os.path.normpath(folder / file) for file in tables.data.files]
-    try:
-        return SurfaceRecipe(name, files, _surface(tables.scene.surface, folder), tables.data)
-    except ValueError as error:
-        raise DataError(f"{name}: scene.surface: {error}") from None
-
-
-def _told(error: ValidationError) -> str:
-    found = error.errors(include_url=False)
-    chosen = next((e for e in found if e["type"] == "extra_forbidden"), found[0])
-    where = [str(part) for part in chosen["loc"]]
-    key = ".".join(where)
-    if chosen["type"] == "extra_forbidden":
-        known = list(_KEYS.get(where[-2] if len(where) > 1 else "", RecipeTable).model_fields)
-        return f"unknown key {key!r}{nearest(where[-1], known)}; known here: {', '.join(known)}"
-    if chosen["type"] == "missing":
-        return f"{key} is missing"
-    return f"{key}: {chosen['msg'][0].lower()}{chosen['msg'][1:]}, got {chosen['input']!r}"
+    def with_data(self, **keys: Any) -> SurfaceRecipe:
+        """The recipe with these keys of `[data]` replaced."""
+        data = self.tables.data.model_copy(update=keys)
+        return replace(self, tables=self.tables.model_copy(update={"data": data}))
 
 
 def _surface(table: SurfaceTable, folder: Path) -> Surface:
@@ -117,12 +111,12 @@ def _surface(table: SurfaceTable, folder: Path) -> Surface:
     return Surface(table.model, numbers, wavelengths)
 
 
-def _number(given: Any, key: str) -> Any:
+def _number(value: Any, key: str) -> Any:
     try:
-        found = _NUMBERS.validate_python(given)
+        table = _NUMBERS.validate_python(value)
     except ValidationError:
         raise UsageError(
             f"{key}: a number, a list of one for each channel, or {{ lower = ..., upper = ... }} was"
-            f" expected, got {given!r}"
+            f" expected, got {value!r}"
         ) from None
-    return found if isinstance(found, list) else number(found, key)
+    return table if isinstance(table, list) else number(table, key)

@@ -1,0 +1,44 @@
+"""Checks of a recipe's tables, with the first error in one sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from pellicle.errors import UsageError
+from pellicle.recipes.dispersion_models import nearest
+
+_Table = TypeVar("_Table", bound=BaseModel)
+
+
+def validated(loaded: dict[str, Any], tables: Mapping[str, type[_Table] | type[BaseModel]]) -> Any:
+    """Check a parsed recipe against the table of the key "", whose sub-tables `tables` lists by their keys.
+
+    Raises UsageError: which key, what was expected, the nearest known one.
+    """
+    try:
+        return tables[""].model_validate(loaded)
+    except ValidationError as error:
+        raise UsageError(_first_error(error, tables)) from None
+
+
+def _first_error(error: ValidationError, tables: Mapping[str, type[BaseModel]]) -> str:
+    """One sentence: an unknown key or an infinity goes before the errors of each branch of a union."""
+    errors = error.errors(include_url=False)
+    clearest = (e for kind in ("extra_forbidden", "finite_number") for e in errors if e["type"] == kind)
+    chosen = next(clearest, errors[0])
+    # unions put the name of the branch they tried into the location
+    branches = ("str", "float", "list[float]")
+    where = [str(part) for part in chosen["loc"] if not str(part)[:1].isupper() and part not in branches]
+    key = ".".join(where)
+    if chosen["type"] == "extra_forbidden":
+        owner = next((part for part in reversed(where[:-1]) if not part.isdigit()), "")
+        known = list(tables.get(owner, tables[""]).model_fields)
+        return f"unknown key {key!r}{nearest(where[-1], known)}; known here: {', '.join(known)}"
+    if chosen["type"] == "missing":
+        return f"{key} is missing"
+    if chosen["type"] == "value_error":
+        return f"{key}: {chosen.get('ctx', {}).get('error', chosen['msg'])}"
+    return f"{key}: {chosen['msg'][0].lower()}{chosen['msg'][1:]}, got {chosen['input']!r}"
