@@ -191,16 +191,6 @@ def test_missing_keys(refused):
     refused(BASE.replace('material = "SiO2"\n', ""), "scene.layer.0: a layer has a material, or between")
 
 
-def test_files_that_are_no_recipe(tmp_path):
-    with pytest.raises(DataError, match="is a folder"):
-        read_recipe(tmp_path)
-    with pytest.raises(DataError, match="No such file"):
-        read_recipe(tmp_path / "gone.toml")
-    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(DataError, match=r"is not UTF-8 text.* arguments of their own"):
-        read_recipe(tmp_path / "binary.toml")
-
-
 def test_what_a_real_sample_adds(scene):
     found = scene(
         """

@@ -114,7 +114,7 @@ def test_freeing_a_number_replaces_it():
     assert free_part(layer.n) == pytest.approx((1.46, 1.0, 1.96))
     assert free_part(layer.k)[1:] == (0, 1)
     assert free_part(media_words.medium("2.9+0.1j", ["n", "k"]).n) == pytest.approx((2.9, 2.4, 3.4))
-    assert media_words.medium("2.9+0.1j", ["k"]).k.value == 0.1
+    assert media_words.medium("2.9+0.1j", ["k"]).k.start == 0.1
     assert media_words.medium("2.9+0.1j", ["n"]).k == 0.1
     assert free_part(media_words.medium("0.2+3j", ["n"]).n)[1:] == (1.0, 1.5)
 

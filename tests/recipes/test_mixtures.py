@@ -175,7 +175,7 @@ def test_any_parameter_of_a_model_can_be_freed():
     free = names(Scene(Layer(layer, 100.0), "Si"))
     assert set(free) == {"Eg", "E0", "k"}
     usual = TERMS["tauc-lorentz"][1]["Eg"]
-    assert (free["Eg"].start, free["Eg"].lower, free["Eg"].upper) == (2.2, usual.lower, usual.upper)
+    assert (free["Eg"].value, free["Eg"].lower, free["Eg"].upper) == (2.2, usual.lower, usual.upper)
     assert (free["E0"].lower, free["E0"].upper) == (3.5, 5)
     assert media_words.medium("sellmeier(1.1,8000)", ["B1"]).B[0].lower == 0.1
     with pytest.raises(UsageError, match="A must not be negative"):

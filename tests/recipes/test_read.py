@@ -1,0 +1,88 @@
+"""Reading recipes: both kinds, and files that are no recipe."""
+
+import numpy as np
+import pytest
+
+import pellicle as pl
+from pellicle.errors import DataError
+from pellicle.recipes.film import FilmRecipe
+from pellicle.recipes.surface import SurfaceRecipe
+
+FILM = '[data]\nfiles = ["oxide.csv"]\n[scene]\nsubstrate = "Si"\n[[scene.layer]]\nmaterial = "SiO2"\n'
+FILM += "thickness = { lower = 10, upper = 3000 }\n"
+SURFACE = '[data]\nfiles = ["paint.csv"]\nnoise = 0.1\n[scene.surface]\nmodel = "microfacet-film"\n'
+SURFACE += "thickness = { lower = 0, upper = 500 }\nn = [1.5, 1.6, 1.7]\n"
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write(text: str | bytes):
+        path = tmp_path / "recipe.toml"
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        return path
+
+    return write
+
+
+def test_a_film_and_a_surface(write, tmp_path):
+    film = pl.read_recipe(write(FILM))
+    assert isinstance(film, FilmRecipe)
+    assert isinstance(film.scene(), pl.Scene)
+    assert film.files == [str(tmp_path / "oxide.csv")]
+    surface = pl.read_recipe(str(write(SURFACE)))
+    assert isinstance(surface, SurfaceRecipe)
+    assert isinstance(surface.scene(), pl.Surface)
+    assert surface.files == [str(tmp_path / "paint.csv")]
+    np.testing.assert_array_equal(surface.scene().fixed()["n"], [1.5, 1.6, 1.7])
+
+
+def test_the_signal_alone_makes_a_surface(write):
+    with pytest.raises(DataError, match=r"scene\.surface is missing"):
+        pl.read_recipe(write('[data]\nsignal = "brdf"\n[scene]\n'))
+
+
+def test_a_byte_order_mark(write):
+    assert pl.read_recipe(write(b"\xef\xbb\xbf" + FILM.encode())).scene().layers[0].thickness.upper == 3000
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            b"\xff\xfe\x00",
+            "is not UTF-8 text, and a recipe is a TOML file; data files are arguments",
+        ),
+        ("[scene\n", "is not TOML, as a recipe must be: .*line 1"),
+        ("a = " + "[" * 5000, "is not a recipe: its brackets are nested too deeply"),
+        (SURFACE.replace("model", "modle"), r"scene\.surface\.model is missing"),
+        (SURFACE.replace("noise", "noize"), r"unknown key 'data\.noize' \(did you mean 'noise'\?\)"),
+    ],
+)
+def test_refused_in_one_sentence(write, text, message):
+    path = write(text)
+    with pytest.raises(DataError, match=message) as caught:
+        pl.read_recipe(path)
+    assert str(caught.value).startswith(f"{path}: ")
+    assert "\n" not in str(caught.value)
+
+
+def test_errors_of_a_surface_name_the_recipe(write):
+    path = write(SURFACE.replace("thickness", "thicknes"))
+    with pytest.raises(DataError, match=r"recipe\.toml: scene\.surface: microfacet-film has no 'thicknes'"):
+        pl.read_recipe(path).scene()
+
+
+def test_files_that_are_no_recipe(tmp_path):
+    with pytest.raises(DataError, match="is a folder; give the recipe's TOML file"):
+        pl.read_recipe(tmp_path)
+    with pytest.raises(DataError, match=r"cannot be read \(No such file"):
+        pl.read_recipe(tmp_path / "gone.toml")
+
+
+def test_mixtures_nested_too_deeply(write):
+    host = '"air"'
+    for _ in range(500):
+        host = f'{{ mix = "linear", host = {host}, inclusion = "air", fraction = 0.5 }}'
+    path = write(FILM.replace('"SiO2"', host))
+    with pytest.raises(DataError, match=r"nested too deeply"):
+        pl.read_recipe(path).scene()
