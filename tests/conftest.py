@@ -1,4 +1,4 @@
-"""What every test runs under: float64, runtime type checks, and a compilation cache of its own."""
+"""Settings and fixtures of all tests: float64, runtime type checks, a compilation cache."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 
 jax.config.update("jax_enable_x64", True)
-# programs compiled by one run serve the next, without touching the user's own cache
+# compiled programs are reused by later runs; the user's own cache is not touched
 jax.config.update("jax_compilation_cache_dir", str(ROOT / ".pytest_cache" / "jax"))
 jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
 jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
 
-# before anything imports the package: every annotated argument and result is checked at run time;
-# an int is a float, as everywhere else in Python's typing
+# must come before the package is imported: annotated arguments and results are checked at run time;
+# int is accepted for float, as by type checkers
 jaxtyping.install_import_hook(
     "pellicle", "beartype.beartype(conf=beartype.BeartypeConf(is_pep484_tower=True))"
 )
 
-# the same examples in every run: a failure is a finding, not a draw of luck
+# the same examples in every run, so that a failure is reproducible
 hypothesis.settings.register_profile(
     "tests", deadline=None, derandomize=True, database=None, max_examples=100
 )
@@ -33,7 +33,7 @@ hypothesis.settings.load_profile("tests")
 
 @pytest.fixture(scope="session")
 def with_part():
-    """Makes the same fit with other facts of its only spectrum."""
+    """Return a function that copies a fit with changed fields of its only spectrum."""
     return _with_part
 
 
@@ -44,7 +44,7 @@ def _with_part(fit, **changes):
 
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
-    """Measurements that are kept beside the repository and not in it."""
+    """Folder of measurements that are kept beside the repository."""
     folder = ROOT.parent / "shared" / "data"
     if not folder.is_dir():
         pytest.skip(f"no measurements at {folder.relative_to(ROOT.parent)} beside the repository")
@@ -53,7 +53,7 @@ def shared_data() -> Path:
 
 @pytest.fixture
 def write(tmp_path):
-    """Writes a small file and gives its path."""
+    """Return a function that writes a small file and returns its path."""
 
     def write(text, name="film.csv"):
         path = tmp_path / name
@@ -65,17 +65,20 @@ def write(tmp_path):
 
 @pytest.fixture
 def refusal():
-    """refusal(read, path, error, *said): reads, expects `error`, and finds every one of `said` in one
-    sentence that starts with the file's name."""
+    """Return `refusal(read, path, error, *parts)`, which expects `error` from `read(path)`.
 
-    def refusal(read, path, error, *said, **kwargs):
+    Its message must be one sentence that begins with the file's name and contains every one of `parts`.
+    """
+
+    def refusal(read, path, error, *parts, **kwargs):
         with pytest.raises(error) as caught:
             read(path, **kwargs)
         message = str(caught.value)
         assert type(caught.value) is error
-        assert message.startswith(str(path))  # and only what follows may hold the words looked for
-        for words in said:
-            assert words in message.removeprefix(str(path)), message
+        assert message.startswith(str(path))
+        sentence = message.removeprefix(str(path))  # the path must not supply the words
+        for part in parts:
+            assert part in sentence, message
         assert "\n" not in message
         assert not message.endswith(".")
 

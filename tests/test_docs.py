@@ -1,7 +1,7 @@
-"""What the README and the documentation show to be typed can be typed: commands, Python, TOML.
+"""Commands, Python blocks and TOML blocks of the README and the documentation run.
 
-Every command of pellicle that a page shows is run here, in the page's order. One of another program has a
-line in `ELSEWHERE`, one that takes too long for every day a line in `SLOW`; each says why.
+Every `pellicle` command on a page is run here, in the page's order. Commands of other programs are listed in
+`ELSEWHERE`, and commands that are too slow for every test run in `SLOW`, each with the reason.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import re
 import shlex
 import sys
 import tomllib
+from collections.abc import Iterable
 from pathlib import Path
 
 import jsonschema
@@ -25,156 +26,198 @@ _PATHS = [
     *sorted((ROOT / "docs").rglob("*.md")),
 ]
 PAGES = {path.relative_to(ROOT).as_posix(): path.read_text("utf-8") for path in _PATHS}
-TYPED = re.compile(r"(?:\.venv/bin/)?(?:pellicle|make|python|pip|source) \S.*")
-PLACE = re.compile(r"\.\.\.|\b[A-Z]{3,}\b")
+COMMAND = re.compile(r"(?:\.venv/bin/)?(?:pellicle|make|python|pip|source) \S.*")
+PLACEHOLDER = re.compile(r"\.\.\.|\b[A-Z]{3,}\b")
 FENCE = re.compile(r"^```([a-z]*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 FILE = re.compile(r"[\w./-]+\.(csv|txt|dat|toml)$")
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
 
-DOUBTFUL = (
+EXIT_4 = (
     "pellicle fit --recipe measurements/recipes/gold_on_glass_300nm.toml",
     "pellicle fit window.csv --layer TiO2 --substrate SiO2 --thickness 10:500",
     "pellicle fit oxide.csv --layer SiO2 --substrate Si --thickness 1000:3000",
     "pellicle sample --recipe docs/examples/five_bands.toml --out results/five_bands",
 )
-"""Their fits end in doubt (exit code 4), as their pages say."""
+"""Their fits do not converge to one answer (exit code 4), as their pages say."""
 SLOW = {
     **{
-        f"pellicle chart docs/surfaces/{name}.toml --out {name}.png": "one sphere of eight is drawn every day"
+        f"pellicle chart docs/surfaces/{name}.toml --out {name}.png": "one sphere of eight is drawn here"
         for name in (
             *("figure_2_coloured", "figure_2_clay", "figure_3_parallel", "figure_3_deviated"),
             *("figure_4", "figure_5_low", "figure_5_high"),
         )
     },
-    "pellicle compare film.csv": "6 s to compile; tests/cli/test_compare_command.py compares others",
+    "pellicle compare film.csv": "compiles for 6 s; tests/cli/test_compare_command.py compares other scenes",
     "pellicle fit --recipe fits/cauchy_100nm/recipe.toml": "one of the studies of tests/test_fits.py",
-    "pellicle cost docs/cost/soap_film.toml --out cost": "fits by many solvers: a minute or two",
+    "pellicle cost docs/cost/soap_film.toml --out cost": "fits with many solvers: one to two minutes",
     **{
-        f"pellicle cost docs/{scene}.toml --datasets 0": "twenty compilations; tests/cli/test_cost_command.py"
+        f"pellicle cost docs/{scene}.toml --datasets 0": "compiles twenty programs"
         for scene in (
             *("cost/soap_film", "cost/cuo_on_aluminium"),
             *("examples/coated_window", "examples/microscope"),
         )
     },
-    "pellicle cost docs/surfaces/tempered_steel.toml --out cost": "forty compilations, and half a minute",
-    "pellicle fit steel.csv --recipe docs/surfaces/tempered_steel.toml": "10 s to compile; "
-    "tests/cli/test_brdf_command.py fits another",
-    "pellicle sample --recipe fits/brdf/tempered_steel/recipe.toml --out results/steel": "20 s to compile; "
-    "tests/sampling samples another",
+    "pellicle cost docs/surfaces/tempered_steel.toml --out cost": "compiles forty programs in half a minute",
+    "pellicle fit steel.csv --recipe docs/surfaces/tempered_steel.toml": "compiles for 10 s; "
+    "tests/cli/test_brdf_command.py fits another surface",
+    "pellicle sample --recipe fits/brdf/tempered_steel/recipe.toml --out results/steel": "compiles for 20 s; "
+    "tests/sampling samples another surface",
 }
 CI = ("make fit", "make test", "make notebooks", "make docs")
-_REPEATED = "a study of hours, whose tables are kept; its parts are tested in their own modules"
+_LONG_STUDY = "takes hours; its tables are kept, and the modules that it uses have their own tests"
 ELSEWHERE = {
-    **dict.fromkeys(CI, "CI itself: .ci/run"),
-    "make fits": "tests/test_fits.py: one study every day, all of them slow",
-    **dict.fromkeys(("make slow", "make coverage"), "these tests"),
-    "make bench": "speed is shown, never tested",
+    **dict.fromkeys(CI, "run by CI: .ci/run"),
+    "make fits": "tests/test_fits.py: one study in every run, all of them in make slow",
+    **dict.fromkeys(("make slow", "make coverage"), "run these tests"),
+    "make bench": "speed is measured by benchmarks, never tested",
     "make properties": "tests/properties: the same on a hundred scenes",
-    "make peers": "several GB of other packages; tests/test_peers.py does without them",
-    "make figures": "tests/reference has the numbers; the pictures are kept",
-    "source .venv/bin/activate": "a shell's own; make fit makes the folder",
+    "make peers": "installs several GB; tests/test_peers.py needs no other package",
+    "make figures": "tests/reference checks the numbers; the figures are kept",
+    "source .venv/bin/activate": "a shell builtin; make fit creates the folder",
     "pellicle demo": "tests/cli/test_demo_command.py",
-    "pellicle --install-completion": "would write to this user's shell: cyclopts' own",
-    "python benchmarks/calibration.py": _REPEATED,
-    "python benchmarks/posterior.py": _REPEATED,
-    "python benchmarks/colour.py": _REPEATED,
-    "python benchmarks/brdf_recovery.py": _REPEATED,
-    "python -m pytest": "this is it",
+    "pellicle --install-completion": "would change the user's shell; part of cyclopts",
+    "python benchmarks/calibration.py": _LONG_STUDY,
+    "python benchmarks/posterior.py": _LONG_STUDY,
+    "python benchmarks/colour.py": _LONG_STUDY,
+    "python benchmarks/brdf_recovery.py": _LONG_STUDY,
+    "python -m pytest": "runs these tests",
     "python scripts/make_measurements.py": "tests/test_measurements.py: two of the files",
     "python scripts/index_materials.py": "tests/materials/test_catalogue.py: the kept index",
 }
 
 
 def commands(text: str) -> list[str]:
-    """What can be typed: lines of indented blocks and of fences without a language, and code spans.
+    """Return the commands of a page: indented lines, lines of fences without a language, and code spans.
 
-    A span of two words, `pellicle cost`, is a mention, and one with a place to fill in (`NAME`, `...`) a
-    pattern.
+    A span of two words (`pellicle cost`) only mentions a command, and one with a placeholder (`NAME`, `...`)
+    is a pattern: both are left out.
     """
     fenced = "".join(inside for kind, inside in FENCE.findall(text) if kind in ("", "sh"))
     prose = FENCE.sub("", text)
     lines = [*re.findall(r"^    (\S.*)$", prose, re.MULTILINE), *fenced.splitlines()]
     spans = re.findall(r"`([^`\n]+)`", re.sub(r"^    .*$", "", prose, flags=re.MULTILINE))
     spans = [span for span in spans if not re.fullmatch(r"pellicle [a-z]+", span)]
-    typed = [re.sub(r"\s+# .*", "", line).strip() for line in [*lines, *spans]]
-    return list(dict.fromkeys(line for line in typed if TYPED.fullmatch(line) and not PLACE.search(line)))
+    candidates = [re.sub(r"\s+# .*", "", line).strip() for line in [*lines, *spans]]
+    found = [line for line in candidates if COMMAND.fullmatch(line) and not PLACEHOLDER.search(line)]
+    return list(dict.fromkeys(found))
 
 
-def ours(page: str) -> list[str]:
-    """The commands of pellicle that are run here."""
+def pellicle_commands(page: str) -> list[str]:
+    """Return the commands of a page that are run here."""
     return [c for c in commands(PAGES[page]) if c.startswith("pellicle ") and c not in ELSEWHERE]
 
 
 def is_slow(command: str) -> bool:
-    """Whether it begins as one of `SLOW`."""
     return command.startswith(tuple(SLOW))
 
 
-SHOWING = [page for page in PAGES if ours(page)]
+PAGES_WITH_COMMANDS = [page for page in PAGES if pellicle_commands(page)]
 
 
 def blocks(page: str, language: str) -> list[str]:
     return [text for kind, text in FENCE.findall(PAGES[page]) if kind == language]
 
 
-def run(command: str, monkeypatch, capsys) -> str:
-    """What it printed."""
-    monkeypatch.setattr(sys, "argv", shlex.split(command))
-    capsys.readouterr()
-    code, said = main(), capsys.readouterr()
-    assert code == (4 if command in DOUBTFUL else 0), (command, said)
-    return said.out
-
-
 def results(text: str) -> list[tuple[float, float]]:
-    """Every value ± error."""
+    """Return every `value ± error` of a text."""
     return [(float(a), float(b)) for a, b in re.findall(r"(\d[\d.]*\d) ± (\d[\d.]*\d)", text)]
 
 
+def missing_results(page: str, outputs: Iterable[str]) -> list[str]:
+    """Return the results that a page quotes and no output contains, within a third of their error."""
+    printed = [pair for text in outputs for pair in results(text)]
+    return [
+        f"{value} ± {error}"
+        for value, error in results(PAGES[page])
+        if not any(abs(value - v) < 0.3 * error and abs(error - e) < 0.2 * error for v, e in printed)
+    ]
+
+
 @pytest.fixture
-def clone(tmp_path, monkeypatch):
-    """A folder that has what a clone has, and that may be written to."""
-    for folder in ("docs", "fits", "measurements"):
-        (tmp_path / folder).symlink_to(ROOT / folder)
-    monkeypatch.chdir(tmp_path)
+def clone(tmp_path_factory, monkeypatch):
+    """Return a function that enters a new writable folder with the contents of a clone."""
     monkeypatch.setenv("PELLICLE_CACHE", "off")
 
+    def enter():
+        folder = tmp_path_factory.mktemp("clone")
+        for name in ("docs", "fits", "measurements"):
+            (folder / name).symlink_to(ROOT / name)
+        monkeypatch.chdir(folder)
 
-def test_what_is_typed_is_found():
+    return enter
+
+
+@pytest.fixture(scope="module")
+def outputs():
+    """What each command has printed so far in this module."""
+    return {}
+
+
+@pytest.fixture
+def run_command(monkeypatch, capsys):
+    """Return a function that runs one command, checks its exit code and returns its stdout."""
+
+    def run(command):
+        monkeypatch.setattr(sys, "argv", shlex.split(command))
+        capsys.readouterr()
+        code, streams = main(), capsys.readouterr()
+        assert code == (4 if command in EXIT_4 else 0), (command, streams)
+        return streams.out
+
+    return run
+
+
+@pytest.fixture
+def run_page(clone, run_command, outputs):
+    """Return a function that runs the quick commands of a page that have not run, or whose files it reads."""
+
+    def run(page):
+        clone()
+        shown = pellicle_commands(page)
+        for i, command in enumerate(shown):
+            out = command.partition("--out ")[2].partition(" ")[0]
+            is_read_later = out and any(out in later.split() for later in shown[i + 1 :])
+            if not is_slow(command) and (is_read_later or command not in outputs):
+                outputs[command] = run_command(command)
+
+    return run
+
+
+def test_commands_of_a_page_are_found():
     page = (
         "Type\n\n    pellicle fit a.csv  # first\n    make fit\n    no command\n\nor `pellicle plan b.toml`, "
         "not `pellicle plan` or `pellicle fit NAME`\n\n```\npip install x\n```\n```python\nmake = 1\n```\n"
     )
     assert commands(page) == ["pellicle fit a.csv", "make fit", "pip install x", "pellicle plan b.toml"]
-    assert len(ours("README.md")) > 5
-    assert {"docs/tour.md", "docs/howto/units.md", "docs/explanation/effects.md"} <= set(SHOWING)
+    assert len(pellicle_commands("README.md")) > 5
+    assert {"docs/tour.md", "docs/howto/units.md", "docs/explanation/effects.md"} <= set(PAGES_WITH_COMMANDS)
 
 
-def test_whatever_is_shown_is_run_by_a_test():
+def test_every_command_is_run_by_a_test():
     shown = {command for text in PAGES.values() for command in commands(text)}
     others = {c for c in shown if not c.startswith("pellicle ") or c in ELSEWHERE}
     extras = PROJECT["optional-dependencies"].keys()
     targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE))
     for command in others:
-        program, what = command.split()[:2]
+        program, target = command.split()[:2]
         if program == "pip":
             assert set(re.findall(r"'\.\[(\w+)\]'", command)) <= extras, command
             continue
-        assert any(command.startswith(line) for line in ELSEWHERE), f"who runs {command}?"
-        assert program != "make" or what in targets, command
-        assert program != "python" or what == "-m" or (ROOT / what).is_file(), command
-    typed_by_ci = (ROOT / ".ci" / "run").read_text("utf-8").splitlines()
-    assert all(any(line.startswith(command) for line in typed_by_ci) for command in CI)
-    stale = [line for line in (*ELSEWHERE, *SLOW, *DOUBTFUL) if not any(c.startswith(line) for c in shown)]
+        assert any(command.startswith(line) for line in ELSEWHERE), f"no test runs {command}"
+        assert program != "make" or target in targets, command
+        assert program != "python" or target == "-m" or (ROOT / target).is_file(), command
+    ci_lines = (ROOT / ".ci" / "run").read_text("utf-8").splitlines()
+    assert all(any(line.startswith(command) for line in ci_lines) for command in CI)
+    stale = [line for line in (*ELSEWHERE, *SLOW, *EXIT_4) if not any(c.startswith(line) for c in shown)]
     assert not stale
 
 
-@pytest.mark.parametrize("page", SHOWING)
-def test_commands_are_known_and_their_files_are_there(page):
-    """In the repository, or written by a command before."""
+@pytest.mark.parametrize("page", PAGES_WITH_COMMANDS)
+def test_commands_parse_and_their_files_exist(page):
+    """Files are in the repository, or written by an earlier command of the page."""
     written = set()
-    for command in ours(page):
+    for command in pellicle_commands(page):
         words = [word for word in shlex.split(command)[1:] if word != "--verbose"]
         _, _, ignored = app.parse_args(words, exit_on_error=False, print_error=False)
         assert not ignored
@@ -184,56 +227,45 @@ def test_commands_are_known_and_their_files_are_there(page):
         written.add(out)
 
 
-@pytest.fixture(scope="module")
-def done():
-    """Commands that a page before has run, and what they printed."""
-    return {}
+@pytest.mark.parametrize("page", PAGES_WITH_COMMANDS)
+def test_commands_run(page, run_page):
+    run_page(page)
 
 
-@pytest.mark.parametrize("page", SHOWING)
-@pytest.mark.usefixtures("clone")
-def test_commands_run(page, done, monkeypatch, capsys):
-    """A second page need not run a command again, unless it reads what that writes."""
-    shown = ours(page)
-    for i, command in enumerate(shown):
-        out = command.partition("--out ")[2].partition(" ")[0]
-        wanted = out and any(out in later.split() for later in shown[i + 1 :])
-        if not is_slow(command) and (wanted or command not in done):
-            done[command] = run(command, monkeypatch, capsys)
+@pytest.mark.parametrize("page", [page for page in PAGES_WITH_COMMANDS if results(PAGES[page])])
+def test_quoted_results_are_printed(page, run_page, outputs):
+    """By a command of the page, or of another one that shows the same command."""
+    for source in [page, *PAGES_WITH_COMMANDS]:
+        run_page(source)
+        missing = missing_results(page, outputs.values())
+        if not missing:
+            break
+    assert not missing
 
 
-@pytest.mark.parametrize("page", [page for page in SHOWING if results(PAGES[page])])
-def test_results_that_a_page_tells_are_what_came_out(page, done):
-    """Of whichever page's command: a second one did not run it again."""
-    if not done:
-        pytest.skip("no command was run before")
-    found = results("".join(done.values()))
-    for value, error in results(PAGES[page]):
-        assert any(abs(value - v) < 0.3 * error and abs(error - e) < 0.2 * error for v, e in found), (
-            f"{value} ± {error}"
-        )
+SLOW_PAGES = [page for page in PAGES_WITH_COMMANDS if any(map(is_slow, pellicle_commands(page)))]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", [page for page in SHOWING if any(map(is_slow, ours(page)))])
-@pytest.mark.usefixtures("clone")
-def test_slow_commands_run(page, monkeypatch, capsys):
-    """With all of their page, as they may read what others write."""
-    for command in ours(page):
-        run(command, monkeypatch, capsys)
+@pytest.mark.parametrize("page", SLOW_PAGES)
+def test_slow_commands_run(page, clone, run_command):
+    """With all commands of their page, because they may read what others write."""
+    clone()
+    for command in pellicle_commands(page):
+        run_command(command)
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "python")])
-@pytest.mark.usefixtures("clone")
-def test_python_runs(page):
-    """The blocks of a page one after the other, as one would type them."""
+def test_python_runs(page, clone):
+    """The blocks of a page run in order, in one namespace."""
+    clone()
     names: dict[str, object] = {}
     for block in blocks(page, "python"):
         exec(compile(block, page, "exec"), names)
 
 
-def test_the_citation_is_whole_and_of_this_version():
-    """What the Citation File Format 1.2.0 requires, of the file and of each reference."""
+def test_the_citation_file_is_complete():
+    """The file and each reference have what the Citation File Format 1.2.0 requires, and this version."""
     cited = yaml.safe_load((ROOT / "CITATION.cff").read_text("utf-8"))
     assert cited["cff-version"] == "1.2.0"
     assert {"message", "title", "authors"} <= cited.keys()
@@ -245,18 +277,26 @@ def test_the_citation_is_whole_and_of_this_version():
         assert reference.get("doi", family) in PAGES["docs/sources.md"], reference["title"]
 
 
+@pytest.mark.parametrize("page", PAGES)
+def test_linked_files_exist(page):
+    """In the repository; `mkdocs build --strict` checks the links of the site."""
+    text = FENCE.sub("", PAGES[page])
+    for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", text):
+        assert "://" in target or (ROOT / page).parent.joinpath(target).exists(), target
+
+
 SCHEMA = json.loads((ROOT / "docs" / "recipe.schema.json").read_text("utf-8"))
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "toml")])
-def test_toml_is_toml_and_a_recipe_where_it_is_whole(page):
+def test_toml_parses_and_complete_recipes_are_valid(page):
     for block in blocks(page, "toml"):
-        found = tomllib.loads(block)
-        if "data" in found and "scene" in found:
-            jsonschema.validate(found, SCHEMA)
+        table = tomllib.loads(block)
+        if "data" in table and "scene" in table:
+            jsonschema.validate(table, SCHEMA)
 
 
-def test_every_flag_that_is_named_exists(monkeypatch, capsys):
+def test_every_flag_on_a_page_exists(monkeypatch, capsys):
     helps = []
     for command in ("", "fit", "sample", "simulate", "plan", "compare", "cost", "chart", "materials"):
         monkeypatch.setattr(sys, "argv", ["pellicle", *command.split(), "--help"])
@@ -266,5 +306,5 @@ def test_every_flag_that_is_named_exists(monkeypatch, capsys):
     known = set(flag.findall(" ".join(helps)))
     for page, text in PAGES.items():
         for span in re.findall(r"`([^`\n]+)`", text):
-            if not TYPED.fullmatch(span) or span.startswith("pellicle "):
+            if not COMMAND.fullmatch(span) or span.startswith("pellicle "):
                 assert set(flag.findall(span)) <= known, (page, span)

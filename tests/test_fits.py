@@ -1,4 +1,4 @@
-"""The fits that are kept: all there, told in their README as they came out, and reproducible."""
+"""Kept fits are complete, their README quotes their results, and they are reproducible."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ def script():
     return module
 
 
-def told(folder: Path) -> dict[str, str]:
-    """The rows of a README's table of studies, by the study's name."""
+def rows_of_readme(folder: Path) -> dict[str, str]:
+    """Return the rows of a README's table of studies by the name of the study."""
     text = (folder / "README.md").read_text("utf-8")
     return dict(re.findall(r"^\| \[([^\]]+)\]\([^)]*report.txt\)(.*)\|$", text, re.MULTILINE))
 
 
 @pytest.mark.parametrize(("folder", "samples"), [(FITS, set()), (FITS / "brdf", {"samples.csv"})])
-def test_every_study_is_whole_and_told_as_it_came_out(folder, samples):
-    rows = told(folder)
+def test_studies_are_complete_and_quoted_in_the_readme(folder, samples):
+    rows = rows_of_readme(folder)
     assert rows.keys() == {path.name for path in folder.iterdir() if (path / "recipe.toml").exists()}
     for name, row in rows.items():
         study = folder / name
@@ -48,17 +48,17 @@ def test_every_study_is_whole_and_told_as_it_came_out(folder, samples):
         assert best in (study / "report.txt").read_text("utf-8")
 
 
-def test_kept_samples_are_what_their_recipes_give(tmp_path):
-    """Up to rounding, which compilers do differently."""
-    made = runpy.run_path(str(ROOT / "scripts" / "make_brdf_samples.py"))
-    made["main"](tmp_path)
+def test_kept_samples_follow_from_their_recipes(tmp_path):
+    """Up to rounding, which differs between compilers."""
+    script = runpy.run_path(str(ROOT / "scripts" / "make_brdf_samples.py"))
+    script["main"](tmp_path)
     for kept in FITS.glob("brdf/*/samples.csv"):
         again = tmp_path / kept.parent.name / "samples.csv"
         numbers, truth = (np.loadtxt(path, delimiter=",", comments="#", skiprows=7) for path in (again, kept))
         np.testing.assert_allclose(numbers, truth, rtol=1e-9, atol=1e-9)
 
 
-def test_what_moved_is_told(script):
+def test_changes_are_reported(script):
     kept = {"status": "converged", "parameters": {"d": {"value": 3.0, "stderr": 0.5}}}
     near = {"status": "converged", "parameters": {"d": {"value": 3.04, "stderr": 0.5}}}
     far = {"status": "ambiguous", "parameters": {"d": {"value": 3.06, "stderr": 0.5}}}
@@ -68,13 +68,13 @@ def test_what_moved_is_told(script):
     assert list(script.moved(kept, lost)) == ["d has a standard error of None, had 0.5", "n is new"]
 
 
-def test_a_study_comes_out_as_kept(script, monkeypatch):
+def test_one_study_is_reproduced(script, monkeypatch):
     monkeypatch.setenv("PELLICLE_CACHE", "off")
     assert script.rerun(FITS / QUICK) == []
 
 
-@pytest.mark.slow  # two minutes; one film is fitted above, every day
-def test_all_studies_come_out_as_kept(script, monkeypatch):
+@pytest.mark.slow  # two minutes; the test above fits one film in every run
+def test_all_studies_are_reproduced(script, monkeypatch):
     monkeypatch.setenv("PELLICLE_CACHE", "off")
     assert {script.called(study): script.rerun(study) for study in script.studies()} == {
         script.called(study): [] for study in script.studies()

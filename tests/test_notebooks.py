@@ -1,4 +1,4 @@
-"""Notebooks are pairs that agree, without outputs, and each is a page of the documentation."""
+"""Notebooks and their scripts agree, contain no outputs, and are pages of the documentation."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def sources(notebook):
     return [(cell.cell_type, cell.source) for cell in notebook.cells]
 
 
-def test_every_notebook_has_both_halves():
+def test_every_notebook_has_a_script():
     assert PAIRS
     assert [path.stem for path in PAIRS] == [
         path.stem for path in sorted((ROOT / "notebooks").glob("*.ipynb"))
@@ -23,20 +23,22 @@ def test_every_notebook_has_both_halves():
 
 
 @pytest.mark.parametrize("path", PAIRS, ids=lambda path: path.stem)
-def test_halves_agree(path):
-    opened = jupytext.read(path.with_suffix(".ipynb"))
-    assert sources(opened) == sources(jupytext.read(path, fmt="py:percent")), "jupytext --sync notebooks/*.py"
-    assert opened.metadata.kernelspec.name == "python3"
+def test_notebook_and_script_agree(path):
+    notebook = jupytext.read(path.with_suffix(".ipynb"))
+    assert sources(notebook) == sources(jupytext.read(path, fmt="py:percent")), (
+        "jupytext --sync notebooks/*.py"
+    )
+    assert notebook.metadata.kernelspec.name == "python3"
 
 
 @pytest.mark.parametrize("path", PAIRS, ids=lambda path: path.stem)
-def test_no_outputs_are_kept(path):
+def test_notebooks_contain_no_outputs(path):
     code = [cell for cell in jupytext.read(path.with_suffix(".ipynb")).cells if cell.cell_type == "code"]
     assert all(not cell.outputs and cell.execution_count is None for cell in code)
 
 
 @pytest.mark.parametrize("path", PAIRS, ids=lambda path: path.stem)
-def test_it_is_a_page_of_the_documentation(path):
+def test_notebooks_are_pages_of_the_documentation(path):
     assert f": tutorials/{path.stem}.md\n" in (ROOT / "mkdocs.yml").read_text("utf-8")
     title = jupytext.read(path, fmt="py:percent").cells[0]
     assert title.cell_type == "markdown"
