@@ -1,4 +1,4 @@
-"""The comparison with other packages: its truth, its errors and its table, with none of them installed."""
+"""Comparison with other packages: reference values, errors and table. None of the packages is needed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NAMES = ("cases", "truth", "table", "packages", "adapters.pellicle_any")
 
 @pytest.fixture(scope="module")
 def peers():
-    """The script's own modules, which live in no package."""
+    """Modules of the script, which belong to no package."""
     sys.path.insert(0, str(HERE))
     try:
         yield {name: importlib.import_module(name) for name in NAMES}
@@ -27,8 +27,8 @@ def peers():
             sys.modules.pop(name, None)
 
 
-def test_the_truth_and_pellicle_agree(peers):
-    """Two codes and two formulas; what a critical substrate loses is its root's rounding."""
+def test_reference_values_agree_with_pellicle(peers):
+    """Two programs and two formulas; at a critical substrate the square root amplifies rounding."""
     cases, ours, table = peers["cases"], peers["adapters.pellicle_any"], peers["table"]
     for name, case in cases.CASES.items():
         smooth = name not in cases.WITHOUT_SLOPE
@@ -40,7 +40,7 @@ def test_the_truth_and_pellicle_agree(peers):
             assert table.error(ours.slopes(case, np.float64), truth["slopes"], "slopes") < 1e-9, name
 
 
-def test_the_page_has_a_place_for_the_tables(peers):
+def test_tables_are_inserted_into_the_page(peers):
     script = runpy.run_path(str(HERE / "__main__.py"), run_name="peers")
     page = script["PAGE"].read_text("utf-8")
     again = script["inserted"](page, "new tables")
@@ -48,7 +48,7 @@ def test_the_page_has_a_place_for_the_tables(peers):
     assert again == before + begin + "\n\nnew tables\n\n" + rest[rest.index(script["END"]) :]
 
 
-def test_every_package_has_its_adapter(peers):
+def test_every_package_has_an_adapter(peers):
     packages = peers["packages"]
     adapters = {path.stem for path in (HERE / "adapters").glob("*.py")}
     assert {p.adapter for p in (*packages.OURS, *packages.PEERS)} <= adapters
@@ -74,7 +74,7 @@ def test_errors_and_cells(peers):
     assert cell({}) == ""
 
 
-def test_a_table_shows_who_is_wrong_and_names_the_rest(peers):
+def test_table_shows_cases_with_errors_and_names_the_rest(peers):
     truths = {"easy": {"values": {"Rs": [0.5]}}, "hard": {"values": {"Rs": [0.5]}}}
     good = {name: {"values": {"Rs": [0.5]}} for name in truths}
     bad = good | {"hard": {"values": "crash"}}
@@ -85,5 +85,5 @@ def test_a_table_shows_who_is_wrong_and_names_the_rest(peers):
         "| hard | 0 | **crash** |",
         "| **wrong of 2** | 0 | 1 |",
         "",
-        "All are right in: easy.",
+        "All are correct in: easy.",
     ]

@@ -1,8 +1,8 @@
 """Hard cases in pellicle and in other packages, against 50 digits: `python benchmarks/peers`.
 
-Makes a virtual environment in .venv-peers (several GB: torch), installs each package by name, and
-runs each in a process of its own, so that one that cannot be installed, crashes or hangs is an entry of
-the table and not its end. Prints Markdown; with --write docs/hard_cases.md gets the same text.
+Creates a virtual environment in .venv-peers (several GB: torch), installs each package by name, and
+runs each in a separate process. A package that cannot be installed, crashes or hangs becomes an entry of
+the table. Prints Markdown; `--write` also writes it to docs/hard_cases.md.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 VENV = ROOT / ".venv-peers"
 PAGE = ROOT / "docs" / "hard_cases.md"
-SECONDS = 300  # for all the cases that a process has left
+SECONDS = 300  # for all remaining cases of a process
 BEGIN, END = "<!-- peers: written by make peers -->", "<!-- /peers -->"
 
 
 def peers_python() -> Path:
-    """The Python of the packages' own environment, made if it is not there."""
+    """Return the Python of the packages' environment, and create it if necessary."""
     python = VENV / "bin" / "python"
     if not python.exists():
         made = subprocess.run([sys.executable, "-m", "venv", VENV], capture_output=True)
-        if made.returncode:  # Debian splits venv's pip into a package of its own: then ours does
+        if made.returncode:  # on Debian, pip for virtual environments is a separate package; use ours
             subprocess.run([sys.executable, "-m", "venv", "--without-pip", VENV], check=True)
             pip = [sys.executable, "-m", "pip", "--python", str(python), "install", "--quiet", "pip"]
             subprocess.run(pip, check=True)
@@ -41,7 +41,7 @@ def peers_python() -> Path:
 
 
 def install(python: Path, package: Package) -> str | None:
-    """None, or why pip could not."""
+    """Install a package and return None, or the reason for a failure."""
     command = [str(python), "-m", "pip", "install", "--quiet", *package.install]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode == 0:
@@ -51,43 +51,43 @@ def install(python: Path, package: Package) -> str | None:
 
 
 def run(python: Path, package: Package) -> dict[str, Any]:
-    """{case: answer}; a case that ends the process is "crash" or "hang", and the rest go on without it.
+    """Return {case: answer}; a case that ends the process is a "crash" or "hang", and the rest run again.
 
-    Raises ImportError with the package's own words where it cannot even be imported.
+    Raises ImportError with the package's message if it cannot be imported.
     """
     answers: dict[str, Any] = {}
-    while left := {name: case for name, case in CASES.items() if name not in answers}:
-        lines, ended = work(python, package, left)
+    while remaining := {name: case for name, case in CASES.items() if name not in answers}:
+        lines, end = work(python, package, remaining)
         if any("unusable" in line for line in lines):
             raise ImportError(lines[0]["unusable"])
         answers |= {line.pop("case"): line for line in lines}
-        lost = next((name for name in left if name not in answers), None)
-        if lost:
-            answers[lost] = {"values": ended}
+        failed = next((name for name in remaining if name not in answers), None)
+        if failed:
+            answers[failed] = {"values": end}
     return answers
 
 
 def work(python: Path, package: Package, cases: dict[str, Any]) -> tuple[list[dict[str, Any]], str]:
-    """What one process said before it ended, and the word for an end that comes too early."""
+    """Return the lines that one process printed, and the word for an early end."""
     command = [str(python), str(HERE / "worker.py"), package.adapter]
     environment = os.environ | {"CUDA_VISIBLE_DEVICES": "", "JAX_PLATFORMS": "cpu"}
-    given = json.dumps(cases).encode()
+    stdin = json.dumps(cases).encode()
     try:
-        said = subprocess.run(command, input=given, capture_output=True, timeout=SECONDS, env=environment)
-        out, ended = said.stdout, "crash"
-    except subprocess.TimeoutExpired as late:
-        out, ended = late.stdout or b"", "hang"
-    return [json.loads(line) for line in out.decode().splitlines() if line.endswith("}")], ended
+        process = subprocess.run(command, input=stdin, capture_output=True, timeout=SECONDS, env=environment)
+        out, end = process.stdout, "crash"
+    except subprocess.TimeoutExpired as timeout:
+        out, end = timeout.stdout or b"", "hang"
+    return [json.loads(line) for line in out.decode().splitlines() if line.endswith("}")], end
 
 
 def version(python: Path, package: Package) -> str:
-    """As the package's own metadata has it."""
+    """Return the version in the package's metadata."""
     name = package.install[0] if package.install else "pellicle"
     code = f"import importlib.metadata as m; print(m.version({name!r}))"
     return subprocess.run([str(python), "-c", code], capture_output=True, text=True).stdout.strip()
 
 
-def main(whole: bool, write: bool) -> None:
+def main(every_case: bool, write: bool) -> None:
     truths = {name: truth(case, slopes=name not in WITHOUT_SLOPE) for name, case in CASES.items()}
     columns, notes = {}, []
     for package in (*OURS, *PEERS):
@@ -102,14 +102,14 @@ def main(whole: bool, write: bool) -> None:
             notes.append(f"- {package.head}: not installed: {why}")
         print(notes[-1], file=sys.stderr, flush=True)
         notes += refusals(columns.get(package.head, {}))
-    text = report(columns, truths, notes, whole)
+    text = report(columns, truths, notes, every_case)
     print(text)
     if write:
         PAGE.write_text(inserted(PAGE.read_text(encoding="utf-8"), text), encoding="utf-8")
 
 
 def refusals(answers: dict[str, Any]) -> list[str]:
-    """A line for each distinct reason that a package gave for having no answer."""
+    """Return a line for each distinct reason for a missing answer."""
     reasons: dict[str, list[str]] = {}
     for name, answer in answers.items():
         for kind in ("values", "slopes"):
@@ -118,16 +118,16 @@ def refusals(answers: dict[str, Any]) -> list[str]:
     return [f"  - refuses {', '.join(dict.fromkeys(names))}: {why}" for why, names in reasons.items()]
 
 
-def report(columns: dict[str, Any], truths: dict[str, Any], notes: list[str], whole: bool) -> str:
+def report(columns: dict[str, Any], truths: dict[str, Any], notes: list[str], every_case: bool) -> str:
     heads, answers = list(columns), list(columns.values())
     return "\n\n".join(
         [
             "Largest error of R and T, s and p:",
-            table(heads, answers, truths, "values", whole),
+            table(heads, answers, truths, "values", every_case),
             "Largest error of their derivatives in d, n, k, the substrate's n and the angle, "
             "as |g − g*|/(|g*| + 0.001):",
-            table(heads, answers, truths, "slopes", whole),
-            "Bold: not a number, refused, or off by more than 0.0005 (R, T) or 1 % (derivatives). "
+            table(heads, answers, truths, "slopes", every_case),
+            "Bold: not a number, refused, or an error of more than 0.0005 (R, T) or 1 % (derivatives). "
             "†: the package warned.",
             "\n".join(notes),
         ]
@@ -135,17 +135,17 @@ def report(columns: dict[str, Any], truths: dict[str, Any], notes: list[str], wh
 
 
 def inserted(page: str, text: str) -> str:
-    """The page with `text` between its two markers."""
+    """Return the page with `text` between its two markers."""
     before, begin, rest = page.partition(BEGIN)
     _, end, after = rest.partition(END)
     if not begin or not end:
-        raise SystemExit(f"{PAGE.name} has no {BEGIN} … {END} to write between")
+        raise SystemExit(f"{PAGE.name} does not contain the markers {BEGIN} and {END}")
     return f"{before}{begin}\n\n{text}\n\n{end}{after}"
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
-    parser.add_argument("--all", action="store_true", help="every case, not only those with a failure")
-    parser.add_argument("--write", action="store_true", help="put the tables into docs/hard_cases.md too")
+    parser.add_argument("--all", action="store_true", help="show every case, not only those with an error")
+    parser.add_argument("--write", action="store_true", help="write the tables to docs/hard_cases.md too")
     given = parser.parse_args()
     main(given.all, given.write)

@@ -1,4 +1,4 @@
-"""The hard cases that every package gets: one layer on a half space."""
+"""Hard cases for every package: one layer on a half space."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PARAMETERS = (
     "wavelength",  # nm
 )
 FREE = ("thickness", "layer_n", "layer_k", "substrate_n", "angle")
-"""What gradients are taken in, angles per degree."""
+"""Parameters of the derivatives; the angle is in degrees."""
 
 SIGNALS = ("Rs", "Rp", "Ts", "Tp")
 
@@ -64,4 +64,4 @@ CASES: dict[str, Case] = {
 }
 
 WITHOUT_SLOPE = ("substrate exactly critical",)
-"""Where the true derivatives in n₂ and angle are infinite."""
+"""Cases in which the derivatives with respect to n₂ and the angle are infinite."""

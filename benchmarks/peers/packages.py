@@ -1,4 +1,4 @@
-"""Which packages are compared, how each is installed, and what to know of it."""
+"""Compared packages, their installation and notes for the table."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Package:
-    """A column of the table: its module in `adapters`, its head, and what pip installs for it.
+    """Column of the table: the module in `adapters`, the head, and the packages for pip.
 
-    Ours have nothing to install: they run in the Python that runs the comparison.
+    Pellicle itself needs no installation: it runs in the Python that runs the comparison.
     """
 
     adapter: str
@@ -23,20 +23,20 @@ OURS = (
     Package("pellicle32", "pellicle float32", (), "the same functions on float32 input"),
 )
 PEERS = (
-    # tmm 0.2.0 needs NumPy and does not tell pip
-    Package("tmm", "tmm", ("tmm", "numpy"), "float64; clamps layers under T = 1e-30, and says so"),
-    Package("tmm_fast", "tmm_fast", ("tmm_fast",), "float64; asks for real indices outside the stack"),
+    # tmm 0.2.0 needs NumPy but does not declare it
+    Package("tmm", "tmm", ("tmm", "numpy"), "float64; clamps layers below T = 1e-30, with a warning"),
+    Package("tmm_fast", "tmm_fast", ("tmm_fast",), "float64; requires real indices outside the stack"),
     Package(
         "tmmax",
         "tmmax",
         ("tmmax",),
-        "float32: under x64 its scan raises TypeError; called beneath `tmm`, which knows media by name only "
-        "and refuses d = 0",
+        "float32: under x64 its scan raises TypeError; called below its function `tmm`, which accepts media "
+        "only by name and refuses d = 0",
     ),
     Package("tmm_faster", "tmm_faster", ("tmm_faster",), "float64"),
     Package("pyelli2x2", "pyElli 2×2", ("pyElli",), "float64, its solver for isotropic stacks"),
     Package("pyelli4x4", "pyElli 4×4", ("pyElli",), "float64, its default solver"),
-    Package("refellips", "refellips", ("refellips", "refnx"), "float64, R only: made for Ψ and Δ"),
+    Package("refellips", "refellips", ("refellips", "refnx"), "float64, R only: written for Ψ and Δ"),
     Package(
         "differentiable_tmm",
         "differentiable_tmm",
@@ -47,6 +47,6 @@ PEERS = (
         "difftmm",
         "difftmm",
         ("difftmm",),
-        "complex64 by construction, R only: it gives amplitudes; fed n − ik, because n + ik amplifies in it",
+        "complex64 by construction, R only: returns amplitudes; called with n − ik, because n + ik amplifies",
     ),
 )

@@ -1,4 +1,4 @@
-"""From answers to errors to Markdown."""
+"""Errors of the packages' answers, as a Markdown table."""
 
 from __future__ import annotations
 
@@ -9,14 +9,17 @@ from typing import Any
 from cases import SIGNALS
 
 WRONG = {"values": 5e-4, "slopes": 1e-2}
-"""An error above this is set in bold: in the third decimal of R and T, in the second digit of a slope."""
+"""Errors above this are bold: the third decimal of R and T, the second digit of a derivative."""
 
 Answers = Mapping[str, Mapping[str, Any]]
 """{case: {"values": {signal: numbers} or a reason, "slopes": ..., "warnings": [...]}}"""
 
 
 def error(found: Mapping[str, Sequence[float]], truth: Mapping[str, Sequence[float]], kind: str) -> float:
-    """The largest over signals and parameters: absolute for values, |g − g*|/(|g*| + 1e-3) for slopes."""
+    """Return the largest error over signals and parameters.
+
+    It is absolute for values, and |g − g*|/(|g*| + 1e-3) for slopes.
+    """
     worst = 0.0
     for signal in (s for s in SIGNALS if s in found):
         for one, other in zip(found[signal], truth[signal], strict=True):
@@ -28,7 +31,7 @@ def error(found: Mapping[str, Sequence[float]], truth: Mapping[str, Sequence[flo
 
 
 def cell(answer: Mapping[str, Any], truth: Mapping[str, Any], kind: str) -> str:
-    """One digit of the error, in bold where it is wrong; a dagger where the package warned."""
+    """Return one digit of the error, in bold if it is wrong, with a dagger if the package warned."""
     found = answer.get(kind)
     if found is None:
         return ""
@@ -40,17 +43,19 @@ def cell(answer: Mapping[str, Any], truth: Mapping[str, Any], kind: str) -> str:
     return (text if off <= WRONG[kind] else f"**{text}**") + dagger
 
 
-def table(heads: Sequence[str], answers: Sequence[Answers], truths: Answers, kind: str, whole: bool) -> str:
-    """A row for each case in which somebody is wrong (each case if `whole`), then how many are."""
+def table(
+    heads: Sequence[str], answers: Sequence[Answers], truths: Answers, kind: str, every_case: bool
+) -> str:
+    """Return a row for each case in which a package is wrong (or for every case), and their number."""
     columns = [(h, a) for h, a in zip(heads, answers, strict=True) if any(kind in x for x in a.values())]
     rows = {}
     for name in (n for n, truth in truths.items() if kind in truth):
         rows[name] = [cell(a.get(name, {}), truths[name], kind) for _, a in columns]
     wrong = [sum(row[i].startswith("**") for row in rows.values()) for i in range(len(columns))]
-    kept = {name: row for name, row in rows.items() if whole or any(x.startswith("**") for x in row)}
+    kept = {name: row for name, row in rows.items() if every_case or any(x.startswith("**") for x in row)}
     lines = [["", *(h for h, _ in columns)], ["---"] * (len(columns) + 1)]
     lines += [[name, *row] for name, row in kept.items()]
     lines += [[f"**wrong of {len(rows)}**", *(str(n) for n in wrong)]]
     text = "\n".join("| " + " | ".join(line) + " |" for line in lines)
     rest = [name for name in rows if name not in kept]
-    return text + (f"\n\nAll are right in: {'; '.join(rest)}." if rest else "")
+    return text + (f"\n\nAll are correct in: {'; '.join(rest)}." if rest else "")

@@ -1,8 +1,7 @@
-"""R and T of a case to 50 digits, with their derivatives: the tilted admittances of a characteristic matrix.
+"""Reference R and T of a case, with derivatives, to 50 digits, by the characteristic matrix.
 
-H. A. Macleod, Thin-Film Optical Filters, chapter 2. Written with k₀d·sinc(k₀d q) = sin(k₀d q)/q, it
-has a value where q is 0. Admittances of p stand as q/ε (of the magnetic field), so that 90° is no
-division by 0.
+H. A. Macleod, Thin-Film Optical Filters, chapter 2. With k₀d·sinc(k₀d q) = sin(k₀d q)/q it is defined
+at q = 0. The admittances of p are q/ε (for the magnetic field), so that 90° does not divide by 0.
 """
 
 from __future__ import annotations
@@ -11,7 +10,7 @@ from cases import FREE, PARAMETERS, Case
 from mpmath import mp, mpc, mpf
 
 STEP = mpf(10) ** -30
-"""Of the central difference: its error is of order 1e-60."""
+"""Step of the central difference, whose error is of order 1e-60."""
 
 
 def truth(case: Case, slopes: bool = True) -> dict[str, dict[str, list[float]]]:

@@ -1,6 +1,6 @@
-"""Runs one package on the cases given on stdin as JSON: one line of JSON for each, as soon as it is known.
+"""Run one package on the cases given on stdin as JSON, and write one line of JSON for each.
 
-Started by `__main__.py` with the package's own Python, which needs nothing else of this repository.
+Started by `__main__.py` with the Python of the packages' environment; needs nothing else of this repository.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import warnings
 
 
 def answer(adapter, case: dict) -> dict:
-    """Values and slopes of one case, or why there are none, and what the package warned of."""
+    """Return values and slopes of one case, or the reason for their absence, and the package's warnings."""
     found: dict = {}
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -22,7 +22,7 @@ def answer(adapter, case: dict) -> dict:
                 continue
             try:
                 found[kind] = {s: [float(x) for x in row] for s, row in function(case).items()}
-            except Exception as problem:  # whatever it is, it is the package's answer
+            except Exception as problem:  # any error is the package's answer
                 found[kind] = " ".join(f"{type(problem).__name__}: {problem}".split())
     found["warnings"] = sorted({" ".join(str(w.message).split()) for w in caught})
     return found

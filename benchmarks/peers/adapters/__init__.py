@@ -1,5 +1,5 @@
-"""One module for each package: `values(case)` and, where it has gradients, `slopes(case)`.
+"""Adapters, one module per package: `values(case)` and, if the package has gradients, `slopes(case)`.
 
-`values` gives {signal: [number]} for the signals that the package has, `slopes` {signal: one number
-for each of `cases.FREE`}. Each calls its package as its documentation says.
+`values` returns {signal: [number]} for the signals that the package computes, `slopes` {signal: one number
+for each of `cases.FREE`}. Each calls its package as the package's documentation describes.
 """

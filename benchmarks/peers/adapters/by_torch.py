@@ -1,11 +1,11 @@
-"""What the packages on torch share: a case as leaf tensors, and reverse derivatives in them."""
+"""Shared by the packages on torch: a case as leaf tensors, and reverse-mode derivatives."""
 
 import torch
 from cases import FREE
 
 
 def leaves(case, dtype):
-    """{parameter: tensor}, and each medium as its pair of n and k."""
+    """Return {parameter: tensor}, with each medium as a pair of n and k."""
     p = {name: torch.tensor(x, dtype=dtype, requires_grad=True) for name, x in case.items()}
     zero = torch.zeros((), dtype=dtype)
     p["ambient"] = p["ambient_n"], zero
@@ -13,7 +13,7 @@ def leaves(case, dtype):
 
 
 def by_autograd(signals, case, dtype):
-    """{signal: derivatives in FREE}; 0 in a parameter that the package does not depend on."""
+    """Return {signal: derivatives in FREE}; 0 for a parameter without influence."""
     p = leaves(case, dtype)
     wanted = [p[name] for name in FREE]
     found = {}

@@ -1,7 +1,7 @@
-"""difftmm: `create_jones_matrix_isotropic`, micrometres and radians, complex64 by its own choice.
+"""difftmm: `create_jones_matrix_isotropic`, micrometres and radians, complex64 by construction.
 
-Its matrices are those of the time factor exp(+iωt), so absorption is n − ik: given n + ik, as its
-documentation writes it, a film amplifies. It gives amplitudes; R is their square.
+Its matrices belong to the time factor exp(+iωt), so absorption is n − ik: with n + ik, as in its
+documentation, a film amplifies. It returns amplitudes; R is their square.
 """
 
 import torch

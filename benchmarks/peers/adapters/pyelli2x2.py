@@ -1,4 +1,4 @@
-"""pyElli by its Solver2x2, meant for isotropic stacks."""
+"""pyElli with Solver2x2, which is for isotropic stacks."""
 
 import elli
 

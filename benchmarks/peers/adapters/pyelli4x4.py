@@ -1,4 +1,4 @@
-"""pyElli by its Solver4x4, its default."""
+"""pyElli with Solver4x4, its default."""
 
 import elli
 

@@ -4,7 +4,7 @@ import elli
 
 
 def values(case, solver):
-    """By one of its solvers."""
+    """Return R and T computed with one of its solvers."""
 
     def medium(n, k):
         return elli.IsotropicMaterial(elli.ConstantRefractiveIndex(n=complex(n, k)))

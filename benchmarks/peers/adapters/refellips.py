@@ -1,6 +1,6 @@
-"""refellips: the amplitudes of its own `coh_tmm`, nanometres and radians, n + ik.
+"""refellips: the amplitudes of its `coh_tmm`, nanometres and radians, n + ik.
 
-Its front door gives Ψ and Δ; R is the square of the amplitude, and a transmittance is not offered.
+Its public interface returns Ψ and Δ; R is the square of the amplitude. It computes no transmittance.
 """
 
 import numpy as np

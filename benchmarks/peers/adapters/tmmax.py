@@ -1,6 +1,6 @@
 """tmmax: `vectorized_coh_tmm`, metres and radians, n + ik, float32.
 
-Its front door `tmm` knows media by name only; this is what it calls with their tables.
+Its public function `tmm` accepts media only by name; this is the function that it calls with their tables.
 """
 
 import jax
