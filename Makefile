@@ -1,13 +1,13 @@
-# Everything a newcomer types. Each target sets up what it needs.
+# Commands of the project. Each target installs what it needs.
 
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 EXAMPLE := measurements/recipes/hematite_on_glass_140nm.toml
 
-# Compiling is most of what the tests cost. With these XLA compiles in half the time what then runs slower;
-# the rounding may differ, so that what counts digits (EXACT) runs as users' programs do.
-SOONER := XLA_FLAGS="--xla_backend_optimization_level=0 --xla_llvm_disable_expensive_passes=true \
+# Tests spend most of their time in compilation. These flags halve the compilation time, at the cost of run time.
+# Rounding may differ, so tests that count digits (EXACT) run without them.
+QUICK_COMPILE := XLA_FLAGS="--xla_backend_optimization_level=0 --xla_llvm_disable_expensive_passes=true \
   --xla_cpu_use_fusion_emitters=false"
 EXACT := tests/hard tests/fitting/test_nist.py
 PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
@@ -17,14 +17,14 @@ EXECUTED := executed/done
 
 .PHONY: schema fit fits notebooks test coverage docs lint bench peers properties tolerance measurements slow clean figures
 
-# Debian splits venv's pip into a package of its own: without it, the system's pip does
+# on Debian, pip for virtual environments is a separate package; without it, the system's pip is used
 $(VENV)/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
-	  { echo "pellicle needs Python 3.11 or newer: name one with make PYTHON=python3.12"; exit 1; }
+	  { echo "pellicle needs Python 3.11 or newer: run make PYTHON=python3.12"; exit 1; }
 	@$(PYTHON) -m venv $(VENV) 2>/dev/null || \
 	  { rm -rf $(VENV); $(PYTHON) -m venv --without-pip $(VENV) && \
 	    $(PYTHON) -m pip --python $(VENV)/bin/python install --quiet pip; } || \
-	  { rm -rf $(VENV); echo "no virtual environment could be made: install python3-venv"; exit 1; }
+	  { rm -rf $(VENV); echo "no virtual environment could be created: install python3-venv"; exit 1; }
 
 $(VENV)/.fit: pyproject.toml | $(VENV)/bin/python
 	$(BIN)/python -m pip install --quiet --editable .
@@ -41,19 +41,19 @@ $(VENV)/.docs: pyproject.toml | $(VENV)/bin/python
 fit: $(VENV)/.fit
 	$(BIN)/pellicle fit --recipe $(EXAMPLE) --out results/hematite_on_glass_140nm
 
-# the kept studies once more; fails if one comes out otherwise
+# repeats the kept studies; fails if a result has changed
 fits: $(VENV)/.fit
 	$(BIN)/python scripts/rerun_fits.py
 
 test: $(VENV)/.dev lint
 	$(PYTEST) $(EXACT)
-	$(SOONER) $(PYTEST) $(addprefix --ignore=,$(EXACT))
+	$(QUICK_COMPILE) $(PYTEST) $(addprefix --ignore=,$(EXACT))
 
 coverage: $(VENV)/.dev
 	$(PYTEST) --cov --cov-report=term
 
-# run once, for the reader and for the documentation; PELLICLE_SHORT=1 is for tests: fewer points, and a third
-# less compiling that costs no speed (what else SOONER leaves out would)
+# executed once, for the reader and for the documentation. PELLICLE_SHORT=1 is for tests: fewer points, and the one
+# flag of QUICK_COMPILE that saves a third of the compilation without slowing the programs down
 notebooks: $(VENV)/.dev
 	rm -rf executed && mkdir executed && cp notebooks/*.ipynb notebooks/matplotlibrc executed
 	$(if $(PELLICLE_SHORT),XLA_FLAGS=--xla_cpu_use_fusion_emitters=false) PYTHONWARNINGS="ignore:Error reading persistent compilation cache entry" \
@@ -65,7 +65,7 @@ notebooks: $(VENV)/.dev
 $(EXECUTED): $(NOTEBOOKS)
 	$(MAKE) notebooks
 
-# into site/, with the notebooks as they were executed; a warning is an error (and --quiet would hide it from --strict)
+# into site/, with the executed notebooks; warnings are errors (--quiet would hide them from --strict)
 docs: $(VENV)/.docs $(EXECUTED)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
@@ -82,11 +82,11 @@ bench: $(VENV)/.dev
 	$(BIN)/python benchmarks/film.py
 	$(BIN)/python benchmarks/cold_start.py
 
-# several GB: the other packages, in an environment of their own; writes the tables of docs/hard_cases.md
+# installs other packages (several GB) in a separate environment; writes the tables of docs/hard_cases.md
 peers: $(VENV)/.dev
 	$(BIN)/python benchmarks/peers --write
 
-# a thousand random scenes: does what a plan leaves out stay within the bound that it states?
+# a thousand random scenes: is the error of every plan within its stated bound?
 tolerance: $(VENV)/.dev
 	$(BIN)/python benchmarks/tolerance.py
 
