@@ -67,7 +67,7 @@ def main(folder: Path) -> None:
         if not path.read_text()[:2000].count("theta_i"):
             continue
         for model, numbers in MODELS.items():
-            fit = pl.fit_brdf(samples(path), pl.Surface(model, numbers, wavelengths(path)))
+            fit = pl.fit(samples(path), pl.Surface(model, numbers, wavelengths(path)))
             errors = [fit.held_out, *(b.held_out for b in fit.baselines)]
             told = " | ".join(f"{error:.4f}" for error in errors)
             layer = "yes" if fit.layered else "no"

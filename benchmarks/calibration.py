@@ -37,7 +37,7 @@ from pellicle.scene.instrument import Drift  # noqa: E402
 from pellicle.synthetic.spectra import synthesise, synthesise_angles  # noqa: E402
 
 WAVELENGTH = np.linspace(400.0, 900.0, 101)
-SILICON = pl.Constant(3.9, 0.02)
+SILICON = pl.dispersion.Constant(3.9, 0.02)
 LEVELS = {"R": (0.001, 0.004, 0.015), "T": (0.001, 0.004, 0.015), "psi-delta": (0.02, 0.1, 0.5)}
 
 
@@ -48,24 +48,24 @@ def thickness(lower: float = 50.0, upper: float = 1200.0) -> pl.Free:
 def kinds() -> dict[str, pl.Scene]:
     """Scenes whose free parameters are drawn uniformly from their bounds."""
     index, extinction = pl.Free(1.3, 1.8), pl.Free(0.0, 0.05)
-    glass, t = pl.Constant(1.52, 0.0), pl.Light(None, 0.0, "T", "unpolarised")
-    plate = pl.Substrate(glass, pl.Constant(1.0, 0.0))
+    glass, t = pl.dispersion.Constant(1.52, 0.0), pl.Light(None, 0.0, "T", "unpolarised")
+    plate = pl.Substrate(glass, pl.dispersion.Constant(1.0, 0.0))
     scaled = pl.Instrument(scale=Drift(0))
     return {
         "R: d": pl.Scene(pl.Layer(1.46, thickness()), SILICON),
-        "R: d, n": pl.Scene(pl.Layer(pl.Constant(index, 0.0), thickness()), SILICON),
-        "R: d, n, k": pl.Scene(pl.Layer(pl.Constant(index, extinction), thickness()), SILICON),
+        "R: d, n": pl.Scene(pl.Layer(pl.dispersion.Constant(index, 0.0), thickness()), SILICON),
+        "R: d, n, k": pl.Scene(pl.Layer(pl.dispersion.Constant(index, extinction), thickness()), SILICON),
         "R: d, Cauchy A, B": pl.Scene(
-            pl.Layer(pl.Cauchy(pl.Free(1.4, 1.7), pl.Free(0.0, 1e4)), thickness()), SILICON
+            pl.Layer(pl.dispersion.Cauchy(pl.Free(1.4, 1.7), pl.Free(0.0, 1e4)), thickness()), SILICON
         ),
         "R: d, n, scale": pl.Scene(
-            pl.Layer(pl.Constant(index, 0.0), thickness()), SILICON, instrument=scaled
+            pl.Layer(pl.dispersion.Constant(index, 0.0), thickness()), SILICON, instrument=scaled
         ),
         "T: d, n, k": pl.Scene(
-            pl.Layer(pl.Constant(pl.Free(1.8, 2.4), extinction), thickness()), plate, light=t
+            pl.Layer(pl.dispersion.Constant(pl.Free(1.8, 2.4), extinction), thickness()), plate, light=t
         ),
         "psi-delta: d, n": pl.Scene(
-            pl.Layer(pl.Constant(index, 0.0), thickness(5.0, 400.0)),
+            pl.Layer(pl.dispersion.Constant(index, 0.0), thickness(5.0, 400.0)),
             SILICON,
             light=pl.Light(None, 70.0, "psi-delta", "unpolarised"),
         ),
@@ -226,7 +226,7 @@ def honesty(count: int) -> list[Verdict]:
         random = np.random.default_rng(1000 + i)
         clean = reflectance(case.thickness, case.n + 1j * case.k, case.wavelength)
         values = clean + random.normal(0, case.noise, clean.size)
-        index = pl.Constant(pl.Free(max(case.n - 0.3, 1.0), case.n + 0.3), case.k)
+        index = pl.dispersion.Constant(pl.Free(max(case.n - 0.3, 1.0), case.n + 0.3), case.k)
         scene = pl.Scene(pl.Layer(index, pl.Free(1.0, 3000.0)), SILICON)
         data = pl.Spectrum(case.wavelength, values, "R", sigma=np.full(clean.size, case.noise))
         fit = pl.fit(data, scene)

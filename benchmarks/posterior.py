@@ -21,6 +21,7 @@ from emcee.autocorr import integrated_time
 jax.config.update("jax_enable_x64", True)
 
 import pellicle as pl  # noqa: E402
+from pellicle.dispersion import Constant  # noqa: E402
 from pellicle.fitting.spectra.fit import fitted  # noqa: E402
 from pellicle.fitting.spectra.search import quiet  # noqa: E402
 from pellicle.sampling.chain import empty  # noqa: E402
@@ -52,7 +53,7 @@ class Problem(NamedTuple):
 
 def problem(truth: tuple[float, float, float], bounds: Any, wavelength: np.ndarray, noise: float, seed: int):
     thickness, n, k = truth
-    scene = pl.Scene(pl.Layer(pl.Constant(n, k), thickness), pl.Constant(SILICON.real, SILICON.imag))
+    scene = pl.Scene(pl.Layer(Constant(n, k), thickness), Constant(SILICON.real, SILICON.imag))
     values = synthesise(scene, wavelength, noise, seed).values
     lower, upper = np.array(bounds, dtype=float).T
     return Problem(lower, upper, wavelength, values, noise)
@@ -115,7 +116,10 @@ class Ours:
     def __init__(self, p: Problem):
         bounds = [pl.Free(a, b) if b > a else float(a) for a, b in zip(p.lower, p.upper, strict=True)]
         thickness, n, k = bounds
-        scene = pl.Scene(pl.Layer(pl.Constant(n, k), thickness), pl.Constant(SILICON.real, SILICON.imag))
+        scene = pl.Scene(
+            pl.Layer(Constant(n, k), thickness),
+            Constant(SILICON.real, SILICON.imag),
+        )
         data = pl.Spectrum(p.wavelength, p.values, "R", sigma=np.full(p.wavelength.size, p.noise))
         self.fit, self.weighed = fitted(data, scene, 0.0, quiet)
         self.box = self.weighed.problem.box

@@ -54,7 +54,7 @@ def weak(rng: np.random.Generator) -> float:
 
 
 def cauchy(rng: np.random.Generator) -> Any:
-    return pl.Cauchy(rng.uniform(1.3, 2.5), rng.uniform(0, 2e4) * weak(rng))
+    return pl.dispersion.Cauchy(rng.uniform(1.3, 2.5), rng.uniform(0, 2e4) * weak(rng))
 
 
 def absorbing(rng: np.random.Generator) -> complex:
@@ -67,7 +67,7 @@ def _coating(rng, wavelength):
 
 
 def _fitted_index(rng, wavelength):
-    material = pl.Constant(free(rng, 1.3, 2.5), free(rng, 0, weak(rng)))
+    material = pl.dispersion.Constant(free(rng, 1.3, 2.5), free(rng, 0, weak(rng)))
     light = pl.Light(wavelength, 60 * weak(rng), polarisation=str(rng.choice(["s", "p", "unpolarised"])))
     return pl.Scene(pl.Layer(material, free(rng, 0, 900)), absorbing(rng), light=light)
 

@@ -159,10 +159,10 @@ print("other minima:", ", ".join(f"{r.parameters['thickness']:.0f} nm" for r in 
 # the spectrum decides. Where one came close, the fit would say `ambiguous`.
 #
 # The error bar holds for what the scene takes for granted: here, that the sample's index is the table's. If
-# n and k may be off by a constant (`pl.Shifted`), the same spectrum says less:
+# n and k may be off by a constant (`pl.dispersion.Shifted`), the same spectrum says less:
 
 # %%
-shifted = pl.Shifted(hematite, pl.Free(-0.5, 0.5, start=0.0), pl.Free(0.0, 1.0, start=0.0))
+shifted = pl.dispersion.Shifted(hematite, pl.Free(-0.5, 0.5, start=0.0), pl.Free(0.0, 1.0, start=0.0))
 freer = pl.fit(spectrum, pl.Scene(pl.Layer(shifted, pl.Free(1, 1000)), glass))
 print(freer)
 print(f"error of the thickness: {freer['thickness'].stderr / fit['thickness'].stderr:.1f} times as large")

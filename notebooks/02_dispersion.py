@@ -22,6 +22,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import pellicle as pl
+from pellicle.recipes.media_words import medium
 
 jax.config.update("jax_enable_x64", True)  # JAX counts in single precision unless told
 SHORT = os.environ.get("PELLICLE_SHORT") == "1"  # fewer points, for a quick run
@@ -62,7 +63,7 @@ plt.show()
 # %% [markdown]
 # ## Five descriptions
 #
-# `pl.medium` takes a word and gives a dispersion with sensible bounds for what is free in it:
+# `medium` takes a word and gives a dispersion with sensible bounds for what is free in it:
 #
 # - **a table**: nothing is free but the thickness. We try the two wrong ones.
 # - **`cauchy`**, n = A + B/λ²: two numbers, for media that do not absorb.
@@ -81,9 +82,9 @@ thickness = pl.Free(10, 1000)
 media = {
     "SOPRA TIO2": "TiO2/TIO2",
     "SOPRA TIO2B": "TiO2/TIO2B",
-    "cauchy": pl.medium("cauchy"),
-    "tauc-lorentz": pl.medium("tauc-lorentz"),
-    "spline": pl.medium("spline(340,365,400,450,580,800)"),
+    "cauchy": medium("cauchy"),
+    "tauc-lorentz": medium("tauc-lorentz"),
+    "spline": medium("spline(340,365,400,450,580,800)"),
 }
 scenes = {word: pl.Scene(pl.Layer(medium, thickness), "SiO2") for word, medium in media.items()}
 comparison = pl.compare(spectrum, scenes)

@@ -106,7 +106,7 @@ def goniometer(lamps):
 
 def measure(surface, lamps, seed):
     """What the goniometer would give, each value with its error."""
-    exact = pl.simulate_brdf(surface, goniometer(lamps))
+    exact = pl.simulate(surface, directions=goniometer(lamps))
     sigma = NOISE * exact.values
     noise = sigma * np.random.default_rng(seed).standard_normal(sigma.shape)
     return replace(exact, values=exact.values + noise, sigma=sigma)
@@ -136,7 +136,7 @@ unknown = pl.Surface(
         "diffuse": pl.Free(0, 2),
     },
 )
-fit = pl.fit_brdf(samples, unknown)
+fit = pl.fit(samples, unknown)
 print(fit.status, "-", fit.verdict)
 
 # %%
@@ -219,7 +219,7 @@ print(f"relative error: thickness {error_d:.2%}, n_g {error_n:.2%}, their produc
 # %%
 print(f"{'lamps (°)':>22}{'thickness (nm)':>18}{'n_g':>18}   other thicknesses, Δχ²")
 for lamps in (LAMPS, (30,)):
-    one = fit if lamps == LAMPS else pl.fit_brdf(measure(surface, lamps, seed=3), unknown)
+    one = fit if lamps == LAMPS else pl.fit(measure(surface, lamps, seed=3), unknown)
     d, n = one["thickness"], one["n_g"]
     others = ", ".join(f"{r.parameters['thickness']:.0f} nm ({r.delta_chi2:.0f})" for r in one.rivals[:2])
     print(
@@ -244,7 +244,7 @@ for lamps in (LAMPS, (30,)):
 bare = pl.Surface(
     "microfacet-film", {"thickness": 0.0, "base_n": 1.5, "base_k": 0.0, "roughness": 0.3, "diffuse": 0.1}
 )
-doubted = pl.fit_brdf(measure(bare, LAMPS, seed=4), unknown)
+doubted = pl.fit(measure(bare, LAMPS, seed=4), unknown)
 print(doubted.status, "-", doubted.verdict)
 
 figure, axes = plt.subplots(figsize=(7, 2.6))
@@ -270,7 +270,7 @@ plt.show()
 #   several.
 # - Data in one plane see the size of a tilt out of it, but not its sign: the fit says so among its
 #   warnings.
-# - Ask for evidence of a layer before believing its thickness. `pl.fit_brdf` does.
+# - Ask for evidence of a layer before believing its thickness. `pl.fit` does.
 
 # %%
 for warning in fit.warnings:

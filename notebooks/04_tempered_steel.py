@@ -217,7 +217,7 @@ directions = pl.Directions(
     theta_o=np.abs(across),
     phi_o=np.where(across > 0, 180.0, 0.0),
 )
-exact = pl.simulate_brdf(pl.Surface("microfacet-film", truth), directions)
+exact = pl.simulate(pl.Surface("microfacet-film", truth), directions=directions)
 sigma = 0.02 * exact.values
 noise = sigma * np.random.default_rng(3).standard_normal(sigma.shape)
 samples = replace(exact, values=exact.values + noise, sigma=sigma)
@@ -229,7 +229,7 @@ unknown = {
     "specular": pl.Free(0, 100),
     "diffuse": pl.Free(0, 2),
 }
-fit = pl.fit_brdf(samples, pl.Surface("microfacet-film", truth | unknown))
+fit = pl.fit(samples, pl.Surface("microfacet-film", truth | unknown))
 print(fit)
 print("other minima:", ", ".join(f"{r.parameters['thickness']:.0f} nm" for r in fit.rivals))
 

@@ -359,7 +359,8 @@ assert limits["Ψ and Δ at 70°"][0] < 0.2 * limits["R at 0°"][0]
 # %%
 # each Free holds a value, which is simulated, and bounds; a fit scans all between these
 film = pl.Layer(
-    pl.Constant(pl.Free(1.5, 2.2, start=1.8), pl.Free(0.0, 0.2, start=0.02)), pl.Free(20, 200, start=80.0)
+    pl.dispersion.Constant(pl.Free(1.5, 2.2, start=1.8), pl.Free(0.0, 0.2, start=0.02)),
+    pl.Free(20, 200, start=80.0),
 )
 scene = pl.Scene(film, "Si")
 NAMES = ("thickness", "n", "k")

@@ -304,7 +304,7 @@ plt.show()
 # 50 nm. Written beside the bounds, that knowledge changes the answer:
 
 # %%
-believed = pl.Scene(pl.Layer(1.46, pl.Free(50, 1500, prior=pl.Normal(430, 100))), "Si")
+believed = pl.Scene(pl.Layer(1.46, pl.Free(50, 1500, prior=pl.priors.Normal(430, 100))), "Si")
 informed = pl.sample(five, believed)
 prior = np.exp(-0.5 * ((grid - 430) / 100) ** 2)
 exact = float((weight * prior)[abs(grid - 438) < 80].sum() / (weight * prior).sum())

@@ -48,7 +48,7 @@ film = np.arange(510, 910 + step / 2, step)
 visible = np.arange(420, 780 + step / 2, step)
 scenes = {
     "soap film": pl.Scene(
-        pl.Layer(pl.Cauchy(1.332, 3100.0), pl.Free(100, 3000)),
+        pl.Layer(pl.dispersion.Cauchy(1.332, 3100.0), pl.Free(100, 3000)),
         "air",
         light=pl.Light(film),
         instrument=pl.Instrument(bandwidth=2.0),

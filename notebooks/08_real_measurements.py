@@ -61,7 +61,7 @@ for note in thin.notes:
 def brush(index=1.47, oxide=2.0):
     """A scene with a brush of unknown thickness; the index is the first coefficient of its Cauchy formula."""
     layers = [
-        pl.Layer(pl.Cauchy(index, 4950.0), pl.Free(0, 300), name="brush"),
+        pl.Layer(pl.dispersion.Cauchy(index, 4950.0), pl.Free(0, 300), name="brush"),
         pl.Layer("SiO2", oxide, name="oxide"),
     ]
     return pl.Scene(layers, "Si")
@@ -208,7 +208,7 @@ assert thick.rms < 0.5 * fit.rms
 # the probability of every set of numbers, given data and belief.
 
 # %%
-believed = brush(free_index, pl.Free(0, 5, prior=pl.Normal(2.0, 0.5)))
+believed = brush(free_index, pl.Free(0, 5, prior=pl.priors.Normal(2.0, 0.5)))
 posterior = pl.sample(first, believed)
 print(posterior)
 checks = posterior.checks

@@ -2,6 +2,7 @@
 
 import ast
 import inspect
+from pathlib import Path
 
 import pytest
 
@@ -9,20 +10,29 @@ import pellicle as pl
 from pellicle.dispersion import effective_medium, empirical, oscillators, spline
 from pellicle.dispersion.cody_lorentz import CodyLorentz
 
+NAMESPACES = ("dispersion", "mixing", "priors")
+
 
 def test_every_name_loads_and_type_checkers_see_the_same():
-    assert all(getattr(pl, name).__name__ for name in pl.__all__)
+    assert all(callable(getattr(pl, name)) for name in pl.__all__ if name not in NAMESPACES)
+    assert all(inspect.ismodule(getattr(pl, name)) for name in NAMESPACES)
     assert set(pl.__all__) < set(dir(pl))
     imports = [x for x in ast.walk(ast.parse(inspect.getsource(pl))) if isinstance(x, ast.ImportFrom)]
-    seen = {
+    typed = {
         alias.asname or alias.name
         for x in imports
-        if (x.module or "").startswith("pellicle.")
+        if (x.module or "").startswith("pellicle")
         for alias in x.names
     }
-    assert {"material" if name == "lookup" else name for name in seen} == set(pl.__all__)
+    assert typed == set(pl.__all__)
     with pytest.raises(AttributeError, match="Lorenz"):
         pl.Lorenz  # noqa: B018  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def test_no_name_is_shadowed_by_a_subpackage():
+    """Importing `pellicle.x` sets `pl.x` to that module, whatever `pl.x` was before."""
+    modules = {path.stem for path in Path(pl.__file__).parent.iterdir()}
+    assert modules & set(pl.__all__) == {"dispersion"}
 
 
 def test_every_model_of_a_medium_is_offered():
@@ -34,5 +44,7 @@ def test_every_model_of_a_medium_is_offered():
         for value in vars(module).values()
         if inspect.isclass(value) and issubclass(value, kinds) and value not in kinds
     } | {CodyLorentz}
-    offered = {getattr(pl, name) for name in pl.__all__}
+    offered = {
+        x for module in (pl.dispersion, pl.mixing) for x in vars(module).values() if inspect.isclass(x)
+    }
     assert models - offered == {empirical.Sampled}

@@ -12,7 +12,7 @@ import pellicle as pl
 from pellicle.cli import main
 from pellicle.data.read_counts import read_counts, reflectance_from_counts
 
-CAUCHY = pl.Cauchy(pl.Free(1.2, 3.0), pl.Free(0.0, 1e5))
+CAUCHY = pl.dispersion.Cauchy(pl.Free(1.2, 3.0), pl.Free(0.0, 1e5))
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ from pellicle.scene.instrument import Instrument
 from .conftest import NM, few
 
 AT = np.array([0, 4, 8])
-STACK = [pl.Layer(pl.Constant(2.1, 0.05), 120.0), pl.Layer(pl.Constant(0.2, 3.4), 15.0)]
+STACK = [pl.Layer(pl.dispersion.Constant(2.1, 0.05), 120.0), pl.Layer(pl.dispersion.Constant(0.2, 3.4), 15.0)]
 INDICES, DEPTHS = [1.0, 2.1 + 0.05j, 0.2 + 3.4j, 1.5], [np.inf, 120.0, 15.0, np.inf]
 THETA = np.deg2rad(50.0)
 
@@ -50,7 +50,7 @@ def test_ellipsometry():
 
 @pytest.mark.parametrize("kind", ["R", "T"])
 def test_a_plate_adds_intensities(kind):
-    glass = pl.Substrate(pl.Constant(1.5, 1e-5), back=1.0, plate_mm=0.5)
+    glass = pl.Substrate(pl.dispersion.Constant(1.5, 1e-5), back=1.0, plate_mm=0.5)
     found = seen(pl.Light(angle=50.0, signal=kind, polarisation="p"), substrate=glass)[:, 0]
     indices = [*INDICES[:3], 1.5 + 1e-5j, 1.0]
     depths = [*DEPTHS[:3], 5e5, np.inf]
@@ -60,7 +60,7 @@ def test_a_plate_adds_intensities(kind):
 
 def test_ellipsometry_through_a_plate():
     """The model has the plate transparent at its faces, and is held against Mueller matrices elsewhere."""
-    plate = pl.Substrate(pl.Constant(1.5, 1e-8), back=1.0, plate_mm=0.5)
+    plate = pl.Substrate(pl.dispersion.Constant(1.5, 1e-8), back=1.0, plate_mm=0.5)
     case = few(pl.Scene(STACK[:1], plate, light=pl.Light(angle=50.0, signal="psi-delta")))
     truth = signal(case, case.draws[0], np.arange(9)).ravel()
     np.testing.assert_allclose(reference("float64", case).values[0].ravel(), truth, atol=1e-7)

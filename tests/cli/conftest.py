@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pellicle import Constant
 from pellicle.cli import main
+from pellicle.dispersion import Constant
 from pellicle.simulation.functions import reflectance
 
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from pellicle import Constant
+from pellicle.dispersion import Constant
 from pellicle.simulation.functions import reflectance
 
 PLAIN = """[data]

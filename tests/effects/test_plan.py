@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
+from pellicle.dispersion import Cauchy, Constant, Shifted
 from pellicle.effects.averaging import MOST_ORDERS, ORDERS_ERROR
 from pellicle.effects.film import EFFECTS
 from pellicle.scene.free import free_leaves, insert
@@ -28,20 +29,25 @@ def scene(layer=1.46, substrate=3.9 + 0.02j, thickness=300.0, ambient=1.0, instr
 BANDWIDTH = pl.Instrument(bandwidth=5.0)
 TABLE = [
     ("absorption", False, "no layer has any extinction", scene()),
-    ("absorption", False, "no layer has any extinction", scene(pl.Constant(1.46, 0.0))),
-    ("absorption", False, "no layer has any extinction", scene(pl.Cauchy(pl.Free(1.4, 1.6)))),
+    ("absorption", False, "no layer has any extinction", scene(Constant(1.46, 0.0))),
+    ("absorption", False, "no layer has any extinction", scene(Cauchy(pl.Free(1.4, 1.6)))),
     ("absorption", True, "extinction is free, or not zero", scene(1.46 + 0.1j)),
     ("stack", False, "one layer", scene()),
     ("stack", True, "2 coherent layers", pl.Scene([pl.Layer(1.46, 10.0), pl.Layer(2.0, 20.0)], 1.5)),
-    ("absorption", True, "extinction is free, or not zero", scene(pl.Constant(1.46, FREE_K))),
-    ("absorption", True, "extinction is free, or not zero", scene(pl.Shifted(pl.Constant(1.46), k=FREE_K))),
+    ("absorption", True, "extinction is free, or not zero", scene(Constant(1.46, FREE_K))),
+    (
+        "absorption",
+        True,
+        "extinction is free, or not zero",
+        scene(Shifted(Constant(1.46), k=FREE_K)),
+    ),
     ("tunnelling", False, "normal incidence", scene()),
     ("tunnelling", False, "no real index can fall below", scene(angle=60.0)),
     ("tunnelling", True, "in the layer is not ruled out", scene(1.33, ambient=1.52, angle=65.0)),
     ("tunnelling", True, "in the substrate is not", scene(2.1, 1.0, ambient=1.52, angle=65.0)),
     ("tunnelling", True, "layer and substrate", scene(1.2, 1.0, ambient=1.52, angle=65.0)),
     ("tunnelling", False, "no real index", scene(1.33 + 0.1j, ambient=1.52, angle=65.0)),
-    ("tunnelling", True, "in the layer", scene(pl.Cauchy(pl.Free(1.3, 2)), angle=65.0)),
+    ("tunnelling", True, "in the layer", scene(Cauchy(pl.Free(1.3, 2)), angle=65.0)),
     ("tunnelling", True, "in the layer", scene(angle=FREE_ANGLE)),
     ("tunnelling", True, "in the layer", scene(angle=60.0, wavelength=None)),
     ("oblique", False, "normal incidence, and the angle is not free", scene()),
@@ -113,9 +119,14 @@ TABLE = [
         pl.Scene([pl.Plate(1.5), pl.Layer(1.46, 9.0)], pl.Substrate(1.5, "air")),
     ),
     ("dispersion", False, "no index varies", scene()),
-    ("dispersion", False, "one wavelength", scene(pl.Cauchy(1.4, 1e4), wavelength=np.array([600.0]))),
+    (
+        "dispersion",
+        False,
+        "one wavelength",
+        scene(Cauchy(1.4, 1e4), wavelength=np.array([600.0])),
+    ),
     ("dispersion", True, "the index of layer and substrate varies", scene("SiO2", "Si")),
-    ("dispersion", True, "the index of layer varies", scene(pl.Cauchy(1.4, pl.Free(0, 1)))),
+    ("dispersion", True, "the index of layer varies", scene(Cauchy(1.4, pl.Free(0, 1)))),
     ("opaque", False, "light may reach everything", scene(0.2 + 3j)),
     ("precision", True, "double", scene()),
     (
@@ -169,7 +180,11 @@ def test_a_start_value_decides_nothing():
     def plan(value):
         free = [pl.Free(0, upper, start=value * upper) for upper in (1.0, 60.0, 9.0)]
         return pl.plan(
-            scene(pl.Constant(1.46, free[0]), angle=free[1], instrument=pl.Instrument(bandwidth=free[2]))
+            scene(
+                Constant(1.46, free[0]),
+                angle=free[1],
+                instrument=pl.Instrument(bandwidth=free[2]),
+            )
         )
 
     for row, same in zip(plan(0.0).rows, plan(0.5).rows, strict=True):
@@ -183,7 +198,7 @@ def test_orders_need_wavelengths():
 
 ORDERS = {
     "oxide on silicon": scene(
-        pl.Constant(pl.Free(1.3, 1.7)),
+        Constant(pl.Free(1.3, 1.7)),
         thickness=pl.Free(10, 900),
         instrument=BANDWIDTH,
     ),
@@ -191,7 +206,7 @@ ORDERS = {
         2.5, thickness=pl.Free(10, 900), angle=pl.Free(0, 60), instrument=BANDWIDTH
     ),
     "absorbing on metal": scene(
-        pl.Constant(2.1, pl.Free(0, 0.2)),
+        Constant(2.1, pl.Free(0, 0.2)),
         0.2 + 3.4j,
         pl.Free(10, 900),
         instrument=BANDWIDTH,

@@ -13,7 +13,7 @@ from pellicle.scene.free import insert
 from pellicle.synthetic.spectra import synthesise
 
 WAVELENGTH = np.linspace(400.0, 900.0, 128)
-SUBSTRATE = pl.Constant(3.9, 0.02)
+SUBSTRATE = pl.dispersion.Constant(3.9, 0.02)
 
 
 def film(thickness: Any = None, material: Any = 1.46, **more: Any) -> pl.Scene:

@@ -30,7 +30,7 @@ def model():
 
 @pytest.fixture
 def scene(film):
-    return film(material=pl.Cauchy(*CAUCHY))
+    return film(material=pl.dispersion.Cauchy(*CAUCHY))
 
 
 def covariance(fit):
@@ -126,7 +126,7 @@ def test_a_film_that_is_everywhere_opaque(film, measured):
 
 def test_index_and_thickness_of_a_thin_film_trade(film, measured):
     """20 nm of something like titania: n·d is known, n and d are not."""
-    scene = film(pl.Free(1, 100), pl.Constant(pl.Free(1.8, 2.8)))
+    scene = film(pl.Free(1, 100), pl.dispersion.Constant(pl.Free(1.8, 2.8)))
     fit = pl.fit(measured(scene, 2.4, 20.0, noise=0.005, sigma=True), scene)
     names = list(fit.correlation_names)
     assert fit.correlation[names.index("n"), names.index("thickness")] < -0.95
@@ -137,7 +137,7 @@ def test_index_and_thickness_of_a_thin_film_trade(film, measured):
 
 
 def test_a_very_strong_trade_is_warned_of(film, measured):
-    scene = film(pl.Free(1, 60), pl.Constant(pl.Free(1.2, 1.8)))
+    scene = film(pl.Free(1, 60), pl.dispersion.Constant(pl.Free(1.2, 1.8)))
     fit = pl.fit(measured(scene, 1.46, 15.0, noise=1e-3, sigma=True), scene)
     names = list(fit.correlation_names)
     assert abs(fit.correlation[names.index("n"), names.index("thickness")]) > 0.99
@@ -146,7 +146,7 @@ def test_a_very_strong_trade_is_warned_of(film, measured):
 
 def test_a_parameter_without_effect_has_an_infinite_error(film, measured):
     """k of a layer of no thickness."""
-    scene = film(0.0, pl.Constant(1.46, pl.Free(0.0, 1.0)))
+    scene = film(0.0, pl.dispersion.Constant(1.46, pl.Free(0.0, 1.0)))
     fit = pl.fit(measured(film(0.0), noise=0.003), scene)
     assert fit["k"].stderr == float("inf")
     assert fit.status == "not-identifiable"

@@ -103,7 +103,7 @@ def test_hafnia(shared_data):
     spectrum = pl.Spectrum(
         wavelength[keep], psi[keep], "psi-delta", angle=angle[keep], delta=delta[keep], path=path.name
     )
-    layer = pl.Cauchy(pl.Free(1.2, 3.0), pl.Free(0, 1e5))
+    layer = pl.dispersion.Cauchy(pl.Free(1.2, 3.0), pl.Free(0, 1e5))
     found = pl.fit(spectrum, pl.Scene(pl.Layer(layer, pl.Free(1, 1000)), "SiO2"))
     assert found.status == "converged"
     assert found["thickness"].value == pytest.approx(109.0, abs=2.0)

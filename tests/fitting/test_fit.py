@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
+from pellicle.dispersion import Cauchy, Constant
 from pellicle.errors import DataError, UsageError
 from pellicle.scene.film import with_wavelength
 from pellicle.scene.free import free_leaves
@@ -27,7 +28,11 @@ def agrees(fit, truth, sigmas=4.0):
 
 @pytest.mark.parametrize("signal", ["R", "T"])
 def test_thickness_n_and_k(film, measured, signal):
-    scene = film(material=pl.Constant(N, K), substrate=pl.Constant(1.5), light=pl.Light(signal=signal))
+    scene = film(
+        material=Constant(N, K),
+        substrate=Constant(1.5),
+        light=pl.Light(signal=signal),
+    )
     fit = pl.fit(measured(scene, 1.72, 0.03, 480.0, noise=0.002), scene)
     agrees(fit, {"n": 1.72, "k": 0.03, "thickness": 480.0})
     assert fit.rms == pytest.approx(0.002, rel=0.2)
@@ -64,12 +69,12 @@ def test_a_free_angle(film, measured):
 
 
 def test_a_plate_with_its_back_face(film, measured):
-    plate = pl.Substrate(pl.Constant(1.5), "air", 1.0)
+    plate = pl.Substrate(Constant(1.5), "air", 1.0)
     scene = film(material=2.1, substrate=plate, light=pl.Light(signal="T"))
     fit = pl.fit(measured(scene, 480.0, noise=0.002), scene)
     agrees(fit, {"thickness": 480.0})
     assert "The back face matters: rms 0.00" in fit.verdict
-    dark = film(substrate=pl.Substrate(pl.Constant(3.9, 0.02), "air", 1.0))
+    dark = film(substrate=pl.Substrate(Constant(3.9, 0.02), "air", 1.0))
     opaque = pl.fit(measured(dark, 480.0), dark)
     assert "The back face makes no difference here" in opaque.verdict
 
@@ -105,15 +110,15 @@ def test_a_prior_pulls_and_sharpens(film, measured):
     data = measured(film(12.0, 1.46), noise=0.003, sigma=True)
 
     def fit(prior):
-        index = pl.Constant(pl.Free(1.2, 1.9, prior=prior))
+        index = Constant(pl.Free(1.2, 1.9, prior=prior))
         return pl.fit(data, film(pl.Free(1, 60), index))
 
-    free, held = fit(None), fit(pl.Normal(1.46, 0.01))
+    free, held = fit(None), fit(pl.priors.Normal(1.46, 0.01))
     assert free["n"].stderr > 0.03
     assert held["n"].stderr == pytest.approx(0.01, rel=0.1)
     assert abs(held["n"].value - 1.46) < 0.01
     assert held["thickness"].stderr < free["thickness"].stderr
-    pulled = fit(pl.Normal(1.6, 0.01))
+    pulled = fit(pl.priors.Normal(1.6, 0.01))
     assert abs(pulled["n"].value - 1.6) < 0.02
 
 
@@ -146,7 +151,7 @@ def compilations():
 
 
 def test_a_second_file_compiles_nothing(film, measured, compilations):
-    scene = film(material=pl.Cauchy(pl.Free(1.3, 1.7), pl.Free(0.0, 3e4)))
+    scene = film(material=Cauchy(pl.Free(1.3, 1.7), pl.Free(0.0, 3e4)))
     nm = np.linspace(400.0, 900.0, 192)  # a length of its own: programs of other tests do not serve
     pl.fit(measured(scene, 1.46, 3000.0, 480.0, wavelength=nm), scene)
     assert compilations
@@ -157,7 +162,7 @@ def test_a_second_file_compiles_nothing(film, measured, compilations):
     assert not compilations
     pl.fit(shorter, scene)
     assert not compilations
-    bounds = film(pl.Free(50, 900), pl.Cauchy(pl.Free(1.2, 1.8, start=1.4), pl.Free(0.0, 2e4)))
+    bounds = film(pl.Free(50, 900), Cauchy(pl.Free(1.2, 1.8, start=1.4), pl.Free(0.0, 2e4)))
     pl.fit(other, bounds)
     assert not compilations
 
@@ -189,7 +194,7 @@ def test_outside_a_table(measured, film):
 
 
 def test_a_scene_without_a_free_thickness(film, measured):
-    scene = film(480.0, pl.Constant(N, K))
+    scene = film(480.0, Constant(N, K))
     fit = pl.fit(measured(scene, 1.6, 0.02), scene)
     agrees(fit, {"n": 1.6, "k": 0.02})
     assert fit.profile is None
@@ -199,7 +204,7 @@ def test_a_scene_without_a_free_thickness(film, measured):
 
 def test_the_record(film, measured):
     """What a fit returns beside the parameters."""
-    scene = film(material=pl.Constant(N))
+    scene = film(material=Constant(N))
     data = measured(scene, 1.5, 480.0, sigma=True)
     fit = pl.fit(data, scene)
     assert fit.free[0].name == "thickness"

@@ -14,7 +14,7 @@ COMPUTED = Path(__file__).parents[2] / "measurements" / "wvase" / "cauchy_100nm.
 
 def test_a_film_whose_delta_was_folded():
     spectrum = pl.read_spectrum(COMPUTED, folded=True, noise=0.01)
-    film = pl.Cauchy(pl.Free(1.3, 1.7), pl.Free(0, 2e4))
+    film = pl.dispersion.Cauchy(pl.Free(1.3, 1.7), pl.Free(0, 2e4))
     found = pl.fit(spectrum, pl.Scene(pl.Layer(film, pl.Free(10, 500)), "Si/Aspnes"))
     assert found.status == "converged"
     assert found["thickness"].value == pytest.approx(100.0, abs=0.02)

@@ -93,8 +93,8 @@ def test_a_real_fit_says_so(film, measured):
     """Two weak reflections of unknown scale and offset: a + b cos(4π n d/λ) shows n·d and nothing else."""
     scene = film(
         pl.Free(10, 2000),
-        pl.Constant(pl.Free(1.3, 1.7)),
-        substrate=pl.Constant(1.52),
+        pl.dispersion.Constant(pl.Free(1.3, 1.7)),
+        substrate=pl.dispersion.Constant(1.52),
         instrument=pl.Instrument("free", "free"),
     )
     fit = pl.fit(measured(scene, 1.46, 1000.0, noise=1e-3, sigma=True), scene)

@@ -64,7 +64,7 @@ def spectra() -> list[pl.Spectrum]:
 
 @pytest.fixture(scope="module")
 def together(spectra) -> pl.Fit:
-    layer = pl.Layer(pl.Cauchy(FREE[1], FREE[2]), FREE[0])
+    layer = pl.Layer(pl.dispersion.Cauchy(FREE[1], FREE[2]), FREE[0])
     return pl.fit(spectra, pl.Scene(layer, GLASS, instrument=pl.Instrument(scale="free")))
 
 
@@ -166,8 +166,8 @@ def test_a_spectrum_of_another_sample_is_not_given_up_in_silence():
 
 def test_layers_are_shared_and_the_instrument_is_each_spectrums_own():
     """A prior of what is shared counts once."""
-    width = pl.Free(0, 20, prior=pl.Normal(5.0, 1.0))
-    thickness = pl.Free(10, 400, prior=pl.Normal(100.0, 2.0))
+    width = pl.Free(0, 20, prior=pl.priors.Normal(5.0, 1.0))
+    thickness = pl.Free(10, 400, prior=pl.priors.Normal(100.0, 2.0))
     scene = pl.Scene(pl.Layer(1.46, thickness), "Si", instrument=pl.Instrument(bandwidth=width))
     problem = make(*(measured(oxide(), scene, name) for name in "ab"))
     names = [p.name for p in problem.parameters]

@@ -34,7 +34,7 @@ def least(data, at, near, width):
 
 def test_an_extinction_beside_zero(film, measured):
     """k is 0; its upper limit is where χ², the thickness fitted again, is 2.71 above the best."""
-    scene = film(material=pl.Constant(1.46, pl.Free(0.0, 1.0)))
+    scene = film(material=pl.dispersion.Constant(1.46, pl.Free(0.0, 1.0)))
     for seed in (1, 2):
         data = measured(scene, 0.0, 430.0, seed=seed, sigma=True)
 
@@ -50,7 +50,7 @@ def test_an_extinction_beside_zero(film, measured):
 
 
 def test_an_extinction_that_is_seen_has_no_limit(film, measured):
-    scene = film(material=pl.Constant(1.46, pl.Free(0.0, 1.0)))
+    scene = film(material=pl.dispersion.Constant(1.46, pl.Free(0.0, 1.0)))
     fit = pl.fit(measured(scene, 0.01, 430.0, sigma=True), scene)
     assert (fit["k"].lower_limit, fit["k"].upper_limit) == (None, None)
     assert fit["k"].stderr < 1e-3
@@ -58,7 +58,7 @@ def test_an_extinction_that_is_seen_has_no_limit(film, measured):
 
 def test_an_index_with_one_open_side(film, measured):
     """A film of 25 nm: any large index will do with another thickness, a small one will not."""
-    scene = film(pl.Free(1, 100), pl.Constant(pl.Free(1.3, 1.9)))
+    scene = film(pl.Free(1, 100), pl.dispersion.Constant(pl.Free(1.3, 1.9)))
     data = measured(scene, 1.6, 25.0, noise=0.001, sigma=True)
 
     def profile(n):
@@ -76,11 +76,11 @@ def test_an_index_with_one_open_side(film, measured):
 
 def test_pushed_against_a_bound_and_unseen_beside_one(film, measured):
     """Both rest on a bound; of one the data see that the truth is beyond it."""
-    pushed = film(material=pl.Constant(pl.Free(1.47, 1.6)))
+    pushed = film(material=pl.dispersion.Constant(pl.Free(1.47, 1.6)))
     fit = pl.fit(measured(film(), 430.0, sigma=True), pushed)
     assert fit["n"].value == 1.47
     assert fit["n"].stderr < 0.01
-    unseen = film(pl.Free(1, 100), pl.Constant(pl.Free(1.3, 1.9)))
+    unseen = film(pl.Free(1, 100), pl.dispersion.Constant(pl.Free(1.3, 1.9)))
     fit = pl.fit(measured(unseen, 1.6, 15.0, noise=0.001, sigma=True), unseen)
     assert fit["n"].value == 1.3
     assert fit["n"].stderr == float("inf")
@@ -88,7 +88,7 @@ def test_pushed_against_a_bound_and_unseen_beside_one(film, measured):
 
 def test_an_interval_by_profile_is_that_of_a_scan(film, measured):
     """Both ends of the thickness, its index fitted again by SciPy, where χ² is 3.84 above the best."""
-    scene = film(material=pl.Constant(pl.Free(1.3, 1.7), 0.0))
+    scene = film(material=pl.dispersion.Constant(pl.Free(1.3, 1.7), 0.0))
     data = measured(scene, 1.46, 430.0, sigma=True)
     fit, weighed = fitted(data, scene, 0.0, quiet)
     found = errors(weighed.problem, [m.at for m in weighed.met], [m.variance for m in weighed.met])

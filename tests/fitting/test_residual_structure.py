@@ -32,7 +32,7 @@ def test_an_outlier_is_no_structure():
 
 @pytest.mark.parametrize("sigma", [True, False])
 def test_a_fit_says_where(film, measured, sigma):
-    scene = film(material=pl.Constant(pl.Free(1.3, 1.7)))
+    scene = film(material=pl.dispersion.Constant(pl.Free(1.3, 1.7)))
     data = measured(scene, 1.46, 430.0, sigma=sigma)
     bump = 0.012 * np.exp(-(((data.wavelength - 500) / 15) ** 2))
     fit = pl.fit(dataclasses.replace(data, values=data.values + bump), scene)

@@ -10,7 +10,7 @@ import pellicle as pl
 from pellicle.errors import UsageError
 from pellicle.fitting.robust_losses import LOSSES, inflation, spread
 
-INDEX = pl.Constant(pl.Free(1.3, 1.7))
+INDEX = pl.dispersion.Constant(pl.Free(1.3, 1.7))
 TRUTH = (1.46, 430.0)
 
 

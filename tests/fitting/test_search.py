@@ -24,7 +24,7 @@ def built(scene, data):
 
 def test_the_scan_resolves_the_shortest_fringe(film, measured):
     """λ_min/(8 n_max) at most, n_max the largest that the bounds allow: over a hundredth of a fringe."""
-    for material, largest in ((1.46, 1.46), (pl.Constant(pl.Free(1.3, 2.4)), 2.4)):
+    for material, largest in ((1.46, 1.46), (pl.dispersion.Constant(pl.Free(1.3, 2.4)), 2.4)):
         scene = film(pl.Free(10, 1000), material)
         truth = (300.0,) if largest == 1.46 else (1.46, 300.0)
         scan = search(built(scene, measured(scene, *truth)), quiet).scan
@@ -55,7 +55,7 @@ def test_only_local_minima_are_polished_and_all_of_them_are_kept(film, measured,
 
 
 def test_minima_are_distinct_and_best_first(film, measured):
-    scene = film(pl.Free(10, 1000), pl.Constant(pl.Free(1.3, 1.7)))
+    scene = film(pl.Free(10, 1000), pl.dispersion.Constant(pl.Free(1.3, 1.7)))
     found = search(built(scene, measured(scene, 1.46, 700.0)), quiet)
     assert (np.diff(found.evidence) >= 0).all()
     thickness = found.units[
@@ -108,9 +108,9 @@ def test_progress_is_told(film, measured):
 
 CASES = {
     "thickness": (lambda: 1.46 + 0.0, ()),
-    "thickness and n": (lambda: pl.Constant(pl.Free(1.3, 1.95)), ("n",)),
+    "thickness and n": (lambda: pl.dispersion.Constant(pl.Free(1.3, 1.95)), ("n",)),
     "thickness and Cauchy": (
-        lambda: pl.Cauchy(pl.Free(1.3, 1.95), pl.Free(0.0, 3e4)),
+        lambda: pl.dispersion.Cauchy(pl.Free(1.3, 1.95), pl.Free(0.0, 3e4)),
         ("A", "B"),
     ),
 }

@@ -25,13 +25,13 @@ def test_at_a_bound_that_the_user_set(film, measured):
     assert fit.status is pl.Status.AT_BOUND
     assert fit["thickness"].value == 429
     assert "thickness (429 nm) rests on a bound" in fit.verdict
-    index = pl.fit(data, film(material=pl.Constant(pl.Free(1.47, 1.6))))
+    index = pl.fit(data, film(material=pl.dispersion.Constant(pl.Free(1.47, 1.6))))
     assert index.status is pl.Status.AT_BOUND
     assert "n (1.47) rests on a bound" in index.verdict
 
 
 def test_a_natural_bound_gives_an_upper_limit_and_stays_converged(film, measured):
-    scene = film(material=pl.Constant(1.46, pl.Free(0.0, 1.0)))
+    scene = film(material=pl.dispersion.Constant(1.46, pl.Free(0.0, 1.0)))
     for seed in range(1, 9):
         fit = pl.fit(measured(scene, 0.0, 430.0, seed=seed), scene)
         assert fit.status is pl.Status.CONVERGED
@@ -48,7 +48,7 @@ def test_a_natural_bound_gives_an_upper_limit_and_stays_converged(film, measured
 
 def test_bounds_that_only_look_natural_are_the_users(film, measured):
     """k ≥ 0.02 is somebody's opinion."""
-    scene = film(material=pl.Constant(1.46, pl.Free(0.02, 1.0)))
+    scene = film(material=pl.dispersion.Constant(1.46, pl.Free(0.02, 1.0)))
     fit = pl.fit(measured(film(), 430.0), scene)
     assert fit.status in (pl.Status.AT_BOUND, pl.Status.MISFIT)
     assert fit["k"].value == 0.02
@@ -57,7 +57,7 @@ def test_bounds_that_only_look_natural_are_the_users(film, measured):
 
 def test_ambiguous_n_and_its_mirror(film, measured):
     """At normal incidence on a substrate s, n d at index n and at s/n reflect alike."""
-    scene = film(material=pl.Constant(pl.Free(1.3, 2.8)))
+    scene = film(material=pl.dispersion.Constant(pl.Free(1.3, 2.8)))
     fit = pl.fit(measured(scene, 1.6, 430.0), scene)
     assert fit.status is pl.Status.AMBIGUOUS
     both = sorted([fit["n"].value, fit.rivals[0].parameters["n"]])

@@ -32,7 +32,7 @@ GOLD = pl.Layer(0.2 + 3.4j, 500.0, name="gold")
 OVER_GOLD = scene([pl.Layer(1.46, FREE), GOLD])
 FAINT = scene(
     [pl.Layer(1.46 + 1e-7j, FREE, roughness=0.05)],
-    pl.Cauchy(1.5, 0.1),
+    pl.dispersion.Cauchy(1.5, 0.1),
     angle=0.3,
     instrument=pl.Instrument(bandwidth=0.2),
 )
@@ -82,8 +82,8 @@ def test_the_bound_holds_and_no_gradient_is_lost(plans, name):
 
 TINY = pl.Free(0, 1e-6, start=0.0)
 ALL_FREE = scene(
-    [pl.Layer(pl.Constant(1.46, TINY), FREE, roughness=TINY)],
-    pl.Substrate(pl.Cauchy(1.5, TINY), "air", plate_mm=FREE),
+    [pl.Layer(pl.dispersion.Constant(1.46, TINY), FREE, roughness=TINY)],
+    pl.Substrate(pl.dispersion.Cauchy(1.5, TINY), "air", plate_mm=FREE),
     angle=TINY,
     instrument=pl.Instrument(bandwidth=TINY),
 )

@@ -67,7 +67,7 @@ def kept(bands, film, tmp_path_factory):
 
 @pytest.mark.parametrize(
     ("data", "scene"),
-    [({"seed": 4}, {}), ({}, {"upper": 1400.0}), ({}, {"prior": pl.Normal(600.0, 200.0)})],
+    [({"seed": 4}, {}), ({}, {"upper": 1400.0}), ({}, {"prior": pl.priors.Normal(600.0, 200.0)})],
     ids=["data", "bounds", "prior"],
 )
 def test_a_chain_of_another_problem_is_refused(bands, film, kept, data, scene):

@@ -61,8 +61,8 @@ def test_all_minima_that_matter_were_visited(bimodal):
 @pytest.mark.parametrize(
     ("prior", "log_prior"),
     [
-        (pl.Normal(440.0, 100.0), lambda d: -0.5 * ((d - 440.0) / 100.0) ** 2),
-        (pl.LogUniform(), lambda d: -np.log(d)),
+        (pl.priors.Normal(440.0, 100.0), lambda d: -0.5 * ((d - 440.0) / 100.0) ** 2),
+        (pl.priors.LogUniform(), lambda d: -np.log(d)),
     ],
 )
 def test_a_prior_weighs_the_minima(bands, film, grid, prior, log_prior):
@@ -76,7 +76,7 @@ def test_a_prior_weighs_the_minima(bands, film, grid, prior, log_prior):
 def test_a_half_normal_prior_presses_towards_zero(film):
     """Data that say nothing leave the prior: half a normal distribution."""
     blind = pl.Spectrum(BANDS, np.full(5, 0.3), "R", sigma=np.full(5, 100.0))
-    found = pl.sample(blind, film(lower=0.0, prior=pl.HalfNormal(50.0))).marginals()["thickness"]
+    found = pl.sample(blind, film(lower=0.0, prior=pl.priors.HalfNormal(50.0))).marginals()["thickness"]
     assert found.mean == pytest.approx(50.0 * np.sqrt(2 / np.pi), rel=0.08)
     assert found.q975 == pytest.approx(50.0 * 2.2414, rel=0.1)
 
@@ -108,7 +108,7 @@ def test_every_view_counts_and_scale_is_integrated_out(bands):
     """Two spectra of one film with a free scale each: the posterior is as wide as least squares say."""
     scene = pl.Scene(
         pl.Layer(1.46, pl.Free(500.0, 560.0)),
-        pl.Constant(3.9, 0.02),
+        pl.dispersion.Constant(3.9, 0.02),
         instrument=pl.Instrument(scale=Drift(0)),
     )
     found = pl.sample([bands(530.0, 0.004, 1), bands(530.0, 0.004, 2)], scene)

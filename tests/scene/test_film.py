@@ -47,7 +47,7 @@ def test_impossible_bounds_are_refused(arguments, message):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: pl.Normal(1.0, 0.0), "a prior's standard deviation must be positive, not 0"),
+        (lambda: pl.priors.Normal(1.0, 0.0), "a prior's standard deviation must be positive, not 0"),
         (lambda: pl.Layer(1.46, -5), "thickness must not be negative, got -5 nm"),
         (lambda: pl.Layer(1.46, pl.Free(-5, 5)), "thickness must not be negative, got -5 nm"),
         (lambda: pl.Layer(1.46 - 0.1j, 5), "negative imaginary part, which is gain"),
@@ -72,7 +72,7 @@ def test_impossible_bounds_are_refused(arguments, message):
         (lambda: scene(ambient=1.33 + 0.1j), "the ambient must not absorb: give it a real index"),
         (lambda: scene(ambient="Au"), "the ambient must not absorb: give it a real index"),
         (lambda: scene(ambient=np.array(1.33 + 0.1j)), "the ambient must not absorb"),
-        (lambda: scene(ambient=pl.Constant(1.33, FREE)), "the ambient must not absorb"),
+        (lambda: scene(ambient=pl.dispersion.Constant(1.33, FREE)), "the ambient must not absorb"),
     ],
 )
 def test_impossible_scenes_are_refused(make, message):
@@ -90,7 +90,7 @@ def test_words_stand_for_linear_nuisances():
 
 def test_free_parameters_are_found_and_filled_in_the_same_order():
     thing = scene(
-        layers=pl.Layer(pl.Constant(pl.Free(1, 2), pl.Free(0, 1)), FREE),
+        layers=pl.Layer(pl.dispersion.Constant(pl.Free(1, 2), pl.Free(0, 1)), FREE),
         instrument=pl.Instrument(bandwidth=pl.Free(0, 20)),
     )
     found = free_leaves(thing)
@@ -109,7 +109,7 @@ def test_a_medium_is_a_number_a_name_or_a_material():
     assert medium(np.complex128(2.9 + 0.1j)) == Constant(2.9, 0.1)
     assert medium(FREE).n is FREE
     assert medium("SiO2").name == "SiO2"
-    material = pl.Cauchy(1.45)
+    material = pl.dispersion.Cauchy(1.45)
     assert medium(material) is material
 
 
@@ -121,10 +121,10 @@ def test_a_medium_is_a_number_a_name_or_a_material():
         (1.46 + 0j, False),
         (complex(1.46, -0.0), False),
         (np.array(1.46 + 0.1j), True),
-        (pl.Constant(1.46, 0), False),
-        (pl.Constant(1.46, pl.Free(0, 1, start=0.0)), True),
-        (pl.Shifted(pl.Constant(1.46), None, pl.Free(0, 1, start=0.0)), True),
-        (pl.Cauchy(FREE), False),
+        (pl.dispersion.Constant(1.46, 0), False),
+        (pl.dispersion.Constant(1.46, pl.Free(0, 1, start=0.0)), True),
+        (pl.dispersion.Shifted(pl.dispersion.Constant(1.46), None, pl.Free(0, 1, start=0.0)), True),
+        (pl.dispersion.Cauchy(FREE), False),
         ("Si", True),
         ("air", False),
     ],

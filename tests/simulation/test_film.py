@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
+from pellicle.dispersion import Cauchy, Constant
 from pellicle.scene.free import insert, start_values
 from pellicle.simulation.film import build, sampled
 
@@ -33,12 +34,12 @@ SCENES = {
     "transparent, normal": scene(),
     "transparent, oblique": scene(angle=60.0),
     "transmittance": scene(substrate=1.52, angle=60.0, signal="T"),
-    "k fixed at 0": scene(pl.Constant(1.46, 0.0), angle=60.0),
+    "k fixed at 0": scene(Constant(1.46, 0.0), angle=60.0),
     "absorbing": scene(2.1 + 0.1j, angle=60.0),
     "one polarisation": scene(angle=60.0, polarisation="p"),
     "tunnelling layer": scene(1.33, 1.7, **DENSE),
     "tunnelling substrate": scene(2.1, 1.0, **DENSE),
-    "dispersive": scene(pl.Cauchy(1.45, 3e3), "Si"),
+    "dispersive": scene(Cauchy(1.45, 3e3), "Si"),
     "plate": scene(substrate=PLATE),
     "plate, oblique transmittance": scene(substrate=PLATE, angle=50.0, signal="T"),
     "an angle for each wavelength": scene(angle=np.linspace(0, 60, 9)),
@@ -102,7 +103,10 @@ def primitives(thing, plan=None):
 BANDWIDTH = pl.Instrument(bandwidth=5.0)
 LEAVES_NO_TRACE = {
     "absorption": (scene(), scene(1.46 + 0.1j)),
-    "absorption, k fixed at 0": (scene(pl.Constant(1.46, 0.0)), scene(pl.Constant(1.46, 0.1))),
+    "absorption, k fixed at 0": (
+        scene(Constant(1.46, 0.0)),
+        scene(Constant(1.46, 0.1)),
+    ),
     "oblique": (scene(polarisation="p"), scene(polarisation="p", angle=30.0)),
     "polarisation": (scene(angle=30.0, polarisation="s"), scene(angle=30.0)),
     "tunnelling": (scene(angle=80.0), scene(angle=80.0, ambient=1.6)),
@@ -128,13 +132,13 @@ def test_one_polarisation_is_half_the_work():
 
 
 def test_k_fixed_at_zero_costs_what_no_k_costs():
-    plain, fixed = scene(angle=30.0), scene(pl.Constant(1.46, 0.0), angle=30.0)
+    plain, fixed = scene(angle=30.0), scene(Constant(1.46, 0.0), angle=30.0)
     assert primitives(fixed) <= primitives(plain) + 2  # the constant itself
 
 
 def test_k_free_from_zero_keeps_its_slope():
     """The trap of judging by values: at k = 0 the model must still know that R falls with k."""
-    thing = scene(pl.Constant(1.46, pl.Free(0, 1, start=0.0)))
+    thing = scene(Constant(1.46, pl.Free(0, 1, start=0.0)))
     model = build(pl.plan(thing))
     predict = jax.jit(lambda k: model(insert(thing, [k])))
     slope = jax.jacfwd(predict)(0.0)
@@ -145,7 +149,7 @@ def test_k_free_from_zero_keeps_its_slope():
 
 def test_a_model_is_pure_and_can_be_traced():
     """jit, vmap and gradients through the free parameters, in their own order."""
-    thing = scene(pl.Constant(pl.Free(1.3, 1.7)), thickness=pl.Free(10, 900), angle=30.0)
+    thing = scene(Constant(pl.Free(1.3, 1.7)), thickness=pl.Free(10, 900), angle=30.0)
     model = build(pl.plan(thing))
 
     @jax.jit

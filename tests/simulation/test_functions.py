@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
+from pellicle.dispersion import Cauchy
 from pellicle.dispersion.empirical import Table
 from pellicle.materials import CLEAR, Material
 from pellicle.simulation import functions
@@ -96,7 +97,12 @@ def test_an_integer_is_a_number_too(function):
 def test_precision_follows_the_input(function, dtype):
     """Python numbers, and materials, take the precision of the arrays beside them."""
     wavelength = np.linspace(400, 800, 3, dtype=dtype)
-    for media in ((1.46, 3.9), (2.1 + 0.1j, 3.9 + 0.02j), ("SiO2", "Si"), (pl.Cauchy(1.45, 3e3), 1.5)):
+    for media in (
+        (1.46, 3.9),
+        (2.1 + 0.1j, 3.9 + 0.02j),
+        ("SiO2", "Si"),
+        (Cauchy(1.45, 3e3), 1.5),
+    ):
         for angle in (0.0, 30.0, dtype(30)):
             assert function(wavelength, 100.0, *media, angle=angle).dtype == dtype
 
@@ -190,7 +196,7 @@ def test_names_are_materials(function):
 def test_the_index_of_whatever_a_layer_may_be():
     np.testing.assert_array_equal(pl.refractive_index(np.array([500.0, 600.0]), 1.5 + 0.1j), 1.5 + 0.1j)
     assert pl.refractive_index(np.array([500.0, 600.0]), 1.5).shape == (2,)
-    n = pl.refractive_index(550.0, pl.Cauchy(1.5, 3000.0))
+    n = pl.refractive_index(550.0, Cauchy(1.5, 3000.0))
     assert complex(n) == pytest.approx(1.5 + 3000 / 550**2)
     with pytest.raises(ValueError, match="not at 90"):
         pl.refractive_index(90.0, "Au")
@@ -222,14 +228,14 @@ def test_outside_a_table_a_traced_wavelength_gives_nan(function):
 
 def test_gradient_through_a_material():
     """The wavelength reaches the index too: the derivative contains the dispersion."""
-    material = pl.Cauchy(1.45, 3e4)
+    material = Cauchy(1.45, 3e4)
 
     def signal(wavelength):
         return pl.reflectance(wavelength, 400.0, material, 3.9)
 
     numeric = (signal(550.001) - signal(549.999)) / 2e-3
     assert float(jax.grad(signal)(550.0)) == pytest.approx(float(numeric), rel=1e-6)
-    by_parameter = jax.grad(lambda a: pl.reflectance(550.0, 400.0, pl.Cauchy(a, 3e4), 3.9))(1.45)
+    by_parameter = jax.grad(lambda a: pl.reflectance(550.0, 400.0, Cauchy(a, 3e4), 3.9))(1.45)
     n = complex(material(550.0)).real
     direct = jax.grad(lambda n: pl.reflectance(550.0, 400.0, n, 3.9))(n)
     assert float(by_parameter) == pytest.approx(float(direct), rel=1e-12)

@@ -69,7 +69,7 @@ def test_uneven_thickness_is_an_average_over_thickness(layer, signal):
 
 def test_bandwidth_is_an_average_over_wavelength():
     """With the dispersion of the layer in it, from a catalogue's formula sampled before."""
-    layer, sigma = pl.Cauchy(2.1, 8e4), 4.0 / 2.3548200450309493
+    layer, sigma = pl.dispersion.Cauchy(2.1, 8e4), 4.0 / 2.3548200450309493
     thing = scene(layer, 1.52, thickness=2000.0, instrument=pl.Instrument(bandwidth=4.0))
     spread = pl.reflectance(WAVELENGTH + sigma * NODES[:, None], 2000.0, layer, 1.52)
     for model_of in (thing, sampled(thing)):

@@ -9,6 +9,7 @@ import tmm
 
 import pellicle as pl
 from pellicle.scene.film import with_wavelength
+from pellicle.scene.free import insert
 from pellicle.simulation.film import build
 
 NM = np.array([450.0, 600.0, 800.0])
@@ -69,7 +70,7 @@ def simulated(scene: pl.Scene) -> np.ndarray:
 
 
 LIGHT = pl.Light(signal="psi-delta", angle=ANGLE)
-PLATE = pl.Substrate(pl.Constant(GLASS, K), back=1.0, plate_mm=MM)
+PLATE = pl.Substrate(pl.dispersion.Constant(GLASS, K), back=1.0, plate_mm=MM)
 
 
 @pytest.mark.parametrize("index", [1.46, 2.2 + 0.05j])
@@ -83,7 +84,7 @@ def test_films_on_both_faces():
     layers = [
         pl.Layer(2.1, 80.0),
         pl.Layer(1.46, 95.0),
-        pl.Plate(pl.Constant(GLASS, K), MM),
+        pl.Plate(pl.dispersion.Constant(GLASS, K), MM),
         pl.Layer(1.38, 110.0),
     ]
     found = simulated(pl.Scene(layers, 3.9 + 0.02j, light=LIGHT))
@@ -99,7 +100,7 @@ def test_its_slope_is_that_of_differences():
 
     @jax.jit
     def signal(thickness):
-        return run(pl.scene.insert(scene, [thickness]))
+        return run(insert(scene, [thickness]))
 
     slope = jax.jit(jax.jacfwd(signal))(120.0)
     differences = (signal(120.0 + 1e-3) - signal(120.0 - 1e-3)) / 2e-3
@@ -110,6 +111,6 @@ def test_behind_a_metal_nothing_comes_back():
     """The plate is then a half space."""
     with_back, without = (
         simulated(pl.Scene(pl.Layer(0.2 + 3.4j, 400.0), substrate, light=LIGHT))
-        for substrate in (PLATE, pl.Constant(GLASS, K))
+        for substrate in (PLATE, pl.dispersion.Constant(GLASS, K))
     )
     np.testing.assert_allclose(with_back, without, rtol=0, atol=1e-9)

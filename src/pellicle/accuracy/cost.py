@@ -40,7 +40,7 @@ def cost(
     scene: Scene,
     wavelength: np.ndarray,
     *,
-    against: str = "float64",
+    reference: str = "float64",
     tolerance: float | None = None,
     noise: float | None = None,
     datasets: int = 20,
@@ -48,7 +48,7 @@ def cost(
 ) -> Cost:
     """Measure every way to a scene's signal at `wavelength` (nm), and to its free parameters.
 
-    `against` is "float64" or "mpmath". `tolerance` is in the signal's unit: a fraction, or degrees on the
+    `reference` is "float64" or "mpmath". `tolerance` is in the signal's unit: a fraction, or degrees on the
     sphere of N, C and S; without it, it is the `noise`, or 0.001 (0.1 degrees). `datasets` spectra are
     simulated with that noise, or noise as large as the tolerance, and fitted by every solver.
 
@@ -61,7 +61,7 @@ def cost(
         raise UsageError(f"the tolerance must be above zero, got {tolerance:g}: what error is small enough?")
     with jax.enable_x64(True):
         here = case(scene, wavelength, tolerance)
-        ladder = climb(here, against, progress)
+        ladder = climb(here, reference, progress)
         if ladder.interrupted:
             return Cost(ladder, None, "interrupted before")
         if datasets == 0:

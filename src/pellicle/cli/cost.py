@@ -64,7 +64,7 @@ def cost(
         result = measure(
             scene,
             wavelength,
-            against=reference,
+            reference=reference,
             tolerance=tolerance,
             noise=found.tables.data.noise,
             datasets=datasets,

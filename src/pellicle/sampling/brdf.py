@@ -41,7 +41,7 @@ def sample_brdf(
     chain: str | os.PathLike[str] | None = None,
     progress: Progress = quiet,
 ) -> Posterior:
-    """Fit as `pellicle.fit_brdf` does, then sample the posterior between the bounds, as `pellicle.sample`.
+    """Fit as `pellicle.fit` does, then sample the posterior between the bounds, as `pellicle.sample`.
 
     What the `residual` compares (ρ, or its cube root) is taken to have normal errors: of the given σ, or of
     the rms of the best fit's residuals. Where these are alike in neighbouring samples the samples count as

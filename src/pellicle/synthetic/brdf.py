@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import jax
 import numpy as np
-from scipy.stats import qmc
 
 from pellicle.data.brdf_samples import CHANNELS, BrdfSamples
 from pellicle.data.half_angles import angles, from_half_difference
@@ -36,6 +35,8 @@ def default_directions(count: int = SAMPLES) -> Directions:
     θ_h is spaced as its square root, as MERL's grid, so that most pairs lie where a lobe is; θ_d and
     both azimuths evenly. Pairs with a direction below the horizon are left out.
     """
+    from scipy.stats import qmc  # takes longer to import than the rest of the package
+
     unit = qmc.Sobol(4, rng=np.random.default_rng(0)).random_base2(int(np.ceil(np.log2(4 * count))))
     quarter, turn = 0.5 * np.pi, 2 * np.pi
     light, eye = from_half_difference(

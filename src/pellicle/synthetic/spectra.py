@@ -47,7 +47,7 @@ def simulate(scene: Scene, wavelength: Any = None, *, noise: float = 0.0, seed: 
     made = (synthesise_angles if ellipsometric else synthesise)(scene, wavelength, noise, seed)
     psi_or_power, delta = made.values.T if ellipsometric else (made.values, None)
     sigma = np.full(wavelength.shape, noise) if noise > 0 else None
-    angle = getattr(light.angle, "value", light.angle)
+    angle = getattr(light.angle, "start", light.angle)
     return Spectrum(
         wavelength,
         psi_or_power,

@@ -154,7 +154,7 @@ def fitted_before(monkeypatch, found):
 
 def test_a_posterior_is_as_wide_as_the_errors_say(fitted_before, known, tmp_path):
     """Every number is decided and far from its bounds: the posterior is normal."""
-    drawn = pl.sample_brdf(known.samples, FREE, chain=tmp_path / "chain.h5")
+    drawn = pl.sample(known.samples, FREE, chain=tmp_path / "chain.h5")
     assert drawn.trusted
     assert list(drawn.parameters) == [p.name for p in known.free]
     for name in FOUND:
@@ -172,9 +172,9 @@ def test_a_posterior_is_as_wide_as_the_errors_say(fitted_before, known, tmp_path
 
 def test_a_chain_goes_on_and_belongs_to_its_problem(fitted_before, known, tmp_path):
     path = tmp_path / "chain.h5"
-    assert not pl.sample_brdf(known.samples, FREE, chain=path, steps=20).trusted
-    resumed = pl.sample_brdf(known.samples, FREE, chain=path, steps=40)
-    whole = pl.sample_brdf(known.samples, FREE, steps=40)
+    assert not pl.sample(known.samples, FREE, chain=path, steps=20).trusted
+    resumed = pl.sample(known.samples, FREE, chain=path, steps=40)
+    whole = pl.sample(known.samples, FREE, steps=40)
     np.testing.assert_array_equal(resumed.draws, whole.draws)
     assert resumed.checks.steps == 40
     for other, changed in (
@@ -183,15 +183,15 @@ def test_a_chain_goes_on_and_belongs_to_its_problem(fitted_before, known, tmp_pa
     ):
         surface = dataclasses.replace(FREE, numbers={**FREE.numbers, **changed})
         with pytest.raises(DataError, match="is the chain of another problem"):
-            pl.sample_brdf(other, surface, chain=path)
+            pl.sample(other, surface, chain=path)
 
 
 def test_a_prior_narrows_a_posterior_and_not_the_fit(fitted_before, known):
     """Two independent measurements of one number: their inverse variances add."""
     p = known["specular"]
-    prior = pl.Normal(p.value, p.stderr)
+    prior = pl.priors.Normal(p.value, p.stderr)
     free = {**FREE.numbers, "specular": Free(0, 100, prior=prior)}
-    drawn = pl.sample_brdf(known.samples, dataclasses.replace(FREE, numbers=free))
+    drawn = pl.sample(known.samples, dataclasses.replace(FREE, numbers=free))
     assert drawn["specular"].sd == pytest.approx(p.stderr / np.sqrt(2), rel=0.12)
     told = evidence.priors(dataclasses.replace(FREE, numbers=free))
     assert told == ["the prior of specular counts in a posterior only: a fit of a surface takes none"]
@@ -202,7 +202,7 @@ def test_samples_that_are_alike_count_as_fewer(monkeypatch, found, known):
     fit, rest = found
     wider = rest._replace(at=rest.at._replace(variance=4 * rest.at.variance))
     monkeypatch.setattr(brdf, "fitted", lambda *asked: (fit, wider))
-    drawn = pl.sample_brdf(known.samples, FREE)
+    drawn = pl.sample(known.samples, FREE)
     assert drawn["specular"].sd == pytest.approx(2 * known["specular"].stderr, rel=0.15)
 
 

@@ -1,0 +1,348 @@
+"""The public verbs. Each takes a `Scene` (a film) or a `Surface` (a BRDF), and does the same with both."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pellicle.accuracy.cost import Cost
+from pellicle.accuracy.cost import cost as film_cost
+from pellicle.accuracy.surface import SurfaceCost
+from pellicle.accuracy.surface import cost as surface_cost
+from pellicle.data.brdf_samples import BrdfSamples
+from pellicle.data.spectrum import Spectrum
+from pellicle.effects.plan import Plan
+from pellicle.fitting.brdf.fit import fit_brdf
+from pellicle.fitting.brdf.result import BrdfFit
+from pellicle.fitting.result import Fit
+from pellicle.fitting.spectra.compare import Comparison
+from pellicle.fitting.spectra.compare import compare as compare_fits
+from pellicle.fitting.spectra.fit import fit as fit_spectra
+from pellicle.planning.film import plan as film_plan
+from pellicle.planning.surface import plan as surface_plan
+from pellicle.reporting.brdf import brdf_report
+from pellicle.reporting.comparison import report as comparison_report
+from pellicle.reporting.fit_text import report as fit_report
+from pellicle.sampling.brdf import sample_brdf
+from pellicle.sampling.result import Posterior
+from pellicle.sampling.spectra import sample as sample_spectra
+from pellicle.scene.film import Scene
+from pellicle.scene.surface import Surface, SurfaceView, lit
+from pellicle.synthetic.brdf import Directions, default_directions, simulate_brdf
+from pellicle.synthetic.spectra import default_wavelengths
+from pellicle.synthetic.spectra import simulate as simulate_spectrum
+
+Progress = Callable[[str, int, int], None]
+"""Called with the name of a stage, the number of steps done and their total."""
+
+
+def no_progress(stage: str, done: int, total: int) -> None:
+    """A no-op progress callback."""
+
+
+@overload
+def simulate(
+    scene: Scene, wavelength: ArrayLike | None = None, *, noise: float = 0.0, seed: int = 0
+) -> Spectrum: ...
+@overload
+def simulate(
+    scene: Surface,
+    *,
+    directions: Directions | BrdfSamples | None = None,
+    noise: float = 0.0,
+    seed: int = 0,
+) -> BrdfSamples: ...
+def simulate(
+    scene: Scene | Surface,
+    wavelength: ArrayLike | None = None,
+    *,
+    directions: Directions | BrdfSamples | None = None,
+    noise: float = 0.0,
+    seed: int = 0,
+) -> Spectrum | BrdfSamples:
+    """Simulate a measurement of `scene`: a spectrum of a film, or samples of the BRDF of a surface.
+
+    **Arguments:**
+
+    - `scene`: `Scene` or `Surface`. Free parameters take their start values; a free scale is 1 and a free
+      offset 0.
+    - `wavelength`: nm, shape (wavelengths,). Of a `Scene` only; 380 to 780 every 2 nm by default, within the
+      tables of its materials.
+    - `directions`: pairs of directions to light and eye, or the samples of which to take them. Of a
+      `Surface` only; 1000 pairs by default, spread over the lobe and around it.
+    - `noise`: standard deviation of the normal noise, in the unit of the signal: a fraction for R and T,
+      degrees for Ψ and Δ, 1/sr for a BRDF. It becomes the σ of the result.
+    - `seed` of the noise.
+
+    **Returns:** `Spectrum` or `BrdfSamples`, as `pellicle.fit` takes them.
+
+    **Raises:** ValueError where a material has no data at a wavelength; UsageError for a surface that
+    reflects nothing, or has neither one channel nor R, G and B.
+
+    ```python
+    >>> scene = pl.Scene(pl.Layer("SiO2", 500.0), "Si")
+    >>> pl.simulate(scene, [500.0, 600.0, 700.0]).values.round(4)
+    array([0.3657, 0.0855, 0.2713])
+
+    ```
+    """
+    if isinstance(scene, Surface):
+        _refuse("a Surface", wavelength=wavelength)
+        return simulate_brdf(scene, directions, noise=noise, seed=seed)
+    _refuse("a Scene", directions=directions)
+    return simulate_spectrum(scene, wavelength, noise=noise, seed=seed)
+
+
+def plan(
+    scene: Scene | Surface,
+    tolerance: float = 0.0,
+    *,
+    keep: Iterable[str] = (),
+    directions: Directions | BrdfSamples | None = None,
+) -> Plan:
+    """List the effects that a simulation of `scene` needs, to be exact or within `tolerance`.
+
+    **Arguments:**
+
+    - `scene`: `Scene`, with wavelengths in its light if `tolerance` is not 0, or `Surface`.
+    - `tolerance`: largest error of the signal anywhere within the bounds. R and T: a fraction. Ψ and Δ:
+      degrees on the sphere of N, C and S (Ψ is off by half of that at most, Δ by that over sin 2Ψ). BRDF:
+      relative to its value, or to 0.01/π where it is darker than that. At 0 an effect is left out only
+      where it is absent.
+    - `keep`: effects that must stay, by the keys of a plan (`"back-face"`, `"polarisation"`, ...).
+    - `directions`: pairs of directions to light and eye. Of a `Surface` only; see `pellicle.simulate`.
+
+    **Returns:** `Plan`, whose `rows` name each effect, whether it is on, why, and a bound on the error of
+    leaving it out.
+
+    **Raises:** ValueError for a negative tolerance, and for a tolerance without wavelengths.
+
+    ```python
+    >>> plan = pl.plan(pl.Scene(pl.Layer("SiO2", 500.0), "Si"))
+    >>> plan.on("coherence"), plan.on("back-face")
+    (True, False)
+
+    ```
+    """
+    if isinstance(scene, Surface):
+        return surface_plan(_view(scene, directions), tolerance, keep)
+    _refuse("a Scene", directions=directions)
+    return film_plan(scene, tolerance, keep)
+
+
+@overload
+def cost(
+    scene: Scene,
+    wavelength: ArrayLike | None = None,
+    *,
+    reference: str = "float64",
+    tolerance: float | None = None,
+    noise: float | None = None,
+    datasets: int = 20,
+    progress: Progress = no_progress,
+) -> Cost: ...
+@overload
+def cost(
+    scene: Surface,
+    *,
+    directions: Directions | BrdfSamples | None = None,
+    tolerance: float | None = None,
+    progress: Progress = no_progress,
+) -> SurfaceCost: ...
+def cost(
+    scene: Scene | Surface,
+    wavelength: ArrayLike | None = None,
+    *,
+    directions: Directions | BrdfSamples | None = None,
+    reference: str = "float64",
+    tolerance: float | None = None,
+    noise: float | None = None,
+    datasets: int = 20,
+    progress: Progress = no_progress,
+) -> Cost | SurfaceCost:
+    """Measure error and time of every method of simulating `scene`, and of fitting it.
+
+    **Arguments:**
+
+    - `scene`: `Scene` or `Surface`.
+    - `wavelength`: nm, shape (wavelengths,). Of a `Scene` only; by default those of its light, or as in
+      `pellicle.simulate`.
+    - `directions`: pairs of directions to light and eye. Of a `Surface` only; see `pellicle.simulate`.
+    - `reference`: what errors are measured against: "float64", or "mpmath" with 50 digits (`Scene` only).
+    - `tolerance`: the error that is small enough. R and T: a fraction, 0.001 by default. Ψ and Δ: degrees on
+      the sphere of N, C and S, 0.1 by default. BRDF: mean ΔE2000 of its film's colour, 0.5 by default, or
+      relative to its value where it has no such film.
+    - `noise`: standard deviation of the spectra that are fitted, as in `pellicle.simulate`; by default the
+      tolerance. A noise without a tolerance is the tolerance too. (`Scene` only)
+    - `datasets`: number of simulated spectra that every solver fits; 0 leaves the solvers out.
+      (`Scene` only)
+    - `progress`: called with the name of a stage, the number of steps done and their total.
+
+    **Returns:** `Cost` or `SurfaceCost`: for each method its error, its time, and whether another one is
+    both faster and more accurate.
+
+    **Raises:** UsageError for a tolerance that is not above zero, for a reference that cannot compute the
+    scene, for a scene whose signal is 0 everywhere, and for the colours of a surface without
+    colour-science.
+    """
+    if isinstance(scene, Surface):
+        _refuse("a Surface", wavelength=wavelength, noise=noise)
+        view = _view(scene, directions)
+        return surface_cost(view, tolerance=tolerance, progress=progress)
+    _refuse("a Scene", directions=directions)
+    if wavelength is None:
+        own = scene.light.wavelength
+        wavelength = default_wavelengths(scene) if own is None else own
+    return film_cost(
+        scene,
+        np.asarray(wavelength, dtype=float),
+        reference=reference,
+        tolerance=tolerance,
+        noise=noise,
+        datasets=datasets,
+        progress=progress,
+    )
+
+
+@overload
+def fit(
+    data: Spectrum | Sequence[Spectrum],
+    scene: Scene | Sequence[Scene],
+    *,
+    tolerance: float = 0.0,
+    loss: str = "least-squares",
+    progress: Progress = no_progress,
+) -> Fit: ...
+@overload
+def fit(
+    data: BrdfSamples, scene: Surface, *, residual: str | None = None, progress: Progress = no_progress
+) -> BrdfFit: ...
+def fit(data: Any, scene: Any, **options: Any) -> Fit | BrdfFit:
+    """Fit the free parameters of `scene` to `data`, in float64.
+
+    **Arguments:**
+
+    - `data`: `Spectrum`, a list of spectra of one sample (a joint fit), or `BrdfSamples`.
+    - `scene`: `Scene`, or a list with one for each spectrum; `Surface` for `BrdfSamples`. Signal, angle and
+      polarisation come from the data.
+    - `tolerance`: leave out effects that change the signal by less (`Scene` only; see `pellicle.plan`).
+    - `loss`: "least-squares", or "huber" or "student-t" against outliers (`Scene` only).
+    - `residual`: what is compared of a BRDF (`Surface` only): "linear", "cosine", "log" or "cube-root". By
+      default "linear" where the samples have a σ, else "cube-root".
+    - `progress`: called with the name of a stage, the number of steps done and their total.
+
+    **Returns:** `Fit` or `BrdfFit`: parameters with errors, a status with a verdict, every rival minimum.
+    `print(fit)` is short, `pellicle.report(fit)` complete.
+
+    **Raises:** UsageError where nothing is free, where the scenes of a joint fit are not of one sample,
+    where an uncalibrated signal has a fixed scale, for an unknown loss or residual, and for too few samples;
+    ValueError where a material has no data at a wavelength.
+
+    ```python
+    >>> scene = pl.Scene(pl.Layer("SiO2", pl.Free(100, 1000)), "Si")
+    >>> spectrum = pl.simulate(pl.Scene(pl.Layer("SiO2", 500.0), "Si"), noise=0.002)
+    >>> fit = pl.fit(spectrum, scene)
+    >>> round(fit["thickness"].value), fit.status.value
+    (500, 'converged')
+
+    ```
+    """
+    if isinstance(scene, Surface):
+        return fit_brdf(data, scene, **options)
+    return fit_spectra(data, scene, **options)
+
+
+@overload
+def sample(
+    data: Spectrum | Sequence[Spectrum],
+    scene: Scene | Sequence[Scene],
+    *,
+    walkers: int | None = None,
+    steps: int = ...,
+    seed: int = 0,
+    chain: str | os.PathLike[str] | None = None,
+    tolerance: float = 0.0,
+    progress: Progress = no_progress,
+) -> Posterior: ...
+@overload
+def sample(
+    data: BrdfSamples,
+    scene: Surface,
+    *,
+    residual: str | None = None,
+    walkers: int | None = None,
+    steps: int = ...,
+    seed: int = 0,
+    chain: str | os.PathLike[str] | None = None,
+    progress: Progress = no_progress,
+) -> Posterior: ...
+def sample(data: Any, scene: Any, **options: Any) -> Posterior:
+    """Fit as `pellicle.fit` does, then sample the posterior of the free parameters, in float64.
+
+    Priors are those of the `Free` parameters, uniform between the bounds by default. Walkers start in every
+    minimum of the fit in proportion to its share.
+
+    **Arguments:**
+
+    - `data`, `scene`, `tolerance`, `residual`, `progress`: as in `pellicle.fit`.
+    - `walkers`: number of walkers, two for each free parameter at least.
+    - `steps`: most steps; the chain ends before that where it is 50 autocorrelation times long and passes
+      its checks. 20000 by default.
+    - `seed` of the chain.
+    - `chain`: file in which the chain is kept as it grows; an interrupted run continues from it.
+
+    **Returns:** `Posterior`: draws, marginals, modes with their mass, and the checks of the chain.
+
+    **Raises:** as `pellicle.fit` does; UsageError for too few walkers, or more than fit into memory;
+    DataError for the chain of another problem.
+    """
+    if isinstance(scene, Surface):
+        return sample_brdf(data, scene, **options)
+    return sample_spectra(data, scene, **options)
+
+
+def compare(
+    data: Spectrum | Sequence[Spectrum],
+    scenes: Mapping[str, Scene | Sequence[Scene]],
+    *,
+    tolerance: float = 0.0,
+    progress: Progress = no_progress,
+) -> Comparison:
+    """Fit several scenes to the same data and compare them by AIC and BIC.
+
+    **Arguments:**
+
+    - `data`: `Spectrum`, or a list of spectra of one sample.
+    - `scenes`: two or more descriptions by name, each as `pellicle.fit` takes it.
+    - `tolerance`, `progress`: as in `pellicle.fit`.
+
+    **Returns:** `Comparison`: each candidate with its fit and criteria, the `best`, and a verdict.
+
+    **Raises:** UsageError for fewer than two scenes, and as `pellicle.fit` does.
+    """
+    return compare_fits(data, scenes, tolerance=tolerance, progress=progress)
+
+
+def report(result: Fit | BrdfFit | Comparison) -> str:
+    """Write the complete report of a fit or a comparison, as text of at most 100 columns.
+
+    **Raises:** TypeError for anything else.
+    """
+    if isinstance(result, Fit):
+        return fit_report(result)
+    return brdf_report(result) if isinstance(result, BrdfFit) else comparison_report(result)
+
+
+def _refuse(kind: str, **arguments: Any) -> None:
+    """Raise TypeError where an argument of the other kind of scene is given."""
+    for name, value in arguments.items():
+        if value is not None:
+            raise TypeError(f"`{name}` has no meaning for {kind}")
+
+
+def _view(surface: Surface, directions: Directions | BrdfSamples | None) -> SurfaceView:
+    return lit(surface, default_directions() if directions is None else directions)

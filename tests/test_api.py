@@ -1,0 +1,45 @@
+"""The public verbs: the same for a film and for a surface."""
+
+import numpy as np
+import pytest
+
+import pellicle as pl
+from pellicle import api
+from pellicle.planning import film, surface
+from pellicle.scene.surface import lit
+from pellicle.synthetic.brdf import default_directions, simulate_brdf
+from pellicle.synthetic.spectra import simulate
+
+FILM = pl.Scene(pl.Layer("SiO2", pl.Free(400, 600)), "Si")
+STEEL = pl.Surface("microfacet-film", {"thickness": pl.Free(20, 80), "n": 2.3, "base_n": 2.9, "base_k": 3.0})
+DIRECTIONS = default_directions(50)
+
+
+def test_simulate_takes_a_film_or_a_surface():
+    wavelength = [500.0, 600.0]
+    spectrum = pl.simulate(FILM, wavelength, noise=0.01, seed=2)
+    assert np.array_equal(spectrum.values, simulate(FILM, wavelength, noise=0.01, seed=2).values)
+    samples = pl.simulate(STEEL, directions=DIRECTIONS, noise=0.01, seed=2)
+    assert np.array_equal(samples.values, simulate_brdf(STEEL, DIRECTIONS, noise=0.01, seed=2).values)
+
+
+def test_plan_takes_a_film_or_a_surface():
+    assert pl.plan(FILM) == film.plan(FILM)
+    assert pl.plan(STEEL, 1e-2, directions=DIRECTIONS, keep=["oblique"]) == surface.plan(
+        lit(STEEL, DIRECTIONS), 1e-2, ["oblique"]
+    )
+
+
+@pytest.mark.parametrize(
+    ("verb", "scene", "arguments", "message"),
+    [
+        ("simulate", STEEL, {"wavelength": [500.0]}, "`wavelength` has no meaning for a Surface"),
+        ("simulate", FILM, {"directions": DIRECTIONS}, "`directions` has no meaning for a Scene"),
+        ("plan", FILM, {"directions": DIRECTIONS}, "`directions` has no meaning for a Scene"),
+        ("cost", STEEL, {"noise": 0.1}, "`noise` has no meaning for a Surface"),
+        ("cost", FILM, {"directions": DIRECTIONS}, "`directions` has no meaning for a Scene"),
+    ],
+)
+def test_arguments_of_the_other_kind_are_refused(verb, scene, arguments, message):
+    with pytest.raises(TypeError, match=message):
+        getattr(api, verb)(scene, **arguments)
