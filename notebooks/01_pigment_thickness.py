@@ -9,11 +9,11 @@
 # %% [markdown]
 # # Thickness of a pigment layer
 #
-# Hematite, the red of ochre, absorbs blue light and lets red light through. A layer of it that is thinner
-# than a wavelength therefore shows two things at once: the colour of the pigment, and the interference of
-# the light from its two faces. Gerardin, Holzschuch and Martinetto (2019) render such layers. Here we draw
-# their figures from pellicle's model, then go the other way: from a spectrum, or from a colour alone, to
-# the thickness.
+# Hematite, the pigment of red ochre, absorbs blue light and transmits red light. A layer that is thinner
+# than a wavelength therefore shows two effects: the colour of the pigment, and the interference of the
+# light from its two faces. Gerardin, Holzschuch and Martinetto (2019) render such layers. This notebook
+# reproduces their figures with pellicle's model. It then determines the thickness from a spectrum, and from
+# a colour alone.
 
 # %%
 import os
@@ -25,15 +25,15 @@ import numpy as np
 import pellicle as pl
 from pellicle.colour import delta_e2000, film_colour, lab, sensor
 
-jax.config.update("jax_enable_x64", True)  # JAX counts in single precision unless told
+jax.config.update("jax_enable_x64", True)  # double precision; JAX's default is single
 SHORT = os.environ.get("PELLICLE_SHORT") == "1"  # fewer points, for a quick run
 
 # %% [markdown]
-# ## What the pigments do to light
+# ## Refractive indices of the pigments
 #
-# A material is a complex refractive index n + ik at each wavelength. n slows the wave down; k, the
-# extinction, takes it away: over a wavelength λ of path its power falls by exp(−4πk). Both come from
-# published tables, which pellicle carries with their sources.
+# A material has a complex refractive index n + ik at each wavelength. n reduces the phase velocity of the
+# wave; k, the extinction coefficient, attenuates it: over a path of one wavelength λ its power falls by
+# exp(−4πk). Both are taken from published tables, which pellicle contains with their sources.
 
 # %%
 nm = np.linspace(400, 700, 301)
@@ -53,15 +53,15 @@ for word, name in pigments.items():
     print(f"{word}: {pl.material(name).citation}")
 
 # %% [markdown]
-# Gold absorbs everywhere. The two pigments are semiconductors: they absorb where a photon has the energy to
-# lift an electron, in the blue and green, and hardly at all in the red.
+# Gold absorbs everywhere. The two pigments are semiconductors: they absorb photons whose energy is above
+# their band gap, in the blue and green, and are nearly transparent in the red.
 #
 # ## From thickness to spectrum and colour
 #
-# `pl.reflectance` takes wavelengths and thicknesses in nanometres, the layer and what lies under it. Its
-# arguments broadcast like NumPy's: a column of thicknesses against a row of wavelengths gives a map.
-# `film_colour` adds the spectrum up as the eye does, under daylight (D65) unless told otherwise. This is
-# Figure 1 of the paper, hematite on glass.
+# `pl.reflectance` takes wavelengths and thicknesses in nanometres, the layer and the substrate. Its
+# arguments broadcast as in NumPy: a column of thicknesses and a row of wavelengths give a map.
+# `film_colour` integrates the spectrum with the sensitivity of the eye, by default under daylight (D65).
+# This is Figure 1 of the paper, hematite on glass.
 
 # %%
 thickness = np.linspace(0, 300, 76 if SHORT else 301)
@@ -84,12 +84,12 @@ for axes, (title, values) in zip(panels, maps.items(), strict=True):
 plt.show()
 
 # %% [markdown]
-# In the red the map has fringes: thicknesses that reflect much and little in turn, because the light of the
-# two faces comes back in step or out of step. In the blue the light does not survive the way to the lower
-# face and back, so there is one face, and no fringes. The colour of the reflected light (the strip) runs
-# through the hues again and again, paler each time.
+# In the red the map has fringes: the reflectance rises and falls with thickness, because the light from the
+# two faces returns in phase or out of phase. In the blue the light is absorbed before it returns from the
+# lower face, so only one face reflects and there are no fringes. The colour of the reflected light (the
+# strip) runs through the hues again and again, paler each time.
 #
-# Figure 4 compares gold with cadmium sulfide, from a few atoms to a fiftieth of a millimetre.
+# Figure 4 compares gold with cadmium sulfide, for thicknesses from 1 nm to 20 µm.
 
 # %%
 grown = np.geomspace(1, 2e4, 100 if SHORT else 600)
@@ -110,15 +110,15 @@ for word in mean:
     print(f"{word}, 100 nm: {np.interp(100, grown, mean[word]):.1%} of the light passes")
 
 # %% [markdown]
-# Gold is opaque from about 100 nm on and shows no fringes at all. Cadmium sulfide shows them, and lets red
-# light through however thick it is here. What passes no layer can tell nothing of its lower face: we shall
-# meet that again below.
+# Gold is opaque above about 100 nm and shows no fringes. Cadmium sulfide shows fringes, and transmits red
+# light at every thickness in the figure. If no light crosses a layer, a measurement contains no information
+# about its lower face: an example follows below.
 #
 # ## From spectrum to thickness
 #
-# `measurements/` holds simulated spectra of these layers, with noise and with the truth in their headers. A
-# *scene* says what is there; what is to be found stands in it as `pl.Free`, with bounds. The fit looks at
-# the whole range between them, because interference gives the misfit many minima.
+# `measurements/` contains simulated spectra of these layers, with noise and with the true values in their
+# headers. A *scene* describes the sample; an unknown parameter is a `pl.Free` with bounds. The fit searches
+# the whole range between the bounds, because interference gives the misfit many minima.
 
 # %%
 spectrum = pl.read_spectrum("../measurements/hematite_on_glass_140nm.csv")
@@ -138,14 +138,14 @@ above.legend()
 below.plot(curve.wavelength, curve.residual / curve.sigma, ".", color="k", markersize=3)
 below.axhline(0, color="C1")
 below.set(xlabel="wavelength (nm)", ylabel="residual (σ)")
-misfit.semilogy(fit.profile.thickness, fit.profile.delta_chi2, label="what the search saw")
+misfit.semilogy(fit.profile.thickness, fit.profile.delta_chi2, label="scan")
 misfit.semilogy(
     [r.parameters["thickness"] for r in fit.rivals],
     [r.delta_chi2 for r in fit.rivals],
     "v",
-    label="bottom of another valley",
+    label="other minima",
 )
-misfit.axvline(fit["thickness"].value, color="k", linestyle=":", label="the best")
+misfit.axvline(fit["thickness"].value, color="k", linestyle=":", label="best fit")
 misfit.set(xlabel="thickness (nm)", ylabel="χ² above the best")
 misfit.legend(ncols=3, loc="upper right", fontsize="small")
 misfit.set_ylim(top=2e7)
@@ -154,12 +154,13 @@ plt.show()
 print("other minima:", ", ".join(f"{r.parameters['thickness']:.0f} nm" for r in fit.rivals[:4]))
 
 # %% [markdown]
-# The residuals are noise, without a pattern. The lowest panel shows why the whole range must be searched: a
-# fit that starts in the wrong valley ends at its bottom. Here the other valleys lie far above the best, so
-# the spectrum decides. Where one came close, the fit would say `ambiguous`.
+# The residuals are noise without structure. The lowest panel shows why the whole range must be searched: a
+# fit that starts near another minimum ends there. Here all other minima are far above the best one, so the
+# spectrum determines the thickness. If one came close, the status would be `ambiguous`.
 #
-# The error bar holds for what the scene takes for granted: here, that the sample's index is the table's. If
-# n and k may be off by a constant (`pl.dispersion.Shifted`), the same spectrum says less:
+# The error bar is conditional on the assumptions of the scene: here, that the index of the sample equals
+# the table. If n and k may differ from the table by a constant (`pl.dispersion.Shifted`), the same spectrum
+# determines the thickness less precisely:
 
 # %%
 shifted = pl.dispersion.Shifted(hematite, pl.Free(-0.5, 0.5, start=0.0), pl.Free(0.0, 1.0, start=0.0))
@@ -168,8 +169,8 @@ print(freer)
 print(f"error of the thickness: {freer['thickness'].stderr / fit['thickness'].stderr:.1f} times as large")
 
 # %% [markdown]
-# Cadmium sulfide and gold go the same way. (These spectra were simulated with another table of cadmium
-# sulfide, the catalogue's `CdS`, which absorbs a little more; so it is the one to fit with.)
+# Cadmium sulfide and gold are fitted in the same way. (These spectra were simulated with another table of
+# cadmium sulfide, the catalogue's `CdS`, which absorbs a little more, so the fit uses that table.)
 
 # %%
 for name, material in (
@@ -183,14 +184,15 @@ for name, material in (
     print(f"{name}: {found.status}. {found.verdict}")
 
 # %% [markdown]
-# No light comes back from under 300 nm of gold. The data say that the layer is thick and no more, so the
-# answer is a lower limit in place of a value with an error bar.
+# No light returns from below 300 nm of gold. The data determine only that the layer is thick, so the result
+# is a lower limit instead of a value with an error bar.
 #
 # ## From colour alone
 #
-# A photograph or a colorimeter gives three numbers instead of a spectrum. How much do they still say? We
-# compute the colour of the hematite spectrum and compare it with that of every thickness, as ΔE (CIE 2000):
-# below about 1 two colours cannot be told apart side by side; a camera is seldom better than 2 or 3.
+# A photograph or a colorimeter gives three numbers instead of a spectrum. How well do they determine the
+# thickness? We compute the colour of the hematite spectrum and compare it with the colour of every
+# thickness, as ΔE (CIE 2000): below about 1, two colours are indistinguishable side by side; a camera is
+# seldom better than 2 or 3.
 
 # %%
 eye = sensor()  # the 1931 observer under D65
@@ -204,7 +206,7 @@ figure, (axes, strip) = plt.subplots(
     2, 1, figsize=(7, 4.2), sharex=True, gridspec_kw={"height_ratios": [6, 1]}
 )
 axes.plot(fine, apart)
-axes.axhspan(0, 3, color="C5", alpha=0.25, linewidth=0, label="ΔE below 3: a photograph cannot tell")
+axes.axhspan(0, 3, color="C5", alpha=0.25, linewidth=0, label="ΔE below 3: indistinguishable in a photograph")
 axes.set(ylabel="ΔE2000 from the measured colour", ylim=(0, 48))
 axes.legend()
 strip.imshow(np.asarray(candidates.srgb)[None], extent=(1, 300, 0, 1))
@@ -216,14 +218,14 @@ ranges = np.split(close, np.flatnonzero(np.diff(close) > 2) + 1)
 print("ΔE below 3:", " and ".join(f"{r[0]:.0f} to {r[-1]:.0f} nm" for r in ranges))
 for r in ranges:
     inside = (fine >= r[0]) & (fine <= r[-1])
-    print(f"  nearest there: {fine[inside][np.argmin(apart[inside])]:.0f} nm, ΔE {apart[inside].min():.1f}")
+    print(f"  closest: {fine[inside][np.argmin(apart[inside])]:.0f} nm, ΔE {apart[inside].min():.1f}")
 
 # %% [markdown]
-# Two layers, of which one is more than twice as thick as the other, have nearly this colour: three numbers
-# cannot count the orders of interference. Only a good instrument under a known lamp tells them apart; or
-# something known from elsewhere that rules one out. Within each range the colour fixes the thickness to a
-# few nanometres. (The small steps of the curve are the formula's own, where two hues are opposite.) The
-# spectrum has no such doubt:
+# Two layers, one more than twice as thick as the other, have nearly this colour: three numbers do not
+# determine the order of interference. Only a precise instrument under a known lamp can distinguish them, or
+# prior knowledge that excludes one of them. Within each range the colour determines the thickness to a few
+# nanometres. (The small steps of the curve are a property of the ΔE formula where two hues are opposite.)
+# The spectrum distinguishes the two easily:
 
 # %%
 at = [r[np.argmin(np.interp(r, fine, apart))] for r in ranges]
@@ -240,15 +242,15 @@ for d, line in zip(at, ("--", "-"), strict=True):
         label=f"{d:.0f} nm",
     )
 axes.set(xlabel="wavelength (nm)", ylabel="reflectance", xlim=(400, 700))
-axes.legend(title="each in its own colour")
+axes.legend(title="drawn in the colour of the film")
 plt.show()
 
 # %% [markdown]
-# ## What to take away
+# ## Summary
 #
-# - A scene with one free number, a spectrum and `pl.fit` give a thickness with an error, or say why they
-#   cannot.
-# - An error bar is only as good as what the scene takes for granted. Free what you are not sure of, and see
-#   it grow.
-# - Colour alone narrows the thickness to a few short ranges; a spectrum says which.
-# - A layer that no light crosses has no thickness for an optical measurement, only a lower limit.
+# - A scene with one free parameter, a spectrum and `pl.fit` give a thickness with an error, or the reason
+#   why the data do not determine it.
+# - An error bar is conditional on the assumptions of the scene. Free uncertain parameters, and the error
+#   grows accordingly.
+# - Colour alone restricts the thickness to a few short ranges; a spectrum selects one of them.
+# - If no light crosses a layer, an optical measurement gives only a lower limit of its thickness.

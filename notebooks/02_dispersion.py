@@ -9,10 +9,10 @@
 # %% [markdown]
 # # Index of an unknown film
 #
-# The thickness of a film comes out of its spectrum if its index n + ik is known. Often it is not: deposited
-# films differ from tables, and tables from each other. Then both must come from one spectrum. That works if
-# the index is described by few enough numbers. This page tries the usual descriptions, on a film of titania
-# whose truth we know, and shows what each of them buys and costs.
+# The spectrum of a film determines its thickness if its index n + ik is known. Often it is not: deposited
+# films differ from tables, and tables differ from each other. Then one spectrum has to determine both,
+# which is possible if few parameters describe the index. This notebook compares the usual models, on a
+# simulated film of titania whose true index is known, and shows the advantages and disadvantages of each.
 
 # %%
 import os
@@ -24,14 +24,14 @@ import numpy as np
 import pellicle as pl
 from pellicle.recipes.media_words import medium
 
-jax.config.update("jax_enable_x64", True)  # JAX counts in single precision unless told
+jax.config.update("jax_enable_x64", True)  # double precision; JAX's default is single
 SHORT = os.environ.get("PELLICLE_SHORT") == "1"  # fewer points, for a quick run
 
 # %% [markdown]
-# ## Which titania?
+# ## Tables of titania
 #
-# The catalogue has three tables of TiO2 films. They were grown in different ways, and differ by much more
-# than the fit of a spectrum can bear.
+# The catalogue has three tables of TiO2 films. The films were grown by different methods, and their indices
+# differ by much more than a fit of a spectrum tolerates.
 
 # %%
 nm = np.arange(340, 801, 4 if SHORT else 2)
@@ -48,8 +48,8 @@ panels[0].legend()
 plt.show()
 
 # %% [markdown]
-# Our film has the index of the first table and 180 nm of it lie on fused silica. We simulate its
-# reflectance with a noise of 0.002. From here on the fits do not know where it came from.
+# Our film has the index of the first table and lies on fused silica with a thickness of 180 nm. We simulate
+# its reflectance with a noise of 0.002. The fits below do not use this knowledge.
 
 # %%
 TRUTH = 180.0  # nm
@@ -61,21 +61,20 @@ axes.set(xlabel="wavelength (nm)", ylabel="reflectance")
 plt.show()
 
 # %% [markdown]
-# ## Five descriptions
+# ## Five models
 #
-# `medium` takes a word and gives a dispersion with sensible bounds for what is free in it:
+# `medium` takes a name and returns a dispersion model with default bounds for its free parameters:
 #
-# - **a table**: nothing is free but the thickness. We try the two wrong ones.
-# - **`cauchy`**, n = A + B/λ²: two numbers, for media that do not absorb.
-# - **`tauc-lorentz`**: an amorphous semiconductor with a gap, five numbers. Its k is zero below the gap,
-#   and its n follows from its k by the relation of Kramers and Kronig, which holds for everything that
-#   cannot answer before it is asked. That relation is why absorption in the ultraviolet shows in n
-#   throughout the visible.
-# - **`spline`**: no physics but smoothness. n and k are free at each of six wavelengths, twelve numbers in
-#   all.
+# - **a table**: only the thickness is free. We try the two wrong tables.
+# - **`cauchy`**, n = A + B/λ²: two parameters, for media that do not absorb.
+# - **`tauc-lorentz`**: an amorphous semiconductor with a band gap, five parameters. Its k is zero below the
+#   gap, and its n follows from its k by the Kramers-Kronig relation, which holds for every causal response.
+#   Because of this relation, absorption in the ultraviolet affects n throughout the visible.
+# - **`spline`**: no physics except smoothness. n and k are free at each of six wavelengths, twelve
+#   parameters in total.
 #
-# `pl.compare` fits each of them to the same data and asks which the data call for. The judge is BIC, which
-# is the misfit plus a price for each free number.
+# `pl.compare` fits each of them to the same data and ranks them by BIC, which is the misfit plus a penalty
+# for each free parameter.
 
 # %%
 thickness = pl.Free(10, 1000)
@@ -92,18 +91,18 @@ fits = {c.name: c.fit for c in comparison.candidates}
 print(comparison)
 
 # %%
-print(f"{'':14}{'free':>5}{'thickness (nm)':>18}{'off by (σ)':>12}{'reduced χ²':>12}   status")
+print(f"{'':14}{'free':>5}{'thickness (nm)':>18}{'error (σ)':>12}{'reduced χ²':>12}   status")
 for word, fit in fits.items():
     d = fit["thickness"]
-    told = f"{d.value:.2f} ± {d.stderr:.2f}"
+    result = f"{d.value:.2f} ± {d.stderr:.2f}"
     off = (d.value - TRUTH) / d.stderr
-    print(f"{word:14}{len(fit.free):5}{told:>18}{off:12.1f}{fit.chi2_reduced:12.1f}   {fit.status}")
+    print(f"{word:14}{len(fit.free):5}{result:>18}{off:12.1f}{fit.chi2_reduced:12.1f}   {fit.status}")
 
 # %% [markdown]
-# χ² is the mean square of the residuals in units of the noise, so a right description has about 1. Three
-# are far from it, and their fits say `misfit`: their thicknesses are not to be used, however small the
-# error bars beside them. An error bar says how far the number could move *within* the description; it knows
-# nothing of a description that is wrong. Look at the residuals:
+# The reduced χ² is the mean square of the residuals in units of the noise, so a correct model has about 1.
+# Three models are far from it, and their fits have the status `misfit`: their thicknesses must not be used,
+# however small their errors. An error bar describes how far the value can move *within* the model; it does
+# not include the error of a wrong model. The residuals show this:
 
 # %%
 figure, panels = plt.subplots(len(fits), 1, figsize=(7, 8), sharex=True)
@@ -116,14 +115,13 @@ panels[-1].set(xlabel="wavelength (nm)")
 plt.show()
 
 # %% [markdown]
-# Residuals that run in waves are no noise: the scene lacks something. Note the scale of each panel. Even
-# the last two wave a little at the blue end, where k rises fast; that is why their χ² stays somewhat above
-# 1, and their error bars are a little too small.
+# Residuals with smooth structure are not noise: the scene lacks an effect. Note the scale of each panel.
+# Even the last two have some structure at the blue end, where k rises fast; therefore their χ² is somewhat
+# above 1, and their errors are a little too small.
 #
-# ## Oscillator against spline
+# ## Oscillator and spline
 #
-# The two descriptions that explain the spectrum find nearly the same index, and nearly the one that was put
-# in:
+# The two models that explain the spectrum find nearly the same index, close to the true one:
 
 # %%
 truth = pl.refractive_index(nm, "TiO2")
@@ -148,23 +146,24 @@ for word in ("tauc-lorentz", "spline"):
     print(f"  {word:14}{index.n_stderr.mean():8.4f}{off:8.4f}")
 
 # %% [markdown]
-# The spline is much less sure: where the film is transparent, a little more k here and a little less there
-# changes nothing that the noise does not cover. (k is never negative in the fit; the band is only the error
-# bar's width.) The oscillator knows that k is zero below the gap and that n must suit k; that knowledge is
-# worth as much as many more measurements. The price: if the film were not of its kind, it would be wrong
-# and the spline would not. That is what the comparison is for.
+# The spline is much less certain: where the film is transparent, small changes of k that compensate each
+# other change the spectrum by less than the noise. (k is never negative in the fit; the band only shows the
+# error.) The oscillator model assumes that k is zero below the gap and that n follows from k; this prior
+# knowledge reduces the error as much as many additional measurements would. If the film were not of this
+# kind, however, the oscillator model would be wrong and the spline would not. The comparison is there to
+# detect this.
 #
-# What the oscillator's numbers mean for the material:
+# The parameters of the oscillator have a meaning for the material:
 
 # %%
 gap = fits["tauc-lorentz"]["Eg"]
 print(f"gap {gap.value:.3f} ± {gap.stderr:.3f} eV, which is light of {1239.84 / gap.value:.0f} nm")
 
 # %% [markdown]
-# ## The Cauchy formula where it holds
+# ## The Cauchy formula in its range of validity
 #
-# Cauchy's formula failed because the film absorbs at the blue end. Cut the spectrum where it is
-# transparent, and two numbers are enough:
+# Cauchy's formula failed because the film absorbs at the blue end. In the range where the film is
+# transparent, two parameters are sufficient:
 
 # %%
 visible = spectrum.cut(450, 800)
@@ -173,12 +172,12 @@ print(fit)
 print(f"reduced χ² {fit.chi2_reduced:.2f}")
 
 # %% [markdown]
-# ## What to take away
+# ## Summary
 #
-# - A table is a guess at your film. Its fit may have a tiny error bar and be wrong; `misfit` and the
-#   residuals say so.
-# - Use the simplest description that the residuals allow: a formula on the transparent part, an oscillator
+# - A table is an assumption about your film. Its fit can have a very small error and be wrong; the status
+#   `misfit` and the residuals show this.
+# - Use the simplest model that the residuals allow: a formula in the transparent range, an oscillator
 #   across an absorption edge.
-# - A spline is the honest answer where nothing is known. Its wide band shows how much the others owe to
+# - Use a spline if nothing is known about the film. Its wide band shows how much the other models depend on
 #   their assumptions.
-# - `pl.compare` tells which of *your* ideas the data prefer. It cannot tell you the one you did not have.
+# - `pl.compare` ranks the models that you offer. It cannot suggest one that you did not include.

@@ -7,13 +7,13 @@
 # ---
 
 # %% [markdown]
-# # A layered BRDF, forwards and back
+# # A layered BRDF, simulated and fitted
 #
-# A BRDF says how much of the light from one direction a surface sends in another. Granier and Heidrich
-# (2002) gave one for a surface under a thin layer, simple enough for a renderer that knows red, green and
-# blue only. Here we look at what its numbers do, then measure a surface (in simulation) and ask for all ten
-# of them back: thickness, three indices, two lobes, the tilt between the two faces of the layer, and two
-# weights.
+# A BRDF gives the fraction of the light from one direction that a surface reflects into another. Granier
+# and Heidrich (2002) described a BRDF of a surface under a thin layer, simple enough for a renderer with
+# only red, green and blue channels. This notebook shows the influence of its parameters, simulates
+# measurements of a surface, and fits all ten parameters to them: thickness, three indices, two lobes, the
+# tilt between the two faces of the layer (two angles), and two weights.
 
 # %%
 import os
@@ -27,23 +27,23 @@ import pellicle as pl
 from pellicle.reporting.colour_figures import shown
 from pellicle.synthetic.sphere import in_plane, render
 
-jax.config.update("jax_enable_x64", True)  # JAX counts in single precision unless told
+jax.config.update("jax_enable_x64", True)  # double precision; JAX's default is single
 SHORT = os.environ.get("PELLICLE_SHORT") == "1"  # smaller pictures, for a quick run
 SIZE = 80 if SHORT else 220  # pixels
 
 # %% [markdown]
 # ## The model
 #
-# Light reflected by the upper face (R) meets light that went through the layer, was reflected by the lower
-# face and came back (T). Their waves add:
+# Light reflected by the upper face (R) interferes with light that crossed the layer, was reflected by the
+# lower face and returned (T):
 #
 #     ρ = specular · (R + T + 2 √(R T) cos 2Φ) + diffuse
 #
-# R and T are lobes of Phong's kind around the two mirror directions, cosines raised to the powers
+# R and T are Phong lobes around the two specular directions, cosines raised to the powers
 # `exponent_reflection` and `exponent_transmission`, with the Fresnel factors of the layer's index. The
-# lower face may be tilted against the upper by `deviation`, towards `azimuth`. The phase 2Φ grows with
-# thickness and index over the wavelength, so each of the three channels, at 645, 525 and 445 nm, has its
-# own.
+# lower face may be tilted against the upper by `deviation`, towards `azimuth`. The phase 2Φ is proportional
+# to thickness and index over the wavelength, so each of the three channels, at 645, 525 and 445 nm, has its
+# own phase.
 
 # %%
 truth = {
@@ -64,7 +64,7 @@ changes += [{"exponent_transmission": 60.0}]
 
 
 def picture(linear):
-    """The brightest of the highlight is white."""
+    """Scale the image so that the highlight is white."""
     return shown(linear / np.nanpercentile(linear, 99.9))
 
 
@@ -79,21 +79,22 @@ for axes, change in zip(panels.flat, changes, strict=True):
 plt.show()
 
 # %% [markdown]
-# A sphere under one lamp, to the upper right. In the upper row only the thickness changes, and with it the
-# colour where the two lobes overlap. In the lower row the tilt grows and pulls them apart: what only one
-# face reflects is white, for interference needs both. Last, a smoother lower face has a narrower lobe.
+# The pictures show a sphere under one lamp at the upper right. In the upper row only the thickness changes,
+# and with it the colour where the two lobes overlap. In the lower row the tilt increases and separates the
+# lobes: where only one face reflects, the light is white, because interference needs both. In the last
+# picture a smoother lower face has a narrower lobe.
 #
-# ## Measuring it
+# ## Simulated measurement
 #
-# A goniometer moves a lamp and a detector in the plane of incidence. Ours takes 40 directions for each of
-# five angles of the lamp, with an error of 1 % of each value.
+# A goniometer moves a lamp and a detector in the plane of incidence. Ours measures 40 directions for each
+# of five angles of the lamp, with an error of 1 % of each value.
 
 # %%
 NOISE = 0.01
 
 
 def goniometer(lamps):
-    """200 pairs of directions in the plane of incidence, spread over the lamp's angles (degrees)."""
+    """Return 200 pairs of directions in the plane of incidence for these angles of the lamp (degrees)."""
     each = 200 // len(lamps)
     across = np.tile(np.linspace(-78, 78, each), len(lamps))
     return pl.Directions(
@@ -105,7 +106,7 @@ def goniometer(lamps):
 
 
 def measure(surface, lamps, seed):
-    """What the goniometer would give, each value with its error."""
+    """Return simulated samples of a surface with noise and standard deviations."""
     exact = pl.simulate(surface, directions=goniometer(lamps))
     sigma = NOISE * exact.values
     noise = sigma * np.random.default_rng(seed).standard_normal(sigma.shape)
@@ -117,10 +118,10 @@ samples = measure(surface, LAMPS, seed=3)
 print(samples)
 
 # %% [markdown]
-# ## Asking for ten numbers
+# ## Fit of ten parameters
 #
-# Everything is free between wide bounds. The search tries some thousand combinations and follows the best
-# of them downhill; one start would seldom find the right order of interference.
+# All parameters are free between wide bounds. The search evaluates some thousand combinations and optimises
+# the best of them; a single start would seldom find the right order of interference.
 
 # %%
 unknown = pl.Surface(
@@ -141,14 +142,14 @@ print(fit.status, "-", fit.verdict)
 
 # %%
 asked = {**truth, **dict(zip(("n_r", "n_g", "n_b"), truth["n"], strict=True))}
-print(f"{'':22}{'truth':>8}{'found':>10}{'± 1σ':>10}{'off by':>10}")
+print(f"{'':22}{'true':>8}{'fit':>10}{'± 1σ':>10}{'error':>10}")
 for p in fit.free:
     off = (p.value - asked[p.name]) / p.stderr
     print(f"{p.name:22}{asked[p.name]:8g}{p.value:10.4g}{p.stderr:10.2g}{off:8.1f} σ")
 
 # %% [markdown]
-# All ten come back, each within a few of its standard errors. Data and fit along the plane of incidence,
-# for three of the lamps:
+# All ten parameters are recovered, each within a few standard errors. The next figure shows data and fit in
+# the plane of incidence, for three of the lamp angles:
 
 # %%
 found = pl.Surface(
@@ -170,7 +171,7 @@ panels[0].set(ylabel="BRDF (1/sr)")
 plt.show()
 
 # %% [markdown]
-# What a renderer makes of the truth and of what was found, and sixteen times their difference:
+# Rendered images of the true surface and of the fit, and sixteen times their difference:
 
 # %%
 pictures = [render(each, size=SIZE) for each in (surface, found)]
@@ -178,7 +179,7 @@ figure, panels = plt.subplots(1, 3, figsize=(8, 3))
 for axes, image, title in zip(
     panels,
     (*map(picture, pictures), np.clip(0.5 + 16 * (pictures[1] - pictures[0]), 0, 1)),
-    ("truth", "found", "difference × 16, around grey"),
+    ("true surface", "fit", "difference × 16, around grey"),
     strict=True,
 ):
     axes.imshow(image, origin="upper")
@@ -190,10 +191,10 @@ worst = np.nanmax(np.abs(pictures[1] - pictures[0])) / np.nanmax(pictures[0])
 print(f"largest difference: {worst:.2%} of the brightest pixel")
 
 # %% [markdown]
-# ## What trades with what
+# ## Correlated parameters
 #
-# Thickness and index enter the phase as a product. So each of them is less well known than the product is,
-# and their errors are tied together:
+# The phase depends on the product of thickness and index. Each of the two is therefore less well determined
+# than their product, and their errors are correlated:
 
 # %%
 names = [p.name for p in fit.free]
@@ -214,7 +215,7 @@ print(f"relative error: thickness {error_d:.2%}, n_g {error_n:.2%}, their produc
 # %% [markdown]
 # ## Fewer angles
 #
-# The same number of samples, all under one lamp:
+# The next fit uses the same number of samples, all under one lamp angle:
 
 # %%
 print(f"{'lamps (°)':>22}{'thickness (nm)':>18}{'n_g':>18}   other thicknesses, Δχ²")
@@ -228,17 +229,17 @@ for lamps in (LAMPS, (30,)):
     )
 
 # %% [markdown]
-# Refraction makes the path through the layer depend on the angle, and that dependence is what tells
-# thickness from index. Under one lamp less of it is seen, and the errors grow. Other thicknesses stay far
-# behind here, because wide lobes let even one lamp be seen from many sides. Narrow lobes, more noise or a
-# single channel bring them nearer; where one comes too near, the fit says `ambiguous`.
+# Because of refraction, the path through the layer depends on the angle, and this dependence separates
+# thickness from index. Under one lamp angle the dependence is sampled less, and the errors grow. Other
+# thicknesses still fit much worse here, because wide lobes make even one lamp visible from many directions.
+# Narrow lobes, more noise or a single channel bring them closer; if one of them fits about as well, the
+# status is `ambiguous`.
 #
 # ## A surface without a layer
 #
-# A model with ten numbers fits many things. To be told a thickness by a surface that has no layer would be
-# worse than nothing. So every fit also tries the same surface without interference, and two lobes with no
-# layer at all, and holds a fifth of the samples back to judge them by. Here is a rough glass without any
-# film:
+# A model with ten parameters can fit many data. A thickness for a surface without a layer would be worse
+# than no result. Every fit is therefore repeated without interference, and with two lobes and no layer; a
+# fifth of the samples is held out to compare them. The example is a rough glass without a film:
 
 # %%
 bare = pl.Surface(
@@ -253,24 +254,23 @@ at = np.arange(len(rivals))
 for one, label, mark in ((fit, "surface with a layer", "o"), (doubted, "surface without", "s")):
     axes.plot([one.held_out, *(b.held_out for b in one.baselines)], at, mark, label=label)
 axes.set_yticks(at, rivals)
-axes.set(xscale="log", xlim=(0.7, None), ylim=(2.5, -0.5), xlabel="error on samples that were held back (σ)")
+axes.set(xscale="log", xlim=(0.7, None), ylim=(2.5, -0.5), xlabel="error on held-out samples (σ)")
 axes.grid(axis="y", alpha=0.4)
 axes.legend(loc="upper right")
 plt.show()
 
 # %% [markdown]
-# Of the layered surface only the layer explains the samples that were held back, to within their noise. Of
-# the bare one two plain lobes do better than the layer, and interference gains next to nothing; so no layer
-# is claimed and no thickness given.
+# For the layered surface, only the layer predicts the held-out samples to within their noise. For the bare
+# surface, two plain lobes do better than the layer, and interference improves the fit hardly at all; so the
+# fit reports no layer and no thickness.
 #
-# ## What to take away
+# ## Summary
 #
-# - All numbers of the layered model come back from 200 samples, if they cover several angles of light.
-# - Thickness and index trade against each other, and one angle of light tells them apart less well than
-#   several.
-# - Data in one plane see the size of a tilt out of it, but not its sign: the fit says so among its
-#   warnings.
-# - Ask for evidence of a layer before believing its thickness. `pl.fit` does.
+# - 200 samples determine all parameters of the layered model, if they cover several angles of incidence.
+# - Thickness and index are correlated, and one angle of incidence separates them less well than several.
+# - Data in one plane determine the size of a tilt out of the plane, but not its sign: the fit reports this
+#   as a warning.
+# - Test for the presence of a layer before you trust its thickness. Every BRDF fit includes this test.
 
 # %%
 for warning in fit.warnings:

@@ -9,11 +9,11 @@
 # %% [markdown]
 # # Tempered steel
 #
-# Polished steel that is heated in air grows an oxide of a few tens of nanometres, and with it colours:
-# straw, then purple, then blue. Smiths read the temperature from them. The colours are interference, so
-# they are a measure of the oxide's thickness. How good a measure? This page goes from colour to thickness,
-# asks where the answer is not unique, and ends with a few samples of the BRDF, which know more than one
-# colour does.
+# Polished steel that is heated in air grows an oxide of a few tens of nanometres, with colours that change
+# from straw to purple to blue. Smiths estimate the temperature from them. The colours are due to
+# interference, so they depend on the oxide's thickness. How precisely do they determine it? This notebook
+# computes the thickness from the colour, examines where the result is not unique, and ends with a fit of a
+# few BRDF samples, which contain more information than one colour.
 
 # %%
 import os
@@ -28,15 +28,15 @@ from pellicle.colour import delta_e2000, film_colour, lab
 from pellicle.reporting.colour_figures import shown
 from pellicle.synthetic.sphere import render
 
-jax.config.update("jax_enable_x64", True)  # JAX counts in single precision unless told
+jax.config.update("jax_enable_x64", True)  # double precision; JAX's default is single
 SHORT = os.environ.get("PELLICLE_SHORT") == "1"  # fewer points, for a quick run
 
 # %% [markdown]
-# ## The order of the colours
+# ## The sequence of colours
 #
-# We take the oxide and the iron as Belcour and Barla's readers do in rendering: an oxide of index 2.9 on a
-# metal of 2.7 + 2.8i, both the same at all wavelengths. `film_colour` gives the colour under daylight (D65)
-# for each thickness and angle of incidence.
+# We use the oxide and the iron of an account of Belcour and Barla: an oxide of index 2.9 on a metal of 2.7
+# + 2.8i, both the same at all wavelengths. `film_colour` computes the colour under daylight (D65) for each
+# thickness and angle of incidence.
 
 # %%
 OXIDE, STEEL = 2.9, 2.7 + 2.8j
@@ -50,9 +50,9 @@ axes.set(xlabel="oxide thickness (nm)", ylabel="angle of incidence (°)")
 plt.show()
 
 # %% [markdown]
-# Names for colours are a matter of hue. In the CIE's L\*a\*b\* space (lightness, green to red, blue to
-# yellow) yellow lies near 90°, red near 30°, purple near 320° and blue near 260°. Where does the hue seen
-# head-on pass through these?
+# Colour names refer to the hue. In the CIE L\*a\*b\* space (lightness, green to red, blue to yellow) yellow
+# is near 90°, red near 30°, purple near 320° and blue near 260°. At which thicknesses does the hue at
+# normal incidence pass through these?
 
 # %%
 a, b = np.asarray(seen.lab)[0, :, 1:].T
@@ -62,7 +62,7 @@ for name, low, high in (("straw", 60, 105), ("purple", 285, 345), ("blue", 235, 
     print(f"{name:7} {inside.min():3.0f} to {inside.max():3.0f} nm")
 
 # %% [markdown]
-# Straw, purple, blue: the smith's order, within 60 nm. The spectra show why:
+# Straw, purple, blue: the sequence of the smiths, within 60 nm. The spectra show the reason:
 
 # %%
 light = np.linspace(400, 700, 151)
@@ -73,19 +73,18 @@ for name, d in (("straw", 20.0), ("purple", 31.0), ("blue", 42.0)):
     axes.plot(light, reflected, color=swatch, linewidth=3, label=f"{name}, {d:.0f} nm")
     print(f"{name}: darkest at {light[np.argmin(reflected)]:.0f} nm, in the range 400 to 700 nm")
 axes.set(xlabel="wavelength (nm)", ylabel="reflectance", ylim=(0, None))
-axes.legend(title="each in its own colour")
+axes.legend(title="drawn in the colour of the film")
 plt.show()
 
 # %% [markdown]
-# There is one wavelength for which the light from the two faces of the oxide nearly cancels. As the oxide
-# grows it moves from the violet to the red; what is left over is yellow, then purple, then blue.
+# At one wavelength the light from the two faces of the oxide nearly cancels. As the oxide grows, this
+# wavelength moves from the violet to the red; the remaining light is yellow, then purple, then blue.
 #
-# ## Reading a heat tint
+# ## Thickness from a heat tint
 #
-# A bar was heated at one end and its oxide is thickest there. We photograph it. The picture has noise, as
-# if each patch had been measured with an error of about one in L\*, a\* and b\*. For each patch we look up
-# the thickness whose colour is nearest, as ΔE (CIE 2000), in which about 1 is the least difference an eye
-# can see.
+# A bar was heated at one end, where its oxide is thickest. We simulate a photograph of it, with noise
+# equivalent to an error of about one in L\*, a\* and b\* of each patch. For each patch we find the
+# thickness with the closest colour by ΔE (CIE 2000), in which about 1 is the smallest visible difference.
 
 # %%
 place = np.linspace(0, 100, 50 if SHORT else 200)  # mm from the cold end
@@ -110,8 +109,8 @@ plt.show()
 print(f"error of the readings: {np.sqrt(np.mean((read - oxide) ** 2)):.2f} nm root mean square")
 
 # %% [markdown]
-# How far a reading can be trusted depends on how fast the colour changes there. The slope of the colour
-# with thickness, turned over, is the error of the thickness that an error of ΔE = 1 makes:
+# The error of such a reading depends on how fast the colour changes with thickness. The inverse of this
+# slope is the error of the thickness caused by an error of ΔE = 1:
 
 # %%
 step = 0.25
@@ -129,14 +128,14 @@ print(f"best, at {fine[best]:.0f} nm: {1 / slope[best]:.2f} nm")
 print(f"at 60 nm: {np.interp(60, fine[1:], 1 / slope):.1f} nm")
 
 # %% [markdown]
-# Between straw and purple the colour turns within a few nanometres and reads like a micrometer; pale blues
-# and the first straw are much coarser.
+# Between straw and purple the colour changes within a few nanometres, so the reading is precise; for pale
+# blues and the first straw it is much less precise.
 #
-# ## Where colour is not unique
+# ## Where the colour is not unique
 #
-# A thicker oxide runs through the colours again. The map compares each thickness up to 250 nm with each
-# other: on the diagonal a film meets itself, and every other dark spot is a pair that looks alike. On the
-# right the lightness is not compared, as in a photograph of unknown exposure.
+# The colours recur as the oxide becomes thicker. The map compares each thickness up to 250 nm with every
+# other: the diagonal compares a film with itself, and every other dark spot is a pair of similar colour. In
+# the map on the right the lightness is ignored, as in a photograph of unknown exposure.
 
 # %%
 wide = np.arange(0, 250.5, 2.0 if SHORT else 1.0)
@@ -166,16 +165,16 @@ for title, apart in maps.items():
         print(f"    {wide[one[k]]:.0f} and {wide[other[k]]:.0f} nm: ΔE {apart[one[k], other[k]]:.1f}")
 
 # %% [markdown]
-# With lightness, the first 90 nm hardly meet themselves again. Without it many tints have a double of
-# another order, ninety nanometres away or more. Three things help: a grey card beside the object for the
-# exposure, a second angle, and what is known of the object. A tempering oxide of 200 nm is no tempering
-# oxide.
+# With lightness, colours of films below 90 nm hardly recur. Without it, many tints occur again in another
+# order, at a thickness larger by ninety nanometres or more. Three measures help: a grey card beside the
+# object for the exposure, a second angle, and prior knowledge of the object. A tempering oxide of 200 nm,
+# for example, is not plausible.
 #
 # ## Which oxide?
 #
-# A colour tells the optical thickness of *some* film. To get nanometres from it one must know the film.
-# Here are three pairs of oxide and metal: the one above, and measured tables of magnetite (Fe3O4) and of
-# hematite (Fe2O3) on iron.
+# A colour determines the optical thickness of a film. To obtain nanometres, the index of the film must be
+# known. The figure compares three pairs of oxide and metal: the one above, and measured tables of magnetite
+# (Fe3O4) and of hematite (Fe2O3) on iron.
 
 # %%
 pairs = {
@@ -196,16 +195,17 @@ panels[-1].set(xlabel="oxide thickness (nm)")
 plt.show()
 
 # %% [markdown]
-# The darkest tint, between straw and blue, stands at quite different thicknesses. So the index of the oxide
-# is the largest error in such a reading, far above that of the colour, unless it is known from elsewhere.
-# Or unless more is measured:
+# The darkest tint, between straw and blue, occurs at quite different thicknesses. The index of the oxide is
+# therefore the largest source of error, far above the error of the colour, unless it is known from another
+# source or determined by a further measurement.
 #
-# ## From a few samples of the BRDF
+# ## Thickness and index from BRDF samples
 #
-# A polished and etched bar is rough. Its BRDF, the share of light from one direction that goes in another,
-# is that of small mirrors (GGX microfacets), each with the oxide on it. Twenty directions under each of
-# three lamps, in red, green and blue and with 2 % of error, are enough to ask for the thickness *and* the
-# index of the oxide, with the roughness and two weights. Iron's own index is held.
+# A polished and etched bar is rough. Its BRDF, the fraction of the light from one direction that is
+# reflected into another, is that of small mirrors (GGX microfacets), each covered by the oxide. Twenty
+# directions under each of three lamps, in red, green and blue with an error of 2 %, are sufficient to fit
+# the thickness *and* the index of the oxide, with the roughness and two weights. The index of the iron is
+# fixed.
 
 # %%
 truth = {"thickness": 42.0, "n": 2.9, "base_n": 2.7, "base_k": 2.8, "roughness": 0.35, "diffuse": 0.02}
@@ -234,10 +234,10 @@ print(fit)
 print("other minima:", ", ".join(f"{r.parameters['thickness']:.0f} nm" for r in fit.rivals))
 
 # %% [markdown]
-# Thickness and index come back together, and no other order fits. They trade against each other, as the
-# report says, so each has a larger error than it would have alone.
+# The fit recovers both thickness and index, and no other order fits. The two are correlated, as the report
+# states, so each has a larger error than it would have with the other fixed.
 #
-# What a renderer makes of such a surface, where the oxide is uneven between 10 and 70 nm:
+# A rendered image of such a surface, with an uneven oxide of 10 to 70 nm:
 
 # %%
 uneven = pl.Surface("microfacet-film", truth | {"thickness": pl.Free(10, 70)})
@@ -248,11 +248,13 @@ axes.set_axis_off()
 plt.show()
 
 # %% [markdown]
-# ## What to take away
+# ## Summary
 #
-# - Straw, purple and blue are one moving dark fringe, and all lie within 60 nm.
-# - Between straw and blue a colour tells the thickness to a fraction of a nanometre; before and after that,
-#   to a nanometre or more.
-# - Without a known exposure most tints have a double of another order. Say which orders are possible, or
-#   measure at another angle.
-# - The index of the oxide is the weak point. Several directions in three channels can give it too.
+# - Straw, purple and blue are due to one dark fringe that moves through the spectrum, and all occur within
+#   60 nm.
+# - Between straw and blue a colour determines the thickness to a fraction of a nanometre; before and after
+#   that, to a nanometre or more.
+# - Without a known exposure most tints occur in two orders. Exclude orders by prior knowledge, or measure
+#   at another angle.
+# - The index of the oxide is the largest source of error. Several directions in three channels can
+#   determine it too.

@@ -7,18 +7,19 @@
 # ---
 
 # %% [markdown]
-# # Gradients: sensitivity, design, and what an instrument can see
+# # Gradients: sensitivity, design, and the Cramér-Rao bound
 #
-# The optics of pellicle can be differentiated. This notebook uses the derivatives for three questions.
+# The optics of pellicle are differentiable. This notebook uses the derivatives to answer three questions.
 #
 # 1. How fast does the colour of a film change with its thickness?
 # 2. Which layers make a good antireflection coating?
-# 3. At which angles and wavelengths should one measure a film, and how well can it be known?
+# 3. At which angles and wavelengths should a film be measured, and how precisely can its parameters be
+#    determined?
 #
-# Derivatives come from [JAX](https://docs.jax.dev), the library of arrays that pellicle is written in.
-# `jax.grad(f)` is a function: the derivative of `f`, which returns one number. `jax.jacfwd(f)` does the
-# same for an `f` that returns an array. Neither is a difference quotient: the rules of calculus are
-# applied to the program itself, so the result is exact but for rounding. `jax.vmap(f)` is `f` over an
+# The derivatives are computed by [JAX](https://docs.jax.dev), the array library that pellicle is written
+# in. `jax.grad(f)` is a function, the derivative of an `f` that returns one number. `jax.jacfwd(f)` is the
+# same for an `f` that returns an array. They are not difference quotients: JAX applies the rules of
+# calculus to the program, so the result is exact except for rounding. `jax.vmap(f)` evaluates `f` for an
 # array of inputs at once, and `jax.jit` compiles a function.
 
 # %%
@@ -33,16 +34,16 @@ from scipy.optimize import minimize
 import pellicle as pl
 from pellicle.colour import film_colour
 
-jax.config.update("jax_enable_x64", True)  # 16 digits in place of JAX's usual 7
-SHORT = os.environ.get("PELLICLE_SHORT") == "1"  # the automatic tests take fewer points
+jax.config.update("jax_enable_x64", True)  # double precision; JAX's default is single
+SHORT = os.environ.get("PELLICLE_SHORT") == "1"  # fewer points, for a quick run
 
 # %% [markdown]
 # ## The colour of an oxide on silicon
 #
-# A wafer with an oxide of some hundred nanometres shows strong colours; people in clean rooms read the
-# thickness from a printed chart. `film_colour` gives the colour under daylight (D65). In the CIE space
-# L\*a\*b\* a distance of 1, written ΔE, is about what an eye can just tell apart when two colours lie
-# side by side.
+# A wafer with an oxide of some hundred nanometres shows strong colours; in clean rooms the thickness is
+# estimated from a printed chart. `film_colour` computes the colour under daylight (D65). In the CIE
+# L\*a\*b\* space a distance of 1, written ΔE, is about the smallest difference that is visible when two
+# colours are side by side.
 
 # %%
 OXIDE, SILICON = pl.material("SiO2"), pl.material("Si")
@@ -50,7 +51,7 @@ OXIDE, SILICON = pl.material("SiO2"), pl.material("Si")
 
 @jax.jit
 def colour(thickness):
-    """L*, a*, b* and sRGB of oxides of these thicknesses (nm), with 64 wavelengths."""
+    """Return L*, a*, b* and sRGB of oxides of these thicknesses (nm), from 64 wavelengths."""
     seen = film_colour(thickness, OXIDE, SILICON, way="uniform-64")
     return seen.lab, seen.srgb
 
@@ -58,7 +59,7 @@ def colour(thickness):
 @jax.jit
 @jax.vmap
 def lab_slope(thickness):
-    """The derivative of L*, a*, b* per nm."""
+    """Return the derivative of L*, a*, b* per nm."""
     return jax.jacfwd(lambda d: colour(d)[0])(thickness)
 
 
@@ -94,12 +95,12 @@ print(f"least sensitive above 50 nm at {thickness[worst]:.0f} nm: {speed[worst]:
 assert speed[best] > 1 > speed[worst]
 
 # %% [markdown]
-# Where the curve is highest, an eye that sees ΔE = 1 tells less than a nanometre. Where it is lowest it
-# takes more than one. At 0 nm the colour hardly changes: a thin transparent layer acts on light only
-# through the square of its thickness, which is why a native oxide of 2 nm cannot be seen.
+# Where the curve is highest, a colour difference of ΔE = 1 corresponds to less than a nanometre; where it
+# is lowest, to more than one. At 0 nm the colour hardly changes: a thin transparent layer changes the
+# reflectance only in proportion to the square of its thickness, so a native oxide of 2 nm is invisible.
 
 # %%
-thin = jnp.linspace(0.0, 600.0, thickness.size).at[1].set(2.0)  # one program serves arrays of one length
+thin = jnp.linspace(0.0, 600.0, thickness.size).at[1].set(2.0)  # same length: no new compilation
 first = float(np.linalg.norm(colour(thin)[0][1] - lab[0]))
 print(f"2 nm of oxide change the colour by ΔE {first:.2f}")
 assert first < 0.5
@@ -107,14 +108,14 @@ assert first < 0.5
 # %% [markdown]
 # ## Design: an antireflection coating
 #
-# Glass reflects about 4 % at each face. One layer of MgF2, a quarter of a wavelength thick, brings that
-# down, most of all at one wavelength. Can three layers (MgF2, HfO2 and Al2O3 from the air down) do better
-# over the whole visible range? The *loss*, the number to make small, is the mean reflectance from 420 to
-# 680 nm. `pl.reflectance` takes a list of layers; `jax.value_and_grad` gives the loss with its slope in
-# all three thicknesses.
+# Glass reflects about 4 % at each face. One layer of MgF2 with a thickness of a quarter wavelength reduces
+# this, mostly near one wavelength. Are three layers (MgF2, HfO2 and Al2O3 from the air down) better over
+# the whole visible range? The *loss* to be minimised is the mean reflectance from 420 to 680 nm.
+# `pl.reflectance` accepts a list of layers; `jax.value_and_grad` computes the loss and its derivative with
+# respect to all three thicknesses.
 #
-# SciPy's minimiser goes downhill by that slope. Going downhill finds the nearest minimum, not the
-# deepest, so we start from many random designs.
+# SciPy's minimiser uses this derivative. It finds a local minimum, not necessarily the global one, so we
+# start from many random designs.
 
 # %%
 band = np.linspace(420.0, 680.0, 27)
@@ -124,7 +125,7 @@ GLASS = pl.material("BK7")
 
 @jax.jit
 def spectrum(thicknesses):
-    """Reflectance over the band of glass under three layers of these thicknesses (nm)."""
+    """Return the reflectance of glass under three layers of these thicknesses (nm) over the band."""
     return pl.reflectance(band, thicknesses, STACK, GLASS)
 
 
@@ -166,11 +167,11 @@ axes.legend()
 plt.show()
 
 # %% [markdown]
-# The three layers reflect less than a quarter of what one reflects. Some starts end in worse designs:
-# without other starts one would not know.
+# The three layers reflect less than a quarter of the light that one layer reflects. Some starts end in
+# worse designs, so a single start would not be sufficient.
 #
-# At the minimum all three slopes are zero, so a small error of a layer costs little: how much, says a
-# layer that is 5 nm too thick.
+# At the minimum all three derivatives are zero, so small errors of the thicknesses have little effect. The
+# next cell computes the effect of a layer that is 5 nm too thick.
 
 # %%
 print("slopes at the minimum (% per nm):", np.round(loss(best.x)[1], 5))
@@ -179,19 +180,19 @@ for i, name in enumerate(("MgF2", "HfO2", "Al2O3")):
 assert np.all(np.abs(loss(best.x)[1]) < 1e-3)
 
 # %% [markdown]
-# ## What an instrument can see
+# ## The Cramér-Rao bound of a measurement
 #
-# Take a film of 80 nm on silicon with an index of 1.8 + 0.02i, and let its thickness d, n and k all be
-# unknown. A measured number y with noise of standard deviation σ tells about them as much as it depends
-# on them. The *Fisher information* of all measured numbers is the matrix F = Σ (∂y/∂p)(∂y/∂p)ᵀ / σ², with
-# p = (d, n, k). No unbiased estimate has standard deviations below the square roots of the diagonal of
-# F⁻¹, the *Cramér-Rao bound*. So one can judge an instrument before it is built, and an experiment before
-# it is done. All it takes are derivatives.
+# Take a film of 80 nm on silicon with an index of 1.8 + 0.02i, with unknown thickness d, n and k. The
+# information that a measured value y with standard deviation σ contains about them depends on its
+# derivatives. The *Fisher information* of all measured values is the matrix F = Σ (∂y/∂p)(∂y/∂p)ᵀ / σ²,
+# with p = (d, n, k). No unbiased estimator has standard deviations below the square roots of the diagonal
+# of F⁻¹, the *Cramér-Rao bound*. An instrument can thus be assessed before it is built, and an experiment
+# before it is done, from derivatives alone.
 #
 # ### Which angles?
 #
-# A laser ellipsometer measures two numbers, Ψ and Δ, at one wavelength, here 633 nm, with 0.02° of noise
-# in Ψ and 0.05° in Δ.
+# A laser ellipsometer measures Ψ and Δ at one wavelength, here 633 nm, with a noise of 0.02° in Ψ and 0.05°
+# in Δ.
 
 # %%
 TRUTH = jnp.array([80.0, 1.8, 0.02])
@@ -200,19 +201,19 @@ angles = np.arange(45.0, 86.0, 1.0)
 
 
 def psi_delta(p, wavelength, angle, substrate):
-    """Ψ and Δ of the film in degrees, (points, 2)."""
+    """Return Ψ and Δ of the film in degrees, with shape (points, 2)."""
     found = pl.ellipsometry(wavelength, p[0], p[1] + 1j * p[2], substrate, angle=angle)
     return jnp.stack(found, axis=-1)
 
 
 @jax.jit
 def angle_information(wavelength, angle, substrate):
-    """What Ψ and Δ tell of d, n and k over their noise, (points, 2, 3)."""
+    """Return the derivatives of Ψ and Δ in d, n and k, divided by the noise, with shape (points, 2, 3)."""
     return jax.jacfwd(psi_delta)(TRUTH, wavelength, angle, substrate) / NOISE[:, None]
 
 
 def bound(information):
-    """The least standard deviations of d (nm), n and k."""
+    """Return the Cramér-Rao bounds of d (nm), n and k."""
     return np.sqrt(np.diag(np.linalg.inv(information)))
 
 
@@ -222,7 +223,7 @@ weighted = np.asarray(
 information = np.einsum("ayp,ayq->apq", weighted, weighted)  # of each angle, (angles, 3, 3)
 
 rank = np.linalg.matrix_rank(weighted)
-print(f"rank of what one angle tells: {rank.min()} to {rank.max()}, of 3 unknowns")
+print(f"rank of the derivatives at one angle: {rank.min()} to {rank.max()}, of 3 unknowns")
 assert np.all(rank == 2)
 
 pairs = np.full((angles.size, angles.size), np.nan)
@@ -246,22 +247,21 @@ image = axes.imshow(
 )
 axes.plot(angles[first], angles[second], "r+", markersize=12)
 axes.set(xlabel="first angle of incidence (degrees)", ylabel="second angle (degrees)")
-bar = figure.colorbar(image, ax=axes, label="least standard deviation of thickness (nm)")
+bar = figure.colorbar(image, ax=axes, label="bound on the error of the thickness (nm)")
 bar.set_ticks([-0.5, 0, 0.5, 1, 1.5], labels=["0.3", "1", "3", "10", "30"])
 plt.show()
 
 # %% [markdown]
-# One angle gives two numbers, which cannot settle three unknowns, however small the noise: their
-# derivatives have rank two. Two angles can. Neighbouring ones say nearly the same thing twice; the best
-# pair lies far apart (red cross).
+# One angle gives two values, which do not determine three unknowns, however small the noise: their
+# derivatives have rank two. Two angles do. Neighbouring angles give nearly the same information; the angles
+# of the best pair are far apart (red cross).
 
 # %% [markdown]
 # ### Which wavelengths?
 #
-# A spectrometer at normal incidence measures R from 400 to 800 nm with a noise of 0.002. Here we take n
-# and k as the same at all wavelengths. With three unknowns three wavelengths are the least. We choose the
-# best three on a grid of 10 nm, and go on adding whichever wavelength lowers the bound on the thickness
-# most.
+# A spectrometer at normal incidence measures R from 400 to 800 nm with a noise of 0.002. Here n and k are
+# the same at all wavelengths. Three unknowns require at least three wavelengths. We choose the best three
+# on a grid of 10 nm, and then repeatedly add the wavelength that reduces the bound on the thickness most.
 
 # %%
 nm = np.linspace(400.0, 800.0, 41 if SHORT else 201)
@@ -273,7 +273,7 @@ each = np.einsum("wp,wq->wpq", slopes, slopes) / R_NOISE**2  # information of ea
 
 
 def errors_of(chosen):
-    """Bounds for each of many sets of wavelengths, (sets, 3); infinite where they do not settle p."""
+    """Return bounds for sets of wavelengths, with shape (sets, 3); infinite if a set does not determine p."""
     total = each[chosen].sum(axis=-3)
     scale = np.sqrt(np.einsum("spp->sp", total))
     unit = total / (scale[:, :, None] * scale[:, None, :])  # 1 along the diagonal: safe to invert
@@ -310,26 +310,26 @@ above.set(xlabel="wavelength (nm)", ylabel="change of R")
 above.legend(ncols=4)
 below.plot(range(3, 13), even, "C0o--", label="evenly spaced")
 below.plot(range(3, 13), greedy, "ko-", label="chosen one by one")
-below.set(xlabel="number of wavelengths", ylabel="least error of d (nm)", ylim=(0, None))
+below.set(xlabel="number of wavelengths", ylabel="bound on the error of d (nm)", ylim=(0, None))
 below.legend()
 plt.show()
 
 places = np.unique(chosen)
-told = ", ".join(f"{nm[i]:.0f}" for i in places)
-print(f"{len(chosen)} measurements at {places.size} different wavelengths: {told} nm")
+names = ", ".join(f"{nm[i]:.0f}" for i in places)
+print(f"{len(chosen)} measurements at {places.size} different wavelengths: {names} nm")
 assert places.size < len(chosen)
 
 # %% [markdown]
-# For the same number of points the chosen wavelengths do better. The choice returns to a few places and
-# measures there again and again: where a film acts as three curves, a few places tell them apart best.
-# But it relies on n and k being the same everywhere. A real film's index varies with the wavelength, and
-# a real spectrum warns of a wrong model, so measure more places than this, but spend the time where it
-# counts.
+# For the same number of points the chosen wavelengths give a smaller bound than evenly spaced ones. The
+# method chooses a few wavelengths repeatedly: three parameters are best determined at a few wavelengths at
+# which their effects differ. This relies on n and k being constant. The index of a real film varies with
+# the wavelength, and a spectrum also reveals a wrong model, so measure at more wavelengths than these, with
+# most of the measuring time at the most informative ones.
 
 # %% [markdown]
 # ### Which instrument?
 #
-# The same film in three instruments, over the same wavelengths.
+# The next cell compares three instruments for the same film over the same wavelengths.
 
 # %%
 p_light = jax.jit(
@@ -348,16 +348,16 @@ for name, (d, n, k) in limits.items():
 assert limits["Ψ and Δ at 70°"][0] < 0.2 * limits["R at 0°"][0]
 
 # %% [markdown]
-# Ellipsometry is far ahead, as people who measure nanometres know: Δ is a phase, and follows the
-# thickness even where intensities hardly change.
+# Ellipsometry is much more precise, as is well known: Δ is a phase, and depends on the thickness even where
+# intensities hardly change.
 #
 # ## Does a fit reach the bound?
 #
-# The bound holds for every method. So we simulate noisy spectra at normal incidence, fit them without
-# knowing d, n and k, and compare: the error that the fit states, and how the answers scatter.
+# The bound holds for every unbiased method. We simulate noisy spectra at normal incidence, fit d, n and k,
+# and compare the bound with the errors that the fits report and with the scatter of the results.
 
 # %%
-# each Free holds a value, which is simulated, and bounds; a fit scans all between these
+# each Free has a start value, which is simulated, and bounds, between which a fit searches
 film = pl.Layer(
     pl.dispersion.Constant(pl.Free(1.5, 2.2, start=1.8), pl.Free(0.0, 0.2, start=0.02)),
     pl.Free(20, 200, start=80.0),
@@ -378,8 +378,8 @@ for i, name in enumerate(NAMES):
 assert np.allclose(np.median(stated, axis=0), limits["R at 0°"], rtol=0.15)
 
 far = [fit for fit, is_near in zip(fits, there, strict=True) if not is_near]
-told = [f"{fit['thickness'].value:.1f} nm ({fit.status})" for fit in far]
-print(f"{len(far)} of {len(fits)} fits lie elsewhere: {', '.join(told) or 'none'}")
+others = [f"{fit['thickness'].value:.1f} nm ({fit.status})" for fit in far]
+print(f"{len(far)} of {len(fits)} fits are elsewhere: {', '.join(others) or 'none'}")
 rival = min(fits[0].rivals, key=lambda rival: rival.delta_chi2)
 thinner = rival.parameters
 print(f"the nearest rival of the first fit: {thinner['thickness']:.1f} nm, n {thinner['n']:.2f}")
@@ -388,7 +388,7 @@ assert thinner["n"] > 1.8
 assert all(fit.status == "ambiguous" for fit in far)
 
 # %% [markdown]
-# The errors that a fit states are the bound, within what differs from one noisy spectrum to the next, and
-# the answers scatter by about as much. But the bound looks at one answer and its neighbourhood only. This
-# film has a rival: a thinner one with a higher index. Once in a while noise makes that one fit best. A
-# fit says so by its status (`ambiguous`); the bound cannot. Notebook 6 goes on from here.
+# The reported errors equal the bound, apart from differences between noisy spectra, and the results scatter
+# by about as much. The bound, however, describes the neighbourhood of one solution only. This film has a
+# rival: a thinner film with a higher index. Occasionally the noise makes the rival fit best. The fit then
+# has the status `ambiguous`; the bound contains no such information. Notebook 6 continues with this case.

@@ -7,18 +7,20 @@
 # ---
 
 # %% [markdown]
-# # What the data cannot say
+# # Limits of identifiability
 #
-# A fit always gives a number. Whether the data called for it is another question. This notebook shows
-# four ways in which a spectrum may say less than it seems to, what pellicle reports then, and what helps.
+# A fit always returns a number. Whether the data determine it is a separate question. This notebook shows
+# four cases in which a spectrum determines less than it seems to, the report of pellicle in each case, and
+# remedies.
 #
-# 1. Two numbers do the work of one.
-# 2. Another film looks the same.
-# 3. No light comes back from where the answer lies.
-# 4. The error is no single number: one needs a *posterior*, the probability of every answer.
+# 1. Two parameters are strongly correlated.
+# 2. Another thickness fits as well.
+# 3. No light returns from the lower face.
+# 4. A single standard error does not describe the uncertainty: the *posterior*, the probability of every
+#    value, does.
 #
-# The misfit is measured by χ² = Σ ((data − model) / σ)², where σ is the noise. Δχ² is how much worse than
-# the best an answer fits: 1 is one standard deviation, 4 are two.
+# The misfit is χ² = Σ ((data − model) / σ)², where σ is the noise. Δχ² is the difference from the best fit:
+# 1 corresponds to one standard deviation, 4 to two.
 
 # %%
 import os
@@ -32,15 +34,15 @@ import numpy as np
 import pellicle as pl
 from pellicle.sampling.checks import split_rhat
 
-jax.config.update("jax_enable_x64", True)  # 16 digits in place of JAX's usual 7
-SHORT = os.environ.get("PELLICLE_SHORT") == "1"  # the automatic tests take fewer points
+jax.config.update("jax_enable_x64", True)  # double precision; JAX's default is single
+SHORT = os.environ.get("PELLICLE_SHORT") == "1"  # fewer points, for a quick run
 
 # %% [markdown]
-# ## Two numbers do the work of one
+# ## Two strongly correlated parameters
 #
-# A transparent film on silicon, its thickness and its index both unknown, seen from 450 to 750 nm with a
-# noise of 0.001 in R. Once the film has 15 nm, once 120 nm. Below is the χ² of every pair of thickness
-# and index, without noise in the data, so that the truth fits exactly.
+# Consider a transparent film on silicon with unknown thickness and index, measured from 450 to 750 nm with
+# a noise of 0.001 in R, with a thickness of 15 nm and of 120 nm. The figure shows χ² for every pair of
+# thickness and index. The data are without noise, so that the true values fit exactly.
 
 # %%
 nm = np.linspace(450.0, 750.0, 31)
@@ -50,7 +52,7 @@ SILICON = pl.material("Si")
 
 @jax.jit
 def delta_chi2(truth, thickness, index):
-    """Δχ² over a grid, (indices, thicknesses), for data of a film of `truth`: thickness (nm) and index."""
+    """Return Δχ² with shape (indices, thicknesses) for a film with thickness (nm) and index `truth`."""
     data = pl.reflectance(nm, truth[0], truth[1], SILICON)
     model = pl.reflectance(nm, thickness[None, :, None], index[:, None, None], SILICON)
     return jnp.sum(((data - model) / NOISE) ** 2, axis=-1)
@@ -73,28 +75,28 @@ figure.colorbar(shades, label="Δχ² (orange: 4, two standard deviations)")
 plt.show()
 
 # %%
-valley = films["15 nm"][1][np.argmin(maps["15 nm"], axis=1)]
-ends = valley[[0, -1]]
+best_thickness = films["15 nm"][1][np.argmin(maps["15 nm"], axis=1)]
+ends = best_thickness[[0, -1]]
 power = np.log(ends[1] / ends[0]) / np.log(index[-1] / index[0])
-print(f"along the valley n goes from {index[0]} to {index[-1]}, d from {ends[0]:.1f} to {ends[1]:.1f} nm")
+print(f"along the minimum n goes from {index[0]} to {index[-1]}, d from {ends[0]:.1f} to {ends[1]:.1f} nm")
 print(f"d is proportional to n to the power of {power:.2f} there")
-print(f"the worst Δχ² along it: {maps['15 nm'].min(axis=1).max():.1f}")
+print(f"largest Δχ² along it: {maps['15 nm'].min(axis=1).max():.1f}")
 assert maps["15 nm"].min(axis=1).max() < 9
 assert maps["120 nm"].min(axis=1).max() > 1000
 
 # %% [markdown]
-# The misfit of the thin film is a valley: every index has its thickness, and they fit alike. The spectrum
-# knows one combination of the two. (It is not quite the product n·d: that is what fringes give, where a
-# film is thick enough to have them.) The film of 120 nm has no such valley: the cross lies in a closed
-# contour, too small to be seen here.
+# The misfit of the thin film has a narrow valley: for every index there is a thickness that fits nearly as
+# well. The spectrum determines one combination of the two. (It is not exactly the product n·d, which
+# fringes determine in a thicker film.) The film of 120 nm has no such valley: the cross lies in a closed
+# contour that is too small to be visible here.
 #
-# Now with noise, and fitted. Noise decides where in its valley the best fit lies: in this spectrum where
-# the valley meets the bound that we gave for n.
+# Next we fit spectra with noise. The noise determines where in the valley the best fit lies: for this
+# spectrum it is where the valley meets the bound of n.
 
 
 # %%
 def measured(thickness):
-    """A spectrum of the film with noise."""
+    """Return a spectrum of the film with noise."""
     return pl.simulate(pl.Scene(pl.Layer(1.46, thickness), "Si"), nm, noise=NOISE, seed=1)
 
 
@@ -106,8 +108,8 @@ for thickness in (15.0, 120.0):
     assert (fit.status == "converged") == (thickness == 120.0)
 
 # %% [markdown]
-# What helps is knowledge from elsewhere. With the index of the material fixed, the same spectrum gives
-# the thickness:
+# The remedy is information from another source. With the index of the material fixed, the same spectrum
+# determines the thickness:
 
 # %%
 fixed = pl.Scene(pl.Layer(1.46, pl.Free(0, 200)), "Si")
@@ -117,11 +119,11 @@ assert fit.status == "converged"
 assert abs(fit["thickness"].value - 15) < 4 * fit["thickness"].stderr < 1
 
 # %% [markdown]
-# ## Another film looks the same
+# ## Another thickness fits as well
 #
-# The colours of a film repeat as it grows. A camera with a few filters sees few numbers, and more than
-# one thickness may explain them. Here a film (index 1.46, on silicon, 650 nm thick) is seen in several
-# bands between 450 and 800 nm, with 4 % of noise. The curves are the expected Δχ² of every other
+# The colours of a film recur as it grows. A camera with a few filters records few values, and more than one
+# thickness may explain them. The example is a film (index 1.46, on silicon, 650 nm thick) measured in
+# several bands between 450 and 800 nm, with a noise of 4 %. The curves show the expected Δχ² of every other
 # thickness.
 
 # %%
@@ -130,13 +132,13 @@ thicknesses = np.linspace(50.0, 1500.0, 2901)
 
 @jax.jit
 def through_bands(bands):
-    """Reflectance of the film of every thickness, (thicknesses, bands); those that are 0 do not count."""
+    """Return the reflectance with shape (thicknesses, bands); bands of 0 are padding."""
     seen = pl.reflectance(jnp.where(bands > 0, bands, 500.0), thicknesses[:, None], 1.46, SILICON)
     return jnp.where(bands > 0, seen, 0.0)
 
 
 def rivals_of(curve):
-    """How many separate places lie below Δχ² = 6, the true one among them."""
+    """Return the number of separate intervals below Δχ² = 6, including the true one."""
     inside = curve < 6
     return int(inside[0]) + int(np.sum(inside[1:] & ~inside[:-1]))
 
@@ -161,11 +163,11 @@ plt.show()
 assert places[0] > places[-1] == 1
 
 # %% [markdown]
-# Three bands leave several answers; many leave one, even though each is as noisy. With five the true one
-# is alone by little: noise can bring its neighbour near 440 nm below the line.
+# Three bands leave several solutions; many bands leave one, even though each has the same noise. With five
+# bands the true one is only just unique: noise can bring the neighbour near 440 nm below the line.
 # `docs/examples/five_bands.csv` is such a data set. A fit scans the whole range of thickness, keeps every
-# minimum that it finds as a *rival*, and calls the answer ambiguous if one of them fits about as well
-# (Δχ² below 6).
+# other minimum as a *rival*, and reports the status `ambiguous` if one of them fits about as well (Δχ²
+# below 6).
 
 # %%
 five = pl.read_spectrum("../docs/examples/five_bands.csv")
@@ -177,14 +179,15 @@ for rival in sorted(ambiguous.rivals, key=lambda rival: rival.delta_chi2)[:3]:
 assert ambiguous.status == "ambiguous"
 
 # %% [markdown]
-# The best fit and its error bar look like any other answer, and the error bar is right as far as it goes:
-# for answers in that minimum.
+# The best fit and its error bar do not show the ambiguity: the error bar is correct, but only for solutions
+# in that minimum.
 #
-# ## No light comes back from there
+# ## No light returns from the lower face
 #
 # Gold absorbs. Light that reaches the lower face of a gold film and returns has lost 1 − exp(−8πkd/λ) of
-# its power, where k is the extinction. Once that is nearly all, reflected light does not know how thick
-# the film is. `measurements/gold_on_glass_300nm.csv` was simulated with 300 nm and a noise of 0.002.
+# its power, where k is the extinction coefficient. Once this is nearly all, the reflected light does not
+# depend on the thickness. `measurements/gold_on_glass_300nm.csv` was simulated with 300 nm and a noise of
+# 0.002.
 
 # %%
 gold = pl.read_spectrum("../measurements/gold_on_glass_300nm.csv")
@@ -203,7 +206,7 @@ figure, axes = plt.subplots()
 for d, row, style in zip(tried[:4], change[:4], ("C1-", "C2--", "C0-", "k:"), strict=True):
     axes.plot(gold.wavelength, row, style, label=f"{d:.0f} nm")
 axes.axhspan(-0.002, 0.002, color="0.9", label="noise, ± σ")
-axes.set(xlabel="wavelength (nm)", ylabel="R less that of 1000 nm of gold", ylim=(-0.006, 0.006))
+axes.set(xlabel="wavelength (nm)", ylabel="R − R of 1000 nm of gold", ylim=(-0.006, 0.006))
 axes.legend(ncols=2)
 plt.show()
 for d, row in zip(tried, change, strict=True):
@@ -212,17 +215,16 @@ assert np.abs(change[2]).max() < 0.002
 assert np.abs(change[3]).max() < 1e-6
 
 # %% [markdown]
-# A film at the limit reflects as an endless one does, to within the noise; one of 300 nm to within
-# nothing that can be measured. So the report gives a one-sided limit in place of a value with an error:
-# with 95 % probability the film is at least so thick. What helps is another measurement: in transmission,
-# while there is any, or a step in the film and a profilometer.
+# A film at the limit reflects like an infinitely thick one to within the noise, and for one of 300 nm the
+# difference is far too small to be measured. The report therefore gives a one-sided limit instead of a
+# value with an error: with 95 % probability the film is at least that thick. Remedies are another kind of
+# measurement: transmission, if any light is transmitted, or a step in the film and a profilometer.
 #
-# ## How likely is each answer?
+# ## How probable is each thickness?
 #
-# Back to the five bands, where two thicknesses fit. How likely is each? The *posterior* answers: the
-# probability of every thickness, given the data and what was believed before (the *prior*: here every
-# thickness from 50 to 1500 nm alike). With a single unknown it can be computed on a grid: exp(−χ²/2) at
-# every thickness, over its sum.
+# Back to the five bands, which two thicknesses explain. How probable is each? The *posterior* is the
+# probability of every thickness, given the data and the prior (here uniform from 50 to 1500 nm). With a
+# single unknown it can be computed on a grid: exp(−χ²/2) at every thickness, normalised.
 
 # %%
 grid = np.linspace(50.0, 1500.0, 14501)
@@ -230,7 +232,7 @@ grid = np.linspace(50.0, 1500.0, 14501)
 
 @jax.jit
 def log_probability(thickness):
-    """−χ²/2 of each thickness (nm) for the five bands; −∞ outside the bounds."""
+    """Return −χ²/2 of each thickness (nm) for the five bands; −∞ outside the bounds."""
     model = pl.reflectance(five.wavelength, thickness[:, None], 1.46, SILICON)
     chi2 = jnp.sum(((five.values - model) / five.sigma) ** 2, axis=1)
     return jnp.where((thickness > 50) & (thickness < 1500), -0.5 * chi2, -jnp.inf)
@@ -241,7 +243,7 @@ density = weight / (weight.sum() * (grid[1] - grid[0]))  # per nm
 
 
 def share(thickness):
-    """The share of draws, or of the grid, near the second minimum (within 80 nm of 438 nm)."""
+    """Return the fraction of thicknesses within 80 nm of the second minimum at 438 nm."""
     return float(np.mean(abs(thickness - 438) < 80))
 
 
@@ -249,10 +251,9 @@ exact = float(weight[abs(grid - 438) < 80].sum() / weight.sum())
 print(f"on the grid: {100 * exact:.1f} % near 438 nm")
 
 # %% [markdown]
-# With more unknowns grids grow too large, and one draws samples instead: walkers move about, to better
-# places readily and to worse ones seldom, so that they come to every place as often as its probability
-# demands. emcee is the package that most people use for this. A usual recipe starts all walkers in a
-# small ball around the best fit:
+# With more unknowns grids become too large, and one draws samples instead: walkers move at random such that
+# they visit every region in proportion to its probability. emcee is the most widely used package for this.
+# A common recipe starts all walkers in a small ball around the best fit:
 
 # %%
 best = ambiguous["thickness"].value
@@ -267,9 +268,9 @@ print(
 )
 
 # %% [markdown]
-# R̂ compares the walkers with each other: 1 means that they agree. They do, and all is well by that test.
-# They agree because they all started in the same place. `pl.sample` starts walkers in every minimum that
-# the fit found, and lets them jump between minima:
+# R̂ compares the walkers with each other: 1 means agreement. Here R̂ is close to 1, so the chain passes
+# this test. The walkers agree because they all started in the same minimum. `pl.sample` starts walkers in
+# every minimum that the fit found, and proposes jumps between minima:
 
 # %%
 posterior = pl.sample(five, scene)
@@ -295,13 +296,13 @@ axes.legend(loc="upper left", bbox_to_anchor=(0.3, 1))
 plt.show()
 
 # %% [markdown]
-# The samples of `pl.sample` follow the grid; those from a ball follow the best fit's own error, and know
-# nothing of the other answer.
+# The samples of `pl.sample` follow the grid; those from a ball follow only the error of the best fit, and
+# miss the other solution.
 #
-# ## What else is known
+# ## Prior knowledge
 #
-# Data and prior weigh together. Suppose that whoever made the film aimed at 430 nm and is usually within
-# 50 nm. Written beside the bounds, that knowledge changes the answer:
+# The posterior combines data and prior. Suppose that the film was made with a target of 430 nm by a process
+# with a standard deviation of 100 nm. This prior, written beside the bounds, changes the result:
 
 # %%
 believed = pl.Scene(pl.Layer(1.46, pl.Free(50, 1500, prior=pl.priors.Normal(430, 100))), "Si")
@@ -314,5 +315,5 @@ assert abs(share(informed.draws) - exact) < 0.05
 assert exact > 0.5
 
 # %% [markdown]
-# The data alone favour the other thickness, three to one; with what the maker says, this one is the
-# likelier. Whoever reports such a number should say which prior it rests on.
+# The data alone favour the other thickness, three to one; with the prior, this one is more probable. A
+# publication of such a result should state its prior.

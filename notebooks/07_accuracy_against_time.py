@@ -9,16 +9,17 @@
 # %% [markdown]
 # # Accuracy against time
 #
-# A layer can be computed in many ways. One may follow every effect, at the price of time, or leave out
-# what does not matter here. Which effects matter depends on the scene: on a soap film a single reflection
-# nearly suffices, on a metal it is far off. This notebook shows
+# A layer can be computed by many methods. A complete calculation includes every effect and takes the most
+# time; a faster one neglects effects that are small. Which effects matter depends on the scene: for a soap
+# film a single reflection is nearly sufficient, for a film on metal it has a large error. This notebook
+# shows
 #
-# 1. the *plan*: what pellicle computes for a scene, what it leaves out, and why;
-# 2. the *ladder*: many ways to the same spectrum, each with its error and its time;
+# 1. the *plan*: which effects pellicle computes for a scene, which it leaves out, and why;
+# 2. the *methods* of computing the same spectrum, each with its error and its time;
 # 3. the same for colours.
 #
-# Errors are properties of the scene, and come out the same anywhere. Times are those of the machine that
-# ran this page, which may have been busy.
+# Errors are properties of the scene and are the same on every machine. Times are those of the machine that
+# executed this page, which may have been busy.
 
 # %%
 import os
@@ -32,14 +33,14 @@ from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 import pellicle as pl
 from pellicle.colour import delta_e2000, film_colour, lab
 
-jax.config.update("jax_enable_x64", True)  # 16 digits in place of JAX's usual 7
-SHORT = os.environ.get("PELLICLE_SHORT") == "1"  # the automatic tests take fewer points
+jax.config.update("jax_enable_x64", True)  # double precision; JAX's default is single
+SHORT = os.environ.get("PELLICLE_SHORT") == "1"  # fewer points, for a quick run
 
 # %% [markdown]
 # ## Three scenes
 #
-# A soap film in air, its fringes slightly blurred by a spectrometer with a bandwidth of 2 nm; hematite
-# (iron oxide) on glass; and black copper oxide on aluminium, seen at 60°. In each the thickness is
+# The scenes are a soap film in air, whose fringes are slightly damped by a spectrometer with a bandwidth of
+# 2 nm; hematite (iron oxide) on glass; and black copper oxide on aluminium at 60°. In each the thickness is
 # unknown within bounds.
 
 # %%
@@ -60,9 +61,9 @@ scenes = {
 # %% [markdown]
 # ## The plan
 #
-# `pl.plan` decides which effects a scene calls for. It looks at what is there and at the bounds of what
-# is free, never at the present value of a free number. Without a tolerance it leaves out only what is
-# certainly absent, which costs nothing then:
+# `pl.plan` determines the effects of a scene from its contents and from the bounds of its free parameters,
+# never from their current values. Without a tolerance it leaves out only effects that are absent, and these
+# take no time:
 
 # %%
 plans = {name: pl.plan(scene) for name, scene in scenes.items()}
@@ -74,28 +75,28 @@ assert not plans["soap film"].on("absorption")
 assert plans["CuO on aluminium"].on("polarisation")
 
 # %% [markdown]
-# The soap film absorbs nothing, and light at normal incidence has no s and p. *Coherence* is the blurring
-# of fringes by the bandwidth, *orders* the number of round trips that are followed in the film,
-# *precision* the use of 16 digits in place of 7.
+# The soap film absorbs nothing, and at normal incidence s and p are the same. *Coherence* is the damping of
+# fringes by the bandwidth, *orders* the number of round trips in the film that are computed, *precision*
+# the use of 16 digits instead of 7.
 #
-# With a tolerance, here 0.001 of R, the plan also leaves out what is there but changes less than that
-# anywhere between the bounds, and says so in words:
+# With a tolerance, here 0.001 of R, the plan also leaves out effects that change the signal by less than
+# that everywhere between the bounds, and gives the reasons:
 
 # %%
 TOLERANCE = 1e-3
 spare = pl.plan(scenes["soap film"], TOLERANCE)
 print(spare)
-print(f"\noff by at most {spare.error_bound:.1e} of R")
+print(f"\nerror of at most {spare.error_bound:.1e} in R")
 assert spare.error_bound <= TOLERANCE
 assert not spare.on("precision")
 
 # %% [markdown]
-# ## The ladder
+# ## Methods and their errors
 #
-# `pl.cost` computes a scene in every way that makes sense for it. It draws the free numbers many times
-# between their bounds and notes the largest error against the full calculation and the median time of one
-# spectrum. (The command `pellicle cost` does the same for a recipe. With `datasets=20` it would also let
-# several solvers fit simulated spectra.)
+# `pl.cost` computes a scene with every applicable method. It draws random values of the free parameters
+# between their bounds and reports the largest error relative to the complete calculation, and the median
+# time per spectrum. (The command `pellicle cost` does the same for a recipe. With `datasets=20` it also
+# compares solvers on fits of simulated spectra.)
 
 # %%
 ladders = {
@@ -106,16 +107,16 @@ for name, ladder in ladders.items():
     print(f"{name}: {ladder.wavelengths} wavelengths, {ladder.draws} draws")
     for rung in ladder.rungs:
         star = "*" if rung.pareto else " "
-        told = f"{rung.name:22} {rung.error:8.1e}  {rung.seconds * 1e6:7.2f} µs"
-        print(f"  {star} {told}   leaves out {rung.leaves_out}")
+        columns = f"{rung.name:22} {rung.error:8.1e}  {rung.seconds * 1e6:7.2f} µs"
+        print(f"  {star} {columns}   leaves out {rung.leaves_out}")
     print(f"  the fastest within {TOLERANCE:g}: {ladder.recommended}\n")
 
 # %%
-LEAST = 1e-9  # smaller errors are drawn here
+LEAST = 1e-9  # smaller errors are drawn at this value
 
 
 def plain_ticks(axis):
-    """1, 2, 5 and so on along a logarithmic axis."""
+    """Label a logarithmic axis with 1, 2, 5 and so on."""
     axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     axis.set_major_formatter(StrMethodFormatter("{x:g}"))
     axis.set_minor_formatter(NullFormatter())
@@ -139,15 +140,15 @@ panels[-1].set_xlabel("time of one spectrum (µs)")
 plt.show()
 
 # %% [markdown]
-# Orange ways are worth having: none of the others is both faster and more accurate. The dotted line is
-# the tolerance. Errors below 1e-9 are drawn there, that of the full calculation (*float64*) among them:
-# it is nothing by definition.
+# Orange methods are Pareto optimal: no other method is both faster and more accurate. The dotted line is
+# the tolerance. Errors below 1e-9 are drawn at that value, including the complete calculation (*float64*),
+# whose error is zero by definition.
 
 # %%
 errors = {name: {rung.name: rung.error for rung in ladder.rungs} for name, ladder in ladders.items()}
-told = ("incoherent", "constant index", "transparent layer", "closed form", "float32")
+shown = ("incoherent", "constant index", "transparent layer", "closed form", "float32")
 print(f"{'largest error in R':22}" + "".join(f"{name:>19}" for name in errors))
-for rung in told:
+for rung in shown:
     row = (f"{errors[name][rung]:.1e}" if rung in errors[name] else "-" for name in errors)
     print(f"{rung:22}" + "".join(f"{cell:>19}" for cell in row))
 for name in errors:
@@ -157,18 +158,18 @@ for name in errors:
 assert errors["soap film"]["closed form"] < TOLERANCE
 
 # %% [markdown]
-# What one may leave out, then:
+# Which effects can be neglected?
 #
-# - **Interference** (*incoherent*) never, for films so thin: that is what colours them.
-# - **Dispersion** (*constant index*: that of the middle of the spectrum) never, at this tolerance.
-# - **The bandwidth** of the soap film's spectrometer, yes: without it there is a closed formula.
-# - **Half of the digits** (*float32*), in all three.
+# - **Interference** (*incoherent*): never for films this thin, because it causes their colours.
+# - **Dispersion** (*constant index*: that of the middle of the spectrum): never at this tolerance.
+# - **The bandwidth** of the soap film's spectrometer: yes; without it there is a closed formula.
+# - **Double precision** (*float32*): yes, in all three.
 #
 # ## How many reflections?
 #
-# Light that enters a layer goes back and forth in it. The reflectance is a series over these round trips,
-# its *orders*. Each is weaker than the one before by what the two faces reflect and the layer absorbs.
-# Renderers often keep one or two.
+# Light that enters a layer is reflected back and forth in it. The reflectance is a series over these round
+# trips, its *orders*. Each order is weaker than the previous one by the reflectances of the two faces and
+# the absorption of the layer. Renderers often keep one or two.
 
 # %%
 orders = {"1 order": 1, "2 orders": 2, "3 orders": 3, "5 orders": 5, "8 orders": 8}
@@ -179,7 +180,7 @@ for (name, found), style in zip(errors.items(), ("C0o-", "C2s-", "C1D-"), strict
     axes.plot(list(kept.values()), [found[rung] for rung in kept], style, label=name)
     needed[name] = next((count for rung, count in kept.items() if found[rung] <= TOLERANCE), None)
     enough = needed[name] or "more than 8"
-    print(f"{name}: one order is off by {found['1 order']:.1e}; for {TOLERANCE:g} it takes {enough}")
+    print(f"{name}: error of one order {found['1 order']:.1e}; orders needed for {TOLERANCE:g}: {enough}")
 axes.axhline(TOLERANCE, color="k", linestyle=":", label="tolerance")
 axes.set(yscale="log", xlabel="orders kept", ylabel="largest error in R")
 axes.legend()
@@ -189,25 +190,24 @@ assert needed["CuO on aluminium"] is None
 assert errors["hematite on glass"]["1 order"] > 10 * errors["soap film"]["1 order"]
 
 # %% [markdown]
-# Water reflects little, so one order does for the soap film. Hematite reflects more. Copper oxide on
-# aluminium lies between a strongly reflecting metal and a face seen at 60°, and eight orders are not
-# enough: there the closed formula, which sums all orders at once, is exact, and no slower. (Soap film's
-# errors level off: with a bandwidth, what remains is how the series treats that.)
+# Water reflects little, so one order is sufficient for the soap film. Hematite reflects more. Copper oxide
+# on aluminium is bounded by a strongly reflecting metal and a face at 60°, and eight orders are not
+# sufficient: there the closed formula, which sums all orders, is exact and no slower. (The errors of the
+# soap film reach a plateau: with a bandwidth, the remaining error is that of the damping in the series.)
 #
 # ## Colours
 #
-# A renderer wants no spectra but three numbers. To integrate over the sensitivity of the eye exactly
-# takes many wavelengths. `film_colour` knows several shorter ways:
+# A renderer needs three values instead of a spectrum. An exact integral over the sensitivity of the eye
+# requires many wavelengths. `film_colour` has several faster methods:
 #
-# - `points-650-510-475`: three wavelengths stand for red, green and blue, as in many shaders;
-# - `belcour-barla`: four Gaussians seen by three orders, as Belcour and Barla (2017) published;
-# - `gaussians-N`: the same idea with N Gaussians of our own, and six orders;
+# - `points-650-510-475`: three wavelengths for red, green and blue, as in many shaders;
+# - `belcour-barla`: four Gaussians and three orders, as published by Belcour and Barla (2017);
+# - `gaussians-N`: the same with N Gaussians of our own, and six orders;
 # - `nodes-N-D`: N wavelengths chosen for films up to D nm;
 # - `uniform-N`: N evenly spaced wavelengths.
 #
-# The errors are colour differences ΔE2000, of which 1 can just be seen, and their reference takes a step
-# of 1 nm. The films: transparent, index 1.33 to 2.4, on glass and on a metal, 0 to 1000 nm thick, at
-# several angles.
+# The errors are colour differences ΔE2000, of which 1 is just visible, relative to a step of 1 nm. The
+# films: transparent, index 1.33 to 2.4, on glass and on a metal, 0 to 1000 nm thick, at several angles.
 
 # %%
 random = np.random.default_rng(0)
@@ -227,12 +227,12 @@ WAYS = (
 
 
 def program(way):
-    """XYZ of every film under D65, compiled."""
+    """Return a compiled function for the XYZ of films under D65."""
     return jax.jit(lambda d, n, b, t: film_colour(d, n, b, angle=t, way=way).xyz)
 
 
 def seen(xyz):
-    """L*, a*, b* against D65's white."""
+    """Return L*, a*, b* relative to the white of D65."""
     return np.asarray(lab(np.asarray(xyz, float), white))
 
 
@@ -273,8 +273,8 @@ assert mean["gaussians-8"] < 0.2 < mean["gaussians-4"]
 assert mean["uniform-16"] > 5 * mean["gaussians-8"]
 
 # %% [markdown]
-# Three wavelengths give wrong colours. The published Gaussians are off by what can just be seen when two
-# colours lie side by side; eight of ours are not. Twice as many plain wavelengths do worse than these:
-# fringes of thick films are finer than their steps, while a Gaussian knows how much of a fringe it blurs.
-# Sixty-four plain wavelengths are the nearest, and where a processor works on many numbers at once they
-# need not be slow: compare the times above.
+# Three wavelengths give wrong colours. The error of the published Gaussians is just visible when two
+# colours are side by side; that of our eight is not. Twice as many evenly spaced wavelengths have a larger
+# error: the fringes of thick films are narrower than their steps, whereas a Gaussian includes the damping
+# of the fringes. Sixty-four evenly spaced wavelengths have the smallest error, and on a processor that
+# computes many values at once they need not be slow: compare the times above.

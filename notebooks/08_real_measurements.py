@@ -9,14 +9,14 @@
 # %% [markdown]
 # # Real measurements, end to end
 #
-# From an instrument's file to the sentence in a paper. The data are ellipsometric angles of polymer
-# brushes (chains tied to a surface by one end) on oxidised silicon, measured with an imaging
-# ellipsometer. They come from the tests of the program refellips (H. Robertson, I. Gresham and A. Nelson,
-# BSD licence): `measurements/README.md` says more. Nobody tells us how thick these layers are. That is
-# the usual case, and what this notebook is about.
+# This notebook goes from an instrument's file to a sentence for a publication. The data are ellipsometric
+# angles of polymer brushes (chains tied to a surface by one end) on oxidised silicon, measured with an
+# imaging ellipsometer. They come from the tests of the program refellips (H. Robertson, I. Gresham and A.
+# Nelson, BSD licence); `measurements/README.md` gives details. The true thickness of these layers is
+# unknown, as it usually is.
 #
-# An ellipsometer compares how light polarised in the plane of incidence (p) and across it (s) is
-# reflected. Ψ tells the ratio of the two amplitudes, Δ the difference of the two phases, both in degrees.
+# An ellipsometer compares the reflection of light polarised in the plane of incidence (p) and perpendicular
+# to it (s). Ψ gives the ratio of the two amplitudes, Δ the difference of the two phases, both in degrees.
 
 # %%
 import os
@@ -29,14 +29,15 @@ import numpy as np
 
 import pellicle as pl
 
-jax.config.update("jax_enable_x64", True)  # 16 digits in place of JAX's usual 7
-SHORT = os.environ.get("PELLICLE_SHORT") == "1"  # the automatic tests take fewer points
+jax.config.update("jax_enable_x64", True)  # double precision; JAX's default is single
+SHORT = os.environ.get("PELLICLE_SHORT") == "1"  # fewer points, for a quick run
 FOLDER = "../measurements/ellipsometry/"
 
 # %% [markdown]
 # ## Read the file
 #
-# The file is read as the instrument wrote it. `notes` says how it was understood: always worth a look.
+# Pellicle reads the instrument's file as it is. `notes` describes how it was read, and should always be
+# checked.
 
 # %%
 with open(FOLDER + "15-1-1.dat", encoding="utf-8") as file:
@@ -47,19 +48,19 @@ for note in thin.notes:
     print("  -", note)
 
 # %% [markdown]
-# One wavelength, several angles of incidence. The file gives no errors of its angles, so their size has
-# to be estimated from what the fit leaves over.
+# The file contains one wavelength and several angles of incidence. It gives no errors of the measured
+# angles, so these have to be estimated from the residuals of the fit.
 #
 # ## Write down the scene
 #
-# What is there, from the air down: the brush, about 2 nm of native oxide that every silicon wafer has,
-# silicon. What we do not measure we have to assume, and to say so: the oxide's thickness, and the
+# The scene, from the air down: the brush, about 2 nm of native oxide that every silicon wafer has, and
+# silicon. Quantities that are not measured must be assumed, and stated: the oxide's thickness, and the
 # polymer's index n = 1.47 + 4950/λ² (λ in nm, from refellips).
 
 
 # %%
 def brush(index=1.47, oxide=2.0):
-    """A scene with a brush of unknown thickness; the index is the first coefficient of its Cauchy formula."""
+    """Return a scene with a brush of unknown thickness; `index` is the coefficient A of its index."""
     layers = [
         pl.Layer(pl.dispersion.Cauchy(index, 4950.0), pl.Free(0, 300), name="brush"),
         pl.Layer("SiO2", oxide, name="oxide"),
@@ -74,12 +75,12 @@ assert fit.status == "converged"
 # %% [markdown]
 # ## Look at the residuals
 #
-# A verdict is not enough. What the fit leaves over should look like noise.
+# The verdict alone is not sufficient. The residuals should look like noise.
 
 
 # %%
 def draw(found):
-    """Ψ and Δ with the fit, and what is left, against the angle of incidence."""
+    """Plot Ψ and Δ with the fit, and the residuals, against the angle of incidence."""
     curve, angle = found.curve, found.spectrum.angle
     _, (above, below) = plt.subplots(2, 1, figsize=(7, 5), sharex=True, height_ratios=[2, 1])
     above.plot(angle, curve.data, "o", color="C0", label="Ψ")
@@ -100,21 +101,21 @@ def draw(found):
 draw(fit)
 rms = [float(np.sqrt(np.mean(x**2))) for x in (fit.curve.residual, fit.curve.delta_residual)]
 print(f"rms of Ψ {rms[0]:.2f}°, of Δ {rms[1]:.2f}°")
-print(f"{len(thin)} points, worth {fit.parts[0].effective_points:.1f} independent ones")
+print(f"{len(thin)} points, effectively {fit.parts[0].effective_points:.1f} independent ones")
 signs = np.sign(fit.curve.delta_residual)
-print("signs of what is left of Δ:", "".join("+" if x > 0 else "−" for x in signs))
+print("signs of the residuals of Δ:", "".join("+" if x > 0 else "−" for x in signs))
 assert fit.parts[0].effective_points < len(thin)
 
 # %% [markdown]
-# The points lie close to the curve, but what is left runs smoothly with the angle. Noise would jump.
-# Something is not quite as we wrote: the index, the oxide, a small error of the angles. pellicle cannot
-# tell what, but it counts such points as fewer, and widens the error to match.
+# The points are close to the curve, but the residuals vary smoothly with the angle, which noise would not.
+# Some assumption is not quite right: the index, the oxide, or the angles of the instrument. The fit cannot
+# determine which, but it reduces the effective number of points, and increases the error accordingly.
 #
-# ## Try another description
+# ## Try another model
 #
-# Is it the index? `pl.compare` fits both descriptions and weighs them by BIC (Bayesian information
-# criterion: misfit, plus a price for every free number; a difference below 2 is no evidence, one above 6
-# is strong).
+# Is it the index? `pl.compare` fits both models and compares them by BIC (Bayesian information criterion:
+# misfit plus a penalty for every free parameter; a difference below 2 is no evidence, one above 6 is
+# strong).
 
 # %%
 free_index = pl.Free(1.3, 1.7)
@@ -122,20 +123,20 @@ compared = pl.compare(thin, {"index assumed": brush(), "index free": brush(free_
 print(compared)
 for candidate in compared.candidates:
     found = candidate.fit
-    told = f"{found['brush.thickness'].value:.2f} ± {found['brush.thickness'].stderr:.2f} nm"
-    print(f"  {candidate.name}: {told}, n at 658 nm = {float(found.curve.n[0]):.3f}, rms {found.rms:.3f}°")
+    d = f"{found['brush.thickness'].value:.2f} ± {found['brush.thickness'].stderr:.2f} nm"
+    print(f"  {candidate.name}: {d}, n at 658 nm = {float(found.curve.n[0]):.3f}, rms {found.rms:.3f}°")
 either = [candidate.fit["brush.thickness"] for candidate in compared.candidates]
 apart = abs(either[0].value - either[1].value)
 print(f"the two thicknesses are {apart:.1f} nm apart")
 assert apart > 3 * max(estimate.stderr for estimate in either)
 
 # %% [markdown]
-# The criterion is clear, and by that the brush is thinner. But an index above 1.6 is not believable for
-# this polymer, and both answers claim errors far smaller than the distance between them. A criterion
-# chooses among the descriptions that we offer. The right one may not be among them.
+# BIC clearly prefers the free index, and with it a thinner brush. But an index above 1.6 is implausible for
+# this polymer, and both results have errors far smaller than the distance between them. A criterion selects
+# among the models that we offer, and the correct one may not be among them.
 #
-# What else could it be? Suppose that the instrument's angles are all off by a little. We shift them, keep
-# the assumed index, and see how well the data are met, for this brush and for a thinner one of the same
+# Another hypothesis: all angles of incidence of the instrument are shifted by a small amount. We shift
+# them, keep the assumed index, and compare the residuals, for this brush and for a thinner one of the same
 # series.
 
 # %%
@@ -144,7 +145,7 @@ thinner = pl.read_spectrum(FOLDER + "19-1-1.dat")
 
 
 def shifted(spectrum):
-    """The fits of a spectrum whose angles of incidence are off by each of the shifts (degrees)."""
+    """Return the fits of a spectrum with its angles of incidence shifted by each of the shifts (degrees)."""
     return [pl.fit(replace(spectrum, angle=spectrum.angle + shift), brush()) for shift in shifts]
 
 
@@ -155,7 +156,7 @@ for (name, fits), style in zip(series.items(), ("C0o-", "C1s-"), strict=True):
 axes.axhline(compared.best.fit.rms, color="C0", linestyle=":", label="15-1-1, index free, no shift")
 axes.set(
     xlabel="shift of all angles of incidence (degrees)",
-    ylabel="rms of what is left (degrees)",
+    ylabel="rms of the residuals (degrees)",
     ylim=(0, None),
 )
 axes.legend()
@@ -165,22 +166,22 @@ best = {name: int(np.argmin([found.rms for found in fits])) for name, fits in se
 for name, fits in series.items():
     found, before = fits[best[name]], fits[int(np.argmin(abs(shifts)))]
     print(
-        f"{name}: {shifts[best[name]]:+.2f}° leaves {found.rms:.3f}° in place of {before.rms:.3f}°,"
+        f"{name}: {shifts[best[name]]:+.2f}°: rms {found.rms:.3f}° instead of {before.rms:.3f}°,"
         f" thickness {found['brush.thickness'].value:.2f} ± {found['brush.thickness'].stderr:.2f} nm"
     )
 assert all(0 < shifts[at] < 0.2 for at in best.values())
 assert series["15-1-1"][best["15-1-1"]].rms < 1.05 * compared.best.fit.rms
 
 # %% [markdown]
-# A shift of about a tenth of a degree explains the data as well as a free index does, with a believable
-# index, and both samples ask for about the same. So the angles are the likelier culprit, and the brush
-# has some 16 nm, not 15. That is an argument, not a proof. What would decide: the instrument's own
-# calibration of the angle, or a second wavelength.
+# A shift of about a tenth of a degree explains the data as well as a free index does, with a plausible
+# index, and both samples require about the same shift. The angles are therefore the more probable cause,
+# and the thickness of the brush is about 16 nm, not 15. This is an argument, not a proof. The instrument's
+# calibration of the angle, or a second wavelength, would settle the question.
 #
 # ## A thicker brush
 #
-# The third file holds 32 spots of one wafer with a thicker brush. A thicker layer gives more: here its
-# index can be left free.
+# The third file contains 32 spots of one wafer with a thicker brush. A thicker layer determines more
+# parameters: here its index can be free.
 
 # %%
 SPOTS = FOLDER + "post_synthesis.dat"
@@ -196,16 +197,16 @@ assert min(shift, key=shift.get) == 0
 assert thick.rms < 0.5 * fit.rms
 
 # %% [markdown]
-# The index comes out as the one that we assumed before, without having been told, and these angles need
-# no shift. What is left is no pure noise either, but far less than before. This description can be
-# trusted further than the last.
+# The fitted index equals the value that we assumed before, although the fit did not use it, and these
+# angles require no shift. The residuals are not pure noise either, but much smaller than before, so this
+# model is more reliable than the previous one.
 #
-# ## How sure, with what was assumed
+# ## Uncertainty of the assumptions
 #
-# The stated error takes the oxide as exactly 2 nm thick. It is not. The two layers look nearly alike to
-# light, so every nanometre of oxide too much is a nanometre of brush too little. Instead of fixing the
-# oxide, we free it and say what we believe: 2.0 ± 0.5 nm, a normal *prior*. Then we sample the posterior,
-# the probability of every set of numbers, given data and belief.
+# The reported error assumes that the oxide is exactly 2 nm thick, which is not certain. Optically the two
+# layers are nearly alike, so every nanometre of oxide too much is a nanometre of brush too little. Instead
+# of fixing the oxide, we give it a normal *prior* of 2.0 ± 0.5 nm, and sample the posterior, the
+# probability of all parameters, given the data and the prior.
 
 # %%
 believed = brush(free_index, pl.Free(0, 5, prior=pl.priors.Normal(2.0, 0.5)))
@@ -239,12 +240,12 @@ right.legend(loc="upper right", fontsize="small")
 plt.show()
 
 # %% [markdown]
-# Most of the uncertainty is not noise, but what we do not know of the oxide. More precise angles would
-# not help; measuring the bare wafer before it is coated would.
+# Most of the uncertainty is not due to noise but to the unknown thickness of the oxide. More precise angles
+# would not reduce it; a measurement of the bare wafer before coating would.
 #
-# ## One spot is not the wafer
+# ## Variation over the wafer
 #
-# All 32 spots, fitted one by one by the same scene.
+# We fit all 32 spots separately with the same scene.
 
 # %%
 columns = np.genfromtxt(SPOTS, skip_header=2, usecols=(5, 11, 12))  # zone, x and y in mm
@@ -256,7 +257,7 @@ index = np.array([float(found.curve.n[0]) for found in fits])
 print(f"{len(fits)} spots, of which {sum(found.status == 'converged' for found in fits)} converged")
 spread = values.std(ddof=1)
 print(f"thickness from {values.min():.1f} to {values.max():.1f} nm, standard deviation {spread:.1f} nm")
-print(f"median error of one spot {np.median(errors):.2f} nm, with the oxide's {thickness.sd:.2f} nm")
+print(f"median error of one spot {np.median(errors):.2f} nm, including the oxide {thickness.sd:.2f} nm")
 print(f"n at 658 nm from {index.min():.4f} to {index.max():.4f}")
 assert spread > 5 * thickness.sd
 
@@ -268,15 +269,15 @@ figure.colorbar(dots, label="thickness of the brush (nm)")
 plt.show()
 
 # %% [markdown]
-# The layer is uneven by far more than any error bar of a single spot. Both numbers are right; they answer
-# different questions. "How thick is the brush here?" has an error of a fraction of a nanometre, "how
-# thick is the brush on this wafer?" one of several.
+# The thickness varies over the wafer by much more than the error of a single spot. Both numbers are
+# correct, but they answer different questions: the thickness at one spot has an error of a fraction of a
+# nanometre, the thickness of the brush on this wafer one of several.
 #
-# ## What one writes
+# ## Text for a publication
 #
-# A reader must be able to judge the number and to repeat it: what was measured, the scene with all that
-# was assumed, how it was fitted, how large the error is and what it contains, and what the data did not
-# decide. The numbers are filled in by the program, so that they cannot differ from the results.
+# The text must allow a reader to assess and repeat the result: the measurement, the scene with all its
+# assumptions, the method of the fit, the size of the error and what it includes, and what the data do not
+# determine. The program inserts the numbers, so that they agree with the results.
 
 # %%
 low, high = first.angle.min(), first.angle.max()
@@ -299,8 +300,8 @@ print(textwrap.fill(" ".join(sentences), 100))
 print("\nsha256 of the data:", first.sha256[:16], "…")
 
 # %% [markdown]
-# Beside the sentence belong the data and the recipe. `fits/brush_post_synthesis` in the repository holds
-# both for the first spot; this repeats its fit, from Python or with `pellicle fit --recipe`:
+# Publish the data and the recipe with the text. `fits/brush_post_synthesis` in the repository contains both
+# for the first spot; this cell repeats its fit from Python, as `pellicle fit --recipe` does:
 
 # %%
 recipe = pl.read_recipe("../fits/brush_post_synthesis/recipe.toml")
