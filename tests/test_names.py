@@ -1,9 +1,16 @@
 """The names that `import pellicle` offers."""
 
 import ast
+import doctest
 import inspect
+import re
+import typing
+from importlib import import_module
 from pathlib import Path
 
+import jax
+import jax.numpy as jnp
+import numpy as np
 import pytest
 
 import pellicle as pl
@@ -11,6 +18,22 @@ from pellicle.dispersion import effective_medium, empirical, oscillators, spline
 from pellicle.dispersion.cody_lorentz import CodyLorentz
 
 NAMESPACES = ("dispersion", "mixing", "priors")
+PAGES = (Path(__file__).parents[1] / "docs" / "reference").glob("*.md")
+LISTED = [
+    name for page in PAGES for name in re.findall(r"^::: ([\w.]+)$", page.read_text("utf-8"), re.MULTILINE)
+]
+
+
+def in_namespaces():
+    """Every class of the namespaces, by the name that a user types."""
+    models = {**vars(pl.dispersion), **vars(pl.mixing)}
+    kinds = (empirical.AbstractDispersion, oscillators.AbstractOscillator)
+    found = {name: x for name, x in models.items() if inspect.isclass(x) and issubclass(x, kinds)}
+    priors = {name: x for name, x in vars(pl.priors).items() if x in typing.get_args(pl.priors.Prior)}
+    return {name: x for name, x in {**found, **priors}.items() if not name.startswith("Abstract")}
+
+
+PUBLIC = {name: getattr(pl, name) for name in pl.__all__ if name not in NAMESPACES} | in_namespaces()
 
 
 def test_every_name_loads_and_type_checkers_see_the_same():
@@ -48,3 +71,25 @@ def test_every_model_of_a_medium_is_offered():
         x for module in (pl.dispersion, pl.mixing) for x in vars(module).values() if inspect.isclass(x)
     }
     assert models - offered == {empirical.Sampled}
+
+
+def test_every_public_name_is_in_the_reference():
+    def resolve(path):
+        module, _, name = path.rpartition(".")
+        return (
+            import_module(path)
+            if name.islower() and module == "pellicle.brdf"
+            else vars(import_module(module))[name]
+        )
+
+    listed = [resolve(path) for path in LISTED]
+    assert [name for name, x in PUBLIC.items() if not any(x is y for y in listed)] == []
+    assert len(LISTED) == len(set(LISTED))
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_examples_in_docstrings_run(name):
+    names = {"pl": pl, "np": np, "jnp": jnp, "jax": jax}
+    finder, runner = doctest.DocTestFinder(recurse=False), doctest.DocTestRunner()
+    for example in finder.find(PUBLIC[name], name, extraglobs=names):
+        assert runner.run(example).failed == 0

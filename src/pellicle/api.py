@@ -86,7 +86,7 @@ def simulate(
     ```python
     >>> scene = pl.Scene(pl.Layer("SiO2", 500.0), "Si")
     >>> pl.simulate(scene, [500.0, 600.0, 700.0]).values.round(4)
-    array([0.3657, 0.0855, 0.2713])
+    array([0.3769, 0.1065, 0.3259])
 
     ```
     """
@@ -122,8 +122,8 @@ def plan(
     **Raises:** ValueError for a negative tolerance, and for a tolerance without wavelengths.
 
     ```python
-    >>> plan = pl.plan(pl.Scene(pl.Layer("SiO2", 500.0), "Si"))
-    >>> plan.on("coherence"), plan.on("back-face")
+    >>> plan = pl.plan(pl.Scene(pl.Layer("SiO2", 500.0), "Si", light=pl.Light(angle=60.0)))
+    >>> plan.on("polarisation"), plan.on("back-face")
     (True, False)
 
     ```

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import doctest
 import subprocess
 import sys
 from functools import partial
@@ -17,7 +16,6 @@ import pellicle as pl
 from pellicle.dispersion import Cauchy
 from pellicle.dispersion.empirical import Table
 from pellicle.materials import CLEAR, Material
-from pellicle.simulation import functions
 
 FUNCTIONS = {"R": pl.reflectance, "T": pl.transmittance}
 BOTH = pytest.mark.parametrize("function", FUNCTIONS.values(), ids=FUNCTIONS)
@@ -271,14 +269,6 @@ def test_lost_precision_is_said_once():
     assert second.startswith(
         "float64 input is computed in float32: jax.config.update('jax_enable_x64', True)"
     )
-
-
-def test_the_examples_in_the_docstrings():
-    tried = doctest.testmod(
-        functions, extraglobs={"pl": pl, "np": np, "jnp": jnp, "jax": jax} | vars(functions)
-    )
-    assert tried.failed == 0
-    assert tried.attempted > 0
 
 
 @pytest.mark.parametrize("whole", [np.asarray, jnp.asarray])

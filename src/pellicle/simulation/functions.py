@@ -1,4 +1,4 @@
-"""What a film does to light, as functions of numbers: the library's front door.
+"""Reflectance, transmittance and ellipsometric angles of coherent layers, as functions of numbers.
 
 Every argument broadcasts and may be traced: `jit`, `vmap`, `grad` and `jacfwd` work through all of
 them. The precision follows the input, float32 or float64.
@@ -36,25 +36,30 @@ def reflectance(
     angle: Any = 0.0,
     polarisation: str = "unpolarised",
 ) -> Float[Array, "..."]:
-    """Power reflectance of a layer on a half space, as a fraction.
+    """Power reflectance of one or several layers on a half space.
 
-    **Arguments:** `wavelength` and `thickness` in nm, `angle` of incidence in degrees, all of any
-    shape; `layer` and `substrate` as numbers n + ik (k ≥ 0 absorbs), arrays, materials or names;
-    `ambient` real; `polarisation` "s", "p" or "unpolarised" (the mean of both). For several coherent
-    layers `layer` is a list from the ambient down and `thickness` a list as long.
+    **Arguments:**
 
-    At 90° R is 1 and T is 0, save where nothing lies between equal media: that reflects nothing at any
-    angle. Where the substrate is exactly critical, its derivatives are truly infinite; those returned
-    are finite.
+    - `wavelength`, `thickness`: nm, any shape. For several layers `thickness` has one for each.
+    - `layer`, `substrate`: number n + ik (k ≥ 0 absorbs), array, material or name. For several coherent
+      layers `layer` is a list from the ambient down.
+    - `ambient`: as `layer`, but real.
+    - `angle` of incidence in degrees, any shape.
+    - `polarisation`: "s", "p" or "unpolarised" (the mean of both).
+
+    **Returns:** a fraction, in the shape that the arguments broadcast to.
+
+    At 90° R is 1 and T is 0, except without any layer between equal media, where R is 0 at every angle.
+    Where the substrate is exactly critical the derivatives diverge; those returned are finite.
 
     **Raises:** ValueError for an absorbing ambient, an unknown polarisation or material, and
-    wavelengths outside a material's data. Under `jit`, where wavelengths are unknown, the result is
+    wavelengths outside the data of a material. Under `jit`, where wavelengths are unknown, the result is
     NaN there.
 
     **Source:** Gerardin et al. 2019, eqs. 11-17, in the form of `pellicle.optics.film`.
 
     ```python
-    >>> round(float(reflectance(550.0, 100.0, 1.46, 4.07 + 0.03j)), 4)
+    >>> round(float(pl.reflectance(550.0, 100.0, 1.46, 4.07 + 0.03j)), 4)
     0.1015
 
     ```
@@ -74,10 +79,19 @@ def transmittance(
     angle: Any = 0.0,
     polarisation: str = "unpolarised",
 ) -> Float[Array, "..."]:
-    """Power transmittance of a layer into its substrate, as a fraction; arguments as `reflectance`.
+    """Power transmittance of one or several layers into their substrate.
 
-    With an absorbing substrate this is the power that enters it. Gerardin et al. 2019 (eq. 21) weight
-    both polarisations alike, which is wrong for p there; here each has its own factor.
+    **Arguments**, **Returns** and **Raises** as `reflectance`. With an absorbing substrate it is the power
+    that enters it.
+
+    **Source:** Gerardin et al. 2019, eq. 21. They use one power weight for both polarisations, which is
+    wrong for p with an absorbing substrate; here each has its own.
+
+    ```python
+    >>> round(float(pl.transmittance(550.0, 100.0, 1.46, 1.52, angle=60.0, polarisation="p")), 4)
+    0.9966
+
+    ```
     """
     return response.transmittance(
         *_responses(wavelength, thickness, layer, substrate, ambient, angle, polarisation)
@@ -93,11 +107,22 @@ def ellipsometry(
     ambient: Medium = 1.0,
     angle: Any,
 ) -> tuple[Float[Array, "..."], Float[Array, "..."]]:
-    """Ψ (0 to 90) and Δ (0 to 360) in degrees; arguments as `reflectance`, the angle in degrees.
+    """Ellipsometric angles Ψ and Δ of one or several layers on a half space.
+
+    **Arguments** and **Raises** as `reflectance`; `angle` in degrees has no default.
+
+    **Returns:** Ψ (0 to 90) and Δ (0 to 360) in degrees, in the shape that the arguments broadcast to. Where
+    r_p or r_s is 0, Δ is undefined and set to 0; where both are, Ψ is 0 too.
 
     tan(Ψ) exp(iΔ) = conj(r_p / r_s) for n + ik, as instruments write it: Δ is near 180 for bare
     silicon at small angles. Δ wraps around: fit N, C, S instead (`pellicle.optics.ellipsometry`).
-    Where r_p or r_s is 0, Δ has no meaning and is 0; where both are, Ψ is 0 too.
+
+    ```python
+    >>> psi, delta = pl.ellipsometry(632.8, 100.0, "SiO2", "Si", angle=70.0)
+    >>> round(float(psi), 2), round(float(delta), 2)
+    (41.03, 79.72)
+
+    ```
     """
     angle = _floating(angle)  # also at 0 both polarisations are needed
     s, p = _responses(wavelength, thickness, layer, substrate, ambient, angle, "unpolarised")
@@ -105,12 +130,16 @@ def ellipsometry(
 
 
 def refractive_index(wavelength: Any, what: Medium) -> Complex[Array, "..."]:
-    """n + ik of a material, or of what else a layer may be, at `wavelength` (nm).
+    """Complex refractive index n + ik of a material, or of anything that a layer may be made of.
+
+    **Arguments:** `wavelength` in nm, any shape; `what`: material, name, number or array.
+
+    **Returns:** complex, in the shape that the arguments broadcast to.
 
     **Raises:** ValueError for an unknown material and for wavelengths outside its data.
 
     ```python
-    >>> print(f"{complex(refractive_index(550.0, 'Au')):.2f}")
+    >>> print(f"{complex(pl.refractive_index(550.0, 'Au')):.2f}")
     0.42+2.47j
 
     ```
