@@ -95,7 +95,7 @@ def drawn(rng: np.random.Generator, surface: Surface) -> dict[str, Any]:
     free = {key: ways[key]() for key, number in surface.numbers.items() if isinstance(number, Free)}
     if surface.model[0] != "g":
         free["n"] = float(np.mean(free["n"]))
-    return {**surface.fixed(), **free}
+    return {**surface.fixed_numbers(), **free}
 
 
 def seen(surface: Surface, truth: dict[str, Any], noise: float, rng: np.random.Generator) -> BrdfSamples:
@@ -118,7 +118,7 @@ def run(surface: Surface, noise: float, seed: int) -> Run:
     at = local(whole, minima.units[0], sigma_known=True)
     status, found = judged(surface, whole, minima, at, rivals(whole, minima, at), sigma_known=True)
     seconds = time.perf_counter() - began
-    true = {leaf.name: float(np.ravel(truth[leaf.key])[leaf.channel or 0]) for leaf in surface.leaves()}
+    true = {leaf.name: float(np.ravel(truth[leaf.key])[leaf.channel or 0]) for leaf in surface.free_numbers()}
     scores = {k: ((found[k].value - x) / found[k].stderr, found[k].stderr) for k, x in true.items()}
     return Run(at.chi2_reduced, status, seconds, scores)
 
@@ -144,7 +144,7 @@ def study(name: str, runs: int, noise: float) -> None:
     print(f"Right minimum in {share(right)}; {said}; right where claimed {share(right[claimed])}.\n")
     print("| parameter | within 2 errors, all runs | where claimed | within 3, claimed | sd of z, claimed |")
     print("|---|---|---|---|---|")
-    for leaf in surface.leaves():
+    for leaf in surface.free_numbers():
         z, error = np.array([r.scores[leaf.name] for r in results]).T
         seen_ = np.isfinite(error)
         z, sure = np.abs(z), seen_ & claimed
@@ -160,7 +160,7 @@ def intervals(name: str, runs: int, noise: float) -> None:
         truth = drawn(rng, surface)
         found = sample_brdf(seen(surface, truth, noise, rng), surface, seed=seed)
         refused += not found.trusted
-        for leaf in surface.leaves() if found.trusted else ():
+        for leaf in surface.free_numbers() if found.trusted else ():
             values = found.draws[..., found.names.index(leaf.name)].ravel()
             below = np.mean(values < float(np.ravel(truth[leaf.key])[leaf.channel or 0]))
             inside.append(abs(2 * below - 1))

@@ -19,7 +19,7 @@ from pellicle.effects.surface import exact
 from pellicle.planning import surface as thrift
 from pellicle.planning.differences import signals
 from pellicle.scene.free import Free, free_leaves
-from pellicle.scene.surface import Surface, lit
+from pellicle.scene.surface import Surface, surface_view
 from pellicle.simulation.surface import build
 from pellicle.synthetic.brdf import default_directions
 
@@ -81,8 +81,8 @@ KINDS = {"facets": facets, "shader": shader, "lobes": lobes}
 
 def tried(rng: np.random.Generator, surface: Surface, tolerance: float) -> tuple[set[str], float, float]:
     """What the plan leaves out, how far it is off, and how far it says to be."""
-    plan = thrift.plan(lit(surface, LOOKED), tolerance)
-    whole = lit(surface, LOOKED, len(LOOKED.theta_i))
+    plan = thrift.plan(surface_view(surface, LOOKED), tolerance)
+    whole = surface_view(surface, LOOKED, len(LOOKED.theta_i))
     free = [leaf for _, leaf in free_leaves(whole)]
     low, high = (np.array([getattr(f, side) for f in free]) for side in ("lower", "upper"))
     points = rng.uniform(low, high, (FRESH, len(free)))

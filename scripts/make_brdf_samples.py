@@ -38,7 +38,7 @@ def main(folder: Path = STUDIES) -> None:
 
 
 def _truth(surface):
-    return [(key, number.reshape(-1)) for key, number in surface.start().items()]
+    return [(key, number.reshape(-1)) for key, number in surface.start_numbers().items()]
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ import pytest
 import pellicle as pl
 from pellicle import api
 from pellicle.planning import film, surface
-from pellicle.scene.surface import lit
+from pellicle.scene.surface import surface_view
 from pellicle.synthetic.brdf import default_directions, simulate_brdf
 from pellicle.synthetic.spectra import simulate
 
@@ -26,7 +26,7 @@ def test_simulate_takes_a_film_or_a_surface():
 def test_plan_takes_a_film_or_a_surface():
     assert pl.plan(FILM) == film.plan(FILM)
     assert pl.plan(STEEL, 1e-2, directions=DIRECTIONS, keep=["oblique"]) == surface.plan(
-        lit(STEEL, DIRECTIONS), 1e-2, ["oblique"]
+        surface_view(STEEL, DIRECTIONS), 1e-2, ["oblique"]
     )
 
 

@@ -31,7 +31,7 @@ from pellicle.sampling.brdf import sample_brdf
 from pellicle.sampling.result import Posterior
 from pellicle.sampling.spectra import sample as sample_spectra
 from pellicle.scene.film import Scene
-from pellicle.scene.surface import Surface, SurfaceView, lit
+from pellicle.scene.surface import Surface, SurfaceView, surface_view
 from pellicle.synthetic.brdf import Directions, default_directions, simulate_brdf
 from pellicle.synthetic.spectra import default_wavelengths
 from pellicle.synthetic.spectra import simulate as simulate_spectrum
@@ -345,4 +345,4 @@ def _refuse(kind: str, **arguments: Any) -> None:
 
 
 def _view(surface: Surface, directions: Directions | BrdfSamples | None) -> SurfaceView:
-    return lit(surface, default_directions() if directions is None else directions)
+    return surface_view(surface, default_directions() if directions is None else directions)

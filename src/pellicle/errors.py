@@ -1,6 +1,9 @@
-"""Errors that a user can act on: each message is one sentence with the remedy in it."""
+"""Errors that a user can act on: each message is one sentence that ends with the remedy."""
 
 from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
 
 
 class DataError(ValueError):
@@ -9,3 +12,15 @@ class DataError(ValueError):
 
 class UsageError(ValueError):
     """An argument that is missing, contradictory or out of range; exit code 2."""
+
+
+def did_you_mean(word: str, known: Iterable[str], cutoff: float = 0.5) -> str:
+    """Return ` (did you mean ...?)` with the known word most like `word`, or an empty string.
+
+    `cutoff` is the least similarity, 0 to 1, as `difflib.get_close_matches` defines it.
+
+    >>> did_you_mean("thicknes", ["thickness", "angle"])
+    " (did you mean 'thickness'?)"
+    """
+    close = difflib.get_close_matches(word, list(known), n=1, cutoff=cutoff)
+    return f" (did you mean {close[0]!r}?)" if close else ""

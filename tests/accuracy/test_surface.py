@@ -15,11 +15,13 @@ from pellicle.colour import delta_e2000, lab, sensor
 from pellicle.reporting.cost import surface_text
 from pellicle.reporting.cost_files import surface_to_json
 from pellicle.scene.free import Free
-from pellicle.scene.surface import Surface, lit
+from pellicle.scene.surface import Surface, surface_view
 from pellicle.synthetic.brdf import default_directions
 
-STEEL = lit(Surface("microfacet-film", {"thickness": Free(10, 70), "n": 2.9}), default_directions(), 40)
-PAINT = lit(Surface("granier-heidrich", {"thickness": Free(10, 70)}), default_directions(), 40)
+STEEL = surface_view(
+    Surface("microfacet-film", {"thickness": Free(10, 70), "n": 2.9}), default_directions(), 40
+)
+PAINT = surface_view(Surface("granier-heidrich", {"thickness": Free(10, 70)}), default_directions(), 40)
 RUNGS = {rung.name: rung for rung in COLOURS}
 
 
@@ -68,7 +70,7 @@ def test_what_makes_no_sense_says_why(films):
     assert RUNGS["nodes-6-500"].program(thick) == "its wavelengths are for films up to 500 nm"
     assert "too few angles" in RUNGS["uniform-64 at 32 angles"].program(films)
     assert "made for three wavelengths" in coloured(PAINT, drawn(PAINT))
-    each = lit(Surface("blinn-phong-film", {}), default_directions(), 8)
+    each = surface_view(Surface("blinn-phong-film", {}), default_directions(), 8)
     free = dataclasses.replace(each, numbers={**each.numbers, "n": [Free(1.4, 1.5)] * 3})
     assert "nothing says what it is between" in coloured(free, drawn(free))
 

@@ -14,7 +14,7 @@ from pellicle.sampling import brdf as sampling
 from pellicle.sampling.ensemble import Subject, sampled
 from pellicle.sampling.modes import mixture
 from pellicle.sampling.predict import Axis, Prediction
-from pellicle.scene.surface import lit
+from pellicle.scene.surface import surface_view
 
 RECIPE = """
 [data]
@@ -67,7 +67,7 @@ def told(monkeypatch):
             effective_points=90.0,
             correlation_names=("thickness",),
             correlation=np.eye(1),
-            plan=exact(lit(surface, samples)),
+            plan=exact(surface_view(surface, samples)),
             warnings=("a warning",),
             model=np.zeros_like(samples.values),
             seconds=0.1,
@@ -93,10 +93,10 @@ def test_a_recipe_says_what_is_fitted_and_how(folder, told, pellicle):
     assert {row["effect"] for row in found["plan"]} >= {"spectral-sampling", "roughness", "diffuse"}
     assert told["residual"] == "log"
     assert np.all(told["samples"].sigma == 0.01)
-    fixed = told["surface"].fixed()
+    fixed = told["surface"].fixed_numbers()
     assert fixed["base_n"].tolist() == [3.9] * 3
     assert fixed["base_k"].tolist() == [0.02] * 3
-    assert [leaf.name for leaf in told["surface"].leaves()] == ["thickness", "roughness"]
+    assert [leaf.name for leaf in told["surface"].free_numbers()] == ["thickness", "roughness"]
     report = (folder / "out" / "report.txt").read_text()
     assert "two lobes" in report
     assert "not determined" in report
@@ -213,6 +213,6 @@ def test_flags_that_a_surface_has_no_use_for(folder, pellicle):
 
 def test_a_metal_from_the_catalogue_is_the_base(folder):
     (folder / "paint.toml").write_text(RECIPE.replace('"3.9+0.02j"', '"Fe"'))
-    fixed = read_recipe(folder / "paint.toml").scene().fixed()
+    fixed = read_recipe(folder / "paint.toml").scene().fixed_numbers()
     assert fixed["base_n"].shape == (3,)
     assert np.all((fixed["base_n"] > 2) & (fixed["base_n"] < 3.2) & (fixed["base_k"] > 2))

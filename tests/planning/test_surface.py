@@ -14,7 +14,7 @@ from pellicle.planning.differences import gradients
 from pellicle.planning.surface import FLOOR, work
 from pellicle.planning.tolerance import SAFETY
 from pellicle.scene.free import Free, insert
-from pellicle.scene.surface import Surface, lit
+from pellicle.scene.surface import Surface, surface_view
 from pellicle.simulation.surface import build
 from pellicle.synthetic.brdf import Directions, default_directions
 
@@ -49,7 +49,7 @@ GONE = {
 
 
 def rows(surface, looked=LOOKED):
-    return {row.effect: row for row in exact(lit(surface, looked)).rows}
+    return {row.effect: row for row in exact(surface_view(surface, looked)).rows}
 
 
 def test_effects_are_judged_from_bounds_and_not_from_values():
@@ -85,7 +85,7 @@ COMPOSED = [
 def test_what_is_composed_is_the_model(name, numbers):
     """Whatever its effects: the exact plan is the BRDF as its own module computes it."""
     surface = Surface(name, numbers)
-    numbers, looked = surface.start(), lit(surface, LOOKED)
+    numbers, looked = surface.start_numbers(), surface_view(surface, LOOKED)
     with jax.enable_x64(True):
         expected = jax.jit(surface.brdf.evaluate)(numbers, looked.i, looked.o)
         found = jax.jit(build(exact(looked)))(looked)
@@ -94,14 +94,16 @@ def test_what_is_composed_is_the_model(name, numbers):
 
 @pytest.fixture(scope="module")
 def plans():
-    return {name: thrift.plan(lit(surface, LOOKED), TOLERANCE) for name, (surface, _) in GONE.items()}
+    return {
+        name: thrift.plan(surface_view(surface, LOOKED), TOLERANCE) for name, (surface, _) in GONE.items()
+    }
 
 
 @pytest.mark.parametrize("name", GONE)
 def test_what_changes_little_is_left_out_within_the_bound(plans, name):
     """At thicknesses that the plan did not look at; for less work, and with every gradient."""
     plan, (surface, effects) = plans[name], GONE[name]
-    seen = lit(surface, LOOKED)
+    seen = surface_view(surface, LOOKED)
     assert {left_out.effect for left_out in plan.left_out} == effects
     assert 0 < plan.error_bound <= TOLERANCE
     points = np.random.default_rng(5).uniform(40.0, 300.0, (64, 1))
@@ -129,7 +131,7 @@ def test_an_effect_whose_number_is_free_stays(effect):
         surface = Surface("granier-heidrich", thin | tilt)
     else:
         surface = Surface("microfacet-film", thin | FREE)
-    kept = thrift.alternatives(effect, lit(surface, LOOKED))
+    kept = thrift.alternatives(effect, surface_view(surface, LOOKED))
     assert bool(kept) == (effect in ("oblique", "polarisation", "precision"))
 
 
@@ -137,7 +139,7 @@ def test_what_is_absent_leaves_no_trace():
     """Fewer primitives, one effect after the other."""
 
     def primitives(**numbers):
-        seen = lit(Surface("granier-heidrich-full", numbers), LOOKED)
+        seen = surface_view(Surface("granier-heidrich-full", numbers), LOOKED)
         return len(jax.make_jaxpr(build(exact(seen)))(seen).eqns)
 
     counts = [
@@ -152,7 +154,7 @@ def test_what_is_absent_leaves_no_trace():
 
 def test_a_lobe_that_is_too_weak_goes_with_its_layer():
     """What is left is the diffuse part, in every channel."""
-    seen = lit(Surface("microfacet-film", {"specular": 1e-9, "diffuse": 0.2}), LOOKED)
+    seen = surface_view(Surface("microfacet-film", {"specular": 1e-9, "diffuse": 0.2}), LOOKED)
     (plan,) = thrift.alternatives("roughness", seen)
     assert [row.effect for row in plan.rows if row.on] == ["diffuse", "precision"]
     with jax.enable_x64(True):
@@ -162,4 +164,4 @@ def test_a_lobe_that_is_too_weak_goes_with_its_layer():
 
 def test_nothing_to_compute():
     with pytest.raises(UsageError, match="nothing to compute"):
-        lit(Surface("granier-heidrich", {"specular": 0.0, "diffuse": 0.0}), LOOKED)
+        surface_view(Surface("granier-heidrich", {"specular": 0.0, "diffuse": 0.0}), LOOKED)

@@ -33,7 +33,7 @@ def test_a_film_and_a_surface(write, tmp_path):
     assert isinstance(surface, SurfaceRecipe)
     assert isinstance(surface.scene(), pl.Surface)
     assert surface.files == [str(tmp_path / "paint.csv")]
-    np.testing.assert_array_equal(surface.scene().fixed()["n"], [1.5, 1.6, 1.7])
+    np.testing.assert_array_equal(surface.scene().fixed_numbers()["n"], [1.5, 1.6, 1.7])
 
 
 def test_the_signal_alone_makes_a_surface(write):

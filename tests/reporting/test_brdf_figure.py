@@ -12,7 +12,7 @@ from pellicle.effects.surface import exact
 from pellicle.fitting.brdf.result import BrdfFit
 from pellicle.fitting.result import Status
 from pellicle.reporting.brdf_figure import draw, half_angle
-from pellicle.scene.surface import Surface, lit
+from pellicle.scene.surface import Surface, surface_view
 
 
 @pytest.fixture
@@ -45,7 +45,7 @@ def fit():
         effective_points=3.0,
         correlation_names=(),
         correlation=np.zeros((0, 0)),
-        plan=exact(lit(surface, samples)),
+        plan=exact(surface_view(surface, samples)),
         warnings=(),
         model=samples.values + 0.1,
         seconds=0.0,

@@ -46,7 +46,7 @@ class SurfaceCost:
 
 
 def cost(
-    lit: SurfaceView, *, tolerance: float | None = None, progress: Progress = lambda what, done, total: None
+    view: SurfaceView, *, tolerance: float | None = None, progress: Progress = lambda what, done, total: None
 ) -> SurfaceCost:
     """Measure every way to a surface's colours (`tolerance` in mean ΔE2000), and to its BRDF.
 
@@ -56,42 +56,42 @@ def cost(
     if tolerance is not None and not 0 < tolerance < math.inf:
         raise UsageError(f"the tolerance must be above zero, got {tolerance:g}: what error is small enough?")
     with jax.enable_x64(True):
-        draws = drawn(lit)
-        films = coloured(lit, draws)
+        draws = drawn(view)
+        films = coloured(view, draws)
         found, own = None, tolerance
         if isinstance(films, Films):
             found, own = _colours(films, tolerance or COLOUR_TOLERANCE, progress), None
-        values = _values(lit, draws, own or VALUE_TOLERANCE, progress)
+        values = _values(view, draws, own or VALUE_TOLERANCE, progress)
         return SurfaceCost(found, values, films if isinstance(films, str) else "")
 
 
-def drawn(lit: SurfaceView, count: int = DRAWS, seed: int = 0) -> np.ndarray:
+def drawn(view: SurfaceView, count: int = DRAWS, seed: int = 0) -> np.ndarray:
     """Values of the free numbers, (draws, numbers), uniform between the bounds; the first are the start."""
-    free = [leaf for _, leaf in free_leaves(lit)]
+    free = [leaf for _, leaf in free_leaves(view)]
     low, high = (np.array([getattr(f, side) for f in free]) for side in ("lower", "upper"))
     draws = np.random.default_rng(seed).uniform(low, high, (count, len(free)))
-    draws[0] = start_values(lit)
+    draws[0] = start_values(view)
     return draws
 
 
 FILM = ("thickness", "n", "k", "base_n", "base_k", "ambient_n")
 
 
-def coloured(lit: SurfaceView, draws: np.ndarray) -> Films | str:
+def coloured(view: SurfaceView, draws: np.ndarray) -> Films | str:
     """The films of these draws, or why they have no colour of their own."""
-    if lit.brdf.coloured is None:
-        return f"{lit.model} is made for three wavelengths and has no other colour"
-    if any(isinstance(lit.numbers.get(key), list) for key in FILM):
+    if view.brdf.coloured is None:
+        return f"{view.model} is made for three wavelengths and has no other colour"
+    if any(isinstance(view.numbers.get(key), list) for key in FILM):
         return "an index is free for each of three wavelengths: nothing says what it is between them"
-    each = [insert(lit.numbers, values) for values in draws]
-    at = tuple(np.asarray(lit.numbers["wavelengths"]))
+    each = [insert(view.numbers, values) for values in draws]
+    at = tuple(np.asarray(view.numbers["wavelengths"]))
     numbers = {}
     for key in FILM:
-        if key in lit.numbers and np.ndim(each[0][key]) == 0:
+        if key in view.numbers and np.ndim(each[0][key]) == 0:
             numbers[key] = np.array([float(one[key]) for one in each])
-        elif key in lit.numbers:
+        elif key in view.numbers:
             numbers[key] = colour_methods.along_the_spectrum(each[0][key], at)
-    angle = np.asarray(angle_to_half(lit.i, lit.o))
+    angle = np.asarray(angle_to_half(view.i, view.o))
     return Films(numbers, angle, float(np.max(numbers["thickness"])))
 
 
@@ -116,23 +116,23 @@ class ValueRung:
     double: bool = True
 
 
-def _left_out(effect: str, absent: str, lit: SurfaceView, tolerance: float) -> Plan | str:
-    judged = exact(lit)
+def _left_out(effect: str, absent: str, view: SurfaceView, tolerance: float) -> Plan | str:
+    judged = exact(view)
     if not any(row.effect == effect and row.on for row in judged.rows):
         return absent
     other = {"roughness": "diffuse", "diffuse": "specular"}.get(effect)
-    if other is not None and other not in lit.numbers:
+    if other is not None and other not in view.numbers:
         return "it is all there is"
     leave_out = LeftOut(effect)
-    return replace(exact(leave_out(lit)), left_out=(leave_out,))
+    return replace(exact(leave_out(view)), left_out=(leave_out,))
 
 
-def _by_angles(count: int, lit: SurfaceView, tolerance: float) -> Plan | str:
-    judged = {row.effect: row for row in exact(lit).rows}
+def _by_angles(count: int, view: SurfaceView, tolerance: float) -> Plan | str:
+    judged = {row.effect: row for row in exact(view).rows}
     if "oblique" not in judged or not judged["oblique"].on:
         return "no film whose colour depends on the angle"
     rows = (replace(row, count=count) if row.effect == "oblique" else row for row in judged.values())
-    return replace(exact(lit), rows=tuple(rows))
+    return replace(exact(view), rows=tuple(rows))
 
 
 def _absent(effect: str, absent: str) -> Callable[[SurfaceView, float], Plan | str]:
@@ -140,8 +140,8 @@ def _absent(effect: str, absent: str) -> Callable[[SurfaceView, float], Plan | s
 
 
 VALUES = (
-    ValueRung("float64", "nothing", lambda lit, _: exact(lit)),
-    ValueRung("float32", "nine digits of sixteen", lambda lit, _: exact(lit), double=False),
+    ValueRung("float64", "nothing", lambda view, _: exact(view)),
+    ValueRung("float32", "nine digits of sixteen", lambda view, _: exact(view), double=False),
     ValueRung("planned", "what a plan within the tolerance does", surface.plan),
     *(
         ValueRung(f"{n} angles", "the film's colour between them", partial(_by_angles, n))
@@ -159,30 +159,30 @@ VALUES = (
 """Every rung to the values of a BRDF, in the order of the table."""
 
 
-def _values(lit: SurfaceView, draws: np.ndarray, tolerance: float, progress: Progress) -> Ladder:
-    truth = _program(lit, draws, exact(lit)).run()
+def _values(view: SurfaceView, draws: np.ndarray, tolerance: float, progress: Progress) -> Ladder:
+    truth = _program(view, draws, exact(view)).run()
     scale = np.maximum(np.abs(truth), FLOOR)
 
     def prepare(rung: ValueRung) -> Program | str:
-        plan = rung.plan(lit, tolerance)
-        return plan if isinstance(plan, str) else _program(lit, draws, plan.static_key, rung.double)
+        plan = rung.plan(view, tolerance)
+        return plan if isinstance(plan, str) else _program(view, draws, plan.static_key, rung.double)
 
     def error(answer: np.ndarray) -> float:
         worst = float(np.max(np.abs(np.asarray(answer, float) - truth) / scale))
         return worst if math.isfinite(worst) else math.inf
 
-    ladder = Ladder("float64", tolerance, "relative", len(lit.i), len(draws), "sample")
+    ladder = Ladder("float64", tolerance, "relative", len(view.i), len(draws), "sample")
     return measured(ladder, VALUES, prepare, error, progress)
 
 
-def _program(lit: SurfaceView, draws: np.ndarray, plan: Plan, double: bool = True) -> Program:
+def _program(view: SurfaceView, draws: np.ndarray, plan: Plan, double: bool = True) -> Program:
     """The BRDF of every draw, (draws, directions, channels)."""
     simulate = build(plan)
 
     def one(values: Any, nothing: Any, numbers: Any, i: Any, o: Any) -> Any:
         # what is the same for all draws would be computed once
-        return simulate(replace(insert(replace(lit, numbers=numbers), list(values)), i=i + nothing, o=o))
+        return simulate(replace(insert(replace(view, numbers=numbers), list(values)), i=i + nothing, o=o))
 
     call = jax.vmap(one, in_axes=(0, 0, None, None, None))
-    arguments = (draws, np.zeros(len(draws)), lit.numbers, lit.i, lit.o)
-    return compiled_function(call, arguments, len(draws) * len(lit.i), double)
+    arguments = (draws, np.zeros(len(draws)), view.numbers, view.i, view.o)
+    return compiled_function(call, arguments, len(draws) * len(view.i), double)

@@ -52,7 +52,7 @@ def fit_surface(
         name: getattr(reading, name) for name in ("columns", "noise") if getattr(reading, name) is not None
     }
     recipe = recipe.with_data(**said)
-    if not recipe.scene().leaves():
+    if not recipe.scene().free_numbers():
         raise DataError(
             f"{recipe.path}: nothing is free to fit: give bounds, as in"
             " thickness = { lower = 0, upper = 1000 }"
@@ -108,7 +108,7 @@ def _one(
             len(samples),
             ", ".join(samples.channels),
         )
-        for leaf in surface.leaves():
+        for leaf in surface.free_numbers():
             log.info("free: %s between %g and %g", leaf.name, leaf.free.lower, leaf.free.upper)
         fit, posterior = _found(recipe, surface, samples, folder, sampler, progress)
     except ValueError as error:

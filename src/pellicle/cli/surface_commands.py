@@ -28,7 +28,7 @@ def simulate_surface(
     start()
     samples, plan = synthesise(surface, looked, noise, seed, tolerance)
     of_plan(plan)
-    numbers = surface.start()
+    numbers = surface.start_numbers()
     units = {about.key: about.unit for about in surface.brdf.parameters}
     truth = (f"{key} = {_listed(x)} {units.get(key, 'nm')}".strip() for key, x in numbers.items())
     said = [
@@ -66,9 +66,9 @@ def plan_surface(recipe: SurfaceRecipe, tolerance: float, as_json: bool) -> int:
     from pellicle.planning import cost_model
     from pellicle.planning import surface as planning
     from pellicle.reporting import plans
-    from pellicle.scene.surface import lit
+    from pellicle.scene.surface import surface_view
 
-    seen = lit(surface, looked)
+    seen = surface_view(surface, looked)
     chosen, calibration = planning.plan(seen, tolerance), cost_model.calibrated(cache_folder())
     savings = planning.savings(seen, calibration)
     whole, planned = (calibration.seconds(planning.work(p, seen)) for p in (exact(seen), chosen))
@@ -90,11 +90,11 @@ def cost_surface(recipe: SurfaceRecipe, tolerance: float | None, out: str | None
     from pellicle.accuracy.surface import cost
     from pellicle.reporting.cost import surface_text
     from pellicle.reporting.cost_files import surface_to_json, write_surface_cost
-    from pellicle.scene.surface import lit
+    from pellicle.scene.surface import surface_view
 
     progress = Progress(recipe.path)
     try:
-        result = cost(lit(surface, looked), tolerance=tolerance, progress=progress)
+        result = cost(surface_view(surface, looked), tolerance=tolerance, progress=progress)
     finally:
         progress.clear()
     record = surface_to_json(result, recipe.path)

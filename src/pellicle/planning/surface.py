@@ -39,7 +39,7 @@ NODES = (8, 16, 24, 32, 48, 64, 96, 128)
 """Angles at which a film's colour may be computed, in place of every sample's own."""
 
 
-def plan(lit: SurfaceView, tolerance: float = 0.0, keep: Iterable[str] = ()) -> Plan:
+def plan(view: SurfaceView, tolerance: float = 0.0, keep: Iterable[str] = ()) -> Plan:
     """The effects to simulate so that the BRDF is within `tolerance`, relative, of the whole truth.
 
     At 0 an effect is left out only where it is provably absent. `keep` names effects that must stay.
@@ -48,33 +48,33 @@ def plan(lit: SurfaceView, tolerance: float = 0.0, keep: Iterable[str] = ()) -> 
     """
     check_tolerance(tolerance)
     if tolerance == 0:
-        return exact(lit)
+        return exact(view)
     with jax.enable_x64(True):
-        return _economised(lit, tolerance, set(keep))
+        return _economised(view, tolerance, set(keep))
 
 
-def _economised(lit: SurfaceView, tolerance: float, keep: set[str]) -> Plan:
-    exactly, points = exact(lit), design(lit)
-    see = seeing(lit, points)
+def _economised(view: SurfaceView, tolerance: float, keep: set[str]) -> Plan:
+    exactly, points = exact(view), design(view)
+    see = seeing(view, points)
     leave_out = [partial(_leave_out, effect) for effect in CAN_BE_LEFT_OUT if effect not in keep]
     moves = [*leave_out, *([] if "oblique" in keep else [_by_nodes])]
-    stage = economise(Stage(exactly, lit, see(exactly), {}), moves, see, tolerance)
-    lost = _gradient_error(exactly, stage.plan, lit, points) if stage.told else 0.0
+    stage = economise(Stage(exactly, view, see(exactly), {}), moves, see, tolerance)
+    lost = _gradient_error(exactly, stage.plan, view, points) if stage.told else 0.0
     return replace(stage.plan, rows=stage.rows, tolerance=tolerance, gradient_error=lost)
 
 
-def seeing(lit: SurfaceView, points: np.ndarray) -> See:
+def seeing(view: SurfaceView, points: np.ndarray) -> See:
     """What a plan of the surface measures at these points, over what is truly there (or `FLOOR`)."""
-    truth = signals(exact(lit), lit, points, build)
+    truth = signals(exact(view), view, points, build)
     scale = np.maximum(np.abs(truth), FLOOR)
-    return lambda plan: signals(plan, lit, points, build) / scale
+    return lambda plan: signals(plan, view, points, build) / scale
 
 
-def _gradient_error(exactly: Plan, chosen: Plan, lit: SurfaceView, points: np.ndarray) -> float:
+def _gradient_error(exactly: Plan, chosen: Plan, view: SurfaceView, points: np.ndarray) -> float:
     if not points.shape[1]:
         return 0.0
     some = points[-SLOPE_POINTS:]
-    return largest_slope_change(*(gradients(each, lit, some, build) for each in (exactly, chosen)))
+    return largest_slope_change(*(gradients(each, view, some, build) for each in (exactly, chosen)))
 
 
 def _leave_out(effect: str, stage: Stage) -> Iterator[Step]:
@@ -106,20 +106,20 @@ def _by_nodes(stage: Stage) -> Iterator[Step]:
         yield Step(replace(stage.plan, rows=tuple(chosen)), stage.scene, row)
 
 
-def alternatives(effect: str, lit: SurfaceView) -> list[Plan]:
+def alternatives(effect: str, view: SurfaceView) -> list[Plan]:
     """Plans of the surface without one effect, all else exact; none where it is absent or must stay."""
-    return [step.plan for step in _leave_out(effect, Stage(exact(lit), lit, np.zeros(0), {}))]
+    return [step.plan for step in _leave_out(effect, Stage(exact(view), view, np.zeros(0), {}))]
 
 
-def work(plan: Plan, lit: SurfaceView) -> cost_model.Work:
+def work(plan: Plan, view: SurfaceView) -> cost_model.Work:
     """The operations of one evaluation along all directions, at the start values."""
     with jax.enable_x64(True):
-        return cost_model.counted(build(plan.static_key), insert(lit, start_values(lit)))
+        return cost_model.counted(build(plan.static_key), insert(view, start_values(view)))
 
 
-def savings(lit: SurfaceView, calibration: cost_model.Calibration) -> dict[str, cost_model.Saving]:
+def savings(view: SurfaceView, calibration: cost_model.Calibration) -> dict[str, cost_model.Saving]:
     """For each effect that could be left out: what that would change and save, all else being exact."""
     with jax.enable_x64(True):
-        see = seeing(lit, design(lit))
-        cheaper = {effect: alternatives(effect, lit)[:1] for effect in CAN_BE_LEFT_OUT}
-        return cost_model.saved(exact(lit), cheaper, see, lambda plan: calibration.seconds(work(plan, lit)))
+        see = seeing(view, design(view))
+        cheaper = {effect: alternatives(effect, view)[:1] for effect in CAN_BE_LEFT_OUT}
+        return cost_model.saved(exact(view), cheaper, see, lambda plan: calibration.seconds(work(plan, view)))

@@ -106,7 +106,7 @@ def _surface(table: SurfaceTable, folder: Path) -> Surface:
     if table.base is not None:
         if clash := {"base_n", "base_k"} & numbers.keys():
             raise UsageError(f"base and {' and '.join(sorted(clash))} exclude each other")
-        index = np.asarray(medium(table.base, folder)(np.array(bare.seen_at)))
+        index = np.asarray(medium(table.base, folder)(np.array(bare.channel_wavelengths)))
         numbers |= {"base_n": np.real(index).tolist(), "base_k": np.imag(index).tolist()}
     return Surface(table.model, numbers, wavelengths)
 

@@ -62,7 +62,7 @@ def sample_brdf(
 def _subject(samples: BrdfSamples, surface: Surface, fit: BrdfFit, found: Found) -> Subject:
     own, variance = affine(surface, found.problem), found.at.variance
     form, *rest = own.program
-    known = {leaf.name: leaf for leaf in surface.leaves()}
+    known = {leaf.name: leaf for leaf in surface.free_numbers()}
     free = [known[name].free for name in form.coordinates.names]
     lower, upper = (np.array([getattr(each, side) for each in free]) for side in ("lower", "upper"))
     held = jax.device_put((*rest, boxed(lower, upper, [each.prior for each in free]), np.float64(variance)))
@@ -137,7 +137,7 @@ def _moved(searched: Problem, own: Problem, unit: np.ndarray) -> np.ndarray:
 
 def _whose(samples: BrdfSamples, surface: Surface, compared: str) -> str:
     seen = (samples.theta_i, samples.phi_i, samples.theta_o, samples.phi_o, samples.values, samples.sigma)
-    return fingerprint([seen, (dict(surface.numbers), surface.seen_at)], surface.model, compared)
+    return fingerprint([seen, (dict(surface.numbers), surface.channel_wavelengths)], surface.model, compared)
 
 
 @partial(jax.jit, static_argnums=0)

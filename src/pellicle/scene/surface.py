@@ -1,8 +1,7 @@
-"""A surface as a recipe describes it: a BRDF by name, each of its keys fixed or free."""
+"""Surfaces: a BRDF model by name, with each of its numbers fixed or free."""
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol, final, runtime_checkable
@@ -13,35 +12,41 @@ import numpy as np
 from pellicle.brdf.directions import direction
 from pellicle.brdf.models import Model, Parameter, model
 from pellicle.data.brdf_samples import spread
-from pellicle.errors import UsageError
+from pellicle.errors import UsageError, did_you_mean
 from pellicle.scene.free import Free
 
 LETTERS = ("r", "g", "b")
 
 
 class FreeNumber(NamedTuple):
-    """One free number: `n_g` of the key `n`, its bounds and how it is searched."""
+    """One free number: the `n_g` of the key `n`, its bounds, and its entry in the model's table."""
 
     name: str
     key: str
     channel: int | None
     free: Free
-    about: Parameter
+    parameter: Parameter
 
     @property
     def log(self) -> bool:
-        """Searched in its logarithm."""
-        return self.about.log and self.free.lower > 0
+        """True where the search runs over the logarithm."""
+        return self.parameter.log and self.free.lower > 0
 
 
 @dataclass(frozen=True)
 class Surface:
-    """A BRDF by name and its numbers: `Surface("microfacet-film", {"thickness": Free(lower=0, upper=500)})`.
+    """A surface: a BRDF model by name, with its numbers.
 
-    Each key of `numbers` is a number, one number a channel, or a `Free`; a key per channel that is
-    free becomes `n_r`, `n_g` and `n_b`. A key that is not given keeps the model's default, fixed.
-    `wavelengths` (nm) has one for each channel of the samples. Raises UsageError for a name or key
-    that is none, and for a count that does not match.
+    **Arguments:** `model`, a name such as "microfacet-film"; `numbers`, for each key of the model one number,
+    one number per channel or a `Free` (missing keys keep the model's defaults, fixed); `wavelengths` in nm,
+    one for each channel of the samples (the model's own if None). A `Free` of a key that differs between
+    channels becomes `n_r`, `n_g` and `n_b`.
+
+    **Raises:** UsageError for an unknown name or key, and where the count of numbers does not match.
+
+    >>> surface = Surface("microfacet-film", {"thickness": Free(0, 500), "n": [1.5, 1.52, 1.54]})
+    >>> [number.name for number in surface.free_numbers()]
+    ['thickness']
     """
 
     model: str
@@ -55,70 +60,74 @@ class Surface:
             raise UsageError(str(error)) from None
         for key, value in self.numbers.items():
             if key not in known:
-                near = difflib.get_close_matches(key, known, 1)
-                hint = f" (did you mean {near[0]!r}?)" if near else ""
-                raise UsageError(f"{self.model} has no {key!r}{hint}; it has {', '.join(known)}")
+                raise UsageError(
+                    f"{self.model} has no {key!r}{did_you_mean(key, known)}; it has {', '.join(known)}"
+                )
             count = np.size(value) if not isinstance(value, Free) else 1
             if count not in (1, self.channels):
                 raise UsageError(f"{key}: {count} numbers for {self.channels} wavelengths; give one or each")
 
     @property
     def brdf(self) -> Model:
+        """The BRDF model."""
         return model(self.model)
 
     @property
-    def seen_at(self) -> tuple[float, ...]:
-        """Wavelengths in nm, the model's own where none are given."""
+    def channel_wavelengths(self) -> tuple[float, ...]:
+        """Wavelength of each channel in nm: `wavelengths`, or the model's own."""
         return self.brdf.wavelengths if self.wavelengths is None else tuple(self.wavelengths)
 
     @property
     def channels(self) -> int:
-        return len(self.seen_at)
+        """Number of channels."""
+        return len(self.channel_wavelengths)
 
-    def leaves(self) -> tuple[FreeNumber, ...]:
-        """Every free number, in the model's order."""
-        return tuple(leaf for about in self.brdf.parameters for leaf in self._of(about))
+    def free_numbers(self) -> tuple[FreeNumber, ...]:
+        """Return every free number, in the model's order."""
+        return tuple(number for parameter in self.brdf.parameters for number in self._free(parameter))
 
-    def _of(self, about: Parameter) -> list[FreeNumber]:
-        given = self.numbers.get(about.key)
-        if not isinstance(given, Free):
+    def _free(self, parameter: Parameter) -> list[FreeNumber]:
+        key, value = parameter.key, self.numbers.get(parameter.key)
+        if not isinstance(value, Free):
             return []
-        if not about.per_channel or self.channels == 1:
-            return [FreeNumber(about.key, about.key, None, given, about)]
+        if not parameter.per_channel or self.channels == 1:
+            return [FreeNumber(key, key, None, value, parameter)]
         names = LETTERS if self.channels == 3 else [str(c + 1) for c in range(self.channels)]
-        return [FreeNumber(f"{about.key}_{name}", about.key, c, given, about) for c, name in enumerate(names)]
+        return [FreeNumber(f"{key}_{name}", key, c, value, parameter) for c, name in enumerate(names)]
 
-    def fixed(self) -> dict[str, np.ndarray]:
-        """Every fixed number as an array () or (channels,), and the wavelengths."""
-        found = {"wavelengths": np.array(self.seen_at)}
-        for about in self.brdf.parameters:
-            given: Any = self.numbers.get(about.key, about.value)
-            if isinstance(given, Free):
+    def fixed_numbers(self) -> dict[str, np.ndarray]:
+        """Return every fixed number as an array () or (channels,), and the wavelengths."""
+        fixed = {"wavelengths": np.array(self.channel_wavelengths)}
+        for parameter in self.brdf.parameters:
+            value: Any = self.numbers.get(parameter.key, parameter.value)
+            if isinstance(value, Free):
                 continue
-            default = about.key not in self.numbers and about.per_channel
-            found[about.key] = np.asarray(given[0] if default else given, dtype=float)
-        return found
+            default = parameter.key not in self.numbers and parameter.per_channel
+            fixed[parameter.key] = np.asarray(value[0] if default else value, dtype=float)
+        return fixed
 
-    def start(self) -> dict[str, np.ndarray]:
-        """Every number as an array: fixed ones, and where free ones start."""
+    def start_numbers(self) -> dict[str, np.ndarray]:
+        """Return every number as an array, free ones at their start values."""
         free = {key: np.asarray(x.start) for key, x in self.numbers.items() if isinstance(x, Free)}
-        return self.fixed() | free
+        return self.fixed_numbers() | free
 
 
-MOST = 256
-"""Pairs of directions that a plan compares models at, spread over those given."""
-
+VIEW_DIRECTIONS = 256
+"""Directions at which a plan compares models, spread over those of the samples."""
 
 LAYERED = ("granier-heidrich-diffuse", "granier-heidrich-full")
-"""Models whose diffuse part has met the layer."""
-
+"""Models whose diffuse part has passed through the layer."""
 
 ZERO_IS_ABSENT = ("k", "base_k", "deviation", "specular", "diffuse")
+"""Keys whose effect is absent where they are fixed at zero."""
 
 
 @runtime_checkable
 class HasDirections(Protocol):
-    """Degrees from the normal and around it, each (samples,): `Directions` or `BrdfSamples`."""
+    """Directions to light and viewer, degrees from the normal and around it, each (samples,).
+
+    `Directions` and `BrdfSamples` are of this kind.
+    """
 
     @property
     def theta_i(self) -> np.ndarray: ...
@@ -132,10 +141,11 @@ class HasDirections(Protocol):
 
 @final
 class SurfaceView(eqx.Module):
-    """Numbers of a BRDF's model, some of them `Free`, and unit vectors to light and eye (samples, 3).
+    """A surface along given directions: numbers of its model and unit vectors to light and viewer.
 
-    What is fixed at zero is not among `numbers`. A number a channel is an array, or a list where it is
-    free. The rest is what a plan may leave out that has no number of its own.
+    `numbers` leaves out effects fixed at zero; some are `Free`. A number per channel is an array, or a list
+    where it is free. `i` and `o` have shape (samples, 3). The other fields are effects without a number of
+    their own that a plan may leave out.
     """
 
     model: str = eqx.field(static=True)
@@ -148,36 +158,42 @@ class SurfaceView(eqx.Module):
 
     @property
     def brdf(self) -> Model:
+        """The BRDF model."""
         return model(self.model)
 
     @property
     def layered(self) -> bool:
-        """Whether anything of the layer is seen: a grey diffuse part alone shows none."""
+        """True where the layer affects the BRDF; a grey diffuse part alone does not show it."""
         return "specular" in self.numbers or self.model in LAYERED
 
     @property
     def channels(self) -> int:
+        """Number of channels."""
         return np.shape(self.numbers["wavelengths"])[0]
 
 
-def lit(surface: Surface, looked: HasDirections, most: int = MOST) -> SurfaceView:
-    """The surface as seen along at most so many of these directions. UsageError for a black one."""
-    numbers = present(surface)
+def surface_view(surface: Surface, directions: HasDirections, count: int = VIEW_DIRECTIONS) -> SurfaceView:
+    """Return the surface along at most `count` of the directions.
+
+    Raises UsageError for a surface that reflects nothing.
+    """
+    numbers = nonzero_numbers(surface)
     if not {"specular", "diffuse"} & numbers.keys():
-        raise UsageError("there is nothing to compute: the surface sends no light back (specular, diffuse 0)")
-    at = spread(len(looked.theta_i), most)
+        raise UsageError("there is nothing to compute: the surface reflects nothing (specular, diffuse 0)")
+    rows = spread(len(directions.theta_i), count)
     i, o = (
-        np.asarray(direction(theta[at], phi[at]))
-        for theta, phi in ((looked.theta_i, looked.phi_i), (looked.theta_o, looked.phi_o))
+        np.asarray(direction(theta[rows], phi[rows]))
+        for theta, phi in ((directions.theta_i, directions.phi_i), (directions.theta_o, directions.phi_o))
     )
     return SurfaceView(surface.model, numbers, i, o)
 
 
-def present(surface: Surface) -> dict[str, Any]:
-    """The surface's numbers, some of them `Free`, but for effects that are fixed at zero: they are absent."""
-    numbers: dict[str, Any] = dict(surface.fixed())
-    gone = {key for key in ZERO_IS_ABSENT if key in numbers and not np.any(numbers[key])}
-    gone |= {"azimuth"} if "deviation" in gone else set()
-    for leaf in surface.leaves():
-        numbers[leaf.key] = leaf.free if leaf.channel is None else [*numbers.get(leaf.key, []), leaf.free]
-    return {key: x for key, x in numbers.items() if key not in gone}
+def nonzero_numbers(surface: Surface) -> dict[str, Any]:
+    """Return the surface's numbers, fixed and `Free`, without those of effects fixed at zero."""
+    numbers: dict[str, Any] = dict(surface.fixed_numbers())
+    absent = {key for key in ZERO_IS_ABSENT if key in numbers and not np.any(numbers[key])}
+    absent |= {"azimuth"} if "deviation" in absent else set()
+    for number in surface.free_numbers():
+        value = number.free if number.channel is None else [*numbers.get(number.key, []), number.free]
+        numbers[number.key] = value
+    return {key: x for key, x in numbers.items() if key not in absent}

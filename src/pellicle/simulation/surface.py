@@ -16,17 +16,17 @@ from pellicle.scene.surface import SurfaceView
 
 @lru_cache(maxsize=64)
 def build(plan: Plan) -> Callable[[SurfaceView], Any]:
-    """simulate(lit) → the BRDF (samples, channels) in 1/sr, of a `SurfaceView` that holds numbers only.
+    """simulate(view) → the BRDF (samples, channels) in 1/sr, of a `SurfaceView` that holds numbers only.
 
     The function is pure and can be traced.
     """
 
-    def simulate(lit: SurfaceView) -> Any:
-        shape = (*lit.i.shape[:-1], lit.channels)
+    def simulate(view: SurfaceView) -> Any:
+        shape = (*view.i.shape[:-1], view.channels)
         for leave_out in plan.left_out:
-            lit = leave_out(lit)
-        numbers = {key: jnp.stack(x) if isinstance(x, list) else x for key, x in lit.numbers.items()}
-        return jnp.broadcast_to(composed(plan, lit.model)(numbers, lit.i, lit.o), shape)
+            view = leave_out(view)
+        numbers = {key: jnp.stack(x) if isinstance(x, list) else x for key, x in view.numbers.items()}
+        return jnp.broadcast_to(composed(plan, view.model)(numbers, view.i, view.o), shape)
 
     return simulate
 
@@ -35,7 +35,7 @@ def build(plan: Plan) -> Callable[[SurfaceView], Any]:
 def composed(plan: Plan, name: str) -> Evaluate:
     """The evaluation of the model of that name, as far as a static_key plan calls for it.
 
-    It takes numbers as `lit.present` gives them: an effect that has one is absent with it.
+    It takes numbers as `scene.surface.nonzero_numbers` gives them: an effect that has one is absent with it.
     """
     brdf = model(name)
     if not plan.on("coherence"):

@@ -13,7 +13,7 @@ from pellicle.data.half_angles import angles, from_half_difference
 from pellicle.effects.plan import Plan
 from pellicle.errors import UsageError
 from pellicle.planning import surface as thrift
-from pellicle.scene.surface import Surface, lit
+from pellicle.scene.surface import Surface, surface_view
 from pellicle.simulation.surface import build
 
 SAMPLES = 1000
@@ -86,11 +86,11 @@ def synthesise(
     channels = {len(names): names for names in CHANNELS}.get(surface.channels)
     if channels is None:
         raise UsageError(f"samples have one channel or R, G and B: {surface.channels} wavelengths were given")
-    numbers = {key: x.tolist() for key, x in surface.start().items() if key != "wavelengths"}
+    numbers = {key: x.tolist() for key, x in surface.start_numbers().items() if key != "wavelengths"}
     fixed = replace(surface, numbers=numbers)
-    plan = thrift.plan(lit(fixed, looked), tolerance)
+    plan = thrift.plan(surface_view(fixed, looked), tolerance)
     with jax.enable_x64(True):
-        seen = jax.jit(build(plan.static_key))(lit(fixed, looked, len(looked.theta_i)))
+        seen = jax.jit(build(plan.static_key))(surface_view(fixed, looked, len(looked.theta_i)))
     clean = np.asarray(seen, dtype=float)
     noisy = clean + np.random.default_rng(seed).normal(0.0, 1.0, clean.shape) * noise
     below = int(np.sum(noisy < 0))

@@ -75,7 +75,7 @@ def relief(normal: np.ndarray, axes: np.ndarray, rng: np.random.Generator) -> Re
 
 def numbers(surface: Surface, noise: Relief | None) -> dict[str, Any]:
     """Every number of the surface: fixed ones, free ones where they start, and what follows the noise."""
-    found = surface.start()
+    found = surface.start_numbers()
     if noise is not None:
         found |= _following(surface, noise)
     return {key: jnp.asarray(value) for key, value in found.items()}

@@ -42,19 +42,23 @@ TILTED = Surface(
 
 
 def test_a_free_key_per_channel_is_one_number_each():
-    assert [leaf.name for leaf in TILTED.leaves()] == [
+    assert [leaf.name for leaf in TILTED.free_numbers()] == [
         *("thickness", "n_r", "n_g", "n_b", "exponent_reflection", "deviation", "azimuth", "specular")
     ]
     grey = Surface("granier-heidrich", {"n": between(1.2, 2)}, wavelengths=(550.0,))
-    assert [leaf.name for leaf in grey.leaves()] == ["n"]
+    assert [leaf.name for leaf in grey.free_numbers()] == ["n"]
 
 
 def test_what_is_not_given_keeps_its_default():
-    fixed = TILTED.fixed()
+    fixed = TILTED.fixed_numbers()
     assert fixed["exponent_transmission"] == 170.0
     assert fixed["wavelengths"].tolist() == [645.0, 525.0, 445.0]
     assert "n" not in fixed
-    assert Surface("granier-heidrich", {"n": [1.4, 1.5, 1.6]}).fixed()["n"].tolist() == [1.4, 1.5, 1.6]
+    assert Surface("granier-heidrich", {"n": [1.4, 1.5, 1.6]}).fixed_numbers()["n"].tolist() == [
+        1.4,
+        1.5,
+        1.6,
+    ]
 
 
 @pytest.mark.parametrize(
@@ -71,7 +75,7 @@ def test_a_wrong_surface_is_refused_in_words(name, numbers, told):
 
 
 def steep(surface, in_plane=False):
-    return coordinates(tuple(leaf for leaf in surface.leaves() if not leaf.about.linear), in_plane)
+    return coordinates(tuple(leaf for leaf in surface.free_numbers() if not leaf.parameter.linear), in_plane)
 
 
 def test_coordinates_span_the_bounds():

@@ -99,14 +99,14 @@ def _covariance(slope: np.ndarray) -> np.ndarray:
 
 def scaled(surface: Surface, at: Local) -> Scaled:
     """The Jacobian by each number's range, in units of the noise."""
-    bounds = {leaf.name: leaf.free.upper - leaf.free.lower for leaf in surface.leaves()}
+    bounds = {leaf.name: leaf.free.upper - leaf.free.lower for leaf in surface.free_numbers()}
     span = np.array([bounds[name] for name in at.names])
     return Scaled(at.slope * span / math.sqrt(at.variance), span, at.names)
 
 
 def estimates(surface: Surface, problem: Problem, at: Local, known: dict[str, Limits]) -> dict[str, Estimate]:
     """Every parameter, free ones first, the thickness before all; `known` by name, of the free ones."""
-    leaves = {leaf.name: leaf for leaf in surface.leaves()}
+    leaves = {leaf.name: leaf for leaf in surface.free_numbers()}
     found = [
         _estimate(leaves[name], float(value), known[name], problem.form.coordinates)
         for name, value in zip(at.names, at.numbers, strict=True)
@@ -115,7 +115,7 @@ def estimates(surface: Surface, problem: Problem, at: Local, known: dict[str, Li
     fixed = [
         Estimate(name, x, 0.0, about.unit, x, x, False)
         for about in surface.brdf.parameters
-        if about.key in (numbers := surface.fixed())
+        if about.key in (numbers := surface.fixed_numbers())
         for name, x in _each(about.key, numbers[about.key])
     ]
     return {e.name: e for e in [*found, *fixed]}
@@ -124,7 +124,7 @@ def estimates(surface: Surface, problem: Problem, at: Local, known: dict[str, Li
 def by_curvature(surface: Surface, at: Local) -> dict[str, Limits]:
     """Errors by the covariance alone, for a fit whose numbers should not be used: profiles of it would mean
     nothing, and cost most where the model misses the samples."""
-    span = {leaf.name: leaf.free.upper - leaf.free.lower for leaf in surface.leaves()}
+    span = {leaf.name: leaf.free.upper - leaf.free.lower for leaf in surface.free_numbers()}
     each = zip(at.names, at.stderr, strict=True)
     return {name: Limits(float(sd) if sd <= UNSEEN * span[name] else math.inf) for name, sd in each}
 
@@ -158,7 +158,7 @@ def _estimate(leaf: FreeNumber, value: float, limit: Limits, searched: Coordinat
     at_bound = not turns and min(value - lower, upper - value) <= _ON_BOUND * (upper - lower)
     stderr = float(limit.stderr)
     return Estimate(
-        leaf.name, value, stderr, leaf.about.unit, lower, upper, True, at_bound, limit.lower, limit.upper
+        leaf.name, value, stderr, leaf.parameter.unit, lower, upper, True, at_bound, limit.lower, limit.upper
     )
 
 

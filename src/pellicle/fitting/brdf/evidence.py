@@ -124,7 +124,7 @@ def in_plane(samples: BrdfSamples) -> bool:
 
 def directions(samples: BrdfSamples, surface: Surface) -> list[str]:
     """What the directions cannot decide."""
-    free = {leaf.key for leaf in surface.leaves()}
+    free = {leaf.key for leaf in surface.free_numbers()}
     incidences = np.unique(np.round(samples.theta_i / _TOLERANCE))
     steepest = float(max(samples.theta_i.max(initial=0), samples.theta_o.max(initial=0)))
     told = []
@@ -146,7 +146,7 @@ def directions(samples: BrdfSamples, surface: Surface) -> list[str]:
 
 def priors(surface: Surface) -> list[str]:
     """Which priors the fit left aside."""
-    keys = dict.fromkeys(leaf.key for leaf in surface.leaves() if leaf.free.prior is not None)
+    keys = dict.fromkeys(leaf.key for leaf in surface.free_numbers() if leaf.free.prior is not None)
     return [f"the prior of {key} counts in a posterior only: a fit of a surface takes none" for key in keys]
 
 

@@ -27,7 +27,7 @@ from pellicle.fitting.brdf.search import FEW, SMOOTH, THOROUGH, Effort, Minima, 
 from pellicle.fitting.result import Estimate, Rival, Status
 from pellicle.fitting.spectra.search import Progress, quiet
 from pellicle.fitting.status import judge, misfits, verdict
-from pellicle.scene.surface import Surface, lit, present
+from pellicle.scene.surface import Surface, nonzero_numbers, surface_view
 from pellicle.simulation.surface import composed
 
 HELD_OUT = 0.2
@@ -73,7 +73,7 @@ def fitted(
 
 def _check(samples: BrdfSamples, surface: Surface) -> None:
     where = f"{samples.path}: " if samples.path else ""
-    if not surface.leaves():
+    if not surface.free_numbers():
         raise UsageError("nothing is free to fit: give bounds, as in thickness = { lower = 0, upper = 1000 }")
     if surface.channels != len(samples.channels):
         raise UsageError(
@@ -88,13 +88,13 @@ def _check(samples: BrdfSamples, surface: Surface) -> None:
 
 def problem(samples: BrdfSamples, surface: Surface, residual: str, evaluate: Any) -> Problem:
     """The problem of fitting `surface`, by `evaluate`, to the samples."""
-    leaves = surface.leaves()
-    steep = tuple(leaf for leaf in leaves if not leaf.about.linear)
-    linear = [leaf for leaf in leaves if leaf.about.linear]
+    leaves = surface.free_numbers()
+    steep = tuple(leaf for leaf in leaves if not leaf.parameter.linear)
+    linear = [leaf for leaf in leaves if leaf.parameter.linear]
     chosen, box = coordinates(steep, evidence.in_plane(samples))
     form = Form(evaluate, chosen, tuple(leaf.key for leaf in linear), False, residual)
     most = np.array([leaf.free.upper for leaf in linear])
-    fixed = {key: x for key, x in present(surface).items() if key in surface.fixed()}
+    fixed = {key: x for key, x in nonzero_numbers(surface).items() if key in surface.fixed_numbers()}
     return Problem(form, data(samples, residual), fixed, box, most, len(samples))
 
 
@@ -122,7 +122,7 @@ def _rate(whole: Problem, split: Split, effort: Effort, progress: Progress) -> t
 def _fit(samples: BrdfSamples, surface: Surface, residual: str, progress: Progress) -> tuple[BrdfFit, Found]:
     began = time.perf_counter()
     split, brdf = _split(samples), surface.brdf
-    plan = exact(lit(surface, samples, len(samples)))
+    plan = exact(surface_view(surface, samples, len(samples)))
     whole = problem(samples, surface, residual, composed(plan.static_key, surface.model))
     flat = whole._replace(form=whole.form._replace(evaluate=brdf.incoherent))
     minima, held_out = _rate(whole, split, THOROUGH, progress)
@@ -198,7 +198,7 @@ def _report(
         sentence = layer.verdict
     elif status is Status.CONVERGED:
         sentence = " ".join([layer.verdict, *(f"But {trade}." for trade in of_lead[:1])])
-    fitted = surface.fixed() | {key: np.asarray(value) for key, value in at.parameters.items()}
+    fitted = surface.fixed_numbers() | {key: np.asarray(value) for key, value in at.parameters.items()}
     return BrdfFit(
         samples=samples,
         surface=surface,

@@ -26,7 +26,7 @@ def affine(surface: Surface, problem: Problem) -> Problem:
     """The same problem with each free number, a weight too, as a coordinate that goes evenly between its own
     bounds; a tilt stays a disc, half a one where samples in one plane cannot see its sign."""
     order = problem.form.coordinates
-    known = {leaf.name: leaf for leaf in surface.leaves()}
+    known = {leaf.name: leaf for leaf in surface.free_numbers()}
     leaves = [known[name] for name in (*order.names, *problem.form.weights)]
     lower, upper = (np.array([getattr(leaf.free, side) for leaf in leaves]) for side in ("lower", "upper"))
     if order.tilt is not None:
@@ -70,7 +70,7 @@ def valley(
         )
         return found, np.asarray(chi2) / variance, converged
 
-    known = {leaf.name: leaf for leaf in surface.leaves()}
+    known = {leaf.name: leaf for leaf in surface.free_numbers()}
     best, *others = np.clip((values - box.lower) / (box.upper - box.lower), 0.0, 1.0)
     return Valley(
         best,
