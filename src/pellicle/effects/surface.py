@@ -103,9 +103,8 @@ def tunnelling(view: SurfaceView) -> Row | None:
     if row is not None and not row.on:
         why = "normal incidence: every wave propagates" if view.layered else NO_LAYER
         return Row("tunnelling", False, why)
-    transverse = (
-        _bound(view.numbers.get("ambient_n", 1.0), "upper") * np.sin(largest_angle(view)) * (1 + 1e-6)
-    )
+    ambient = _bound(view.numbers.get("ambient_n", 1.0), "upper")
+    transverse = ambient * np.sin(largest_angle(view)) * (1 + 1e-6)
     real = [("film", "n", "k"), ("base", "base_n", "base_k")]
     unsure = [
         name
