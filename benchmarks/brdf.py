@@ -1,8 +1,8 @@
-"""Nanoseconds per RGB sample of each BRDF, forward and with its Jacobian, in one run on one thread.
+"""Time per RGB sample of each BRDF model, forward and with its Jacobian, on one thread.
 
-Run `python benchmarks/brdf.py`. A sample is one pair of directions with its three channels; the
-Jacobian is in every parameter of the model. Models take turns in each round, so that a noisy machine
-is noisy for all; the table gives medians, and the least in brackets.
+Run `python benchmarks/brdf.py`. A sample is one pair of directions with three channels; the
+Jacobian is with respect to every parameter of the model. Models take turns in each round, so that noise of
+the machine affects all of them; the table gives medians, and the minimum in brackets.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ MEASURED = {
 
 
 def programs(brdf: Model, dtype: type, samples: int) -> dict[str, tuple]:
-    """Compiled forward and Jacobian with their arguments."""
+    """Return the compiled forward function and Jacobian with their arguments."""
     rng = np.random.default_rng(0)
     theta, phi = rng.uniform(0, 85, (2, samples)), rng.uniform(0, 360, (2, samples))
     i, o = (direction(t, p).astype(dtype) for t, p in zip(theta, phi, strict=True))

@@ -1,10 +1,10 @@
-"""Do intervals hold what they promise, and is what cannot be known said to be unknown?
+"""Coverage of the reported intervals, and correctness of the claim that a thickness is determined.
 
-First: simulated data sets over seven kinds of film, three noise levels, with sigma told and not told. The
-truth is drawn from the bounds, uniformly, and the share of truths inside the 68 % and 95 % intervals is
-counted: of the covariance of the best fit, its profile likelihood (95 % alone) and the sampled posterior.
-Second: sixty cases, thirty of which a scan of the likelihood in plain NumPy calls decided, and thirty
-undecided; does the fit say so?
+First study: simulated data sets of seven kinds of film, three noise levels, with sigma given and estimated.
+True values are drawn uniformly between the bounds, and the share of them inside the 68 % and 95 % intervals
+is counted: for the covariance of the best fit, its profile likelihood (95 % only) and the sampled posterior.
+Second study: sixty films. A scan of the likelihood in plain NumPy classifies the thickness of thirty of them
+as determined and of thirty as undetermined; the fit should agree.
 
     python benchmarks/calibration.py [--sets 1000] [--cases 60] [--jobs 2] [--write FILE.md]
 """
@@ -46,7 +46,7 @@ def thickness(lower: float = 50.0, upper: float = 1200.0) -> pl.Free:
 
 
 def kinds() -> dict[str, pl.Scene]:
-    """Scenes whose free parameters are drawn uniformly from their bounds."""
+    """Return scenes whose free parameters are drawn uniformly between their bounds."""
     index, extinction = pl.Free(1.3, 1.8), pl.Free(0.0, 0.05)
     glass, t = pl.dispersion.Constant(1.52, 0.0), pl.Light(None, 0.0, "T", "unpolarised")
     plate = pl.Substrate(glass, pl.dispersion.Constant(1.0, 0.0))
@@ -73,7 +73,7 @@ def kinds() -> dict[str, pl.Scene]:
 
 
 class Count(NamedTuple):
-    """Of one parameter of one data set: whether its intervals hold the truth; None where none was given."""
+    """Whether the intervals of one parameter of a data set contain the true value; None without interval."""
 
     kind: str
     level: int
@@ -96,7 +96,7 @@ def simulated(scene: pl.Scene, truth: np.ndarray, noise: float, known: bool, see
 
 
 def coverage(sets: int, jobs: int) -> list[Count]:
-    """Every data set has its own random numbers, so that processes may share the work."""
+    """Count for all data sets; each has its own random numbers, so that processes can share the work."""
     if jobs == 1:
         return _some(range(sets))
     shares = [range(first, sets, jobs) for first in range(jobs)]
@@ -116,7 +116,7 @@ def _some(which: range) -> list[Count]:
         posterior, profiles = pl.sample(data, scene, seed=i), _profiles(data, scene)
         for p, value in zip(free, truth, strict=True):
             found.append(_count(posterior, profiles, p.name, float(value), (kind, level, known)))
-        told(done + 1, len(which), "data sets")
+        print_progress(done + 1, len(which), "data sets")
     return found
 
 
@@ -150,25 +150,25 @@ def _count(
 
 
 class Case(NamedTuple):
-    """A film whose thickness and index are free, and what the likelihood alone says of its thickness."""
+    """A film with free thickness and index, and whether the likelihood determines the thickness."""
 
     thickness: float
     n: float
     k: float
     wavelength: np.ndarray
     noise: float
-    decided: bool
+    determined: bool
 
 
 SUBSTRATE = 3.9 + 0.02j
-DECIDED, UNDECIDED = 0.05, 0.3
-"""Shares of the thickness: a likelihood narrower than the first decides it, one wider than the second not."""
-MIDDLE = float(np.sqrt(DECIDED * UNDECIDED))
-"""A fit that gives four standard errors less than this claims to know the thickness."""
+DETERMINED, UNDETERMINED = 0.05, 0.3
+"""Width of the likelihood over the thickness: determined below the first, undetermined above the second."""
+CLAIMED = float(np.sqrt(DETERMINED * UNDETERMINED))
+"""A fit with four standard errors below this fraction of the thickness claims that it is determined."""
 
 
 def reflectance(thickness: Any, index: Any, wavelength: np.ndarray) -> np.ndarray:
-    """R at normal incidence in NumPy; `thickness` and `index` are arrays that broadcast."""
+    """Return R at normal incidence in NumPy; the arrays `thickness` and `index` broadcast."""
     thickness, index = np.asarray(thickness)[..., None], np.asarray(index, dtype=complex)[..., None]
     r01, r12 = (1 - index) / (1 + index), (index - SUBSTRATE) / (index + SUBSTRATE)
     turn = np.exp(4j * np.pi * index * thickness / wavelength)
@@ -176,27 +176,27 @@ def reflectance(thickness: Any, index: Any, wavelength: np.ndarray) -> np.ndarra
 
 
 def cases(count: int, seed: int = 0) -> list[Case]:
-    """As many decided as undecided films, in the order in which they were drawn; those between are left out.
+    """Draw as many determined as undetermined films, alternating; films between the two are skipped.
 
     Films of 5 to 1500 nm, index 1.3 to 2.5 free by ± 0.3, transparent or opaque, 4 to 101 wavelengths.
     """
-    random, found = np.random.default_rng(seed), {True: [], False: []}
-    while min(map(len, found.values())) < count // 2:
+    random, drawn = np.random.default_rng(seed), {True: [], False: []}
+    while min(map(len, drawn.values())) < count // 2:
         d = float(np.exp(random.uniform(np.log(5), np.log(1500))))
         n = random.uniform(1.3, 2.5)
         k = 0.0 if random.random() < 0.7 else float(np.exp(random.uniform(np.log(0.1), np.log(4))))
         points = int(random.choice([4, 8, 30, 101]))
         noise = float(random.choice([0.001, 0.005, 0.02, 0.05]))
         case = Case(d, n, k, np.linspace(400, 900, points), noise, True)
-        width = _undecided_width(case) / d
-        decided = True if width < DECIDED else False if width > UNDECIDED else None
-        if decided is not None and len(found[decided]) < count // 2:
-            found[decided].append(case._replace(decided=decided))
-    return [case for pair in zip(found[True], found[False], strict=True) for case in pair]
+        width = _likelihood_width(case) / d
+        determined = True if width < DETERMINED else False if width > UNDETERMINED else None
+        if determined is not None and len(drawn[determined]) < count // 2:
+            drawn[determined].append(case._replace(determined=determined))
+    return [case for pair in zip(drawn[True], drawn[False], strict=True) for case in pair]
 
 
-def _undecided_width(case: Case) -> float:
-    """How far apart thicknesses lie whose misfit to data without noise is below 4 at some index (nm)."""
+def _likelihood_width(case: Case) -> float:
+    """Return the range (nm) of thicknesses with a misfit below 4 to noiseless data for some index."""
     clean = reflectance(case.thickness, case.n + 1j * case.k, case.wavelength)
     thick = np.unique(
         np.concatenate([np.linspace(1, 3000, 1500), case.thickness * np.linspace(0.8, 1.2, 401)])
@@ -212,17 +212,18 @@ def _undecided_width(case: Case) -> float:
     return float(np.ptp(inside))
 
 
-class Verdict(NamedTuple):
+class Claim(NamedTuple):
+    """Status and standard error of a fit, and whether it claims that the thickness is determined."""
+
     case: Case
     status: str
     stderr: float
-    claimed: bool  # converged, with an error that calls the thickness decided
+    claimed: bool
 
 
-def honesty(count: int) -> list[Verdict]:
-    found = []
-    drawn = cases(count)
-    for i, case in enumerate(drawn):
+def claims(count: int) -> list[Claim]:
+    results = []
+    for i, case in enumerate(cases(count)):
         random = np.random.default_rng(1000 + i)
         clean = reflectance(case.thickness, case.n + 1j * case.k, case.wavelength)
         values = clean + random.normal(0, case.noise, clean.size)
@@ -231,22 +232,22 @@ def honesty(count: int) -> list[Verdict]:
         data = pl.Spectrum(case.wavelength, values, "R", sigma=np.full(clean.size, case.noise))
         fit = pl.fit(data, scene)
         error = fit["thickness"].stderr
-        claimed = fit.status in ("converged", "at-bound") and 4 * error < MIDDLE * fit["thickness"].value
-        found.append(Verdict(case, str(fit.status), error, bool(claimed)))
-        told(i + 1, count, "cases")
-    return found
+        claimed = fit.status in ("converged", "at-bound") and 4 * error < CLAIMED * fit["thickness"].value
+        results.append(Claim(case, str(fit.status), error, bool(claimed)))
+        print_progress(i + 1, count, "cases")
+    return results
 
 
-def told(done: int, total: int, what: str) -> None:
+def print_progress(done: int, total: int, what: str) -> None:
     if sys.stderr.isatty() or done == total or done % 50 == 0:
         print(f"{done} of {total} {what}", file=sys.stderr, flush=True)
 
 
-def share(counts: list[Count], way: str, which: int) -> str:
-    held = [getattr(c, way)[which] for c in counts if getattr(c, way) is not None]
-    if not held:
+def coverage_cell(counts: list[Count], method: str, which: int) -> str:
+    inside = [getattr(c, method)[which] for c in counts if getattr(c, method) is not None]
+    if not inside:
         return "     -"
-    p, size = float(np.mean(held)), len(held)
+    p, size = float(np.mean(inside)), len(inside)
     return f"{100 * p:5.1f} ± {100 * np.sqrt(max(p * (1 - p), 1 / size**2) / size):.1f} ({size})"
 
 
@@ -254,32 +255,31 @@ SHOWN = (("covariance", 0), ("covariance", 1), ("profile", 1), ("posterior", 0),
 
 
 def coverage_table(counts: list[Count]) -> list[str]:
-    """Shares of truths inside, in per cent, their binomial standard error, and of how many."""
-    ways = " | ".join(f"{way} {'95 %' if which else '68 %'}" for way, which in SHOWN)
+    """Return the coverage in per cent with its binomial standard error and the number of parameters."""
+    head = " | ".join(f"{method} {'95 %' if which else '68 %'}" for method, which in SHOWN)
     rows: list[tuple[str, Callable[[Count], bool]]] = [("all", lambda c: True)]
     rows += [(kind, lambda c, kind=kind: c.kind == kind) for kind in kinds()]
     rows += [(f"noise level {i + 1}", lambda c, i=i: c.level == i) for i in range(3)]
-    rows += [("sigma told", lambda c: c.known), ("sigma not told", lambda c: not c.known)]
-    lines = [f"| data sets | {ways} |", "|---|---|---|---|---|---|"]
+    rows += [("sigma given", lambda c: c.known), ("sigma estimated", lambda c: not c.known)]
+    lines = [f"| data sets | {head} |", "|---|---|---|---|---|---|"]
     for label, chosen in rows:
         some = [c for c in counts if chosen(c)]
-        cells = [share(some, way, which) for way, which in SHOWN]
+        cells = [coverage_cell(some, method, which) for method, which in SHOWN]
         lines.append(f"| {label} | {' | '.join(cells)} |")
     return lines
 
 
-def honesty_table(found: list[Verdict]) -> list[str]:
-    lines = ["| likelihood in NumPy | fit: decided | fit: not decided |", "|---|---|---|"]
-    for decided in (True, False):
-        claims = [v.claimed for v in found if v.case.decided is decided]
-        label = "decided" if decided else "undecided"
-        lines.append(f"| {label} | {sum(claims)} | {len(claims) - sum(claims)} |")
-    wrong = [v for v in found if v.claimed is not v.case.decided]
-    for v in wrong:
-        c = v.case
-        label = "decided" if c.decided else "undecided"
+def claim_table(results: list[Claim]) -> list[str]:
+    lines = ["| likelihood in NumPy | fit: determined | fit: not determined |", "|---|---|---|"]
+    for determined in (True, False):
+        claimed = [r.claimed for r in results if r.case.determined is determined]
+        label = "determined" if determined else "undetermined"
+        lines.append(f"| {label} | {sum(claimed)} | {len(claimed) - sum(claimed)} |")
+    for r in [r for r in results if r.claimed is not r.case.determined]:
+        c = r.case
+        label = "determined" if c.determined else "undetermined"
         lines.append(
-            f"\n{label}, but {v.status} ± {v.stderr:.3g} nm: {c.thickness:.4g} nm, n {c.n:.3f}, k {c.k:.3g},"
+            f"\n{label}, but {r.status} ± {r.stderr:.3g} nm: {c.thickness:.4g} nm, n {c.n:.3f}, k {c.k:.3g},"
             f" {c.wavelength.size} wavelengths, noise {c.noise:g}"
         )
     return lines
@@ -291,19 +291,19 @@ def main() -> None:
     parser.add_argument("--cases", type=int, default=60)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--write", type=Path)
-    given = parser.parse_args()
+    arguments = parser.parse_args()
     began, lines = time.perf_counter(), []
-    if given.sets:
-        counts = coverage(given.sets, given.jobs)
+    if arguments.sets:
+        counts = coverage(arguments.sets, arguments.jobs)
         trusted = np.mean([c.posterior is not None for c in counts])
         lines += coverage_table(counts)
-        lines += [f"\n{given.sets} data sets; {100 * trusted:.1f} % of chains trusted."]
-    if given.cases:
-        lines += ["", *honesty_table(honesty(given.cases))]
+        lines += [f"\n{arguments.sets} data sets; {100 * trusted:.1f} % of chains trusted."]
+    if arguments.cases:
+        lines += ["", *claim_table(claims(arguments.cases))]
     print("\n".join(lines))
     print(f"{time.perf_counter() - began:.0f} s", file=sys.stderr)
-    if given.write:
-        given.write.write_text("\n".join(lines) + "\n")
+    if arguments.write:
+        arguments.write.write_text("\n".join(lines) + "\n")
 
 
 if __name__ == "__main__":

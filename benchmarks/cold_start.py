@@ -1,8 +1,8 @@
-"""What a user waits for: a whole `pellicle fit` in a new process, against importing JAX and one operation.
+"""Start-up time: a complete `pellicle fit` in a new process, compared with JAX and one operation.
 
-Run `python benchmarks/cold_start.py`. The first fit starts with an empty cache; the later ones find
-it filled. Both commands take turns; the table gives medians of processor and wall seconds, and the
-ratio of the second cold fit to bare JAX.
+Run `python benchmarks/cold_start.py`. The first fit starts with an empty cache, later fits with a
+filled one. The commands take turns; the table gives medians of processor and wall time (s), and the
+ratio of a fit with a filled cache to bare JAX.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ BARE = "import jax, jax.numpy as jnp; jnp.ones(3).sum().block_until_ready()"
 PELLICLE = "import sys; from pellicle.cli import main; sys.exit(main())"
 
 
-def spent(command: list[str], environment: dict[str, str]) -> tuple[float, float]:
-    """Processor and wall seconds of one process."""
+def times_of(command: list[str], environment: dict[str, str]) -> tuple[float, float]:
+    """Return the processor and wall time (s) of one process."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     began = time.perf_counter()
     subprocess.run(command, env=environment, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -43,19 +43,21 @@ def main(rounds: int) -> None:
             "fit, cache filled": fit,
         }
         print(f"{'':<22}{'cpu s':>8}{'wall s':>8}")
-        first = spent(fit, environment)
+        first = times_of(fit, environment)
         print(f"{'fit, cache empty':<22}{first[0]:>8.2f}{first[1]:>8.2f}")
         times: dict[str, list[tuple[float, float]]] = {name: [] for name in commands}
         for _ in range(rounds):
             for name, command in commands.items():
-                times[name].append(spent(command, environment))
+                times[name].append(times_of(command, environment))
     medians = {
         name: [statistics.median(column) for column in zip(*t, strict=True)] for name, t in times.items()
     }
     for name, (cpu, wall) in medians.items():
         print(f"{name:<22}{cpu:>8.2f}{wall:>8.2f}")
     ratios = [a / b for a, b in zip(medians["fit, cache filled"], medians["bare jax"], strict=True)]
-    print(f"second cold fit / bare jax: {ratios[0]:.2f} in processor time, {ratios[1]:.2f} in wall time")
+    print(
+        f"fit with filled cache / bare jax: {ratios[0]:.2f} in processor time, {ratios[1]:.2f} in wall time"
+    )
 
 
 if __name__ == "__main__":

@@ -1,10 +1,10 @@
-"""Error and time of every way to a film's colour, in one run, as Markdown.
+"""Error and time of every method of computing a film's colour, as Markdown.
 
 Run `python benchmarks/colour.py` (needs colour-science). 9,999 films: index 1.33 to 2.9, 0 to 2000 nm,
-on 1.5 and on 2.7 + 2.8i, 0 to 80°, under each lamp. The truth is the Airy formula in complex NumPy at
-steps of 1 nm, 380 to 730 nm. Programs run in float32 on one thread; compilation is timed apart; ways
-take turns in each round, and the medians are given, with each as a share of the published way's: the
-median of the ratios within a round, as what else runs here slows both.
+on 1.5 and on 2.7 + 2.8i, 0 to 80°, under each lamp. The reference is the Airy formula in complex NumPy in
+steps of 1 nm, 380 to 730 nm. Programs run in float32 on one thread; compilation is timed separately. Methods
+take turns in each round. The table gives medians, and the median over the rounds of the ratio to the time of
+the published method, which other processes hardly affect.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ import numpy as np
 
 from pellicle.colour import delta_e2000, film_colour, lab, sensor
 
-sys.path.pop(0)  # this file's own name must not hide colour-science
+sys.path.pop(0)  # the name of this file must not shadow colour-science
 
 INDICES, BASES = (1.33, 1.5, 1.7, 2.0, 2.4, 2.9), (1.5, 2.7 + 2.8j)
 WAYS = (
@@ -37,7 +37,7 @@ WAYS = (
 
 
 def sweep():
-    """Columns (films,) of thickness, index, base and angle in degrees; no film on its own base."""
+    """Return columns (films,) of thickness, index, base and angle (degrees); no film equals its base."""
     grid = np.meshgrid(INDICES, np.arange(0, 2001, 20.0), BASES, np.linspace(0, 80, 9), indexing="ij")
     index, thickness, base, angle = (x.ravel() for x in grid)
     seen = ~((index == 1.5) & (base == 1.5))
@@ -45,7 +45,7 @@ def sweep():
 
 
 def airy(wavelength, thickness, index, base, angle):
-    """The textbook formula, (films, wavelengths)."""
+    """Return R by the textbook formula, with shape (films, wavelengths)."""
     thickness, index, base, a = (x[:, None] for x in (thickness, index, base, np.sin(np.deg2rad(angle))))
     q0, q1, q2 = (np.sqrt(n**2 - a**2 + 0j) for n in (1.0, index, base))
     turn, total = np.exp(4j * np.pi / wavelength * q1 * thickness), 0.0
@@ -56,7 +56,7 @@ def airy(wavelength, thickness, index, base, angle):
 
 
 def errors(name, lamp, films, truth):
-    """ΔE2000 of every film, computed in float32."""
+    """Return ΔE2000 of every film, computed in float32."""
     thickness, index, base, angle = films
     inputs = [x.astype(np.float32) for x in (thickness, index, angle)] + [base.astype(np.complex64)]
     xyz = jax.jit(lambda d, n, t, b: film_colour(d, n, b, angle=t, way=name, illuminant=lamp).xyz)
@@ -64,7 +64,7 @@ def errors(name, lamp, films, truth):
 
 
 def compiled(films, count):
-    """Every way under E as a program, its arguments, and its first call in seconds."""
+    """Compile every method under E; return programs, arguments and times of the first calls (s)."""
     thickness, index, base, angle = (x[:count] for x in films)
     inputs = [x.astype(np.float32) for x in (thickness, index, angle)] + [base.astype(np.complex64)]
     programs, first = {}, {}
@@ -79,7 +79,7 @@ def compiled(films, count):
 
 
 def timed(programs, inputs, rounds):
-    """Seconds of every program in every round."""
+    """Return the times (s) of every program in every round."""
     times = {name: [] for name in programs}
     for _ in range(rounds):
         for name, program in programs.items():
@@ -99,7 +99,7 @@ def main(rounds: int, lamps: list[str]) -> None:
         end="",
     )
     print(f"load average {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores, {rounds} rounds\n")
-    print("| way | ns per film (least) | of published | first call s |")
+    print("| method | ns per film (minimum) | time / published | first call s |")
     print("|---|---|---|---|")
     for name in WAYS:
         ns, ratio = times[name] / count * 1e9, statistics.median(times[name] / times["belcour-barla"])

@@ -1,12 +1,12 @@
-"""Nanoseconds per point of one film: pellicle against a floor, other packages and plain NumPy, in one run.
+"""Time per point of one film: pellicle compared with a lower bound, other packages and plain NumPy.
 
-Run `python benchmarks/film.py`. A point is one (wavelength, thickness) giving unpolarised R and T at
-45°; the time is the processor's, so that what else runs on it counts little. The floor is what no
-formula for a film can do without: one exponential, and one sine and cosine by the same polynomial, at
+Run `python benchmarks/film.py`. A point is one (wavelength, thickness) with unpolarised R and T at
+45°. Times are processor times, so that other processes have little influence. The lower bound ("floor") is
+the minimum for any film formula: one exponential, and one sine and cosine by the same polynomial, at
 every point, written to one array as large as pellicle's. Competitors take turns in each round; the
 table gives medians, and the median of each round's ratio to the floor of the same precision.
-Compilation is timed apart. Packages take part if they are installed (`pip install tmm_fast tmmax
-tmm-faster`); those that are slow get fewer points.
+Compilation is timed separately. Packages take part if they are installed (`pip install tmm_fast tmmax
+tmm-faster`); slow ones compute fewer points.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ Run = Callable[[np.ndarray, np.ndarray], Any]
 
 
 class Runner(NamedTuple):
-    """A competitor, the thicknesses that it gets, how exact it has to be, and its precision's floor."""
+    """A competitor, its thicknesses, its tolerance, and the floor of its precision."""
 
     run: Run
     thickness: np.ndarray
@@ -83,7 +83,7 @@ def by_tmm(wavelength: np.ndarray, thickness: np.ndarray) -> tuple[np.ndarray, n
 
 
 def _compiled(both: Callable, dtype: type, *media: np.ndarray) -> Run:
-    """One program whose two answers are packed in one complex array: two outputs cost twice."""
+    """Compile a program that packs R and T in one complex array, because two outputs take twice the time."""
     program = jax.jit(both)
 
     def run(wavelength, thickness):
@@ -93,12 +93,12 @@ def _compiled(both: Callable, dtype: type, *media: np.ndarray) -> Run:
 
 
 def by_pellicle_table(layer: np.ndarray, dtype: type) -> Run:
-    """The same with an index for each wavelength, known when the program runs and not before."""
+    """Return pellicle with an index for each wavelength, as an argument of the compiled program."""
     return _compiled(partial(_both, dtype), dtype, layer.astype(np.result_type(dtype, np.complex64)))
 
 
 def by_pellicle(layer: complex, dtype: type) -> Run:
-    """The library's front door; a layer without an imaginary part is a real number."""
+    """Return pellicle's public functions; an index without imaginary part is a real number."""
     kind = (np.complex64 if dtype is np.float32 else np.complex128) if isinstance(layer, complex) else dtype
     return _compiled(partial(_both, dtype, layer=kind(layer)), dtype)
 
@@ -110,7 +110,7 @@ def _both(dtype: type, wavelength, thickness, layer):
 
 
 def floor(dtype: type) -> Run:
-    """One exponential, one sine and cosine at each point."""
+    """Return the lower bound: one exponential, one sine and cosine at each point."""
 
     def both(wavelength, thickness):
         phase = dtype(2 * np.pi * 2.8) / wavelength * thickness
@@ -122,7 +122,7 @@ def floor(dtype: type) -> Run:
 
 
 def by_tmm_fast() -> Run:
-    """tmm_fast on its own broadcasting."""
+    """Return tmm_fast with its own broadcasting."""
     import torch
     from tmm_fast import coh_tmm
 
@@ -141,7 +141,7 @@ def by_tmm_fast() -> Run:
 
 
 def by_tmmax() -> Run:
-    """tmmax, float32, its function for tables under our own jit and vmap over thickness."""
+    """Return tmmax, float32: its function for tables under our jit and vmap over thickness."""
     from tmmax.tmm import vectorized_coh_tmm
 
     with jax.enable_x64(False):
@@ -170,7 +170,7 @@ def by_tmmax() -> Run:
 
 
 def by_tmm_faster() -> Run:
-    """tmm_faster, one call for all wavelengths of a thickness."""
+    """Return tmm_faster, with one call for all wavelengths of a thickness."""
     from tmm_faster import calc_coherent
 
     def run(wavelength, thickness):
@@ -186,8 +186,7 @@ def by_tmm_faster() -> Run:
 
 
 def keep_pages() -> None:
-    """What is freed stays with the process (glibc): fresh pages cost more than a film, and luck decides
-    who gets them."""
+    """Keep freed memory in the process (glibc): new pages take longer than a film, at random."""
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
     if mallopt is not None:
         trim_threshold, mmap_threshold = -1, -3  # malloc.h
@@ -196,7 +195,7 @@ def keep_pages() -> None:
 
 
 def installed(make: Callable[[], Run]) -> Run | None:
-    """The competitor, or None, and a line that says so, where its package is missing."""
+    """Return the competitor, or print a line and return None if its package is missing."""
     try:
         return make()
     except ImportError as error:
@@ -205,7 +204,7 @@ def installed(make: Callable[[], Run]) -> Run | None:
 
 
 def competitors(thicknesses: int) -> dict[str, Runner]:
-    """Everybody who takes part."""
+    """Return all competitors."""
     thickness = np.linspace(0.0, 1000.0, thicknesses)[:, None]
     found = {}
     for dtype, tolerance in ((np.float64, 1e-12), (np.float32, 2e-5)):
@@ -250,7 +249,7 @@ def main(rounds: int, thicknesses: int) -> None:
         for name, runner in runners.items():
             runner.run(
                 wavelengths(name), runner.thickness
-            )  # what the one before left in the caches is not its
+            )  # refills the caches after the previous competitor
             began = time.process_time()
             runner.run(wavelengths(name), runner.thickness)
             size = np.broadcast(wavelengths(name), runner.thickness).size

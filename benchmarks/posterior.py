@@ -1,8 +1,8 @@
-"""Effective samples per CPU second, and the share of a second minimum that is found.
+"""Effective samples per CPU second, and the fraction of draws in a second minimum.
 
-Competitors: emcee as most people use it (stretch moves from a ball around the best fit, a log-probability in
+Compared are emcee in its usual form (stretch moves from a ball around the best fit, a log-probability in
 plain NumPy, one walker at a time), the same with vectorised NumPy, and `pellicle.sample`, whose time includes
-its checks. All sample the same film in turn, round after round; compilation, and the fit, are apart.
+its checks. All sample the same film in turn in each round; compilation and the fit are not included.
 
     python benchmarks/posterior.py [--rounds 5]
 """
@@ -28,17 +28,18 @@ from pellicle.sampling.chain import empty  # noqa: E402
 from pellicle.sampling.density import log_density  # noqa: E402
 from pellicle.sampling.modes import modes  # noqa: E402
 from pellicle.sampling.run import run  # noqa: E402
+from pellicle.sampling.target import Target  # noqa: E402
 from pellicle.synthetic.spectra import synthesise  # noqa: E402
 
 WALKERS, STEPS, BURN = 32, 2000, 500
 SILICON = 3.9 + 0.02j
 ONE, ALL = "NumPy, a walker at a time", "NumPy, vectorised"
 SECOND = 438.0
-"""Where the second minimum of the five bands lies (nm)."""
+"""Thickness of the second minimum of the five bands (nm)."""
 
 
 class Problem(NamedTuple):
-    """A film on something like silicon: bounds of thickness, n and k, and a spectrum of it with noise."""
+    """A film on silicon with constant index: bounds of thickness, n and k, and a noisy spectrum."""
 
     lower: np.ndarray
     upper: np.ndarray
@@ -65,13 +66,13 @@ def film_problem() -> Problem:
 
 
 def bimodal_problem() -> Problem:
-    """Five bands with 4 % noise: two thicknesses are left."""
+    """Five bands with 4 % of noise, which two thicknesses explain."""
     bands = np.array([450.0, 520.0, 600.0, 690.0, 800.0])
     return problem((650.0, 1.46, 0.0), [(50, 1500), (1.46, 1.46), (0, 0)], bands, 0.04, 3)
 
 
 def reflectance(values: np.ndarray, wavelength: np.ndarray) -> np.ndarray:
-    """R at normal incidence in NumPy, of (..., 3) thickness, n and k."""
+    """Return R at normal incidence in NumPy; `values` has the shape (..., 3): thickness, n and k."""
     thickness, n, k = np.moveaxis(values[..., None], -2, 0)
     index = n + 1j * k
     r01, r12 = (1 - index) / (1 + index), (index - SILICON) / (index + SILICON)
@@ -80,16 +81,16 @@ def reflectance(values: np.ndarray, wavelength: np.ndarray) -> np.ndarray:
 
 
 def log_probability(values: np.ndarray, p: Problem) -> Any:
-    """Of free parameters (..., free)."""
-    whole = np.broadcast_to(p.lower, (*values.shape[:-1], 3)).copy()
-    whole[..., p.free] = values
+    """Return the log-probability of free parameters with the shape (..., free)."""
+    full = np.broadcast_to(p.lower, (*values.shape[:-1], 3)).copy()
+    full[..., p.free] = values
     inside = np.all((values >= p.lower[p.free]) & (values <= p.upper[p.free]), axis=-1)
-    residual = (p.values - reflectance(whole, p.wavelength)) / p.noise
+    residual = (p.values - reflectance(full, p.wavelength)) / p.noise
     return np.where(inside, -0.5 * np.sum(residual**2, axis=-1), -np.inf)
 
 
 class Sampled(NamedTuple):
-    """Draws (steps, walkers, parameters) in the parameters' units, and the CPU seconds that they took."""
+    """Draws (steps, walkers, parameters) in the parameters' units, and their CPU time (s)."""
 
     draws: np.ndarray
     seconds: float
@@ -110,8 +111,8 @@ def plain(p: Problem, best: np.ndarray, seed: int, vectorize: bool) -> Sampled:
     return Sampled(sampler.get_chain(discard=BURN), time.process_time() - began)
 
 
-class Ours:
-    """`pellicle.sample` without its fit, from the same best fit."""
+class PellicleSampler:
+    """`pellicle.sample` from an existing fit."""
 
     def __init__(self, p: Problem):
         bounds = [pl.Free(a, b) if b > a else float(a) for a, b in zip(p.lower, p.upper, strict=True)]
@@ -133,15 +134,16 @@ class Ours:
 
     def __call__(self, seed: int, steps: int = 20_000) -> Sampled:
         began = time.process_time()
-        found = modes(self.weighed)
+        starts = modes(self.weighed)
         target = Target(log_density(self.weighed.problem), WALKERS // 2)
         chain = empty(WALKERS, len(self.order), seed)
-        chain, checks = run(target, found, chain, steps, lambda chain: None, quiet)
+        chain, checks = run(target, starts, chain, steps, lambda chain: None, quiet)
         seconds = time.process_time() - began
         return Sampled(self.box.values(chain.draws[checks.discard :])[..., self.order], seconds)
 
 
 def share_near(sampled: Sampled, thickness: float) -> float:
+    """Return the fraction of draws within 80 nm of a thickness."""
     return float(np.mean(abs(sampled.draws[..., 0] - thickness) < 80))
 
 
@@ -150,12 +152,12 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=5)
     rounds = parser.parse_args().rounds
     film, two = film_problem(), bimodal_problem()
-    ours, ours_two = Ours(film), Ours(two)
+    ours, ours_two = PellicleSampler(film), PellicleSampler(two)
     rows: dict[str, list[tuple[float, float]]] = {ONE: [], ALL: [], "pellicle": []}
     for seed in range(rounds):
         for name in (ONE, ALL):
-            found = [plain(p, its.best, seed, name == ALL) for p, its in ((film, ours), (two, ours_two))]
-            rows[name].append((found[0].rate, share_near(found[1], SECOND)))
+            one, other = (plain(p, its.best, seed, name == ALL) for p, its in ((film, ours), (two, ours_two)))
+            rows[name].append((one.rate, share_near(other, SECOND)))
         rows["pellicle"].append((ours(seed).rate, share_near(ours_two(seed), SECOND)))
     grid = np.linspace(50, 1500, 40001)
     log = log_probability(grid[:, None], two)
@@ -164,10 +166,10 @@ def main() -> None:
     print(
         f"three-parameter film, {film.wavelength.size} wavelengths; second minimum of five bands: {truth:.3f}"
     )
-    print(f"{'':27}  samples/CPU s   ratio   share of the second minimum")
+    print(f"{'':27}  samples/CPU s   ratio   fraction in the second minimum")
     base = np.median([rate for rate, _ in rows[ONE]])
-    for name, found in rows.items():
-        rates, shares = zip(*found, strict=True)
+    for name, results in rows.items():
+        rates, shares = zip(*results, strict=True)
         rate = float(np.median(rates))
         print(
             f"{name:27}  {rate:13.0f}  {rate / base:6.1f}   {np.mean(shares):.3f}"

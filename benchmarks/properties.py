@@ -1,10 +1,10 @@
-"""A million random scenes: is every value and derivative finite, and is energy conserved?
+"""Properties of a million random scenes: finite values and derivatives, conservation of energy.
 
 Run `python benchmarks/properties.py` (`make properties`). Single films and stacks of 1 to 8 layers, in
 float64 and float32: media that are real, weakly absorbing, metallic; dense ambients; thickness 0 and
 1e-6 nm to 1 mm; angles at 0, at 90 and up to 1e-9 degrees from it, and critical in a layer or in the
-substrate. Each line counts the scenes that break a law; the exit code is 1 if there are any. N² + C² + S²
-must be 1, and at most 1 for two samples seen at once.
+substrate. Each line counts the scenes that violate a law; the exit code is 1 if there are any. N² + C² + S²
+must be 1, and at most 1 for a mixture of two samples.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ CHUNK = 5000
 
 
 def rounding(rows: np.ndarray, values: np.ndarray, slopes: np.ndarray, layers: int) -> np.ndarray:
-    """What R + T of s and p may miss 1 by: 32 roundings of 1, of each layer, and of what resonates.
+    """Return the allowed deviation of R + T from 1: 32 roundings of 1, of each layer, and of resonances.
 
-    Light's flux through a layer is conserved by c² + Q f² = 1, whatever the phase is, so neither grazing
-    incidence nor a critical angle enters. A guided wave does: an index that rounding turns by ε in the
-    complex plane takes ε n ∂(R + T)/∂k there, and amplitudes of size 1 cancel in a denominator that is
+    The flux through a layer is conserved by c² + Q f² = 1 for every phase, so neither grazing incidence
+    nor a critical angle matters. A guided wave does: an index that is rotated by ε in the complex plane by
+    rounding changes the sum by ε n ∂(R + T)/∂k, and amplitudes of size 1 cancel in a denominator that is
     as small as cos θ/|1 + r|.
     """
     n, k = rows[:, layers : 2 * layers], slopes[:, :4, 2 * layers : 3 * layers]
@@ -41,7 +41,7 @@ def rounding(rows: np.ndarray, values: np.ndarray, slopes: np.ndarray, layers: i
 
 
 def scenes(rng: np.random.Generator, count: int, layers: int) -> np.ndarray:
-    """Rows of thicknesses, n and k of each layer; n, k of the substrate; ambient, angle, wavelength."""
+    """Draw rows of thicknesses, n and k of each layer; n, k of the substrate; ambient, angle, wavelength."""
 
     def often(values, edges, chance=0.15):
         return np.where(rng.random(values.shape) < chance, rng.choice(edges, values.shape), values)
@@ -91,8 +91,8 @@ def purity(sums) -> np.ndarray:
     return np.where(square == 0, 1, square)
 
 
-def broken(rows: np.ndarray, layers: int) -> dict[str, np.ndarray]:
-    """Law → which rows break it."""
+def violations(rows: np.ndarray, layers: int) -> dict[str, np.ndarray]:
+    """Return {law: which rows violate it}."""
     values, slopes = map(np.asarray, run(rows, layers))
     unit, few = rounding(rows, values, slopes, layers), 16 * np.finfo(rows.dtype).eps
     reflected, passed, (psi, delta) = values[:, :2], values[:, 2:4], values[:, 4:6].T
@@ -100,7 +100,7 @@ def broken(rows: np.ndarray, layers: int) -> dict[str, np.ndarray]:
     normal = rows[:, -2] == 0
     total = reflected + passed
     sums = values[:, 6:10].T
-    # two samples side by side: what a detector sees of both
+    # two samples side by side, both on the detector
     mixed = purity(sums + sums[:, ::-1])
     return {
         "value not finite": ~np.all(np.isfinite(values), axis=1),
@@ -124,7 +124,7 @@ def main(total: int) -> int:
             began, counts, example = time.perf_counter(), {}, {}
             for _ in range(chunks):
                 rows = scenes(rng, CHUNK, layers).astype(dtype)
-                for law, bad in broken(rows, layers).items():
+                for law, bad in violations(rows, layers).items():
                     counts[law] = counts.get(law, 0) + int(bad.sum())
                     if bad.any():
                         example.setdefault(law, rows[bad][0].tolist())

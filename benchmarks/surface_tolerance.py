@@ -1,6 +1,6 @@
-"""Draws surfaces with bounds and tolerances, plans them, and looks whether the stated bound holds.
+"""Check of the error bounds of plans on random surfaces.
 
-At fresh random points of each surface's bounds, and along directions that the plan did not look at, the
+At new random points between the bounds of each surface, and in directions that the plan did not use, the
 planned BRDF is compared with the exact one. Run as `python benchmarks/surface_tolerance.py [--surfaces 100]`.
 """
 
@@ -16,7 +16,7 @@ import jax
 import numpy as np
 
 from pellicle.effects.surface import exact
-from pellicle.planning import surface as thrift
+from pellicle.planning import surface as planning
 from pellicle.planning.differences import signals
 from pellicle.scene.free import Free, free_leaves
 from pellicle.scene.surface import Surface, surface_view
@@ -24,12 +24,12 @@ from pellicle.simulation.surface import build
 from pellicle.synthetic.brdf import default_directions
 
 FRESH = 64
-"""Points of each surface's bounds at which the bound is tried."""
-LOOKED = default_directions(1000)
+"""Number of points per surface at which the bound is checked."""
+PLANNED = default_directions(1000)
 
 
 def weak(rng: np.random.Generator) -> float:
-    """Small over many decades."""
+    """Draw a small number, uniform in its logarithm."""
     return float(10 ** rng.uniform(-8, 0))
 
 
@@ -80,15 +80,15 @@ KINDS = {"facets": facets, "shader": shader, "lobes": lobes}
 
 
 def tried(rng: np.random.Generator, surface: Surface, tolerance: float) -> tuple[set[str], float, float]:
-    """What the plan leaves out, how far it is off, and how far it says to be."""
-    plan = thrift.plan(surface_view(surface, LOOKED), tolerance)
-    whole = surface_view(surface, LOOKED, len(LOOKED.theta_i))
+    """Return what the plan leaves out, its error, and its stated bound."""
+    plan = planning.plan(surface_view(surface, PLANNED), tolerance)
+    whole = surface_view(surface, PLANNED, len(PLANNED.theta_i))
     free = [leaf for _, leaf in free_leaves(whole)]
     low, high = (np.array([getattr(f, side) for f in free]) for side in ("lower", "upper"))
     points = rng.uniform(low, high, (FRESH, len(free)))
     with jax.enable_x64(True):
         true, found = (signals(each, whole, points, build) for each in (exact(whole), plan))
-    off = np.max(np.abs(found - true) / np.maximum(true, thrift.FLOOR))
+    off = np.max(np.abs(found - true) / np.maximum(true, planning.FLOOR))
     gone = {left_out.effect for left_out in plan.left_out}
     gone |= {f"{row.count} angles" for row in plan.rows if row.effect == "oblique" and row.count}
     return gone, float(off), plan.error_bound
@@ -102,18 +102,16 @@ def main(surfaces: int, seed: int) -> int:
         kind, tolerance = str(rng.choice(list(KINDS))), 10 ** rng.uniform(-5, -1)
         gone, off, bound = tried(rng, KINDS[kind](rng), tolerance)
         left_out.update(gone)
-        print(f"{number + 1} of {surfaces}: {kind}, off by {off:.1e}", file=sys.stderr, flush=True)
+        print(f"{number + 1} of {surfaces}: {kind}, error {off:.1e}", file=sys.stderr, flush=True)
         if gone:
             shares.append(off / bound)
         if off > bound or bound > tolerance:
-            failures.append(
-                f"{number} {kind}: off by {off:.2g}, bound {bound:.2g}, tolerance {tolerance:.2g}"
-            )
+            failures.append(f"{number} {kind}: error {off:.2g}, bound {bound:.2g}, tolerance {tolerance:.2g}")
     took = time.perf_counter() - began
     print(f"{surfaces} surfaces in {took:.0f} s; left out: {dict(left_out.most_common())}")
     print(f"error over bound: median {np.median(shares):.2f}, largest {np.max(shares):.2f}")
     print(*failures, sep="\n")
-    print(f"{len(failures)} beyond their bound or tolerance")
+    print(f"{len(failures)} exceed their bound or tolerance")
     return bool(failures)
 
 

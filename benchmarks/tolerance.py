@@ -1,6 +1,6 @@
-"""Draws scenes with bounds and tolerances, plans them, and looks whether the stated bound holds.
+"""Check of the error bounds of plans on random scenes of films.
 
-At fresh random points of each scene's bounds the planned model is compared with the exact one.
+At new random points between the bounds of each scene the planned model is compared with the exact one.
 Run as `python benchmarks/tolerance.py [--scenes 1000]` (`make tolerance`).
 """
 
@@ -23,11 +23,11 @@ from pellicle.scene.free import free_leaves
 from pellicle.simulation.film import sampled
 
 FRESH = 400
-"""Points of each scene at which the bound is tried."""
+"""Number of points per scene at which the bound is checked."""
 
 
 class Drawn(NamedTuple):
-    """A scene with a tolerance in its signal's unit."""
+    """A scene with a tolerance in the unit of its signal."""
 
     name: str
     scene: pl.Scene
@@ -35,7 +35,7 @@ class Drawn(NamedTuple):
 
 
 def draw(rng: np.random.Generator) -> Drawn:
-    """One of ten kinds of scene, with numbers and bounds of its own."""
+    """Draw one of ten kinds of scene with random numbers and bounds."""
     kind = str(rng.choice(list(KINDS)))
     wavelength = np.linspace(*sorted(rng.uniform(400, 900, 2)), 7)
     scene = KINDS[kind](rng, wavelength)
@@ -49,7 +49,7 @@ def free(rng: np.random.Generator, low: float, high: float) -> pl.Free:
 
 
 def weak(rng: np.random.Generator) -> float:
-    """Small over many decades."""
+    """Draw a small number, uniform in its logarithm."""
     return float(10 ** rng.uniform(-9, 0))
 
 
@@ -133,13 +133,13 @@ KINDS = {
 
 
 def fresh(rng: np.random.Generator, scene: pl.Scene) -> np.ndarray:
-    """Points within the bounds, none of which the plan has seen."""
+    """Draw points between the bounds, which the plan did not use."""
     bounds = [(leaf.lower, leaf.upper) for _, leaf in free_leaves(scene)]
     return np.stack([rng.uniform(*b, FRESH) for b in bounds], axis=1)
 
 
 def measured(plan: Plan, scene: pl.Scene, points: np.ndarray) -> float:
-    """The largest error of a plan at these points, in the signal's unit."""
+    """Return the largest error of a plan at these points, in the unit of the signal."""
     whole = sampled(scene)
     one, other = (signals(p, whole, points) for p in (plan, reference(scene)))
     return largest_difference(one, other, plan.signal)
@@ -166,7 +166,9 @@ def main() -> int:
         if (number + 1) % 50 == 0:
             print(f"{number + 1} scenes, {time.monotonic() - start:.0f} s", file=sys.stderr, flush=True)
     print(f"{given.scenes} scenes, {len(ratios)} with something left out: " + str(dict(gone)))
-    print(f"error over bound: median {np.median(ratios):.2f}, largest {np.max(ratios):.2f}; {broken} broken")
+    print(
+        f"error over bound: median {np.median(ratios):.2f}, largest {np.max(ratios):.2f}; {broken} violated"
+    )
     return int(broken > 0)
 
 
