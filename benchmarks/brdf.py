@@ -29,8 +29,8 @@ MEASURED = {
     "granier-heidrich": model("granier-heidrich"),
     "granier-heidrich-reciprocal": model("granier-heidrich-reciprocal"),
     "microfacet-film": model("microfacet-film"),
-    "microfacet-film up to 500 nm": model("microfacet-film").up_to(500.0),
-    "microfacet-film up to 100 nm": model("microfacet-film").up_to(100.0),
+    "microfacet-film up to 500 nm": model("microfacet-film").for_thickness_up_to(500.0),
+    "microfacet-film up to 100 nm": model("microfacet-film").for_thickness_up_to(100.0),
 }
 
 

@@ -59,7 +59,7 @@ def errors(name, lamp, films, truth):
     """Return ΔE2000 of every film, computed in float32."""
     thickness, index, base, angle = films
     inputs = [x.astype(np.float32) for x in (thickness, index, angle)] + [base.astype(np.complex64)]
-    xyz = jax.jit(lambda d, n, t, b: film_colour(d, n, b, angle=t, way=name, illuminant=lamp).xyz)
+    xyz = jax.jit(lambda d, n, t, b: film_colour(d, n, b, angle=t, method=name, illuminant=lamp).xyz)
     return delta_e2000(np.asarray(lab(np.asarray(xyz(*inputs), float), sensor("1931", lamp).white)), truth)
 
 
@@ -70,7 +70,7 @@ def compiled(films, count):
     programs, first = {}, {}
     for name in WAYS:
         programs[name] = jax.jit(
-            lambda d, n, t, b, name=name: film_colour(d, n, b, angle=t, way=name, illuminant="E").xyz
+            lambda d, n, t, b, name=name: film_colour(d, n, b, angle=t, method=name, illuminant="E").xyz
         )
         began = time.perf_counter()
         programs[name](*inputs).block_until_ready()

@@ -70,7 +70,7 @@ maps = {
     "reflectance": pl.reflectance(nm, thickness[:, None], hematite, glass),
     "transmittance": pl.transmittance(nm, thickness[:, None], hematite, glass),
 }
-colours = film_colour(thickness, hematite, glass, way="uniform-64")
+colours = film_colour(thickness, hematite, glass, method="uniform-64")
 
 figure, (strip, *panels) = plt.subplots(
     1, 3, figsize=(10, 3.8), sharey=True, gridspec_kw={"width_ratios": [0.6, 5, 5]}
@@ -199,7 +199,7 @@ eye = sensor()  # the 1931 observer under D65
 xyz = np.interp(eye.wavelength, spectrum.wavelength, spectrum.values) @ eye.weights
 seen = lab(xyz, eye.white)
 fine = np.linspace(1, 300, 300 if SHORT else 1200)
-candidates = film_colour(fine, hematite, glass, way="uniform-64")
+candidates = film_colour(fine, hematite, glass, method="uniform-64")
 apart = delta_e2000(candidates.lab, seen)
 
 figure, (axes, strip) = plt.subplots(
@@ -232,7 +232,7 @@ at = [r[np.argmin(np.interp(r, fine, apart))] for r in ranges]
 figure, axes = plt.subplots(figsize=(6.5, 3.5))
 axes.plot(spectrum.wavelength, spectrum.values, ".", color="k", markersize=3, label="data")
 for d, line in zip(at, ("--", "-"), strict=True):
-    swatch = np.asarray(film_colour(d, hematite, glass, way="uniform-64").srgb)
+    swatch = np.asarray(film_colour(d, hematite, glass, method="uniform-64").srgb)
     axes.plot(
         nm,
         pl.reflectance(nm, d, hematite, glass),

@@ -42,7 +42,7 @@ SHORT = os.environ.get("PELLICLE_SHORT") == "1"  # fewer points, for a quick run
 OXIDE, STEEL = 2.9, 2.7 + 2.8j
 nm = np.linspace(0, 80, 81 if SHORT else 321)
 angle = np.linspace(0, 80, 21 if SHORT else 81)
-seen = film_colour(nm, OXIDE, STEEL, angle=angle[:, None], way="uniform-64")
+seen = film_colour(nm, OXIDE, STEEL, angle=angle[:, None], method="uniform-64")
 
 figure, axes = plt.subplots(figsize=(7, 3.6))
 axes.imshow(np.asarray(seen.srgb), extent=(0, 80, 0, 80))
@@ -68,7 +68,7 @@ for name, low, high in (("straw", 60, 105), ("purple", 285, 345), ("blue", 235, 
 light = np.linspace(400, 700, 151)
 figure, axes = plt.subplots(figsize=(6.5, 3.4))
 for name, d in (("straw", 20.0), ("purple", 31.0), ("blue", 42.0)):
-    swatch = np.asarray(film_colour(d, OXIDE, STEEL, way="uniform-64").srgb)
+    swatch = np.asarray(film_colour(d, OXIDE, STEEL, method="uniform-64").srgb)
     reflected = pl.reflectance(light, d, OXIDE, STEEL)
     axes.plot(light, reflected, color=swatch, linewidth=3, label=f"{name}, {d:.0f} nm")
     print(f"{name}: darkest at {light[np.argmin(reflected)]:.0f} nm, in the range 400 to 700 nm")
@@ -89,16 +89,18 @@ plt.show()
 # %%
 place = np.linspace(0, 100, 50 if SHORT else 200)  # mm from the cold end
 oxide = 8 + 52 * (place / 100) ** 2  # nm
-exact = np.asarray(film_colour(oxide, OXIDE, STEEL, way="uniform-64").lab)
+exact = np.asarray(film_colour(oxide, OXIDE, STEEL, method="uniform-64").lab)
 photograph = exact + np.random.default_rng(5).normal(0, 1, exact.shape)
 
 table = np.linspace(0, 70, 281)
-colours = film_colour(table, OXIDE, STEEL, way="uniform-64")
+colours = film_colour(table, OXIDE, STEEL, method="uniform-64")
 apart = delta_e2000(photograph[:, None], np.asarray(colours.lab)[None])
 read = table[np.argmin(apart, axis=1)]
 
 figure, (bar, axes) = plt.subplots(2, 1, figsize=(7, 4), sharex=True, height_ratios=[1, 4])
-bar.imshow(np.asarray(film_colour(oxide, OXIDE, STEEL, way="uniform-64").srgb)[None], extent=(0, 100, 0, 1))
+bar.imshow(
+    np.asarray(film_colour(oxide, OXIDE, STEEL, method="uniform-64").srgb)[None], extent=(0, 100, 0, 1)
+)
 bar.set(yticks=[], title="the bar")
 axes.plot(place, oxide, "k", label="truth")
 axes.plot(place, read, ".", label="read from the colour")
@@ -115,7 +117,7 @@ print(f"error of the readings: {np.sqrt(np.mean((read - oxide) ** 2)):.2f} nm ro
 # %%
 step = 0.25
 fine = np.arange(0, 70, step)
-lab_of = np.asarray(film_colour(fine, OXIDE, STEEL, way="uniform-64").lab)
+lab_of = np.asarray(film_colour(fine, OXIDE, STEEL, method="uniform-64").lab)
 slope = delta_e2000(lab_of[1:], lab_of[:-1]) / step
 
 figure, axes = plt.subplots(figsize=(7, 3))
@@ -139,7 +141,7 @@ print(f"at 60 nm: {np.interp(60, fine[1:], 1 / slope):.1f} nm")
 
 # %%
 wide = np.arange(0, 250.5, 2.0 if SHORT else 1.0)
-many = film_colour(wide, OXIDE, STEEL, way="uniform-64")
+many = film_colour(wide, OXIDE, STEEL, method="uniform-64")
 xyz = np.asarray(many.xyz)
 exposed = np.asarray(lab(0.3 * xyz / xyz[:, 1:2], np.asarray(many.white)))
 maps = {
@@ -185,7 +187,7 @@ pairs = {
 thin = np.linspace(0, 80, 161)
 figure, panels = plt.subplots(3, 1, figsize=(7, 3), sharex=True)
 for axes, (name, (oxide, metal)) in zip(panels, pairs.items(), strict=True):
-    tint = film_colour(thin, oxide, metal, way="uniform-64")
+    tint = film_colour(thin, oxide, metal, method="uniform-64")
     axes.imshow(np.asarray(tint.srgb)[None], extent=(0, 80, 0, 1))
     axes.set(yticks=[])
     axes.set_title(name, loc="left", fontsize="small")

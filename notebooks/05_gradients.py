@@ -52,7 +52,7 @@ OXIDE, SILICON = pl.material("SiO2"), pl.material("Si")
 @jax.jit
 def colour(thickness):
     """Return L*, a*, b* and sRGB of oxides of these thicknesses (nm), from 64 wavelengths."""
-    seen = film_colour(thickness, OXIDE, SILICON, way="uniform-64")
+    seen = film_colour(thickness, OXIDE, SILICON, method="uniform-64")
     return seen.lab, seen.srgb
 
 

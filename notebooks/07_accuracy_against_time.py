@@ -228,7 +228,7 @@ WAYS = (
 
 def program(way):
     """Return a compiled function for the XYZ of films under D65."""
-    return jax.jit(lambda d, n, b, t: film_colour(d, n, b, angle=t, way=way).xyz)
+    return jax.jit(lambda d, n, b, t: film_colour(d, n, b, angle=t, method=way).xyz)
 
 
 def seen(xyz):

@@ -53,7 +53,7 @@ def hematite() -> Figure:
         (right, pl.transmittance, "transmittance"),
     ):
         map_of(axes, thickness, film(function, "Fe2O3", thickness), "thickness (nm)", title, 1.0)
-    swatches = film_colour(thickness, pl.material("Fe2O3"), GLASS, way="uniform-64").srgb
+    swatches = film_colour(thickness, pl.material("Fe2O3"), GLASS, method="uniform-64").srgb
     beside = left.inset_axes((-0.32, 0, 0.07, 1), sharey=left)
     beside.imshow(
         np.asarray(swatches)[:, None], extent=(0, 1, 0, 300), origin="lower", aspect="auto", rasterized=True
@@ -96,7 +96,7 @@ STEEL = 2.7 + 2.8j
 def swatch(axes, most: float, index: float, base: complex, title: str, exposure=1.0, steepest=80.0) -> None:
     """A film's colours under D65 against its thickness and the angle of incidence."""
     nm, degrees = np.linspace(0.0, most, 401), np.linspace(0.0, steepest, 81)
-    seen = film_colour(nm, index, base, angle=degrees[:, None], way="uniform-64")
+    seen = film_colour(nm, index, base, angle=degrees[:, None], method="uniform-64")
     shown = srgb(exposure * np.asarray(seen.linear_srgb))
     axes.imshow(shown, origin="lower", aspect="auto", extent=(0, most, 0, steepest), rasterized=True)
     axes.set(xlabel="thickness (nm)", ylabel="angle of incidence (°)", title=title)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from pellicle.fitting.brdf.result import BrdfFit as BrdfFit
     from pellicle.fitting.result import Fit as Fit
     from pellicle.fitting.result import Status as Status
-    from pellicle.materials import lookup as material  # noqa: F401
+    from pellicle.materials import material as material
     from pellicle.recipes.read import read_recipe as read_recipe
     from pellicle.sampling.result import Posterior as Posterior
     from pellicle.scene import free as priors  # noqa: F401
@@ -63,7 +63,6 @@ _NAMES = {
     "pellicle.synthetic.brdf": ("Directions",),
 }
 _MODULE = {name: module for module, names in _NAMES.items() for name in names}
-_RENAMED = {"material": "lookup"}
 _NAMESPACES = {
     "dispersion": "pellicle.dispersion",
     "mixing": "pellicle.dispersion.effective_medium",
@@ -80,7 +79,7 @@ def __getattr__(name: str) -> Any:
         return import_module(_NAMESPACES[name])
     if name not in _MODULE:
         raise AttributeError(f"module 'pellicle' has no attribute {name!r}")
-    return getattr(import_module(_MODULE[name]), _RENAMED.get(name, name))
+    return getattr(import_module(_MODULE[name]), name)
 
 
 def __dir__() -> list[str]:

@@ -59,7 +59,7 @@ def test_a_rung_is_as_far_off_as_it_says(films):
 def test_angles_may_be_spared(films):
     with jax.enable_x64(True):
         exact, few = (RUNGS[name].program(films).run() for name in ("uniform-64", "uniform-64 at 16 angles"))
-    # 1.04e-4: `film_colour.nodes` asks for 32 angles where 1e-4 is to be kept
+    # 1.04e-4: `film_colour.node_count` asks for 32 angles where 1e-4 is to be kept
     np.testing.assert_allclose(few, exact, atol=2e-4)
 
 

@@ -55,11 +55,11 @@ def test_refraction_at_its_edges():
 
 def test_half_vectors():
     i, o = V[:25], V[25:]
-    h = d.half(i, o)
+    h = d.half_vector(i, o)
     np.testing.assert_allclose(d.dot(i, h), d.dot(o, h), atol=1e-14)
     np.testing.assert_allclose(d.cosine_to_half(i, o), d.dot(i, h), atol=1e-14)
     np.testing.assert_allclose(d.angle_to_half(i, o), np.arccos(d.dot(i, h)), atol=1e-12)
-    assert np.all(d.half(i, -i) == 0)
+    assert np.all(d.half_vector(i, -i) == 0)
 
 
 @pytest.mark.parametrize("theta", [0.0, 90.0])
@@ -68,8 +68,8 @@ def test_slopes_are_finite_at_normal_and_grazing(theta):
     for function in (
         lambda v: d.refract(v, Z, 1.0),
         lambda v: d.refract(v, Z, 1.5),
-        lambda v: d.half(v, v * jnp.array([-1.0, -1.0, 1.0])),
-        lambda v: d.half(v, -v),
+        lambda v: d.half_vector(v, v * jnp.array([-1.0, -1.0, 1.0])),
+        lambda v: d.half_vector(v, -v),
         lambda v: d.angle_to_half(v, v),
         lambda v: d.reflect(v, Z),
     ):

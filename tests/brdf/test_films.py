@@ -53,10 +53,10 @@ def test_nodes_follow_the_exact_film(thickest):
 
 
 def test_fewer_nodes_for_thinner_films():
-    assert [film_colour.nodes(d) for d in (0, 500, 1500)] == [24, 56, 112]
+    assert [film_colour.node_count(d) for d in (0, 500, 1500)] == [24, 56, 112]
     steel = model("microfacet-film")
-    assert steel.up_to(100).evaluate is not steel.evaluate
-    assert model("granier-heidrich").up_to(100) is model("granier-heidrich")
+    assert steel.for_thickness_up_to(100).evaluate is not steel.evaluate
+    assert model("granier-heidrich").for_thickness_up_to(100) is model("granier-heidrich")
 
 
 def test_tempered_steel_turns_straw_then_purple_then_blue():

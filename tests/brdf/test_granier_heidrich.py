@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pellicle.brdf import granier_heidrich as gh
-from pellicle.brdf.albedo import directional_albedo, energy_warning, greatest_albedo
+from pellicle.brdf.albedo import directional_albedo, energy_warning, max_albedo
 from pellicle.brdf.directions import direction
 from pellicle.brdf.models import model
 from pellicle.brdf.presets import PRESETS
@@ -121,7 +121,7 @@ def test_energy_exceeds_one_as_published():
     s = {**SURFACE, "n": 1.5, "thickness": 0.0, "deviation": 0.0, "specular": 1.0, "diffuse": 0.0}
     np.testing.assert_allclose(PUBLISHED(s, up, up), (0.2 + 0.96) ** 2, rtol=1e-12)
     broad = {**s, "exponent_reflection": 1.0, "exponent_transmission": 1.0}
-    assert greatest_albedo(PUBLISHED, broad) > 2
+    assert max_albedo(PUBLISHED, broad) > 2
 
 
 def test_a_surface_that_creates_energy_is_told_with_the_number():

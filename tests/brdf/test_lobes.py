@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pellicle.brdf import lobes
-from pellicle.brdf.directions import direction, half
+from pellicle.brdf.directions import direction, half_vector
 
 THETA, WEIGHT = np.polynomial.legendre.leggauss(400)
 THETA = 45 * (THETA + 1)
@@ -46,8 +46,8 @@ def test_blinn_phong_is_a_power_of_the_half_vector():
 
 def test_narrow_ggx_keeps_its_shape_in_float32():
     i, o = direction(np.float32(30), np.float32(0)), direction(np.float32(30.2), np.float32(180))
-    exact = lobes.ggx(half(direction(30.0, 0.0), direction(30.2, 180.0)), 0.003)
-    found = lobes.ggx(half(i, o), np.float32(0.003))
+    exact = lobes.ggx(half_vector(direction(30.0, 0.0), direction(30.2, 180.0)), 0.003)
+    found = lobes.ggx(half_vector(i, o), np.float32(0.003))
     assert found.dtype == np.float32
     assert float(found) == pytest.approx(float(exact), rel=1e-3)
 

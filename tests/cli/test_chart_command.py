@@ -22,7 +22,7 @@ def test_one_layer_is_the_film(oxide):
     """Against the colour package's own film, by other bands."""
     layer, substrate = pl.material("SiO2"), pl.material("Si")
     thickness, angle = np.meshgrid(NM, DEGREES)
-    own = film_colour(thickness, layer, substrate, angle=angle, way="uniform-200")
+    own = film_colour(thickness, layer, substrate, angle=angle, method="uniform-200")
     assert oxide[1].xyz.shape == (3, 7, 3)
     assert np.max(np.asarray(delta_e2000(oxide[1].lab, own.lab))) < 0.1
 

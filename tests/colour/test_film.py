@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.colour import delta_e2000, film, film_colour, lab, sensor, way
+from pellicle.colour import delta_e2000, film, film_colour, integration_bands, lab, sensor
 
 THICKNESS = np.array([0.0, 40.0, 150.0, 420.0, 900.0, 1600.0])
 ANGLE = np.array([0.0, 55.0])[:, None]
@@ -48,9 +48,9 @@ def truth(layer, substrate, illuminant="D65", thickness=THICKNESS, angle=ANGLE):
     return np.asarray(lab(airy(eye.wavelength, thickness, layer, substrate, angle) @ eye.weights, eye.white))
 
 
-@partial(jax.jit, static_argnames=("way", "illuminant"))
-def seen(thickness, layer, substrate, angle, way, illuminant):
-    return film_colour(thickness, layer, substrate, angle=angle, way=way, illuminant=illuminant).lab
+@partial(jax.jit, static_argnames=("method", "illuminant"))
+def seen(thickness, layer, substrate, angle, method, illuminant):
+    return film_colour(thickness, layer, substrate, angle=angle, method=method, illuminant=illuminant).lab
 
 
 def error(layer, substrate, name, illuminant="D65", **films):
@@ -90,9 +90,11 @@ def test_belcour_and_barla_are_as_far_off_as_published_constants_are():
     films = {"thickness": np.arange(0.0, 2001.0, 50.0), "angle": ANGLE}
     errors = np.concatenate([error(n, 1.0, "belcour-barla", "E", **films).ravel() for n in (1.33, 1.7)])
     assert 0.7 < np.mean(errors) < 2.5
-    np.testing.assert_allclose(way("belcour-barla", "1931", "E").weights.sum(axis=0), 1.0, atol=2e-3)
+    np.testing.assert_allclose(
+        integration_bands("belcour-barla", "1931", "E").weights.sum(axis=0), 1.0, atol=2e-3
+    )
     with pytest.raises(ValueError, match="gaussians-8"):
-        film_colour(100.0, 2.0 + 0.1j, 1.5, way="belcour-barla")
+        film_colour(100.0, 2.0 + 0.1j, 1.5, method="belcour-barla")
 
 
 def test_dispersive_media():
@@ -116,7 +118,7 @@ def test_srgb_is_that_of_colour_science(angle):
     eye = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"].copy().align(spectrum.shape)
     lamp = colour.SDS_ILLUMINANTS["D65"].copy().align(spectrum.shape)
     expected = colour.XYZ_to_sRGB(colour.sd_to_XYZ(spectrum, eye, lamp, method="Integration") / 100)
-    found = film_colour(300.0, 1.33, 1.0, angle=angle, way="uniform-64").srgb
+    found = film_colour(300.0, 1.33, 1.0, angle=angle, method="uniform-64").srgb
     np.testing.assert_allclose(found, expected, atol=5e-4)
 
 
@@ -129,7 +131,7 @@ def test_gradients(name):
     """∂Lab/∂(thickness, n, k, angle) against central differences; jit and vmap."""
 
     def seen(x):
-        return film_colour(x[0], jax.lax.complex(x[1], x[2]), 2.7 + 2.8j, angle=x[3], way=name).lab
+        return film_colour(x[0], jax.lax.complex(x[1], x[2]), 2.7 + 2.8j, angle=x[3], method=name).lab
 
     x, h = jnp.array([230.0, 1.8, 0.02, 35.0]), 1e-5 * np.eye(4)
     values = jax.jit(jax.vmap(seen))(jnp.concatenate([x + h, x - h]))
@@ -140,20 +142,20 @@ def test_gradients(name):
 
 def test_total_reflection_inside_is_no_special_case():
     """A film of less index than the medium above, past its critical angle."""
-    found = film_colour(300.0, 1.2, 1.5, ambient=1.5, angle=70.0, way="gaussians-8").xyz
-    expected = film_colour(300.0, 1.2, 1.5, ambient=1.5, angle=70.0, way="uniform-64").xyz
+    found = film_colour(300.0, 1.2, 1.5, ambient=1.5, angle=70.0, method="gaussians-8").xyz
+    expected = film_colour(300.0, 1.2, 1.5, ambient=1.5, angle=70.0, method="uniform-64").xyz
     np.testing.assert_allclose(found, expected, atol=0.01)
 
 
 def test_no_layer_is_the_bare_substrate():
-    found = film_colour(0.0, 1.8, 1.5, way="gaussians-8", illuminant="E").xyz
+    found = film_colour(0.0, 1.8, 1.5, method="gaussians-8", illuminant="E").xyz
     np.testing.assert_allclose(found, 0.04 * sensor("1931", "E").white, rtol=1e-2)
 
 
 @pytest.mark.parametrize("name", ["rainbow", "points-645-525", "uniform-0", "nodes-7-500", "gaussians-9"])
 def test_unknown_ways_are_refused(name):
     with pytest.raises(ValueError, match="expected"):
-        way(name)
+        integration_bands(name)
 
 
 def test_an_absorbing_ambient_is_refused():

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import pellicle as pl
 from pellicle.dispersion.effective_medium import MIXTURES, Bruggeman, Linear, Looyenga, MaxwellGarnett
 from pellicle.dispersion.empirical import Cauchy, Constant
-from pellicle.materials import lookup, materials_in
+from pellicle.materials import material, materials_in
 from pellicle.optics.pair import imag, is_real, real
 from pellicle.recipes import media_words
 from pellicle.synthetic.spectra import synthesise
@@ -125,7 +125,7 @@ def test_precision_follows_the_wavelength(rule):
 
 
 def test_materials_keep_their_names_and_ranges():
-    porous = Bruggeman(lookup("SiO2"), lookup("TiO2"), 0.3)
+    porous = Bruggeman(material("SiO2"), material("TiO2"), 0.3)
     assert {m.name for m in materials_in(porous)} == {"SiO2", "TiO2"}
     scene = pl.Scene(pl.Layer(porous, 100.0), "Si")
     with pytest.raises(ValueError, match=r"SiO2 .* is known from"):
@@ -150,7 +150,7 @@ def _fit(tmp_path, truth, layer):
 @pytest.mark.slow  # the Tauc-Lorentz layer's fit below goes the same way
 def test_a_fit_finds_the_porosity(tmp_path):
     def porous(fraction):
-        return Bruggeman(lookup("TiO2"), Constant(1.0), fraction)
+        return Bruggeman(material("TiO2"), Constant(1.0), fraction)
 
     fit = _fit(
         tmp_path,

@@ -11,7 +11,7 @@ import pellicle as pl
 from pellicle.fitting.spectra.evaluation import local
 from pellicle.fitting.spectra.problem import make
 from pellicle.fitting.spectra.targets import measured
-from pellicle.optics.ellipsometry import angles
+from pellicle.optics.ellipsometry import psi_delta
 from pellicle.scene.film import with_wavelength
 from pellicle.simulation.film import build
 
@@ -29,7 +29,7 @@ def ncs() -> np.ndarray:
 
 
 def spectrum(ncs: np.ndarray) -> pl.Spectrum:
-    psi, delta = map(np.asarray, angles(*ncs))
+    psi, delta = map(np.asarray, psi_delta(*ncs))
     return pl.Spectrum(NM, psi, "psi-delta", angle=np.full(40, 65.0), delta=delta, path="film.csv")
 
 

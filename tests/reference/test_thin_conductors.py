@@ -9,15 +9,15 @@ import pytest
 
 import pellicle as pl
 from pellicle.colour import film_colour
-from pellicle.materials import lookup
+from pellicle.materials import material
 
 VISIBLE = np.linspace(400.0, 700.0, 61)
 
 
-def on_glass(function, material, thickness, wavelength=VISIBLE):
+def on_glass(function, name, thickness, wavelength=VISIBLE):
     """R or T of a film on glass; 61 points in every call, so that all share what is compiled."""
     wavelength, thickness = (np.broadcast_to(x, VISIBLE.shape).copy() for x in (wavelength, thickness))
-    return np.asarray(function(wavelength, thickness, lookup(material)(wavelength), 1.52))
+    return np.asarray(function(wavelength, thickness, material(name)(wavelength), 1.52))
 
 
 def test_hematite_runs_through_the_temper_colours_three_times():
@@ -27,7 +27,7 @@ def test_hematite_runs_through_the_temper_colours_three_times():
     By 64 wavelengths: Gaussians are for indices that change less, and pass over the last, pale straw.
     """
     thickness = np.arange(40.0, 287.0, 2.0)
-    _, a, b = np.asarray(film_colour(thickness, lookup("Fe2O3"), 1.52, way="uniform-64").lab).T
+    _, a, b = np.asarray(film_colour(thickness, material("Fe2O3"), 1.52, method="uniform-64").lab).T
     hue, chroma = np.rad2deg(np.unwrap(np.arctan2(b, a))), np.hypot(a, b)
     assert np.all(np.diff(hue) < 0)
     edges = np.array([45.0, 115.0, 220.0, 290.0, 345.0])
@@ -49,8 +49,8 @@ def test_gold_lets_light_through_at_30_nm_and_hardly_any_above_100():
 def test_fringes_are_weaker_in_metals_than_in_semiconductors():
     """Section 5, as the span of R over thicknesses from 100 nm to 1 µm, in the red."""
 
-    def span(material):
-        return np.ptp(on_glass(pl.reflectance, material, np.linspace(100.0, 1000.0, 61), 650.0))
+    def span(name):
+        return np.ptp(on_glass(pl.reflectance, name, np.linspace(100.0, 1000.0, 61), 650.0))
 
     assert max(span("Au"), span("Al")) < 0.01
     assert min(span("CdS"), span("Fe2O3")) > 0.1
@@ -62,7 +62,7 @@ def test_cadmium_sulfide_at_1_mm_by_two_tables():
     red = np.linspace(600.0, 700.0, 61)
     assert np.min(on_glass(pl.transmittance, "main/CdS/Treharne", 1e6, red)) > 0.4
     assert np.max(on_glass(pl.transmittance, "main/CdS/Treharne", 1e6, np.linspace(400, 500, 61))) < 1e-9
-    assert np.imag(lookup("CdS")(red))[-1] == pytest.approx(0.036, abs=1e-3)
+    assert np.imag(material("CdS")(red))[-1] == pytest.approx(0.036, abs=1e-3)
     assert np.max(on_glass(pl.transmittance, "CdS", 1e6, red)) < 1e-200
 
 

@@ -16,7 +16,7 @@ from pellicle.data.spectrum import Spectrum
 from pellicle.effects.plan import Plan, Row
 from pellicle.errors import UsageError
 from pellicle.fitting.result import Curve, Estimate, Fit, Part, Profile, Rival, Status
-from pellicle.materials import lookup
+from pellicle.materials import material
 from pellicle.reporting.folders import (
     failure,
     fit_csv,
@@ -220,7 +220,7 @@ def test_nk_csv_is_a_material(fit, tmp_path):
     frame = pd.read_csv(path, comment="#")
     assert list(frame) == ["wavelength_nm", "n", "k", "n_stderr", "k_stderr"]
     assert frame["k_stderr"].isna().sum() == 20  # infinite below 600 nm
-    index = np.asarray(lookup(str(path))(fit.curve.wavelength))
+    index = np.asarray(material(str(path))(fit.curve.wavelength))
     np.testing.assert_allclose(index, fit.curve.n + 1j * fit.curve.k, rtol=1e-9)
 
 
@@ -229,7 +229,7 @@ def test_nk_csv_of_several_angles_holds_each_wavelength_once(fit, with_part, tmp
     twice = {name: np.repeat(getattr(fit.curve, name), 2) for name in vars(fit.curve)}
     path.write_text(nk_csv(with_part(fit, curve=Curve(**twice))), encoding="utf-8")
     assert path.read_text() == nk_csv(fit)
-    lookup(str(path))
+    material(str(path))
 
 
 @pytest.mark.parametrize("everywhere", [["n_stderr"], ["k_stderr"], ["n_stderr", "k_stderr"]])
@@ -237,7 +237,7 @@ def test_nk_csv_is_a_material_whatever_errors_are_infinite(fit, with_part, tmp_p
     path = tmp_path / "nk.csv"
     unseen = replace(fit.curve, **{name: np.full(41, np.inf) for name in everywhere})
     path.write_text(nk_csv(with_part(fit, curve=unseen)), encoding="utf-8")
-    index = np.asarray(lookup(str(path))(fit.curve.wavelength))
+    index = np.asarray(material(str(path))(fit.curve.wavelength))
     np.testing.assert_allclose(index, fit.curve.n + 1j * fit.curve.k, rtol=1e-9)
 
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from pellicle.accuracy.compiled import Program, compiled_function
 from pellicle.brdf import film_colour
-from pellicle.colour import delta_e2000, lab, sensor, way
+from pellicle.colour import delta_e2000, integration_bands, lab, sensor
 from pellicle.colour.bands import Bands
 from pellicle.colour.film import reflectance
 from pellicle.colour.observers import Sensor
@@ -83,7 +83,7 @@ def _table(extinction: Any, like: Table) -> Any:
 
 
 def _by_way(name: str, films: Films, double: bool = False) -> Program | str:
-    bands = way(name, *EYE)
+    bands = integration_bands(name, *EYE)
     if films.absorbs and not bands.absorbs:
         return "it knows no absorbing layer"
     return _compiled(partial(xyz, bands), films, double)
@@ -101,7 +101,7 @@ def _by_angles(count: int, films: Films) -> Program | str:
         return "it is seen at too few angles"
     if any(isinstance(x, Table) for x in films.numbers.values()):
         return "its index is a table"
-    bands, colour = way(FINE, *EYE), film_colour.by_nodes(count)
+    bands, colour = integration_bands(FINE, *EYE), film_colour.interpolated(count)
 
     def at_angles(numbers: dict[str, Any], angle: Any) -> Any:
         i = jnp.stack([jnp.sin(angle), 0 * angle, jnp.cos(angle)], axis=-1)

@@ -79,7 +79,7 @@ FILM = ("thickness", "n", "k", "base_n", "base_k", "ambient_n")
 
 def coloured(view: SurfaceView, draws: np.ndarray) -> Films | str:
     """The films of these draws, or why they have no colour of their own."""
-    if view.brdf.coloured is None:
+    if view.brdf.from_film_colour is None:
         return f"{view.model} is made for three wavelengths and has no other colour"
     if any(isinstance(view.numbers.get(key), list) for key in FILM):
         return "an index is free for each of three wavelengths: nothing says what it is between them"

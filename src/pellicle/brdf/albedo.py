@@ -10,11 +10,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from pellicle.brdf.broadcasting import Parameters
 from pellicle.brdf.directions import direction
-from pellicle.brdf.shapes import Parameters
 
 ANGLES = (0.0, 30.0, 60.0, 80.0)
-"""Angles of incidence (degrees) at which `greatest_albedo` looks."""
+"""Angles of incidence (degrees) at which `max_albedo` looks."""
 
 
 def directional_albedo(
@@ -33,7 +33,7 @@ def directional_albedo(
     return (np.pi / 2) * jnp.tensordot(jnp.asarray(weight, values.dtype), values.mean(axis=1), axes=1)
 
 
-def greatest_albedo(brdf: Callable, parameters: Parameters) -> float:
+def max_albedo(brdf: Callable, parameters: Parameters) -> float:
     """The greatest directional albedo over `ANGLES` and channels; above 1 says that energy is created."""
     at = jax.jit(jax.vmap(lambda theta: directional_albedo(brdf, parameters, theta)))
     return float(jnp.max(at(jnp.asarray(ANGLES))))
@@ -41,7 +41,7 @@ def greatest_albedo(brdf: Callable, parameters: Parameters) -> float:
 
 def energy_warning(brdf: Callable, parameters: Parameters) -> str | None:
     """A sentence with the number where the BRDF sends back more light than it gets, else None."""
-    most = greatest_albedo(brdf, parameters)
+    most = max_albedo(brdf, parameters)
     if most <= 1.005:  # the quadrature's own error, for lobes wider than a degree
         return None
     return (

@@ -15,8 +15,8 @@ from typing import Any
 import jax.numpy as jnp
 
 from pellicle.brdf import film_colour
+from pellicle.brdf.broadcasting import Parameters, column, weighted_sum
 from pellicle.brdf.lobes import blinn_phong
-from pellicle.brdf.shapes import Parameters, column, summed
 from pellicle.optics.orders import AirySeries, airy_series
 
 PUBLISHED_WAVELENGTHS = (650.0, 510.0, 475.0)
@@ -59,6 +59,6 @@ def blinn_phong_film(colour: film_colour.Colour = film_colour.exact) -> Callable
         def lobes():
             return column(blinn_phong(i, o, parameters["exponent"])) * colour(parameters, i, o)
 
-        return summed(parameters, lobes)
+        return weighted_sum(parameters, lobes)
 
     return evaluate

@@ -75,7 +75,7 @@ def refract(v: Any, normal: Any, index: Any) -> Float[Array, "... 3"]:
     return jnp.where((_inside_square(cosine, index) >= 0)[..., None], down, 0.0)
 
 
-def half(i: Any, o: Any) -> Float[Array, "... 3"]:
+def half_vector(i: Any, o: Any) -> Float[Array, "... 3"]:
     """The half vector (i + o)/|i + o|; zero where i = −o."""
     both = i + o
     size = length(both)

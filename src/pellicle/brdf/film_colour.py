@@ -13,8 +13,8 @@ from typing import Any, TypeAlias
 import jax.numpy as jnp
 import numpy as np
 
+from pellicle.brdf.broadcasting import Parameters, column
 from pellicle.brdf.directions import angle_to_half, cosine_to_half
-from pellicle.brdf.shapes import Parameters, column
 from pellicle.optics import coherent, orders, response
 from pellicle.optics.interface import allow_tunnelling
 from pellicle.optics.pair import Number, Pair
@@ -23,7 +23,7 @@ SHORTEST = 400.0
 """Wavelength (nm) at which `nodes` counts: eyes and cameras see next to nothing below."""
 
 
-def nodes(thickest: float) -> int:
+def node_count(thickest: float) -> int:
     """How many nodes of ⟨i, h⟩ keep a film of at most `thickest` nm within 1e-4 of its reflectance.
 
     Measured as the worst of 400 random films (n and base from 1.05, k to 0.3, metals among the bases)
@@ -93,16 +93,16 @@ def rgb(parameters: Parameters, spectrum: Any) -> Any:
     return spectrum if weights is None else spectrum @ weights
 
 
-def at_each(reflectance: Reflectance) -> Colour:
+def per_sample(reflectance: Reflectance) -> Colour:
     """The film's RGB reflectance for light from i to o, computed for each sample."""
     return lambda parameters, i, o: rgb(parameters, reflectance(parameters, angle_to_half(i, o)))
 
 
-exact = at_each(reflectance)
-incoherent = at_each(without_interference)
+exact = per_sample(reflectance)
+incoherent = per_sample(without_interference)
 
 
-def head_on(reflectance: Reflectance) -> Colour:
+def at_normal_incidence(reflectance: Reflectance) -> Colour:
     """The same as if light always met the facets along their normals."""
     return lambda parameters, i, o: rgb(parameters, reflectance(parameters, None))
 
@@ -116,15 +116,15 @@ def coefficients(parameters: Parameters, dtype: Any, count: int, reflectance: Re
     return jnp.asarray(transform, dtype) @ rgb(parameters, reflectance(parameters, angle))
 
 
-def by_nodes(count: int, reflectance: Reflectance = reflectance) -> Colour:
-    """`at_each` by a polynomial through so many nodes; with a thickness map, `at_each` itself.
+def interpolated(count: int, reflectance: Reflectance = reflectance) -> Colour:
+    """`per_sample` by a polynomial through so many nodes; with a thickness map, `per_sample` itself.
 
     For values: a Jacobian through `exact` costs less than through a long polynomial.
     """
 
     def colour(parameters, i, o):
         if jnp.ndim(parameters["thickness"]) > 0:
-            return at_each(reflectance)(parameters, i, o)
+            return per_sample(reflectance)(parameters, i, o)
         cosine = cosine_to_half(i, o)
         series = coefficients(parameters, cosine.dtype, count, reflectance)
         # one channel after the other: a last axis of three would keep the processor's lanes empty
@@ -135,7 +135,7 @@ def by_nodes(count: int, reflectance: Reflectance = reflectance) -> Colour:
 
 def chebyshev(thickest: float) -> Colour:
     """`exact` by as many nodes as films of at most `thickest` nm take."""
-    return by_nodes(nodes(thickest))
+    return interpolated(node_count(thickest))
 
 
 def _clenshaw(series: Any, twice_x: Any) -> Any:

@@ -25,9 +25,9 @@ from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
+from pellicle.brdf.broadcasting import Parameters, column, weighted_sum
 from pellicle.brdf.directions import cosine_inside, cosine_to_half, direction
 from pellicle.brdf.lobes import cosine_to_mirror, power
-from pellicle.brdf.shapes import Parameters, column, summed
 from pellicle.optics.elementary import sincos
 from pellicle.optics.pair import sqrt
 
@@ -161,7 +161,7 @@ def specular(fresnel: Callable = published, join: Callable = interfering) -> Cal
     """The Phong-like model over a grey diffuse base: specular · (eq. 5) + diffuse."""
 
     def evaluate(parameters, i, o):
-        return summed(parameters, lambda: join(amplitudes(parameters, i, o, fresnel)))
+        return weighted_sum(parameters, lambda: join(amplitudes(parameters, i, o, fresnel)))
 
     return evaluate
 
@@ -180,7 +180,7 @@ def full(fresnel: Callable = published, join: Callable = interfering) -> Callabl
     """Both: specular · (eq. 5) + diffuse · ρ_d (eq. 16), as in the paper's figures 3 and 5."""
 
     def evaluate(parameters, i, o):
-        return summed(
+        return weighted_sum(
             parameters,
             lambda: join(amplitudes(parameters, i, o, fresnel)),
             lambda: layered_diffuse(parameters, join),

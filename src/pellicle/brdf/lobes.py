@@ -10,7 +10,7 @@ from typing import Any
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from pellicle.brdf.directions import half
+from pellicle.brdf.directions import half_vector
 from pellicle.optics.pair import sqrt
 
 
@@ -32,7 +32,7 @@ def phong(i: Any, o: Any, exponent: Any) -> Float[Array, "..."]:
 
 def blinn_phong(i: Any, o: Any, exponent: Any) -> Float[Array, "..."]:
     """⟨n, h⟩₊^e, as published: 1 at the peak (J. F. Blinn, SIGGRAPH 1977)."""
-    return power(half(i, o)[..., 2], exponent)
+    return power(half_vector(i, o)[..., 2], exponent)
 
 
 def normalisation(exponent: Any) -> Any:
@@ -70,4 +70,4 @@ def smith(i: Any, o: Any, alpha: Any) -> Float[Array, "..."]:
 
 def microfacets(i: Any, o: Any, alpha: Any) -> Float[Array, "..."]:
     """D G₂/(4⟨i, n⟩⟨o, n⟩) in 1/sr: the BRDF of mirror-like GGX facets."""
-    return ggx(half(i, o), alpha) * smith(i, o, alpha)
+    return ggx(half_vector(i, o), alpha) * smith(i, o, alpha)

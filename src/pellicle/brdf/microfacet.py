@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from pellicle.brdf import film_colour
+from pellicle.brdf.broadcasting import column, weighted_sum
 from pellicle.brdf.lobes import microfacets
-from pellicle.brdf.shapes import column, summed
 
 
 def microfacet(colour: Callable = film_colour.exact) -> Callable:
@@ -20,6 +20,6 @@ def microfacet(colour: Callable = film_colour.exact) -> Callable:
         def lobes():
             return column(microfacets(i, o, parameters["roughness"])) * colour(parameters, i, o)
 
-        return summed(parameters, lobes)
+        return weighted_sum(parameters, lobes)
 
     return evaluate

@@ -21,8 +21,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from pellicle.brdf import blinn_phong_film, film_colour, granier_heidrich
+from pellicle.brdf.broadcasting import Parameters
 from pellicle.brdf.microfacet import microfacet
-from pellicle.brdf.shapes import Parameters
 
 RGB = (645.0, 525.0, 445.0)
 """Wavelengths of R, G and B in nm (Granier and Heidrich 2002)."""
@@ -55,17 +55,17 @@ class Model(NamedTuple):
     evaluate: Evaluate
     incoherent: Evaluate  # without interference: what a layer must beat
     wavelengths: tuple[float, ...] = RGB
-    coloured: Callable[[film_colour.Colour], Evaluate] | None = None  # `evaluate` by a film's colour
+    from_film_colour: Callable[[film_colour.Colour], Evaluate] | None = None  # `evaluate` by a film's colour
 
-    def up_to(self, thickest: float) -> Model:
+    def for_thickness_up_to(self, thickest: float) -> Model:
         """The same model for layers of at most `thickest` nm, and as quick as that allows."""
-        if self.coloured is None:
+        if self.from_film_colour is None:
             return self
-        return self._replace(evaluate=self.coloured(film_colour.chebyshev(thickest)))
+        return self._replace(evaluate=self.from_film_colour(film_colour.chebyshev(thickest)))
 
     def without_interference(self) -> Model:
         """The same model with its phase averaged away, or its lobes added as intensities."""
-        return self._replace(evaluate=self.incoherent, coloured=None)
+        return self._replace(evaluate=self.incoherent, from_film_colour=None)
 
     def __call__(self, parameters: Parameters, i: Any, o: Any) -> Float[Array, "... channels"]:
         """The BRDF for light from `i` to `o`, unit vectors (..., 3) with the normal as third axis.
@@ -127,11 +127,19 @@ def _granier_heidrich(name: str, description: str, make: Callable, fresnel: Call
     )
 
 
-def _shader(name: str, description: str, colour: film_colour.Colour, coloured: Callable | None) -> Model:
-    average = blinn_phong_film.blinn_phong_film(film_colour.at_each(blinn_phong_film.phase_average))
+def _shader(
+    name: str, description: str, colour: film_colour.Colour, from_film_colour: Callable | None
+) -> Model:
+    average = blinn_phong_film.blinn_phong_film(film_colour.per_sample(blinn_phong_film.phase_average))
     made = blinn_phong_film.blinn_phong_film(colour)
     return Model(
-        name, description, _SHADER, made, average, blinn_phong_film.PUBLISHED_WAVELENGTHS, coloured=coloured
+        name,
+        description,
+        _SHADER,
+        made,
+        average,
+        blinn_phong_film.PUBLISHED_WAVELENGTHS,
+        from_film_colour=from_film_colour,
     )
 
 
@@ -168,7 +176,7 @@ _ALL = (
         _FACETS,
         microfacet(),
         microfacet(film_colour.incoherent),
-        coloured=microfacet,
+        from_film_colour=microfacet,
     ),
     _shader(
         "blinn-phong-film",
@@ -179,7 +187,7 @@ _ALL = (
     _shader(
         "blinn-phong-film-published",
         "the same with the shader's phase counted twice",
-        film_colour.at_each(blinn_phong_film.published),
+        film_colour.per_sample(blinn_phong_film.published),
         None,
     ),
 )

@@ -5,7 +5,7 @@ colour, `spaces` and `difference` what is done with a colour.
 """
 
 from pellicle.colour.bands import Bands as Bands
-from pellicle.colour.bands import way as way
+from pellicle.colour.bands import integration_bands as integration_bands
 from pellicle.colour.difference import delta_e76 as delta_e76
 from pellicle.colour.difference import delta_e2000 as delta_e2000
 from pellicle.colour.film import film_colour as film_colour

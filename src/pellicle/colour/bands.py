@@ -119,7 +119,7 @@ _WORD = re.compile(r"(points|uniform|frequency|nodes|gaussians)-(\d+(?:-\d+)*)")
 
 
 @cache
-def way(name: str = "gaussians-8", observer: str = "1931", illuminant: str = "D65") -> Bands:
+def integration_bands(method: str = "gaussians-8", observer: str = "1931", illuminant: str = "D65") -> Bands:
     """The bands of a way by its name.
 
     `points-645-525-445` (any three, in nm), `uniform-32` (steps in λ), `frequency-32` (steps in
@@ -131,9 +131,9 @@ def way(name: str = "gaussians-8", observer: str = "1931", illuminant: str = "D6
     the layer absorbs and how its index varies.
     """
     target = sensor(observer, illuminant)
-    if name == "belcour-barla":
+    if method == "belcour-barla":
         return belcour_barla(target)
-    found = _WORD.fullmatch(name)
+    found = _WORD.fullmatch(method)
     kind, numbers = (found[1], [int(n) for n in found[2].split("-")]) if found else ("", [])
     match kind, numbers:
         case "points", [_, _, _] if min(numbers) > 0:
@@ -145,7 +145,7 @@ def way(name: str = "gaussians-8", observer: str = "1931", illuminant: str = "D6
         case "gaussians", [count]:
             return _derived("gaussians", count, LONGEST_PATH, target)
     raise ValueError(
-        f"way {name!r} is unknown: expected belcour-barla, gaussians-N, uniform-N, "
+        f"method {method!r} is unknown: expected belcour-barla, gaussians-N, uniform-N, "
         "frequency-N, nodes-N-THICKEST or points-RED-GREEN-BLUE"
     )
 

@@ -10,8 +10,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from pellicle.colour import spaces
-from pellicle.colour.bands import Bands
-from pellicle.colour.bands import way as bands_of
+from pellicle.colour.bands import Bands, integration_bands
 from pellicle.colour.observers import sensor
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.optics import coherent, interface, orders, response
@@ -48,7 +47,7 @@ def film_colour(
     *,
     ambient: Any = 1.0,
     angle: Any = 0.0,
-    way: str = "gaussians-8",
+    method: str = "gaussians-8",
     illuminant: str = "D65",
     observer: str = "1931",
 ) -> Colour:
@@ -56,14 +55,14 @@ def film_colour(
 
     **Arguments:** `thickness` in nm and `angle` of incidence in degrees broadcast; `layer` and
     `substrate` are numbers n + ik, arrays of such, or materials (`pl.material("Fe2O3")`); `ambient`
-    is real; for `way` see `pellicle.colour.way`.
+    is real; for `method` see `pellicle.colour.integration_bands`.
 
     **How exact:** against steps of 1 nm, the mean ΔE2000 of `gaussians-8` over the sweep of
     `benchmarks/colour.py` is 0.06 to 0.09 under E, D50, D65, D75 and A (0.7 at most). Gaussians take a
     material's index at their centres and its slope there, which does not do for media that change much
     within 30 nm: 140 nm of Fe2O3 on glass are 3.6 off, and by `uniform-64` 0.005.
 
-    **Raises:** ValueError for an unknown way, observer or illuminant, and for an absorbing layer by
+    **Raises:** ValueError for an unknown method, observer or illuminant, and for an absorbing layer by
     `belcour-barla`, which has none.
 
     ```python
@@ -72,7 +71,7 @@ def film_colour(
 
     ```
     """
-    bands, white = bands_of(way, observer, illuminant), sensor(observer, illuminant).white
+    bands, white = integration_bands(method, observer, illuminant), sensor(observer, illuminant).white
     seen = jnp.asarray(reflectance(thickness, layer, substrate, bands, ambient=ambient, angle=angle))
     xyz = seen @ jnp.asarray(bands.weights, seen.dtype)
     return Colour(xyz, (float(white[0]), float(white[1]), float(white[2])))

@@ -41,7 +41,7 @@ def bounds_of(number: Any) -> tuple[float, float] | None:
     return None
 
 
-def not_negative(model: str, **parameters: Any) -> None:
+def require_nonnegative(model: str, **parameters: Any) -> None:
     """ValueError for a parameter that can be below zero."""
     for name, number in parameters.items():
         found = bounds_of(number)
@@ -49,6 +49,6 @@ def not_negative(model: str, **parameters: Any) -> None:
             raise ValueError(f"{model}: {name} must not be negative, got {found[0]:g}")
 
 
-def like(values: Any, wavelength: Any):
+def cast_like(values: Any, wavelength: Any):
     """A table's column in the precision of the wavelengths, so that float32 stays float32."""
     return jnp.asarray(values, dtype=jnp.result_type(float, wavelength))

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, final
 
 import jax.numpy as jnp
 
-from pellicle.dispersion.base import HC, AbstractDispersion, bounds_of, like, not_negative
+from pellicle.dispersion.base import HC, AbstractDispersion, bounds_of, cast_like, require_nonnegative
 from pellicle.optics.pair import Number, Pair, imag, is_real, real
 
 
@@ -40,8 +40,8 @@ class Table(AbstractDispersion):
 
     def index(self, wavelength):
         def column(values):
-            at = like(self.wavelength, wavelength)
-            return jnp.interp(wavelength, at, like(values, wavelength), left=jnp.nan, right=jnp.nan)
+            at = cast_like(self.wavelength, wavelength)
+            return jnp.interp(wavelength, at, cast_like(values, wavelength), left=jnp.nan, right=jnp.nan)
 
         return column(self.n) if self.k is None else Pair(column(self.n), column(self.k))
 
@@ -79,7 +79,7 @@ class CauchyUrbach(AbstractDispersion):
     Eb: Any = 3.1
 
     def __check_init__(self):
-        not_negative("cauchy-urbach", k0=self.k0)
+        require_nonnegative("cauchy-urbach", k0=self.k0)
         found = bounds_of(self.Eu)
         if found is not None and not found[0] > 0:
             raise ValueError(f"cauchy-urbach: the Urbach energy Eu must be positive, got {found[0]:g} eV")

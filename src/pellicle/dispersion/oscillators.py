@@ -12,7 +12,7 @@ from typing import Any, ClassVar, final
 import equinox as eqx
 import jax.numpy as jnp
 
-from pellicle.dispersion.base import HC, AbstractDispersion, bounds_of, not_negative
+from pellicle.dispersion.base import HC, AbstractDispersion, bounds_of, require_nonnegative
 from pellicle.optics import pair
 from pellicle.optics.pair import Pair
 from pellicle.optics.special import arctan_over_root, dawson, log_abs
@@ -30,7 +30,7 @@ class AbstractOscillator(eqx.Module):
 
 def check(model: str, *, gap: Any = None, centre: Any = None, **not_below_zero: Any) -> None:
     """ValueError where a parameter may fall below zero, or the gap lies wholly above the resonance."""
-    not_negative(model, **not_below_zero)
+    require_nonnegative(model, **not_below_zero)
     low, high = bounds_of(gap), bounds_of(centre)
     if low is not None and high is not None and low[0] >= high[1]:
         raise ValueError(
@@ -46,7 +46,7 @@ class Oscillators(AbstractDispersion):
     terms: tuple[AbstractOscillator, ...]
 
     def __check_init__(self):
-        not_negative("oscillators", eps_inf=self.eps_inf)
+        require_nonnegative("oscillators", eps_inf=self.eps_inf)
 
     def index(self, wavelength):
         energy = HC / wavelength

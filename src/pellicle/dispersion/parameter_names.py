@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 _BRANCHES = ("host", "inclusion")
 
 
-class Place(NamedTuple):
+class ParameterLocation(NamedTuple):
     """A number's full name in its dispersion, its last part, the field that holds it, and whose it is."""
 
     name: str
@@ -21,7 +21,7 @@ class Place(NamedTuple):
         return getattr(self.owner, "units", {}).get(self.field, "")
 
 
-def place(tree: Any, path: tuple) -> Place:
+def locate_parameter(tree: Any, path: tuple) -> ParameterLocation:
     """Where the leaf at `path` (as of `jax.tree_util`) stands in a dispersion.
 
     The numbers of a tuple are counted from 1 (`B1`); a mixture's components and, where there are
@@ -41,4 +41,4 @@ def place(tree: Any, path: tuple) -> Place:
         elif len(node) > 1:
             words.append(f"term{index + 1}")
         node = node[index]
-    return Place(".".join([*words, field + count]), field + count, field, owner)
+    return ParameterLocation(".".join([*words, field + count]), field + count, field, owner)

@@ -18,7 +18,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.dispersion.base import HC, AbstractDispersion, like, not_negative
+from pellicle.dispersion.base import HC, AbstractDispersion, cast_like, require_nonnegative
 from pellicle.optics.pair import Pair
 from pellicle.optics.special import log_abs
 
@@ -40,7 +40,7 @@ def _check(model: str, knots: tuple[float, ...], **coefficients: Any) -> None:
         if len(values) != len(knots):
             raise ValueError(f"{model}: {name} needs one number a knot, {len(knots)}, got {len(values)}")
         for i, value in enumerate(values):
-            not_negative(model, **{f"{name}{i + 1}": value})
+            require_nonnegative(model, **{f"{name}{i + 1}": value})
 
 
 @final
@@ -88,7 +88,7 @@ class KramersKronigSpline(AbstractDispersion):
 
     def __check_init__(self):
         _check("spline-kk", self.knots, k=self.k)
-        not_negative("spline-kk", n_inf=self.n_inf)
+        require_nonnegative("spline-kk", n_inf=self.n_inf)
 
     def index(self, wavelength):
         energy = HC / wavelength
@@ -113,13 +113,13 @@ def b_splines(x: Any, knots: np.ndarray, degree: int) -> Any:
 
     Zero outside the knots; the last interval holds its right end.
     """
-    x, t = jnp.asarray(x)[..., None], like(knots, x)
+    x, t = jnp.asarray(x)[..., None], cast_like(knots, x)
     last = knots[1:] == knots[-1]
     held = (x >= t[:-1]) & ((x < t[1:]) | (jnp.asarray(last & (knots[:-1] < knots[-1])) & (x <= t[-1])))
     basis = jnp.where(held, jnp.ones_like(x), jnp.zeros_like(x))
     for d in range(1, degree + 1):
         spans = knots[d:] - knots[:-d]
-        slope = like(np.divide(1.0, spans, out=np.zeros_like(spans), where=spans > 0), x)
+        slope = cast_like(np.divide(1.0, spans, out=np.zeros_like(spans), where=spans > 0), x)
         rise = (x - t[:-d]) * slope
         fall = (t[d:] - x) * slope
         basis = rise[..., :-1] * basis[..., :-1] + fall[..., 1:] * basis[..., 1:]
@@ -128,7 +128,7 @@ def b_splines(x: Any, knots: np.ndarray, degree: int) -> Any:
 
 def _conjugates(energy: Any, knots: np.ndarray) -> Any:
     """(2/π) P∫ ξ B(ξ)/(ξ² − E²) dξ of every cubic B-spline over `knots`."""
-    t = like(knots, energy)
+    t = cast_like(knots, energy)
     below, above = t - energy[..., None], t + energy[..., None]
     parts = (below**3 * log_abs(below) + above**3 * log_abs(above)) / math.pi
     weights = np.zeros((len(knots), len(knots) - 4))
@@ -136,5 +136,5 @@ def _conjugates(energy: Any, knots: np.ndarray) -> Any:
         own = knots[j : j + 5]
         for i in range(5):
             weights[j + i, j] = (own[4] - own[0]) / np.prod(own[i] - np.delete(own, i))
-    at = like(weights, energy)
+    at = cast_like(weights, energy)
     return jnp.sum(parts[..., None] * at, axis=-2)

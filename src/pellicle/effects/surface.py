@@ -76,7 +76,7 @@ def coherence(view: SurfaceView) -> Row:
 
 def oblique(view: SurfaceView) -> Row | None:
     """On where a facet is lit at an angle; only of a film."""
-    if view.brdf.coloured is None:
+    if view.brdf.from_film_colour is None:
         return None
     if not view.layered:
         return Row("oblique", False, NO_LAYER)
@@ -97,7 +97,7 @@ def polarisation(view: SurfaceView) -> Row | None:
 
 def tunnelling(view: SurfaceView) -> Row | None:
     """Off where no index can fall below n₀ sin θ: then a root needs no branch."""
-    if view.brdf.coloured is None:
+    if view.brdf.from_film_colour is None:
         return None
     row = oblique(view)
     if row is not None and not row.on:

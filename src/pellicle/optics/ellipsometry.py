@@ -36,7 +36,7 @@ def stokes(s: Response, p: Response) -> Stokes:
     return Stokes(abs2(rs) - abs2(rp), real(both), imag(both), abs2(rs) + abs2(rp))
 
 
-class Crossed(NamedTuple):
+class CrossProducts(NamedTuple):
     """conj(x_p) x_s of one sheet's amplitudes x: reflected, passed both ways, and reflected from below."""
 
     reflected: Any
@@ -44,7 +44,7 @@ class Crossed(NamedTuple):
     below: Any
 
 
-def crossed(s: Response, p: Response) -> Crossed:
+def cross_products(s: Response, p: Response) -> CrossProducts:
     """From the responses of the same layers to both polarisations, between media that absorb next to nothing.
 
     Their t t′ has the size T and, but for what s and p have in common, twice the phase of 1/denominator.
@@ -52,14 +52,14 @@ def crossed(s: Response, p: Response) -> Crossed:
     ds, dp = to_complex(s.denominator), to_complex(p.denominator)
     apart = jnp.conj(ds) * dp
     turn = apart / jnp.abs(apart)
-    return Crossed(
+    return CrossProducts(
         jnp.conj(to_complex(p.reflected) / dp) * (to_complex(s.reflected) / ds),
         transmittance(p) * transmittance(s) * turn * turn,
         jnp.conj(to_complex(p.below) / dp) * (to_complex(s.below) / ds),
     )
 
 
-def summed(s: Any, p: Any, cross: Any) -> Stokes:
+def stokes_from_sums(s: Any, p: Any, cross: Any) -> Stokes:
     """From sums of intensities |x_s|², |x_p|² and of conj(x_p) x_s: what comes back from plates."""
     return Stokes(s - p, 2 * jnp.real(cross), 2 * jnp.imag(cross), s + p)
 
@@ -74,7 +74,7 @@ def normalised(given: Stokes) -> tuple[Any, Any, Any]:
     return n, c, s
 
 
-def angles(n: Any, c: Any, s: Any) -> tuple[Any, Any]:
+def psi_delta(n: Any, c: Any, s: Any) -> tuple[Any, Any]:
     """Ψ in 0 to 90 and Δ in 0 to 360 degrees.
 
     Where Ψ is 0 or 90, Δ is 0 and its derivatives are 0; where nothing is reflected, all are 0.

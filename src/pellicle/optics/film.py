@@ -16,16 +16,24 @@ import jax.numpy as jnp
 from jax.custom_derivatives import SymbolicZero
 
 from pellicle.optics.characteristic import (
+    element_slopes,
     half_expm1,
     is_real_array,
     matrix_elements,
     propagating_elements,
     root,
-    slopes,
 )
 from pellicle.optics.elementary import sincos, sincos_squares
-from pellicle.optics.hoisting import hold, used_again
-from pellicle.optics.interface import carried, normal, normal_square, nothing_where, power, same, transverse
+from pellicle.optics.hoisting import hoist, is_reused
+from pellicle.optics.interface import (
+    equal_media,
+    incident_factor,
+    normal,
+    normal_flux,
+    normal_square,
+    transverse,
+    zero_where,
+)
 from pellicle.optics.pair import Number, abs2, conj, is_real, real, times_i, where
 from pellicle.optics.response import Amplitudes, Response
 
@@ -52,11 +60,11 @@ def _amplitudes(
     if is_real_array(Q):
         c, f, scale_square, _ = matrix_elements(Q, k)
         g = times_i(-f)
-        return tuple(_plain([A * c + B * g for A, B in hold(three, k)]) for three in sides), scale_square
+        return tuple(_plain([A * c + B * g for A, B in hoist(three, k)]) for three in sides), scale_square
     q = root(Q)
     half, scale_square = half_expm1(q, k)
     pairs = [[(A, A - B / q) for A, B in three] for three in sides]
-    if used_again(pairs, k):
+    if is_reused(pairs, k):
         return tuple(_on_grid(three, half, k) for three in pairs), scale_square
     return tuple(_plain([A + half * C for A, C in three]) for three in pairs), scale_square
 
@@ -68,16 +76,16 @@ def _plain(values: list[Number]) -> AmplitudesAndSquares:
 def _by_wave(sides: tuple[Amplitudes, ...], Q: Any, k: Any) -> tuple[tuple[AmplitudesAndSquares, ...], Any]:
     """Where the wave propagates without loss: |A c − iB f|² of real A and B is a sum of two squares."""
     q = jnp.sqrt(Q)
-    phase = k * hold(q, k)
+    phase = k * hoist(q, k)
     sine, cosine = sincos(phase)
     sine_square, cosine_square = sincos_squares(phase)
 
     def one(three: Amplitudes) -> AmplitudesAndSquares:
-        pairs = hold([(A, B / q) for A, B in three], k)
+        pairs = hoist([(A, B / q) for A, B in three], k)
         found = _plain([A * cosine + times_i(-sine) * V for A, V in pairs])
         if not all(is_real(x) for pair in pairs for x in pair):
             return found
-        weights = hold([(A * A, V * V) for A, V in pairs], k)
+        weights = hoist([(A * A, V * V) for A, V in pairs], k)
         return AmplitudesAndSquares(
             found.values, Amplitudes(*(a * cosine_square + b * sine_square for a, b in weights))
         )
@@ -91,8 +99,8 @@ def _on_grid(pairs: list[tuple[Number, Number]], half: Number, k: Any) -> Amplit
     Where C is nothing but rounding, so is θ: all that is made of C must be made of the same C, which
     holds because it is held.
     """
-    pairs = hold(pairs, k)
-    squares = (abs2(turned + half * size) for turned, size in hold([_turned(*pair) for pair in pairs], k))
+    pairs = hoist(pairs, k)
+    squares = (abs2(turned + half * size) for turned, size in hoist([_turned(*pair) for pair in pairs], k))
     return AmplitudesAndSquares(Amplitudes(*(A + half * C for A, C in pairs)), Amplitudes(*squares))
 
 
@@ -108,7 +116,7 @@ def _amplitudes_slope(propagating, primal, tangent):
     """By the derivatives of c and f. What is known not to vary costs nothing."""
     (sides, Q, k), (dsides, dQ, dk) = primal, tangent
     dQ, dk = jax.tree.map(_filled, (dQ, dk), is_leaf=_is_nothing)
-    (c, f, _, _), (dc, df, dscale, _) = slopes(
+    (c, f, _, _), (dc, df, dscale, _) = element_slopes(
         propagating_elements if propagating else matrix_elements, (Q, k), (dQ, dk)
     )
     g, dg = times_i(-f), times_i(-df)
@@ -169,7 +177,7 @@ def film(
     a, q0 = transverse(ambient, angle)
     e0, e1, e2, q1_square = ambient * ambient, layer * layer, substrate * substrate, normal_square(layer, a)
     q2 = normal(substrate, a)
-    bare, empty = same(ambient, substrate), same(ambient, layer, substrate)
+    bare, empty = equal_media(ambient, substrate), equal_media(ambient, layer, substrate)
     letters = polarisations[:1] if angle is None else polarisations
     sides, fluxes = [], []
     for polarisation in letters:
@@ -178,8 +186,8 @@ def film(
         else:
             u, v = e0 * e2 * q1_square / e1, e1 * q0 * q2
             A, B, A_, B_ = e0 * q2 + e2 * q0, u + v, e2 * q0 - e0 * q2, v - u
-        A_, B_ = nothing_where(bare, A_), nothing_where(empty, B_)
-        flux = carried(ambient, q0, polarisation) * power(substrate, q2, polarisation)
+        A_, B_ = zero_where(bare, A_), zero_where(empty, B_)
+        flux = incident_factor(ambient, q0, polarisation) * normal_flux(substrate, q2, polarisation)
         if is_real(A):  # and positive: over A, which cancels, a product less at each point
             over = 1 / A
             A, A_, B, B_, flux = 1.0, A_ * over, B * over, B_ * over, flux * over * over
@@ -189,6 +197,6 @@ def film(
     responses = []
     for (values, squares), flux in zip(results, fluxes, strict=True):
         reflected, below, denominator = values
-        passed = hold(flux, scale_square)
+        passed = hoist(flux, scale_square)
         responses.append(Response(reflected, below, denominator, squares, passed, scale_square))
     return tuple(responses)

@@ -12,20 +12,20 @@ from jax.experimental.xla_metadata import set_xla_metadata
 from pellicle.optics.pair import Number
 
 
-def used_again(value: Number, beside: Any) -> bool:
+def is_reused(value: Number, beside: Any) -> bool:
     """Whether each element of `value` meets so many of `beside` that holding it takes little memory."""
     own = jnp.broadcast_shapes(*(jnp.shape(x) for x in jax.tree.leaves(value)))
     return 8 * math.prod(own) <= math.prod(jnp.broadcast_shapes(own, jnp.shape(beside)))
 
 
-def hold(value: Number, beside: Any) -> Number:
+def hoist(value: Number, beside: Any) -> Number:
     """The same numbers, computed once and not again at every point of an array `beside` that they meet.
 
     XLA moves what it takes for cheap into the loop that uses it and repeats it there at each point; where
     two loops use it, each computes it anew, and not always to the same rounding. It does not look into
     a function that is not to be inlined.
     """
-    if not used_again(value, beside):
+    if not is_reused(value, beside):
         return value
     leaves, tree = jax.tree.flatten(value)
     with set_xla_metadata(inlineable="false"):

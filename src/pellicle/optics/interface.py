@@ -63,12 +63,12 @@ def normal_square(index: Number, a: Any) -> Number:
     return (index - a) * (index + a)
 
 
-def same(ambient: Any, *others: Number):
+def equal_media(ambient: Any, *others: Number):
     """Where all these media are the ambient itself, to the last digit."""
     return reduce(jnp.logical_and, [abs2(other - ambient) == 0 for other in others])
 
 
-def nothing_where(test, amplitude: Number) -> Number:
+def zero_where(test, amplitude: Number) -> Number:
     """An amplitude that is exactly 0 where `test` holds, and not by rounding; its slope stays."""
     exact = where(test, amplitude, 0.0 * amplitude)
     return amplitude - jax.tree.map(jax.lax.stop_gradient, exact)
@@ -102,7 +102,7 @@ def fresnel(n1: Number, q1: Number, n2: Number, q2: Number, polarisation: str) -
     return (u - v) / (u + v)
 
 
-def power(index: Number, q: Number, polarisation: str):
+def normal_flux(index: Number, q: Number, polarisation: str):
     """Flux along the normal per |E|²: Re q for s, Re(ε q̄) for p, up to |n|² which cancels.
 
     Gerardin et al. 2019 (eq. 21) use one factor for both polarisations; with an absorbing
@@ -111,7 +111,7 @@ def power(index: Number, q: Number, polarisation: str):
     return real(q) if polarisation == "s" else real(index * index * conj(q))
 
 
-def carried(index: Number, q: Number, polarisation: str):
+def incident_factor(index: Number, q: Number, polarisation: str):
     """4 |q|²/Re q for s, 4 |εq|²/Re(ε q̄) for p: an incident wave's part in what a film transmits.
 
     For a medium that does not absorb 4 q and 4 ε q, which need no division at grazing incidence.
@@ -119,7 +119,7 @@ def carried(index: Number, q: Number, polarisation: str):
     if is_real(index) and is_real(q):
         return 4 * q if polarisation == "s" else 4 * index * index * q
     amplitude = q if polarisation == "s" else index * index * q
-    flux = power(index, q, polarisation)
+    flux = normal_flux(index, q, polarisation)
     nothing = flux == 0
     return jnp.where(nothing, 0.0, 4 * abs2(amplitude) / jnp.where(nothing, 1.0, flux))
 
@@ -131,9 +131,9 @@ def reflectance(n1: Number, q1: Number, n2: Number, q2: Number, polarisation: st
 
 def transmittance(n1: Number, q1: Number, n2: Number, q2: Number, polarisation: str):
     """Power transmittance of one boundary; 0 where the incident wave carries no power."""
-    carried = power(n1, q1, polarisation)
+    carried = normal_flux(n1, q1, polarisation)
     nothing = carried == 0
-    ratio = power(n2, q2, polarisation) / where(nothing, 1.0 + 0.0 * carried, carried)
+    ratio = normal_flux(n2, q2, polarisation) / where(nothing, 1.0 + 0.0 * carried, carried)
     if polarisation == "s":
         amplitude = 4 * abs2(q1) / abs2(q1 + q2)
     else:

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 
 from pellicle.optics.elementary import sincos
-from pellicle.optics.interface import carried, fresnel, normal, power, transverse
+from pellicle.optics.interface import fresnel, incident_factor, normal, normal_flux, transverse
 from pellicle.optics.pair import Number, Pair, abs2, conj, imag, real
 
 Window = Callable[[int], Any]
@@ -55,7 +55,7 @@ def airy_series(
         lower=fresnel(layer, q1, substrate, q2, polarisation),
         damping=jnp.exp(-2 * phase * imag(q1)),
         phase=2 * phase * real(q1),
-        direct=carried(ambient, q0, polarisation) * direct * power(substrate, q2, polarisation),
+        direct=incident_factor(ambient, q0, polarisation) * direct * normal_flux(substrate, q2, polarisation),
     )
 
 
@@ -100,7 +100,7 @@ def gaussian(variance) -> Window:
     return lambda m: jnp.exp(-0.5 * m * m * variance)
 
 
-def blur(phase_slope, bandwidth, cosine_index, thickness_spread, wavelength):
+def phase_variance(phase_slope, bandwidth, cosine_index, thickness_spread, wavelength):
     """Variance of the phase (rad²) seen by an instrument.
 
     `phase_slope` is ∂ϕ/∂λ (rad/nm) with the layer's dispersion in it (the group index: ϕ/λ alone is

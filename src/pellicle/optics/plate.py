@@ -27,12 +27,12 @@ def plate_reflectance(front: Face, back_reflectance, internal):
     transparent plate; for one that absorbs, the relative error is (k/n)², at most 1e-5 for plates
     over 10 µm through which anything passes.
     """
-    return bounced(
+    return multiple_reflections(
         front.reflectance, front.transmittance**2, front.reflectance_below, back_reflectance, internal
     )
 
 
-def bounced(reflected, passed_twice, below, back, internal):
+def multiple_reflections(reflected, passed_twice, below, back, internal):
     """reflected + passed_twice·back·τ²/(1 − below·back·τ²), the orders of light in a plate summed.
 
     For powers, and for the products conj(x_p) x_s of two polarisations' amplitudes: both add from order to

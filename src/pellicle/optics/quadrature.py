@@ -16,7 +16,7 @@ def normal_rule(count: int) -> tuple[np.ndarray, np.ndarray]:
     return np.sqrt(2) * nodes, weights / np.sqrt(np.pi)
 
 
-class Directions(NamedTuple):
+class ConeRays(NamedTuple):
     """The cone's rays: angles of incidence (radians), their weights, and how much of light that was
     polarised s along the axis each carries as s."""
 
@@ -31,7 +31,7 @@ def _legendre_rule(count: int) -> tuple[np.ndarray, np.ndarray]:
     return np.polynomial.legendre.leggauss(count)
 
 
-def directions(angle: Any, sine: Any, count: int, around: int) -> Directions:
+def cone_rays(angle: Any, sine: Any, count: int, around: int) -> ConeRays:
     """Rays that fill a pupil evenly, as an aplanatic lens does, in half a turn (the rest is its mirror).
 
     `angle` of the axis (radians) and `sine` of the half angle broadcast; rays come first. `around` is
@@ -42,7 +42,7 @@ def directions(angle: Any, sine: Any, count: int, around: int) -> Directions:
     nodes, weights = _legendre_rule(count)
     radius = np.sqrt(0.5 * (nodes + 1))
     if around == 1:
-        return Directions(jnp.arcsin(_first(radius, sine) * sine), 0.5 * weights, 0.5)
+        return ConeRays(jnp.arcsin(_first(radius, sine) * sine), 0.5 * weights, 0.5)
     azimuth = np.pi * (np.arange(around) + 0.5) / around
     r, phi = (x.ravel() for x in np.meshgrid(radius, azimuth, indexing="ij"))
     shape = jnp.broadcast_shapes(np.shape(angle), np.shape(sine))
@@ -53,7 +53,7 @@ def directions(angle: Any, sine: Any, count: int, around: int) -> Directions:
     across = across + jnp.finfo(across.dtype).tiny  # so that no root has an infinite slope
     s = s0 * (along * cos_phi**2 + sin_phi**2) - rho * cos_phi * c0
     theta = jnp.arctan2(jnp.sqrt(across), along * c0 + rho * cos_phi * s0)
-    return Directions(theta, np.repeat(0.5 * weights, around) / around, s * s / across)
+    return ConeRays(theta, np.repeat(0.5 * weights, around) / around, s * s / across)
 
 
 def _first(x: np.ndarray, like: Any) -> np.ndarray:
@@ -77,5 +77,5 @@ def cone_error(phase: Callable[[Any], Any], angle: float, sine: float, count: in
 
 
 def _fringe(phase: Callable[[Any], Any], angle: float, sine: float, count: int, around: int) -> complex:
-    rays = directions(angle, sine, count, around)
+    rays = cone_rays(angle, sine, count, around)
     return complex(np.sum(rays.weight * np.exp(1j * np.asarray(phase(np.asarray(rays.angle))))))

@@ -18,7 +18,15 @@ import jax
 import jax.numpy as jnp
 
 from pellicle.optics.characteristic import matrix_elements
-from pellicle.optics.interface import carried, normal, normal_square, nothing_where, power, same, transverse
+from pellicle.optics.interface import (
+    equal_media,
+    incident_factor,
+    normal,
+    normal_flux,
+    normal_square,
+    transverse,
+    zero_where,
+)
 from pellicle.optics.pair import Number, abs2, to_complex
 from pellicle.optics.response import Amplitudes, Response
 
@@ -52,7 +60,7 @@ def stack(
     index, depth = rows(layers), jnp.real(rows(phases))
     bottom, top, q_top = full(substrate), full(ambient), full(q0)
     q_bottom = normal(bottom, a)
-    empty = same(ambient, substrate, *layers)
+    empty = equal_media(ambient, substrate, *layers)
     responses = []
     for polarisation in polarisations[:1] if angle is None else polarisations:
         e0, e2 = _weight(top, polarisation), _weight(bottom, polarisation)
@@ -67,11 +75,11 @@ def stack(
         (E, H), scale_square = _fields(*below, a, polarisation)
         (E_, H_), _ = _fields(index, depth, q_top / e0, up_faces, a, polarisation)
         down, up = q_top * E / e0, q_bottom * E_ / e2
-        flux = carried(ambient, q0, polarisation) * power(bottom, q_bottom, polarisation)
+        flux = incident_factor(ambient, q0, polarisation) * normal_flux(bottom, q_bottom, polarisation)
         denominator = down + H
         # the two directions share their denominator but for scale: bring the second to the first
         reversed_ = (up - H_) / (up + H_) * denominator
-        amplitudes = (nothing_where(empty, down - H), reversed_, denominator)
+        amplitudes = (zero_where(empty, down - H), reversed_, denominator)
         squares = Amplitudes(*(abs2(amplitude) for amplitude in amplitudes))
         responses.append(Response(*amplitudes, squares, flux / abs2(e0 * e2), scale_square))
     return tuple(responses)

@@ -19,7 +19,7 @@ from pellicle.dispersion.oscillators import (
     Oscillators,
     TaucLorentz,
 )
-from pellicle.dispersion.parameter_names import Place
+from pellicle.dispersion.parameter_names import ParameterLocation
 from pellicle.dispersion.spline import KramersKronigSpline, Spline
 from pellicle.errors import UsageError
 from pellicle.scene.free import Free, is_free
@@ -154,7 +154,7 @@ def checked(dispersion: AbstractDispersion, what: str) -> AbstractDispersion:
     return dispersion
 
 
-def default_bounds(at: Place, number: Any) -> tuple[float, float] | None:
+def default_bounds(at: ParameterLocation, number: Any) -> tuple[float, float] | None:
     """A parameter's default bounds, or those it has; None where there are none."""
     if at.field == "fraction":
         return 0.0, 1.0

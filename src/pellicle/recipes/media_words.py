@@ -12,9 +12,9 @@ from pellicle.data.tabular.numbers import number, span
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.effective_medium import MIXTURES
 from pellicle.dispersion.empirical import Constant, Shifted
-from pellicle.dispersion.parameter_names import place
+from pellicle.dispersion.parameter_names import locate_parameter
 from pellicle.errors import UsageError
-from pellicle.materials import UnknownMaterial, lookup
+from pellicle.materials import UnknownMaterial, material
 from pellicle.recipes.dispersion_models import MODELS as MODELS
 from pellicle.recipes.dispersion_models import bare, called, checked, default_bounds
 from pellicle.recipes.dispersion_models import model as model
@@ -85,7 +85,7 @@ def _named(text: str, what: str) -> AbstractDispersion:
 
 def _catalogued(name: str) -> AbstractDispersion:
     try:
-        return lookup(name)
+        return material(name)
     except UnknownMaterial as error:
         if name.lower() in (*MIXTURES, "oscillators"):
             raise UsageError(f"{name} is made of several parts: describe it in a recipe") from None
@@ -114,7 +114,7 @@ def _free_own(dispersion: AbstractDispersion, name: str, limits: tuple[float, fl
     """The model's own number of that name, freed within `limits` or the model's default bounds."""
     leaves, structure = jax.tree_util.tree_flatten_with_path(dispersion, is_leaf=is_free)
     own = [i for i, (_, leaf) in enumerate(leaves) if is_free(leaf) or isinstance(leaf, int | float)]
-    known = {place(dispersion, leaves[i][0]).name: i for i in own}
+    known = {locate_parameter(dispersion, leaves[i][0]).name: i for i in own}
     if not known or (isinstance(dispersion, Constant | Shifted) and name not in known):
         raise UsageError(
             f"--free {name}: the layer has no such number; n and k can be freed for any material"
@@ -126,7 +126,7 @@ def _free_own(dispersion: AbstractDispersion, name: str, limits: tuple[float, fl
             f"--free {name}{nearest(name, known)}: the layer has {listed}, and n and k can be added"
         )
     path, leaf = leaves[known[name]]
-    bounds = limits or default_bounds(place(dispersion, path), leaf)
+    bounds = limits or default_bounds(locate_parameter(dispersion, path), leaf)
     if bounds is None:
         raise UsageError(f"--free {name}: give bounds, as in --free {name}=LO:HI")
     value = leaf.start if is_free(leaf) else leaf

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pellicle.errors import UsageError
-from pellicle.materials import Material, contents, lookup
+from pellicle.materials import Material, contents, material
 from pellicle.reporting.drawing import blank, saved
 
 if TYPE_CHECKING:
@@ -60,24 +60,24 @@ def table(pattern: str | None = None) -> str:
 def describe(name: str) -> str:
     """One material in full: which page the name stands for, why, its reference, the book's other pages.
 
-    Raises what `lookup` raises.
+    Raises what `material` raises.
     """
-    material = lookup(name)
-    if not isinstance(material, Material):
+    source = material(name)
+    if not isinstance(source, Material):
         return f"{name}\n"
-    low, high = material.wavelength_range
+    low, high = source.wavelength_range
     facts = [
-        ("page", material.page),
+        ("page", source.page),
         ("range", "all wavelengths" if high == np.inf else f"{_range(low, high)} nm"),
-        ("k data", "yes" if material.has_extinction else "no: taken as transparent"),
-        ("caution", material.caution),
-        ("why" if contents.find_name(name) else "sample", material.note),
-        ("reference", material.citation),
+        ("k data", "yes" if source.has_extinction else "no: taken as transparent"),
+        ("caution", source.caution),
+        ("why" if contents.find_name(name) else "sample", source.note),
+        ("reference", source.citation),
         ("aliases", ", ".join(_aliases(name))),
         ("pages", ""),
     ]
-    text = [material.name, *(_fact(label, value) for label, value in facts if value)]
-    parts = material.page.split("/")
+    text = [source.name, *(_fact(label, value) for label, value in facts if value)]
+    parts = source.page.split("/")
     others = contents.pages_of_book(parts[1]) if len(parts) == 3 else []
     if others:
         rows = (_row(f"{p.book}/{p.page}", p)[:1] + _row("", p)[2:] + (p.comments[:60],) for p in others)
@@ -108,7 +108,7 @@ def shown_range(material: Material) -> tuple[float, float]:
 def figure(name: str, path: str | os.PathLike[str]) -> Path:
     """Draw n and k of a material against wavelength into `path` (.png, .pdf or .svg), which is returned.
 
-    The file appears complete or not at all, and none is overwritten. Raises what `lookup` raises, and
+    The file appears complete or not at all, and none is overwritten. Raises what `material` raises, and
     UsageError for a file type that is none of these or a place that cannot be written.
     """
     target = Path(path)
@@ -119,10 +119,10 @@ def figure(name: str, path: str | os.PathLike[str]) -> Path:
 
 def _draw(name: str) -> Figure:
 
-    material = lookup(name)
-    low, high = shown_range(material) if isinstance(material, Material) else SHOWN_NM
+    source = material(name)
+    low, high = shown_range(source) if isinstance(source, Material) else SHOWN_NM
     nm = np.clip(np.linspace(low, high, POINTS), low, high)
-    values = np.asarray(material(nm))
+    values = np.asarray(source(nm))
     n, k = np.real(values), np.imag(values)
     drawn = blank(7, 4)
     axes = drawn.add_subplot()
@@ -133,8 +133,8 @@ def _draw(name: str) -> Figure:
         lines += beside.plot(nm, k, color="C3", linestyle="--", label="k")
         beside.set(ylabel="k", ylim=(0, None))
     axes.legend(handles=lines, frameon=False)
-    if isinstance(material, Material):
-        axes.set_title(f"{material.name}   {material.page}", loc="left")
-        if material.caution:
-            drawn.supxlabel("\n".join(textwrap.wrap(material.caution, 90)), fontsize="small", color="C3")
+    if isinstance(source, Material):
+        axes.set_title(f"{source.name}   {source.page}", loc="left")
+        if source.caution:
+            drawn.supxlabel("\n".join(textwrap.wrap(source.caution, 90)), fontsize="small", color="C3")
     return drawn

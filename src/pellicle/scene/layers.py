@@ -11,7 +11,7 @@ import numpy as np
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.effective_medium import MIXTURES
 from pellicle.dispersion.empirical import Constant
-from pellicle.materials import Material, lookup
+from pellicle.materials import Material, material
 from pellicle.optics.pair import is_real
 from pellicle.scene.free import Free, insert, is_free, start_values
 
@@ -27,7 +27,7 @@ def medium(what: Any) -> AbstractDispersion:
     if isinstance(what, AbstractDispersion):
         return what
     if isinstance(what, str):
-        return lookup(what)
+        return material(what)
     if is_free(what):
         return Constant(what)
     if isinstance(what, complex | np.complexfloating):

@@ -154,4 +154,4 @@ def _blur(plan: Plan, sheet: Sheet):
     _, slope = jax.jvp(phase, (at,), (jnp.ones_like(at),))
     widths = (scene.instrument.bandwidth, thickness_spread(scene, layer))
     bandwidth, spread = (0.0 if width is None else width for width in widths)
-    return orders.blur(slope, bandwidth, cosine_index(at), spread, at)
+    return orders.phase_variance(slope, bandwidth, cosine_index(at), spread, at)

@@ -144,7 +144,7 @@ def _ellipsometer(plan: Plan) -> Intensities:
                 ellipsometry.stokes(response_of(plan, sheet, "s"), response_of(plan, sheet, "p"))
             )
         s, p = (reflected(plan, sheets, polarisation) for polarisation in "sp")
-        return jnp.stack(ellipsometry.summed(s, p, _crossed(plan, sheets)))
+        return jnp.stack(ellipsometry.stokes_from_sums(s, p, _crossed(plan, sheets)))
 
     return simulate
 
@@ -152,10 +152,10 @@ def _ellipsometer(plan: Plan) -> Intensities:
 def _crossed(plan: Plan, sheets: list[Sheet]):
     """conj(r_p) r_s of the first sheet and everything under it."""
     sheet, *under = sheets
-    front = ellipsometry.crossed(response_of(plan, sheet, "s"), response_of(plan, sheet, "p"))
+    front = ellipsometry.cross_products(response_of(plan, sheet, "s"), response_of(plan, sheet, "p"))
     if not under:
         return front.reflected
-    return plate.bounced(*front, _crossed(plan, under), sheet.internal)
+    return plate.multiple_reflections(*front, _crossed(plan, under), sheet.internal)
 
 
 def _polarisations(plan: Plan) -> str:

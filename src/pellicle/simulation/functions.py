@@ -17,7 +17,7 @@ from jaxtyping import Array, Complex, Float
 
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.optics import coherent, interface, response
-from pellicle.optics.ellipsometry import angles, normalised, stokes
+from pellicle.optics.ellipsometry import normalised, psi_delta, stokes
 from pellicle.optics.pair import Number, is_real, to_complex, to_pair
 from pellicle.scene.film import check_polarisation
 from pellicle.scene.layers import medium, surroundings
@@ -126,7 +126,7 @@ def ellipsometry(
     """
     angle = _floating(angle)  # also at 0 both polarisations are needed
     s, p = _responses(wavelength, thickness, layer, substrate, ambient, angle, "unpolarised")
-    return angles(*normalised(stokes(s, p)))
+    return psi_delta(*normalised(stokes(s, p)))
 
 
 def refractive_index(wavelength: Any, what: Medium) -> Complex[Array, "..."]:

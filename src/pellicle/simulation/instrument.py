@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from pellicle.optics.orders import FWHM
-from pellicle.optics.quadrature import directions, normal_rule
+from pellicle.optics.quadrature import cone_rays, normal_rule
 from pellicle.scene.film import Scene
 
 Intensities = Callable[[Scene], Any]
@@ -72,7 +72,7 @@ def over_cone(simulate: Intensities, count: int, around: int, mix: Callable[[Any
 
     def average(scene: Scene):
         like = jnp.result_type(scene.light.wavelength)
-        rays = directions(jnp.deg2rad(scene.light.angle), cone_sine(scene), count, around)
+        rays = cone_rays(jnp.deg2rad(scene.light.angle), cone_sine(scene), count, around)
 
         def at(angle, s_share):
             turned = eqx.tree_at(lambda s: s.light.angle, scene, jnp.rad2deg(angle))

@@ -40,16 +40,16 @@ def composed(plan: Plan, name: str) -> Evaluate:
     brdf = model(name)
     if not plan.on("coherence"):
         return brdf.incoherent
-    return brdf.evaluate if brdf.coloured is None else brdf.coloured(_colour(plan))
+    return brdf.evaluate if brdf.from_film_colour is None else brdf.from_film_colour(_colour(plan))
 
 
 def _colour(plan: Plan) -> film_colour.Colour:
     """The film's colour: at nodes of the angle, at each sample, or at none."""
     reflectance = _reflectance(plan)
     if not plan.on("oblique"):
-        return film_colour.head_on(reflectance)
+        return film_colour.at_normal_incidence(reflectance)
     count = plan.row("oblique").count
-    return film_colour.by_nodes(count, reflectance) if count else film_colour.at_each(reflectance)
+    return film_colour.interpolated(count, reflectance) if count else film_colour.per_sample(reflectance)
 
 
 def _reflectance(plan: Plan) -> film_colour.Reflectance:

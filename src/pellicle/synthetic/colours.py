@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.colour import sensor, way
+from pellicle.colour import integration_bands, sensor
 from pellicle.colour.film import Colour
 from pellicle.effects.film import exact
 from pellicle.errors import UsageError
@@ -44,7 +44,7 @@ def interference_colours(
     """
     if scene.light.signal == "psi-delta":
         raise UsageError("ellipsometry has no colour: chart a recipe with signal R or T")
-    bands, white = way(BANDS, observer, illuminant), sensor(observer, illuminant).white
+    bands, white = integration_bands(BANDS, observer, illuminant), sensor(observer, illuminant).white
     with jax.enable_x64(True):
         seen = _over(with_wavelength(scene, bands.wavelength), thickness, angle, varied(scene, layer))
         grid = np.stack(np.meshgrid(thickness, angle), axis=-1).reshape(-1, 2)

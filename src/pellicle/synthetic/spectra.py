@@ -12,7 +12,7 @@ import numpy as np
 from pellicle.data.spectrum import Spectrum
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.effects.plan import Plan
-from pellicle.optics.ellipsometry import angles
+from pellicle.optics.ellipsometry import psi_delta
 from pellicle.planning.film import plan
 from pellicle.scene.film import Scene, with_wavelength
 from pellicle.scene.free import insert, is_free, start_values
@@ -85,7 +85,7 @@ def synthesise_angles(
 ) -> Synthetic:
     """The same for ellipsometry as Ψ and Δ in degrees, (wavelengths, 2), with noise in degrees."""
     exact = synthesise(scene, wavelength, tolerance=tolerance)
-    clean = np.stack(np.broadcast_arrays(*angles(*exact.clean.reshape(-1, 3).T)), axis=1)
+    clean = np.stack(np.broadcast_arrays(*psi_delta(*exact.clean.reshape(-1, 3).T)), axis=1)
     noisy = clean + np.random.default_rng(seed).normal(0.0, noise, clean.shape)
     psi, delta = np.clip(noisy[:, 0], 0.0, 90.0), np.mod(noisy[:, 1], 360.0)
     return exact._replace(values=np.stack([psi, delta], axis=1), clean=clean)

@@ -13,7 +13,7 @@ import numpy as np
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.cody_lorentz import CodyLorentz
 from pellicle.dispersion.oscillators import AbstractOscillator, Gaussian, Lorentz, Oscillators, TaucLorentz
-from pellicle.dispersion.parameter_names import Place, place
+from pellicle.dispersion.parameter_names import ParameterLocation, locate_parameter
 from pellicle.dispersion.spline import Spline
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free, Prior, free_leaves, insert, is_free
@@ -117,18 +117,18 @@ def _parameter(scene: Scene, path: tuple, free: Free, name: str) -> Parameter:
     )
 
 
-def _place(scene: Scene, path: tuple) -> Place:
+def _place(scene: Scene, path: tuple) -> ParameterLocation:
     """What the number at `path` is called inside its medium, or inside the scene if it has none."""
     node: Any = scene
     for depth, step in enumerate(path):
         node = getattr(node, step.name) if hasattr(step, "name") else node[step.idx]
         if isinstance(node, AbstractDispersion):
-            return place(node, path[depth + 1 :])
+            return locate_parameter(node, path[depth + 1 :])
     key = path[-1].name
-    return Place(key, key, key, None)
+    return ParameterLocation(key, key, key, None)
 
 
-def _unit(found: Place) -> str:
+def _unit(found: ParameterLocation) -> str:
     return found.unit or _UNITS.get(found.key, "")
 
 

@@ -17,7 +17,9 @@ def column(map_: Any) -> Any:
     return map_ if jnp.ndim(map_) == 0 else jnp.asarray(map_)[..., None]
 
 
-def summed(parameters: Parameters, lobes: Callable[[], Any], below: Callable[[], Any] | None = None) -> Any:
+def weighted_sum(
+    parameters: Parameters, lobes: Callable[[], Any], below: Callable[[], Any] | None = None
+) -> Any:
     """specular · lobes + diffuse · below; a weight that is not among the parameters leaves its part out."""
     parts = [column(parameters["specular"]) * lobes()] if "specular" in parameters else []
     if "diffuse" in parameters:
