@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from pellicle.materials import material as material
     from pellicle.recipes.read import read_recipe as read_recipe
     from pellicle.sampling.result import Posterior as Posterior
-    from pellicle.scene import free as priors  # noqa: F401
+    from pellicle.scene import priors as priors
     from pellicle.scene.film import Light as Light
     from pellicle.scene.film import Scene as Scene
     from pellicle.scene.free import Free as Free
@@ -66,7 +66,7 @@ _MODULE = {name: module for module, names in _NAMES.items() for name in names}
 _NAMESPACES = {
     "dispersion": "pellicle.dispersion",
     "mixing": "pellicle.dispersion.effective_medium",
-    "priors": "pellicle.scene.free",
+    "priors": "pellicle.scene.priors",
 }
 
 __all__ = sorted([*_MODULE, *_NAMESPACES])  # pyright: ignore[reportUnsupportedDunderAll]

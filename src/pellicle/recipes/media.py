@@ -13,7 +13,8 @@ from pellicle.dispersion.effective_medium import MIXTURES
 from pellicle.errors import UsageError
 from pellicle.recipes import dispersion_models, media_words
 from pellicle.recipes.dispersion_models import nearest
-from pellicle.scene.free import Free, HalfNormal, LogUniform, Normal, Prior
+from pellicle.scene.free import Free
+from pellicle.scene.priors import HalfNormal, LogUniform, Normal, Prior
 
 
 class PriorTable(BaseModel):

@@ -1,79 +1,34 @@
-"""Free parameters: they stand in a pytree wherever its number would."""
+"""Free parameters, which stand in a pytree in place of numbers."""
 
 from __future__ import annotations
 
 import math
-from typing import Any, final
+from collections.abc import Iterable
+from typing import Any, TypeGuard, final
 
 import equinox as eqx
 import jax
 import numpy as np
+from jaxtyping import Float
 
+from pellicle.errors import UsageError
+from pellicle.scene.priors import Prior
 
-@final
-class Normal(eqx.Module):
-    """A normal prior on a free parameter, in the parameter's unit; its bounds cut it off."""
-
-    mean: float = eqx.field(static=True)
-    sd: float = eqx.field(static=True)
-
-    def __check_init__(self):
-        _positive(self.sd)
-
-    @property
-    def row(self) -> tuple[float, float]:
-        """What least squares take: the mean, and the weight 1/sd of the distance from it."""
-        return self.mean, 1 / self.sd
-
-
-@final
-class HalfNormal(eqx.Module):
-    """A normal prior around zero for a parameter that is never negative: a roughness, an extinction."""
-
-    sd: float = eqx.field(static=True)
-
-    def __check_init__(self):
-        _positive(self.sd)
-
-    @property
-    def row(self) -> tuple[float, float]:
-        return 0.0, 1 / self.sd
-
-
-@final
-class LogUniform(eqx.Module):
-    """Every factor of two is as likely as any other between the bounds, which must be above zero.
-
-    For posteriors only: the best fit is the one in the logarithm of the parameter, where this is flat.
-    """
-
-    @property
-    def row(self) -> tuple[float, float]:
-        return 0.0, 0.0
-
-
-Prior = Normal | HalfNormal | LogUniform
-
-
-def _positive(sd: float) -> None:
-    if not sd > 0:
-        raise ValueError(f"a prior's standard deviation must be positive, not {sd}")
+MOST_FREE = 64
+"""Most parameters a fit may have free: 21 took 30 s and 121 did not end within 5 minutes (two cores)."""
 
 
 @final
 class Free(eqx.Module):
-    """A parameter to be fitted, placed where its number would stand.
+    """Parameter to be fitted, in place of a number.
 
     **Arguments:** `lower` and `upper` bounds, `start` value (the middle of the bounds if None) and `prior`
     (uniform between the bounds if None), all in the parameter's own unit.
 
     **Raises:** ValueError where bounds are reversed or infinite, or the start or the prior is outside them.
 
-    ```python
     >>> Free(10, 3000).start
     1505.0
-
-    ```
     """
 
     lower: float = eqx.field(static=True)
@@ -89,37 +44,40 @@ class Free(eqx.Module):
         start = 0.5 * (lower + upper) if start is None else start
         if not lower <= start <= upper:
             raise ValueError(f"the start value {start:g} is outside its bounds {lower:g} to {upper:g}")
-        _check_prior(prior, lower, upper)
+        if prior is not None:
+            prior.check(lower, upper)
         self.lower, self.upper, self.start, self.prior = float(lower), float(upper), float(start), prior
 
 
-def _check_prior(prior: Prior | None, lower: float, upper: float) -> None:
-    if isinstance(prior, Normal) and not lower <= prior.mean <= upper:
-        raise ValueError(f"the prior's mean {prior.mean:g} is outside the bounds {lower:g} to {upper:g}")
-    if isinstance(prior, HalfNormal) and not lower <= 0 < upper:
-        raise ValueError(f"a half-normal prior starts at 0, outside the bounds {lower:g} to {upper:g}")
-    if isinstance(prior, LogUniform) and not lower > 0:
-        raise ValueError(f"a log-uniform prior needs a lower bound above 0, not {lower:g}")
+def check_free_count(count: int, least: int = 1) -> None:
+    """Raise UsageError unless `count`, the number of free parameters, is `least` to `MOST_FREE`."""
+    if count < least:
+        raise UsageError(
+            "nothing is free to fit: give bounds, as in `thickness=Free(10, 3000)`, or in a recipe"
+            " thickness = { lower = 10, upper = 3000 }"
+        )
+    if count > MOST_FREE:
+        raise UsageError(f"{count} parameters are free, more than the {MOST_FREE} that a fit takes: fix some")
 
 
-def is_free(leaf: Any) -> bool:
-    """True for a `Free`, which a pytree's traversal must take as one leaf."""
+def is_free(leaf: Any) -> TypeGuard[Free]:
+    """Return True for a `Free`, which a traversal of a pytree must take as one leaf."""
     return isinstance(leaf, Free)
 
 
 def free_leaves(tree: Any) -> list[tuple[Any, Free]]:
-    """(path, Free) for every free parameter in a pytree, in the pytree's own order."""
+    """Return (path, Free) of every free parameter in a pytree, in the pytree's order."""
     leaves = jax.tree_util.tree_leaves_with_path(tree, is_leaf=is_free)
     return [(path, leaf) for path, leaf in leaves if is_free(leaf)]
 
 
-def insert(tree: Any, values: Any) -> Any:
-    """The pytree with its free parameters replaced by `values`, in the order of `free_leaves`."""
+def insert(tree: Any, values: Iterable[Any]) -> Any:
+    """Replace the free parameters of a pytree by `values`, in the order of `free_leaves`."""
     leaves, structure = jax.tree_util.tree_flatten(tree, is_leaf=is_free)
     numbers = iter(values)
     return jax.tree_util.tree_unflatten(structure, [next(numbers) if is_free(x) else x for x in leaves])
 
 
-def start_values(tree: Any) -> np.ndarray:
-    """The start value of each free parameter, shape (parameters,)."""
+def start_values(tree: Any) -> Float[np.ndarray, " parameters"]:
+    """Return the start value of each free parameter."""
     return np.array([free.start for _, free in free_leaves(tree)])

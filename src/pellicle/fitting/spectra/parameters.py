@@ -16,7 +16,8 @@ from pellicle.dispersion.oscillators import AbstractOscillator, Gaussian, Lorent
 from pellicle.dispersion.parameter_names import ParameterLocation, locate_parameter
 from pellicle.dispersion.spline import Spline
 from pellicle.scene.film import Scene
-from pellicle.scene.free import Free, Prior, free_leaves, insert, is_free
+from pellicle.scene.free import Free, free_leaves, insert, is_free
+from pellicle.scene.priors import Prior
 
 _WIDTHS = {"bandwidth": "nm", "thickness_spread": "nm", "roughness": "nm", "angle_spread": "deg"}
 _UNITS = {"thickness": "nm", "wavelength_shift": "nm", "plate_mm": "mm", "angle": "deg", **_WIDTHS}

@@ -16,7 +16,7 @@ from pellicle.fitting.spectra.targets import Measured, Noise
 from pellicle.planning.differences import largest_difference, signals
 from pellicle.planning.film import plan, reference
 from pellicle.scene.film import Scene, coherent_layers, with_wavelength
-from pellicle.scene.free import LogUniform, Prior
+from pellicle.scene.priors import LogUniform, Prior
 from pellicle.simulation.film import sampled
 
 _STAY = ("precision", "dispersion")
@@ -46,7 +46,7 @@ class Box(NamedTuple):
 
 def boxed(lower: np.ndarray, upper: np.ndarray, priors: Sequence[Prior | None]) -> Box:
     """The box between bounds (parameters,), with the prior of each parameter."""
-    rows = [prior.row if prior else (0.0, 0.0) for prior in priors]
+    rows = [prior.mean_and_weight if prior else (0.0, 0.0) for prior in priors]
     logarithmic = np.array([float(isinstance(prior, LogUniform)) for prior in priors])
     mean, weight = np.reshape(rows, (-1, 2)).T
     return Box(lower, upper, mean, weight, logarithmic)
