@@ -1,9 +1,9 @@
-"""Write src/pellicle/colour/data: the centres and widths of optimised samples and Gaussians.
+"""Derive the optimised samples and Gaussians in src/pellicle/colour/data.
 
-The transforms of the bands are brought as near as can be to those of the CIE 1931 observer, at all
-optical paths up to a reach; the difference is weighted as L*, a* and b* weight X, Y and Z near grey.
-Samples are for illuminant E; Gaussians are for several lamps at once, of which four can serve but two.
-Weights are linear, so only places and widths are searched; the library solves them anew for each
+The transforms of the bands are fitted to those of the CIE 1931 observer at all optical paths up to a
+maximum; the difference is weighted as L*, a* and b* weight X, Y and Z near grey. Samples are for
+illuminant E; Gaussians are for several lamps at once, except that four Gaussians suffice for only two lamps.
+Weights are linear, so only centres and widths are optimised; the library solves the weights for each
 observer and illuminant. Run: python scripts/derive_colour_nodes.py
 """
 
@@ -26,16 +26,16 @@ STARTS = 60
 
 
 def residual(wavelength, width, targets):
-    left = []
+    residuals = []
     for target in targets:
         weights = fit_weights(wavelength, width, target)
         apart = target.columns(wavelength, width) @ weights - target.exact
-        left.append((apart / target.white @ TO_LAB).ravel())
-    return np.concatenate(left)
+        residuals.append((apart / target.white @ TO_LAB).ravel())
+    return np.concatenate(residuals)
 
 
 def split(x, gaussian):
-    """Frequencies (1/µm) and, for Gaussians, the logarithms of 10 × their widths, as nm and 1/nm."""
+    """Convert frequencies (1/µm) and, for Gaussians, the logarithms of 10 × their widths to nm and 1/nm."""
     if not gaussian:
         return 1000 / x, np.zeros_like(x)
     frequency, width = np.split(x, 2)
@@ -52,8 +52,8 @@ def derive(count, reach, lamps, gaussian):
         starts += [np.sort(rng.uniform(1.45, 2.45, count)) for _ in range(STARTS)]
     for start in starts:
         x = np.concatenate([start, rng.uniform(-0.5, 0.2, count)]) if gaussian else start
-        found = least_squares(lambda x: residual(*split(x, gaussian), targets), x, max_nfev=100)
-        best = found if best is None or found.cost < best.cost else best
+        result = least_squares(lambda x: residual(*split(x, gaussian), targets), x, max_nfev=100)
+        best = result if best is None or result.cost < best.cost else best
     wavelength, width = split(best.x, gaussian)
     order = np.argsort(wavelength)
     print(count, reach, "cost", best.cost, flush=True)

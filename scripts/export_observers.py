@@ -1,6 +1,6 @@
-"""Write src/pellicle/colour/data: the CIE observers and illuminants, as colour-science carries them.
+"""Export the CIE observers and illuminants from colour-science to src/pellicle/colour/data.
 
-Run once: python scripts/export_observers.py (needs colour-science, an extra of development).
+Run once: python scripts/export_observers.py (needs colour-science, which the extra `dev` installs).
 """
 
 import csv
@@ -11,7 +11,7 @@ import numpy as np
 
 DATA = Path(__file__).parents[1] / "src/pellicle/colour/data"
 OBSERVERS = {"1931": "CIE 1931 2 Degree Standard Observer", "1964": "CIE 1964 10 Degree Standard Observer"}
-ILLUMINANTS = ("A", "D50", "D55", "D65", "D75")  # E is a constant
+ILLUMINANTS = ("A", "D50", "D55", "D65", "D75")  # E is constant
 
 
 def write(name: str, source: str, header: list[str], columns: list[np.ndarray]) -> None:

@@ -1,4 +1,4 @@
-"""Write src/pellicle/materials/data/pages.csv: one line per vendored page, read instead of the pages.
+"""Write src/pellicle/materials/data/pages.csv: one line per included page, faster to read than the pages.
 
 Run after adding a page: python scripts/index_materials.py
 """
@@ -33,16 +33,16 @@ def database_rows():
         shelf = next(s for s in SHELVES if file.stem.startswith(s + "_"))
         book, page = file.stem.removeprefix(shelf + "_").split("_", 1)
         content = load_yaml(file.read_text(encoding="utf-8"))
-        found = contents(content)
+        page_contents = contents(content)
         references = content["REFERENCES"]
         yield {
             "shelf": shelf,
             "book": book,
             "page": page,
             "file": file.relative_to(DATA).as_posix(),
-            "low": f"{found.wavelength_range[0]:.10g}",
-            "high": f"{found.wavelength_range[1]:.10g}",
-            "has_extinction": "yes" if found.has_extinction else "no",
+            "low": f"{page_contents.wavelength_range[0]:.10g}",
+            "high": f"{page_contents.wavelength_range[1]:.10g}",
+            "has_extinction": "yes" if page_contents.has_extinction else "no",
             "short": short_citation(references),
             "citation": plain_text(references),
             "comments": plain_text(content.get("COMMENTS")),
@@ -50,14 +50,14 @@ def database_rows():
 
 
 def table_row(file, shelf, book, page, short, citation, comments):
-    found = csv_contents(file.read_text(encoding="utf-8"))
+    page_contents = csv_contents(file.read_text(encoding="utf-8"))
     return {
         "shelf": shelf,
         "book": book,
         "page": page,
         "file": file.relative_to(DATA).as_posix(),
-        "low": f"{found.wavelength_range[0]:.10g}",
-        "high": f"{found.wavelength_range[1]:.10g}",
+        "low": f"{page_contents.wavelength_range[0]:.10g}",
+        "high": f"{page_contents.wavelength_range[1]:.10g}",
         "has_extinction": "yes",
         "short": short,
         "citation": citation,

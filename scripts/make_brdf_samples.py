@@ -1,7 +1,7 @@
-"""Write the simulated samples of the studies in `fits/brdf`: what each recipe's surface would give.
+"""Write the simulated samples of the studies in `fits/brdf` from their recipes.
 
-Run `python scripts/make_brdf_samples.py [FOLDER]` (default: fits/brdf). Files that exist are left alone:
-remove one to have it made again.
+Run `python scripts/make_brdf_samples.py [FOLDER]` (default: fits/brdf). Existing files are not overwritten:
+remove a file to write it again.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from pellicle.synthetic.brdf import default_directions, simulate_brdf
 
 STUDIES = Path(__file__).resolve().parents[1] / "fits" / "brdf"
 SAMPLES, NOISE = 250, 0.002
-"""Pairs of directions, and the standard deviation of the noise (1/sr)."""
+"""Number of pairs of directions, and standard deviation of the noise (1/sr)."""
 
 
 def main(folder: Path = STUDIES) -> None:
-    """The seed is the study's place in the alphabet, from 1."""
+    """Simulate every study; the seed is its position in alphabetical order, from 1."""
     for seed, recipe in enumerate(sorted(STUDIES.glob("*/recipe.toml")), start=1):
         target = folder / recipe.parent.name / "samples.csv"
         if target.exists():

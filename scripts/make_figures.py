@@ -1,4 +1,4 @@
-"""Draws docs/figures: examples of published systems, from our model.
+"""Draw the figures of published systems in docs/figures.
 
 The thin conductors of Gerardin, Holzschuch and Martinetto 2019, and the tempered steel and water-like
 films of an account of Belcour and Barla 2017.
@@ -32,7 +32,7 @@ def canvas(title: str, panels: int) -> tuple[Figure, list]:
 
 
 def map_of(axes, y, values, ylabel: str, title: str, most: float) -> None:
-    """A signal over wavelength and something else."""
+    """Draw a signal against wavelength and another quantity."""
     mesh = axes.pcolormesh(
         VISIBLE, y, values, cmap="viridis", vmin=0, vmax=most, shading="auto", rasterized=True
     )
@@ -45,7 +45,7 @@ def film(function, name: str, thickness):
 
 
 def hematite() -> Figure:
-    """Figure 1: a hematite layer on glass from 0 to 300 nm."""
+    """Draw figure 1: a hematite layer on glass from 0 to 300 nm."""
     thickness = np.linspace(0.0, 300.0, 301)
     figure, (left, right) = canvas("Hematite on glass, normal incidence", 2)
     for axes, function, title in (
@@ -63,7 +63,7 @@ def hematite() -> Figure:
 
 
 def gold_and_cadmium_sulfide() -> Figure:
-    """Figure 4: how much light passes, and what is left of it as the layer grows."""
+    """Draw figure 4: transmittance and reflectance against thickness."""
     thickness = np.geomspace(1.0, 2e4, 600)
     figure, panels = canvas("A layer on glass, mean over 500-700 nm", 2)
     red = VISIBLE >= 500
@@ -78,7 +78,7 @@ def gold_and_cadmium_sulfide() -> Figure:
 
 
 def copper_oxide_on_aluminium() -> Figure:
-    """Figure 5, right: against the angle of incidence, printed as 500 µm; fringes need some 100 nm."""
+    """Draw figure 5, right, against the angle. The paper prints 500 µm; fringes need some 100 nm."""
     angle = np.linspace(0.0, 89.0, 180)
     figure, panels = canvas("CuO on aluminium, unpolarised", 2)
     for axes, thickness, title in zip(panels, (150.0, 500.0), ("150 nm", "500 nm"), strict=True):
@@ -90,20 +90,20 @@ def copper_oxide_on_aluminium() -> Figure:
 
 
 STEEL = 2.7 + 2.8j
-"""The base of the tempered steel; its oxide has an index of 2.9."""
+"""Index of the base of the tempered steel; its oxide has an index of 2.9."""
 
 
 def swatch(axes, most: float, index: float, base: complex, title: str, exposure=1.0, steepest=80.0) -> None:
-    """A film's colours under D65 against its thickness and the angle of incidence."""
+    """Draw the colours of a film under D65 against thickness and angle of incidence."""
     nm, degrees = np.linspace(0.0, most, 401), np.linspace(0.0, steepest, 81)
-    seen = film_colour(nm, index, base, angle=degrees[:, None], method="uniform-64")
-    shown = srgb(exposure * np.asarray(seen.linear_srgb))
+    colours = film_colour(nm, index, base, angle=degrees[:, None], method="uniform-64")
+    shown = srgb(exposure * np.asarray(colours.linear_srgb))
     axes.imshow(shown, origin="lower", aspect="auto", extent=(0, most, 0, steepest), rasterized=True)
     axes.set(xlabel="thickness (nm)", ylabel="angle of incidence (°)", title=title)
 
 
 def tempered_steel() -> Figure:
-    """The oxide that runs through straw, purple and blue, and films of 1.33 on the same base and on glass."""
+    """Draw the colours of the oxide, and of films of index 1.33 on the same base and on glass."""
     figure, (steel, water, glass) = canvas("Colours under D65", 3)
     swatch(steel, 80.0, 2.9, STEEL, "film 2.9 on 2.7 + 2.8i")
     for nm, name in ((20, "straw"), (30, "purple"), (40, "blue")):

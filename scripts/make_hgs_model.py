@@ -1,11 +1,11 @@
-"""Write the cinnabar (HgS) model table: an index and an absorption edge that are made, not measured.
+"""Write the table of cinnabar (HgS), whose index and absorption edge are modelled, not measured.
 
-Nobody has published n and k of HgS below 620 nm in a form free to ship. What is known is the
-ordinary index above 620 nm (Bond 1967, as Bhar's formula) and the colour's cause, an absorption
-edge near 2.05 eV. The model is the one Tauc-Lorentz band (Jellison and Modine, Appl. Phys. Lett. 69,
-371 (1996)) that begins at that edge and whose real part, by the Kramers-Kronig relation, gives back
-Bond's index: its height, its place and the constant ε∞ are fitted to 620-2500 nm, its width (which
-the index cannot tell) is set to 1 eV. Run: python scripts/make_hgs_model.py
+No n and k of HgS below 620 nm have been published under a free licence. Known are the
+ordinary index above 620 nm (Bond 1967, as Bhar's formula) and the cause of the colour, an absorption
+edge near 2.05 eV. The model is one Tauc-Lorentz band (Jellison and Modine, Appl. Phys. Lett. 69,
+371 (1996)) that begins at this edge and whose real part, by the Kramers-Kronig relation, reproduces
+Bond's index: its height, its centre and the constant ε∞ are fitted to 620-2500 nm; its width, which
+the index does not determine, is set to 1 eV. Run: python scripts/make_hgs_model.py
 """
 
 import csv
@@ -18,19 +18,19 @@ TARGET = Path(__file__).parents[1] / "src/pellicle/materials/data/model/HgS.csv"
 EV_NM = 1239.841984
 EDGE_EV, WIDTH_EV = 2.05, 1.0
 STEP_EV = 0.002
-# midpoints: the principal value's singular point falls between two of them
+# midpoints, so that the singular point of the principal value lies between two of them
 GRID_EV = np.arange(EDGE_EV + STEP_EV / 2, 20.0, STEP_EV)
 
 
 def absorption(energy, height, centre):
-    """Tauc-Lorentz Im ε at energies in eV."""
+    """Return Im ε of the Tauc-Lorentz band at energies in eV."""
     band = height * centre * WIDTH_EV * (energy - EDGE_EV) ** 2
     shape = (energy**2 - centre**2) ** 2 + (WIDTH_EV * energy) ** 2
     return np.where(energy > EDGE_EV, band / shape / energy, 0.0)
 
 
 def permittivity(energy, height, centre, constant):
-    """Re ε by Kramers-Kronig; the value at the singular point is subtracted, which leaves it regular."""
+    """Return Re ε by Kramers-Kronig; the value at the singular point is subtracted from the integrand."""
     here = absorption(energy, height, centre)[:, None]
     there = absorption(GRID_EV, height, centre)
     far, near = GRID_EV[-1] + STEP_EV / 2, EDGE_EV
@@ -43,13 +43,13 @@ def permittivity(energy, height, centre, constant):
 
 
 def bond_squared(nm):
-    """n² of the ordinary ray: refractiveindex.info main/HgS/Bond-o, formula 2."""
+    """Return n² of the ordinary ray: refractiveindex.info main/HgS/Bond-o, formula 2."""
     square = (nm / 1000) ** 2
     return 1 + 3.1506 + 2.7896 * square / (square - 0.1328) + 1.1378 * square / (square - 705)
 
 
 def lattice(nm):
-    """The infrared term of the same formula, which the band does not carry."""
+    """Return the infrared term of the same formula, which the band does not include."""
     square = (nm / 1000) ** 2
     return 1.1378 * square / (square - 705)
 

@@ -1,9 +1,9 @@
 """Write the synthetic spectra of `measurements/` from their recipes, and their index.
 
-The index keeps its other rows: what was measured, or computed by other programs.
+Rows of the index for measured files, and for files computed by other programs, are kept.
 
-Run `python scripts/make_measurements.py FOLDER` (default: measurements). Files that exist are left
-alone: remove one to have it made again.
+Run `python scripts/make_measurements.py FOLDER` (default: measurements). Existing files are not
+overwritten: remove a file to write it again.
 """
 
 from __future__ import annotations
@@ -22,27 +22,27 @@ COLUMNS = ("file", "kind", "recipe", "seed", "truth", "sample", "source", "licen
 
 
 def main(folder: Path) -> None:
-    """One spectrum for each recipe; the seed is the recipe's place in the alphabet, from 1."""
+    """Simulate one spectrum per recipe; the seed is its position in alphabetical order, from 1."""
     rows: list[tuple[str, ...]] = []
     for seed, recipe in enumerate(sorted((ROOT / "measurements" / "recipes").glob("*.toml")), start=1):
         target = folder / f"{recipe.stem}.csv"
         if not target.exists():
             simulate(str(recipe), out=str(target), seed=seed)
         rows.append(_row(recipe, target, seed))
-    rows += _from_elsewhere(folder / "INDEX.csv")
+    rows += _other_rows(folder / "INDEX.csv")
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerows([COLUMNS, *rows])
     write_text(folder / "INDEX.csv", text.getvalue(), overwrite=True)
 
 
-def _from_elsewhere(index: Path) -> list[tuple[str, ...]]:
-    """The rows of what was not made here, which only people write."""
+def _other_rows(index: Path) -> list[tuple[str, ...]]:
+    """Return the rows of files that this script does not write."""
     if not index.exists():
         return []
     with index.open(encoding="utf-8", newline="") as file:
-        found = [row for row in csv.DictReader(file) if row["kind"] != "synthetic"]
-    return [tuple(row[name] for name in COLUMNS) for row in found]
+        rows = [row for row in csv.DictReader(file) if row["kind"] != "synthetic"]
+    return [tuple(row[name] for name in COLUMNS) for row in rows]
 
 
 def _row(recipe: Path, target: Path, seed: int) -> tuple[str, ...]:

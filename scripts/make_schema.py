@@ -1,6 +1,6 @@
 """Write the JSON schema of recipes, for editors that complete and check TOML.
 
-Run `python scripts/make_schema.py`. It comes from the models that read recipes: a film's and a surface's.
+Run `python scripts/make_schema.py`. It uses the pydantic models of film and surface recipes.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ SCHEMA = Path(__file__).resolve().parents[1] / "docs" / "recipe.schema.json"
 
 
 def schema() -> dict[str, Any]:
-    """One schema for both kinds of recipe."""
+    """Return one schema for both kinds of recipe."""
     kinds = (recipe_tables.RecipeTable, surface.SurfaceRecipeTable)
-    found, definitions = models_json_schema([(kind, "validation") for kind in kinds])
+    schemas, definitions = models_json_schema([(kind, "validation") for kind in kinds])
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "A recipe of pellicle",
-        "anyOf": [found[kind, "validation"] for kind in kinds],
+        "anyOf": [schemas[kind, "validation"] for kind in kinds],
         "$defs": definitions["$defs"],
     }
 

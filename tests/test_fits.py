@@ -62,10 +62,10 @@ def test_changes_are_reported(script):
     kept = {"status": "converged", "parameters": {"d": {"value": 3.0, "stderr": 0.5}}}
     near = {"status": "converged", "parameters": {"d": {"value": 3.04, "stderr": 0.5}}}
     far = {"status": "ambiguous", "parameters": {"d": {"value": 3.06, "stderr": 0.5}}}
-    assert list(script.moved(kept, near)) == []
-    assert list(script.moved(kept, far)) == ["status ambiguous, was converged", "d 3.06, was 3 ± 0.5"]
+    assert list(script.differences(kept, near)) == []
+    assert list(script.differences(kept, far)) == ["status ambiguous, was converged", "d 3.06, was 3 ± 0.5"]
     lost = {"status": "converged", "parameters": {"d": {"value": 3.0, "stderr": None}, "n": {}}}
-    assert list(script.moved(kept, lost)) == ["d has a standard error of None, had 0.5", "n is new"]
+    assert list(script.differences(kept, lost)) == ["d has a standard error of None, had 0.5", "n is new"]
 
 
 def test_one_study_is_reproduced(script, monkeypatch):
@@ -76,6 +76,6 @@ def test_one_study_is_reproduced(script, monkeypatch):
 @pytest.mark.slow  # two minutes; the test above fits one film in every run
 def test_all_studies_are_reproduced(script, monkeypatch):
     monkeypatch.setenv("PELLICLE_CACHE", "off")
-    assert {script.called(study): script.rerun(study) for study in script.studies()} == {
-        script.called(study): [] for study in script.studies()
+    assert {script.name_of(study): script.rerun(study) for study in script.studies()} == {
+        script.name_of(study): [] for study in script.studies()
     }
