@@ -20,16 +20,16 @@ from typing import Any, NamedTuple
 
 import jax
 import numpy as np
+from pellicle.fitting.brdf.estimates import local, rivals
+from pellicle.sampling.brdf import sample_brdf
 from scipy.stats import binomtest
 
 from pellicle.brdf import direction
 from pellicle.data.brdf_samples import BrdfSamples
-from pellicle.fitting.brdf.estimates import local, rivals
 from pellicle.fitting.brdf.fit import judged, problem
 from pellicle.fitting.brdf.search import THOROUGH, search, settle
 from pellicle.fitting.result import Status
 from pellicle.fitting.spectra.search import quiet
-from pellicle.sampling.brdf import sample_brdf
 from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface
 

@@ -25,10 +25,11 @@ import numpy as np
 
 jax.config.update("jax_enable_x64", True)
 
+from pellicle.fitting.spectra.covariance import errors  # noqa: E402
+
 import pellicle as pl  # noqa: E402
 from pellicle.fitting.neighbourhood import valley  # noqa: E402
 from pellicle.fitting.profile_likelihood import interval  # noqa: E402
-from pellicle.fitting.spectra.covariance import errors  # noqa: E402
 from pellicle.fitting.spectra.fit import fitted  # noqa: E402
 from pellicle.fitting.spectra.parameters import parameters  # noqa: E402
 from pellicle.fitting.spectra.search import quiet  # noqa: E402

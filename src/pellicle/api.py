@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, overload
 
 import numpy as np
@@ -16,32 +16,26 @@ from pellicle.accuracy.surface import cost as surface_cost
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.spectrum import Spectrum
 from pellicle.effects.plan import Plan
-from pellicle.fitting.brdf.fit import fit_brdf
-from pellicle.fitting.brdf.result import BrdfFit
+from pellicle.fitting.brdf.fit import fit as fit_brdf
+from pellicle.fitting.comparison import Comparison
+from pellicle.fitting.comparison import compare as compare_fits
+from pellicle.fitting.progress import Progress, quiet
 from pellicle.fitting.result import Fit
-from pellicle.fitting.spectra.compare import Comparison
-from pellicle.fitting.spectra.compare import compare as compare_fits
 from pellicle.fitting.spectra.fit import fit as fit_spectra
 from pellicle.planning.film import plan as film_plan
 from pellicle.planning.surface import plan as surface_plan
 from pellicle.reporting.brdf import brdf_report
 from pellicle.reporting.comparison import report as comparison_report
 from pellicle.reporting.fit_text import report as fit_report
-from pellicle.sampling.brdf import sample_brdf
+from pellicle.sampling.ensemble import STEPS
 from pellicle.sampling.result import Posterior
-from pellicle.sampling.spectra import sample as sample_spectra
+from pellicle.sampling.sample import Measurement, brdf_samples, spectra_of
+from pellicle.sampling.sample import sample as sample_posterior
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface, SurfaceView, surface_view
 from pellicle.synthetic.brdf import Directions, default_directions, simulate_brdf
 from pellicle.synthetic.spectra import default_wavelengths
 from pellicle.synthetic.spectra import simulate as simulate_spectrum
-
-Progress = Callable[[str, int, int], None]
-"""Called with the name of a stage, the number of steps done and their total."""
-
-
-def no_progress(stage: str, done: int, total: int) -> None:
-    """A no-op progress callback."""
 
 
 @overload
@@ -143,7 +137,7 @@ def cost(
     tolerance: float | None = None,
     noise: float | None = None,
     datasets: int = 20,
-    progress: Progress = no_progress,
+    progress: Progress = quiet,
 ) -> Cost: ...
 @overload
 def cost(
@@ -151,7 +145,7 @@ def cost(
     *,
     directions: Directions | BrdfSamples | None = None,
     tolerance: float | None = None,
-    progress: Progress = no_progress,
+    progress: Progress = quiet,
 ) -> SurfaceCost: ...
 def cost(
     scene: Scene | Surface,
@@ -162,7 +156,7 @@ def cost(
     tolerance: float | None = None,
     noise: float | None = None,
     datasets: int = 20,
-    progress: Progress = no_progress,
+    progress: Progress = quiet,
 ) -> Cost | SurfaceCost:
     """Measure error and time of every method of simulating `scene`, and of fitting it.
 
@@ -208,34 +202,30 @@ def cost(
     )
 
 
-@overload
 def fit(
-    data: Spectrum | Sequence[Spectrum],
-    scene: Scene | Sequence[Scene],
+    data: Measurement,
+    scene: Scene | Sequence[Scene] | Surface,
     *,
     tolerance: float = 0.0,
     loss: str = "least-squares",
-    progress: Progress = no_progress,
-) -> Fit: ...
-@overload
-def fit(
-    data: BrdfSamples, scene: Surface, *, residual: str | None = None, progress: Progress = no_progress
-) -> BrdfFit: ...
-def fit(data: Any, scene: Any, **options: Any) -> Fit | BrdfFit:
+    residual: str | None = None,
+    progress: Progress = quiet,
+) -> Fit:
     """Fit the free parameters of `scene` to `data`, in float64.
 
     **Arguments:**
 
-    - `data`: `Spectrum`, a list of spectra of one sample (a joint fit), or `BrdfSamples`.
+    - `data`: `Spectrum` or `BrdfSamples`, or a list of either, of one sample (a joint fit).
     - `scene`: `Scene`, or a list with one for each spectrum; `Surface` for `BrdfSamples`. Signal, angle and
       polarisation come from the data.
-    - `tolerance`: leave out effects that change the signal by less (`Scene` only; see `pellicle.plan`).
-    - `loss`: "least-squares", or "huber" or "student-t" against outliers (`Scene` only).
+    - `tolerance`: leave out effects that change the signal by less (see `pellicle.plan`); where the best fit
+      turns out to be off by more, the fit is done again with every effect.
+    - `loss`: "least-squares", or "huber" or "student-t" against outliers.
     - `residual`: what is compared of a BRDF (`Surface` only): "linear", "cosine", "log" or "cube-root". By
       default "linear" where the samples have a σ, else "cube-root".
     - `progress`: called with the name of a stage, the number of steps done and their total.
 
-    **Returns:** `Fit` or `BrdfFit`: parameters with errors, a status with a verdict, every rival minimum.
+    **Returns:** `Fit`: parameters with errors, a status with a verdict, every rival minimum.
     `print(fit)` is short, `pellicle.report(fit)` complete.
 
     **Raises:** UsageError where nothing is free, where the scenes of a joint fit are not of one sample,
@@ -252,35 +242,24 @@ def fit(data: Any, scene: Any, **options: Any) -> Fit | BrdfFit:
     ```
     """
     if isinstance(scene, Surface):
-        return fit_brdf(data, scene, **options)
-    return fit_spectra(data, scene, **options)
+        samples = brdf_samples(data)
+        return fit_brdf(samples, scene, residual=residual, tolerance=tolerance, loss=loss, progress=progress)
+    _refuse("a Scene", residual=residual)
+    return fit_spectra(spectra_of(data), scene, tolerance=tolerance, loss=loss, progress=progress)
 
 
-@overload
 def sample(
-    data: Spectrum | Sequence[Spectrum],
-    scene: Scene | Sequence[Scene],
+    data: Measurement,
+    scene: Scene | Sequence[Scene] | Surface,
     *,
     walkers: int | None = None,
-    steps: int = ...,
+    steps: int = STEPS,
     seed: int = 0,
     chain: str | os.PathLike[str] | None = None,
     tolerance: float = 0.0,
-    progress: Progress = no_progress,
-) -> Posterior: ...
-@overload
-def sample(
-    data: BrdfSamples,
-    scene: Surface,
-    *,
     residual: str | None = None,
-    walkers: int | None = None,
-    steps: int = ...,
-    seed: int = 0,
-    chain: str | os.PathLike[str] | None = None,
-    progress: Progress = no_progress,
-) -> Posterior: ...
-def sample(data: Any, scene: Any, **options: Any) -> Posterior:
+    progress: Progress = quiet,
+) -> Posterior:
     """Fit as `pellicle.fit` does, then sample the posterior of the free parameters, in float64.
 
     Priors are those of the `Free` parameters, uniform between the bounds by default. Walkers start in every
@@ -300,41 +279,53 @@ def sample(data: Any, scene: Any, **options: Any) -> Posterior:
     **Raises:** as `pellicle.fit` does; UsageError for too few walkers, or more than fit into memory;
     DataError for the chain of another problem.
     """
-    if isinstance(scene, Surface):
-        return sample_brdf(data, scene, **options)
-    return sample_spectra(data, scene, **options)
+    if not isinstance(scene, Surface):
+        _refuse("a Scene", residual=residual)
+    return sample_posterior(
+        data,
+        scene,
+        walkers=walkers,
+        steps=steps,
+        seed=seed,
+        chain=chain,
+        tolerance=tolerance,
+        residual=residual,
+        progress=progress,
+    )
 
 
 def compare(
-    data: Spectrum | Sequence[Spectrum],
-    scenes: Mapping[str, Scene | Sequence[Scene]],
+    data: Measurement,
+    scenes: Mapping[str, Scene | Sequence[Scene] | Surface],
     *,
     tolerance: float = 0.0,
-    progress: Progress = no_progress,
+    residual: str | None = None,
+    progress: Progress = quiet,
 ) -> Comparison:
     """Fit several scenes to the same data and compare them by AIC and BIC.
 
     **Arguments:**
 
-    - `data`: `Spectrum`, or a list of spectra of one sample.
+    - `data`: as in `pellicle.fit`.
     - `scenes`: two or more descriptions by name, each as `pellicle.fit` takes it.
-    - `tolerance`, `progress`: as in `pellicle.fit`.
+    - `tolerance`, `residual`, `progress`: as in `pellicle.fit`.
 
     **Returns:** `Comparison`: each candidate with its fit and criteria, the `best`, and a verdict.
 
     **Raises:** UsageError for fewer than two scenes, and as `pellicle.fit` does.
     """
-    return compare_fits(data, scenes, tolerance=tolerance, progress=progress)
+    options = {"tolerance": tolerance, "residual": residual, "progress": progress}
+    return compare_fits({name: fit(data, scene, **options) for name, scene in scenes.items()})
 
 
-def report(result: Fit | BrdfFit | Comparison) -> str:
+def report(result: Fit | Comparison) -> str:
     """Write the complete report of a fit or a comparison, as text of at most 100 columns.
 
     **Raises:** TypeError for anything else.
     """
     if isinstance(result, Fit):
-        return fit_report(result)
-    return brdf_report(result) if isinstance(result, BrdfFit) else comparison_report(result)
+        return fit_report(result) if result.layer_test is None else brdf_report(result)
+    return comparison_report(result)
 
 
 def _refuse(kind: str, **arguments: Any) -> None:

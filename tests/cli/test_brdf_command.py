@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from pellicle.fitting.brdf.result import Baseline, BrdfFit
 
 from pellicle.effects.surface import exact
 from pellicle.fitting.brdf import fit as fitting
-from pellicle.fitting.brdf.result import Baseline, BrdfFit
 from pellicle.fitting.result import Estimate, Rival, Status
 from pellicle.recipes import read_recipe
 from pellicle.sampling import brdf as sampling

@@ -5,11 +5,11 @@ import jax.numpy as jnp
 import lmfit
 import numpy as np
 import pytest
+from pellicle.fitting.spectra.covariance import errors
+from pellicle.fitting.spectra.evaluation import local
 from scipy.optimize import curve_fit
 
 import pellicle as pl
-from pellicle.fitting.spectra.covariance import errors
-from pellicle.fitting.spectra.evaluation import local
 from pellicle.fitting.spectra.problem import make
 from pellicle.fitting.spectra.targets import measured as as_numbers
 from pellicle.simulation.functions import reflectance

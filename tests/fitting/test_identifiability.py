@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from pellicle.fitting.spectra.covariance import Scaled
 
 import pellicle as pl
 from pellicle.fitting.identifiability import bounded, of, step, trades
 from pellicle.fitting.result import Estimate
-from pellicle.fitting.spectra.covariance import Scaled
 
 NM = np.linspace(400.0, 900.0, 128)
 

@@ -15,10 +15,10 @@ import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
 import pytest
-
-from pellicle.fitting.levenberg_marquardt import BoundedLevenbergMarquardt
 from pellicle.fitting.spectra.covariance import errors
 from pellicle.fitting.spectra.evaluation import Local
+
+from pellicle.fitting.levenberg_marquardt import BoundedLevenbergMarquardt
 from pellicle.fitting.spectra.nuisance import Data
 from pellicle.fitting.spectra.parameters import Parameter
 from pellicle.fitting.spectra.problem import Box, View

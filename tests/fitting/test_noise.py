@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 from pellicle.fitting.spectra.noise import MODEL_ERROR, correlation_length, drifting_sigma, local_noise
 
 RANDOM = np.random.default_rng(8)

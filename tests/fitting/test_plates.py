@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pellicle.fitting.spectra.evaluation import local
 
 import pellicle as pl
-from pellicle.fitting.spectra.evaluation import local
 from pellicle.fitting.spectra.problem import make
 from pellicle.fitting.spectra.targets import measured
 from pellicle.optics.ellipsometry import psi_delta

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from pellicle.fitting.spectra.covariance import errors
 from scipy.optimize import brentq, minimize_scalar
 
 import pellicle as pl
 from pellicle.fitting.neighbourhood import valley
 from pellicle.fitting.profile_likelihood import interval
-from pellicle.fitting.spectra.covariance import errors
 from pellicle.fitting.spectra.fit import fitted
 from pellicle.fitting.spectra.search import quiet
 

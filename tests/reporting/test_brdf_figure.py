@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pellicle.fitting.brdf.result import BrdfFit
 
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.effects.surface import exact
-from pellicle.fitting.brdf.result import BrdfFit
 from pellicle.fitting.result import Status
 from pellicle.reporting.brdf_figure import draw, half_angle
 from pellicle.scene.surface import Surface, surface_view

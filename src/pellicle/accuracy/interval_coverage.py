@@ -13,11 +13,12 @@ import numpy as np
 
 from pellicle.accuracy.measure import Progress, entrants, mark_pareto
 from pellicle.accuracy.simulated_data import Trial
-from pellicle.fitting.neighbourhood import valley
+from pellicle.fitting.conclusion import linearised
+from pellicle.fitting.neighbourhood import neighbourhood
 from pellicle.fitting.profile_likelihood import interval
-from pellicle.fitting.spectra.covariance import errors
-from pellicle.fitting.spectra.reweighting import RankedMinima, weigh
-from pellicle.fitting.spectra.search import quiet, search
+from pellicle.fitting.progress import quiet
+from pellicle.fitting.reweighting import RankedMinima, rank
+from pellicle.fitting.spectra.search import search
 from pellicle.sampling.chain import empty
 from pellicle.sampling.checks import missing
 from pellicle.sampling.density import log_density
@@ -100,7 +101,7 @@ def intervals(trials: Sequence[Trial], progress: Progress) -> Intervals:
 
 
 def _fitted(trial: Trial) -> RankedMinima:
-    return weigh(trial.problem, search(trial.problem, quiet))
+    return rank(trial.problem, search(trial.problem, quiet))
 
 
 @dataclass
@@ -135,22 +136,19 @@ class _Run:
 
 def _covariance(fit: RankedMinima) -> Interval:
     problem, best = fit.problem, fit.minima.units[0]
-    found = errors(problem, [m.at for m in fit.met], _variances(fit))
-    sd = found.stderr[: len(best)] / (problem.box.upper - problem.box.lower)
+    _, errors = linearised(fit)
+    sd = errors.stderr[: len(best)] / (problem.box.upper - problem.box.lower)
     return best - _WIDE * sd, best + _WIDE * sd
 
 
 def _profile(fit: RankedMinima) -> Interval:
     box = fit.problem.box
-    covariance = errors(fit.problem, [m.at for m in fit.met], _variances(fit)).covariance
-    around = valley(fit, covariance)
-    ends = np.array([interval(around, i) for i in range(len(fit.problem.parameters))])
+    count = len(fit.problem.parameters)
+    _, errors = linearised(fit)
+    around = neighbourhood(fit, errors.covariance, np.zeros((0, count)))
+    ends = np.array([interval(around, i) for i in range(count)])
     lower, upper = (ends.T - box.lower) / (box.upper - box.lower)
     return lower, upper
-
-
-def _variances(fit: RankedMinima) -> list[float]:
-    return [m.variance for m in fit.met]
 
 
 def _sampled(steps: int, fit: RankedMinima) -> Interval:

@@ -12,14 +12,12 @@ import numpy as np
 from pellicle.accuracy.case import Case
 from pellicle.accuracy.compiled import compiled
 from pellicle.accuracy.methods import Way
-from pellicle.effects.plan import Plan
 from pellicle.fitting.levenberg_marquardt import least_squares
-from pellicle.fitting.spectra import nuisance
-from pellicle.fitting.spectra.problem import Problem, make
+from pellicle.fitting.problem import Explained, Form, Problem
+from pellicle.fitting.spectra.problem import make
 from pellicle.fitting.spectra.targets import Measured
 from pellicle.scene.film import Scene
-from pellicle.scene.free import free_leaves, insert
-from pellicle.simulation.film import build
+from pellicle.scene.free import free_leaves
 
 
 class Trial(NamedTuple):
@@ -31,9 +29,9 @@ class Trial(NamedTuple):
 
     @property
     def program(self) -> tuple[Any, ...]:
-        """The arguments of the functions below, the plan first (static)."""
+        """The arguments of the functions below, the form of the spectrum first (static)."""
         (view,) = self.problem.views
-        return view.program
+        return view.form, view.arrays, self.problem.box
 
 
 def trials(case: Case, scene: Scene, noise: float, count: int, seed: int = 0) -> list[Trial]:
@@ -60,35 +58,33 @@ def trials(case: Case, scene: Scene, noise: float, count: int, seed: int = 0) ->
     ]
 
 
-def _solved(plan: Plan, scene: Scene, data: nuisance.Data, box: Any, unit: Any) -> nuisance.Solved:
-    signal = build(plan)(insert(scene, list(box.values(unit))))
-    return nuisance.solve(signal, data, scene.instrument)
+def _explained(form: Form, arrays: Any, box: Any, unit: Any) -> tuple[Explained, Any]:
+    values = box.lower + unit * (box.upper - box.lower)
+    return form.explain(arrays, list(values)), box.prior_rows(values)
 
 
-def _prior(box: Any, unit: Any) -> Any:
-    return (box.values(unit) - box.prior_mean) * box.prior_weight
-
-
-def residual(plan: Plan, scene: Scene, data: nuisance.Data, box: Any, unit: Any) -> Any:
+def residual(form: Form, arrays: Any, box: Any, unit: Any) -> Any:
     """Weighted residuals at one point of the unit cube, with those of the priors."""
-    return jnp.concatenate([_solved(plan, scene, data, box, unit).residual, _prior(box, unit)])
+    spectrum, prior = _explained(form, arrays, box, unit)
+    return jnp.concatenate([spectrum.residual, prior])
 
 
-def misfit(plan: Plan, scene: Scene, data: nuisance.Data, box: Any, unit: Any) -> Any:
-    """−2 log evidence at one point of the unit cube."""
-    return _solved(plan, scene, data, box, unit).evidence + jnp.sum(_prior(box, unit) ** 2)
+def misfit(form: Form, arrays: Any, box: Any, unit: Any) -> Any:
+    """Deviance at one point of the unit cube."""
+    spectrum, prior = _explained(form, arrays, box, unit)
+    return spectrum.deviance + jnp.sum(prior**2)
 
 
 @partial(jax.jit, static_argnums=0)
-def misfits(plan: Plan, scene: Scene, data: nuisance.Data, box: Any, units: Any) -> Any:
+def misfits(form: Form, arrays: Any, box: Any, units: Any) -> Any:
     """The misfit at points (points, parameters)."""
-    return jax.vmap(lambda unit: misfit(plan, scene, data, box, unit))(units)
+    return jax.vmap(lambda unit: misfit(form, arrays, box, unit))(units)
 
 
 @partial(jax.jit, static_argnums=0)
-def misfit_and_slope(plan: Plan, scene: Scene, data: nuisance.Data, box: Any, unit: Any) -> Any:
+def misfit_and_slope(form: Form, arrays: Any, box: Any, unit: Any) -> Any:
     """The misfit at one point, and its gradient by forward mode."""
-    value, push = jax.linearize(lambda u: misfit(plan, scene, data, box, u), unit)
+    value, push = jax.linearize(lambda u: misfit(form, arrays, box, u), unit)
     return value, jax.vmap(push)(jnp.eye(len(unit)))
 
 
@@ -96,12 +92,12 @@ FEW_STEPS = 4
 
 
 @partial(jax.jit, static_argnums=0)
-def descend(plan: Plan, scene: Scene, data: nuisance.Data, box: Any, units: Any) -> tuple[Any, Any]:
+def descend(form: Form, arrays: Any, box: Any, units: Any) -> tuple[Any, Any]:
     """A few steps of our bounded Levenberg-Marquardt from each start (starts, parameters): where they lead,
     and the misfit there."""
 
     def one(unit):
-        there, _ = least_squares(lambda u: residual(plan, scene, data, box, u), unit, steps=FEW_STEPS)
-        return there, misfit(plan, scene, data, box, there)
+        there, _ = least_squares(lambda u: residual(form, arrays, box, u), unit, steps=FEW_STEPS)
+        return there, misfit(form, arrays, box, there)
 
     return jax.vmap(one)(units)

@@ -15,9 +15,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from pellicle.accuracy.simulated_data import Trial, descend, misfit, misfit_and_slope, residual
-from pellicle.effects.plan import Plan
-from pellicle.fitting.spectra.evaluation import polish
-from pellicle.fitting.spectra.search import LANES, quiet, search
+from pellicle.fitting.minima import LANES, solve
+from pellicle.fitting.problem import Form
+from pellicle.fitting.progress import quiet
+from pellicle.fitting.spectra.search import search
 
 STEPS = 100
 """Most steps of a solver that is not ours."""
@@ -50,7 +51,8 @@ def _in_lanes(program: Callable[[np.ndarray], Any], starts: np.ndarray) -> tuple
 
 
 def _from(trial: Trial, starts: np.ndarray) -> np.ndarray:
-    return _best(*_in_lanes(partial(polish, *trial.problem.program), starts), 1)[0]
+    polished = solve(trial.problem, starts, lanes=1 if len(starts) == 1 else LANES)
+    return _best(polished.units, polished.deviance, 1)[0]
 
 
 def _start_once(trial: Trial) -> np.ndarray:
@@ -93,11 +95,11 @@ def _scipy_lbfgsb(trial: Trial) -> np.ndarray:
 
 
 @partial(jax.jit, static_argnums=0)
-def _jaxopt_run(plan: Plan, scene: Any, data: Any, box: Any, unit: Any) -> Any:
+def _jaxopt_run(form: Form, arrays: Any, box: Any, unit: Any) -> Any:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # jaxopt says on import that nobody maintains it
         jaxopt: Any = importlib.import_module("jaxopt")  # optional
-    solver = jaxopt.LBFGSB(fun=lambda u: misfit(plan, scene, data, box, u), maxiter=STEPS, tol=1e-8)
+    solver = jaxopt.LBFGSB(fun=lambda u: misfit(form, arrays, box, u), maxiter=STEPS, tol=1e-8)
     return solver.run(unit, bounds=(jnp.zeros_like(unit), jnp.ones_like(unit))).params
 
 
@@ -106,12 +108,12 @@ def _jaxopt_lbfgsb(trial: Trial) -> np.ndarray:
 
 
 @partial(jax.jit, static_argnums=0)
-def _optimistix_run(plan: Plan, scene: Any, data: Any, box: Any, unit: Any) -> Any:
+def _optimistix_run(form: Form, arrays: Any, box: Any, unit: Any) -> Any:
     import optimistix as optx
 
     solver = optx.LevenbergMarquardt(rtol=1e-8, atol=1e-8)
     return optx.least_squares(
-        lambda u, _: residual(plan, scene, data, box, u), solver, unit, max_steps=STEPS, throw=False
+        lambda u, _: residual(form, arrays, box, u), solver, unit, max_steps=STEPS, throw=False
     ).value
 
 

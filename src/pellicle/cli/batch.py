@@ -141,7 +141,7 @@ class Batch:
     def _sampled(
         self, what: tuple[Any, Any], sampler: Sampler, folder: Path | None, progress: Progress
     ) -> Posterior:
-        from pellicle.sampling.spectra import sample
+        from pellicle.sampling.sample import sample
 
         return sample(*what, **sampler.settings(folder), tolerance=self.tolerance, progress=progress)
 

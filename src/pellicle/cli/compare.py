@@ -16,7 +16,7 @@ from pellicle.errors import DataError, UsageError
 
 if TYPE_CHECKING:
     from pellicle.cli.batch import Look
-    from pellicle.fitting.spectra.compare import Comparison
+    from pellicle.fitting.comparison import Comparison
 
 log = getLogger(__name__)
 
@@ -78,7 +78,7 @@ def _names(recipes: list[str]) -> list[str]:
 
 
 def _one(label: str, looks: dict[str, list[Look]], folder: Path | None, as_json: bool) -> int:
-    from pellicle.fitting.spectra.compare import compared
+    from pellicle.fitting.comparison import compare as compared
     from pellicle.reporting.comparison import failure, report, to_json, write_comparison
 
     progress, first = Progress(label), next(iter(looks))

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from pellicle.cli.batch import Sampler
     from pellicle.cli.flags import ReadWords, SceneWords
     from pellicle.data.brdf_samples import BrdfSamples
-    from pellicle.fitting.brdf.result import BrdfFit
+    from pellicle.fitting.result import Fit
     from pellicle.recipes.surface import SurfaceRecipe
     from pellicle.sampling.result import Posterior
     from pellicle.scene.surface import Surface
@@ -140,13 +140,13 @@ def _found(
     folder: Path | None,
     sampler: Sampler | None,
     progress: Progress,
-) -> tuple[BrdfFit, Posterior | None]:
+) -> tuple[Fit, Posterior | None]:
     compared = {"residual": recipe.tables.data.residual, "progress": progress}
     if sampler is None:
-        from pellicle.fitting.brdf.fit import fit_brdf
+        from pellicle.fitting.brdf.fit import fit
 
-        return fit_brdf(samples, surface, **compared), None
-    from pellicle.sampling.brdf import sample_brdf
+        return fit(samples, surface, **compared), None
+    from pellicle.sampling.sample import sample
 
-    posterior = sample_brdf(samples, surface, **sampler.settings(folder), **compared)
+    posterior = sample(samples, surface, **sampler.settings(folder), **compared)
     return posterior.fit, posterior

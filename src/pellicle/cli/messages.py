@@ -10,13 +10,10 @@ import ast
 import re
 import shlex
 from dataclasses import replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from pellicle.fitting.brdf.result import BrdfFit
     from pellicle.fitting.result import Fit
-
-AnyFit = TypeVar("AnyFit", "Fit", "BrdfFit")
 
 FLAGS = {
     "ambient": "--ambient",
@@ -115,6 +112,6 @@ def _word(value: ast.expr, source: str) -> str | None:
     return ast.get_source_segment(source, value)
 
 
-def with_flags(fit: AnyFit) -> AnyFit:
+def with_flags(fit: Fit) -> Fit:
     """A copy of a fit whose verdict and warnings name flags."""
     return replace(fit, verdict=as_flags(fit.verdict), warnings=tuple(map(as_flags, fit.warnings)))

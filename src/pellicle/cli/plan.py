@@ -38,11 +38,11 @@ def plan(
         return plan_surface(found, tolerance, json)
     scene = with_wavelength(*seen(found))
     start()
-    from pellicle.fitting.spectra import logging
+    from pellicle.fitting.spectra import messages
     from pellicle.planning import cost_model, film
     from pellicle.reporting import plans
 
-    logging.of_scene(scene)
+    messages.log_scene(scene)
     chosen, calibration = film.plan(scene, tolerance), cost_model.calibrated(cache_folder())
     savings = cost_model.savings(scene, calibration)
     whole, planned = (calibration.seconds(cost_model.work(p, scene)) for p in (film.reference(scene), chosen))

@@ -45,17 +45,17 @@ def simulate(
         return simulate_surface(found, out, noise, seed, tolerance)
     scene = found.scene()
     start()
-    from pellicle.fitting.spectra import logging
+    from pellicle.fitting.spectra import messages
     from pellicle.synthetic.spectra import synthesise, synthesise_angles
 
-    logging.of_scene(scene)
+    messages.log_scene(scene)
     ellipsometric = scene.light.signal == "psi-delta"
     if ellipsometric and found.tables.data.angle is None:
         raise DataError(f"{found.path}: ellipsometry needs an angle of incidence: give [data] angle = 70")
     noise = (found.tables.data.noise or 0.0) if noise is None else noise
     wavelength = wavelengths(found, scene)
     result = (synthesise_angles if ellipsometric else synthesise)(scene, wavelength, noise, seed, tolerance)
-    logging.of_plan(result.plan)
+    messages.log_plan(result.plan)
     write_text(out, _csv(found, scene, result, noise, seed))
     say(f"{out}: {len(wavelength)} points, {wavelength[0]:g} to {wavelength[-1]:g} nm")
     return 0
@@ -66,7 +66,7 @@ def _csv(recipe: FilmRecipe, scene: Any, result: Any, noise: float, seed: int) -
     from pellicle.fitting.spectra.parameters import fixed_numbers, parameters
 
     light = scene.light
-    truth = [(p.name, p.value, p.unit) for p in parameters(scene)] + fixed_numbers(scene)
+    truth = [(p.name, p.start, p.unit) for p in parameters(scene)] + fixed_numbers(scene)
     head = [
         "SYNTHETIC: simulated, not measured",
         f"recipe {Path(recipe.path).name}, seed {seed}, noise {noise:g}, pellicle {version('pellicle')}",

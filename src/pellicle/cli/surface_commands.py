@@ -20,14 +20,14 @@ def simulate_surface(
 ) -> int:
     """Write the recipe's BRDF as CSV. Returns the exit code."""
     from pellicle.data.write_brdf import write_brdf_samples
-    from pellicle.fitting.spectra.logging import of_plan
+    from pellicle.fitting.spectra.messages import log_plan
     from pellicle.synthetic.brdf import synthesise
 
     surface, looked = recipe.scene(), directions(recipe)
     noise = (recipe.tables.data.noise or 0.0) if noise is None else noise
     start()
     samples, plan = synthesise(surface, looked, noise, seed, tolerance)
-    of_plan(plan)
+    log_plan(plan)
     numbers = surface.start_numbers()
     units = {about.key: about.unit for about in surface.brdf.parameters}
     truth = (f"{key} = {_listed(x)} {units.get(key, 'nm')}".strip() for key, x in numbers.items())

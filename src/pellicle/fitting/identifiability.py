@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from pellicle.fitting.covariance import Scaled
 from pellicle.fitting.result import Estimate
-from pellicle.fitting.spectra.covariance import Scaled
 from pellicle.fitting.status import limits_in_words
 
 STEPS = {
@@ -76,7 +76,7 @@ def trades(found: Scaled, parameters: Mapping[str, Estimate]) -> list[str]:
     Scale and offset are eliminated first, and said to trade where the others suffer from it.
     """
     steps = np.array([step(name, parameters[name]) for name in found.names])
-    matrix = found.jacobian * (steps / found.unit)
+    matrix = found.by_range(steps)
     nuisance = np.array([bool(_NUISANCE.match(name)) for name in found.names])
     own, linear = matrix[:, ~nuisance], matrix[:, nuisance]
     triangle: Any = np.linalg.qr(np.hstack([linear, own]), mode="r")
@@ -143,7 +143,7 @@ def _amount(size: float, p: Estimate) -> str:
     return f"{size:.2g}{f' {p.unit}' if p.unit else ''}"
 
 
-def of(lead: str, trading: Sequence[str]) -> list[str]:
+def naming(lead: str, trading: Sequence[str]) -> list[str]:
     """The sentences that name the leading parameter."""
     return [sentence for sentence in trading if re.search(rf"(?<![\w.]){re.escape(lead)}(?![\w.])", sentence)]
 

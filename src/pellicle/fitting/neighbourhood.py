@@ -1,27 +1,26 @@
-"""The misfit around a fit's best point, whatever was fitted: what profiles of it need to know."""
+"""The misfit around the best minimum of a fit, in the parameters' own units."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from pellicle.fitting.spectra.problem import Problem, View, thin
-from pellicle.fitting.spectra.reweighting import RankedMinima, SpectrumFit
-from pellicle.fitting.spectra.search import SCAN_POINTS, held, quiet, scanned, solver
+from pellicle.fitting.evaluation import total_deviance
+from pellicle.fitting.minima import solve
+from pellicle.fitting.reweighting import RankedMinima
 
 
-class Valley(NamedTuple):
-    """Parameters (parameters,) in their own units, and χ² above some constant, which counts points as the
-    covariance does.
+class Neighbourhood(NamedTuple):
+    """χ² around a best point, above some constant; it counts points as the covariance does.
 
-    `best` is in the unit cube between `lower` and `upper`; `covariance` (parameters, parameters);
-    `natural` says of each lower and each upper bound whether it is physics'. `misfit` gives χ² at points
-    (points, parameters) of the cube, `held(which, values, starts)` the least χ² with one parameter held at
-    each value and the others polished from `starts` (values, starts, parameters). `others` (points,
-    parameters) are further minima from which a profile may be reached.
+    `best` (parameters,) is in the unit cube between `lower` and `upper`; `covariance` (parameters,
+    parameters) in the parameters' own units; `natural` says of each lower and upper bound whether physics
+    sets it.
+    `misfit` returns χ² at points (points, parameters) of the cube; `profile(which, values, starts)` the least
+    χ² with one parameter fixed at each value and the others polished from `starts` (values, starts,
+    parameters). `others` (points, parameters) are further minima from which a profile may be reached.
     """
 
     best: np.ndarray
@@ -30,7 +29,7 @@ class Valley(NamedTuple):
     covariance: np.ndarray
     natural: tuple[tuple[bool, bool], ...]
     misfit: Callable[[np.ndarray], np.ndarray]
-    held: Callable[[int, np.ndarray, np.ndarray], np.ndarray]
+    profile: Callable[[int, np.ndarray, np.ndarray], np.ndarray]
     others: np.ndarray = np.zeros((0, 0))
 
     @property
@@ -43,26 +42,32 @@ class Valley(NamedTuple):
         return np.sqrt(np.diag(self.covariance))
 
 
-def valley(weighed: RankedMinima, covariance: np.ndarray) -> Valley:
-    """That of spectra; `covariance` has the problem's nonlinear parameters first."""
-    problem, best = _as_in_covariance(weighed), weighed.minima.units[0]
-    few = problem._replace(views=tuple(thin(view, SCAN_POINTS) for view in problem.views))
-    bounds, count = (problem.box.lower, problem.box.upper), len(best)
-    return Valley(
+def neighbourhood(ranked: RankedMinima, covariance: np.ndarray, others: np.ndarray) -> Neighbourhood:
+    """Neighbourhood of the best of the ranked minima.
+
+    `covariance` has the problem's parameters first; `others` (points, parameters) are further minima, in the
+    parameters' own units.
+    """
+    values = ranked.values
+    pairs = zip(ranked.problem.views, ranked.fits, strict=True)
+    counted = ranked.problem._replace(views=tuple(view.counting(1 / fit.variance) for view, fit in pairs))
+    own = counted.in_own_units(values)
+    thinned, box = own.thinned(), own.box
+    lower, upper = np.asarray(box.lower), np.asarray(box.upper)
+    best, *further = np.clip((np.vstack([values, *others]) - lower) / (upper - lower), 0.0, 1.0)
+
+    def profile(which: int, at: np.ndarray, starts: np.ndarray) -> np.ndarray:
+        every = np.repeat(at, starts.shape[1])
+        deviance = solve(own, starts.reshape(len(every), -1), fixed=(which, every)).deviance
+        return deviance.reshape(len(at), -1).min(axis=1)
+
+    return Neighbourhood(
         best,
-        *bounds,
-        covariance[:count, :count],
-        tuple((p.natural_lower, False) for p in problem.parameters),
-        lambda units: scanned(few, units, quiet).sum(-1),
-        partial(held, solver(problem), bounds),
+        lower,
+        upper,
+        covariance[: len(best), : len(best)],
+        tuple(p.natural for p in ranked.problem.parameters),
+        lambda units: total_deviance(thinned, units),
+        profile,
+        np.reshape(further, (-1, len(best))),
     )
-
-
-def _as_in_covariance(weighed: RankedMinima) -> Problem:
-    """The problem with each point counting for as much as it does in the covariance."""
-    views = zip(weighed.problem.views, weighed.met, strict=True)
-    return weighed.problem._replace(views=tuple(_counted(view, met) for view, met in views))
-
-
-def _counted(view: View, met: SpectrumFit) -> View:
-    return view._replace(data=view.data._replace(independent_fraction=np.float64(1 / met.variance)))

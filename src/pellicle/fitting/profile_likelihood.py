@@ -1,7 +1,7 @@
 """How far a parameter may go before the misfit rises: limits by profile likelihood.
 
 A standard error pictures χ² as a parabola. Where that picture fails (a film too thick to see through, an
-extinction next to 0, a curved valley) the parameter is held at one value after the other, all others are
+extinction next to 0, a curved valley) the parameter is fixed at one value after the other, all others are
 fitted again, and the limit is where χ² has risen by as much as 95 % demand (bounded likelihood: W. Rolke,
 A. López and J. Conrad, 2005, Nucl. Instrum. Methods A 551, 493).
 """
@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pellicle.fitting.neighbourhood import Valley
+from pellicle.fitting.covariance import UNSEEN
+from pellicle.fitting.neighbourhood import Neighbourhood
 from pellicle.fitting.result import Profile
-from pellicle.fitting.spectra.covariance import UNSEEN
 from pellicle.fitting.status import RIVAL
 
 ONE_SIDED, TWO_SIDED = 2.71, 3.84
@@ -47,12 +47,12 @@ class Limits(NamedTuple):
     upper: float | None = None
 
 
-def limits(valley: Valley, scans: Mapping[int, Profile] | None = None) -> list[Limits]:
-    """Limits of each parameter of the valley; `scans` are what a search saw of some of them."""
-    doubted, scans = _doubted(valley), scans or {}
+def limits(around: Neighbourhood, scans: Mapping[int, Profile] | None = None) -> list[Limits]:
+    """Limits of each parameter; `scans` are scans of the misfit against some of them."""
+    doubted, scans = _doubted(around), scans or {}
     found = []
-    for i, natural in enumerate(valley.natural):
-        at, rise = _best(valley, i), _rise(valley, i)
+    for i, natural in enumerate(around.natural):
+        at, rise = _best(around, i), _rise(around, i)
         flat = _flat(scans[i], at.value) if i in scans else (False, False)
         ends = [end for end, is_one in zip((at.lower, at.upper), natural, strict=True) if is_one]
         beside = next((end for end in ends if abs(at.value - end) < _REACH * at.sd), None)
@@ -65,12 +65,12 @@ def limits(valley: Valley, scans: Mapping[int, Profile] | None = None) -> list[L
     return found
 
 
-def interval(valley: Valley, which: int) -> tuple[float, float]:
+def interval(around: Neighbourhood, which: int) -> tuple[float, float]:
     """The 95 % interval of one parameter by profile likelihood, whatever its status.
 
     An end is the bound where the misfit never rises on the way to it.
     """
-    at, rise = _best(valley, which), _rise(valley, which)
+    at, rise = _best(around, which), _rise(around, which)
     bounds = [at.lower, at.upper]
     sides = _sides(rise, at, bounds, TWO_SIDED)
     low, high = (
@@ -106,20 +106,20 @@ class _Side(NamedTuple):
     outside: float
 
 
-def _best(valley: Valley, which: int) -> _Best:
-    lower, upper = float(valley.lower[which]), float(valley.upper[which])
-    return _Best(float(valley.values[which]), lower, upper, float(valley.stderr[which]))
+def _best(around: Neighbourhood, which: int) -> _Best:
+    lower, upper = float(around.lower[which]), float(around.upper[which])
+    return _Best(float(around.values[which]), lower, upper, float(around.stderr[which]))
 
 
-def _doubted(valley: Valley) -> np.ndarray:
+def _doubted(around: Neighbourhood) -> np.ndarray:
     """Which parameters the parabola may have wrong, (parameters,), by a look along the axis of each.
 
     Two standard errors out, with the others where the covariance expects them, it says 4.
     """
-    best, span, stderr = valley.best, valley.upper - valley.lower, valley.stderr
-    along = _REACH * valley.covariance / stderr[:, None] / span
+    best, span, stderr = around.best, around.upper - around.lower, around.stderr
+    along = _REACH * around.covariance / stderr[:, None] / span
     ends = np.clip(best + np.concatenate([along, -along]), 0.0, 1.0)
-    misfit = valley.misfit(np.concatenate([best[None], ends]))
+    misfit = around.misfit(np.concatenate([best[None], ends]))
     own = np.concatenate([np.diag(half - best) for half in np.split(ends, 2)])
     moved = np.abs(own) * np.tile(span / stderr, 2)
     share = (misfit[1:] - misfit[0]) / np.maximum(moved, 1e-100) ** 2
@@ -127,18 +127,18 @@ def _doubted(valley: Valley) -> np.ndarray:
     return (stderr > UNSEEN * span) | wrong.reshape(2, len(best)).any(axis=0)
 
 
-def _rise(valley: Valley, which: int) -> Rise:
+def _rise(around: Neighbourhood, which: int) -> Rise:
     """The profile of one parameter: the others start at their best values, where the covariance expects
-    them, which follows a valley, and at further minima."""
-    covariance, best = valley.covariance, valley.best
-    slope = covariance[which] / covariance[which, which] / (valley.upper - valley.lower)
-    value = valley.values[which]
+    them, along a curved valley, and at further minima."""
+    covariance, best = around.covariance, around.best
+    slope = covariance[which] / covariance[which, which] / (around.upper - around.lower)
+    value = around.values[which]
 
     def rise(values: np.ndarray) -> np.ndarray:
         values = np.append(values, value)
         moved = np.clip(best + (values - value)[:, None] * slope, 0.0, 1.0)
-        starts = np.stack([moved, *(np.broadcast_to(x, moved.shape) for x in (best, *valley.others))], axis=1)
-        found = valley.held(which, values, starts)
+        starts = np.stack([moved, *(np.broadcast_to(x, moved.shape) for x in (best, *around.others))], axis=1)
+        found = around.profile(which, values, starts)
         return np.maximum(found[:-1] - found[-1], 0.0)
 
     return rise

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from enum import StrEnum
-from typing import Any
 
 import numpy as np
 
+from pellicle.data.brdf_samples import BrdfSamples
+from pellicle.data.spectrum import Spectrum
 from pellicle.effects.plan import Plan
+from pellicle.scene.film import Scene
+from pellicle.scene.surface import Surface
 
 
 class Status(StrEnum):
@@ -87,6 +90,14 @@ class Curve:
 
 
 @dataclass(frozen=True)
+class BrdfCurve:
+    """Model of BRDF samples, (samples, channels) in 1/sr, and residuals in the unit of the comparison."""
+
+    model: np.ndarray
+    residual: np.ndarray
+
+
+@dataclass(frozen=True)
 class Index:
     """The layer's n and k with standard errors at each wavelength (nm), rising."""
 
@@ -107,16 +118,17 @@ class Profile:
 
 @dataclass(frozen=True)
 class Part:
-    """One spectrum of a fit, and how the best scene explains it.
+    """One spectrum, or one set of BRDF samples, of a fit, and how the best scene explains it.
 
-    `name` is what its own parameters end in, empty where the fit is no joint one; `rms` is in the unit of
-    the signal: a fraction, or degrees of Ψ. `sigma_from` says where the curve's σ comes from: "given",
-    "residuals", or "model", the error of one whose lamp drifts.
+    `name` ends the names of its own parameters, empty where the fit is no joint one. `rms` is in the unit of
+    the signal: a fraction, degrees of Ψ, or the unit in which BRDF samples are compared (standard deviations
+    where σ is known). `sigma_from` names the source of σ: "given", "residuals", or "model", the error of a
+    model whose lamp drifts.
     """
 
     name: str
-    spectrum: Any
-    curve: Curve
+    data: Spectrum | BrdfSamples
+    curve: Curve | BrdfCurve
     plan: Plan
     rms: float
     chi2_reduced: float
@@ -125,16 +137,63 @@ class Part:
 
     @property
     def sigma(self) -> float:
-        """The median σ of the points, in the unit of the signal."""
-        return float(np.median(self.curve.sigma))
+        """The median σ of the points, in the unit of the signal; of BRDF samples in 1/sr, or their rms where
+        no σ is given."""
+        if isinstance(self.curve, Curve):
+            return float(np.median(self.curve.sigma))
+        return self.rms if self.data.sigma is None else float(np.median(self.data.sigma))
+
+    @property
+    def spectrum(self) -> Spectrum:
+        """The spectrum. Raises TypeError for BRDF samples."""
+        if not isinstance(self.data, Spectrum):
+            raise TypeError("BRDF samples were fitted, not a spectrum: see data")
+        return self.data
+
+    @property
+    def samples(self) -> BrdfSamples:
+        """The BRDF samples. Raises TypeError for a spectrum."""
+        if not isinstance(self.data, BrdfSamples):
+            raise TypeError("a spectrum was fitted, not BRDF samples: see data")
+        return self.data
+
+    @property
+    def spectral(self) -> Curve:
+        """Data and model of the spectrum. Raises TypeError for BRDF samples."""
+        if not isinstance(self.curve, Curve):
+            raise TypeError("BRDF samples were fitted, not a spectrum: see curve")
+        return self.curve
 
 
 @dataclass(frozen=True)
-class Fit:
-    """The outcome of fitting a spectrum, or several of one sample together: `parts`.
+class Baseline:
+    """Another model of the same samples and its error on those that were held out."""
 
-    `rms` is None where the spectra have no unit in common.
-    `print(fit)` gives the verdict and the parameters; `pellicle.reporting.fit_text.report(fit)` everything.
+    name: str
+    held_out: float
+
+
+@dataclass(frozen=True)
+class LayerTest:
+    """Evidence for a layer on a surface: errors on held-out BRDF samples.
+
+    `held_out` is the error on a fifth of the samples of a fit to the others, as it is for the `baselines`, in
+    the unit in which samples are compared (`residual`: its name; standard deviations where σ is known).
+    """
+
+    layered: bool
+    held_out: float
+    baselines: tuple[Baseline, ...]
+    residual: str
+
+
+@dataclass(frozen=True, repr=False)
+class Fit:
+    """The outcome of fitting spectra or BRDF samples of one sample: `parts`, one for each.
+
+    `rms` is None where the spectra have no unit in common. `scene` is what was fitted, one for each spectrum
+    where there are several, or a `Surface`. `profile` is the scan against thickness of a fit of spectra,
+    `layer_test` the evidence for a layer of a fit of BRDF samples; None else.
     """
 
     parts: tuple[Part, ...]
@@ -150,12 +209,16 @@ class Fit:
     warnings: tuple[str, ...]
     profile: Profile | None
     seconds: float
+    scene: Scene | tuple[Scene, ...] | Surface | None = None
+    layer_test: LayerTest | None = None
 
     def __getitem__(self, name: str) -> Estimate:
         return self.parameters[name]
 
     def __str__(self) -> str:
         return in_short(self.status, self.verdict, self.free)
+
+    __repr__ = __str__
 
     @property
     def free(self) -> tuple[Estimate, ...]:
@@ -167,14 +230,36 @@ class Fit:
         return bool(self.parts[0].name)
 
     @property
-    def spectrum(self) -> Any:
+    def data(self) -> Spectrum | BrdfSamples:
+        """The spectrum or samples that were fitted. Raises ValueError where there are several."""
+        return self._only.data
+
+    @property
+    def spectrum(self) -> Spectrum:
         """The spectrum that was fitted. Raises ValueError where there are several."""
         return self._only.spectrum
 
     @property
+    def samples(self) -> BrdfSamples:
+        """The BRDF samples that were fitted. Raises ValueError where there are several sets."""
+        return self._only.samples
+
+    @property
+    def surface(self) -> Surface:
+        """The surface that was fitted. Raises TypeError for a fit of spectra."""
+        if not isinstance(self.scene, Surface):
+            raise TypeError("a scene was fitted to spectra, not a surface: see scene")
+        return self.scene
+
+    @property
     def curve(self) -> Curve:
         """Data and model of the only spectrum. Raises ValueError where there are several."""
-        return self._only.curve
+        return self._only.spectral
+
+    @property
+    def model(self) -> np.ndarray:
+        """Model of the only data. Raises ValueError where there are several."""
+        return self._only.curve.model
 
     @property
     def plan(self) -> Plan:
@@ -184,7 +269,7 @@ class Fit:
     @property
     def index(self) -> Index:
         """The layer's n and k at every wavelength of any spectrum, each once."""
-        curves = [part.curve for part in self.parts]
+        curves = [part.spectral for part in self.parts]
         columns = {f.name: np.concatenate([getattr(c, f.name) for c in curves]) for f in fields(Index)}
         _, first = np.unique(columns["wavelength"], return_index=True)
         return Index(**{name: column[first] for name, column in columns.items()})
@@ -192,7 +277,7 @@ class Fit:
     @property
     def _only(self) -> Part:
         if len(self.parts) != 1:
-            raise ValueError(f"a joint fit of {len(self.parts)} spectra has one of these for each: see parts")
+            raise ValueError(f"a joint fit of {len(self.parts)} has one of these for each: see parts")
         return self.parts[0]
 
     def alone(self, part: Part) -> Fit:

@@ -47,7 +47,7 @@ def judge(
     rivals: tuple[Rival, ...],
     natural: frozenset[str],
 ) -> Status:
-    """The first status that holds. `natural` names parameters whose lower bound physics sets."""
+    """The first status that holds. `natural` names parameters that rest on a bound that physics sets."""
     free = [p for p in parameters.values() if p.free and not p.name.startswith("instrument.")]
     depths = [p for p in free if p.name.split(".")[-1] == "thickness"]
     unseen = [p for p in (depths or free) if not math.isfinite(p.stderr)]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from pellicle.fitting.brdf.result import BrdfFit
+from typing import cast
+
+from pellicle.fitting.result import Fit, LayerTest
 from pellicle.reporting import fit_text
 from pellicle.reporting.plain_text import block, facts, wrapped
 
@@ -18,25 +20,28 @@ _SIGMA = {
 }
 
 
-def brdf_report(fit: BrdfFit) -> str:
+def brdf_report(fit: Fit) -> str:
     """Everything a fit found, as text of at most 100 columns without colour codes."""
-    samples = fit.samples
+    samples, test = fit.samples, cast(LayerTest, fit.layer_test)
     status = f"{fit.status}. {fit_text.ADVICE[fit.status]}"
     data = f"{len(samples)} samples of {', '.join(samples.channels)}"
     if fit.effective_points < 0.95 * samples.values.size:
         data += f", {samples.values.size} values, worth {fit.effective_points:.3g} independent ones"
     seen = [("status", status), ("file", samples.path), ("data", data), ("model", fit.surface.model)]
     statistics = [
-        ("compared", _COMPARED[fit.residual] + (" over sigma" if samples.sigma is not None else "")),
+        (
+            "compared",
+            _COMPARED[test.residual] + (" over sigma" if samples.sigma is not None else ""),
+        ),
         ("rms residual", f"{fit.rms:.4g}"),
-        ("noise", _SIGMA[fit.sigma_from].format(fit.sigma)),
+        ("noise", _SIGMA[fit.parts[0].sigma_from].format(fit.parts[0].sigma)),
         ("reduced chi-square", f"{fit.chi2_reduced:.4g}"),
         ("seconds", f"{fit.seconds:.1f}"),
     ]
     errors = [
         ("held-out error", "of a fit to four fifths of the samples"),
-        ("this surface", f"{fit.held_out:.4g}"),
-        *((b.name, f"{b.held_out:.4g}") for b in fit.baselines),
+        ("this surface", f"{test.held_out:.4g}"),
+        *((b.name, f"{b.held_out:.4g}") for b in test.baselines),
     ]
     blocks = [
         ("Verdict", [*wrapped(fit.verdict), *facts(row for row in seen if row[1])]),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pellicle.data.half_angles import vectors
-from pellicle.fitting.brdf.result import BrdfFit
+from pellicle.fitting.result import Fit
 from pellicle.reporting.drawing import BLACK, BLUE, GREEN, GREY, ORANGE, blank, marker_size, saved
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ DPI = 120
 _COLOURS = {"R": ORANGE, "G": GREEN, "B": BLUE}
 
 
-def brdf_figure(fit: BrdfFit, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+def brdf_figure(fit: Fit, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
     """Draw a fit into `path` (.png, .pdf or .svg), which is returned.
 
     The file appears complete or not at all. Raises UsageError where it exists, without `overwrite`,
@@ -29,7 +29,7 @@ def brdf_figure(fit: BrdfFit, path: str | os.PathLike[str], *, overwrite: bool =
     return saved(draw(fit), path, overwrite=overwrite, dpi=DPI)
 
 
-def draw(fit: BrdfFit) -> Figure:
+def draw(fit: Fit) -> Figure:
     """The figure itself, bound to no window and to no global state."""
     drawn = blank(8.0, 5.6)
     above, below = drawn.subplots(2, 1, sharex=True, height_ratios=(3, 1.3))
@@ -39,14 +39,14 @@ def draw(fit: BrdfFit) -> Figure:
     return drawn
 
 
-def half_angle(fit: BrdfFit) -> np.ndarray:
+def half_angle(fit: Fit) -> np.ndarray:
     """Between the normal and the bisector of light and eye, in degrees, (samples,)."""
     at = {name: np.deg2rad(getattr(fit.samples, name)) for name in ("theta_i", "phi_i", "theta_o", "phi_o")}
     half = vectors(at["theta_i"], at["phi_i"]) + vectors(at["theta_o"], at["phi_o"])
     return np.rad2deg(np.arctan2(np.hypot(half[0], half[1]), half[2]))
 
 
-def _samples(axes: Axes, fit: BrdfFit) -> None:
+def _samples(axes: Axes, fit: Fit) -> None:
     """Where nothing is below zero the axis is logarithmic: a lobe spans decades."""
     angle, size = half_angle(fit), marker_size(len(fit.samples))
     for i, name in enumerate(fit.samples.channels):
@@ -59,7 +59,7 @@ def _samples(axes: Axes, fit: BrdfFit) -> None:
     axes.legend(fontsize="small")
 
 
-def _left(axes: Axes, fit: BrdfFit) -> None:
+def _left(axes: Axes, fit: Fit) -> None:
     """Samples less model, in σ where that is known."""
     sigma = fit.samples.sigma
     left = (fit.samples.values - fit.model) / (1.0 if sigma is None else sigma)

@@ -7,14 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pellicle.files import MARKER, new_folder, write_text
-from pellicle.fitting.spectra.compare import Candidate, Comparison
+from pellicle.fitting.comparison import Candidate, Comparison
 from pellicle.fitting.status import describe
 from pellicle.reporting.json_record import indented, versions
 from pellicle.reporting.json_record import to_json as fit_to_json
 from pellicle.reporting.plain_text import INDENT, block, table, wrapped
 
 if TYPE_CHECKING:
-    from pellicle.fitting.spectra.compare import Candidate, Comparison
+    from pellicle.fitting.comparison import Candidate, Comparison
 
 _SHOWN = 3
 """Parameters that are told of each fit."""
@@ -23,7 +23,7 @@ _SHOWN = 3
 def report(found: Comparison) -> str:
     """The verdict, the criteria against those of the best, and every fit's own verdict."""
     parts = found.best.fit.parts
-    points = sum(part.curve.wavelength.size for part in parts)
+    points = sum(part.spectral.wavelength.size for part in parts)
     of = ", ".join(part.spectrum.path.replace("\\", "/").rsplit("/", 1)[-1] or "spectrum" for part in parts)
     counted = f"{of}: {points} points, worth {found.effective_points:.3g} independent ones"
     rows = [("", "recipe", "ΔBIC", "ΔAIC", "free", "chi-square", "rms", "status")]

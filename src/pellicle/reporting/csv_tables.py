@@ -73,7 +73,7 @@ def _joint_csv(fit: Fit) -> str:
 
 def _tidy(part: Part) -> list[list[str]]:
     """Rows of file, signal and numbers."""
-    curve, data = part.curve, part.spectrum
+    curve, data = part.spectral, part.spectrum
     unknown = np.full(curve.wavelength.size, np.nan)
     angle = unknown if data.angle is None else data.angle
     kind = data.signal if curve.delta_data is None else "psi"

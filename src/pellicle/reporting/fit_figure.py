@@ -207,7 +207,7 @@ def _power(exponent: int) -> str:
 
 
 def _index_is_free(fit: Fit) -> bool:
-    several = any(part.curve.delta_data is None for part in fit.parts) or fit.index.wavelength.size > 1
+    several = any(part.spectral.delta_data is None for part in fit.parts) or fit.index.wavelength.size > 1
     return several and bool(np.any(fit.index.n_stderr > 0) or np.any(fit.index.k_stderr > 0))
 
 

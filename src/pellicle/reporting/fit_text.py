@@ -14,7 +14,7 @@ from pellicle.reporting.plain_text import COLUMNS, INDENT, block, facts, table, 
 
 if TYPE_CHECKING:
     from pellicle.effects.plan import Plan
-    from pellicle.fitting.brdf.result import BrdfFit
+    from pellicle.fitting.result import Fit
 
 LEAST_CORRELATION = 0.5
 MOST_CORRELATIONS = 10
@@ -78,7 +78,7 @@ def _verdict(fit: Fit) -> list[str]:
 
 def _file(part: Part) -> list[tuple[str, str]]:
     """What was measured, and where it lies."""
-    data, nm = part.spectrum, part.curve.wavelength
+    data, nm = part.spectrum, part.spectral.wavelength
     points = f"{data.signal}, {nm.size} points"
     if nm.size:
         points += _span(nm, "nm")
@@ -124,13 +124,13 @@ def _rms(part: Part) -> list[tuple[str, str]]:
         chi2 = f"reduced chi-square {part.chi2_reduced:.4g}"
         (label, rms), (noise, sigma) = rows
         rows = [(f"{label} of {part.name}", f"{rms}, {chi2}"), (f"{noise} of {part.name}", sigma)]
-    if part.curve.delta_data is not None:
-        psi, delta = (np.sqrt(np.mean(r**2)) for r in (part.curve.residual, part.curve.delta_residual))
+    if part.spectral.delta_data is not None:
+        psi, delta = (np.sqrt(np.mean(r**2)) for r in (part.spectral.residual, part.spectral.delta_residual))
         rows.append(("of psi and of delta", f"{psi:.4g} and {delta:.4g} degrees"))
     return rows
 
 
-def parameters(fit: Fit | BrdfFit) -> list[str]:
+def parameters(fit: Fit) -> list[str]:
     """A line for each, in columns: name, value ± error or limit, unit and bounds."""
     width = max((len(name) for name in fit.parameters), default=0) + 1
     rows = [(f"{p.name + ':':<{width}}", _value(p) if p.free else _fixed(p), _bounds(p)) for p in _all(fit)]
@@ -138,7 +138,7 @@ def parameters(fit: Fit | BrdfFit) -> list[str]:
     return [f"{INDENT}{name}  {value:<{middle}}  {bounds}".rstrip() for name, value, bounds in rows]
 
 
-def _all(fit: Fit | BrdfFit) -> list[Estimate]:
+def _all(fit: Fit) -> list[Estimate]:
     """Free parameters before fixed ones, each in the fit's own order."""
     return sorted(fit.parameters.values(), key=lambda p: not p.free)
 
@@ -178,7 +178,7 @@ def _bounds(p: Estimate) -> str:
     return f"[{p.lower:g}, {p.upper:g}]" + (f"  AT ITS {side.upper()} BOUND" if p.at_bound else "")
 
 
-def correlations(fit: Fit | BrdfFit) -> list[str]:
+def correlations(fit: Fit) -> list[str]:
     """The largest ones.
 
     The coefficients of the scale's and the offset's polynomials are left out among themselves: they
@@ -198,14 +198,14 @@ def correlations(fit: Fit | BrdfFit) -> list[str]:
     return lines + _left_out(len(pairs) - len(shown))
 
 
-def rivals(fit: Fit | BrdfFit) -> list[str]:
+def rivals(fit: Fit) -> list[str]:
     """Other minima, the nearest first."""
     shown = sorted(fit.rivals, key=lambda rival: rival.delta_chi2)[:MOST_RIVALS]
     rows = [(f"Δχ² {rival.delta_chi2:.3g}", *_of_rival(fit, rival)) for rival in shown]
     return table(rows) + _left_out(len(fit.rivals) - len(shown))
 
 
-def _of_rival(fit: Fit | BrdfFit, rival: Rival) -> list[str]:
+def _of_rival(fit: Fit, rival: Rival) -> list[str]:
     """The rival's parameters, the thickness first as in the table of parameters."""
     names = [name for name in fit.parameters if name in rival.parameters]
     return [f"{name} {rival.parameters[name]:.5g}{_unit(fit.parameters[name])}" for name in names]
@@ -221,6 +221,6 @@ def plan(made: Plan, name: str = "") -> list[str]:
     return [*(wrapped(f"{name}:") if name else []), *rows]
 
 
-def warnings(fit: Fit | BrdfFit) -> list[str]:
+def warnings(fit: Fit) -> list[str]:
     """Each as an item of a list, wrapped."""
     return [line for warning in fit.warnings for line in wrapped(warning, "- ", "  ")]

@@ -29,7 +29,7 @@ from pellicle.data.tabular.columns import DIRECTIONS
 from pellicle.reporting.json_record import brdf_to_json as brdf_to_json
 
 if TYPE_CHECKING:
-    from pellicle.fitting.brdf.result import BrdfFit
+    from pellicle.fitting.result import Fit
 
 INDEX_SCHEMA = "pellicle.fits/1"
 SUMMARY = "summary.csv"
@@ -121,7 +121,7 @@ def _known(value: float | None) -> str:
     return "" if value is None else f"{value:.10g}"
 
 
-def write_brdf_fit(folder: str | os.PathLike[str], fit: BrdfFit) -> Path:
+def write_brdf_fit(folder: str | os.PathLike[str], fit: Fit) -> Path:
     """Write report.txt, result.json, fit.csv and figure.png into a folder, each whole or not at all.
 
     Raises UsageError where it holds anything that pellicle did not write, or cannot be written.
@@ -137,7 +137,7 @@ def write_brdf_fit(folder: str | os.PathLike[str], fit: BrdfFit) -> Path:
     return target
 
 
-def brdf_csv(fit: BrdfFit) -> str:
+def brdf_csv(fit: Fit) -> str:
     """Every sample with its model: pellicle reads the data again as they were."""
     samples, names = fit.samples, fit.samples.channels
     header = [

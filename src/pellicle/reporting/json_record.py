@@ -8,14 +8,13 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 if TYPE_CHECKING:
     from pellicle.effects.plan import Plan
-    from pellicle.fitting.brdf.result import BrdfFit
-    from pellicle.fitting.result import Estimate, Fit, Part
+    from pellicle.fitting.result import Estimate, Fit, LayerTest, Part
 
 SCHEMA = "pellicle.fit/1"
 
@@ -29,21 +28,22 @@ def to_json(fit: Fit) -> dict[str, Any]:
     return _record(fit, _data(fit), plan) | {"noise": noise if fit.joint else noise[0]}
 
 
-def brdf_to_json(fit: BrdfFit) -> dict[str, Any]:
+def brdf_to_json(fit: Fit) -> dict[str, Any]:
     """The same of a fit to samples of a BRDF, with what it was judged against."""
     data = {"path": fit.samples.path, "sha256": fit.samples.sha256, "signal": "brdf"}
+    part, test = fit.parts[0], cast("LayerTest", fit.layer_test)
     judged = {
         "model": fit.surface.model,
-        "residual": fit.residual,
-        "layered": fit.layered,
-        "held_out": number(fit.held_out),
-        "baselines": [{"name": b.name, "held_out": number(b.held_out)} for b in fit.baselines],
-        "noise": {"sigma": number(fit.sigma), "source": fit.sigma_from},
+        "residual": test.residual,
+        "layered": test.layered,
+        "held_out": number(test.held_out),
+        "baselines": [{"name": b.name, "held_out": number(b.held_out)} for b in test.baselines],
+        "noise": {"sigma": number(part.sigma), "source": part.sigma_from},
     }
     return _record(fit, {**data, "points": int(fit.samples.values.size)}, _plan(fit.plan)) | judged
 
 
-def _record(fit: Fit | BrdfFit, data: Any, plan: list[dict[str, Any]]) -> dict[str, Any]:
+def _record(fit: Fit, data: Any, plan: list[dict[str, Any]]) -> dict[str, Any]:
     matrix = np.asarray(fit.correlation, dtype=float)
     return {
         "schema": SCHEMA,
@@ -79,7 +79,7 @@ def _data(fit: Fit) -> dict[str, Any] | list[dict[str, Any]]:
 
 def _source(part: Part) -> dict[str, Any]:
     data = part.spectrum
-    points = int(part.curve.wavelength.size)
+    points = int(part.spectral.wavelength.size)
     return {"path": data.path, "sha256": data.sha256, "signal": data.signal, "points": points}
 
 

@@ -14,7 +14,6 @@ from pellicle.reporting.folders import write_brdf_fit, write_fit
 from pellicle.reporting.json_record import brdf_to_json, indented, number, one_line, to_json, versions
 
 if TYPE_CHECKING:
-    from pellicle.fitting.brdf.result import BrdfFit
     from pellicle.fitting.result import Fit
     from pellicle.sampling.predict import Prediction
     from pellicle.sampling.result import Marginal, Posterior
@@ -32,7 +31,7 @@ def chain_in(folder: str | os.PathLike[str]) -> Path:
     return target / CHAIN
 
 
-def record(fit: Fit | BrdfFit, posterior: Posterior | None) -> dict[str, Any]:
+def record(fit: Fit, posterior: Posterior | None) -> dict[str, Any]:
     """A fit as a record of the schema, with its posterior where it has one."""
     found = _ways(fit).to_json(fit)
     return found if posterior is None else found | {"posterior": posterior_to_json(posterior)}
@@ -46,10 +45,8 @@ class _Ways(NamedTuple):
     write: Callable[[str | os.PathLike[str], Any], Path]
 
 
-def _ways(fit: Fit | BrdfFit) -> _Ways:
-    from pellicle.fitting.brdf.result import BrdfFit
-
-    if isinstance(fit, BrdfFit):
+def _ways(fit: Fit) -> _Ways:
+    if fit.layer_test is not None:
         from pellicle.reporting.brdf import brdf_report
 
         return _Ways(brdf_to_json, brdf_report, write_brdf_fit)
@@ -94,7 +91,7 @@ def _marginal(m: Marginal | None) -> dict[str, Any]:
     }
 
 
-def text(fit: Fit | BrdfFit, posterior: Posterior | None) -> str:
+def text(fit: Fit, posterior: Posterior | None) -> str:
     """The report of a fit, with its posterior's under it."""
     if posterior is None:
         return _ways(fit).report(fit)
@@ -103,7 +100,7 @@ def text(fit: Fit | BrdfFit, posterior: Posterior | None) -> str:
     return _ways(fit).report(fit) + posterior_report(posterior)
 
 
-def write(folder: str | os.PathLike[str], fit: Fit | BrdfFit, posterior: Posterior | None) -> Path:
+def write(folder: str | os.PathLike[str], fit: Fit, posterior: Posterior | None) -> Path:
     """Write a fit's files, and its posterior's where it has one; returns the folder. Raises UsageError."""
     return _ways(fit).write(folder, fit) if posterior is None else write_posterior(folder, posterior)
 

@@ -52,7 +52,7 @@ def residuals(axes: Axes, fit: Fit) -> None:
 def abscissa(fit: Fit) -> tuple[np.ndarray, str]:
     """What is drawn against, with its label: the angle of incidence where there is but one wavelength."""
     if _sweeps_angle(fit):
-        return fit.spectrum.angle, "angle of incidence (degrees)"
+        return np.asarray(fit.spectrum.angle), "angle of incidence (degrees)"
     return fit.curve.wavelength, "wavelength (nm)"
 
 

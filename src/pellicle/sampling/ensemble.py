@@ -12,15 +12,16 @@ import jax
 import numpy as np
 
 from pellicle.errors import UsageError
-from pellicle.fitting.spectra.search import Progress
+from pellicle.fitting.progress import Progress
 from pellicle.sampling import chain as chains
 from pellicle.sampling.chain import Chain
 from pellicle.sampling.checks import missing
+from pellicle.sampling.density import LogDensity
 from pellicle.sampling.modes import Modes
 from pellicle.sampling.predict import Prediction
 from pellicle.sampling.result import Posterior
 from pellicle.sampling.run import run
-from pellicle.sampling.target import LogDensity, Target
+from pellicle.sampling.target import Target
 
 STEPS = 20_000
 """Steps at which a chain that does not settle is given up."""
@@ -34,7 +35,7 @@ _LIVE = 40
 class Subject(NamedTuple):
     """What is sampled: a finished fit, and the posterior of its parameters in the unit cube of their bounds.
 
-    `values` takes points of the cube to the parameters' own units; `whose` is the fingerprint of the problem;
+    `values` takes points of the cube to the parameters' own units; `fingerprint` identifies the problem;
     `points` how many data one evaluation compares; `predict` makes predictions of draws, from a seed.
     """
 
@@ -43,10 +44,10 @@ class Subject(NamedTuple):
     log_density: LogDensity
     modes: Modes
     values: Callable[[np.ndarray], Any]
-    whose: str
+    fingerprint: str
     points: int
     predict: Callable[[np.ndarray, int], tuple[Prediction, ...]]
-    granted: str = ""
+    assumption: str = ""
 
 
 def sampled(
@@ -62,9 +63,9 @@ def sampled(
     path = None if chain is None else Path(chain)
     with jax.enable_x64(True):
         count = _walkers(walkers, steps, subject)
-        begun = _begun(path, subject.whose, count, len(subject.names), seed)
+        begun = _begun(path, subject.fingerprint, count, len(subject.names), seed)
         target = Target(subject.log_density, (count + 1) // 2)
-        keep = _Keeper(path, subject.whose, subject.names)
+        keep = _Keeper(path, subject.fingerprint, subject.names)
         grown, checks = run(target, subject.modes, begun, steps, keep, progress)
         keep.last(grown)
     units = grown.draws[checks.discard :]
@@ -78,15 +79,15 @@ def sampled(
         checks=checks,
         predict=subject.predict,
         seconds=time.perf_counter() - began,
-        granted=subject.granted,
+        assumption=subject.assumption,
     )
 
 
 class _Keeper:
     """Writes the chain now and then, where it is to be kept."""
 
-    def __init__(self, path: Path | None, whose: str, names: tuple[str, ...]):
-        self.path, self.whose, self.names = path, whose, names
+    def __init__(self, path: Path | None, fingerprint: str, names: tuple[str, ...]):
+        self.path, self.fingerprint, self.names = path, fingerprint, names
         self.written = time.monotonic()
 
     def __call__(self, chain: Chain) -> None:
@@ -95,14 +96,14 @@ class _Keeper:
 
     def last(self, chain: Chain) -> None:
         if self.path is not None:
-            chains.save(self.path, chain, self.whose, self.names)
+            chains.save(self.path, chain, self.fingerprint, self.names)
             self.written = time.monotonic()
 
 
-def _begun(path: Path | None, whose: str, walkers: int, parameters: int, seed: int) -> Chain:
+def _begun(path: Path | None, fingerprint: str, walkers: int, parameters: int, seed: int) -> Chain:
     if path is None or not path.exists():
         return chains.empty(walkers, parameters, seed)
-    found = chains.load(path, whose)
+    found = chains.load(path, fingerprint)
     if found.draws.shape[1] != walkers:
         raise UsageError(
             f"{path}: is a chain of {found.draws.shape[1]} walkers: go on with as many,"

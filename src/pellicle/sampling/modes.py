@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import jax
 import numpy as np
 
-from pellicle.fitting.spectra.covariance import scaled
-from pellicle.fitting.spectra.evaluation import local
-from pellicle.fitting.spectra.reweighting import RankedMinima
+from pellicle.fitting.covariance import scaled
+from pellicle.fitting.reweighting import RankedMinima
 
 FREEDOM = 5.0
 """Degrees of freedom of the t distributions: their tails are heavier than those of what is sampled."""
@@ -108,14 +106,15 @@ def confined(jacobian: np.ndarray, size: int) -> np.ndarray:
     return np.linalg.inv(jacobian.T @ jacobian + np.diag(uniform))[:size, :size]
 
 
-def modes(weighed: RankedMinima) -> Modes:
-    """The minima that a fit of spectra has ranked, each with the covariance of its own Jacobian."""
-    minima = weighed.minima
-    return mixture(minima.units, minima.evidence, lambda unit: _covariance(weighed, unit))
+def modes(ranked: RankedMinima) -> Modes:
+    """The minima of a fit in affine coordinates, each with the covariance of its own Jacobian; nuisances are
+    integrated out."""
+    problem, variance = ranked.problem.affine(), [fit.variance for fit in ranked.fits]
 
+    def covariance(unit: np.ndarray) -> np.ndarray:
+        values = np.asarray(problem.values(unit))
+        at = [view.local(problem.seen_by(view, values)) for view in problem.views]
+        return confined(scaled(problem, unit, at, variance).jacobian, len(unit))
 
-def _covariance(weighed: RankedMinima, unit: np.ndarray) -> np.ndarray:
-    """Of the nonlinear parameters, scale and offset integrated out."""
-    problem = weighed.problem
-    at = [jax.device_get(local(*view.program, unit[list(view.takes)])) for view in problem.views]
-    return confined(scaled(problem, at, [m.variance for m in weighed.met]).jacobian, len(unit))
+    centre = np.array([ranked.problem.in_affine(unit) for unit in ranked.minima.units])
+    return mixture(centre, ranked.minima.deviance, covariance)

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import jax
 import numpy as np
 
-from pellicle.fitting.result import Part
-from pellicle.fitting.spectra.evaluation import curves
+from pellicle.data.brdf_samples import BrdfSamples
+from pellicle.fitting.brdf.residuals import INVERSES, RESIDUALS
+from pellicle.fitting.brdf.view import SamplesView
+from pellicle.fitting.evaluation import curves
+from pellicle.fitting.problem import Problem
+from pellicle.fitting.result import BrdfCurve, Part
 from pellicle.fitting.spectra.parts import psi_delta
-from pellicle.fitting.spectra.problem import Problem, View
+from pellicle.fitting.spectra.problem import SpectrumView
 
 DRAWS = 256
 """Curves behind a band: 2.5 % of them are six."""
@@ -48,25 +51,64 @@ def chosen(units: np.ndarray, random: np.random.Generator) -> np.ndarray:
 def predictions(
     problem: Problem, parts: tuple[Part, ...], units: np.ndarray, seed: int
 ) -> tuple[Prediction, ...]:
-    """Of each spectrum one, or Ψ and Δ, from draws (steps, walkers, parameters) in the unit cube."""
+    """Predictions of each spectrum, of Ψ and Δ, or of each channel of BRDF samples.
+
+    `units` are draws (steps, walkers, parameters) in the unit cube of an affine problem.
+    """
     random = np.random.default_rng(seed)
     drawn = chosen(units, random)
     with jax.enable_x64(True):
-        each = zip(problem.views, parts, strict=True)
-        return tuple(found for view, part in each for found in _of(view, part, drawn, random))
+        values = np.asarray(problem.values(drawn))
+        pairs = zip(problem.views, parts, strict=True)
+        result: list[Prediction] = []
+        for view, part in pairs:
+            model = np.asarray(curves(view.form, view.arrays, problem.seen_by(view, values)).model)
+            of_part = _samples if isinstance(part.curve, BrdfCurve) else _spectrum
+            result += of_part(view, part, model, random)
+        return tuple(result)
 
 
-def _of(view: View, part: Part, drawn: np.ndarray, random: np.random.Generator) -> Iterator[Prediction]:
-    model = np.asarray(curves(*view.program, drawn[:, list(view.takes)]).model)[:, : view.points]
+def _spectrum(
+    view: SpectrumView, part: Part, model: np.ndarray, random: np.random.Generator
+) -> list[Prediction]:
+    model = model[:, : view.points]
     sigma = 1 / np.asarray(view.data.weight)[: view.points]
     noisy = model + sigma * random.standard_normal(model.shape)
-    curve, (prefix, suffix) = part.curve, (f"{part.name}: ", f"_{part.name}") if part.name else ("", "")
+    curve, (prefix, suffix) = part.spectral, (f"{part.name}: ", f"_{part.name}") if part.name else ("", "")
     axis = Axis(f"wavelength_nm{suffix}", "wavelength (nm)", curve.wavelength)
     if curve.delta_data is None:
         signal = part.spectrum.signal
-        yield Prediction(signal + suffix, prefix + _SIGNALS[signal], axis, curve.data, model, noisy)
-        return
+        return [Prediction(signal + suffix, prefix + _SIGNALS[signal], axis, curve.data, model, noisy)]
     angles = zip(*(psi_delta(view.in_columns(x)) for x in (model, noisy)), strict=True)
     names, data = (("psi", "Ψ"), ("delta", "Δ")), (curve.data, curve.delta_data)
-    for (name, sign), measured, drawn_angles in zip(names, data, angles, strict=True):
-        yield Prediction(f"{name}{suffix}", f"{prefix}{sign} (degrees)", axis, measured, *drawn_angles)
+    return [
+        Prediction(f"{name}{suffix}", f"{prefix}{sign} (degrees)", axis, measured, *drawn_angles)
+        for (name, sign), measured, drawn_angles in zip(names, data, angles, strict=True)
+    ]
+
+
+def _samples(
+    view: SamplesView, part: Part, model: np.ndarray, random: np.random.Generator
+) -> list[Prediction]:
+    """One for each channel, its samples from the darkest to the brightest of the fitted surface."""
+    rows, samples, residual = slice(view.rows), view.samples, view.form.residual
+    model = model[:, rows]
+    where = samples.i[rows, 2:3], samples.floor[rows]
+    compared = RESIDUALS[residual](model, *where)
+    compared = compared + random.standard_normal(model.shape) / np.asarray(samples.weight)[rows]
+    noisy = np.asarray(INVERSES[residual](compared, *where))
+    rank = part.curve.model.argsort(axis=0).argsort(axis=0)
+    prefix, suffix = (f"{part.name}: ", f"_{part.name}") if part.name else ("", "")
+    channels = cast(BrdfSamples, part.data).channels
+    return [
+        Prediction(
+            name + suffix,
+            f"{prefix}{name} (1/sr)",
+            Axis(f"rank_{name}{suffix}", "samples, from the darkest to the brightest", rank[:, c]),
+            part.data.values[:, c],
+            model[..., c],
+            noisy[..., c],
+            decades=True,
+        )
+        for c, name in enumerate(channels)
+    ]

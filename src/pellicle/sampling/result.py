@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
+from pellicle.fitting.result import Fit
 from pellicle.sampling.checks import Checks
 from pellicle.sampling.modes import Modes
 from pellicle.sampling.predict import Prediction
@@ -43,10 +43,10 @@ class Posterior:
     `draws` (steps, walkers, parameters) in the parameters' own units, without burn-in, `log_density`
     (steps, walkers) beside them. `parameters` holds each one's marginal, or nothing where the checks do
     not carry an interval: `checks.doubts` says why. `units` is the same as `draws` between 0 and 1.
-    `granted` is what the posterior takes for granted though the fit doubts it, empty if nothing.
+    `assumption` is what the posterior takes for assumption though the fit doubts it, empty if nothing.
     """
 
-    fit: Any  # a Fit, or a BrdfFit
+    fit: Fit
     names: tuple[str, ...]
     draws: np.ndarray
     units: np.ndarray
@@ -55,7 +55,7 @@ class Posterior:
     checks: Checks
     predict: Callable[[np.ndarray, int], tuple[Prediction, ...]]
     seconds: float
-    granted: str = ""
+    assumption: str = ""
 
     def predictions(self, seed: int = 0) -> tuple[Prediction, ...]:
         """What draws from the posterior say of each measured quantity."""
@@ -110,7 +110,7 @@ def verdict(posterior: Posterior) -> str:
         return f"The chain does not carry an interval: {'; '.join(checks.doubts)}."
     lead = next(iter(posterior.parameters.values()))
     unit = f" {lead.unit}" if lead.unit else ""
-    opening = f"If {posterior.granted}, with" if posterior.granted else "With"
+    opening = f"If {posterior.assumption}, with" if posterior.assumption else "With"
     told = f"{opening} 95 % probability {lead.name} lies between {lead.q025:.5g} and {lead.q975:.5g}{unit}"
     several = [mode for mode in lead.modes if mode.mass >= 0.05]
     if len(several) < 2:

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
-LogDensity = Callable[[np.ndarray], np.ndarray]
-"""ln posterior (points,), up to a constant, at points (points, parameters) of the unit cube."""
+from pellicle.sampling.density import LogDensity
 
 
 class Target:

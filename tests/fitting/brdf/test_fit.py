@@ -208,9 +208,9 @@ def test_samples_that_are_alike_count_as_fewer(monkeypatch, found, known):
 
 def test_a_posterior_grants_the_layer_that_the_fit_does_not_see(found, known):
     fit, rest = found
-    assert brdf._subject(known.samples, FREE, fit, rest).granted == ""
+    assert brdf._subject(known.samples, FREE, fit, rest).assumption == ""
     blind = dataclasses.replace(fit, layered=False, status=Status.NOT_IDENTIFIABLE)
-    assert brdf._subject(known.samples, FREE, blind, rest).granted == "there is a layer"
+    assert brdf._subject(known.samples, FREE, blind, rest).assumption == "there is a layer"
 
 
 @pytest.mark.slow

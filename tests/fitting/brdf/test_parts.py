@@ -8,15 +8,15 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from pellicle.fitting.brdf.coordinates import coordinates, log_area, named, values
+from pellicle.fitting.brdf.neighbourhood import affine
+from pellicle.fitting.brdf.result import Baseline
 from scipy.optimize import nnls
 
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.errors import UsageError
 from pellicle.fitting.brdf import evidence, fit, residuals, search
-from pellicle.fitting.brdf.coordinates import coordinates, log_area, named, values
-from pellicle.fitting.brdf.neighbourhood import affine
 from pellicle.fitting.brdf.problem import _nonnegative
-from pellicle.fitting.brdf.result import Baseline
 from pellicle.fitting.result import Estimate, Rival
 from pellicle.fitting.spectra.search import quiet
 from pellicle.sampling import brdf

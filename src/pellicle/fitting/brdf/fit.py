@@ -1,228 +1,275 @@
-"""Fit a layered surface to samples of a BRDF, and the same samples without one: then judge."""
+"""Fit a layered surface to BRDF samples, and the same samples without a layer: then judge."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
 import time
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
 
 import jax
 import numpy as np
 
 from pellicle.data.brdf_samples import BrdfSamples, spread
-from pellicle.effects.plan import Plan
-from pellicle.effects.surface import exact
 from pellicle.errors import UsageError
 from pellicle.fitting import identifiability
-from pellicle.fitting.brdf import evidence
-from pellicle.fitting.brdf.baselines import plain
-from pellicle.fitting.brdf.coordinates import coordinates
-from pellicle.fitting.brdf.estimates import Local, by_curvature, by_profile, estimates, local, rivals, scaled
-from pellicle.fitting.brdf.neighbourhood import NATURAL
-from pellicle.fitting.brdf.problem import Form, Problem, chi_squares, data, seeing
+from pellicle.fitting.brdf import warnings
+from pellicle.fitting.brdf.layer_test import evidence
+from pellicle.fitting.brdf.problem import incoherent, make, restricted, without_layer
 from pellicle.fitting.brdf.residuals import RESIDUALS
-from pellicle.fitting.brdf.result import Baseline, BrdfFit
-from pellicle.fitting.brdf.search import FEW, SMOOTH, THOROUGH, Effort, Minima, polish, search, settle
-from pellicle.fitting.result import Estimate, Rival, Status
-from pellicle.fitting.spectra.search import Progress, quiet
-from pellicle.fitting.status import judge, misfits, verdict
-from pellicle.scene.surface import Surface, nonzero_numbers, surface_view
-from pellicle.simulation.surface import composed
+from pellicle.fitting.brdf.search import FEW, SMOOTH, THOROUGH, Effort, search
+from pellicle.fitting.conclusion import common_rms, conclude, linearised, ranked_minima
+from pellicle.fitting.evaluation import total_deviance
+from pellicle.fitting.minima import Minima, minima
+from pellicle.fitting.problem import Problem
+from pellicle.fitting.profile_likelihood import Limits
+from pellicle.fitting.progress import Progress, quiet
+from pellicle.fitting.result import Baseline, BrdfCurve, Estimate, Fit, LayerTest, Part, Status
+from pellicle.fitting.reweighting import RankedMinima
+from pellicle.fitting.robust_losses import LEAST_SQUARES, check_loss
+from pellicle.fitting.status import misfits, verdict
+from pellicle.planning.surface import plan
+from pellicle.scene.surface import Surface, surface_view
 
 HELD_OUT = 0.2
-"""The share of the samples that no fit sees until it is judged."""
+"""Share of the samples that no fit uses before the fits are compared."""
 FEWEST = 20
+_KEPT_EFFECTS = ("precision",)
+"""A fit stops by differences below single precision, whatever its tolerance."""
 _FLAT, _PLAIN = "the surface without interference", "two lobes without a layer"
 
 
-def fit_brdf(
-    samples: BrdfSamples, surface: Surface, *, residual: str | None = None, progress: Progress = quiet
-) -> BrdfFit:
+def fit(
+    data: BrdfSamples | Sequence[BrdfSamples],
+    surface: Surface,
+    *,
+    residual: str | None = None,
+    tolerance: float = 0.0,
+    loss: str = LEAST_SQUARES,
+    progress: Progress = quiet,
+) -> Fit:
     """Fit the free numbers of `surface`, in float64 whatever the caller's setting.
 
-    `residual` names what is compared (`residuals.RESIDUALS`): by default `linear` over σ where the
-    samples have one, else `cube-root`. The same samples are fitted without interference and with two
-    lobes and no layer, all of them on four fifths of the samples and judged on the rest.
+    A list of samples of one surface is fitted jointly. `residual` names what is compared
+    (`residuals.RESIDUALS`): by default `linear` over σ where all samples have one, else `cube-root`. The same
+    samples are fitted without interference and with two lobes and no layer, all of them on four fifths of the
+    samples and judged on the rest. `tolerance`, here relative, and `loss` are those of fits of spectra.
 
-    **Raises:** UsageError where nothing is free, a residual or the wavelengths do not match, or the
+    **Raises:** UsageError where nothing is free, a residual, a loss or the wavelengths do not match, or the
     samples are too few.
     """
-    return fitted(samples, surface, residual, progress)[0]
-
-
-class Found(NamedTuple):
-    """What a fit rests on: its problem, the minima, and what is around the best one."""
-
-    problem: Problem
-    minima: Minima
-    at: Local
+    return fitted(data, surface, tolerance, progress, loss, residual)[0]
 
 
 def fitted(
-    samples: BrdfSamples, surface: Surface, residual: str | None, progress: Progress
-) -> tuple[BrdfFit, Found]:
-    """What `fit_brdf` returns, and what it rests on, for whoever goes on from there."""
-    name = residual or ("linear" if samples.sigma is not None else "cube-root")
+    data: BrdfSamples | Sequence[BrdfSamples],
+    surface: Surface,
+    tolerance: float,
+    progress: Progress,
+    loss: str = LEAST_SQUARES,
+    residual: str | None = None,
+) -> tuple[Fit, RankedMinima]:
+    """The result of `fit`, and the ranked minima that it rests on."""
+    check_loss(loss)
+    samples = [data] if isinstance(data, BrdfSamples) else list(data)
+    if not samples:
+        raise UsageError("there are no samples to fit: give some, or a list of them")
+    known = all(each.sigma is not None for each in samples)
+    name = residual or ("linear" if known else "cube-root")
     if name not in RESIDUALS:
         raise UsageError(f"residual must be one of {', '.join(RESIDUALS)}, not {name!r}")
     _check(samples, surface)
+    stems = [Path(each.path).stem.replace(".", "_") for each in samples]
+    names = stems if len(set(stems)) == len(stems) else [str(i + 1) for i in range(len(stems))]
     with jax.enable_x64(True):
-        return _fit(samples, surface, name, progress)
+        return _fit(
+            samples,
+            [""] if isinstance(data, BrdfSamples) else names,
+            surface,
+            name,
+            tolerance,
+            loss,
+            progress,
+        )
 
 
-def _check(samples: BrdfSamples, surface: Surface) -> None:
-    where = f"{samples.path}: " if samples.path else ""
+def _check(samples: list[BrdfSamples], surface: Surface) -> None:
     if not surface.free_numbers():
         raise UsageError("nothing is free to fit: give bounds, as in thickness = { lower = 0, upper = 1000 }")
-    if surface.channels != len(samples.channels):
-        raise UsageError(
-            f"{where}{len(samples.channels)} channels ({', '.join(samples.channels)}) for"
-            f" {surface.channels} wavelengths: give wavelengths one for each"
-        )
-    if len(samples) < FEWEST:
-        raise UsageError(
-            f"{where}{len(samples)} samples are too few to fit and to judge: give {FEWEST} or more"
-        )
+    for each in samples:
+        where = f"{each.path}: " if each.path else ""
+        if surface.channels != len(each.channels):
+            raise UsageError(
+                f"{where}{len(each.channels)} channels ({', '.join(each.channels)}) for"
+                f" {surface.channels} wavelengths: give wavelengths one for each"
+            )
+    count = sum(len(each) for each in samples)
+    if count < FEWEST:
+        where = f"{samples[0].path}: " if samples[0].path else ""
+        raise UsageError(f"{where}{count} samples are too few to fit and to judge: give {FEWEST} or more")
 
 
-def problem(samples: BrdfSamples, surface: Surface, residual: str, evaluate: Any) -> Problem:
-    """The problem of fitting `surface`, by `evaluate`, to the samples."""
-    leaves = surface.free_numbers()
-    steep = tuple(leaf for leaf in leaves if not leaf.parameter.linear)
-    linear = [leaf for leaf in leaves if leaf.parameter.linear]
-    chosen, box = coordinates(steep, evidence.in_plane(samples))
-    form = Form(evaluate, chosen, tuple(leaf.key for leaf in linear), False, residual)
-    most = np.array([leaf.free.upper for leaf in linear])
-    fixed = {key: x for key, x in nonzero_numbers(surface).items() if key in surface.fixed_numbers()}
-    return Problem(form, data(samples, residual), fixed, box, most, len(samples))
+class _Split(NamedTuple):
+    """Rows of each view that are fitted and rows that judge, and how many numbers the latter are."""
 
-
-class Split(NamedTuple):
-    """The rows that are fitted and those that judge, and how many numbers the latter are."""
-
-    fitted: np.ndarray
-    judging: np.ndarray
+    fitted: list[np.ndarray]
+    judging: list[np.ndarray]
     size: int
 
 
-def _split(samples: BrdfSamples) -> Split:
-    """Four fifths to fit, spread over the file, and the rest to judge."""
-    out = spread(len(samples), max(1, round(HELD_OUT * len(samples))))
-    return Split(np.setdiff1d(np.arange(len(samples)), out), out, out.size * len(samples.channels))
+def _split(samples: list[BrdfSamples]) -> _Split:
+    """Four fifths to fit, spread over each file, and the rest to judge."""
+    out = [spread(len(each), max(1, round(HELD_OUT * len(each)))) for each in samples]
+    fitted = [np.setdiff1d(np.arange(len(each)), rows) for each, rows in zip(samples, out, strict=True)]
+    return _Split(fitted, out, sum(rows.size * len(e.channels) for rows, e in zip(out, samples, strict=True)))
 
 
-def _rate(whole: Problem, split: Split, effort: Effort, progress: Progress) -> tuple[Minima, float]:
+def _held_out(whole: Problem, split: _Split, effort: Effort, progress: Progress) -> tuple[Minima, float]:
     """Minima on the fitted rows, and the best one's error on the others."""
-    minima = search(seeing(whole, split.fitted), effort, progress)
-    [chi2] = chi_squares(*seeing(whole, split.judging).program, minima.units[:1])
-    return minima, float(np.sqrt(chi2 / split.size))
+    result = search(restricted(whole, split.fitted), effort, progress)
+    judging = restricted(whole, split.judging)
+    judging = judging._replace(box=judging.box._replace(prior_weight=np.zeros(len(judging.parameters))))
+    [chi2] = total_deviance(judging, result.units[:1])
+    return result, float(np.sqrt(chi2 / split.size))
 
 
-def _fit(samples: BrdfSamples, surface: Surface, residual: str, progress: Progress) -> tuple[BrdfFit, Found]:
-    began = time.perf_counter()
-    split, brdf = _split(samples), surface.brdf
-    plan = exact(surface_view(surface, samples, len(samples)))
-    whole = problem(samples, surface, residual, composed(plan.static_key, surface.model))
-    flat = whole._replace(form=whole.form._replace(evaluate=brdf.incoherent))
-    minima, held_out = _rate(whole, split, THOROUGH, progress)
-    baselines = (
-        Baseline(_FLAT, _rate(flat, split, SMOOTH, progress)[1]),
-        Baseline(_PLAIN, _rate(plain(whole), split, FEW, progress)[1]),
-    )
-    minima = settle(whole, polish(whole, minima.units, THOROUGH, progress), progress)
-    found = Found(whole, minima, local(whole, minima.units[0], samples.sigma is not None))
-    return _report(samples, surface, plan, found, held_out, baselines, began), found
-
-
-def judged(
-    surface: Surface, whole: Problem, minima: Minima, at: Local, others: tuple[Rival, ...], sigma_known: bool
-) -> tuple[Status, dict[str, Estimate]]:
-    """What the fit of the layer says of itself, not yet weighed against the baselines, and its numbers."""
-    converged, misfit = bool(minima.converged[0]), _misses(at, sigma_known)
-    usable = converged and not misfit
-    known = by_profile(surface, whole, at, others) if usable else by_curvature(surface, at)
-    parameters = estimates(surface, whole, at, known)
-    status = judge(
-        converged=converged,
-        misfit=misfit,
-        parameters=parameters,
-        rivals=others,
-        natural=frozenset(name for name in NATURAL & parameters.keys() if parameters[name].value == 0),
-    )
-    return status, parameters
-
-
-def _misses(at: Local, sigma_known: bool) -> bool:
-    return misfits(
-        chi2_reduced=at.chi2_reduced,
-        sigma_known=sigma_known,
-        drifting=False,
-        effective_share=1 / at.length,
-        rms=float(np.sqrt(np.mean(at.residuals**2))),
-        span=at.span,
-        calibrated=False,
-    )
-
-
-def _unlayered(parameters: dict[str, Estimate]) -> dict[str, Estimate]:
-    """Without evidence of a layer its thickness has no finite error, and none that it must have."""
-    depth = parameters.get("thickness")
-    if depth is None or not depth.free:
-        return parameters
-    unseen = dataclasses.replace(depth, stderr=math.inf, lower_limit=None)
-    return {**parameters, "thickness": unseen}
-
-
-def _report(
-    samples: BrdfSamples,
+def _fit(
+    samples: list[BrdfSamples],
+    names: list[str],
     surface: Surface,
-    plan: Plan,
-    found: Found,
-    held_out: float,
-    baselines: tuple[Baseline, ...],
-    began: float,
-) -> BrdfFit:
-    whole, minima, at = found
-    others = rivals(whole, minima, at)
-    status, parameters = judged(surface, whole, minima, at, others, samples.sigma is not None)
-    layer = evidence.weigh(parameters, others, held_out, baselines)
-    rms = float(np.sqrt(np.mean(at.residuals**2)))
-    trading = identifiability.trades(scaled(surface, at), parameters)
+    residual: str,
+    tolerance: float,
+    loss: str,
+    progress: Progress,
+) -> tuple[Fit, RankedMinima]:
+    began = time.perf_counter()
+    split, errors = _split(samples), {}
+    lanes = {"lanes": THOROUGH.starts, "followed": 1}
+
+    def build(allowed: float) -> Problem:
+        plans = [plan(surface_view(surface, each, len(each)), allowed, _KEPT_EFFECTS) for each in samples]
+        return make(samples, names, surface, plans, residual)
+
+    def searched(problem: Problem) -> Minima:
+        result, errors["layer"] = _held_out(problem, split, THOROUGH, progress)
+        _, errors[_FLAT] = _held_out(incoherent(problem), split, SMOOTH, progress)
+        _, errors[_PLAIN] = _held_out(without_layer(problem), split, FEW, progress)
+        return minima(problem, result.units, progress, **lanes)
+
+    ranked, notes = ranked_minima(build, searched, tolerance, loss, **lanes)
+    jacobian, covariance = linearised(ranked)
+    pairs = list(zip(ranked.problem.views, ranked.fits, strict=True))
+    conclusion = conclude(
+        ranked,
+        jacobian,
+        covariance,
+        misfit=any(_misses(view, fit) for view, fit in pairs),
+        fixed=_fixed(surface),
+        scans={},
+        near=True,
+        amend=lambda limits: _amended(ranked.problem, limits),
+    )
+    baselines = tuple(Baseline(name, errors[name]) for name in (_FLAT, _PLAIN))
+    status, parameters = conclusion.status, conclusion.parameters
+    layer = evidence(parameters, conclusion.rivals, errors["layer"], baselines)
     if not layer.layered and not layer.several:
         parameters = _unlayered(parameters)
         status = status if status in (Status.NOT_CONVERGED, Status.MISFIT) else Status.NOT_IDENTIFIABLE
-    of_lead = identifiability.of(next(iter(parameters)), trading)
-    sentence = verdict(status, parameters, others, rms, trading=of_lead)
+    parts = tuple(
+        Part(
+            name=view.name,
+            data=each,
+            curve=BrdfCurve(np.asarray(fit.at.model)[: view.rows], view.compared(fit.at)),
+            plan=view.plan,
+            rms=view.rms(fit.at),
+            chi2_reduced=fit.chi2 / fit.freedom,
+            effective_points=view.independent / fit.length,
+            sigma_from="given" if view.noise.given else "residuals",
+        )
+        for each, (view, fit) in zip(samples, pairs, strict=True)
+    )
+    rms = common_rms([view.independent for view, _ in pairs], [part.rms for part in parts])
+    of_lead = identifiability.naming(next(iter(parameters)), conclusion.trades)
+    sentence = verdict(status, parameters, conclusion.rivals, rms, trading=of_lead)
     if not layer.layered:
         sentence = layer.verdict
     elif status is Status.CONVERGED:
         sentence = " ".join([layer.verdict, *(f"But {trade}." for trade in of_lead[:1])])
-    fitted = surface.fixed_numbers() | {key: np.asarray(value) for key, value in at.parameters.items()}
-    return BrdfFit(
-        samples=samples,
-        surface=surface,
-        residual=whole.form.residual,
+    view = ranked.problem.views[0]
+    numbers = {k: np.asarray(x) for k, x in view.form.numbers(ranked.values, surface.fixed_numbers()).items()}
+    result = Fit(
+        parts=parts,
         status=status,
         verdict=sentence,
-        layered=layer.layered,
         parameters=parameters,
-        rivals=others,
-        baselines=baselines,
-        held_out=held_out,
-        chi2_reduced=at.chi2_reduced if samples.sigma is not None else 1.0,
+        rivals=conclusion.rivals,
+        chi2_reduced=ranked.chi2_reduced,
         rms=rms,
-        effective_points=at.residuals.size / at.length,
-        correlation_names=at.names,
-        correlation=at.correlation,
-        plan=plan,
+        effective_points=sum(part.effective_points for part in parts),
+        correlation_names=covariance.names,
+        correlation=covariance.correlation,
         warnings=(
-            *evidence.directions(samples, surface),
-            *evidence.priors(surface),
-            *evidence.numbers(surface, parameters, fitted),
+            *notes,
+            *dict.fromkeys(message for each in samples for message in warnings.directions(each, surface)),
+            *warnings.numbers(surface, parameters, numbers),
             *identifiability.bounded(parameters, ()),
-            *trading,
+            *conclusion.trades,
         ),
-        model=at.model,
+        profile=None,
         seconds=time.perf_counter() - began,
+        scene=surface,
+        layer_test=LayerTest(layer.layered, errors["layer"], baselines, residual),
     )
+    return result, ranked
+
+
+def _misses(view, fit) -> bool:
+    return misfits(
+        chi2_reduced=fit.chi2 / fit.freedom,
+        sigma_known=view.noise.given,
+        drifting=False,
+        effective_share=1 / fit.length,
+        rms=view.rms(fit.at),
+        span=view.span(),
+        calibrated=False,
+    )
+
+
+def _amended(problem: Problem, limits: list[Limits]) -> list[Limits]:
+    """Limits without an azimuth where there is no tilt: an azimuth has no bounds to lie beside."""
+    if problem.coordinates.tilt is None:
+        return limits
+    deviation, azimuth = problem.coordinates.tilt
+    tilt, turn = limits[deviation], limits[azimuth]
+    upright = tilt.upper is not None or not math.isfinite(tilt.stderr)
+    one_sided = (turn.lower is None) != (turn.upper is None)
+    unknown = upright or (one_sided and not problem.coordinates.folded)
+    return [Limits(math.inf) if unknown and at == azimuth else each for at, each in enumerate(limits)]
+
+
+def _fixed(surface: Surface) -> list[Estimate]:
+    """Every fixed number, one for each channel where they differ by channel."""
+    numbers, result = surface.fixed_numbers(), []
+    for about in surface.brdf.parameters:
+        if about.key not in numbers:
+            continue
+        value = numbers[about.key]
+        names = [about.key]
+        if value.ndim:
+            letters = ("r", "g", "b") if value.size == 3 else range(1, value.size + 1)
+            names = [f"{about.key}_{letter}" for letter in letters]
+        result += [
+            Estimate(name, x, 0.0, about.unit, x, x, False)
+            for name, x in zip(names, np.ravel(value).tolist(), strict=True)
+        ]
+    return result
+
+
+def _unlayered(parameters: dict[str, Estimate]) -> dict[str, Estimate]:
+    """Without evidence of a layer its thickness has no finite error, and no lower limit."""
+    depth = parameters.get("thickness")
+    if depth is None or not depth.free:
+        return parameters
+    return {**parameters, "thickness": dataclasses.replace(depth, stderr=math.inf, lower_limit=None)}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from logging import getLogger
 from pathlib import Path
 
 import equinox as eqx
@@ -13,19 +12,19 @@ import jax
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
 from pellicle.fitting import identifiability
+from pellicle.fitting.conclusion import conclude, linearised, ranked_minima
+from pellicle.fitting.problem import Problem
+from pellicle.fitting.progress import Progress, quiet
 from pellicle.fitting.result import Fit
+from pellicle.fitting.reweighting import RankedMinima
 from pellicle.fitting.robust_losses import LEAST_SQUARES, check_loss
-from pellicle.fitting.spectra import backface, estimates, logging, parts, residual_structure
-from pellicle.fitting.spectra.covariance import errors, scaled
-from pellicle.fitting.spectra.problem import Problem, beyond, make
-from pellicle.fitting.spectra.reweighting import RankedMinima, weigh
-from pellicle.fitting.spectra.search import Progress, quiet, search
+from pellicle.fitting.spectra import backface, messages, parts, residual_structure, summary
+from pellicle.fitting.spectra.problem import make
+from pellicle.fitting.spectra.search import search
 from pellicle.fitting.spectra.targets import Measured, measured, unscaled
-from pellicle.fitting.status import judge, verdict
+from pellicle.fitting.status import verdict
 from pellicle.scene.film import Scene
 from pellicle.scene.free import free_leaves
-
-log = getLogger(__name__)
 
 
 def fit(
@@ -69,9 +68,9 @@ def fitted(
     """What `fit` returns, and the minima and weights that it rests on, for whoever goes on from there."""
     check_loss(loss)
     with jax.enable_x64(True):
-        found = measurements(data, scene)
+        targets = measurements(data, scene)
         spectra = [data] if isinstance(data, Spectrum) else list(data)
-        return _fit(spectra, found, tolerance, loss, progress)
+        return _fit(spectra, [target.scene for target in targets], targets, tolerance, loss, progress)
 
 
 def measurements(data: Spectrum | Sequence[Spectrum], scene: Scene | Sequence[Scene]) -> list[Measured]:
@@ -125,66 +124,63 @@ def _scenes(spectra: list[Spectrum], scene: Scene | Sequence[Scene]) -> list[Sce
 
 
 def _fit(
-    data: list[Spectrum], spectra: list[Measured], tolerance: float, loss: str, progress: Progress
+    data: list[Spectrum],
+    scenes: list[Scene],
+    spectra: list[Measured],
+    tolerance: float,
+    loss: str,
+    progress: Progress,
 ) -> tuple[Fit, RankedMinima]:
     began = time.perf_counter()
-    problem, warnings = make(*spectra, tolerance=tolerance), []
-    logging.of_problem(spectra, problem)
-    weighed = _weighed(problem, loss, progress)
-    off = max(beyond(view, weighed.minima.units[0]) for view in weighed.problem.views)
-    if off > tolerance:
-        log.info("plan: off by %.2g at the best fit, beyond the tolerance: again with every effect", off)
-        warnings = [
-            f"at the best fit what was left out changes the signal by {off:.2g}, more than the tolerance "
-            f"{tolerance:g}: fitted again with every effect"
-        ]
-        weighed = _weighed(make(*spectra), loss, progress)
-    return _report(data, spectra, weighed, warnings, began), weighed
 
+    def build(allowed: float) -> Problem:
+        problem = make(*spectra, tolerance=allowed)
+        messages.log_problem(spectra, problem)
+        return problem
 
-def _weighed(problem: Problem, loss: str, progress: Progress) -> RankedMinima:
-    return weigh(problem, search(problem, progress), loss)
-
-
-def _report(
-    data: list[Spectrum], spectra: list[Measured], weighed: RankedMinima, warnings: list[str], began: float
-) -> Fit:
-    problem = weighed.problem
-    profile = estimates.profile(problem, weighed)
-    around = problem, [m.at for m in weighed.met], [m.variance for m in weighed.met]
-    found = errors(*around)
-    parameters = estimates.estimates(spectra, weighed, found, profile)
-    others = estimates.rivals(weighed)
-    each = parts.parts(data, weighed, found)
-    missed = parts.missed(each, weighed)
-    status = judge(
-        converged=bool(weighed.minima.converged[0]),
+    ranked, warnings = ranked_minima(build, lambda problem: search(problem, progress), tolerance, loss)
+    profile, depth = summary.scan_profile(ranked), ranked.problem.thickness_axis
+    jacobian, covariance = linearised(ranked)
+    each = parts.parts(data, ranked, covariance)
+    missed = parts.missed(each, ranked)
+    conclusion = conclude(
+        ranked,
+        jacobian,
+        covariance,
         misfit=bool(missed),
-        parameters=parameters,
-        rivals=others,
-        natural=frozenset(p.name for p in problem.parameters if p.natural_lower),
+        fixed=summary.fixed(spectra),
+        scans={} if profile is None or depth is None else {depth: profile},
+        amend=lambda limits: summary.amended(spectra, ranked, limits),
     )
-    log.info("status: %s", status)
-    shown, dark = (missed or each)[0], estimates.opaque(spectra, weighed)
-    trading = identifiability.trades(scaled(*around), parameters)
-    of_lead = identifiability.of(next(iter(parameters)), trading)
-    at = next(i for i, part in enumerate(each) if part is shown)
-    places = residual_structure.missed(problem.views[at], weighed.met[at])
-    where = places.place if places else ""
-    said = verdict(status, parameters, others, shown.rms, shown.name or "the data", where, dark, of_lead)
-    unclear = [*identifiability.bounded(parameters, dark), *trading]
-    return Fit(
+    parameters, dark = conclusion.parameters, summary.opaque(spectra, ranked)
+    worst = (missed or each)[0]
+    at = next(i for i, part in enumerate(each) if part is worst)
+    structure = residual_structure.missed(ranked.problem.views[at], ranked.fits[at])
+    sentence = verdict(
+        conclusion.status,
+        parameters,
+        conclusion.rivals,
+        worst.rms,
+        worst.name or "the data",
+        structure.place if structure else "",
+        dark,
+        identifiability.naming(next(iter(parameters)), conclusion.trades),
+    )
+    unclear = [*identifiability.bounded(parameters, dark), *conclusion.trades]
+    fit = Fit(
         parts=each,
-        status=status,
-        verdict=said + backface.told(backface.worth(spectra, weighed)),
+        status=conclusion.status,
+        verdict=sentence + backface.sentence(backface.comparison(spectra, ranked)),
         parameters=parameters,
-        rivals=others,
-        chi2_reduced=weighed.chi2_reduced,
+        rivals=conclusion.rivals,
+        chi2_reduced=ranked.chi2_reduced,
         rms=parts.together(each),
         effective_points=sum(part.effective_points for part in each),
-        correlation_names=found.names,
-        correlation=found.correlation,
-        warnings=(*warnings, *estimates.warnings(spectra, weighed, unclear)),
+        correlation_names=covariance.names,
+        correlation=covariance.correlation,
+        warnings=(*warnings, *summary.warnings(spectra, ranked, unclear)),
         profile=profile,
         seconds=time.perf_counter() - began,
+        scene=scenes[0] if len(scenes) == 1 else tuple(scenes),
     )
+    return fit, ranked

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
+from dataclasses import dataclass
 from math import comb
 from typing import Any, NamedTuple
 
@@ -40,6 +41,18 @@ class Data(NamedTuple):
     frame: Any = None  # of N, C, S at each point, where Ψ and Δ have errors of their own
 
 
+@dataclass(frozen=True)
+class Coefficient:
+    """One coefficient of the scale or the offset, in physical units."""
+
+    name: str
+    value: float
+    basis: np.ndarray  # what it multiplies at each point
+    prior_sd: float
+    on_signal: bool
+    not_negative: bool  # one number that cannot be below zero
+
+
 class Solved(NamedTuple):
     """The nuisances solved for one simulated signal."""
 
@@ -47,7 +60,7 @@ class Solved(NamedTuple):
     residual: Any  # weighted, tempered, with a row for each prior
     gain: Any  # g at every point
     offset: Any  # o at every point
-    evidence: Any  # −2 log of the marginal likelihood, up to a constant
+    deviance: Any  # −2 ln of the marginal likelihood, up to a constant
 
 
 def chebyshev(position, degree: int) -> list:
@@ -59,7 +72,7 @@ def chebyshev(position, degree: int) -> list:
 
 
 def solve(signal, data: Data, instrument: Instrument) -> Solved:
-    """The best scale and offset for a simulated signal, and the evidence left."""
+    """The best scale and offset for a simulated signal, and the deviance left."""
     weight = data.weight * jnp.sqrt(data.independent_fraction)
     gains, scale = _split(instrument.scale, lambda drift: _gains(signal, weight, data, drift))
     shifts, offset = _split(instrument.offset, lambda drift: _shifts(data, drift))
@@ -71,14 +84,14 @@ def solve(signal, data: Data, instrument: Instrument) -> Solved:
         residual = weight * (data.values - known)
         return Solved(known, residual, scale * one, offset * one, jnp.sum(residual**2))
     prior = _join(gains, shifts)
-    coefficients, evidence = _project(columns * weight, weight * (data.values - known), prior, shifts)
+    coefficients, deviance = _project(columns * weight, weight * (data.values - known), prior, shifts)
     first = len(gains.basis) if gains else 0
     model = known + coefficients @ columns
     residual = jnp.concatenate([weight * (data.values - model), (coefficients - prior.mean) / prior.sd])
     gain = coefficients[:first] @ jnp.stack(gains.basis) if gains else scale * one
     shift = coefficients[first:] @ jnp.stack(shifts.basis) if shifts else offset * one
-    evidence = evidence + jnp.sum(residual**2) + _penalty(gain, weight)
-    return Solved(model, residual, gain, shift, evidence)
+    deviance = deviance + jnp.sum(residual**2) + _penalty(gain, weight)
+    return Solved(model, residual, gain, shift, deviance)
 
 
 class _Series(NamedTuple):
@@ -108,6 +121,34 @@ def offset_prior(drift: Drift) -> tuple[np.ndarray, np.ndarray]:
     return np.zeros(count), np.array(sd)
 
 
+def coefficients(
+    data: Data, instrument: Instrument, gain: Any, offset: Any, points: int, suffix: str = ""
+) -> list[Coefficient]:
+    """Scale and offset as Chebyshev coefficients in wavelength, from their curves at the first `points`.
+
+    Priors of the gain are in units of its own mean, those of the offset in units of the signal's level. The
+    `suffix` ends the names of one spectrum among several.
+    """
+    result: list[Coefficient] = []
+    position = np.asarray(data.position)[:points]
+    for name, drift, prior, curve in (
+        ("scale", instrument.scale, scale_prior, gain),
+        ("offset", instrument.offset, offset_prior, offset),
+    ):
+        if not isinstance(drift, Drift):
+            continue
+        _, sd = prior(drift)
+        degree = len(sd) - 1
+        numbers = np.polynomial.chebyshev.chebfit(position, np.asarray(curve)[:points], degree)
+        basis = np.polynomial.chebyshev.chebvander(position, degree).T
+        prior_sd = sd * (abs(numbers[0]) if name == "scale" else float(data.level))
+        not_negative = name == "offset" and degree == 0
+        for j, (number, column, own_sd) in enumerate(zip(numbers.tolist(), basis, prior_sd, strict=True)):
+            full = f"instrument.{name}" + (f"_{j}" if j else "") + suffix
+            result.append(Coefficient(full, number, column, own_sd, name == "scale", not_negative))
+    return result
+
+
 def _gains(signal, weight, data: Data, drift: Drift) -> _Series:
     """Chebyshev terms in units of the plain scale, which a single free number would have."""
     square = weight * weight
@@ -126,7 +167,7 @@ def _join(*series: _Series | None) -> _Series:
 
 
 def _project(rows, values, prior: _Series, shifts: _Series | None):
-    """Coefficients of the weighted rows under their prior, and the evidence's log-determinant."""
+    """Coefficients of the weighted rows under their prior, and the deviance's log-determinant."""
     precision = np.diag(1 / prior.sd**2)
     matrix = rows @ rows.T + precision
     target = rows @ values + precision @ prior.mean

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import equinox as eqx
@@ -15,9 +15,9 @@ from pellicle.dispersion.cody_lorentz import CodyLorentz
 from pellicle.dispersion.oscillators import AbstractOscillator, Gaussian, Lorentz, Oscillators, TaucLorentz
 from pellicle.dispersion.parameter_names import ParameterLocation, locate_parameter
 from pellicle.dispersion.spline import Spline
+from pellicle.fitting.parameter import Parameter
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free, free_leaves, insert, is_free
-from pellicle.scene.priors import Prior
 
 _WIDTHS = {"bandwidth": "nm", "thickness_spread": "nm", "roughness": "nm", "angle_spread": "deg"}
 _UNITS = {"thickness": "nm", "wavelength_shift": "nm", "plate_mm": "mm", "angle": "deg", **_WIDTHS}
@@ -26,48 +26,10 @@ _STRENGTHS = (Lorentz, Gaussian, TaucLorentz, CodyLorentz)
 """Their A is a strength, which cannot be negative; the A of Cauchy is an index."""
 _SEARCHED = ("thickness", "n", "A", "B", "k", "B1", "Ep", "E0", "Eg", "eps_inf", "fraction")
 """Parameters that change where the fringes lie, or whether there are any: a start in the middle fails."""
+_RESOLUTION = 0.5
+"""Thicknesses (nm) closer than this belong to one minimum."""
 _FEW = 3
 """Levels of an oscillator's parameter, of which there are many at once."""
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """One nonlinear parameter; `key` is its last name (`thickness`, `n`, `A`), `name` its full one.
-
-    `field` is the key without the number of a tuple (`k` for `k2`), `owner` whose number it is.
-    """
-
-    name: str
-    key: str
-    unit: str
-    value: float
-    lower: float
-    upper: float
-    prior: Prior | None
-    field: str = ""
-    owner: type = object
-
-    @property
-    def natural_lower(self) -> bool:
-        """A lower bound that physics sets: resting on it gives a one-sided limit, not a warning."""
-        strength = self.key == "A" and issubclass(self.owner, _STRENGTHS)
-        return (strength or (self.field or self.key) in _NATURAL_ZERO) and self.lower == 0
-
-    @property
-    def searched(self) -> bool:
-        return self.key in _SEARCHED or (self.owner is Spline and self.field == "n")
-
-    @property
-    def together(self) -> str:
-        """What a search moves together: a spline's index as a whole, anything else alone."""
-        return self.name.removesuffix(self.key) + self.field if self.owner is Spline else self.name
-
-    @property
-    def levels(self) -> int | None:
-        """How many values a search should try, None to leave it to the width of the bounds."""
-        if self.owner is Oscillators or issubclass(self.owner, AbstractOscillator):
-            return _FEW
-        return None
 
 
 def parameters(scene: Scene) -> tuple[Parameter, ...]:
@@ -105,16 +67,25 @@ def _full_name(scene: Scene, path: tuple, last: str, name: str) -> str:
 
 def _parameter(scene: Scene, path: tuple, free: Free, name: str) -> Parameter:
     found = _place(scene, path)
+    owner, key, field = type(found.owner), found.key, found.field
+    full = _full_name(scene, path, found.name, name)
+    strength = key == "A" and issubclass(owner, _STRENGTHS)
+    # a search moves the index of a spline as a whole
+    group = full.removesuffix(key) + field if owner is Spline else full
+    oscillator = owner is Oscillators or issubclass(owner, AbstractOscillator)
     return Parameter(
-        name=_full_name(scene, path, found.name, name),
-        key=found.key,
-        unit=_unit(found),
-        value=free.start,
+        name=full,
+        key=key,
+        unit=found.unit or _UNITS.get(key, ""),
+        start=free.start,
         lower=free.lower,
         upper=free.upper,
         prior=free.prior,
-        field=found.field,
-        owner=type(found.owner),
+        natural=((strength or (field or key) in _NATURAL_ZERO) and free.lower == 0, False),
+        resolution=_RESOLUTION if key == "thickness" else None,
+        searched=key in _SEARCHED or (owner is Spline and field == "n"),
+        group=group,
+        levels=_FEW if oscillator else None,
     )
 
 
@@ -127,10 +98,6 @@ def _place(scene: Scene, path: tuple) -> ParameterLocation:
             return locate_parameter(node, path[depth + 1 :])
     key = path[-1].name
     return ParameterLocation(key, key, key, None)
-
-
-def _unit(found: ParameterLocation) -> str:
-    return found.unit or _UNITS.get(found.key, "")
 
 
 def _owner(scene: Scene, path: tuple) -> list[str]:
@@ -172,5 +139,5 @@ def fixed_numbers(scene: Scene, name: str = "") -> list[tuple[str, float, str]]:
         if path[0].name not in ("layers", "instrument") or not isinstance(leaf, int | float):
             continue
         at = _place(scene, path)
-        found.append((_full_name(scene, path, at.name, name), float(leaf), _unit(at)))
+        found.append((_full_name(scene, path, at.name, name), float(leaf), at.unit or _UNITS.get(at.key, "")))
     return found

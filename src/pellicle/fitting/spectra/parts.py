@@ -7,11 +7,11 @@ import math
 import numpy as np
 
 from pellicle.data.spectrum import Spectrum
+from pellicle.fitting import noise
+from pellicle.fitting.covariance import Errors
 from pellicle.fitting.result import Curve, Part
-from pellicle.fitting.spectra import noise
-from pellicle.fitting.spectra.covariance import Errors, layer_errors
-from pellicle.fitting.spectra.problem import View
-from pellicle.fitting.spectra.reweighting import RankedMinima, SpectrumFit
+from pellicle.fitting.reweighting import RankedMinima, ViewFit
+from pellicle.fitting.spectra.problem import Local, SpectrumView
 from pellicle.fitting.status import MISFIT_CHI2, misfits
 
 FAR = math.sqrt(MISFIT_CHI2)
@@ -19,16 +19,16 @@ FAR = math.sqrt(MISFIT_CHI2)
 neighbouring points differ by serves as the σ that nobody gave, and the bound is that of a known one."""
 
 
-def parts(data: list[Spectrum], weighed: RankedMinima, found: Errors) -> tuple[Part, ...]:
+def parts(data: list[Spectrum], ranked: RankedMinima, found: Errors) -> tuple[Part, ...]:
     """One part for each spectrum, in their order."""
-    views = zip(data, weighed.problem.views, weighed.met, strict=True)
+    views = zip(data, ranked.problem.views, ranked.fits, strict=True)
     return tuple(_part(spectrum, view, met, found) for spectrum, view, met in views)
 
 
-def _part(spectrum: Spectrum, view: View, met: SpectrumFit, found: Errors) -> Part:
+def _part(spectrum: Spectrum, view: SpectrumView, met: ViewFit, found: Errors) -> Part:
     return Part(
         name=view.name,
-        spectrum=spectrum,
+        data=spectrum,
         curve=_curve(view, met, found),
         plan=view.plan,
         rms=view.rms(met.at.model),
@@ -45,18 +45,18 @@ def together(found: tuple[Part, ...]) -> float | None:
     units = {part.spectrum.signal == "psi-delta" for part in found}
     if len(units) > 1 or not all(part.spectrum.calibrated for part in found):
         return None
-    sizes = [part.curve.wavelength.size for part in found]
+    sizes = [part.spectral.wavelength.size for part in found]
     return math.sqrt(np.average([part.rms**2 for part in found], weights=sizes))
 
 
-def missed(found: tuple[Part, ...], weighed: RankedMinima) -> tuple[Part, ...]:
+def missed(found: tuple[Part, ...], ranked: RankedMinima) -> tuple[Part, ...]:
     """The spectra that the scene does not explain."""
-    views = zip(found, weighed.problem.views, weighed.met, strict=True)
+    views = zip(found, ranked.problem.views, ranked.fits, strict=True)
     several = len(found) > 1
     return tuple(part for part, view, met in views if _misses(part, view, met, several))
 
 
-def _misses(part: Part, view: View, met: SpectrumFit, several: bool) -> bool:
+def _misses(part: Part, view: SpectrumView, met: ViewFit, several: bool) -> bool:
     values = view.in_columns(view.data.values)
     rms = part.rms if view.channels == 1 else math.radians(2 * part.rms)
     floor = np.sqrt(np.mean([np.median(noise.local_noise(column)) ** 2 for column in values.T]))
@@ -73,7 +73,7 @@ def _misses(part: Part, view: View, met: SpectrumFit, several: bool) -> bool:
     )
 
 
-def _curve(view: View, met: SpectrumFit, found: Errors) -> Curve:
+def _curve(view: SpectrumView, met: ViewFit, found: Errors) -> Curve:
     """Data, model and the layer's index with errors, at the real points."""
     at, rows, held = met.at, view.rows, list(view.takes)
     n_stderr, k_stderr = layer_errors(at, found.covariance[np.ix_(held, held)], rows)
@@ -95,6 +95,14 @@ def _curve(view: View, met: SpectrumFit, found: Errors) -> Curve:
         k_stderr=k_stderr,
         **angles,
     )
+
+
+def layer_errors(at: Local, covariance: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray]:
+    """Standard errors of the layer's n and k at each wavelength, from the covariance of the parameters."""
+    slope = np.asarray(at.layer_slope)[:, :points]
+    variance = np.einsum("cip,pq,ciq->ci", slope, covariance, slope)
+    n, k = np.sqrt(np.maximum(variance, 0.0))
+    return n, k
 
 
 def psi_delta(sphere: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

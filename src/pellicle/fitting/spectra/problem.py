@@ -1,73 +1,135 @@
-"""Spectra of a sample and their scenes as numbers: what is simulated, and what it is compared with."""
+"""Spectra of a sample and their scenes as a least-squares problem."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from pellicle.effects.bounds import largest_index
 from pellicle.effects.plan import Plan
-from pellicle.fitting.spectra.nuisance import Data
-from pellicle.fitting.spectra.parameters import Parameter, anonymous, bounds, shared
-from pellicle.fitting.spectra.targets import Measured, Noise
+from pellicle.fitting.coordinates import box
+from pellicle.fitting.noise import DRIFT_CORRELATION, correlation_length
+from pellicle.fitting.problem import Explained, Noise, Problem
+from pellicle.fitting.program_cache import kept
+from pellicle.fitting.spectra import nuisance
+from pellicle.fitting.spectra.nuisance import Coefficient, Data
+from pellicle.fitting.spectra.parameters import anonymous, bounds, shared
+from pellicle.fitting.spectra.targets import Measured
 from pellicle.planning.differences import largest_difference, signals
 from pellicle.planning.film import plan, reference
 from pellicle.scene.film import Scene, coherent_layers, with_wavelength
-from pellicle.scene.priors import LogUniform, Prior
-from pellicle.simulation.film import sampled
+from pellicle.scene.free import free_leaves, insert
+from pellicle.scene.layers import Interface
+from pellicle.simulation.film import build, sampled
 
-_STAY = ("precision", "dispersion")
-"""What a tolerance leaves alone: a fit stops by differences below single precision, and its media are
-evaluated once in any case."""
+_KEPT_EFFECTS = ("precision", "dispersion")
+"""Effects that a tolerance does not remove: a fit stops by differences below single precision, and its media
+are evaluated once in any case."""
 
 _ROUND = 64
 """Spectra are padded to a multiple of this, so that files of nearly one length share a program."""
 
-
-class Box(NamedTuple):
-    """Bounds and priors; the search lives in the unit cube between the bounds.
-
-    Normal and half-normal priors have a mean and a weight; `logarithmic` is 1 for a log-uniform one, which
-    posteriors count and fits do not.
-    """
-
-    lower: Any
-    upper: Any
-    prior_mean: Any
-    prior_weight: Any  # 1/sd, 0 for none
-    logarithmic: Any
-
-    def values(self, unit):
-        return self.lower + unit * (self.upper - self.lower)
+SCAN_POINTS = 448
+"""Wavelengths used while scanning: enough for four samples in a fringe of 5 µm at index 2."""
 
 
-def boxed(lower: np.ndarray, upper: np.ndarray, priors: Sequence[Prior | None]) -> Box:
-    """The box between bounds (parameters,), with the prior of each parameter."""
-    rows = [prior.mean_and_weight if prior else (0.0, 0.0) for prior in priors]
-    logarithmic = np.array([float(isinstance(prior, LogUniform)) for prior in priors])
-    mean, weight = np.reshape(rows, (-1, 2)).T
-    return Box(lower, upper, mean, weight, logarithmic)
+@dataclass(frozen=True)
+class SpectrumForm:
+    """The simulation of a spectrum by a plan without words, compared with data by variable projection."""
+
+    plan: Plan
+
+    def simulate(self, scene: Scene, data: Data) -> Any:
+        """The signal as measured: all of it, or of N, C, S the N and C that a folded Δ leaves.
+
+        Ψ and Δ do not depend on the degree of polarisation, so where some light is unpolarised, N, C, S are
+        brought to their sphere; a rotating analyser measures N and C as they are.
+        """
+        signal = build(self.plan)(scene).reshape(scene.light.wavelength.size, -1)
+        channels = data.values.size // len(signal)
+        # intensities of several polarisations add
+        depolarised = (
+            self.plan.on("back-face") or self.plan.on("angle-spread") or self.plan.row("coherence").count
+        )
+        if channels == 3 and depolarised:
+            square = jnp.sum(signal**2, axis=1, keepdims=True)
+            signal = signal * jnp.where(square > 0, jax.lax.rsqrt(jnp.where(square > 0, square, 1.0)), 0.0)
+        if data.frame is not None:
+            signal = jnp.einsum("pij,pj->pi", data.frame, signal)
+        return signal[:, :channels].reshape(-1)
+
+    def explain(self, arrays: tuple[Scene, Data], values: Any, /) -> Explained:
+        """The spectrum with the free parameters of its scene at `values`."""
+        scene, data = arrays
+        solved = nuisance.solve(self.simulate(insert(scene, values), data), data, scene.instrument)
+        return Explained(solved.model, solved.residual, solved.deviance)
 
 
-class View(NamedTuple):
-    """One spectrum of a problem: what is simulated, and what it is compared with.
+class Local(NamedTuple):
+    """The model of a spectrum around one point, for errors and reports."""
 
-    `scene` has anonymous free parameters and sampled media; `takes` says which of the problem's
-    parameters they are. A prior is in the `box` of the first view that holds its parameter.
+    signal: Any  # simulated, without scale and offset
+    slope: Any  # ∂ signal / ∂ parameter in its own unit, (points, parameters)
+    model: Any
+    gain: Any
+    offset: Any
+    layer: Any  # n and k of the layer at each wavelength
+    layer_slope: Any  # their derivatives, (2, points, parameters)
+
+
+def reported_layer(scene: Scene) -> int | None:
+    """Position of the layer whose n and k are reported: the first with free parameters of its own, else the
+    uppermost; None, the substrate, where nothing but interfaces lies on it."""
+    known = [(i, x.material) for i, x in enumerate(scene.layers) if not isinstance(x, Interface)]
+    free = [i for i, material in known if free_leaves(material)]
+    return next(iter([*free, *(i for i, _ in known)]), None)
+
+
+@kept
+def local(form: SpectrumForm, scene: Scene, data: Data, values: Any) -> Local:
+    """Signal, its Jacobian, and the layer's index at `values` (parameters,)."""
+    shown = reported_layer(scene)
+
+    def both(values):
+        numbers = insert(scene, list(values))
+        medium: Any = numbers.substrate if shown is None else numbers.layers[shown]
+        index = medium.material(numbers.light.wavelength)
+        return form.simulate(numbers, data), jnp.stack([index.real, index.imag])
+
+    (signal, layer), push = jax.linearize(both, values)
+    slope, layer_slope = jax.vmap(push, out_axes=-1)(jnp.eye(len(values)))
+    solved = nuisance.solve(signal, data, scene.instrument)
+    return Local(signal, slope, solved.model, solved.gain, solved.offset, layer, layer_slope)
+
+
+@dataclass(frozen=True)
+class SpectrumView:
+    """One spectrum of a problem.
+
+    `scene` has anonymous free parameters and sampled media; `takes` are the positions of its parameters in
+    the problem. `data` is padded to a round length.
     """
 
     name: str  # empty where there is no other
     plan: Plan
     scene: Scene
     data: Data
-    box: Box
     takes: tuple[int, ...]
     noise: Noise
     points: int  # data values: N, C, S, or N and C, for each wavelength in ellipsometry
     largest_index: float
+
+    @property
+    def form(self) -> SpectrumForm:
+        return SpectrumForm(self.plan.static_key)
+
+    @property
+    def arrays(self) -> tuple[Scene, Data]:
+        return self.scene, self.data
 
     @property
     def channels(self) -> int:
@@ -76,16 +138,90 @@ class View(NamedTuple):
 
     @property
     def rows(self) -> int:
-        """Wavelengths that are real, not padding."""
+        """Wavelengths without padding."""
         return self.points // self.channels
 
     @property
     def independent(self) -> int:
-        """Data values that are independent: N, C and S lie on a sphere, so two of the three."""
+        """Independent data values: N, C and S lie on a sphere, so two of the three."""
         return self.points if self.channels < 3 else 2 * self.rows
 
+    def local(self, values: Any) -> Local:
+        """The model around `values` (its parameters,)."""
+        return jax.device_get(local(self.form, self.scene, self.data, values))
+
+    def residuals(self, at: Local) -> np.ndarray:
+        """Weighted residuals (rows, channels)."""
+        left = (self.data.values - np.asarray(at.model)) * self.data.weight
+        return left[: self.points].reshape(self.rows, self.channels)
+
+    def nuisances(self, at: Local) -> list[Coefficient]:
+        """Coefficients of scale and offset, recovered from their curves."""
+        own = f".{self.name}" if self.name else ""
+        return nuisance.coefficients(self.data, self.scene.instrument, at.gain, at.offset, self.points, own)
+
+    def jacobian(self, at: Local) -> np.ndarray:
+        """Weighted ∂ model / ∂ parameter, then by each coefficient of scale and offset in units of its prior,
+        (points, parameters and coefficients)."""
+        keep = slice(self.points)
+        signal, weight = np.asarray(at.signal)[keep], np.asarray(self.data.weight)[keep, None]
+        steep = np.asarray(at.gain)[keep, None] * np.asarray(at.slope)[keep]
+        flat = [c.basis * (signal if c.on_signal else 1.0) * c.prior_sd for c in self.nuisances(at)]
+        return weight * np.column_stack([steep, *flat])
+
+    def correlation_length(self, residuals: np.ndarray) -> float:
+        """Number of neighbouring points whose residuals count as one."""
+        # outwards from the sphere nothing is measured
+        columns = residuals.T if self.data.frame is None else residuals.T[:2]
+        return float(np.mean([correlation_length(column) for column in columns]))
+
+    def reweighted(self, factor: Any, fraction: float) -> SpectrumView:
+        """Weights times `factor` (a number or (rows, channels)), each point for `fraction` of one."""
+        whole = np.ones(len(self.data.weight))
+        whole[: self.points] = np.broadcast_to(factor, (self.rows, self.channels)).reshape(-1)
+        most = 1 / DRIFT_CORRELATION if self.noise.drifting else 1.0
+        data = self.data._replace(
+            weight=self.data.weight * whole, independent_fraction=np.float64(min(fraction, most))
+        )
+        return replace(self, data=data)
+
+    def counting(self, fraction: float) -> SpectrumView:
+        """The view with each point counting for `fraction` of an independent one."""
+        return replace(self, data=self.data._replace(independent_fraction=np.float64(fraction)))
+
+    def thinned(self) -> SpectrumView:
+        """Every so-many-th wavelength, at most about `SCAN_POINTS`, with the weight of those left out."""
+        stride = -(-self.rows // SCAN_POINTS)
+        if stride <= 1:
+            return self
+        size, channels = len(self.scene.light.wavelength), self.channels
+        chosen = np.arange(0, self.rows, stride)
+        padding = -len(chosen) % _ROUND
+        take = np.concatenate([chosen, np.full(padding, size - 1)])
+
+        def pick(x):
+            if np.ndim(x) not in (1, 3) or len(x) not in (size, size * channels):
+                return x
+            taken = x.reshape(size, -1)[take]
+            return taken.reshape(-1) if np.ndim(x) == 1 else taken.reshape(-1, *x.shape[1:])
+
+        scene, data = jax.tree_util.tree_map(pick, (self.scene, self.data))
+        real = np.repeat(np.concatenate([np.ones(len(chosen)), np.zeros(padding)]), channels)
+        data = data._replace(
+            weight=data.weight * real, independent_fraction=data.independent_fraction * stride
+        )
+        return replace(self, scene=scene, data=data, points=len(chosen) * channels)
+
+    def off_tolerance(self, values: np.ndarray) -> float:
+        """Error of the view's plan at `values`, in the unit of its signal."""
+        if not self.plan.tolerance:
+            return 0.0
+        at = np.asarray(values)[None]
+        planned, whole = (signals(p, self.scene, at) for p in (self.plan, reference(self.scene)))
+        return largest_difference(planned, whole, self.plan.signal)
+
     def in_columns(self, values: Any) -> np.ndarray:
-        """Data values or a model of them (..., data values) as signals, or as N, C and S, of the real points,
+        """Data values or a model of them (..., data values) as signals, or as N, C and S, without padding,
         (..., rows, channels)."""
         values = np.asarray(values)[..., : self.points]
         columns = values.reshape(*values.shape[:-1], self.rows, self.channels)
@@ -101,35 +237,10 @@ class View(NamedTuple):
             return float(np.sqrt(np.mean(residual**2)))
         return float(np.rad2deg(np.sqrt(residual @ residual / (2 * self.rows))) / 2)
 
-    @property
-    def program(self) -> tuple[Any, ...]:
-        """The arguments that the compiled functions take, the plan first (static)."""
-        return self.plan.static_key, self.scene, self.data, self.box
 
-
-class Problem(NamedTuple):
-    """Everything about one fit: the spectra of a sample, and the parameters that explain them all."""
-
-    views: tuple[View, ...]
-    box: Box
-    parameters: tuple[Parameter, ...]
-
-    @property
-    def thickness_axis(self) -> int | None:
-        """Which thickness is scanned finely: the one with the widest bounds, None where all are fixed."""
-        spans = {i: p.upper - p.lower for i, p in enumerate(self.parameters) if p.key == "thickness"}
-        return max(spans, key=lambda i: spans[i]) if spans else None
-
-    @property
-    def shortest(self) -> float:
-        """The shortest wavelength (nm) inside a layer that any spectrum and the bounds allow."""
-        return min(v.scene.light.wavelength.min() / v.largest_index for v in self.views)
-
-    @property
-    def program(self) -> tuple[Any, ...]:
-        """The arguments of `polish`, what is static first."""
-        looks = tuple((v.plan.static_key, v.takes) for v in self.views)
-        return looks, tuple(v.scene for v in self.views), tuple(v.data for v in self.views), self.box
+def shortest_wavelength(problem: Problem) -> float:
+    """The shortest wavelength (nm) inside a layer that any spectrum and the bounds allow."""
+    return min(v.scene.light.wavelength.min() / v.largest_index for v in problem.views)
 
 
 def make(*spectra: Measured, tolerance: float = 0.0) -> Problem:
@@ -137,25 +248,18 @@ def make(*spectra: Measured, tolerance: float = 0.0) -> Problem:
 
     Raises ValueError where a material has no data at a wavelength.
     """
-    scenes, names = [m.scene for m in spectra], [m.name for m in spectra]
-    free, held = shared(scenes, names)
-    box = boxed(*bounds(free), [p.prior for p in free])
-    views, told = [], set()
-    for spectrum, takes in zip(spectra, held, strict=True):
-        first = np.array([i not in told for i in takes], dtype=float)
-        told |= set(takes)
-        own = Box(*(column[list(takes)] for column in box))
-        views.append(_view(spectrum, own._replace(prior_weight=own.prior_weight * first), takes, tolerance))
-    return Problem(tuple(views), box, free)
+    free, positions = shared([m.scene for m in spectra], [m.name for m in spectra])
+    views = [_view(spectrum, takes, tolerance) for spectrum, takes in zip(spectra, positions, strict=True)]
+    return Problem(tuple(views), free, box(*bounds(free), [p.prior for p in free]))
 
 
-def _view(spectrum: Measured, box: Box, takes: tuple[int, ...], tolerance: float) -> View:
+def _view(spectrum: Measured, takes: tuple[int, ...], tolerance: float) -> SpectrumView:
     scene, wavelength, values = spectrum.scene, spectrum.wavelength, spectrum.values
     points, channels = len(wavelength), values.size // len(wavelength)
     extra = -points % _ROUND
-    wavelength, values = _pad(wavelength, extra), _pad(values, extra)
-    scene = with_wavelength(scene, wavelength, _pad_angle(scene.light.angle, extra))
-    chosen = plan(scene, tolerance, _STAY)
+    wavelength, values, angle = _pad(wavelength, extra), _pad(values, extra), scene.light.angle
+    scene = with_wavelength(scene, wavelength, _pad(angle, extra) if np.ndim(angle) else angle)
+    chosen = plan(scene, tolerance, _KEPT_EFFECTS)
     span = max(wavelength.max() - wavelength.min(), 1e-9)  # one wavelength at many angles has none
     sigma = np.reshape(spectrum.sigma, (-1, 1)) if np.ndim(spectrum.sigma) < 2 else spectrum.sigma
     weight = np.concatenate([1 / np.broadcast_to(sigma, (points, channels)), np.zeros((extra, channels))])
@@ -169,53 +273,10 @@ def _view(spectrum: Measured, box: Box, takes: tuple[int, ...], tolerance: float
     )
     scene = sampled(scene, chosen.on("coherence") or scene.instrument.wavelength_shift is not None)
     steepest = max((largest_index(x.material, wavelength) for x in coherent_layers(scene)), default=1.0)
-    return View(
-        spectrum.name,
-        chosen,
-        anonymous(scene),
-        data,
-        box,
-        takes,
-        spectrum.noise,
-        points * channels,
-        steepest,
+    return SpectrumView(
+        spectrum.name, chosen, anonymous(scene), data, takes, spectrum.noise, points * channels, steepest
     )
-
-
-def beyond(view: View, unit: np.ndarray) -> float:
-    """How far the view's plan is off at one point of the unit cube, in the unit of its signal."""
-    if not view.plan.tolerance:
-        return 0.0
-    at = np.asarray(view.box.values(unit[list(view.takes)]))[None]
-    planned, whole = (signals(p, view.scene, at) for p in (view.plan, reference(view.scene)))
-    return largest_difference(planned, whole, view.plan.signal)
 
 
 def _pad(x: np.ndarray, extra: int) -> np.ndarray:
     return np.concatenate([x, np.repeat(x[-1:], extra, axis=0)])
-
-
-def _pad_angle(angle: Any, extra: int) -> Any:
-    return _pad(angle, extra) if np.ndim(angle) else angle
-
-
-def thin(view: View, most: int) -> View:
-    """Every so-many-th wavelength, at most about `most`, with the weight of those left out."""
-    stride = -(-view.rows // most)
-    if stride <= 1:
-        return view
-    size, channels = len(view.scene.light.wavelength), view.channels
-    kept = np.arange(0, view.rows, stride)
-    padding = -len(kept) % _ROUND
-    take = np.concatenate([kept, np.full(padding, size - 1)])
-
-    def pick(x):
-        if np.ndim(x) not in (1, 3) or len(x) not in (size, size * channels):
-            return x
-        taken = x.reshape(size, -1)[take]
-        return taken.reshape(-1) if np.ndim(x) == 1 else taken.reshape(-1, *x.shape[1:])
-
-    scene, data = jax.tree_util.tree_map(pick, (view.scene, view.data))
-    real = np.repeat(np.concatenate([np.ones(len(kept)), np.zeros(padding)]), channels)
-    data = data._replace(weight=data.weight * real, independent_fraction=data.independent_fraction * stride)
-    return view._replace(scene=scene, data=data, points=len(kept) * channels)

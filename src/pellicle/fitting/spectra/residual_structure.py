@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pellicle.fitting.spectra.noise import local_noise
-from pellicle.fitting.spectra.problem import View
-from pellicle.fitting.spectra.reweighting import SpectrumFit
+from pellicle.fitting.noise import local_noise
+from pellicle.fitting.reweighting import ViewFit
+from pellicle.fitting.spectra.problem import SpectrumView
 
 _NARROWEST = 5
 """Points in the narrowest window whose mean is tested."""
@@ -93,7 +93,7 @@ class Missed(NamedTuple):
         return f"{self.place or 'over most of the spectrum'}{by}"
 
 
-def missed(view: View, met: SpectrumFit) -> Missed | None:
+def missed(view: SpectrumView, met: ViewFit) -> Missed | None:
     """Where the residuals of the best fit are no noise, None where they may be."""
     shape, seen = (view.rows, view.channels), slice(None) if view.data.frame is None else slice(2)
     weight = np.asarray(view.data.weight)[: view.points].reshape(shape)[:, seen]

@@ -9,17 +9,11 @@ import numpy as np
 
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import DataError, UsageError
-from pellicle.fitting.spectra import noise
+from pellicle.fitting import noise
+from pellicle.fitting.problem import Noise
 from pellicle.scene.film import Light, Scene
 from pellicle.scene.free import free_leaves, is_free
 from pellicle.scene.instrument import Drift, Instrument
-
-
-class Noise(NamedTuple):
-    """Where the weights come from: `given` is an absolute σ; `drifting` the model's own error."""
-
-    given: bool = True
-    drifting: bool = False
 
 
 class Measured(NamedTuple):

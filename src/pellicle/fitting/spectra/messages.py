@@ -14,7 +14,7 @@ import numpy as np
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.empirical import Constant
 from pellicle.effects.plan import Plan
-from pellicle.fitting.spectra.problem import Problem, View
+from pellicle.fitting.problem import Problem
 from pellicle.fitting.spectra.targets import Measured
 from pellicle.materials import Material
 from pellicle.scene.film import Scene
@@ -24,19 +24,19 @@ from pellicle.scene.layers import Interface, Layer, Plate
 log = getLogger(__name__)
 
 
-def of_problem(spectra: Sequence[Measured], problem: Problem) -> None:
+def log_problem(spectra: Sequence[Measured], problem: Problem) -> None:
     """The scene, the numbers that are free, each spectrum with its noise, and what is simulated of it."""
     if not log.isEnabledFor(INFO):
         return
-    of_scene(spectra[0].scene)
+    log_scene(spectra[0].scene)
     for p in problem.parameters:
         log.info("free: %s between %g and %g%s", p.name, p.lower, p.upper, f" {p.unit}" if p.unit else "")
     for spectrum, view in zip(spectra, problem.views, strict=True):
         log.info("data%s: %s; %s", _of(view.name), _looked(spectrum), _noise(spectrum))
-        of_plan(view.plan, view.name)
+        log_plan(view.plan, view.name)
 
 
-def of_scene(scene: Scene) -> None:
+def log_scene(scene: Scene) -> None:
     """`from air: Fe2O3 (main/Fe2O3/Querry-o), 1 to 1000 nm, on BK7 (...)`, from the ambient down."""
     if log.isEnabledFor(INFO):
         layers = ", then ".join(_layer(layer) for layer in scene.layers)
@@ -45,7 +45,7 @@ def of_scene(scene: Scene) -> None:
         log.info("scene: from %s: %s, on %s%s", medium_in_words(scene.ambient), layers, on, behind)
 
 
-def of_plan(plan: Plan, name: str = "") -> None:
+def log_plan(plan: Plan, name: str = "") -> None:
     """What is computed, with its reason, and what is not."""
     for row in plan.rows:
         if row.on:
@@ -55,50 +55,6 @@ def of_plan(plan: Plan, name: str = "") -> None:
         log.info("plan%s: left out within the tolerance %g: %s", _of(name), plan.tolerance, ", ".join(small))
     absent = ", ".join(row.effect for row in plan.rows if not row.on and row.effect not in small)
     log.info("plan%s: not called for, so not computed: %s", _of(name), absent or "nothing")
-
-
-def of_scan(problem: Problem, thicknesses: int, others: int) -> None:
-    """How finely the box is scanned."""
-    depth = problem.thickness_axis
-    if depth is None:
-        log.info("scan: no thickness is free; %d starting points for the other parameters", others)
-        return
-    p = problem.parameters[depth]
-    log.info(
-        "scan: %d values of %s, %.3g nm apart (an eighth of the shortest wavelength in a layer, %.3g), "
-        "with %d choice%s of the rest each: %d candidates",
-        thicknesses,
-        p.name,
-        (p.upper - p.lower) / max(thicknesses - 1, 1),
-        problem.shortest,
-        others,
-        "s" * (others != 1),
-        thicknesses * others,
-    )
-
-
-def of_minima(problem: Problem, starts: int, units: np.ndarray, converged: np.ndarray) -> None:
-    """How many candidates were refined, and where they ended."""
-    best = zip(problem.parameters, problem.box.values(units[0]), strict=True)
-    log.info(
-        "refined: %d minima of the scan; %d distinct ones are left, the solver settled on %d; best: %s",
-        starts,
-        len(units),
-        int(np.sum(converged)),
-        ", ".join(f"{p.name} {value:.6g}" for p, value in best),
-    )
-
-
-def of_weights(views: Sequence[View], lengths: Sequence[float]) -> None:
-    """How many points the residuals of the best minimum count as."""
-    for view, length in zip(views, lengths, strict=True):
-        log.info(
-            "weights%s: residuals run alike over %.3g points, so that %d count as %.3g",
-            _of(view.name),
-            length,
-            view.rows,
-            view.rows / length,
-        )
 
 
 def medium_in_words(medium: AbstractDispersion) -> str:

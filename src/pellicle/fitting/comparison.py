@@ -1,4 +1,4 @@
-"""Rival descriptions of one sample: which of them the data call for, by information criteria.
+"""Comparison of fits of the same data by information criteria.
 
 With L the likelihood on the points that count, k the free numbers and n those points,
 AIC = −2 ln L + 2 k (H. Akaike 1974, IEEE Trans. Automat. Contr. 19, 716) and
@@ -16,11 +16,8 @@ import numpy as np
 
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
-from pellicle.fitting.result import Fit, Part, Status
-from pellicle.fitting.spectra.fit import fit
-from pellicle.fitting.spectra.noise import correlation_length
-from pellicle.fitting.spectra.search import Progress, quiet
-from pellicle.scene.film import Scene
+from pellicle.fitting.noise import correlation_length
+from pellicle.fitting.result import BrdfCurve, Fit, Part, Status
 
 log = getLogger(__name__)
 
@@ -59,40 +56,27 @@ class Comparison:
         return "\n".join([self.verdict, *rows])
 
 
-def compare(
-    data: Spectrum | Sequence[Spectrum],
-    scenes: Mapping[str, Scene | Sequence[Scene]],
-    *,
-    tolerance: float = 0.0,
-    progress: Progress = quiet,
-) -> Comparison:
-    """Fit every scene to the same data, as `pellicle.fit` does, and say which the data call for.
-
-    `scenes` are named. **Raises:** UsageError for fewer than two scenes, and as `fit` does.
-    """
-    fits = {name: fit(data, scene, tolerance=tolerance, progress=progress) for name, scene in scenes.items()}
-    return compared(fits)
-
-
-def compared(fits: Mapping[str, Fit]) -> Comparison:
-    """The comparison of fits that were done. Raises UsageError where they are not of the same data."""
+def compare(fits: Mapping[str, Fit]) -> Comparison:
+    """Compare fits, by name, of the same data. Raises UsageError where they are not of the same data."""
     if len(fits) < 2:
         raise UsageError("a comparison needs two descriptions or more")
     _check_same(fits)
-    left = {name: [_residual(part) for part in found.parts] for name, found in fits.items()}
-    nearest = min(left.values(), key=lambda rows: _deviance(rows, [1.0] * len(rows), fits))
+    residuals = {name: [_residual(part) for part in fit.parts] for name, fit in fits.items()}
+    nearest = min(residuals.values(), key=lambda rows: _deviance(rows, [1.0] * len(rows), fits))
     lengths = [float(np.mean([correlation_length(c) for c in rows.T])) for rows in nearest]
-    points = sum(_independent(rows) / length for rows, length in zip(nearest, lengths, strict=True))
-    found = []
-    for name, rows in left.items():
+    parts = next(iter(fits.values())).parts
+    counts = [_independent(part, rows) for part, rows in zip(parts, nearest, strict=True)]
+    points = sum(count / length for count, length in zip(counts, lengths, strict=True))
+    candidates = []
+    for name, rows in residuals.items():
         free, deviance = len(fits[name].free), _deviance(rows, lengths, fits)
         bic = deviance + free * math.log(max(points, 2.0))
         log.info(
-            "comparison: %s has %d free numbers and -2 ln L %.6g on %.4g points: BIC %.6g",
+            "comparison: %s has %d free parameters and -2 ln L %.6g on %.4g points: BIC %.6g",
             *(name, free, deviance, points, bic),
         )
-        found.append(Candidate(name, fits[name], free, deviance, deviance + 2 * free, bic))
-    return Comparison(tuple(found), points, _verdict(found))
+        candidates.append(Candidate(name, fits[name], free, deviance, deviance + 2 * free, bic))
+    return Comparison(tuple(candidates), points, _verdict(candidates))
 
 
 def _check_same(fits: Mapping[str, Fit]) -> None:
@@ -100,29 +84,36 @@ def _check_same(fits: Mapping[str, Fit]) -> None:
     for other in others:
         pairs = zip(fits[first].parts, fits[other].parts, strict=False)
         same = len(fits[first].parts) == len(fits[other].parts) and all(_alike(a, b) for a, b in pairs)
-        if not same:
+        tests = fits[first].layer_test, fits[other].layer_test
+        if not same or len({test and test.residual for test in tests}) > 1:
             raise UsageError(
-                f"{first} and {other} do not look at the same points with the same noise: give both the same"
+                f"{first} and {other} do not use the same points with the same noise: give both the same"
                 " range, noise and signal, or their criteria mean nothing"
             )
 
 
 def _alike(one: Part, other: Part) -> bool:
-    a, b = one.spectrum, other.spectrum
-    columns = ((a.wavelength, b.wavelength), (a.values, b.values), (a.delta, b.delta), (a.sigma, b.sigma))
-    return a.signal == b.signal and all(
-        x is y if x is None or y is None else np.array_equal(x, y) for x, y in columns
-    )
+    a, b = one.data, other.data
+    if type(a) is not type(b):
+        return False
+    names = ["values", "sigma"]
+    names += ["wavelength", "delta"] if isinstance(a, Spectrum) else ["theta_i", "phi_i", "theta_o", "phi_o"]
+    columns = [(getattr(a, name), getattr(b, name)) for name in names]
+    same_signal = not isinstance(a, Spectrum) or a.signal == getattr(b, "signal", None)
+    return same_signal and all(x is y if x is None or y is None else np.array_equal(x, y) for x, y in columns)
 
 
 def _residual(part: Part) -> np.ndarray:
     """Residuals over a given σ, else as they are, (points, channels): of Ψ and Δ on the sphere."""
-    c, sigma = part.curve, part.spectrum.sigma
+    if isinstance(part.curve, BrdfCurve):
+        return part.curve.residual
+    c, spectrum = part.curve, part.spectrum
+    sigma = spectrum.sigma
     if c.delta_data is None or c.delta_model is None:
         return (c.residual if sigma is None else c.residual / sigma)[:, None]
     if sigma is None:
         return _sphere(c.data, c.delta_data) - _sphere(c.model, c.delta_model)
-    across = sigma if part.spectrum.delta_sigma is None else part.spectrum.delta_sigma
+    across = sigma if spectrum.delta_sigma is None else spectrum.delta_sigma
     # at the poles, where Δ has no meaning, the error of Ψ leaves some to it
     sine = np.sin(2 * np.deg2rad(c.data)) / np.hypot(np.sin(2 * np.deg2rad(c.data)), 2 * np.deg2rad(sigma))
     return np.stack([c.residual / sigma, sine * c.delta_residual / across], axis=1)
@@ -133,9 +124,9 @@ def _sphere(psi: np.ndarray, delta: np.ndarray) -> np.ndarray:
     return np.stack([np.cos(psi), np.sin(psi) * np.cos(delta), np.sin(psi) * np.sin(delta)], axis=-1)
 
 
-def _independent(rows: np.ndarray) -> int:
-    """Numbers that are independent: three on a sphere are two."""
-    return rows.shape[0] * min(rows.shape[1], 2)
+def _independent(part: Part, rows: np.ndarray) -> int:
+    """Independent numbers: three on the sphere of N, C and S are two."""
+    return rows.size if isinstance(part.curve, BrdfCurve) else rows.shape[0] * min(rows.shape[1], 2)
 
 
 def _deviance(rows: Sequence[np.ndarray], lengths: Sequence[float], fits: Mapping[str, Fit]) -> float:
@@ -143,8 +134,8 @@ def _deviance(rows: Sequence[np.ndarray], lengths: Sequence[float], fits: Mappin
     parts = next(iter(fits.values())).parts
     total = 0.0
     for part, left, length in zip(parts, rows, lengths, strict=True):
-        square, count = float(np.sum(left**2)), _independent(left)
-        known = part.spectrum.sigma is not None
+        square, count = float(np.sum(left**2)), _independent(part, left)
+        known = part.data.sigma is not None
         total += (square if known else count * math.log(max(square / count, 1e-300))) / length
     return total
 

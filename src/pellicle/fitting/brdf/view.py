@@ -1,0 +1,228 @@
+"""BRDF samples as a view of a least-squares problem."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from pellicle.brdf.directions import direction
+from pellicle.brdf.models import Evaluate, model
+from pellicle.brdf.two_lobes import two_lobes
+from pellicle.data.brdf_samples import BrdfSamples
+from pellicle.effects.plan import Plan
+from pellicle.effects.surface import exact
+from pellicle.fitting.brdf.residuals import RESIDUALS, slope
+from pellicle.fitting.noise import correlation_length
+from pellicle.fitting.problem import Explained, Noise
+from pellicle.fitting.program_cache import kept
+from pellicle.planning.surface import seeing
+from pellicle.scene.surface import SurfaceView
+from pellicle.simulation.surface import build
+
+_ROUND = 128
+"""Samples are padded to a multiple of this, so that files of nearly one length share a program."""
+_DARKEST = 1e-3
+"""Share of the median value below which all values are alike to the cube root."""
+
+
+class Samples(NamedTuple):
+    """Samples in numbers, padded: `weight` is 0 on the padding."""
+
+    i: Any  # unit vectors to the light and to the eye, (samples, 3)
+    o: Any
+    values: Any  # (samples, channels), 1/sr
+    weight: Any  # of the transformed residual, (samples, channels)
+    floor: Any  # 1/sr, (samples, 1)
+    independent_fraction: Any  # effective points per point: correlated errors count less
+
+
+Arrays = tuple[Samples, dict[str, Any]]
+"""The samples and the fixed numbers of the surface, by key."""
+
+
+@dataclass(frozen=True)
+class SamplesForm:
+    """A BRDF model and which of its numbers are free.
+
+    `kind` is "layer", simulated by the `plan`; "incoherent", the same without interference; or "two lobes",
+    without a layer. `keys` and `channels` name each free number; `residual` what is compared.
+    """
+
+    model: str
+    kind: str
+    plan: Plan
+    keys: tuple[str, ...]
+    channels: tuple[int | None, ...]
+    residual: str
+
+    @property
+    def evaluate(self) -> Evaluate:
+        """(numbers, i, o) → (samples, channels) in 1/sr."""
+        if self.kind == "two lobes":
+            return two_lobes
+        if self.kind == "incoherent":
+            return model(self.model).incoherent
+        simulate = build(self.plan)
+        return lambda numbers, i, o: simulate(SurfaceView(self.model, dict(numbers), i, o))
+
+    def numbers(self, values: Any, fixed: dict[str, Any]) -> dict[str, Any]:
+        """Every number of the model by key, those of channels in one array."""
+        free: dict[str, Any] = {}
+        for value, key, channel in zip(values, self.keys, self.channels, strict=True):
+            free[key] = value if channel is None else [*free.get(key, []), value]
+        return {**fixed, **{key: jnp.stack(x) if isinstance(x, list) else x for key, x in free.items()}}
+
+    def compare(self, samples: Samples, rho: Any) -> Any:
+        """Weighted residuals (samples, channels) of a BRDF's values: measured less computed."""
+        transform, cosine = RESIDUALS[self.residual], samples.i[:, 2:3]
+        measured = transform(samples.values, cosine, samples.floor)
+        difference = measured - transform(rho, cosine, samples.floor)
+        return jnp.where(samples.weight > 0, difference, 0.0) * samples.weight
+
+    def explain(self, arrays: Arrays, values: Any, /) -> Explained:
+        """The samples with the free numbers of the surface at `values`."""
+        samples, fixed = arrays
+        rho = self.evaluate(self.numbers(values, fixed), samples.i, samples.o)
+        residual = self.compare(samples, rho).reshape(-1) * jnp.sqrt(samples.independent_fraction)
+        return Explained(rho, residual, jnp.sum(residual**2))
+
+
+class Local(NamedTuple):
+    """The BRDF (samples, channels), weighted residuals, and the slope of the compared numbers, weighted, by
+    each free number in its own unit: (samples, channels, numbers)."""
+
+    model: Any
+    residual: Any
+    slope: Any
+
+
+@kept
+def local(form: SamplesForm, samples: Samples, fixed: dict[str, Any], values: Any) -> Local:
+    """The model around `values` (free numbers,)."""
+
+    def left(values):
+        rho = form.evaluate(form.numbers(values, fixed), samples.i, samples.o)
+        return form.compare(samples, rho), rho
+
+    (residual, rho), push = jax.linearize(left, values)
+    rise, _ = jax.vmap(push, out_axes=-1)(jnp.eye(len(values)))
+    return Local(rho, residual, -rise)
+
+
+@dataclass(frozen=True)
+class SamplesView:
+    """BRDF samples of a problem; `stated` are the weights before any reweighting."""
+
+    name: str  # empty where there is no other
+    plan: Plan
+    form: SamplesForm
+    samples: Samples
+    fixed: dict[str, Any]
+    takes: tuple[int, ...]
+    noise: Noise
+    rows: int
+    stated: np.ndarray
+
+    @property
+    def arrays(self) -> Arrays:
+        return self.samples, self.fixed
+
+    @property
+    def independent(self) -> int:
+        """Measured numbers: samples times channels."""
+        return self.rows * self.samples.values.shape[1]
+
+    def local(self, values: Any) -> Local:
+        """The model around `values` (free numbers,)."""
+        return jax.device_get(local(self.form, self.samples, self.fixed, values))
+
+    def residuals(self, at: Local) -> np.ndarray:
+        """Weighted residuals (rows, channels)."""
+        return np.asarray(at.residual)[: self.rows]
+
+    def jacobian(self, at: Local) -> np.ndarray:
+        """Weighted ∂ compared number / ∂ free number, (rows · channels, free numbers)."""
+        return np.asarray(at.slope)[: self.rows].reshape(self.independent, -1)
+
+    def nuisances(self, at: Local) -> list[Any]:
+        """None: the weights of lobes are free numbers."""
+        return []
+
+    def correlation_length(self, residuals: np.ndarray) -> float:
+        """Number of neighbouring samples of the file, as on a goniometer's arc, that count as one."""
+        return float(np.mean([correlation_length(column) for column in residuals.T]))
+
+    def reweighted(self, factor: Any, fraction: float) -> SamplesView:
+        """Weights times `factor` (a number or (rows, channels)), each point for `fraction` of one."""
+        weight = np.array(self.samples.weight)
+        weight[: self.rows] *= factor
+        return replace(self, samples=self.samples._replace(weight=weight)).counting(fraction)
+
+    def counting(self, fraction: float) -> SamplesView:
+        """The view with each point counting for `fraction` of an independent one."""
+        return replace(self, samples=self.samples._replace(independent_fraction=np.float64(fraction)))
+
+    def restricted(self, rows: np.ndarray) -> SamplesView:
+        """The same view, and program, with weight on the samples of these rows alone."""
+        kept_rows = np.zeros((len(self.samples.weight), 1))
+        kept_rows[rows] = 1.0
+        return replace(self, samples=self.samples._replace(weight=self.samples.weight * kept_rows))
+
+    def thinned(self) -> SamplesView:
+        """The view as it is: a look around a minimum needs all samples."""
+        return self
+
+    def off_tolerance(self, values: np.ndarray) -> float:
+        """Relative error of the view's plan at `values`, as in `planning.surface`."""
+        if not self.plan.tolerance:
+            return 0.0
+        numbers = {key: np.asarray(x) for key, x in self.form.numbers(values, self.fixed).items()}
+        keep = slice(self.rows)
+        view = SurfaceView(self.form.model, numbers, self.samples.i[keep], self.samples.o[keep])
+        see = seeing(view, np.zeros((1, 0)))
+        return float(np.max(np.abs(see(self.plan) - see(exact(view)))))
+
+    def compared(self, at: Local) -> np.ndarray:
+        """Residuals (rows, channels) in the unit of the residual; in standard deviations where σ is given."""
+        weight = np.asarray(self.samples.weight)[: self.rows]
+        scale = np.divide(self.stated[: self.rows], weight, out=np.zeros_like(weight), where=weight > 0)
+        return self.residuals(at) * scale
+
+    def rms(self, at: Local) -> float:
+        """rms of the residuals, in the unit of the residual; in standard deviations where σ is given."""
+        return float(np.sqrt(np.mean(self.compared(at) ** 2)))
+
+    def span(self) -> float:
+        """The range of the compared data, in the residuals' unit."""
+        stated = self.samples._replace(weight=self.stated)
+        values = np.asarray(self.form.compare(stated, 0.0 * self.samples.values))[: self.rows]
+        return float(np.max(np.ptp(values, axis=0)))
+
+
+def samples_view(
+    samples: BrdfSamples, name: str, plan: Plan, form: SamplesForm, fixed: dict[str, Any]
+) -> SamplesView:
+    """The view of a file's samples; weights are 1/σ where σ is known, else 1 for every transformed value."""
+    size = len(samples)
+    extra = -size % _ROUND
+
+    def pad(x, edge):
+        return np.concatenate([x, np.broadcast_to(edge, (extra, *np.shape(x)[1:]))])
+
+    i = np.asarray(direction(samples.theta_i, samples.phi_i))
+    o = np.asarray(direction(samples.theta_o, samples.phi_o))
+    known = samples.values
+    floor = np.full((size + extra, 1), _DARKEST * max(float(np.median(known)), 1e-9))
+    weight = np.ones_like(known)
+    if samples.sigma is not None:
+        rise = slope(RESIDUALS[form.residual], jnp.asarray(known), jnp.asarray(i[:, 2:3]), floor[:size])
+        weight = 1 / (np.asarray(rise) * samples.sigma)
+    up, weight = np.array([0.0, 0.0, 1.0]), pad(weight, 0.0)
+    numbers = Samples(pad(i, up), pad(o, up), pad(known, np.median(known)), weight, floor, np.float64(1.0))
+    noise = Noise(given=samples.sigma is not None, correlated=True)
+    takes = tuple(range(len(form.keys)))
+    return SamplesView(name, plan, form, numbers, fixed, takes, noise, size, weight)

@@ -1,0 +1,113 @@
+"""From ranked minima to a status, estimates and what the data do not determine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from logging import getLogger
+from typing import NamedTuple
+
+import numpy as np
+
+from pellicle.fitting import identifiability
+from pellicle.fitting.covariance import Errors, Scaled, errors, scaled
+from pellicle.fitting.estimates import by_curvature, by_profile, estimates, rivals
+from pellicle.fitting.minima import Minima
+from pellicle.fitting.problem import Problem
+from pellicle.fitting.profile_likelihood import Limits
+from pellicle.fitting.result import Estimate, Profile, Rival, Status
+from pellicle.fitting.reweighting import RankedMinima, rank
+from pellicle.fitting.status import judge
+
+log = getLogger(__name__)
+
+_ON_BOUND = 1e-6
+
+
+def ranked_minima(
+    make: Callable[[float], Problem],
+    search: Callable[[Problem], Minima],
+    tolerance: float,
+    loss: str,
+    **lanes: int,
+) -> tuple[RankedMinima, list[str]]:
+    """Ranked minima of the problem that `make` returns for a tolerance, and warnings.
+
+    Where the plan turns out to be off by more than the tolerance at the best fit, the fit is done again with
+    every effect. `lanes` are those of `fitting.reweighting.rank`.
+    """
+    problem = make(tolerance)
+    ranked = rank(problem, search(problem), loss, **lanes)
+    off = max(view.off_tolerance(problem.seen_by(view, ranked.values)) for view in ranked.problem.views)
+    if off <= tolerance:
+        return ranked, []
+    log.info("plan: off by %.2g at the best fit, beyond the tolerance: again with every effect", off)
+    exact = make(0.0)
+    warning = (
+        f"at the best fit what was left out changes the signal by {off:.2g}, more than the tolerance "
+        f"{tolerance:g}: fitted again with every effect"
+    )
+    return rank(exact, search(exact), loss, **lanes), [warning]
+
+
+def linearised(ranked: RankedMinima) -> tuple[Scaled, Errors]:
+    """The scaled Jacobian at the best minimum, and the covariance from it."""
+    at, variance = [fit.at for fit in ranked.fits], [fit.variance for fit in ranked.fits]
+    jacobian = scaled(ranked.problem, ranked.minima.units[0], at, variance)
+    return jacobian, errors(jacobian)
+
+
+class Conclusion(NamedTuple):
+    """Status, estimates and rivals of a fit; `trades` are sentences on parameters that are correlated."""
+
+    status: Status
+    parameters: dict[str, Estimate]
+    rivals: tuple[Rival, ...]
+    trades: list[str]
+
+
+def conclude(
+    ranked: RankedMinima,
+    jacobian: Scaled,
+    covariance: Errors,
+    *,
+    misfit: bool,
+    fixed: list[Estimate],
+    scans: Mapping[int, Profile],
+    near: bool = False,
+    amend: Callable[[list[Limits]], Sequence[Limits]] = lambda limits: limits,
+) -> Conclusion:
+    """Judge the best of the ranked minima.
+
+    Limits come from profiles where the fit is usable, else from the covariance alone; with `near` profiles
+    start from near rivals too. `amend` has the last word on them.
+    """
+    converged, others = bool(ranked.minima.converged[0]), rivals(ranked)
+    if converged and not misfit:
+        bounded = by_profile(ranked, covariance, scans, others if near else ())
+    else:
+        bounded = by_curvature(ranked, covariance)
+    parameters = estimates(ranked, covariance, list(amend(bounded)), fixed)
+    status = judge(
+        converged=converged,
+        misfit=misfit,
+        parameters=parameters,
+        rivals=others,
+        natural=_on_natural_bound(ranked),
+    )
+    log.info("status: %s", status)
+    return Conclusion(status, parameters, others, identifiability.trades(jacobian, parameters))
+
+
+def _on_natural_bound(ranked: RankedMinima) -> frozenset[str]:
+    """Names of parameters at a zero that physics sets; a thickness of 0 is none of them: no layer."""
+    pairs = zip(ranked.problem.parameters, ranked.values.tolist(), strict=True)
+    return frozenset(
+        p.name
+        for p, value in pairs
+        if p.natural[0] and p.lower == 0 and p.key != "thickness" and value <= _ON_BOUND * p.upper
+    )
+
+
+def common_rms(sizes: Sequence[int], rms: Sequence[float]) -> float:
+    """rms over all parts of a fit, by their number of points."""
+    return float(np.sqrt(np.average(np.square(rms), weights=sizes)))

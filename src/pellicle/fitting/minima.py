@@ -1,0 +1,123 @@
+"""Local minima of a problem: polished in lanes of one compiled program, told apart, and sorted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import jax
+import numpy as np
+
+from pellicle.fitting.evaluation import polish
+from pellicle.fitting.problem import Problem
+from pellicle.fitting.progress import Progress, quiet
+
+LANES = 16
+"""Starts that one call of the solver polishes side by side."""
+STEPS = 100
+"""Most steps of one polish."""
+_MOST_ROUNDS = 50
+"""Polishes of the best minima where the best of all has not settled: some valleys take thousands of steps (an
+oscillator's parameters; 2400 on a retroreflective tape, with an exponent at its bound)."""
+_GAIN = 1e-6
+"""Least relative improvement of the best deviance for which another round is worth its time."""
+
+
+@dataclass(frozen=True)
+class Scan:
+    """Deviance of each view at a coarse design of the other parameters, against thickness (nm).
+
+    `deviance` (design, thickness, views) is above that at the best minimum.
+    """
+
+    thickness: np.ndarray
+    deviance: np.ndarray
+
+
+@dataclass(frozen=True)
+class Minima:
+    """Distinct local minima, best first: `units` (minima, parameters) in the unit cube, their deviance, and
+    whether the solver settled."""
+
+    units: np.ndarray
+    deviance: np.ndarray
+    converged: np.ndarray
+    scan: Scan | None = None
+
+
+def solve(
+    problem: Problem,
+    starts: np.ndarray,
+    *,
+    fixed: tuple[int, np.ndarray] | None = None,
+    lanes: int = LANES,
+    steps: int = STEPS,
+    progress: Progress = quiet,
+) -> Minima:
+    """The local minimum below each start (starts, parameters), in their order.
+
+    `fixed` is the position of a parameter and its value in each start, in the coordinate's unit. All calls of
+    one shape share a program: starts are padded to `lanes`.
+    """
+    box, shape = problem.box, np.shape(starts)
+    lower, upper = (np.array(np.broadcast_to(side, shape), dtype=float) for side in (box.lower, box.upper))
+    if fixed is not None:
+        lower[:, fixed[0]] = upper[:, fixed[0]] = fixed[1]
+    pieces = []
+    for first in range(0, len(starts), lanes):
+        low, high, units = (_padded(x[first : first + lanes], lanes) for x in (lower, upper, starts))
+        own = box._replace(lower=low, upper=high)
+        polished = jax.device_get(polish((problem.static, steps), problem.arrays, own, units))
+        pieces.append([np.asarray(column)[: len(starts) - first] for column in polished])
+        progress("polish", min(first + lanes, len(starts)), len(starts))
+    units, deviance, converged = (np.concatenate(column) for column in zip(*pieces, strict=True))
+    return Minima(units, np.where(np.isfinite(deviance), deviance, np.inf), converged)
+
+
+def _padded(rows: np.ndarray, lanes: int) -> np.ndarray:
+    return np.concatenate([rows, np.repeat(rows[-1:], lanes - len(rows), axis=0)])
+
+
+def minima(
+    problem: Problem,
+    starts: np.ndarray,
+    progress: Progress = quiet,
+    *,
+    lanes: int = LANES,
+    followed: int = LANES,
+) -> Minima:
+    """The distinct local minima below `starts` (starts, parameters), best first.
+
+    While the best has not settled, the best `followed` minima are polished again; none where that is 0.
+    """
+    result = solve(problem, starts, lanes=lanes, progress=progress)
+    units, deviance, converged = result.units, result.deviance, result.converged
+    for _ in range(_MOST_ROUNDS if followed else 0):
+        best = np.argsort(deviance, kind="stable")[:followed]
+        before = deviance[best[0]]
+        if converged[best[0]] or not np.isfinite(before):
+            break
+        again = solve(problem, units[best], lanes=followed)
+        units[best], deviance[best], converged[best] = again.units, again.deviance, again.converged
+        if before - deviance.min() <= _GAIN * abs(before) and not converged[np.argmin(deviance)]:
+            break
+    return distinct(problem, Minima(units, deviance, converged), lanes)
+
+
+def distinct(problem: Problem, found: Minima, most: int) -> Minima:
+    """At most `most` minima, best first, those of one place once."""
+    order = np.argsort(found.deviance, kind="stable")
+    kept: list[int] = []
+    for i in order:
+        if np.isfinite(found.deviance[i]) and all(
+            _apart(problem, found.units[i], found.units[j]) for j in kept
+        ):
+            kept.append(int(i))
+    kept = (kept or [int(order[0])])[:most]
+    return replace(
+        found, units=found.units[kept], deviance=found.deviance[kept], converged=found.converged[kept]
+    )
+
+
+def _apart(problem: Problem, one: np.ndarray, other: np.ndarray) -> bool:
+    pairs = zip(problem.parameters, one.tolist(), other.tolist(), strict=True)
+    return any(abs(x - y) > p.resolution_at(x) for p, x, y in pairs)

@@ -1,0 +1,207 @@
+"""A least-squares problem: parameters with bounds and priors, and the data that they explain.
+
+Spectra (`fitting.spectra.problem`) and BRDF samples (`fitting.brdf.problem`) are two kinds of `View`;
+whatever comes after the search takes a `Problem` and depends on neither.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from pellicle.effects.plan import Plan
+from pellicle.fitting.coordinates import Box, Coordinates
+from pellicle.fitting.parameter import Parameter
+
+
+class Noise(NamedTuple):
+    """Source of the weights: `given` is an absolute σ; `drifting` is the error of a model whose lamp drifts.
+
+    `correlated`: the covariance counts correlated residuals as fewer points even where σ is given.
+    """
+
+    given: bool = True
+    drifting: bool = False
+    correlated: bool = False
+
+    @property
+    def known(self) -> bool:
+        """True where the residuals do not set the weights."""
+        return self.given or self.drifting
+
+
+class Explained(NamedTuple):
+    """One view at one set of values; traced."""
+
+    model: Any  # as measured, with nuisances at their best
+    residual: Any  # weighted, with a row for each prior of a nuisance
+    deviance: Any  # −2 ln of the marginal likelihood, up to a constant
+
+
+class Form(Hashable, Protocol):
+    """The static part of a view: its `repr` says all that a compiled program depends on."""
+
+    def explain(self, arrays: Any, values: Any, /) -> Explained:
+        """The view with parameters at `values` (its parameters,)."""
+        ...
+
+
+class Nuisance(Protocol):
+    """A linear coefficient that is solved in each evaluation, such as a scale or an offset."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def value(self) -> float: ...
+    @property
+    def prior_sd(self) -> float: ...
+    @property
+    def not_negative(self) -> bool: ...
+
+
+class View(Protocol):
+    """One set of data of a problem: the model of it, its weights, and which parameters it depends on.
+
+    `local` evaluates the model around one point; what it returns is the argument of the methods below it.
+    """
+
+    @property
+    def name(self) -> str:
+        """Empty where there is no other view."""
+        ...
+
+    @property
+    def takes(self) -> tuple[int, ...]:
+        """Positions of its parameters in the problem."""
+        ...
+
+    @property
+    def noise(self) -> Noise: ...
+    @property
+    def plan(self) -> Plan: ...
+    @property
+    def form(self) -> Form: ...
+    @property
+    def arrays(self) -> Any:
+        """Numbers of the view, as a pytree: the arguments of its program."""
+        ...
+
+    @property
+    def rows(self) -> int:
+        """Measured points, without padding; each has one or several data values."""
+        ...
+
+    @property
+    def independent(self) -> int:
+        """Independent data values."""
+        ...
+
+    def local(self, values: Any) -> Any:
+        """The model and its derivatives at `values` (its parameters,)."""
+        ...
+
+    def residuals(self, at: Any) -> np.ndarray:
+        """Weighted residuals (rows, channels)."""
+        ...
+
+    def jacobian(self, at: Any) -> np.ndarray:
+        """Weighted ∂ model / ∂ parameter in its own unit, then by each nuisance in units of its prior:
+        (rows · channels, its parameters and nuisances)."""
+        ...
+
+    def nuisances(self, at: Any) -> Sequence[Nuisance]: ...
+
+    def correlation_length(self, residuals: np.ndarray) -> float:
+        """Number of neighbouring points that count as one."""
+        ...
+
+    def reweighted(self, factor: Any, fraction: float) -> View:
+        """The view with its weights times `factor` (a number or (rows, channels)), each point counting for
+        `fraction` of an independent one."""
+        ...
+
+    def counting(self, fraction: float) -> View:
+        """The view with each point counting for `fraction` of an independent one, and no less."""
+        ...
+
+    def thinned(self) -> View:
+        """The view with fewer points, of the same total weight, where it has more than a scan needs."""
+        ...
+
+    def off_tolerance(self, values: np.ndarray) -> float:
+        """Error of the view's plan at `values`, in the unit of its signal; 0 for an exact plan."""
+        ...
+
+
+class Problem(NamedTuple):
+    """Parameters of one sample and the views that they explain together."""
+
+    views: tuple[Any, ...]
+    parameters: tuple[Parameter, ...]
+    box: Box
+    coordinates: Coordinates = Coordinates()
+
+    def values(self, units: Any) -> Any:
+        """Parameters in their own units at `units` (..., parameters) of the unit cube."""
+        return self.coordinates.values(self.box, units)
+
+    def seen_by(self, view: View, values: Any) -> Any:
+        """The values (..., parameters) that a view depends on."""
+        return values[..., list(view.takes)]
+
+    @property
+    def thickness_axis(self) -> int | None:
+        """Position of the thickness that a search scans: the one with the widest bounds; None without any."""
+        spans = {i: p.upper - p.lower for i, p in enumerate(self.parameters) if p.key == "thickness"}
+        return max(spans, key=lambda i: spans[i]) if spans else None
+
+    @property
+    def static(self) -> tuple[Coordinates, tuple[tuple[Form, tuple[int, ...]], ...]]:
+        """What a compiled program of all views depends on."""
+        return self.coordinates, tuple((view.form, view.takes) for view in self.views)
+
+    @property
+    def arrays(self) -> tuple[Any, ...]:
+        """The numbers of all views."""
+        return tuple(view.arrays for view in self.views)
+
+    def thinned(self) -> Problem:
+        """The problem with as many points as a scan needs."""
+        return self._replace(views=tuple(view.thinned() for view in self.views))
+
+    def affine(self) -> Problem:
+        """The same problem in coordinates that go evenly between the parameters' own bounds; a tilt stays a
+        disc, half a one where its sign is not seen."""
+        lower, upper = (np.array([getattr(p, side) for p in self.parameters]) for side in ("lower", "upper"))
+        tilt, folded = self.coordinates.tilt, self.coordinates.folded
+        if tilt is not None:
+            lower[list(tilt)], upper[list(tilt)] = (-1.0, 0.0 if folded else -1.0), 1.0
+        box = self.box._replace(lower=lower, upper=upper)
+        return self._replace(box=box, coordinates=Coordinates(tilt=tilt))
+
+    def in_own_units(self, values: np.ndarray) -> Problem:
+        """The affine problem with deviation and azimuth in the place of a disc.
+
+        A free azimuth goes half a turn to either side of its value; from 0 to 180 degrees where samples in
+        one plane do not see its sign.
+        """
+        own, tilt = self.affine(), self.coordinates.tilt
+        if tilt is None:
+            return own
+        lower, upper = own.box.lower.copy(), own.box.upper.copy()
+        (deviation, azimuth), turn = tilt, np.array([-180.0, 180.0])
+        lower[deviation], upper[deviation] = 0.0, self.box.reach
+        ends = np.array([0.0, 180.0]) if self.coordinates.folded else values[azimuth] + turn
+        lower[azimuth], upper[azimuth] = ends
+        return own._replace(box=own.box._replace(lower=lower, upper=upper), coordinates=Coordinates())
+
+    def in_affine(self, unit: np.ndarray) -> np.ndarray:
+        """A point (parameters,) of this problem's unit cube in that of `affine`."""
+        own, numbers = self.affine(), np.array(self.values(unit))
+        for at in self.coordinates.tilt or ():
+            numbers[at] = self.box.lower[at] + unit[at] * (self.box.upper[at] - self.box.lower[at])
+        if self.coordinates.folded and self.coordinates.tilt is not None:
+            numbers[self.coordinates.tilt[1]] **= 0.5
+        return np.clip((numbers - own.box.lower) / (own.box.upper - own.box.lower), 0.0, 1.0)

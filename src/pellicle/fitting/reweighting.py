@@ -1,0 +1,178 @@
+"""Iteratively reweighted least squares: rank minima by the noise and correlation that the data show.
+
+Model errors are correlated along a spectrum. Counting every point as independent makes a rival look
+impossible when it is not: on 119 real soap-film spectra it costs 15 right answers.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from logging import getLogger
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pellicle.fitting.minima import LANES, Minima, minima
+from pellicle.fitting.problem import Problem, View
+from pellicle.fitting.robust_losses import LEAST_SQUARES, LOSSES, Loss, inflation, spread
+
+log = getLogger(__name__)
+
+_ROUNDS, _ROBUST_ROUNDS = 3, 12
+
+
+@dataclass(frozen=True)
+class ViewFit:
+    """Fit quality of one view at the best minimum.
+
+    `at` is the local model there; `variance` multiplies the σ² of the weights in the covariance; `length` is
+    the number of neighbouring points that count as one; `chi2` is the misfit over `freedom` degrees;
+    `outliers` is the number of points to which a robust loss gives less than half their weight.
+    """
+
+    at: Any
+    variance: float
+    length: float
+    chi2: float
+    freedom: float
+    outliers: int = 0
+
+
+@dataclass(frozen=True)
+class RankedMinima:
+    """Minima ranked on the effective points; `problem` carries the weights that the ranking used, `searched`
+    those of the search."""
+
+    searched: Problem
+    problem: Problem
+    minima: Minima
+    fits: tuple[ViewFit, ...]
+
+    @property
+    def chi2_reduced(self) -> float:
+        return sum(fit.chi2 for fit in self.fits) / sum(fit.freedom for fit in self.fits)
+
+    @property
+    def values(self) -> np.ndarray:
+        """The best values of the parameters, in their own units."""
+        return np.asarray(self.problem.values(self.minima.units[0]))
+
+
+class _Noise(NamedTuple):
+    """Noise of one view by its residuals: χ², its degrees of freedom, and the correlation length.
+
+    Where a loss is robust, `factor` multiplies the weight of each point, and `inflation` the variance.
+    """
+
+    chi2: float
+    freedom: float
+    length: float
+    factor: Any = 1.0
+    inflation: float = 1.0
+
+    @property
+    def reduced(self) -> float:
+        return max(self.chi2 / self.freedom, 1e-12)
+
+
+def rank(
+    problem: Problem,
+    candidates: Minima,
+    loss: str = LEAST_SQUARES,
+    *,
+    lanes: int = LANES,
+    followed: int = LANES,
+) -> RankedMinima:
+    """Estimate σ and the effective points of each view from the best fit's residuals, and rank again.
+
+    A given σ stays. An unknown one becomes the rms of the residuals. Where scale and offset drift,
+    the weights stay too: the residuals of so flexible a model understate its error. A robust `loss`
+    weighs each point by its residual, and takes σ from the bulk of them.
+    """
+    robust, scan = LOSSES.get(loss), candidates.scan
+    unit = candidates.units[0] if robust is None else _typical(problem, candidates, robust)
+    noise = _noise(problem, unit, robust)
+    for _ in range(_ROUNDS if robust is None else _ROBUST_ROUNDS):
+        best, weighted = candidates.units[0], _reweighted(problem, noise)
+        candidates = minima(weighted, candidates.units, lanes=lanes, followed=followed)
+        again = _noise(problem, candidates.units[0], robust)
+        near = 1e-3 if robust is None else 1e-6
+        settled = np.allclose(candidates.units[0], best, atol=near)
+        if settled and _agree(problem, noise, again, robust is not None):
+            break
+        noise = again
+    weighted = _reweighted(problem, noise)
+    for view, own in zip(weighted.views, noise, strict=True):
+        log.info(
+            "weights%s: residuals are correlated over %.3g points, so that %d points count as %.3g",
+            *(f" of {view.name}" if view.name else "", own.length, view.rows, view.rows / own.length),
+        )
+    pairs = zip(weighted.views, _local(weighted, candidates.units[0]), noise, strict=True)
+    return RankedMinima(
+        problem, weighted, replace(candidates, scan=scan), tuple(_fit(*each) for each in pairs)
+    )
+
+
+def _local(problem: Problem, unit: np.ndarray) -> list[Any]:
+    values = np.asarray(problem.values(unit))
+    return [view.local(problem.seen_by(view, values)) for view in problem.views]
+
+
+def _typical(problem: Problem, candidates: Minima, loss: Loss) -> np.ndarray:
+    """The minimum of the least robust loss: least squares may have followed the outliers."""
+    each = [
+        [view.residuals(at).ravel() for view, at in zip(problem.views, _local(problem, unit), strict=True)]
+        for unit in candidates.units
+    ]
+    least = [min(spread(residuals) for residuals in of_view) for of_view in zip(*each, strict=True)]
+    sizes = [1.0 if v.noise.given else size for v, size in zip(problem.views, least, strict=True)]
+    losses = [sum(loss.loss(r / s).sum() for r, s in zip(rows, sizes, strict=True)) for rows in each]
+    return candidates.units[int(np.argmin(losses))]
+
+
+def _fit(view: View, at: Any, noise: _Noise) -> ViewFit:
+    chi2 = noise.chi2 if view.noise.known else noise.freedom
+    # the ranked weights hold the rms already, so only the correlation is left to count
+    length = noise.length if view.noise.correlated or not view.noise.given else 1.0
+    variance = length * (noise.reduced if view.noise.drifting else 1.0)
+    outliers = int(np.sum(np.square(noise.factor) < 0.5))
+    return ViewFit(at, variance * noise.inflation, noise.length, chi2, noise.freedom, outliers)
+
+
+def _noise(problem: Problem, unit: np.ndarray, loss: Loss | None) -> list[_Noise]:
+    """Noise of every view. A parameter that several views share costs each a share of it, by their points."""
+    result = []
+    for view, at in zip(problem.views, _local(problem, unit), strict=True):
+        residuals = view.residuals(at)
+        totals = [sum(v.independent for v in problem.views if i in v.takes) for i in view.takes]
+        used = sum(view.independent / total for total in totals) + len(view.nuisances(at))
+        freedom = max(view.independent - used, 1)
+        if loss is None:
+            chi2 = float(np.sum(residuals**2))
+            result.append(_Noise(chi2, freedom, view.correlation_length(residuals)))
+            continue
+        bulk = spread(residuals.ravel()) * math.sqrt(view.independent / freedom)
+        weight = loss.weight(residuals if view.noise.given else residuals / bulk)
+        length = view.correlation_length(np.sqrt(weight) * residuals)
+        widening = inflation(loss, residuals / bulk)
+        result.append(_Noise(bulk**2 * freedom, freedom, length, np.sqrt(weight), widening))
+    return result
+
+
+def _agree(problem: Problem, one: list[_Noise], other: list[_Noise], absolute: bool) -> bool:
+    """True where the relative weights of the views agree within 2 %; with `absolute` their noise too."""
+    a, b = ([_rescale(v, r) for v, r in zip(problem.views, rs, strict=True)] for rs in (one, other))
+    alike = bool(np.allclose(np.divide(a, a[0]), np.divide(b, b[0]), rtol=0.02))
+    return alike and (not absolute or bool(np.allclose(a, b, rtol=0.02)))
+
+
+def _rescale(view: View, noise: _Noise) -> float:
+    return 1.0 if view.noise.known else 1 / math.sqrt(noise.reduced)
+
+
+def _reweighted(problem: Problem, noise: Sequence[_Noise]) -> Problem:
+    pairs = zip(problem.views, noise, strict=True)
+    views = tuple(v.reweighted(_rescale(v, own) * own.factor, 1 / own.length) for v, own in pairs)
+    return problem._replace(views=views)

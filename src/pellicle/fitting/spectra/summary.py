@@ -1,0 +1,121 @@
+"""What a fit of spectra adds to the shared conclusion: scan profile, drift limits, opacity, warnings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from pellicle.fitting.profile_likelihood import Limits
+from pellicle.fitting.result import Estimate, Profile
+from pellicle.fitting.reweighting import RankedMinima, ViewFit
+from pellicle.fitting.spectra import residual_structure
+from pellicle.fitting.spectra.nuisance import Data
+from pellicle.fitting.spectra.parameters import fixed_numbers, thickness_name
+from pellicle.fitting.spectra.problem import SpectrumView
+from pellicle.fitting.spectra.targets import Measured, drifts
+from pellicle.materials import materials_in
+from pellicle.scene.free import insert
+from pellicle.scene.layers import Layer
+
+_RULED_OUT = 1e8
+_ABSORBS = 1e-3
+"""An extinction above this is what makes a layer opaque."""
+FEWEST_FRINGES = 0.75
+"""Fringes that a spectrum must span where scale and offset drift: with fewer, drift can imitate the film.
+On real soap films from 510 to 910 nm this is 330 nm, below which no single spectrum was decided."""
+
+
+def scan_profile(ranked: RankedMinima) -> Profile | None:
+    """The scan against thickness, in χ² on the effective points; None where no thickness is free."""
+    scan = ranked.minima.scan
+    if scan is None:
+        return None
+    views = zip(ranked.searched.views, ranked.problem.views, strict=True)
+    ratio = np.array([_reweighted(before.data, after.data) for before, after in views])
+    above = (scan.deviance * ratio).sum(-1).min(axis=0)
+    # on their new weights several views together may have their least misfit elsewhere in the scan
+    return Profile(scan.thickness, np.minimum(above - min(above.min(), 0.0), _RULED_OUT))
+
+
+def _reweighted(before: Data, after: Data) -> float:
+    # a robust loss lowers the weights of some points
+    ratio = np.max(after.weight / np.where(before.weight > 0, before.weight, np.inf))
+    return float(ratio**2 * after.independent_fraction / before.independent_fraction)
+
+
+def amended(spectra: Sequence[Measured], ranked: RankedMinima, limits: list[Limits]) -> list[Limits]:
+    """Limits with a thickness that drift of scale and offset could imitate bounded from above only."""
+    if not all(drifts(m.scene) and len(m.scene.layers) == 1 for m in spectra):
+        return limits
+    views = zip(ranked.problem.views, ranked.fits, strict=True)
+    least = min(thinnest(view, fit) for view, fit in views)
+    pairs = zip(ranked.problem.parameters, ranked.values.tolist(), limits, strict=True)
+    return [
+        Limits(math.inf, limit.lower, least)
+        if p.key == "thickness" and math.isfinite(limit.stderr) and value < least
+        else limit
+        for p, value, limit in pairs
+    ]
+
+
+def thinnest(view: SpectrumView, fit: ViewFit) -> float:
+    """The thickness (nm) of which the spectrum spans `FEWEST_FRINGES`."""
+    rows = slice(view.rows)
+    wavelength, n = np.asarray(view.scene.light.wavelength)[rows], np.asarray(fit.at.layer)[0, rows]
+    return float(FEWEST_FRINGES / max(np.ptp(2 * n / wavelength), 1e-12))
+
+
+def fixed(spectra: Sequence[Measured]) -> list[Estimate]:
+    """The fixed numbers of the layers and the instruments."""
+    return [
+        Estimate(name, value, 0.0, unit, value, value, False)
+        for spectrum in spectra
+        for name, value, unit in fixed_numbers(spectrum.scene, spectrum.name)
+    ]
+
+
+def opaque(spectra: Sequence[Measured], ranked: RankedMinima) -> frozenset[str]:
+    """Names of the thicknesses of layers that absorb at the best fit."""
+    view = ranked.problem.views[0]
+    scene = insert(view.scene, ranked.problem.seen_by(view, ranked.values))
+    wavelength = scene.light.wavelength  # of a padded length, so that nothing is compiled for it again
+    return frozenset(
+        thickness_name(spectra[0].scene, i)
+        for i, layer in enumerate(scene.layers)
+        if isinstance(layer, Layer) and np.median(layer.material(wavelength).imag) > _ABSORBS
+    )
+
+
+def warnings(spectra: Sequence[Measured], ranked: RankedMinima, unclear: Sequence[str]) -> tuple[str, ...]:
+    """Warnings that a reader needs before using the numbers; `unclear` is what the data do not determine."""
+    messages = [w for m in spectra for material in materials_in(m.scene) for w in material.warnings()]
+    for spectrum, view, fit in zip(spectra, ranked.problem.views, ranked.fits, strict=True):
+        own = f"{view.name}: " if view.name else ""
+        messages += [own + sentence for sentence in _of_view(spectrum, view, fit)]
+    return tuple(dict.fromkeys([*messages, *unclear]))
+
+
+def _of_view(spectrum: Measured, view: SpectrumView, fit: ViewFit) -> list[str]:
+    messages, scene, length = [], spectrum.scene, fit.length
+    orders = view.plan.row("orders")
+    if orders.on and orders.error_bound > max(1e-4, view.plan.tolerance):
+        messages.append(
+            f"{orders.count} orders leave an error of up to {orders.error_bound:.1g}: |q| is near 1"
+        )
+    if length >= 10:
+        messages.append(
+            f"residuals are correlated over {length:.0f} points: {view.rows} points"
+            f" count as {view.rows / length:.0f}"
+        )
+    if place := residual_structure.missed(view, fit):
+        messages.append(f"the model misses structure {place.words}")
+    if fit.outliers:
+        messages.append(f"{fit.outliers} of {view.rows} points are outliers that count for less than half")
+    if scene.light.signal == "T" and scene.substrate.back is None:
+        messages.append(
+            "transmittance into the substrate, as if the detector were inside it; "
+            '`back="air"` makes it a plate'
+        )
+    return messages

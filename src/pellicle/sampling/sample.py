@@ -1,0 +1,133 @@
+"""Sample the posterior of a fit's free parameters, from every minimum that the fit found."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Sequence
+from functools import partial
+from typing import TypeAlias
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from pellicle.data.brdf_samples import BrdfSamples
+from pellicle.data.spectrum import Spectrum
+from pellicle.errors import UsageError
+from pellicle.fitting.brdf import fit as brdf
+from pellicle.fitting.problem import Problem
+from pellicle.fitting.progress import Progress, quiet
+from pellicle.fitting.result import Fit, Status
+from pellicle.fitting.reweighting import RankedMinima
+from pellicle.fitting.spectra import fit as spectra
+from pellicle.sampling.density import fingerprint, log_density
+from pellicle.sampling.ensemble import STEPS, Subject, installed, sampled
+from pellicle.sampling.modes import modes
+from pellicle.sampling.predict import predictions
+from pellicle.sampling.result import Posterior
+from pellicle.scene.film import Scene
+from pellicle.scene.surface import Surface
+
+Measurement: TypeAlias = Spectrum | Sequence[Spectrum] | BrdfSamples | Sequence[BrdfSamples]
+
+
+def sample(
+    data: Measurement,
+    scene: Scene | Sequence[Scene] | Surface,
+    *,
+    walkers: int | None = None,
+    steps: int = STEPS,
+    seed: int = 0,
+    chain: str | os.PathLike[str] | None = None,
+    tolerance: float = 0.0,
+    residual: str | None = None,
+    progress: Progress = quiet,
+) -> Posterior:
+    """Fit as `pellicle.fit` does, then sample the posterior between the bounds, in float64.
+
+    Priors are those of the `Free` parameters, uniform between the bounds by default; scale and offset
+    are integrated out. Walkers start in every minimum in proportion to its share and move by
+    differential evolution, its snooker update, and jumps between minima. The chain ends when it is 50
+    autocorrelation times long and passes the other checks, or after `steps`. With a `chain` file it is
+    kept there as it grows, and a run that was cut short goes on where it stopped.
+
+    BRDF samples are taken to have normal errors in the unit of the `residual` (ρ, or its cube root): of the
+    given σ, or of the rms of the best fit's residuals. Where these are correlated in neighbouring samples the
+    samples count as fewer. A deviation and its azimuth are a direction, and all directions are as likely. The
+    posterior assumes that there is a layer, also where the fit finds no evidence of one.
+
+    **Raises:** as `fit` does, and UsageError for too few walkers (two for each parameter at least) or
+    more than the machine's memory holds; DataError for a chain of another problem.
+    """
+    began = time.perf_counter()
+    installed()
+    assumption = ""
+    if isinstance(scene, Surface):
+        measurements = brdf_samples(data)
+        fit, ranked = brdf.fitted(measurements, scene, tolerance, progress, residual=residual)
+        unsure = fit.layer_test and not fit.layer_test.layered and fit.status is not Status.AMBIGUOUS
+        assumption = "there is a layer" if unsure else ""
+        identity = _surface_fingerprint(measurements, scene, fit, tolerance)
+    else:
+        measurements = spectra_of(data)
+        fit, ranked = spectra.fitted(measurements, scene, tolerance, progress)
+        with jax.enable_x64(True):
+            identity = fingerprint(spectra.measurements(measurements, scene), tolerance)
+    with jax.enable_x64(True):
+        subject = _subject(fit, ranked, identity, assumption)
+    return sampled(subject, walkers, steps, seed, chain, progress, began)
+
+
+def spectra_of(data: Measurement) -> Spectrum | list[Spectrum]:
+    """The data as spectra. Raises UsageError for BRDF samples."""
+    if isinstance(data, Spectrum):
+        return data
+    if isinstance(data, BrdfSamples) or not all(isinstance(each, Spectrum) for each in data):
+        raise UsageError("BRDF samples need a Surface, and spectra a Scene")
+    return list(data)  # pyright: ignore[reportReturnType]
+
+
+def brdf_samples(data: Measurement) -> BrdfSamples | list[BrdfSamples]:
+    """The data as BRDF samples. Raises UsageError for spectra."""
+    if isinstance(data, BrdfSamples):
+        return data
+    if isinstance(data, Spectrum) or not all(isinstance(each, BrdfSamples) for each in data):
+        raise UsageError("BRDF samples need a Surface, and spectra a Scene")
+    return list(data)  # pyright: ignore[reportReturnType]
+
+
+def _subject(fit: Fit, ranked: RankedMinima, identity: str, assumption: str) -> Subject:
+    problem = ranked.problem.affine()
+    return Subject(
+        fit,
+        tuple(p.name for p in problem.parameters),
+        log_density(problem),
+        modes(ranked),
+        partial(_values, problem, ranked.values),
+        identity,
+        max(view.independent for view in problem.views),
+        partial(predictions, problem, fit.parts),
+        assumption,
+    )
+
+
+def _values(problem: Problem, best: np.ndarray, units: np.ndarray) -> np.ndarray:
+    """Points (..., parameters) of the unit cube in the parameters' own units, an azimuth within half a turn
+    of the best one."""
+    values = np.array(problem.values(jnp.asarray(units)))
+    if problem.coordinates.tilt is not None:
+        at = problem.coordinates.tilt[1]
+        values[..., at] = best[at] + (values[..., at] - best[at] + 180) % 360 - 180
+    return values
+
+
+def _surface_fingerprint(
+    data: BrdfSamples | list[BrdfSamples], surface: Surface, fit: Fit, tolerance: float
+) -> str:
+    samples = [data] if isinstance(data, BrdfSamples) else data
+    columns = [(s.theta_i, s.phi_i, s.theta_o, s.phi_o, s.values, s.sigma) for s in samples]
+    residual = fit.layer_test.residual if fit.layer_test else ""
+    return fingerprint(
+        [*columns, (dict(surface.numbers), surface.channel_wavelengths)], surface.model, residual, tolerance
+    )
