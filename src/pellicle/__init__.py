@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from pellicle.data.read_spectrum import read_spectrum as read_spectrum
     from pellicle.data.spectrum import Spectrum as Spectrum
     from pellicle.dispersion import effective_medium as mixing  # noqa: F401
-    from pellicle.fitting.brdf.result import BrdfFit as BrdfFit
     from pellicle.fitting.result import Fit as Fit
     from pellicle.fitting.result import Status as Status
     from pellicle.materials import material as material
@@ -49,7 +48,6 @@ _NAMES = {
     "pellicle.data.read_brdf": ("read_brdf_samples",),
     "pellicle.data.read_spectrum": ("read_spectrum",),
     "pellicle.data.spectrum": ("Spectrum",),
-    "pellicle.fitting.brdf.result": ("BrdfFit",),
     "pellicle.fitting.result": ("Fit", "Status"),
     "pellicle.materials": ("material",),
     "pellicle.recipes.read": ("read_recipe",),

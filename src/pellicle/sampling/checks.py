@@ -8,7 +8,7 @@ from importlib.util import find_spec
 
 import numpy as np
 
-from pellicle.fitting.spectra.noise import integrated_time
+from pellicle.fitting.noise import integrated_time
 from pellicle.sampling.chain import Chain
 from pellicle.sampling.modes import Modes
 

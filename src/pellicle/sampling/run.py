@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pellicle.fitting.spectra.search import Progress
+from pellicle.fitting.progress import Progress
 from pellicle.sampling.chain import Chain
 from pellicle.sampling.checks import Checks, check
 from pellicle.sampling.modes import Modes

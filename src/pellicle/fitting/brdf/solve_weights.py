@@ -11,7 +11,7 @@ import jax.numpy as jnp
 from pellicle.fitting.brdf.residuals import RESIDUALS, slope
 from pellicle.fitting.brdf.view import Samples, SamplesForm
 from pellicle.fitting.coordinates import Box, Coordinates
-from pellicle.fitting.levenberg_marquardt import solve_positive
+from pellicle.fitting.positive_definite import solve_positive
 from pellicle.fitting.program_cache import kept
 
 
