@@ -14,7 +14,7 @@ from pellicle.fitting.evaluation import curves
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.result import BrdfCurve, Part
 from pellicle.fitting.spectra.parts import psi_delta
-from pellicle.fitting.spectra.problem import SpectrumView
+from pellicle.fitting.spectra.view import SpectrumView
 
 DRAWS = 256
 """Curves behind a band: 2.5 % of them are six."""

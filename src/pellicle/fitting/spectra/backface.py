@@ -10,8 +10,9 @@ import numpy as np
 
 from pellicle.fitting.minima import minima
 from pellicle.fitting.reweighting import RankedMinima
-from pellicle.fitting.spectra.problem import Local, SpectrumView, make
+from pellicle.fitting.spectra.problem import make
 from pellicle.fitting.spectra.targets import Measured
+from pellicle.fitting.spectra.view import Local, SpectrumView
 from pellicle.scene.film import Scene
 from pellicle.scene.free import free_leaves
 

@@ -11,7 +11,7 @@ from pellicle.fitting import noise
 from pellicle.fitting.covariance import Errors
 from pellicle.fitting.result import Curve, Part
 from pellicle.fitting.reweighting import RankedMinima, ViewFit
-from pellicle.fitting.spectra.problem import Local, SpectrumView
+from pellicle.fitting.spectra.view import Local, SpectrumView
 from pellicle.fitting.status import MISFIT_CHI2, misfits
 
 FAR = math.sqrt(MISFIT_CHI2)

@@ -10,7 +10,7 @@ import numpy as np
 
 from pellicle.fitting.noise import local_noise
 from pellicle.fitting.reweighting import ViewFit
-from pellicle.fitting.spectra.problem import SpectrumView
+from pellicle.fitting.spectra.view import SpectrumView
 
 _NARROWEST = 5
 """Points in the narrowest window whose mean is tested."""

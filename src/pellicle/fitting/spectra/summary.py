@@ -13,8 +13,8 @@ from pellicle.fitting.reweighting import RankedMinima, ViewFit
 from pellicle.fitting.spectra import residual_structure
 from pellicle.fitting.spectra.nuisance import Data
 from pellicle.fitting.spectra.parameters import fixed_numbers, thickness_name
-from pellicle.fitting.spectra.problem import SpectrumView
 from pellicle.fitting.spectra.targets import Measured, drifts
+from pellicle.fitting.spectra.view import SpectrumView
 from pellicle.materials import materials_in
 from pellicle.scene.free import insert
 from pellicle.scene.layers import Layer

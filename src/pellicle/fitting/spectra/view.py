@@ -1,0 +1,230 @@
+"""A spectrum as a view of a least-squares problem: simulated by a plan, scaled, compared with data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from pellicle.effects.plan import Plan
+from pellicle.fitting.noise import DRIFT_CORRELATION, correlation_length
+from pellicle.fitting.problem import Explained, Noise
+from pellicle.fitting.program_cache import kept
+from pellicle.fitting.spectra import nuisance
+from pellicle.fitting.spectra.nuisance import Coefficient, Data
+from pellicle.planning.differences import largest_difference, signals
+from pellicle.planning.film import reference
+from pellicle.scene.film import Scene
+from pellicle.scene.free import free_leaves, insert
+from pellicle.scene.layers import Interface
+from pellicle.simulation.film import build
+
+ROUND = 64
+"""Spectra are padded to a multiple of this, so that files of nearly one length share a program."""
+
+SCAN_POINTS = 448
+"""Wavelengths used while scanning: enough for four samples in a fringe of 5 µm at index 2."""
+
+
+@dataclass(frozen=True)
+class SpectrumForm:
+    """The simulation of a spectrum by a plan without words, compared with data by variable projection."""
+
+    plan: Plan
+
+    def simulate(self, scene: Scene, data: Data) -> Any:
+        """The signal as measured: all of it, or of N, C, S the N and C that a folded Δ leaves.
+
+        Ψ and Δ do not depend on the degree of polarisation, so where some light is unpolarised, N, C, S are
+        brought to their sphere; a rotating analyser measures N and C as they are.
+        """
+        signal = build(self.plan)(scene).reshape(scene.light.wavelength.size, -1)
+        channels = data.values.size // len(signal)
+        # intensities of several polarisations add
+        depolarised = (
+            self.plan.on("back-face") or self.plan.on("angle-spread") or self.plan.row("coherence").count
+        )
+        if channels == 3 and depolarised:
+            square = jnp.sum(signal**2, axis=1, keepdims=True)
+            signal = signal * jnp.where(square > 0, jax.lax.rsqrt(jnp.where(square > 0, square, 1.0)), 0.0)
+        if data.frame is not None:
+            signal = jnp.einsum("pij,pj->pi", data.frame, signal)
+        return signal[:, :channels].reshape(-1)
+
+    def explain(self, arrays: tuple[Scene, Data], values: Any, /) -> Explained:
+        """The spectrum with the free parameters of its scene at `values`."""
+        scene, data = arrays
+        solved = nuisance.solve(self.simulate(insert(scene, values), data), data, scene.instrument)
+        return Explained(solved.model, solved.residual, solved.deviance)
+
+
+class Local(NamedTuple):
+    """The model of a spectrum around one point, for errors and reports."""
+
+    signal: Any  # simulated, without scale and offset
+    slope: Any  # ∂ signal / ∂ parameter in its own unit, (points, parameters)
+    model: Any
+    gain: Any
+    offset: Any
+    layer: Any  # n and k of the layer at each wavelength
+    layer_slope: Any  # their derivatives, (2, points, parameters)
+
+
+def reported_layer(scene: Scene) -> int | None:
+    """Position of the layer whose n and k are reported: the first with free parameters of its own, else the
+    uppermost; None, the substrate, where nothing but interfaces lies on it."""
+    known = [(i, x.material) for i, x in enumerate(scene.layers) if not isinstance(x, Interface)]
+    free = [i for i, material in known if free_leaves(material)]
+    return next(iter([*free, *(i for i, _ in known)]), None)
+
+
+@kept
+def local(form: SpectrumForm, scene: Scene, data: Data, values: Any) -> Local:
+    """Signal, its Jacobian, and the layer's index at `values` (parameters,)."""
+    shown = reported_layer(scene)
+
+    def both(values):
+        numbers = insert(scene, list(values))
+        medium: Any = numbers.substrate if shown is None else numbers.layers[shown]
+        index = medium.material(numbers.light.wavelength)
+        return form.simulate(numbers, data), jnp.stack([index.real, index.imag])
+
+    (signal, layer), push = jax.linearize(both, values)
+    slope, layer_slope = jax.vmap(push, out_axes=-1)(jnp.eye(len(values)))
+    solved = nuisance.solve(signal, data, scene.instrument)
+    return Local(signal, slope, solved.model, solved.gain, solved.offset, layer, layer_slope)
+
+
+@dataclass(frozen=True)
+class SpectrumView:
+    """One spectrum of a problem.
+
+    `scene` has anonymous free parameters and sampled media; `takes` are the positions of its parameters in
+    the problem. `data` is padded to a round length.
+    """
+
+    name: str  # empty where there is no other
+    plan: Plan
+    scene: Scene
+    data: Data
+    takes: tuple[int, ...]
+    noise: Noise
+    points: int  # data values: N, C, S, or N and C, for each wavelength in ellipsometry
+    largest_index: float
+
+    @property
+    def form(self) -> SpectrumForm:
+        return SpectrumForm(self.plan.static_key)
+
+    @property
+    def arrays(self) -> tuple[Scene, Data]:
+        return self.scene, self.data
+
+    @property
+    def channels(self) -> int:
+        """Data values at each wavelength."""
+        return len(self.data.values) // len(self.scene.light.wavelength)
+
+    @property
+    def rows(self) -> int:
+        """Wavelengths without padding."""
+        return self.points // self.channels
+
+    @property
+    def independent(self) -> int:
+        """Independent data values: N, C and S lie on a sphere, so two of the three."""
+        return self.points if self.channels < 3 else 2 * self.rows
+
+    def local(self, values: Any) -> Local:
+        """The model around `values` (its parameters,)."""
+        return jax.device_get(local(self.form, self.scene, self.data, values))
+
+    def residuals(self, at: Local) -> np.ndarray:
+        """Weighted residuals (rows, channels)."""
+        left = (self.data.values - np.asarray(at.model)) * self.data.weight
+        return left[: self.points].reshape(self.rows, self.channels)
+
+    def nuisances(self, at: Local) -> list[Coefficient]:
+        """Coefficients of scale and offset, recovered from their curves."""
+        own = f".{self.name}" if self.name else ""
+        return nuisance.coefficients(self.data, self.scene.instrument, at.gain, at.offset, self.points, own)
+
+    def jacobian(self, at: Local) -> np.ndarray:
+        """Weighted ∂ model / ∂ parameter, then by each coefficient of scale and offset in units of its prior,
+        (points, parameters and coefficients)."""
+        keep = slice(self.points)
+        signal, weight = np.asarray(at.signal)[keep], np.asarray(self.data.weight)[keep, None]
+        steep = np.asarray(at.gain)[keep, None] * np.asarray(at.slope)[keep]
+        flat = [c.basis * (signal if c.on_signal else 1.0) * c.prior_sd for c in self.nuisances(at)]
+        return weight * np.column_stack([steep, *flat])
+
+    def correlation_length(self, residuals: np.ndarray) -> float:
+        """Number of neighbouring points whose residuals count as one."""
+        # outwards from the sphere nothing is measured
+        columns = residuals.T if self.data.frame is None else residuals.T[:2]
+        return float(np.mean([correlation_length(column) for column in columns]))
+
+    def reweighted(self, factor: Any, fraction: float) -> SpectrumView:
+        """Weights times `factor` (a number or (rows, channels)), each point for `fraction` of one."""
+        whole = np.ones(len(self.data.weight))
+        whole[: self.points] = np.broadcast_to(factor, (self.rows, self.channels)).reshape(-1)
+        most = 1 / DRIFT_CORRELATION if self.noise.drifting else 1.0
+        data = self.data._replace(
+            weight=self.data.weight * whole, independent_fraction=np.float64(min(fraction, most))
+        )
+        return replace(self, data=data)
+
+    def counting(self, fraction: float) -> SpectrumView:
+        """The view with each point counting for `fraction` of an independent one."""
+        return replace(self, data=self.data._replace(independent_fraction=np.float64(fraction)))
+
+    def thinned(self) -> SpectrumView:
+        """Every so-many-th wavelength, at most about `SCAN_POINTS`, with the weight of those left out."""
+        stride = -(-self.rows // SCAN_POINTS)
+        if stride <= 1:
+            return self
+        size, channels = len(self.scene.light.wavelength), self.channels
+        chosen = np.arange(0, self.rows, stride)
+        padding = -len(chosen) % ROUND
+        take = np.concatenate([chosen, np.full(padding, size - 1)])
+
+        def pick(x):
+            if np.ndim(x) not in (1, 3) or len(x) not in (size, size * channels):
+                return x
+            taken = x.reshape(size, -1)[take]
+            return taken.reshape(-1) if np.ndim(x) == 1 else taken.reshape(-1, *x.shape[1:])
+
+        scene, data = jax.tree_util.tree_map(pick, (self.scene, self.data))
+        real = np.repeat(np.concatenate([np.ones(len(chosen)), np.zeros(padding)]), channels)
+        data = data._replace(
+            weight=data.weight * real, independent_fraction=data.independent_fraction * stride
+        )
+        return replace(self, scene=scene, data=data, points=len(chosen) * channels)
+
+    def off_tolerance(self, values: np.ndarray) -> float:
+        """Error of the view's plan at `values`, in the unit of its signal."""
+        if not self.plan.tolerance:
+            return 0.0
+        at = np.asarray(values)[None]
+        planned, whole = (signals(p, self.scene, at) for p in (self.plan, reference(self.scene)))
+        return largest_difference(planned, whole, self.plan.signal)
+
+    def in_columns(self, values: Any) -> np.ndarray:
+        """Data values or a model of them (..., data values) as signals, or as N, C and S, without padding,
+        (..., rows, channels)."""
+        values = np.asarray(values)[..., : self.points]
+        columns = values.reshape(*values.shape[:-1], self.rows, self.channels)
+        if self.data.frame is None:
+            return columns
+        return np.einsum("pij,...pi->...pj", np.asarray(self.data.frame)[: self.rows], columns)
+
+    def rms(self, model: Any) -> float:
+        """rms of the residuals. For ellipsometry it is in degrees of Ψ: half the distance on the sphere, in
+        each of its two directions."""
+        residual = (self.data.values - np.asarray(model))[: self.points]
+        if self.channels == 1:
+            return float(np.sqrt(np.mean(residual**2)))
+        return float(np.rad2deg(np.sqrt(residual @ residual / (2 * self.rows))) / 2)
