@@ -51,7 +51,7 @@ def test_data_that_call_for_one_more_parameter(pellicle, recipe, wrong_index, tm
     [again] = ran.objects
     assert (again["schema"], again["best"]) == ("pellicle.compare/1", "b.toml")
     assert again["verdict"].startswith("b.toml is better than a.toml by ΔBIC")
-    assert again["verdict"].endswith("the data call for A.")
+    assert again["verdict"].endswith("the data strongly favour A.")
     first, second = again["recipes"]
     # σ is not known: n ln(RSS / n) with the points that count, and the price of each free number
     points, size = again["effective_points"], 100
@@ -80,7 +80,7 @@ def test_data_that_do_not(pellicle, recipe, spectrum_file):
     [found] = pellicle("compare", path, "--recipe", a, "--recipe", b, "--json").objects
     assert found["best"] == "a.toml"
     assert 0 < found["recipes"][1]["delta_bic"] <= math.log(100) + 0.1
-    assert "the data do not call for A" in found["verdict"] or "prefer a.toml" in found["verdict"]
+    assert "A is not needed" in found["verdict"] or "prefer a.toml" in found["verdict"]
 
 
 def test_bad_input_in_one_sentence(pellicle, recipe, spectrum_file, tmp_path):

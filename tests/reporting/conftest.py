@@ -46,7 +46,8 @@ def fit() -> Fit:
             ),
         ),
         status=Status.AMBIGUOUS,
-        verdict="The data do not decide: thickness 486.28 nm fits best, but 242.87 nm fits nearly as well.",
+        verdict="The data do not determine thickness: 486.28 nm fits best, but 242.87 nm fits nearly"
+        " as well.",
         parameters={
             "thickness": Estimate("thickness", 486.28, 3.6, "nm", 10.0, 3000.0, True),
             "A": Estimate("A", 1.324, 0.0012, "", 1.2, 2.8, True),

@@ -60,7 +60,7 @@ def test_panels_and_what_they_show(fit):
     np.testing.assert_array_equal(marked["rivals"].get_xydata(), [[242.87, 0.69], [963.57, 14.2]])
     np.testing.assert_array_equal(marked["best"].get_xydata(), [[486.28, 0.0]])
     title = drawn.get_suptitle()
-    assert title.startswith("film.csv: ambiguous\nThe data do not decide")
+    assert title.startswith("film.csv: ambiguous\nThe data do not determine")
 
 
 def test_the_misfit_reaches_the_bottom_of_valleys_that_the_grid_missed(fit):

@@ -62,7 +62,7 @@ def fit() -> Fit:
             ),
         ),
         status=Status.CONVERGED,
-        verdict="The data decide: thickness 486.28 ± 0.12 nm.",
+        verdict="The data determine thickness: 486.28 ± 0.12 nm.",
         parameters={
             "thickness": Estimate("thickness", 486.28, 0.12, "nm", 10.0, 3000.0, True),
             "k": Estimate("k", 0.0, 0.001, "", 0.0, 1.0, True, True, None, 0.0016),

@@ -27,7 +27,7 @@ def with_parameter(fit, name="thickness", **changes):
 
 def test_the_verdict_comes_first_with_status_advice_file_and_points(fit):
     text = report(fit)
-    assert text.startswith("[[Verdict]]\n    The data do not decide: thickness 486.28 nm fits best")
+    assert text.startswith("[[Verdict]]\n    The data do not determine thickness: 486.28 nm fits best")
     lines = block(text, "Verdict")
     assert f"status  ambiguous. {ADVICE[Status.AMBIGUOUS]}" in lines
     assert "file    /data/film.csv" in lines

@@ -22,8 +22,8 @@ from pellicle.fitting.result import BrdfCurve, Fit, Part, Status
 log = getLogger(__name__)
 
 UNDECIDED, STRONG = 2.0, 6.0
-"""ΔBIC below which two descriptions cannot be told apart, and from which the evidence is strong (R. Kass and
-A. Raftery 1995, J. Am. Stat. Assoc. 90, 773)."""
+"""ΔBIC below which two descriptions cannot be distinguished, and from which the evidence is strong (R. Kass
+and A. Raftery 1995, J. Am. Stat. Assoc. 90, 773)."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Descriptions of the same data, in the order given, and what is to be said of them."""
+    """Candidates in the order given, the effective points, and a verdict."""
 
     candidates: tuple[Candidate, ...]
     effective_points: float
@@ -144,30 +144,32 @@ def _verdict(found: Sequence[Candidate]) -> str:
     best, second, *_ = sorted(found, key=lambda c: c.bic)
     apart = second.bic - best.bic
     if apart < UNDECIDED:
-        told = f"The data do not tell {best.name} from {second.name} (ΔBIC {apart:.1f})"
+        sentence = f"The data do not distinguish {best.name} from {second.name} (ΔBIC {apart:.1f})"
         simpler = min((best, second), key=lambda c: c.free)
-        told += (
+        sentence += (
             f": prefer {simpler.name}, which has fewer free parameters" if best.free != second.free else ""
         )
     else:
-        told = f"{best.name} is better than {second.name} by ΔBIC {apart:.3g}: {_why(best, second, apart)}"
+        sentence = (
+            f"{best.name} is better than {second.name} by ΔBIC {apart:.3g}: {_why(best, second, apart)}"
+        )
     if best.fit.status is Status.MISFIT:
-        return f"{told}. But even {best.name} does not explain the data."
+        return f"{sentence}. But even {best.name} does not explain the data."
     if best.fit.status is not Status.CONVERGED:
-        return f"{told}. But the fit of {best.name} is {best.fit.status}."
-    return f"{told}."
+        return f"{sentence}. But the fit of {best.name} is {best.fit.status}."
+    return f"{sentence}."
 
 
 def _why(best: Candidate, second: Candidate, apart: float) -> str:
-    """What sets the two apart: free parameters and effects that only one of them has."""
+    """Difference of the two: free parameters and effects that only one of them has."""
     more, less = (_extra(a.fit, b.fit) for a, b in ((best, second), (second, best)))
-    verb = "call for" if apart >= STRONG else "lean towards"
+    verb = "strongly favour" if apart >= STRONG else "favour"
     if more and less:
         return f"the data {verb} {' and '.join(more)} rather than {' and '.join(less)}"
     if more:
         return f"the data {verb} {' and '.join(more)}"
     if less:
-        return f"the data do not call for {' and '.join(less)}"
+        return f"{' and '.join(less)} {'is' if len(less) == 1 else 'are'} not needed"
     return f"the data {verb} its materials"
 
 

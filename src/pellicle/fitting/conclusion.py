@@ -57,12 +57,12 @@ def linearised(ranked: RankedMinima) -> tuple[Scaled, Errors]:
 
 
 class Conclusion(NamedTuple):
-    """Status, estimates and rivals of a fit; `trades` are sentences on parameters that are correlated."""
+    """Status, estimates and rivals of a fit; `correlated` are sentences on parameters that are."""
 
     status: Status
     parameters: dict[str, Estimate]
     rivals: tuple[Rival, ...]
-    trades: list[str]
+    correlated: list[str]
 
 
 def conclude(
@@ -95,7 +95,7 @@ def conclude(
         natural=_on_natural_bound(ranked),
     )
     log.info("status: %s", status)
-    return Conclusion(status, parameters, others, identifiability.trades(jacobian, parameters))
+    return Conclusion(status, parameters, others, identifiability.correlated(jacobian, parameters))
 
 
 def _on_natural_bound(ranked: RankedMinima) -> frozenset[str]:

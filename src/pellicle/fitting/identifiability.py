@@ -1,8 +1,9 @@
-"""What the data decide and what they do not, in words.
+"""Correlated and undetermined parameters, in sentences.
 
-The Jacobian in units of the noise and of a meaningful step of each parameter: a singular value below 1
-says that along its direction the parameters may move by more than a step before one standard deviation
-of the noise is reached. Where several parameters make up such a direction they trade against each other.
+The Jacobian is taken in units of the noise and of a meaningful step of each parameter. A singular value
+below 1 means that the parameters can move along its direction by more than a step within one standard
+deviation of the noise. Several parameters in such a direction are correlated: only a combination of them is
+determined.
 """
 
 from __future__ import annotations
@@ -34,19 +35,19 @@ STEPS = {
     "scale": 0.01,  # of a signal that is 1
     "offset": 0.001,
 }
-"""What is worth knowing of a parameter, by the last part of its name; of others 1 % of their range."""
+"""Meaningful step of a parameter, by the last part of its name; for others 1 % of their range."""
 _RELATIVE = ("exponent", "exponent_reflection", "exponent_transmission", "specular", "diffuse")
-"""Of these 1 % of the value is worth knowing."""
+"""Parameters whose meaningful step is 1 % of their value."""
 _SHARE = 0.01
 _FINEST = 1e-4
-"""The least step of those, as a share of their range."""
+"""Least step of those, as a share of their range."""
 _WORTH = 0.3
 """Steps that a parameter must move along a direction to be named in it."""
 _BETTER = 3.0
-"""How much better a parameter would be known with the others known, before they are said to trade."""
+"""Ratio of a parameter's error to its error with the others fixed, above which they are called correlated."""
 _LEAST = 1e-100
 _LAW = 0.15
-"""How well a direction must follow n·d = const or n/d = const, in logarithms, to be called so."""
+"""Largest deviation of a direction from n·d = const or n/d = const, in logarithms, to be named so."""
 _CHANNEL = re.compile(r"(?<=^n)_(r|g|b|\d+)$")
 _NUISANCE = re.compile(r"instrument\.(scale|offset)(_\d+)?(\..+)?$")
 
@@ -70,18 +71,18 @@ def _key(name: str) -> str:
     return parts[1] if parts[0] == "instrument" else re.sub(_CHANNEL, "", parts[-1])
 
 
-def trades(found: Scaled, parameters: Mapping[str, Estimate]) -> list[str]:
-    """A sentence for each set of parameters of which the data decide a combination only.
+def correlated(jacobian: Scaled, parameters: Mapping[str, Estimate]) -> list[str]:
+    """A sentence for each set of parameters of which the data determine only a combination.
 
-    Scale and offset are eliminated first, and said to trade where the others suffer from it.
+    Scale and offset are eliminated first, and named where they enlarge the errors of the others.
     """
-    steps = np.array([step(name, parameters[name]) for name in found.names])
-    matrix = found.by_range(steps)
-    nuisance = np.array([bool(_NUISANCE.match(name)) for name in found.names])
+    steps = np.array([step(name, parameters[name]) for name in jacobian.names])
+    matrix = jacobian.by_range(steps)
+    nuisance = np.array([bool(_NUISANCE.match(name)) for name in jacobian.names])
     own, linear = matrix[:, ~nuisance], matrix[:, nuisance]
     triangle: Any = np.linalg.qr(np.hstack([linear, own]), mode="r")
     left = triangle[linear.shape[1] :, linear.shape[1] :]
-    free = [parameters[name] for name, aside in zip(found.names, nuisance, strict=True) if not aside]
+    free = [parameters[name] for name, aside in zip(jacobian.names, nuisance, strict=True) if not aside]
     told = [_trade([free[i] for i in part], moves) for part, moves in _directions(left, steps[~nuisance])]
     drowned = (_spread(left) > 1) & (_spread(left) > _BETTER * _spread(own))
     if linear.size and drowned.any():
@@ -91,7 +92,7 @@ def trades(found: Scaled, parameters: Mapping[str, Estimate]) -> list[str]:
 
 
 def _directions(matrix: np.ndarray, steps: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Which parameters (columns) move together unseen by more than a step, and by how much in their units.
+    """Sets of parameters (columns) that can move together by more than a step, with their moves.
 
     A parameter belongs to the direction that most of its variance comes from (D. Belsley, E. Kuh and
     R. Welsch, 1980, Regression Diagnostics), if it would be known far better with the others known.
@@ -115,23 +116,25 @@ def _spread(matrix: np.ndarray) -> np.ndarray:
 
 
 def _trade(found: Sequence[Estimate], moves: np.ndarray) -> str:
-    """`moves` says how far each goes along the direction that the data do not see, in its own unit."""
+    """Sentence on correlated parameters; `moves` are their steps along the direction, in their own units."""
     order = sorted(range(len(found)), key=lambda i: _key(found[i].name) == "thickness")
     found, moves = [found[i] for i in order], moves[order]
     names = [p.name for p in found]
     if len(found) > 2:
         every = f"{', '.join(names[:-1])} and {names[-1]}"
-        return f"{every} trade against each other: none of them is known alone"
+        return f"{every} are strongly correlated: none of them is determined alone"
     moves = moves * step(names[0], found[0]) / moves[0]
     amounts = f"{_amount(moves[0], found[0])} against {_amount(abs(moves[1]), found[1])}"
     if law := _law(found, moves):
-        return f"only {law} is determined: {names[0]} and {names[1]} trade against each other, {amounts}"
+        return f"only {law} is determined: {names[0]} and {names[1]} are correlated, {amounts}"
     way = "one rises as the other does" if moves[1] > 0 else "one rises as the other falls"
-    return f"{names[0]} and {names[1]} trade against each other, {amounts} ({way}): neither is known alone"
+    return (
+        f"{names[0]} and {names[1]} are strongly correlated, {amounts} ({way}): neither is determined alone"
+    )
 
 
 def _law(found: Sequence[Estimate], moves: np.ndarray) -> str:
-    """The product or the quotient that stays as it is along the direction, if one does."""
+    """The product or the quotient that is constant along the direction, if one is."""
     relative = moves / np.array([p.value or math.inf for p in found])
     names, near = [p.name for p in found], _LAW * np.max(np.abs(relative))
     if abs(relative.sum()) < near:

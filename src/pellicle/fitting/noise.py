@@ -1,11 +1,11 @@
-"""How noisy a spectrum is, and how many of its points count."""
+"""Noise of a spectrum, and the number of its independent points."""
 
 from __future__ import annotations
 
 import numpy as np
 
 MODEL_ERROR = 0.12
-"""Relative error of an uncalibrated spectrum's model: lamp, detector and film drift along it."""
+"""Relative model error of an uncalibrated spectrum, along which lamp, detector and film drift."""
 DRIFT_CORRELATION = 10.0
 """Points that count as one where scale and offset drift slowly: the drift's own polynomials hide the
 correlation from the residuals of a short or featureless spectrum, so fewer is never assumed."""
@@ -30,7 +30,7 @@ def drifting_sigma(values: np.ndarray) -> np.ndarray:
 
 
 def correlation_length(residual: np.ndarray) -> float:
-    """How many neighbouring residuals count as one: the integrated autocorrelation time, at least 1."""
+    """Number of neighbouring residuals that count as one: the integrated autocorrelation time, at least 1."""
     return integrated_time(residual[:, None])
 
 

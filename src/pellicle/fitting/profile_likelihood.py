@@ -1,8 +1,8 @@
-"""How far a parameter may go before the misfit rises: limits by profile likelihood.
+"""Limits of parameters by profile likelihood.
 
-A standard error pictures χ² as a parabola. Where that picture fails (a film too thick to see through, an
+A standard error approximates χ² by a parabola. Where that fails (a film too thick to see through, an
 extinction next to 0, a curved valley) the parameter is fixed at one value after the other, all others are
-fitted again, and the limit is where χ² has risen by as much as 95 % demand (bounded likelihood: W. Rolke,
+fitted again, and the limit is where χ² has risen by its 95 % threshold (bounded likelihood: W. Rolke,
 A. López and J. Conrad, 2005, Nucl. Instrum. Methods A 551, 493).
 """
 
@@ -19,9 +19,9 @@ from pellicle.fitting.result import Profile
 from pellicle.fitting.status import RIVAL
 
 ONE_SIDED, TWO_SIDED = 2.71, 3.84
-"""χ² above the best at a 95 % limit: where one side is bounded, and where both are."""
+"""χ² above the best at a 95 % limit, where one side is bounded and where both are."""
 _OPEN = RIVAL
-"""A side where the misfit never rises by as much as would rule a rival out is open."""
+"""A side is open where the misfit never rises by this, which would rule out a rival."""
 _REACH = 2.0
 """Standard errors at which the parabola is compared with the misfit, and within which a bound matters."""
 _FLAT, _CURVED = 0.5, 4.0

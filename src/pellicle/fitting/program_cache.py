@@ -1,8 +1,8 @@
 """Compiled programs that outlive the process.
 
-XLA's own cache saves the compilation; what is left of a cold start is Python tracing the solver.
-Where a session has a compilation cache, the traced program is kept beside it, keyed by everything
-that it depends on, and the next process neither traces it nor imports the solver.
+XLA's own cache saves the compilation; the rest of a cold start is tracing the solver in Python. Where a
+session has a compilation cache, the traced program is kept beside it, keyed by everything that it depends
+on, and the next process neither traces it nor imports the solver.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def kept(function: Program) -> Program:
 def _load(
     function: Program, plan: Hashable, structure: Any, shapes: tuple, folder: str
 ) -> tuple[Program, Any]:
-    """The program as a function of flat arrays, and the structure of what it returns."""
+    """The program as a function of flat arrays, and the structure of its results."""
     from jax import export
 
     path = Path(folder) / "programs" / f"{_key(function, plan, structure, shapes)}.bin"
@@ -69,7 +69,7 @@ def _flat(function: Program, plan: Hashable, structure: Any) -> Program:
 
 
 def _output(function: Program) -> Any:
-    """How the flat results are put together again: the named tuple of the return annotation."""
+    """Structure of the results: the named tuple of the return annotation."""
     kind = get_type_hints(function)["return"]
     return jax.tree_util.tree_structure(kind(*range(len(kind._fields))))
 
@@ -96,7 +96,7 @@ def _sources() -> str:
 
 
 def _keep(path: Path, program: bytes | bytearray) -> None:
-    """Write whole or not at all; a cache that cannot be written is no failure."""
+    """Write the program whole or not at all; a cache that cannot be written is no failure."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(dir=path.parent)

@@ -1,4 +1,4 @@
-"""Robust losses by name: how much a residual counts that is larger than noise should be.
+"""Robust losses by name: weights of residuals larger than noise should be.
 
 With z the residual in standard deviations and ρ(z) the loss, ψ = ρ'. Least squares have ψ = z; a loss
 whose ψ stops growing, or falls again, is not moved by a few outliers. They are fitted by least squares
@@ -48,23 +48,23 @@ LOSSES = {
         lambda z: (_FREEDOM + 1) * (_FREEDOM - z**2) / (_FREEDOM + z**2) ** 2,
     ),
 }
-"""Losses that a fit may be asked for beside least squares."""
+"""Losses that a fit accepts beside least squares."""
 
 
 def check_loss(name: str, what: str = "loss") -> None:
-    """UsageError for a name that is no loss."""
+    """Raise UsageError for an unknown loss."""
     if name not in (LEAST_SQUARES, *LOSSES):
         raise UsageError(f"{what} must be one of {', '.join([LEAST_SQUARES, *LOSSES])}, not {name!r}")
 
 
 def spread(residual: np.ndarray) -> float:
-    """The standard deviation of the bulk of the residuals, whatever the rest may be."""
+    """Standard deviation of the bulk of the residuals, from their median absolute value."""
     return float(max(_MAD * np.median(np.abs(residual)), 1e-300))
 
 
 def inflation(loss: Loss, z: np.ndarray) -> float:
-    """What multiplies the variance that the reweighted Jacobian gives: E[w] E[ψ²] / E[ψ']², of residuals
-    whose bulk has a standard deviation of 1."""
+    """Factor on the variance from the reweighted Jacobian: E[w] E[ψ²] / E[ψ']², for residuals `z` whose bulk
+    has a standard deviation of 1."""
     weight = loss.weight(z)
     curvature = max(float(np.mean(loss.curvature(z))), 0.1)
     return float(np.mean(weight) * np.mean((weight * z) ** 2) / curvature**2)

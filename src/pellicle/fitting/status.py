@@ -1,4 +1,4 @@
-"""The verdict on a fit: the first status that holds, and one or two plain sentences."""
+"""Status of a fit, the first that holds, and its verdict in one or two sentences."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pellicle.fitting.result import Estimate, Rival, Status
 log = getLogger(__name__)
 
 RIVAL = 6.0
-"""A distinct rival closer than this in χ² on the effective points leaves the answer open."""
+"""A distinct rival within this Δχ² on the effective points makes a fit ambiguous."""
 MISFIT_CHI2 = 4.0
 MISFIT_RMS, MISFIT_SPAN = 0.02, 0.05
 
@@ -26,10 +26,10 @@ def misfits(
     span: float,
     calibrated: bool,
 ) -> bool:
-    """Whether the model misses the data: by χ² where σ is known, else by structured, large residuals.
+    """True where the model misses the data: by χ² where σ is known, else by structured, large residuals.
 
-    Where scale and offset drift, the weights are the model's own error, and residuals within it
-    (reduced χ² below 1) are no misfit however structured: the lamp is.
+    Where scale and offset drift, the weights are the model's own error, and residuals within it (reduced χ²
+    below 1) are no misfit: their structure is that of the lamp.
     """
     if sigma_known:
         return chi2_reduced > MISFIT_CHI2
@@ -54,11 +54,11 @@ def judge(
     at_bound = [p for p in free if p.at_bound and p.name not in natural]
     close = distinct_rivals(parameters, rivals)
     for question, answer in (
-        ("did the solver settle?", converged),
-        ("does the scene miss the data?", misfit),
-        ("is something of the sample not seen?", [p.name for p in unseen]),
-        (f"does a rival come within Δχ² {RIVAL:g}, outside the errors?", len(close)),
-        ("does a number rest on a bound that was set?", [p.name for p in at_bound]),
+        ("did the solver converge?", converged),
+        ("does the scene not explain the data?", misfit),
+        ("which parameters of the sample have no finite error?", [p.name for p in unseen]),
+        (f"how many rivals lie within Δχ² {RIVAL:g} and outside the errors?", len(close)),
+        ("which parameters lie on a bound that was set?", [p.name for p in at_bound]),
     ):
         log.info("status: %s %s", question, _answer(answer))
     if not converged:
@@ -72,10 +72,12 @@ def judge(
     return Status.AT_BOUND if at_bound else Status.CONVERGED
 
 
-def _answer(found: bool | int | list[str]) -> str:
-    if isinstance(found, list):
-        return ", ".join(found) or "no"
-    return str(found) if found and not isinstance(found, bool) else "yes" if found else "no"
+def _answer(value: bool | int | list[str]) -> str:
+    if isinstance(value, list):
+        return ", ".join(value) or "none"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return str(value)
 
 
 def distinct_rivals(parameters: Mapping[str, Estimate], rivals: tuple[Rival, ...]) -> list[Rival]:
@@ -101,28 +103,29 @@ def verdict(
     opaque: Container[str] = (),
     trading: Sequence[str] = (),
 ) -> str:
-    """One or two sentences for a reader who is no statistician.
+    """The verdict in one or two sentences.
 
-    `missed` is what the scene does not explain, by `rms` and `where`, if it explains too little; `opaque` are
-    thicknesses of layers that absorb, and `trading` sentences of what the leading parameter trades with.
+    `missed`, `rms` and `where` name the data that a misfit does not explain, by how much and at which
+    wavelengths; `opaque` are thicknesses of layers that absorb, and `trading` sentences on parameters that
+    are correlated with the leading one.
     """
     lead = next((p for p in parameters.values() if p.free), None)
     if lead is None:
         return "Nothing was free to fit."
-    told, best = describe(lead), f"{lead.name} {lead.value:.4g}{_unit(lead)}"
+    value, best = describe(lead).removeprefix(f"{lead.name} "), f"{lead.name} {lead.value:.4g}{_unit(lead)}"
     besides = "".join(f" But {sentence}." for sentence in trading[:1])
     if status is Status.CONVERGED:
-        return f"The data decide: {told}.{besides}"
+        return f"The data determine {lead.name}: {value}.{besides}"
     if status is Status.AT_BOUND:
         resting = [p for p in parameters.values() if p.free and p.at_bound]
         names = " and ".join(f"{p.name} ({p.value:.6g}{_unit(p)})" for p in resting)
         return (
-            f"The best fit, {told}, lies at the edge of what was allowed: {names} rests on a bound."
-            " Widen it; if it only moves on, the scene is another."
+            f"The best fit, {lead.name} {value}, lies on a bound that was set: {names}."
+            " Widen the bound; if the best value moves with it, the scene may be wrong."
         )
     if status is Status.AMBIGUOUS:
         other = _other(parameters, rivals, lead)
-        return f"The data do not decide: {told} fits best, but {other} fits nearly as well."
+        return f"The data do not determine {lead.name}: {value} fits best, but {other} fits nearly as well."
     if status is Status.NOT_IDENTIFIABLE:
         if lead.name in opaque and lead.lower_limit is not None:
             return f"The layer is opaque: {lead.name} {limits_in_words(lead)}."
@@ -132,7 +135,7 @@ def verdict(
             f"The scene does not explain {missed}: even the best fit misses by {rms:.2g} on average, far more"
             f" than noise would{f', most of all {where}' if where else ''}. Its {best} should not be used."
         )
-    return f"The fit did not settle on an answer: its best point so far, {best}, should not be used."
+    return f"The fit did not converge: its best point so far, {best}, should not be used."
 
 
 def _other(parameters: Mapping[str, Estimate], rivals: tuple[Rival, ...], lead: Estimate) -> str:
@@ -169,5 +172,5 @@ def limits_in_words(p: Estimate) -> str:
 
 
 def _rounded(limit: float) -> str:
-    """Two digits of what is small, nothing behind the point of what is large."""
+    """Two digits below 10, four above."""
     return f"{limit:.2g}" if abs(limit) < 10 else f"{limit:.4g}"

@@ -1,4 +1,4 @@
-"""Lengthen a chain until it carries its intervals, a limit is reached, or the user has had enough."""
+"""Extend a chain until its checks pass, a limit is reached, or the user interrupts."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def run(
     keep: Callable[[Chain], None],
     progress: Progress,
 ) -> tuple[Chain, Checks]:
-    """The chain lengthened to at most `steps`, and what its checks say.
+    """The chain extended to at most `steps`, and its checks.
 
     `keep` is called with the chain after every block. Ctrl-C ends the chain with what it has; before the
     first block it is raised again.

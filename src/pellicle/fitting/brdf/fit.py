@@ -191,12 +191,12 @@ def _fit(
         for each, (view, fit) in zip(samples, pairs, strict=True)
     )
     rms = common_rms([view.independent for view, _ in pairs], [part.rms for part in parts])
-    of_lead = identifiability.naming(next(iter(parameters)), conclusion.trades)
+    of_lead = identifiability.naming(next(iter(parameters)), conclusion.correlated)
     sentence = verdict(status, parameters, conclusion.rivals, rms, trading=of_lead)
     if not layer.layered:
         sentence = layer.verdict
     elif status is Status.CONVERGED:
-        sentence = " ".join([layer.verdict, *(f"But {trade}." for trade in of_lead[:1])])
+        sentence = " ".join([layer.verdict, *(f"But {correlation}." for correlation in of_lead[:1])])
     view = ranked.problem.views[0]
     numbers = {k: np.asarray(x) for k, x in view.form.numbers(ranked.values, surface.fixed_numbers()).items()}
     result = Fit(
@@ -215,7 +215,7 @@ def _fit(
             *dict.fromkeys(message for each in samples for message in warnings.directions(each, surface)),
             *warnings.numbers(surface, parameters, numbers),
             *identifiability.bounded(parameters, ()),
-            *conclusion.trades,
+            *conclusion.correlated,
         ),
         profile=None,
         seconds=time.perf_counter() - began,

@@ -36,12 +36,12 @@ def evidence(
     doubts = [*_none_at_all(parameters), *_no_better(held_out, baselines), *others, *_empty(parameters)]
     depth = parameters.get("thickness")
     if doubts == others and doubts and depth is not None and math.isfinite(depth.stderr):
-        return Evidence(False, f"The samples do not decide the thickness of the layer: {others[0]}.", True)
+        return Evidence(False, f"The samples do not determine the thickness of the layer: {others[0]}.", True)
     if doubts:
         return Evidence(False, f"No evidence of a layer: {'; '.join(doubts)}.")
     gains = " and ".join(f"{100 * (1 - held_out / b.held_out):.0f} % below {b.name}" for b in baselines)
     lead = f"{describe(depth)}. The" if depth is not None else "the"
-    return Evidence(True, f"The samples call for a layer: {lead} held-out error is {gains}.")
+    return Evidence(True, f"Evidence of a layer: {lead} held-out error is {gains}.")
 
 
 def _none_at_all(parameters: Mapping[str, Estimate]) -> list[str]:

@@ -1,9 +1,9 @@
-"""What is compared: a BRDF spans decades, and where a fit looks depends on the scale it looks at.
+"""Residuals of BRDF samples by name: the scale on which values that span decades are compared.
 
-- `linear`: ρ. The mirror peak decides everything; right where σ is known.
+- `linear`: ρ. The mirror peak dominates; right where σ is known.
 - `cosine`: ρ cos θ_i (A. Ngan, F. Durand and W. Matusik, EGSR 2005).
 - `log`: log(1 + ρ cos θ_i), as neural BRDFs are trained.
-- `cube-root`: ρ^⅓, nearest to what eyes see (the default without σ).
+- `cube-root`: ρ^⅓, nearest to perceived lightness (the default without σ).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Where to start: random candidates with their weights solved, halved by short polishes of few samples.
+"""Search for minima of a surface: random candidates with weights solved, halved by short polishes.
 
 From one random start 2 to 8 of 100 fits succeed. A film of another thickness and index often has nearly
 the right lobes, for those are where the light is: the next round keeps the lobes of the best minima and

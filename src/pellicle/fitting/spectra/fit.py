@@ -1,4 +1,4 @@
-"""Fit a scene to spectra of one sample: scan, polish, compare, and say how sure the answer is."""
+"""Fit a scene to spectra of one sample: scan, polish, rank minima, estimate uncertainties."""
 
 from __future__ import annotations
 
@@ -164,9 +164,9 @@ def _fit(
         worst.name or "the data",
         structure.place if structure else "",
         dark,
-        identifiability.naming(next(iter(parameters)), conclusion.trades),
+        identifiability.naming(next(iter(parameters)), conclusion.correlated),
     )
-    unclear = [*identifiability.bounded(parameters, dark), *conclusion.trades]
+    unclear = [*identifiability.bounded(parameters, dark), *conclusion.correlated]
     fit = Fit(
         parts=each,
         status=conclusion.status,

@@ -1,4 +1,4 @@
-"""What a fit says of itself while it works: one record of the logger for each step, silent unless heard.
+"""Log messages for each step of a fit of spectra.
 
 `pellicle ... --verbose` listens; so does anyone with `logging.getLogger("pellicle").setLevel("INFO")`.
 """
@@ -25,7 +25,7 @@ log = getLogger(__name__)
 
 
 def log_problem(spectra: Sequence[Measured], problem: Problem) -> None:
-    """The scene, the numbers that are free, each spectrum with its noise, and what is simulated of it."""
+    """Log the scene, the free parameters, each spectrum with its noise, and its plan."""
     if not log.isEnabledFor(INFO):
         return
     log_scene(spectra[0].scene)
@@ -37,7 +37,7 @@ def log_problem(spectra: Sequence[Measured], problem: Problem) -> None:
 
 
 def log_scene(scene: Scene) -> None:
-    """`from air: Fe2O3 (main/Fe2O3/Querry-o), 1 to 1000 nm, on BK7 (...)`, from the ambient down."""
+    """Log the layers: `from air: Fe2O3 (main/Fe2O3/Querry-o), 1 to 1000 nm, on BK7 (...)`."""
     if log.isEnabledFor(INFO):
         layers = ", then ".join(_layer(layer) for layer in scene.layers)
         on, back = medium_in_words(scene.substrate.material), scene.substrate.back
@@ -46,19 +46,19 @@ def log_scene(scene: Scene) -> None:
 
 
 def log_plan(plan: Plan, name: str = "") -> None:
-    """What is computed, with its reason, and what is not."""
+    """Log each effect that is simulated, with its reason, and those that are not."""
     for row in plan.rows:
         if row.on:
-            log.info("plan%s: %s is computed: %s", _of(name), row.effect, row.why)
+            log.info("plan%s: %s is simulated: %s", _of(name), row.effect, row.why)
     small = [out.effect for out in plan.left_out]
     if small:
         log.info("plan%s: left out within the tolerance %g: %s", _of(name), plan.tolerance, ", ".join(small))
     absent = ", ".join(row.effect for row in plan.rows if not row.on and row.effect not in small)
-    log.info("plan%s: not called for, so not computed: %s", _of(name), absent or "nothing")
+    log.info("plan%s: absent, so not simulated: %s", _of(name), absent or "nothing")
 
 
 def medium_in_words(medium: AbstractDispersion) -> str:
-    """A material by its name and page, an index by its numbers, anything else by its kind."""
+    """Describe a medium: a material by name and page, an index by its numbers, others by their type."""
     if isinstance(medium, Material):
         return medium.name if medium.page == medium.name else f"{medium.name} ({medium.page})"
     if isinstance(medium, Constant) and not free_leaves(medium):

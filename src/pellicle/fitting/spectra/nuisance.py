@@ -23,7 +23,7 @@ from jaxtyping import ScalarLike
 from pellicle.scene.instrument import Drift, Instrument
 
 _LOOSE = 10.0
-"""Prior standard deviation of a single free number, in units of its own expected size: no prior."""
+"""Prior standard deviation of a single free number, in units of its expected size: next to no prior."""
 _STIFF = 1e8
 """Weight that holds an offset at zero where it would turn negative."""
 _SLACK = 1e-6
@@ -72,7 +72,7 @@ def chebyshev(position, degree: int) -> list:
 
 
 def solve(signal, data: Data, instrument: Instrument) -> Solved:
-    """The best scale and offset for a simulated signal, and the deviance left."""
+    """The best scale and offset for a simulated signal, and the deviance."""
     weight = data.weight * jnp.sqrt(data.independent_fraction)
     gains, scale = _split(instrument.scale, lambda drift: _gains(signal, weight, data, drift))
     shifts, offset = _split(instrument.offset, lambda drift: _shifts(data, drift))
@@ -103,7 +103,7 @@ class _Series(NamedTuple):
 
 
 def _split(given: ScalarLike | Drift, series: Callable[[Drift], _Series]) -> tuple[_Series | None, Any]:
-    """A nuisance as a series to solve for and nothing known, or no series and the known number."""
+    """A nuisance as a series to solve for and 0, or as no series and a known number."""
     return (series(given), 0.0) if isinstance(given, Drift) else (None, given)
 
 
@@ -115,7 +115,7 @@ def scale_prior(drift: Drift) -> tuple[np.ndarray, np.ndarray]:
 
 
 def offset_prior(drift: Drift) -> tuple[np.ndarray, np.ndarray]:
-    """The same for the offset, in units of the signal's level."""
+    """Means and standard deviations of the offset's coefficients, in units of the signal's level."""
     count = drift.degree + 1
     sd = [_LOOSE] if drift.degree == 0 else [drift.width * 0.5**j for j in range(count)]
     return np.zeros(count), np.array(sd)
@@ -181,7 +181,7 @@ def _project(rows, values, prior: _Series, shifts: _Series | None):
 
 
 def _stiffness(matrix, target, shifts: _Series | None):
-    """What to add to the matrix so that the offset's solution is nowhere negative.
+    """Matrix to add so that the offset's solution is nowhere negative.
 
     The offset is held nonnegative through its Bernstein coefficients (enough, and for so low a degree
     little more than needed). There are few of them, so every set that could be zero is tried and the
@@ -214,5 +214,5 @@ def _to_bernstein(count: int) -> np.ndarray:
 
 
 def _penalty(gain, weight):
-    """Rules a gain below zero out of any comparison."""
+    """Penalty that rules out a gain below zero."""
     return jnp.where(jnp.min(jnp.where(weight > 0, gain, jnp.inf)) > 0, 0.0, 1e9)

@@ -25,7 +25,7 @@ _NATURAL_ZERO = ("k", "k0", "fraction", "offset", "numerical_aperture", *_WIDTHS
 _STRENGTHS = (Lorentz, Gaussian, TaucLorentz, CodyLorentz)
 """Their A is a strength, which cannot be negative; the A of Cauchy is an index."""
 _SEARCHED = ("thickness", "n", "A", "B", "k", "B1", "Ep", "E0", "Eg", "eps_inf", "fraction")
-"""Parameters that change where the fringes lie, or whether there are any: a start in the middle fails."""
+"""Parameters that move fringes or make them vanish: a start in the middle of their bounds fails."""
 _RESOLUTION = 0.5
 """Thicknesses (nm) closer than this belong to one minimum."""
 _FEW = 3
@@ -40,7 +40,7 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
 def shared(
     scenes: Sequence[Scene], names: Sequence[str]
 ) -> tuple[tuple[Parameter, ...], list[tuple[int, ...]]]:
-    """The free parameters of one sample looked at in several ways, and which of them each scene holds.
+    """Free parameters of one sample measured in several ways, and the positions of those in each scene.
 
     Layers, substrate and ambient are shared; light and instrument are each scene's own, and bear its name.
     """
@@ -90,7 +90,7 @@ def _parameter(scene: Scene, path: tuple, free: Free, name: str) -> Parameter:
 
 
 def _place(scene: Scene, path: tuple) -> ParameterLocation:
-    """What the number at `path` is called inside its medium, or inside the scene if it has none."""
+    """Location of the number at `path` inside its medium, or inside the scene outside of media."""
     node: Any = scene
     for depth, step in enumerate(path):
         node = getattr(node, step.name) if hasattr(step, "name") else node[step.idx]
@@ -101,7 +101,7 @@ def _place(scene: Scene, path: tuple) -> ParameterLocation:
 
 
 def _owner(scene: Scene, path: tuple) -> list[str]:
-    """What goes in front of a name: nothing for the only layer of a scene."""
+    """Prefix of a parameter's name: nothing for the only layer of a scene."""
     first = path[0].name
     if first != "layers":
         return [] if first == "light" else [first]
@@ -109,7 +109,7 @@ def _owner(scene: Scene, path: tuple) -> list[str]:
 
 
 def _layer(scene: Scene, position: int) -> list[str]:
-    """What a layer's parameters begin with: nothing if it is the only one."""
+    """Prefix of the names of a layer's parameters: nothing if it is the only one."""
     return [] if len(scene.layers) == 1 else [scene.layers[position].name or f"layer{position + 1}"]
 
 

@@ -1,4 +1,4 @@
-"""How the best scene explains each spectrum of a fit."""
+"""Fit quality, curves and misfit of each spectrum of a fit."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from pellicle.fitting.spectra.view import Local, SpectrumView
 from pellicle.fitting.status import MISFIT_CHI2, misfits
 
 FAR = math.sqrt(MISFIT_CHI2)
-"""Residuals of a spectrum among several above this many times its noise count as structured: what its
-neighbouring points differ by serves as the σ that nobody gave, and the bound is that of a known one."""
+"""Ratio of residuals to noise above which the residuals of one spectrum among several count as structured.
+The noise, from differences of neighbouring points, takes the place of a given σ; the bound is the same."""
 
 
 def parts(data: list[Spectrum], ranked: RankedMinima, found: Errors) -> tuple[Part, ...]:
@@ -50,7 +50,7 @@ def together(found: tuple[Part, ...]) -> float | None:
 
 
 def missed(found: tuple[Part, ...], ranked: RankedMinima) -> tuple[Part, ...]:
-    """The spectra that the scene does not explain."""
+    """Spectra that the scene does not explain."""
     views = zip(found, ranked.problem.views, ranked.fits, strict=True)
     several = len(found) > 1
     return tuple(part for part, view, met in views if _misses(part, view, met, several))

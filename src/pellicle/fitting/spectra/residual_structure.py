@@ -1,4 +1,4 @@
-"""Where the residuals are no noise: the wavelengths at which the model misses something."""
+"""Structure in residuals: the wavelengths at which the model misses something."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from pellicle.fitting.spectra.view import SpectrumView
 _NARROWEST = 5
 """Points in the narrowest window whose mean is tested."""
 _CHANCE = 0.01
-"""How often a spectrum of pure noise may be said to have structure."""
+"""Probability that pure noise is reported as structure."""
 _CLIP = 4.0
-"""A residual counts for no more than this: a lone outlier is no structure."""
+"""Standard deviations at which residuals are clipped: a lone outlier is no structure."""
 _MOST, _SHOWN = 12, 2
 _EVERYWHERE = 0.6
-"""Windows that cover this share of a spectrum are called most of it."""
+"""Share of a spectrum that is called most of it."""
 
 
 class Window(NamedTuple):
-    """Points `first` to `last` (included) whose mean residual noise cannot explain, by `score` sigmas."""
+    """Points `first` to `last` (included) whose mean residual is `score` standard deviations off zero."""
 
     first: int
     last: int
@@ -32,10 +32,10 @@ class Window(NamedTuple):
 
 
 def windows(z: np.ndarray) -> list[Window]:
-    """Stretches of residuals `z`, in standard deviations of white noise, of one sign too long for it.
+    """Windows of residuals `z`, in standard deviations of white noise, whose mean noise does not explain.
 
-    Means over windows of all positions and of widths that grow by half are compared with the largest
-    that noise of as many points would show by chance. The strongest is taken first; neighbours merge.
+    Means over windows of all positions, of widths that grow by half, are compared with the largest mean
+    that noise of as many points shows by chance. The strongest is taken first; neighbours merge.
     """
     z, size, found = np.clip(z, -_CLIP, _CLIP), len(z), []
     bar = math.sqrt(2 * math.log(max(size, 2) / _CHANCE))
@@ -63,7 +63,7 @@ def _strongest(z: np.ndarray, width: int) -> Window:
 
 
 def _merged(found: list[Window]) -> list[Window]:
-    """Neighbours closer than the narrower one is wide are one stretch: a wave has two signs."""
+    """Windows, merged where their gap is narrower than the narrower one: a wave has two signs."""
     merged: list[Window] = []
     for window in found:
         last = merged[-1] if merged else None
@@ -75,7 +75,8 @@ def _merged(found: list[Window]) -> list[Window]:
 
 
 class Missed(NamedTuple):
-    """Where the model misses something, the strongest place first, and by how much (None for Ψ and Δ)."""
+    """Wavelengths at which the model misses something, the strongest first, and the mean size (None for Ψ and
+    Δ)."""
 
     spans: tuple[str, ...]
     size: float | None
@@ -94,7 +95,7 @@ class Missed(NamedTuple):
 
 
 def missed(view: SpectrumView, met: ViewFit) -> Missed | None:
-    """Where the residuals of the best fit are no noise, None where they may be."""
+    """Structure in the residuals of the best fit, None where they may be noise."""
     shape, seen = (view.rows, view.channels), slice(None) if view.data.frame is None else slice(2)
     weight = np.asarray(view.data.weight)[: view.points].reshape(shape)[:, seen]
     left = (view.data.values - np.asarray(met.at.model))[: view.points].reshape(shape)[:, seen]
@@ -117,7 +118,7 @@ def missed(view: SpectrumView, met: ViewFit) -> Missed | None:
 
 
 def _sweeps(nm: np.ndarray) -> list[slice]:
-    """Runs of wavelengths that go one way: one for each angle of incidence."""
+    """Monotone runs of wavelengths: one for each angle of incidence."""
     steps = np.sign(np.diff(nm))
     turns = np.flatnonzero(steps != steps[0]) + 1 if len(nm) > 1 else np.zeros(0, int)
     edges = [0, *turns.tolist(), len(nm)]

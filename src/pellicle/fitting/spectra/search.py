@@ -1,4 +1,4 @@
-"""Where to start: interference makes the misfit multi-modal, so the whole range is scanned first.
+"""Search for minima of a film: interference makes the misfit multi-modal, so the whole range is scanned.
 
 A single start finds the right thickness in one case of ten. The scan's thickness step resolves the
 shortest fringe, the other parameters take a few values each, and only *local minima in thickness*

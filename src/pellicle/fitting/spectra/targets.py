@@ -1,4 +1,4 @@
-"""A spectrum and its scene as the numbers that a fit compares."""
+"""Targets of a fit of spectra: values, σ and the scene that is to explain them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from pellicle.scene.instrument import Drift, Instrument
 
 
 class Measured(NamedTuple):
-    """What is fitted, and the scene that is to explain it.
+    """Values of one spectrum, and the scene that is to explain them.
 
     `values` are fractions (points,), or N, C, S (points, 3) for ellipsometry, which have no wrap-around,
     or N and C alone (points, 2) where Δ is folded;
@@ -37,7 +37,7 @@ class Measured(NamedTuple):
 
 
 def measured(data: Spectrum, scene: Scene, name: str = "") -> Measured:
-    """A spectrum in numbers, with the scene looked at as it was. Raises UsageError as `fit` does."""
+    """A spectrum in numbers, with the scene in its light. Raises UsageError as `fit` does."""
     scene = seen_as(scene, data)
     _check(data, scene)
     source = Noise(data.sigma is not None, data.sigma is None and drifts(scene))
@@ -50,11 +50,13 @@ def measured(data: Spectrum, scene: Scene, name: str = "") -> Measured:
 
 
 def seen_as(scene: Scene, data: Spectrum) -> Scene:
-    """The scene looked at as the spectrum was: its signal, wavelengths, polarisation and angles."""
+    """The scene in the light of the spectrum: its signal, wavelengths, polarisation and angles."""
     angle: Any = scene.light.angle
     if data.angle is not None and is_free(angle):
         if np.ptp(data.angle) > 0:
-            raise UsageError(f"{data.path}: has several angles of incidence, which one free angle cannot be")
+            raise UsageError(
+                f"{data.path}: has several angles of incidence, and one free angle cannot stand for them"
+            )
     elif data.angle is not None:
         angle = float(data.angle[0]) if np.ptp(data.angle) == 0 else data.angle
     stated = data.polarisation != "unpolarised"
@@ -69,7 +71,7 @@ def unscaled(scene: Scene) -> Scene:
 
 
 def drifts(scene: Scene) -> bool:
-    """Whether the scale varies along the spectrum."""
+    """True where the scale varies along the spectrum."""
     return isinstance(scene.instrument.scale, Drift) and scene.instrument.scale.degree > 0
 
 
@@ -79,7 +81,7 @@ def _check(data: Spectrum, scene: Scene) -> None:
     drifting = [x for x in (scene.instrument.scale, scene.instrument.offset) if isinstance(x, Drift)]
     if data.delta is None and not data.calibrated and scene.instrument.scale not in drifting:
         raise UsageError(
-            f"{data.path}: an uncalibrated intensity needs a free scale: add --scale slow, or --scale free"
+            f'{data.path}: an uncalibrated intensity needs a free scale: `scale="slow"` or `scale="free"`'
         )
     if data.delta is None:
         return
@@ -87,8 +89,8 @@ def _check(data: Spectrum, scene: Scene) -> None:
         raise UsageError(f"{data.path}: Ψ and Δ have no scale and no offset: leave both out")
     if data.angle is None and not free_leaves(scene.light) and not np.any(scene.light.angle):
         raise UsageError(
-            f"{data.path}: ellipsometry needs its angle of incidence: add --angle 70, say, angle = 70 under "
-            "[data] in a recipe, or a column angle_deg"
+            f"{data.path}: ellipsometry needs its angle of incidence: give `angle=70`, for instance, "
+            "angle = 70 under [data] in a recipe, or a column angle_deg"
         )
 
 
