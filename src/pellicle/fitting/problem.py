@@ -7,7 +7,7 @@ whatever comes after the search takes a `Problem` and depends on neither.
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -40,6 +40,7 @@ class Explained(NamedTuple):
     deviance: Any  # −2 ln of the marginal likelihood, up to a constant
 
 
+@runtime_checkable
 class Form(Hashable, Protocol):
     """The static part of a view: its `repr` says all that a compiled program depends on."""
 
@@ -48,6 +49,7 @@ class Form(Hashable, Protocol):
         ...
 
 
+@runtime_checkable
 class Nuisance(Protocol):
     """A linear coefficient that is solved in each evaluation, such as a scale or an offset."""
 
@@ -61,6 +63,7 @@ class Nuisance(Protocol):
     def not_negative(self) -> bool: ...
 
 
+@runtime_checkable
 class View(Protocol):
     """One set of data of a problem: the model of it, its weights, and which parameters it depends on.
 
