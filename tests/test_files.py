@@ -23,7 +23,7 @@ def test_text_arrives_whole_and_readable_as_other_files_are(tmp_path):
 def test_an_existing_file_is_kept(tmp_path):
     target = tmp_path / "mine.csv"
     target.write_text("mine")
-    with pytest.raises(UsageError, match=r"mine\.csv: exists and is not overwritten; choose another name"):
+    with pytest.raises(UsageError, match=r"mine\.csv: exists and is not overwritten; choose another `path`"):
         write_text(target, "theirs")
     assert target.read_text() == "mine"
     write_text(target, "new", overwrite=True)
@@ -64,7 +64,7 @@ def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path):
 def test_places_that_cannot_be_written(tmp_path):
     with pytest.raises(
         UsageError,
-        match=r"written \(there is no folder .*nowhere\); make it.*--out",
+        match=r"written \(there is no folder .*nowhere\); make it.*`path`",
     ):
         write_text(tmp_path / "nowhere" / "a.txt", "")
     with pytest.raises(UsageError, match="is a folder, not a file"):
@@ -83,13 +83,13 @@ def test_folders_that_are_new_or_empty_or_ours(tmp_path):
 @pytest.mark.parametrize(("name", "text"), [("diary.txt", "mine"), ("result.json", '{"schema": "other"}')])
 def test_a_folder_with_files_of_others_is_refused(tmp_path, name, text):
     (tmp_path / name).write_text(text)
-    with pytest.raises(UsageError, match=r"holds files that pellicle did not write; .* --out"):
+    with pytest.raises(UsageError, match=r"holds files that pellicle did not write; .* `folder`"):
         new_folder(tmp_path)
 
 
 def test_a_file_is_no_folder(tmp_path):
     (tmp_path / "out").write_text("mine")
-    with pytest.raises(UsageError, match=r"out: is a file, not a folder; .*--out"):
+    with pytest.raises(UsageError, match=r"out: is a file, not a folder; .*`folder`"):
         new_folder(tmp_path / "out")
-    with pytest.raises(UsageError, match=r"cannot be made .*--out"):
+    with pytest.raises(UsageError, match=r"cannot be made .*`folder`"):
         new_folder(tmp_path / "out" / "deeper")

@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from pellicle.api import cost as cost
     from pellicle.api import fit as fit
     from pellicle.api import plan as plan
-    from pellicle.api import report as report
     from pellicle.api import sample as sample
     from pellicle.api import simulate as simulate
     from pellicle.data.brdf_samples import BrdfSamples as BrdfSamples
@@ -25,6 +24,7 @@ if TYPE_CHECKING:
     from pellicle.fitting.result import Status as Status
     from pellicle.materials import material as material
     from pellicle.recipes.read import read_recipe as read_recipe
+    from pellicle.reporting.present import report as report
     from pellicle.sampling.result import Posterior as Posterior
     from pellicle.scene import priors as priors
     from pellicle.scene.film import Light as Light
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from pellicle.synthetic.brdf import Directions as Directions
 
 _NAMES = {
-    "pellicle.api": ("compare", "cost", "fit", "plan", "report", "sample", "simulate"),
+    "pellicle.api": ("compare", "cost", "fit", "plan", "sample", "simulate"),
     "pellicle.data.brdf_samples": ("BrdfSamples",),
     "pellicle.data.read_brdf": ("read_brdf_samples",),
     "pellicle.data.read_spectrum": ("read_spectrum",),
@@ -51,6 +51,7 @@ _NAMES = {
     "pellicle.fitting.result": ("Fit", "Status"),
     "pellicle.materials": ("material",),
     "pellicle.recipes.read": ("read_recipe",),
+    "pellicle.reporting.present": ("report",),
     "pellicle.sampling.result": ("Posterior",),
     "pellicle.scene.film": ("Light", "Scene"),
     "pellicle.scene.free": ("Free",),

@@ -24,9 +24,6 @@ from pellicle.fitting.result import Fit
 from pellicle.fitting.spectra.fit import fit as fit_spectra
 from pellicle.planning.film import plan as film_plan
 from pellicle.planning.surface import plan as surface_plan
-from pellicle.reporting.brdf import brdf_report
-from pellicle.reporting.comparison import report as comparison_report
-from pellicle.reporting.fit_text import report as fit_report
 from pellicle.sampling.ensemble import STEPS
 from pellicle.sampling.result import Posterior
 from pellicle.sampling.sample import Measurement, brdf_samples, spectra_of
@@ -316,16 +313,6 @@ def compare(
     """
     options = {"tolerance": tolerance, "residual": residual, "progress": progress}
     return compare_fits({name: fit(data, scene, **options) for name, scene in scenes.items()})
-
-
-def report(result: Fit | Comparison) -> str:
-    """Write the complete report of a fit or a comparison, as text of at most 100 columns.
-
-    **Raises:** TypeError for anything else.
-    """
-    if isinstance(result, Fit):
-        return fit_report(result) if result.layer_test is None else brdf_report(result)
-    return comparison_report(result)
 
 
 def _refuse(kind: str, **arguments: Any) -> None:

@@ -1,9 +1,8 @@
-"""Writing without losing anything: whole files or none, and never over what a user had.
+"""Atomic writing of files and result folders that never overwrites a user's files.
 
-Single files (`--out FILE`) are refused if they exist. A folder (`--out DIR`) is refused if it
-holds anything, unless pellicle wrote it, which its `result.json` shows; then files are replaced
-one by one under pellicle's own names and whatever else lies there stays. A writer of several
-files writes `result.json` first, so that an interrupted run can be repeated.
+A file that exists is refused. A folder with files is refused unless pellicle wrote it, which its
+`result.json` shows; then files of pellicle's names are replaced one by one and others stay. A writer of
+several files writes `result.json` first, so that an interrupted run can be repeated.
 """
 
 from __future__ import annotations
@@ -22,10 +21,10 @@ _MARK = '"pellicle.'  # every result carries "schema": "pellicle.fit/1" or the l
 
 @contextmanager
 def replacing(path: str | os.PathLike[str], *, overwrite: bool = False) -> Iterator[Path]:
-    """Gives a temporary file beside `path` to write into, and renames it to `path` at the end.
+    """Yield a temporary file beside `path` and rename it to `path` at the end of the block.
 
-    The temporary name keeps the suffix, for writers that go by it. If the block raises, nothing is
-    left. Raises UsageError if `path` is a folder, exists without `overwrite`, or cannot be written.
+    The temporary name keeps the suffix, which some writers depend on. If the block raises, no file is left.
+    Raises UsageError if `path` is a folder, exists without `overwrite`, or cannot be written.
     """
     target = Path(path)
     _refuse_existing(target, overwrite)
@@ -33,13 +32,11 @@ def replacing(path: str | os.PathLike[str], *, overwrite: bool = False) -> Itera
         handle, name = tempfile.mkstemp(prefix=f".{target.stem}.", suffix=target.suffix, dir=target.parent)
     except FileNotFoundError:
         raise UsageError(
-            f"{target}: cannot be written (there is no folder {target.parent}); make it, or choose another "
-            "place with --out"
+            f"{target}: cannot be written (there is no folder {target.parent}); make it, or choose another"
+            " `path`"
         ) from None
     except OSError as error:
-        raise UsageError(
-            f"{target}: cannot be written ({error.strerror}); choose another place with --out"
-        ) from None
+        raise UsageError(f"{target}: cannot be written ({error.strerror}); choose another `path`") from None
     os.close(handle)
     temporary = Path(name)
     try:
@@ -54,30 +51,28 @@ def replacing(path: str | os.PathLike[str], *, overwrite: bool = False) -> Itera
 
 
 def write_text(path: str | os.PathLike[str], text: str, *, overwrite: bool = False) -> None:
-    """Writes `text` as UTF-8 to `path`, whole or not at all. Raises as `replacing` does."""
+    """Write `text` as UTF-8 to `path`, complete or not at all. Raises as `replacing` does."""
     with replacing(path, overwrite=overwrite) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
 def new_folder(path: str | os.PathLike[str]) -> Path:
-    """The folder for a result, made if it is absent.
+    """Make the folder for a result if it is absent, and return it.
 
-    Raises UsageError if `path` is a file, cannot be made, or holds anything while pellicle did not
-    write it. Inside it, write with `overwrite=True`.
+    Raises UsageError if `path` is a file, cannot be made, or is a folder with files that pellicle did not
+    write. Inside it, write with `overwrite=True`.
     """
     folder = Path(path)
     if folder.exists() and not folder.is_dir():
-        raise UsageError(f"{folder}: is a file, not a folder; choose another place with --out")
+        raise UsageError(f"{folder}: is a file, not a folder; choose another `folder`")
     if folder.is_dir() and any(folder.iterdir()) and not _is_ours(folder):
         raise UsageError(
-            f"{folder}: holds files that pellicle did not write; choose an empty or new folder with --out"
+            f"{folder}: holds files that pellicle did not write; choose an empty or new `folder`"
         )
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise UsageError(
-            f"{folder}: cannot be made ({error.strerror}); choose another place with --out"
-        ) from None
+        raise UsageError(f"{folder}: cannot be made ({error.strerror}); choose another `folder`") from None
     return folder
 
 
@@ -88,9 +83,9 @@ def _is_ours(folder: Path) -> bool:
 
 def _refuse_existing(target: Path, overwrite: bool) -> None:
     if target.is_dir():
-        raise UsageError(f"{target}: is a folder, not a file; choose another name with --out")
+        raise UsageError(f"{target}: is a folder, not a file; choose another `path`")
     if target.exists() and not overwrite:
-        raise UsageError(f"{target}: exists and is not overwritten; choose another name or remove it first")
+        raise UsageError(f"{target}: exists and is not overwritten; choose another `path` or remove it")
 
 
 def _umask() -> int:

@@ -12,8 +12,8 @@ from pellicle.accuracy import colour_methods
 from pellicle.accuracy.measure import Ladder, MethodResult
 from pellicle.accuracy.surface import COLOURS, VALUES, SurfaceCost, coloured, drawn
 from pellicle.colour import delta_e2000, lab, sensor
-from pellicle.reporting.cost import surface_text
-from pellicle.reporting.cost_files import surface_to_json
+from pellicle.reporting.cost_files import to_json
+from pellicle.reporting.cost_text import text
 from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface, surface_view
 from pellicle.synthetic.brdf import default_directions
@@ -106,7 +106,7 @@ def test_record_and_report_say_the_same():
     values = Ladder(
         "float64", 1e-3, "relative", 40, 64, "sample", [MethodResult("float64", "y", 0.0, 9e-8, 1.0, None)]
     )
-    record = surface_to_json(SurfaceCost(seen, values), "steel.toml")
+    record = to_json(SurfaceCost(seen, values), "steel.toml")
     assert (record["schema"], record["unit"], record["recommended"]) == (
         "pellicle.cost/1",
         "ΔE2000",
@@ -114,9 +114,9 @@ def test_record_and_report_say_the_same():
     )
     assert [rung["kind"] for rung in record["rungs"]] == ["colour", "brdf"]
     assert record["brdf"]["recommended"] == "float64"
-    report = surface_text(SurfaceCost(seen, values), "steel.toml")
+    report = text(SurfaceCost(seen, values), "steel.toml")
     assert "nodes-6-500 is the fastest within an error of 0.5 in ΔE2000" in report
     assert "float64 is the fastest within a relative error of 0.001" in report
     assert "100" in report  # ns
-    alone = surface_to_json(SurfaceCost(None, values, "no film"), "paint.toml")
+    alone = to_json(SurfaceCost(None, values, "no film"), "paint.toml")
     assert (alone["unit"], alone["no_colours"]) == ("relative", "no film")

@@ -21,7 +21,7 @@ def fit() -> Fit:
         parts=(
             Part(
                 name="",
-                spectrum=Spectrum(nm, model + noise, "R", path="/data/film.csv", sha256="ab" * 32),
+                data=Spectrum(nm, model + noise, "R", path="/data/film.csv", sha256="ab" * 32),
                 curve=Curve(
                     wavelength=nm,
                     data=model + noise,
@@ -109,7 +109,7 @@ def ellipsometric(fit: Fit, wavelength, angle, with_part, **curve) -> Fit:
         delta_model=delta,
         **(arrays | curve),
     )
-    return with_part(dataclasses.replace(fit, rms=0.123), spectrum=spectrum, curve=made, rms=0.123)
+    return with_part(dataclasses.replace(fit, rms=0.123), data=spectrum, curve=made, rms=0.123)
 
 
 @pytest.fixture

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pellicle.fitting.brdf.result import BrdfFit
 
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.effects.surface import exact
-from pellicle.fitting.result import Status
-from pellicle.reporting.brdf_figure import draw, half_angle
+from pellicle.fitting.result import BrdfCurve, Fit, LayerTest, Part, Status
+from pellicle.reporting.brdf_figure import half_angle
+from pellicle.reporting.fit_figure import draw
 from pellicle.scene.surface import Surface, surface_view
 
 
@@ -29,31 +29,36 @@ def fit():
         sigma=np.full((3, 1), 0.05),
     )
     surface = Surface("microfacet-film", {"thickness": 40.0, "n": 1.5, "base_n": 2.7}, (550.0,))
-    return BrdfFit(
-        samples=samples,
-        surface=surface,
-        residual="linear",
+    part = Part(
+        name="",
+        data=samples,
+        curve=BrdfCurve(samples.values + 0.1, np.full((3, 1), -2.0)),
+        plan=exact(surface_view(surface, samples)),
+        rms=1.0,
+        chi2_reduced=1.0,
+        effective_points=3.0,
+    )
+    return Fit(
+        parts=(part,),
         status=Status.MISFIT,
         verdict="",
-        layered=False,
         parameters={},
         rivals=(),
-        baselines=(),
-        held_out=1.0,
         chi2_reduced=1.0,
         rms=1.0,
         effective_points=3.0,
         correlation_names=(),
         correlation=np.zeros((0, 0)),
-        plan=exact(surface_view(surface, samples)),
         warnings=(),
-        model=samples.values + 0.1,
+        profile=None,
         seconds=0.0,
+        scene=surface,
+        layer_test=LayerTest(False, 1.0, (), "linear"),
     )
 
 
 def test_half_angles(fit):
-    np.testing.assert_allclose(half_angle(fit), [10.0, 0.0, 10.0], atol=1e-6)
+    np.testing.assert_allclose(half_angle(fit.samples), [10.0, 0.0, 10.0], atol=1e-6)
 
 
 def test_samples_model_and_residuals_in_sigma_are_drawn(fit):
@@ -66,8 +71,9 @@ def test_samples_model_and_residuals_in_sigma_are_drawn(fit):
     assert below.get_ylabel() == "residual / σ"
 
 
-def test_without_sigma_residuals_have_the_unit_of_the_brdf(fit):
-    fit = replace(fit, samples=replace(fit.samples, sigma=None), model=fit.model - 0.3)
+def test_without_sigma_residuals_have_the_unit_of_the_brdf(fit, with_part):
+    curve = replace(fit.parts[0].curve, model=fit.model - 0.3)
+    fit = with_part(fit, data=replace(fit.samples, sigma=None), curve=curve)
     above, below = draw(fit).axes
     assert above.get_yscale() == "linear"
     np.testing.assert_allclose(below.lines[0].get_ydata(), 0.2, atol=1e-12)

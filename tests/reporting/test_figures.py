@@ -10,7 +10,8 @@ import pytest
 
 from pellicle.errors import UsageError
 from pellicle.fitting.result import Profile
-from pellicle.reporting.fit_figure import draw, figure
+from pellicle.reporting.drawing import save_figure
+from pellicle.reporting.fit_figure import draw
 
 
 def labels(drawn) -> list[str]:
@@ -24,7 +25,7 @@ def png_size(path) -> tuple[int, int]:
 
 
 def test_a_png_of_a_readable_size_and_nothing_else(fit, tmp_path):
-    assert figure(fit, tmp_path / "figure.png") == tmp_path / "figure.png"
+    assert save_figure(draw(fit), tmp_path / "figure.png") == tmp_path / "figure.png"
     width, height = png_size(tmp_path / "figure.png")
     assert 1000 <= width <= 1600
     assert 900 <= height <= 1800
@@ -36,9 +37,9 @@ def test_an_existing_figure_is_kept_unless_told_otherwise(fit, tmp_path):
     target = tmp_path / "figure.png"
     target.write_text("mine")
     with pytest.raises(UsageError, match="exists"):
-        figure(fit, target)
+        save_figure(draw(fit), target)
     assert target.read_text() == "mine"
-    figure(fit, target, overwrite=True)
+    save_figure(draw(fit), target, overwrite=True)
     png_size(target)
 
 
@@ -93,7 +94,7 @@ def test_n_and_k_do_not_lie_on_each_other(fit, with_part):
 
 def test_an_infinite_error_leaves_a_gap_in_the_band(fit, with_part, tmp_path):
     curve = replace(fit.curve, n_stderr=np.where(np.arange(41) < 9, np.inf, 0.001))
-    figure(with_part(fit, curve=curve), tmp_path / "figure.png")
+    save_figure(draw(with_part(fit, curve=curve)), tmp_path / "figure.png")
     [band] = draw(with_part(fit, curve=curve)).axes[3].collections
     vertices = np.concatenate([path.vertices for path in band.get_paths()])
     assert np.isfinite(vertices).all()
@@ -106,10 +107,10 @@ def test_lines_cross_neither_gaps_nor_angles(fit, with_part):
         fit.curve, **{name: array[half] for name, array in vars(fit.curve).items() if array is not None}
     )
     spectrum = replace(fit.spectrum, wavelength=curve.wavelength, values=curve.data)
-    gapped = draw(with_part(fit, curve=curve, spectrum=spectrum)).axes[0]
+    gapped = draw(with_part(fit, curve=curve, data=spectrum)).axes[0]
     assert [line.get_xdata().size for line in gapped.lines] == [20, 10, 10]
     angled = replace(fit.spectrum, angle=np.where(np.arange(41) % 2, 30.0, 60.0))
-    assert [line.get_xdata().size for line in draw(with_part(fit, spectrum=angled)).axes[0].lines] == [
+    assert [line.get_xdata().size for line in draw(with_part(fit, data=angled)).axes[0].lines] == [
         41,
         20,
         21,
@@ -118,12 +119,12 @@ def test_lines_cross_neither_gaps_nor_angles(fit, with_part):
 
 def test_odd_fits_are_drawn_too(fit, with_part, tmp_path):
     odd = replace(
-        with_part(fit, spectrum=replace(fit.spectrum, path="a$b_{$.csv", calibrated=False, signal="T")),
+        with_part(fit, data=replace(fit.spectrum, path="a$b_{$.csv", calibrated=False, signal="T")),
         rivals=(),
         parameters={"A": fit["A"]},
         profile=Profile(np.linspace(1.0, 9.0, 5), np.full(5, 1e8)),
     )
-    figure(odd, tmp_path / "figure.png")
+    save_figure(draw(odd), tmp_path / "figure.png")
     assert labels(draw(odd))[0] == "transmittance × unknown scale"
 
 

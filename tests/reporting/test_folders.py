@@ -17,18 +17,11 @@ from pellicle.effects.plan import Plan, Row
 from pellicle.errors import UsageError
 from pellicle.fitting.result import Curve, Estimate, Fit, Part, Profile, Rival, Status
 from pellicle.materials import material
-from pellicle.reporting.folders import (
-    failure,
-    fit_csv,
-    nk_csv,
-    one_line,
-    several,
-    to_json,
-    write_fit,
-    write_summary,
-)
+from pellicle.reporting.csv_tables import fit_csv, nk_csv
+from pellicle.reporting.folders import folder_per_file, write_fit, write_summary
+from pellicle.reporting.json_record import failure, one_line, to_json
 
-FILES = ["fit.csv", "nk.csv", "report.txt", "result.json"]
+FILES = ["figure.png", "fit.csv", "nk.csv", "report.txt", "result.json"]
 KEYS = (
     "schema data status verdict parameters rivals chi2_reduced rms effective_points correlation plan"
     " warnings versions seconds"
@@ -44,7 +37,7 @@ def fit() -> Fit:
         parts=(
             Part(
                 name="",
-                spectrum=Spectrum(nm, data, "R", path="/data/film.csv", sha256="ab" * 32),
+                data=Spectrum(nm, data, "R", path="/data/film.csv", sha256="ab" * 32),
                 curve=Curve(
                     wavelength=nm,
                     data=data,
@@ -148,8 +141,8 @@ def test_a_file_that_cannot_be_read_has_the_same_keys_and_an_error(fit):
 
 
 def test_a_folder_holds_report_json_tables_and_figure(fit, tmp_path):
-    assert write_fit(tmp_path / "out", fit, True) == tmp_path / "out"
-    assert sorted(os.listdir(tmp_path / "out")) == sorted([*FILES, "figure.png"])
+    assert write_fit(tmp_path / "out", fit) == tmp_path / "out"
+    assert sorted(os.listdir(tmp_path / "out")) == sorted(FILES)
     assert (tmp_path / "out" / "figure.png").read_bytes().startswith(b"\x89PNG")
     assert (tmp_path / "out" / "report.txt").read_text().startswith("[[Verdict]]")
     record = strictly((tmp_path / "out" / "result.json").read_text())
@@ -157,10 +150,10 @@ def test_a_folder_holds_report_json_tables_and_figure(fit, tmp_path):
 
 
 def test_a_second_fit_replaces_the_first_and_leaves_the_rest(fit, tmp_path):
-    write_fit(tmp_path, fit, True)
+    write_fit(tmp_path, fit)
     (tmp_path / "diary.txt").write_text("mine")
-    write_fit(tmp_path, replace(fit, rms=0.5), False)
-    assert sorted(os.listdir(tmp_path)) == sorted([*FILES, "diary.txt"])  # the old figure showed another fit
+    write_fit(tmp_path, replace(fit, rms=0.5))
+    assert sorted(os.listdir(tmp_path)) == sorted([*FILES, "diary.txt"])
     assert (tmp_path / "diary.txt").read_text() == "mine"
     assert strictly((tmp_path / "result.json").read_text())["rms"] == 0.5
 
@@ -169,9 +162,9 @@ def test_a_second_fit_replaces_the_first_and_leaves_the_rest(fit, tmp_path):
 def test_a_folder_of_the_users_stays_as_it_is(fit, tmp_path, name):
     (tmp_path / name).write_text("mine")
     for write in (
-        lambda: write_fit(tmp_path, fit, False),
-        lambda: write_summary(tmp_path / "summary.csv", [fit]),
-        lambda: several(tmp_path, ["a.csv", "b.csv"]),
+        lambda: write_fit(tmp_path, fit),
+        lambda: write_summary(tmp_path / "summary.csv", [to_json(fit)]),
+        lambda: folder_per_file(tmp_path, ["a.csv", "b.csv"]),
     ):
         with pytest.raises(UsageError, match="did not write"):
             write()
@@ -206,7 +199,7 @@ def test_uncalibrated_data_at_angles_are_read_again_as_such(fit, with_part, tmp_
     path = tmp_path / "fit.csv"
     curve = replace(fit.curve, data=50 * fit.curve.data)
     angled = replace(fit.spectrum, values=curve.data, angle=np.full(41, 30.0), calibrated=False)
-    path.write_text(fit_csv(with_part(fit, spectrum=angled, curve=curve)), encoding="utf-8")
+    path.write_text(fit_csv(with_part(fit, data=angled, curve=curve)), encoding="utf-8")
     assert "wavelength,intensity,_,_,sigma,angle" in path.read_text()
     again = read_spectrum(path, columns="wavelength,intensity,_,_,sigma,angle", signal="R")
     assert not again.calibrated
@@ -242,7 +235,7 @@ def test_nk_csv_is_a_material_whatever_errors_are_infinite(fit, with_part, tmp_p
 
 
 def test_a_path_cannot_break_out_of_its_comment(fit, with_part, tmp_path):
-    odd = with_part(fit, spectrum=replace(fit.spectrum, path="a\n1,2\r3.csv"))
+    odd = with_part(fit, data=replace(fit.spectrum, path="a\n1,2\r3.csv"))
     assert "# from a 1,2 3.csv, sha256" in fit_csv(odd)
 
 
@@ -252,8 +245,10 @@ def test_the_summary_has_a_row_per_file_and_the_union_of_free_parameters(fit, tm
         parameters={"thickness": fit["thickness"], "n": Estimate("n", 1.5, 0.01, "", 1.3, 1.7, True)},
         chi2_reduced=1.5,
     )
-    several(tmp_path, ["a.csv", "b.csv", "c.csv"])
-    write_summary(tmp_path / "summary.csv", [fit, failure("c, d.csv", "no such file"), other])
+    folder_per_file(tmp_path, ["a.csv", "b.csv", "c.csv"])
+    write_summary(
+        tmp_path / "summary.csv", [to_json(fit), failure("c, d.csv", "no such file"), to_json(other)]
+    )
     assert (tmp_path / "summary.csv").read_text().startswith("# ")
     frame = pd.read_csv(tmp_path / "summary.csv", comment="#")
     names = ("thickness", "k", "instrument.scale", "n")
@@ -274,24 +269,24 @@ def test_the_summary_has_a_row_per_file_and_the_union_of_free_parameters(fit, tm
     np.testing.assert_array_equal(frame["n"], [np.nan, np.nan, 1.5])
     np.testing.assert_array_equal(frame["thickness_stderr"], [0.12, np.nan, 0.12])
     assert frame["instrument.scale_stderr"].isna().all()  # infinite
-    write_summary(tmp_path / "summary.csv", [fit])
+    write_summary(tmp_path / "summary.csv", [to_json(fit)])
     assert len(pd.read_csv(tmp_path / "summary.csv", comment="#")) == 1
 
 
 def test_folders_of_several_files(tmp_path):
     paths = ["x/a.csv", "y/A.txt", "a-2.csv", "b.csv", "summary.csv.csv", "z/a.csv"]
     root = tmp_path / "out"
-    folders = several(root, paths)
+    folders = folder_per_file(root, paths)
     assert [folder.name for folder in folders] == ["a", "A-2", "a-2-2", "b", "summary.csv-2", "a-3"]
     assert all(folder.parent == root for folder in folders)
     index = strictly((root / "result.json").read_text())
     assert index["schema"] == "pellicle.fits/1"
     assert index["files"][1] == {"path": "y/A.txt", "folder": "A-2"}
-    assert several(root, paths) == folders  # and again, in a folder that is ours
+    assert folder_per_file(root, paths) == folders  # and again, in a folder that is ours
 
 
 def test_one_file_has_the_folder_to_itself(tmp_path):
-    assert several(tmp_path / "out", ["a.csv"]) == [tmp_path / "out"]
+    assert folder_per_file(tmp_path / "out", ["a.csv"]) == [tmp_path / "out"]
     assert not (tmp_path / "out").exists()
 
 
@@ -302,7 +297,7 @@ def joint(fit) -> Fit:
     few = {name: array[:4] for name, array in vars(one.curve).items() if array is not None}
     curve = Curve(**few | {"delta_data": np.full(4, 359.0), "delta_model": np.full(4, 1.0)})
     spectrum = Spectrum(few["wavelength"], few["data"], "psi-delta", path="b,c.csv", delta=np.full(4, 359.0))
-    other = replace(one, name="b,c", spectrum=spectrum, curve=curve, rms=0.1)
+    other = replace(one, name="b,c", data=spectrum, curve=curve, rms=0.1)
     return replace(fit, parts=(replace(one, name="film"), other), rms=None)
 
 
@@ -319,8 +314,8 @@ def test_json_of_a_joint_fit_lists_its_data(joint):
 
 
 def test_tables_of_a_joint_fit(joint, fit, tmp_path):
-    write_fit(tmp_path / "out", joint, True)
-    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == sorted([*FILES, "figure.png"])
+    write_fit(tmp_path / "out", joint)
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == sorted(FILES)
     frame = pd.read_csv(tmp_path / "out" / "fit.csv", comment="#")
     assert frame.groupby(["file", "signal"]).size().to_dict() == {
         ("film", "R"): 41,

@@ -43,10 +43,10 @@ class Sampler(NamedTuple):
 
     def settings(self, folder: Path | None) -> dict[str, Any]:
         """What the library takes, for a chain that is kept in `folder`."""
-        from pellicle.reporting.posterior_files import chain_in
+        from pellicle.reporting.folders import chain_file
         from pellicle.sampling.ensemble import STEPS
 
-        chain = None if folder is None else chain_in(folder)
+        chain = None if folder is None else chain_file(folder)
         return {"walkers": self.walkers, "steps": self.steps or STEPS, "seed": self.seed, "chain": chain}
 
 
@@ -66,7 +66,7 @@ class Batch:
 
     def __call__(self, groups: list[list[Look]]) -> int:
         from pellicle.files import new_folder
-        from pellicle.reporting.folders import several, write_summary
+        from pellicle.reporting.folders import folder_per_file, write_summary
 
         if self.sampler is not None and any(
             looks[0].reading.loss not in (None, "least-squares") for looks in groups
@@ -75,7 +75,7 @@ class Batch:
         folders = [None] * len(groups)
         if self.out is not None:
             root = Path(self.out)
-            folders = several(root, [looks[0].path for looks in groups])
+            folders = folder_per_file(root, [looks[0].path for looks in groups])
             if root.exists():
                 new_folder(root)  # refuses a stranger's folder before the work, not after
         worst = 0
@@ -90,7 +90,7 @@ class Batch:
         return worst
 
     def _one(self, looks: list[Look], folder: Path | None) -> int:
-        from pellicle.reporting.folders import failure
+        from pellicle.reporting.json_record import failure, to_json
 
         paths = [look.path for look in looks]
         label = ", ".join(paths)
@@ -109,20 +109,22 @@ class Batch:
         progress.clear()
         found = with_flags(found)
         posterior = None if posterior is None else replace(posterior, fit=found)
-        self.done.append(found)
+        self.done.append(to_json(found))
         self._show(found, posterior, folder)
         if posterior is not None and not posterior.trusted:
             return TOO_SHORT
         return 0 if found.status == "converged" else 4
 
     def _show(self, found: Fit, posterior: Posterior | None, folder: Path | None) -> None:
-        from pellicle.reporting.posterior_files import record, text, write
+        from pellicle.reporting.fit_text import report
+        from pellicle.reporting.folders import write_fit
+        from pellicle.reporting.json_record import one_line, to_json
 
-        written = json_module.dumps(record(found, posterior), allow_nan=False) if self.as_json else None
-        print(written or text(found, posterior), flush=True)
+        written = one_line(to_json(found, posterior)) if self.as_json else None
+        print(written or report(found, posterior), flush=True)
         if folder is None:
             return
-        write(folder, found, posterior)
+        write_fit(folder, found, posterior)
         say(f"{folder}: report, figures and tables written")
 
     def _found(

@@ -56,8 +56,8 @@ def cost(
         new_folder(out)  # refuses a stranger's folder before the work, not after
     start(keep=False)
     from pellicle.accuracy.cost import cost as measure
-    from pellicle.reporting.cost import text
     from pellicle.reporting.cost_files import to_json, write_cost
+    from pellicle.reporting.cost_text import text
 
     progress = Progress(found.path)
     try:

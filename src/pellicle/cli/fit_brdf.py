@@ -70,11 +70,11 @@ def _each(
     recipe: SurfaceRecipe, files: list[str], out: str | None, as_json: bool, sampler: Sampler | None
 ) -> int:
     from pellicle.files import new_folder
-    from pellicle.reporting.folders import several, write_summary
+    from pellicle.reporting.folders import folder_per_file, write_summary
 
     folders: list[Path | None] = [None] * len(files)
     if out is not None:
-        folders = [*several(Path(out), files)]
+        folders = [*folder_per_file(Path(out), files)]
         if Path(out).exists():
             new_folder(Path(out))  # refuses a stranger's folder before the work, not after
     records: list[dict[str, Any]] = []
@@ -95,8 +95,9 @@ def _each(
 def _one(
     recipe: SurfaceRecipe, path: str, folder: Path | None, as_json: bool, sampler: Sampler | None
 ) -> tuple[dict[str, Any], int]:
-    from pellicle.reporting.folders import failure, one_line
-    from pellicle.reporting.posterior_files import record, text, write
+    from pellicle.reporting.fit_text import report
+    from pellicle.reporting.folders import write_fit
+    from pellicle.reporting.json_record import failure, one_line, to_json
 
     progress = Progress(path)
     try:
@@ -123,10 +124,10 @@ def _one(
     progress.clear()
     fit = with_flags(fit)
     posterior = None if posterior is None else replace(posterior, fit=fit)
-    found = record(fit, posterior)
-    print(one_line(found) if as_json else text(fit, posterior), flush=True)
+    found = to_json(fit, posterior)
+    print(one_line(found) if as_json else report(fit, posterior), flush=True)
     if folder is not None:
-        write(folder, fit, posterior)
+        write_fit(folder, fit, posterior)
         say(f"{folder}: report, figure and tables written")
     if posterior is not None and not posterior.trusted:
         return found, TOO_SHORT

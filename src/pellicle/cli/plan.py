@@ -47,9 +47,9 @@ def plan(
     savings = cost_model.savings(scene, calibration)
     whole, planned = (calibration.seconds(cost_model.work(p, scene)) for p in (film.reference(scene), chosen))
     if json:
-        print(json_module.dumps(plans.record(chosen, savings), allow_nan=False), flush=True)
+        print(json_module.dumps(plans.to_json(chosen, savings), allow_nan=False), flush=True)
         return 0
-    print(plans.table(chosen, savings, whole, planned), end="", flush=True)
+    print(plans.report_with_savings(chosen, savings, whole, planned), end="", flush=True)
     if chosen.error_bound > tolerance:
         say(f"no plan is within {tolerance:g}: the averages alone are off by up to {chosen.error_bound:.1g}")
     return 0

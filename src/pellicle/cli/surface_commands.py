@@ -73,9 +73,9 @@ def plan_surface(recipe: SurfaceRecipe, tolerance: float, as_json: bool) -> int:
     savings = planning.savings(seen, calibration)
     whole, planned = (calibration.seconds(planning.work(p, seen)) for p in (exact(seen), chosen))
     if as_json:
-        print(json.dumps(plans.record(chosen, savings), allow_nan=False), flush=True)
+        print(json.dumps(plans.to_json(chosen, savings), allow_nan=False), flush=True)
     else:
-        print(plans.table(chosen, savings, whole, planned), end="", flush=True)
+        print(plans.report_with_savings(chosen, savings, whole, planned), end="", flush=True)
     return 0
 
 
@@ -88,8 +88,8 @@ def cost_surface(recipe: SurfaceRecipe, tolerance: float | None, out: str | None
         new_folder(out)  # refuses a stranger's folder before the work, not after
     start(keep=False)
     from pellicle.accuracy.surface import cost
-    from pellicle.reporting.cost import surface_text
-    from pellicle.reporting.cost_files import surface_to_json, write_surface_cost
+    from pellicle.reporting.cost_files import to_json, write_cost
+    from pellicle.reporting.cost_text import text
     from pellicle.scene.surface import surface_view
 
     progress = Progress(recipe.path)
@@ -97,8 +97,8 @@ def cost_surface(recipe: SurfaceRecipe, tolerance: float | None, out: str | None
         result = cost(surface_view(surface, looked), tolerance=tolerance, progress=progress)
     finally:
         progress.clear()
-    record = surface_to_json(result, recipe.path)
-    print(json.dumps(record, allow_nan=False) if as_json else surface_text(result, recipe.path), flush=True)
+    record = to_json(result, recipe.path)
+    print(json.dumps(record, allow_nan=False) if as_json else text(result, recipe.path), flush=True)
     if out is not None:
-        say(f"{write_surface_cost(out, result, recipe.path)}: report, figure and tables written")
+        say(f"{write_cost(out, result, recipe.path)}: report, figure and tables written")
     return 130 if result.interrupted else 0

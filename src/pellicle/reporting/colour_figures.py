@@ -1,35 +1,34 @@
-"""The interference colour chart: a swatch against thickness and angle of incidence."""
+"""Interference colour chart of a film, and picture of a surface with its BRDF."""
 
 from __future__ import annotations
 
 import os
-from pathlib import Path
-from typing import TYPE_CHECKING
-
-import numpy as np
-
-from pellicle.errors import UsageError
-from pellicle.reporting.drawing import blank, saved
-from pellicle.scene.film import Scene
-from pellicle.synthetic.colours import interference_colours
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from pellicle.colour import srgb
+from pellicle.errors import UsageError
+from pellicle.reporting.drawing import figure_path, new_figure, save_figure
+from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface
+from pellicle.synthetic.colours import interference_colours
 from pellicle.synthetic.sphere import in_plane, render
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FORMATS = (".png", ".pdf", ".svg")
 ACROSS, UP = 600, 61
+"""Pixels of the chart: thicknesses, angles."""
+INCIDENCES = (15.0, 45.0, 70.0)
+LEAVING = np.linspace(-88.0, 88.0, 353)
+"""Angles (degrees) of the polar plots: of the light, and to the eye."""
+BACKGROUND = 0.12
+WHITE_PERCENTILE = 99.0
+"""Percentile of the radiance that is shown as white: a lobe has no upper end."""
+_CHANNELS = ("#c03030", "#2f8f2f", "#3050c0")
 
 
 def chart(
@@ -43,75 +42,60 @@ def chart(
     illuminant: str = "D65",
     title: str = "",
 ) -> float:
-    """Draw a film's colours into `path` and return the share of them that sRGB cannot show.
+    """Draw a film's colours against thickness and angle of incidence into `path` (.png, .pdf or .svg).
 
-    `thickness` (nm) and `angle` (degrees) are ranges; the rest is as `appearance.interference_colours`
-    takes it. The file appears whole or not at all. Raises UsageError for another file type.
+    **Arguments:** `thickness` (nm) and `angle` (degrees) are ranges; `layer`, `observer` and `illuminant` are
+    those of `pellicle.synthetic.colours.interference_colours`.
+
+    **Returns:** the share of the colours that sRGB cannot show.
+
+    **Raises:** UsageError for another file type, and where the file exists or cannot be written.
     """
-    target = Path(path)
-    if target.suffix.lower() not in FORMATS:
-        raise UsageError(f"--out {target}: expected a name ending in {', '.join(FORMATS)}")
+    target = figure_path(path)
     nm, degrees = np.linspace(*thickness, ACROSS), np.linspace(*angle, UP)
     colours = interference_colours(scene, nm, degrees, layer, observer=observer, illuminant=illuminant)
     linear = np.asarray(colours.linear_srgb)
     shown = np.clip(np.asarray(colours.srgb), 0, 1)
-    saved(_draw_chart(shown, thickness, angle, f"{title}   {illuminant}"), target)
+    save_figure(_draw_chart(shown, thickness, angle, f"{title}   {illuminant}"), target)
     return float(np.mean(np.any((linear < -1e-3) | (linear > 1 + 1e-3), axis=-1)))
 
 
 def _draw_chart(
     srgb: np.ndarray, thickness: tuple[float, float], angle: tuple[float, float], title: str
 ) -> Figure:
-    """The swatch over all angles, and under it a strip of the first one alone."""
-
-    drawn = blank(8, 4)
-    swatch, strip = drawn.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [4, 1]})
+    """The colours over all angles, and below them a strip of the first angle."""
+    figure = new_figure(8, 4)
+    swatch, strip = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [4, 1]})
     swatch.imshow(srgb, origin="lower", aspect="auto", extent=(*thickness, *angle))
     swatch.set(ylabel="angle of incidence (°)")
     swatch.set_title(title.strip(), loc="left")
     strip.imshow(srgb[:1], origin="lower", aspect="auto", extent=(*thickness, 0, 1))
     strip.set(xlabel="thickness (nm)", yticks=[], ylabel=f"{angle[0]:g}°")
-    return drawn
-
-
-INCIDENCES = (15.0, 45.0, 70.0)
-
-
-LEAVING = np.linspace(-88.0, 88.0, 353)
-
-
-BACKGROUND = 0.12
-
-
-EXPOSED = 99.0
-"""Percentile of the lit radiance that is shown as white: a lobe has no upper end."""
-
-
-_CHANNELS = ("#c03030", "#2f8f2f", "#3050c0")
+    return figure
 
 
 def sphere(
     surface: Surface, path: str | os.PathLike[str], light: tuple[float, float], title: str = ""
 ) -> None:
-    """Draw the surface into `path`; `light` is its polar angle from the line of sight and its azimuth.
+    """Draw a sphere of the surface and polar plots of its BRDF into `path` (.png, .pdf or .svg).
 
-    Raises UsageError for a surface that has no three channels to show, and for another file type.
+    `light` is the polar angle of the light from the line of sight and its azimuth, in degrees. Raises
+    UsageError for a surface without red, green and blue, for another file type, and where the file exists or
+    cannot be written.
     """
-    target = Path(path)
-    if target.suffix.lower() not in FORMATS:
-        raise UsageError(f"--out {target}: expected a name ending in {', '.join(FORMATS)}")
+    target = figure_path(path)
     if surface.channels != 3:
         raise UsageError(f"a picture needs three wavelengths, red, green and blue, not {surface.channels}")
     with jax.enable_x64(True):
-        seen = render(surface, light)
+        radiance = render(surface, light)
         lobes = {angle: in_plane(surface, angle, LEAVING) for angle in INCIDENCES}
-    saved(_draw_sphere(shown(seen), lobes, title), target)
+    save_figure(_draw_sphere(shown(radiance), lobes, title), target)
 
 
 def shown(radiance: np.ndarray) -> np.ndarray:
-    """sRGB of linear RGB (height, width, 3) by one exposure; what is NaN is the background."""
+    """Convert linear RGB (height, width, 3) to sRGB with one exposure; NaN is the background."""
     lit = radiance[np.isfinite(radiance) & (radiance > 0)]
-    white = np.percentile(lit, EXPOSED) if lit.size else 1.0
+    white = np.percentile(lit, WHITE_PERCENTILE) if lit.size else 1.0
     linear = np.clip(radiance / max(white, 1.0), 0, 1)
     return np.nan_to_num(np.asarray(srgb(jnp.asarray(linear))), nan=BACKGROUND)
 
@@ -119,14 +103,14 @@ def shown(radiance: np.ndarray) -> np.ndarray:
 def _draw_sphere(image: np.ndarray, lobes: dict[float, np.ndarray], title: str) -> Figure:
     from matplotlib.ticker import MaxNLocator
 
-    drawn = blank(10, 6)
-    grid = drawn.add_gridspec(len(lobes), 2, width_ratios=[2, 1])
-    ball = drawn.add_subplot(grid[:, 0])
+    figure = new_figure(10, 6)
+    grid = figure.add_gridspec(len(lobes), 2, width_ratios=[2, 1])
+    ball = figure.add_subplot(grid[:, 0])
     ball.imshow(image)
     ball.set_axis_off()
     ball.set_title(title, loc="left")
     for row, (angle, values) in enumerate(lobes.items()):
-        axes = drawn.add_subplot(grid[row, 1], projection="polar")
+        axes = figure.add_subplot(grid[row, 1], projection="polar")
         for channel, colour in enumerate(_CHANNELS):
             axes.plot(np.deg2rad(LEAVING), values[:, channel], color=colour, linewidth=1.2)
         axes.axvline(np.deg2rad(-angle), color="#777777", linestyle=":", linewidth=1.0)
@@ -134,4 +118,4 @@ def _draw_sphere(image: np.ndarray, lobes: dict[float, np.ndarray], title: str) 
         axes.tick_params(labelsize="x-small")
         axes.yaxis.set_major_locator(MaxNLocator(2))
         axes.set_title(f"light at {angle:g}°, BRDF in 1/sr", fontsize="small")
-    return drawn
+    return figure

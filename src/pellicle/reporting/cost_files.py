@@ -1,21 +1,23 @@
-"""What accuracy costs as files: a record of one JSON schema, a CSV and a figure."""
+"""JSON record, table and folder of accuracy against time."""
 
 from __future__ import annotations
 
 import csv
 import math
 import os
+from collections.abc import Iterable
 from dataclasses import asdict
-from functools import partial
 from io import StringIO
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from pellicle.accuracy.cost import Cost
-from pellicle.accuracy.measure import Ladder
-from pellicle.accuracy.surface import SurfaceCost
 from pellicle.files import MARKER, new_folder, write_text
 from pellicle.reporting.json_record import indented, versions
+
+if TYPE_CHECKING:
+    from pellicle.accuracy.cost import Cost
+    from pellicle.accuracy.measure import Ladder
+    from pellicle.accuracy.surface import SurfaceCost
 
 SCHEMA = "pellicle.cost/1"
 COLUMNS = (
@@ -24,82 +26,67 @@ COLUMNS = (
 )
 
 
-def to_json(cost: Cost, recipe: str) -> dict[str, Any]:
-    """The record: forward and inverse rungs, and those of intervals, in one list, told by their `kind`.
+def to_json(cost: Cost | SurfaceCost, recipe: str) -> dict[str, Any]:
+    """Convert to dictionaries: all methods in one list, `rungs`, each with its `kind`.
 
-    An error is null where it is infinite; an interval's is how far its coverage is from 95 %. `recommended`
-    is a forward rung's name, `recommended_solver` an inverse one's, `recommended_interval` that of a way to
-    an interval; `within` says whether the first meets the tolerance.
+    Kinds of a film are "forward", "inverse" (a solver) and "interval" (its error is the distance of its
+    coverage from 95 %); of a surface "colour" (mean ΔE2000) and "brdf" (relative error). `recommended`
+    names a forward method, or one for colours; `within` says whether it meets the tolerance. `brdf` has the
+    same keys for a surface's values. Infinite errors are None.
     """
-    ladder, race, held = cost.ladder, cost.race, cost.intervals
-    forward = [{"kind": "forward", **asdict(rung)} for rung in ladder.rungs]
-    inverse = [] if race is None else [{"kind": "inverse", **asdict(solver)} for solver in race.solvers]
-    ways = [] if held is None else [{"kind": "interval", **asdict(way)} for way in held.ways]
-    absent = [part.left_out for part in (ladder, race, held) if part is not None]
+    from pellicle.accuracy.surface import SurfaceCost
+
+    details = _surface(cost) if isinstance(cost, SurfaceCost) else _film(cost)
+    end = {"interrupted": cost.interrupted, "versions": versions()}
+    return {"schema": SCHEMA, "recipe": recipe} | details | end
+
+
+def _film(cost: Cost) -> dict[str, Any]:
+    ladder, race, intervals = cost.ladder, cost.race, cost.intervals
+    rungs = _rungs("forward", ladder.rungs)
+    rungs += [] if race is None else _rungs("inverse", race.solvers)
+    rungs += [] if intervals is None else _rungs("interval", intervals.ways)
+    omitted = [part.left_out for part in (ladder, race, intervals) if part is not None]
     return {
-        "schema": SCHEMA,
-        "recipe": recipe,
-        "reference": ladder.reference,
-        "tolerance": ladder.tolerance,
-        "unit": ladder.unit,
+        **_summary(ladder),
         "wavelengths": ladder.wavelengths,
         "draws": ladder.draws,
-        "rungs": [
-            rung | {"error": rung["error"] if math.isfinite(rung["error"]) else None}
-            for rung in [*forward, *inverse, *ways]
-        ],
-        "recommended": ladder.recommended,
-        "within": ladder.within,
+        "rungs": rungs,
         "recommended_solver": None if race is None else race.recommended,
-        "recommended_interval": None if held is None else held.recommended,
+        "recommended_interval": None if intervals is None else intervals.recommended,
         "noise": None if race is None else race.noise,
-        "left_out": {name: why for left_out in absent for name, why in left_out.items()},
+        "left_out": {name: why for left_out in omitted for name, why in left_out.items()},
         "no_fits": cost.no_race or None,
-        "interrupted": cost.interrupted,
-        "versions": versions(),
     }
 
 
-def surface_to_json(cost: SurfaceCost, recipe: str) -> dict[str, Any]:
-    """The record of a surface: rungs of the `kind` "colour" (errors are mean ΔE2000) and "brdf" (relative).
-
-    `reference`, `tolerance`, `unit`, `recommended` and `within` are those of colours where there are any;
-    `brdf` has those of values.
-    """
-    first = cost.values if cost.colours is None else cost.colours
-    kinds = (
-        [("brdf", cost.values)] if cost.colours is None else [("colour", cost.colours), ("brdf", cost.values)]
-    )
+def _surface(cost: SurfaceCost) -> dict[str, Any]:
+    ladders = {"brdf": cost.values} if cost.colours is None else {"colour": cost.colours, "brdf": cost.values}
+    first = next(iter(ladders.values()))
     return {
-        "schema": SCHEMA,
-        "recipe": recipe,
         **_summary(first),
         "draws": first.draws,
-        "rungs": [
-            {"kind": kind, **asdict(rung), "error": rung.error if math.isfinite(rung.error) else None}
-            for kind, ladder in kinds
-            for rung in ladder.rungs
-        ],
+        "rungs": [rung for kind, ladder in ladders.items() for rung in _rungs(kind, ladder.rungs)],
         "brdf": _summary(cost.values),
-        "left_out": {name: why for _, ladder in kinds for name, why in ladder.left_out.items()},
+        "left_out": {name: why for ladder in ladders.values() for name, why in ladder.left_out.items()},
         "no_colours": cost.no_colours or None,
-        "interrupted": cost.interrupted,
-        "versions": versions(),
     }
+
+
+def _rungs(kind: str, items: Iterable[Any]) -> list[dict[str, Any]]:
+    return [
+        {"kind": kind, **asdict(item), "error": item.error if math.isfinite(item.error) else None}
+        for item in items
+    ]
 
 
 def _summary(ladder: Ladder) -> dict[str, Any]:
-    return {
-        "reference": ladder.reference,
-        "tolerance": ladder.tolerance,
-        "unit": ladder.unit,
-        "recommended": ladder.recommended,
-        "within": ladder.within,
-    }
+    names = ("reference", "tolerance", "unit", "recommended", "within")
+    return {name: getattr(ladder, name) for name in names}
 
 
 def to_csv(rungs: list[dict[str, Any]]) -> str:
-    """Every rung of a record as a row; a column that a kind of rung does not have is empty."""
+    """Format the methods of a record as rows; columns that a kind of method lacks are empty."""
     text = StringIO()
     writer = csv.DictWriter(text, COLUMNS, lineterminator="\n", restval="")
     writer.writeheader()
@@ -107,33 +94,20 @@ def to_csv(rungs: list[dict[str, Any]]) -> str:
     return text.getvalue()
 
 
-def write_cost(folder: str | os.PathLike[str], cost: Cost, recipe: str) -> Path:
-    """Write result.json, report.txt, cost.csv and cost.png into a folder, each whole or not at all.
+def write_cost(folder: str | os.PathLike[str], cost: Cost | SurfaceCost, recipe: str = "scene") -> Path:
+    """Write result.json, report.txt, cost.csv and cost.png into a folder, each complete or not at all.
 
-    Raises UsageError where it holds anything that pellicle did not write, or cannot be written.
+    Returns the folder. Raises UsageError where it holds files that pellicle did not write, or cannot be
+    written.
     """
-    from pellicle.reporting.cost import text
-    from pellicle.reporting.cost_figure import figure
+    from pellicle.reporting.cost_figure import draw
+    from pellicle.reporting.cost_text import text
+    from pellicle.reporting.drawing import save_figure
 
-    name = Path(recipe).name
-    record, report = to_json(cost, recipe), text(cost, name)
-    return _written(folder, record, report, partial(figure, cost, name))
-
-
-def write_surface_cost(folder: str | os.PathLike[str], cost: SurfaceCost, recipe: str) -> Path:
-    """The same of a surface."""
-    from pellicle.reporting.cost import surface_text
-    from pellicle.reporting.cost_figure import surface_figure
-
-    name = Path(recipe).name
-    record, report = surface_to_json(cost, recipe), surface_text(cost, name)
-    return _written(folder, record, report, partial(surface_figure, cost, name))
-
-
-def _written(folder: str | os.PathLike[str], record: dict[str, Any], report: str, figure: Any) -> Path:
+    name, record = Path(recipe).name, to_json(cost, recipe)
     target = new_folder(folder)
     write_text(target / MARKER, indented(record), overwrite=True)  # first: it marks the folder
-    write_text(target / "report.txt", report, overwrite=True)
+    write_text(target / "report.txt", text(cost, name), overwrite=True)
     write_text(target / "cost.csv", to_csv(record["rungs"]), overwrite=True)
-    figure(target / "cost.png", overwrite=True)
+    save_figure(draw(cost, name), target / "cost.png", overwrite=True)
     return target

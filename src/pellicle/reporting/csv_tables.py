@@ -1,28 +1,55 @@
-"""Tables of a fit as CSV, with where they come from in comments."""
+"""CSV tables of a fit, with their source in comments."""
 
 from __future__ import annotations
 
+import csv
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.metadata import version
+from io import StringIO
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pellicle.data.tabular.columns import DIRECTIONS
+
 if TYPE_CHECKING:
     from pellicle.fitting.result import Fit, Part
 
+Columns = Mapping[str, Sequence[float] | np.ndarray]
+
 
 def fit_csv(fit: Fit) -> str:
-    """Data, model, residual and σ at each wavelength, with the angle where the data have one.
+    """Format data, model and residuals of a fit as CSV that pellicle can read again.
 
-    Of a joint fit one table of one value a row, with the spectrum's name and the signal.
+    A spectrum has a row for each wavelength and angle, with σ; BRDF samples have one for each pair of
+    directions. In a joint fit each value has its row, with the name of the spectrum and the signal.
     """
     if fit.joint:
         return _joint_csv(fit)
-    curve, data = fit.curve, fit.spectrum
-    if curve.delta_data is not None:
-        return _psi_delta_csv(fit)
+    [part] = fit.parts
+    if fit.layer_test is not None:
+        about, columns = _samples(fit, part)
+    elif part.spectral.delta_data is not None:
+        about, columns = _psi_delta(part)
+    else:
+        about, columns = _spectrum(part)
+    return _csv(about, fit, list(columns), zip(*columns.values(), strict=True))
+
+
+def nk_csv(fit: Fit) -> str:
+    """Format n and k of the layer with their standard errors, each wavelength once.
+
+    pellicle reads the table as a material. Infinite errors are empty cells.
+    """
+    columns = {("wavelength_nm" if name == "wavelength" else name): c for name, c in vars(fit.index).items()}
+    about = ["n and k of the fitted layer, a material that pellicle takes by its path"]
+    return _csv(about, fit, list(columns), zip(*columns.values(), strict=True))
+
+
+def _spectrum(part: Part) -> tuple[list[str], Columns]:
+    curve, data = part.spectral, part.spectrum
+    names = ["wavelength", data.signal if data.calibrated else "intensity", "_", "_", "sigma"]
     columns = {
         "wavelength_nm": curve.wavelength,
         "data": curve.data,
@@ -30,20 +57,18 @@ def fit_csv(fit: Fit) -> str:
         "residual": curve.residual,
         "sigma": curve.sigma,
     }
-    angle = ""
     if data.angle is not None:
-        columns["angle_deg"], angle = data.angle, ",angle"
-    kind = data.signal if data.calibrated else "intensity"
+        columns["angle_deg"] = data.angle
+        names.append("angle")
     about = [
         f"fit of {data.signal}: data, model, residual = data - model, sigma = standard deviation assumed",
-        f"pellicle reads the data again with --columns wavelength,{kind},_,_,sigma{angle}",
+        f"pellicle reads the data again with --columns {','.join(names)}",
     ]
-    return _table(about, fit, columns)
+    return about, columns
 
 
-def _psi_delta_csv(fit: Fit) -> str:
-    """Ψ and Δ of data and model in degrees, in columns that pellicle reads again as they are."""
-    curve, data = fit.curve, fit.spectrum
+def _psi_delta(part: Part) -> tuple[list[str], Columns]:
+    curve, data = part.spectral, part.spectrum
     assert curve.delta_data is not None
     assert curve.delta_model is not None
     columns = {"wavelength_nm": curve.wavelength}
@@ -60,19 +85,29 @@ def _psi_delta_csv(fit: Fit) -> str:
     if data.sigma is not None and data.delta_sigma is not None:
         columns |= {"sigma_psi": data.sigma, "sigma_delta": data.delta_sigma}
     about = ["fit of psi and delta in degrees: data, model, residual = data - model (of delta: -180 to 180)"]
-    return _table(about, fit, columns)
+    return about, columns
+
+
+def _samples(fit: Fit, part: Part) -> tuple[list[str], Columns]:
+    samples = part.samples
+    columns = {name: getattr(samples, name) for name in DIRECTIONS}
+    columns |= dict(zip(samples.channels, samples.values.T, strict=True))
+    columns |= {f"model_{name}": m for name, m in zip(samples.channels, part.curve.model.T, strict=True)}
+    about = [
+        f"BRDF in 1/sr, directions in degrees; model_{samples.channels[0]} and so on: {fit.surface.model} as"
+        " fitted"
+    ]
+    return about, columns
 
 
 def _joint_csv(fit: Fit) -> str:
-    """Every spectrum below the other, a row a value: Ψ and Δ are two."""
-    rows = [row for part in fit.parts for row in _tidy(part)]
     about = ["joint fit: data, model, residual = data - model, sigma = standard deviation assumed"]
     names = ["file", "signal", "wavelength_nm", "angle_deg", "data", "model", "residual", "sigma"]
-    return _written(about, fit, names, rows)
+    return _csv(about, fit, names, (row for part in fit.parts for row in _joint_rows(part)))
 
 
-def _tidy(part: Part) -> list[list[str]]:
-    """Rows of file, signal and numbers."""
+def _joint_rows(part: Part) -> Iterable[tuple[str | float, ...]]:
+    """A row for each value; Ψ and Δ are two."""
     curve, data = part.spectral, part.spectrum
     unknown = np.full(curve.wavelength.size, np.nan)
     angle = unknown if data.angle is None else data.angle
@@ -81,35 +116,25 @@ def _tidy(part: Part) -> list[list[str]]:
     if curve.delta_data is not None and curve.delta_model is not None:
         sigma = unknown if data.delta_sigma is None else data.delta_sigma
         columns["delta"] = (curve.delta_data, curve.delta_model, curve.delta_residual, sigma)
-    name = '"' + part.name.replace('"', '""') + '"' if set(part.name) & set('",\n\r') else part.name
-    return [
-        [name, signal, *map(_cell, row)]
-        for signal, values in columns.items()
-        for row in zip(curve.wavelength, angle, *values, strict=True)
+    for signal, values in columns.items():
+        for row in zip(curve.wavelength, angle, *values, strict=True):
+            yield part.name, signal, *row
+
+
+def _csv(about: Iterable[str], fit: Fit, names: list[str], rows: Iterable[Iterable[str | float]]) -> str:
+    """The table below its comments: what it is, the path (on one line) and hash of each source."""
+    sources = [
+        f"from {' '.join(part.data.path.split()) or 'no file'}, sha256 {part.data.sha256 or 'unknown'}"
+        for part in fit.parts
     ]
-
-
-def nk_csv(fit: Fit) -> str:
-    """The layer's n and k with standard errors (empty where infinite), each wavelength once."""
-    columns = {("wavelength_nm" if name == "wavelength" else name): c for name, c in vars(fit.index).items()}
-    return _table(["n and k of the fitted layer, a material that pellicle takes by its path"], fit, columns)
-
-
-def _table(about: Iterable[str], fit: Fit, columns: Mapping[str, np.ndarray]) -> str:
-    rows = [list(map(_cell, row)) for row in zip(*columns.values(), strict=True)]
-    return _written(about, fit, list(columns), rows)
-
-
-def _written(about: Iterable[str], fit: Fit, names: list[str], rows: list[list[str]]) -> str:
-    data = [part.spectrum for part in fit.parts]
-    sources = [f"from {_plain(s.path) or 'a spectrum'}, sha256 {s.sha256 or 'unknown'}" for s in data]
-    comments = [f"# {line}" for line in (*about, *sources, f"written by pellicle {version('pellicle')}")]
-    return "\n".join([*comments, ",".join(names), *map(",".join, rows)]) + "\n"
-
-
-def _plain(path: str) -> str:
-    """A path on one line, whatever its name holds."""
-    return " ".join(path.split())
+    text = StringIO()
+    for line in (*about, *sources, f"written by pellicle {version('pellicle')}"):
+        text.write(f"# {line}\n")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(names)
+    for row in rows:
+        writer.writerow([cell if isinstance(cell, str) else _cell(cell) for cell in row])
+    return text.getvalue()
 
 
 def _cell(value: float) -> str:

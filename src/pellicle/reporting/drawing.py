@@ -1,4 +1,4 @@
-"""What every figure needs around its panels: a sheet, and a file that appears whole or not at all."""
+"""Figure setup, colours and files, shared by all figures."""
 
 from __future__ import annotations
 
@@ -6,53 +6,58 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from pellicle.errors import UsageError
 from pellicle.files import replacing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-import numpy as np
+FORMATS = (".png", ".pdf", ".svg")
+BLACK, ORANGE, BLUE, GREEN, GREY = "#000000", "#D55E00", "#0072B2", "#009E73", "#777777"
+"""Okabe and Ito's colours, which the colour-blind can distinguish."""
+FITTED = {"color": ORANGE, "linewidth": 1.4}
+GAP = 10
+"""A step this many times the median step is a gap in the data, which no line crosses."""
 
 
-def blank(width: float, height: float, constrained: bool = True) -> Figure:
-    """An empty figure (inches), bound to no window and to no global state."""
+def new_figure(width: float, height: float, constrained: bool = True) -> Figure:
+    """Make an empty figure (inches) without a window or pyplot's global state."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    drawn = Figure(figsize=(width, height), layout="constrained" if constrained else None)
-    FigureCanvasAgg(drawn)
-    return drawn
+    figure = Figure(figsize=(width, height), layout="constrained" if constrained else None)
+    FigureCanvasAgg(figure)
+    return figure
 
 
-def saved(
-    drawn: Figure,
+def save_figure(
+    figure: Figure,
     path: str | os.PathLike[str],
     *,
     overwrite: bool = False,
     dpi: float = 150,
     bbox_inches: str | None = None,
 ) -> Path:
-    """Write a figure into `path` (.png, .pdf or .svg), which is returned.
+    """Write a figure into `path` (.png, .pdf or .svg), complete or not at all, and return the path.
 
-    Raises UsageError where it exists, without `overwrite`, or cannot be written.
+    Raises UsageError where the file exists, without `overwrite`, or cannot be written.
     """
     target = Path(path)
     with replacing(target, overwrite=overwrite) as draft:
-        drawn.savefig(draft, dpi=dpi, bbox_inches=bbox_inches)
+        figure.savefig(draft, dpi=dpi, bbox_inches=bbox_inches)
     return target
 
 
-BLACK, ORANGE, BLUE, GREEN, GREY = "#000000", "#D55E00", "#0072B2", "#009E73", "#777777"
-"""Okabe and Ito's colours, which the colour-blind tell apart."""
-
-
-FITTED = {"color": ORANGE, "linewidth": 1.4}
-
-
-GAP = 10
-"""A step this many times the usual one is a gap in the data, which no line crosses."""
+def figure_path(path: str | os.PathLike[str]) -> Path:
+    """The path of a figure that is to be written. Raises UsageError for another file type."""
+    target = Path(path)
+    if target.suffix.lower() not in FORMATS:
+        raise UsageError(f"`path` {target}: expected a name ending in {', '.join(FORMATS)}")
+    return target
 
 
 def marker_size(points: int) -> float:
-    """The size (points) of a marker that leaves room between as many of them."""
+    """Size of a marker in points that leaves room between this many of them."""
     return float(np.clip(900 / max(points, 1), 1.5, 4.0))

@@ -1,34 +1,30 @@
-"""The figure of a fit: data and model, residuals, the misfit against thickness, n and k."""
+"""Figure of a fit: data and model, residuals, misfit against thickness, n and k."""
 
 from __future__ import annotations
 
-import os
 import textwrap
 from collections.abc import Callable
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from pellicle.fitting.result import Fit, Profile
 from pellicle.fitting.status import RIVAL
-from pellicle.reporting import psi_delta
-from pellicle.reporting.drawing import BLACK, BLUE, FITTED, GAP, GREY, ORANGE, blank, marker_size, saved
+from pellicle.reporting import brdf_figure, psi_delta
+from pellicle.reporting.drawing import BLACK, BLUE, FITTED, GAP, GREY, ORANGE, marker_size, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-DPI = 150
+    from pellicle.fitting.result import Fit, Part, Profile
+
 WIDTH_INCHES = 8.0
 MOST_LABELS = 6
 ROOM_FOR_LABEL = 0.025
 """Least distance between two labels, as a share of the axis."""
 HOPELESS = 1e7
 """Δχ² from which nothing is worth showing: the search caps it above."""
-
-Panel = tuple[Callable[["Axes", Fit], None], float]
-"""What draws a panel, and its height in inches."""
 
 _LABEL: dict[str, Any] = {
     "rotation": 90,
@@ -42,93 +38,84 @@ _LABEL: dict[str, Any] = {
 _SIGNALS = {"R": "reflectance", "T": "transmittance"}
 
 
-def figure(fit: Fit, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
-    """Draw a fit into `path` (.png, .pdf or .svg), which is returned.
+class _Panel(NamedTuple):
+    """One panel: what draws it, its height in inches, and the spectrum whose axis it shares."""
 
-    The file appears complete or not at all. Raises UsageError where it exists, without `overwrite`,
-    or cannot be written.
-    """
-    return saved(draw(fit), path, overwrite=overwrite, dpi=DPI)
+    draw: Callable[[Axes], None]
+    height: float
+    part: Part | None = None
 
 
 def draw(fit: Fit) -> Figure:
-    """The figure itself, bound to no window and to no global state."""
-    panels: list[tuple[Callable[[Axes, Fit], None], float, Fit]] = []
-    for part in fit.parts:
-        alone = fit.alone(part)
-        panels += [(panel, height, alone) for panel, height in _signal(alone)]
-    of_data = len(panels)
+    """Draw a fit, with panels of its data for each spectrum or set of BRDF samples."""
+    if fit.layer_test is not None:
+        return brdf_figure.draw(fit)
+    panels = [panel for part in fit.parts for panel in _panels_of_data(part)]
     if fit.profile is not None and fit.profile.thickness.size > 1:
-        panels.append((_misfit, 1.9, fit))
+        panels.append(_Panel(partial(_misfit, fit=fit), 1.9))
     if _index_is_free(fit):
-        panels.append((_index, 1.5, fit))
-    heights = [height for _, height, _ in panels]
-    drawn = blank(WIDTH_INCHES, sum(heights) + 1.2)
-    axes = drawn.subplots(len(panels), 1, squeeze=False, height_ratios=heights)[:, 0]
-    for above, below, one, other in zip(axes, axes[1:of_data], panels, panels[1:of_data], strict=False):
-        if one[2] is other[2]:
-            below.sharex(above)
-    for (panel, _, shown), at in zip(panels, axes, strict=True):
-        panel(at, shown)
-    _name_parts(fit, list(axes[:of_data]), [shown for _, _, shown in panels[:of_data]])
-    drawn.suptitle(_title(fit), fontsize="medium", x=0.01, ha="left")
-    return drawn
-
-
-def _signal(fit: Fit) -> list[Panel]:
-    """The panels that share the axis of the data."""
-    if fit.curve.delta_data is None:
-        return [(_data, 3.0), (_residuals, 1.3)]
-    return [(psi_delta.psi, 2.2), (psi_delta.delta, 2.2), (psi_delta.residuals, 1.5)]
-
-
-def _name_parts(fit: Fit, axes: list[Axes], shown: list[Fit]) -> None:
-    """The name of each of several spectra over its first panel."""
-    if len(fit.parts) == 1:
-        return
+        panels.append(_Panel(partial(_index, fit=fit), 1.5))
+    heights = [panel.height for panel in panels]
+    figure = new_figure(WIDTH_INCHES, sum(heights) + 1.2)
+    rows = figure.subplots(len(panels), 1, squeeze=False, height_ratios=heights)[:, 0]
     for part in fit.parts:
-        first = next(at for at, of in zip(axes, shown, strict=True) if of.parts[0] is part)
-        first.set_title(part.name.replace("$", r"\$"), fontsize="small", loc="left")
+        first, *rest = [axes for axes, panel in zip(rows, panels, strict=True) if panel.part is part]
+        for axes in rest:
+            axes.sharex(first)
+        if len(fit.parts) > 1:
+            first.set_title(part.name.replace("$", r"\$"), fontsize="small", loc="left")
+    for panel, axes in zip(panels, rows, strict=True):
+        panel.draw(axes)
+    figure.suptitle(_title(fit), fontsize="medium", x=0.01, ha="left")
+    return figure
+
+
+def _panels_of_data(part: Part) -> list[_Panel]:
+    if part.spectral.delta_data is None:
+        rows = ((_data, 3.0), (_residuals, 1.3))
+    else:
+        rows = ((psi_delta.psi, 2.2), (psi_delta.delta, 2.2), (psi_delta.residuals, 1.5))
+    return [_Panel(partial(panel, part=part), height, part) for panel, height in rows]
 
 
 def _title(fit: Fit) -> str:
-    name = " and ".join(part.spectrum.path.replace("\\", "/").rsplit("/", 1)[-1] for part in fit.parts)
+    name = " and ".join(part.data.path.replace("\\", "/").rsplit("/", 1)[-1] for part in fit.parts)
     verdict = textwrap.wrap(fit.verdict.replace(" ± ", "\u00a0±\u00a0"), 108, break_on_hyphens=False)
     text = "\n".join([f"{textwrap.shorten(name, 70) or 'spectrum'}: {fit.status}", *verdict])
     return text.replace("$", r"\$")  # no mathematics in a file's name
 
 
-def _series(fit: Fit) -> list[np.ndarray]:
-    """The points that one line joins: of one angle of incidence, without a wide gap."""
-    nm, angle = fit.curve.wavelength, fit.spectrum.angle
-    parts = []
+def _series(part: Part) -> list[np.ndarray]:
+    """Indices of the points that one line joins: of one angle of incidence, without a wide gap."""
+    nm, angle = part.spectral.wavelength, part.spectrum.angle
+    series = []
     for value in [None] if angle is None else np.unique(angle):
         points = np.arange(nm.size) if value is None else np.flatnonzero(angle == value)
         steps = np.diff(nm[points])
         gaps = np.flatnonzero(steps > GAP * np.median(steps)) if steps.size else []
-        parts += np.split(points, np.asarray(gaps, dtype=int) + 1)
-    return parts
+        series += np.split(points, np.asarray(gaps, dtype=int) + 1)
+    return series
 
 
-def _data(axes: Axes, fit: Fit) -> None:
-    curve = fit.curve
+def _data(axes: Axes, part: Part) -> None:
+    curve, data = part.spectral, part.spectrum
     size = marker_size(curve.wavelength.size)
     axes.plot(curve.wavelength, curve.data, ".", color=GREY, markersize=size, label="data")
-    for i, part in enumerate(_series(fit)):
-        axes.plot(curve.wavelength[part], curve.model[part], **FITTED, label="_" if i else "fit")
-    kind = _SIGNALS.get(fit.spectrum.signal) or str(fit.spectrum.signal)
-    axes.set_ylabel(kind if fit.spectrum.calibrated else f"{kind} × unknown scale")
+    for i, line in enumerate(_series(part)):
+        axes.plot(curve.wavelength[line], curve.model[line], **FITTED, label="_" if i else "fit")
+    kind = _SIGNALS.get(data.signal) or str(data.signal)
+    axes.set_ylabel(kind if data.calibrated else f"{kind} × unknown scale")
     axes.tick_params(labelbottom=False)
     axes.legend(frameon=False, markerscale=3)
     axes.margins(x=0.01)
 
 
-def _residuals(axes: Axes, fit: Fit) -> None:
-    curve = fit.curve
-    for i, part in enumerate(_series(fit)):
-        nm, sigma = curve.wavelength[part], curve.sigma[part]
+def _residuals(axes: Axes, part: Part) -> None:
+    curve = part.spectral
+    for i, line in enumerate(_series(part)):
+        nm, sigma = curve.wavelength[line], curve.sigma[line]
         axes.fill_between(nm, -sigma, sigma, color=BLUE, alpha=0.2, lw=0, label="_" if i else "±σ")
-        axes.plot(nm, curve.residual[part], color=BLACK, linewidth=0.8)
+        axes.plot(nm, curve.residual[line], color=BLACK, linewidth=0.8)
     axes.axhline(0, color=GREY, linewidth=0.6)
     axes.set(xlabel="wavelength (nm)", ylabel="data − fit")
     axes.legend(loc="upper right", edgecolor="none")
@@ -155,7 +142,7 @@ def _misfit(axes: Axes, fit: Fit) -> None:
 
 
 def _minima(fit: Fit) -> list[tuple[float, float]]:
-    """(thickness, Δχ²) of the best fit and its rivals, best first."""
+    """(thickness, Δχ²) of the best fit and its rivals, the best first."""
     name = next((p.name for p in fit.free if p.name.split(".")[-1] == "thickness"), None)
     if name is None:
         return []
@@ -164,7 +151,7 @@ def _minima(fit: Fit) -> list[tuple[float, float]]:
 
 
 def _completed(profile: Profile, minima: list[tuple[float, float]]) -> tuple[np.ndarray, np.ndarray]:
-    """The scan with the minima that lie below it: its grid seldom meets the bottom of a valley."""
+    """The scan with the minima added that lie below it: its grid seldom includes the very minimum."""
     thickness, misfit = profile.thickness, np.maximum(profile.delta_chi2, 0.0)
     below = [(t, delta) for t, delta in minima if delta < np.interp(t, thickness, misfit)]
     thickness = np.concatenate([thickness, [t for t, _ in below]])
@@ -173,14 +160,14 @@ def _completed(profile: Profile, minima: list[tuple[float, float]]) -> tuple[np.
 
 
 def _span(thickness: np.ndarray, misfit: np.ndarray) -> tuple[float, float]:
-    """The thicknesses worth showing: all but hopeless ends."""
+    """Range of thickness to show: ends whose misfit is hopeless are cut."""
     shown = thickness[misfit < HOPELESS] if np.any(misfit < HOPELESS) else thickness
     margin = 0.03 * float(np.ptp(shown)) or 1.0
     return float(shown.min()) - margin, float(shown.max()) + margin
 
 
 def _labelled(minima: list[tuple[float, float]], room: float) -> list[tuple[float, float]]:
-    """The best minima, as many as leave room for each other's labels."""
+    """The best minima whose labels do not overlap."""
     chosen: list[tuple[float, float]] = []
     for minimum in minima:
         if len(chosen) < MOST_LABELS and all(abs(minimum[0] - other[0]) > room for other in chosen):
@@ -189,7 +176,7 @@ def _labelled(minima: list[tuple[float, float]], room: float) -> list[tuple[floa
 
 
 def _scale(axes: Axes, misfit: np.ndarray, minima: list[tuple[float, float]]) -> None:
-    """A logarithmic axis from the threshold up, linear below, with room for labels over the markers."""
+    """Set a logarithmic axis above the threshold and a linear one below, with room for labels."""
     hopeful = misfit[misfit < HOPELESS]
     heights = [float(np.percentile(hopeful, 95)) if hopeful.size else 0.0, *(delta for _, delta in minima)]
     top = max(10 * RIVAL, *heights)
@@ -197,13 +184,10 @@ def _scale(axes: Axes, misfit: np.ndarray, minima: list[tuple[float, float]]) ->
     decades = int(np.log10(ceiling))
     powers = range(1, decades + 1, 1 + decades // 5)
     axes.set_yscale("symlog", linthresh=RIVAL, linscale=0.8)
-    axes.set_yticks([0, *(10.0**i for i in powers)], ["0", *(_power(i) for i in powers)])
+    labels = [str(10**i) if i < 4 else f"$10^{{{i}}}$" for i in powers]
+    axes.set_yticks([0, *(10.0**i for i in powers)], ["0", *labels])
     axes.set_yticks([], minor=True)
     axes.set_ylim(-2, ceiling)
-
-
-def _power(exponent: int) -> str:
-    return str(10**exponent) if exponent < 4 else f"$10^{{{exponent}}}$"
 
 
 def _index_is_free(fit: Fit) -> bool:
@@ -212,7 +196,7 @@ def _index_is_free(fit: Fit) -> bool:
 
 
 def _index(axes: Axes, fit: Fit) -> None:
-    """n on the left; k, if there is any, on the right and below n, so that their bands stay apart."""
+    """n on the left axis; k, if there is any, on the right axis and below n, so that they do not overlap."""
     curve = fit.index
     _band(axes, curve.wavelength, curve.n, curve.n_stderr, BLUE, "-")
     axes.set(xlabel="wavelength (nm)")
@@ -228,13 +212,13 @@ def _index(axes: Axes, fit: Fit) -> None:
 
 
 def _stretch(axes: Axes, below: float = 0.0, above: float = 0.0) -> None:
-    """Add empty room, as a share of what is shown."""
+    """Extend the y axis by shares of its range."""
     low, high = axes.get_ylim()
     axes.set_ylim(low - below * (high - low), high + above * (high - low))
 
 
 def _band(axes: Axes, nm: np.ndarray, value: np.ndarray, stderr: np.ndarray, color: str, style: str) -> None:
-    """A line and ± its standard error; fill_between leaves out what is not finite."""
+    """Draw a line and the band of ± its standard error, where that is finite."""
     order = np.argsort(nm, kind="stable")
     nm, value, stderr = nm[order], value[order], stderr[order]
     axes.fill_between(nm, value - stderr, value + stderr, color=color, alpha=0.25, lw=0)

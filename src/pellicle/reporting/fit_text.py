@@ -1,25 +1,20 @@
-"""The report of a fit as plain text: the verdict first, then the numbers it rests on."""
+"""Report of a fit as plain text: the verdict first, then the numbers behind it."""
 
 from __future__ import annotations
 
-import math
-import re
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pellicle.fitting.result import Estimate, Fit, Part, Rival, Status
-from pellicle.fitting.status import RIVAL, describe
-from pellicle.reporting.plain_text import COLUMNS, INDENT, block, facts, table, wrapped
+from pellicle.fitting.result import Curve, Status
+from pellicle.fitting.status import RIVAL
+from pellicle.reporting import parameter_text
+from pellicle.reporting.parameter_text import LEAST_CORRELATION
+from pellicle.reporting.plain_text import COLUMNS, INDENT, block, facts, wrapped
 
 if TYPE_CHECKING:
-    from pellicle.effects.plan import Plan
-    from pellicle.fitting.result import Fit
-
-LEAST_CORRELATION = 0.5
-MOST_CORRELATIONS = 10
-MOST_RIVALS = 6
-SUMMARY_PARAMETERS = 3
+    from pellicle.fitting.result import Fit, Part
+    from pellicle.sampling.result import Posterior
 
 ADVICE = {
     Status.FAILED: "There is no result: the error says what to change.",
@@ -30,197 +25,132 @@ ADVICE = {
     Status.AT_BOUND: "Widen that bound, or give it the value that is known.",
     Status.CONVERGED: "Use the numbers within their errors.",
 }
-"""What to do next, for every status."""
-
-CORRELATIONS = f"Correlations above {LEAST_CORRELATION:g}"
-RIVALS = f"Rivals: other minima and how much worse they fit (Δχ² below {RIVAL:g}: about as well)"
-PLAN, WARNINGS = "Plan: what was simulated", "Warnings"
+"""The next step, for every status."""
 
 _SIGMA = {
     "given": "sigma {}, as given",
     "residuals": "sigma {}, estimated from the residuals: none was given",
-    "model": "sigma {}, the error that a drifting lamp is allowed: none was given",
+    "model": "sigma {}, the error allowed for a drifting lamp: none was given",
 }
-"""Where the noise comes from that errors rest on."""
+"""The noise and its source, by a part's `sigma_from`."""
 
-_NUISANCE = re.compile(r"instrument\.(scale|offset)(_\d+)?(\..+)?")
+_RESIDUALS = {
+    "linear": "ρ",
+    "cosine": "ρ cos θ_i",
+    "log": "log(1 + ρ cos θ_i)",
+    "cube-root": "the cube root of ρ",
+}
+"""The quantity whose residuals a BRDF fit minimises."""
 
 
-def report(fit: Fit) -> str:
-    """Everything a fit found, as text of at most 100 columns without colour codes."""
+def report(fit: Fit, posterior: Posterior | None = None) -> str:
+    """Format a fit, and its posterior if there is one, as text of at most 100 columns."""
     blocks = [
         ("Verdict", _verdict(fit)),
+        ("With and without a layer", _layer_test(fit)),
         ("Fit statistics", _statistics(fit)),
-        ("Parameters", parameters(fit)),
-        (CORRELATIONS, correlations(fit)),
-        (RIVALS, rivals(fit)),
-        (PLAN, [line for part in fit.parts for line in plan(part.plan, part.name)]),
-        (WARNINGS, warnings(fit)),
+        ("Parameters", parameter_text.parameters(fit)),
+        (f"Correlations above {LEAST_CORRELATION:g}", parameter_text.correlations(fit)),
+        (
+            f"Rivals: other minima and how much worse they fit (Δχ² below {RIVAL:g}: about as well)",
+            parameter_text.rivals(fit),
+        ),
+        ("Plan: what was simulated", [line for part in fit.parts for line in _plan(part)]),
+        ("Warnings", [line for text in fit.warnings for line in wrapped(text, "- ", "  ")]),
     ]
-    return "".join(block(title, lines) for title, lines in blocks if lines)
+    text = "".join(block(title, lines) for title, lines in blocks if lines)
+    if posterior is None:
+        return text
+    from pellicle.reporting.posterior import posterior_report
 
-
-def summary_line(fit: Fit) -> str:
-    """One line for one of several files: name, status, the leading parameters and the rms."""
-    leading = [p for p in fit.free if not _NUISANCE.fullmatch(p.name)] or list(fit.free)
-    told = [_value(p, named=True) for p in leading[:SUMMARY_PARAMETERS]]
-    more = ["..."] if len(leading) > SUMMARY_PARAMETERS else []
-    names = (part.spectrum.path.replace("\\", "/").rsplit("/", 1)[-1] or "spectrum" for part in fit.parts)
-    rms = [] if fit.rms is None else [f"rms {fit.rms:.3g}{_degrees(fit.parts[0])}"]
-    return f"{' and '.join(names)}: {fit.status}, {', '.join([*told, *more, *rms])}"
+    return text + posterior_report(posterior)
 
 
 def _verdict(fit: Fit) -> list[str]:
-    status = f"{fit.status}. {ADVICE[fit.status]}"
-    files = [row for part in fit.parts for row in _file(part)]
-    return [*wrapped(fit.verdict), *facts([("status", status), *files])]
+    rows = [("status", f"{fit.status}. {ADVICE[fit.status]}")]
+    for part in fit.parts:
+        path = part.data.path
+        room = COLUMNS - 2 * len(INDENT) - len("status")
+        short = path if len(path) <= room else "…" + path[1 - room :]
+        rows += [("file", short)] if path else []
+        rows.append((part.name or "data", _samples(part) if fit.layer_test else _spectrum(part)))
+    if fit.layer_test:
+        rows.append(("model", fit.surface.model))
+    return [*wrapped(fit.verdict), *facts(rows)]
 
 
-def _file(part: Part) -> list[tuple[str, str]]:
-    """What was measured, and where it lies."""
+def _spectrum(part: Part) -> str:
+    """`R, 41 points from 400 to 800 nm`."""
     data, nm = part.spectrum, part.spectral.wavelength
-    points = f"{data.signal}, {nm.size} points"
+    text = f"{data.signal}, {nm.size} points"
     if nm.size:
-        points += _span(nm, "nm")
-    if data.signal == "psi-delta" and data.angle is not None and nm.size:
-        points += "," + _span(data.angle, "degrees")
-    if part.effective_points < 0.95 * nm.size:
-        points += f", worth {part.effective_points:.3g} independent ones"
-    file = [("file", _shortened(data.path))] if data.path else []
-    return [*file, (part.name or "data", points)]
+        text += _range(nm, "nm")
+        if data.signal == "psi-delta" and data.angle is not None:
+            text += "," + _range(data.angle, "degrees")
+    return text + _independent(part, nm.size, "")
 
 
-def _span(values: np.ndarray, unit: str) -> str:
+def _samples(part: Part) -> str:
+    """`200 samples of R, G, B`."""
+    samples = part.samples
+    size = samples.values.size
+    return f"{len(samples)} samples of {', '.join(samples.channels)}" + _independent(
+        part, size, f", {size} values"
+    )
+
+
+def _independent(part: Part, size: int, values: str) -> str:
+    """The number of independent points, where it is clearly below that of the points."""
+    worth = part.effective_points
+    return f"{values}, worth {worth:.3g} independent ones" if worth < 0.95 * size else ""
+
+
+def _range(values: np.ndarray, unit: str) -> str:
     lo, hi = values.min(), values.max()
     return f" from {lo:g} to {hi:g} {unit}" if lo < hi else f" at {lo:g} {unit}"
 
 
-def _degrees(part: Part) -> str:
-    """The unit of what is measured, where it has one."""
-    return " degrees" if part.spectrum.signal == "psi-delta" else ""
-
-
-def _shortened(path: str) -> str:
-    """The end of a long path, with an ellipsis for what is left out."""
-    room = COLUMNS - 2 * len(INDENT) - len("status")
-    return path if len(path) <= room else "…" + path[1 - room :]
+def _layer_test(fit: Fit) -> list[str]:
+    """Errors on held-out BRDF samples: of the surface, and of models without a layer."""
+    test = fit.layer_test
+    if test is None:
+        return []
+    errors = [(b.name, f"{b.held_out:.4g}") for b in test.baselines]
+    head = ("held-out error", "of a fit to four fifths of the samples")
+    return facts([head, ("this surface", f"{test.held_out:.4g}"), *errors])
 
 
 def _statistics(fit: Fit) -> list[str]:
-    return facts(
-        [
-            *(row for part in fit.parts for row in _rms(part)),
-            ("reduced chi-square", f"{fit.chi2_reduced:.4g}"),
-            ("seconds", f"{fit.seconds:.2f}"),
-        ]
-    )
+    rows = []
+    if fit.layer_test:
+        over = "" if fit.parts[0].data.sigma is None else " over sigma"
+        rows.append(("compared", _RESIDUALS[fit.layer_test.residual] + over))
+    for part in fit.parts:
+        rows += _residuals(part)
+    chi2 = ("reduced chi-square", f"{fit.chi2_reduced:.4g}")
+    return facts([*rows, chi2, ("seconds", f"{fit.seconds:.2f}")])
 
 
-def _rms(part: Part) -> list[tuple[str, str]]:
-    """How far the model is from one spectrum; of several also the reduced χ², as each has its noise."""
-    rows = [("rms residual", f"{part.rms:.4g}{_degrees(part)}")]
-    rows.append(("noise", _SIGMA[part.sigma_from].format(f"{part.sigma:.2g}{_degrees(part)}")))
+def _residuals(part: Part) -> list[tuple[str, str]]:
+    """Rms and noise of one part; in a joint fit also its reduced χ², as each has its own noise."""
+    curve = part.curve
+    unit = " degrees" if isinstance(curve, Curve) and curve.delta_data is not None else ""
+    if not isinstance(curve, Curve) and part.sigma_from == "given":
+        sigma = f"{part.sigma:.2g} 1/sr in the median"
+    else:
+        sigma = f"{part.sigma:.2g}{unit}"
+    rms, noise = f"{part.rms:.4g}{unit}", _SIGMA[part.sigma_from].format(sigma)
+    of = f" of {part.name}" if part.name else ""
     if part.name:
-        chi2 = f"reduced chi-square {part.chi2_reduced:.4g}"
-        (label, rms), (noise, sigma) = rows
-        rows = [(f"{label} of {part.name}", f"{rms}, {chi2}"), (f"{noise} of {part.name}", sigma)]
-    if part.spectral.delta_data is not None:
-        psi, delta = (np.sqrt(np.mean(r**2)) for r in (part.spectral.residual, part.spectral.delta_residual))
+        rms += f", reduced chi-square {part.chi2_reduced:.4g}"
+    rows = [(f"rms residual{of}", rms), (f"noise{of}", noise)]
+    if isinstance(curve, Curve) and curve.delta_data is not None:
+        psi, delta = (np.sqrt(np.mean(r**2)) for r in (curve.residual, curve.delta_residual))
         rows.append(("of psi and of delta", f"{psi:.4g} and {delta:.4g} degrees"))
     return rows
 
 
-def parameters(fit: Fit) -> list[str]:
-    """A line for each, in columns: name, value ± error or limit, unit and bounds."""
-    width = max((len(name) for name in fit.parameters), default=0) + 1
-    rows = [(f"{p.name + ':':<{width}}", _value(p) if p.free else _fixed(p), _bounds(p)) for p in _all(fit)]
-    middle = max((len(value) for _, value, bounds in rows if bounds), default=0)
-    return [f"{INDENT}{name}  {value:<{middle}}  {bounds}".rstrip() for name, value, bounds in rows]
-
-
-def _all(fit: Fit) -> list[Estimate]:
-    """Free parameters before fixed ones, each in the fit's own order."""
-    return sorted(fit.parameters.values(), key=lambda p: not p.free)
-
-
-def _unit(p: Estimate) -> str:
-    return f" {p.unit}" if p.unit else ""
-
-
-def _fixed(p: Estimate) -> str:
-    return f"{p.value:.6g}{_unit(p)} (fixed)"
-
-
-def _value(p: Estimate, named: bool = False) -> str:
-    """`751.66 ± 0.12 nm (0.016 %)`, or what is known where there is no error; `named` is shorter."""
-    name = f"{p.name} " if named else ""
-    if not math.isfinite(p.stderr):
-        limits = "".join(f", {limit}" for limit in _limits(p))
-        return f"{name}not determined (best {p.value:.6g}{_unit(p)}{limits})"
-    text = describe(p).removeprefix("" if named else f"{p.name} ")
-    if named:
-        return text
-    relative = 100 * p.stderr / abs(p.value) if p.value else math.inf
-    share = [f"{relative:.2g} %"] if relative < 100 else []
-    notes = ", ".join([*share, *_limits(p)])
-    return f"{text} ({notes})" if notes else text
-
-
-def _limits(p: Estimate) -> list[str]:
-    sides = (("at least", p.lower_limit), ("at most", p.upper_limit))
-    return [f"{side} {limit:.4g}{_unit(p)} at 95 %" for side, limit in sides if limit is not None]
-
-
-def _bounds(p: Estimate) -> str:
-    if not p.free or not (math.isfinite(p.lower) and math.isfinite(p.upper)):
-        return ""
-    side = "lower" if p.value - p.lower <= p.upper - p.value else "upper"
-    return f"[{p.lower:g}, {p.upper:g}]" + (f"  AT ITS {side.upper()} BOUND" if p.at_bound else "")
-
-
-def correlations(fit: Fit) -> list[str]:
-    """The largest ones.
-
-    The coefficients of the scale's and the offset's polynomials are left out among themselves: they
-    follow from the basis that was chosen, and say nothing of the layer. the JSON has them all.
-    """
-    names, matrix = fit.correlation_names, fit.correlation
-    pairs = [
-        (float(matrix[i, j]), names[i], names[j])
-        for j in range(len(names))
-        for i in range(j)
-        if abs(matrix[i, j]) > LEAST_CORRELATION
-        and not (_NUISANCE.fullmatch(names[i]) and _NUISANCE.fullmatch(names[j]))
-    ]
-    pairs.sort(key=lambda pair: -abs(pair[0]))
-    shown = pairs[:MOST_CORRELATIONS]
-    lines = table([(f"C({one}, {other})", f"{value:+.3f}") for value, one, other in shown])
-    return lines + _left_out(len(pairs) - len(shown))
-
-
-def rivals(fit: Fit) -> list[str]:
-    """Other minima, the nearest first."""
-    shown = sorted(fit.rivals, key=lambda rival: rival.delta_chi2)[:MOST_RIVALS]
-    rows = [(f"Δχ² {rival.delta_chi2:.3g}", *_of_rival(fit, rival)) for rival in shown]
-    return table(rows) + _left_out(len(fit.rivals) - len(shown))
-
-
-def _of_rival(fit: Fit, rival: Rival) -> list[str]:
-    """The rival's parameters, the thickness first as in the table of parameters."""
-    names = [name for name in fit.parameters if name in rival.parameters]
-    return [f"{name} {rival.parameters[name]:.5g}{_unit(fit.parameters[name])}" for name in names]
-
-
-def _left_out(count: int) -> list[str]:
-    return [f"{INDENT}... and {count} more in the JSON"] if count > 0 else []
-
-
-def plan(made: Plan, name: str = "") -> list[str]:
-    """Every effect, on or off, and why; under the name of the spectrum where it is one of several."""
-    rows = facts((f"{row.effect:<13} {'on' if row.on else 'off':<3}", row.why) for row in made.rows)
-    return [*(wrapped(f"{name}:") if name else []), *rows]
-
-
-def warnings(fit: Fit) -> list[str]:
-    """Each as an item of a list, wrapped."""
-    return [line for warning in fit.warnings for line in wrapped(warning, "- ", "  ")]
+def _plan(part: Part) -> list[str]:
+    """Every effect, on or off, and why; under the name of the spectrum in a joint fit."""
+    rows = facts((f"{row.effect:<13} {'on' if row.on else 'off':<3}", row.why) for row in part.plan.rows)
+    return [*(wrapped(f"{part.name}:") if part.name else []), *rows]

@@ -1,4 +1,4 @@
-"""A fit as a record of one JSON schema, strict: what is infinite or undefined is null."""
+"""JSON record of a fit and its posterior: one strict schema, null for infinite and undefined numbers."""
 
 from __future__ import annotations
 
@@ -8,46 +8,31 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from pellicle.effects.plan import Plan
-    from pellicle.fitting.result import Estimate, Fit, LayerTest, Part
+    from pellicle.effects.plan import Row
+    from pellicle.fitting.result import Estimate, Fit, Part
+    from pellicle.sampling.result import Marginal, Posterior
 
 SCHEMA = "pellicle.fit/1"
 
 _PACKAGES = ("jax", "optimistix", "numpy")
 
 
-def to_json(fit: Fit) -> dict[str, Any]:
-    """A fit as plain dictionaries of the schema; what is infinite or undefined is None."""
-    plan = [row for part in fit.parts for row in _plan(part.plan, part.name)]
-    noise = [{"sigma": number(part.sigma), "source": part.sigma_from} for part in fit.parts]
-    return _record(fit, _data(fit), plan) | {"noise": noise if fit.joint else noise[0]}
+def to_json(fit: Fit, posterior: Posterior | None = None) -> dict[str, Any]:
+    """Convert a fit, and its posterior if there is one, to dictionaries of the schema.
 
-
-def brdf_to_json(fit: Fit) -> dict[str, Any]:
-    """The same of a fit to samples of a BRDF, with what it was judged against."""
-    data = {"path": fit.samples.path, "sha256": fit.samples.sha256, "signal": "brdf"}
-    part, test = fit.parts[0], cast("LayerTest", fit.layer_test)
-    judged = {
-        "model": fit.surface.model,
-        "residual": test.residual,
-        "layered": test.layered,
-        "held_out": number(test.held_out),
-        "baselines": [{"name": b.name, "held_out": number(b.held_out)} for b in test.baselines],
-        "noise": {"sigma": number(part.sigma), "source": part.sigma_from},
-    }
-    return _record(fit, {**data, "points": int(fit.samples.values.size)}, _plan(fit.plan)) | judged
-
-
-def _record(fit: Fit, data: Any, plan: list[dict[str, Any]]) -> dict[str, Any]:
+    Infinite and undefined numbers are None. A joint fit has a list as `data` and `noise`; a fit of BRDF
+    samples has the layer test.
+    """
     matrix = np.asarray(fit.correlation, dtype=float)
-    return {
+    noise = [{"sigma": number(part.sigma), "source": part.sigma_from} for part in fit.parts]
+    record = {
         "schema": SCHEMA,
-        "data": data,
+        "data": [_joint_part(part) for part in fit.parts] if fit.joint else _data(fit.parts[0]),
         "status": str(fit.status),
         "verdict": fit.verdict,
         "parameters": {name: _parameter(p) for name, p in fit.parameters.items()},
@@ -65,55 +50,97 @@ def _record(fit: Fit, data: Any, plan: list[dict[str, Any]]) -> dict[str, Any]:
             "names": list(fit.correlation_names),
             "matrix": [[number(value) for value in row] for row in matrix],
         },
-        "plan": plan,
+        "plan": [_effect(row, part.name) for part in fit.parts for row in part.plan.rows],
         "warnings": list(fit.warnings),
         "versions": versions(),
         "seconds": number(fit.seconds),
+        "noise": noise if fit.joint else noise[0],
+        **_layer_test(fit),
+    }
+    return record if posterior is None else record | {"posterior": posterior_to_json(posterior)}
+
+
+def _data(part: Part) -> dict[str, Any]:
+    data = part.data
+    return {
+        "path": data.path,
+        "sha256": data.sha256,
+        "signal": getattr(data, "signal", "brdf"),
+        "points": int(part.curve.model.size),
     }
 
 
-def _data(fit: Fit) -> dict[str, Any] | list[dict[str, Any]]:
-    """What was fitted: a list where the fit is a joint one."""
-    return [_part(part) for part in fit.parts] if fit.joint else _source(fit.parts[0])
-
-
-def _source(part: Part) -> dict[str, Any]:
-    data = part.spectrum
-    points = int(part.spectral.wavelength.size)
-    return {"path": data.path, "sha256": data.sha256, "signal": data.signal, "points": points}
-
-
-def _part(part: Part) -> dict[str, Any]:
-    """One spectrum of a joint fit: its name, that its own parameters end in, and how it is explained."""
+def _joint_part(part: Part) -> dict[str, Any]:
+    """One spectrum of a joint fit: its name, which its own parameters end in, and its fit quality."""
     return {
         "name": part.name,
-        **_source(part),
+        **_data(part),
         "rms": number(part.rms),
         "chi2_reduced": number(part.chi2_reduced),
         "effective_points": number(part.effective_points),
     }
 
 
-def _plan(plan: Plan, name: str = "") -> list[dict[str, Any]]:
-    """The plan's rows, with the name of the spectrum where it is one of several."""
-    return [
-        {
-            **({"name": name} if name else {}),
-            "effect": row.effect,
-            "on": bool(row.on),
-            "why": row.why,
-            "error_bound": number(row.error_bound),
-        }
-        for row in plan.rows
-    ]
+def _effect(row: Row, name: str) -> dict[str, Any]:
+    """A row of a plan, with the name of the spectrum in a joint fit."""
+    return {
+        **({"name": name} if name else {}),
+        "effect": row.effect,
+        "on": bool(row.on),
+        "why": row.why,
+        "error_bound": number(row.error_bound),
+    }
+
+
+def _layer_test(fit: Fit) -> dict[str, Any]:
+    """The surface's model and its errors on held-out BRDF samples beside those of the baselines."""
+    test = fit.layer_test
+    if test is None:
+        return {}
+    return {
+        "model": fit.surface.model,
+        "residual": test.residual,
+        "layered": test.layered,
+        "held_out": number(test.held_out),
+        "baselines": [{"name": b.name, "held_out": number(b.held_out)} for b in test.baselines],
+    }
+
+
+def posterior_to_json(posterior: Posterior) -> dict[str, Any]:
+    """Convert a posterior to dictionaries; the parameters have no numbers where the chain is not trusted."""
+    checks, trusted = posterior.checks, posterior.parameters
+    return {
+        "parameters": {name: _marginal(trusted.get(name)) for name in posterior.marginals()},
+        "checks": {
+            "n_over_tau": number(checks.n_over_tau),
+            "rhat": number(checks.rhat),
+            "acceptance": number(checks.acceptance),
+            "minima_found": checks.minima_found,
+            "minima_visited": checks.minima_visited,
+            "steps": checks.steps,
+            "discard": checks.discard,
+            "walkers": posterior.draws.shape[1],
+            "autocorrelation_time": number(checks.autocorrelation_time),
+            "independent": checks.independent,
+        },
+        "trusted": checks.trusted,
+        "doubts": list(checks.doubts),
+    }
+
+
+def _marginal(marginal: Marginal | None) -> dict[str, Any]:
+    if marginal is None:
+        return {**dict.fromkeys(("mean", "sd", "q025", "q50", "q975")), "modes": []}
+    numbers = {name: getattr(marginal, name) for name in ("mean", "sd", "q025", "q50", "q975")}
+    return numbers | {"modes": [{"value": mode.value, "mass": mode.mass} for mode in marginal.modes]}
 
 
 def failure(
     path: str | os.PathLike[str] | Sequence[str], error: Exception | str, sha256: str | None = None
 ) -> dict[str, Any]:
-    """The record of a file that gave no fit, or of several that gave no joint one, and why.
+    """Build the record of a file, or of several files of a joint fit, without a result.
 
-    Its schema is the same, its status "failed".
+    It has all keys of the schema, the status "failed" and the `error`.
     """
     alone = isinstance(path, str | os.PathLike)
     paths = [os.fspath(path)] if isinstance(path, str | os.PathLike) else list(path)
@@ -138,35 +165,32 @@ def failure(
 
 
 def one_line(record: Mapping[str, Any]) -> str:
-    """A record as one line of strict JSON, in ASCII so that every terminal and pipe takes it."""
+    """Format a record as one line of strict JSON, in ASCII so that every terminal and pipe takes it."""
     return json.dumps(record, allow_nan=False)
 
 
 def indented(record: Mapping[str, Any]) -> str:
-    """A record as the text of a file for people to open."""
+    """Format a record as the text of a file, indented for readers."""
     return json.dumps(record, allow_nan=False, ensure_ascii=False, indent=1) + "\n"
 
 
 def versions() -> dict[str, str | None]:
-    """The versions of pellicle, Python and what the numbers depend on; nothing is imported."""
-    return {
+    """Versions of pellicle, Python and the packages that numbers depend on, without importing them."""
+    installed: dict[str, str | None] = {
         "pellicle": version("pellicle"),
         "python": ".".join(map(str, sys.version_info[:3])),
-        **{name: _version(name) for name in _PACKAGES},
     }
-
-
-def _version(name: str) -> str | None:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return None
+    for name in _PACKAGES:
+        try:
+            installed[name] = version(name)
+        except PackageNotFoundError:
+            installed[name] = None
+    return installed
 
 
 def number(value: Any) -> float | None:
-    """A number of the schema: what is infinite or undefined is null."""
-    found = float(value)
-    return found if math.isfinite(found) else None
+    """The number as the schema has it: None where it is infinite or undefined."""
+    return float(value) if math.isfinite(value) else None
 
 
 def _parameter(p: Estimate) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""What the catalogue holds, as text for people and as a figure of n and k."""
+"""The catalogue of materials as text, and figures of n and k."""
 
 from __future__ import annotations
 
@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pellicle.errors import UsageError
 from pellicle.materials import Material, contents, material
-from pellicle.reporting.drawing import blank, saved
+from pellicle.reporting.drawing import figure_path, new_figure, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -20,7 +19,6 @@ if TYPE_CHECKING:
 HEADINGS = ("name", "page", "range (nm)", "k data", "source")
 SHOWN_NM = (190.0, 2500.0)
 POINTS = 1200
-FORMATS = (".png", ".pdf", ".svg")
 
 
 def _range(low: float, high: float) -> str:
@@ -41,9 +39,9 @@ def _align(rows: Iterable[tuple[str, ...]]) -> str:
 
 
 def table(pattern: str | None = None) -> str:
-    """The catalogue, one line per short name and per other page, as aligned text.
+    """List the catalogue as aligned text, one line for each short name and each other page.
 
-    `pattern` keeps the lines that hold it in name, alias, page or source, whatever the case.
+    `pattern` keeps the lines that contain it in name, alias, page or source, in whatever case.
     """
     default = {entry.page for entry in contents.names()}
     entries = [(_row(e.name, e.page), e.aliases) for e in contents.names()]
@@ -58,11 +56,11 @@ def table(pattern: str | None = None) -> str:
 
 
 def describe(name: str) -> str:
-    """One material in full: which page the name stands for, why, its reference, the book's other pages.
+    """Describe a material: the page of its name, why that one, its reference, other pages of its book.
 
     Raises what `material` raises.
     """
-    source = material(name)
+    source, entry = material(name), contents.find_name(name)
     if not isinstance(source, Material):
         return f"{name}\n"
     low, high = source.wavelength_range
@@ -71,9 +69,9 @@ def describe(name: str) -> str:
         ("range", "all wavelengths" if high == np.inf else f"{_range(low, high)} nm"),
         ("k data", "yes" if source.has_extinction else "no: taken as transparent"),
         ("caution", source.caution),
-        ("why" if contents.find_name(name) else "sample", source.note),
+        ("why" if entry else "sample", source.note),
         ("reference", source.citation),
-        ("aliases", ", ".join(_aliases(name))),
+        ("aliases", ", ".join(entry.aliases) if entry else ""),
         ("pages", ""),
     ]
     text = [source.name, *(_fact(label, value) for label, value in facts if value)]
@@ -81,13 +79,12 @@ def describe(name: str) -> str:
     others = contents.pages_of_book(parts[1]) if len(parts) == 3 else []
     if others:
         rows = (_row(f"{p.book}/{p.page}", p)[:1] + _row("", p)[2:] + (p.comments[:60],) for p in others)
-        text += ["", f"pages of {parts[1]} that ship:", textwrap.indent(_align(rows), "  ").rstrip()]
+        text += [
+            "",
+            f"pages of {parts[1]} in this installation:",
+            textwrap.indent(_align(rows), "  ").rstrip(),
+        ]
     return "\n".join(text) + "\n"
-
-
-def _aliases(name: str) -> tuple[str, ...]:
-    entry = contents.find_name(name)
-    return entry.aliases if entry else ()
 
 
 def _fact(label: str, value: str) -> str:
@@ -98,7 +95,7 @@ def _fact(label: str, value: str) -> str:
 
 
 def shown_range(material: Material) -> tuple[float, float]:
-    """The wavelengths (nm) of a figure: the material's own, within 190-2500 nm where it has any there."""
+    """Wavelengths (nm) of a figure: the material's own, cut to 190-2500 nm if it has any there."""
     low, high = material.wavelength_range
     if low < SHOWN_NM[1] and high > SHOWN_NM[0]:
         return max(low, SHOWN_NM[0]), min(high, SHOWN_NM[1])
@@ -108,24 +105,21 @@ def shown_range(material: Material) -> tuple[float, float]:
 def figure(name: str, path: str | os.PathLike[str]) -> Path:
     """Draw n and k of a material against wavelength into `path` (.png, .pdf or .svg), which is returned.
 
-    The file appears complete or not at all, and none is overwritten. Raises what `material` raises, and
-    UsageError for a file type that is none of these or a place that cannot be written.
+    The file appears complete or not at all; an existing one is not overwritten. Raises what `material`
+    raises, and UsageError for another file type or a path that cannot be written.
     """
-    target = Path(path)
-    if target.suffix.lower() not in FORMATS:
-        raise UsageError(f"--out {target}: expected a name ending in {', '.join(FORMATS)}")
-    return saved(_draw(name), target)
+    target = figure_path(path)
+    return save_figure(_draw(name), target)
 
 
 def _draw(name: str) -> Figure:
-
     source = material(name)
     low, high = shown_range(source) if isinstance(source, Material) else SHOWN_NM
     nm = np.clip(np.linspace(low, high, POINTS), low, high)
     values = np.asarray(source(nm))
     n, k = np.real(values), np.imag(values)
-    drawn = blank(7, 4)
-    axes = drawn.add_subplot()
+    sheet = new_figure(7, 4)
+    axes = sheet.add_subplot()
     lines = axes.plot(nm, n, color="C0", label="n")
     axes.set(xlabel="wavelength (nm)", ylabel="n", xlim=(low, high))
     if k.any():
@@ -136,5 +130,5 @@ def _draw(name: str) -> Figure:
     if isinstance(source, Material):
         axes.set_title(f"{source.name}   {source.page}", loc="left")
         if source.caution:
-            drawn.supxlabel("\n".join(textwrap.wrap(source.caution, 90)), fontsize="small", color="C3")
-    return drawn
+            sheet.supxlabel("\n".join(textwrap.wrap(source.caution, 90)), fontsize="small", color="C3")
+    return sheet

@@ -1,4 +1,4 @@
-"""Plain text for reports: indented, wrapped, in aligned columns of at most 100 characters."""
+"""Plain text for reports: blocks, wrapped text and aligned columns, at most 100 characters wide."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ INDENT = "    "
 
 
 def block(title: str, lines: Sequence[str]) -> str:
-    """A titled part of a report."""
+    """Format a titled part of a report."""
     return "\n".join([f"[[{title}]]", *lines]) + "\n"
 
 
 def wrapped(text: str, first: str = "", rest: str = "") -> list[str]:
-    """Lines of `text`; `first` and `rest` go before the first line and the others."""
+    """Wrap `text`; `first` precedes the first line and `rest` each other one."""
     return textwrap.wrap(
         text,
         COLUMNS,
@@ -26,14 +26,14 @@ def wrapped(text: str, first: str = "", rest: str = "") -> list[str]:
 
 
 def facts(rows: Iterable[tuple[str, str]]) -> list[str]:
-    """Labels and their texts, side by side."""
+    """Format labels and their texts side by side."""
     rows = list(rows)
     width = max((len(label) for label, _ in rows), default=0)
     return [line for label, text in rows for line in wrapped(text, f"{label:<{width}}  ", " " * (width + 2))]
 
 
 def table(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Aligned columns; a row that is too long goes on below itself."""
+    """Format aligned columns; a row that is too long continues on the next line."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows]
     return [part for line in lines for part in wrapped(line, "", INDENT)]

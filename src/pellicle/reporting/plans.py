@@ -1,71 +1,93 @@
-"""A plan as a table for people and as a record for programs."""
+"""Report and JSON record of a plan."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
-from pellicle.effects.plan import Plan
-from pellicle.planning.cost_model import Saving
+from pellicle.effects.plan import Plan, Row
 
-UNITS = {
+if TYPE_CHECKING:
+    from pellicle.planning.cost_model import Saving
+
+_UNITS = {
     "psi-delta": "degrees on the sphere of N, C, S",
     "brdf": "of each value of the BRDF (of 0.01/π where that is more)",
 }
-HEADINGS = ("effect", "", "off by", "without it", "saves", "why")
 
 
-def table(plan: Plan, savings: dict[str, Saving], whole: float, planned: float) -> str:
-    """One line per effect, and what it comes to; `whole` and `planned` are seconds per evaluation.
+def report(plan: Plan) -> str:
+    """Format one line for each effect, on or off, with its reason, and the bound on the error of the plan."""
+    rows = [("effect", "", "error bound", "why")]
+    rows += [(row.effect, "on" if row.on else "off", _bound(row), row.why) for row in plan.rows]
+    return "\n".join([*_aligned(rows), "", *_summary(plan)]) + "\n"
 
-    "off by" is what the plan is off by, "without it" and "saves" what leaving the effect out of the
-    exact plan changes and saves, where that is possible.
+
+def report_with_savings(plan: Plan, savings: dict[str, Saving], exact: float, planned: float) -> str:
+    """Format a plan with the error and the time of leaving each effect out of the exact plan.
+
+    `exact` and `planned` are seconds of one evaluation of the exact plan and of `plan`.
     """
-    rows = [HEADINGS, *(_row(row, savings.get(row.effect)) for row in plan.rows)]
-    widths = [max(len(row[i]) for row in rows) for i in range(len(HEADINGS) - 1)]
-    lines = ["  ".join([*(c.ljust(w) for c, w in zip(row, widths, strict=False)), row[-1]]) for row in rows]
-    unit = UNITS.get(plan.signal, f"of {plan.signal}")
-    told = [
-        "",
-        f"off by at most {plan.error_bound:.1e} {unit}; the tolerance is {plan.tolerance:g}",
-        f"an evaluation takes about {_time(planned)}, with every effect that is there {_time(whole)}",
-    ]
+    rows = [("effect", "", "error bound", "if left out", "saves", "why")]
+    for row in plan.rows:
+        saving = savings.get(row.effect)
+        change, time = ("", "") if saving is None else (f"{saving.error:.1e}", _time(saving.seconds))
+        rows.append((row.effect, "on" if row.on else "off", _bound(row), change, time, row.why))
+    error, *gradients = _summary(plan)
+    times = f"an evaluation takes about {_time(planned)}, with every effect that is present {_time(exact)}"
+    return "\n".join([*_aligned(rows), "", error, times, *gradients]) + "\n"
+
+
+def _bound(row: Row) -> str:
+    return f"{row.error_bound:.1e}" if row.error_bound else "0"
+
+
+def _aligned(rows: Sequence[tuple[str, ...]]) -> list[str]:
+    """Columns of text; the last one is not padded."""
+    widths = [*(max(map(len, column)) for column in list(zip(*rows, strict=True))[:-1]), 0]
+    lines = ("  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)) for row in rows)
+    return [line.rstrip() for line in lines]
+
+
+def _summary(plan: Plan) -> list[str]:
+    unit = _UNITS.get(plan.signal, f"of {plan.signal}")
+    lines = [f"error at most {plan.error_bound:.1e} {unit}; the tolerance is {plan.tolerance:g}"]
     if plan.gradient_error:
-        told.append(f"derivatives change by at most {plan.gradient_error:.1e} of their largest value")
-    return "\n".join(line.rstrip() for line in [*lines, *told]) + "\n"
-
-
-def _row(row: Any, saving: Saving | None) -> tuple[str, ...]:
-    off_by = f"{row.error_bound:.1e}" if row.error_bound else "0"
-    changes, saves = ("", "") if saving is None else (f"{saving.error:.1e}", _time(saving.seconds))
-    return row.effect, "on" if row.on else "off", off_by, changes, saves, row.why
+        lines.append(f"derivatives change by at most {plan.gradient_error:.1e} of their largest value")
+    return lines
 
 
 def _time(seconds: float) -> str:
-    """In the unit that suits it."""
+    """`8.19 µs`."""
     for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
         if abs(seconds) >= size:
             return f"{seconds / size:.3g} {unit}"
     return f"{seconds / 1e-9:.3g} ns"
 
 
-def record(plan: Plan, savings: dict[str, Saving]) -> dict[str, Any]:
-    """What `--json` prints: `cost` is the seconds that leaving an effect out of the exact plan saves, 0 where
-    it is absent or must stay, and `error_without` what that changes."""
+def to_json(plan: Plan, savings: dict[str, Saving]) -> dict[str, Any]:
+    """Convert a plan to dictionaries.
+
+    `cost` is the seconds that leaving an effect out of the exact plan saves, 0 where it is absent or must
+    stay; `error_without` is the change of the signal.
+    """
+    effects = []
+    for row in plan.rows:
+        saving = savings.get(row.effect)
+        effects.append(
+            {
+                "effect": row.effect,
+                "on": row.on,
+                "why": row.why,
+                "error_bound": row.error_bound,
+                "cost": 0.0 if saving is None else saving.seconds,
+                "error_without": None if saving is None else saving.error,
+            }
+        )
     return {
         "schema": "pellicle.plan/1",
         "tolerance": plan.tolerance,
         "error_bound": plan.error_bound,
         "gradient_error": plan.gradient_error,
-        "effects": [_effect(row, savings.get(row.effect)) for row in plan.rows],
-    }
-
-
-def _effect(row: Any, saving: Saving | None) -> dict[str, Any]:
-    return {
-        "effect": row.effect,
-        "on": row.on,
-        "why": row.why,
-        "error_bound": row.error_bound,
-        "cost": 0.0 if saving is None else saving.seconds,
-        "error_without": None if saving is None else saving.error,
+        "effects": effects,
     }

@@ -16,7 +16,7 @@ from pellicle.fitting.brdf import evidence
 from pellicle.fitting.brdf.fit import fit_brdf, fitted
 from pellicle.fitting.result import Status
 from pellicle.fitting.spectra.search import quiet
-from pellicle.reporting.json_record import brdf_to_json
+from pellicle.reporting.json_record import to_json
 from pellicle.sampling import brdf
 from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface
@@ -129,7 +129,7 @@ def test_one_colour_for_all_directions_decides_nothing():
     assert {p.stderr for p in found.free} == {np.inf}
     assert "thickness may be anything between 0 and 1000 nm" in found.warnings
     assert any("trade against each other" in sentence for sentence in found.warnings)
-    record = brdf_to_json(found)
+    record = to_json(found)
     assert record["parameters"]["n_g"]["stderr"] is None
     assert record["noise"] == {"sigma": pytest.approx(0.0025), "source": "given"}
 

@@ -1,0 +1,94 @@
+"""Parameters, correlations and rivals of a fit as lines of text."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import TYPE_CHECKING
+
+from pellicle.fitting.status import describe
+from pellicle.reporting.plain_text import INDENT, table
+
+if TYPE_CHECKING:
+    from pellicle.fitting.result import Estimate, Fit
+
+LEAST_CORRELATION = 0.5
+MOST_CORRELATIONS = 10
+MOST_RIVALS = 6
+
+_NUISANCE = re.compile(r"instrument\.(scale|offset)(_\d+)?(\..+)?")
+
+
+def parameters(fit: Fit) -> list[str]:
+    """One line for each, the free ones first: name, value ± error or limit, unit and bounds."""
+    width = max((len(name) for name in fit.parameters), default=0) + 1
+    rows = [
+        (f"{p.name + ':':<{width}}", _free(p) if p.free else f"{p.value:.6g}{_unit(p)} (fixed)", _bounds(p))
+        for p in sorted(fit.parameters.values(), key=lambda p: not p.free)
+    ]
+    middle = max((len(value) for _, value, bounds in rows if bounds), default=0)
+    return [f"{INDENT}{name}  {value:<{middle}}  {bounds}".rstrip() for name, value, bounds in rows]
+
+
+def _free(p: Estimate) -> str:
+    """`751.66 ± 0.12 nm (0.016 %)`, or the best value and its limits where the error is infinite."""
+    sides = (("at least", p.lower_limit), ("at most", p.upper_limit))
+    limits = [f"{side} {limit:.4g}{_unit(p)} at 95 %" for side, limit in sides if limit is not None]
+    if not math.isfinite(p.stderr):
+        return f"not determined ({', '.join([f'best {p.value:.6g}{_unit(p)}', *limits])})"
+    relative = 100 * p.stderr / abs(p.value) if p.value else math.inf
+    notes = ", ".join([f"{relative:.2g} %", *limits] if relative < 100 else limits)
+    value = describe(p).removeprefix(f"{p.name} ")
+    return f"{value} ({notes})" if notes else value
+
+
+def _unit(p: Estimate) -> str:
+    return f" {p.unit}" if p.unit else ""
+
+
+def _bounds(p: Estimate) -> str:
+    if not p.free or not (math.isfinite(p.lower) and math.isfinite(p.upper)):
+        return ""
+    side = "lower" if p.value - p.lower <= p.upper - p.value else "upper"
+    return f"[{p.lower:g}, {p.upper:g}]" + (f"  AT ITS {side.upper()} BOUND" if p.at_bound else "")
+
+
+def correlations(fit: Fit) -> list[str]:
+    """Correlations above 0.5, the largest first.
+
+    Pairs of coefficients of the scale's and the offset's polynomials are left out: they follow from the
+    choice of the basis and say nothing of the layer. The JSON record has them.
+    """
+    names, matrix = fit.correlation_names, fit.correlation
+    pairs = [
+        (float(matrix[i, j]), names[i], names[j])
+        for j in range(len(names))
+        for i in range(j)
+        if abs(matrix[i, j]) > LEAST_CORRELATION
+        and not (_NUISANCE.fullmatch(names[i]) and _NUISANCE.fullmatch(names[j]))
+    ]
+    pairs.sort(key=lambda pair: -abs(pair[0]))
+    shown = pairs[:MOST_CORRELATIONS]
+    lines = table([(f"C({one}, {other})", f"{value:+.3f}") for value, one, other in shown])
+    return lines + _omitted(len(pairs) - len(shown))
+
+
+def rivals(fit: Fit) -> list[str]:
+    """Other minima, the least Δχ² first, each with its parameters in the order of the fit's."""
+    shown = sorted(fit.rivals, key=lambda rival: rival.delta_chi2)[:MOST_RIVALS]
+    rows = [
+        (
+            f"Δχ² {rival.delta_chi2:.3g}",
+            *(
+                f"{name} {rival.parameters[name]:.5g}{_unit(p)}"
+                for name, p in fit.parameters.items()
+                if name in rival.parameters
+            ),
+        )
+        for rival in shown
+    ]
+    return table(rows) + _omitted(len(fit.rivals) - len(shown))
+
+
+def _omitted(count: int) -> list[str]:
+    return [f"{INDENT}... and {count} more in the JSON"] if count > 0 else []

@@ -1,0 +1,103 @@
+"""Report, figure and folder of any result: a fit, a posterior, a comparison, a plan, or a cost."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pellicle.accuracy.cost import Cost
+from pellicle.accuracy.surface import SurfaceCost
+from pellicle.effects.plan import Plan
+from pellicle.fitting.comparison import Comparison
+from pellicle.fitting.result import Fit
+from pellicle.reporting import (
+    comparison,
+    cost_figure,
+    cost_files,
+    cost_text,
+    fit_figure,
+    fit_text,
+    folders,
+    plans,
+    posterior,
+)
+from pellicle.sampling.result import Posterior
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+AnyCost = Cost | SurfaceCost
+
+
+def report(result: Fit | Posterior | Comparison | Plan | AnyCost) -> str:
+    """Format a result as plain text.
+
+    **Arguments:** `result` of `pl.fit`, `pl.sample`, `pl.compare`, `pl.plan` or `pl.cost`.
+
+    **Returns:** the text that the command line prints: the verdict first, then the numbers behind it.
+
+    **Raises:** TypeError for another object.
+
+    ```python
+    >>> plan = pl.plan(pl.Scene(pl.Layer(1.46, 100.0), 3.9))
+    >>> print(pl.report(plan).splitlines()[-1])
+    error at most 0.0e+00 of R; the tolerance is 0
+
+    ```
+    """
+    match result:
+        case Fit():
+            return fit_text.report(result)
+        case Posterior():
+            return fit_text.report(result.fit, result)
+        case Comparison():
+            return comparison.report(result)
+        case Plan():
+            return plans.report(result)
+        case Cost() | SurfaceCost():
+            return cost_text.text(result)
+    raise TypeError(f"a {type(result).__name__} has no report; fits, posteriors and plans have")
+
+
+def plot(result: Fit | Posterior | AnyCost) -> Figure:
+    """Draw a result.
+
+    **Arguments:** `result` of `pl.fit` (data, fit, residuals; of films also misfit against thickness, n and
+    k), `pl.sample` (corner plot) or `pl.cost` (error against time).
+
+    **Returns:** a Matplotlib figure, which a notebook shows and `figure.savefig(path)` writes.
+
+    **Raises:** TypeError for another object.
+    """
+    match result:
+        case Fit():
+            return fit_figure.draw(result)
+        case Posterior():
+            return posterior.corner_figure(result)
+        case Cost() | SurfaceCost():
+            return cost_figure.draw(result)
+    raise TypeError(f"a {type(result).__name__} has no figure; fits, posteriors and costs have")
+
+
+def save(result: Fit | Posterior | Comparison | AnyCost, folder: str | os.PathLike[str]) -> Path:
+    """Write a result into a folder, as `--out` does: report, JSON record, tables and figures.
+
+    **Arguments:** `result` of `pl.fit`, `pl.sample`, `pl.compare` or `pl.cost`; `folder`, which is made if it
+    is absent. Files of an earlier result in it are replaced.
+
+    **Returns:** the folder.
+
+    **Raises:** UsageError where the folder holds files that pellicle did not write, or cannot be written;
+    TypeError for another object.
+    """
+    match result:
+        case Fit():
+            return folders.write_fit(folder, result)
+        case Posterior():
+            return folders.write_fit(folder, result.fit, result)
+        case Comparison():
+            return comparison.write_comparison(folder, result)
+        case Cost() | SurfaceCost():
+            return cost_files.write_cost(folder, result)
+    raise TypeError(f"a {type(result).__name__} has no files; fits, posteriors and costs have")
