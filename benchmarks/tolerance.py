@@ -18,9 +18,9 @@ import numpy as np
 import pellicle as pl
 from pellicle.effects.plan import Plan
 from pellicle.planning.differences import largest_difference, signals
-from pellicle.planning.film import reference
+from pellicle.planning.film import full_plan
 from pellicle.scene.free import free_leaves
-from pellicle.simulation.film import sampled
+from pellicle.simulation.film import build, sampled
 
 FRESH = 400
 """Number of points per scene at which the bound is checked."""
@@ -141,7 +141,7 @@ def fresh(rng: np.random.Generator, scene: pl.Scene) -> np.ndarray:
 def measured(plan: Plan, scene: pl.Scene, points: np.ndarray) -> float:
     """Return the largest error of a plan at these points, in the unit of the signal."""
     whole = sampled(scene)
-    one, other = (signals(p, whole, points) for p in (plan, reference(scene)))
+    one, other = (signals(p, whole, points, build) for p in (plan, full_plan(scene)))
     return largest_difference(one, other, plan.signal)
 
 

@@ -43,8 +43,8 @@ TABLE = [
     ),
     ("tunnelling", False, "normal incidence", scene()),
     ("tunnelling", False, "no real index can fall below", scene(angle=60.0)),
-    ("tunnelling", True, "in the layer is not ruled out", scene(1.33, ambient=1.52, angle=65.0)),
-    ("tunnelling", True, "in the substrate is not", scene(2.1, 1.0, ambient=1.52, angle=65.0)),
+    ("tunnelling", True, "in the layer is possible", scene(1.33, ambient=1.52, angle=65.0)),
+    ("tunnelling", True, "in the substrate is possible", scene(2.1, 1.0, ambient=1.52, angle=65.0)),
     ("tunnelling", True, "layer and substrate", scene(1.2, 1.0, ambient=1.52, angle=65.0)),
     ("tunnelling", False, "no real index", scene(1.33 + 0.1j, ambient=1.52, angle=65.0)),
     ("tunnelling", True, "in the layer", scene(Cauchy(pl.Free(1.3, 2)), angle=65.0)),
@@ -54,14 +54,14 @@ TABLE = [
     ("oblique", True, "incidence at 30°", scene(angle=30)),
     ("oblique", True, "incidence at 10 to 50°", scene(angle=np.linspace(10, 50, 9))),
     ("oblique", True, "the angle of incidence is free", scene(angle=FREE_ANGLE)),
-    ("polarisation", False, "s and p are one at normal incidence", scene()),
-    ("polarisation", False, "only p is asked for", scene(angle=30.0, polarisation="p")),
+    ("polarisation", False, "s and p are equal at normal incidence", scene()),
+    ("polarisation", False, "the light is p-polarised", scene(angle=30.0, polarisation="p")),
     ("polarisation", True, "the mean of s and p", scene(angle=30.0)),
     ("polarisation", True, "the mean of s and p", scene(angle=FREE_ANGLE)),
     ("transmission", False, "the signal is a reflectance", scene()),
     ("transmission", True, "the signal is a transmittance", scene(signal="T")),
     ("transmission", True, "reaches the back face", scene(substrate=pl.Substrate(1.5, "air"))),
-    ("back-face", False, "no back face was given", scene()),
+    ("back-face", False, "without a back face", scene()),
     ("back-face", True, "a plate", scene(substrate=pl.Substrate(1.5, "air"))),
     ("coherence", False, "monochromatic", scene()),
     ("coherence", False, "monochromatic", scene(instrument=pl.Instrument(bandwidth=0, thickness_spread=0.0))),
@@ -88,7 +88,7 @@ TABLE = [
     (
         "orders",
         False,
-        "nodes of the closed form",
+        "averaged over nodes instead",
         scene(signal="psi-delta", angle=60.0, instrument=BANDWIDTH),
     ),
     (
@@ -99,8 +99,8 @@ TABLE = [
     ),
     ("coherence", False, "monochromatic", scene(thickness=pl.Free(10, 2.5e5))),
     ("coherence", False, "monochromatic", scene(thickness=2.5e5, wavelength=np.array([600.0]))),
-    ("orders", True, "no order is left", scene(thickness=2.5e5)),
-    ("roughness", False, "no face", scene()),
+    ("orders", True, "no order remains", scene(thickness=2.5e5)),
+    ("roughness", False, "no face has a roughness", scene()),
     ("roughness", True, "1 rough: up to 3 nm", scene(pl.Layer(1.46, 300.0, roughness=3.0))),
     ("stack", True, "rough faces", scene(pl.Layer(1.46, 300.0, roughness=FREE_K))),
     ("angle-spread", False, "one angle of incidence", scene()),
@@ -127,7 +127,7 @@ TABLE = [
     ),
     ("dispersion", True, "the index of layer and substrate varies", scene("SiO2", "Si")),
     ("dispersion", True, "the index of layer varies", scene(Cauchy(1.4, pl.Free(0, 1)))),
-    ("opaque", False, "light may reach everything", scene(0.2 + 3j)),
+    ("opaque", False, "light may reach every layer", scene(0.2 + 3j)),
     ("precision", True, "double", scene()),
     (
         "coherence",
@@ -148,7 +148,7 @@ def test_each_effect_and_its_reason(effect, on, why, thing):
 
 
 def test_the_table_covers_every_effect_both_ways():
-    """But for what only a tolerance decides (test_thrift.py)."""
+    """But for what only a tolerance decides (tests/planning)."""
     both = {(e.name, on) for e in EFFECTS for on in (True, False)}
     assert {(effect, on) for effect, on, *_ in TABLE} == both - {("opaque", True), ("precision", False)}
 

@@ -9,7 +9,7 @@ import pytest
 
 import pellicle as pl
 from pellicle.effects.film import exact
-from pellicle.effects.removal import LeftOut
+from pellicle.effects.removal import FilmRemoval
 from pellicle.fitting.spectra import fit as fitting
 from pellicle.synthetic.spectra import synthesise
 
@@ -45,7 +45,7 @@ def test_a_fit_beyond_its_tolerance_is_done_again(monkeypatch):
     data = spectrum(thing)
 
     def careless(scene, tolerance, keep):
-        return replace(exact(scene), left_out=(LeftOut("absorption"),), tolerance=tolerance)
+        return replace(exact(scene), left_out=(FilmRemoval("absorption"),), tolerance=tolerance)
 
     monkeypatch.setattr(
         "pellicle.fitting.spectra.problem.plan", lambda s, t, k: careless(s, t, k) if t else exact(s)

@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.effects.removal import CAN_BE_LEFT_OUT, LeftOut
-from pellicle.planning.cost_model import work
+from pellicle.effects.removal import REMOVABLE, FilmRemoval
 from pellicle.planning.differences import design, gradients, largest_difference, signals
-from pellicle.planning.film import alternatives, reference
+from pellicle.planning.film import alternatives, full_plan, work
 from pellicle.scene.free import free_leaves, insert
 from pellicle.simulation.film import build, sampled
 
@@ -63,7 +62,7 @@ def test_what_changes_little_is_left_out(plans, name):
         assert 0 <= plan.row(effect).error_bound <= TOLERANCE
         assert "left out" in plan.row(effect).why
     assert 0 < plan.error_bound <= TOLERANCE
-    assert work(plan, thing).flops < work(reference(thing), thing).flops
+    assert work(plan, thing).flops < work(full_plan(thing), thing).flops
 
 
 @pytest.mark.parametrize("name", LEFT_OUT)
@@ -74,8 +73,8 @@ def test_the_bound_holds_and_no_gradient_is_lost(plans, name):
     points = np.random.default_rng(2).uniform(thickness.lower, thickness.upper, (160, 1))
     with jax.enable_x64(True):
         whole = sampled(thing)
-        one, other = (signals(p, whole, points) for p in (plan, reference(thing)))
-        slopes = gradients(plan, whole, points[:16])
+        one, other = (signals(p, whole, points, build) for p in (plan, full_plan(thing)))
+        slopes = gradients(plan, whole, points[:16], build)
     assert largest_difference(one, other, "R") <= plan.error_bound
     assert np.all(np.any(slopes != 0, axis=(0, 1)))
 
@@ -89,7 +88,7 @@ ALL_FREE = scene(
 )
 
 
-@pytest.mark.parametrize("effect", [effect for effect in CAN_BE_LEFT_OUT if effect != "precision"])
+@pytest.mark.parametrize("effect", [effect for effect in REMOVABLE if effect != "precision"])
 def test_an_effect_with_a_free_parameter_is_not_even_tried(effect):
     """However little it changes: its gradient is what a fit needs."""
     cone = pl.Instrument(bandwidth=TINY, angle_spread=TINY)
@@ -117,7 +116,7 @@ def test_what_must_stay_stays():
 def test_single_precision_is_single_throughout():
     """But for scalars, whose type bends."""
     thing = scene(1.46 + 0.1j, instrument=pl.Instrument(bandwidth=3.0), angle=20.0)
-    plan = replace(reference(thing), left_out=(LeftOut("precision"),))
+    plan = replace(full_plan(thing), left_out=(FilmRemoval("precision"),))
     with jax.enable_x64(True):
         whole = sampled(thing)
         jaxpr = jax.make_jaxpr(lambda t: build(plan)(insert(whole, [t])))(200.0)
@@ -144,7 +143,7 @@ def test_ellipsometry_counts_in_degrees():
     points = design(thing)
     with jax.enable_x64(True):
         whole = sampled(thing)
-        one, other = (signals(p, whole, points).reshape(-1, 3) for p in (plan, reference(thing)))
+        one, other = (signals(p, whole, points, build).reshape(-1, 3) for p in (plan, full_plan(thing)))
     psi = [0.5 * np.rad2deg(np.arctan2(np.hypot(x[:, 1], x[:, 2]), x[:, 0])) for x in (one, other)]
     assert np.max(np.abs(psi[0] - psi[1])) <= 0.5 * plan.error_bound
 

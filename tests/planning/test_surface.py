@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from pellicle.brdf.models import MODELS
-from pellicle.effects.surface import CAN_BE_LEFT_OUT, exact
+from pellicle.effects.surface import exact
+from pellicle.effects.surface_removal import REMOVABLE
 from pellicle.errors import UsageError
-from pellicle.planning import surface as thrift
+from pellicle.planning import surface as planning
 from pellicle.planning.differences import gradients
 from pellicle.planning.surface import FLOOR, work
 from pellicle.planning.tolerance import SAFETY
@@ -95,7 +96,7 @@ def test_what_is_composed_is_the_model(name, numbers):
 @pytest.fixture(scope="module")
 def plans():
     return {
-        name: thrift.plan(surface_view(surface, LOOKED), TOLERANCE) for name, (surface, _) in GONE.items()
+        name: planning.plan(surface_view(surface, LOOKED), TOLERANCE) for name, (surface, _) in GONE.items()
     }
 
 
@@ -122,7 +123,7 @@ def test_what_changes_little_is_left_out_within_the_bound(plans, name):
 FREE = {key: Free(0.0, 1e-9, start=0.0) for key in ("k", "base_k", "diffuse")}
 
 
-@pytest.mark.parametrize("effect", CAN_BE_LEFT_OUT)
+@pytest.mark.parametrize("effect", REMOVABLE)
 def test_an_effect_whose_number_is_free_stays(effect):
     """However little it changes: its gradient is what a fit needs."""
     thin = {"thickness": Free(0.0, 1e-6, start=0.0), "specular": Free(0.9, 1.1, start=1.0)}
@@ -131,7 +132,7 @@ def test_an_effect_whose_number_is_free_stays(effect):
         surface = Surface("granier-heidrich", thin | tilt)
     else:
         surface = Surface("microfacet-film", thin | FREE)
-    kept = thrift.alternatives(effect, surface_view(surface, LOOKED))
+    kept = planning.alternatives(effect, surface_view(surface, LOOKED))
     assert bool(kept) == (effect in ("oblique", "polarisation", "precision"))
 
 
@@ -155,7 +156,7 @@ def test_what_is_absent_leaves_no_trace():
 def test_a_lobe_that_is_too_weak_goes_with_its_layer():
     """What is left is the diffuse part, in every channel."""
     seen = surface_view(Surface("microfacet-film", {"specular": 1e-9, "diffuse": 0.2}), LOOKED)
-    (plan,) = thrift.alternatives("roughness", seen)
+    (plan,) = planning.alternatives("roughness", seen)
     assert [row.effect for row in plan.rows if row.on] == ["diffuse", "precision"]
     with jax.enable_x64(True):
         found = jax.jit(build(plan.static_key))(seen)

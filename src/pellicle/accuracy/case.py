@@ -10,7 +10,7 @@ import numpy as np
 
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.effects.plan import Plan
-from pellicle.planning.film import reference
+from pellicle.planning.film import full_plan
 from pellicle.scene.film import Scene, with_wavelength
 from pellicle.scene.free import free_leaves, insert, start_values
 from pellicle.scene.layers import Interface
@@ -49,7 +49,7 @@ def case(scene: Scene, wavelength: np.ndarray, tolerance: float = 1e-3, seed: in
     low, high = np.array([f.lower for f in free]), np.array([f.upper for f in free])
     draws = np.random.default_rng(seed).uniform(low, high, (count, len(free)))
     draws[0] = start_values(seen)
-    return Case(seen, reference(seen), draws, tolerance)
+    return Case(seen, full_plan(seen), draws, tolerance)
 
 
 def media(scene: Scene) -> list[AbstractDispersion]:

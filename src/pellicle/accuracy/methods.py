@@ -14,9 +14,9 @@ import numpy as np
 from pellicle.accuracy.case import Case, altered, disperses, media
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.effects.plan import Plan
-from pellicle.effects.removal import LeftOut, RealPart
+from pellicle.effects.removal import FilmRemoval, RealPart
 from pellicle.optics.pair import Pair, is_real, parts
-from pellicle.planning.film import plan, reference
+from pellicle.planning.film import full_plan, plan
 from pellicle.scene.film import Scene, coherent_layers, with_wavelength
 from pellicle.scene.layers import Layer
 
@@ -59,8 +59,8 @@ def _without(effect: str, absent: str, case: Case) -> Way | str:
 
 
 def _left_out(effect: str, case: Case) -> Way:
-    leave_out = LeftOut(effect)
-    return Way(replace(reference(leave_out(case.scene)), left_out=(leave_out,)), case.scene)
+    leave_out = FilmRemoval(effect)
+    return Way(replace(full_plan(leave_out(case.scene)), left_out=(leave_out,)), case.scene)
 
 
 def _without_angle(case: Case) -> Way | str:
@@ -109,7 +109,7 @@ def _transparent(case: Case) -> Way | str:
         replace(x, material=RealPart(x.material)) if isinstance(x, Layer) else x for x in case.scene.layers
     )
     clear = eqx.tree_at(lambda s: s.layers, case.scene, layers)
-    return Way(reference(clear), clear)
+    return Way(full_plan(clear), clear)
 
 
 @final

@@ -18,7 +18,8 @@ from pellicle.accuracy.measure import Ladder, Progress, measured
 from pellicle.brdf.directions import angle_to_half
 from pellicle.colour import sensor
 from pellicle.effects.plan import Plan
-from pellicle.effects.surface import LeftOut, exact
+from pellicle.effects.surface import exact
+from pellicle.effects.surface_removal import SurfaceRemoval
 from pellicle.errors import UsageError
 from pellicle.planning import surface
 from pellicle.planning.surface import FLOOR
@@ -50,7 +51,7 @@ def cost(
 ) -> SurfaceCost:
     """Measure every way to a surface's colours (`tolerance` in mean ΔE2000), and to its BRDF.
 
-    The tolerance is relative, as in `thrift.plan`, where the surface has no film to be coloured.
+    The tolerance is relative, as in `planning.surface.plan`, where the surface has no film to be coloured.
     **Raises:** UsageError for a tolerance that is not above zero, and without colour-science.
     """
     if tolerance is not None and not 0 < tolerance < math.inf:
@@ -123,7 +124,7 @@ def _left_out(effect: str, absent: str, view: SurfaceView, tolerance: float) -> 
     other = {"roughness": "diffuse", "diffuse": "specular"}.get(effect)
     if other is not None and other not in view.numbers:
         return "it is all there is"
-    leave_out = LeftOut(effect)
+    leave_out = SurfaceRemoval(effect)
     return replace(exact(leave_out(view)), left_out=(leave_out,))
 
 

@@ -44,8 +44,8 @@ def plan(
 
     messages.log_scene(scene)
     chosen, calibration = film.plan(scene, tolerance), cost_model.calibrated(cache_folder())
-    savings = cost_model.savings(scene, calibration)
-    whole, planned = (calibration.seconds(cost_model.work(p, scene)) for p in (film.reference(scene), chosen))
+    savings = film.savings(scene, calibration)
+    whole, planned = (calibration.seconds(film.work(p, scene)) for p in (film.full_plan(scene), chosen))
     if json:
         print(json_module.dumps(plans.to_json(chosen, savings), allow_nan=False), flush=True)
         return 0

@@ -1,4 +1,4 @@
-"""What an instrument averages over: how many orders, nodes or rays it takes, and how exact that is."""
+"""Averages of an instrument: numbers of orders, nodes and rays, with bounds on their errors."""
 
 from __future__ import annotations
 
@@ -22,42 +22,45 @@ from pellicle.scene.layers import Layer, absorbs
 
 
 def coherence(scene: Scene) -> Row:
-    """A single layer's series is damped order by order; anything else is averaged over nodes."""
-    present, narrow = _blurs(scene), _unresolved(scene)
-    if narrow is not None:
-        return Row("coherence", True, f"{narrow}: what is read is their average", UNRESOLVED_ERROR)
-    if not present:
-        return Row("coherence", False, "no bandwidth and no thickness spread were given: monochromatic light")
-    _need_wavelengths(scene)
+    """On where fringes are damped: a single layer order by order, anything else averaged over nodes."""
+    blurs, unresolved = _blurs(scene), _unresolved(scene)
+    if unresolved is not None:
+        return Row("coherence", True, f"{unresolved}: the signal is their average", UNRESOLVED_ERROR)
+    if not blurs:
+        return Row("coherence", False, "neither bandwidth nor thickness spread: monochromatic light")
+    if scene.light.wavelength is None:
+        raise ValueError("the number of orders depends on the wavelengths: give the light its wavelengths")
     if _by_orders(scene):
-        why = f"fringes are damped by {' and '.join(present)}"
+        why = f"fringes are damped by {' and '.join(blurs)}"
         return Row("coherence", True, why, _straight_phase_error(scene))
     return coherence_by_nodes(scene)
 
 
 def coherence_by_nodes(scene: Scene) -> Row:
-    """The same without orders: the closed form, averaged over wavelengths and thicknesses."""
+    """The row of `coherence` for the closed form averaged over wavelengths and thicknesses."""
     count, error = _nodes(scene)
     why = f"fringes are damped by {' and '.join(_blurs(scene))}, each averaged over {count} nodes"
     return Row("coherence", True, why, error, count)
 
 
 def _blurs(scene: Scene) -> list[str]:
-    """What washes out the fringes, if there are any layers to make them."""
+    """Names of the spreads that damp the fringes; empty without layers."""
     layers = coherent_layers(scene)
     uneven = any(thickness_spread(scene, layer) is not None for layer in layers)
-    found = [] if scene.instrument.bandwidth is None else ["bandwidth"]
-    return [*found, *(["uneven thickness"] if uneven else [])] if layers else []
+    if not layers:
+        return []
+    bandwidth = scene.instrument.bandwidth is not None
+    return [*(["bandwidth"] if bandwidth else []), *(["uneven thickness"] if uneven else [])]
 
 
 UNRESOLVED_ERROR = 4 * float(np.exp(-0.5 * (4 * np.pi / series.FWHM) ** 2))
-"""What is left of a fringe after a window as wide as the sampling step, twice the fringes' spacing."""
+"""Remaining amplitude of a fringe under a window as wide as the sampling step, twice the fringe spacing."""
 
 
 def _unresolved(scene: Scene) -> str | None:
-    """Says so where, all over the bounds, two fringes or more fit between neighbouring wavelengths.
+    """A message where two or more fringes fit between neighbouring wavelengths all over the bounds, or None.
 
-    A spectrometer that samples every so many nanometres does not resolve finer than that.
+    A spectrometer is taken to resolve no finer than its sampling step.
     """
     if scene.light.wavelength is None or not _has_series(scene) or _blurs(scene):
         return None
@@ -75,15 +78,15 @@ def _unresolved(scene: Scene) -> str | None:
 
 
 def _has_series(scene: Scene) -> bool:
-    """Whether there is one coherent layer, of which only intensities are asked for."""
+    """True for one smooth coherent layer whose signal is an intensity."""
     one = len(coherent_layers(scene)) == 1
     return one and scene.light.signal != "psi-delta" and not roughness(scene).on
 
 
 def _by_orders(scene: Scene) -> bool:
-    """Whether fringes are damped order by order, or the closed form is averaged over nodes.
+    """True where fringes are damped order by order, False where the closed form is averaged over nodes.
 
-    Orders know the spread of the phase but not of what the layer absorbs, which varies with an uneven
+    Orders contain the spread of the phase, but not of the absorption, which varies with an uneven
     thickness; and where |q| is near 1 there are too many of them.
     """
     if not _has_series(scene):
@@ -100,22 +103,22 @@ ORDERS_ERROR = 1e-6
 
 
 def orders(scene: Scene) -> Row:
-    """How many orders of interference are summed where fringes are damped, and the error of the rest.
+    """Number of orders of interference in the sum where fringes are damped, and the error of truncation.
 
-    Raises ValueError where the light has no wavelengths.
+    **Raises:** ValueError where the light has no wavelengths.
     """
     if not coherence(scene).on:
         return Row("orders", False, "the closed form sums all orders")
     if _unresolved(scene) is not None:
-        return Row("orders", True, "no order is left where fringes are not resolved", 0.0, 0)
+        return Row("orders", True, "no order remains where fringes are not resolved", 0.0, 0)
     if not _by_orders(scene):
-        return Row("orders", False, "nodes of the closed form are averaged, not orders")
+        return Row("orders", False, "the closed form is averaged over nodes instead")
     ratio, count, left_out = _orders(scene)
     return Row("orders", True, f"|q| ≤ {ratio:.2g} over the bounds: {count} orders", left_out, count)
 
 
 def _orders(scene: Scene) -> tuple[float, int, float]:
-    """The largest |q|, how many orders that takes, and what those beyond them can add up to."""
+    """The largest |q|, the number of orders that it needs, and a bound on the sum of all higher orders."""
     ratio = float(np.clip(largest_ratio(scene), 1e-12, 0.999))
     count = int(np.clip(np.ceil(np.log(ORDERS_ERROR * (1 - ratio)) / np.log(ratio)), 1, MOST_ORDERS))
     return ratio, count, float(min(2 * ratio**count / (1 - ratio), 1.0))
@@ -126,25 +129,25 @@ NODES_ERROR = 1e-6
 
 
 def _nodes(scene: Scene) -> tuple[int, float]:
-    """The fewest wavelengths, or thicknesses, that stand for a blur, and their error.
+    """The fewest nodes of an average over wavelength or thickness, and their error.
 
-    It is that on a fringe of the thickest stack the bounds allow, for every blur up to theirs.
+    It is the error on a fringe of the thickest stack within the bounds, for every blur up to the largest.
     """
-    at, layers = _seen_layers(scene)
+    at, layers = _layers(scene)
     blurs = [_path(at, layers) / np.min(at) * upper(scene.instrument.bandwidth) / series.FWHM]
     blurs += [4 * np.pi / np.min(at) * index * upper(thickness_spread(scene, x)) for x, index in layers]
     tried = [(n, float(sum(quadrature.normal_error(blur, n) for blur in blurs))) for n in NODES]
-    return next((found for found in tried if found[1] < NODES_ERROR), tried[-1])
+    return next(((n, error) for n, error in tried if error < NODES_ERROR), tried[-1])
 
 
 def _straight_phase_error(scene: Scene) -> float:
-    """How far a fringe's mean phase over the window is from that at its middle: P σ²/λ² for P radians."""
-    at, layers = _seen_layers(scene)
+    """Error of taking a fringe's phase as linear over the window: P σ²/λ² for a phase of P radians."""
+    at, layers = _layers(scene)
     window = upper(scene.instrument.bandwidth) / series.FWHM / np.min(at)
     return float(min(_path(at, layers) * window**2, 1.0))
 
 
-def _seen_layers(scene: Scene) -> tuple[np.ndarray, list[tuple[Layer, float]]]:
+def _layers(scene: Scene) -> tuple[np.ndarray, list[tuple[Layer, float]]]:
     """The wavelengths, and every coherent layer with its largest index."""
     at = np.asarray(scene.light.wavelength, dtype=float)
     return at, [(layer, largest_index(layer.material, at)) for layer in coherent_layers(scene)]
@@ -155,18 +158,13 @@ def _path(at: np.ndarray, layers: list[tuple[Layer, float]]) -> float:
     return float(4 * np.pi / np.min(at) * sum(upper(layer.thickness) * index for layer, index in layers))
 
 
-def _need_wavelengths(scene: Scene) -> None:
-    if scene.light.wavelength is None:
-        raise ValueError("the number of orders depends on the wavelengths: give the light its wavelengths")
-
-
 def angle_spread(scene: Scene) -> Row:
-    """How many rays stand for a cone of light, and the error of so many.
+    """Number of rays of a cone of light, and their error.
 
-    Raises ValueError where the light has no wavelengths.
+    **Raises:** ValueError where the light has no wavelengths.
     """
     if not scene.instrument.has_cone:
-        return Row("angle-spread", False, "no cone of light was given: one angle of incidence")
+        return Row("angle-spread", False, "no cone of light: one angle of incidence")
     if scene.light.wavelength is None:
         raise ValueError("the cone's rays depend on the wavelengths: give the light its wavelengths")
     count, around, error = _rays(scene)
@@ -195,4 +193,4 @@ def _rays(scene: Scene) -> tuple[int, int, float]:
         return count, around, quadrature.cone_error(phase, float(axis), float(sine), count, around)
 
     tried = map(rays, RAYS)
-    return next((found for found in tried if found[2] < CONE_ERROR), rays(RAYS[-1]))
+    return next((result for result in tried if result[2] < CONE_ERROR), rays(RAYS[-1]))

@@ -1,4 +1,4 @@
-"""What the bounds of a scene's free parameters allow: the largest and the smallest of what matters."""
+"""Extremes over the bounds of a scene's free parameters: indices, thicknesses, |q| of a layer."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from pellicle.scene.free import Free, free_leaves, insert, start_values
 
 
 def is_zero(number: Any) -> bool:
-    """Fixed, and exactly nothing."""
+    """True for None and for a fixed number that is exactly 0."""
     return number is None or (not isinstance(number, Free) and np.ndim(number) == 0 and float(number) == 0.0)
 
 
@@ -29,7 +29,7 @@ def least_ambient(scene: Scene) -> float:
 
 
 def upper(number: Any) -> float:
-    """The largest value that a number or a free one's bounds allow; 0 where it is absent."""
+    """The largest value of a number, or of the bounds of a free one; 0 for None."""
     return float(number.upper if isinstance(number, Free) else number or 0.0)
 
 
@@ -44,7 +44,7 @@ def largest_index(material: AbstractDispersion, wavelength: np.ndarray) -> float
 
 
 def smallest_index(material: AbstractDispersion, wavelength: np.ndarray) -> float:
-    """The smallest likewise, but not below 0.1: a metal has no fringes to count."""
+    """The smallest real index likewise, but at least 0.1: a metal has no fringes to count."""
     return max(float(np.nanmin(_corner_indices(material, wavelength))), 0.1)
 
 
@@ -57,9 +57,9 @@ def _corner_indices(material: AbstractDispersion, wavelength: np.ndarray) -> np.
 
 
 def largest_ratio(scene: Scene) -> float:
-    """The largest |q| = |r₁₂ r₂₃| over the corners of the box of bounds, at most 64 of them.
+    """The largest |q| = |r₁₂ r₂₃| over the bounds.
 
-    Measured, not proved: the corners and the start values, times 1.05.
+    An estimate, not a proof: the largest of the corners (at most 64) and the start values, times 1.05.
     """
     free = [leaf for _, leaf in free_leaves(scene)]
     corners = itertools.islice(itertools.product(*[(f.lower, f.upper) for f in free]), 64)
@@ -70,18 +70,18 @@ def _ratio(scene: Scene) -> float:
     at = jnp.asarray(scene.light.wavelength, dtype=float)
     group = next(group for group in groups(scene)[0] if group.layers)
     above, layer, below = (m.index(at) for m in (group.above, group.layers[0].material, group.below))
-    found = []
+    squares = []
     for angle in _extreme_angles(scene):
         a, _ = interface.transverse(scene.ambient.index(at), angle)
         inside = None if angle is None else interface.Inside(a)
         for polarisation in "s" if angle is None else "sp":
             b = orders.airy_series(above, layer, below, 0.0 * at, inside, polarisation)
-            found.append(np.asarray(abs2(b.upper * b.lower)))
-    return float(np.sqrt(np.nanmax(np.stack(found))))
+            squares.append(np.asarray(abs2(b.upper * b.lower)))
+    return float(np.sqrt(np.nanmax(np.stack(squares))))
 
 
 def _extreme_angles(scene: Scene) -> list[Any]:
-    """The angles of incidence in radians, and those at the rim of a cone; None is normal incidence."""
+    """The angles of incidence in radians, also at the rim of a cone; None is normal incidence."""
     angle = None if is_zero(scene.light.angle) else jnp.deg2rad(scene.light.angle)
     if not scene.instrument.has_cone:
         return [angle]

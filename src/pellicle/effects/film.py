@@ -13,7 +13,7 @@ from pellicle.scene.film import Scene
 
 @dataclass(frozen=True)
 class Effect:
-    """An effect by name, and the function that judges whether a scene has it."""
+    """Name of an effect, and the function that makes its row of a plan from a scene."""
 
     name: str
     judge: Callable[[Any], Row]
@@ -35,14 +35,14 @@ EFFECTS = (
     Effect("opaque", presence.opaque),
     Effect("precision", presence.precision),
 )
-"""Every effect there is, in the order that a plan lists them."""
+"""Every effect of a film, in the order of a plan."""
 
 
 def exact(scene: Scene) -> Plan:
     """The effects that a scene has, judged from its types and bounds.
 
-    An effect is left out only where it is provably absent: of those the error bound is 0. The orders,
-    nodes and rays of an average have a bound (see `effects.averaging`).
+    An effect is off only where it is provably absent; its error bound is 0. The orders, nodes and rays of
+    an average have a bound above 0 (see `effects.averaging`).
     """
     rows = tuple(effect.judge(scene) for effect in EFFECTS)
     return Plan(rows, scene.light.signal, scene.light.polarisation)

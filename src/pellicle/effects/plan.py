@@ -1,4 +1,4 @@
-"""A plan: which effects a scene calls for, why, and what leaving the others out costs."""
+"""Plan: the effects that a simulation includes, why, and the error of leaving the others out."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import Any, Protocol, runtime_checkable
 
 @dataclass(frozen=True)
 class Row:
-    """One line of a plan: the effect, whether it is simulated, why, and how far off the plan is by it.
+    """One effect of a plan: its name, whether it is simulated, why, and the error of that choice.
 
-    `error_bound` is in the unit of the signal: of leaving the effect out where it is off, of how it is
-    computed where it is on. `count` is the number of orders, or of nodes where an average is taken; a
-    cone of light has `around` rays for each of its nodes.
+    `error_bound` is in the unit of the signal: the error of leaving the effect out where it is off, of its
+    numerical method where it is on. `count` is the number of orders, or of nodes of an average; a cone of
+    light has `around` rays for each node.
     """
 
     effect: str
@@ -24,8 +24,8 @@ class Row:
 
 
 @runtime_checkable
-class LeaveOut(Protocol):
-    """Makes a scene simpler by one effect; frozen and hashable."""
+class Removal(Protocol):
+    """Removes one effect from a scene or a surface; frozen and hashable."""
 
     @property
     def effect(self) -> str: ...
@@ -35,38 +35,40 @@ class LeaveOut(Protocol):
 
 @dataclass(frozen=True)
 class Plan:
-    """Frozen, hashable and printable; `model.build` composes what it names and nothing else.
+    """The effects that a simulation includes; frozen, hashable and printable.
 
-    `left_out` are the effects that a `tolerance` (in the unit of the signal) leaves out although they
-    are there, in the order in which the scene is simplified. `gradient_error` is by how much of its
-    largest value a derivative in a free parameter changes through that, at most.
+    The `build` functions of `pellicle.simulation` turn it into a forward model. `left_out` are the effects
+    that are present but left out within the `tolerance` (in the unit of the signal), in the order in which
+    the scene is simplified. `gradient_error` is the largest change of a derivative in a free parameter by
+    that, relative to the largest value of that derivative.
     """
 
     rows: tuple[Row, ...]
     signal: str
     polarisation: str
-    left_out: tuple[LeaveOut, ...] = ()
+    left_out: tuple[Removal, ...] = ()
     tolerance: float = 0.0
     gradient_error: float = 0.0
 
     def row(self, effect: str) -> Row:
-        """The line of one effect; KeyError for a name that is none."""
+        """The row of one effect. Raises KeyError for an unknown name."""
         for row in self.rows:
             if row.effect == effect:
                 return row
         raise KeyError(effect)
 
     def on(self, effect: str) -> bool:
+        """True where the effect is simulated. Raises KeyError for an unknown name."""
         return self.row(effect).on
 
     @property
     def error_bound(self) -> float:
-        """How far the signal can be off by all that the plan leaves out, and by how it averages."""
+        """Bound on the error of the signal by everything that the plan leaves out or averages."""
         return sum(row.error_bound for row in self.rows)
 
     @property
     def static_key(self) -> Plan:
-        """The same without reasons and bounds: all that a compiled program depends on."""
+        """The plan without reasons and bounds: everything that a compiled program depends on."""
         rows = tuple(Row(row.effect, row.on, "", count=row.count, around=row.around) for row in self.rows)
         return Plan(rows, self.signal, self.polarisation, self.left_out)
 

@@ -1,7 +1,7 @@
-"""Which effects are there, judged from types and from the *bounds* of free parameters.
+"""Presence of each effect in a scene, judged from types and from the *bounds* of free parameters.
 
-Never from their current values: a layer whose k is 0 but free keeps its absorption, because dR/dk is
-not 0 there.
+Start values decide nothing: a layer whose k is free and starts at 0 keeps its absorption, because
+dR/dk is not 0 there.
 """
 
 from __future__ import annotations
@@ -26,26 +26,25 @@ def absorption(scene: Scene) -> Row:
 
 
 def stack(scene: Scene) -> Row:
-    """On where one closed form does not do: several layers, or rough faces."""
+    """On where the closed form of one layer does not apply: several layers, or rough faces."""
     count = max(len(group.layers) for group in groups(scene)[0])
     if count > 1:
         return Row("stack", True, f"{count} coherent layers: a product of characteristic matrices")
     if roughness(scene).on:
-        return Row("stack", True, "rough faces stand between characteristic matrices")
+        return Row("stack", True, "rough faces between characteristic matrices")
     return Row("stack", False, "one layer: its closed form")
 
 
 def roughness(scene: Scene) -> Row:
-    """On where a face was given a roughness, free or not."""
+    """On where a face has a roughness, fixed or free."""
     faces = [upper(each) for group in groups(scene)[0] for each in group.roughness if each is not None]
-    if faces:
-        how = f"up to {max(faces):g} nm damps what a face reflects"
-        return Row("roughness", True, f"{len(faces)} rough: {how}")
-    return Row("roughness", False, "no face was given a roughness")
+    if not faces:
+        return Row("roughness", False, "no face has a roughness")
+    return Row("roughness", True, f"{len(faces)} rough: up to {max(faces):g} nm damps their reflection")
 
 
 def oblique(scene: Scene) -> Row:
-    """On where light comes at an angle, at a free one or in a cone."""
+    """On at an angle of incidence other than 0, at a free one, and in a cone of light."""
     angle = scene.light.angle
     if scene.instrument.has_cone:
         return Row("oblique", True, "the light's cone has oblique rays")
@@ -58,18 +57,18 @@ def oblique(scene: Scene) -> Row:
 
 
 def tunnelling(scene: Scene) -> Row:
-    """Off where every real index is provably above n₀ sin θ: then its root needs no branch."""
+    """Off where every real index is provably above n₀ sin θ: the square root then needs no branch."""
     if not oblique(scene).on:
         return Row("tunnelling", False, "normal incidence: every wave propagates")
     unsure = [name for name, m in _media(scene) if not absorbs(m) and not _propagates(m, scene)]
     if unsure:
         named = " and ".join(dict.fromkeys(unsure))
-        return Row("tunnelling", True, f"total reflection in the {named} is not ruled out")
+        return Row("tunnelling", True, f"total reflection in the {named} is possible")
     return Row("tunnelling", False, "no real index can fall below n₀ sin θ")
 
 
 def _media(scene: Scene) -> list[tuple[str, AbstractDispersion]]:
-    """Everything that a wave enters, with the name that a reader knows it by."""
+    """Every medium that a wave enters, with its name in messages."""
     own = [(i, x.material) for i, x in enumerate(scene.layers) if not isinstance(x, Interface)]
     names = {id(material): name(scene, i) for i, material in own}
     coherent = [(names.get(id(x.material), "interface"), x.material) for x in coherent_layers(scene)]
@@ -78,7 +77,7 @@ def _media(scene: Scene) -> list[tuple[str, AbstractDispersion]]:
 
 
 def name(scene: Scene, position: int) -> str:
-    """What a reader knows a layer by."""
+    """Name of a layer in messages: its own, or by its position (`layer2`)."""
     return "layer" if len(scene.layers) == 1 else scene.layers[position].name or f"layer{position + 1}"
 
 
@@ -99,14 +98,14 @@ def polarisation(scene: Scene) -> Row:
     if scene.instrument.has_cone:
         return Row("polarisation", True, "the light's cone has s and p")
     if is_zero(scene.light.angle):
-        return Row("polarisation", False, "s and p are one at normal incidence")
+        return Row("polarisation", False, "s and p are equal at normal incidence")
     if scene.light.polarisation != "unpolarised":
-        return Row("polarisation", False, f"only {scene.light.polarisation} is asked for")
+        return Row("polarisation", False, f"the light is {scene.light.polarisation}-polarised")
     return Row("polarisation", True, "unpolarised light at an angle: the mean of s and p")
 
 
 def transmission(scene: Scene) -> Row:
-    """On where the signal, or a plate's back face, needs what passes the layers."""
+    """On where the signal, or the back face of a plate, needs the transmitted light."""
     if scene.light.signal == "T":
         return Row("transmission", True, "the signal is a transmittance")
     if back_face(scene).on:
@@ -115,17 +114,17 @@ def transmission(scene: Scene) -> Row:
 
 
 def back_face(scene: Scene) -> Row:
-    """On where there is a plate: its faces add intensities."""
+    """On where there is a plate: the intensities from its faces add up."""
     plates = len(groups(scene)[1])
     if plates == 0:
-        return Row("back-face", False, "the substrate is a half space: no back face was given")
+        return Row("back-face", False, "the substrate is a half space, without a back face")
     if plates == 1 and scene.substrate.back is not None:
         return Row("back-face", True, "the substrate is a plate; its back face adds incoherently")
-    return Row("back-face", True, f"{plates} incoherent: the faces of a plate add intensities")
+    return Row("back-face", True, f"{plates} incoherent plates: the intensities from their faces add up")
 
 
 def dispersion(scene: Scene) -> Row:
-    """On where an index varies over the wavelengths."""
+    """On where an index varies with the wavelength."""
     at = scene.light.wavelength
     varying = [name for name, m in [*_media(scene), ("ambient", scene.ambient)] if not _constant(m)]
     if at is not None and np.size(np.unique(at)) == 1:
@@ -141,10 +140,10 @@ def _constant(material: AbstractDispersion) -> bool:
 
 
 def opaque(scene: Scene) -> Row:
-    """Off: only a tolerance says that a layer hides what lies beneath (`pellicle.planning.film`)."""
-    return Row("opaque", False, "light may reach everything, down to the substrate")
+    """Off: only within a tolerance may an opaque layer hide what lies beneath (`pellicle.planning.film`)."""
+    return Row("opaque", False, "light may reach every layer and the substrate")
 
 
 def precision(scene: Scene) -> Row:
-    """On: only a tolerance says that single precision will do (`pellicle.planning.film`)."""
-    return Row("precision", True, "double, as far as JAX is set to it")
+    """On: only a tolerance permits single precision (`pellicle.planning.film`)."""
+    return Row("precision", True, "double precision, where JAX has it enabled")

@@ -1,8 +1,8 @@
-"""A scene with one effect left out: simpler, and nearly the same to the instrument.
+"""Removal of single effects from the scene of a film.
 
-Each function takes a scene of `Free` parameters or of numbers and gives another one. What the scene
-no longer holds leaves no trace in what is computed; a `Free` that it no longer holds is a gradient
-lost, and then the effect must stay (see `pellicle.planning.film`).
+Each function takes a scene, of `Free` parameters or of numbers, and returns a simpler one whose
+simulation does not contain the effect. If the simpler scene lacks a `Free` parameter its gradient would
+be lost, and the effect must stay (see `pellicle.planning.tolerance`).
 """
 
 from __future__ import annotations
@@ -25,44 +25,44 @@ from pellicle.scene.layers import Interface, Layer, Plate, Substrate
 
 
 @dataclass(frozen=True)
-class LeftOut:
-    """An effect that a plan leaves out; `depth` is the number of layers above an opaque one."""
+class FilmRemoval:
+    """Removal of one effect from a scene; `depth` is the number of layers above an opaque one."""
 
     effect: str
     depth: int = 0
 
     def __call__(self, scene: Scene) -> Scene:
-        return _WITHOUT[self.effect](scene, self)
+        return _REMOVALS[self.effect](scene, self)
 
 
 def _with(module: Any, **changed: Any) -> Any:
-    """Some fields changed, unchecked: no layer at all is a bare surface here."""
-    names = list(changed)
+    """The module with some fields changed and without its checks: a scene may have no layer here."""
     return eqx.tree_at(
-        lambda m: [getattr(m, name) for name in names], module, [*changed.values()], is_leaf=_absent
+        lambda m: [getattr(m, name) for name in changed],
+        module,
+        [*changed.values()],
+        is_leaf=lambda x: x is None,
     )
-
-
-def _absent(x: Any) -> bool:
-    return x is None
 
 
 def _each(scene: Scene, change: Callable[[Layer], Layer]) -> tuple[Layer | Interface | Plate, ...]:
     return tuple(change(x) if isinstance(x, Layer) else x for x in scene.layers)
 
 
-def _angle_spread(scene: Scene, _: LeftOut) -> Scene:
+def _angle_spread(scene: Scene, _: FilmRemoval) -> Scene:
+    """Take the axis of the light's cone for all its rays."""
     return _with(scene, instrument=_with(scene.instrument, angle_spread=None, numerical_aperture=None))
 
 
-def _coherence(scene: Scene, _: LeftOut) -> Scene:
+def _coherence(scene: Scene, _: FilmRemoval) -> Scene:
+    """Drop bandwidth and thickness spreads."""
     instrument = _with(scene.instrument, bandwidth=None, thickness_spread=None)
     even = _each(scene, lambda layer: _with(layer, thickness_spread=None))
     return _with(scene, instrument=instrument, layers=even)
 
 
-def _back_face(scene: Scene, _: LeftOut) -> Scene:
-    """The first plate as a half space."""
+def _back_face(scene: Scene, _: FilmRemoval) -> Scene:
+    """Make the first plate a half space."""
     first = next((i for i, x in enumerate(scene.layers) if isinstance(x, Plate)), None)
     if first is None:
         substrate = scene.substrate
@@ -71,33 +71,36 @@ def _back_face(scene: Scene, _: LeftOut) -> Scene:
     return _with(scene, layers=scene.layers[:first], substrate=Substrate(plate.material))
 
 
-def _opaque(scene: Scene, left_out: LeftOut) -> Scene:
-    """The layer under the first `depth` ones as a half space."""
-    layer: Any = scene.layers[left_out.depth]
+def _opaque(scene: Scene, removal: FilmRemoval) -> Scene:
+    """Make the layer under the first `depth` ones a half space."""
+    layer: Any = scene.layers[removal.depth]
     substrate = Substrate(layer.material, roughness=layer.roughness)
-    return _with(scene, layers=scene.layers[: left_out.depth], substrate=substrate)
+    return _with(scene, layers=scene.layers[: removal.depth], substrate=substrate)
 
 
-def _oblique(scene: Scene, _: LeftOut) -> Scene:
+def _oblique(scene: Scene, _: FilmRemoval) -> Scene:
+    """Take normal incidence."""
     return _with(scene, light=_with(scene.light, angle=0.0))
 
 
-def _roughness(scene: Scene, _: LeftOut) -> Scene:
+def _roughness(scene: Scene, _: FilmRemoval) -> Scene:
+    """Make every face smooth."""
     smooth = _each(scene, lambda layer: _with(layer, roughness=None))
     return _with(scene, layers=smooth, substrate=_with(scene.substrate, roughness=None))
 
 
-def _polarisation(scene: Scene, _: LeftOut) -> Scene:
-    """s alone for the mean of s and p."""
+def _polarisation(scene: Scene, _: FilmRemoval) -> Scene:
+    """Take s alone for the mean of s and p."""
     return _with(scene, light=replace(scene.light, polarisation="s"))
 
 
-def _absorption(scene: Scene, _: LeftOut) -> Scene:
+def _absorption(scene: Scene, _: FilmRemoval) -> Scene:
+    """Drop the extinction of every layer."""
     return _with(scene, layers=_each(scene, lambda layer: _with(layer, material=_lossless(layer.material))))
 
 
 def _lossless(material: AbstractDispersion) -> AbstractDispersion:
-    """Without a free parameter: one may be the extinction, or be lost with it."""
+    """The material without extinction, unless a parameter is free: it may be lost with the extinction."""
     if free_leaves(material):
         return material
     return Constant(material.n) if isinstance(material, Constant) else RealPart(material)
@@ -105,7 +108,7 @@ def _lossless(material: AbstractDispersion) -> AbstractDispersion:
 
 @final
 class RealPart(AbstractDispersion):
-    """Another dispersion as if it did not absorb."""
+    """The real part of another dispersion."""
 
     base: AbstractDispersion
 
@@ -113,8 +116,8 @@ class RealPart(AbstractDispersion):
         return real(self.base.index(wavelength))
 
 
-def _dispersion(scene: Scene, _: LeftOut) -> Scene:
-    """Every fixed medium by its index at the middle wavelength."""
+def _dispersion(scene: Scene, _: FilmRemoval) -> Scene:
+    """Give every fixed medium its index at the middle wavelength."""
     at = scene.light.wavelength
     flat = _each(scene, lambda layer: _with(layer, material=_flat(layer.material, at)))
     plates = [_with(x, material=_flat(x.material, at)) if isinstance(x, Plate) else x for x in flat]
@@ -128,6 +131,7 @@ def _dispersion(scene: Scene, _: LeftOut) -> Scene:
 
 
 def _flat(material: AbstractDispersion, wavelength: Any) -> AbstractDispersion:
+    """The material with its index at the middle wavelength, unless a parameter is free."""
     if free_leaves(material):
         return material
     middle = np.size(wavelength) // 2
@@ -135,12 +139,8 @@ def _flat(material: AbstractDispersion, wavelength: Any) -> AbstractDispersion:
     return Constant(0.0 if re is None else re, im)
 
 
-def _precision(scene: Scene, _: LeftOut) -> Scene:
-    return in_single(scene)
-
-
-def in_single(scene: Any) -> Any:
-    """Arrays in single precision; plain numbers take on theirs."""
+def in_single_precision(scene: Any) -> Any:
+    """The pytree with arrays in single precision; Python numbers follow them."""
 
     def single(x: Any) -> Any:
         if is_free(x) or not hasattr(x, "dtype"):
@@ -150,7 +150,7 @@ def in_single(scene: Any) -> Any:
     return jax.tree_util.tree_map(single, scene, is_leaf=is_free)
 
 
-_WITHOUT: dict[str, Callable[[Scene, LeftOut], Scene]] = {
+_REMOVALS: dict[str, Callable[[Scene, FilmRemoval], Scene]] = {
     "angle-spread": _angle_spread,
     "coherence": _coherence,
     "back-face": _back_face,
@@ -160,8 +160,8 @@ _WITHOUT: dict[str, Callable[[Scene, LeftOut], Scene]] = {
     "polarisation": _polarisation,
     "absorption": _absorption,
     "dispersion": _dispersion,
-    "precision": _precision,
+    "precision": lambda scene, _: in_single_precision(scene),
 }
 
-CAN_BE_LEFT_OUT = tuple(_WITHOUT)
-"""Effects that a tolerance may leave out, those that save most first."""
+REMOVABLE = tuple(_REMOVALS)
+"""Effects that may be left out within a tolerance, those that save most first."""

@@ -1,9 +1,7 @@
-"""Which effects a surface calls for, judged from what it has and from the bounds of what is free."""
+"""Effects that a surface can have, and its exact plan, judged from the bounds of its free parameters."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
 from typing import Any
 
 import jax
@@ -11,78 +9,83 @@ import numpy as np
 
 from pellicle.brdf.directions import angle_to_half
 from pellicle.effects.plan import Plan, Row
-from pellicle.effects.removal import in_single
 from pellicle.scene.free import Free, is_free
-from pellicle.scene.surface import LAYERED, SurfaceView
+from pellicle.scene.surface import SurfaceView
 
-ALONG = 1e-6
-"""Radians between light and eye, halved, below which they are one."""
+SAME_DIRECTION = 1e-6
+"""Angle (radians) between light and half vector below which light and eye count as one direction."""
 
-NO_LAYER = "nothing of the layer is seen"
+NO_LAYER = "the layer has no part in the BRDF"
 
 
 def spectral_sampling(view: SurfaceView) -> Row:
     """On where channels differ."""
     if not view.layered:
         return Row("spectral-sampling", False, "the diffuse part alone is grey", count=1)
-    at = np.asarray(view.numbers["wavelengths"])
-    listed = ", ".join(f"{nm:g}" for nm in at)
-    if len(at) == 1:
+    wavelengths = np.asarray(view.numbers["wavelengths"])
+    listed = ", ".join(f"{nm:g}" for nm in wavelengths)
+    if len(wavelengths) == 1:
         return Row("spectral-sampling", False, f"one channel: {listed} nm", count=1)
-    return Row("spectral-sampling", True, f"one wavelength a channel: {listed} nm", count=len(at))
+    return Row("spectral-sampling", True, f"one wavelength a channel: {listed} nm", count=len(wavelengths))
 
 
 def roughness(view: SurfaceView) -> Row:
     """On where there is a lobe."""
-    if "specular" not in {p.key for p in view.brdf.parameters}:
+    if "specular" not in _keys(view):
         return Row("roughness", False, "the diffuse part alone: no lobe")
     if "specular" not in view.numbers:
         return Row("roughness", False, "the lobe has no weight")
-    return Row(
-        "roughness", True, "a lobe of GGX microfacets" if "roughness" in view.numbers else "cosine lobes"
-    )
+    lobe = "a lobe of GGX microfacets" if "roughness" in view.numbers else "cosine lobes"
+    return Row("roughness", True, lobe)
 
 
 def deviation(view: SurfaceView) -> Row | None:
-    """On where the two normals differ, or may; only a model of two boundaries has them."""
+    """On where the two normals may differ; only models with two boundaries have them."""
     return _of_number(view, "deviation", "the angle between the two normals", "the boundaries are parallel")
 
 
 def diffuse(view: SurfaceView) -> Row | None:
-    """On where there is a diffuse part, or may be."""
+    """On where there may be a diffuse part."""
     return _of_number(view, "diffuse", "the diffuse part", "there is no diffuse part")
 
 
 def absorption(view: SurfaceView) -> Row | None:
-    """On where the film's extinction is free, or not zero; only microfacets know one."""
+    """On where the extinction of the film is free or not zero; only microfacet models have one."""
     row = _of_number(view, "k", "the film's extinction", "the film has no extinction")
     return None if row is None else Row("absorption", row.on, row.why)
 
 
+def _keys(view: SurfaceView) -> set[str]:
+    return {parameter.key for parameter in view.brdf.parameters}
+
+
 def _of_number(view: SurfaceView, key: str, what: str, absent: str) -> Row | None:
-    if key not in {p.key for p in view.brdf.parameters}:
+    """The row of an effect with a number of its own; None where the model does not have it."""
+    if key not in _keys(view):
         return None
     if key not in view.numbers:
         return Row(key, False, absent)
-    return Row(key, True, f"{what} is {'free' if _free(view.numbers[key]) else 'not zero'}")
+    number = view.numbers[key]
+    free = any(map(is_free, number)) if isinstance(number, list) else is_free(number)
+    return Row(key, True, f"{what} is {'free' if free else 'not zero'}")
 
 
 def coherence(view: SurfaceView) -> Row:
-    """On where anything of the layer is seen: what its two faces reflect interferes."""
+    """On where the layer takes part: the reflections of its two faces interfere."""
     if not view.layered:
         return Row("coherence", False, NO_LAYER)
-    return Row("coherence", view.coherent, "what the layer's two faces reflect interferes")
+    return Row("coherence", view.coherent, "the reflections of the layer's two faces interfere")
 
 
 def oblique(view: SurfaceView) -> Row | None:
-    """On where a facet is lit at an angle; only of a film."""
+    """On where a facet is lit at an angle; None for a model without a film."""
     if view.brdf.from_film_colour is None:
         return None
     if not view.layered:
         return Row("oblique", False, NO_LAYER)
     steepest = largest_angle(view)
-    if not view.oblique or steepest < ALONG:
-        return Row("oblique", False, "the light returns to where it comes from")
+    if not view.oblique or steepest < SAME_DIRECTION:
+        return Row("oblique", False, "light and eye are in the same direction")
     return Row("oblique", True, f"facets are lit at up to {np.rad2deg(steepest):.3g}°")
 
 
@@ -90,13 +93,13 @@ def polarisation(view: SurfaceView) -> Row | None:
     """On where s and p differ."""
     row = oblique(view)
     if row is None or not row.on:
-        why = "s and p are one at normal incidence" if view.layered else NO_LAYER
+        why = "s and p are equal at normal incidence" if view.layered else NO_LAYER
         return None if row is None else Row("polarisation", False, why)
     return Row("polarisation", view.polarisation == "unpolarised", "unpolarised light: the mean of s and p")
 
 
 def tunnelling(view: SurfaceView) -> Row | None:
-    """Off where no index can fall below n₀ sin θ: then a root needs no branch."""
+    """Off where no index can fall below n₀ sin θ: the square root then needs no branch."""
     if view.brdf.from_film_colour is None:
         return None
     row = oblique(view)
@@ -105,105 +108,43 @@ def tunnelling(view: SurfaceView) -> Row | None:
         return Row("tunnelling", False, why)
     ambient = _bound(view.numbers.get("ambient_n", 1.0), "upper")
     transverse = ambient * np.sin(largest_angle(view)) * (1 + 1e-6)
-    real = [("film", "n", "k"), ("base", "base_n", "base_k")]
     unsure = [
         name
-        for name, n, k in real
+        for name, n, k in (("film", "n", "k"), ("base", "base_n", "base_k"))
         if k not in view.numbers and _bound(view.numbers[n], "lower") <= transverse
     ]
     if unsure:
-        return Row("tunnelling", True, f"total reflection at the {' and '.join(unsure)} is not ruled out")
+        return Row("tunnelling", True, f"total reflection at the {' and '.join(unsure)} is possible")
     return Row("tunnelling", False, "no real index can fall below n₀ sin θ")
 
 
 def precision(view: SurfaceView) -> Row:
-    """On: only a tolerance says that single precision will do."""
-    return Row("precision", True, "double, as far as JAX is set to it")
+    """On: only a tolerance permits single precision."""
+    return Row("precision", True, "double precision, where JAX has it enabled")
 
 
 JUDGES = (
     *(spectral_sampling, roughness, deviation, diffuse, absorption),
     *(coherence, tunnelling, oblique, polarisation, precision),
 )
-"""One for every effect that a surface can have, in the order that a plan lists them; None says that its
-model cannot have it."""
+"""One function for each effect of a surface, in the order of a plan; it returns None where the model cannot
+have the effect."""
 
 
 def exact(view: SurfaceView) -> Plan:
-    """The effects that a surface calls for; one is off only where it is provably absent."""
+    """The effects that a surface has; one is off only where it is provably absent."""
     rows = [judge(view) for judge in JUDGES]
     return Plan(tuple(row for row in rows if row is not None), "brdf", view.polarisation)
 
 
 def largest_angle(view: SurfaceView) -> float:
-    """The largest angle (radians) at which a facet that mirrors the light to the eye is lit."""
+    """The largest angle of incidence (radians) on a facet that mirrors the light to the eye."""
     with jax.enable_x64(True):
         return float(np.max(np.asarray(angle_to_half(view.i, view.o)), initial=0.0))
 
 
-def _free(number: Any) -> bool:
-    return any(map(is_free, number)) if isinstance(number, list) else is_free(number)
-
-
 def _bound(number: Any, side: str) -> float:
-    """The largest (side "upper") or smallest value that a number, or the bounds of a free one, allow."""
+    """The largest (side "upper") or smallest value of a number, or of the bounds of a free one."""
     each = number if isinstance(number, list) else [number]
     values = [getattr(x, side) if isinstance(x, Free) else np.asarray(x) for x in each]
     return float(max(map(np.max, values)) if side == "upper" else min(map(np.min, values)))
-
-
-_LOBES = ("specular", "roughness", "exponent", "exponent_reflection", "exponent_transmission")
-
-
-_NORMALS = ("deviation", "azimuth")
-
-
-@dataclass(frozen=True)
-class LeftOut:
-    """An effect that a plan leaves out."""
-
-    effect: str
-
-    def __call__(self, view: SurfaceView) -> SurfaceView:
-        return _WITHOUT[self.effect](view)
-
-
-def _roughness(view: SurfaceView) -> SurfaceView:
-    """The diffuse part alone; where that is grey nothing of the layer is left."""
-    if view.model in LAYERED:
-        return _dropped(view, *_LOBES, *_NORMALS)
-    kept = {"wavelengths", "diffuse"}
-    return _dropped(view, *(view.numbers.keys() - kept))
-
-
-def _spectral_sampling(view: SurfaceView) -> SurfaceView:
-    """The middle channel for all of them."""
-    middle = view.channels // 2
-
-    def one(number: Any) -> Any:
-        if isinstance(number, list):
-            return [number[middle]]
-        return number if np.ndim(number) == 0 else number[middle : middle + 1]
-
-    return replace(view, numbers={key: one(number) for key, number in view.numbers.items()})
-
-
-def _dropped(view: SurfaceView, *keys: str) -> SurfaceView:
-    return replace(view, numbers={key: x for key, x in view.numbers.items() if key not in keys})
-
-
-_WITHOUT: dict[str, Callable[[SurfaceView], SurfaceView]] = {
-    "roughness": _roughness,
-    "spectral-sampling": _spectral_sampling,
-    "coherence": lambda view: replace(view, coherent=False),
-    "oblique": lambda view: replace(view, oblique=False),
-    "polarisation": lambda view: replace(view, polarisation="s"),
-    "deviation": lambda view: _dropped(view, *_NORMALS),
-    "absorption": lambda view: _dropped(view, "k"),
-    "diffuse": lambda view: _dropped(view, "diffuse"),
-    "precision": in_single,
-}
-
-
-CAN_BE_LEFT_OUT = tuple(_WITHOUT)
-"""Effects that a tolerance may leave out, those that save most first."""

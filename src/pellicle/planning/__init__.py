@@ -1,1 +1,1 @@
-"""Plans within a tolerance: effects left out, the error made, and the time saved."""
+"""Plans within a tolerance, and the cost model behind them."""

@@ -1,10 +1,10 @@
-"""What an evaluation costs: XLA's own count of operations, and this machine's time for each of them."""
+"""Cost model: operations of a simulation as XLA counts them, times the calibrated speed of this machine."""
 
 from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,90 +14,75 @@ import jax.numpy as jnp
 import numpy as np
 
 from pellicle.effects.plan import Plan
-from pellicle.effects.removal import CAN_BE_LEFT_OUT
 from pellicle.errors import UsageError
 from pellicle.files import write_text
-from pellicle.planning.differences import design, largest_difference, signals
-from pellicle.planning.film import alternatives, reference
-from pellicle.planning.tolerance import See
-from pellicle.scene.film import Scene
-from pellicle.scene.free import insert, start_values
-from pellicle.simulation.film import build, sampled
+from pellicle.planning.differences import Evaluation, largest_difference
 
 
 class Work(NamedTuple):
-    """Operations of one evaluation, before XLA puts any of them together."""
+    """Operations of one evaluation, before XLA fuses any of them."""
 
     flops: float
     transcendentals: float
 
 
 class Calibration(NamedTuple):
-    """Seconds that a call, an operation and a transcendental function take here, in float64."""
+    """Seconds of a call, an operation and a transcendental function on this machine, in float64."""
 
     call: float
     flop: float
     transcendental: float
 
     def seconds(self, work: Work) -> float:
-        """The time that an evaluation should take; within a factor of 3 for films of some 100 points."""
+        """Estimated time of an evaluation; within a factor of 3 for films of about 100 points."""
         return self.call + self.flop * work.flops + self.transcendental * work.transcendentals
 
 
 class Saving(NamedTuple):
-    """What leaving one effect out would change, in the signal's unit, and save, in seconds."""
+    """Effect of leaving something out: its error in the unit of the signal, and the seconds it saves."""
 
     error: float
     seconds: float
 
 
-def work(plan: Plan, scene: Scene) -> Work:
-    """The operations of one evaluation of the scene at its start values, as XLA counts them."""
-    with jax.enable_x64(True):
-        return counted(build(plan.static_key), insert(sampled(scene), start_values(scene)))
+def work(simulate: Callable[[Any], Any], numbers: Any) -> Work:
+    """Operations of a function of one pytree of numbers, as XLA counts them."""
+    counts = jax.jit(simulate).lower(numbers).cost_analysis() or {}
+    return Work(float(counts.get("flops", 0.0)), float(counts.get("transcendentals", 0.0)))
 
 
-def counted(simulate: Callable[[Any], Any], numbers: Any) -> Work:
-    """The same of any function of one pytree of numbers."""
-    found = jax.jit(simulate).lower(numbers).cost_analysis() or {}
-    return Work(float(found.get("flops", 0.0)), float(found.get("transcendentals", 0.0)))
-
-
-def savings(scene: Scene, calibration: Calibration) -> dict[str, Saving]:
-    """For each effect that could be left out: what that would change and save, all else being exact."""
-    with jax.enable_x64(True):
-        see = partial(signals, scene=sampled(scene), points=design(scene))
-        cheaper = {effect: alternatives(effect, scene)[:1] for effect in CAN_BE_LEFT_OUT}
-        return saved(reference(scene), cheaper, see, lambda plan: calibration.seconds(work(plan, scene)))
-
-
-def saved(
-    exactly: Plan, cheaper: dict[str, list[Plan]], see: See, seconds: Callable[[Plan], float]
+def savings(
+    full: Plan, cheaper: Mapping[str, list[Plan]], evaluation: Evaluation, seconds: Callable[[Plan], float]
 ) -> dict[str, Saving]:
-    """What each cheaper plan changes, by `see`, and saves, by `seconds`; none where there is no plan."""
-    truth, whole = see(exactly), seconds(exactly)
+    """What the cheaper plan of each effect changes and saves, compared with the `full` one.
+
+    `cheaper` has at most one plan for each effect; `seconds` estimates the time of a plan.
+    """
+    exact, total = evaluation.signals(full), seconds(full)
     return {
-        effect: Saving(largest_difference(see(plan), truth, exactly.signal), whole - seconds(plan))
+        effect: Saving(
+            largest_difference(evaluation.signals(plan), exact, full.signal), total - seconds(plan)
+        )
         for effect, plans in cheaper.items()
         for plan in plans
     }
 
 
 def calibrated(folder: Path | None) -> Calibration:
-    """This machine's calibration, from the folder (or None) where it is kept; measured once, in a second."""
+    """The calibration of this machine, read from `folder` (None: not stored) or measured in about 1 s."""
     if folder is None:
         return _calibrate()
     path = folder / f"calibration-{jax.default_backend()}-{jax.__version__}.json"
     try:
         return Calibration(**json.loads(path.read_text(encoding="utf-8")))
-    except (OSError, ValueError, TypeError):  # absent, or cut short: measured again
-        found = _calibrate()
+    except (OSError, ValueError, TypeError):  # absent or truncated
+        calibration = _calibrate()
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        write_text(path, json.dumps(found._asdict()), overwrite=True)
+        write_text(path, json.dumps(calibration._asdict()), overwrite=True)
     except (OSError, UsageError):
-        pass  # a cache that cannot be written is no failure
-    return found
+        pass  # it is only a cache
+    return calibration
 
 
 CHAIN, SIZE, REPEATS = 64, 4096, 40
@@ -105,7 +90,7 @@ CHAIN, SIZE, REPEATS = 64, 4096, 40
 
 @lru_cache(maxsize=1)
 def _calibrate() -> Calibration:
-    """Chains of products and sums, and of sines, long enough to outweigh the call."""
+    """Time chains of products and sums, and of sines, long enough to outweigh the call."""
     with jax.enable_x64(True):
         x = jnp.linspace(0.0, 1.0, SIZE)
         call = _best(jax.jit(lambda x: x + 1.0), x[:1])
@@ -123,7 +108,7 @@ def _chain(step: Callable[[Any, Any], Any], x: Any) -> Any:
 
 
 def _best(function: Callable[[Any], Any], x: Any) -> float:
-    """The shortest time of many calls: what else runs here only ever adds to it."""
+    """The shortest time of many calls: other processes only ever add to it."""
     function(x).block_until_ready()
 
     def once() -> float:

@@ -1,11 +1,11 @@
-"""How much two plans differ over the bounds of a scene, a film's or a surface's, measured."""
+"""Largest difference of two plans over the bounds of a scene, film or surface, by simulation."""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -13,10 +13,9 @@ import numpy as np
 
 from pellicle.effects.plan import Plan
 from pellicle.scene.free import free_leaves, insert, is_free, start_values
-from pellicle.simulation.film import build
 
-Builder = Callable[[Plan], Callable[[Any], Any]]
-"""A plan → what simulates a scene by it: `model.build`, or that of a surface."""
+Build = Callable[[Plan], Callable[[Any], Any]]
+"""A plan → its forward model: `build` of `simulation.film` or `simulation.surface`."""
 
 POINTS = 256
 CORNERS = 64
@@ -24,12 +23,15 @@ _BATCH = 16
 
 
 def design(scene: Any) -> np.ndarray:
-    """Where plans are compared: the corners of the bounds (at most 64), the start, and 256 points of a
-    Sobol sequence between, (points, parameters). Without free parameters it is the scene itself."""
+    """Points within the bounds at which plans are compared, (points, parameters).
+
+    They are the corners of the bounds (at most 64), the start values, and 256 points of a Sobol sequence;
+    without free parameters one point, the scene itself.
+    """
     free = [leaf for _, leaf in free_leaves(scene)]
     if not free:
         return np.zeros((1, 0))
-    from scipy.stats import qmc
+    from scipy.stats import qmc  # slow to import
 
     lower, upper = (np.array([getattr(f, side) for f in free]) for side in ("lower", "upper"))
     corners = [*itertools.islice(itertools.product(*zip(lower, upper, strict=True)), CORNERS)]
@@ -38,19 +40,47 @@ def design(scene: Any) -> np.ndarray:
     return np.concatenate([corners, start, lower + between * (upper - lower)])
 
 
-def signals(plan: Plan, scene: Any, points: np.ndarray, builder: Builder = build) -> np.ndarray:
-    """The signal at each of the points, (points, wavelengths), N, C and S of each for ellipsometry."""
-    return np.asarray(_signals(builder, plan.static_key, *_split(scene, points)), dtype=float)
+class Evaluation(NamedTuple):
+    """Simulations of one scene at the points of a design, by any plan.
+
+    `scene` has its media evaluated where possible. Signals are divided by `scale`, which broadcasts to
+    (points, values).
+    """
+
+    build: Build
+    scene: Any
+    points: np.ndarray
+    scale: Any = 1.0
+
+    def signals(self, plan: Plan) -> np.ndarray:
+        """Signal of a plan at each point, (points, values)."""
+        return signals(plan, self.scene, self.points, self.build) / self.scale
+
+    def slope_change(self, one: Plan, other: Plan, count: int) -> float:
+        """`largest_slope_change` between two plans at the last `count` points; 0 if nothing is free."""
+        if not self.points.shape[1]:
+            return 0.0
+        last = self.points[-count:]
+        return largest_slope_change(*(gradients(plan, self.scene, last, self.build) for plan in (one, other)))
 
 
-def gradients(plan: Plan, scene: Any, points: np.ndarray, builder: Builder = build) -> np.ndarray:
-    """Its derivatives in the free parameters, (points, wavelengths, parameters)."""
-    return np.asarray(_gradients(builder, plan.static_key, *_split(scene, points)), dtype=float)
+def signals(plan: Plan, scene: Any, points: np.ndarray, build: Build) -> np.ndarray:
+    """Signal at each point, (points, values): for a film its wavelengths, for ellipsometry N, C and S of
+    each wavelength, for a surface the channels of each pair of directions."""
+    return np.asarray(_signals(build, plan.static_key, *_split(scene, points)), dtype=float)
+
+
+def gradients(plan: Plan, scene: Any, points: np.ndarray, build: Build) -> np.ndarray:
+    """Derivatives of the signal in the free parameters at each point, (points, values, parameters)."""
+    return np.asarray(_gradients(build, plan.static_key, *_split(scene, points)), dtype=float)
 
 
 def largest_difference(one: np.ndarray, other: np.ndarray, signal: str) -> float:
-    """Of two sets of signals, in the signal's unit: for ellipsometry the arc, in degrees, between two
-    points (N, C, S). Infinite where one of them is no number."""
+    """Largest difference of two arrays of signals, in the unit of the signal.
+
+    For ellipsometry it is the arc, in degrees, between two points (N, C, S). Infinite where one of the
+    signals is not a number.
+    """
     apart = np.abs(one - other)
     if signal == "psi-delta":
         apart = np.rad2deg(np.linalg.norm(apart.reshape(-1, 3), axis=1))
@@ -58,41 +88,43 @@ def largest_difference(one: np.ndarray, other: np.ndarray, signal: str) -> float
 
 
 def largest_slope_change(one: np.ndarray, other: np.ndarray) -> float:
-    """Of two sets of gradients, as a share of each parameter's largest derivative in the first."""
+    """Largest difference of two arrays of gradients, relative to the largest derivative of each parameter in
+    the first."""
     apart, size = (np.max(np.abs(x), axis=(0, 1), initial=0.0) for x in (one - other, one))
     return float(np.max(apart / np.where(size > 0, size, 1.0), initial=0.0))
 
 
 def _split(scene: Any, points: np.ndarray) -> tuple[Any, tuple[bool, ...], list[Any], np.ndarray]:
-    """What a program is compiled for (structure, and which leaves are free), and its numbers."""
-    marked = jax.tree_util.tree_leaves(scene, is_leaf=is_free)
+    """The static arguments of a program (structure, and which leaves are free) and its numbers."""
+    leaves = jax.tree_util.tree_leaves(scene, is_leaf=is_free)
     fixed, structure = jax.tree_util.tree_flatten(insert(scene, points[0]))
-    free = tuple(is_free(leaf) for leaf in marked)
+    free = tuple(is_free(leaf) for leaf in leaves)
     return structure, free, [x for x, f in zip(fixed, free, strict=True) if not f], points
 
 
-def _filled(structure: Any, free: tuple[bool, ...], fixed: list[Any], values: Any) -> Any:
-    moving, standing = iter(values), iter(fixed)
-    leaves = [next(moving) if f else next(standing) for f in free]
+def _join(structure: Any, free: tuple[bool, ...], fixed: list[Any], values: Any) -> Any:
+    free_values, fixed_values = iter(values), iter(fixed)
+    leaves = [next(free_values) if f else next(fixed_values) for f in free]
     return jax.tree_util.tree_unflatten(structure, leaves)
 
 
 @partial(jax.jit, static_argnums=(0, 1, 2, 3))
 def _signals(
-    builder: Builder, plan: Plan, structure: Any, free: tuple[bool, ...], fixed: list[Any], points: Any
+    build: Build, plan: Plan, structure: Any, free: tuple[bool, ...], fixed: list[Any], points: Any
 ) -> Any:
-    simulate = builder(plan)
-    return _at_each(lambda v: jnp.ravel(simulate(_filled(structure, free, fixed, v))), points)
+    simulate = build(plan)
+    return _in_batches(lambda v: jnp.ravel(simulate(_join(structure, free, fixed, v))), points)
 
 
 @partial(jax.jit, static_argnums=(0, 1, 2, 3))
 def _gradients(
-    builder: Builder, plan: Plan, structure: Any, free: tuple[bool, ...], fixed: list[Any], points: Any
+    build: Build, plan: Plan, structure: Any, free: tuple[bool, ...], fixed: list[Any], points: Any
 ) -> Any:
-    simulate = builder(plan)
-    return _at_each(jax.jacfwd(lambda v: jnp.ravel(simulate(_filled(structure, free, fixed, v)))), points)
+    simulate = build(plan)
+    return _in_batches(jax.jacfwd(lambda v: jnp.ravel(simulate(_join(structure, free, fixed, v)))), points)
 
 
-def _at_each(function: Callable[[Any], Any], points: Any) -> Any:
-    """A few points at a time: a cone of light over a long spectrum would not fit into memory at once."""
+def _in_batches(function: Callable[[Any], Any], points: Any) -> Any:
+    """`function` at each point, a few at a time: a cone of light over a long spectrum would not fit into
+    memory at once."""
     return jax.lax.map(function, points, batch_size=min(_BATCH, len(points)))

@@ -1,4 +1,4 @@
-"""What a tolerance lets one leave out of a film's scene, by measuring what that changes over its bounds."""
+"""Plans of a film within a tolerance, by measuring what each effect changes over the bounds."""
 
 from __future__ import annotations
 
@@ -7,79 +7,83 @@ from dataclasses import replace
 from functools import partial
 
 import jax
-import numpy as np
 
 from pellicle.effects import averaging, presence
 from pellicle.effects.film import exact
 from pellicle.effects.plan import Plan, Row
-from pellicle.effects.removal import CAN_BE_LEFT_OUT, LeftOut
-from pellicle.planning.differences import design, gradients, largest_slope_change, signals
+from pellicle.effects.removal import REMOVABLE, FilmRemoval
+from pellicle.planning import cost_model
+from pellicle.planning.differences import Evaluation, design
 from pellicle.planning.tolerance import (
-    SLOPE_POINTS,
     Stage,
     Step,
     check_tolerance,
-    economise,
     left_out_row,
-    without,
+    plans_after,
+    reduced_plan,
+    removal_steps,
 )
 from pellicle.scene.film import Scene
-from pellicle.scene.free import is_free
+from pellicle.scene.free import insert, is_free, start_values
 from pellicle.scene.layers import Layer, absorbs
-from pellicle.simulation.film import sampled
+from pellicle.simulation.film import build, sampled
 
 
 def plan(scene: Scene, tolerance: float = 0.0, keep: Iterable[str] = ()) -> Plan:
-    """The effects to simulate so that the signal is within `tolerance` of the whole truth.
+    """The effects to simulate so that the signal is within `tolerance` of the exact model.
 
     **Arguments:** `tolerance` in the unit of the signal: a fraction or, for ellipsometry, degrees on
     the sphere of N, C and S (Ψ is off by half of that at most, Δ by that over sin 2Ψ). At 0 an effect
     is left out only where it is provably absent. `keep` names effects that must stay.
 
-    An effect stays where a free parameter would lose its gradient. **Raises** ValueError for a tolerance
-    below 0 and, with a tolerance, for a scene without wavelengths.
+    An effect stays where the gradient of a free parameter would be lost with it.
+
+    **Raises:** ValueError for a negative tolerance and, with a tolerance, for a scene without wavelengths.
     """
     check_tolerance(tolerance)
     if tolerance == 0:
         return exact(scene)
     if scene.light.wavelength is None:
         raise ValueError("what an effect changes depends on the wavelengths: give the light its wavelengths")
+    kept = set(keep)
+    removals = [partial(_removals, effect) for effect in REMOVABLE if effect not in kept]
+    averages = [partial(_fewer, effect) for effect in ("coherence", "orders", "angle-spread")]
     with jax.enable_x64(True):
-        return _economised(scene, tolerance, set(keep))
+        moves = (_by_orders, *removals, *averages)
+        return reduced_plan(full_plan(scene), scene, evaluation(scene), moves, tolerance)
 
 
-def reference(scene: Scene) -> Plan:
-    """The plan that others are measured against: exact, and averaged by nodes, not by orders."""
+def full_plan(scene: Scene) -> Plan:
+    """The exact plan with averages taken over nodes in place of orders of interference."""
     return _by_nodes(exact(scene), scene)
 
 
+def evaluation(scene: Scene) -> Evaluation:
+    """Simulations of the scene over its bounds."""
+    return Evaluation(build, sampled(scene), design(scene))
+
+
 def alternatives(effect: str, scene: Scene) -> list[Plan]:
-    """Plans of the scene without one effect, all else exact; none where it is absent or must stay."""
-    stage = Stage(reference(scene), scene, np.zeros(0), {})
-    return [step.plan for step in _leave_out(effect, stage)]
+    """Plans of the scene without one effect, otherwise exact; empty where it is absent or must stay."""
+    return plans_after(partial(_removals, effect), full_plan(scene), scene)
 
 
-def _economised(scene: Scene, tolerance: float, keep: set[str]) -> Plan:
-    whole, points = sampled(scene), design(scene)
-    exactly = reference(scene)
-    see = partial(signals, scene=whole, points=points)
-    fewer = [partial(_fewer, effect) for effect in ("coherence", "orders", "angle-spread")]
-    leave_out = [partial(_leave_out, effect) for effect in CAN_BE_LEFT_OUT if effect not in keep]
-    stage = Stage(exactly, scene, see(exactly), {})
-    stage = economise(stage, (_by_orders, *leave_out, *fewer), see, tolerance)
-    lost = _gradient_error(exactly, stage.plan, whole, points) if stage.told else 0.0
-    return replace(stage.plan, rows=stage.rows, tolerance=tolerance, gradient_error=lost)
+def work(plan: Plan, scene: Scene) -> cost_model.Work:
+    """Operations of one simulation of the scene at its start values, as XLA counts them."""
+    with jax.enable_x64(True):
+        return cost_model.work(build(plan.static_key), insert(sampled(scene), start_values(scene)))
 
 
-def _gradient_error(exactly: Plan, chosen: Plan, whole: Scene, points: np.ndarray) -> float:
-    if not points.shape[1]:
-        return 0.0
-    some = points[-SLOPE_POINTS:]
-    return largest_slope_change(gradients(exactly, whole, some), gradients(chosen, whole, some))
+def savings(scene: Scene, calibration: cost_model.Calibration) -> dict[str, cost_model.Saving]:
+    """Error and time saved by leaving out each effect of the full plan, one at a time."""
+    with jax.enable_x64(True):
+        cheaper = {effect: alternatives(effect, scene)[:1] for effect in REMOVABLE}
+        seconds = lambda plan: calibration.seconds(work(plan, scene))  # noqa: E731
+        return cost_model.savings(full_plan(scene), cheaper, evaluation(scene), seconds)
 
 
 def _by_nodes(plan: Plan, scene: Scene) -> Plan:
-    """With the closed form averaged where the exact plan has orders, whose phase is a straight line."""
+    """The plan with the closed form averaged over nodes in place of orders, whose phase is linear."""
     if not plan.row("orders").count:
         return plan
     rows = {"coherence": averaging.coherence_by_nodes(scene), "orders": Row("orders", False, "nodes instead")}
@@ -87,51 +91,47 @@ def _by_nodes(plan: Plan, scene: Scene) -> Plan:
 
 
 def _by_orders(stage: Stage) -> Iterator[Step]:
-    judged = exact(stage.scene)
-    if judged.row("orders").count:
-        yield Step(judged, stage.scene, judged.row("coherence"))
+    plan = exact(stage.scene)
+    if plan.row("orders").count:
+        yield Step(plan, stage.scene, plan.row("coherence"))
 
 
-def _leave_out(effect: str, stage: Stage) -> Iterator[Step]:
-    """The plan of the scene without an effect that is there, unless a gradient is lost with it."""
-
-    def judge(simpler: Scene) -> Plan:
-        return exact(simpler) if stage.plan.on("orders") else _by_nodes(exact(simpler), simpler)
-
-    return without(stage, _ways(effect, stage), judge, partial(_told, stage))
-
-
-def _ways(effect: str, stage: Stage) -> list[LeftOut]:
-    """How an effect could be left out, the most thorough first; none where that has no meaning."""
-    light = stage.scene.light
-    if effect == "opaque":
-        seen_from_above = [] if light.signal == "T" else enumerate(stage.scene.layers)
-        return [
-            LeftOut(effect, i) for i, x in seen_from_above if isinstance(x, Layer) and absorbs(x.material)
-        ]
+def _removals(effect: str, stage: Stage) -> Iterator[Step]:
+    """Removal of one effect; of opaque layers the uppermost first."""
+    scene, light = stage.scene, stage.scene.light
     meaningless = {
         "oblique": light.signal == "psi-delta",
         "back-face": light.signal == "T",
         "polarisation": light.signal == "psi-delta"
-        or is_free(light.angle)  # s and p turn opposite ways with it
-        or stage.scene.instrument.has_cone,
+        or is_free(light.angle)  # with the angle s and p change in opposite directions
+        or scene.instrument.has_cone,
     }
-    return [LeftOut(effect)] if stage.plan.on(effect) and not meaningless.get(effect, False) else []
+    removals = []
+    if effect == "opaque" and light.signal != "T":
+        opaque = (isinstance(x, Layer) and absorbs(x.material) for x in scene.layers)
+        removals = [FilmRemoval(effect, depth) for depth, may_be in enumerate(opaque) if may_be]
+    elif stage.plan.on(effect) and not meaningless.get(effect, False):
+        removals = [FilmRemoval(effect)]
 
+    def judge(simpler: Scene) -> Plan:
+        return exact(simpler) if stage.plan.on("orders") else full_plan(simpler)
 
-def _told(stage: Stage, left_out: LeftOut) -> Row:
-    if left_out.effect == "opaque":
-        name = presence.name(stage.scene, left_out.depth)
-        return Row("opaque", True, f"{name} lets nothing through: what lies beneath is left out")
-    return left_out_row(stage.plan.row(left_out.effect))
+    def row(removal: FilmRemoval) -> Row:
+        if effect == "opaque":
+            name = presence.name(scene, removal.depth)
+            return Row("opaque", True, f"{name} lets nothing through: what lies beneath is left out")
+        return left_out_row(stage.plan.row(effect))
+
+    return removal_steps(stage, removals, judge, row)
 
 
 def _fewer(effect: str, stage: Stage) -> Iterator[Step]:
+    """Fewer orders, nodes or rays of an average."""
     row = stage.plan.row(effect)
     for count in sorted({max(row.count // 4, 1), row.count // 2, 3 * row.count // 4}):
         if 1 <= count < row.count:
             around = count if row.around > 1 else row.around
-            why = f"{count} are enough of {row.count}: {row.why}"
+            why = f"{count} suffice of {row.count}: {row.why}"
             cheaper = replace(row, count=count, around=around, why=why)
             rows = tuple(cheaper if r.effect == effect else r for r in stage.plan.rows)
             yield Step(replace(stage.plan, rows=rows), stage.scene, cheaper)

@@ -1,7 +1,7 @@
-"""What a tolerance lets one leave out of a surface, by measuring what that changes over its bounds.
+"""Plans of a surface within a tolerance, by measuring what each effect changes over the bounds.
 
-A BRDF spans decades, so it is relative errors that count: those of each value, where it is above a
-hundredth of what a white diffuser sends back (`FLOOR`), and in units of that where it is below.
+A BRDF spans decades, so errors are relative: to each value where it is above a hundredth of a white
+diffuser (`FLOOR`), and to that floor where it is below.
 """
 
 from __future__ import annotations
@@ -15,85 +15,89 @@ import jax
 import numpy as np
 
 from pellicle.effects.plan import Plan
-from pellicle.effects.surface import CAN_BE_LEFT_OUT, LeftOut, exact
+from pellicle.effects.surface import exact
+from pellicle.effects.surface_removal import REMOVABLE, SurfaceRemoval
 from pellicle.planning import cost_model
-from pellicle.planning.differences import design, gradients, largest_slope_change, signals
+from pellicle.planning.differences import Evaluation, design, signals
 from pellicle.planning.tolerance import (
-    SLOPE_POINTS,
-    See,
     Stage,
     Step,
     check_tolerance,
-    economise,
     left_out_row,
-    without,
+    plans_after,
+    reduced_plan,
+    removal_steps,
 )
 from pellicle.scene.free import insert, is_free, start_values
 from pellicle.scene.surface import SurfaceView
 from pellicle.simulation.surface import build
 
 FLOOR = 0.01 / math.pi
-"""1/sr: what is darker counts as if it were as bright as this."""
+"""Least value (1/sr) that a relative error refers to."""
 
 NODES = (8, 16, 24, 32, 48, 64, 96, 128)
-"""Angles at which a film's colour may be computed, in place of every sample's own."""
+"""Numbers of angles at which the colour of a film may be computed, in place of the angle of every sample."""
 
 
 def plan(view: SurfaceView, tolerance: float = 0.0, keep: Iterable[str] = ()) -> Plan:
-    """The effects to simulate so that the BRDF is within `tolerance`, relative, of the whole truth.
+    """The effects to simulate so that the BRDF is within the relative `tolerance` of the exact model.
 
     At 0 an effect is left out only where it is provably absent. `keep` names effects that must stay.
-    An effect stays where a free parameter would lose its gradient. Raises ValueError for a tolerance
-    that is none.
+    An effect stays where the gradient of a free parameter would be lost with it.
+
+    **Raises:** ValueError for a negative tolerance.
     """
     check_tolerance(tolerance)
     if tolerance == 0:
         return exact(view)
+    kept = set(keep)
+    removals = [partial(_removal, effect) for effect in REMOVABLE if effect not in kept]
     with jax.enable_x64(True):
-        return _economised(view, tolerance, set(keep))
+        moves = [*removals, *([] if "oblique" in kept else [_by_nodes])]
+        return reduced_plan(exact(view), view, evaluation(view), moves, tolerance)
 
 
-def _economised(view: SurfaceView, tolerance: float, keep: set[str]) -> Plan:
-    exactly, points = exact(view), design(view)
-    see = seeing(view, points)
-    leave_out = [partial(_leave_out, effect) for effect in CAN_BE_LEFT_OUT if effect not in keep]
-    moves = [*leave_out, *([] if "oblique" in keep else [_by_nodes])]
-    stage = economise(Stage(exactly, view, see(exactly), {}), moves, see, tolerance)
-    lost = _gradient_error(exactly, stage.plan, view, points) if stage.told else 0.0
-    return replace(stage.plan, rows=stage.rows, tolerance=tolerance, gradient_error=lost)
+def evaluation(view: SurfaceView) -> Evaluation:
+    """Simulations of the surface over its bounds, relative to the exact values (or to `FLOOR`)."""
+    points = design(view)
+    exact_values = signals(exact(view), view, points, build)
+    return Evaluation(build, view, points, np.maximum(np.abs(exact_values), FLOOR))
 
 
-def seeing(view: SurfaceView, points: np.ndarray) -> See:
-    """What a plan of the surface measures at these points, over what is truly there (or `FLOOR`)."""
-    truth = signals(exact(view), view, points, build)
-    scale = np.maximum(np.abs(truth), FLOOR)
-    return lambda plan: signals(plan, view, points, build) / scale
+def alternatives(effect: str, view: SurfaceView) -> list[Plan]:
+    """Plans of the surface without one effect, otherwise exact; empty where it is absent or must stay."""
+    return plans_after(partial(_removal, effect), exact(view), view)
 
 
-def _gradient_error(exactly: Plan, chosen: Plan, view: SurfaceView, points: np.ndarray) -> float:
-    if not points.shape[1]:
-        return 0.0
-    some = points[-SLOPE_POINTS:]
-    return largest_slope_change(*(gradients(each, view, some, build) for each in (exactly, chosen)))
+def work(plan: Plan, view: SurfaceView) -> cost_model.Work:
+    """Operations of one simulation along all directions at the start values, as XLA counts them."""
+    with jax.enable_x64(True):
+        return cost_model.work(build(plan.static_key), insert(view, start_values(view)))
 
 
-def _leave_out(effect: str, stage: Stage) -> Iterator[Step]:
-    ways = [LeftOut(effect)] if _may_go(effect, stage) else []
-    return without(stage, ways, exact, lambda _: left_out_row(stage.plan.row(effect)))
+def savings(view: SurfaceView, calibration: cost_model.Calibration) -> dict[str, cost_model.Saving]:
+    """Error and time saved by leaving out each effect of the exact plan, one at a time."""
+    with jax.enable_x64(True):
+        cheaper = {effect: alternatives(effect, view)[:1] for effect in REMOVABLE}
+        seconds = lambda plan: calibration.seconds(work(plan, view))  # noqa: E731
+        return cost_model.savings(exact(view), cheaper, evaluation(view), seconds)
 
 
-def _may_go(effect: str, stage: Stage) -> bool:
-    """Whether the effect is there, and something else would be left; a free thickness needs interference."""
-    if not any(row.effect == effect and row.on for row in stage.plan.rows):
-        return False
+def _removal(effect: str, stage: Stage) -> Iterator[Step]:
+    """Removal of one effect, where it is present and something else remains."""
+    numbers = stage.scene.numbers
+    present = any(row.effect == effect and row.on for row in stage.plan.rows)
     other = {"roughness": "diffuse", "diffuse": "specular"}.get(effect)
     if effect == "coherence":
-        return not is_free(stage.scene.numbers.get("thickness"))
-    return other is None or other in stage.scene.numbers
+        removable = not is_free(numbers.get("thickness"))  # without interference it has no gradient
+    else:
+        removable = other is None or other in numbers
+    removals = [SurfaceRemoval(effect)] if present and removable else []
+    return removal_steps(stage, removals, exact, lambda _: left_out_row(stage.plan.row(effect)))
 
 
 def _by_nodes(stage: Stage) -> Iterator[Step]:
-    """The film's colour at ever more nodes of the angle, as long as they are fewer than the samples."""
+    """The colour of the film at more and more angles, while they are fewer than the samples."""
     rows = {row.effect: row for row in stage.plan.rows}
     if "oblique" not in rows or not (rows["oblique"].on and rows["roughness"].on and rows["coherence"].on):
         return
@@ -102,24 +106,5 @@ def _by_nodes(stage: Stage) -> Iterator[Step]:
             break
         why = f"{rows['oblique'].why}: the film's colour at {count} angles"
         row = replace(rows["oblique"], count=count, why=why)
-        chosen = [row if r.effect == "oblique" else r for r in stage.plan.rows]
-        yield Step(replace(stage.plan, rows=tuple(chosen)), stage.scene, row)
-
-
-def alternatives(effect: str, view: SurfaceView) -> list[Plan]:
-    """Plans of the surface without one effect, all else exact; none where it is absent or must stay."""
-    return [step.plan for step in _leave_out(effect, Stage(exact(view), view, np.zeros(0), {}))]
-
-
-def work(plan: Plan, view: SurfaceView) -> cost_model.Work:
-    """The operations of one evaluation along all directions, at the start values."""
-    with jax.enable_x64(True):
-        return cost_model.counted(build(plan.static_key), insert(view, start_values(view)))
-
-
-def savings(view: SurfaceView, calibration: cost_model.Calibration) -> dict[str, cost_model.Saving]:
-    """For each effect that could be left out: what that would change and save, all else being exact."""
-    with jax.enable_x64(True):
-        see = seeing(view, design(view))
-        cheaper = {effect: alternatives(effect, view)[:1] for effect in CAN_BE_LEFT_OUT}
-        return cost_model.saved(exact(view), cheaper, see, lambda plan: calibration.seconds(work(plan, view)))
+        nodes = tuple(row if r.effect == "oblique" else r for r in stage.plan.rows)
+        yield Step(replace(stage.plan, rows=nodes), stage.scene, row)

@@ -1,9 +1,9 @@
-"""What a tolerance lets one leave out, whatever is simulated: steps that fit into it, one after the other.
+"""Greedy removal of effects whose contribution stays within a tolerance, for films and surfaces.
 
-Every effect that may go is tried, those that save most first: a model with it and one without are
-compared all over the box of bounds, and it goes if `SAFETY` times the largest difference still fits
-into the tolerance. As each step starts from the one before, the steps add up to a bound on the whole
-(the triangle inequality).
+Effects are tried one after the other, those that save most first. The plans with and without an effect
+are compared all over the bounds; the effect is left out if `SAFETY` times the largest difference still
+fits into the tolerance. Each step starts from the plan before it, so the bounds of all steps add up to
+a bound on the total error (triangle inequality).
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pellicle.effects.plan import LeaveOut, Plan, Row
-from pellicle.planning.differences import largest_difference
+from pellicle.effects.plan import Plan, Removal, Row
+from pellicle.planning.differences import Evaluation, largest_difference
 from pellicle.scene.free import free_leaves
 
 SAFETY = 2.0
@@ -24,23 +24,26 @@ SAFETY = 2.0
 factor in every scene of `benchmarks/tolerance.py`."""
 
 SLOPE_POINTS = 16
+"""Points at which gradients of the reduced plan are compared with those of the full one."""
 
 
 class Stage(NamedTuple):
-    """What is planned so far, for a scene made simpler, and what it measures at every point."""
+    """Plan and simplified scene after some steps, its signals at every point, and the rows of the effects
+    that the steps changed."""
 
     plan: Plan
     scene: Any
-    seen: np.ndarray
-    told: dict[str, Row]
+    signals: np.ndarray
+    changed: dict[str, Row]
 
     @property
     def rows(self) -> tuple[Row, ...]:
-        return tuple(self.told.get(row.effect, row) for row in self.plan.rows)
+        """Every row of the plan, those of changed effects with their error bounds."""
+        return tuple(self.changed.get(row.effect, row) for row in self.plan.rows)
 
 
 class Step(NamedTuple):
-    """A cheaper plan, and the row that tells of it."""
+    """A cheaper plan with its scene, and the row of the effect that it changes."""
 
     plan: Plan
     scene: Any
@@ -48,48 +51,60 @@ class Step(NamedTuple):
 
 
 Move = Callable[[Stage], Iterable[Step]]
-See = Callable[[Plan], np.ndarray]
-"""A plan → what it measures at every point, (points, numbers)."""
+"""Steps that may follow a stage, the one that saves most first; at most one of them is taken."""
 
 
 def check_tolerance(tolerance: float) -> None:
-    """ValueError for one that is below 0, infinite or none."""
+    """Raise ValueError for a tolerance that is negative, infinite or not a number."""
     if not 0 <= tolerance < math.inf:
         raise ValueError(f"the tolerance must be positive, or 0 for an exact plan, not {tolerance:g}")
 
 
-def economise(stage: Stage, moves: Iterable[Move], see: See, tolerance: float) -> Stage:
-    """The stage after every move: of its steps the first that fits into the tolerance, if any."""
+def reduced_plan(
+    full: Plan, scene: Any, evaluation: Evaluation, moves: Iterable[Move], tolerance: float
+) -> Plan:
+    """The plan after every move: of its steps the first that stays within the tolerance, if any."""
+    stage = Stage(full, scene, evaluation.signals(full), {})
     for move in moves:
-        tried = (_taken(stage, step, see) for step in move(stage))
-        stage = next((new for new in tried if sum(row.error_bound for row in new.rows) <= tolerance), stage)
-    return stage
+        stages = (_after(step, stage, evaluation) for step in move(stage))
+        stage = next((s for s in stages if sum(row.error_bound for row in s.rows) <= tolerance), stage)
+    change = evaluation.slope_change(full, stage.plan, SLOPE_POINTS) if stage.changed else 0.0
+    return replace(stage.plan, rows=stage.rows, tolerance=tolerance, gradient_error=change)
 
 
-def _taken(stage: Stage, step: Step, see: See) -> Stage:
-    seen = see(step.plan)
-    bound = SAFETY * largest_difference(seen, stage.seen, stage.plan.signal)
-    bound += stage.told[step.row.effect].error_bound if step.row.effect in stage.told else 0.0
-    told = stage.told | {step.row.effect: replace(step.row, error_bound=bound)}
-    return Stage(step.plan, step.scene, seen, told)
+def _after(step: Step, stage: Stage, evaluation: Evaluation) -> Stage:
+    signals = evaluation.signals(step.plan)
+    bound = SAFETY * largest_difference(signals, stage.signals, stage.plan.signal)
+    effect = step.row.effect
+    bound += stage.changed[effect].error_bound if effect in stage.changed else 0.0
+    return Stage(
+        step.plan, step.scene, signals, stage.changed | {effect: replace(step.row, error_bound=bound)}
+    )
 
 
-def without(
-    stage: Stage, ways: Iterable[LeaveOut], judge: Callable[[Any], Plan], told: Callable[[Any], Row]
+def removal_steps(
+    stage: Stage, removals: Iterable[Removal], judge: Callable[[Any], Plan], row: Callable[[Any], Row]
 ) -> Iterator[Step]:
-    """Steps to the plans of the scene without an effect, unless it stays or a gradient is lost with it."""
-    for leave_out in ways:
-        effect = leave_out.effect
-        simpler = stage.scene if effect == "precision" else leave_out(stage.scene)
+    """Steps that remove one effect, except where it stays or the gradient of a free parameter is lost.
+
+    `judge` plans the simplified scene, `row` describes a removal.
+    """
+    for removal in removals:
+        effect = removal.effect
+        simpler = stage.scene if effect == "precision" else removal(stage.scene)
         if len(free_leaves(simpler)) < len(free_leaves(stage.scene)):
             continue
-        judged = judge(simpler)
-        if effect in ("opaque", "precision") or not judged.on(effect):
-            chosen = replace(judged, left_out=(*stage.plan.left_out, leave_out))
-            yield Step(chosen, simpler, told(leave_out))
+        plan = judge(simpler)
+        if effect in ("opaque", "precision") or not plan.on(effect):
+            yield Step(replace(plan, left_out=(*stage.plan.left_out, removal)), simpler, row(removal))
+
+
+def plans_after(move: Move, full: Plan, scene: Any) -> list[Plan]:
+    """Every plan to which one move leads from the full plan of a scene."""
+    return [step.plan for step in move(Stage(full, scene, np.zeros(0), {}))]
 
 
 def left_out_row(row: Row) -> Row:
-    """What a plan says of an effect that is there, and is left out."""
-    why = "single precision will do" if row.effect == "precision" else row.why
+    """The row of an effect that is present and left out."""
+    why = "single precision suffices" if row.effect == "precision" else row.why
     return Row(row.effect, False, f"left out: {why}")

@@ -12,7 +12,7 @@ from pellicle.data.brdf_samples import CHANNELS, BrdfSamples
 from pellicle.data.half_angles import angles, from_half_difference
 from pellicle.effects.plan import Plan
 from pellicle.errors import UsageError
-from pellicle.planning import surface as thrift
+from pellicle.planning import surface as planning
 from pellicle.scene.surface import Surface, surface_view
 from pellicle.simulation.surface import build
 
@@ -80,7 +80,7 @@ def synthesise(
     """The BRDF at where free numbers start, with normal noise of standard deviation `noise` (1/sr).
 
     What noise takes below zero is 0, and a note counts it. Effects that change less than the `tolerance`
-    are left out (`surfaces.thrift`). **Raises:** UsageError unless the surface has one channel, or R, G
+    are left out (`pellicle.plan`). **Raises:** UsageError unless the surface has one channel, or R, G
     and B, and for a black one.
     """
     channels = {len(names): names for names in CHANNELS}.get(surface.channels)
@@ -88,7 +88,7 @@ def synthesise(
         raise UsageError(f"samples have one channel or R, G and B: {surface.channels} wavelengths were given")
     numbers = {key: x.tolist() for key, x in surface.start_numbers().items() if key != "wavelengths"}
     fixed = replace(surface, numbers=numbers)
-    plan = thrift.plan(surface_view(fixed, looked), tolerance)
+    plan = planning.plan(surface_view(fixed, looked), tolerance)
     with jax.enable_x64(True):
         seen = jax.jit(build(plan.static_key))(surface_view(fixed, looked, len(looked.theta_i)))
     clean = np.asarray(seen, dtype=float)

@@ -19,7 +19,7 @@ from pellicle.fitting.brdf.residuals import RESIDUALS, slope
 from pellicle.fitting.noise import correlation_length
 from pellicle.fitting.problem import Explained, Noise
 from pellicle.fitting.program_cache import kept
-from pellicle.planning.surface import seeing
+from pellicle.planning.surface import evaluation
 from pellicle.scene.surface import SurfaceView
 from pellicle.simulation.surface import build
 
@@ -183,8 +183,8 @@ class SamplesView:
         numbers = {key: np.asarray(x) for key, x in self.form.numbers(values, self.fixed).items()}
         keep = slice(self.rows)
         view = SurfaceView(self.form.model, numbers, self.samples.i[keep], self.samples.o[keep])
-        see = seeing(view, np.zeros((1, 0)))
-        return float(np.max(np.abs(see(self.plan) - see(exact(view)))))
+        values_of = evaluation(view).signals
+        return float(np.max(np.abs(values_of(self.plan) - values_of(exact(view)))))
 
     def compared(self, at: Local) -> np.ndarray:
         """Residuals (rows, channels) in the unit of the residual; in standard deviations where σ is given."""

@@ -16,7 +16,7 @@ from pellicle.fitting.program_cache import kept
 from pellicle.fitting.spectra import nuisance
 from pellicle.fitting.spectra.nuisance import Coefficient, Data
 from pellicle.planning.differences import largest_difference, signals
-from pellicle.planning.film import reference
+from pellicle.planning.film import full_plan
 from pellicle.scene.film import Scene
 from pellicle.scene.free import free_leaves, insert
 from pellicle.scene.layers import Interface
@@ -209,7 +209,7 @@ class SpectrumView:
         if not self.plan.tolerance:
             return 0.0
         at = np.asarray(values)[None]
-        planned, whole = (signals(p, self.scene, at) for p in (self.plan, reference(self.scene)))
+        planned, whole = (signals(p, self.scene, at, build) for p in (self.plan, full_plan(self.scene)))
         return largest_difference(planned, whole, self.plan.signal)
 
     def in_columns(self, values: Any) -> np.ndarray:
