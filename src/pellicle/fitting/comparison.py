@@ -133,15 +133,15 @@ def _deviance(rows: Sequence[np.ndarray], lengths: Sequence[float], fits: Mappin
     """−2 ln L up to a constant, each point counting for 1/length; an unknown σ takes its best value."""
     parts = next(iter(fits.values())).parts
     total = 0.0
-    for part, left, length in zip(parts, rows, lengths, strict=True):
-        square, count = float(np.sum(left**2)), _independent(part, left)
+    for part, residuals, length in zip(parts, rows, lengths, strict=True):
+        square, count = float(np.sum(residuals**2)), _independent(part, residuals)
         known = part.data.sigma is not None
         total += (square if known else count * math.log(max(square / count, 1e-300))) / length
     return total
 
 
-def _verdict(found: Sequence[Candidate]) -> str:
-    best, second, *_ = sorted(found, key=lambda c: c.bic)
+def _verdict(candidates: Sequence[Candidate]) -> str:
+    best, second, *_ = sorted(candidates, key=lambda c: c.bic)
     apart = second.bic - best.bic
     if apart < UNDECIDED:
         sentence = f"The data do not distinguish {best.name} from {second.name} (ΔBIC {apart:.1f})"

@@ -81,14 +81,16 @@ def correlated(jacobian: Scaled, parameters: Mapping[str, Estimate]) -> list[str
     nuisance = np.array([bool(_NUISANCE.match(name)) for name in jacobian.names])
     own, linear = matrix[:, ~nuisance], matrix[:, nuisance]
     triangle: Any = np.linalg.qr(np.hstack([linear, own]), mode="r")
-    left = triangle[linear.shape[1] :, linear.shape[1] :]
+    triangular = triangle[linear.shape[1] :, linear.shape[1] :]
     free = [parameters[name] for name, aside in zip(jacobian.names, nuisance, strict=True) if not aside]
-    told = [_trade([free[i] for i in part], moves) for part, moves in _directions(left, steps[~nuisance])]
-    drowned = (_spread(left) > 1) & (_spread(left) > _BETTER * _spread(own))
+    sentences = [
+        _sentence([free[i] for i in part], moves) for part, moves in _directions(triangular, steps[~nuisance])
+    ]
+    drowned = (_spread(triangular) > 1) & (_spread(triangular) > _BETTER * _spread(own))
     if linear.size and drowned.any():
         names = " and ".join(p.name for p, lost in zip(free, drowned, strict=True) if lost)
-        told.append(f"{names} would be known far better with a known scale and offset of the instrument")
-    return told
+        sentences.append(f"{names} would be known far better with a known scale and offset of the instrument")
+    return sentences
 
 
 def _directions(matrix: np.ndarray, steps: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -101,12 +103,12 @@ def _directions(matrix: np.ndarray, steps: np.ndarray) -> list[tuple[np.ndarray,
     moved = rows / np.maximum(sizes, _LEAST)[:, None]
     share = moved**2 / np.sum(moved**2, axis=0)
     suffers = _spread(matrix) * np.linalg.norm(matrix, axis=0) > _BETTER
-    found = []
+    directions = []
     for move, of_all in zip(moved, share, strict=True):
         part = np.flatnonzero((of_all > 0.5) & suffers & (np.abs(move) > _WORTH))
         if np.linalg.norm(move) > 1 and len(part) > 1:
-            found.append((part, move[part] * steps[part]))
-    return found
+            directions.append((part, move[part] * steps[part]))
+    return directions
 
 
 def _spread(matrix: np.ndarray) -> np.ndarray:
@@ -115,17 +117,17 @@ def _spread(matrix: np.ndarray) -> np.ndarray:
     return np.linalg.norm(rows / np.maximum(sizes, _LEAST)[:, None], axis=0)
 
 
-def _trade(found: Sequence[Estimate], moves: np.ndarray) -> str:
+def _sentence(parameters: Sequence[Estimate], moves: np.ndarray) -> str:
     """Sentence on correlated parameters; `moves` are their steps along the direction, in their own units."""
-    order = sorted(range(len(found)), key=lambda i: _key(found[i].name) == "thickness")
-    found, moves = [found[i] for i in order], moves[order]
-    names = [p.name for p in found]
-    if len(found) > 2:
+    order = sorted(range(len(parameters)), key=lambda i: _key(parameters[i].name) == "thickness")
+    parameters, moves = [parameters[i] for i in order], moves[order]
+    names = [p.name for p in parameters]
+    if len(parameters) > 2:
         every = f"{', '.join(names[:-1])} and {names[-1]}"
         return f"{every} are strongly correlated: none of them is determined alone"
-    moves = moves * step(names[0], found[0]) / moves[0]
-    amounts = f"{_amount(moves[0], found[0])} against {_amount(abs(moves[1]), found[1])}"
-    if law := _law(found, moves):
+    moves = moves * step(names[0], parameters[0]) / moves[0]
+    amounts = f"{_amount(moves[0], parameters[0])} against {_amount(abs(moves[1]), parameters[1])}"
+    if law := _law(parameters, moves):
         return f"only {law} is determined: {names[0]} and {names[1]} are correlated, {amounts}"
     way = "one rises as the other does" if moves[1] > 0 else "one rises as the other falls"
     return (
@@ -133,10 +135,10 @@ def _trade(found: Sequence[Estimate], moves: np.ndarray) -> str:
     )
 
 
-def _law(found: Sequence[Estimate], moves: np.ndarray) -> str:
+def _law(parameters: Sequence[Estimate], moves: np.ndarray) -> str:
     """The product or the quotient that is constant along the direction, if one is."""
-    relative = moves / np.array([p.value or math.inf for p in found])
-    names, near = [p.name for p in found], _LAW * np.max(np.abs(relative))
+    relative = moves / np.array([p.value or math.inf for p in parameters])
+    names, near = [p.name for p in parameters], _LAW * np.max(np.abs(relative))
     if abs(relative.sum()) < near:
         return f"the product {names[0]}·{names[1]}"
     return f"the quotient {names[0]}/{names[1]}" if abs(relative[0] - relative[1]) < near else ""
@@ -153,14 +155,14 @@ def naming(lead: str, trading: Sequence[str]) -> list[str]:
 
 def bounded(parameters: Mapping[str, Estimate], opaque: Container[str]) -> list[str]:
     """A sentence for each free parameter that the data bound on one side only, or not at all."""
-    told = []
+    sentences = []
     for name, p in parameters.items():
         if p.free and math.isfinite(p.stderr) and (p.lower_limit, p.upper_limit) != (None, None):
             end = p.lower if p.upper_limit is not None else p.upper
-            told.append(
+            sentences.append(
                 f"{name} is compatible with {end if math.isfinite(end) else 0:g}: it {limits_in_words(p)}"
             )
         elif p.free and not math.isfinite(p.stderr):
             opening = "the layer is opaque: " if name in opaque and p.lower_limit is not None else ""
-            told.append(f"{opening}{name} {limits_in_words(p)}")
-    return told
+            sentences.append(f"{opening}{name} {limits_in_words(p)}")
+    return sentences

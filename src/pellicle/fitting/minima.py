@@ -103,18 +103,18 @@ def minima(
     return distinct(problem, Minima(units, deviance, converged), lanes)
 
 
-def distinct(problem: Problem, found: Minima, most: int) -> Minima:
+def distinct(problem: Problem, minima: Minima, most: int) -> Minima:
     """At most `most` minima, best first, those of one place once."""
-    order = np.argsort(found.deviance, kind="stable")
+    order = np.argsort(minima.deviance, kind="stable")
     kept: list[int] = []
     for i in order:
-        if np.isfinite(found.deviance[i]) and all(
-            _apart(problem, found.units[i], found.units[j]) for j in kept
+        if np.isfinite(minima.deviance[i]) and all(
+            _apart(problem, minima.units[i], minima.units[j]) for j in kept
         ):
             kept.append(int(i))
     kept = (kept or [int(order[0])])[:most]
     return replace(
-        found, units=found.units[kept], deviance=found.deviance[kept], converged=found.converged[kept]
+        minima, units=minima.units[kept], deviance=minima.deviance[kept], converged=minima.converged[kept]
     )
 
 

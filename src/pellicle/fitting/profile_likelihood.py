@@ -50,19 +50,19 @@ class Limits(NamedTuple):
 def limits(around: Neighbourhood, scans: Mapping[int, Profile] | None = None) -> list[Limits]:
     """Limits of each parameter; `scans` are scans of the misfit against some of them."""
     doubted, scans = _doubted(around), scans or {}
-    found = []
+    result = []
     for i, natural in enumerate(around.natural):
         at, rise = _best(around, i), _rise(around, i)
         flat = _flat(scans[i], at.value) if i in scans else (False, False)
         ends = [end for end, is_one in zip((at.lower, at.upper), natural, strict=True) if is_one]
         beside = next((end for end in ends if abs(at.value - end) < _REACH * at.sd), None)
         if beside is not None:
-            found.append(_beside(rise, at, beside))
+            result.append(_beside(rise, at, beside))
         elif doubted[i] or any(flat):
-            found.append(_profiled(rise, at, flat, natural))
+            result.append(_profiled(rise, at, flat, natural))
         else:
-            found.append(Limits(at.error))
-    return found
+            result.append(Limits(at.error))
+    return result
 
 
 def interval(around: Neighbourhood, which: int) -> tuple[float, float]:

@@ -47,8 +47,8 @@ class Estimate:
 
 def in_short(status: str, verdict: str, free: tuple[Estimate, ...]) -> str:
     """A fit as it prints: status and verdict, then each free parameter with its error."""
-    told = [f"  {p.name} = {p.value:.8g} ± {p.stderr:.2g} {p.unit}".rstrip() for p in free]
-    return "\n".join([f"{status}: {verdict}", *told])
+    lines = [f"  {p.name} = {p.value:.8g} ± {p.stderr:.2g} {p.unit}".rstrip() for p in free]
+    return "\n".join([f"{status}: {verdict}", *lines])
 
 
 @dataclass(frozen=True)

@@ -47,19 +47,21 @@ class Checks:
     @property
     def doubts(self) -> tuple[str, ...]:
         """Why no interval should be taken from the chain; empty if it can be trusted."""
-        told = []
+        reasons = []
         if not self.n_over_tau >= LONG_ENOUGH:
-            told.append(
+            reasons.append(
                 f"the chain is {self.n_over_tau:.0f} autocorrelation times long,"
                 f" and {LONG_ENOUGH:.0f} are needed"
             )
         if not self.rhat <= MIXED_ENOUGH:
-            told.append(f"walkers differ (split R̂ {self.rhat:.3f}, at most {MIXED_ENOUGH} is trusted)")
+            reasons.append(f"walkers differ (split R̂ {self.rhat:.3f}, at most {MIXED_ENOUGH} is trusted)")
         if self.minima_visited < self.minima_found:
-            told.append(f"{self.minima_visited} of the {self.minima_found} minima that matter were visited")
+            reasons.append(
+                f"{self.minima_visited} of the {self.minima_found} minima that matter were visited"
+            )
         if not self.acceptance >= MOVING:
-            told.append(f"only {100 * self.acceptance:.2g} % of the moves were accepted")
-        return tuple(told)
+            reasons.append(f"only {100 * self.acceptance:.2g} % of the moves were accepted")
+        return tuple(reasons)
 
     @property
     def trusted(self) -> bool:

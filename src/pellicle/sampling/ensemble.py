@@ -24,7 +24,7 @@ from pellicle.sampling.run import run
 from pellicle.sampling.target import Target
 
 STEPS = 20_000
-"""Steps at which a chain that does not settle is given up."""
+"""Maximum number of steps of a chain."""
 FEWEST_WALKERS = 32
 _PATIENCE = 2.0
 """Seconds between two checkpoints."""
@@ -103,13 +103,13 @@ class _Keeper:
 def _begun(path: Path | None, fingerprint: str, walkers: int, parameters: int, seed: int) -> Chain:
     if path is None or not path.exists():
         return chains.empty(walkers, parameters, seed)
-    found = chains.load(path, fingerprint)
-    if found.draws.shape[1] != walkers:
+    chain = chains.load(path, fingerprint)
+    if chain.draws.shape[1] != walkers:
         raise UsageError(
-            f"{path}: is a chain of {found.draws.shape[1]} walkers: go on with as many,"
+            f"{path}: is a chain of {chain.draws.shape[1]} walkers: go on with as many,"
             " or name another folder"
         )
-    return found
+    return chain
 
 
 def installed() -> None:
@@ -121,22 +121,22 @@ def installed() -> None:
         )
 
 
-def _walkers(given: int | None, steps: int, subject: Subject) -> int:
-    """How many walkers there are: given and possible, or four for each parameter and at least 32."""
+def _walkers(walkers: int | None, steps: int, subject: Subject) -> int:
+    """How many walkers memory are: walkers and possible, or four for each parameter and at least 32."""
     size = len(subject.names)
-    if given is None:
+    if walkers is None:
         return max(FEWEST_WALKERS, 4 * size)
-    if given < max(2 * size, 4) or given % 2:
-        raise UsageError(f"walkers must be an even number of at least {max(2 * size, 4)}, got {given}")
-    needed = 8.0 * given * (_LIVE * subject.points + 3 * steps * (size + 1))
-    there = _memory()
-    if needed > there:
-        most = int(given * there / needed) // 2 * 2
+    if walkers < max(2 * size, 4) or walkers % 2:
+        raise UsageError(f"walkers must be an even number of at least {max(2 * size, 4)}, got {walkers}")
+    needed = 8.0 * walkers * (_LIVE * subject.points + 3 * steps * (size + 1))
+    memory = _memory()
+    if needed > memory:
+        most = int(walkers * memory / needed) // 2 * 2
         raise UsageError(
-            f"{given} walkers of {steps} steps need about {needed / 2**30:.3g} GiB and the machine has"
-            f" {there / 2**30:.3g}: take {most} at most, or fewer steps"
+            f"{walkers} walkers of {steps} steps need about {needed / 2**30:.3g} GiB and the machine has"
+            f" {memory / 2**30:.3g}: take {most} at most, or fewer steps"
         )
-    return given
+    return walkers
 
 
 def _memory() -> float:

@@ -46,13 +46,13 @@ class Modes:
         """Starting points inside the unit cube, every minimum that matters among them."""
         first = np.flatnonzero(self.matter)[: count // 2]
         mode = np.concatenate([first, random.choice(len(self.share), count - len(first), p=self._drawn)])
-        found = self._around(mode, random)
+        units = self._around(mode, random)
         for _ in range(100):
-            outside = np.any((found < 0) | (found > 1), axis=1)
+            outside = np.any((units < 0) | (units > 1), axis=1)
             if not outside.any():
-                return found
-            found[outside] = self._around(mode[outside], random)
-        return np.clip(found, 1e-9, 1 - 1e-9)
+                return units
+            units[outside] = self._around(mode[outside], random)
+        return np.clip(units, 1e-9, 1 - 1e-9)
 
     def log_density(self, units: np.ndarray) -> np.ndarray:
         """ln of the mixture's density at (points, parameters), up to a constant."""

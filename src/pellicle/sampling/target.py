@@ -18,9 +18,9 @@ class Target:
 
     def __call__(self, units: np.ndarray) -> np.ndarray:
         inside = np.clip(units, 0.0, 1.0)  # nothing is simulated where it has no meaning
-        found = [self._batch(inside[i : i + self.lanes]) for i in range(0, len(units), self.lanes)]
+        batches = [self._batch(inside[i : i + self.lanes]) for i in range(0, len(units), self.lanes)]
         within = np.all((units >= 0) & (units <= 1), axis=1)
-        return np.where(within, np.concatenate(found), -np.inf)
+        return np.where(within, np.concatenate(batches), -np.inf)
 
     def _batch(self, units: np.ndarray) -> np.ndarray:
         padded = np.concatenate([units, np.repeat(units[-1:], self.lanes - len(units), axis=0)])

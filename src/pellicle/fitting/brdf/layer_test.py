@@ -52,13 +52,13 @@ def _none_at_all(parameters: Mapping[str, Estimate]) -> list[str]:
 
 
 def _no_better(held_out: float, baselines: tuple[Baseline, ...]) -> list[str]:
-    found = []
+    reasons = []
     for b in baselines:
         if not held_out < (1 - GAIN) * b.held_out:
             ratio = held_out / b.held_out if b.held_out > 0 else math.inf
             how = f"{100 * (1 - ratio):.0f} % below" if ratio < 0.995 else f"{ratio:.2f} times that of"
-            found.append(f"its held-out error is {how} {b.name}, and {100 * GAIN:.0f} % below is asked for")
-    return found
+            reasons.append(f"its held-out error is {how} {b.name}, and {100 * GAIN:.0f} % below is asked for")
+    return reasons
 
 
 def _other_thickness(parameters: Mapping[str, Estimate], rivals: tuple[Rival, ...]) -> list[str]:
@@ -76,19 +76,19 @@ def _other_thickness(parameters: Mapping[str, Estimate], rivals: tuple[Rival, ..
 
 def _empty(parameters: Mapping[str, Estimate]) -> list[str]:
     """Free numbers that mean nothing where they are."""
-    found = []
+    reasons = []
     for name, p in parameters.items():
         key = name.split("_")[0]
         if not p.free:
             continue
         if key == "exponent" and p.value <= FLATTEST:
-            found.append(f"{name} {p.value:.2f} is no lobe (above {FLATTEST:g} is asked for)")
+            reasons.append(f"{name} {p.value:.2f} is no lobe (above {FLATTEST:g} is asked for)")
         elif name == "roughness" and p.value >= ROUGHEST:
-            found.append(f"roughness {p.value:.2f} is no lobe (below {ROUGHEST:g} is asked for)")
+            reasons.append(f"roughness {p.value:.2f} is no lobe (below {ROUGHEST:g} is asked for)")
         elif name == "specular" and p.value == p.lower:
-            found.append("the layered lobes have no weight")
+            reasons.append("the layered lobes have no weight")
         elif p.at_bound and (
             key in ("exponent", "n", "roughness") or (name == "deviation" and p.value > p.lower)
         ):
-            found.append(f"{name} rests on its bound {p.value:g}")
-    return found
+            reasons.append(f"{name} rests on its bound {p.value:g}")
+    return reasons

@@ -25,10 +25,10 @@ RESIDUALS: dict[str, Transform] = {
 }
 
 INVERSES: dict[str, Transform] = {
-    "linear": lambda seen, cosine, floor: seen,
-    "cosine": lambda seen, cosine, floor: seen / cosine,
-    "log": lambda seen, cosine, floor: jnp.expm1(seen) / cosine,
-    "cube-root": lambda seen, cosine, floor: seen**3 - floor,
+    "linear": lambda compared, cosine, floor: compared,
+    "cosine": lambda compared, cosine, floor: compared / cosine,
+    "log": lambda compared, cosine, floor: jnp.expm1(compared) / cosine,
+    "cube-root": lambda compared, cosine, floor: compared**3 - floor,
 }
 """(number that is compared, cos θ_i, floor) → ρ."""
 

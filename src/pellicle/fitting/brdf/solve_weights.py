@@ -64,9 +64,9 @@ def solve_weights(
     change = samples.weight * slope(
         RESIDUALS[form.residual], samples.values, samples.i[:, 2:3], samples.floor
     )
-    left = columns * change
-    normal = jnp.einsum("knc,lnc->ckl", left, left)
-    right = jnp.einsum("knc,nc->ck", left, (samples.values - nothing) * change)
+    weighted = columns * change
+    normal = jnp.einsum("knc,lnc->ckl", weighted, weighted)
+    right = jnp.einsum("knc,nc->ck", weighted, (samples.values - nothing) * change)
     if not by_channel:
         normal, right = normal.sum(0, keepdims=True), right.sum(0, keepdims=True)
     weights = jax.vmap(_nonnegative)(normal, right).T.reshape(-1)

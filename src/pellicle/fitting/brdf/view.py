@@ -104,11 +104,11 @@ class Local(NamedTuple):
 def local(form: SamplesForm, samples: Samples, fixed: dict[str, Any], values: Any) -> Local:
     """The model around `values` (free numbers,)."""
 
-    def left(values):
+    def compared(values):
         rho = form.evaluate(form.numbers(values, fixed), samples.i, samples.o)
         return form.compare(samples, rho), rho
 
-    (residual, rho), push = jax.linearize(left, values)
+    (residual, rho), push = jax.linearize(compared, values)
     rise, _ = jax.vmap(push, out_axes=-1)(jnp.eye(len(values)))
     return Local(rho, residual, -rise)
 

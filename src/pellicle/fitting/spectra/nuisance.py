@@ -173,17 +173,17 @@ def _project(rows, values, prior: _Series, shifts: _Series | None):
     target = rows @ values + precision @ prior.mean
     stiffness = _stiffness(*jax.lax.stop_gradient((matrix, target)), shifts)
     factor = cho_factor(jax.lax.stop_gradient(matrix) + stiffness)
-    found = cho_solve(factor, jax.lax.stop_gradient(target))
+    coefficients = cho_solve(factor, jax.lax.stop_gradient(target))
     # adds nothing, but carries the implicit derivative A⁻¹(db − dA x): no factorisation is differentiated
-    found = found + cho_solve(factor, target - (matrix + stiffness) @ found)
+    coefficients = coefficients + cho_solve(factor, target - (matrix + stiffness) @ coefficients)
     _, log_determinant = jnp.linalg.slogdet(matrix)
-    return found, log_determinant + 2 * float(np.sum(np.log(prior.sd)))
+    return coefficients, log_determinant + 2 * float(np.sum(np.log(prior.sd)))
 
 
 def _stiffness(matrix, target, shifts: _Series | None):
     """Matrix to add so that the offset's solution is nowhere negative.
 
-    The offset is held nonnegative through its Bernstein coefficients (enough, and for so low a degree
+    The offset is zero nonnegative through its Bernstein coefficients (enough, and for so low a degree
     little more than needed). There are few of them, so every set that could be zero is tried and the
     best feasible one is the exact solution of this convex problem: it moves continuously with the
     data, as a solver needs. Which set it is counts as a constant.
@@ -193,13 +193,15 @@ def _stiffness(matrix, target, shifts: _Series | None):
     count = len(shifts.basis)
     bernstein = _to_bernstein(count)
     rows = jnp.zeros((count, matrix.shape[0])).at[:, -count:].set(bernstein)
-    held = np.array(list(itertools.product((0.0, 1.0), repeat=count)))
-    stiff = _STIFF * jnp.trace(matrix) * jnp.einsum("si,ip,iq->spq", held, rows, rows)
+    zero = np.array(list(itertools.product((0.0, 1.0), repeat=count)))
+    stiff = _STIFF * jnp.trace(matrix) * jnp.einsum("si,ip,iq->spq", zero, rows, rows)
 
     def trial(stiffness):
-        found = cho_solve(cho_factor(matrix + stiffness), target)
-        feasible = jnp.all(rows @ found >= -_SLACK)
-        return jnp.where(feasible, found @ (matrix @ found) - 2 * target @ found, jnp.inf)
+        coefficients = cho_solve(cho_factor(matrix + stiffness), target)
+        feasible = jnp.all(rows @ coefficients >= -_SLACK)
+        return jnp.where(
+            feasible, coefficients @ (matrix @ coefficients) - 2 * target @ coefficients, jnp.inf
+        )
 
     return stiff[jnp.argmin(jax.vmap(trial)(stiff))]
 

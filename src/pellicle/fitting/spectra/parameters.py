@@ -44,16 +44,16 @@ def shared(
 
     Layers, substrate and ambient are shared; light and instrument are each scene's own, and bear its name.
     """
-    found: dict[tuple[str, str], Parameter] = {}
-    held: list[list[tuple[str, str]]] = []
+    parameters: dict[tuple[str, str], Parameter] = {}
+    positions: list[list[tuple[str, str]]] = []
     for scene, name in zip(scenes, names, strict=True):
-        held.append([])
+        positions.append([])
         for path, free in free_leaves(scene):
             key = _own(path, name), jax.tree_util.keystr(path)
-            found.setdefault(key, _parameter(scene, path, free, name))
-            held[-1].append(key)
-    order = {key: i for i, key in enumerate(found)}
-    return tuple(found.values()), [tuple(order[key] for key in keys) for keys in held]
+            parameters.setdefault(key, _parameter(scene, path, free, name))
+            positions[-1].append(key)
+    order = {key: i for i, key in enumerate(parameters)}
+    return tuple(parameters.values()), [tuple(order[key] for key in keys) for keys in positions]
 
 
 def _own(path: tuple, name: str) -> str:
@@ -66,9 +66,9 @@ def _full_name(scene: Scene, path: tuple, last: str, name: str) -> str:
 
 
 def _parameter(scene: Scene, path: tuple, free: Free, name: str) -> Parameter:
-    found = _place(scene, path)
-    owner, key, field = type(found.owner), found.key, found.field
-    full = _full_name(scene, path, found.name, name)
+    location = _place(scene, path)
+    owner, key, field = type(location.owner), location.key, location.field
+    full = _full_name(scene, path, location.name, name)
     strength = key == "A" and issubclass(owner, _STRENGTHS)
     # a search moves the index of a spline as a whole
     group = full.removesuffix(key) + field if owner is Spline else full
@@ -76,7 +76,7 @@ def _parameter(scene: Scene, path: tuple, free: Free, name: str) -> Parameter:
     return Parameter(
         name=full,
         key=key,
-        unit=found.unit or _UNITS.get(key, ""),
+        unit=location.unit or _UNITS.get(key, ""),
         start=free.start,
         lower=free.lower,
         upper=free.upper,
@@ -134,10 +134,16 @@ def fixed_numbers(scene: Scene, name: str = "") -> list[tuple[str, float, str]]:
 
     `name` is the scene's where it is one of several.
     """
-    found = []
+    rows = []
     for path, leaf in jax.tree_util.tree_leaves_with_path(scene, is_leaf=is_free):
         if path[0].name not in ("layers", "instrument") or not isinstance(leaf, int | float):
             continue
-        at = _place(scene, path)
-        found.append((_full_name(scene, path, at.name, name), float(leaf), at.unit or _UNITS.get(at.key, "")))
-    return found
+        location = _place(scene, path)
+        rows.append(
+            (
+                _full_name(scene, path, location.name, name),
+                float(leaf),
+                location.unit or _UNITS.get(location.key, ""),
+            )
+        )
+    return rows

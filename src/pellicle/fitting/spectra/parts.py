@@ -19,40 +19,40 @@ FAR = math.sqrt(MISFIT_CHI2)
 The noise, from differences of neighbouring points, takes the place of a given σ; the bound is the same."""
 
 
-def parts(data: list[Spectrum], ranked: RankedMinima, found: Errors) -> tuple[Part, ...]:
+def parts(data: list[Spectrum], ranked: RankedMinima, errors: Errors) -> tuple[Part, ...]:
     """One part for each spectrum, in their order."""
     views = zip(data, ranked.problem.views, ranked.fits, strict=True)
-    return tuple(_part(spectrum, view, met, found) for spectrum, view, met in views)
+    return tuple(_part(spectrum, view, met, errors) for spectrum, view, met in views)
 
 
-def _part(spectrum: Spectrum, view: SpectrumView, met: ViewFit, found: Errors) -> Part:
+def _part(spectrum: Spectrum, view: SpectrumView, fit: ViewFit, errors: Errors) -> Part:
     return Part(
         name=view.name,
         data=spectrum,
-        curve=_curve(view, met, found),
+        curve=_curve(view, fit, errors),
         plan=view.plan,
-        rms=view.rms(met.at.model),
-        chi2_reduced=met.chi2 / met.freedom,
-        effective_points=view.rows / met.length,
+        rms=view.rms(fit.at.model),
+        chi2_reduced=fit.chi2 / fit.freedom,
+        effective_points=view.rows / fit.length,
         sigma_from="given" if view.noise.given else "model" if view.noise.drifting else "residuals",
     )
 
 
-def together(found: tuple[Part, ...]) -> float | None:
+def together(parts: tuple[Part, ...]) -> float | None:
     """rms over all spectra, None where they have no unit in common."""
-    if len(found) == 1:
-        return found[0].rms
-    units = {part.spectrum.signal == "psi-delta" for part in found}
-    if len(units) > 1 or not all(part.spectrum.calibrated for part in found):
+    if len(parts) == 1:
+        return parts[0].rms
+    units = {part.spectrum.signal == "psi-delta" for part in parts}
+    if len(units) > 1 or not all(part.spectrum.calibrated for part in parts):
         return None
-    sizes = [part.spectral.wavelength.size for part in found]
-    return math.sqrt(np.average([part.rms**2 for part in found], weights=sizes))
+    sizes = [part.spectral.wavelength.size for part in parts]
+    return math.sqrt(np.average([part.rms**2 for part in parts], weights=sizes))
 
 
-def missed(found: tuple[Part, ...], ranked: RankedMinima) -> tuple[Part, ...]:
+def missed(parts: tuple[Part, ...], ranked: RankedMinima) -> tuple[Part, ...]:
     """Spectra that the scene does not explain."""
-    views = zip(found, ranked.problem.views, ranked.fits, strict=True)
-    several = len(found) > 1
+    views = zip(parts, ranked.problem.views, ranked.fits, strict=True)
+    several = len(parts) > 1
     return tuple(part for part, view, met in views if _misses(part, view, met, several))
 
 
@@ -73,10 +73,10 @@ def _misses(part: Part, view: SpectrumView, met: ViewFit, several: bool) -> bool
     )
 
 
-def _curve(view: SpectrumView, met: ViewFit, found: Errors) -> Curve:
+def _curve(view: SpectrumView, fit: ViewFit, errors: Errors) -> Curve:
     """Data, model and the layer's index with errors, at the real points."""
-    at, rows, held = met.at, view.rows, list(view.takes)
-    n_stderr, k_stderr = layer_errors(at, found.covariance[np.ix_(held, held)], rows)
+    at, rows, takes = fit.at, view.rows, list(view.takes)
+    n_stderr, k_stderr = layer_errors(at, errors.covariance[np.ix_(takes, takes)], rows)
     n, k = np.asarray(at.layer)[:, :rows]
     data, model = view.in_columns(view.data.values), view.in_columns(at.model)
     sigma = 1 / view.data.weight[: view.points : view.channels]
@@ -107,6 +107,6 @@ def layer_errors(at: Local, covariance: np.ndarray, points: int) -> tuple[np.nda
 
 def psi_delta(sphere: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Ψ and Δ in degrees from N, C, S (..., 3), or from N and C (..., 2): then Δ is in 0 to 180."""
-    n, c, *seen = np.moveaxis(sphere, -1, 0)
-    s = seen[0] if seen else np.sqrt(np.maximum(1 - n**2 - c**2, 0.0))
+    n, c, *measured = np.moveaxis(sphere, -1, 0)
+    s = measured[0] if measured else np.sqrt(np.maximum(1 - n**2 - c**2, 0.0))
     return np.rad2deg(np.arctan2(np.hypot(c, s), n)) / 2, np.rad2deg(np.arctan2(s, c)) % 360.0

@@ -37,15 +37,15 @@ def windows(z: np.ndarray) -> list[Window]:
     Means over windows of all positions, of widths that grow by half, are compared with the largest mean
     that noise of as many points shows by chance. The strongest is taken first; neighbours merge.
     """
-    z, size, found = np.clip(z, -_CLIP, _CLIP), len(z), []
+    z, size, result = np.clip(z, -_CLIP, _CLIP), len(z), []
     bar = math.sqrt(2 * math.log(max(size, 2) / _CHANCE))
     for _ in range(_MOST):
         best = max((_strongest(z, width) for width in _widths(size)), key=lambda w: w.score, default=None)
         if best is None or best.score < bar:
             break
-        found.append(best)
+        result.append(best)
         z[best.first : best.last + 1] = 0.0
-    return _merged(sorted(found))
+    return _merged(sorted(result))
 
 
 def _widths(size: int) -> list[int]:
@@ -62,10 +62,10 @@ def _strongest(z: np.ndarray, width: int) -> Window:
     return Window(at, at + width - 1, float(abs(sums[at])))
 
 
-def _merged(found: list[Window]) -> list[Window]:
+def _merged(windows: list[Window]) -> list[Window]:
     """Windows, merged where their gap is narrower than the narrower one: a wave has two signs."""
     merged: list[Window] = []
-    for window in found:
+    for window in windows:
         last = merged[-1] if merged else None
         if last and window.first - last.last <= min(last.last - last.first, window.last - window.first) + 1:
             merged[-1] = Window(last.first, max(last.last, window.last), max(last.score, window.score))
@@ -94,27 +94,29 @@ class Missed(NamedTuple):
         return f"{self.place or 'over most of the spectrum'}{by}"
 
 
-def missed(view: SpectrumView, met: ViewFit) -> Missed | None:
+def missed(view: SpectrumView, fit: ViewFit) -> Missed | None:
     """Structure in the residuals of the best fit, None where they may be noise."""
-    shape, seen = (view.rows, view.channels), slice(None) if view.data.frame is None else slice(2)
-    weight = np.asarray(view.data.weight)[: view.points].reshape(shape)[:, seen]
-    left = (view.data.values - np.asarray(met.at.model))[: view.points].reshape(shape)[:, seen]
+    shape, columns = (view.rows, view.channels), slice(None) if view.data.frame is None else slice(2)
+    weight = np.asarray(view.data.weight)[: view.points].reshape(shape)[:, columns]
+    residuals = (view.data.values - np.asarray(fit.at.model))[: view.points].reshape(shape)[:, columns]
     nm = np.asarray(view.scene.light.wavelength)[: view.rows]
-    told, covered = [], 0
+    stretches, covered = [], 0
     for part in _sweeps(nm):
-        for column, inverse in zip(left[part].T, weight[part].T, strict=True):
+        for column, inverse in zip(residuals[part].T, weight[part].T, strict=True):
             known = view.noise.given or view.noise.drifting
             scale = inverse if known else 1 / max(np.median(local_noise(column)), 1e-300)
             for w in windows(column * scale):
                 inside = nm[part][w.first : w.last + 1]
                 size = float(np.mean(np.abs(column[w.first : w.last + 1])))
                 covered += len(inside)
-                told.append((w.score, f"{inside.min():.0f}-{inside.max():.0f} nm", size))
-    if not told:
+                stretches.append((w.score, f"{inside.min():.0f}-{inside.max():.0f} nm", size))
+    if not stretches:
         return None
-    told.sort(reverse=True)
-    spans = tuple(dict.fromkeys(span for _, span, _ in told))
-    return Missed(spans, told[0][2] if view.channels == 1 else None, covered > _EVERYWHERE * left.size)
+    stretches.sort(reverse=True)
+    spans = tuple(dict.fromkeys(span for _, span, _ in stretches))
+    return Missed(
+        spans, stretches[0][2] if view.channels == 1 else None, covered > _EVERYWHERE * residuals.size
+    )
 
 
 def _sweeps(nm: np.ndarray) -> list[slice]:

@@ -99,10 +99,10 @@ def _design(problem: Problem) -> np.ndarray:
         longest = max(range(len(free)), key=lambda i: len(free[i]))
         free[longest] = _even(len(free[longest]) - 1)
     design = np.array(list(itertools.product(*free))).reshape(-1, len(free))
-    found = np.empty((len(design), len(levels)))
+    units = np.empty((len(design), len(levels)))
     for column, members in zip(design.T, groups.values(), strict=True):
-        found[:, members] = column[:, None]
-    return found
+        units[:, members] = column[:, None]
+    return units
 
 
 def _even(count: int) -> np.ndarray:

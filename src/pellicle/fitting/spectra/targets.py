@@ -147,10 +147,10 @@ def _sigma_in_frame(psi: np.ndarray, psi_sigma: np.ndarray, delta_sigma: np.ndar
 def _sigma_folded(
     psi: np.ndarray, delta: np.ndarray, psi_sigma: np.ndarray, delta_sigma: np.ndarray
 ) -> np.ndarray:
-    """Where only N and C are seen: the mean square of what errors of Ψ and of Δ move, all in radians.
+    """Where only N and C are visible: the mean square of what errors of Ψ and of Δ move, all in radians.
 
     An error of Δ at 0 or 180° moves neither to first order; the second order of σ_Ψ keeps σ above zero.
     """
     along, across = 2 * psi_sigma, np.sin(2 * psi) * delta_sigma
-    seen = np.sin(2 * psi) ** 2 + (np.cos(2 * psi) * np.cos(delta)) ** 2
-    return np.sqrt(0.5 * (seen * along**2 + (across * np.sin(delta)) ** 2 + along**4))
+    visible = np.sin(2 * psi) ** 2 + (np.cos(2 * psi) * np.cos(delta)) ** 2
+    return np.sqrt(0.5 * (visible * along**2 + (across * np.sin(delta)) ** 2 + along**4))

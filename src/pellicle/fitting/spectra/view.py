@@ -144,8 +144,8 @@ class SpectrumView:
 
     def residuals(self, at: Local) -> np.ndarray:
         """Weighted residuals (rows, channels)."""
-        left = (self.data.values - np.asarray(at.model)) * self.data.weight
-        return left[: self.points].reshape(self.rows, self.channels)
+        weighted = (self.data.values - np.asarray(at.model)) * self.data.weight
+        return weighted[: self.points].reshape(self.rows, self.channels)
 
     def nuisances(self, at: Local) -> list[Coefficient]:
         """Coefficients of scale and offset, recovered from their curves."""
