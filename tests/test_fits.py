@@ -43,7 +43,7 @@ def test_studies_are_complete_and_quoted_in_the_readme(folder, samples):
         assert result["status"] == "converged" or result["status"] in row
         data = result["data"]
         assert hashlib.sha256((study / data["path"]).read_bytes()).hexdigest() == data["sha256"]
-        (best,) = re.findall(r"(?:thickness|at most) ([\d.]+(?: ± \S+)? nm)", result["verdict"])
+        (best,) = re.findall(r"(?:thickness:?|at most) ([\d.]+(?: ± \S+)? nm)", result["verdict"])
         assert best in row
         assert best in (study / "report.txt").read_text("utf-8")
 
