@@ -180,8 +180,8 @@ for name, material in (
     ("gold_on_glass_300nm", "Au"),
 ):
     measured = pl.read_spectrum(f"../measurements/{name}.csv")
-    found = pl.fit(measured, pl.Scene(pl.Layer(material, pl.Free(1, 2000)), glass))
-    print(f"{name}: {found.status}. {found.verdict}")
+    result = pl.fit(measured, pl.Scene(pl.Layer(material, pl.Free(1, 2000)), glass))
+    print(f"{name}: {result.status}. {result.verdict}")
 
 # %% [markdown]
 # No light returns from below 300 nm of gold. The data determine only that the layer is thick, so the result
@@ -197,10 +197,10 @@ for name, material in (
 # %%
 eye = sensor()  # the 1931 observer under D65
 xyz = np.interp(eye.wavelength, spectrum.wavelength, spectrum.values) @ eye.weights
-seen = lab(xyz, eye.white)
+measured_lab = lab(xyz, eye.white)
 fine = np.linspace(1, 300, 300 if SHORT else 1200)
 candidates = film_colour(fine, hematite, glass, method="uniform-64")
-apart = delta_e2000(candidates.lab, seen)
+apart = delta_e2000(candidates.lab, measured_lab)
 
 figure, (axes, strip) = plt.subplots(
     2, 1, figsize=(7, 4.2), sharex=True, gridspec_kw={"height_ratios": [6, 1]}

@@ -141,18 +141,18 @@ fit = pl.fit(samples, unknown)
 print(fit.status, "-", fit.verdict)
 
 # %%
-asked = {**truth, **dict(zip(("n_r", "n_g", "n_b"), truth["n"], strict=True))}
+true_values = {**truth, **dict(zip(("n_r", "n_g", "n_b"), truth["n"], strict=True))}
 print(f"{'':22}{'true':>8}{'fit':>10}{'± 1σ':>10}{'error':>10}")
 for p in fit.free:
-    off = (p.value - asked[p.name]) / p.stderr
-    print(f"{p.name:22}{asked[p.name]:8g}{p.value:10.4g}{p.stderr:10.2g}{off:8.1f} σ")
+    off = (p.value - true_values[p.name]) / p.stderr
+    print(f"{p.name:22}{true_values[p.name]:8g}{p.value:10.4g}{p.stderr:10.2g}{off:8.1f} σ")
 
 # %% [markdown]
 # All ten parameters are recovered, each within a few standard errors. The next figure shows data and fit in
 # the plane of incidence, for three of the lamp angles:
 
 # %%
-found = pl.Surface(
+fitted_surface = pl.Surface(
     "granier-heidrich",
     {key: (tuple(fit[f"n_{c}"].value for c in "rgb") if key == "n" else fit[key].value) for key in truth},
 )
@@ -162,7 +162,7 @@ signed = np.where(samples.phi_o > 90, samples.theta_o, -samples.theta_o)
 figure, panels = plt.subplots(1, 3, figsize=(10, 3.4), sharey=True)
 for axes, lamp in zip(panels, (10, 40, 70), strict=True):
     rows = samples.theta_i == lamp
-    curve = in_plane(found, lamp, leaving)
+    curve = in_plane(fitted_surface, lamp, leaving)
     for channel, colour in enumerate(("#c03030", "#2f8f2f", "#3050c0")):
         axes.plot(leaving, curve[:, channel], color=colour)
         axes.plot(signed[rows], samples.values[rows, channel], ".", color=colour, markersize=4)
@@ -174,7 +174,7 @@ plt.show()
 # Rendered images of the true surface and of the fit, and sixteen times their difference:
 
 # %%
-pictures = [render(each, size=SIZE) for each in (surface, found)]
+pictures = [render(each, size=SIZE) for each in (surface, fitted_surface)]
 figure, panels = plt.subplots(1, 3, figsize=(8, 3))
 for axes, image, title in zip(
     panels,

@@ -42,10 +42,10 @@ SHORT = os.environ.get("PELLICLE_SHORT") == "1"  # fewer points, for a quick run
 OXIDE, STEEL = 2.9, 2.7 + 2.8j
 nm = np.linspace(0, 80, 81 if SHORT else 321)
 angle = np.linspace(0, 80, 21 if SHORT else 81)
-seen = film_colour(nm, OXIDE, STEEL, angle=angle[:, None], method="uniform-64")
+colours_of_films = film_colour(nm, OXIDE, STEEL, angle=angle[:, None], method="uniform-64")
 
 figure, axes = plt.subplots(figsize=(7, 3.6))
-axes.imshow(np.asarray(seen.srgb), extent=(0, 80, 0, 80))
+axes.imshow(np.asarray(colours_of_films.srgb), extent=(0, 80, 0, 80))
 axes.set(xlabel="oxide thickness (nm)", ylabel="angle of incidence (°)")
 plt.show()
 
@@ -55,7 +55,7 @@ plt.show()
 # normal incidence pass through these?
 
 # %%
-a, b = np.asarray(seen.lab)[0, :, 1:].T
+a, b = np.asarray(colours_of_films.lab)[0, :, 1:].T
 hue, chroma = np.rad2deg(np.arctan2(b, a)) % 360, np.hypot(a, b)
 for name, low, high in (("straw", 60, 105), ("purple", 285, 345), ("blue", 235, 280)):
     inside = nm[(hue > low) & (hue < high) & (chroma > 10)]

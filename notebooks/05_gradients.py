@@ -52,8 +52,8 @@ OXIDE, SILICON = pl.material("SiO2"), pl.material("Si")
 @jax.jit
 def colour(thickness):
     """Return L*, a*, b* and sRGB of oxides of these thicknesses (nm), from 64 wavelengths."""
-    seen = film_colour(thickness, OXIDE, SILICON, method="uniform-64")
-    return seen.lab, seen.srgb
+    colours = film_colour(thickness, OXIDE, SILICON, method="uniform-64")
+    return colours.lab, colours.srgb
 
 
 @jax.jit
@@ -202,8 +202,8 @@ angles = np.arange(45.0, 86.0, 1.0)
 
 def psi_delta(p, wavelength, angle, substrate):
     """Return Ψ and Δ of the film in degrees, with shape (points, 2)."""
-    found = pl.ellipsometry(wavelength, p[0], p[1] + 1j * p[2], substrate, angle=angle)
-    return jnp.stack(found, axis=-1)
+    psi_and_delta = pl.ellipsometry(wavelength, p[0], p[1] + 1j * p[2], substrate, angle=angle)
+    return jnp.stack(psi_and_delta, axis=-1)
 
 
 @jax.jit

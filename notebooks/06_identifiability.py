@@ -133,8 +133,8 @@ thicknesses = np.linspace(50.0, 1500.0, 2901)
 @jax.jit
 def through_bands(bands):
     """Return the reflectance with shape (thicknesses, bands); bands of 0 are padding."""
-    seen = pl.reflectance(jnp.where(bands > 0, bands, 500.0), thicknesses[:, None], 1.46, SILICON)
-    return jnp.where(bands > 0, seen, 0.0)
+    reflectances = pl.reflectance(jnp.where(bands > 0, bands, 500.0), thicknesses[:, None], 1.46, SILICON)
+    return jnp.where(bands > 0, reflectances, 0.0)
 
 
 def rivals_of(curve):
@@ -149,8 +149,8 @@ figure, axes = plt.subplots(len(counts), 1, figsize=(8, 6), sharex=True)
 places = []
 for at, count in zip(axes, counts, strict=True):
     bands = np.concatenate([np.linspace(450, 800, count), np.zeros(33 - count)])
-    seen = through_bands(bands)
-    curve = np.asarray(jnp.sum(((seen - seen[truth_at]) / 0.04) ** 2, axis=1))
+    reflectances = through_bands(bands)
+    curve = np.asarray(jnp.sum(((reflectances - reflectances[truth_at]) / 0.04) ** 2, axis=1))
     places.append(rivals_of(curve))
     at.plot(thicknesses, curve, "k")
     at.axhline(6, color="C0", linestyle=":")

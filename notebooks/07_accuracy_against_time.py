@@ -175,12 +175,13 @@ assert errors["soap film"]["closed form"] < TOLERANCE
 orders = {"1 order": 1, "2 orders": 2, "3 orders": 3, "5 orders": 5, "8 orders": 8}
 figure, axes = plt.subplots(figsize=(7, 3.6))
 needed = {}
-for (name, found), style in zip(errors.items(), ("C0o-", "C2s-", "C1D-"), strict=True):
-    kept = {rung: count for rung, count in orders.items() if rung in found}
-    axes.plot(list(kept.values()), [found[rung] for rung in kept], style, label=name)
-    needed[name] = next((count for rung, count in kept.items() if found[rung] <= TOLERANCE), None)
+for (name, method_errors), style in zip(errors.items(), ("C0o-", "C2s-", "C1D-"), strict=True):
+    kept = {rung: count for rung, count in orders.items() if rung in method_errors}
+    axes.plot(list(kept.values()), [method_errors[rung] for rung in kept], style, label=name)
+    needed[name] = next((count for rung, count in kept.items() if method_errors[rung] <= TOLERANCE), None)
     enough = needed[name] or "more than 8"
-    print(f"{name}: error of one order {found['1 order']:.1e}; orders needed for {TOLERANCE:g}: {enough}")
+    one_order = method_errors["1 order"]
+    print(f"{name}: error of one order {one_order:.1e}; orders needed for {TOLERANCE:g}: {enough}")
 axes.axhline(TOLERANCE, color="k", linestyle=":", label="tolerance")
 axes.set(yscale="log", xlabel="orders kept", ylabel="largest error in R")
 axes.legend()
@@ -215,7 +216,7 @@ COUNT = 1000 if SHORT else 8000
 thickness, angle = random.uniform(0, 1000, COUNT), random.uniform(0, 80, COUNT)
 index = random.uniform(1.33, 2.4, COUNT)
 base = np.where(random.random(COUNT) < 0.5, 1.5, 2.7 + 2.8j)
-WAYS = (
+METHODS = (
     "points-650-510-475",
     "belcour-barla",
     "gaussians-4",
@@ -226,48 +227,52 @@ WAYS = (
 )
 
 
-def program(way):
+def program(method):
     """Return a compiled function for the XYZ of films under D65."""
-    return jax.jit(lambda d, n, b, t: film_colour(d, n, b, angle=t, method=way).xyz)
+    return jax.jit(lambda d, n, b, t: film_colour(d, n, b, angle=t, method=method).xyz)
 
 
-def seen(xyz):
+def to_lab(xyz):
     """Return L*, a*, b* relative to the white of D65."""
     return np.asarray(lab(np.asarray(xyz, float), white))
 
 
 white = film_colour(0.0, 1.0, 1.0).white
-truth = seen(program("uniform-351")(thickness, index, base, angle))
+truth = to_lab(program("uniform-351")(thickness, index, base, angle))
 single = [x.astype(np.float32) for x in (thickness, index)] + [
     base.astype(np.complex64),
     angle.astype(np.float32),
 ]
 table = {}
-for way in WAYS:
-    run = program(way)
-    error = delta_e2000(seen(run(*single)), truth)
+for method in METHODS:
+    run = program(method)
+    error = delta_e2000(to_lab(run(*single)), truth)
     taken = []
     for _ in range(20):
         began = time.perf_counter()
         run(*single).block_until_ready()
         taken.append(time.perf_counter() - began)
-    table[way] = float(np.mean(error)), float(np.percentile(error, 95)), float(np.median(taken)) / COUNT * 1e9
-print(f"{'way':20} mean ΔE2000   95 % below   ns per colour")
-for way, (mean, most, ns) in table.items():
-    print(f"{way:20} {mean:11.3f} {most:12.2f} {ns:15.0f}")
+    table[method] = (
+        float(np.mean(error)),
+        float(np.percentile(error, 95)),
+        float(np.median(taken)) / COUNT * 1e9,
+    )
+print(f"{'method':20} mean ΔE2000   95 % below   ns per colour")
+for method, (mean, most, ns) in table.items():
+    print(f"{method:20} {mean:11.3f} {most:12.2f} {ns:15.0f}")
 
 # %%
 figure, axes = plt.subplots(figsize=(7, 4))
-for way, (mean, _, ns) in table.items():
-    axes.plot(ns, mean, "o", color="C1" if way.startswith("gaussians") else "0.4")
-    axes.annotate(way, (ns, mean), xytext=(5, 3), textcoords="offset points", fontsize="small")
+for method, (mean, _, ns) in table.items():
+    axes.plot(ns, mean, "o", color="C1" if method.startswith("gaussians") else "0.4")
+    axes.annotate(method, (ns, mean), xytext=(5, 3), textcoords="offset points", fontsize="small")
 axes.axhline(1.0, color="C0", linestyle=":", label="just visible")
 axes.set(xscale="log", yscale="log", xlabel="time of one colour (ns)", ylabel="mean ΔE2000")
 plain_ticks(axes.xaxis)
 axes.margins(x=0.25)
 axes.legend(loc="upper right")
 plt.show()
-mean = {way: row[0] for way, row in table.items()}
+mean = {method: row[0] for method, row in table.items()}
 assert mean["points-650-510-475"] > 5 * mean["belcour-barla"] > 5
 assert mean["gaussians-8"] < 0.2 < mean["gaussians-4"]
 assert mean["uniform-16"] > 5 * mean["gaussians-8"]

@@ -79,9 +79,9 @@ assert fit.status == "converged"
 
 
 # %%
-def draw(found):
+def draw(fit):
     """Plot Ψ and Δ with the fit, and the residuals, against the angle of incidence."""
-    curve, angle = found.curve, found.spectrum.angle
+    curve, angle = fit.curve, fit.spectrum.angle
     _, (above, below) = plt.subplots(2, 1, figsize=(7, 5), sharex=True, height_ratios=[2, 1])
     above.plot(angle, curve.data, "o", color="C0", label="Ψ")
     above.plot(angle, curve.model, "-", color="C0")
@@ -122,9 +122,9 @@ free_index = pl.Free(1.3, 1.7)
 compared = pl.compare(thin, {"index assumed": brush(), "index free": brush(free_index)})
 print(compared)
 for candidate in compared.candidates:
-    found = candidate.fit
-    d = f"{found['brush.thickness'].value:.2f} ± {found['brush.thickness'].stderr:.2f} nm"
-    print(f"  {candidate.name}: {d}, n at 658 nm = {float(found.curve.n[0]):.3f}, rms {found.rms:.3f}°")
+    result = candidate.fit
+    d = f"{result['brush.thickness'].value:.2f} ± {result['brush.thickness'].stderr:.2f} nm"
+    print(f"  {candidate.name}: {d}, n at 658 nm = {float(result.curve.n[0]):.3f}, rms {result.rms:.3f}°")
 either = [candidate.fit["brush.thickness"] for candidate in compared.candidates]
 apart = abs(either[0].value - either[1].value)
 print(f"the two thicknesses are {apart:.1f} nm apart")
@@ -152,7 +152,7 @@ def shifted(spectrum):
 series = {"15-1-1": shifted(thin), "19-1-1": shifted(thinner)}
 figure, axes = plt.subplots(figsize=(7, 3.4))
 for (name, fits), style in zip(series.items(), ("C0o-", "C1s-"), strict=True):
-    axes.plot(shifts, [found.rms for found in fits], style, label=f"{name}, index assumed")
+    axes.plot(shifts, [fit.rms for fit in fits], style, label=f"{name}, index assumed")
 axes.axhline(compared.best.fit.rms, color="C0", linestyle=":", label="15-1-1, index free, no shift")
 axes.set(
     xlabel="shift of all angles of incidence (degrees)",
@@ -162,12 +162,12 @@ axes.set(
 axes.legend()
 plt.show()
 
-best = {name: int(np.argmin([found.rms for found in fits])) for name, fits in series.items()}
+best = {name: int(np.argmin([fit.rms for fit in fits])) for name, fits in series.items()}
 for name, fits in series.items():
-    found, before = fits[best[name]], fits[int(np.argmin(abs(shifts)))]
+    after, before = fits[best[name]], fits[int(np.argmin(abs(shifts)))]
     print(
-        f"{name}: {shifts[best[name]]:+.2f}°: rms {found.rms:.3f}° instead of {before.rms:.3f}°,"
-        f" thickness {found['brush.thickness'].value:.2f} ± {found['brush.thickness'].stderr:.2f} nm"
+        f"{name}: {shifts[best[name]]:+.2f}°: rms {after.rms:.3f}° instead of {before.rms:.3f}°,"
+        f" thickness {after['brush.thickness'].value:.2f} ± {after['brush.thickness'].stderr:.2f} nm"
     )
 assert all(0 < shifts[at] < 0.2 for at in best.values())
 assert series["15-1-1"][best["15-1-1"]].rms < 1.05 * compared.best.fit.rms
@@ -251,10 +251,10 @@ plt.show()
 columns = np.genfromtxt(SPOTS, skip_header=2, usecols=(5, 11, 12))  # zone, x and y in mm
 places = columns[columns[:, 0] == 0][::5, 1:]  # five angles a spot
 fits = [pl.fit(pl.read_spectrum(SPOTS, spot=spot), brush(free_index)) for spot in range(1, len(places) + 1)]
-values = np.array([found["brush.thickness"].value for found in fits])
-errors = np.array([found["brush.thickness"].stderr for found in fits])
-index = np.array([float(found.curve.n[0]) for found in fits])
-print(f"{len(fits)} spots, of which {sum(found.status == 'converged' for found in fits)} converged")
+values = np.array([fit["brush.thickness"].value for fit in fits])
+errors = np.array([fit["brush.thickness"].stderr for fit in fits])
+index = np.array([float(fit.curve.n[0]) for fit in fits])
+print(f"{len(fits)} spots, of which {sum(fit.status == 'converged' for fit in fits)} converged")
 spread = values.std(ddof=1)
 print(f"thickness from {values.min():.1f} to {values.max():.1f} nm, standard deviation {spread:.1f} nm")
 print(f"median error of one spot {np.median(errors):.2f} nm, including the oxide {thickness.sd:.2f} nm")
