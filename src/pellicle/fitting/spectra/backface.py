@@ -13,7 +13,6 @@ from pellicle.fitting.reweighting import RankedMinima
 from pellicle.fitting.spectra.problem import make
 from pellicle.fitting.spectra.targets import Measured
 from pellicle.fitting.spectra.view import Local, SpectrumView
-from pellicle.scene.film import Scene
 from pellicle.scene.free import free_leaves
 
 
@@ -50,15 +49,14 @@ def _bare(spectrum: Measured, view: SpectrumView) -> Measured:
     """The spectrum with its final weights, of a sample without a back face."""
     sigma = 1 / view.data.weight[: view.points].reshape(view.rows, view.channels)
     return spectrum._replace(
-        scene=_half_space(spectrum.scene),
+        scene=eqx.tree_at(
+            lambda s: s.substrate.back,
+            spectrum.scene,
+            None,
+            is_leaf=lambda x: x is None or x is spectrum.scene.substrate.back,
+        ),
         sigma=sigma,
         independent_fraction=float(view.data.independent_fraction),
-    )
-
-
-def _half_space(scene: Scene) -> Scene:
-    return eqx.tree_at(
-        lambda s: s.substrate.back, scene, None, is_leaf=lambda x: x is None or x is scene.substrate.back
     )
 
 
