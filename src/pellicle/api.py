@@ -26,7 +26,7 @@ from pellicle.planning.film import plan as film_plan
 from pellicle.planning.surface import plan as surface_plan
 from pellicle.sampling.ensemble import STEPS
 from pellicle.sampling.result import Posterior
-from pellicle.sampling.sample import Measurement, brdf_samples, spectra_of
+from pellicle.sampling.sample import Measurement, measured
 from pellicle.sampling.sample import sample as sample_posterior
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface, SurfaceView, surface_view
@@ -239,10 +239,10 @@ def fit(
     ```
     """
     if isinstance(scene, Surface):
-        samples = brdf_samples(data)
+        samples = measured(BrdfSamples, data)
         return fit_brdf(samples, scene, residual=residual, tolerance=tolerance, loss=loss, progress=progress)
     _refuse("a Scene", residual=residual)
-    return fit_spectra(spectra_of(data), scene, tolerance=tolerance, loss=loss, progress=progress)
+    return fit_spectra(measured(Spectrum, data), scene, tolerance=tolerance, loss=loss, progress=progress)
 
 
 def sample(

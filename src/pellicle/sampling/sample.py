@@ -6,7 +6,7 @@ import os
 import time
 from collections.abc import Sequence
 from functools import partial
-from typing import TypeAlias
+from typing import TypeAlias, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -29,6 +29,7 @@ from pellicle.sampling.result import Posterior
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface
 
+Kind = TypeVar("Kind", Spectrum, BrdfSamples)
 Measurement: TypeAlias = Spectrum | Sequence[Spectrum] | BrdfSamples | Sequence[BrdfSamples]
 
 
@@ -64,13 +65,13 @@ def sample(
     installed()
     assumption = ""
     if isinstance(scene, Surface):
-        measurements = brdf_samples(data)
+        measurements = measured(BrdfSamples, data)
         fit, ranked = brdf.fitted(measurements, scene, tolerance, progress, residual=residual)
         unsure = fit.layer_test and not fit.layer_test.layered and fit.status is not Status.AMBIGUOUS
         assumption = "there is a layer" if unsure else ""
         identity = _surface_fingerprint(measurements, scene, fit, tolerance)
     else:
-        measurements = spectra_of(data)
+        measurements = measured(Spectrum, data)
         fit, ranked = spectra.fitted(measurements, scene, tolerance, progress)
         with jax.enable_x64(True):
             identity = fingerprint(spectra.measurements(measurements, scene), tolerance)
@@ -79,22 +80,14 @@ def sample(
     return sampled(subject, walkers, steps, seed, chain, progress, began)
 
 
-def spectra_of(data: Measurement) -> Spectrum | list[Spectrum]:
-    """The data as spectra. Raises UsageError for BRDF samples."""
-    if isinstance(data, Spectrum):
+def measured(kind: type[Kind], data: Measurement) -> Kind | list[Kind]:
+    """The data as one or a list of one kind. Raises UsageError for the other kind."""
+    if isinstance(data, kind):
         return data
-    if isinstance(data, BrdfSamples) or not all(isinstance(each, Spectrum) for each in data):
+    rows = [data] if isinstance(data, Spectrum | BrdfSamples) else list(data)
+    if not all(isinstance(row, kind) for row in rows):
         raise UsageError("BRDF samples need a Surface, and spectra a Scene")
-    return list(data)  # pyright: ignore[reportReturnType]
-
-
-def brdf_samples(data: Measurement) -> BrdfSamples | list[BrdfSamples]:
-    """The data as BRDF samples. Raises UsageError for spectra."""
-    if isinstance(data, BrdfSamples):
-        return data
-    if isinstance(data, Spectrum) or not all(isinstance(each, BrdfSamples) for each in data):
-        raise UsageError("BRDF samples need a Surface, and spectra a Scene")
-    return list(data)  # pyright: ignore[reportReturnType]
+    return [row for row in rows if isinstance(row, kind)]
 
 
 def _subject(fit: Fit, ranked: RankedMinima, identity: str, assumption: str) -> Subject:
