@@ -12,7 +12,6 @@ import numpy as np
 from pellicle.accuracy.case import Case
 from pellicle.accuracy.compiled import compiled
 from pellicle.accuracy.methods import Way
-from pellicle.fitting.levenberg_marquardt import least_squares
 from pellicle.fitting.problem import Explained, Form, Problem
 from pellicle.fitting.spectra.problem import make
 from pellicle.fitting.spectra.targets import Measured
@@ -95,6 +94,8 @@ FEW_STEPS = 4
 def descend(form: Form, arrays: Any, box: Any, units: Any) -> tuple[Any, Any]:
     """A few steps of our bounded Levenberg-Marquardt from each start (starts, parameters): where they lead,
     and the misfit there."""
+
+    from pellicle.fitting.levenberg_marquardt import least_squares  # slow to import
 
     def one(unit):
         there, _ = least_squares(lambda u: residual(form, arrays, box, u), unit, steps=FEW_STEPS)
