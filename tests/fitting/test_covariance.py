@@ -5,11 +5,10 @@ import jax.numpy as jnp
 import lmfit
 import numpy as np
 import pytest
-from pellicle.fitting.spectra.covariance import errors
-from pellicle.fitting.spectra.evaluation import local
 from scipy.optimize import curve_fit
 
 import pellicle as pl
+from pellicle.fitting.covariance import errors, scaled
 from pellicle.fitting.spectra.problem import make
 from pellicle.fitting.spectra.targets import measured as as_numbers
 from pellicle.simulation.functions import reflectance
@@ -168,8 +167,9 @@ def test_a_direction_that_the_data_do_not_see_keeps_its_variance(film, measured)
     scene = film(pl.Free(1, 4000), "Au")
     data = measured(scene, 3000.0, noise=0.005, sigma=True)
     problem = make(as_numbers(data, scene))
-    at = jax.device_get(local(*problem.views[0].program, np.array([3000.0 / 4000])))
-    assert errors(problem, [at], [1.0]).stderr[0] > 1e6
+    unit = np.array([3000.0 / 4000])
+    at = problem.views[0].local(problem.values(unit))
+    assert errors(scaled(problem, unit, [at], [1.0])).stderr[0] > 1e6
 
 
 def test_a_lower_limit_is_where_chi2_has_risen_by_2_71(film, measured):

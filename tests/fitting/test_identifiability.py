@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from pellicle.fitting.spectra.covariance import Scaled
 
 import pellicle as pl
-from pellicle.fitting.identifiability import bounded, of, step, trades
+from pellicle.fitting.covariance import Scaled
+from pellicle.fitting.identifiability import bounded, naming, step, trades
 from pellicle.fitting.result import Estimate
 
 NM = np.linspace(400.0, 900.0, 128)
@@ -26,7 +26,7 @@ OFFSET = estimate("instrument.offset_1", 0.0, -math.inf, math.inf)
 def of_columns(noise, **columns):
     """A problem whose model has these derivatives, in each parameter's own unit."""
     names = tuple(columns)
-    return Scaled(np.column_stack(list(columns.values())) / noise, np.ones(len(names)), names)
+    return Scaled(np.column_stack(list(columns.values())) / noise, np.eye(len(names)), names)
 
 
 def fringes(noise, share=0.0):
@@ -141,5 +141,5 @@ def test_sentences_beside_a_bound_that_is_not_zero():
 
 def test_sentences_of_the_leading_parameter():
     told = ["A and au.thickness trade against each other", "n and thickness trade against each other"]
-    assert of("thickness", told) == told[1:]
-    assert of("au.thickness", told) == told[:1]
+    assert naming("thickness", told) == told[1:]
+    assert naming("au.thickness", told) == told[:1]

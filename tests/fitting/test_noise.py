@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from pellicle.fitting.spectra.noise import MODEL_ERROR, correlation_length, drifting_sigma, local_noise
+
+from pellicle.fitting.noise import MODEL_ERROR, correlation_length, drifting_sigma, local_noise
 
 RANDOM = np.random.default_rng(8)
 POSITION = np.linspace(0.0, 1.0, 1000)

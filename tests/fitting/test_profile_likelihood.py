@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-from pellicle.fitting.spectra.covariance import errors
 from scipy.optimize import brentq, minimize_scalar
 
 import pellicle as pl
-from pellicle.fitting.neighbourhood import valley
+from pellicle.fitting.conclusion import linearised
+from pellicle.fitting.neighbourhood import neighbourhood
 from pellicle.fitting.profile_likelihood import interval
+from pellicle.fitting.progress import quiet
 from pellicle.fitting.spectra.fit import fitted
-from pellicle.fitting.spectra.search import quiet
 
 SUBSTRATE = 3.9 + 0.02j
 
@@ -90,12 +90,13 @@ def test_an_interval_by_profile_is_that_of_a_scan(film, measured):
     """Both ends of the thickness, its index fitted again by SciPy, where χ² is 3.84 above the best."""
     scene = film(material=pl.dispersion.Constant(pl.Free(1.3, 1.7), 0.0))
     data = measured(scene, 1.46, 430.0, sigma=True)
-    fit, weighed = fitted(data, scene, 0.0, quiet)
-    found = errors(weighed.problem, [m.at for m in weighed.met], [m.variance for m in weighed.met])
-    low, high = interval(valley(weighed, found.covariance), fit.correlation_names.index("thickness"))
+    fit, ranked = fitted(data, scene, 0.0, quiet)
+    _, errors = linearised(ranked)
+    around = neighbourhood(ranked, errors.covariance, np.zeros((0, 2)))
+    low, high = interval(around, fit.correlation_names.index("thickness"))
 
     def profile(d):
-        return least(data, lambda n: chi2(data, d, n), 1.46, 0.03) * weighed.met[0].variance ** -1
+        return least(data, lambda n: chi2(data, d, n), 1.46, 0.03) * ranked.fits[0].variance ** -1
 
     best = profile(fit["thickness"].value)
     for end in (low, high):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
+from pellicle.fitting import minima
 from pellicle.fitting.result import Estimate, Rival, Status
 from pellicle.fitting.status import describe, judge, misfits, verdict
 
@@ -98,15 +99,13 @@ def test_not_identifiable(film, measured):
 
 def test_not_converged(film, measured, monkeypatch):
     """A solver that may take no step has not arrived."""
-    from pellicle.fitting.spectra import search
-
-    real = search.polish
+    real = minima.polish
 
     def stopped(*arguments):
-        units, evidence, converged = real(*arguments)
-        return units, evidence, np.zeros_like(np.asarray(converged))
+        polished = real(*arguments)
+        return polished._replace(converged=np.zeros_like(np.asarray(polished.converged)))
 
-    monkeypatch.setattr(search, "polish", stopped)
+    monkeypatch.setattr(minima, "polish", stopped)
     scene = film()
     fit = pl.fit(measured(scene, 430.0), scene)
     assert fit.status is pl.Status.NOT_CONVERGED

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pellicle.fitting.spectra.evaluation import local
 
 import pellicle as pl
 from pellicle.fitting.spectra.problem import make
@@ -36,8 +35,7 @@ def spectrum(ncs: np.ndarray) -> pl.Spectrum:
 def residual(data: pl.Spectrum) -> np.ndarray:
     """At the truth."""
     (view,) = make(measured(data, SCENE)).views
-    unit = (120.0 - view.box.lower) / (view.box.upper - view.box.lower)
-    return (view.data.values - np.asarray(local(*view.program, unit).model))[: view.points]
+    return (view.data.values - np.asarray(view.local(np.array([120.0])).model))[: view.points]
 
 
 def test_psi_and_delta_say_nothing_of_the_unpolarised_part(ncs):
@@ -46,7 +44,7 @@ def test_psi_and_delta_say_nothing_of_the_unpolarised_part(ncs):
 
 
 def test_a_rotating_analyser_sees_n_and_c_as_they_are(ncs):
-    """As `io.forms` turns α and β into Ψ and Δ: N = cos 2Ψ and C = sin 2Ψ cos Δ, whatever S was."""
+    """N = cos 2Ψ and C = sin 2Ψ cos Δ, as from α and β (`data.ellipsometry_angles`), whatever S was."""
     n, c, _ = ncs
     seen = spectrum(np.array([n, c, np.sqrt(1 - n**2 - c**2)]))
     np.testing.assert_allclose(residual(replace(seen, folded=True)), 0, atol=1e-12)

@@ -11,7 +11,7 @@ from scipy.optimize import lsq_linear
 from pellicle.fitting.spectra.nuisance import Data, solve
 from pellicle.scene.instrument import Instrument
 
-POINTS, LEVEL, TEMPER = 64, 0.4, 0.5
+POINTS, LEVEL, FRACTION = 64, 0.4, 0.5
 POSITION = np.linspace(-1.0, 1.0, POINTS)
 SIGNAL = 0.3 + 0.2 * np.cos(9 * POSITION + 1)
 WEIGHT = 1 / (0.01 + 0.005 * (1 + POSITION))
@@ -21,7 +21,7 @@ DEGREES = {"free": (0, 0), "slow": (3, 2)}
 
 
 def data(values, weight=WEIGHT) -> Data:
-    return Data(np.asarray(values), weight, POSITION, np.float64(TEMPER), np.float64(LEVEL))
+    return Data(np.asarray(values), weight, POSITION, np.float64(FRACTION), np.float64(LEVEL))
 
 
 solved = jax.jit(solve)
@@ -36,7 +36,7 @@ class Dense:
     """
 
     def __init__(self, values, scale: str | None, offset: str | None):
-        root = WEIGHT * np.sqrt(TEMPER)
+        root = WEIGHT * np.sqrt(FRACTION)
         plain = np.sum(root**2 * values * SIGNAL) / np.sum(root**2 * SIGNAL**2)
         blocks, mean, sd = [], [], []
         if scale:
@@ -75,8 +75,8 @@ class Dense:
         target = np.concatenate([self.y, self.mean / self.sd])
         return change @ lsq_linear(rows, target, (lower, np.inf), method="bvls", tol=1e-14).x
 
-    def evidence(self):
-        """−2 log of the marginal likelihood of the whitened data, without the 2π's."""
+    def deviance(self):
+        """−2 ln of the marginal likelihood of the whitened data, without the 2π's."""
         covariance = np.eye(POINTS) + (self.x * self.sd**2) @ self.x.T
         residual = self.y - self.x @ self.mean
         return residual @ np.linalg.solve(covariance, residual) + np.linalg.slogdet(covariance)[1]
@@ -112,17 +112,17 @@ def test_equal_to_dense_least_squares(scale, offset):
 
 
 @pytest.mark.parametrize(("scale", "offset"), CASES)
-def test_evidence_is_the_gaussian_marginal(scale, offset):
+def test_deviance_is_the_gaussian_marginal(scale, offset):
     values = lifted(scale)
     found = solved(SIGNAL, data(values), instrument(scale, offset))
-    np.testing.assert_allclose(found.evidence, Dense(values, scale, offset).evidence(), rtol=1e-9)
+    np.testing.assert_allclose(found.deviance, Dense(values, scale, offset).deviance(), rtol=1e-9)
 
 
-def test_without_nuisances_the_evidence_is_chi2():
+def test_without_nuisances_the_deviance_is_chi2():
     values = 0.9 * SIGNAL + 0.1 + NOISE
     found = solved(SIGNAL, data(values), Instrument(0.9, 0.1))
-    np.testing.assert_allclose(found.evidence, np.sum((WEIGHT * NOISE) ** 2) * TEMPER, rtol=1e-10)
-    np.testing.assert_allclose(found.residual, WEIGHT * np.sqrt(TEMPER) * NOISE, atol=1e-12)
+    np.testing.assert_allclose(found.deviance, np.sum((WEIGHT * NOISE) ** 2) * FRACTION, rtol=1e-10)
+    np.testing.assert_allclose(found.residual, WEIGHT * np.sqrt(FRACTION) * NOISE, atol=1e-12)
 
 
 @pytest.mark.parametrize(("scale", "offset"), CASES)
@@ -163,15 +163,15 @@ def test_a_negative_gain_is_ruled_out(scale):
     values = 0.5 - SIGNAL  # the fringes upside down
     found = solved(SIGNAL, data(values), instrument(scale, "free"))
     right = solved(0.5 - SIGNAL, data(values), instrument(scale, "free"))
-    assert found.evidence > right.evidence + 100
+    assert found.deviance > right.deviance + 100
     if np.min(found.gain) <= 0:
-        assert found.evidence > 1e8
+        assert found.deviance > 1e8
 
 
 def test_a_gain_that_turns_negative_at_one_end_is_ruled_out():
     falling = solved(SIGNAL, data((0.3 - POSITION) * SIGNAL), instrument("slow", None))
     assert np.min(falling.gain) < 0
-    assert falling.evidence > 1e8
+    assert falling.deviance > 1e8
 
 
 @pytest.mark.parametrize("level", [0.2, -0.2], ids=["offset free", "offset held at zero"])
@@ -199,6 +199,6 @@ def test_points_of_zero_weight_change_nothing(scale, offset):
     other = solved(
         np.where(off, 0.9, SIGNAL), data(np.where(off, 5.0, values), weight), instrument(scale, offset)
     )
-    np.testing.assert_allclose(found.evidence, other.evidence, rtol=1e-12)
+    np.testing.assert_allclose(found.deviance, other.deviance, rtol=1e-12)
     np.testing.assert_allclose(found.offset, other.offset, rtol=1e-9)
     np.testing.assert_allclose(found.gain, other.gain, rtol=1e-9)

@@ -8,7 +8,7 @@ import pytest
 import pellicle as pl
 from pellicle.fitting.spectra.targets import measured
 
-COMPUTED = Path(__file__).parents[2] / "measurements" / "wvase" / "cauchy_100nm.txt"
+COMPUTED = Path(__file__).parents[3] / "measurements" / "wvase" / "cauchy_100nm.txt"
 """By another program (WVASE): n = 1.47 + 4950/λ², 100 nm on silicon, with Δ folded where it passes 180."""
 
 

@@ -1,4 +1,4 @@
-"""Where fits start: how fine the scan is, what goes on to the solver, and how often it succeeds."""
+"""The scan before a fit of spectra: its step, the starts that it gives, and how often it succeeds."""
 
 import dataclasses
 
@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.fitting.spectra import evaluation
-from pellicle.fitting.spectra import search as fit_search
+from pellicle.fitting import minima as solver
+from pellicle.fitting.minima import minima
+from pellicle.fitting.progress import quiet
 from pellicle.fitting.spectra.problem import make
-from pellicle.fitting.spectra.search import polished, quiet, search
+from pellicle.fitting.spectra.search import search
 from pellicle.fitting.spectra.targets import measured as as_numbers
 
 NM = np.linspace(400.0, 900.0, 128)
@@ -38,17 +39,16 @@ def test_only_local_minima_are_polished_and_all_of_them_are_kept(film, measured,
     scene = film()
     problem = built(scene, measured(scene, 700.0))
     starts = []
-    real = evaluation.polish
+    real = solver.polish
 
     def watched(*arguments):
         starts.append(np.asarray(arguments[-1]))
         return real(*arguments)
 
-    monkeypatch.setattr("pellicle.fitting.spectra.search.polish", watched)
-    found = search(problem, quiet)
-    scan = found.scan
-    evidence = np.concatenate([[np.inf], scan.evidence[0, :, 0], [np.inf]])
-    lowest = (evidence[1:-1] <= evidence[:-2]) & (evidence[1:-1] <= evidence[2:])
+    monkeypatch.setattr(solver, "polish", watched)
+    scan = search(problem, quiet).scan
+    deviance = np.concatenate([[np.inf], scan.deviance[0, :, 0], [np.inf]])
+    lowest = (deviance[1:-1] <= deviance[:-2]) & (deviance[1:-1] <= deviance[2:])
     tried = np.unique(np.concatenate(starts)) * 990 + 10
     np.testing.assert_allclose(tried, scan.thickness[lowest], atol=1e-6)
     assert 3 <= lowest.sum() < 16
@@ -56,12 +56,10 @@ def test_only_local_minima_are_polished_and_all_of_them_are_kept(film, measured,
 
 def test_minima_are_distinct_and_best_first(film, measured):
     scene = film(pl.Free(10, 1000), pl.dispersion.Constant(pl.Free(1.3, 1.7)))
-    found = search(built(scene, measured(scene, 1.46, 700.0)), quiet)
-    assert (np.diff(found.evidence) >= 0).all()
-    thickness = found.units[
-        :, [p.key for p in built(scene, measured(scene, 1.46, 700.0)).parameters].index("thickness")
-    ]
-    index = found.units[:, 0]
+    problem = built(scene, measured(scene, 1.46, 700.0))
+    result = search(problem, quiet)
+    assert (np.diff(result.deviance) >= 0).all()
+    thickness, index = result.units[:, problem.thickness_axis], result.units[:, 0]
     apart = np.abs(thickness[:, None] - thickness) * 990 > 0.5
     apart |= np.abs(index[:, None] - index) > 0.02
     assert apart[~np.eye(len(apart), dtype=bool)].all()
@@ -71,39 +69,19 @@ def test_one_minimum_from_many_starts_is_one(film, measured):
     scene = film()
     problem = built(scene, measured(scene, 700.0))
     near = (690 + np.linspace(0, 15, 7) - 10)[:, None] / 990
-    found = polished(problem, near, quiet)
-    assert len(found.units) == 1
-    assert 10 + 990 * found.units[0, 0] == pytest.approx(700, abs=1)
+    result = minima(problem, near)
+    assert len(result.units) == 1
+    assert 10 + 990 * result.units[0, 0] == pytest.approx(700, abs=1)
 
 
-def test_the_best_goes_on_until_it_settles(film, measured, monkeypatch):
-    """A solver that gets a third of the way at each call, and settles within a thousandth of a nanometre."""
-    problem = built(film(), measured(film(), 700.0))
-    p = problem.parameters[0]
-    home, calls = (700.0 - p.lower) / (p.upper - p.lower), []
-
-    def third(lower, upper, units):
-        calls.append(len(units))
-        nearer = home + (units - home) / 3
-        left = np.abs(nearer - home)[:, 0] * (p.upper - p.lower)
-        return nearer, left, left < 1e-3
-
-    monkeypatch.setattr(fit_search, "solver", lambda _: third)
-    start = home + 3.0 / (p.upper - p.lower)
-    minima = polished(problem, np.array([[start]]), quiet)
-    assert minima.converged[0]
-    assert len(calls) == 8  # 3 nm / 3⁸ < 1e-3 nm
-    far = polished(problem, np.array([[0.01]]), quiet)  # 690 nm / 3⁹: not yet
-    assert not far.converged[0]
-
-
-def test_progress_is_told(film, measured):
-    heard = []
+def test_progress_is_reported(film, measured):
+    reports = []
     scene = film()
-    search(built(scene, measured(scene, 700.0)), lambda *told: heard.append(told))
-    assert {what for what, _, _ in heard} == {"scan", "polish"}
-    assert all(0 < done <= total for _, done, total in heard)
-    assert [done for what, done, total in heard if done == total]
+    search(built(scene, measured(scene, 700.0)), lambda *report: reports.append(report))
+    assert {stage for stage, _, _ in reports} == {"scan", "polish"}
+    assert all(0 < done <= total for _, done, total in reports)
+    for stage in ("scan", "polish"):
+        assert [done == total for name, done, total in reports if name == stage][-1]
 
 
 CASES = {
