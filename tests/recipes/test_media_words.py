@@ -1,4 +1,7 @@
-"""Words of the command line and of recipes: what each stands for, and what is refused."""
+"""Words of the command line and of recipes: media, free numbers, and the errors of wrong words."""
+
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -6,6 +9,7 @@ import pytest
 from pellicle.dispersion.empirical import Cauchy, Constant, Sellmeier, Shifted
 from pellicle.errors import UsageError
 from pellicle.recipes import media_words
+from pellicle.recipes.dispersion_models import MODELS, build_model
 from pellicle.scene.free import Free
 
 AT = np.array([450.0, 633.0, 850.0])
@@ -23,7 +27,7 @@ def test_a_range_is_a_free_thickness_and_a_number_a_fixed_one():
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("800:10", "reversed"),
         ("10:10", "reversed"),
@@ -36,8 +40,8 @@ def test_a_range_is_a_free_thickness_and_a_number_a_fixed_one():
         (":", "number"),
     ],
 )
-def test_thickness_refused(text, said):
-    with pytest.raises(UsageError, match=said):
+def test_thickness_refused(text, message):
+    with pytest.raises(UsageError, match=message):
         media_words.thickness(text)
 
 
@@ -49,7 +53,7 @@ def test_numbers_are_media():
 
 @pytest.mark.parametrize("text", ["-1.5", "1.5-0.1j", "nan"])
 def test_impossible_indices(text):
-    with pytest.raises(UsageError, match="--layer"):
+    with pytest.raises(UsageError, match="`layer` must be an index n"):
         media_words.medium(text)
 
 
@@ -90,21 +94,19 @@ def test_a_call_fixes_them():
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [("cauchy(1,2,3,4)", "1 to 3 numbers"), ("cauchy()", "got 0"), ("cauchy(a)", "'a'")],
 )
-def test_calls_refused(text, said):
-    with pytest.raises(UsageError, match=said):
+def test_calls_refused(text, message):
+    with pytest.raises(UsageError, match=message):
         media_words.medium(text)
 
 
 def test_models_by_name():
-    assert free_part(media_words.model("cauchy", {"B": Free(0.0, 10.0)}).B) == (5, 0, 10)
-    assert media_words.model("cauchy", {}).A == 1.5  # not written: its documented default, fixed
-    with pytest.raises(UsageError, match="did you mean 'cauchy'"):
-        media_words.model("cauchi", {})
+    assert free_part(build_model("cauchy", {"B": Free(0.0, 10.0)}).B) == (5, 0, 10)
+    assert build_model("cauchy", {}).A == 1.5  # missing parameters keep their documented defaults, fixed
     with pytest.raises(UsageError, match=r"has no parameter 'D'.*A, B, C"):
-        media_words.model("cauchy", {"D": 1.0})
+        build_model("cauchy", {"D": 1.0})
 
 
 def test_freeing_a_number_replaces_it():
@@ -145,35 +147,44 @@ def test_freeing_a_table_adds_a_constant():
 
 
 @pytest.mark.parametrize(
-    ("layer", "item", "said"),
+    ("layer", "item", "message"),
     [
-        ("1.46", "q", "n and k can be freed"),
-        ("SiO2", "A", "n and k can be freed"),
+        ("1.46", "q", "n and k can always be freed"),
+        ("SiO2", "A", "n and k can always be freed"),
         ("cauchy", "D", "A, B and C"),
         ("1.46", "k=-1:1", "negative"),
         ("1.46", "n=1.7:1.3", "reversed"),
         ("1.46", "n=1.7", "LO:HI"),
     ],
 )
-def test_freeing_refused(layer, item, said):
-    with pytest.raises(UsageError, match=said):
+def test_freeing_refused(layer, item, message):
+    with pytest.raises(UsageError, match=message):
         media_words.medium(layer, [item])
 
 
 def test_scale_and_offset():
-    assert media_words.drift("free", "--scale") == "free"
-    assert media_words.drift("slow", "--scale") == "slow"
-    assert media_words.drift("0.98", "--scale") == 0.98
-    with pytest.raises(UsageError, match="--scale must be a number, not 'loose'"):
-        media_words.drift("loose", "--scale")
+    assert media_words.drift("free", "`scale`") == "free"
+    assert media_words.drift("slow", "`scale`") == "slow"
+    assert media_words.drift("0.98", "`scale`") == 0.98
+    with pytest.raises(UsageError, match="`scale` must be a number, not 'loose'"):
+        media_words.drift("loose", "`scale`")
 
 
 def test_free_or_a_number():
-    assert free_part(media_words.free_or_number("free", "--bandwidth", 0.0, 20.0, 2.0)) == (2, 0, 20)
-    assert free_part(media_words.free_or_number("1:3", "--bandwidth", 0.0, 20.0, 2.0)) == (2, 1, 3)
-    assert media_words.free_or_number("4", "--bandwidth", 0.0, 20.0, 2.0) == 4
+    assert free_part(media_words.free_or_number("free", "`bandwidth`", 0.0, 20.0, 2.0)) == (2, 0, 20)
+    assert free_part(media_words.free_or_number("1:3", "`bandwidth`", 0.0, 20.0, 2.0)) == (2, 1, 3)
+    assert media_words.free_or_number("4", "`bandwidth`", 0.0, 20.0, 2.0) == 4
 
 
-def test_nearest():
-    assert media_words.nearest("thicknes", ["thickness", "angle"]) == " (did you mean 'thickness'?)"
-    assert media_words.nearest("zzz", ["thickness", "angle"]) == ""
+@pytest.mark.parametrize(("name", "specs"), MODELS.items())
+def test_the_documented_defaults_are_these(name, specs):
+    """Of each parameter that docs/reference/recipes.md lists; rows may refer to another row."""
+    page = (Path(__file__).parents[2] / "docs" / "reference" / "recipes.md").read_text("utf-8")
+    row = next(line for line in page.splitlines() if line.startswith(f"| `{name}` |"))
+    listed = re.findall(r"(\**)(\w+)\1 (\S+) \((\S+) to (\S+)\)", row.split("|")[2])
+    assert listed or "as `" in row
+    for bold, key, *numbers in listed:
+        spec = specs[key]
+        assert (bool(bold), *map(float, numbers)) == (spec.free, spec.value, spec.lower, spec.upper)
+    others = specs.keys() - {key for _, key, *_ in listed}
+    assert others <= {"eps_inf"} or "as " in row

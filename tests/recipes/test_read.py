@@ -86,3 +86,12 @@ def test_mixtures_nested_too_deeply(write):
     path = write(FILM.replace('"SiO2"', host))
     with pytest.raises(DataError, match=r"nested too deeply"):
         pl.read_recipe(path).scene()
+
+
+def test_the_base_of_a_surface_is_fixed(write):
+    """By a constant index as by any other medium, once its numbers are fixed."""
+    surface = SURFACE + 'base = { model = "constant", n = 2.9, k = 3.1 }\n'
+    fixed = pl.read_recipe(write(surface)).scene().fixed_numbers()
+    assert (fixed["base_n"].tolist(), fixed["base_k"].tolist()) == ([2.9] * 3, [3.1] * 3)
+    with pytest.raises(DataError, match=r"scene\.surface: base cannot be free: give base_n and base_k"):
+        pl.read_recipe(write(surface.replace("3.1", "{ lower = 0, upper = 4 }"))).scene()

@@ -27,14 +27,28 @@ def test_recipes_of_the_repository_are_valid(path):
     jsonschema.validate(tomllib.loads(path.read_text(encoding="utf-8")), KEPT)
 
 
+FILM = """[scene]
+substrate = 'Si'
+[[scene.layer]]
+material = { model = 'constant', n = 1.8, k = { lower = 0, upper = 0.5 } }
+thickness = 100
+"""
+
+
+def test_parameters_of_models():
+    jsonschema.validate(tomllib.loads(FILM), KEPT)
+
+
 @pytest.mark.parametrize(
     "wrong",
     [
         "[scene]\nsubstrat = 'Si'\n[[scene.layer]]\nmaterial = 1.46\nthickness = 100",
         "[scene]\nsubstrate = 'Si'\n[[scene.layer]]\nmaterial = 1.46\nthickness = 'thick'",
         "[data]\nsignal = 'X'\n[scene]\nsubstrate = 'Si'\n[[scene.layer]]\nmaterial = 1.46\nthickness = 100",
+        FILM.replace("'constant'", "'constand'"),
+        FILM.replace("n = 1.8", "m = 1.8"),
     ],
-    ids=["key", "type", "word"],
+    ids=["key", "type", "word", "model", "parameter"],
 )
 def test_wrong_recipes_are_not(wrong):
     with pytest.raises(jsonschema.ValidationError):

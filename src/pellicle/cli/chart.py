@@ -71,9 +71,9 @@ def _surface(recipe: SurfaceRecipe, out: str, light: float) -> int:
 
 
 def _range(flag: str, text: str, most: float) -> tuple[float, float]:
-    from pellicle.data.tabular.numbers import span
+    from pellicle.recipes.number_words import parse_range
 
-    low, high = span(text, flag)
+    low, high = parse_range(text, flag)
     if low < 0 or high > most:
         raise UsageError(f"{flag} must lie in 0 to {most:g}, got {text}")
     return low, high

@@ -36,17 +36,17 @@ def scene_from_words(words: SceneWords, read: ReadWords) -> tuple[Scene, list[st
     free = [item.strip() for item in (words.free or "").split(",") if item.strip()]
     assumed = [] if words.thickness else ["thickness: 1 to 5000 nm, since no --thickness was given"]
     layer = Layer(w.medium(words.layer, free), w.thickness(words.thickness or DEFAULT_THICKNESS))
-    back = None if words.back is None else w.medium(words.back, what="--back")
+    back = None if words.back is None else w.medium(words.back, name="`back`")
     bandwidth = words.bandwidth
     scene = Scene(
         layer,
-        Substrate(w.medium(words.substrate, what="--substrate"), back, words.plate_mm or 1.0),
-        ambient=w.medium(words.ambient or "air", what="--ambient"),
+        Substrate(w.medium(words.substrate, name="`substrate`"), back, words.plate_mm or 1.0),
+        ambient=w.medium(words.ambient or "air", name="`ambient`"),
         light=light(read),
         instrument=Instrument(
-            w.drift(words.scale or "1", "--scale"),
-            w.drift(words.offset or "0", "--offset"),
-            None if bandwidth is None else w.free_or_number(bandwidth, "--bandwidth", 0.0, 20.0, 2.0),
+            w.drift(words.scale or "1", "`scale`"),
+            w.drift(words.offset or "0", "`offset`"),
+            None if bandwidth is None else w.free_or_number(bandwidth, "`bandwidth`", 0.0, 20.0, 2.0),
         ),
     )
     return scene, assumed
@@ -101,9 +101,9 @@ def spanned(given: str | tuple[float, float] | None) -> tuple[float, float] | No
     """The wavelengths to keep (nm), however they were written. Raises UsageError."""
     if not isinstance(given, str):
         return given
-    from pellicle.data.tabular.numbers import span
+    from pellicle.recipes.number_words import parse_range
 
-    return span(given, "--range")
+    return parse_range(given, "`range`")
 
 
 def _from_counts(path: str, words: ReadWords) -> Any:
@@ -122,7 +122,7 @@ def _from_counts(path: str, words: ReadWords) -> Any:
     sample = read_counts(path, range=spanned(words.range), **options)
     reference = read_counts(str(words.reference), **options)
     dark = None if words.dark is None else read_counts(words.dark, **options)
-    material = medium(words.reference_material, what="--reference-material")
+    material = medium(words.reference_material, name="`reference_material`")
     known = reflectance(
         sample.wavelength,
         0.0,

@@ -1,16 +1,15 @@
-"""Dispersion models by name: their parameters, default bounds, and how each is put together."""
+"""Dispersion models by name: their parameters, default bounds and values, and how to build them."""
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Callable, Iterable
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 import equinox as eqx
 
-from pellicle.dispersion.base import AbstractDispersion
+from pellicle.dispersion.base import AbstractDispersion, require_nonnegative
 from pellicle.dispersion.cody_lorentz import CodyLorentz
-from pellicle.dispersion.empirical import Cauchy, CauchyUrbach, Sellmeier
+from pellicle.dispersion.empirical import Cauchy, CauchyUrbach, Constant, Sellmeier
 from pellicle.dispersion.oscillators import (
     AbstractOscillator,
     Drude,
@@ -21,12 +20,18 @@ from pellicle.dispersion.oscillators import (
 )
 from pellicle.dispersion.parameter_names import ParameterLocation
 from pellicle.dispersion.spline import KramersKronigSpline, Spline
-from pellicle.errors import UsageError
+from pellicle.errors import UsageError, did_you_mean
 from pellicle.scene.free import Free, is_free
 
+Parameter: TypeAlias = float | Free
+Values: TypeAlias = Mapping[str, "Parameter | Sequence[Parameter]"]
+"""Parameters of a model by name; of a spline one or one per knot, and its `knots` (nm)."""
 
-class Own(NamedTuple):
-    """A model's own parameter: default bounds, default value, and whether the bare name frees it."""
+_Built = TypeVar("_Built", bound=AbstractDispersion | AbstractOscillator)
+
+
+class ParameterSpec(NamedTuple):
+    """Default bounds and value of a model's parameter, and whether the model's bare name frees it."""
 
     lower: float
     upper: float
@@ -34,199 +39,241 @@ class Own(NamedTuple):
     free: bool = True
 
 
-_CAUCHY = {"A": Own(1.2, 3.0, 1.5), "B": Own(0.0, 1e5, 0.0), "C": Own(-1e10, 1e10, 0.0, False)}
-_EPS_INF = Own(1.0, 6.0, 1.0)
+_CAUCHY = {
+    "A": ParameterSpec(1.2, 3.0, 1.5),
+    "B": ParameterSpec(0.0, 1e5, 0.0),
+    "C": ParameterSpec(-1e10, 1e10, 0.0, False),
+}
+_EPS_INF = ParameterSpec(1.0, 6.0, 1.0)
 
-TERMS: dict[str, tuple[type[AbstractOscillator], dict[str, Own]]] = {
-    "lorentz": (Lorentz, {"A": Own(0.0, 10.0, 1.0), "E0": Own(1.0, 10.0, 4.0), "gamma": Own(0.01, 4.0, 0.5)}),
-    "drude": (Drude, {"Ep": Own(0.0, 15.0, 3.0), "gamma": Own(0.01, 2.0, 0.1)}),
+TERMS: dict[str, tuple[type[AbstractOscillator], dict[str, ParameterSpec]]] = {
+    "lorentz": (
+        Lorentz,
+        {
+            "A": ParameterSpec(0.0, 10.0, 1.0),
+            "E0": ParameterSpec(1.0, 10.0, 4.0),
+            "gamma": ParameterSpec(0.01, 4.0, 0.5),
+        },
+    ),
+    "drude": (Drude, {"Ep": ParameterSpec(0.0, 15.0, 3.0), "gamma": ParameterSpec(0.01, 2.0, 0.1)}),
     "gaussian": (
         Gaussian,
-        {"A": Own(0.0, 10.0, 1.0), "E0": Own(1.0, 10.0, 4.0), "fwhm": Own(0.05, 4.0, 0.5)},
+        {
+            "A": ParameterSpec(0.0, 10.0, 1.0),
+            "E0": ParameterSpec(1.0, 10.0, 4.0),
+            "fwhm": ParameterSpec(0.05, 4.0, 0.5),
+        },
     ),
     "tauc-lorentz": (
         TaucLorentz,
         {
-            "A": Own(0.0, 300.0, 100.0),
-            "E0": Own(2.0, 8.0, 4.0),
-            "C": Own(0.2, 6.0, 2.0),
-            "Eg": Own(0.5, 5.0, 2.0),
+            "A": ParameterSpec(0.0, 300.0, 100.0),
+            "E0": ParameterSpec(2.0, 8.0, 4.0),
+            "C": ParameterSpec(0.2, 6.0, 2.0),
+            "Eg": ParameterSpec(0.5, 5.0, 2.0),
         },
     ),
     "cody-lorentz": (
         CodyLorentz,
         {
-            "A": Own(0.0, 300.0, 100.0),
-            "E0": Own(2.0, 8.0, 4.0),
-            "C": Own(0.2, 6.0, 2.0),
-            "Eg": Own(0.5, 5.0, 2.0),
-            "Ep": Own(0.1, 5.0, 1.0),
-            "Et": Own(0.0, 1.0, 0.0, False),
-            "Eu": Own(0.01, 0.5, 0.05, False),
+            "A": ParameterSpec(0.0, 300.0, 100.0),
+            "E0": ParameterSpec(2.0, 8.0, 4.0),
+            "C": ParameterSpec(0.2, 6.0, 2.0),
+            "Eg": ParameterSpec(0.5, 5.0, 2.0),
+            "Ep": ParameterSpec(0.1, 5.0, 1.0),
+            "Et": ParameterSpec(0.0, 1.0, 0.0, False),
+            "Eu": ParameterSpec(0.01, 0.5, 0.05, False),
         },
     ),
 }
 """Oscillators and their parameters; energies in eV, the strength A of lorentz and gaussian without unit."""
 
-_INDEX = {"n": Own(1.2, 4.0, 1.5), "k": Own(0.0, 2.0, 0.01)}
-MODELS: dict[str, dict[str, Own]] = {
+_INDEX = {"n": ParameterSpec(1.2, 4.0, 1.5), "k": ParameterSpec(0.0, 2.0, 0.01)}
+MODELS: dict[str, dict[str, ParameterSpec]] = {
+    "constant": {"n": _INDEX["n"], "k": ParameterSpec(0.0, 2.0, 0.0, False)},
     "cauchy": _CAUCHY,
     "cauchy-urbach": {
         **_CAUCHY,
-        "k0": Own(0.0, 1.0, 0.01),
-        "Eu": Own(0.05, 2.0, 0.5),
-        "Eb": Own(1.0, 6.0, 3.1, False),
+        "k0": ParameterSpec(0.0, 1.0, 0.01),
+        "Eu": ParameterSpec(0.05, 2.0, 0.5),
+        "Eb": ParameterSpec(1.0, 6.0, 3.1, False),
     },
     "sellmeier": {
-        "B1": Own(0.1, 6.0, 1.1),
-        "C1": Own(0.0, 6e4, 8e3),
-        "B2": Own(0.0, 6.0, 0.0, False),
-        "C2": Own(0.0, 6e4, 2e4, False),
-        "B3": Own(0.0, 6.0, 0.0, False),
-        "C3": Own(1e6, 1e9, 1e8, False),
+        "B1": ParameterSpec(0.1, 6.0, 1.1),
+        "C1": ParameterSpec(0.0, 6e4, 8e3),
+        "B2": ParameterSpec(0.0, 6.0, 0.0, False),
+        "C2": ParameterSpec(0.0, 6e4, 2e4, False),
+        "B3": ParameterSpec(0.0, 6.0, 0.0, False),
+        "C3": ParameterSpec(1e6, 1e9, 1e8, False),
     },
-    **{name: {**own, "eps_inf": _EPS_INF} for name, (_, own) in TERMS.items()},
+    **{name: {**specs, "eps_inf": _EPS_INF} for name, (_, specs) in TERMS.items()},
     "spline": _INDEX,
-    "spline-kk": {"k": _INDEX["k"], "n_inf": Own(1.0, 3.0, 1.5)},
+    "spline-kk": {"k": _INDEX["k"], "n_inf": ParameterSpec(1.0, 3.0, 1.5)},
 }
 """Dispersion models by name. Lengths in nm (Cauchy's B in nm², C in nm⁴, Sellmeier's C1 in nm²),
 energies in eV. `spline` has one n and one k at each knot."""
 
+SPLINES = ("spline", "spline-kk")
+
 KNOTS = (300.0, 400.0, 500.0, 650.0, 850.0, 1100.0)
-"""Knots (nm) of a spline that was not given any."""
+"""Default knots of a spline (nm)."""
 
 
-def bare(name: str) -> AbstractDispersion:
-    """The model with its parameters free within their default bounds."""
-    free = {key: Free(own.lower, own.upper, start=own.value) for key, own in MODELS[name].items() if own.free}
-    if name in ("cauchy", "sellmeier"):
-        # their bounds are narrow: the middle is as good a start as any
-        free = {key: Free(own.lower, own.upper) for key, own in MODELS[name].items() if own.free}
-    return model(name, free)
+def free_model(name: str) -> AbstractDispersion:
+    """Build a model with its parameters free within their default bounds."""
+    # the bounds of these are narrow: their middle is as good a start as any
+    middle = name in ("constant", "cauchy", "sellmeier")
+    return build_model(
+        name,
+        {
+            key: Free(spec.lower, spec.upper, start=None if middle else spec.value)
+            for key, spec in MODELS[name].items()
+            if spec.free
+        },
+    )
 
 
-def called(name: str, numbers: list[float], what: str) -> AbstractDispersion:
-    """`name(numbers)`: the parameters in their order, fixed; for a spline its knots. Raises UsageError."""
-    own = MODELS[name]
-    if name in ("spline", "spline-kk"):
-        free = {key: Free(o.lower, o.upper, start=o.value) for key, o in own.items()}
-        return model(name, {"knots": numbers, **free})
-    if not 0 < len(numbers) <= len(own):
-        raise UsageError(
-            f"{what}: {name} takes 1 to {len(own)} numbers ({', '.join(own)}), got {len(numbers)}"
-        )
-    return model(name, dict(zip(own, numbers, strict=False)))
+def fixed_model(name: str, numbers: Sequence[float], label: str) -> AbstractDispersion:
+    """Build a model from its parameters in their order, fixed; a spline from its knots, the rest free.
 
-
-def model(name: str, given: dict[str, Any]) -> AbstractDispersion:
-    """A dispersion model: `given` numbers or `Free`s, the rest fixed at their defaults.
-
-    Raises UsageError for a name or a parameter that is none, with the nearest, and for values that
-    the model forbids.
+    Raises UsageError with `label` in front for a wrong count.
     """
-    if name not in MODELS:
-        raise UsageError(f"no dispersion model {name!r}{nearest(name, MODELS)}; known: {', '.join(MODELS)}")
-    splines = name.startswith("spline")
-    values = _filled(name, MODELS[name], given, ("knots",) if splines else ())
-    return _made(lambda: _assembled(name, values, given))
+    specs = MODELS[name]
+    if name in SPLINES:
+        free = {key: Free(spec.lower, spec.upper, start=spec.value) for key, spec in specs.items()}
+        return build_model(name, {"knots": numbers, **free})
+    if not 0 < len(numbers) <= len(specs):
+        raise UsageError(
+            f"{label}: {name} takes 1 to {len(specs)} numbers ({', '.join(specs)}), got {len(numbers)}"
+        )
+    return build_model(name, dict(zip(specs, numbers, strict=False)))
 
 
-def term(kind: str, given: dict[str, Any]) -> AbstractOscillator:
-    """One oscillator of a sum, like `model`."""
+def build_model(name: str, values: Values) -> AbstractDispersion:
+    """Build a model of `MODELS` from `values`; other parameters are fixed at their defaults.
+
+    Raises UsageError for an unknown parameter, with the nearest known one, and for values that the model
+    forbids.
+    """
+    complete = _with_defaults(name, MODELS[name], values, ("knots",) if name in SPLINES else ())
+    if name == "sellmeier":  # terms beyond the last one given are absent
+        last = max((key[1] for key in values), default="1")
+        complete = {key: value for key, value in complete.items() if key[1] <= last}
+    return _checked(lambda: _BUILDERS[name](complete))
+
+
+def build_oscillator(kind: str, values: Values) -> AbstractOscillator:
+    """Build one oscillator of a sum. Raises UsageError as `build_model` does."""
     if kind not in TERMS:
-        raise UsageError(f"no oscillator {kind!r}{nearest(kind, TERMS)}; known: {', '.join(TERMS)}")
-    made, own = TERMS[kind]
-    return _made(lambda: made(**_filled(kind, own, given)))
+        raise UsageError(f"no oscillator {kind!r}{did_you_mean(kind, TERMS)}; known: {', '.join(TERMS)}")
+    oscillator, specs = TERMS[kind]
+    values = _with_defaults(kind, specs, values)
+    return _checked(lambda: oscillator(**values))
 
 
-def oscillators(eps_inf: Any, terms: Iterable[Any]) -> AbstractDispersion:
-    """A sum of terms."""
-    return _made(lambda: Oscillators(eps_inf, tuple(terms)))
+def sum_of_oscillators(eps_inf: Parameter, terms: Iterable[AbstractOscillator]) -> AbstractDispersion:
+    """Build a sum of oscillators. Raises UsageError for values that it forbids."""
+    return _checked(lambda: Oscillators(eps_inf, tuple(terms)))
 
 
-def checked(dispersion: AbstractDispersion, what: str) -> AbstractDispersion:
-    """The dispersion, once more through its own checks. Raises UsageError, `what` in front."""
+def check_dispersion(dispersion: AbstractDispersion, label: str) -> AbstractDispersion:
+    """Run the checks of a dispersion again and return it. Raises UsageError with `label` in front."""
     try:
         for part in _modules(dispersion):
             getattr(part, "__check_init__", lambda: None)()
     except ValueError as error:
-        raise UsageError(f"{what}: {error}") from None
+        raise UsageError(f"{label}: {error}") from None
     return dispersion
 
 
-def default_bounds(at: ParameterLocation, number: Any) -> tuple[float, float] | None:
-    """A parameter's default bounds, or those it has; None where there are none."""
+def default_bounds(at: ParameterLocation, number: Parameter) -> tuple[float, float] | None:
+    """Return a parameter's default bounds, else its own; None where there are none."""
     if at.field == "fraction":
         return 0.0, 1.0
-    for name, own in MODELS.items():
-        kind = TERMS[name][0] if name in TERMS else _KINDS.get(name)
-        if kind is type(at.owner) and (at.key in own or at.field in own):
-            found = own.get(at.key) or own[at.field]
-            return found.lower, found.upper
+    for name, specs in MODELS.items():
+        if _TYPES.get(name) is type(at.owner) and (at.key in specs or at.field in specs):
+            spec = specs.get(at.key) or specs[at.field]
+            return spec.lower, spec.upper
     if at.field == "eps_inf":
         return _EPS_INF.lower, _EPS_INF.upper
     return (number.lower, number.upper) if is_free(number) else None
 
 
-def nearest(word: str, known: Iterable[str], likeness: float = 0.5) -> str:
-    """` (did you mean ...?)`, or nothing."""
-    close = difflib.get_close_matches(word, list(known), n=1, cutoff=likeness)
-    return f" (did you mean {close[0]!r}?)" if close else ""
+def _constant(values: Values) -> Constant:
+    n, k = values["n"], values["k"]
+    require_nonnegative("constant", n=n, k=k)
+    return Constant(n, None if k == 0 else k)
 
 
-_KINDS = {
+def _sellmeier(values: Values) -> Sellmeier:
+    orders = [key[1] for key in values if key[0] == "B"]
+    return Sellmeier(tuple(values[f"B{i}"] for i in orders), tuple(values[f"C{i}"] for i in orders))
+
+
+def _single(name: str) -> Callable[[Values], Oscillators]:
+    oscillator, specs = TERMS[name]
+    return lambda values: Oscillators(values["eps_inf"], (oscillator(**{key: values[key] for key in specs}),))
+
+
+def _spline(name: str, kind: type[Spline | KramersKronigSpline]) -> Callable[[Values], AbstractDispersion]:
+    def build(values: Values) -> AbstractDispersion:
+        complete: dict[str, Any] = {"knots": KNOTS, **values}
+        knots = complete["knots"]
+        if not isinstance(knots, list | tuple) or not all(isinstance(x, int | float) for x in knots):
+            raise UsageError(f"{name}: knots must be a list of wavelengths in nm, got {knots!r}")
+        for key in complete.keys() & {"n", "k"}:
+            column = complete[key]
+            complete[key] = tuple(column) if isinstance(column, list | tuple) else (column,) * len(knots)
+        return kind(**complete)
+
+    return build
+
+
+_BUILDERS: dict[str, Callable[[Values], AbstractDispersion]] = {
+    "constant": _constant,
+    "cauchy": lambda values: Cauchy(**values),
+    "cauchy-urbach": lambda values: CauchyUrbach(**values),
+    "sellmeier": _sellmeier,
+    **{name: _single(name) for name in TERMS},
+    "spline": _spline("spline", Spline),
+    "spline-kk": _spline("spline-kk", KramersKronigSpline),
+}
+
+# `constant` is absent: words free n and k of a constant with bounds around its own index
+_TYPES: dict[str, type] = {
     "cauchy": Cauchy,
     "cauchy-urbach": CauchyUrbach,
     "sellmeier": Sellmeier,
+    **{name: oscillator for name, (oscillator, _) in TERMS.items()},
     "spline": Spline,
     "spline-kk": KramersKronigSpline,
 }
 
 
-def _assembled(name: str, values: dict[str, Any], given: dict[str, Any]) -> AbstractDispersion:
-    if name in TERMS:
-        made, own = TERMS[name]
-        return Oscillators(values["eps_inf"], (made(**{key: values[key] for key in own}),))
-    if name == "sellmeier":
-        count = max((int(key[1]) for key in given), default=1)
-        pairs = [(values[f"B{i + 1}"], values[f"C{i + 1}"]) for i in range(count)]
-        return Sellmeier(tuple(b for b, _ in pairs), tuple(c for _, c in pairs))
-    if not name.startswith("spline"):
-        return _KINDS[name](**values)
-    knots = values.pop("knots", KNOTS)
-    if not isinstance(knots, list | tuple) or not all(isinstance(x, int | float) for x in knots):
-        raise UsageError(f"{name}: knots must be a list of wavelengths in nm, got {knots!r}")
-    columns = {key: _column(values.pop(key), len(knots)) for key in ("n", "k") if key in values}
-    return _KINDS[name](knots=knots, **columns, **values)
-
-
-def _column(value: Any, count: int) -> tuple[Any, ...]:
-    return tuple(value) if isinstance(value, list | tuple) else (value,) * count
-
-
-def _filled(
-    name: str, own: dict[str, Own], given: dict[str, Any], more: tuple[str, ...] = ()
-) -> dict[str, Any]:
-    known = [*own, *more]
-    for key in given:
+def _with_defaults(
+    name: str, specs: Mapping[str, ParameterSpec], values: Values, others: tuple[str, ...] = ()
+) -> Values:
+    known = [*specs, *others]
+    for key in values:
         if key not in known:
             raise UsageError(
-                f"{name} has no parameter {key!r}{nearest(key, known)}; it has {', '.join(known)}"
+                f"{name} has no parameter {key!r}{did_you_mean(key, known)}; it has {', '.join(known)}"
             )
-    return {key: o.value for key, o in own.items()} | given
+    return {key: spec.value for key, spec in specs.items()} | dict(values)
 
 
-def _made(make: Callable[[], Any]) -> Any:
+def _checked(build: Callable[[], _Built]) -> _Built:
+    """Turn the ValueErrors of a dispersion into UsageErrors."""
     try:
-        return make()
+        return build()
     except UsageError:
         raise
     except ValueError as error:
         raise UsageError(str(error)) from None
 
 
-def _modules(tree: Any) -> list[eqx.Module]:
-    """Every module of a dispersion, itself included, but the free parameters."""
+def _modules(tree: object) -> list[eqx.Module]:
+    """Every module of a dispersion, itself included, without the free parameters."""
     if is_free(tree):
         return []
     if isinstance(tree, tuple):

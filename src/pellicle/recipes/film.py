@@ -24,7 +24,7 @@ from pellicle.recipes.schema import (
     of_file,
 )
 from pellicle.scene.film import Light, Scene
-from pellicle.scene.free import Free
+from pellicle.scene.free import Free, check_free_count, free_leaves
 from pellicle.scene.instrument import Instrument
 from pellicle.scene.layers import Interface, Layer, Plate, Substrate
 
@@ -80,15 +80,16 @@ class FilmRecipe:
 
 
 def _scene(tables: RecipeTable, folder: Path) -> Scene:
-    scene, data = tables.scene, tables.data
-    layers = [_layer(layer, folder) for layer in scene.layer]
-    instrument = tables.instrument
-    return Scene(
-        layers,
+    scene, data, instrument = tables.scene, tables.data, tables.instrument
+    built = Scene(
+        [_layer(layer, folder) for layer in scene.layer],
         _substrate(scene.substrate, folder),
-        ambient=medium(scene.ambient, folder),
+        ambient=medium(scene.ambient, folder, "ambient"),
         light=Light(
-            None, optional(data.angle, "angle") or 0.0, data.signal or "R", data.polarisation or "unpolarised"
+            None,
+            optional(data.angle, "angle") or 0.0,
+            data.signal or "R",
+            data.polarisation or "unpolarised",
         ),
         instrument=Instrument(
             instrument.scale,
@@ -97,31 +98,33 @@ def _scene(tables: RecipeTable, folder: Path) -> Scene:
             optional(instrument.thickness_spread, "thickness_spread"),
             optional(instrument.angle_spread, "angle_spread"),
             optional(instrument.numerical_aperture, "numerical_aperture"),
-            optional(instrument.wavelength_shift, "wavelength_shift", natural=None),
+            optional(instrument.wavelength_shift, "wavelength_shift", minimum=None),
         ),
     )
+    check_free_count(len(free_leaves(built)), least=0)
+    return built
 
 
-def _layer(given: LayerTable, folder: Path) -> Layer | Interface | Plate:
-    thickness: Any = optional(given.thickness, "thickness")
-    stated: Any = given.material  # the table has seen to it that what a kind needs is there
-    if given.between is not None:
-        return Interface(thickness, 1 if given.steps is None else given.steps, given.between, given.name)
-    material = media_words.freed(medium(stated, folder), given.free)
-    if given.plate_mm is not None:
-        return Plate(material, number(given.plate_mm, "plate_mm", natural=0.0), given.name)
-    spread = optional(given.thickness_spread, "thickness_spread")
-    return Layer(material, thickness, given.name, spread, optional(given.roughness, "roughness"))
+def _layer(table: LayerTable, folder: Path) -> Layer | Interface | Plate:
+    thickness: Any = optional(table.thickness, "thickness")
+    if table.between is not None:
+        return Interface(thickness, 1 if table.steps is None else table.steps, table.between, table.name)
+    stated: Any = table.material  # LayerTable has checked that it is there
+    material = media_words.free_numbers(medium(stated, folder), table.free)
+    if table.plate_mm is not None:
+        return Plate(material, number(table.plate_mm, "plate_mm", minimum=0.0), table.name)
+    spread = optional(table.thickness_spread, "thickness_spread")
+    return Layer(material, thickness, table.name, spread, optional(table.roughness, "roughness"))
 
 
-def _substrate(given: Medium | PlateTable, folder: Path) -> Substrate:
-    if not isinstance(given, PlateTable):
-        return Substrate(medium(given, folder))
-    back = None if given.back is None else medium(given.back, folder)
-    plate_mm = number(given.plate_mm, "plate_mm", natural=0.0)
-    return Substrate(medium(given.material, folder), back, plate_mm, optional(given.roughness, "roughness"))
+def _substrate(value: Medium | PlateTable, folder: Path) -> Substrate:
+    if not isinstance(value, PlateTable):
+        return Substrate(medium(value, folder, "substrate"))
+    back = None if value.back is None else medium(value.back, folder, "back")
+    plate_mm = number(value.plate_mm, "plate_mm", minimum=0.0)
+    return Substrate(medium(value.material, folder), back, plate_mm, optional(value.roughness, "roughness"))
 
 
-def optional(given: Number | None, what: str, natural: float | None = 0.0) -> float | Free | None:
-    """A number that may be absent."""
-    return None if given is None else number(given, what, natural=natural)
+def optional(value: Number | None, name: str, minimum: float | None = 0.0) -> float | Free | None:
+    """Return a number that may be absent. Raises UsageError as `number` does."""
+    return None if value is None else number(value, name, minimum=minimum)

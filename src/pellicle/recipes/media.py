@@ -10,16 +10,27 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError,
 
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.effective_medium import MIXTURES
-from pellicle.errors import UsageError
-from pellicle.recipes import dispersion_models, media_words
-from pellicle.recipes.dispersion_models import nearest
+from pellicle.dispersion.oscillators import AbstractOscillator
+from pellicle.errors import UsageError, did_you_mean
+from pellicle.recipes import media_words
+from pellicle.recipes.dispersion_models import (
+    MODELS,
+    SPLINES,
+    TERMS,
+    Parameter,
+    build_model,
+    build_oscillator,
+    sum_of_oscillators,
+)
 from pellicle.scene.free import Free
 from pellicle.scene.priors import HalfNormal, LogUniform, Normal, Prior
 
 
 class PriorTable(BaseModel):
-    """`{ mean = 100, sd = 5 }`, `{ half_normal = 0.01 }` by its standard deviation, or
-    `{ log_uniform = true }`; in the parameter's unit, cut off at the bounds."""
+    """A prior in the parameter's unit, truncated at the bounds.
+
+    `{ mean = 100, sd = 5 }`, `{ half_normal = 0.01 }` (its standard deviation) or `{ log_uniform = true }`.
+    """
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
     mean: float | None = None
@@ -28,13 +39,14 @@ class PriorTable(BaseModel):
     log_uniform: Literal[True] | None = None
 
     @model_validator(mode="after")
-    def _one(self) -> PriorTable:
-        given = {name for name, value in vars(self).items() if value is not None}
-        if given not in ({"mean", "sd"}, {"half_normal"}, {"log_uniform"}):
+    def _one_kind(self) -> PriorTable:
+        keys = {name for name, value in vars(self).items() if value is not None}
+        if keys not in ({"mean", "sd"}, {"half_normal"}, {"log_uniform"}):
             raise ValueError("give mean and sd, or half_normal, or log_uniform = true")
         return self
 
     def prior(self) -> Prior:
+        """Build the prior."""
         if self.half_normal is not None:
             return HalfNormal(self.half_normal)
         if self.mean is None or self.sd is None:
@@ -43,7 +55,7 @@ class PriorTable(BaseModel):
 
 
 class FreeTable(BaseModel):
-    """A number that may be free: bounds, and optionally a start value and a prior; or fixed."""
+    """A free number by its bounds, with optional start value and prior; or a fixed one by its value."""
 
     model_config = ConfigDict(extra="forbid")
     value: float | None = None
@@ -54,128 +66,167 @@ class FreeTable(BaseModel):
 
 Number = float | FreeTable
 
+_NUMBER = {"anyOf": [{"type": "number"}, {"$ref": "#/$defs/FreeTable"}]}
+_NUMBER_PER_KNOT = {"anyOf": [*_NUMBER["anyOf"], {"type": "array", "items": _NUMBER}]}
+
+
+def _model_schema(schema: dict[str, Any]) -> None:
+    """Add to the schema which parameters each model has, for editors."""
+    choices: list[dict[str, Any]] = []
+    for name, specs in MODELS.items():
+        number = _NUMBER_PER_KNOT if name in SPLINES else _NUMBER
+        properties = {"model": {"const": name}, **dict.fromkeys(specs, number)}
+        if name in SPLINES:
+            properties["knots"] = {"type": "array", "items": {"type": "number"}}
+        choices.append({"properties": properties, "additionalProperties": False})
+    kinds = [{"kind": {"const": kind}, **dict.fromkeys(specs, _NUMBER)} for kind, (_, specs) in TERMS.items()]
+    term = [{"properties": keys, "required": ["kind"], "additionalProperties": False} for keys in kinds]
+    terms = {"type": "array", "minItems": 1, "items": {"anyOf": term}}
+    choices.append(
+        {
+            "properties": {"model": {"const": "oscillators"}, "eps_inf": _NUMBER, "terms": terms},
+            "required": ["terms"],
+            "additionalProperties": False,
+        }
+    )
+    schema.pop("additionalProperties", None)
+    schema["anyOf"] = choices
+
 
 class MediumTable(BaseModel):
-    """`{ model = "cauchy", A = ..., B = ... }`: what else it holds are the model's parameters.
+    """A dispersion model, `{ model = "cauchy", A = ..., B = ... }`: further keys are its parameters.
 
     `{ model = "oscillators", eps_inf = ..., terms = [{ kind = "lorentz", ... }, ...] }` is a sum.
     """
 
-    model_config = ConfigDict(extra="allow")
+    model_config = ConfigDict(extra="allow", json_schema_extra=_model_schema)
     model: str
 
 
 class MixTable(BaseModel):
     """`{ mix = "bruggeman", host = "SiO2", inclusion = "air", fraction = { lower = 0, upper = 0.5 } }`.
 
-    `host` and `inclusion` are media of any kind; `materials = [host, inclusion]` says the same.
+    `host` and `inclusion` are media of any kind; `materials = [host, inclusion]` is another way to give them.
     """
 
     model_config = ConfigDict(extra="allow")
-    mix: str
+    mix: str = Field(json_schema_extra={"enum": [*MIXTURES]})
 
 
 Medium = str | float | MediumTable | MixTable
 _MEDIUM: TypeAdapter[Any] = TypeAdapter(Medium)
 
 
-def number(given: Number, what: str, natural: float | None = None) -> float | Free:
-    """A fixed number or a `Free`; ValueError where it is neither, not finite, or below what nature allows."""
-    if isinstance(given, float | int):
-        lowest, result = float(given), float(given)
-    elif given.lower is None and given.upper is None and given.value is not None:
-        lowest, result = given.value, given.value
-    elif given.lower is None or given.upper is None:
-        raise UsageError(f"{what}: give lower and upper, or one plain number")
+def number(value: Number, name: str, minimum: float | None = None) -> float | Free:
+    """Return a fixed number or a `Free` from what a recipe gives for `name`.
+
+    Raises UsageError where it is neither, not finite, or below `minimum`.
+    """
+    if isinstance(value, float | int):
+        lowest, result = float(value), float(value)
+    elif value.lower is None and value.upper is None and value.value is not None:
+        lowest, result = value.value, value.value
+    elif value.lower is None or value.upper is None:
+        raise UsageError(f"{name}: give lower and upper, or one plain number")
     else:
         try:
-            prior = None if given.prior is None else given.prior.prior()
-            result = Free(given.lower, given.upper, start=given.value, prior=prior)
+            prior = None if value.prior is None else value.prior.prior()
+            result = Free(value.lower, value.upper, start=value.value, prior=prior)
         except ValueError as error:
-            raise UsageError(f"{what}: {error}") from None
-        lowest = given.lower
+            raise UsageError(f"{name}: {error}") from None
+        lowest = value.lower
     if not math.isfinite(lowest):
-        raise UsageError(f"{what} must be a finite number, got {lowest:g}")
-    if natural is not None and lowest < natural:
-        raise UsageError(f"{what} must not be below {natural:g}, got {lowest:g}")
+        raise UsageError(f"{name} must be a finite number, got {lowest:g}")
+    if minimum is not None and lowest < minimum:
+        raise UsageError(f"{name} must not be below {minimum:g}, got {lowest:g}")
     return result
 
 
-def medium(given: Medium, folder: Path) -> AbstractDispersion:
-    """The dispersion that a recipe names; paths are relative to `folder`. Raises UsageError."""
-    if isinstance(given, MixTable):
-        return _mixture(given.mix, dict(given.model_extra or {}), folder)
-    if isinstance(given, MediumTable):
-        return _model(given.model, dict(given.model_extra or {}))
-    if isinstance(given, str) and given.lower().endswith((".csv", ".txt", ".dat")):
-        given = str(folder / given)
-    return media_words.medium(str(given), what="material")
+def medium(value: Medium, folder: Path, name: str = "material") -> AbstractDispersion:
+    """Return the dispersion that a recipe gives for the key `name`; paths are relative to `folder`.
+
+    Raises UsageError, or DataError for a table that cannot be read.
+    """
+    if isinstance(value, MixTable):
+        return _mixture(value.mix, dict(value.model_extra or {}), folder)
+    if isinstance(value, MediumTable):
+        return _model(value.model, dict(value.model_extra or {}))
+    if isinstance(value, str) and value.lower().endswith((".csv", ".txt", ".dat")):
+        value = str(folder / value)
+    return media_words.medium(str(value), name=name)
 
 
-def _model(name: str, given: dict[str, Any]) -> AbstractDispersion:
+def _model(name: str, values: dict[str, Any]) -> AbstractDispersion:
     if name == "oscillators":
-        return _oscillators(given)
-    if name not in dispersion_models.MODELS:
-        known = [*dispersion_models.MODELS, "oscillators"]
-        raise UsageError(f"no dispersion model {name!r}{nearest(name, known)}; known: {', '.join(known)}")
-    return dispersion_models.model(name, {key: _parameter(key, value) for key, value in given.items()})
+        return _oscillators(values)
+    if name not in MODELS:
+        known = [*MODELS, "oscillators"]
+        close = did_you_mean(name, known)
+        raise UsageError(f"no dispersion model {name!r}{close}; known: {', '.join(known)}")
+    parameter = _parameter_per_knot if name in SPLINES else _parameter
+    return build_model(name, {key: parameter(key, value) for key, value in values.items()})
 
 
-def _oscillators(given: dict[str, Any]) -> AbstractDispersion:
-    terms = given.pop("terms", None)
-    eps_inf = _parameter("eps_inf", given.pop("eps_inf", 1.0))
-    if given:
-        wrong = next(iter(given))
-        close = nearest(wrong, ["eps_inf", "terms"])
-        raise UsageError(f"oscillators has no parameter {wrong!r}{close}; it has eps_inf, terms")
+def _oscillators(values: dict[str, Any]) -> AbstractDispersion:
+    terms = values.pop("terms", None)
+    eps_inf = _parameter("eps_inf", values.pop("eps_inf", 1.0))
+    if values:
+        key = next(iter(values))
+        close = did_you_mean(key, ["eps_inf", "terms"])
+        raise UsageError(f"oscillators has no parameter {key!r}{close}; it has eps_inf, terms")
     if not isinstance(terms, list) or not terms or not all(isinstance(t, dict) for t in terms):
         raise UsageError('oscillators needs terms, a list of tables like { kind = "lorentz", A = 1.0, ... }')
-    return dispersion_models.oscillators(eps_inf, [_term(dict(t)) for t in terms])
+    return sum_of_oscillators(eps_inf, [_term(dict(t)) for t in terms])
 
 
-def _term(given: dict[str, Any]) -> Any:
-    if "kind" not in given:
-        raise UsageError(f"a term of oscillators needs a kind: one of {', '.join(dispersion_models.TERMS)}")
-    kind = str(given.pop("kind"))
-    return dispersion_models.term(kind, {key: _parameter(key, value) for key, value in given.items()})
+def _term(values: dict[str, Any]) -> AbstractOscillator:
+    if "kind" not in values:
+        raise UsageError(f"a term of oscillators needs a kind: one of {', '.join(TERMS)}")
+    kind = str(values.pop("kind"))
+    return build_oscillator(kind, {key: _parameter(key, value) for key, value in values.items()})
 
 
-def _mixture(rule: str, given: dict[str, Any], folder: Path) -> AbstractDispersion:
+def _mixture(rule: str, values: dict[str, Any], folder: Path) -> AbstractDispersion:
     if rule not in MIXTURES:
-        raise UsageError(f"no mix {rule!r}{nearest(rule, MIXTURES)}; known: {', '.join(MIXTURES)}")
-    if "materials" in given:
-        both = given.pop("materials")
-        if not isinstance(both, list) or len(both) != 2 or given.keys() & {"host", "inclusion"}:
+        raise UsageError(f"no mix {rule!r}{did_you_mean(rule, MIXTURES)}; known: {', '.join(MIXTURES)}")
+    if "materials" in values:
+        both = values.pop("materials")
+        if not isinstance(both, list) or len(both) != 2 or values.keys() & {"host", "inclusion"}:
             raise UsageError(f"{rule}: materials is a list of two, the host and the inclusion")
-        given |= {"host": both[0], "inclusion": both[1]}
+        values |= {"host": both[0], "inclusion": both[1]}
     known = ("host", "inclusion", "fraction")
-    for key in given:
+    for key in values:
         if key not in known:
-            raise UsageError(f"{rule} has no {key!r}{nearest(key, known)}; it has {', '.join(known)}")
-    missing = [key for key in known if key not in given]
+            raise UsageError(f"{rule} has no {key!r}{did_you_mean(key, known)}; it has {', '.join(known)}")
+    missing = [key for key in known if key not in values]
     if missing:
         raise UsageError(f"{rule}: {' and '.join(missing)} missing; it needs host, inclusion and fraction")
-    fraction = _parameter("fraction", given["fraction"])
-    host, inclusion = (_nested(key, given[key], folder) for key in ("host", "inclusion"))
+    fraction = _parameter("fraction", values["fraction"])
+    host, inclusion = (_component(key, values[key], folder) for key in ("host", "inclusion"))
     try:
         return MIXTURES[rule](host, inclusion, fraction)
     except ValueError as error:
         raise UsageError(f"{rule}: {error}") from None
 
 
-def _nested(key: str, value: Any, folder: Path) -> AbstractDispersion:
+def _component(key: str, value: Any, folder: Path) -> AbstractDispersion:
     try:
-        return medium(_MEDIUM.validate_python(value), folder)
+        return medium(_MEDIUM.validate_python(value), folder, key)
     except ValidationError:
         raise UsageError(
             f"{key} must be a name, a number or a table with model or mix, got {value!r}"
         ) from None
 
 
-def _parameter(key: str, value: Any) -> Any:
-    """A model's parameter; without bounds of its own it is fixed. A list is one for each knot."""
+def _parameter_per_knot(key: str, value: Any) -> Parameter | list[Parameter]:
+    """A spline's parameter, or a list of one for each knot."""
     if isinstance(value, list):
-        return [_parameter(f"{key}{i + 1}", each) for i, each in enumerate(value)]
+        return [_parameter(f"{key}{i}", each) for i, each in enumerate(value, start=1)]
+    return _parameter(key, value)
+
+
+def _parameter(key: str, value: Any) -> Parameter:
+    """A model's parameter; without bounds it is fixed."""
     try:
         table = FreeTable.model_validate(value) if isinstance(value, dict) else float(value)
     except (ValidationError, TypeError, ValueError):

@@ -10,10 +10,12 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
+from pellicle.brdf.models import MODELS as BRDF_MODELS
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.read_brdf import read_brdf_samples
 from pellicle.errors import DataError, UsageError
 from pellicle.recipes.media import Medium, Number, medium, number
+from pellicle.scene.free import check_free_count, free_leaves
 from pellicle.scene.surface import Surface
 
 _NUMBERS: TypeAdapter[Any] = TypeAdapter(Number | list[float])
@@ -38,7 +40,7 @@ class SurfaceTable(_Table):
     """`[scene.surface]`: further keys are the model's own numbers."""
 
     model_config = ConfigDict(extra="allow", allow_inf_nan=False)
-    model: str
+    model: str = Field(json_schema_extra={"enum": [*BRDF_MODELS]})
     wavelengths: list[float] | None = Field(default=None, min_length=1)
     base: Medium | None = None
 
@@ -106,9 +108,14 @@ def _surface(table: SurfaceTable, folder: Path) -> Surface:
     if table.base is not None:
         if clash := {"base_n", "base_k"} & numbers.keys():
             raise UsageError(f"base and {' and '.join(sorted(clash))} exclude each other")
-        index = np.asarray(medium(table.base, folder)(np.array(bare.channel_wavelengths)))
+        base = medium(table.base, folder, "base")
+        if free_leaves(base):
+            raise UsageError("base cannot be free: give base_n and base_k as { lower = ..., upper = ... }")
+        index = np.asarray(base(np.array(bare.channel_wavelengths)))
         numbers |= {"base_n": np.real(index).tolist(), "base_k": np.imag(index).tolist()}
-    return Surface(table.model, numbers, wavelengths)
+    surface = Surface(table.model, numbers, wavelengths)
+    check_free_count(len(surface.free_numbers()), least=0)
+    return surface
 
 
 def _number(value: Any, key: str) -> Any:

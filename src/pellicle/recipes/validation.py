@@ -7,8 +7,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from pellicle.errors import UsageError
-from pellicle.recipes.dispersion_models import nearest
+from pellicle.errors import UsageError, did_you_mean
 
 _Table = TypeVar("_Table", bound=BaseModel)
 
@@ -36,7 +35,7 @@ def _first_error(error: ValidationError, tables: Mapping[str, type[BaseModel]]) 
     if chosen["type"] == "extra_forbidden":
         owner = next((part for part in reversed(where[:-1]) if not part.isdigit()), "")
         known = list(tables.get(owner, tables[""]).model_fields)
-        return f"unknown key {key!r}{nearest(where[-1], known)}; known here: {', '.join(known)}"
+        return f"unknown key {key!r}{did_you_mean(where[-1], known)}; known here: {', '.join(known)}"
     if chosen["type"] == "missing":
         return f"{key} is missing"
     if chosen["type"] == "value_error":

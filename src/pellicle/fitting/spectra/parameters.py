@@ -103,6 +103,8 @@ def _place(scene: Scene, path: tuple) -> ParameterLocation:
 def _owner(scene: Scene, path: tuple) -> list[str]:
     """Prefix of a parameter's name: nothing for the only layer of a scene."""
     first = path[0].name
+    if first == "substrate" and path[1].name == "back":
+        return ["back"]
     if first != "layers":
         return [] if first == "light" else [first]
     return _layer(scene, path[1].idx)
