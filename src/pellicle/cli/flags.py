@@ -32,8 +32,8 @@ class SceneWords:
         str | None,
         flag(
             SCENE,
-            "The layer: a material (SiO2), an index (1.46, 2.9+0.1j), an n,k CSV, or a model: cauchy, "
-            "cauchy-urbach, sellmeier, lorentz, drude, gaussian, tauc-lorentz, cody-lorentz, spline or "
+            "The layer: a material (SiO2), an index (1.46, 2.9+0.1j), an n,k CSV, or a model: constant, "
+            "cauchy, cauchy-urbach, sellmeier, lorentz, drude, gaussian, tauc-lorentz, cody-lorentz, spline or "
             "spline-kk, its numbers free; cauchy(1.46,3000) fixes them. A recipe also mixes and adds models.",
         ),
     ] = None
