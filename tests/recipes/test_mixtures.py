@@ -37,7 +37,7 @@ def test_a_porous_layer(tmp_path):
     assert isinstance(scene.layers[0].material, Bruggeman)
     (fraction,) = parameters(scene)
     assert (fraction.name, fraction.unit, fraction.lower, fraction.upper) == ("fraction", "", 0, 0.5)
-    assert fraction.natural_lower
+    assert fraction.natural[0]
     assert fraction.searched
 
 
@@ -77,7 +77,7 @@ def test_a_sum_of_oscillators(tmp_path):
     assert [type(t) for t in material.terms] == [Lorentz, Gaussian]
     found = names(scene)
     assert set(found) == {"eps_inf", "term1.A", "term2.E0"}
-    assert found["term1.A"].natural_lower
+    assert found["term1.A"].natural[0]
     assert (found["term1.A"].unit, found["term2.E0"].unit) == ("", "eV")
 
 
@@ -92,7 +92,7 @@ def test_splines(tmp_path):
         tmp_path, '{ model = "spline-kk", knots = [400, 600, 900], k = { lower = 0, upper = 1 } }'
     )
     assert set(names(scene)) == {"k1", "k2", "k3"}
-    assert all(p.natural_lower for p in parameters(scene))
+    assert all(p.natural[0] for p in parameters(scene))
 
 
 @pytest.mark.parametrize(
@@ -136,7 +136,7 @@ def test_every_bare_model_is_a_scene_whose_index_is_finite_over_its_bounds(name)
     scene = Scene(Layer(media_words.medium(name), 100.0), "Si")
     free = parameters(scene)
     assert len({p.name for p in free}) == len(free) > 0
-    for choose in ("lower", "value", "upper"):
+    for choose in ("lower", "start", "upper"):
         values = iter([getattr(p, choose) for p in free])
         material = _filled(scene.layers[0].material, values)
         index = np.asarray(material(np.linspace(260.0, 2500.0, 41)))
@@ -175,7 +175,7 @@ def test_any_parameter_of_a_model_can_be_freed():
     free = names(Scene(Layer(layer, 100.0), "Si"))
     assert set(free) == {"Eg", "E0", "k"}
     usual = TERMS["tauc-lorentz"][1]["Eg"]
-    assert (free["Eg"].value, free["Eg"].lower, free["Eg"].upper) == (2.2, usual.lower, usual.upper)
+    assert (free["Eg"].start, free["Eg"].lower, free["Eg"].upper) == (2.2, usual.lower, usual.upper)
     assert (free["E0"].lower, free["E0"].upper) == (3.5, 5)
     assert media_words.medium("sellmeier(1.1,8000)", ["B1"]).B[0].lower == 0.1
     with pytest.raises(UsageError, match="A must not be negative"):

@@ -33,8 +33,9 @@ class SceneWords:
         flag(
             SCENE,
             "The layer: a material (SiO2), an index (1.46, 2.9+0.1j), an n,k CSV, or a model: constant, "
-            "cauchy, cauchy-urbach, sellmeier, lorentz, drude, gaussian, tauc-lorentz, cody-lorentz, spline or "
-            "spline-kk, its numbers free; cauchy(1.46,3000) fixes them. A recipe also mixes and adds models.",
+            "cauchy, cauchy-urbach, sellmeier, lorentz, drude, gaussian, tauc-lorentz, cody-lorentz, spline "
+            "or spline-kk, its numbers free; cauchy(1.46,3000) fixes them. A recipe also mixes and adds "
+            "models.",
         ),
     ] = None
     substrate: Annotated[str | None, flag(SCENE, "What it lies on; the same words.")] = None
