@@ -20,7 +20,7 @@ from pellicle.effects.plan import Plan
 from pellicle.planning.differences import largest_difference, signals
 from pellicle.planning.film import full_plan
 from pellicle.scene.free import free_leaves
-from pellicle.simulation.film import build, sampled
+from pellicle.simulation.film import build, tabulated
 
 FRESH = 400
 """Number of points per scene at which the bound is checked."""
@@ -140,7 +140,7 @@ def fresh(rng: np.random.Generator, scene: pl.Scene) -> np.ndarray:
 
 def measured(plan: Plan, scene: pl.Scene, points: np.ndarray) -> float:
     """Return the largest error of a plan at these points, in the unit of the signal."""
-    whole = sampled(scene)
+    whole = tabulated(scene)
     one, other = (signals(p, whole, points, build) for p in (plan, full_plan(scene)))
     return largest_difference(one, other, plan.signal)
 

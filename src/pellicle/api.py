@@ -76,8 +76,8 @@ def simulate(
 
     ```python
     >>> scene = pl.Scene(pl.Layer("SiO2", 500.0), "Si")
-    >>> pl.simulate(scene, [500.0, 600.0, 700.0]).values.round(4)
-    array([0.3769, 0.1065, 0.3259])
+    >>> pl.simulate(scene, [500.0, 600.0, 700.0]).values.round(4).tolist()
+    [0.3769, 0.1065, 0.3259]
 
     ```
     """

@@ -7,7 +7,15 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from pellicle.dispersion.empirical import Cauchy, Constant, Sampled, Sellmeier, Shifted, Table, WithExtinction
+from pellicle.dispersion.empirical import (
+    Cauchy,
+    Constant,
+    Sellmeier,
+    Shifted,
+    Table,
+    Tabulated,
+    WithExtinction,
+)
 from pellicle.optics.pair import Pair, imag, is_real, real
 
 WAVELENGTH = np.linspace(400.0, 800.0, 9)
@@ -111,15 +119,15 @@ def test_gradient_of_a_tables_values():
 
 def test_sampled_gives_the_samples_and_their_slope():
     n, slope = jax.jvp(BK7.index, (WAVELENGTH,), (np.ones_like(WAVELENGTH),))
-    same = Sampled(WAVELENGTH, n, slope)
+    same = Tabulated(WAVELENGTH, n, slope)
     found, rate = jax.jvp(same.index, (WAVELENGTH,), (np.ones_like(WAVELENGTH),))
     np.testing.assert_array_equal(found, n)
     np.testing.assert_array_equal(rate, slope)
-    _, none = jax.jvp(Sampled(WAVELENGTH, n, None).index, (WAVELENGTH,), (np.ones_like(WAVELENGTH),))
+    _, none = jax.jvp(Tabulated(WAVELENGTH, n, None).index, (WAVELENGTH,), (np.ones_like(WAVELENGTH),))
     np.testing.assert_array_equal(none, 0)
 
 
 def test_sampled_absorption():
     index = TABLE.index(WAVELENGTH)
-    same = Sampled(WAVELENGTH, index, Pair(0 * WAVELENGTH, 0 * WAVELENGTH))
+    same = Tabulated(WAVELENGTH, index, Pair(0 * WAVELENGTH, 0 * WAVELENGTH))
     np.testing.assert_array_equal(same(WAVELENGTH), TABLE(WAVELENGTH))

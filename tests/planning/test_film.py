@@ -15,7 +15,7 @@ from pellicle.effects.removal import REMOVABLE, FilmRemoval
 from pellicle.planning.differences import design, gradients, largest_difference, signals
 from pellicle.planning.film import alternatives, full_plan, work
 from pellicle.scene.free import free_leaves, insert
-from pellicle.simulation.film import build, sampled
+from pellicle.simulation.film import build, tabulated
 
 WAVELENGTH = np.linspace(450.0, 850.0, 7)
 FREE = pl.Free(100.0, 400.0)
@@ -72,7 +72,7 @@ def test_the_bound_holds_and_no_gradient_is_lost(plans, name):
     ((_, thickness),) = free_leaves(thing)
     points = np.random.default_rng(2).uniform(thickness.lower, thickness.upper, (160, 1))
     with jax.enable_x64(True):
-        whole = sampled(thing)
+        whole = tabulated(thing)
         one, other = (signals(p, whole, points, build) for p in (plan, full_plan(thing)))
         slopes = gradients(plan, whole, points[:16], build)
     assert largest_difference(one, other, "R") <= plan.error_bound
@@ -118,7 +118,7 @@ def test_single_precision_is_single_throughout():
     thing = scene(1.46 + 0.1j, instrument=pl.Instrument(bandwidth=3.0), angle=20.0)
     plan = replace(full_plan(thing), left_out=(FilmRemoval("precision"),))
     with jax.enable_x64(True):
-        whole = sampled(thing)
+        whole = tabulated(thing)
         jaxpr = jax.make_jaxpr(lambda t: build(plan)(insert(whole, [t])))(200.0)
     wide = [e for e in jaxpr.eqns for v in e.outvars if v.aval.dtype == np.float64 and v.aval.shape]
     assert wide == []
@@ -142,7 +142,7 @@ def test_ellipsometry_counts_in_degrees():
     assert {left_out.effect for left_out in plan.left_out} >= {"absorption", "precision"}
     points = design(thing)
     with jax.enable_x64(True):
-        whole = sampled(thing)
+        whole = tabulated(thing)
         one, other = (signals(p, whole, points, build).reshape(-1, 3) for p in (plan, full_plan(thing)))
     psi = [0.5 * np.rad2deg(np.arctan2(np.hypot(x[:, 1], x[:, 2]), x[:, 0])) for x in (one, other)]
     assert np.max(np.abs(psi[0] - psi[1])) <= 0.5 * plan.error_bound

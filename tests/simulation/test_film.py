@@ -12,7 +12,7 @@ import pytest
 import pellicle as pl
 from pellicle.dispersion import Cauchy, Constant
 from pellicle.scene.free import insert, start_values
-from pellicle.simulation.film import build, sampled
+from pellicle.simulation.film import build, tabulated
 
 WAVELENGTH = np.linspace(450.0, 850.0, 9)
 
@@ -66,7 +66,7 @@ def test_what_a_plan_leaves_out_changes_nothing(name):
 def test_sampling_the_media_changes_nothing(name):
     """What is fixed is evaluated before a fit; values and the slope in thickness stay."""
     thing = SCENES[name]
-    np.testing.assert_allclose(predict(sampled(thing)), predict(thing), rtol=1e-14)
+    np.testing.assert_allclose(predict(tabulated(thing)), predict(thing), rtol=1e-14)
 
 
 @pytest.mark.parametrize("name", [name for name, s in SCENES.items() if s.substrate.back is None])
@@ -168,7 +168,7 @@ def test_a_model_is_pure_and_can_be_traced():
 def test_wavelengths_outside_a_table_are_refused():
     high = pl.material("Si").wavelength_range[1]
     with pytest.raises(ValueError, match=r"Si .*is known from .* not at"):
-        sampled(scene(substrate="Si", wavelength=np.array([500.0, high + 50])))
+        tabulated(scene(substrate="Si", wavelength=np.array([500.0, high + 50])))
 
 
 # the back face

@@ -8,7 +8,7 @@ import pytest
 
 import pellicle as pl
 from pellicle.scene.free import insert
-from pellicle.simulation.film import build, sampled
+from pellicle.simulation.film import build, tabulated
 
 WAVELENGTH = np.linspace(450.0, 850.0, 9)
 
@@ -72,9 +72,9 @@ def test_bandwidth_is_an_average_over_wavelength():
     layer, sigma = pl.dispersion.Cauchy(2.1, 8e4), 4.0 / 2.3548200450309493
     thing = scene(layer, 1.52, thickness=2000.0, instrument=pl.Instrument(bandwidth=4.0))
     spread = pl.reflectance(WAVELENGTH + sigma * NODES[:, None], 2000.0, layer, 1.52)
-    for model_of in (thing, sampled(thing)):
+    for model_of in (thing, tabulated(thing)):
         assert np.max(np.abs(predict(model_of) - WEIGHTS @ spread)) < 1e-3
-    assert np.max(np.abs(predict(sampled(thing, slope=False)) - WEIGHTS @ spread)) > 2e-3
+    assert np.max(np.abs(predict(tabulated(thing, slope=False)) - WEIGHTS @ spread)) > 2e-3
 
 
 def test_a_window_under_a_plate():

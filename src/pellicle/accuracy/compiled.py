@@ -18,7 +18,7 @@ from pellicle.fitting.spectra.parameters import anonymous
 from pellicle.scene.film import Scene
 from pellicle.scene.free import insert
 from pellicle.scene.layers import Plate
-from pellicle.simulation.film import build, sampled
+from pellicle.simulation.film import build, tabulated
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Program:
 
 def compiled(case: Case, way: Way) -> Program:
     """Compile a way for all the draws of a case. Raises ValueError where a material has no data."""
-    scene = anonymous(sampled(way.scene, way.plan.on("coherence")))
+    scene = anonymous(tabulated(way.scene, way.plan.on("coherence")))
     values = case.draws[:, kept(case.scene, way.scene)]
     simulate = build(way.plan)
 

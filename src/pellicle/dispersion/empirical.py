@@ -138,12 +138,12 @@ class Shifted(AbstractDispersion):
 
 
 @final
-class Sampled(AbstractDispersion):
-    """Another dispersion known at the very wavelengths of a measurement, with its slope there.
+class Tabulated(AbstractDispersion):
+    """Index and slope (1/nm) of another dispersion at the wavelengths of a measurement.
 
-    A medium without free parameters is evaluated once, before a fit, and stands for itself as this.
-    The first-order expansion returns the samples exactly and hands their slope (1/nm) to whoever
-    differentiates in wavelength: the group index needs it. `slope=None` says that nobody does.
+    A fit replaces every medium without free parameters by this before it starts. The first-order expansion
+    is exact at these wavelengths, and has the derivative in wavelength that the group index needs;
+    `slope=None` where nothing needs it.
     """
 
     wavelength: Any

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from pellicle.dispersion.base import AbstractDispersion
-from pellicle.dispersion.empirical import Sampled
+from pellicle.dispersion.empirical import Tabulated
 from pellicle.optics import interface, orders
 from pellicle.optics.pair import abs2, real
 from pellicle.scene.film import Scene, groups
@@ -49,7 +49,7 @@ def smallest_index(material: AbstractDispersion, wavelength: np.ndarray) -> floa
 
 
 def _corner_indices(material: AbstractDispersion, wavelength: np.ndarray) -> np.ndarray:
-    if isinstance(material, Sampled):
+    if isinstance(material, Tabulated):
         return np.asarray(real(material.value))
     free = [leaf for _, leaf in free_leaves(material)]
     corners = itertools.islice(itertools.product(*[(f.lower, f.upper) for f in free]), 64)

@@ -26,7 +26,7 @@ from pellicle.planning.tolerance import (
 from pellicle.scene.film import Scene
 from pellicle.scene.free import insert, is_free, start_values
 from pellicle.scene.layers import Layer, absorbs
-from pellicle.simulation.film import build, sampled
+from pellicle.simulation.film import build, tabulated
 
 
 def plan(scene: Scene, tolerance: float = 0.0, keep: Iterable[str] = ()) -> Plan:
@@ -60,7 +60,7 @@ def full_plan(scene: Scene) -> Plan:
 
 def evaluation(scene: Scene) -> Evaluation:
     """Simulations of the scene over its bounds."""
-    return Evaluation(build, sampled(scene), design(scene))
+    return Evaluation(build, tabulated(scene), design(scene))
 
 
 def alternatives(effect: str, scene: Scene) -> list[Plan]:
@@ -71,7 +71,7 @@ def alternatives(effect: str, scene: Scene) -> list[Plan]:
 def work(plan: Plan, scene: Scene) -> cost_model.Work:
     """Operations of one simulation of the scene at its start values, as XLA counts them."""
     with jax.enable_x64(True):
-        return cost_model.work(build(plan.static_key), insert(sampled(scene), start_values(scene)))
+        return cost_model.work(build(plan.static_key), insert(tabulated(scene), start_values(scene)))
 
 
 def savings(scene: Scene, calibration: cost_model.Calibration) -> dict[str, cost_model.Saving]:

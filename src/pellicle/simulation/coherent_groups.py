@@ -1,7 +1,8 @@
-"""Coherent groups of layers between thick media, and what light makes of one on top of another."""
+"""Coherent groups of layers between incoherent plates, and the intensities of all groups together."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -15,8 +16,9 @@ from pellicle.scene.film import Group, Scene, groups, thickness_spread
 from pellicle.scene.layers import Layer
 
 
-class Sheet(NamedTuple):
-    """Coherent layers between two thick media, as numbers of the types that the plan allows."""
+class CoherentGroup(NamedTuple):
+    """Coherent layers between two thick media: their indices at each wavelength, of the types that the plan
+    needs, and their phases."""
 
     scene: Scene
     group: Group
@@ -25,20 +27,26 @@ class Sheet(NamedTuple):
     below: Number
     phases: list[Any]
     angle: Any  # of incidence in radians; None is normal, `Inside` within a plate
-    internal: Any  # what one passage through the plate beneath leaves, None on a half space
+    internal: Any  # internal transmittance of the plate below, None on a half space
+
+    @property
+    def rough(self) -> bool:
+        """True where any of its faces is rough."""
+        return any(face is not None for face in self.group.roughness)
 
 
-def sheets_of(plan: Plan, scene: Scene) -> list[Sheet]:
-    """One for each group of coherent layers, from the ambient down."""
+def coherent_groups(plan: Plan, scene: Scene) -> list[CoherentGroup]:
+    """The coherent groups of a scene from the ambient down."""
     wavelength = scene.light.wavelength
-    found, plates = groups(scene)
+    described, plates = groups(scene)
     angle = jnp.deg2rad(scene.light.angle) if plan.on("oblique") else None
-    ambient = scene.ambient.index(wavelength)
-    a = interface.transverse(ambient, angle)[0]
-    any_root = interface.allow_tunnelling if plan.on("tunnelling") else _unchanged
-    thick = [ambient, *(any_root(group.below.index(wavelength)) for group in found)]
-    sheets = []
-    for i, group in enumerate(found):
+    thick = [scene.ambient.index(wavelength)]
+    a = interface.transverse(thick[0], angle)[0]
+    for group in described:
+        index = group.below.index(wavelength)
+        thick.append(interface.allow_tunnelling(index) if plan.on("tunnelling") else index)
+    evaluated = []
+    for i, group in enumerate(described):
         internal = None
         if i < len(plates):
             extinction = imag(interface.normal(thick[i + 1], a))
@@ -46,8 +54,10 @@ def sheets_of(plan: Plan, scene: Scene) -> list[Sheet]:
         layers = [_layer_index(plan, layer, wavelength) for layer in group.layers]
         phases = [2 * jnp.pi / wavelength * layer.thickness for layer in group.layers]
         incidence = angle if i == 0 or angle is None else interface.Inside(a)
-        sheets.append(Sheet(scene, group, thick[i], layers, thick[i + 1], phases, incidence, internal))
-    return sheets
+        evaluated.append(
+            CoherentGroup(scene, group, thick[i], layers, thick[i + 1], phases, incidence, internal)
+        )
+    return evaluated
 
 
 def _layer_index(plan: Plan, layer: Layer, wavelength: Any) -> Number:
@@ -55,103 +65,103 @@ def _layer_index(plan: Plan, layer: Layer, wavelength: Any) -> Number:
     return index if plan.on("absorption") else real(index)
 
 
-def _unchanged(index: Number) -> Number:
-    return index
+def reflected(plan: Plan, groups: list[CoherentGroup], polarisation: str):
+    """R of the first group and everything below it."""
+    group, *below = groups
+    powers = _powers(plan, group, polarisation)
+    if not below:
+        return powers.R()
+    front = plate.Face(powers.R(), powers.T(), powers.R_below())
+    return plate.plate_reflectance(front, reflected(plan, below, polarisation), group.internal)
 
 
-def reflected(plan: Plan, sheets: list[Sheet], polarisation: str):
-    """R of the first sheet and everything under it."""
-    sheet, *under = sheets
-    faces = _faces(plan, sheet, polarisation)
-    if not under:
-        return faces["R"]()
-    front = plate.Face(faces["R"](), faces["T"](), faces["below"]())
-    return plate.plate_reflectance(front, reflected(plan, under, polarisation), sheet.internal)
+def transmitted(plan: Plan, groups: list[CoherentGroup], polarisation: str):
+    """T through the first group and everything below it, into the last medium."""
+    group, *below = groups
+    powers = _powers(plan, group, polarisation)
+    if not below:
+        return powers.T()
+    front = plate.Face(powers.R(), powers.T(), powers.R_below())
+    back, passed = reflected(plan, below, polarisation), transmitted(plan, below, polarisation)
+    return plate.plate_transmittance(front, back, passed, group.internal)
 
 
-def transmitted(plan: Plan, sheets: list[Sheet], polarisation: str):
-    """T through the first sheet and everything under it, into the last medium."""
-    sheet, *under = sheets
-    faces = _faces(plan, sheet, polarisation)
-    if not under:
-        return faces["T"]()
-    front = plate.Face(faces["R"](), faces["T"](), faces["below"]())
-    back, passed = reflected(plan, under, polarisation), transmitted(plan, under, polarisation)
-    return plate.plate_transmittance(front, back, passed, sheet.internal)
+class _Powers(NamedTuple):
+    """Functions for the power coefficients of a group; one that is not called costs nothing."""
+
+    R: Callable[[], Any]
+    T: Callable[[], Any]
+    R_below: Callable[[], Any]
 
 
-def _faces(plan: Plan, sheet: Sheet, polarisation: str) -> dict[str, Any]:
-    """Functions that give a sheet's power coefficients; one that is not called costs nothing."""
-    if not sheet.layers and not _rough(sheet):
-        return _bare_faces(sheet, polarisation)
+def _powers(plan: Plan, group: CoherentGroup, polarisation: str) -> _Powers:
+    if not group.layers and not group.rough:
+        return _bare_face(group, polarisation)
     if plan.on("orders"):
-        return _windowed_faces(plan, sheet, polarisation)
-    sheet_response = response_of(plan, sheet, polarisation)
-    return {
-        "R": partial(response.reflectance, sheet_response),
-        "T": partial(response.transmittance, sheet_response),
-        "below": partial(response.reflectance_below, sheet_response),
-    }
+        return _damped_orders(plan, group, polarisation)
+    amplitudes = response_of(plan, group, polarisation)
+    return _Powers(
+        partial(response.reflectance, amplitudes),
+        partial(response.transmittance, amplitudes),
+        partial(response.reflectance_below, amplitudes),
+    )
 
 
-def _bare_faces(sheet: Sheet, polarisation: str) -> dict[str, Any]:
-    a, q_above = interface.transverse(sheet.above, sheet.angle)
-    face = (sheet.above, q_above, sheet.below, interface.normal(sheet.below, a), polarisation)
+def _bare_face(group: CoherentGroup, polarisation: str) -> _Powers:
+    a, q_above = interface.transverse(group.above, group.angle)
+    face = (group.above, q_above, group.below, interface.normal(group.below, a), polarisation)
     reflectance = partial(interface.reflectance, *face)
-    return {"R": reflectance, "T": partial(interface.transmittance, *face), "below": reflectance}
+    return _Powers(reflectance, partial(interface.transmittance, *face), reflectance)
 
 
-def _rough(sheet: Sheet) -> bool:
-    return any(face is not None for face in sheet.group.roughness)
-
-
-def response_of(plan: Plan, sheet: Sheet, polarisation: str) -> response.Response:
-    """The response of a sheet to one polarisation."""
-    wavenumber = 2 * jnp.pi / sheet.scene.light.wavelength
-    faces = [0.0 if x is None else wavenumber * x for x in sheet.group.roughness] if _rough(sheet) else None
-    (sheet_response,) = coherent.responses(
-        sheet.above,
-        sheet.layers,
-        sheet.below,
-        sheet.phases,
-        sheet.angle,
+def response_of(plan: Plan, group: CoherentGroup, polarisation: str) -> response.Response:
+    """The response of a group to one polarisation."""
+    wavenumber = 2 * jnp.pi / group.scene.light.wavelength
+    faces = [0.0 if x is None else wavenumber * x for x in group.group.roughness] if group.rough else None
+    (group_response,) = coherent.responses(
+        group.above,
+        group.layers,
+        group.below,
+        group.phases,
+        group.angle,
         polarisation,
         propagating=not plan.on("tunnelling"),
         roughness=faces,
     )
-    return sheet_response
+    return group_response
 
 
-def _windowed_faces(plan: Plan, sheet: Sheet, polarisation: str) -> dict[str, Any]:
-    """The same, order by order through the instrument's window."""
-    layer = interface.allow_tunnelling(sheet.layers[0]) if plan.on("tunnelling") else sheet.layers[0]
-    b = orders.airy_series(sheet.above, layer, sheet.below, sheet.phases[0], sheet.angle, polarisation)
-    widths = (sheet.scene.instrument.bandwidth, thickness_spread(sheet.scene, sheet.group.layers[0]))
-    window = orders.monochromatic if widths == (None, None) else orders.gaussian(_blur(plan, sheet))
+def _damped_orders(plan: Plan, group: CoherentGroup, polarisation: str) -> _Powers:
+    """Sums of orders of interference, each damped by the instrument."""
+    layer = interface.allow_tunnelling(group.layers[0]) if plan.on("tunnelling") else group.layers[0]
+    series = orders.airy_series(group.above, layer, group.below, group.phases[0], group.angle, polarisation)
+    widths = (group.scene.instrument.bandwidth, thickness_spread(group.scene, group.group.layers[0]))
+    window = orders.monochromatic if widths == (None, None) else orders.gaussian(_phase_variance(plan, group))
     count = plan.row("orders").count
-    back = orders.reversed_series(b)
-    return {
-        "R": lambda: orders.reflectance(b, window, count),
-        "T": lambda: orders.transmittance(b, window, count),
-        "below": lambda: orders.reflectance(back, window, count),
-    }
+    from_below = orders.reversed_series(series)
+    return _Powers(
+        lambda: orders.reflectance(series, window, count),
+        lambda: orders.transmittance(series, window, count),
+        lambda: orders.reflectance(from_below, window, count),
+    )
 
 
-def _blur(plan: Plan, sheet: Sheet):
-    """Variance of the phase from the spectrometer's bandwidth and the layer's uneven thickness."""
-    scene, layer = sheet.scene, sheet.group.layers[0]
-    angle, at = None if sheet.angle is None else jnp.deg2rad(scene.light.angle), scene.light.wavelength
+def _phase_variance(plan: Plan, group: CoherentGroup):
+    """Variance of the round-trip phase from the bandwidth and the thickness spread."""
+    scene, layer = group.scene, group.group.layers[0]
+    angle = None if group.angle is None else jnp.deg2rad(scene.light.angle)
+    wavelength = scene.light.wavelength
 
-    def cosine_index(wavelength):
-        a, _ = interface.transverse(scene.ambient.index(wavelength), angle)
-        index = _layer_index(plan, layer, wavelength)
+    def cosine_index(at):
+        a, _ = interface.transverse(scene.ambient.index(at), angle)
+        index = _layer_index(plan, layer, at)
         index = interface.allow_tunnelling(index) if plan.on("tunnelling") else index
         return real(interface.normal(index, a))
 
-    def phase(wavelength):
-        return 4 * jnp.pi / wavelength * cosine_index(wavelength) * layer.thickness
+    def phase(at):
+        return 4 * jnp.pi / at * cosine_index(at) * layer.thickness
 
-    _, slope = jax.jvp(phase, (at,), (jnp.ones_like(at),))
+    _, slope = jax.jvp(phase, (wavelength,), (jnp.ones_like(wavelength),))
     widths = (scene.instrument.bandwidth, thickness_spread(scene, layer))
     bandwidth, spread = (0.0 if width is None else width for width in widths)
-    return orders.phase_variance(slope, bandwidth, cosine_index(at), spread, at)
+    return orders.phase_variance(slope, bandwidth, cosine_index(wavelength), spread, wavelength)

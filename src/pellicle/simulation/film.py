@@ -1,9 +1,9 @@
-"""From a plan to a function that predicts the signal: it composes what the plan names, nothing else."""
+"""Forward model of a film: composes the effects of a plan into a function of a scene."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any
 
 import equinox as eqx
@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from pellicle.dispersion.base import AbstractDispersion
-from pellicle.dispersion.empirical import Sampled
+from pellicle.dispersion.empirical import Tabulated
 from pellicle.effects.plan import Plan
 from pellicle.materials import materials_in
 from pellicle.optics import ellipsometry, plate
@@ -20,34 +20,25 @@ from pellicle.scene.film import Scene, thickness_spread
 from pellicle.scene.free import free_leaves
 from pellicle.scene.layers import Interface, Layer
 from pellicle.simulation import instrument
-from pellicle.simulation.coherent_groups import Sheet, reflected, response_of, sheets_of, transmitted
+from pellicle.simulation.coherent_groups import (
+    CoherentGroup,
+    coherent_groups,
+    reflected,
+    response_of,
+    transmitted,
+)
 from pellicle.simulation.instrument import Intensities
 
 Simulate = Callable[[Scene], Any]
 
 
-@jax.jit
-def _index_and_slope(dispersion: AbstractDispersion, wavelength):
-    return jax.jvp(dispersion.index, (wavelength,), (jnp.ones_like(wavelength),))
+def tabulated(scene: Scene, slope: bool = True) -> Scene:
+    """The scene with every medium evaluated at the wavelengths of its light, unless it has free parameters.
 
+    A fit then compiles one program for all materials, and evaluates each once. `slope` includes the
+    derivative in wavelength.
 
-def sample(dispersion: AbstractDispersion, wavelength: np.ndarray, slope: bool = True) -> AbstractDispersion:
-    """The dispersion at these wavelengths (nm), evaluated once; one with free parameters is kept.
-
-    Raises ValueError where a material has no data, naming it and the wavelengths.
-    """
-    for material in materials_in(dispersion):
-        material.check_range(wavelength)
-    if free_leaves(dispersion):
-        return dispersion
-    index, rate = jax.device_get(_index_and_slope(dispersion, wavelength))
-    return Sampled(wavelength, index, rate if slope else None)
-
-
-def sampled(scene: Scene, slope: bool = True) -> Scene:
-    """The scene with every medium that has no free parameter evaluated at the light's wavelengths.
-
-    A fit then compiles one program for all tables, and evaluates them once.
+    **Raises:** ValueError where a material has no data, naming it and the wavelengths.
     """
     wavelength = np.asarray(scene.light.wavelength, dtype=float)
 
@@ -56,31 +47,54 @@ def sampled(scene: Scene, slope: bool = True) -> Scene:
         layers = [layer.material for layer in s.layers if not isinstance(layer, Interface)]
         return [*layers, s.substrate.material, s.ambient, *back]
 
-    return eqx.tree_at(media, scene, [sample(m, wavelength, slope) for m in media(scene)])
+    return eqx.tree_at(media, scene, [_tabulated(m, wavelength, slope) for m in media(scene)])
+
+
+def _tabulated(dispersion: AbstractDispersion, wavelength: np.ndarray, slope: bool) -> AbstractDispersion:
+    for material in materials_in(dispersion):
+        material.check_range(wavelength)
+    if free_leaves(dispersion):
+        return dispersion
+    index, rate = jax.device_get(_index_and_slope(dispersion, wavelength))
+    return Tabulated(wavelength, index, rate if slope else None)
+
+
+@jax.jit
+def _index_and_slope(dispersion: AbstractDispersion, wavelength):
+    return jax.jvp(dispersion.index, (wavelength,), (jnp.ones_like(wavelength),))
 
 
 @lru_cache(maxsize=64)
 def build(plan: Plan) -> Simulate:
-    """simulate(scene) → the signal at `scene.light.wavelength`, as a fraction, without scale or offset.
+    """The forward model of a plan: simulate(scene) → signal at `scene.light.wavelength`.
 
-    For ellipsometry it is N, C, S of the first wavelength, then of the next, in one array. `scene`
-    holds numbers only (see `scene.insert`). The function is pure and can be traced.
+    The signal is a fraction, without scale or offset; for ellipsometry it is one array with N, C, S of the
+    first wavelength, then of the next. `scene` contains numbers only (see `scene.free.insert`). The function
+    is pure and can be traced.
     """
     ellipsometric = plan.signal == "psi-delta"
-    rows = _ellipsometer(plan) if ellipsometric else _photometer(plan)
-    rows = _blurred(rows, plan.row("coherence").count) if plan.row("coherence").count else rows
+    intensities = _ellipsometer(plan) if ellipsometric else _photometer(plan)
+    if plan.row("coherence").count:
+        intensities = _averaged(intensities, plan.row("coherence").count)
     if plan.on("angle-spread"):
         cone = plan.row("angle-spread")
         mix = instrument.unmixed if ellipsometric else instrument.mixed(plan.polarisation)
-        rows = instrument.over_cone(rows, cone.count, cone.around, mix)
-    finish = _on_sphere if ellipsometric else _mean
-    return lambda scene: finish(rows(_simplified(plan, _shifted(scene))))
+        intensities = instrument.over_cone(intensities, cone.count, cone.around, mix)
+    finish = _normalised_stokes if ellipsometric else _mean
+
+    def simulate(scene: Scene) -> Any:
+        scene = _shifted(scene)
+        for remove in plan.left_out:
+            scene = remove(scene)
+        return finish(intensities(scene))
+
+    return simulate
 
 
 def _shifted(scene: Scene) -> Scene:
-    """The scene at the wavelengths that the light had, where the instrument tells them wrong.
+    """The scene at its true wavelengths, where the instrument has a wavelength shift.
 
-    A sampled medium follows by its slope, which is enough for the few nm of a calibration.
+    A tabulated medium follows to first order, which is enough for the few nm of a calibration.
     """
     shift = scene.instrument.wavelength_shift
     if shift is None:
@@ -88,21 +102,14 @@ def _shifted(scene: Scene) -> Scene:
     return eqx.tree_at(lambda s: s.light.wavelength, scene, scene.light.wavelength + shift)
 
 
-def _simplified(plan: Plan, scene: Scene) -> Scene:
-    for leave_out in plan.left_out:
-        scene = leave_out(scene)
-    return scene
-
-
-def _blurred(rows: Intensities, count: int) -> Intensities:
-    """Averaged over whatever the scene gives a width to."""
+def _averaged(intensities: Intensities, count: int) -> Intensities:
+    """Intensities averaged over the thickness spreads and the bandwidth of a scene."""
 
     def average(scene: Scene):
-        averaged = rows
+        averaged = intensities
         for position, layer in enumerate(scene.layers):
             if isinstance(layer, Layer) and thickness_spread(scene, layer) is not None:
-                spread = partial(_spread_of, position)
-                averaged = instrument.over_thickness(averaged, count, position, spread)
+                averaged = instrument.over_thickness(averaged, count, position)
         if scene.instrument.bandwidth is not None:
             averaged = instrument.over_bandwidth(averaged, count)
         return averaged(scene)
@@ -110,55 +117,49 @@ def _blurred(rows: Intensities, count: int) -> Intensities:
     return average
 
 
-def _spread_of(position: int, scene: Scene):
-    layer: Any = scene.layers[position]
-    return thickness_spread(scene, layer)
-
-
 def _mean(rows: Any) -> Any:
+    """The mean over polarisations."""
     return rows[0] if len(rows) == 1 else 0.5 * (rows[0] + rows[1])
 
 
-def _on_sphere(rows: Any) -> Any:
+def _normalised_stokes(rows: Any) -> Any:
+    """N, C and S of each wavelength in one array."""
     return jnp.stack(ellipsometry.normalised(ellipsometry.Stokes(*rows)), -1).reshape(-1)
 
 
 def _photometer(plan: Plan) -> Intensities:
-    """R or T of one polarisation, or of both."""
-    follow = reflected if plan.signal == "R" else transmitted
+    """R or T of one polarisation, or of both, (polarisations, wavelengths)."""
+    power = reflected if plan.signal == "R" else transmitted
+    polarisations = "sp"
+    if not plan.on("polarisation"):
+        one = plan.on("oblique") and plan.polarisation != "unpolarised"
+        polarisations = plan.polarisation if one else "s"
 
-    def simulate(scene: Scene):
-        sheets = sheets_of(plan, scene)
-        return jnp.stack([follow(plan, sheets, p) for p in _polarisations(plan)])
+    def intensities(scene: Scene):
+        groups = coherent_groups(plan, scene)
+        return jnp.stack([power(plan, groups, p) for p in polarisations])
 
-    return simulate
+    return intensities
 
 
 def _ellipsometer(plan: Plan) -> Intensities:
-    """Sums of intensities, (4, wavelengths)."""
+    """Stokes parameters before normalisation, (4, wavelengths)."""
 
-    def simulate(scene: Scene):
-        sheet, *under = sheets = sheets_of(plan, scene)
-        if not under:
-            return jnp.stack(
-                ellipsometry.stokes(response_of(plan, sheet, "s"), response_of(plan, sheet, "p"))
-            )
-        s, p = (reflected(plan, sheets, polarisation) for polarisation in "sp")
-        return jnp.stack(ellipsometry.stokes_from_sums(s, p, _crossed(plan, sheets)))
+    def intensities(scene: Scene):
+        groups = coherent_groups(plan, scene)
+        if len(groups) == 1:
+            s, p = (response_of(plan, groups[0], polarisation) for polarisation in "sp")
+            return jnp.stack(ellipsometry.stokes(s, p))
+        s, p = (reflected(plan, groups, polarisation) for polarisation in "sp")
+        return jnp.stack(ellipsometry.stokes_from_sums(s, p, _cross_product(plan, groups)))
 
-    return simulate
+    return intensities
 
 
-def _crossed(plan: Plan, sheets: list[Sheet]):
-    """conj(r_p) r_s of the first sheet and everything under it."""
-    sheet, *under = sheets
-    front = ellipsometry.cross_products(response_of(plan, sheet, "s"), response_of(plan, sheet, "p"))
-    if not under:
+def _cross_product(plan: Plan, groups: list[CoherentGroup]):
+    """conj(r_p) r_s of the first group and everything below it."""
+    group, *below = groups
+    front = ellipsometry.cross_products(response_of(plan, group, "s"), response_of(plan, group, "p"))
+    if not below:
         return front.reflected
-    return plate.multiple_reflections(*front, _crossed(plan, under), sheet.internal)
-
-
-def _polarisations(plan: Plan) -> str:
-    if plan.on("polarisation"):
-        return "sp"
-    return plan.polarisation if plan.on("oblique") and plan.polarisation != "unpolarised" else "s"
+    return plate.multiple_reflections(*front, _cross_product(plan, below), group.internal)

@@ -1,7 +1,7 @@
-"""What an instrument averages: a band of wavelengths, a spot of uneven thickness, a cone of light.
+"""Averages over a bandwidth, a thickness spread and a cone of light.
 
-Each average is a wrapper of a model, and each rule says how far a fringe averaged by it is from the
-truth. Intensities are averaged (rows, wavelengths), never amplitudes or ratios.
+Each wraps a forward model and averages intensities (rows, wavelengths), never amplitudes or ratios. Errors
+of the quadrature rules are in `pellicle.optics.quadrature`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 
 from pellicle.optics.orders import FWHM
 from pellicle.optics.quadrature import cone_rays, normal_rule
-from pellicle.scene.film import Scene
+from pellicle.scene.film import Scene, thickness_spread
 
 Intensities = Callable[[Scene], Any]
 """A scene in numbers → intensities, (rows, wavelengths)."""
@@ -29,7 +29,7 @@ def _weighted(at: Callable[[Any], Any], nodes: Any, weights: np.ndarray, wavelen
 
 
 def over_bandwidth(simulate: Intensities, count: int) -> Intensities:
-    """The mean over a spectrometer's window, a normal distribution of the given full width."""
+    """The mean over the window of the spectrometer, a normal distribution with the bandwidth as its FWHM."""
     nodes, weights = normal_rule(count)
 
     def average(scene: Scene):
@@ -44,14 +44,16 @@ def over_bandwidth(simulate: Intensities, count: int) -> Intensities:
     return average
 
 
-def over_thickness(simulate: Intensities, count: int, position: int, spread: Callable[[Scene], Any]):
-    """The mean over a layer's uneven thickness, a normal distribution cut off at no thickness."""
+def over_thickness(simulate: Intensities, count: int, position: int) -> Intensities:
+    """The mean over the thickness spread of one layer, a normal distribution truncated at 0."""
     nodes, weights = normal_rule(count)
 
     def average(scene: Scene):
+        layer: Any = scene.layers[position]
+        spread = thickness_spread(scene, layer)
+
         def at(node):
-            thickness: Any = scene.layers[position].thickness  # pyright: ignore[reportAttributeAccessIssue]
-            uneven = jnp.maximum(thickness + node * spread(scene), 0.0)
+            uneven = jnp.maximum(layer.thickness + node * spread, 0.0)
             return simulate(eqx.tree_at(lambda s: s.layers[position].thickness, scene, uneven))
 
         return _weighted(at, nodes, weights, scene.light.wavelength)
@@ -60,7 +62,7 @@ def over_thickness(simulate: Intensities, count: int, position: int, spread: Cal
 
 
 def cone_sine(scene: Scene) -> Any:
-    """The sine of the cone's half angle, at each wavelength if the ambient disperses."""
+    """The sine of the half angle of the cone; one for each wavelength if the ambient is dispersive."""
     aperture, spread = scene.instrument.numerical_aperture, scene.instrument.angle_spread
     if aperture is not None:
         return aperture / scene.ambient.index(scene.light.wavelength)
@@ -68,7 +70,7 @@ def cone_sine(scene: Scene) -> Any:
 
 
 def over_cone(simulate: Intensities, count: int, around: int, mix: Callable[[Any, Any], Any]) -> Intensities:
-    """The mean over the light's cone. `mix(rows, s_share)` puts the polarisations of a ray together."""
+    """The mean over the cone of light; `mix(rows, s_share)` combines the polarisations of a ray."""
 
     def average(scene: Scene):
         like = jnp.result_type(scene.light.wavelength)
@@ -87,7 +89,7 @@ def over_cone(simulate: Intensities, count: int, around: int, mix: Callable[[Any
 
 
 def mixed(polarisation: str) -> Callable[[Any, Any], Any]:
-    """How a ray's s and p add: halves where light is unpolarised, else by what the lens made of it."""
+    """Weighted sum of s and p of a ray: one half each for unpolarised light, else by the lens's rotation."""
 
     def mix(rows, s_share):
         share = {"s": s_share, "p": 1 - s_share, "unpolarised": 0.5}[polarisation]
@@ -97,5 +99,5 @@ def mixed(polarisation: str) -> Callable[[Any, Any], Any]:
 
 
 def unmixed(rows: Any, s_share: Any) -> Any:
-    """For an ellipsometer, which keeps s and p apart; that the lens turns them is left out."""
+    """The rows of an ellipsometer unchanged: the rotation of s and p by the lens is neglected."""
     return rows

@@ -18,7 +18,7 @@ from pellicle.planning.differences import signals
 from pellicle.scene.film import Scene, with_wavelength
 from pellicle.scene.free import Free, insert, start_values
 from pellicle.scene.layers import Layer
-from pellicle.simulation.film import build, sampled
+from pellicle.simulation.film import build, tabulated
 
 BANDS = "uniform-64"
 """Colours are within ΔE2000 of 0.02 of those by steps of 1 nm, for films up to 5 µm."""
@@ -48,7 +48,7 @@ def interference_colours(
     with jax.enable_x64(True):
         seen = _over(with_wavelength(scene, bands.wavelength), thickness, angle, varied(scene, layer))
         grid = np.stack(np.meshgrid(thickness, angle), axis=-1).reshape(-1, 2)
-        found = signals(exact(seen), sampled(seen), grid, build) @ bands.weights
+        found = signals(exact(seen), tabulated(seen), grid, build) @ bands.weights
         xyz = jnp.asarray(found.reshape(len(angle), len(thickness), 3))
     return Colour(xyz, (float(white[0]), float(white[1]), float(white[2])))
 

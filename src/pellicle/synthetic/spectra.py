@@ -17,7 +17,7 @@ from pellicle.planning.film import plan
 from pellicle.scene.film import Scene, with_wavelength
 from pellicle.scene.free import insert, is_free, start_values
 from pellicle.scene.instrument import Drift, Instrument
-from pellicle.simulation.film import build, sampled
+from pellicle.simulation.film import build, tabulated
 
 VISIBLE = (380.0, 780.0, 2.0)
 """Default wavelengths: start, stop and step in nm."""
@@ -74,7 +74,7 @@ def synthesise(
         fixed = with_wavelength(insert(scene, start_values(scene)), wavelength)
         fixed = eqx.tree_at(lambda s: s.instrument, fixed, _settled(fixed.instrument))
         chosen = plan(fixed, tolerance)
-        signal = np.asarray(jax.jit(build(chosen))(sampled(fixed, chosen.on("coherence"))))
+        signal = np.asarray(jax.jit(build(chosen))(tabulated(fixed, chosen.on("coherence"))))
     clean = float(fixed.instrument.scale) * signal + float(fixed.instrument.offset)
     random = np.random.default_rng(seed).normal(0.0, 1.0, clean.shape)
     return Synthetic(wavelength, clean + noise * random, clean, chosen)

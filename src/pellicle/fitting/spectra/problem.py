@@ -13,7 +13,7 @@ from pellicle.fitting.spectra.targets import Measured
 from pellicle.fitting.spectra.view import ROUND, SpectrumView
 from pellicle.planning.film import plan
 from pellicle.scene.film import coherent_layers, with_wavelength
-from pellicle.simulation.film import sampled
+from pellicle.simulation.film import tabulated
 
 _KEPT_EFFECTS = ("precision", "dispersion")
 """Effects that a tolerance does not remove: a fit stops by differences below single precision, and its media
@@ -53,7 +53,7 @@ def _view(spectrum: Measured, takes: tuple[int, ...], tolerance: float) -> Spect
         level=np.float64(max(float(np.median(np.abs(values[:points]))), 1e-12)),
         frame=None if spectrum.frame is None else _pad(spectrum.frame, extra),
     )
-    scene = sampled(scene, chosen.on("coherence") or scene.instrument.wavelength_shift is not None)
+    scene = tabulated(scene, chosen.on("coherence") or scene.instrument.wavelength_shift is not None)
     steepest = max((largest_index(x.material, wavelength) for x in coherent_layers(scene)), default=1.0)
     return SpectrumView(
         spectrum.name, chosen, anonymous(scene), data, takes, spectrum.noise, points * channels, steepest
