@@ -1,8 +1,8 @@
-"""Ellipsometry: the ratio of the two polarisations' reflection, as angles and as a point on a sphere.
+"""Ellipsometry: Ψ, Δ and the Stokes parameters N, C, S from the response to s and p.
 
-Convention, with n + ik and the time factor exp(−iωt): tan(Ψ) exp(iΔ) = conj(r_p / r_s), which is what
-instruments write; Δ is near 180° for bare silicon at small angles. N = cos 2Ψ, C = sin 2Ψ cos Δ and
-S = sin 2Ψ sin Δ lie on a unit sphere, have no wrap-around, and are what is fitted (Jellison and Modine
+Convention, with n + ik and the time factor exp(−iωt): tan(Ψ) exp(iΔ) = conj(r_p / r_s), as instruments
+write it; Δ is near 180° for bare silicon at small angles. N = cos 2Ψ, C = sin 2Ψ cos Δ and
+S = sin 2Ψ sin Δ lie on a unit sphere, do not wrap around, and are what is fitted (Jellison and Modine
 1990, Appl. Opt. 29, 959).
 """
 
@@ -18,9 +18,9 @@ from pellicle.optics.response import Response, transmittance
 
 
 class Stokes(NamedTuple):
-    """N, C and S, each times the intensity, and the intensity |r_s|² + |r_p|².
+    """N, C and S times the intensity, and the intensity |r_s|² + |r_p|².
 
-    They are sums of intensities: what an instrument averages is averaged here, before the division.
+    They are sums of intensities: instrumental averages are taken over them, before the division.
     """
 
     n: Any
@@ -30,54 +30,58 @@ class Stokes(NamedTuple):
 
 
 def stokes(s: Response, p: Response) -> Stokes:
-    """From the responses of the same layers to both polarisations."""
+    """Return the Stokes sums of light reflected by layers, from their responses to s and p."""
     rs, rp = s.reflected / s.denominator, p.reflected / p.denominator
     both = 2 * (conj(rp) * rs)
     return Stokes(abs2(rs) - abs2(rp), real(both), imag(both), abs2(rs) + abs2(rp))
 
 
 class CrossProducts(NamedTuple):
-    """conj(x_p) x_s of one sheet's amplitudes x: reflected, passed both ways, and reflected from below."""
+    """conj(x_p) x_s of the amplitudes x of one coherent group of layers."""
 
     reflected: Any
-    passed_twice: Any
-    below: Any
+    passed_twice: Any  # transmitted down and up again
+    below: Any  # reflected from below
 
 
 def cross_products(s: Response, p: Response) -> CrossProducts:
-    """From the responses of the same layers to both polarisations, between media that absorb next to nothing.
+    """Return the cross products of layers between media with negligible absorption.
 
-    Their t t′ has the size T and, but for what s and p have in common, twice the phase of 1/denominator.
+    The product t t′ has modulus T and, except for a factor common to s and p, twice the phase of
+    1/denominator.
     """
     ds, dp = to_complex(s.denominator), to_complex(p.denominator)
-    apart = jnp.conj(ds) * dp
-    turn = apart / jnp.abs(apart)
+    product = jnp.conj(ds) * dp
+    phase = product / jnp.abs(product)
     return CrossProducts(
         jnp.conj(to_complex(p.reflected) / dp) * (to_complex(s.reflected) / ds),
-        transmittance(p) * transmittance(s) * turn * turn,
+        transmittance(p) * transmittance(s) * phase * phase,
         jnp.conj(to_complex(p.below) / dp) * (to_complex(s.below) / ds),
     )
 
 
 def stokes_from_sums(s: Any, p: Any, cross: Any) -> Stokes:
-    """From sums of intensities |x_s|², |x_p|² and of conj(x_p) x_s: what comes back from plates."""
+    """Return the Stokes sums from sums over orders of |x_s|², |x_p|² and conj(x_p) x_s (thick plates)."""
     return Stokes(s - p, 2 * jnp.real(cross), 2 * jnp.imag(cross), s + p)
 
 
-def normalised(given: Stokes) -> tuple[Any, Any, Any]:
-    """N, C, S on the unit sphere; all 0 where nothing is reflected, so that Ψ and Δ have no meaning."""
-    dark = given.intensity < jnp.finfo(jnp.result_type(given.intensity)).tiny
-    # scaled to size first: the derivative of 1/x holds 1/x², which overflows where little is reflected
-    size = jax.lax.stop_gradient(jnp.where(dark, 0.0, 1 / jnp.where(dark, 1.0, given.intensity)))
-    over = jnp.where(dark, 0.0, 1 / jnp.where(dark, 1.0, given.intensity * size))
-    n, c, s = (x * size * over for x in given[:3])
+def normalised(sums: Stokes) -> tuple[Any, Any, Any]:
+    """Return N, C, S on the unit sphere; all 0 where nothing is reflected and Ψ and Δ are undefined."""
+    dark = sums.intensity < jnp.finfo(jnp.result_type(sums.intensity)).tiny
+    # scaled first: the derivative of 1/x contains 1/x², which overflows where little is reflected
+    size = jax.lax.stop_gradient(jnp.where(dark, 0.0, 1 / jnp.where(dark, 1.0, sums.intensity)))
+    inverse = jnp.where(dark, 0.0, 1 / jnp.where(dark, 1.0, sums.intensity * size))
+    n, c, s = (x * size * inverse for x in sums[:3])
     return n, c, s
 
 
 def psi_delta(n: Any, c: Any, s: Any) -> tuple[Any, Any]:
-    """Ψ in 0 to 90 and Δ in 0 to 360 degrees.
+    """Return Ψ in 0 to 90 and Δ in 0 to 360 degrees from N, C, S.
 
     Where Ψ is 0 or 90, Δ is 0 and its derivatives are 0; where nothing is reflected, all are 0.
+
+    >>> [round(float(x), 1) for x in psi_delta(0.0, -1.0, 0.0)]
+    [45.0, 180.0]
     """
     square = c * c + s * s
     pole = square == 0
@@ -85,23 +89,27 @@ def psi_delta(n: Any, c: Any, s: Any) -> tuple[Any, Any]:
     across = jnp.sqrt(jnp.where(pole, 1.0, square)) * jnp.where(pole, 0.0, 1.0)
     psi = 0.5 * jnp.arctan2(across, jnp.where(dark, 1.0, n))
     delta = jnp.arctan2(jnp.where(pole, 0.0, s), jnp.where(pole, 1.0, c))
-    turned = jnp.mod(jnp.rad2deg(delta), 360.0)
-    # −1e-17 + 360 rounds to 360: such a Δ is 0, with the slope that it has
-    whole = jax.lax.stop_gradient(jnp.where(turned >= 360.0, turned, 0.0))
-    return jnp.rad2deg(psi), turned - whole
+    wrapped = jnp.mod(jnp.rad2deg(delta), 360.0)
+    # −1e-17 + 360 rounds to 360: such a Δ is 0, with its slope unchanged
+    full_turn = jax.lax.stop_gradient(jnp.where(wrapped >= 360.0, wrapped, 0.0))
+    return jnp.rad2deg(psi), wrapped - full_turn
 
 
 def alpha_beta(n: Any, c: Any, analyser: Any) -> tuple[Any, Any]:
-    """α and β of a rotating-analyser ellipsometer from N and C; S does not enter, so neither does Δ's sign.
+    """Return α and β of a rotating-analyser ellipsometer from N and C; both are blind to the sign of Δ.
 
-    The detector sees 1 + α cos 2a + β sin 2a while one polariser turns by a and the other, before or
-    behind the sample, stands at `analyser`, in degrees between 0 and 90, neither included; both angles
-    count from the plane of incidence, and β has the sign of cos Δ. With A for `analyser`
-    α = (tan²Ψ − tan²A)/(tan²Ψ + tan²A) and β = 2 tanΨ cosΔ tanA/(tan²Ψ + tan²A) (the instrument of
-    D. E. Aspnes and A. A. Studna, Appl. Opt. 14, 220 (1975)), here as α = (cos 2A − N)/(1 − N cos 2A)
-    and β = C sin 2A/(1 − N cos 2A), which are finite at Ψ = 0 and 90. The function is its own inverse:
-    `alpha_beta(alpha, beta, analyser)` returns N and C.
+    The detector signal is 1 + α cos 2a + β sin 2a, where one polariser turns by a and the other, before
+    or behind the sample, stands at `analyser`, in degrees strictly between 0 and 90. Both angles count
+    from the plane of incidence, and β has the sign of cos Δ. With A for `analyser`,
+    α = (tan²Ψ − tan²A)/(tan²Ψ + tan²A) and β = 2 tanΨ cosΔ tanA/(tan²Ψ + tan²A). Written as
+    α = (cos 2A − N)/(1 − N cos 2A) and β = C sin 2A/(1 − N cos 2A) they are finite at Ψ = 0 and 90.
+    The function is its own inverse: `alpha_beta(alpha, beta, analyser)` returns N and C.
+
+    **Source:** D. E. Aspnes and A. A. Studna, Appl. Opt. 14, 220 (1975).
+
+    >>> [round(float(x), 6) for x in alpha_beta(*alpha_beta(0.2, -0.6, 30.0), 30.0)]
+    [0.2, -0.6]
     """
     twice = 2 * jnp.deg2rad(analyser)
-    over = 1 - n * jnp.cos(twice)
-    return (jnp.cos(twice) - n) / over, c * jnp.sin(twice) / over
+    denominator = 1 - n * jnp.cos(twice)
+    return (jnp.cos(twice) - n) / denominator, c * jnp.sin(twice) / denominator

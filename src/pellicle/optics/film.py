@@ -1,9 +1,9 @@
-"""One coherent layer on a substrate, with value and gradient finite everywhere.
+"""Closed-form response of one coherent layer on a substrate, with finite values and gradients everywhere.
 
-The layer enters only through the two entire functions of `pellicle.optics.characteristic`. So zero thickness,
-grazing incidence, an exactly critical film, a matched index, a millimetre of metal and tunnelling need
-no special case. This is the Airy formula of Gerardin et al. 2019 (eqs. 11 and 12) multiplied out; each
-line below is the same for real, complex and Pair numbers.
+The layer enters only through the two entire functions of `pellicle.optics.characteristic`. So zero
+thickness, grazing incidence, a layer exactly at its critical angle, a matched index, a millimetre of metal
+and tunnelling need no special case. This is the Airy formula of Gerardin et al. 2019 (eqs. 11 and 12)
+multiplied out; the same lines serve real, complex and `Pair` numbers.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from pellicle.optics.characteristic import (
     half_expm1,
     is_real_array,
     matrix_elements,
+    nonzero_root,
     propagating_elements,
-    root,
 )
 from pellicle.optics.elementary import sincos, sincos_squares
 from pellicle.optics.hoisting import hoist, is_reused
@@ -49,107 +49,105 @@ class AmplitudesAndSquares(NamedTuple):
 def _amplitudes(
     sides: tuple[Amplitudes, ...], Q: Number, k: Any, propagating: bool
 ) -> tuple[tuple[AmplitudesAndSquares, ...], Any]:
-    """What `sides`, a pair (A, B) for each amplitude of each polarisation, make of a layer; and |scale|².
+    """Return the amplitudes A c − iB f for each pair (A, B) in `sides`, and |scale|².
 
-    A grid of thicknesses spends its time in multiplications at each point: in the functions of the
-    phase, and here. So what knows nothing of the thickness is multiplied out and held, and squares are
-    taken of what is left.
+    A grid of thicknesses spends its time on what is computed at each point: the functions of the phase,
+    and the products here. So factors that do not depend on the thickness are multiplied out and hoisted,
+    and the squares are formed from the rest.
     """
     if propagating:
-        return _by_wave(sides, Q, k)
+        return _propagating_amplitudes(sides, Q, k)
     if is_real_array(Q):
         c, f, scale_square, _ = matrix_elements(Q, k)
         g = times_i(-f)
-        return tuple(_plain([A * c + B * g for A, B in hoist(three, k)]) for three in sides), scale_square
-    q = root(Q)
+        return tuple(_squared([A * c + B * g for A, B in hoist(side, k)]) for side in sides), scale_square
+    q = nonzero_root(Q)
     half, scale_square = half_expm1(q, k)
-    pairs = [[(A, A - B / q) for A, B in three] for three in sides]
+    pairs = [[(A, A - B / q) for A, B in side] for side in sides]
     if is_reused(pairs, k):
-        return tuple(_on_grid(three, half, k) for three in pairs), scale_square
-    return tuple(_plain([A + half * C for A, C in three]) for three in pairs), scale_square
+        return tuple(_grid_amplitudes(side, half, k) for side in pairs), scale_square
+    return tuple(_squared([A + half * C for A, C in side]) for side in pairs), scale_square
 
 
-def _plain(values: list[Number]) -> AmplitudesAndSquares:
+def _squared(values: list[Number]) -> AmplitudesAndSquares:
     return AmplitudesAndSquares(Amplitudes(*values), Amplitudes(*(abs2(x) for x in values)))
 
 
-def _by_wave(sides: tuple[Amplitudes, ...], Q: Any, k: Any) -> tuple[tuple[AmplitudesAndSquares, ...], Any]:
-    """Where the wave propagates without loss: |A c − iB f|² of real A and B is a sum of two squares."""
+def _propagating_amplitudes(
+    sides: tuple[Amplitudes, ...], Q: Any, k: Any
+) -> tuple[tuple[AmplitudesAndSquares, ...], Any]:
+    """Amplitudes in a lossless layer: |A c − iB f|² of real A and B is a sum of two squares."""
     q = jnp.sqrt(Q)
     phase = k * hoist(q, k)
     sine, cosine = sincos(phase)
     sine_square, cosine_square = sincos_squares(phase)
 
-    def one(three: Amplitudes) -> AmplitudesAndSquares:
-        pairs = hoist([(A, B / q) for A, B in three], k)
-        found = _plain([A * cosine + times_i(-sine) * V for A, V in pairs])
+    def one(side: Amplitudes) -> AmplitudesAndSquares:
+        pairs = hoist([(A, B / q) for A, B in side], k)
+        both = _squared([A * cosine + times_i(-sine) * V for A, V in pairs])
         if not all(is_real(x) for pair in pairs for x in pair):
-            return found
+            return both
         weights = hoist([(A * A, V * V) for A, V in pairs], k)
-        return AmplitudesAndSquares(
-            found.values, Amplitudes(*(a * cosine_square + b * sine_square for a, b in weights))
-        )
+        squares = Amplitudes(*(a * cosine_square + b * sine_square for a, b in weights))
+        return AmplitudesAndSquares(both.values, squares)
 
-    return tuple(one(three) for three in sides), jnp.ones_like(cosine)
+    return tuple(one(side) for side in sides), jnp.ones_like(cosine)
 
 
-def _on_grid(pairs: list[tuple[Number, Number]], half: Number, k: Any) -> AmplitudesAndSquares:
-    """A + half C for each (A, C). The squares are those of A e^{−iθ} + half |C|, with θ the phase of C.
+def _grid_amplitudes(pairs: list[tuple[Number, Number]], half: Number, k: Any) -> AmplitudesAndSquares:
+    """Return A + half C for each (A, C), with squares |A e^{−iθ} + half |C||², θ the phase of C.
 
-    Where C is nothing but rounding, so is θ: all that is made of C must be made of the same C, which
-    holds because it is held.
+    Where C is only a rounding error, so is θ. Everything made of C must then be made of the same C: it is
+    the same because it is hoisted.
     """
     pairs = hoist(pairs, k)
-    squares = (abs2(turned + half * size) for turned, size in hoist([_turned(*pair) for pair in pairs], k))
+    rotated = hoist([_rotated(A, C) for A, C in pairs], k)
+    squares = (abs2(A + half * size) for A, size in rotated)
     return AmplitudesAndSquares(Amplitudes(*(A + half * C for A, C in pairs)), Amplitudes(*squares))
 
 
-def _turned(A: Number, C: Number) -> tuple[Number, Any]:
-    """A e^{−iθ} and |C|; where C is 0, θ may be anything."""
+def _rotated(A: Number, C: Number) -> tuple[Number, Any]:
+    """Return A e^{−iθ} and |C|, θ the phase of C; where C is 0, θ may be anything."""
     square = abs2(C)
-    nothing = square == 0
-    size = jnp.sqrt(jnp.where(nothing, 1.0, square))
-    return where(nothing, A + 0.0 * C, A * conj(C) / size), jnp.where(nothing, 0.0, size)
+    zero = square == 0
+    size = jnp.sqrt(jnp.where(zero, 1.0, square))
+    return where(zero, A + 0.0 * C, A * conj(C) / size), jnp.where(zero, 0.0, size)
 
 
-def _amplitudes_slope(propagating, primal, tangent):
-    """By the derivatives of c and f. What is known not to vary costs nothing."""
+def _amplitude_slopes(propagating: bool, primal: Any, tangent: Any) -> Any:
+    """JVP of `_amplitudes` by the derivatives of c and f; symbolic zeros cost nothing."""
     (sides, Q, k), (dsides, dQ, dk) = primal, tangent
-    dQ, dk = jax.tree.map(_filled, (dQ, dk), is_leaf=_is_nothing)
-    (c, f, _, _), (dc, df, dscale, _) = element_slopes(
-        propagating_elements if propagating else matrix_elements, (Q, k), (dQ, dk)
-    )
+    dQ, dk = jax.tree.map(_instantiate, (dQ, dk), is_leaf=_is_symbolic_zero)
+    elements = propagating_elements if propagating else matrix_elements
+    (c, f, _, _), (dc, df, dscale, _) = element_slopes(elements, (Q, k), (dQ, dk))
     g, dg = times_i(-f), times_i(-df)
 
-    def slope(side, turn):
-        dA, dB = (None if _all_nothing(x) else jax.tree.map(_filled, x, is_leaf=_is_nothing) for x in turn)
-        found = side[0] * dc + side[1] * dg
-        found = found if dA is None else found + dA * c
-        return found if dB is None else found + dB * g
+    def slope(pair: Any, dpair: Any) -> Number:
+        total = pair[0] * dc + pair[1] * dg
+        for d, factor in zip(dpair, (c, g), strict=True):
+            if not all(map(_is_symbolic_zero, jax.tree.leaves(d, is_leaf=_is_symbolic_zero))):
+                total = total + jax.tree.map(_instantiate, d, is_leaf=_is_symbolic_zero) * factor
+        return total
 
-    def slopes_of(found: AmplitudesAndSquares, three, turns) -> AmplitudesAndSquares:
-        moved = [slope(side, turn) for side, turn in zip(three, turns, strict=True)]
-        squares = (2 * real(conj(x) * dx) for x, dx in zip(found.values, moved, strict=True))
-        return AmplitudesAndSquares(Amplitudes(*moved), Amplitudes(*squares))
+    def slopes_of(result: AmplitudesAndSquares, side: Any, dside: Any) -> AmplitudesAndSquares:
+        slopes = [slope(pair, dpair) for pair, dpair in zip(side, dside, strict=True)]
+        squares = (2 * real(conj(x) * dx) for x, dx in zip(result.values, slopes, strict=True))
+        return AmplitudesAndSquares(Amplitudes(*slopes), Amplitudes(*squares))
 
-    found, scale_square = _amplitudes(sides, Q, k, propagating)
-    moved = tuple(slopes_of(*each) for each in zip(found, sides, dsides, strict=True))
-    return (found, scale_square), (moved, dscale)
+    results, scale_square = _amplitudes(sides, Q, k, propagating)
+    slopes = tuple(slopes_of(*each) for each in zip(results, sides, dsides, strict=True))
+    return (results, scale_square), (slopes, dscale)
 
 
-def _is_nothing(x: Any) -> bool:
+def _is_symbolic_zero(x: Any) -> bool:
     return isinstance(x, SymbolicZero)
 
 
-def _filled(x: Any) -> Any:
-    return jnp.zeros(x.shape, x.dtype) if _is_nothing(x) else x
+def _instantiate(x: Any) -> Any:
+    return jnp.zeros(x.shape, x.dtype) if _is_symbolic_zero(x) else x
 
 
-def _all_nothing(x: Any) -> bool:
-    return all(map(_is_nothing, jax.tree.leaves(x, is_leaf=_is_nothing)))
-
-
-_amplitudes.defjvp(_amplitudes_slope, symbolic_zeros=True)
+_amplitudes.defjvp(_amplitude_slopes, symbolic_zeros=True)
 
 
 def film(
@@ -161,26 +159,23 @@ def film(
     polarisations: str = "sp",
     propagating: bool = False,
 ) -> tuple[Response, ...]:
-    """Return the response of one layer, one for each letter of `polarisations`.
+    """Return the response of one layer, for each letter of `polarisations`.
 
-    Arguments broadcast. `ambient`, `layer` and `substrate` are numbers of any type, the ambient real
-    but for light from within a plate (`interface.Inside` in place of the angle); `phase` is
-    k₀d = 2πd/λ; `angle` is in radians, None being normal incidence, where s and p are one and only
-    the first polarisation is computed. `propagating` promises that no wave is totally reflected in
-    a layer of real index.
+    With A, B, A′, B′ as in the code, the denominator is D = A c − iB f and the numerator N = A′ c − iB′ f;
+    reversing the light changes the sign of A′. Denominators contain no division: at grazing incidence T
+    is 0, not 0/0. Between equal media A′ is exactly 0, and where nothing is between them (no thickness,
+    or the same medium again) exactly nothing is reflected, at 90° too.
 
-    With A, B, A′, B′ below, D = A c − iB f and N = A′ c − iB′ f; reversing the light turns the sign
-    of A′. Denominators carry no division: at grazing incidence T is 0, not 0/0.
-    Between equal media A′ is exactly 0, and nothing between them (no thickness, or the same medium
-    again) reflects exactly nothing, at 90° too.
+    **Arguments:** as for `coherent.responses`, with one `layer` and its `phase` k₀d = 2πd/λ.
+
+    **Source:** Gerardin et al. 2019, eqs. 11 and 12.
     """
     a, q0 = transverse(ambient, angle)
     e0, e1, e2, q1_square = ambient * ambient, layer * layer, substrate * substrate, normal_square(layer, a)
     q2 = normal(substrate, a)
     bare, empty = equal_media(ambient, substrate), equal_media(ambient, layer, substrate)
-    letters = polarisations[:1] if angle is None else polarisations
     sides, fluxes = [], []
-    for polarisation in letters:
+    for polarisation in polarisations[:1] if angle is None else polarisations:
         if polarisation == "s":
             A, B, A_, B_ = q0 + q2, q0 * q2 + q1_square, q0 - q2, q0 * q2 - q1_square
         else:
@@ -188,9 +183,9 @@ def film(
             A, B, A_, B_ = e0 * q2 + e2 * q0, u + v, e2 * q0 - e0 * q2, v - u
         A_, B_ = zero_where(bare, A_), zero_where(empty, B_)
         flux = incident_factor(ambient, q0, polarisation) * normal_flux(substrate, q2, polarisation)
-        if is_real(A):  # and positive: over A, which cancels, a product less at each point
-            over = 1 / A
-            A, A_, B, B_, flux = 1.0, A_ * over, B * over, B_ * over, flux * over * over
+        if is_real(A):  # and positive: divided by A, which cancels, one product less at each point
+            inverse = 1 / A
+            A, A_, B, B_, flux = 1.0, A_ * inverse, B * inverse, B_ * inverse, flux * inverse * inverse
         sides.append(Amplitudes((A_, B_), (-A_, B_), (A, B)))
         fluxes.append(flux)
     results, scale_square = _amplitudes(tuple(sides), q1_square, phase, propagating and is_real(layer))

@@ -1,4 +1,4 @@
-"""What a grid computes once: coefficients held outside the loop over its points."""
+"""Loop hoisting: compute coefficients once, outside the compiled loop over a grid."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ from jax.experimental.xla_metadata import set_xla_metadata
 from pellicle.optics.pair import Number
 
 
-def is_reused(value: Number, beside: Any) -> bool:
-    """Whether each element of `value` meets so many of `beside` that holding it takes little memory."""
+def is_reused(value: Number, grid: Any) -> bool:
+    """True if each element of `value` is used at 8 or more points of `grid`: storing it costs little."""
     own = jnp.broadcast_shapes(*(jnp.shape(x) for x in jax.tree.leaves(value)))
-    return 8 * math.prod(own) <= math.prod(jnp.broadcast_shapes(own, jnp.shape(beside)))
+    return 8 * math.prod(own) <= math.prod(jnp.broadcast_shapes(own, jnp.shape(grid)))
 
 
-def hoist(value: Number, beside: Any) -> Number:
-    """The same numbers, computed once and not again at every point of an array `beside` that they meet.
+def hoist(value: Number, grid: Any) -> Number:
+    """Return `value` unchanged, computed once and not again at each point of `grid` where it is used.
 
-    XLA moves what it takes for cheap into the loop that uses it and repeats it there at each point; where
-    two loops use it, each computes it anew, and not always to the same rounding. It does not look into
-    a function that is not to be inlined.
+    XLA fuses cheap expressions into the loop that uses them, and repeats them there at each point. Where
+    two loops use one, each recomputes it, and not always to the same rounding. XLA does not look into a
+    function that must not be inlined.
     """
-    if not is_reused(value, beside):
+    if not is_reused(value, grid):
         return value
     leaves, tree = jax.tree.flatten(value)
     with set_xla_metadata(inlineable="false"):
         # as one array: with many, the compiler gives up on vector instructions
-        rows = _itself(jnp.stack(jnp.broadcast_arrays(*leaves)))
+        rows = _identity(jnp.stack(jnp.broadcast_arrays(*leaves)))
     return jax.tree.unflatten(tree, list(rows))
 
 
 @jax.jit
-def _itself(rows: Any) -> Any:
+def _identity(rows: Any) -> Any:
     return rows

@@ -1,4 +1,4 @@
-"""The layer as a Fourier series in its round-trip phase: what an instrument damps order by order.
+"""Airy's formula as a Fourier series in the round-trip phase, damped order by order by an instrument.
 
 With a = r₁₂, β = r₂₃ e^{−Im φ}, ϕ = Re φ and γ = |aβ|²,
 
@@ -6,8 +6,8 @@ With a = r₁₂, β = r₂₃ e^{−Im φ}, ϕ = Re φ and γ = |aβ|²,
     C₀ = |a|² + |1−a²|²|β|²/(1−γ),    K = β[(1−a²)ā − a|1−a²|²|β|²/(1−γ)],
     |t|² = |t₁₂t₂₃|² e^{−Im φ}/(1−γ) · [1 + 2 Re Σ q^m e^{imϕ} W_m].
 
-W_m = 1 sums to Airy's formula. It converges for |q| < 1; what is left out after M orders is at
-most 2|K||q|^M/(1−|q|) times the next window.
+With W_m = 1 the sum is Airy's formula. It converges for |q| < 1. After M orders, the rest is at most
+2|K||q|^M/(1−|q|) times the next window factor.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from pellicle.optics.interface import fresnel, incident_factor, normal, normal_f
 from pellicle.optics.pair import Number, Pair, abs2, conj, imag, real
 
 Window = Callable[[int], Any]
-"""m → W_m, the factor that order m keeps."""
+"""m → W_m, the factor by which order m is damped."""
 
 
 FWHM = 2.3548200450309493
@@ -30,7 +30,7 @@ FWHM = 2.3548200450309493
 
 
 class AirySeries(NamedTuple):
-    """What one polarisation's series is made of."""
+    """Coefficients of the series for one polarisation."""
 
     upper: Number  # r from the ambient at the layer's upper face
     lower: Number  # r from the layer at its lower face
@@ -42,7 +42,7 @@ class AirySeries(NamedTuple):
 def airy_series(
     ambient: Any, layer: Number, substrate: Number, phase: Any, angle: Any, polarisation: str
 ) -> AirySeries:
-    """Arguments as for `film.film`; `phase` is k₀d = 2πd/λ, so that φ = 2 k₀d q₁."""
+    """Return the series of one layer; arguments as for `film.film`, with φ = 2 k₀d q₁."""
     a, q0 = transverse(ambient, angle)
     q1, q2 = normal(layer, a), normal(substrate, a)
     e0, e1, e2 = ambient * ambient, layer * layer, substrate * substrate
@@ -50,62 +50,68 @@ def airy_series(
         direct = 4 * abs2(q1) / abs2((q0 + q1) * (q1 + q2))
     else:
         direct = 4 * abs2(e1 * q1) / abs2((e1 * q0 + e0 * q1) * (e2 * q1 + e1 * q2))
+    flux = incident_factor(ambient, q0, polarisation) * direct * normal_flux(substrate, q2, polarisation)
     return AirySeries(
         upper=fresnel(ambient, q0, layer, q1, polarisation),
         lower=fresnel(layer, q1, substrate, q2, polarisation),
         damping=jnp.exp(-2 * phase * imag(q1)),
         phase=2 * phase * real(q1),
-        direct=incident_factor(ambient, q0, polarisation) * direct * normal_flux(substrate, q2, polarisation),
+        direct=flux,
     )
 
 
-def reversed_series(b: AirySeries) -> AirySeries:
-    """The same layer with the light coming from the substrate."""
-    return b._replace(upper=-b.lower, lower=-b.upper)
+def reversed_series(series: AirySeries) -> AirySeries:
+    """Return the series of the same layer for light from the substrate."""
+    return series._replace(upper=-series.lower, lower=-series.upper)
 
 
-def _series(first: Number, q: Number, phase, window: Window, count: int):
-    """2 Re Σ_{m=1..count} first·q^{m−1} e^{imϕ} W_m."""
+def _damped_sum(first: Number, q: Number, phase: Any, window: Window, count: int) -> Any:
+    """Return 2 Re Σ_{m=1..count} first·q^{m−1} e^{imϕ} W_m."""
     sine, cosine = sincos(phase)
-    turn = Pair(cosine, sine)
-    term, step, total = first * turn, q * turn, 0.0
+    rotation = Pair(cosine, sine)
+    term, step, total = first * rotation, q * rotation, 0.0
     for m in range(1, count + 1):
         total = total + real(term) * window(m)
         term = term * step
     return 2 * total
 
 
-def reflectance(b: AirySeries, window: Window, count: int):
-    """|r|² with `count` orders through the window."""
-    beta = b.lower * b.damping
-    into = 1 - b.upper * b.upper
-    echo = abs2(into) * abs2(beta) / (1 - abs2(b.upper * beta))
-    first = beta * (into * conj(b.upper) - b.upper * echo)
-    return abs2(b.upper) + echo + _series(first, -(b.upper * beta), b.phase, window, count)
+def reflectance(series: AirySeries, window: Window, count: int) -> Any:
+    """Return |r|² with `count` orders damped by `window`."""
+    beta = series.lower * series.damping
+    into = 1 - series.upper * series.upper
+    echo = abs2(into) * abs2(beta) / (1 - abs2(series.upper * beta))
+    first = beta * (into * conj(series.upper) - series.upper * echo)
+    orders = _damped_sum(first, -(series.upper * beta), series.phase, window, count)
+    return abs2(series.upper) + echo + orders
 
 
-def transmittance(b: AirySeries, window: Window, count: int):
-    """Power into the substrate with `count` orders through the window."""
-    q = -(b.upper * b.lower * b.damping)
-    return b.direct * b.damping / (1 - abs2(q)) * (1 + _series(q, q, b.phase, window, count))
+def transmittance(series: AirySeries, window: Window, count: int) -> Any:
+    """Return the power into the substrate with `count` orders damped by `window`."""
+    q = -(series.upper * series.lower * series.damping)
+    orders = _damped_sum(q, q, series.phase, window, count)
+    return series.direct * series.damping / (1 - abs2(q)) * (1 + orders)
 
 
 def monochromatic(order: int) -> float:
-    """The window of light of one wavelength on an even layer: every order is whole."""
+    """Return 1: the window of monochromatic light on a uniform layer damps no order."""
     return 1.0
 
 
-def gaussian(variance) -> Window:
-    """W_m = exp(−m²σ²/2): the phase ϕ is blurred by a normal distribution of variance σ² (rad²)."""
+def gaussian(variance: Any) -> Window:
+    """Return W_m = exp(−m²σ²/2), for a phase ϕ blurred by a normal distribution of variance σ² (rad²)."""
     return lambda m: jnp.exp(-0.5 * m * m * variance)
 
 
-def phase_variance(phase_slope, bandwidth, cosine_index, thickness_spread, wavelength):
-    """Variance of the phase (rad²) seen by an instrument.
+def phase_variance(
+    phase_slope: Any, bandwidth: Any, cosine_index: Any, thickness_spread: Any, wavelength: Any
+) -> Any:
+    """Return the variance (rad²) of the round-trip phase over a bandwidth and a non-uniform thickness.
 
-    `phase_slope` is ∂ϕ/∂λ (rad/nm) with the layer's dispersion in it (the group index: ϕ/λ alone is
-    wrong by 0.01 in R for 2 µm of a dispersive film at 5 nm); `bandwidth` is the full width at half
-    maximum (nm); `cosine_index` is Re q₁; `thickness_spread` a standard deviation (nm).
+    **Arguments:** `phase_slope` is ∂ϕ/∂λ (rad/nm) including the layer's dispersion (the group index:
+    ϕ/λ alone is wrong by 0.01 in R for 2 µm of a dispersive film at 5 nm); `bandwidth` the full width at
+    half maximum (nm); `cosine_index` Re q₁; `thickness_spread` a standard deviation (nm); `wavelength` in
+    nm.
     """
     over_wavelength = phase_slope * (bandwidth / FWHM)
     over_thickness = 4 * jnp.pi / wavelength * cosine_index * thickness_spread

@@ -1,9 +1,9 @@
-"""Numbers whose real and imaginary parts are separate arrays.
+"""Complex numbers as pairs of real arrays, with arithmetic over real, complex and paired numbers.
 
-XLA's complex arithmetic on a CPU costs three times the same maths on separate real arrays. So
-formulas are written once, over the functions below, which take a real array, a complex array or a
-`Pair`, and give back the narrowest of these that holds the answer. A part of a `Pair` that is
-`None` is absent: known to be zero when the program is traced, so nothing is computed for it.
+XLA's complex arithmetic on a CPU takes three times as long as the same formula on separate real arrays.
+So formulas are written once, with the functions below, which accept a real array, a complex array or a
+`Pair`, and return the narrowest type that represents the result. A part of a `Pair` that is `None` is
+absent: it is known to be zero when the program is traced, and nothing is computed for it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Number: TypeAlias = Any
 class Pair:
     """A complex number as two real arrays, either of which may be None (absent)."""
 
-    __array_ufunc__ = None  # numpy arrays leave the operation to us
+    __array_ufunc__ = None  # NumPy arrays defer to the operators below
     __array_priority__ = 1000
 
     def __init__(self, re: Any, im: Any):
@@ -70,24 +70,24 @@ class Pair:
         return conj(self) * (other / abs2(self))
 
 
-def _plus(a, b):
+def _plus(a: Any, b: Any) -> Any:
     return b if a is None else a if b is None else a + b
 
 
-def _times(a, b):
+def _times(a: Any, b: Any) -> Any:
     return None if a is None or b is None else a * b
 
 
-def _minus(a):
+def _minus(a: Any) -> Any:
     return None if a is None else -a
 
 
-def _some(a):
+def _or_zero(a: Any) -> Any:
     return 0.0 if a is None else a
 
 
 def parts(z: Number) -> tuple[Any, Any]:
-    """Real and imaginary part; None where a part is absent."""
+    """Return the real and imaginary part; None where a part is absent."""
     if isinstance(z, Pair):
         return z.re, z.im
     if jnp.iscomplexobj(z):
@@ -96,40 +96,40 @@ def parts(z: Number) -> tuple[Any, Any]:
 
 
 def narrow(re: Any, im: Any) -> Number:
-    """A real array if the imaginary part is absent, else a Pair."""
+    """Return a real array if the imaginary part is absent, else a `Pair`."""
     return re if im is None else Pair(re, im)
 
 
-def real(z: Number):
-    """The real part; 0 where it is absent."""
-    return _some(parts(z)[0])
+def real(z: Number) -> Any:
+    """Return the real part; 0 where it is absent."""
+    return _or_zero(parts(z)[0])
 
 
-def imag(z: Number):
-    """The imaginary part; 0 where it is absent."""
-    return _some(parts(z)[1])
+def imag(z: Number) -> Any:
+    """Return the imaginary part; 0 where it is absent."""
+    return _or_zero(parts(z)[1])
 
 
 def is_real(z: Number) -> bool:
-    """True where the number's type says that it has no imaginary part."""
+    """True if the type of the number excludes an imaginary part."""
     return z.im is None if isinstance(z, Pair) else not jnp.iscomplexobj(z)
 
 
 def conj(z: Number) -> Number:
-    """The conjugate, of the same type."""
+    """Return the complex conjugate, of the same type."""
     if isinstance(z, Pair):
         return Pair(z.re, _minus(z.im))
     return jnp.conj(z) if jnp.iscomplexobj(z) else z
 
 
-def abs2(z: Number):
-    """|z|²."""
+def abs2(z: Number) -> Any:
+    """Return |z|²."""
     re, im = parts(z)
-    return _some(_plus(_times(re, re), _times(im, im)))
+    return _or_zero(_plus(_times(re, re), _times(im, im)))
 
 
 def times_i(z: Number) -> Number:
-    """i z; the parts of a Pair change places, so that an absent one stays absent."""
+    """Return i z; an absent part of a `Pair` stays absent."""
     if not isinstance(z, Pair) and jnp.iscomplexobj(z):
         return 1j * z
     re, im = parts(z)
@@ -137,36 +137,36 @@ def times_i(z: Number) -> Number:
 
 
 def to_pair(z: Number) -> Number:
-    """A complex array as a Pair; anything else unchanged."""
+    """Convert a complex array to a `Pair`; return anything else unchanged."""
     return Pair(jnp.real(z), jnp.imag(z)) if not isinstance(z, Pair) and jnp.iscomplexobj(z) else z
 
 
-def to_complex(z: Number):
-    """Any number as one complex array, for the public border."""
+def to_complex(z: Number) -> Any:
+    """Convert any number to one complex array, as public functions return it."""
     re, im = parts(z)
-    dtype = jnp.promote_types(jnp.result_type(_some(re), _some(im)), jnp.float32)
-    re, im = jnp.broadcast_arrays(jnp.asarray(_some(re)), jnp.asarray(_some(im)))
+    dtype = jnp.promote_types(jnp.result_type(_or_zero(re), _or_zero(im)), jnp.float32)
+    re, im = jnp.broadcast_arrays(jnp.asarray(_or_zero(re)), jnp.asarray(_or_zero(im)))
     return jax.lax.complex(re.astype(dtype), im.astype(dtype))
 
 
-def where(test, yes: Number, no: Number) -> Number:
-    """`jnp.where`, part by part; a part absent on both sides stays absent."""
+def where(test: Any, yes: Number, no: Number) -> Number:
+    """Apply `jnp.where` part by part; a part that is absent on both sides stays absent."""
     if not isinstance(yes, Pair) and not isinstance(no, Pair):
         return jnp.where(test, yes, no)
     (a, b), (c, d) = parts(yes), parts(no)
 
     def pick(p, q):
-        return None if p is None and q is None else jnp.where(test, _some(p), _some(q))
+        return None if p is None and q is None else jnp.where(test, _or_zero(p), _or_zero(q))
 
     return narrow(pick(a, c), pick(b, d))
 
 
 @jax.custom_jvp
 def sqrt(z: Number) -> Number:
-    """Square root with a nonnegative imaginary part: waves decay away from their source.
+    """Return the square root with a nonnegative imaginary part: waves decay away from their source.
 
-    A real array is a promise that it is never negative. At zero, where the true slope is
-    infinite, the derivative returned is zero.
+    A real array is a promise that no element is negative. At zero, where the true slope is infinite, the
+    derivative returned is zero.
     """
     if not isinstance(z, Pair):
         root = jnp.sqrt(z)
@@ -182,7 +182,7 @@ def sqrt(z: Number) -> Number:
 
 
 @sqrt.defjvp
-def _sqrt_slope(primal, tangent):
+def _sqrt_slope(primal: Any, tangent: Any) -> tuple[Number, Number]:
     root = sqrt(primal[0])
     at_zero = abs2(root) == 0
     safe = where(at_zero, 1.0 + 0.0 * root, root)

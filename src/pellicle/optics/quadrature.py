@@ -1,9 +1,9 @@
-"""Quadrature rules for a bandwidth, an uneven thickness and a cone of light, with their errors."""
+"""Quadrature over a bandwidth, a non-uniform thickness and a cone of light, with error estimates."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
@@ -11,43 +11,46 @@ import numpy as np
 
 
 def normal_rule(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes, in standard deviations, and weights of a normal distribution (Gauss and Hermite)."""
+    """Return nodes, in standard deviations, and weights for a normal distribution (Gauss-Hermite)."""
     nodes, weights = np.polynomial.hermite.hermgauss(count)
     return np.sqrt(2) * nodes, weights / np.sqrt(np.pi)
 
 
 class ConeRays(NamedTuple):
-    """The cone's rays: angles of incidence (radians), their weights, and how much of light that was
-    polarised s along the axis each carries as s."""
+    """Rays of a cone of light."""
 
-    angle: Any
+    angle: Any  # of incidence, radians
     weight: np.ndarray
-    s_share: Any
+    s_share: Any  # fraction that each ray carries as s of light polarised s along the axis
 
 
 @lru_cache(maxsize=64)
 def _legendre_rule(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Gauss-Legendre nodes and weights; a plan asks for the same few again and again, at 50 ms each."""
+    """Gauss-Legendre nodes and weights, cached: a plan asks for the same few repeatedly, at 50 ms each."""
     return np.polynomial.legendre.leggauss(count)
 
 
 def cone_rays(angle: Any, sine: Any, count: int, around: int) -> ConeRays:
-    """Rays that fill a pupil evenly, as an aplanatic lens does, in half a turn (the rest is its mirror).
+    """Return rays that fill a pupil evenly, as an aplanatic lens does, over half the azimuths.
 
-    `angle` of the axis (radians) and `sine` of the half angle broadcast; rays come first. `around` is
-    1 where the axis is the surface's normal: then every azimuth is the same. The lens turns each ray
-    about the axis perpendicular to its own meridian, and its polarisation with it (Richards and Wolf
-    1959, Proc. R. Soc. A 253, 358).
+    The other half is the mirror image. The lens turns each ray about the axis perpendicular to its
+    meridional plane, and turns the polarisation with it.
+
+    **Arguments:** `angle` of the axis (radians) and `sine` of the half angle broadcast; rays come first.
+    `count` is the number of rings, `around` the number of azimuths: 1 where the axis is the surface's
+    normal, for then all azimuths are equal.
+
+    **Source:** Richards and Wolf 1959, Proc. R. Soc. A 253, 358.
     """
     nodes, weights = _legendre_rule(count)
     radius = np.sqrt(0.5 * (nodes + 1))
     if around == 1:
-        return ConeRays(jnp.arcsin(_first(radius, sine) * sine), 0.5 * weights, 0.5)
+        return ConeRays(jnp.arcsin(_leading_axis(radius, sine) * sine), 0.5 * weights, 0.5)
     azimuth = np.pi * (np.arange(around) + 0.5) / around
     r, phi = (x.ravel() for x in np.meshgrid(radius, azimuth, indexing="ij"))
     shape = jnp.broadcast_shapes(np.shape(angle), np.shape(sine))
-    cos_phi, sin_phi = (_first(x, np.empty(shape)) for x in (np.cos(phi), np.sin(phi)))
-    rho = _first(r, np.empty(shape)) * sine
+    cos_phi, sin_phi = (_leading_axis(x, np.empty(shape)) for x in (np.cos(phi), np.sin(phi)))
+    rho = _leading_axis(r, np.empty(shape)) * sine
     along, c0, s0 = jnp.sqrt(1 - rho**2), jnp.cos(angle), jnp.sin(angle)
     across = (rho * sin_phi) ** 2 + (along * s0 - rho * cos_phi * c0) ** 2
     across = across + jnp.finfo(across.dtype).tiny  # so that no root has an infinite slope
@@ -56,26 +59,29 @@ def cone_rays(angle: Any, sine: Any, count: int, around: int) -> ConeRays:
     return ConeRays(theta, np.repeat(0.5 * weights, around) / around, s * s / across)
 
 
-def _first(x: np.ndarray, like: Any) -> np.ndarray:
-    """The nodes as a leading axis in front of another array's."""
+def _leading_axis(x: np.ndarray, like: Any) -> np.ndarray:
+    """Reshape nodes (count,) to (count, 1, ...), to broadcast in front of the axes of `like`."""
     return x.reshape(-1, *[1] * np.ndim(like))
 
 
 def normal_error(deviation: float, count: int) -> float:
-    """The largest error on a fringe blurred by up to `deviation` radians of phase."""
+    """Return the largest error of a fringe averaged over a phase blur of up to `deviation` radians."""
     nodes, weights = normal_rule(count)
     sigma = np.linspace(0.0, deviation, 200)
-    kept = np.cos(sigma[:, None] * nodes) @ weights
-    return float(np.max(np.abs(kept - np.exp(-0.5 * sigma**2))))
+    average = np.cos(sigma[:, None] * nodes) @ weights
+    return float(np.max(np.abs(average - np.exp(-0.5 * sigma**2))))
 
 
 def cone_error(phase: Callable[[Any], Any], angle: float, sine: float, count: int, around: int) -> float:
-    """The error on a fringe of phase(angle of incidence), against twelve times as many rays."""
-    fringe = partial(_fringe, phase, angle)
+    """Return the error of a fringe averaged over a cone, against twelve times as many rays.
+
+    **Arguments:** `phase` of the fringe as a function of the angle of incidence (radians), otherwise as
+    for `cone_rays`.
+    """
+
+    def fringe(sine: float, count: int, around: int) -> complex:
+        rays = cone_rays(angle, sine, count, around)
+        return complex(np.sum(rays.weight * np.exp(1j * np.asarray(phase(np.asarray(rays.angle))))))
+
     finer = (12 * count, 1 if around == 1 else 4 * around)
     return max(abs(fringe(s, count, around) - fringe(s, *finer)) for s in (0.5 * sine, sine))
-
-
-def _fringe(phase: Callable[[Any], Any], angle: float, sine: float, count: int, around: int) -> complex:
-    rays = cone_rays(angle, sine, count, around)
-    return complex(np.sum(rays.weight * np.exp(1j * np.asarray(phase(np.asarray(rays.angle))))))

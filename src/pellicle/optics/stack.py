@@ -1,10 +1,10 @@
-"""Several coherent layers: the product of characteristic matrices, each held to size.
+"""Response of several coherent layers: the product of characteristic matrices, rescaled layer by layer.
 
-The fields (E, H) at a layer's lower face give those at its upper face through the same two entire
-functions as one film (`characteristic.matrix_elements`), both times a scale; after each layer the fields are
-divided by their own size. So 50 layers with an opaque one among them stay finite, and nothing is
-clamped. Complex arithmetic: on separate real arrays a stack gains nothing. One `lax.scan` over the
-layers: unrolled, 50 of them do not compile in minutes.
+The fields (E, H) at a layer's lower face give those at its upper face by the elements of
+`characteristic.matrix_elements`, times their scale. After each layer the fields are divided by their
+norm, so that 50 layers with an opaque one among them stay finite without clamping. Complex arithmetic:
+separate real arrays bring nothing here. One `lax.scan` runs over the layers; unrolled, 50 of them do not
+compile in minutes.
 
 Source: Born and Wolf, Principles of Optics, section 1.6 (characteristic matrices).
 """
@@ -40,21 +40,19 @@ def stack(
     polarisations: str = "sp",
     roughness: Sequence[Any] | None = None,
 ) -> tuple[Response, ...]:
-    """Return the response of a stack, one for each letter of `polarisations`.
+    """Return the response of a stack, for each letter of `polarisations`.
 
-    `layers` and `phases` (k₀d = 2πd/λ of each) run from the ambient down; `roughness` is k₀σ of each
-    face from the top down, one more than there are layers, or None where all are smooth; the other
-    arguments are as for `film.film`. Every array broadcasts against every other.
+    **Arguments:** as for `coherent.responses`. Every array broadcasts against every other.
     """
     a, q0 = transverse(ambient, angle)
     leaves = jax.tree_util.tree_leaves((ambient, list(layers), substrate, list(phases), a, roughness))
     shape = jnp.broadcast_shapes(*(jnp.shape(x) for x in leaves))
     dtype = jnp.promote_types(jnp.result_type(*leaves), jnp.complex64)
 
-    def full(number: Number):
+    def full(number: Number) -> Any:
         return jnp.broadcast_to(to_complex(number).astype(dtype), shape)
 
-    def rows(numbers: Sequence[Any]):
+    def rows(numbers: Sequence[Any]) -> Any:
         return jnp.stack([full(n) for n in numbers]) if numbers else jnp.zeros((0, *shape), dtype)
 
     index, depth = rows(layers), jnp.real(rows(phases))
@@ -77,7 +75,7 @@ def stack(
         down, up = q_top * E / e0, q_bottom * E_ / e2
         flux = incident_factor(ambient, q0, polarisation) * normal_flux(bottom, q_bottom, polarisation)
         denominator = down + H
-        # the two directions share their denominator but for scale: bring the second to the first
+        # both directions have the same denominator except for its scale: rescale the second to the first
         reversed_ = (up - H_) / (up + H_) * denominator
         amplitudes = (zero_where(empty, down - H), reversed_, denominator)
         squares = Amplitudes(*(abs2(amplitude) for amplitude in amplitudes))
@@ -85,28 +83,28 @@ def stack(
     return tuple(responses)
 
 
-def _weight(index, polarisation: str):
-    """What divides q in the boundary condition: 1 for s, ε for p."""
+def _weight(index: Any, polarisation: str) -> Any:
+    """Return the divisor of q in the boundary condition: 1 for s, ε for p."""
     return jnp.ones_like(index) if polarisation == "s" else index * index
 
 
-def _rough_faces(q, weight, q_below, weight_below, rough):
-    """(2, faces, ...): by what the fields (E, H) grow on their way up through each rough face.
+def _rough_faces(q: Any, weight: Any, q_below: Any, weight_below: Any, rough: Any) -> Any:
+    """Return the factors (2, faces, ...) of the fields (E, H) on their way up through each rough face.
 
     Névot and Croce 1980 (Rev. Phys. Appl. 15, 761): r exp(−x) with x = 2 k₀²σ² q q′, and
-    t exp(k₀²σ² (q − q′)²/2). In terms of fields this is diagonal, and with (1 − e^−x)/x entire, so
-    that a face that is smooth, or at a critical angle, is no special case.
+    t exp(k₀²σ² (q − q′)²/2). In terms of fields this is diagonal, with the entire function
+    (1 − e^−x)/x, so that a smooth face, or one at a critical angle, is no special case.
     """
     square = rough * rough
-    pull = square * _damped(2 * square * q * q_below)
+    damping = square * _expm1_ratio(2 * square * q * q_below)
     passed = jnp.exp(-0.5 * square * (q - q_below) ** 2)
-    E = 1 + pull * q_below * (q_below * weight / weight_below - q)
-    H = 1 + pull * q * (q * weight_below / weight - q_below)
+    E = 1 + damping * q_below * (q_below * weight / weight_below - q)
+    H = 1 + damping * q * (q * weight_below / weight - q_below)
     return jnp.stack([E * passed, H * passed])
 
 
-def _damped(x):
-    """(1 − e^−x)/x."""
+def _expm1_ratio(x: Any) -> Any:
+    """Return (1 − e^−x)/x, by its Taylor series near 0."""
     near = abs2(x) < 0.01
     small, far = jnp.where(near, x, 0), jnp.where(near, 1, x)
     taylor = jnp.ones_like(x)
@@ -115,8 +113,8 @@ def _damped(x):
     return jnp.where(near, taylor, (1 - jnp.exp(-far)) / far)
 
 
-def _fields(index, depth, admittance, faces, a, polarisation: str):
-    """(E, H) at the far face for a unit wave in the last medium, layer after layer, and the scale²."""
+def _fields(index: Any, depth: Any, admittance: Any, faces: Any, a: Any, polarisation: str) -> Any:
+    """Return (E, H) at the far face for a unit wave in the last medium, and |scale|²."""
 
     def through_layer(carry, layer):
         (E, H), scale_square = carry
