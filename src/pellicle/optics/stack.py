@@ -30,6 +30,9 @@ from pellicle.optics.interface import (
 from pellicle.optics.pair import Number, abs2, to_complex
 from pellicle.optics.response import Amplitudes, Response
 
+UNROLLED = 3
+"""Layers up to which the loop over them is unrolled."""
+
 
 def stack(
     ambient: Any,
@@ -130,5 +133,7 @@ def _fields(index: Any, depth: Any, admittance: Any, faces: Any, a: Any, polaris
 
     start = (jnp.ones_like(admittance), admittance), jnp.ones_like(jnp.real(admittance))
     inner = None if faces is None else jnp.moveaxis(faces[:, :-1], 0, 1)
-    ((E, H), scale_square), _ = jax.lax.scan(through_layer, start, (index, depth, inner))
+    ((E, H), scale_square), _ = jax.lax.scan(
+        through_layer, start, (index, depth, inner), unroll=len(index) <= UNROLLED
+    )
     return ((E, H) if faces is None else (E * faces[0, -1], H * faces[1, -1])), scale_square

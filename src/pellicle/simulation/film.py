@@ -16,6 +16,7 @@ from pellicle.dispersion.empirical import Tabulated
 from pellicle.effects.plan import Plan
 from pellicle.materials import materials_in
 from pellicle.optics import ellipsometry, plate
+from pellicle.optics.layout import stack_rows
 from pellicle.scene.film import Scene, thickness_spread
 from pellicle.scene.free import free_leaves
 from pellicle.scene.layers import Interface, Layer
@@ -124,7 +125,7 @@ def _mean(rows: Any) -> Any:
 
 def _normalised_stokes(rows: Any) -> Any:
     """N, C and S of each wavelength in one array."""
-    return jnp.stack(ellipsometry.normalised(ellipsometry.Stokes(*rows)), -1).reshape(-1)
+    return stack_rows(ellipsometry.normalised(ellipsometry.Stokes(*rows))).T.reshape(-1)
 
 
 def _photometer(plan: Plan) -> Intensities:
@@ -137,7 +138,7 @@ def _photometer(plan: Plan) -> Intensities:
 
     def intensities(scene: Scene):
         groups = coherent_groups(plan, scene)
-        return jnp.stack([power(plan, groups, p) for p in polarisations])
+        return stack_rows([power(plan, groups, p) for p in polarisations])
 
     return intensities
 
@@ -149,9 +150,9 @@ def _ellipsometer(plan: Plan) -> Intensities:
         groups = coherent_groups(plan, scene)
         if len(groups) == 1:
             s, p = (response_of(plan, groups[0], polarisation) for polarisation in "sp")
-            return jnp.stack(ellipsometry.stokes(s, p))
+            return stack_rows(ellipsometry.stokes(s, p))
         s, p = (reflected(plan, groups, polarisation) for polarisation in "sp")
-        return jnp.stack(ellipsometry.stokes_from_sums(s, p, _cross_product(plan, groups)))
+        return stack_rows(ellipsometry.stokes_from_sums(s, p, _cross_product(plan, groups)))
 
     return intensities
 

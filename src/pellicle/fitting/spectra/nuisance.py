@@ -20,6 +20,7 @@ import numpy as np
 from jax.scipy.linalg import cho_factor, cho_solve
 from jaxtyping import ScalarLike
 
+from pellicle.optics.layout import stack_rows
 from pellicle.scene.instrument import Drift, Instrument
 
 _LOOSE = 10.0
@@ -79,7 +80,7 @@ def solve(signal, data: Data, instrument: Instrument) -> Solved:
     one = jnp.ones_like(signal)
     known = scale * signal + offset * one
     columns = [g * signal for g in gains.basis] if gains else []
-    columns = jnp.stack([*columns, *(shifts.basis if shifts else [])]) if gains or shifts else None
+    columns = stack_rows([*columns, *(shifts.basis if shifts else [])]) if gains or shifts else None
     if columns is None:
         residual = weight * (data.values - known)
         return Solved(known, residual, scale * one, offset * one, jnp.sum(residual**2))

@@ -15,6 +15,7 @@ from pellicle.fitting.problem import Explained, Noise
 from pellicle.fitting.program_cache import kept
 from pellicle.fitting.spectra import nuisance
 from pellicle.fitting.spectra.nuisance import Coefficient, Data
+from pellicle.optics.layout import stack_rows
 from pellicle.planning.differences import largest_difference, signals
 from pellicle.planning.film import full_plan
 from pellicle.scene.film import Scene
@@ -90,7 +91,7 @@ def local(form: SpectrumForm, scene: Scene, data: Data, values: Any) -> Local:
         numbers = insert(scene, list(values))
         medium: Any = numbers.substrate if shown is None else numbers.layers[shown]
         index = medium.material(numbers.light.wavelength)
-        return form.simulate(numbers, data), jnp.stack([index.real, index.imag])
+        return form.simulate(numbers, data), stack_rows([index.real, index.imag])
 
     (signal, layer), push = jax.linearize(both, values)
     slope, layer_slope = jax.vmap(push, out_axes=-1)(jnp.eye(len(values)))
