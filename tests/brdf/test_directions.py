@@ -1,4 +1,4 @@
-"""Directions: Snell's and the mirror law from vectors, and slopes where roots vanish."""
+"""Directions: Snell's law and the law of reflection by vectors, and slopes where roots vanish."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ NORMAL = d.direction(RNG.uniform(0, 20, 50), RNG.uniform(-180, 180, 50))
 Z = jnp.array([0.0, 0.0, 1.0])
 
 
-def test_a_direction_by_its_angles():
+def test_direction_from_angles():
     root = np.sqrt(0.5)
     np.testing.assert_allclose(d.direction(45.0, 90.0), [0, root, root], atol=1e-15)
     np.testing.assert_allclose(d.direction(90.0, 180.0), [-1, 0, 0], atol=1e-15)
 
 
-def test_frames_turn_to_their_normal():
+def test_frames_are_tilted_to_their_normal():
     theta, phi = RNG.uniform(0, 90, 20), RNG.uniform(-180, 180, 20)
     frames = d.frame(theta, phi)
     np.testing.assert_allclose(frames @ frames.mT, np.broadcast_to(np.eye(3), (20, 3, 3)), atol=1e-14)
@@ -30,23 +30,23 @@ def test_frames_turn_to_their_normal():
     np.testing.assert_allclose(d.frame(0.0, 77.0), np.eye(3), atol=1e-15)
 
 
-def test_the_mirror_law():
+def test_law_of_reflection():
     mirrored = d.reflect(V, NORMAL)
     np.testing.assert_allclose(d.dot(mirrored, NORMAL), d.dot(V, NORMAL), atol=1e-14)
     np.testing.assert_allclose(np.cross(mirrored + V, NORMAL), 0, atol=1e-14)
 
 
-def test_snell_as_vectors():
+def test_snells_law_by_vectors():
     """n₁ t × n = n₀ (−v) × n, t is a unit vector, and it points down."""
     index = RNG.uniform(1.05, 2.5, 50)
     t = d.refract(V, NORMAL, index)
-    lit = np.asarray(d.dot(V, NORMAL)) > 0
+    above = np.asarray(d.dot(V, NORMAL)) > 0
     np.testing.assert_allclose(index[:, None] * np.cross(t, NORMAL), -np.cross(V, NORMAL), atol=1e-14)
     np.testing.assert_allclose(d.length(t), 1, atol=1e-14)
-    assert np.all(np.asarray(d.dot(t, NORMAL))[lit] < 0)
+    assert np.all(np.asarray(d.dot(t, NORMAL))[above] < 0)
 
 
-def test_refraction_at_its_edges():
+def test_refraction_at_grazing_incidence_and_in_total_reflection():
     grazing = d.direction(90.0, 0.0)
     np.testing.assert_allclose(d.refract(grazing, Z, 1.0), -grazing, atol=1e-15)
     assert np.all(d.refract(d.direction(60.0, 0.0), Z, 0.8) == 0)
@@ -62,15 +62,31 @@ def test_half_vectors():
     assert np.all(d.half_vector(i, -i) == 0)
 
 
-@pytest.mark.parametrize("theta", [0.0, 90.0])
-def test_slopes_are_finite_at_normal_and_grazing(theta):
+def jacobian(function, v):
+    """Return the Jacobian by automatic differentiation and by central differences."""
+    steps = 1e-6 * jnp.eye(3)
+    numeric = jnp.stack([(function(v + s) - function(v - s)) / 2e-6 for s in steps], axis=-1)
+    return jax.jacfwd(function)(v), numeric
+
+
+@pytest.mark.parametrize("theta", [0.0, 40.0, 90.0])
+def test_slopes_at_normal_and_grazing_incidence(theta):
     v = d.direction(theta, 30.0)
-    for function in (
-        lambda v: d.refract(v, Z, 1.0),
-        lambda v: d.refract(v, Z, 1.5),
-        lambda v: d.half_vector(v, v * jnp.array([-1.0, -1.0, 1.0])),
-        lambda v: d.half_vector(v, -v),
-        lambda v: d.angle_to_half(v, v),
-        lambda v: d.reflect(v, Z),
-    ):
-        assert np.all(np.isfinite(jax.jacfwd(function)(v)))
+    smooth = [lambda v: d.refract(v, Z, 1.5), lambda v: d.reflect(v, Z)]
+    if theta < 90:  # at 90 degrees both vectors are opposite
+        smooth.append(lambda v: d.half_vector(v, v * jnp.array([-1.0, -1.0, 1.0])))
+    for function in smooth:
+        np.testing.assert_allclose(*jacobian(function, v), atol=1e-8)
+
+
+def test_slope_of_refraction_without_contrast_is_that_of_minus_v():
+    """At grazing incidence too, where the root in cos θ₁ vanishes."""
+    slope = jax.jacfwd(lambda v: d.refract(v, Z, 1.0))(d.direction(90.0, 30.0))
+    np.testing.assert_allclose(slope, -np.eye(3), atol=1e-15)
+
+
+def test_slopes_are_zero_where_a_root_vanishes():
+    """The true slopes depend on the direction of the step."""
+    grazing = d.direction(90.0, 30.0)
+    for function in (lambda v: d.half_vector(v, -v), lambda v: d.angle_to_half(v, v)):
+        assert np.all(jax.jacfwd(function)(grazing) == 0)

@@ -26,19 +26,19 @@ FACETS = jax.jit(lambda s, i, o: model("microfacet-film")(s, i, o))
 exact = jax.jit(film_colour.exact)
 
 
-def test_film_colour_is_tmm_at_the_facet():
-    found = exact({**STEEL, **SENSOR, "k": 0.1}, I, O)
+def test_film_colour_equals_tmm_at_the_facet():
+    colour = exact({**STEEL, **SENSOR, "k": 0.1}, I, O)
     for row in range(0, N, 10):
         angle = np.arccos(float(cosine_to_half(I[row], O[row])))
         for channel, wavelength in enumerate(RGB):
             media = [1, 2.9 + 0.1j, 2.7 + 2.8j], [np.inf, 40.0, np.inf]
             expected = tmm.unpolarized_RT(*media, angle, wavelength)["R"]
-            assert float(found[row, channel]) == pytest.approx(expected, rel=1e-9)
+            assert float(colour[row, channel]) == pytest.approx(expected, rel=1e-9)
 
 
 @pytest.mark.parametrize("thickest", [100, 1500])
-def test_nodes_follow_the_exact_film(thickest):
-    """Within the 1e-4 that `nodes` promises, for films and bases all over their bounds."""
+def test_nodes_agree_with_the_exact_film(thickest):
+    """Within the 1e-4 that `node_count` promises, for random films and bases within their bounds."""
     chebyshev = jax.jit(film_colour.chebyshev(thickest))
     for _ in range(60):
         film = {
@@ -52,7 +52,7 @@ def test_nodes_follow_the_exact_film(thickest):
         np.testing.assert_allclose(chebyshev(film, I, O), exact(film, I, O), atol=1e-4)
 
 
-def test_fewer_nodes_for_thinner_films():
+def test_thinner_films_take_fewer_nodes():
     assert [film_colour.node_count(d) for d in (0, 500, 1500)] == [24, 56, 112]
     steel = model("microfacet-film")
     assert steel.for_thickness_up_to(100).evaluate is not steel.evaluate
@@ -74,15 +74,15 @@ def test_tempered_steel_turns_straw_then_purple_then_blue():
     assert 190 < blue < 250
 
 
-def test_weights_integrate_a_sensor():
-    """Two wavelengths of equal weight are the mean of their reflectances."""
-    nodes = {"wavelengths": np.array([500.0, 600.0])}
-    apart = exact({**STEEL, **nodes}, I, O)
-    together = exact({**STEEL, **nodes, "weights": np.full((2, 3), 0.5)}, I, O)
-    np.testing.assert_allclose(together, np.repeat(apart.mean(-1)[:, None], 3, 1), rtol=1e-12)
+def test_weights_integrate_over_a_sensor():
+    """Two wavelengths of equal weight give the mean of their reflectances."""
+    wavelengths = {"wavelengths": np.array([500.0, 600.0])}
+    each = exact({**STEEL, **wavelengths}, I, O)
+    weighted = exact({**STEEL, **wavelengths, "weights": np.full((2, 3), 0.5)}, I, O)
+    np.testing.assert_allclose(weighted, np.repeat(each.mean(-1)[:, None], 3, 1), rtol=1e-12)
 
 
-def test_microfacets_compose_lobe_and_colour():
+def test_microfacets_multiply_lobe_and_colour():
     s = {**STEEL, "specular": 2.0, "diffuse": 0.3}
     expected = 2 * lobes.microfacets(I, O, 0.2)[:, None] * exact({**s, **SENSOR}, I, O) + 0.3
     np.testing.assert_allclose(FACETS(s, I, O), expected, rtol=1e-6)
@@ -90,13 +90,13 @@ def test_microfacets_compose_lobe_and_colour():
 
 def test_a_thickness_map():
     thickness = np.linspace(10, 70, N)
-    found = FACETS({**STEEL, "thickness": thickness}, I, O)
+    result = FACETS({**STEEL, "thickness": thickness}, I, O)
     one = model("microfacet-film")({**STEEL, "thickness": float(thickness[7])}, I[7], O[7])
-    np.testing.assert_allclose(found[7], one, rtol=1e-10)
+    np.testing.assert_allclose(result[7], one, rtol=1e-10)
 
 
-def test_microfacets_return_at_most_what_the_film_reflects():
-    """A film that reflects everything (a perfect metal below) loses only what bounces between facets."""
+def test_microfacets_reflect_at_most_as_much_as_the_film():
+    """On a perfect metal, which reflects everything, only light between facets is lost."""
     mirror = {**STEEL, "base_n": 0.001, "base_k": 50.0, "roughness": 0.05}
     albedo = np.asarray(jax.jit(lambda s: directional_albedo(FACETS, s, 30.0, rings=128, spokes=256))(mirror))
     assert np.all((albedo > 0.985) & (albedo < 1.001))
@@ -105,8 +105,8 @@ def test_microfacets_return_at_most_what_the_film_reflects():
 SHADER = {"ambient_n": 1.0, "n": 1.5, "base_n": 2.0, "thickness": 250.0, "wavelengths": np.array([550.0])}
 
 
-def test_the_shader_counts_its_phase_twice():
-    """FINDINGS.md: 0.0942 as published, 0.0239 by tmm."""
+def test_the_published_shader_counts_the_phase_twice():
+    """0.0942 as published, 0.0239 by tmm."""
     up = jnp.array(0.0)
     assert float(blinn_phong_film.published(SHADER, up)[0]) == pytest.approx(0.0942, abs=5e-5)
     truth = tmm.unpolarized_RT([1, 1.5, 2], [np.inf, 250, np.inf], 0, 550)["R"]
@@ -120,8 +120,8 @@ def test_phase_average_is_the_mean_over_a_period(angle):
     heights = np.arange(200) / 200 * 550 / (2 * 1.5 * cosine)
     angles = jnp.full(200, angle)
     mean = film_colour.reflectance({**SHADER, "thickness": heights}, angles).mean()
-    found = blinn_phong_film.phase_average(SHADER, jnp.array(angle))
-    assert float(found[0]) == pytest.approx(float(mean), rel=1e-12)
+    average = blinn_phong_film.phase_average(SHADER, jnp.array(angle))
+    assert float(average[0]) == pytest.approx(float(mean), rel=1e-12)
 
 
 def test_a_film_without_interference_is_the_mean_over_its_phase():
@@ -133,11 +133,11 @@ def test_a_film_without_interference_is_the_mean_over_its_phase():
     assert float(flat[0]) == pytest.approx(float(waves), rel=1e-12)
 
 
-def test_light_that_never_returns_has_met_one_face():
+def test_an_opaque_film_reflects_like_one_face():
     deep = {**STEEL, "n": 2.2, "k": 0.2, "thickness": 1e5, "wavelengths": np.array([550.0])}
     truth = tmm.unpolarized_RT([1, 2.2 + 0.2j, 1], [np.inf, 1e5, np.inf], 0.6, 550)["R"]
-    found = film_colour.without_interference(deep, jnp.array(0.6))
-    assert float(found[0]) == pytest.approx(truth, rel=1e-9)
+    result = film_colour.without_interference(deep, jnp.array(0.6))
+    assert float(result[0]) == pytest.approx(truth, rel=1e-9)
 
 
 def test_total_reflection_is_total():
@@ -151,8 +151,8 @@ def test_total_reflection_is_total():
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_every_model_has_the_same_shape(name):
-    """Finite value and slope in every parameter at defaults; nothing below the horizon; float32 stays."""
+def test_every_model_has_finite_values_and_slopes(name):
+    """At the defaults, in every parameter; 0 below the horizon; float32 in gives float32 out."""
     m = model(name)
     i, o = (
         direction(np.array([0.0, 30.0, 90.0, 100.0]), 0.0),
@@ -177,19 +177,19 @@ def test_presets_are_complete(name):
     assert set(parameters) == {p.key for p in model(which).parameters}
 
 
-def test_a_wrong_name_says_the_nearest():
+def test_an_unknown_name_suggests_the_nearest():
     with pytest.raises(ValueError, match="did you mean 'microfacet-film'"):
         model("microfacet-fil")
 
 
-def test_slopes_of_the_film_are_finite_differences():
+def test_slopes_of_the_film_against_finite_differences():
     m = FACETS
     s = {**STEEL, "diffuse": 0.1, "k": 0.05}
     slope = jax.jit(jax.jacfwd(lambda free: m({**s, **free}, I, O)))(
         {key: s[key] for key in ("thickness", "roughness", "n")}
     )
-    for key, found in slope.items():
+    for key, result in slope.items():
         step = 1e-5 * s[key]
         up, down = (m({**s, key: s[key] + sign * step}, I, O) for sign in (1, -1))
         expected = (up - down) / (2 * step)
-        np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-7 * float(jnp.max(jnp.abs(expected))))
+        np.testing.assert_allclose(result, expected, rtol=1e-5, atol=1e-7 * float(jnp.max(jnp.abs(expected))))

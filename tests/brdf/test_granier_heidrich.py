@@ -1,4 +1,4 @@
-"""The layered model of 2002 against its own vectors, mpmath, quadrature, and the facts known of it."""
+"""The model of Granier and Heidrich against its equations by vectors, mpmath and quadrature."""
 
 from __future__ import annotations
 
@@ -44,21 +44,21 @@ def unit(theta, phi):
 
 
 def downward(v, index):
-    """Snell by angles: the azimuth turns half round, and light travels down."""
+    """Return the refracted direction by angles: it points down, and its azimuth is reversed."""
     inside = np.arcsin(np.hypot(v[0], v[1]) / index)
     return -unit(np.rad2deg(inside), np.rad2deg(np.arctan2(v[1], v[0])))
 
 
 def by_hand(s, i, o, index, wavelength):
-    """Eqs. 3 and 5 to 10 with vectors, one channel of one pair of directions."""
+    """Evaluate eqs. 3 and 5 to 10 by vectors, for one channel of one pair of directions."""
     n0, n1 = np.array([0, 0, 1.0]), unit(s["deviation"], s["azimuth"])
     down_i, down_o = downward(i, index), downward(o, index)
     f = ((1 - index) / (1 + index)) ** 2
     F = f + (1 - f) * (1 - i @ n0) ** 5
     T_o = (1 - f) * (1 - (1 + down_o @ n0) ** 5)
     mirrored = 2 * (i @ n0) * n0 - i
-    bounced = down_i - 2 * (down_i @ n1) * n1
-    lobe = bounced @ -down_o
+    mirrored_inside = down_i - 2 * (down_i @ n1) * n1
+    lobe = mirrored_inside @ -down_o
     null = down_i @ n1 >= 0 or down_o @ n1 >= 0 or lobe <= 0
     R = F * max(mirrored @ o, 0) ** s["exponent_reflection"]
     T = 0 if null else (1 - F) * T_o * lobe ** s["exponent_transmission"]
@@ -66,7 +66,7 @@ def by_hand(s, i, o, index, wavelength):
     return s["specular"] * (R + T + 2 * np.cos(2 * phase) * np.sqrt(R * T)) + s["diffuse"]
 
 
-def test_it_is_the_paper_by_vectors():
+def test_equations_of_the_paper_by_vectors():
     expected = [
         [by_hand(SURFACE, i, o, *channel) for channel in zip(SURFACE["n"], WAVELENGTHS, strict=True)]
         for i, o in zip(np.asarray(I), np.asarray(O), strict=True)
@@ -74,7 +74,7 @@ def test_it_is_the_paper_by_vectors():
     np.testing.assert_allclose(PUBLISHED(SURFACE, I, O), expected, rtol=1e-11)
 
 
-def test_only_the_variant_is_reciprocal():
+def test_only_the_reciprocal_variant_is_reciprocal():
     there, back = RECIPROCAL(SURFACE, I, O), RECIPROCAL(SURFACE, O, I)
     np.testing.assert_allclose(there, back, rtol=1e-12)
     there, back = PUBLISHED(SURFACE, I, O), PUBLISHED(SURFACE, O, I)
@@ -89,7 +89,7 @@ def test_diffuse_reflectance_is_the_average_of_schlick(n):
     assert float(gh.diffuse_reflectance(n) + gh.diffuse_transmittance(n)) == pytest.approx(1, rel=1e-14)
 
 
-def test_mean_cosine_weighs_all_solid_angle_alike():
+def test_mean_cosine_weights_all_solid_angles_equally():
     mean = mpmath.quad(lambda c: mpmath.sqrt(1 - (1 - c * c) / 2.25), [0, 1])
     assert float(gh.mean_cosine_inside(1.5)) == pytest.approx(float(mean), rel=1e-13)
 
@@ -97,14 +97,14 @@ def test_mean_cosine_weighs_all_solid_angle_alike():
 def test_diffuse_part_is_eq_16():
     n, T = SURFACE["n"], 80 / 21 * SURFACE["n"] / (1 + SURFACE["n"]) ** 2
     expected = 1 + 2 * np.cos(4 * np.pi * n * 71.0 / WAVELENGTHS) * np.sqrt(T * (1 - T))
-    found = model("granier-heidrich-diffuse")({"thickness": 71.0, "n": n, "diffuse": 0.7}, I, O)
-    np.testing.assert_allclose(found, np.broadcast_to(0.7 * expected, (N, 3)), rtol=1e-12)
+    diffuse = model("granier-heidrich-diffuse")({"thickness": 71.0, "n": n, "diffuse": 0.7}, I, O)
+    np.testing.assert_allclose(diffuse, np.broadcast_to(0.7 * expected, (N, 3)), rtol=1e-12)
     bare = PUBLISHED({**SURFACE, "diffuse": 0.0}, I, O)
     full = model("granier-heidrich-full")({**SURFACE, "diffuse": 0.7}, I, O)
-    np.testing.assert_allclose(full, bare + found, rtol=1e-12)
+    np.testing.assert_allclose(full, bare + diffuse, rtol=1e-12)
 
 
-def test_without_interference_it_is_the_mean_over_thickness():
+def test_without_interference_is_the_mean_over_thickness():
     """cos 2Φ averages to zero over whole periods of one direction and channel."""
     i, o, n = I[0], I[0] * jnp.array([-1.0, -1.0, 1.0]), 1.5
     inside = np.sqrt(1 - (1 - float(i[2]) ** 2) / n**2)
@@ -124,8 +124,8 @@ def test_energy_exceeds_one_as_published():
     assert max_albedo(PUBLISHED, broad) > 2
 
 
-def test_a_surface_that_creates_energy_is_told_with_the_number():
-    """Figure 3 is drawn with weights 1 and 0.7. Light at the normal, summed by hand over the hemisphere."""
+def test_the_energy_warning_gives_the_albedo():
+    """Figure 3 has weights 1 and 0.7; here light at the normal, summed over the hemisphere by quadrature."""
     name, figure = PRESETS["granier-heidrich figure 3, parallel"]
     node, weight = np.polynomial.legendre.leggauss(200)
     theta = 45 * (node + 1)
@@ -135,9 +135,9 @@ def test_a_surface_that_creates_energy_is_told_with_the_number():
     T = 80 / 21 * 1.4 / 2.4**2
     red += np.pi * 0.7 * (1 + 2 * np.cos(4 * np.pi * 1.4 * 71 / 645) * np.sqrt(T * (1 - T)))
     assert float(directional_albedo(model(name), figure, 0.0)[0]) == pytest.approx(red, rel=1e-6)
-    told = energy_warning(model(name), figure)
-    assert told is not None
-    assert float(told.split("up to ")[1].split()[0]) >= round(red, 2) > 1
+    warning = energy_warning(model(name), figure)
+    assert warning is not None
+    assert float(warning.split("up to ")[1].split()[0]) >= round(red, 2) > 1
     assert energy_warning(PUBLISHED, SURFACE | {"specular": 0.01, "diffuse": 0.1}) is None
 
 
@@ -161,23 +161,23 @@ def slopes(s, i, o):
     return jax.jacfwd(lambda free: PUBLISHED({**s, **free}, i, o))({key: s[key] for key in KEYS})
 
 
-def test_slopes_are_finite_differences():
-    found = slopes(SURFACE, I, O)
+def test_slopes_against_finite_differences():
+    result = slopes(SURFACE, I, O)
     for key in KEYS:
         step = 1e-5 * np.max(SURFACE[key])
         if key == "n":
             moved = [PUBLISHED({**SURFACE, "n": SURFACE["n"] + sign * step}, I, O) for sign in (1, -1)]
-            slope = jnp.einsum("nck->nc", found[key])
+            slope = jnp.einsum("nck->nc", result[key])
         else:
             moved = [PUBLISHED({**SURFACE, key: SURFACE[key] + sign * step}, I, O) for sign in (1, -1)]
-            slope = found[key]
+            slope = result[key]
         expected = (moved[0] - moved[1]) / (2 * step)
         scale = float(jnp.max(jnp.abs(expected)))
         np.testing.assert_allclose(slope, expected, rtol=1e-5, atol=1e-7 * scale)
 
 
 def test_value_and_slopes_are_finite_at_the_edges():
-    """Parallel boundaries, exponents at their bound, grazing and normal light, no layer, no contrast."""
+    """Parallel boundaries, exponents at their bounds, grazing and normal light, no layer, no contrast."""
     edge = direction(np.array([0.0, 90.0, 88.0, 45.0, 45.0]), np.array([0.0, 0.0, 10.0, 0.0, 0.0]))
     other = direction(np.array([0.0, 90.0, 88.0, 45.0, 90.0]), np.array([0.0, 180.0, 10.0, 0.0, 90.0]))
     for n in (1.0, 1.05, 1.41, 2.5):

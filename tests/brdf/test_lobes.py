@@ -1,8 +1,9 @@
-"""Lobes against quadrature, their limits, and slopes at their edges."""
+"""Lobes against quadrature and closed forms, their limits, and slopes at their edges."""
 
 from __future__ import annotations
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -24,18 +25,18 @@ def test_normalisation_of_cosine_lobes(exponent):
 
 
 @pytest.mark.parametrize("alpha", [0.1, 0.5, 1.0])
-def test_facets_of_ggx_cover_the_surface(alpha):
+def test_ggx_facets_cover_the_surface(alpha):
     assert float(lobes.ggx(AROUND, alpha) @ RING) == pytest.approx(1, rel=1e-6)
 
 
-def test_smith_is_the_closed_form():
+def test_smith_equals_the_closed_form():
     """Heitz 2014, eq. 99: G₂ = 1/(1 + Λ(i) + Λ(o)), Λ = (√(1 + α² tan² θ) − 1)/2."""
     theta = np.array([[10.0, 70.0], [35.0, 80.0], [60.0, 60.0]])
     tan, cos = np.tan(np.deg2rad(theta)), np.cos(np.deg2rad(theta))
     shadow = 0.5 * (np.sqrt(1 + (0.3 * tan) ** 2) - 1)
     expected = 1 / (1 + shadow.sum(1)) / (4 * cos.prod(1))
-    found = lobes.smith(direction(theta[:, 0], 0.0), direction(theta[:, 1], 130.0), 0.3)
-    np.testing.assert_allclose(found, expected, rtol=1e-13)
+    result = lobes.smith(direction(theta[:, 0], 0.0), direction(theta[:, 1], 130.0), 0.3)
+    np.testing.assert_allclose(result, expected, rtol=1e-13)
 
 
 def test_blinn_phong_is_a_power_of_the_half_vector():
@@ -47,20 +48,40 @@ def test_blinn_phong_is_a_power_of_the_half_vector():
 def test_narrow_ggx_keeps_its_shape_in_float32():
     i, o = direction(np.float32(30), np.float32(0)), direction(np.float32(30.2), np.float32(180))
     exact = lobes.ggx(half_vector(direction(30.0, 0.0), direction(30.2, 180.0)), 0.003)
-    found = lobes.ggx(half_vector(i, o), np.float32(0.003))
-    assert found.dtype == np.float32
-    assert float(found) == pytest.approx(float(exact), rel=1e-3)
+    narrow = lobes.ggx(half_vector(i, o), np.float32(0.003))
+    assert narrow.dtype == np.float32
+    assert float(narrow) == pytest.approx(float(exact), rel=1e-3)
 
 
+LOBES = [(lobes.phong, 1.0), (lobes.blinn_phong, 1.0), (lobes.phong, 1e5), (lobes.microfacets, 0.003)]
+
+
+@pytest.mark.parametrize(
+    ("lobe", "width"), [(lobes.phong, 30.0), (lobes.blinn_phong, 30.0), (lobes.microfacets, 0.2)]
+)
+@pytest.mark.parametrize("theta", [0.0, 60.0])
+def test_slopes_against_finite_differences(lobe, width, theta):
+    arguments = [direction(theta, 0.0), direction(40.0, 150.0), jnp.array(width)]
+    for position, step in ((0, 1e-6), (1, 1e-6), (2, 1e-6 * width)):
+
+        def along(x, position=position):
+            return lobe(*arguments[:position], x, *arguments[position + 1 :])
+
+        x = arguments[position]
+        steps = step * (jnp.eye(3) if x.ndim else jnp.ones(1))
+        numeric = [(along(x + s) - along(x - s)) / (2 * step) for s in steps]
+        slope = np.ravel(jax.jacfwd(along)(x))
+        np.testing.assert_allclose(slope, np.ravel(numeric), rtol=1e-6, atol=1e-8 * np.max(np.abs(numeric)))
+
+
+@pytest.mark.parametrize(("lobe", "width"), LOBES)
 @pytest.mark.parametrize("theta", [0.0, 60.0, 90.0])
-def test_slopes_are_finite(theta):
+def test_slopes_at_the_edges_of_a_lobe(lobe, width, theta):
+    """Finite everywhere; zero with a Phong lobe of width 1 on its dark side."""
     i = direction(theta, 0.0)
     for o in (i, direction(90.0, 90.0), direction(90.0, 180.0), -i):
-        for lobe, width in (
-            (lobes.phong, 1.0),
-            (lobes.blinn_phong, 1.0),
-            (lobes.phong, 1e5),
-            (lobes.microfacets, 0.003),
-        ):
-            for slope in jax.jacfwd(lobe, argnums=(0, 1, 2))(i, o, width):
-                assert np.all(np.isfinite(slope))
+        value = lobe(i, o, width)
+        for slope in jax.jacfwd(lobe, argnums=(0, 1, 2))(i, o, width):
+            assert np.all(np.isfinite(slope))
+            if lobe is lobes.phong and value == 0:
+                assert np.all(slope == 0)

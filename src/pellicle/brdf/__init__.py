@@ -1,7 +1,7 @@
-"""How surfaces under a thin layer reflect light, RGB, in 1/sr: directions, lobes, and models by name.
+"""BRDF models of surfaces under a thin layer, in 1/sr for R, G and B: directions, lobes and models by name.
 
-Directions are unit vectors away from the surface in its own frame, whose normal is z. Every model is
-a pure function of its parameters and two directions.
+Directions are unit vectors away from the surface, in its own frame, whose normal is z. Every model is a
+pure function of its parameters and two directions.
 """
 
 from pellicle.brdf.albedo import directional_albedo as directional_albedo

@@ -1,4 +1,4 @@
-"""How parameters and directions broadcast: a parameter is one number, or a map as large as the directions."""
+"""Broadcasting of BRDF parameters against directions: a parameter is one number, or a map of samples."""
 
 from __future__ import annotations
 
@@ -11,18 +11,24 @@ Parameters: TypeAlias = Mapping[str, Any]
 """Key → a number, or a map (...) that broadcasts with the directions. `n` and `k` of any medium,
 `wavelengths` and `weights` have a last axis of channels, or are one number for all of them."""
 
+Evaluate: TypeAlias = Callable[[Parameters, Any, Any], Any]
+"""(parameters, i, o) → (..., channels), without a test of the horizon."""
 
-def column(map_: Any) -> Any:
-    """A map (...) as (..., 1), to broadcast with channels; a number as it is."""
-    return map_ if jnp.ndim(map_) == 0 else jnp.asarray(map_)[..., None]
+
+def column(samples: Any) -> Any:
+    """Reshape a map (...) to (..., 1), so that it broadcasts with channels; return a number unchanged."""
+    return samples if jnp.ndim(samples) == 0 else jnp.asarray(samples)[..., None]
 
 
 def weighted_sum(
-    parameters: Parameters, lobes: Callable[[], Any], below: Callable[[], Any] | None = None
+    parameters: Parameters, lobes: Callable[[], Any], base: Callable[[], Any] | None = None
 ) -> Any:
-    """specular · lobes + diffuse · below; a weight that is not among the parameters leaves its part out."""
-    parts = [column(parameters["specular"]) * lobes()] if "specular" in parameters else []
+    """Return specular · lobes + diffuse · base; a weight absent from the parameters leaves its term out.
+
+    `base` None is a grey base, of value 1.
+    """
+    terms = [column(parameters["specular"]) * lobes()] if "specular" in parameters else []
     if "diffuse" in parameters:
         weight = column(parameters["diffuse"])
-        parts.append(weight if below is None else weight * below())
-    return sum(parts[1:], parts[0])
+        terms.append(weight if base is None else weight * base())
+    return sum(terms[1:], terms[0])

@@ -1,7 +1,7 @@
-"""RGB reflectance of one film against the cosine at which a facet is lit.
+"""RGB reflectance of a film as a function of the cosine of incidence on a facet.
 
-The film's colour depends on the directions only through ⟨i, h⟩, so it is computed at Chebyshev
-nodes of it and each sample evaluates one polynomial: the film drops out of the cost per sample.
+The colour depends on the directions only through ⟨i, h⟩. So it is computed at Chebyshev nodes of ⟨i, h⟩,
+and each sample evaluates one polynomial: the cost per sample does not depend on the film.
 """
 
 from __future__ import annotations
@@ -20,22 +20,17 @@ from pellicle.optics.interface import allow_tunnelling
 from pellicle.optics.pair import Number, Pair
 
 SHORTEST = 400.0
-"""Wavelength (nm) at which `nodes` counts: eyes and cameras see next to nothing below."""
+"""Wavelength (nm) for which `node_count` counts: eyes and cameras are nearly blind below."""
 
 
 def node_count(thickest: float) -> int:
-    """How many nodes of ⟨i, h⟩ keep a film of at most `thickest` nm within 1e-4 of its reflectance.
+    """Return the number of nodes of ⟨i, h⟩ for an error of 1e-4 in R, for films of at most `thickest` nm.
 
     Measured as the worst of 400 random films (n and base from 1.05, k to 0.3, metals among the bases)
-    at 445 nm: 40 nodes to 500 nm, 56 to 1000, 80 to 1500, 128 to 2000, 160 to 3000, a line in
-    thickness over wavelength. Below it is the base, not the film, that asks for nodes.
+    at 445 nm: 40 nodes to 500 nm, 56 to 1000, 80 to 1500, 128 to 2000, 160 to 3000, linear in thickness
+    over wavelength. For thinner films the base, not the film, determines the number.
     """
     return 8 * math.ceil((22 + 22 * thickest / SHORTEST) / 8)
-
-
-def index(n: Any, k: Any) -> Number:
-    """n + ik; k None means that the medium cannot absorb."""
-    return n if k is None else Pair(n, k)
 
 
 Reflectance: TypeAlias = Callable[[Parameters, Any], Any]
@@ -45,12 +40,16 @@ Colour: TypeAlias = Callable[[Parameters, Any, Any], Any]
 """(parameters, i, o) → (..., 3), or a channel for each wavelength."""
 
 
-def _lit(parameters: Parameters, angle: Any, tunnelling: bool) -> tuple[Any, Any, Any, Any, Any]:
-    """Ambient, film, base, 2πd/λ and angle, (..., wavelengths)."""
-    base = index(parameters["base_n"], parameters.get("base_k"))
+def _film(parameters: Parameters, angle: Any, tunnelling: bool) -> tuple[Any, Any, Any, Any, Any]:
+    """Return ambient, film, base, 2πd/λ and angle, (..., wavelengths)."""
+
+    def index(n: str, k: str) -> Number:
+        return Pair(parameters[n], parameters[k]) if parameters.get(k) is not None else parameters[n]
+
+    base = index("base_n", "base_k")
     return (
         parameters.get("ambient_n", 1.0),
-        index(parameters["n"], parameters.get("k")),
+        index("n", "k"),
         allow_tunnelling(base) if tunnelling else base,
         2 * jnp.pi / parameters["wavelengths"] * column(parameters["thickness"]),
         None if angle is None else angle[..., None],
@@ -58,43 +57,41 @@ def _lit(parameters: Parameters, angle: Any, tunnelling: bool) -> tuple[Any, Any
 
 
 def airy(polarisations: str = "sp", tunnelling: bool = True) -> Reflectance:
-    """Airy's reflectance, the mean over `polarisations`, of a film in air.
+    """Return a function for the Airy reflectance of a film, the mean over `polarisations`.
 
-    It reads `thickness` (nm), `n`, `k`, `base_n`, `base_k`, `wavelengths` (nm), and `ambient_n` where
-    the ambient is not air; without `k` or `base_k` the medium cannot absorb. `tunnelling=False`
-    promises that no wave is totally reflected.
+    It reads the parameters `thickness` (nm), `n`, `k`, `base_n`, `base_k`, `wavelengths` (nm), and
+    `ambient_n` if the ambient is not air; without `k` or `base_k` the medium does not absorb.
+    `tunnelling=False` promises that no wave is totally reflected.
     """
 
     def reflectance(parameters: Parameters, angle: Any) -> Any:
-        ambient, layer, base, phase, theta = _lit(parameters, angle, tunnelling)
-        return response.reflectance(
-            *coherent.responses(
-                ambient, [layer], base, [phase], theta, polarisations, propagating=not tunnelling
-            )
-        )
+        ambient, layer, base, phase, theta = _film(parameters, angle, tunnelling)
+        media = (ambient, [layer], base, [phase])
+        responses = coherent.responses(*media, theta, polarisations, propagating=not tunnelling)
+        return response.reflectance(*responses)
 
     return reflectance
 
 
 reflectance = airy()
-"""The unpolarised one, whatever the media."""
+"""The unpolarised reflectance, for any media."""
 
 
 def without_interference(parameters: Parameters, angle: Any) -> Any:
-    """The same averaged over the film's phase: order 0 of its Fourier series."""
-    lit = _lit(parameters, angle, tunnelling=True)
-    s, p = (orders.reflectance(orders.airy_series(*lit, letter), lambda _: 1.0, count=0) for letter in "sp")
-    return 0.5 * (s + p)
+    """Return the reflectance averaged over the film's phase: order 0 of its Fourier series."""
+    film = _film(parameters, angle, tunnelling=True)
+    s, p = (orders.airy_series(*film, letter) for letter in "sp")
+    return 0.5 * sum(orders.reflectance(series, orders.monochromatic, count=0) for series in (s, p))
 
 
 def rgb(parameters: Parameters, spectrum: Any) -> Any:
-    """(..., wavelengths) → (..., 3): `weights` (wavelengths, 3) of a sensor, or each wavelength a channel."""
+    """Weight a spectrum (..., wavelengths) by a sensor's `weights` (wavelengths, 3), if there are any."""
     weights = parameters.get("weights")
     return spectrum if weights is None else spectrum @ weights
 
 
 def per_sample(reflectance: Reflectance) -> Colour:
-    """The film's RGB reflectance for light from i to o, computed for each sample."""
+    """Return the RGB reflectance for light from i to o, computed for each sample."""
     return lambda parameters, i, o: rgb(parameters, reflectance(parameters, angle_to_half(i, o)))
 
 
@@ -103,23 +100,23 @@ incoherent = per_sample(without_interference)
 
 
 def at_normal_incidence(reflectance: Reflectance) -> Colour:
-    """The same as if light always met the facets along their normals."""
+    """Return the RGB reflectance at normal incidence on the facets, for all directions."""
     return lambda parameters, i, o: rgb(parameters, reflectance(parameters, None))
 
 
 def coefficients(parameters: Parameters, dtype: Any, count: int, reflectance: Reflectance) -> Any:
-    """Chebyshev coefficients (count, 3) of the film's RGB reflectance in 2⟨i, h⟩ − 1."""
-    turn = np.pi * (np.arange(count) + 0.5) / count
-    angle = jnp.asarray(np.arccos(0.5 + 0.5 * np.cos(turn)), dtype)
-    transform = 2 / count * np.cos(np.outer(np.arange(count), turn))
+    """Return the Chebyshev coefficients (count, 3) of the RGB reflectance in 2⟨i, h⟩ − 1."""
+    phase = np.pi * (np.arange(count) + 0.5) / count
+    angle = jnp.asarray(np.arccos(0.5 + 0.5 * np.cos(phase)), dtype)
+    transform = 2 / count * np.cos(np.outer(np.arange(count), phase))
     transform[0] *= 0.5
     return jnp.asarray(transform, dtype) @ rgb(parameters, reflectance(parameters, angle))
 
 
 def interpolated(count: int, reflectance: Reflectance = reflectance) -> Colour:
-    """`per_sample` by a polynomial through so many nodes; with a thickness map, `per_sample` itself.
+    """Return the RGB reflectance by a polynomial through `count` nodes; `per_sample` for a thickness map.
 
-    For values: a Jacobian through `exact` costs less than through a long polynomial.
+    For values only: a Jacobian through `exact` costs less than through a long polynomial.
     """
 
     def colour(parameters, i, o):
@@ -127,19 +124,20 @@ def interpolated(count: int, reflectance: Reflectance = reflectance) -> Colour:
             return per_sample(reflectance)(parameters, i, o)
         cosine = cosine_to_half(i, o)
         series = coefficients(parameters, cosine.dtype, count, reflectance)
-        # one channel after the other: a last axis of three would keep the processor's lanes empty
+        # one channel after the other: a last axis of three would leave vector lanes empty
         return jnp.stack([_clenshaw(channel, 4 * cosine - 2) for channel in series.T], axis=-1)
 
     return colour
 
 
 def chebyshev(thickest: float) -> Colour:
-    """`exact` by as many nodes as films of at most `thickest` nm take."""
+    """Return `exact` by a polynomial with enough nodes for films of at most `thickest` nm."""
     return interpolated(node_count(thickest))
 
 
 def _clenshaw(series: Any, twice_x: Any) -> Any:
-    one, two = 0.0, 0.0
+    """Evaluate a Chebyshev series at x by Clenshaw's recurrence."""
+    current, previous = 0.0, 0.0
     for term in range(len(series) - 1, 0, -1):
-        one, two = series[term] + twice_x * one - two, one
-    return series[0] + 0.5 * twice_x * one - two
+        current, previous = series[term] + twice_x * current - previous, current
+    return series[0] + 0.5 * twice_x * current - previous

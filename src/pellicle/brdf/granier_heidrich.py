@@ -1,31 +1,31 @@
 """A layered RGB BRDF by interference of two Phong lobes (X. Granier and W. Heidrich, Pacific Graphics 2002).
 
-Light is reflected at the upper boundary, whose normal n₀ is z, or refracted, mirrored at the lower
-one, whose normal n₁ is tilted, and refracted out; both lobes interfere. Equation numbers are the
-paper's. What it leaves open is read so that it agrees with itself:
+Light is reflected at the upper boundary, whose normal n₀ is z, or refracted, mirrored at the lower one,
+whose normal n₁ is tilted, and refracted out; both lobes interfere. Equation numbers are those of the
+paper. Where it is ambiguous, the reading that is consistent with the rest of it is taken:
 
 - i and o point away from the surface; t_i and t_o are **both** their refractions downward (with one
   of them upward eq. 3 would cancel the phase), so that eq. 10's lobe is ⟨r_ti, −t_o⟩.
 - Eq. 8 is squared: unsquared it is negative.
-- Eq. 10 is null where ⟨−t_i, n₁⟩, ⟨−t_o, n₁⟩ or ⟨r_ti, −t_o⟩ is not positive: light meets the lower
-  boundary from within the layer. The paper's "always true" for parallel boundaries is not: two rays
-  on one side at 88° are null for an index below √2.
-- Eq. 9 with t_o is Schlick's formula at the angle inside the layer, as published: it is not 1 − F of
-  the way out, and reciprocity fails. The reciprocal variant has F at the half vector in R and
+- Eq. 10 is null where ⟨−t_i, n₁⟩, ⟨−t_o, n₁⟩ or ⟨r_ti, −t_o⟩ is not positive: light reaches the lower
+  boundary from within the layer. The paper's "always true" for parallel boundaries is wrong: two rays on
+  one side at 88° are null for an index below √2.
+- Eq. 9 with t_o is Schlick's formula at the angle inside the layer, as published. It differs from 1 − F
+  of light that leaves, and reciprocity fails. The reciprocal variant has F at the half vector in R and
   (1 − F(i))(1 − F(o)) in T.
-- The lower boundary reflects everything and turns no phase; the lobes are not normalised.
+- The lower boundary reflects everything without a phase shift; the lobes are not normalised.
 
-Energy can exceed one: the weights are no albedos (`pellicle.brdf.albedo` measures it).
+Energy can exceed one, so the weights are not albedos (`pellicle.brdf.albedo` computes it).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import jax.numpy as jnp
 
-from pellicle.brdf.broadcasting import Parameters, column, weighted_sum
+from pellicle.brdf.broadcasting import Evaluate, Parameters, column, weighted_sum
 from pellicle.brdf.directions import cosine_inside, cosine_to_half, direction
 from pellicle.brdf.lobes import cosine_to_mirror, power
 from pellicle.optics.elementary import sincos
@@ -33,7 +33,7 @@ from pellicle.optics.pair import sqrt
 
 
 class Paths(NamedTuple):
-    """Cosines along the two ways through the layer, each (..., 1) or per channel (..., 3)."""
+    """Cosines along both paths, reflected and through the layer, each (..., 1) or per channel (..., 3)."""
 
     i: Any  # ⟨i, n₀⟩
     o: Any  # ⟨o, n₀⟩
@@ -41,7 +41,7 @@ class Paths(NamedTuple):
     inside_i: Any  # ⟨t_i, −n₀⟩
     inside_o: Any  # ⟨t_o, −n₀⟩
     mirror: Any  # ⟨r_i, o⟩
-    lower: Any  # ⟨r_ti, −t_o⟩, 0 where light misses the lower boundary
+    lower: Any  # ⟨r_ti, −t_o⟩, 0 where light does not reach the lower boundary
 
 
 class Amplitudes(NamedTuple):
@@ -52,11 +52,18 @@ class Amplitudes(NamedTuple):
     phase: Any
 
 
-def paths(i: Any, o: Any, n: Any, normal: Any = None) -> Paths:
-    """The cosines for a layer of index n ≥ 1 (scalar or per channel) over a boundary with this normal.
+Fresnel: TypeAlias = Callable[[Paths, Any], tuple[Any, Any]]
+"""(cosines, index) → F, and the transmitted factor of eq. 10 over (1 − f)²."""
 
-    None is the upper boundary's own: parallel boundaries.
-    With u = −t_i and w = −t_o the lobe of eq. 10 is ⟨r_ti, w⟩ = 2⟨u, n₁⟩⟨w, n₁⟩ − ⟨u, w⟩.
+Combine: TypeAlias = Callable[[Amplitudes], Any]
+"""Sum of both lobes, with or without interference."""
+
+
+def paths(i: Any, o: Any, n: Any, normal: Any = None) -> Paths:
+    """Return the cosines for a layer of index n ≥ 1 (scalar or per channel) over a boundary of this normal.
+
+    `normal` None means parallel boundaries. With u = −t_i and w = −t_o the lobe of eq. 10 is
+    ⟨r_ti, w⟩ = 2⟨u, n₁⟩⟨w, n₁⟩ − ⟨u, w⟩.
     """
     (xi, yi, zi), (xo, yo, zo) = ((v[..., 0:1], v[..., 1:2], v[..., 2:3]) for v in (i, o))
     down_i, down_o = cosine_inside(zi, n), cosine_inside(zo, n)
@@ -64,8 +71,8 @@ def paths(i: Any, o: Any, n: Any, normal: Any = None) -> Paths:
     if normal is not None:
         x, y, z = (normal[..., k : k + 1] for k in range(3))
         toward_i, toward_o = (xi * x + yi * y) / n + down_i * z, (xo * x + yo * y) / n + down_o * z
-    between = (xi * xo + yi * yo) / (n * n) + down_i * down_o
-    meets = (toward_i > 0) & (toward_o > 0)
+    cosine_between = (xi * xo + yi * yo) / (n * n) + down_i * down_o
+    reached = (toward_i > 0) & (toward_o > 0)
     return Paths(
         i=zi,
         o=zo,
@@ -73,117 +80,117 @@ def paths(i: Any, o: Any, n: Any, normal: Any = None) -> Paths:
         inside_i=down_i,
         inside_o=down_o,
         mirror=cosine_to_mirror(i, o)[..., None],
-        lower=jnp.where(meets, 2 * toward_i * toward_o - between, 0.0),
+        lower=jnp.where(reached, 2 * toward_i * toward_o - cosine_between, 0.0),
     )
 
 
 def normal_reflectance(n: Any) -> Any:
-    """f of eq. 8, squared, from air."""
+    """Return f of eq. 8, squared, from air."""
     return ((1 - n) / (1 + n)) ** 2
 
 
 def schlick(cosine: Any, n: Any) -> Any:
-    """F of eq. 7."""
+    """Return F of eq. 7."""
     f = normal_reflectance(n)
     return f + (1 - f) * (1 - cosine) ** 5
 
 
-def _opening(c):
-    """1 − (1 − c)⁵, so that 1 − F = (1 − f) times it, without its cancellation at grazing."""
+def _schlick_complement(c: Any) -> Any:
+    """Return (1 − F)/(1 − f) = 1 − (1 − c)⁵, without cancellation at grazing incidence."""
     return c * (5 - c * (10 - c * (10 - c * (5 - c))))
 
 
 def published(p: Paths, n: Any) -> tuple[Any, Any]:
-    """F and (1 − F(i)) T(t_o) of eqs. 6 and 10, the latter over (1 − f)²."""
-    return schlick(p.i, n), _opening(p.i) * _opening(p.inside_o)
+    """Return F and (1 − F(i)) T(t_o) of eqs. 6 and 10, the latter over (1 − f)²."""
+    return schlick(p.i, n), _schlick_complement(p.i) * _schlick_complement(p.inside_o)
 
 
 def reciprocal(p: Paths, n: Any) -> tuple[Any, Any]:
-    """The same from factors that do not change when i and o are exchanged."""
-    return schlick(p.half, n), _opening(p.i) * _opening(p.o)
+    """Return F and (1 − F(i))(1 − F(o)), symmetric in i and o, the latter over (1 − f)²."""
+    return schlick(p.half, n), _schlick_complement(p.i) * _schlick_complement(p.o)
 
 
-def amplitudes(parameters: Parameters, i: Any, o: Any, fresnel: Callable = published) -> Amplitudes:
-    """√R, √T and Φ. The roots are products of roots: √(lobe^e) itself has no slope at the lobe's edge."""
+def amplitudes(parameters: Parameters, i: Any, o: Any, fresnel: Fresnel = published) -> Amplitudes:
+    """Return √R, √T and Φ, as products of roots: √(lobe^e) itself has no slope at the edge of the lobe."""
     n = parameters["n"]
     tilted = "deviation" in parameters
     p = paths(i, o, n, direction(parameters["deviation"], parameters["azimuth"]) if tilted else None)
-    F, through = fresnel(p, n)
+    F, passed = fresnel(p, n)
     e0, e1 = column(parameters["exponent_reflection"]), column(parameters["exponent_transmission"])
     per_wavelength = jnp.pi * n * column(parameters["thickness"]) / parameters["wavelengths"]
     return Amplitudes(
         reflected=sqrt(F) * power(p.mirror, 0.5 * e0),
-        transmitted=(1 - normal_reflectance(n)) * sqrt(through) * power(p.lower, 0.5 * e1),
+        transmitted=(1 - normal_reflectance(n)) * sqrt(passed) * power(p.lower, 0.5 * e1),
         phase=per_wavelength * (p.inside_i + p.inside_o),
     )
 
 
 def interfering(a: Amplitudes) -> Any:
-    """R + T + 2 cos 2Φ √(RT), eq. 5, as (√R − √T)² + 4 √R √T cos² Φ: never negative."""
+    """Return R + T + 2 cos 2Φ √(RT), eq. 5, as (√R − √T)² + 4 √R √T cos² Φ, which is never negative."""
     cosine = sincos(a.phase)[1]
     return (a.reflected - a.transmitted) ** 2 + 4 * a.reflected * a.transmitted * cosine * cosine
 
 
 def incoherent(a: Amplitudes) -> Any:
-    """R + T: the same surface without interference."""
+    """Return R + T, without interference."""
     return a.reflected * a.reflected + a.transmitted * a.transmitted
 
 
 def diffuse_reflectance(n: Any) -> Any:
-    """R_d of eq. 12: exactly the cosine-weighted average of Schlick's F over the hemisphere.
+    """Return R_d of eq. 12, exactly the cosine-weighted average of Schlick's F over the hemisphere.
 
-    It is 1/21 at n = 1 and 0.0857 at n = 1.5, where Fresnel's own formula gives 0.0918.
+    It is 1/21 at n = 1 and 0.0857 at n = 1.5, where Fresnel's formula gives 0.0918.
     """
     return (21 * (n * n + 1) - 38 * n) / (21 * (1 + n) ** 2)
 
 
 def diffuse_transmittance(n: Any) -> Any:
-    """T_d = 1 − R_d of eq. 13."""
+    """Return T_d = 1 − R_d of eq. 13."""
     return 80 / 21 * n / (1 + n) ** 2
 
 
 def mean_cosine_inside(n: Any) -> Any:
-    """The mean of ⟨t_i, −n₀⟩ over the hemisphere, eq. 14, for n > 1; eq. 15 then takes 1 in its place.
+    """Return the mean of ⟨t_i, −n₀⟩ over the hemisphere, eq. 14, for n > 1; eq. 15 replaces it by 1.
 
-    It weights all solid angle alike, where eq. 12 weights by the cosine.
+    It weights all solid angles equally, where eq. 12 weights by the cosine.
     """
     return 0.25 * (jnp.log((n + 1) / (n - 1)) * (n * n - 1) + 2 * n) / n
 
 
-def layered_diffuse(parameters: Parameters, join: Callable = interfering) -> Any:
-    """ρ_d of eqs. 11 and 16 per channel; 1 without interference."""
+def layered_diffuse(parameters: Parameters, combine: Combine = interfering) -> Any:
+    """Return ρ_d of eqs. 11 and 16 per channel; 1 without interference."""
     n = parameters["n"]
     phase = 2 * jnp.pi * n * column(parameters["thickness"]) / parameters["wavelengths"]
-    return join(Amplitudes(sqrt(diffuse_reflectance(n)), sqrt(diffuse_transmittance(n)), phase))
+    return combine(Amplitudes(sqrt(diffuse_reflectance(n)), sqrt(diffuse_transmittance(n)), phase))
 
 
-def specular(fresnel: Callable = published, join: Callable = interfering) -> Callable:
-    """The Phong-like model over a grey diffuse base: specular · (eq. 5) + diffuse."""
+def specular(fresnel: Fresnel = published, combine: Combine = interfering) -> Evaluate:
+    """Return the Phong-like BRDF over a grey diffuse base: specular · (eq. 5) + diffuse."""
 
     def evaluate(parameters, i, o):
-        return weighted_sum(parameters, lambda: join(amplitudes(parameters, i, o, fresnel)))
+        return weighted_sum(parameters, lambda: combine(amplitudes(parameters, i, o, fresnel)))
 
     return evaluate
 
 
-def diffuse(join: Callable = interfering) -> Callable:
-    """The diffuse model alone: diffuse · ρ_d, the same for all directions."""
+def diffuse(combine: Combine = interfering) -> Evaluate:
+    """Return the diffuse BRDF alone: diffuse · ρ_d, independent of the directions."""
 
     def evaluate(parameters, i, o):
-        same = jnp.zeros_like(i[..., 2:3] * o[..., 2:3])
-        return column(parameters["diffuse"]) * layered_diffuse(parameters, join) + same
+        zeros = jnp.zeros_like(i[..., 2:3] * o[..., 2:3])
+        return column(parameters["diffuse"]) * layered_diffuse(parameters, combine) + zeros
 
     return evaluate
 
 
-def full(fresnel: Callable = published, join: Callable = interfering) -> Callable:
-    """Both: specular · (eq. 5) + diffuse · ρ_d (eq. 16), as in the paper's figures 3 and 5."""
+def full(fresnel: Fresnel = published, combine: Combine = interfering) -> Evaluate:
+    """Return specular · (eq. 5) + diffuse · ρ_d (eq. 16), as in the paper's figures 3 and 5."""
 
     def evaluate(parameters, i, o):
         return weighted_sum(
             parameters,
-            lambda: join(amplitudes(parameters, i, o, fresnel)),
-            lambda: layered_diffuse(parameters, join),
+            lambda: combine(amplitudes(parameters, i, o, fresnel)),
+            lambda: layered_diffuse(parameters, combine),
         )
 
     return evaluate

@@ -1,6 +1,6 @@
 """Lobes around the mirror direction: Phong, Blinn-Phong, and GGX microfacets with Smith's shadowing.
 
-The normal is z. Values and gradients are finite at a lobe's edge, where it is zero with slope zero.
+The normal is z. Values and gradients are finite at the edge of a lobe, where both are zero.
 """
 
 from __future__ import annotations
@@ -15,59 +15,66 @@ from pellicle.optics.pair import sqrt
 
 
 def power(cosine: Any, exponent: Any) -> Float[Array, "..."]:
-    """cos₊^e: 0 with zero slope where the cosine is not positive."""
-    lit = cosine > 0
-    return jnp.where(lit, jnp.exp(exponent * jnp.log(jnp.where(lit, cosine, 1.0))), 0.0)
+    """Return cos₊^e: 0 with zero slope where the cosine is not positive."""
+    positive = cosine > 0
+    return jnp.where(positive, jnp.exp(exponent * jnp.log(jnp.where(positive, cosine, 1.0))), 0.0)
 
 
 def cosine_to_mirror(i: Any, o: Any) -> Float[Array, "..."]:
-    """⟨r, o⟩ with r the mirror direction of i."""
+    """Return ⟨r, o⟩ with r the mirror direction of i."""
     return i[..., 2] * o[..., 2] - i[..., 0] * o[..., 0] - i[..., 1] * o[..., 1]
 
 
 def phong(i: Any, o: Any, exponent: Any) -> Float[Array, "..."]:
-    """⟨r, o⟩₊^e, as published: 1 at the peak (B. T. Phong, Commun. ACM 18, 311 (1975))."""
+    """Return ⟨r, o⟩₊^e, as published: 1 at the peak (B. T. Phong, Commun. ACM 18, 311 (1975))."""
     return power(cosine_to_mirror(i, o), exponent)
 
 
 def blinn_phong(i: Any, o: Any, exponent: Any) -> Float[Array, "..."]:
-    """⟨n, h⟩₊^e, as published: 1 at the peak (J. F. Blinn, SIGGRAPH 1977)."""
+    """Return ⟨n, h⟩₊^e, as published: 1 at the peak (J. F. Blinn, SIGGRAPH 1977)."""
     return power(half_vector(i, o)[..., 2], exponent)
 
 
 def normalisation(exponent: Any) -> Any:
-    """(e + 2)/2π, which makes ∫ cos^e θ cos θ dω over the hemisphere 1 (E. Lafortune and Y. Willems 1994)."""
+    """Return (e + 2)/2π, which makes ∫ cos^e θ cos θ dω over the hemisphere 1.
+
+    **Source:** E. Lafortune and Y. Willems 1994.
+    """
     return (exponent + 2) / (2 * jnp.pi)
 
 
 def ggx(h: Any, alpha: Any) -> Float[Array, "..."]:
-    """D(h) in 1/sr, the density of facets with normal h, so that ∫ D ⟨n, h⟩ dω = 1 (B. Walter et al. 2007).
+    """Return D(h) in 1/sr, the density of facets with normal h, so that ∫ D ⟨n, h⟩ dω = 1.
 
-    `alpha` is the roughness, above 0. sin² θ comes from h's own components: 1 − cos² θ would lose a
+    `alpha` is the roughness, above 0. sin² θ is taken from the components of h: 1 − cos² θ would lose a
     narrow lobe in float32.
+
+    **Source:** B. Walter et al. 2007.
     """
     square = alpha * alpha
     spread = square * h[..., 2] ** 2 + h[..., 0] ** 2 + h[..., 1] ** 2
-    some = spread > 0  # there is no half vector where i = −o
-    return jnp.where(some, square / (jnp.pi * jnp.where(some, spread, 1.0) ** 2), 0.0)
+    exists = spread > 0  # there is no half vector where i = −o
+    return jnp.where(exists, square / (jnp.pi * jnp.where(exists, spread, 1.0) ** 2), 0.0)
 
 
 def smith(i: Any, o: Any, alpha: Any) -> Float[Array, "..."]:
-    """G₂/(4⟨i, n⟩⟨o, n⟩), Smith's height-correlated shadowing and masking of GGX over its Jacobian.
+    """Return G₂/(4⟨i, n⟩⟨o, n⟩): Smith's height-correlated shadowing and masking of GGX, over its Jacobian.
 
-    (E. Heitz, JCGT 3 (2014), eq. 99.) Directions on or below the horizon together have no value: 0.
+    It is 0 where both directions are on or below the horizon.
+
+    **Source:** E. Heitz, JCGT 3 (2014), eq. 99.
     """
     ci, co = i[..., 2], o[..., 2]
     square = alpha * alpha
 
-    def reach(c):  # c √(1 + α² tan² θ)
+    def projected_root(c):  # c √(1 + α² tan² θ)
         return sqrt(c * c + square * (1 - c * c))
 
-    below = co * reach(ci) + ci * reach(co)
-    lit = below > 0
-    return jnp.where(lit, 0.5 / jnp.where(lit, below, 1.0), 0.0)
+    denominator = co * projected_root(ci) + ci * projected_root(co)
+    positive = denominator > 0
+    return jnp.where(positive, 0.5 / jnp.where(positive, denominator, 1.0), 0.0)
 
 
 def microfacets(i: Any, o: Any, alpha: Any) -> Float[Array, "..."]:
-    """D G₂/(4⟨i, n⟩⟨o, n⟩) in 1/sr: the BRDF of mirror-like GGX facets."""
+    """Return D G₂/(4⟨i, n⟩⟨o, n⟩) in 1/sr, the BRDF of mirror-like GGX facets."""
     return ggx(half_vector(i, o), alpha) * smith(i, o, alpha)

@@ -1,4 +1,4 @@
-"""Every BRDF by its name: its parameters with units and default bounds, and the function that evaluates it.
+"""BRDF models by name, with the units and default bounds of their parameters.
 
 ```python
 >>> from pellicle.brdf.directions import direction
@@ -21,6 +21,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from pellicle.brdf import blinn_phong_film, film_colour, granier_heidrich
+from pellicle.brdf.broadcasting import Evaluate as Evaluate
 from pellicle.brdf.broadcasting import Parameters
 from pellicle.brdf.microfacet import microfacet
 
@@ -29,7 +30,7 @@ RGB = (645.0, 525.0, 445.0)
 
 
 class Parameter(NamedTuple):
-    """One key of a model: what it means, its default bounds and its default value."""
+    """One parameter of a model: its key, unit, default bounds, default value and meaning."""
 
     key: str
     unit: str
@@ -42,47 +43,50 @@ class Parameter(NamedTuple):
     linear: bool = False  # a weight: the BRDF is linear in it
 
 
-Evaluate: TypeAlias = Callable[[Parameters, Any, Any], Any]
-"""(parameters, i, o) → (..., channels), whatever the side of the horizon."""
+FromColour: TypeAlias = Callable[[film_colour.Colour], Evaluate]
 
 
 class Model(NamedTuple):
-    """A BRDF by name. Called with parameters and directions it gives (..., 3), RGB, in 1/sr."""
+    """A BRDF model; `model(parameters, i, o)` evaluates it, (..., 3), RGB, in 1/sr."""
 
     name: str
     description: str
     parameters: tuple[Parameter, ...]
     evaluate: Evaluate
-    incoherent: Evaluate  # without interference: what a layer must beat
+    incoherent: Evaluate  # without interference: the alternative to a layer
     wavelengths: tuple[float, ...] = RGB
-    from_film_colour: Callable[[film_colour.Colour], Evaluate] | None = None  # `evaluate` by a film's colour
+    from_film_colour: FromColour | None = None  # `evaluate`, from the function for the film's colour
 
     def for_thickness_up_to(self, thickest: float) -> Model:
-        """The same model for layers of at most `thickest` nm, and as quick as that allows."""
+        """Return the model with the cheapest evaluation that serves layers of at most `thickest` nm."""
         if self.from_film_colour is None:
             return self
         return self._replace(evaluate=self.from_film_colour(film_colour.chebyshev(thickest)))
 
     def without_interference(self) -> Model:
-        """The same model with its phase averaged away, or its lobes added as intensities."""
+        """Return the model without interference: averaged over the phase, or lobes added as intensities."""
         return self._replace(evaluate=self.incoherent, from_film_colour=None)
 
     def __call__(self, parameters: Parameters, i: Any, o: Any) -> Float[Array, "... channels"]:
-        """The BRDF for light from `i` to `o`, unit vectors (..., 3) with the normal as third axis.
+        """Evaluate the BRDF (1/sr) for light from `i` to `o`.
 
-        `parameters` has every key of the model, each a number or a map (...) that broadcasts with
-        the directions; without `k`, `base_k`, `deviation`, `specular` or `diffuse` that effect is absent,
-        and costs nothing. It may have `wavelengths` (nm, one a channel, of R, G and B by default). A
-        film's model also takes `weights` (wavelengths, 3): its reflectance at any wavelengths is then
-        weighted to RGB. Below the horizon the BRDF is 0.
+        **Arguments:**
+
+        - `parameters` has every key of the model, each a number or a map (...) that broadcasts with the
+          directions. Without `k`, `base_k`, `deviation`, `specular` or `diffuse` that effect is absent and
+          costs nothing. `wavelengths` (nm) are one for each channel, R, G and B by default. A film's model
+          also takes `weights` (wavelengths, 3), which weight its reflectance at any wavelengths to RGB.
+        - `i`, `o`: unit vectors (..., 3) away from the surface, with the normal as third axis.
+
+        **Returns:** (..., 3), or one value for each wavelength; 0 below the horizon.
         """
-        given = {"wavelengths": self.wavelengths, **parameters}
-        given = {k: jnp.asarray(x, i.dtype) if isinstance(x, tuple | list) else x for k, x in given.items()}
+        values = {"wavelengths": self.wavelengths, **parameters}
+        arrays = {k: jnp.asarray(x, i.dtype) if isinstance(x, tuple | list) else x for k, x in values.items()}
         above = (i[..., 2:3] >= 0) & (o[..., 2:3] >= 0)
-        return jnp.where(above, self.evaluate(given, i, o), 0.0)
+        return jnp.where(above, self.evaluate(arrays, i, o), 0.0)
 
     def defaults(self) -> dict[str, Any]:
-        """Each key's default value; a channel's numbers as an array."""
+        """Return the default value of each parameter; one that differs by channel as an array."""
         return {p.key: jnp.asarray(p.value) if p.per_channel else p.value for p in self.parameters}
 
 
@@ -120,7 +124,13 @@ _SHADER = (
 )
 
 
-def _granier_heidrich(name: str, description: str, make: Callable, fresnel: Callable, diffuse=_GREY) -> Model:
+def _granier_heidrich(
+    name: str,
+    description: str,
+    make: Callable,
+    fresnel: granier_heidrich.Fresnel,
+    diffuse: Parameter = _GREY,
+) -> Model:
     keys = (_THICKNESS, _INDEX, *_LOBES, _SPECULAR, diffuse)
     return Model(
         name, description, keys, make(fresnel), incoherent=make(fresnel, granier_heidrich.incoherent)
@@ -128,15 +138,15 @@ def _granier_heidrich(name: str, description: str, make: Callable, fresnel: Call
 
 
 def _shader(
-    name: str, description: str, colour: film_colour.Colour, from_film_colour: Callable | None
+    name: str, description: str, colour: film_colour.Colour, from_film_colour: FromColour | None
 ) -> Model:
     average = blinn_phong_film.blinn_phong_film(film_colour.per_sample(blinn_phong_film.phase_average))
-    made = blinn_phong_film.blinn_phong_film(colour)
+    evaluate = blinn_phong_film.blinn_phong_film(colour)
     return Model(
         name,
         description,
         _SHADER,
-        made,
+        evaluate,
         average,
         blinn_phong_film.PUBLISHED_WAVELENGTHS,
         from_film_colour=from_film_colour,
@@ -152,7 +162,7 @@ _ALL = (
     ),
     _granier_heidrich(
         "granier-heidrich-reciprocal",
-        "the same with Fresnel factors that obey reciprocity",
+        "two interfering Phong lobes, with reciprocal Fresnel factors",
         granier_heidrich.specular,
         granier_heidrich.reciprocal,
     ),
@@ -186,7 +196,7 @@ _ALL = (
     ),
     _shader(
         "blinn-phong-film-published",
-        "the same with the shader's phase counted twice",
+        "a transparent film in a Blinn-Phong lobe, with the phase error of the published shader",
         film_colour.per_sample(blinn_phong_film.published),
         None,
     ),
@@ -197,7 +207,10 @@ MODELS: dict[str, Model] = {each.name: each for each in _ALL}
 
 
 def model(name: str) -> Model:
-    """The model of this name; ValueError, with the nearest, for a name that is none."""
+    """Return the model of this name.
+
+    **Raises:** ValueError for an unknown name, with the nearest known one.
+    """
     if name in MODELS:
         return MODELS[name]
     near = difflib.get_close_matches(name, MODELS, 1)

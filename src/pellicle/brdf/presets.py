@@ -1,11 +1,8 @@
-"""The settings of published figures, as (name of the model, parameters)."""
+"""Parameters of published figures, as (name of the model, parameters)."""
 
 from __future__ import annotations
 
 from typing import Any
-
-HEIGHTS = (66.0, 76.0)
-"""Range of the layer's thickness (nm) in Granier and Heidrich's figures 3 and 4."""
 
 _PHONG = {
     "thickness": 71.0,
@@ -40,5 +37,5 @@ PRESETS: dict[str, tuple[str, dict[str, Any]]] = {
         },
     ),
 }
-"""Thickness is the middle of the published range: figures 3 and 4 vary it over `HEIGHTS`, tempered
-steel from 10 to 70 nm."""
+"""The thickness is the middle of the published range: Granier and Heidrich vary it from 66 to
+76 nm in their figures 3 and 4; the figure of tempered steel, from 10 to 70 nm."""
