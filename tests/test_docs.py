@@ -73,6 +73,7 @@ ELSEWHERE = {
     "make bench": "speed is measured by benchmarks, never tested",
     "make properties": "tests/properties: the same on a hundred scenes",
     "make peers": "installs several GB; tests/test_peers.py needs no other package",
+    "make schema": "tests/recipes/test_schema.py: the kept schema",
     "make figures": "tests/reference checks the numbers; the figures are kept",
     "source .venv/bin/activate": "a shell builtin; make fit creates the folder",
     "pellicle demo": "tests/cli/test_demo_command.py",
