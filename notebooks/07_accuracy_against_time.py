@@ -99,17 +99,16 @@ assert not spare.on("precision")
 # compares solvers on fits of simulated spectra.)
 
 # %%
-ladders = {
-    name: pl.cost(scene, np.asarray(scene.light.wavelength), tolerance=TOLERANCE, datasets=0).ladder
-    for name, scene in scenes.items()
+comparisons = {
+    name: pl.cost(scene, tolerance=TOLERANCE, datasets=0).methods for name, scene in scenes.items()
 }
-for name, ladder in ladders.items():
-    print(f"{name}: {ladder.wavelengths} wavelengths, {ladder.draws} draws")
-    for rung in ladder.rungs:
-        star = "*" if rung.pareto else " "
-        columns = f"{rung.name:22} {rung.error:8.1e}  {rung.seconds * 1e6:7.2f} µs"
-        print(f"  {star} {columns}   leaves out {rung.leaves_out}")
-    print(f"  the fastest within {TOLERANCE:g}: {ladder.recommended}\n")
+for name, comparison in comparisons.items():
+    print(f"{name}: {comparison.wavelengths} wavelengths, {comparison.draws} draws")
+    for method in comparison.results:
+        star = "*" if method.pareto else " "
+        columns = f"{method.name:22} {method.error:8.1e}  {method.seconds * 1e6:7.2f} µs"
+        print(f"  {star} {columns}   leaves out {method.leaves_out}")
+    print(f"  the fastest within {TOLERANCE:g}: {comparison.recommended}\n")
 
 # %%
 LEAST = 1e-9  # smaller errors are drawn at this value
@@ -123,13 +122,13 @@ def plain_ticks(axis):
 
 
 figure, panels = plt.subplots(3, 1, figsize=(9, 11))
-for at, (name, ladder) in zip(panels, ladders.items(), strict=True):
-    for rung in ladder.rungs:
-        place = (rung.seconds * 1e6, max(rung.error, LEAST))
-        look = {"color": "C1" if rung.pareto else "0.5"}
+for at, (name, comparison) in zip(panels, comparisons.items(), strict=True):
+    for method in comparison.results:
+        place = (method.seconds * 1e6, max(method.error, LEAST))
+        look = {"color": "C1" if method.pareto else "0.5"}
         at.plot(*place, "o", markersize=4, **look)
         at.annotate(
-            rung.name, place, xytext=(3, 3), textcoords="offset points", rotation=30, fontsize=7, **look
+            method.name, place, xytext=(3, 3), textcoords="offset points", rotation=30, fontsize=7, **look
         )
     at.axhline(TOLERANCE, color="C0", linestyle=":")
     at.set(xscale="log", yscale="log", ylim=(0.3 * LEAST, 100), ylabel="largest error in R")
@@ -145,12 +144,15 @@ plt.show()
 # whose error is zero by definition.
 
 # %%
-errors = {name: {rung.name: rung.error for rung in ladder.rungs} for name, ladder in ladders.items()}
+errors = {
+    name: {method.name: method.error for method in comparison.results}
+    for name, comparison in comparisons.items()
+}
 shown = ("incoherent", "constant index", "transparent layer", "closed form", "float32")
 print(f"{'largest error in R':22}" + "".join(f"{name:>19}" for name in errors))
-for rung in shown:
-    row = (f"{errors[name][rung]:.1e}" if rung in errors[name] else "-" for name in errors)
-    print(f"{rung:22}" + "".join(f"{cell:>19}" for cell in row))
+for method in shown:
+    row = (f"{errors[name][method]:.1e}" if method in errors[name] else "-" for name in errors)
+    print(f"{method:22}" + "".join(f"{cell:>19}" for cell in row))
 for name in errors:
     assert errors[name]["incoherent"] > 10 * TOLERANCE
     assert errors[name]["constant index"] > 10 * TOLERANCE
@@ -176,9 +178,9 @@ orders = {"1 order": 1, "2 orders": 2, "3 orders": 3, "5 orders": 5, "8 orders":
 figure, axes = plt.subplots(figsize=(7, 3.6))
 needed = {}
 for (name, method_errors), style in zip(errors.items(), ("C0o-", "C2s-", "C1D-"), strict=True):
-    kept = {rung: count for rung, count in orders.items() if rung in method_errors}
-    axes.plot(list(kept.values()), [method_errors[rung] for rung in kept], style, label=name)
-    needed[name] = next((count for rung, count in kept.items() if method_errors[rung] <= TOLERANCE), None)
+    kept = {method: count for method, count in orders.items() if method in method_errors}
+    axes.plot(list(kept.values()), [method_errors[method] for method in kept], style, label=name)
+    needed[name] = next((count for method, count in kept.items() if method_errors[method] <= TOLERANCE), None)
     enough = needed[name] or "more than 8"
     one_order = method_errors["1 order"]
     print(f"{name}: error of one order {one_order:.1e}; orders needed for {TOLERANCE:g}: {enough}")

@@ -1,4 +1,4 @@
-"""Small scenes to climb ladders on: few wavelengths, few draws."""
+"""Small cases: few wavelengths, few draws."""
 
 from __future__ import annotations
 

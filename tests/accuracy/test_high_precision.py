@@ -1,4 +1,4 @@
-"""The reference of 50 digits against the tmm package, and what it refuses."""
+"""The mpmath reference against the tmm package, and the cases that it refuses."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import tmm
 
 import pellicle as pl
 from pellicle.accuracy.high_precision import signal
-from pellicle.accuracy.reference import reference
+from pellicle.accuracy.reference import reference_signal
 from pellicle.errors import UsageError
 from pellicle.scene.instrument import Instrument
 
@@ -59,21 +59,21 @@ def test_a_plate_adds_intensities(kind):
 
 
 def test_ellipsometry_through_a_plate():
-    """The model has the plate transparent at its faces, and is held against Mueller matrices elsewhere."""
+    """The forward model takes the plate as transparent at its faces; Mueller matrices test it elsewhere."""
     plate = pl.Substrate(pl.dispersion.Constant(1.5, 1e-8), back=1.0, plate_mm=0.5)
     case = few(pl.Scene(STACK[:1], plate, light=pl.Light(angle=50.0, signal="psi-delta")))
     truth = signal(case, case.draws[0], np.arange(9)).ravel()
-    np.testing.assert_allclose(reference("float64", case).values[0].ravel(), truth, atol=1e-7)
+    np.testing.assert_allclose(reference_signal("float64", case).values[0].ravel(), truth, atol=1e-7)
 
 
 def test_the_model_is_within_rounding(oblique):
-    truth = reference("mpmath", oblique)
+    truth = reference_signal("mpmath", oblique)
     assert truth.values.shape == (3, 9, 1)
-    assert reference("float64", oblique).error(oblique, truth.values[:, :, 0]) < 1e-14
+    assert reference_signal("float64", oblique).error(oblique, truth.values[:, :, 0]) < 1e-14
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
+    ("changes", "message"),
     [
         ({"instrument": Instrument(bandwidth=2.0)}, "bandwidth"),
         ({"instrument": Instrument(angle_spread=2.0)}, "cone"),
@@ -82,10 +82,10 @@ def test_the_model_is_within_rounding(oblique):
         ({"layers": pl.Layer(2.0, 250e3)}, "narrower than the sampling"),
     ],
 )
-def test_what_it_cannot_compute_is_refused(given, said):
-    case = few(pl.Scene(**({"layers": pl.Layer(2.0, 100.0), "substrate": 1.5} | given)))
-    with pytest.raises(UsageError, match=said) as refused:
-        reference("mpmath", case)
-    assert "--reference float64" in str(refused.value)
+def test_what_it_cannot_compute_is_refused(changes, message):
+    case = few(pl.Scene(**({"layers": pl.Layer(2.0, 100.0), "substrate": 1.5} | changes)))
+    with pytest.raises(UsageError, match=message) as refused:
+        reference_signal("mpmath", case)
+    assert '`reference="float64"`' in str(refused.value)
     with pytest.raises(UsageError, match="float64 or mpmath"):
-        reference("tmm", case)
+        reference_signal("tmm", case)

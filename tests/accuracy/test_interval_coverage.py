@@ -1,4 +1,4 @@
-"""Ways to an interval on simulated data sets: how often they hold the truth, and who is recommended."""
+"""Intervals on simulated data sets: coverage and width are counted, and a method is recommended."""
 
 from __future__ import annotations
 
@@ -10,20 +10,17 @@ import pytest
 import pellicle as pl
 from pellicle.accuracy import interval_coverage as module
 from pellicle.accuracy.case import case
-from pellicle.accuracy.interval_coverage import Way, intervals
-from pellicle.accuracy.simulated_data import trials
+from pellicle.accuracy.interval_coverage import IntervalMethod, compare_intervals
+from pellicle.accuracy.simulated_data import data_sets
+from pellicle.fitting.progress import quiet
 
 NM = np.linspace(420.0, 740.0, 40)
-
-
-def quiet(what, done, total):
-    pass
 
 
 @pytest.fixture(scope="module")
 def several():
     scene = pl.Scene(pl.Layer(2.2, pl.Free(50.0, 100.0, start=75.0)), substrate=1.5)
-    return trials(case(scene, NM), scene, 0.002, 4)
+    return data_sets(case(scene, NM), scene, 0.002, 4)
 
 
 def fixed(lower, upper, fit):
@@ -31,26 +28,26 @@ def fixed(lower, upper, fit):
 
 
 def test_the_share_of_truths_inside_is_counted(several, monkeypatch):
-    ways = (
-        Way("all", "", partial(fixed, 0.0, 1.0)),
-        Way("nothing", "", partial(fixed, 2.0, 3.0)),
-        Way("absent", "", partial(fixed, 0.0, 1.0), missing="nosuchpackage"),
+    methods = (
+        IntervalMethod("all", "", partial(fixed, 0.0, 1.0)),
+        IntervalMethod("nothing", "", partial(fixed, 2.0, 3.0)),
+        IntervalMethod("absent", "", partial(fixed, 0.0, 1.0), missing="nosuchpackage"),
     )
-    monkeypatch.setattr(module, "WAYS", ways)
-    found = intervals(several, quiet)
-    held = {way.name: way for way in found.ways}
-    assert {name: way.coverage for name, way in held.items()} == {"all": 1.0, "nothing": 0.0}
-    assert held["all"].width == pytest.approx(1.0)
-    assert held["nothing"].error == pytest.approx(0.95)
-    assert held["all"].doubt == pytest.approx(np.sqrt(0.95 * 0.05 / 4))
-    assert found.recommended == "all"
-    assert found.left_out == {"absent": "nosuchpackage is not installed"}
+    monkeypatch.setattr(module, "INTERVAL_METHODS", methods)
+    compared = compare_intervals(several, quiet)
+    results = {r.name: r for r in compared.results}
+    assert {name: r.coverage for name, r in results.items()} == {"all": 1.0, "nothing": 0.0}
+    assert results["all"].width == pytest.approx(1.0)
+    assert results["nothing"].error == pytest.approx(0.95)
+    assert results["all"].doubt == pytest.approx(np.sqrt(0.95 * 0.05 / 4))
+    assert compared.recommended == "all"
+    assert compared.left_out == {"absent": "nosuchpackage is not installed"}
 
 
 @pytest.mark.slow  # samples; what is sampled is tested against grids in tests/sampling
-def test_all_ways_agree_where_one_thickness_is_well_known(several):
-    found = intervals(several, quiet)
-    width = {way.name: way.width for way in found.ways}
+def test_all_methods_agree_where_one_thickness_is_well_known(several):
+    compared = compare_intervals(several, quiet)
+    width = {r.name: r.width for r in compared.results}
     best = width.pop("emcee, until it is long enough")
     assert best < 0.1
     assert width.pop("emcee, 25 steps") == pytest.approx(best, rel=0.3)

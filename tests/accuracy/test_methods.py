@@ -1,4 +1,4 @@
-"""Each forward rung leaves out what it says, and nothing else: against numbers from elsewhere."""
+"""Each method of simulation leaves out its own effect and nothing else, against independent numbers."""
 
 from __future__ import annotations
 
@@ -7,27 +7,27 @@ import pytest
 
 import pellicle as pl
 from pellicle.accuracy.compiled import compiled
-from pellicle.accuracy.methods import FORWARD
+from pellicle.accuracy.methods import METHODS
 from pellicle.scene.instrument import Instrument
 
 from .conftest import NM, few
 
-RUNGS = {rung.name: rung for rung in FORWARD}
+BY_NAME = {method.name: method for method in METHODS}
 
 
 def answer(case, name):
-    """The rung's signal, (draws, wavelengths)."""
-    return compiled(case, RUNGS[name].way(case)).run()
+    """Signal of a method, (draws, wavelengths)."""
+    return compiled(case, BY_NAME[name].variant(case)).run()
 
 
 def reason(case, name):
-    way = RUNGS[name].way(case)
-    assert isinstance(way, str)
-    return way
+    variant = BY_NAME[name].variant(case)
+    assert isinstance(variant, str)
+    return variant
 
 
 def by_library(case, thickness=None, **changes):
-    """The same films through the library's front door, with something of the scene changed."""
+    """Reflectance of the films by `pl.reflectance`, with something of the scene changed."""
     given = {
         "angle": 60.0,
         "n": 1.9 + 12000.0 / NM**2,
@@ -61,7 +61,7 @@ def test_single_precision_is_single(oblique):
 def test_what_is_planned_is_within_the_tolerance():
     """A bandwidth that hardly blurs the fringes may go, and most of the cost with it."""
     case = few(pl.Scene(pl.Layer(2.2, 300.0), 1.5, instrument=Instrument(bandwidth=1.0)), draws=1)
-    full, planned = (compiled(case, RUNGS[name].way(case)) for name in ("float64", "planned"))
+    full, planned = (compiled(case, BY_NAME[name].variant(case)) for name in ("float64", "planned"))
     assert 0 < np.abs(planned.run() - full.run()).max() < case.tolerance
     assert planned.flops < full.flops / 3
 
@@ -107,15 +107,15 @@ def test_a_blur_a_cone_and_a_back_face_are_left_out():
     assert np.abs(answer(cone, "float64")[0] - bare).max() > 1e-3
 
 
-def test_what_makes_no_sense_says_why():
+def test_methods_that_do_not_apply_say_why():
     case = few(pl.Scene(pl.Layer(2.2, 300.0), 1.5))
-    assert {name for name in RUNGS if not isinstance(RUNGS[name].way(case), str)} == {
+    assert {name for name in BY_NAME if not isinstance(BY_NAME[name].variant(case), str)} == {
         *("float64", "float32", "planned", "incoherent", "twice the wavelengths", "every 2nd wavelength"),
         *("1 order", "2 orders", "3 orders", "5 orders", "8 orders"),
     }
     angles = few(pl.Scene(pl.Layer(2.2, 300.0), 1.5, light=pl.Light(angle=70.0, signal="psi-delta")))
     assert "compares s and p" in reason(angles, "normal incidence")
-    assert "no series" in reason(angles, "incoherent")
+    assert "series of orders" in reason(angles, "incoherent")
     assert answer(angles, "every 2nd wavelength").shape == (3, 27)
 
 

@@ -1,4 +1,4 @@
-"""Solvers on simulated data sets: who misses the truth's valley, and who is told to have."""
+"""Solvers on simulated data sets: failures and errors are counted, and the best one is recommended."""
 
 from __future__ import annotations
 
@@ -7,43 +7,40 @@ import pytest
 
 import pellicle as pl
 from pellicle.accuracy.case import case
-from pellicle.accuracy.simulated_data import trials
-from pellicle.accuracy.solver_comparison import race
+from pellicle.accuracy.simulated_data import data_sets
+from pellicle.accuracy.solver_comparison import compare_solvers
 from pellicle.accuracy.solvers import SOLVERS, Solver, from_truth
+from pellicle.fitting.progress import quiet
 
 NM = np.linspace(420.0, 740.0, 40)
 NOISE = 0.002
 
 
-def quiet(what, done, total):
-    pass
-
-
-def datasets(lower, upper, count):
+def simulated(lower, upper, count):
     scene = pl.Scene(pl.Layer(2.2, pl.Free(lower, upper, start=0.5 * (lower + upper))), substrate=1.5)
-    return trials(case(scene, NM), scene, NOISE, count)
+    return data_sets(case(scene, NM), scene, NOISE, count)
 
 
 @pytest.fixture(scope="module")
 def several():
-    return datasets(50.0, 1500.0, 3)
+    return simulated(50.0, 1500.0, 3)
 
 
 def test_a_data_set_is_its_truth_and_noise(several):
     assert len({float(t.truth[0]) for t in several}) == 3
-    for trial in several:
-        clean = np.asarray(pl.reflectance(NM, 50.0 + 1450.0 * trial.truth[0], 2.2, 1.5))
-        off = np.asarray(trial.problem.views[0].data.values)[: len(NM)] - clean
+    for data in several:
+        clean = np.asarray(pl.reflectance(NM, 50.0 + 1450.0 * data.truth[0], 2.2, 1.5))
+        off = np.asarray(data.problem.views[0].data.values)[: len(NM)] - clean
         assert 0.5 * NOISE < np.std(off) < 1.5 * NOISE
         assert np.abs(np.mean(off)) < NOISE
-        assert trial.start == 0.5
+        assert data.start == 0.5
 
 
 def test_a_solver_that_misses_is_told(several):
-    def far(trial):
-        return np.clip(trial.truth + np.where(trial.truth < 0.5, 0.2, -0.2), 0, 1)
+    def far(data):
+        return np.clip(data.truth + np.where(data.truth < 0.5, 0.2, -0.2), 0, 1)
 
-    def lost(trial):
+    def lost(data):
         return np.full(1, np.nan)
 
     solvers = (
@@ -52,41 +49,41 @@ def test_a_solver_that_misses_is_told(several):
         Solver("lost", "", lost),
         Solver("absent", "", far, missing="nosuchpackage"),
     )
-    found = race(several, NOISE, quiet, solvers)
-    by_name = {s.name: s for s in found.solvers}
+    compared = compare_solvers(several, NOISE, quiet, solvers)
+    by_name = {s.name: s for s in compared.results}
     assert {name: s.failures for name, s in by_name.items()} == {"oracle": 0, "far": 3, "lost": 3}
     assert by_name["oracle"].error < 1e-3
     assert by_name["far"].error == pytest.approx(0.2)
-    assert found.recommended == "oracle"
-    assert found.left_out == {"absent": "nosuchpackage is not installed"}
+    assert compared.recommended == "oracle"
+    assert compared.left_out == {"absent": "nosuchpackage is not installed"}
 
 
 def test_an_interruption_keeps_whole_data_sets(several):
     seen = []
 
-    def impatient(trial):
-        seen.append(trial)
+    def impatient(data):
+        seen.append(data)
         if len(seen) > 2:
             raise KeyboardInterrupt
-        return trial.truth
+        return data.truth
 
-    found = race(several, NOISE, quiet, (Solver("impatient", "", impatient),))
-    assert found.interrupted
-    assert found.solvers[0].datasets == 1
+    compared = compare_solvers(several, NOISE, quiet, (Solver("impatient", "", impatient),))
+    assert compared.interrupted
+    assert compared.results[0].datasets == 1
 
 
 @pytest.mark.slow
 def test_every_solver_finds_the_only_minimum():
     """Bounds so narrow that there is one: 40 nm, a fifth of a fringe."""
-    found = race(datasets(100.0, 140.0, 3), NOISE, quiet)
-    assert {s.name for s in found.solvers} | set(found.left_out) == {s.name for s in SOLVERS}
-    for solver in found.solvers:
+    compared = compare_solvers(simulated(100.0, 140.0, 3), NOISE, quiet)
+    assert {s.name for s in compared.results} | set(compared.left_out) == {s.name for s in SOLVERS}
+    for solver in compared.results:
         assert solver.failures == 0, solver.name
         assert solver.error < 0.01, solver.name
 
 
 @pytest.mark.slow
 def test_a_search_is_needed_among_many_minima():
-    found = {s.name: s for s in race(datasets(50.0, 3000.0, 6), NOISE, quiet).solvers}
-    assert found["scan + LM"].failures == 0
-    assert found["LM, start once"].failures >= 4
+    compared = {s.name: s for s in compare_solvers(simulated(50.0, 3000.0, 6), NOISE, quiet).results}
+    assert compared["scan + LM"].failures == 0
+    assert compared["LM, start once"].failures >= 4

@@ -1,4 +1,4 @@
-"""The ladder of a surface: which ways there are, and what they are off by."""
+"""The comparison of a surface: which ways there are, and what they are off by."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from pellicle.accuracy import colour_methods
-from pellicle.accuracy.measure import Ladder, MethodResult
-from pellicle.accuracy.surface import COLOURS, VALUES, SurfaceCost, coloured, drawn
+from pellicle.accuracy.measure import MethodComparison, MethodResult
+from pellicle.accuracy.surface import BRDF_METHODS, COLOUR_METHODS, SurfaceCost, films_of, random_draws
 from pellicle.colour import delta_e2000, lab, sensor
 from pellicle.reporting.cost_files import to_json
 from pellicle.reporting.cost_text import text
@@ -22,7 +22,7 @@ STEEL = surface_view(
     Surface("microfacet-film", {"thickness": Free(10, 70), "n": 2.9}), default_directions(), 40
 )
 PAINT = surface_view(Surface("granier-heidrich", {"thickness": Free(10, 70)}), default_directions(), 40)
-RUNGS = {rung.name: rung for rung in COLOURS}
+BY_NAME = {method.name: method for method in COLOUR_METHODS}
 
 
 def airy(wavelength, thickness, n, base, angle):
@@ -39,16 +39,16 @@ def airy(wavelength, thickness, n, base, angle):
 @pytest.fixture(scope="module")
 def films():
     with jax.enable_x64(True):
-        return coloured(STEEL, drawn(STEEL, 8))
+        return films_of(STEEL, random_draws(STEEL, 8))
 
 
-def test_a_rung_is_as_far_off_as_it_says(films):
+def test_the_error_of_a_method_is_true(films):
     """Against the textbook formula at steps of 1 nm."""
     eye = sensor("1931", "D65")
     true = airy(eye.wavelength, films.numbers["thickness"], 2.9, 2.7 + 2.8j, films.angle) @ eye.weights
     with jax.enable_x64(True):
         for name, least, most in (("points-645-525-445", 1.0, 10.0), ("uniform-16", 1e-3, 0.2)):
-            found = RUNGS[name].program(films).run()
+            found = BY_NAME[name].program(films).run()
             off = np.mean(
                 delta_e2000(*(np.asarray(lab(np.asarray(x, float), eye.white)) for x in (found, true)))
             )
@@ -58,21 +58,23 @@ def test_a_rung_is_as_far_off_as_it_says(films):
 
 def test_angles_may_be_spared(films):
     with jax.enable_x64(True):
-        exact, few = (RUNGS[name].program(films).run() for name in ("uniform-64", "uniform-64 at 16 angles"))
+        exact, few = (
+            BY_NAME[name].program(films).run() for name in ("uniform-64", "uniform-64 at 16 angles")
+        )
     # 1.04e-4: `film_colour.node_count` asks for 32 angles where 1e-4 is to be kept
     np.testing.assert_allclose(few, exact, atol=2e-4)
 
 
 def test_what_makes_no_sense_says_why(films):
     absorbing = films._replace(numbers={**films.numbers, "k": np.full(8, 0.1)})
-    assert RUNGS["belcour-barla"].program(absorbing) == "it knows no absorbing layer"
+    assert BY_NAME["belcour-barla"].program(absorbing) == "it has no absorbing layer"
     thick = films._replace(thickest=800.0)
-    assert RUNGS["nodes-6-500"].program(thick) == "its wavelengths are for films up to 500 nm"
-    assert "too few angles" in RUNGS["uniform-64 at 32 angles"].program(films)
-    assert "made for three wavelengths" in coloured(PAINT, drawn(PAINT))
+    assert BY_NAME["nodes-6-500"].program(thick) == "its wavelengths are for films up to 500 nm"
+    assert "too few angles" in BY_NAME["uniform-64 at 32 angles"].program(films)
+    assert "defined at three wavelengths only" in films_of(PAINT, random_draws(PAINT))
     each = surface_view(Surface("blinn-phong-film", {}), default_directions(), 8)
     free = dataclasses.replace(each, numbers={**each.numbers, "n": [Free(1.4, 1.5)] * 3})
-    assert "nothing says what it is between" in coloured(free, drawn(free))
+    assert "unknown between them" in films_of(free, random_draws(free))
 
 
 def test_values_of_three_wavelengths_lie_on_a_line():
@@ -84,7 +86,7 @@ def test_values_of_three_wavelengths_lie_on_a_line():
 
 
 def test_values_leave_out_what_is_there():
-    plans = {rung.name: rung.plan(PAINT, 1e-3) for rung in VALUES if rung.name != "planned"}
+    plans = {method.name: method.plan(PAINT, 1e-3) for method in BRDF_METHODS if method.name != "planned"}
     missing = {name for name, plan in plans.items() if isinstance(plan, str)}
     assert missing == {
         *("8 angles", "16 angles", "32 angles", "normal incidence", "s alone", "transparent film"),
@@ -94,7 +96,7 @@ def test_values_leave_out_what_is_there():
 
 
 def test_record_and_report_say_the_same():
-    seen = Ladder(
+    seen = MethodComparison(
         "steps of 1 nm",
         0.5,
         "ΔE2000",
@@ -103,7 +105,7 @@ def test_record_and_report_say_the_same():
         "colour",
         [MethodResult("nodes-6-500", "x", 0.2, 1e-7, 1.0, 900.0)],
     )
-    values = Ladder(
+    values = MethodComparison(
         "float64", 1e-3, "relative", 40, 64, "sample", [MethodResult("float64", "y", 0.0, 9e-8, 1.0, None)]
     )
     record = to_json(SurfaceCost(seen, values), "steel.toml")
@@ -112,7 +114,7 @@ def test_record_and_report_say_the_same():
         "ΔE2000",
         "nodes-6-500",
     )
-    assert [rung["kind"] for rung in record["rungs"]] == ["colour", "brdf"]
+    assert [method["kind"] for method in record["rungs"]] == ["colour", "brdf"]
     assert record["brdf"]["recommended"] == "float64"
     report = text(SurfaceCost(seen, values), "steel.toml")
     assert "nodes-6-500 is the fastest within an error of 0.5 in ΔE2000" in report

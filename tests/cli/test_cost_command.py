@@ -42,7 +42,7 @@ def test_table_folder_and_record_say_the_same(pellicle, recipe, tmp_path):
     for rung in record["rungs"]:
         assert rung["seconds"] > 0
         assert isinstance(rung["pareto"], bool)
-    assert record["left_out"]["normal incidence"] == "light comes at normal incidence"
+    assert record["left_out"]["normal incidence"] == "the light is at normal incidence"
     rows = list(csv.DictReader((out / "cost.csv").read_text().splitlines()))
     assert [row["name"] for row in rows] == names
     assert float(rows[0]["error"]) == record["rungs"][0]["error"]

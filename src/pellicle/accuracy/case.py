@@ -1,4 +1,4 @@
-"""What a ladder is climbed on: a scene, its full plan, and draws of its free parameters."""
+"""Case of a comparison: a scene, its full plan, and draws of its free parameters."""
 
 from __future__ import annotations
 
@@ -16,14 +16,15 @@ from pellicle.scene.free import free_leaves, insert, start_values
 from pellicle.scene.layers import Interface
 
 MOST_DRAWS, LEAST_DRAWS, POINTS = 256, 16, 65536
-"""Spectra in one call: so many that the call itself does not count, and about this many points in all."""
+"""Limits of the number of draws in one call, which hides the cost of the call itself, and about the number of
+points of all draws together."""
 
 
 class Case(NamedTuple):
-    """One scene, looked at at its wavelengths through an instrument without scale and offset.
+    """One scene with its wavelengths and an instrument without scale and offset.
 
-    `plan` is the full one, from which nothing is left out. `draws` are values of the free parameters,
-    (draws, parameters), the first of them the scene's own. `tolerance` is in the signal's unit.
+    `plan` is the full one, which leaves nothing out. `draws` are values of the free parameters,
+    (draws, parameters), the first of them the start values. `tolerance` is in the unit of the signal.
     """
 
     scene: Scene
@@ -41,44 +42,44 @@ class Case(NamedTuple):
 
 
 def case(scene: Scene, wavelength: np.ndarray, tolerance: float = 1e-3, seed: int = 0) -> Case:
-    """The case of a scene at `wavelength` (nm). Draws are uniform between the bounds."""
+    """The case of a scene at `wavelength` (nm), with draws uniform between the bounds."""
     bare = replace(scene.instrument, scale=1.0, offset=0.0)
-    seen = with_wavelength(eqx.tree_at(lambda s: s.instrument, scene, bare), np.asarray(wavelength, float))
+    scene = with_wavelength(eqx.tree_at(lambda s: s.instrument, scene, bare), np.asarray(wavelength, float))
     count = int(np.clip(POINTS // len(wavelength), LEAST_DRAWS, MOST_DRAWS))
-    free = [leaf for _, leaf in free_leaves(seen)]
+    free = [leaf for _, leaf in free_leaves(scene)]
     low, high = np.array([f.lower for f in free]), np.array([f.upper for f in free])
     draws = np.random.default_rng(seed).uniform(low, high, (count, len(free)))
-    draws[0] = start_values(seen)
-    return Case(seen, full_plan(seen), draws, tolerance)
+    draws[0] = start_values(scene)
+    return Case(scene, full_plan(scene), draws, tolerance)
 
 
 def media(scene: Scene) -> list[AbstractDispersion]:
-    """Every medium that has a name of its own: layers, substrate, ambient, and what is behind a plate."""
+    """Every medium of a scene: layers, substrate, ambient, and the medium behind a plate."""
     back = [] if scene.substrate.back is None else [scene.substrate.back]
     layers = [layer.material for layer in scene.layers if not isinstance(layer, Interface)]
     return [*layers, scene.substrate.material, scene.ambient, *back]
 
 
 def disperses(case: Case) -> bool:
-    """Whether any medium's index changes along the spectrum, at the scene's own values."""
+    """True where the index of any medium varies over the spectrum, at the start values."""
     scene = insert(case.scene, start_values(case.scene))
     return any(np.ptp(np.asarray(m(case.wavelength))) > 0 for m in media(scene))
 
 
-def kept(scene: Scene, changed: Scene) -> list[int]:
-    """Which of a scene's free parameters a changed scene still has, by their places in it."""
-    before, found = [_place(path) for path, _ in free_leaves(scene)], []
+def remaining_parameters(scene: Scene, changed: Scene) -> list[int]:
+    """Positions, among the free parameters of a scene, of those that a changed scene still has."""
+    names, positions = [_name(path) for path, _ in free_leaves(scene)], []
     for path, _ in free_leaves(changed):
-        found.append(before.index(_place(path), found[-1] + 1 if found else 0))
-    return found
+        positions.append(names.index(_name(path), positions[-1] + 1 if positions else 0))
+    return positions
 
 
-def _place(path: tuple) -> str:
-    """A path in words, blind to a medium's being wrapped in another."""
+def _name(path: tuple) -> str:
+    """A path as text, the same for a medium that is wrapped in another one (`base`)."""
     return "".join(str(step) for step in path if getattr(step, "name", "") != "base")
 
 
-def altered(plan: Plan, effect: str, on: bool, count: int = 0) -> Plan:
-    """The plan with one effect switched, and its count of orders or nodes."""
+def with_effect(plan: Plan, effect: str, on: bool, count: int = 0) -> Plan:
+    """The plan with one effect switched on or off, and its number of orders or nodes."""
     rows: Any = [replace(row, on=on, count=count) if row.effect == effect else row for row in plan.rows]
     return replace(plan, rows=tuple(rows))

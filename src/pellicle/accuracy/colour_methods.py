@@ -1,6 +1,6 @@
-"""The rungs to a film's colour: ways to integrate over the eye and the lamp, and to spare angles.
+"""Methods of computing the colour of a film: integration over the spectrum, interpolation in the angle.
 
-They run in single precision, as colours do; what they are measured against runs in double.
+They run in single precision, as colours do; the reference runs in double.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from pellicle.dispersion.empirical import Table
 
 EYE = ("1931", "D65")
 FINE = "uniform-64"
-"""Whose colours are as good as exact: what is spared in angles is measured with it."""
+"""Integration of practically exact colours, with which fewer angles are measured."""
 
 
 class Films(NamedTuple):
     """Films in air and the angles (radians, (angles,)) at which each of them is seen.
 
-    `numbers` holds for each of a film's keys, `k` and `base_k` only where there are any, an array (draws,)
-    or, for what differs from channel to channel, a dispersion.
+    `numbers` has for each key of the film an array (draws,) or, where it differs between channels, a
+    dispersion; `k` and `base_k` only where there are any.
     """
 
     numbers: dict[str, Any]
@@ -41,21 +41,23 @@ class Films(NamedTuple):
 
     @property
     def absorbs(self) -> bool:
+        """True where the film has an extinction."""
         return "k" in self.numbers
 
 
-def along_the_spectrum(number: Any, at: tuple[float, ...]) -> Any:
-    """A number; one a channel as a straight line between the channels' wavelengths, level beyond them."""
+def along_the_spectrum(number: Any, wavelengths: tuple[float, ...]) -> Any:
+    """A number as it is; one for each channel as a table, linear between their wavelengths (nm) and constant
+    beyond."""
     if np.ndim(number) == 0:
         return number
-    order = np.argsort(at)
-    nm, values = np.asarray(at, float)[order], np.asarray(number, float)[order]
+    order = np.argsort(wavelengths)
+    nm, values = np.asarray(wavelengths, float)[order], np.asarray(number, float)[order]
     return Table(np.array([1.0, *nm, 1e5]), np.array([values[0], *values, values[-1]]))
 
 
 @dataclass(frozen=True)
-class ColourRung:
-    """One way to a colour; `program` gives it, or the reason why it makes no sense for these films."""
+class ColourMethod:
+    """A method of computing colours; `program` compiles it for films, or returns why it does not apply."""
 
     name: str
     leaves_out: str
@@ -67,25 +69,26 @@ def xyz(bands: Bands, numbers: dict[str, Any], angle: Any) -> Any:
     index, base = (_index(numbers, *keys) for keys in (("n", "k"), ("base_n", "base_k")))
     ambient = numbers.get("ambient_n", 1.0)
     degrees = jnp.rad2deg(angle)
-    seen = jnp.asarray(reflectance(numbers["thickness"], index, base, bands, ambient=ambient, angle=degrees))
-    return seen @ jnp.asarray(bands.weights, seen.dtype)
+    spectrum = jnp.asarray(
+        reflectance(numbers["thickness"], index, base, bands, ambient=ambient, angle=degrees)
+    )
+    return spectrum @ jnp.asarray(bands.weights, spectrum.dtype)
 
 
 def _index(numbers: dict[str, Any], n: str, k: str) -> Any:
-    found, extinction = numbers[n], numbers.get(k)
-    if isinstance(found, Table):
-        return found if extinction is None else Table(found.wavelength, found.n, _table(extinction, found))
-    return found if extinction is None else jax.lax.complex(*jnp.broadcast_arrays(found, extinction))
-
-
-def _table(extinction: Any, like: Table) -> Any:
-    return extinction.n if isinstance(extinction, Table) else extinction * jnp.ones_like(like.n)
+    index, extinction = numbers[n], numbers.get(k)
+    if extinction is None:
+        return index
+    if isinstance(index, Table):
+        same = isinstance(extinction, Table)
+        return Table(index.wavelength, index.n, extinction.n if same else extinction * jnp.ones_like(index.n))
+    return jax.lax.complex(*jnp.broadcast_arrays(index, extinction))
 
 
 def _by_way(name: str, films: Films, double: bool = False) -> Program | str:
     bands = integration_bands(name, *EYE)
     if films.absorbs and not bands.absorbs:
-        return "it knows no absorbing layer"
+        return "it has no absorbing layer"
     return _compiled(partial(xyz, bands), films, double)
 
 
@@ -96,9 +99,9 @@ def _by_nodes(count: int, thickest: float, films: Films) -> Program | str:
 
 
 def _by_angles(count: int, films: Films) -> Program | str:
-    """A polynomial in the cosine through the colours at some angles."""
+    """Interpolation of the colours at some angles by a polynomial in the cosine."""
     if 2 * count > films.angle.size:
-        return "it is seen at too few angles"
+        return "too few angles to interpolate between"
     if any(isinstance(x, Table) for x in films.numbers.values()):
         return "its index is a table"
     bands, colour = integration_bands(FINE, *EYE), film_colour.interpolated(count)
@@ -119,43 +122,47 @@ def _compiled(colour: Callable, films: Films, double: bool = False) -> Program:
     return compiled_function(call, (films.numbers, films.angle), draws * films.angle.size, double)
 
 
-def error(eye: Sensor, truth: np.ndarray, answer: np.ndarray) -> float:
-    """The mean ΔE2000 of colours (draws, angles, 3) from what they are; infinite where one is no colour."""
-    apart = delta_e2000(*(np.asarray(lab(np.asarray(x, float), eye.white)) for x in (answer, truth)))
-    return float(np.mean(apart)) if np.all(np.isfinite(apart)) else math.inf
+def error(eye: Sensor, reference: np.ndarray, colours: np.ndarray) -> float:
+    """Mean ΔE2000 of colours (draws, angles, 3) from the reference; infinite where one is not finite."""
+    difference = delta_e2000(
+        *(np.asarray(lab(np.asarray(x, float), eye.white)) for x in (colours, reference))
+    )
+    return float(np.mean(difference)) if np.all(np.isfinite(difference)) else math.inf
 
 
-def truth(films: Films) -> np.ndarray:
-    """Colours by steps of 1 nm, in double precision."""
+def reference_colours(films: Films) -> np.ndarray:
+    """Colours by integration in steps of 1 nm, in double precision."""
     eye = sensor(*EYE)
     return _compiled(partial(xyz, Bands(eye.wavelength, None, eye.weights)), films, double=True).run()
 
 
 _SAMPLES = "the spectrum between them"
-COLOURS = (
+COLOUR_METHODS = (
     *(
-        ColourRung(f"points-{rgb}", "all but three wavelengths", partial(_by_way, f"points-{rgb}"))
+        ColourMethod(f"points-{rgb}", "all but three wavelengths", partial(_by_way, f"points-{rgb}"))
         for rgb in ("650-510-475", "645-525-445")
     ),
-    ColourRung("belcour-barla", "the sensors' shape: 4 Gaussians", partial(_by_way, "belcour-barla")),
+    ColourMethod("belcour-barla", "the sensors' shape: 4 Gaussians", partial(_by_way, "belcour-barla")),
     *(
-        ColourRung(f"gaussians-{n}", f"the sensors' shape: {n} Gaussians", partial(_by_way, f"gaussians-{n}"))
+        ColourMethod(
+            f"gaussians-{n}", f"the sensors' shape: {n} Gaussians", partial(_by_way, f"gaussians-{n}")
+        )
         for n in (4, 5, 6, 8, 10)
     ),
-    ColourRung("gaussians-8 in float64", "as gaussians-8", partial(_by_way, "gaussians-8", double=True)),
+    ColourMethod("gaussians-8 in float64", "as gaussians-8", partial(_by_way, "gaussians-8", double=True)),
     *(
-        ColourRung(f"nodes-{n}-{d}", _SAMPLES, partial(_by_nodes, n, d))
+        ColourMethod(f"nodes-{n}-{d}", _SAMPLES, partial(_by_nodes, n, d))
         for d, counts in ((500, (3, 4, 6, 8, 12)), (1000, (8, 12, 16)))
         for n in counts
     ),
     *(
-        ColourRung(f"{kind}-{n}", _SAMPLES, partial(_by_way, f"{kind}-{n}"))
+        ColourMethod(f"{kind}-{n}", _SAMPLES, partial(_by_way, f"{kind}-{n}"))
         for kind in ("uniform", "frequency")
         for n in (8, 16, 32, 64)
     ),
     *(
-        ColourRung(f"{FINE} at {n} angles", "the angles between them", partial(_by_angles, n))
+        ColourMethod(f"{FINE} at {n} angles", "the angles between them", partial(_by_angles, n))
         for n in (8, 16, 32)
     ),
 )
-"""Every rung to a colour, in the order of the table."""
+"""Every method of computing a colour, in the order of the table."""

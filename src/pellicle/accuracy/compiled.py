@@ -1,8 +1,7 @@
-"""A way as a compiled program: what it answers, what it takes to compile, to run, and to count."""
+"""Compiled programs of methods, with their result, compile time, run time and operations."""
 
 from __future__ import annotations
 
-import contextlib
 import time
 from dataclasses import dataclass
 from typing import Any
@@ -12,8 +11,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.accuracy.case import Case, kept
-from pellicle.accuracy.methods import Way
+from pellicle.accuracy.case import Case, remaining_parameters
+from pellicle.accuracy.methods import Variant
 from pellicle.fitting.spectra.parameters import anonymous
 from pellicle.scene.film import Scene
 from pellicle.scene.free import insert
@@ -23,8 +22,11 @@ from pellicle.simulation.film import build, tabulated
 
 @dataclass(frozen=True)
 class Program:
-    """All draws of a case in one call, of so many `samples`. `flops` is XLA's own count for one of them,
-    None if it has none."""
+    """A compiled function of all draws of a case, `samples` in number.
+
+    `finish` is a second program that runs on the result of `call`. `flops` is XLA's count for one sample,
+    None if it has none.
+    """
 
     call: Any
     finish: Any
@@ -36,73 +38,59 @@ class Program:
 
     def run(self) -> np.ndarray:
         """The signal of every draw, (draws, points)."""
-        with _precision(self.double):
+        with jax.enable_x64(self.double):
             return np.asarray(self.finish(self.call(*self.arguments)))
 
     def seconds(self) -> float:
-        """How long one sample takes, from one call."""
-        with _precision(self.double):
+        """Time of one sample, from one call."""
+        with jax.enable_x64(self.double):
             began = time.perf_counter()
             self.finish(self.call(*self.arguments)).block_until_ready()
             return (time.perf_counter() - began) / self.samples
 
 
-def compiled(case: Case, way: Way) -> Program:
-    """Compile a way for all the draws of a case. Raises ValueError where a material has no data."""
-    scene = anonymous(tabulated(way.scene, way.plan.on("coherence")))
-    values = case.draws[:, kept(case.scene, way.scene)]
-    simulate = build(way.plan)
+def compiled(case: Case, variant: Variant) -> Program:
+    """Compile a variant for all draws of a case. Raises ValueError where a material has no data."""
+    scene = anonymous(tabulated(variant.scene, variant.plan.on("coherence")))
+    values = case.draws[:, remaining_parameters(case.scene, variant.scene)]
+    simulate = build(variant.plan)
 
-    def signals(scene, values, nothing):
+    def signals(scene, values, zeros):
         def one(numbers, zero):
-            return simulate(_told_apart(insert(scene, list(numbers)), zero))
+            return simulate(_with_added(zero, insert(scene, list(numbers))))
 
-        return jax.vmap(one)(values, nothing)
+        return jax.vmap(one)(values, zeros)
 
     arguments = (scene, values, np.zeros(len(values)))
-    finish = None if way.finish is None else jax.vmap(way.finish)
-    return compiled_function(signals, arguments, len(values), way.double, finish)
+    finish = None if variant.finish is None else jax.vmap(variant.finish)
+    return compiled_function(signals, arguments, len(values), variant.double, finish)
 
 
 def compiled_function(
     function: Any, arguments: tuple[Any, ...], samples: int, double: bool = True, finish: Any = None
 ) -> Program:
-    """Compile a function for arguments of this shape, in double or single precision.
+    """Compile a function for arguments of these shapes, in double or single precision.
 
-    What `finish` makes of its answer is a program of its own: within the first, XLA would compute a point
-    again for all that is made of it.
+    `finish` is compiled as a second program: in the same one, XLA would compute a point again for each of
+    its uses.
     """
-    with _precision(double):
+    with jax.enable_x64(double):
         number = jnp.float64 if double else jnp.float32
-        given = jax.tree_util.tree_map(lambda x: jnp.asarray(x, number), arguments)
+        converted = jax.tree_util.tree_map(lambda x: jnp.asarray(x, number), arguments)
         began = time.perf_counter()
-        call = jax.jit(function).lower(*given).compile()
-        after = _unchanged
+        call = jax.jit(function).lower(*converted).compile()
+        second = lambda result: result  # noqa: E731
         if finish is not None:
-            after = jax.jit(finish).lower(jax.eval_shape(function, *given)).compile()
-        took = time.perf_counter() - began
-    return Program(call, after, given, double, samples, took, _flops(call, samples))
+            second = jax.jit(finish).lower(jax.eval_shape(function, *converted)).compile()
+        compile_seconds = time.perf_counter() - began
+    counts = call.cost_analysis() or {}
+    counts = counts[0] if isinstance(counts, list) else counts
+    flops = float(counts["flops"]) / samples if "flops" in counts else None
+    return Program(call, second, converted, double, samples, compile_seconds, flops)
 
 
-def _unchanged(signals: Any) -> Any:
-    return signals
-
-
-def _told_apart(scene: Scene, zero: Any) -> Scene:
-    """The same scene, in a way that keeps a compiler from simulating it once for all draws."""
-    where = (lambda s: s.layers[0].plate_mm) if isinstance(scene.layers[0], Plate) else _first_thickness
+def _with_added(zero: Any, scene: Scene) -> Scene:
+    """The scene with 0 added to its first thickness, so that no compiler simulates it once for all draws."""
+    thickness = "plate_mm" if isinstance(scene.layers[0], Plate) else "thickness"
+    where = lambda s: getattr(s.layers[0], thickness)  # noqa: E731
     return eqx.tree_at(where, scene, where(scene) + zero)
-
-
-def _first_thickness(scene: Scene) -> Any:
-    return scene.layers[0].thickness  # pyright: ignore[reportAttributeAccessIssue]
-
-
-def _precision(double: bool) -> contextlib.AbstractContextManager:
-    return jax.enable_x64(double)
-
-
-def _flops(call: Any, samples: int) -> float | None:
-    counted = call.cost_analysis() or {}
-    counted = counted[0] if isinstance(counted, list) else counted
-    return float(counted["flops"]) / samples if "flops" in counted else None

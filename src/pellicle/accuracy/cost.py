@@ -1,4 +1,4 @@
-"""What accuracy costs for one scene: its forward rungs, and its solvers where something is free."""
+"""Accuracy against time for a film: methods of simulation, solvers, and methods of computing intervals."""
 
 from __future__ import annotations
 
@@ -9,31 +9,38 @@ import jax
 import numpy as np
 
 from pellicle.accuracy.case import case
-from pellicle.accuracy.interval_coverage import Intervals, intervals
-from pellicle.accuracy.measure import Ladder, Progress, climb
-from pellicle.accuracy.simulated_data import trials
-from pellicle.accuracy.solver_comparison import Race, race
+from pellicle.accuracy.interval_coverage import IntervalComparison, compare_intervals
+from pellicle.accuracy.measure import MethodComparison, compare_methods
+from pellicle.accuracy.simulated_data import data_sets
+from pellicle.accuracy.solver_comparison import SolverComparison, compare_solvers
 from pellicle.errors import UsageError
+from pellicle.fitting.progress import Progress, quiet
 from pellicle.scene.film import Scene
 from pellicle.scene.free import free_leaves
 
 TOLERANCE = {"psi-delta": 0.1}
 DEFAULT_TOLERANCE = 1e-3
-"""What is accurate enough unless somebody says otherwise: a fraction, or degrees on the sphere of N, C, S."""
+"""Default tolerance: a fraction, or degrees on the sphere of N, C, S."""
 
 
 @dataclass
 class Cost:
-    """`race` is None where no solver took part, and `no_race` says why; `intervals` follow it."""
+    """Accuracy against time for one film.
 
-    ladder: Ladder
-    race: Race | None
-    no_race: str = ""
-    intervals: Intervals | None = None
+    `methods` compares simulations, `solvers` fits and `intervals` their errors. `solvers` is None where
+    nothing was fitted, and `no_solvers` says why.
+    """
+
+    methods: MethodComparison
+    solvers: SolverComparison | None
+    no_solvers: str = ""
+    intervals: IntervalComparison | None = None
 
     @property
     def interrupted(self) -> bool:
-        return any(part is not None and part.interrupted for part in (self.ladder, self.race, self.intervals))
+        """True where Ctrl-C ended the measurement."""
+        parts = (self.methods, self.solvers, self.intervals)
+        return any(part is not None and part.interrupted for part in parts)
 
 
 def cost(
@@ -44,32 +51,33 @@ def cost(
     tolerance: float | None = None,
     noise: float | None = None,
     datasets: int = 20,
-    progress: Progress = lambda what, done, total: None,
+    progress: Progress = quiet,
 ) -> Cost:
-    """Measure every way to a scene's signal at `wavelength` (nm), and to its free parameters.
+    """Measure every method of computing the signal of a scene at `wavelength` (nm), and of fitting it.
 
-    `reference` is "float64" or "mpmath". `tolerance` is in the signal's unit: a fraction, or degrees on the
-    sphere of N, C and S; without it, it is the `noise`, or 0.001 (0.1 degrees). `datasets` spectra are
-    simulated with that noise, or noise as large as the tolerance, and fitted by every solver.
+    `reference` is "float64" or "mpmath". `tolerance` is in the unit of the signal: a fraction, or degrees on
+    the sphere of N, C and S; its default is the `noise`, or else 0.001 (0.1 degrees). `datasets` spectra are
+    simulated with that noise, or else noise equal to the tolerance, and fitted by every solver.
 
-    **Raises:** UsageError for a tolerance that is not above zero, a reference that the scene cannot be
-    computed with, and a scene whose signal is nothing.
+    **Raises:** UsageError for a tolerance that is not above zero, for a reference that cannot compute the
+    scene, and for a scene whose signal is 0 everywhere.
     """
-    usual = TOLERANCE.get(scene.light.signal, DEFAULT_TOLERANCE)
-    tolerance = (usual if noise is None else noise) if tolerance is None else tolerance
+    default = TOLERANCE.get(scene.light.signal, DEFAULT_TOLERANCE)
+    tolerance = (default if noise is None else noise) if tolerance is None else tolerance
     if not 0 < tolerance < np.inf:
         raise UsageError(f"the tolerance must be above zero, got {tolerance:g}: what error is small enough?")
     with jax.enable_x64(True):
-        here = case(scene, wavelength, tolerance)
-        ladder = climb(here, reference, progress)
-        if ladder.interrupted:
-            return Cost(ladder, None, "interrupted before")
+        one = case(scene, wavelength, tolerance)
+        methods = compare_methods(one, reference, progress)
+        if methods.interrupted:
+            return Cost(methods, None, "interrupted before")
         if datasets == 0:
-            return Cost(ladder, None, "no data sets were asked for")
+            return Cost(methods, None, "no data sets were requested")
         if not free_leaves(scene):
-            return Cost(ladder, None, "nothing is free to fit")
+            return Cost(methods, None, "nothing is free to fit")
         noise = tolerance if noise is None else noise
-        own = eqx.tree_at(lambda s: s.instrument, here.scene, scene.instrument)
-        sets = trials(here, own, noise, datasets)
-        raced = race(sets, noise, progress)
-        return Cost(ladder, raced, intervals=None if raced.interrupted else intervals(sets, progress))
+        with_instrument = eqx.tree_at(lambda s: s.instrument, one.scene, scene.instrument)
+        data = data_sets(one, with_instrument, noise, datasets)
+        solvers = compare_solvers(data, noise, progress)
+        intervals = None if solvers.interrupted else compare_intervals(data, progress)
+        return Cost(methods, solvers, intervals=intervals)

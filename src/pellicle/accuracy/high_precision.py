@@ -1,7 +1,7 @@
-"""A scene's signal to 50 digits: characteristic matrices in mpmath, sharing no code with the model.
+"""Signal of a scene to 50 digits: characteristic matrices in mpmath, sharing no code with the forward model.
 
 Source: H. A. Macleod, Thin-Film Optical Filters, chapter 2; incoherent plates by summed intensities.
-The indices of the media are taken as the model has them, rounded to float64.
+The indices of the media are those of the forward model, rounded to float64.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pellicle.accuracy.case import Case
 from pellicle.scene.film import Scene, groups, thickness_spread, with_wavelength
 from pellicle.scene.free import insert
 
-mp: Any = mpmath.mp  # its functions are made at run time, which type checkers do not see
+mp: Any = mpmath.mp  # its functions are created at run time, which type checkers do not see
 mpc: Any = mpmath.mpc
 mpf: Any = mpmath.mpf
 
@@ -23,7 +23,7 @@ DIGITS = 50
 
 
 def unsuitable(case: Case) -> str | None:
-    """Why a case cannot be computed here; None where it can."""
+    """The reason why a case cannot be computed; None where it can."""
     scene, instrument = case.scene, case.scene.instrument
     if instrument.bandwidth is not None:
         return "this light has a bandwidth"
@@ -46,11 +46,11 @@ def signal(case: Case, values: np.ndarray, at: np.ndarray) -> np.ndarray:
     angle = np.broadcast_to(scene.light.angle, case.wavelength.shape)[at]
     scene = with_wavelength(scene, case.wavelength[at], angle)
     with mp.workdps(DIGITS):
-        points = [_point(scene, seen) for seen in _seen(scene)]
+        points = [_signal(scene, point) for point in _points(scene)]
     return np.array(points, dtype=float)
 
 
-class _Sheet(NamedTuple):
+class _Group(NamedTuple):
     """Coherent layers between two thick media, at one wavelength."""
 
     above: Any
@@ -58,29 +58,29 @@ class _Sheet(NamedTuple):
     below: Any
 
 
-class _Seen(NamedTuple):
-    """The whole scene at one wavelength (nm)."""
+class _Point(NamedTuple):
+    """A scene at one wavelength (nm)."""
 
     wavelength: Any
     angle: Any  # radians
-    sheets: list[_Sheet]
+    groups: list[_Group]
     plates_mm: list[Any]
 
 
-def _seen(scene: Scene) -> list[_Seen]:
-    found, plates = groups(scene)
+def _points(scene: Scene) -> list[_Point]:
+    described, plates = groups(scene)
     wavelength = np.asarray(scene.light.wavelength)
     tables = [
         (_indices(g.above, wavelength), [_indices(x.material, wavelength) for x in g.layers],
          _indices(g.below, wavelength), [_exact(x.thickness) for x in g.layers])
-        for g in found
+        for g in described
     ]  # fmt: skip
     return [
-        _Seen(
+        _Point(
             mpf(float(nm)),
             mpf(float(scene.light.angle[i])) * mp.pi / 180,
             [
-                _Sheet(above[i], [(n[i], d) for n, d in zip(layers, depths, strict=True)], below[i])
+                _Group(above[i], [(n[i], d) for n, d in zip(layers, depths, strict=True)], below[i])
                 for above, layers, below, depths in tables
             ],
             [_exact(plate.plate_mm) for plate in plates],
@@ -97,84 +97,84 @@ def _indices(medium: Any, wavelength: np.ndarray) -> list[Any]:
     return [mpc(float(n.real), float(n.imag)) for n in np.asarray(medium(wavelength))]
 
 
-def _point(scene: Scene, seen: _Seen) -> list[Any]:
+def _signal(scene: Scene, point: _Point) -> list[Any]:
     light = scene.light
     if light.signal == "psi-delta":
         s, p, cross = (
-            mp.re(_product(seen, 0, "ss")),
-            mp.re(_product(seen, 0, "pp")),
-            _product(seen, 0, "ps"),
+            mp.re(_product(point, 0, "ss")),
+            mp.re(_product(point, 0, "pp")),
+            _product(point, 0, "ps"),
         )
         # tan Ψ e^{iΔ} = conj(r_p/r_s): N = cos 2Ψ, C = sin 2Ψ cos Δ, S = sin 2Ψ sin Δ
         return [(s - p) / (s + p), 2 * mp.re(cross) / (s + p), -2 * mp.im(cross) / (s + p)]
     letters = "sp" if light.polarisation == "unpolarised" else light.polarisation
     which = 0 if light.signal == "R" else 1
-    return [sum(_powers(seen, 0, letter)[which] for letter in letters) / len(letters)]
+    return [sum(_powers(point, 0, letter)[which] for letter in letters) / len(letters)]
 
 
-def _powers(seen: _Seen, first: int, letter: str) -> tuple[Any, Any]:
-    """R of a sheet and all under it, and T through them."""
-    R, T, R_below, T_below = _faces(seen, seen.sheets[first], letter)
-    if first == len(seen.sheets) - 1:
+def _powers(point: _Point, first: int, letter: str) -> tuple[Any, Any]:
+    """R of a group and all under it, and T through them."""
+    R, T, R_below, T_below = _faces(point, point.groups[first], letter)
+    if first == len(point.groups) - 1:
         return R, T
-    R_next, T_next = _powers(seen, first + 1, letter)
-    q = _normal(seen, seen.sheets[first].below)
-    passed = mp.exp(-4 * mp.pi * mp.im(q) * seen.plates_mm[first] * 10**6 / seen.wavelength)
+    R_next, T_next = _powers(point, first + 1, letter)
+    q = _normal(point, point.groups[first].below)
+    passed = mp.exp(-4 * mp.pi * mp.im(q) * point.plates_mm[first] * 10**6 / point.wavelength)
     between = 1 - R_below * R_next * passed**2
     return R + T * T_below * R_next * passed**2 / between, T * T_next * passed / between
 
 
-def _product(seen: _Seen, first: int, letters: str) -> Any:
-    """r conj(r) of a sheet and all under it, for two polarisations, summed over the plates' orders."""
-    (r, back, twice), (r_, back_, twice_) = (_amplitudes(seen, seen.sheets[first], x) for x in letters)
-    if first == len(seen.sheets) - 1:
+def _product(point: _Point, first: int, letters: str) -> Any:
+    """r conj(r) of a group and all under it, for two polarisations, summed over the plates' orders."""
+    (r, back, twice), (r_, back_, twice_) = (_amplitudes(point, point.groups[first], x) for x in letters)
+    if first == len(point.groups) - 1:
         return r * mp.conj(r_)
-    q = _normal(seen, seen.sheets[first].below)
-    passed = mp.exp(-4 * mp.pi * mp.im(q) * seen.plates_mm[first] * 10**6 / seen.wavelength)
-    beneath = _product(seen, first + 1, letters) * passed**2
+    q = _normal(point, point.groups[first].below)
+    passed = mp.exp(-4 * mp.pi * mp.im(q) * point.plates_mm[first] * 10**6 / point.wavelength)
+    beneath = _product(point, first + 1, letters) * passed**2
     return r * mp.conj(r_) + twice * mp.conj(twice_) * beneath / (1 - back * mp.conj(back_) * beneath)
 
 
-def _normal(seen: _Seen, index: Any) -> Any:
-    a = seen.sheets[0].above * mp.sin(seen.angle)
+def _normal(point: _Point, index: Any) -> Any:
+    a = point.groups[0].above * mp.sin(point.angle)
     q = mp.sqrt(index**2 - a**2)
     return -q if mp.im(q) < 0 else q
 
 
-def _admittance(seen: _Seen, index: Any, letter: str) -> Any:
-    q = _normal(seen, index)
+def _admittance(point: _Point, index: Any, letter: str) -> Any:
+    q = _normal(point, index)
     return q if letter == "s" else q / index**2
 
 
-def _fields(seen: _Seen, layers: list[tuple[Any, Any]], bottom: Any, letter: str) -> tuple[Any, Any]:
+def _fields(point: _Point, layers: list[tuple[Any, Any]], bottom: Any, letter: str) -> tuple[Any, Any]:
     """(E, H) at the upper face for a unit wave that leaves below; in p they change places."""
     E, H = mpc(1), bottom
     for index, depth in reversed(layers):
-        q, weight = _normal(seen, index), mpc(1) if letter == "s" else index**2
-        k0d = 2 * mp.pi * depth / seen.wavelength
+        q, weight = _normal(point, index), mpc(1) if letter == "s" else index**2
+        k0d = 2 * mp.pi * depth / point.wavelength
         cosine, sine = mp.cos(k0d * q), k0d * mp.sinc(k0d * q)  # the latter over q
         E, H = E * cosine - 1j * sine * weight * H, H * cosine - 1j * sine * q**2 / weight * E
     return E, H
 
 
-def _amplitudes(seen: _Seen, sheet: _Sheet, letter: str) -> tuple[Any, Any, Any]:
-    """r of one sheet from above and from below, and t t′; at normal incidence r_p = −r_s."""
-    top, bottom = _admittance(seen, sheet.above, letter), _admittance(seen, sheet.below, letter)
-    E, H = _fields(seen, sheet.layers, bottom, letter)
-    E_, H_ = _fields(seen, sheet.layers[::-1], top, letter)
+def _amplitudes(point: _Point, group: _Group, letter: str) -> tuple[Any, Any, Any]:
+    """r of one group from above and from below, and t t′; at normal incidence r_p = −r_s."""
+    top, bottom = _admittance(point, group.above, letter), _admittance(point, group.below, letter)
+    E, H = _fields(point, group.layers, bottom, letter)
+    E_, H_ = _fields(point, group.layers[::-1], top, letter)
     start, start_ = top * E + H, bottom * E_ + H_
     return (top * E - H) / start, (bottom * E_ - H_) / start_, 4 * top * bottom / (start * start_)
 
 
-def _faces(seen: _Seen, sheet: _Sheet, letter: str) -> tuple[Any, Any, Any, Any]:
+def _faces(point: _Point, group: _Group, letter: str) -> tuple[Any, Any, Any, Any]:
     """R and T from above, R and T from below."""
     found = []
     for above, layers, below in (
-        (sheet.above, sheet.layers, sheet.below),
-        (sheet.below, sheet.layers[::-1], sheet.above),
+        (group.above, group.layers, group.below),
+        (group.below, group.layers[::-1], group.above),
     ):
-        top, bottom = _admittance(seen, above, letter), _admittance(seen, below, letter)
-        E, H = _fields(seen, layers, bottom, letter)
+        top, bottom = _admittance(point, above, letter), _admittance(point, below, letter)
+        E, H = _fields(point, layers, bottom, letter)
         start = top * E + H
         found += [
             abs((top * E - H) / start) ** 2,

@@ -1,4 +1,4 @@
-"""The rungs of uncertainty: ways to a 95 % interval, how often it holds the truth, and its time."""
+"""Coverage of 95 % intervals by several methods on simulated data sets, with their times."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from functools import partial
 
 import numpy as np
 
-from pellicle.accuracy.measure import Progress, entrants, mark_pareto
-from pellicle.accuracy.simulated_data import Trial
+from pellicle.accuracy.measure import first_runs, mark_pareto
+from pellicle.accuracy.simulated_data import DataSet
 from pellicle.fitting.conclusion import linearised
 from pellicle.fitting.neighbourhood import neighbourhood
 from pellicle.fitting.profile_likelihood import interval
-from pellicle.fitting.progress import quiet
+from pellicle.fitting.progress import Progress, quiet
 from pellicle.fitting.reweighting import RankedMinima, rank
 from pellicle.fitting.spectra.search import search
 from pellicle.sampling.chain import empty
@@ -26,9 +26,9 @@ from pellicle.sampling.modes import modes
 from pellicle.sampling.run import run
 from pellicle.sampling.target import Target
 
-PROMISED = 0.95
+NOMINAL = 0.95
 _WIDE = 1.959964
-"""Standard deviations of a normal distribution on either side of its 95 %."""
+"""Half width of the central 95 % of a normal distribution, in standard deviations."""
 _WALKERS = 32
 _STEPS = 20_000
 
@@ -37,8 +37,8 @@ Interval = tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
-class Way:
-    """One way from a finished fit to intervals; `missing` names a package that is not installed."""
+class IntervalMethod:
+    """A method of computing intervals from a fit; `missing` names a package that is not installed."""
 
     name: str
     leaves_out: str
@@ -47,12 +47,12 @@ class Way:
 
 
 @dataclass
-class Held:
-    """How a way did over the data sets.
+class IntervalResult:
+    """Coverage and cost of one method over all data sets.
 
-    `coverage` is the share of the parameters' truths inside, `error` how far that is from 95 %, `doubt` its
-    binomial standard deviation; `width` is that of the intervals as a share of the bounds, their median.
-    `seconds` are those after the fit.
+    `coverage` is the share of true values inside the intervals, `error` its distance from 95 %, `doubt` its
+    binomial standard deviation. `width` is the median width of the intervals relative to the bounds,
+    `seconds` the time after the fit.
     """
 
     name: str
@@ -68,69 +68,70 @@ class Held:
 
 
 @dataclass
-class Intervals:
-    """The ways of one case, the fastest first, and those that took no part, with why."""
+class IntervalComparison:
+    """Results of all methods of one case, the fastest first, and the methods left out, with why."""
 
-    ways: list[Held] = field(default_factory=list)
+    results: list[IntervalResult] = field(default_factory=list)
     left_out: dict[str, str] = field(default_factory=dict)
     interrupted: bool = False
 
     @property
     def recommended(self) -> str | None:
-        """The fastest of those whose coverage is 95 % within two of its standard deviations."""
-        good = [way for way in self.ways if way.error <= 2 * way.doubt] or self.ways
-        return min(good, key=lambda way: way.seconds).name if good else None
+        """Name of the fastest method whose coverage is 95 % within two of its standard deviations."""
+        good = [result for result in self.results if result.error <= 2 * result.doubt] or self.results
+        return min(good, key=lambda result: result.seconds).name if good else None
 
 
-def intervals(trials: Sequence[Trial], progress: Progress) -> Intervals:
-    """Let every way say what it knows of every data set. Ctrl-C ends it, and keeps what was finished."""
-    found, runs = Intervals(), []
+def compare_intervals(data: Sequence[DataSet], progress: Progress) -> IntervalComparison:
+    """Compute intervals for every data set by every method. Ctrl-C ends this and keeps the results so far."""
+    comparison, runs = IntervalComparison(), []
     try:
-        fits = [_fitted(trial) for trial in trials]
-        for way, seconds in entrants(WAYS, lambda way: way.intervals(fits[0]), found.left_out, progress):
-            runs.append(_Run(way, seconds))
-        for done, (trial, fit) in enumerate(zip(trials, fits, strict=True)):
-            progress("intervals", done, len(trials))
-            for each in runs:
-                each.take(trial, fit)
+        fits = [rank(one.problem, search(one.problem, quiet)) for one in data]
+        first = lambda method: method.intervals(fits[0])  # noqa: E731
+        for method, seconds in first_runs(INTERVAL_METHODS, first, comparison.left_out, progress):
+            runs.append(_Run(method, seconds))
+        for done, (one, fit) in enumerate(zip(data, fits, strict=True)):
+            progress("intervals", done, len(data))
+            for run in runs:
+                run.add(one, fit)
     except KeyboardInterrupt:
-        found.interrupted = True
-    found.ways = sorted((each.held() for each in runs if each.times), key=lambda way: way.seconds)
-    mark_pareto(found.ways)
-    return found
-
-
-def _fitted(trial: Trial) -> RankedMinima:
-    return rank(trial.problem, search(trial.problem, quiet))
+        comparison.interrupted = True
+    results = (run.result() for run in runs if run.times)
+    comparison.results = sorted(results, key=lambda result: result.seconds)
+    mark_pareto(comparison.results)
+    return comparison
 
 
 @dataclass
 class _Run:
-    way: Way
+    """A method while it is measured."""
+
+    method: IntervalMethod
     compile_seconds: float
     times: list[float] = field(default_factory=list)
     inside: list[bool] = field(default_factory=list)
     widths: list[float] = field(default_factory=list)
 
-    def take(self, trial: Trial, fit: RankedMinima) -> None:
+    def add(self, data: DataSet, fit: RankedMinima) -> None:
         began = time.perf_counter()
-        lower, upper = self.way.intervals(fit)
+        lower, upper = self.method.intervals(fit)
         self.times.append(time.perf_counter() - began)
-        self.inside += ((lower <= trial.truth) & (trial.truth <= upper)).tolist()
+        self.inside += ((lower <= data.truth) & (data.truth <= upper)).tolist()
         self.widths += (np.minimum(upper, 1.0) - np.maximum(lower, 0.0)).tolist()
 
-    def held(self) -> Held:
-        coverage, count, usual = float(np.mean(self.inside)), len(self.inside), statistics.median(self.times)
-        return Held(
-            name=self.way.name,
-            leaves_out=self.way.leaves_out,
-            error=abs(coverage - PROMISED),
+    def result(self) -> IntervalResult:
+        coverage, count = float(np.mean(self.inside)), len(self.inside)
+        seconds = statistics.median(self.times)
+        return IntervalResult(
+            name=self.method.name,
+            leaves_out=self.method.leaves_out,
+            error=abs(coverage - NOMINAL),
             coverage=coverage,
-            doubt=math.sqrt(PROMISED * (1 - PROMISED) / count),
+            doubt=math.sqrt(NOMINAL * (1 - NOMINAL) / count),
             width=float(np.median(self.widths)),
             datasets=len(self.times),
-            seconds=usual,
-            compile_seconds=max(self.compile_seconds - usual, 0.0),
+            seconds=seconds,
+            compile_seconds=max(self.compile_seconds - seconds, 0.0),
         )
 
 
@@ -152,15 +153,15 @@ def _profile(fit: RankedMinima) -> Interval:
 
 
 def _sampled(steps: int, fit: RankedMinima) -> Interval:
-    """By `pellicle.sample`'s own chain, of that many steps or until it is long enough."""
+    """Intervals by the chain of `pellicle.sample`, of `steps` steps or until it is long enough."""
     size = len(fit.problem.parameters)
     target = Target(log_density(fit.problem), _WALKERS // 2)
     chain, checks = run(target, modes(fit), empty(_WALKERS, size, 0), steps, lambda chain: None, quiet)
     return _quantiles(chain.draws[checks.discard :])
 
 
-def _usual(steps: int, fit: RankedMinima) -> Interval:
-    """What is often done: stretch moves from a ball around the best fit, the first half thrown away."""
+def _stretch(steps: int, fit: RankedMinima) -> Interval:
+    """Intervals by the usual chain: stretch moves from a ball around the best fit, half of it burn-in."""
     import emcee
 
     size = len(fit.problem.parameters)
@@ -178,12 +179,16 @@ def _quantiles(draws: np.ndarray) -> Interval:
 
 
 _MISSING = next(iter(missing()), None)
-WAYS = (
-    Way("covariance", "curvature, bounds, other minima", _covariance),
-    Way("profile", "other minima", _profile),
-    Way("emcee, 25 steps", "most of the chain", partial(_sampled, 25), _MISSING),
-    Way("emcee, 100 steps", "half of the chain", partial(_sampled, 100), _MISSING),
-    Way("emcee, until it is long enough", "nothing: pellicle sample", partial(_sampled, _STEPS), _MISSING),
-    Way("emcee, stretch, 500 steps", "other minima: from the best fit", partial(_usual, 500), _MISSING),
+INTERVAL_METHODS = (
+    IntervalMethod("covariance", "curvature, bounds, other minima", _covariance),
+    IntervalMethod("profile", "other minima", _profile),
+    IntervalMethod("emcee, 25 steps", "most of the chain", partial(_sampled, 25), _MISSING),
+    IntervalMethod("emcee, 100 steps", "half of the chain", partial(_sampled, 100), _MISSING),
+    IntervalMethod(
+        "emcee, until it is long enough", "nothing: pellicle sample", partial(_sampled, _STEPS), _MISSING
+    ),
+    IntervalMethod(
+        "emcee, stretch, 500 steps", "other minima: from the best fit", partial(_stretch, 500), _MISSING
+    ),
 )
-"""Every way to an interval, in the order of their cost."""
+"""Every method of computing intervals, in the order of their cost."""

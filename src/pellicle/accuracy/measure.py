@@ -1,4 +1,4 @@
-"""Climbing a ladder: every rung compiled, run in turns with the others, and set against the reference."""
+"""Measurement of methods: each is compiled, timed in turn with the others, and compared with a reference."""
 
 from __future__ import annotations
 
@@ -12,23 +12,22 @@ import numpy as np
 
 from pellicle.accuracy.case import Case
 from pellicle.accuracy.compiled import Program, compiled
-from pellicle.accuracy.methods import FORWARD, Rung
-from pellicle.accuracy.reference import Reference, reference
+from pellicle.accuracy.methods import METHODS, Method
+from pellicle.accuracy.reference import reference_signal
 from pellicle.errors import UsageError
-
-Progress = Callable[[str, int, int], None]
-"""Called with what is being done, how much is done and how much there is."""
+from pellicle.fitting.progress import Progress
 
 ROUNDS, SECONDS = 40, 15.0
-"""Most rounds in which the rungs take turns, and about how long all of them together may take."""
+"""Most rounds in which the methods are timed in turn, and about how long all of them may take together."""
 
 
 @dataclass
 class MethodResult:
-    """What a rung costs and how far off it is.
+    """Error and cost of one method.
 
-    `error` is in the signal's unit; `seconds` is the median time of one spectrum, colour or sample,
-    compilation apart; `flops` is XLA's count for it.
+    `error` is in the unit of the signal; `seconds` is the median time of one spectrum, colour or sample
+    without compilation; `flops` is XLA's count for it, None if it has none. `pareto` is False where another
+    method is both faster and more accurate.
     """
 
     name: str
@@ -41,10 +40,10 @@ class MethodResult:
 
 
 @dataclass
-class Ladder:
-    """The forward rungs of one case, the fastest first, and those that make no sense for it, with why.
+class MethodComparison:
+    """Results of all methods of one case, the fastest first, and the methods that do not apply, with why.
 
-    A `sample` is what one evaluation gives: a spectrum of so many wavelengths, a colour, a BRDF.
+    A `sample` is what one evaluation computes: a spectrum of `wavelengths` points, a colour, a BRDF.
     """
 
     reference: str
@@ -53,45 +52,53 @@ class Ladder:
     wavelengths: int
     draws: int
     sample: str = "spectrum"
-    rungs: list[MethodResult] = field(default_factory=list)
+    results: list[MethodResult] = field(default_factory=list)
     left_out: dict[str, str] = field(default_factory=dict)
     interrupted: bool = False
 
     @property
     def within(self) -> bool:
-        """Whether any rung meets the tolerance."""
-        return any(rung.error <= self.tolerance for rung in self.rungs)
+        """True where any method meets the tolerance."""
+        return any(result.error <= self.tolerance for result in self.results)
 
     @property
     def recommended(self) -> str | None:
-        """The fastest rung within the tolerance, or the most accurate where none is."""
-        good = [rung for rung in self.rungs if rung.error <= self.tolerance]
+        """Name of the fastest method within the tolerance, or of the most accurate where none is."""
+        good = [result for result in self.results if result.error <= self.tolerance]
         if good:
-            return min(good, key=lambda rung: rung.seconds).name
-        return min(self.rungs, key=lambda rung: rung.error).name if self.rungs else None
+            return min(good, key=lambda result: result.seconds).name
+        return min(self.results, key=lambda result: result.error).name if self.results else None
 
 
-def climb(case: Case, against: str, progress: Progress, rungs: Sequence[Rung] = FORWARD) -> Ladder:
-    """Measure every rung of a case.
+def compare_methods(
+    case: Case, reference: str, progress: Progress, methods: Sequence[Method] = METHODS
+) -> MethodComparison:
+    """Measure every method of simulating a case.
 
-    Raises UsageError for a reference that the case cannot be computed with, ValueError where a material
-    has no data at a wavelength.
+    **Raises:** UsageError for a `reference` that cannot compute the case and for a signal that is 0
+    everywhere; ValueError where a material has no data at a wavelength.
     """
-    truth = reference(against, case)
-    _check(truth, case)
+    truth = reference_signal(reference, case)
+    known = truth.values[np.isfinite(truth.values)]
+    if known.size == 0:
+        raise UsageError("there is nothing to compute: the signal is not finite anywhere between the bounds")
+    if not np.any(known):
+        raise UsageError(
+            f"there is nothing to compute: {case.plan.signal} is 0 everywhere between the bounds"
+        )
     unit = "degrees" if case.ellipsometric else case.plan.signal
-    ladder = Ladder(truth.name, case.tolerance, unit, len(truth.wavelengths), len(truth.draws))
+    comparison = MethodComparison(truth.name, case.tolerance, unit, len(truth.wavelengths), len(truth.draws))
 
-    def prepare(rung: Rung) -> Program | str:
-        way = rung.way(case)
-        return way if isinstance(way, str) else compiled(case, way)
+    def prepare(method: Method) -> Program | str:
+        variant = method.variant(case)
+        return variant if isinstance(variant, str) else compiled(case, variant)
 
-    return measured(ladder, rungs, prepare, lambda answer: truth.error(case, answer), progress)
+    return measure(comparison, methods, prepare, lambda signal: truth.error(case, signal), progress)
 
 
 @runtime_checkable
 class Named(Protocol):
-    """A rung by its name, and what it leaves out."""
+    """A method by its name and by what it leaves out."""
 
     @property
     def name(self) -> str: ...
@@ -99,79 +106,60 @@ class Named(Protocol):
     def leaves_out(self) -> str: ...
 
 
-def measured(
-    ladder: Ladder,
-    rungs: Sequence[Any],
-    prepare: Callable[[Any], Program | str],
-    error: Callable[[np.ndarray], float],
-    progress: Progress,
-) -> Ladder:
-    """The ladder with every rung measured: its program, or why there is none, by `prepare`, and the error
-    of its answer. Ctrl-C ends it, and keeps what was measured."""
-    runs: list[_Run] = []
-    try:
-        _compile(ladder, rungs, prepare, error, runs, progress)
-        _take_turns(runs, progress)
-    except KeyboardInterrupt:
-        ladder.interrupted = True
-    ladder.rungs = sorted((run.standing() for run in runs if run.times), key=lambda rung: rung.seconds)
-    mark_pareto(ladder.rungs)
-    return ladder
-
-
-def _check(truth: Reference, case: Case) -> None:
-    """UsageError where there is no signal to be wrong about."""
-    known = truth.values[np.isfinite(truth.values)]
-    if known.size == 0:
-        raise UsageError("there is nothing to compute: the signal is no number anywhere between the bounds")
-    if not np.any(known):
-        raise UsageError(
-            f"there is nothing to compute: {case.plan.signal} is 0 everywhere between the bounds"
-        )
-
-
 @dataclass
 class _Run:
-    """A rung while it is measured."""
+    """A method while it is measured."""
 
-    rung: Named
+    method: Named
     program: Program
     error: float
     times: list[float] = field(default_factory=list)
 
-    def standing(self) -> MethodResult:
-        program = self.program
-        return MethodResult(
-            self.rung.name,
-            self.rung.leaves_out,
-            self.error,
-            statistics.median(self.times),
-            program.compile_seconds,
-            program.flops,
-        )
 
-
-def _compile(
-    ladder: Ladder,
-    rungs: Sequence[Any],
+def measure(
+    comparison: MethodComparison,
+    methods: Sequence[Any],
     prepare: Callable[[Any], Program | str],
     error: Callable[[np.ndarray], float],
-    runs: list[_Run],
     progress: Progress,
-) -> None:
-    """Compile and run each rung once. It counts as measured from then on."""
-    for done, rung in enumerate(rungs):
-        progress(f"compile {rung.name}", done, len(rungs))
-        program = prepare(rung)
-        if isinstance(program, str):
-            ladder.left_out[rung.name] = program
-            continue
-        runs.append(_Run(rung, program, error(program.run())))
-        runs[-1].times.append(program.seconds())
+) -> MethodComparison:
+    """Fill a comparison with the result of every method.
+
+    `prepare` compiles a method or returns why it does not apply, `error` compares its signal with the
+    reference. Ctrl-C ends the measurement and keeps its results so far.
+    """
+    runs: list[_Run] = []
+    try:
+        for done, method in enumerate(methods):
+            progress(f"compile {method.name}", done, len(methods))
+            program = prepare(method)
+            if isinstance(program, str):
+                comparison.left_out[method.name] = program
+                continue
+            runs.append(_Run(method, program, error(program.run())))
+            runs[-1].times.append(program.seconds())
+        _time_in_turns(runs, progress)
+    except KeyboardInterrupt:
+        comparison.interrupted = True
+    results = [
+        MethodResult(
+            run.method.name,
+            run.method.leaves_out,
+            run.error,
+            statistics.median(run.times),
+            run.program.compile_seconds,
+            run.program.flops,
+        )
+        for run in runs
+        if run.times
+    ]
+    comparison.results = sorted(results, key=lambda result: result.seconds)
+    mark_pareto(comparison.results)
+    return comparison
 
 
-def _take_turns(runs: list[_Run], progress: Progress) -> None:
-    """Time the rungs round after round, so that a noisy machine is noisy for all."""
+def _time_in_turns(runs: list[_Run], progress: Progress) -> None:
+    """Time the methods round after round, so that noise of the machine affects all of them."""
     began = time.perf_counter()
     for done in range(ROUNDS):
         if done > 4 and time.perf_counter() - began > SECONDS:
@@ -181,21 +169,21 @@ def _take_turns(runs: list[_Run], progress: Progress) -> None:
             run.times.append(run.program.seconds())
 
 
-def mark_pareto(rungs: Sequence[Any]) -> None:
-    """Mark the rungs that no other beats in error or time without being worse in the other."""
-    for rung in rungs:
+def mark_pareto(results: Sequence[Any]) -> None:
+    """Mark the results that no other one beats in error or time without being worse in the other."""
+    for result in results:
         beaten = (
-            other.error <= rung.error
-            and other.seconds <= rung.seconds
-            and (other.error < rung.error or other.seconds < rung.seconds)
-            for other in rungs
+            other.error <= result.error
+            and other.seconds <= result.seconds
+            and (other.error < result.error or other.seconds < result.seconds)
+            for other in results
         )
-        rung.pareto = not any(beaten)
+        result.pareto = not any(beaten)
 
 
 @runtime_checkable
-class Entrant(Protocol):
-    """Something with a name; `missing` is a package that it needs and that is not installed."""
+class Installable(Protocol):
+    """A method that may need a package; `missing` names it where it is not installed."""
 
     @property
     def name(self) -> str: ...
@@ -204,21 +192,21 @@ class Entrant(Protocol):
     def missing(self) -> str | None: ...
 
 
-Kind = TypeVar("Kind", bound=Entrant)
+Kind = TypeVar("Kind", bound=Installable)
 
 
-def entrants(
-    given: Sequence[Kind], first: Callable[[Kind], object], left_out: dict[str, str], progress: Progress
+def first_runs(
+    methods: Sequence[Kind], run: Callable[[Kind], object], left_out: dict[str, str], progress: Progress
 ) -> Iterator[tuple[Kind, float]]:
-    """Each that can take part, with the seconds of its `first` use, compilation included.
+    """Run every installed method once; yield it with the seconds that this takes, compilation included.
 
     The others go into `left_out`, with why.
     """
-    for done, one in enumerate(given):
-        progress(f"compile {one.name}", done, len(given))
-        if one.missing:
-            left_out[one.name] = f"{one.missing} is not installed"
+    for done, method in enumerate(methods):
+        progress(f"compile {method.name}", done, len(methods))
+        if method.missing:
+            left_out[method.name] = f"{method.missing} is not installed"
             continue
         began = time.perf_counter()
-        first(one)
-        yield one, time.perf_counter() - began
+        run(method)
+        yield method, time.perf_counter() - began

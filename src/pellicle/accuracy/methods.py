@@ -1,4 +1,4 @@
-"""The forward rungs: ways to simulate a scene, each of which leaves something out."""
+"""Methods of simulating a scene, each of which leaves something out."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.accuracy.case import Case, altered, disperses, media
+from pellicle.accuracy.case import Case, disperses, media, with_effect
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.effects.plan import Plan
 from pellicle.effects.removal import FilmRemoval, RealPart
@@ -21,8 +21,9 @@ from pellicle.scene.film import Scene, coherent_layers, with_wavelength
 from pellicle.scene.layers import Layer
 
 
-class Way(NamedTuple):
-    """How a rung simulates: its plan and scene, what a second program makes of the signal, the precision."""
+class Variant(NamedTuple):
+    """A method applied to a case: its plan and scene, a second program that completes the signal, and its
+    precision."""
 
     plan: Plan
     scene: Scene
@@ -31,90 +32,76 @@ class Way(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Rung:
-    """One way to the answer. `way` gives the way, or the reason why it makes no sense for a case."""
+class Method:
+    """A method of simulating a scene; `variant` applies it to a case, or returns why it does not apply."""
 
     name: str
     leaves_out: str
-    way: Callable[[Case], Way | str]
+    variant: Callable[[Case], Variant | str]
 
 
-def _full(case: Case) -> Way:
-    return Way(case.plan, case.scene)
+def _left_out(effect: str, case: Case) -> Variant:
+    removal = FilmRemoval(effect)
+    return Variant(replace(full_plan(removal(case.scene)), left_out=(removal,)), case.scene)
 
 
-def _single(case: Case) -> Way:
-    return Way(case.plan, case.scene, double=False)
+def _without(effect: str, absent: str, case: Case) -> Variant | str:
+    """The scene without one effect, otherwise in full; `absent` is the reason where it does not have it."""
+    return _left_out(effect, case) if case.plan.on(effect) else absent
 
 
-def _planned(case: Case) -> Way:
-    return Way(plan(case.scene, case.tolerance), case.scene)
-
-
-def _without(effect: str, absent: str, case: Case) -> Way | str:
-    """The scene without one effect, all else in full; `absent` is what to say where it has none."""
-    if not case.plan.on(effect):
-        return absent
-    return _left_out(effect, case)
-
-
-def _left_out(effect: str, case: Case) -> Way:
-    leave_out = FilmRemoval(effect)
-    return Way(replace(full_plan(leave_out(case.scene)), left_out=(leave_out,)), case.scene)
-
-
-def _without_angle(case: Case) -> Way | str:
+def _without_angle(case: Case) -> Variant | str:
     if case.ellipsometric:
-        return "ellipsometry compares s and p, which are one at normal incidence"
-    return _without("oblique", "light comes at normal incidence", case)
+        return "ellipsometry compares s and p, which are equal at normal incidence"
+    return _without("oblique", "the light is at normal incidence", case)
 
 
-def _s_alone(case: Case) -> Way | str:
+def _s_alone(case: Case) -> Variant | str:
     if case.ellipsometric or case.scene.instrument.has_cone:
-        return "this scene is seen in both polarisations"
-    return _without("polarisation", "one polarisation is all there is", case)
+        return "this signal needs both polarisations"
+    return _without("polarisation", "there is only one polarisation", case)
 
 
-def _half_space(case: Case) -> Way | str:
+def _half_space(case: Case) -> Variant | str:
     if case.plan.signal == "T":
-        return "what passes a plate has met its back face"
+        return "light transmitted by a plate passes its back face"
     return _without("back-face", "the substrate has no back face", case)
 
 
-def _closed(case: Case) -> Way | str:
+def _closed_form(case: Case) -> Variant | str:
     if not case.plan.on("coherence"):
         return "the full plan is the closed form"
-    return Way(altered(altered(case.plan, "coherence", False), "orders", False), case.scene)
+    return Variant(with_effect(with_effect(case.plan, "coherence", False), "orders", False), case.scene)
 
 
-def _orders(count: int, case: Case) -> Way | str:
+def _orders(count: int, case: Case) -> Variant | str:
     smooth = not case.plan.on("roughness")
     if case.ellipsometric or not smooth or len(coherent_layers(case.scene)) != 1:
-        return "there is no series of one smooth layer's orders to cut off"
+        return "only one smooth layer has a series of orders"
     if case.plan.on("orders"):
-        return "fringes narrower than the sampling leave no order" if count else "that is the full plan"
-    return Way(altered(altered(case.plan, "coherence", True), "orders", True, count), case.scene)
+        return "fringes narrower than the sampling have no orders" if count else "this is the full plan"
+    return Variant(with_effect(with_effect(case.plan, "coherence", True), "orders", True, count), case.scene)
 
 
-def _nodes(count: int, case: Case) -> Way | str:
+def _nodes(count: int, case: Case) -> Variant | str:
     if case.plan.row("coherence").count <= count:
-        return "nothing is averaged over nodes"
-    return Way(altered(case.plan, "coherence", True, count), case.scene)
+        return "no average over nodes"
+    return Variant(with_effect(case.plan, "coherence", True, count), case.scene)
 
 
-def _transparent(case: Case) -> Way | str:
+def _transparent(case: Case) -> Variant | str:
     if not case.plan.on("absorption"):
         return "no layer absorbs"
     layers = tuple(
         replace(x, material=RealPart(x.material)) if isinstance(x, Layer) else x for x in case.scene.layers
     )
     clear = eqx.tree_at(lambda s: s.layers, case.scene, layers)
-    return Way(full_plan(clear), clear)
+    return Variant(full_plan(clear), clear)
 
 
 @final
 class AtOne(AbstractDispersion):
-    """The index that another medium has at one wavelength (nm), at all of them."""
+    """Constant index: that of another medium at one wavelength (nm)."""
 
     base: AbstractDispersion
     at: float
@@ -126,42 +113,43 @@ class AtOne(AbstractDispersion):
         return re * one if is_real(index) else Pair(re * one, im * one)
 
 
-def _constant_index(case: Case) -> Way | str:
+def _constant_index(case: Case) -> Variant | str:
     if not disperses(case):
-        return "no medium's index changes along the spectrum"
+        return "no index varies over the spectrum"
     middle = float(0.5 * (case.wavelength.min() + case.wavelength.max()))
     flat = [AtOne(m, middle) for m in media(case.scene)]
-    return Way(case.plan, eqx.tree_at(media, case.scene, flat))
+    return Variant(case.plan, eqx.tree_at(media, case.scene, flat))
 
 
-def _rises(case: Case) -> bool:
+def _is_rising(case: Case) -> bool:
+    """True for one angle of incidence and rising wavelengths."""
     return not np.ndim(case.scene.light.angle) and bool(np.all(np.diff(case.wavelength) > 0))
 
 
-def _coarser(step: int, case: Case) -> Way | str:
-    """Every so-many-th wavelength and the last, and straight lines between them."""
+def _coarser(step: int, case: Case) -> Variant | str:
+    """Every `step`-th wavelength and the last, with linear interpolation between them."""
     own = case.wavelength
-    if not _rises(case) or len(own) < 3 * step:
-        return "there are too few wavelengths to leave any out"
-    some = np.unique([*own[::step], own[-1]])
+    if not _is_rising(case) or len(own) < 3 * step:
+        return "too few wavelengths to leave any out"
+    nodes = np.unique([*own[::step], own[-1]])
     size, left = len(own) - 1, np.arange(len(own) - 1) // step
-    share = ((own[:-1] - some[left]) / (some[left + 1] - some[left]))[:, None]
+    share = ((own[:-1] - nodes[left]) / (nodes[left + 1] - nodes[left]))[:, None]
 
     def finish(signal):
-        rows = signal.reshape(len(some), -1)
+        rows = signal.reshape(len(nodes), -1)
         first, second = (jnp.repeat(x, step, axis=0)[:size] for x in (rows[:-1], rows[1:]))
         return jnp.concatenate([first + (second - first) * share.astype(rows.dtype), rows[-1:]]).reshape(-1)
 
-    return Way(case.plan, with_wavelength(case.scene, some), finish)
+    return Variant(case.plan, with_wavelength(case.scene, nodes), finish)
 
 
-def _finer(case: Case) -> Way | str:
-    """A wavelength between any two, whose signals are then not used."""
+def _finer(case: Case) -> Variant | str:
+    """One more wavelength between any two, whose signals are then discarded."""
     own = case.wavelength
-    if not _rises(case) or len(own) < 2:
-        return "there are no wavelengths between which others lie"
+    if not _is_rising(case) or len(own) < 2:
+        return "too few wavelengths to insert others"
     more = np.sort(np.concatenate([own, 0.5 * (own[1:] + own[:-1])]))
-    return Way(
+    return Variant(
         case.plan,
         with_wavelength(case.scene, more),
         lambda signal: signal.reshape(len(more), -1)[::2].reshape(-1),
@@ -170,25 +158,29 @@ def _finer(case: Case) -> Way | str:
 
 ORDERS = (1, 2, 3, 5, 8)
 
-FORWARD = (
-    Rung("float64", "nothing", _full),
-    Rung("float32", "nine digits of sixteen", _single),
-    Rung("planned", "what a plan within the tolerance does", _planned),
-    Rung("closed form", "what damps the fringes", _closed),
-    *(Rung(f"{m} order{'s' * (m > 1)}", "higher orders", partial(_orders, m)) for m in ORDERS),
-    Rung("incoherent", "interference", partial(_orders, 0)),
-    *(Rung(f"{n} nodes", "finer averages", partial(_nodes, n)) for n in (3, 7)),
-    Rung("normal incidence", "the angle", _without_angle),
-    Rung("s alone", "p", _s_alone),
-    Rung("one ray", "the cone of light", partial(_without, "angle-spread", "there is no cone of light")),
-    Rung("half space", "the plate's back face", _half_space),
-    Rung("smooth faces", "roughness", partial(_without, "roughness", "every face is smooth")),
-    Rung("transparent layer", "its absorption", _transparent),
-    Rung("constant index", "dispersion: the index of mid-band", _constant_index),
-    Rung("twice the wavelengths", "nothing", _finer),
+METHODS = (
+    Method("float64", "nothing", lambda case: Variant(case.plan, case.scene)),
+    Method("float32", "nine digits of sixteen", lambda case: Variant(case.plan, case.scene, double=False)),
+    Method(
+        "planned",
+        "what its plan leaves out",
+        lambda case: Variant(plan(case.scene, case.tolerance), case.scene),
+    ),
+    Method("closed form", "the damping of fringes", _closed_form),
+    *(Method(f"{m} order{'s' * (m > 1)}", "higher orders", partial(_orders, m)) for m in ORDERS),
+    Method("incoherent", "interference", partial(_orders, 0)),
+    *(Method(f"{n} nodes", "finer averages", partial(_nodes, n)) for n in (3, 7)),
+    Method("normal incidence", "the angle", _without_angle),
+    Method("s alone", "p", _s_alone),
+    Method("one ray", "the cone of light", partial(_without, "angle-spread", "no cone of light")),
+    Method("half space", "the plate's back face", _half_space),
+    Method("smooth faces", "roughness", partial(_without, "roughness", "every face is smooth")),
+    Method("transparent layer", "its absorption", _transparent),
+    Method("constant index", "dispersion: the index of mid-band", _constant_index),
+    Method("twice the wavelengths", "nothing", _finer),
     *(
-        Rung(f"every {nth} wavelength", "the others: a line between", partial(_coarser, step))
+        Method(f"every {nth} wavelength", "the others: interpolated", partial(_coarser, step))
         for step, nth in ((2, "2nd"), (4, "4th"), (8, "8th"))
     ),
 )
-"""Every forward rung there is, in the order of the table."""
+"""Every method of simulating a scene, in the order of the table."""

@@ -1,4 +1,4 @@
-"""The answers that a ladder is measured against."""
+"""Reference signals, with which the signals of all methods are compared."""
 
 from __future__ import annotations
 
@@ -8,63 +8,62 @@ import numpy as np
 
 from pellicle.accuracy.case import Case
 from pellicle.accuracy.compiled import compiled
-from pellicle.accuracy.methods import Way
+from pellicle.accuracy.methods import Variant
 from pellicle.errors import UsageError
 
 REFERENCES = ("float64", "mpmath")
 MP_DRAWS, MP_WAVELENGTHS = 12, 25
-"""How much of a case is computed to 50 digits."""
+"""Most draws and wavelengths of a case that are computed to 50 digits."""
 
 
 class Reference(NamedTuple):
-    """A case's signal, (draws, wavelengths, channels), at some of its draws and wavelengths."""
+    """Signal of a case, (draws, wavelengths, channels), at some of its draws and wavelengths."""
 
     name: str
     values: np.ndarray
     draws: np.ndarray
     wavelengths: np.ndarray
 
-    def error(self, case: Case, answer: np.ndarray) -> float:
-        """The largest distance of an answer (draws, points) from the truth, in the signal's unit.
+    def error(self, case: Case, signal: np.ndarray) -> float:
+        """The largest error of a signal (draws, points), in its unit.
 
-        For ellipsometry the arc between two points (N, C, S) in degrees: an error of Ψ counts twice, one
-        of Δ by sin 2Ψ. Infinite where the answer is no number and the truth is.
+        For ellipsometry it is the arc between two points (N, C, S) in degrees: an error of Ψ counts twice,
+        one of Δ sin 2Ψ times. Infinite where the signal is not finite and the reference is.
         """
-        rows = answer.reshape(len(answer), len(case.wavelength), -1)[self.draws][:, self.wavelengths]
+        rows = signal.reshape(len(signal), len(case.wavelength), -1)[self.draws][:, self.wavelengths]
         known = np.all(np.isfinite(self.values), axis=-1)
         off = np.linalg.norm(np.asarray(rows, dtype=float) - self.values, axis=-1)[known]
         worst = float(np.max(off, initial=0.0)) if np.all(np.isfinite(off)) else np.inf
         return float(np.rad2deg(worst)) if case.ellipsometric else worst
 
 
-def reference(name: str, case: Case) -> Reference:
-    """The reference of that name. Raises UsageError where the case cannot be computed with it."""
-    if name == "float64":
-        return _float64(case)
+def reference_signal(name: str, case: Case) -> Reference:
+    """The signal of a case by the full plan in float64, or by mpmath with 50 digits.
+
+    **Raises:** UsageError for another name and where mpmath cannot compute the case.
+    """
     if name == "mpmath":
-        return _fifty_digits(case)
-    raise UsageError(f"--reference must be {' or '.join(REFERENCES)}, not {name!r}")
+        return _by_mpmath(case)
+    if name != "float64":
+        raise UsageError(f"`reference` must be {' or '.join(REFERENCES)}, not {name!r}")
+    signal = compiled(case, Variant(case.plan, case.scene)).run()
+    rows = signal.reshape(len(signal), len(case.wavelength), -1)
+    return Reference("float64", rows, np.arange(len(signal)), np.arange(len(case.wavelength)))
 
 
-def _float64(case: Case) -> Reference:
-    program = compiled(case, Way(case.plan, case.scene))
-    answer = program.run()
-    rows = answer.reshape(len(answer), len(case.wavelength), -1)
-    return Reference("float64", rows, np.arange(len(answer)), np.arange(len(case.wavelength)))
-
-
-def _fifty_digits(case: Case) -> Reference:
+def _by_mpmath(case: Case) -> Reference:
     try:
         from pellicle.accuracy.high_precision import signal, unsuitable
     except ImportError:
         raise UsageError(
-            "--reference mpmath needs mpmath: pip install 'pellicle[reference]', or --reference float64"
+            "`reference=\"mpmath\"` needs mpmath: pip install 'pellicle[reference]', or use"
+            ' `reference="float64"`'
         ) from None
     why = unsuitable(case)
     if why is not None:
         raise UsageError(
-            f"--reference mpmath computes smooth, even layers in light of one wavelength and angle; {why}:"
-            " use --reference float64"
+            f'`reference="mpmath"` computes smooth, even layers at one wavelength and angle; {why}:'
+            ' use `reference="float64"`'
         )
     draws = np.arange(min(MP_DRAWS, len(case.draws) if case.draws.shape[1] else 1))
     count = min(MP_WAVELENGTHS, len(case.wavelength))

@@ -1,4 +1,4 @@
-"""Simulated data sets whose truth is known, and the misfit that every solver minimises on them."""
+"""Simulated data sets with known true values, and the deviance that every solver minimises on them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from pellicle.accuracy.case import Case
 from pellicle.accuracy.compiled import compiled
-from pellicle.accuracy.methods import Way
+from pellicle.accuracy.methods import Variant
 from pellicle.fitting.problem import Explained, Form, Problem
 from pellicle.fitting.spectra.problem import make
 from pellicle.fitting.spectra.targets import Measured
@@ -19,8 +19,8 @@ from pellicle.scene.film import Scene
 from pellicle.scene.free import free_leaves
 
 
-class Trial(NamedTuple):
-    """A data set to fit, where its truth lies in the unit cube of the bounds, and where to start."""
+class DataSet(NamedTuple):
+    """A data set to fit, with its true values and start values in the unit cube of the bounds."""
 
     problem: Problem
     truth: np.ndarray
@@ -28,31 +28,31 @@ class Trial(NamedTuple):
 
     @property
     def program(self) -> tuple[Any, ...]:
-        """The arguments of the functions below, the form of the spectrum first (static)."""
+        """Arguments of the functions below, the form of the spectrum first (static)."""
         (view,) = self.problem.views
         return view.form, view.arrays, self.problem.box
 
 
-def trials(case: Case, scene: Scene, noise: float, count: int, seed: int = 0) -> list[Trial]:
-    """`count` data sets of a case, their truths uniform between the bounds, with normal noise.
+def data_sets(case: Case, scene: Scene, noise: float, count: int, seed: int = 0) -> list[DataSet]:
+    """`count` data sets of a case, with true values uniform between the bounds and normal noise.
 
-    `scene` is the case's with the instrument's own scale and offset, which are fitted where they are
-    free. `noise` is the standard deviation of every point in the signal's unit; for ellipsometry, in
-    degrees of Ψ, that of N, C and S is twice as large on their sphere.
+    `scene` is that of the case with the scale and offset of its instrument, which are fitted where they are
+    free. `noise` is the standard deviation of every point in the unit of the signal; for ellipsometry it is
+    in degrees of Ψ, and that of N, C and S twice as large on their sphere.
     """
     free = [leaf for _, leaf in free_leaves(case.scene)]
     low, high = np.array([f.lower for f in free]), np.array([f.upper for f in free])
     start = (np.array([f.start for f in free]) - low) / (high - low)
     random = np.random.default_rng(seed)
     units = random.uniform(size=(count, len(free)))
-    clean = compiled(case._replace(draws=low + units * (high - low)), Way(case.plan, case.scene)).run()
+    clean = compiled(case._replace(draws=low + units * (high - low)), Variant(case.plan, case.scene)).run()
     sigma = float(np.deg2rad(2 * noise)) if case.ellipsometric else noise
     noisy = clean + random.normal(0.0, sigma, clean.shape)
     if case.ellipsometric:
         noisy = noisy.reshape(count, -1, 3)
     nm, sigmas = case.wavelength, np.full(len(case.wavelength), sigma)
     return [
-        Trial(make(Measured(scene, nm, values, sigmas)), unit, start)
+        DataSet(make(Measured(scene, nm, values, sigmas)), unit, start)
         for values, unit in zip(noisy, units, strict=True)
     ]
 
@@ -68,22 +68,22 @@ def residual(form: Form, arrays: Any, box: Any, unit: Any) -> Any:
     return jnp.concatenate([spectrum.residual, prior])
 
 
-def misfit(form: Form, arrays: Any, box: Any, unit: Any) -> Any:
-    """Deviance at one point of the unit cube."""
+def deviance(form: Form, arrays: Any, box: Any, unit: Any) -> Any:
+    """Deviance (−2 ln evidence) at one point of the unit cube."""
     spectrum, prior = _explained(form, arrays, box, unit)
     return spectrum.deviance + jnp.sum(prior**2)
 
 
 @partial(jax.jit, static_argnums=0)
-def misfits(form: Form, arrays: Any, box: Any, units: Any) -> Any:
-    """The misfit at points (points, parameters)."""
-    return jax.vmap(lambda unit: misfit(form, arrays, box, unit))(units)
+def deviances(form: Form, arrays: Any, box: Any, units: Any) -> Any:
+    """Deviance at points (points, parameters)."""
+    return jax.vmap(lambda unit: deviance(form, arrays, box, unit))(units)
 
 
 @partial(jax.jit, static_argnums=0)
-def misfit_and_slope(form: Form, arrays: Any, box: Any, unit: Any) -> Any:
-    """The misfit at one point, and its gradient by forward mode."""
-    value, push = jax.linearize(lambda u: misfit(form, arrays, box, u), unit)
+def deviance_and_slope(form: Form, arrays: Any, box: Any, unit: Any) -> Any:
+    """Deviance at one point, and its gradient by forward mode."""
+    value, push = jax.linearize(lambda u: deviance(form, arrays, box, u), unit)
     return value, jax.vmap(push)(jnp.eye(len(unit)))
 
 
@@ -92,13 +92,12 @@ FEW_STEPS = 4
 
 @partial(jax.jit, static_argnums=0)
 def descend(form: Form, arrays: Any, box: Any, units: Any) -> tuple[Any, Any]:
-    """A few steps of our bounded Levenberg-Marquardt from each start (starts, parameters): where they lead,
-    and the misfit there."""
-
+    """Take a few steps of bounded Levenberg-Marquardt from each start (starts, parameters); return the points
+    and their deviance."""
     from pellicle.fitting.levenberg_marquardt import least_squares  # slow to import
 
     def one(unit):
         there, _ = least_squares(lambda u: residual(form, arrays, box, u), unit, steps=FEW_STEPS)
-        return there, misfit(form, arrays, box, there)
+        return there, deviance(form, arrays, box, there)
 
     return jax.vmap(one)(units)

@@ -1,4 +1,4 @@
-"""A race of the solvers over simulated data sets: how often each fails, how far off it is, and its time."""
+"""Comparison of solvers on simulated data sets: failures, errors and times."""
 
 from __future__ import annotations
 
@@ -9,19 +9,20 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pellicle.accuracy.measure import Progress, entrants, mark_pareto
-from pellicle.accuracy.simulated_data import Trial, misfits
+from pellicle.accuracy.measure import first_runs, mark_pareto
+from pellicle.accuracy.simulated_data import DataSet, deviances
 from pellicle.accuracy.solvers import SOLVERS, Solver, from_truth
+from pellicle.fitting.progress import Progress
 from pellicle.fitting.status import RIVAL
 
 
 @dataclass
 class SolverResult:
-    """How a solver did.
+    """Failures, error and time of one solver.
 
-    `error` is the mean over the data sets of the worst parameter's distance from the truth, as a share
-    of its bounds, and `median_error` their median; `failures` counts the data sets in which it stopped
-    above the minimum in whose valley the truth lies, by a rival's Δχ² (6) or more.
+    `error` is the mean over the data sets, `median_error` the median, of the largest error of any parameter
+    relative to its bounds; `failures` counts the data sets in which the solver stopped more than Δχ² = 6
+    (a rival) above the minimum reached from the true values.
     """
 
     name: str
@@ -36,41 +37,41 @@ class SolverResult:
 
 
 @dataclass
-class Race:
-    """The solvers of one case, the fastest first, and those that took no part, with why."""
+class SolverComparison:
+    """Results of all solvers of one case, the fastest first, and the solvers left out, with why."""
 
     noise: float
-    solvers: list[SolverResult] = field(default_factory=list)
+    results: list[SolverResult] = field(default_factory=list)
     left_out: dict[str, str] = field(default_factory=dict)
     interrupted: bool = False
 
     @property
     def recommended(self) -> str | None:
-        """The fastest of those that failed least."""
-        return (
-            min(self.solvers, key=lambda s: (s.failures / s.datasets, s.seconds)).name
-            if self.solvers
-            else None
-        )
+        """Name of the fastest solver among those that failed least."""
+        if not self.results:
+            return None
+        return min(self.results, key=lambda s: (s.failures / s.datasets, s.seconds)).name
 
 
 @dataclass
 class _Run:
+    """A solver while it is measured."""
+
     solver: Solver
     compile_seconds: float
     times: list[float] = field(default_factory=list)
     errors: list[float] = field(default_factory=list)
     failures: int = 0
 
-    def take(self, trial: Trial, least: float) -> None:
+    def fit(self, data: DataSet, least: float) -> None:
         began = time.perf_counter()
-        unit = self.solver.find(trial)
+        unit = self.solver.find(data)
         self.times.append(time.perf_counter() - began)
         inside = np.clip(np.nan_to_num(unit, nan=0.5), 0.0, 1.0)
-        self.errors.append(float(np.max(np.abs(inside - trial.truth))))
-        self.failures += bool(_misfit(trial, inside) > least + RIVAL)
+        self.errors.append(float(np.max(np.abs(inside - data.truth))))
+        self.failures += bool(_deviance(data, inside) > least + RIVAL)
 
-    def finish(self) -> SolverResult:
+    def result(self) -> SolverResult:
         return SolverResult(
             self.solver.name,
             self.solver.leaves_out,
@@ -83,26 +84,26 @@ class _Run:
         )
 
 
-def _misfit(trial: Trial, unit: np.ndarray) -> float:
-    value = float(misfits(*trial.program, unit[None])[0])
+def _deviance(data: DataSet, unit: np.ndarray) -> float:
+    value = float(deviances(*data.program, unit[None])[0])
     return value if np.isfinite(value) else np.inf
 
 
-def race(
-    trials: Sequence[Trial], noise: float, progress: Progress, solvers: Sequence[Solver] = SOLVERS
-) -> Race:
-    """Let every solver fit every data set, taking turns. Ctrl-C ends it, and keeps what was finished."""
-    found, runs = Race(noise), []
+def compare_solvers(
+    data: Sequence[DataSet], noise: float, progress: Progress, solvers: Sequence[Solver] = SOLVERS
+) -> SolverComparison:
+    """Fit every data set with every solver in turn. Ctrl-C ends this and keeps the results so far."""
+    comparison, runs = SolverComparison(noise), []
     try:
-        for solver, seconds in entrants(solvers, lambda s: s.find(trials[0]), found.left_out, progress):
+        for solver, seconds in first_runs(solvers, lambda s: s.find(data[0]), comparison.left_out, progress):
             runs.append(_Run(solver, seconds))
-        for done, trial in enumerate(trials):
-            progress("data sets", done, len(trials))
-            least = _misfit(trial, from_truth(trial))
+        for done, one in enumerate(data):
+            progress("data sets", done, len(data))
+            least = _deviance(one, from_truth(one))
             for run in runs:
-                run.take(trial, least)
+                run.fit(one, least)
     except KeyboardInterrupt:
-        found.interrupted = True
-    found.solvers = sorted((run.finish() for run in runs if run.times), key=lambda s: s.seconds)
-    mark_pareto(found.solvers)
-    return found
+        comparison.interrupted = True
+    comparison.results = sorted((run.result() for run in runs if run.times), key=lambda s: s.seconds)
+    mark_pareto(comparison.results)
+    return comparison

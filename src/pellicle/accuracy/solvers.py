@@ -1,4 +1,4 @@
-"""The inverse rungs: ways to find a scene's free parameters from a spectrum."""
+"""Solvers: methods of finding the free parameters of a scene from a spectrum."""
 
 from __future__ import annotations
 
@@ -14,26 +14,27 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.accuracy.simulated_data import Trial, descend, misfit, misfit_and_slope, residual
+from pellicle.accuracy.simulated_data import DataSet, descend, deviance, deviance_and_slope, residual
 from pellicle.fitting.minima import LANES, solve
 from pellicle.fitting.problem import Form
 from pellicle.fitting.progress import quiet
 from pellicle.fitting.spectra.search import search
 
 STEPS = 100
-"""Most steps of a solver that is not ours."""
+"""Most steps of a solver of another package."""
 CANDIDATES, SURVIVORS = 256, (64, 16, 4)
-"""Successive halving: after every few steps of all that are left, so many go on; the last to their end."""
+"""Successive halving: random starts, and how many of them continue after every few steps, the last ones to
+convergence."""
 
 
 @dataclass(frozen=True)
 class Solver:
-    """One way to a data set's parameters. `find` gives the best point of the unit cube; `missing` names
-    the package that is not installed, None where nothing is missing."""
+    """A solver; `find` returns the best point of the unit cube. `missing` names a package that is not
+    installed."""
 
     name: str
     leaves_out: str
-    find: Callable[[Trial], np.ndarray]
+    find: Callable[[DataSet], np.ndarray]
     missing: str | None = None
 
 
@@ -50,61 +51,49 @@ def _in_lanes(program: Callable[[np.ndarray], Any], starts: np.ndarray) -> tuple
     return units, values
 
 
-def _from(trial: Trial, starts: np.ndarray) -> np.ndarray:
-    polished = solve(trial.problem, starts, lanes=1 if len(starts) == 1 else LANES)
+def _from(data: DataSet, starts: np.ndarray) -> np.ndarray:
+    polished = solve(data.problem, starts, lanes=1 if len(starts) == 1 else LANES)
     return _best(polished.units, polished.deviance, 1)[0]
 
 
-def _start_once(trial: Trial) -> np.ndarray:
-    return _from(trial, trial.start[None])
+def from_truth(data: DataSet) -> np.ndarray:
+    """The local minimum reached from the true values, where no solver of real data can start."""
+    return _from(data, data.truth[None])
 
 
-def from_truth(trial: Trial) -> np.ndarray:
-    """The minimum in whose valley the truth lies: no solver of a real data set can start there."""
-    return _from(trial, trial.truth[None])
+def _random(data: DataSet, count: int) -> np.ndarray:
+    return np.random.default_rng(count).uniform(size=(count, len(data.start)))
 
 
-def _scan(trial: Trial) -> np.ndarray:
-    return search(trial.problem, quiet).units[0]
+def _multistart(count: int, data: DataSet) -> np.ndarray:
+    return _from(data, _random(data, count))
 
 
-def _random(trial: Trial, count: int) -> np.ndarray:
-    return np.random.default_rng(count).uniform(size=(count, len(trial.start)))
-
-
-def _multistart(count: int, trial: Trial) -> np.ndarray:
-    return _from(trial, _random(trial, count))
-
-
-def _halving(trial: Trial) -> np.ndarray:
-    units = _random(trial, CANDIDATES)
+def _halving(data: DataSet) -> np.ndarray:
+    units = _random(data, CANDIDATES)
     for count in SURVIVORS:
-        units = _best(*_in_lanes(partial(descend, *trial.program), units), count)
-    return _from(trial, units)
+        units = _best(*_in_lanes(partial(descend, *data.program), units), count)
+    return _from(data, units)
 
 
-def _scipy_lbfgsb(trial: Trial) -> np.ndarray:
+def _scipy_lbfgsb(data: DataSet) -> np.ndarray:
     from scipy.optimize import minimize
 
     def both(unit):
-        value, slope = jax.device_get(misfit_and_slope(*trial.program, jnp.asarray(unit)))
+        value, slope = jax.device_get(deviance_and_slope(*data.program, jnp.asarray(unit)))
         return float(value), np.asarray(slope, dtype=float)
 
-    bounds = [(0.0, 1.0)] * len(trial.start)
-    return minimize(both, trial.start, jac=True, method="L-BFGS-B", bounds=bounds).x
+    bounds = [(0.0, 1.0)] * len(data.start)
+    return minimize(both, data.start, jac=True, method="L-BFGS-B", bounds=bounds).x
 
 
 @partial(jax.jit, static_argnums=0)
 def _jaxopt_run(form: Form, arrays: Any, box: Any, unit: Any) -> Any:
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # jaxopt says on import that nobody maintains it
+        warnings.simplefilter("ignore")  # on import jaxopt warns that it is unmaintained
         jaxopt: Any = importlib.import_module("jaxopt")  # optional
-    solver = jaxopt.LBFGSB(fun=lambda u: misfit(form, arrays, box, u), maxiter=STEPS, tol=1e-8)
+    solver = jaxopt.LBFGSB(fun=lambda u: deviance(form, arrays, box, u), maxiter=STEPS, tol=1e-8)
     return solver.run(unit, bounds=(jnp.zeros_like(unit), jnp.ones_like(unit))).params
-
-
-def _jaxopt_lbfgsb(trial: Trial) -> np.ndarray:
-    return np.asarray(_jaxopt_run(*trial.program, jnp.asarray(trial.start)))
 
 
 @partial(jax.jit, static_argnums=0)
@@ -117,22 +106,32 @@ def _optimistix_run(form: Form, arrays: Any, box: Any, unit: Any) -> Any:
     ).value
 
 
-def _optimistix_lm(trial: Trial) -> np.ndarray:
-    return np.asarray(_optimistix_run(*trial.program, jnp.asarray(trial.start)))
+def _from_start(run: Callable[..., Any], data: DataSet) -> np.ndarray:
+    return np.asarray(run(*data.program, jnp.asarray(data.start)))
 
 
 def _absent(package: str) -> str | None:
     return None if importlib.util.find_spec(package) else package
 
 
+_NO_JACOBIAN = "the search, and the residuals' Jacobian"
 SOLVERS = (
-    Solver("LM, start once", "the search: one descent from the recipe's start", _start_once),
-    Solver("scan + LM", "nothing: what pellicle fit does", _scan),
+    Solver(
+        "LM, start once",
+        "the search: one descent from the recipe's start",
+        lambda data: _from(data, data.start[None]),
+    ),
+    Solver("scan + LM", "nothing: what pellicle fit does", lambda data: search(data.problem, quiet).units[0]),
     Solver("successive halving", "the scan: most of 256 random starts, soon", _halving),
     Solver("multistart, 16", "the scan: 16 random starts", partial(_multistart, 16)),
     Solver("multistart, 64", "the scan: 64 random starts", partial(_multistart, 64)),
     Solver("L-BFGS-B, scipy", "the search, and the residuals' Jacobian", _scipy_lbfgsb, _absent("scipy")),
-    Solver("L-BFGS-B, jaxopt", "the search, and the residuals' Jacobian", _jaxopt_lbfgsb, _absent("jaxopt")),
-    Solver("LM, Optimistix's own", "the search, and the bounds", _optimistix_lm),
+    Solver(
+        "L-BFGS-B, jaxopt",
+        "the search, and the residuals' Jacobian",
+        partial(_from_start, _jaxopt_run),
+        _absent("jaxopt"),
+    ),
+    Solver("LM, Optimistix's own", "the search, and the bounds", partial(_from_start, _optimistix_run)),
 )
-"""Every inverse rung there is, in the order of the table."""
+"""Every solver, in the order of the table."""

@@ -1,4 +1,4 @@
-"""What accuracy costs for a surface: the ways to its film's colour, and to the values of its BRDF."""
+"""Accuracy against time for a surface: methods of computing the colour of its film, and its BRDF."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ import jax
 import numpy as np
 
 from pellicle.accuracy import colour_methods
-from pellicle.accuracy.colour_methods import COLOURS, Films
+from pellicle.accuracy.colour_methods import COLOUR_METHODS, Films
 from pellicle.accuracy.compiled import Program, compiled_function
-from pellicle.accuracy.measure import Ladder, Progress, measured
+from pellicle.accuracy.measure import MethodComparison, measure
 from pellicle.brdf.directions import angle_to_half
 from pellicle.colour import sensor
 from pellicle.effects.plan import Plan
 from pellicle.effects.surface import exact
 from pellicle.effects.surface_removal import SurfaceRemoval
 from pellicle.errors import UsageError
+from pellicle.fitting.progress import Progress, quiet
 from pellicle.planning import surface
 from pellicle.planning.surface import FLOOR
 from pellicle.scene.free import free_leaves, insert, start_values
@@ -28,46 +29,49 @@ from pellicle.scene.surface import SurfaceView
 from pellicle.simulation.surface import build
 
 DRAWS = 64
-"""Surfaces, drawn between the bounds: so many that a call itself does not count."""
+"""Number of surfaces drawn between the bounds: enough to hide the cost of a call."""
 COLOUR_TOLERANCE, VALUE_TOLERANCE = 0.5, 1e-3
-"""What is accurate enough unless somebody says otherwise: mean ΔE2000, and the share of a BRDF's value."""
+"""Default tolerances: mean ΔE2000, and relative error of a BRDF."""
 
 
 @dataclass
 class SurfaceCost:
-    """`colours` is None where the surface has no film to be coloured, and `no_colours` says why."""
+    """Accuracy against time for one surface.
 
-    colours: Ladder | None
-    values: Ladder
+    `colours` is None where the surface has no film with a colour of its own, and `no_colours` says why.
+    """
+
+    colours: MethodComparison | None
+    values: MethodComparison
     no_colours: str = ""
 
     @property
     def interrupted(self) -> bool:
+        """True where Ctrl-C ended the measurement."""
         return self.values.interrupted or (self.colours is not None and self.colours.interrupted)
 
 
-def cost(
-    view: SurfaceView, *, tolerance: float | None = None, progress: Progress = lambda what, done, total: None
-) -> SurfaceCost:
-    """Measure every way to a surface's colours (`tolerance` in mean ΔE2000), and to its BRDF.
+def cost(view: SurfaceView, *, tolerance: float | None = None, progress: Progress = quiet) -> SurfaceCost:
+    """Measure every method of computing the colours of a surface, and its BRDF.
 
-    The tolerance is relative, as in `planning.surface.plan`, where the surface has no film to be coloured.
+    `tolerance` is in mean ΔE2000; where the surface has no film with a colour, it is relative, as in
+    `planning.surface.plan`.
+
     **Raises:** UsageError for a tolerance that is not above zero, and without colour-science.
     """
     if tolerance is not None and not 0 < tolerance < math.inf:
         raise UsageError(f"the tolerance must be above zero, got {tolerance:g}: what error is small enough?")
     with jax.enable_x64(True):
-        draws = drawn(view)
-        films = coloured(view, draws)
-        found, own = None, tolerance
-        if isinstance(films, Films):
-            found, own = _colours(films, tolerance or COLOUR_TOLERANCE, progress), None
-        values = _values(view, draws, own or VALUE_TOLERANCE, progress)
-        return SurfaceCost(found, values, films if isinstance(films, str) else "")
+        draws = random_draws(view)
+        films = films_of(view, draws)
+        if isinstance(films, str):
+            return SurfaceCost(None, _values(view, draws, tolerance or VALUE_TOLERANCE, progress), films)
+        colours = _colours(films, tolerance or COLOUR_TOLERANCE, progress)
+        return SurfaceCost(colours, _values(view, draws, VALUE_TOLERANCE, progress))
 
 
-def drawn(view: SurfaceView, count: int = DRAWS, seed: int = 0) -> np.ndarray:
-    """Values of the free numbers, (draws, numbers), uniform between the bounds; the first are the start."""
+def random_draws(view: SurfaceView, count: int = DRAWS, seed: int = 0) -> np.ndarray:
+    """Values of the free numbers, (draws, numbers), uniform between the bounds, the start values first."""
     free = [leaf for _, leaf in free_leaves(view)]
     low, high = (np.array([getattr(f, side) for f in free]) for side in ("lower", "upper"))
     draws = np.random.default_rng(seed).uniform(low, high, (count, len(free)))
@@ -78,38 +82,40 @@ def drawn(view: SurfaceView, count: int = DRAWS, seed: int = 0) -> np.ndarray:
 FILM = ("thickness", "n", "k", "base_n", "base_k", "ambient_n")
 
 
-def coloured(view: SurfaceView, draws: np.ndarray) -> Films | str:
+def films_of(view: SurfaceView, draws: np.ndarray) -> Films | str:
     """The films of these draws, or why they have no colour of their own."""
     if view.brdf.from_film_colour is None:
-        return f"{view.model} is made for three wavelengths and has no other colour"
+        return f"{view.model} is defined at three wavelengths only"
     if any(isinstance(view.numbers.get(key), list) for key in FILM):
-        return "an index is free for each of three wavelengths: nothing says what it is between them"
+        return "an index is free at each of three wavelengths: it is unknown between them"
     each = [insert(view.numbers, values) for values in draws]
-    at = tuple(np.asarray(view.numbers["wavelengths"]))
+    wavelengths = tuple(np.asarray(view.numbers["wavelengths"]))
     numbers = {}
     for key in FILM:
         if key in view.numbers and np.ndim(each[0][key]) == 0:
             numbers[key] = np.array([float(one[key]) for one in each])
         elif key in view.numbers:
-            numbers[key] = colour_methods.along_the_spectrum(each[0][key], at)
+            numbers[key] = colour_methods.along_the_spectrum(each[0][key], wavelengths)
     angle = np.asarray(angle_to_half(view.i, view.o))
     return Films(numbers, angle, float(np.max(numbers["thickness"])))
 
 
-def _colours(films: Films, tolerance: float, progress: Progress) -> Ladder:
+def _colours(films: Films, tolerance: float, progress: Progress) -> MethodComparison:
     try:
-        truth = colour_methods.truth(films)
-        error = partial(colour_methods.error, sensor(*colour_methods.EYE), truth)
-        error(truth)
+        reference = colour_methods.reference_colours(films)
+        error = partial(colour_methods.error, sensor(*colour_methods.EYE), reference)
+        error(reference)  # fails without colour-science
     except ImportError as missing:
         raise UsageError(str(missing)) from None
-    ladder = Ladder("steps of 1 nm", tolerance, "ΔE2000", films.angle.size, len(truth), "colour")
-    return measured(ladder, COLOURS, lambda rung: rung.program(films), error, progress)
+    comparison = MethodComparison(
+        "steps of 1 nm", tolerance, "ΔE2000", films.angle.size, len(reference), "colour"
+    )
+    return measure(comparison, COLOUR_METHODS, lambda method: method.program(films), error, progress)
 
 
 @dataclass(frozen=True)
-class ValueRung:
-    """One way to the BRDF; `plan` gives it, or the reason why it makes no sense for a surface."""
+class BrdfMethod:
+    """A method of computing a BRDF; `plan` is its plan for a surface, or why it does not apply."""
 
     name: str
     leaves_out: str
@@ -117,72 +123,69 @@ class ValueRung:
     double: bool = True
 
 
-def _left_out(effect: str, absent: str, view: SurfaceView, tolerance: float) -> Plan | str:
-    judged = exact(view)
-    if not any(row.effect == effect and row.on for row in judged.rows):
+def _without(effect: str, absent: str, view: SurfaceView, tolerance: float) -> Plan | str:
+    if not any(row.effect == effect and row.on for row in exact(view).rows):
         return absent
     other = {"roughness": "diffuse", "diffuse": "specular"}.get(effect)
     if other is not None and other not in view.numbers:
-        return "it is all there is"
-    leave_out = SurfaceRemoval(effect)
-    return replace(exact(leave_out(view)), left_out=(leave_out,))
+        return "nothing else is left of the BRDF"
+    removal = SurfaceRemoval(effect)
+    return replace(exact(removal(view)), left_out=(removal,))
 
 
 def _by_angles(count: int, view: SurfaceView, tolerance: float) -> Plan | str:
-    judged = {row.effect: row for row in exact(view).rows}
-    if "oblique" not in judged or not judged["oblique"].on:
+    plan = exact(view)
+    if not any(row.effect == "oblique" and row.on for row in plan.rows):
         return "no film whose colour depends on the angle"
-    rows = (replace(row, count=count) if row.effect == "oblique" else row for row in judged.values())
-    return replace(exact(view), rows=tuple(rows))
+    rows = (replace(row, count=count) if row.effect == "oblique" else row for row in plan.rows)
+    return replace(plan, rows=tuple(rows))
 
 
-def _absent(effect: str, absent: str) -> Callable[[SurfaceView, float], Plan | str]:
-    return partial(_left_out, effect, absent)
-
-
-VALUES = (
-    ValueRung("float64", "nothing", lambda view, _: exact(view)),
-    ValueRung("float32", "nine digits of sixteen", lambda view, _: exact(view), double=False),
-    ValueRung("planned", "what a plan within the tolerance does", surface.plan),
+BRDF_METHODS = (
+    BrdfMethod("float64", "nothing", lambda view, _: exact(view)),
+    BrdfMethod("float32", "nine digits of sixteen", lambda view, _: exact(view), double=False),
+    BrdfMethod("planned", "what its plan leaves out", surface.plan),
     *(
-        ValueRung(f"{n} angles", "the film's colour between them", partial(_by_angles, n))
+        BrdfMethod(f"{n} angles", "the film's colour between them", partial(_by_angles, n))
         for n in (8, 16, 32)
     ),
-    ValueRung("without interference", "interference", _absent("coherence", "there is none")),
-    ValueRung("normal incidence", "the film's angle", _absent("oblique", "no film whose angle counts")),
-    ValueRung("s alone", "p", _absent("polarisation", "no polarisation is told apart")),
-    ValueRung("transparent film", "its absorption", _absent("absorption", "no film absorbs")),
-    ValueRung("parallel boundaries", "the deviation", _absent("deviation", "no boundary deviates")),
-    ValueRung("no diffuse part", "the diffuse part", _absent("diffuse", "there is none")),
-    ValueRung("diffuse part alone", "the lobe", _absent("roughness", "there is no lobe")),
-    ValueRung("one wavelength", "the other channels", _absent("spectral-sampling", "there is but one")),
+    BrdfMethod("without interference", "interference", partial(_without, "coherence", "it has none")),
+    BrdfMethod("normal incidence", "the film's angle", partial(_without, "oblique", "no oblique film")),
+    BrdfMethod("s alone", "p", partial(_without, "polarisation", "s and p are equal")),
+    BrdfMethod("transparent film", "its absorption", partial(_without, "absorption", "no film absorbs")),
+    BrdfMethod("parallel boundaries", "the deviation", partial(_without, "deviation", "they are parallel")),
+    BrdfMethod("no diffuse part", "the diffuse part", partial(_without, "diffuse", "it has none")),
+    BrdfMethod("diffuse part alone", "the lobe", partial(_without, "roughness", "there is no lobe")),
+    BrdfMethod(
+        "one wavelength", "the other channels", partial(_without, "spectral-sampling", "it has only one")
+    ),
 )
-"""Every rung to the values of a BRDF, in the order of the table."""
+"""Every method of computing a BRDF, in the order of the table."""
 
 
-def _values(view: SurfaceView, draws: np.ndarray, tolerance: float, progress: Progress) -> Ladder:
+def _values(view: SurfaceView, draws: np.ndarray, tolerance: float, progress: Progress) -> MethodComparison:
     truth = _program(view, draws, exact(view)).run()
     scale = np.maximum(np.abs(truth), FLOOR)
 
-    def prepare(rung: ValueRung) -> Program | str:
-        plan = rung.plan(view, tolerance)
-        return plan if isinstance(plan, str) else _program(view, draws, plan.static_key, rung.double)
+    def prepare(method: BrdfMethod) -> Program | str:
+        plan = method.plan(view, tolerance)
+        return plan if isinstance(plan, str) else _program(view, draws, plan.static_key, method.double)
 
-    def error(answer: np.ndarray) -> float:
-        worst = float(np.max(np.abs(np.asarray(answer, float) - truth) / scale))
+    def error(values: np.ndarray) -> float:
+        worst = float(np.max(np.abs(np.asarray(values, float) - truth) / scale))
         return worst if math.isfinite(worst) else math.inf
 
-    ladder = Ladder("float64", tolerance, "relative", len(view.i), len(draws), "sample")
-    return measured(ladder, VALUES, prepare, error, progress)
+    comparison = MethodComparison("float64", tolerance, "relative", len(view.i), len(draws), "sample")
+    return measure(comparison, BRDF_METHODS, prepare, error, progress)
 
 
 def _program(view: SurfaceView, draws: np.ndarray, plan: Plan, double: bool = True) -> Program:
     """The BRDF of every draw, (draws, directions, channels)."""
     simulate = build(plan)
 
-    def one(values: Any, nothing: Any, numbers: Any, i: Any, o: Any) -> Any:
-        # what is the same for all draws would be computed once
-        return simulate(replace(insert(replace(view, numbers=numbers), list(values)), i=i + nothing, o=o))
+    def one(values: Any, zero: Any, numbers: Any, i: Any, o: Any) -> Any:
+        # i + zero: XLA computes anything that is equal for all draws only once
+        return simulate(replace(insert(replace(view, numbers=numbers), list(values)), i=i + zero, o=o))
 
     call = jax.vmap(one, in_axes=(0, 0, None, None, None))
     arguments = (draws, np.zeros(len(draws)), view.numbers, view.i, view.o)

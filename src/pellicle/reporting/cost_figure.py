@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from pellicle.accuracy.cost import Cost
-    from pellicle.accuracy.measure import Ladder
+    from pellicle.accuracy.measure import MethodComparison
     from pellicle.accuracy.surface import SurfaceCost
 
 FLOOR = 1e-17
@@ -27,30 +27,30 @@ def draw(cost: Cost | SurfaceCost, name: str = "scene") -> Figure:
     from pellicle.accuracy.surface import SurfaceCost
 
     if isinstance(cost, SurfaceCost):
-        ladders = [ladder for ladder in (cost.colours, cost.values) if ladder is not None]
-        race = None
+        kinds = [methods for methods in (cost.colours, cost.values) if methods is not None]
+        solvers = None
     else:
-        ladders, race = [cost.ladder], cost.race if cost.race and cost.race.solvers else None
-    count = len(ladders) + (race is not None)
+        kinds, solvers = [cost.methods], cost.solvers if cost.solvers and cost.solvers.results else None
+    count = len(kinds) + (solvers is not None)
     figure = new_figure(8.0, 0.4 + 4.6 * count)
     panels = np.atleast_1d(figure.subplots(count, 1))
-    for axes, ladder in zip(panels, ladders, strict=False):
-        _methods(axes, ladder, name)
-    if race is not None:
+    for axes, methods in zip(panels, kinds, strict=False):
+        _methods(axes, methods, name)
+    if solvers is not None:
         axes = panels[-1]
-        _scatter(axes, race.solvers, race.recommended, 1e3)
+        _scatter(axes, solvers.results, solvers.recommended, 1e3)
         axes.set(xlabel="time of one fit (ms)", ylabel="mean error of the parameters, share of the bounds")
     return figure
 
 
-def _methods(axes: Axes, ladder: Ladder, name: str) -> None:
-    unit, scale = time_unit(ladder)
-    _scatter(axes, ladder.rungs, ladder.recommended, scale)
-    axes.axhline(ladder.tolerance, color=BLUE, linewidth=0.8, linestyle=":")
-    which = "mean" if ladder.sample == "colour" else "largest"
+def _methods(axes: Axes, methods: MethodComparison, name: str) -> None:
+    unit, scale = time_unit(methods)
+    _scatter(axes, methods.results, methods.recommended, scale)
+    axes.axhline(methods.tolerance, color=BLUE, linewidth=0.8, linestyle=":")
+    which = "mean" if methods.sample == "colour" else "largest"
     axes.set(
-        xlabel=f"time of one {ladder.sample} ({unit})",
-        ylabel=f"{which} {error_label(ladder)}, against {ladder.reference}",
+        xlabel=f"time of one {methods.sample} ({unit})",
+        ylabel=f"{which} {error_label(methods)}, against {methods.reference}",
         title=name.replace("$", r"\$"),
     )
 

@@ -16,7 +16,7 @@ from pellicle.reporting.json_record import indented, versions
 
 if TYPE_CHECKING:
     from pellicle.accuracy.cost import Cost
-    from pellicle.accuracy.measure import Ladder
+    from pellicle.accuracy.measure import MethodComparison
     from pellicle.accuracy.surface import SurfaceCost
 
 SCHEMA = "pellicle.cost/1"
@@ -42,33 +42,33 @@ def to_json(cost: Cost | SurfaceCost, recipe: str) -> dict[str, Any]:
 
 
 def _film(cost: Cost) -> dict[str, Any]:
-    ladder, race, intervals = cost.ladder, cost.race, cost.intervals
-    rungs = _rungs("forward", ladder.rungs)
-    rungs += [] if race is None else _rungs("inverse", race.solvers)
-    rungs += [] if intervals is None else _rungs("interval", intervals.ways)
-    omitted = [part.left_out for part in (ladder, race, intervals) if part is not None]
+    methods, solvers, intervals = cost.methods, cost.solvers, cost.intervals
+    rungs = _rungs("forward", methods.results)
+    rungs += [] if solvers is None else _rungs("inverse", solvers.results)
+    rungs += [] if intervals is None else _rungs("interval", intervals.results)
+    omitted = [part.left_out for part in (methods, solvers, intervals) if part is not None]
     return {
-        **_summary(ladder),
-        "wavelengths": ladder.wavelengths,
-        "draws": ladder.draws,
+        **_summary(methods),
+        "wavelengths": methods.wavelengths,
+        "draws": methods.draws,
         "rungs": rungs,
-        "recommended_solver": None if race is None else race.recommended,
+        "recommended_solver": None if solvers is None else solvers.recommended,
         "recommended_interval": None if intervals is None else intervals.recommended,
-        "noise": None if race is None else race.noise,
+        "noise": None if solvers is None else solvers.noise,
         "left_out": {name: why for left_out in omitted for name, why in left_out.items()},
-        "no_fits": cost.no_race or None,
+        "no_fits": cost.no_solvers or None,
     }
 
 
 def _surface(cost: SurfaceCost) -> dict[str, Any]:
-    ladders = {"brdf": cost.values} if cost.colours is None else {"colour": cost.colours, "brdf": cost.values}
-    first = next(iter(ladders.values()))
+    kinds = {"brdf": cost.values} if cost.colours is None else {"colour": cost.colours, "brdf": cost.values}
+    first = next(iter(kinds.values()))
     return {
         **_summary(first),
         "draws": first.draws,
-        "rungs": [rung for kind, ladder in ladders.items() for rung in _rungs(kind, ladder.rungs)],
+        "rungs": [method for kind, methods in kinds.items() for method in _rungs(kind, methods.results)],
         "brdf": _summary(cost.values),
-        "left_out": {name: why for ladder in ladders.values() for name, why in ladder.left_out.items()},
+        "left_out": {name: why for methods in kinds.values() for name, why in methods.left_out.items()},
         "no_colours": cost.no_colours or None,
     }
 
@@ -80,9 +80,9 @@ def _rungs(kind: str, items: Iterable[Any]) -> list[dict[str, Any]]:
     ]
 
 
-def _summary(ladder: Ladder) -> dict[str, Any]:
+def _summary(methods: MethodComparison) -> dict[str, Any]:
     names = ("reference", "tolerance", "unit", "recommended", "within")
-    return {name: getattr(ladder, name) for name in names}
+    return {name: getattr(methods, name) for name in names}
 
 
 def to_csv(rungs: list[dict[str, Any]]) -> str:

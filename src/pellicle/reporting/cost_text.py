@@ -10,9 +10,9 @@ from pellicle.reporting.plain_text import COLUMNS
 
 if TYPE_CHECKING:
     from pellicle.accuracy.cost import Cost
-    from pellicle.accuracy.interval_coverage import Intervals
-    from pellicle.accuracy.measure import Ladder
-    from pellicle.accuracy.solver_comparison import Race
+    from pellicle.accuracy.interval_coverage import IntervalComparison
+    from pellicle.accuracy.measure import MethodComparison
+    from pellicle.accuracy.solver_comparison import SolverComparison
     from pellicle.accuracy.surface import SurfaceCost
 
 _Columns = Mapping[str, Callable[[Any], str]]
@@ -28,64 +28,68 @@ def text(cost: Cost | SurfaceCost, name: str = "scene") -> str:
         blocks.append(_methods(cost.values, name))
         blocks += [f"No colours: {cost.no_colours}.\n"] if cost.no_colours else []
     else:
-        blocks = [_methods(cost.ladder, name)]
-        blocks.append(f"No fits: {cost.no_race}.\n" if cost.race is None else _solvers(cost.race))
+        blocks = [_methods(cost.methods, name)]
+        blocks.append(f"No fits: {cost.no_solvers}.\n" if cost.solvers is None else _solvers(cost.solvers))
         blocks += [] if cost.intervals is None else [_intervals(cost.intervals)]
     blocks += ["Interrupted: these are the measurements until then.\n"] if cost.interrupted else []
     return "\n".join(blocks)
 
 
-def error_label(ladder: Ladder, size: str = "") -> str:
+def error_label(methods: MethodComparison, size: str = "") -> str:
     """`error in R`, or of one size: `error of 0.1 degrees`."""
     of = f" of {size}" if size else ""
-    if ladder.unit == "relative":
+    if methods.unit == "relative":
         return f"relative error{of}"
-    if size and ladder.unit == "degrees":
+    if size and methods.unit == "degrees":
         return f"error{of} degrees"
-    return f"error{of} in {ladder.unit}"
+    return f"error{of} in {methods.unit}"
 
 
-def time_unit(ladder: Ladder) -> tuple[str, float]:
+def time_unit(methods: MethodComparison) -> tuple[str, float]:
     """The unit for the time of one sample, and the number of them in a second."""
-    return ("µs", 1e6) if ladder.sample == "spectrum" else ("ns", 1e9)
+    return ("µs", 1e6) if methods.sample == "spectrum" else ("ns", 1e9)
 
 
-def _methods(ladder: Ladder, name: str) -> str:
-    unit, scale = time_unit(ladder)
+def _methods(methods: MethodComparison, name: str) -> str:
+    unit, scale = time_unit(methods)
     few, more = (2, 1) if scale < 1e9 else (0, 2)
     columns: _Columns = {
         "method": lambda method: method.name,
         "leaves out": lambda method: method.leaves_out,
-        error_label(ladder): lambda method: f"{method.error:.1e}",
-        f"{unit}/{ladder.sample}": lambda method: f"{method.seconds * scale:.{few}f}",
+        error_label(methods): lambda method: f"{method.error:.1e}",
+        f"{unit}/{methods.sample}": lambda method: f"{method.seconds * scale:.{few}f}",
         "compile s": lambda method: f"{method.compile_seconds:.2f}",
         "kflop": lambda method: "" if method.flops is None else f"{method.flops / 1e3:.{more}f}",
     }
-    size = error_label(ladder, f"{ladder.tolerance:g}")
+    size = error_label(methods, f"{methods.tolerance:g}")
     within = f"{'a' if size.startswith('r') else 'an'} {size}"
-    advice = f"{ladder.recommended} is the fastest within {within}"
-    if not ladder.within:
-        advice = f"no method is within {within}; {ladder.recommended} comes nearest"
-    title = f"{name}: {_compared(ladder)} against {ladder.reference}"
-    notes = ["* no other method is both faster and as accurate", f"→ {advice}", *_omitted(ladder.left_out)]
-    return _table(title, ladder.rungs, ladder.recommended, columns, notes)
+    advice = f"{methods.recommended} is the fastest within {within}"
+    if not methods.within:
+        advice = f"no method is within {within}; {methods.recommended} comes nearest"
+    title = f"{name}: {_compared(methods)} against {methods.reference}"
+    notes = [
+        "* no other method is both faster and as accurate",
+        f"→ {advice}",
+        *_omitted(methods.left_out),
+    ]
+    return _table(title, methods.results, methods.recommended, columns, notes)
 
 
-def _compared(ladder: Ladder) -> str:
-    if ladder.sample != "spectrum":
-        each = f"{ladder.wavelengths} {'angles' if ladder.sample == 'colour' else 'pairs of directions'}"
-        which = "mean" if ladder.sample == "colour" else "largest"
-        return f"{ladder.draws} surfaces between the bounds along {each}, the {which} error"
-    several = "s" * (ladder.wavelengths > 1)
-    draws = "draws between the bounds" if ladder.draws > 1 else "spectrum"
-    return f"{ladder.wavelengths} wavelength{several}, the largest error of {ladder.draws} {draws}"
+def _compared(methods: MethodComparison) -> str:
+    if methods.sample != "spectrum":
+        each = f"{methods.wavelengths} {'angles' if methods.sample == 'colour' else 'pairs of directions'}"
+        which = "mean" if methods.sample == "colour" else "largest"
+        return f"{methods.draws} surfaces between the bounds along {each}, the {which} error"
+    several = "s" * (methods.wavelengths > 1)
+    draws = "draws between the bounds" if methods.draws > 1 else "spectrum"
+    return f"{methods.wavelengths} wavelength{several}, the largest error of {methods.draws} {draws}"
 
 
-def _solvers(race: Race) -> str:
-    count = max((solver.datasets for solver in race.solvers), default=0)
+def _solvers(solvers: SolverComparison) -> str:
+    count = max((solver.datasets for solver in solvers.results), default=0)
     title = (
-        f"Fits of {count} simulated spectra with noise {race.noise:g}, their true values anywhere between the"
-        " bounds; errors as a share of the bounds"
+        f"Fits of {count} simulated spectra with noise {solvers.noise:g}, their true values anywhere between"
+        " the bounds; errors as a share of the bounds"
     )
     columns: _Columns = {
         "solver": lambda solver: solver.name,
@@ -96,12 +100,14 @@ def _solvers(race: Race) -> str:
         "ms/fit": lambda solver: f"{solver.seconds * 1e3:.1f}",
         "compile s": lambda solver: f"{solver.compile_seconds:.1f}",
     }
-    advice = [f"→ {race.recommended} is the fastest of those that failed least"] if race.solvers else []
-    return _table(title, race.solvers, race.recommended, columns, [*advice, *_omitted(race.left_out)])
+    advice = [f"→ {solvers.recommended} is the fastest of those that failed least"] if solvers.results else []
+    return _table(
+        title, solvers.results, solvers.recommended, columns, [*advice, *_omitted(solvers.left_out)]
+    )
 
 
-def _intervals(intervals: Intervals) -> str:
-    count = max((way.datasets for way in intervals.ways), default=0)
+def _intervals(intervals: IntervalComparison) -> str:
+    count = max((way.datasets for way in intervals.results), default=0)
     title = (
         f"95 % intervals of the same {count} data sets: share that contains the true value, width as a share"
         " of the bounds, and time after the fit"
@@ -115,8 +121,8 @@ def _intervals(intervals: Intervals) -> str:
         "compile s": lambda way: f"{way.compile_seconds:.1f}",
     }
     best = f"→ {intervals.recommended} is the fastest whose coverage is 95 % within two standard deviations"
-    notes = [*([best] if intervals.ways else []), *_omitted(intervals.left_out)]
-    return _table(title, intervals.ways, intervals.recommended, columns, notes)
+    notes = [*([best] if intervals.results else []), *_omitted(intervals.left_out)]
+    return _table(title, intervals.results, intervals.recommended, columns, notes)
 
 
 def _table(
