@@ -286,6 +286,21 @@ def test_linked_files_exist(page):
         assert "://" in target or (ROOT / page).parent.joinpath(target).exists(), target
 
 
+def test_the_house_is_drawn_in_the_order_of_the_import_contract():
+    """The diagram of CONTRIBUTING, whose indented lines are folders inside of others."""
+    (diagram,) = blocks("CONTRIBUTING.md", "text")
+    drawn = [re.split(r"\s{2,}", line)[0] for line in diagram.splitlines() if not line.startswith(" ")]
+    pyproject = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
+    assert drawn == pyproject["tool"]["importlinter"]["contracts"][0]["layers"]
+
+
+def test_modules_named_in_contributing_exist():
+    """By their path in the repository or in the package, or by the end of it."""
+    named = set(re.findall(r"`([\w./]+\.(?:py|toml|csv|md))`", PAGES["CONTRIBUTING.md"])) - {"NN_name.py"}
+    kept = ["/" + path.relative_to(ROOT).as_posix() for path in ROOT.glob("[a-z]*/**/*") if path.is_file()]
+    assert not [name for name in named if not any(path.endswith("/" + name) for path in kept)]
+
+
 SCHEMA = json.loads((ROOT / "docs" / "recipe.schema.json").read_text("utf-8"))
 
 
