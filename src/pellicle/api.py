@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pellicle.accuracy.cost import Cost
-from pellicle.accuracy.cost import cost as film_cost
-from pellicle.accuracy.surface import SurfaceCost
-from pellicle.accuracy.surface import cost as surface_cost
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.spectrum import Spectrum
 from pellicle.effects.plan import Plan
@@ -33,6 +29,10 @@ from pellicle.scene.surface import Surface, SurfaceView, surface_view
 from pellicle.synthetic.brdf import Directions, default_directions, simulate_brdf
 from pellicle.synthetic.spectra import default_wavelengths
 from pellicle.synthetic.spectra import simulate as simulate_spectrum
+
+if TYPE_CHECKING:
+    from pellicle.accuracy.cost import Cost
+    from pellicle.accuracy.surface import SurfaceCost
 
 
 @overload
@@ -180,6 +180,9 @@ def cost(
     scene, for a scene whose signal is 0 everywhere, and for the colours of a surface without
     colour-science.
     """
+    from pellicle.accuracy.cost import cost as film_cost  # solvers, a fifth of the time of importing this
+    from pellicle.accuracy.surface import cost as surface_cost
+
     if isinstance(scene, Surface):
         _refuse("a Surface", wavelength=wavelength, noise=noise)
         view = _view(scene, directions)

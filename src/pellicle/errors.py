@@ -24,3 +24,8 @@ def did_you_mean(word: str, known: Iterable[str], cutoff: float = 0.5) -> str:
     """
     close = difflib.get_close_matches(word, list(known), n=1, cutoff=cutoff)
     return f" (did you mean {close[0]!r}?)" if close else ""
+
+
+def install_command(extra: str) -> str:
+    """The command that installs the packages of an extra, for an installed pellicle and for a clone."""
+    return f"pip install 'pellicle[{extra}]' (in a clone of the repository: pip install -e '.[{extra}]')"

@@ -33,6 +33,14 @@ class Ran:
 
         return [json.loads(line, parse_constant=refuse) for line in self.out.splitlines()]
 
+    def refused(self, code: int, *words: str) -> None:
+        """Check the exit code, that nothing is on stdout, and one sentence on stderr with all `words`."""
+        assert (self.code, self.out) == (code, ""), self.err
+        complaints = [line for line in self.err.splitlines() if line.startswith("pellicle: ")]
+        assert len(complaints) == 1, self.err
+        assert [word for word in words if word not in complaints[0]] == [], complaints[0]
+        assert "Traceback" not in self.err
+
 
 @pytest.fixture
 def pellicle(monkeypatch, capsys) -> Callable[..., Ran]:

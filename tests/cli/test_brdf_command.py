@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
-from pellicle.fitting.brdf.result import Baseline, BrdfFit
 
+from pellicle import api
 from pellicle.effects.surface import exact
-from pellicle.fitting.brdf import fit as fitting
-from pellicle.fitting.result import Estimate, Rival, Status
+from pellicle.fitting.result import (
+    Baseline,
+    BrdfCurve,
+    Estimate,
+    Fit,
+    LayerTest,
+    Part,
+    Rival,
+    Status,
+)
 from pellicle.recipes import read_recipe
-from pellicle.sampling import brdf as sampling
-from pellicle.sampling.ensemble import Subject, sampled
+from pellicle.sampling.ensemble import STEPS, Subject, sampled
 from pellicle.sampling.modes import mixture
 from pellicle.sampling.predict import Axis, Prediction
 from pellicle.scene.surface import surface_view
@@ -42,42 +51,52 @@ def folder(tmp_path):
 
 
 @pytest.fixture
-def told(monkeypatch):
-    """A stand-in for the fit: what it was asked, and an answer."""
-    asked = {}
+def fits(monkeypatch):
+    """Arguments of each fit, in place of the fits themselves."""
+    calls = []
 
-    def stand_in(samples, surface, *, residual=None, progress=None):
-        asked.update(samples=samples, surface=surface, residual=residual)
-        return BrdfFit(
-            samples=samples,
-            surface=surface,
-            residual=residual or "linear",
+    def fit(samples, surface, **options):
+        calls.append({"samples": samples, "surface": surface, **options})
+        several = isinstance(samples, list)
+        parts = tuple(
+            Part(
+                name=Path(each.path).stem if several else "",
+                data=each,
+                curve=BrdfCurve(np.zeros_like(each.values), each.values),
+                plan=exact(surface_view(surface, each)),
+                rms=1.0,
+                chi2_reduced=1.1,
+                effective_points=80.0,
+                sigma_from="residuals" if each.sigma is None else "given",
+            )
+            for each in (samples if several else [samples])
+        )
+        return Fit(
+            parts=parts,
             status=Status.NOT_IDENTIFIABLE,
-            verdict="No evidence of a layer: it was not sought.",
-            layered=False,
+            verdict="No evidence of a layer.",
             parameters={
                 "thickness": Estimate("thickness", 300.0, np.inf, "nm", 10.0, 700.0, True),
                 "n": Estimate("n", 1.5, 0.0, "", 1.5, 1.5, False),
             },
             rivals=(Rival({"thickness": 120.0}, 9.0),),
-            baselines=(Baseline("two lobes", 2.0),),
-            held_out=1.9,
             chi2_reduced=1.1,
             rms=1.0,
-            effective_points=90.0,
+            effective_points=80.0,
             correlation_names=("thickness",),
             correlation=np.eye(1),
-            plan=exact(surface_view(surface, samples)),
             warnings=("a warning",),
-            model=np.zeros_like(samples.values),
+            profile=None,
             seconds=0.1,
+            scene=surface,
+            layer_test=LayerTest(False, 1.9, (Baseline("two lobes", 2.0),), options["residual"] or "linear"),
         )
 
-    monkeypatch.setattr(fitting, "fit_brdf", stand_in)
-    return asked
+    monkeypatch.setattr(api, "fit", fit)
+    return calls
 
 
-def test_a_recipe_says_what_is_fitted_and_how(folder, told, pellicle):
+def test_a_recipe_says_what_is_fitted_and_how(folder, fits, pellicle):
     ran = pellicle("fit", "--recipe", folder / "paint.toml", "--json", "--verbose", "--out", folder / "out")
     assert ran.code == 4
     assert "surface: microfacet-film, by 30 samples of R, G, B\n" in ran.err
@@ -91,12 +110,12 @@ def test_a_recipe_says_what_is_fitted_and_how(folder, told, pellicle):
     assert found["baselines"] == [{"name": "two lobes", "held_out": 2.0}]
     assert (found["held_out"], found["layered"]) == (1.9, False)
     assert {row["effect"] for row in found["plan"]} >= {"spectral-sampling", "roughness", "diffuse"}
-    assert told["residual"] == "log"
-    assert np.all(told["samples"].sigma == 0.01)
-    fixed = told["surface"].fixed_numbers()
+    assert fits[-1]["residual"] == "log"
+    assert np.all(fits[-1]["samples"].sigma == 0.01)
+    fixed = fits[-1]["surface"].fixed_numbers()
     assert fixed["base_n"].tolist() == [3.9] * 3
     assert fixed["base_k"].tolist() == [0.02] * 3
-    assert [leaf.name for leaf in told["surface"].free_numbers()] == ["thickness", "roughness"]
+    assert [leaf.name for leaf in fits[-1]["surface"].free_numbers()] == ["thickness", "roughness"]
     report = (folder / "out" / "report.txt").read_text()
     assert "two lobes" in report
     assert "not determined" in report
@@ -108,30 +127,30 @@ def test_a_recipe_says_what_is_fitted_and_how(folder, told, pellicle):
 
 
 @pytest.fixture
-def drawn(monkeypatch, told):
-    """A stand-in for the sampler: a normal posterior of the thickness, by the real ensemble."""
+def posterior(monkeypatch, fits):
+    """A normal posterior of the thickness by the real ensemble, in place of that of the surface."""
 
-    def stand_in(samples, surface, *, residual, walkers, steps, seed, chain, progress):
-        found = fitting.fit_brdf(samples, surface, residual=residual)
+    def sample(samples, surface, *, walkers, seed, chain, progress, steps=STEPS, **options):
+        fit = api.fit(samples, surface, **options)
         axis = Axis("rank_R", "samples", np.arange(30))
         rows = 1.0 + np.random.default_rng(0).random((50, 30))
         subject = Subject(
-            fit=found,
+            fit=fit,
             names=("thickness",),
             log_density=lambda units: -0.5 * ((units[:, 0] - 0.5) / 0.01) ** 2,
             modes=mixture(np.array([[0.5]]), np.zeros(1), lambda unit: np.array([[1e-4]])),
             values=lambda units: 10 + 690 * units,
-            whose="paint",
+            fingerprint="paint",
             points=90,
             predict=lambda units, seed: (Prediction("R", "R (1/sr)", axis, rows[0], rows, rows, True),),
-            granted="there is a layer",
+            assumption="there is a layer",
         )
         return sampled(subject, walkers, steps, seed, chain, progress, 0.0)
 
-    monkeypatch.setattr(sampling, "sample_brdf", stand_in)
+    monkeypatch.setattr(api, "sample", sample)
 
 
-def test_a_posterior_of_a_surface(folder, drawn, pellicle):
+def test_a_posterior_of_a_surface(folder, posterior, pellicle):
     out = folder / "out"
     ran = pellicle("sample", "--recipe", folder / "paint.toml", "--json", "--out", out, "--walkers", 32)
     assert ran.code == 4  # by the fit's own status
@@ -154,7 +173,7 @@ def test_a_posterior_of_a_surface(folder, drawn, pellicle):
     assert short.objects[0]["posterior"]["parameters"]["thickness"]["mean"] is None
 
 
-def test_flags_go_before_the_recipe_and_a_bad_file_does_not_stop_the_others(folder, told, pellicle):
+def test_flags_go_before_the_recipe_and_a_bad_file_does_not_stop_the_others(folder, fits, pellicle):
     ran = pellicle(
         *("fit", folder / "absent.csv", folder / "paint.csv", "--noise", 0.5),
         *("--recipe", folder / "paint.toml", "--json"),
@@ -162,7 +181,7 @@ def test_flags_go_before_the_recipe_and_a_bad_file_does_not_stop_the_others(fold
     assert ran.code == 4
     assert [each["status"] for each in ran.objects] == ["failed", "not-identifiable"]
     assert "no such file" in ran.err
-    assert np.all(told["samples"].sigma == 0.5)
+    assert np.all(fits[-1]["samples"].sigma == 0.5)
 
 
 @pytest.mark.parametrize(
@@ -180,35 +199,42 @@ def test_flags_go_before_the_recipe_and_a_bad_file_does_not_stop_the_others(fold
 )
 def test_a_bad_recipe_is_told_in_one_sentence(folder, pellicle, old, new, code, words):
     (folder / "paint.toml").write_text(RECIPE.replace(old, new))
-    ran = pellicle("fit", "--recipe", folder / "paint.toml")
-    assert ran.code == code
-    assert words in ran.err
-    assert len(ran.err.strip().splitlines()) == 1
-    assert ran.out == ""
+    pellicle("fit", "--recipe", folder / "paint.toml").refused(code, words)
 
 
 def test_nothing_free_is_a_bad_recipe(folder, pellicle):
     fixed = RECIPE.replace("{ lower = 10, upper = 700 }", "50").replace("{ lower = 0.01, upper = 1 }", "0.2")
     (folder / "paint.toml").write_text(fixed)
-    ran = pellicle("fit", "--recipe", folder / "paint.toml")
-    assert ran.code == 3
-    assert "paint.toml: nothing is free to fit" in ran.err
+    pellicle("fit", "--recipe", folder / "paint.toml").refused(3, "paint.toml: nothing is free")
 
 
 def test_flags_that_a_surface_has_no_use_for(folder, pellicle):
     recipe = ("--recipe", folder / "paint.toml")
     for flags, words in (
         (("--angle", 30), "--angle cannot be used on a BRDF"),
-        (("--layer", "SiO2"), "--layer cannot be used on a BRDF"),
-        (("--joint", "--tolerance", 0.1), "--joint, --tolerance cannot be used on a BRDF"),
-        (("--signal", "R"), "describes a surface, whose signal is brdf and not R"),
+        (("--layer", "SiO2"), "--layer and --recipe"),
+        (("--range", "400:700", "--folded"), "--range, --folded cannot be used on a BRDF"),
+        (("--signal", "R"), "describes a surface, whose signal is brdf, not R"),
     ):
-        ran = pellicle("fit", *recipe, *flags)
-        assert ran.code == 2
-        assert words in ran.err
-    ran = pellicle("fit", folder / "paint.csv", "--signal", "brdf")
-    assert ran.code == 2
-    assert "needs a --recipe that describes the surface" in ran.err
+        pellicle("fit", *recipe, *flags).refused(2, words)
+    pellicle("fit", folder / "paint.csv", "--signal", "brdf").refused(2, "needs a --recipe")
+
+
+def test_files_of_one_surface_are_fitted_together(folder, fits, pellicle):
+    """With the loss and the tolerance of fits of spectra, and a table, a figure and a record of all files."""
+    (folder / "again.csv").write_text(ROWS)
+    files = (folder / "paint.csv", folder / "again.csv")
+    flags = ("--joint", "--loss", "huber", "--tolerance", 0.01, "--json", "--out", folder / "out")
+    ran = pellicle("fit", *files, "--recipe", folder / "paint.toml", *flags)
+    assert ran.code == 4
+    [record] = ran.objects
+    assert [data["name"] for data in record["data"]] == ["paint", "again"]
+    assert (fits[-1]["loss"], fits[-1]["tolerance"]) == ("huber", 0.01)
+    table = (folder / "out" / "fit.csv").read_text().splitlines()
+    assert table[4].startswith("file,theta_i,")
+    assert [line.split(",")[0] for line in table[5:]] == ["paint"] * 30 + ["again"] * 30
+    assert (folder / "out" / "figure.png").read_bytes().startswith(b"\x89PNG")
+    assert "rms residual of again" in (folder / "out" / "report.txt").read_text()
 
 
 def test_a_metal_from_the_catalogue_is_the_base(folder):

@@ -85,25 +85,14 @@ def test_data_that_do_not(pellicle, recipe, spectrum_file):
 
 def test_bad_input_in_one_sentence(pellicle, recipe, spectrum_file, tmp_path):
     path, a = spectrum_file(), recipe("a.toml")
-
-    def said(*arguments):
-        ran = pellicle("compare", *arguments)
-        return ran.code, ran.err
-
-    code, err = said(path, "--recipe", a)
-    assert code == 2
-    assert "needs two recipes or more" in err
-    code, err = said(path, "--recipe", a, "--recipe", a)
-    assert code == 2
-    assert "given twice" in err
-    code, err = said(path, "--recipe", a, "--recipe", tmp_path / "none.toml")
-    assert code == 3
-    assert "none.toml: cannot be read" in err
-    other = recipe("narrow.toml", data="range = [500, 700]")
-    code, err = said(path, "--recipe", a, "--recipe", other)
-    assert code == 3
-    assert "a.toml and narrow.toml do not look at the same points" in err
+    narrow = recipe("narrow.toml", data="range = [500, 700]")
     robust = recipe("robust.toml", data='loss = "huber"')
-    code, err = said(path, "--recipe", a, "--recipe", robust)
-    assert code == 3
-    assert "robust.toml: a comparison needs least squares" in err
+    for recipes, code, words in (
+        ([a], 2, "two recipes or more"),
+        ([a, a], 2, "given twice"),
+        ([a, tmp_path / "none.toml"], 3, "none.toml: cannot be read"),
+        ([a, narrow], 3, "a.toml and narrow.toml do not use the same points"),
+        ([a, robust], 3, "robust.toml: a comparison needs least squares"),
+    ):
+        flags = [word for each in recipes for word in ("--recipe", each)]
+        pellicle("compare", path, *flags).refused(code, words)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from importlib import import_module
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ def ran(pellicle, tmp_path, monkeypatch):
 def test_it_leaves_a_folder_to_look_at(ran, tmp_path):
     folder = tmp_path / "pellicle-demo"
     assert ran.code == 0, ran.err
-    assert f"look into {folder.name}/result" in ran.err
+    assert f"see {folder.name}/result" in ran.err
     found = json.loads((folder / "result" / "result.json").read_text())
     thickness = found["parameters"]["thickness"]
     assert found["status"] == "converged"
@@ -32,7 +33,7 @@ def test_it_leaves_a_folder_to_look_at(ran, tmp_path):
 def test_a_folder_that_is_there_is_not_touched(pellicle, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     module = import_module("pellicle.cli.demo")  # the name in its package is the command
-    monkeypatch.setattr(module, "Batch", lambda *arguments: lambda groups: 0)
+    monkeypatch.setattr(module, "Batch", lambda *arguments, **options: SimpleNamespace(run=lambda: 0))
     monkeypatch.setattr(import_module("pellicle.cli.chart"), "chart", lambda *arguments, **more: 0)
     (tmp_path / "pellicle-demo").mkdir()
     mine = tmp_path / "pellicle-demo" / "hematite.toml"

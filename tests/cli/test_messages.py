@@ -9,10 +9,10 @@ from dataclasses import fields
 import pytest
 
 from pellicle.cli import main
-from pellicle.cli.flags import ReadWords, SceneWords
+from pellicle.cli.flags import ReadingFlags, SceneFlags
 from pellicle.cli.messages import FLAGS, as_flags
 from pellicle.cli.session import say
-from pellicle.cli.verbose import aloud
+from pellicle.cli.verbose import log_to_stderr
 
 COMMANDS = ("fit", "sample", "simulate", "plan", "compare", "cost", "chart", "materials")
 
@@ -74,7 +74,7 @@ def test_several_arguments_in_one_sentence():
 def test_every_flag_of_the_table_exists_and_no_flag_of_a_scene_or_a_file_is_missing(pellicle):
     helps = "".join(pellicle(command, "--help").out for command in COMMANDS).replace("--", " --").split()
     assert {flag for flag in FLAGS.values() if flag not in helps} == set()
-    assert {field.name for kind in (SceneWords, ReadWords) for field in fields(kind)} <= FLAGS.keys()
+    assert {field.name for kind in (SceneFlags, ReadingFlags) for field in fields(kind)} <= FLAGS.keys()
 
 
 def test_messages_on_stderr(monkeypatch, capsys):
@@ -84,7 +84,7 @@ def test_messages_on_stderr(monkeypatch, capsys):
         raise ValueError('film.csv: uncalibrated: give `scale="slow"`')
 
     say("counts.csv: `signal` is not given")
-    with aloud():
+    with log_to_stderr():
         logging.getLogger("pellicle").info("give `angle=70`")
     monkeypatch.setattr("pellicle.cli.command", refused)
     assert main() == 3
@@ -96,15 +96,15 @@ def doubtful(monkeypatch):
     """Makes every fit of spectra warn, and name an argument in its verdict."""
     from dataclasses import replace
 
-    import pellicle.fitting.spectra.fit as module
+    import pellicle.api
 
-    real = module.fit
+    real = pellicle.api.fit
 
     def fit(*arguments, **options):
         result = real(*arguments, **options)
         return replace(result, verdict="Give `angle=70`.", warnings=("noise: give `noise=0.01`",))
 
-    monkeypatch.setattr(module, "fit", fit)
+    monkeypatch.setattr(pellicle.api, "fit", fit)
 
 
 @pytest.mark.usefixtures("doubtful")

@@ -67,9 +67,7 @@ def test_noise_and_seed(pellicle, recipe, tmp_path):
 
 def test_an_existing_file_is_kept(pellicle, recipe, tmp_path):
     (tmp_path / "film.csv").write_text("mine")
-    ran = pellicle("simulate", recipe, "--out", tmp_path / "film.csv")
-    assert ran.code == 2
-    assert "not overwritten" in ran.err
+    pellicle("simulate", recipe, "--out", tmp_path / "film.csv").refused(2, "not overwritten")
     assert (tmp_path / "film.csv").read_text() == "mine"
 
 
@@ -86,16 +84,12 @@ def test_default_wavelengths_are_said(pellicle, recipe, tmp_path):
 )
 def test_bad_wavelengths(pellicle, recipe, tmp_path, grid, said):
     recipe.write_text(RECIPE.replace("{ start = 400, stop = 796, step = 4 }", grid))
-    ran = pellicle("simulate", recipe, "--out", tmp_path / "film.csv")
-    assert ran.code == 3
-    assert said in ran.err
+    pellicle("simulate", recipe, "--out", tmp_path / "film.csv").refused(3, said)
     assert not (tmp_path / "film.csv").exists()
 
 
 def test_negative_noise(pellicle, recipe, tmp_path):
-    ran = pellicle("simulate", recipe, "--out", tmp_path / "film.csv", "--noise", -1)
-    assert ran.code == 2
-    assert "--noise" in ran.err
+    pellicle("simulate", recipe, "--out", tmp_path / "film.csv", "--noise", -1).refused(2, "--noise")
 
 
 def test_ellipsometry_comes_back_as_psi_and_delta(pellicle, recipe, tmp_path):
@@ -121,7 +115,5 @@ def test_ellipsometry_comes_back_as_psi_and_delta(pellicle, recipe, tmp_path):
         < 4 * found["parameters"]["thickness"]["stderr"]
     )
     recipe.write_text(ellipsometric.replace("angle = 65\n", ""))
-    ran = pellicle("simulate", recipe, "--out", tmp_path / "none.csv")
-    assert ran.code == 3
-    assert "needs an angle of incidence" in ran.err
+    pellicle("simulate", recipe, "--out", tmp_path / "none.csv").refused(3, "needs an angle of incidence")
     assert not (tmp_path / "none.csv").exists()

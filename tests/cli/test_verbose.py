@@ -7,7 +7,7 @@ import re
 
 import jax
 
-from pellicle.cli.verbose import aloud
+from pellicle.cli.verbose import log_to_stderr
 
 
 def test_every_step_of_a_fit_is_told(pellicle, spectrum_file, scene):
@@ -15,7 +15,7 @@ def test_every_step_of_a_fit_is_told(pellicle, spectrum_file, scene):
     sentences = re.findall(r"^ *\d+\.\d\d s  (.*)$", ran.err, re.MULTILINE)
     heads = [re.split(r":| of ", sentence)[0] for sentence in sentences if "oxide.csv" not in sentence]
     assert list(dict.fromkeys(heads)) == [
-        *("scene", "free", "data", "plan", "scan", "refined", "weights", "status", "time")
+        *("scene", "free", "data", "plan", "scan", "polished", "weights", "status", "time")
     ]
     assert "oxide.csv: 100 rows used: R from 400 to 796 nm" in ran.err
     assert "scene: from air (exactly 1): index 1.46, 10 to 800 nm, on index 3.9 + 0.02i" in sentences
@@ -30,12 +30,10 @@ def test_every_step_of_a_fit_is_told(pellicle, spectrum_file, scene):
 
 
 def test_where_the_time_went(capsys):
-    with aloud():
+    with log_to_stderr():
         jax.jit(lambda x: x + 11.5)(1.0)
     said = capsys.readouterr().err
-    whole, making, programs = re.search(
-        r"time: (\S+) s in all, (\S+) s of it .* (\d+) programs", said
-    ).groups()
+    whole, making, programs = re.search(r"time: (\S+) s, (\S+) s of them .* (\d+) programs", said).groups()
     assert 0 < float(making) <= float(whole)
     assert int(programs) == 1
 
@@ -50,7 +48,7 @@ def test_why_a_fit_is_no_answer(pellicle, spectrum_file):
         *("--noise", "0.002", "--verbose"),
     )
     assert ran.code == 4
-    assert "status: does the scene miss the data? yes" in ran.err
+    assert "status: does the scene not explain the data? yes" in ran.err
     assert "its noise is given" in ran.err
 
 

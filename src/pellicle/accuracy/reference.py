@@ -9,7 +9,7 @@ import numpy as np
 from pellicle.accuracy.case import Case
 from pellicle.accuracy.compiled import compiled
 from pellicle.accuracy.methods import Variant
-from pellicle.errors import UsageError
+from pellicle.errors import UsageError, install_command
 
 REFERENCES = ("float64", "mpmath")
 MP_DRAWS, MP_WAVELENGTHS = 12, 25
@@ -56,8 +56,7 @@ def _by_mpmath(case: Case) -> Reference:
         from pellicle.accuracy.high_precision import signal, unsuitable
     except ImportError:
         raise UsageError(
-            "`reference=\"mpmath\"` needs mpmath: pip install 'pellicle[reference]', or use"
-            ' `reference="float64"`'
+            f'`reference="mpmath"` needs mpmath: {install_command("reference")}; or use `reference="float64"`'
         ) from None
     why = unsuitable(case)
     if why is not None:

@@ -1,4 +1,4 @@
-"""The `pellicle` command. stdout is the result, stderr is talk."""
+"""The `pellicle` command: results on stdout, messages on stderr."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from pellicle.cli.plan import plan
 from pellicle.cli.sample import sample
 from pellicle.cli.session import say
 from pellicle.cli.simulate import simulate
-from pellicle.cli.verbose import aloud
+from pellicle.cli.verbose import log_to_stderr
 from pellicle.errors import DataError, UsageError
 
 INTERRUPTED = 130
 
 app = App(
     name="pellicle",
-    help="Look at a thin layer and say what it is: thickness and index from a measured spectrum.",
+    help="Thickness and refractive index of thin layers from measured spectra and BRDF samples.",
     help_format="plaintext",
     version_flags=["--version"],
     exit_on_error=False,
@@ -41,10 +41,10 @@ app.command(cost)
 app.command(chart)
 app.command(materials)
 app.command(demo)
-app.register_install_completion_command(help="Complete commands and flags in this shell from now on.")
+app.register_install_completion_command(help="Install completion of commands and flags for this shell.")
 
 command = app.meta
-"""What is typed: a command of `app`, and the flags that all of them share."""
+"""A command of `app` with the flags that all commands share."""
 
 
 @command.default
@@ -52,24 +52,24 @@ def _any(
     *words: Annotated[str, Parameter(show=False, allow_leading_hyphen=True)],
     verbose: Annotated[
         bool,
-        Parameter(negative="", help="Tell on stderr, step by step, what is understood, and why."),
+        Parameter(negative="", help="Log each step to stderr."),
     ] = False,
 ) -> int:
-    with aloud() if verbose else nullcontext():
+    with log_to_stderr() if verbose else nullcontext():
         return int(app(words) or 0)
 
 
 def main() -> int:
     """Run the command line and return its exit code.
 
-    0 good, 2 wrong usage, 3 bad data, 4 no clear answer, 5 a chain too short to trust.
+    0 good, 2 wrong usage, 3 bad data, 4 no clear answer, 5 a chain that is too short, 130 interrupted.
     """
     from cyclopts import CycloptsError
 
     try:
         return int(command(sys.argv[1:]) or 0)
     except CycloptsError:
-        return 2  # cyclopts has said what is wrong
+        return 2  # cyclopts has printed the error
     except UsageError as error:
         say(f"pellicle: {error}")
         return 2

@@ -1,169 +1,150 @@
-"""Fits of one file after the other, or of several together, and what is left of each."""
+"""Fits of data files, one by one or together: results on stdout, folders, exit code."""
 
 from __future__ import annotations
 
-import json as json_module
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from pellicle.cli.flags import ReadWords
+from pellicle.cli.inputs import LEAST_SQUARES, Input, Inputs
 from pellicle.cli.messages import as_flags, with_flags
-from pellicle.cli.options import read
-from pellicle.cli.session import Progress, say
+from pellicle.cli.session import Progress, check_folder, say
 from pellicle.errors import UsageError
 
 if TYPE_CHECKING:
+    from pellicle.data.brdf_samples import BrdfSamples
+    from pellicle.data.spectrum import Spectrum
     from pellicle.fitting.result import Fit
     from pellicle.sampling.result import Posterior
     from pellicle.scene.film import Scene
+    from pellicle.scene.surface import Surface
 
-TOO_SHORT = 5
-"""The exit code of a chain that carries no interval."""
-
-
-class Look(NamedTuple):
-    """A file, the scene that is to explain it, and how it is read.
-
-    `rescaled` says that the scale or the offset is of this file alone.
-    """
-
-    path: str
-    scene: Scene
-    reading: ReadWords
-    rescaled: bool = False
+CONVERGED, FAILED, UNCLEAR, TOO_SHORT, INTERRUPTED = 0, 3, 4, 5, 130
+"""Exit codes: one answer, an unreadable file, any other status, a chain without an interval, Ctrl-C."""
 
 
 class Sampler(NamedTuple):
-    """How posteriors are sampled; None leaves a number to the library."""
+    """Settings of posterior sampling; None is the library's default."""
 
     walkers: int | None = None
     steps: int | None = None
     seed: int = 0
 
-    def settings(self, folder: Path | None) -> dict[str, Any]:
-        """What the library takes, for a chain that is kept in `folder`."""
+    def options(self, folder: Path | None) -> dict[str, Any]:
+        """Arguments of `pellicle.sample`, with the chain kept in `folder`."""
         from pellicle.reporting.folders import chain_file
-        from pellicle.sampling.ensemble import STEPS
 
+        chosen = {} if self.steps is None else {"steps": self.steps}
         chain = None if folder is None else chain_file(folder)
-        return {"walkers": self.walkers, "steps": self.steps or STEPS, "seed": self.seed, "chain": chain}
+        return {"walkers": self.walkers, "seed": self.seed, "chain": chain, **chosen}
 
 
+@dataclass
 class Batch:
-    """Fits group after group of files; one that fails does not stop the others.
+    """Fits of several files; with a `sampler` each is followed by its posterior.
 
-    A joint batch has one group, whose files are fitted together; else every group is one file. With a
-    `sampler` every fit is followed by its posterior.
+    A file that fails does not stop the others. `records` are the JSON records of the results so far.
     """
 
-    def __init__(
-        self, out: str | None, as_json: bool, joint: bool, tolerance: float, sampler: Sampler | None = None
-    ):
-        self.out, self.as_json, self.joint, self.tolerance = out, as_json, joint, tolerance
-        self.sampler = sampler
-        self.done: list[Any] = []
+    inputs: Inputs
+    tolerance: float = 0.0
+    sampler: Sampler | None = None
+    out: str | None = None
+    as_json: bool = False
+    records: list[dict[str, Any]] = field(default_factory=list)
 
-    def __call__(self, groups: list[list[Look]]) -> int:
-        from pellicle.files import new_folder
-        from pellicle.reporting.folders import folder_per_file, write_summary
+    def run(self) -> int:
+        """Fit every group of files, print and write each result, and return the largest exit code."""
+        from pellicle.reporting.folders import SUMMARY, folder_per_file, write_summary
 
-        if self.sampler is not None and any(
-            looks[0].reading.loss not in (None, "least-squares") for looks in groups
-        ):
+        if self.sampler is not None and self.inputs.loss != LEAST_SQUARES:
             raise UsageError("a posterior needs least squares: leave the loss out, or the posterior")
-        folders = [None] * len(groups)
+        groups = self.inputs.groups
+        folders: list[Path | None] = [None] * len(groups)
         if self.out is not None:
-            root = Path(self.out)
-            folders = folder_per_file(root, [looks[0].path for looks in groups])
-            if root.exists():
-                new_folder(root)  # refuses a stranger's folder before the work, not after
-        worst = 0
+            check_folder(self.out)
+            folders = [*folder_per_file(self.out, [files[0].path for files in groups])]
+        worst = CONVERGED
         try:
-            for looks, folder in zip(groups, folders, strict=True):
-                worst = max(worst, self._one(looks, folder))
+            for files, folder in zip(groups, folders, strict=True):
+                worst = max(worst, self._fit(files, folder))
         except KeyboardInterrupt:
-            say(f"interrupted after {len(self.done)} of {len(groups)} files; what is done is kept")
-            worst = 130
-        if self.out is not None and len(groups) > 1 and self.done:
-            write_summary(Path(self.out) / "summary.csv", self.done)
+            say(f"interrupted after {len(self.records)} of {len(groups)} files; finished results are kept")
+            worst = INTERRUPTED
+        if self.out is not None and len(groups) > 1 and self.records:
+            write_summary(Path(self.out) / SUMMARY, self.records)
         return worst
 
-    def _one(self, looks: list[Look], folder: Path | None) -> int:
-        from pellicle.reporting.json_record import failure, to_json
-
-        paths = [look.path for look in looks]
-        label = ", ".join(paths)
-        progress = Progress(label)
-        try:
-            found, posterior = self._found(looks, folder, progress)
-        except ValueError as error:
-            progress.clear()
-            message = as_flags(str(error))
-            message = message if any(path in message for path in paths) else f"{label}: {message}"
-            say(f"pellicle: {message}")
-            self.done.append(failure(paths if self.joint else paths[0], message))
-            if self.as_json:
-                print(json_module.dumps(self.done[-1], allow_nan=False), flush=True)
-            return 3  # a failed file is 3, whatever would mend it
-        progress.clear()
-        found = with_flags(found)
-        posterior = None if posterior is None else replace(posterior, fit=found)
-        self.done.append(to_json(found))
-        self._show(found, posterior, folder)
-        if posterior is not None and not posterior.trusted:
-            return TOO_SHORT
-        return 0 if found.status == "converged" else 4
-
-    def _show(self, found: Fit, posterior: Posterior | None, folder: Path | None) -> None:
+    def _fit(self, files: list[Input], folder: Path | None) -> int:
+        """Fit one group of files, print and write the result, and return its exit code."""
         from pellicle.reporting.fit_text import report
         from pellicle.reporting.folders import write_fit
-        from pellicle.reporting.json_record import one_line, to_json
+        from pellicle.reporting.json_record import failure, one_line, to_json
 
-        written = one_line(to_json(found, posterior)) if self.as_json else None
-        print(written or report(found, posterior), flush=True)
-        if folder is None:
-            return
-        write_fit(folder, found, posterior)
-        say(f"{folder}: report, figures and tables written")
+        paths = [file.path for file in files]
+        progress = Progress(", ".join(paths))
+        try:
+            fit, posterior = self._result(files, folder, progress)
+        except ValueError as error:
+            progress.clear()
+            message = error_message(error, paths)
+            say(f"pellicle: {message}")
+            self.records.append(failure(paths if self.inputs.joint else paths[0], message))
+            if self.as_json:
+                print(one_line(self.records[-1]), flush=True)
+            return FAILED  # also where the error is one of usage: the other files go on
+        progress.clear()
+        record = to_json(fit, posterior)
+        self.records.append(record)
+        print(one_line(record) if self.as_json else report(fit, posterior), flush=True)
+        if folder is not None:
+            write_fit(folder, fit, posterior)
+            say(f"{folder}: report, figures and tables written")
+        if posterior is not None and not posterior.trusted:
+            return TOO_SHORT
+        return CONVERGED if fit.status == "converged" else UNCLEAR
 
-    def _found(
-        self, looks: list[Look], folder: Path | None, progress: Progress
+    def _result(
+        self, files: list[Input], folder: Path | None, progress: Progress
     ) -> tuple[Fit, Posterior | None]:
-        what = measurements(looks, self.joint)
-        if self.sampler is not None:
-            posterior = self._sampled(what, self.sampler, folder, progress)
-            return posterior.fit, posterior
-        from pellicle.fitting.robust_losses import LEAST_SQUARES
-        from pellicle.fitting.spectra.fit import fit
+        from pellicle.api import fit, sample
 
-        loss = looks[0].reading.loss or LEAST_SQUARES
-        return fit(*what, tolerance=self.tolerance, loss=loss, progress=progress), None
-
-    def _sampled(
-        self, what: tuple[Any, Any], sampler: Sampler, folder: Path | None, progress: Progress
-    ) -> Posterior:
-        from pellicle.sampling.sample import sample
-
-        return sample(*what, **sampler.settings(folder), tolerance=self.tolerance, progress=progress)
+        data, scene = measurement(files, self.inputs.joint)
+        options: dict[str, Any] = {"tolerance": self.tolerance, "residual": self.inputs.residual}
+        if self.sampler is None:
+            return with_flags(fit(data, scene, loss=self.inputs.loss, progress=progress, **options)), None
+        posterior = sample(data, scene, progress=progress, **self.sampler.options(folder), **options)
+        posterior = replace(posterior, fit=with_flags(posterior.fit))
+        return posterior.fit, posterior
 
 
-def measurements(looks: list[Look], joint: bool, talk: bool = True) -> tuple[Any, Any]:
-    """What is fitted, and its scenes: lists where the fit is joint. Says how the files were understood."""
-    spectra, scenes = [], []
-    for look in looks:
-        spectrum, scene = _seen(look, own=look.rescaled or len(looks) == 1)
-        spectra.append(spectrum)
+def measurement(
+    files: list[Input], joint: bool, notes: bool = True
+) -> tuple[Spectrum | BrdfSamples | list[Any], Scene | Surface | list[Scene]]:
+    """Read files: data and scene as `pellicle.fit` takes them, lists in a joint fit.
+
+    The notes of the readers go to stderr, unless `notes` is false.
+    """
+    from pellicle.data.spectrum import Spectrum
+    from pellicle.fitting.spectra.targets import without_scale
+    from pellicle.scene.film import Scene
+    from pellicle.scene.surface import Surface
+
+    data, scenes = [], []
+    for file in files:
+        values, scene = file.read(), file.scene
+        say(*(f"{file.path}: {note}" for note in values.notes if notes))
+        data.append(values)
+        shared = len(files) > 1 and not file.own_scale
+        if shared and isinstance(values, Spectrum) and isinstance(scene, Scene):
+            scene = without_scale(scene, values)
         scenes.append(scene)
-        say(*(f"{look.path}: {note}" for note in spectrum.notes if talk))
-    return (spectra, scenes) if joint else (spectra[0], scenes[0])
+    if not joint:
+        return data[0], scenes[0]
+    return data, scenes[0] if isinstance(scenes[0], Surface) else scenes
 
 
-def _seen(look: Look, own: bool) -> tuple[Any, Scene]:
-    """The spectrum, and its scene: Ψ and Δ leave out a scale and an offset that are not their own."""
-    from pellicle.fitting.spectra.targets import unscaled
-    from pellicle.scene.instrument import Drift
-
-    scaled = isinstance(look.scene.instrument.scale, Drift)
-    spectrum = read(look.path, look.reading, scaled=scaled)
-    return spectrum, look.scene if own or spectrum.delta is None else unscaled(look.scene)
+def error_message(error: Exception, paths: list[str]) -> str:
+    """The message of an error with flags for arguments, and the data files in front unless it names one."""
+    message = as_flags(str(error))
+    return message if any(path in message for path in paths) else f"{', '.join(paths)}: {message}"

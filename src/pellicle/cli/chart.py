@@ -1,4 +1,4 @@
-"""`pellicle chart`: the colours of a film against thickness and angle, or a picture of a surface."""
+"""`pellicle chart`: colours of a film against thickness and angle, or a picture of a surface."""
 
 from __future__ import annotations
 
@@ -17,44 +17,44 @@ if TYPE_CHECKING:
 
 
 def chart(
-    recipe: Annotated[str, Parameter(help="A TOML file that describes the scene.")],
+    recipe: Annotated[str, Parameter(help="TOML file that describes the scene or surface.")],
     *,
-    out: Annotated[str, Parameter(help="The picture to write (PNG, PDF, SVG); none is overwritten.")],
+    out: Annotated[str, Parameter(help="Picture to write (PNG, PDF, SVG); no file is overwritten.")],
     layer: Annotated[
-        str | None, Parameter(help="The layer whose thickness varies (the one that is free).")
+        str | None, Parameter(help="Layer whose thickness varies (the one with a free thickness).")
     ] = None,
     thickness: Annotated[str | None, Parameter(help="LO:HI in nm (the recipe's bounds).")] = None,
     angle: Annotated[str, Parameter(help="LO:HI in degrees.")] = "0:80",
     illuminant: Annotated[str, Parameter(help="E, A, D50, D55, D65 or D75.")] = "D65",
     observer: Annotated[str, Parameter(help="1931 (2 degrees) or 1964 (10 degrees).")] = "1931",
     light: Annotated[
-        float, Parameter(help="Of a surface: degrees between the light and the line of sight.")
+        float, Parameter(help="Surfaces: angle between the light and the line of sight in degrees.")
     ] = 35.0,
 ) -> int:
-    """Draw the interference colours of a recipe's film, or, of a recipe of a surface, a sphere and its BRDF.
+    """Draw the interference colours of a recipe's film, or a sphere and the BRDF of a recipe's surface.
 
     Example: pellicle chart film.toml --out colours.png --thickness 0:1000
     """
     from pellicle.recipes import read_recipe
     from pellicle.recipes.surface import SurfaceRecipe
 
-    found = read_recipe(recipe)
-    if isinstance(found, SurfaceRecipe):
+    described = read_recipe(recipe)
+    if isinstance(described, SurfaceRecipe):
         if layer is not None or thickness is not None:
             raise UsageError("--layer and --thickness are for films: a surface has its own thickness")
-        return _surface(found, out, light)
-    scene = found.scene()
+        return _surface(described, out, light)
+    scene = described.scene()
     angles = _range("--angle", angle, 90.0)
     nm = _bounds(scene, layer) if thickness is None else _range("--thickness", thickness, inf)
     start()
     from pellicle.reporting import colour_figures
 
-    lost = colour_figures.chart(
+    outside = colour_figures.chart(
         scene, out, nm, angles, layer, observer=observer, illuminant=illuminant, title=Path(recipe).stem
     )
     say(f"{out}: {nm[0]:g} to {nm[1]:g} nm, {angles[0]:g} to {angles[1]:g} degrees")
-    if lost > 0.005:
-        say(f"{100 * lost:.0f} % of the colours lie outside sRGB and are shown by their nearest")
+    if outside > 0.005:
+        say(f"{100 * outside:.0f} % of the colours are outside sRGB and are shown by the nearest ones")
     return 0
 
 
@@ -70,17 +70,17 @@ def _surface(recipe: SurfaceRecipe, out: str, light: float) -> int:
     return 0
 
 
-def _range(flag: str, text: str, most: float) -> tuple[float, float]:
+def _range(flag: str, text: str, upper: float) -> tuple[float, float]:
     from pellicle.recipes.number_words import parse_range
 
     low, high = parse_range(text, flag)
-    if low < 0 or high > most:
-        raise UsageError(f"{flag} must lie in 0 to {most:g}, got {text}")
+    if low < 0 or high > upper:
+        raise UsageError(f"{flag} must lie in 0 to {upper:g}, got {text}")
     return low, high
 
 
 def _bounds(scene: Scene, layer: str | None) -> tuple[float, float]:
-    """The recipe's own bounds, or 0 to twice a thickness that is fixed."""
+    """The recipe's bounds, or 0 to twice a fixed thickness."""
     from pellicle.scene.free import Free
     from pellicle.synthetic.colours import varied
 

@@ -1,22 +1,19 @@
-"""`pellicle compare`: the same data by several recipes, and which of them the data call for."""
+"""`pellicle compare`: fits of the same data by several recipes, ranked by AIC and BIC."""
 
 from __future__ import annotations
 
-import json as json_module
 from logging import getLogger
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 from cyclopts import Parameter
 
-from pellicle.cli.flags import OUTPUT, SCENE, ReadWords, SceneWords, flag, switch
-from pellicle.cli.messages import as_flags, with_flags
-from pellicle.cli.session import Progress, say, start
+from pellicle.cli.batch import CONVERGED, FAILED, UNCLEAR, error_message, measurement
+from pellicle.cli.flags import OUTPUT, SCENE, ReadingFlags, SceneFlags, flag, switch
+from pellicle.cli.inputs import LEAST_SQUARES, Input, Inputs, inputs
+from pellicle.cli.messages import with_flags
+from pellicle.cli.session import Progress, check_folder, say, start
 from pellicle.errors import DataError, UsageError
-
-if TYPE_CHECKING:
-    from pellicle.cli.batch import Look
-    from pellicle.fitting.comparison import Comparison
 
 log = getLogger(__name__)
 
@@ -25,12 +22,12 @@ def compare(
     *data: Annotated[str, Parameter(help="Files to fit, one by one.")],
     recipe: Annotated[
         list[str] | None,
-        Parameter(group=SCENE, help="A recipe to compare; give it two times or more.", negative=""),
+        Parameter(group=SCENE, help="Recipe to compare; give two or more.", negative=""),
     ] = None,
-    out: Annotated[str | None, flag(OUTPUT, "A folder for the comparison and every fit.")] = None,
-    json: Annotated[bool, switch(OUTPUT, "One JSON object a line.")] = False,
+    out: Annotated[str | None, flag(OUTPUT, "Folder for the comparison and every fit.")] = None,
+    json: Annotated[bool, switch(OUTPUT, "Print one JSON object a line.")] = False,
 ) -> int:
-    """Fit data by several recipes and say which of them the data call for (AIC, BIC).
+    """Fit data by several recipes and rank these by information criteria (AIC, BIC).
 
     Example: pellicle compare oxide.csv --recipe smooth.toml --recipe rough.toml
     """
@@ -39,73 +36,56 @@ def compare(
         raise UsageError("a comparison needs two recipes or more: give --recipe A.toml --recipe B.toml")
     if len(set(recipes)) < len(recipes):
         raise UsageError("the same recipe is given twice: there is nothing to compare")
-    each = [_groups(list(data), path) for path in recipes]
-    paths = [[[look.path for look in looks] for looks in groups] for groups in each]
-    if any(other != paths[0] for other in paths[1:]):
+    short = [Path(path).name for path in recipes]
+    names = short if len(set(short)) == len(short) else recipes
+    candidates = {name: _inputs(list(data), path) for name, path in zip(names, recipes, strict=True)}
+    groups = [[[file.path for file in files] for files in each.groups] for each in candidates.values()]
+    if any(other != groups[0] for other in groups[1:]):
         raise UsageError("the recipes name different files: give the files on the command line")
-    if out is not None and Path(out).exists():
-        from pellicle.files import new_folder
-
-        new_folder(out)  # refuses a stranger's folder before the work, not after
+    if out is not None:
+        check_folder(out)
     start()
-    names = _names(recipes)
-    worst, many = 0, len(paths[0]) > 1
-    for position, files in enumerate(paths[0]):
-        looks = {name: groups[position] for name, groups in zip(names, each, strict=True)}
-        folder = None if out is None else Path(out) / Path(files[0]).stem if many else Path(out)
-        worst = max(worst, _one(", ".join(files), looks, folder, json))
+    worst, several = CONVERGED, len(groups[0]) > 1
+    for position, paths in enumerate(groups[0]):
+        folder = None if out is None else Path(out) / Path(paths[0]).stem if several else Path(out)
+        worst = max(worst, _compare(candidates, position, paths, folder, json))
     return worst
 
 
-def _groups(data: list[str], recipe: str) -> list[list[Look]]:
-    from pellicle.cli.inputs import groups
-    from pellicle.recipes import read_recipe
-    from pellicle.recipes.surface import SurfaceRecipe
-
-    of_film = read_recipe(recipe)
-    if isinstance(of_film, SurfaceRecipe):
-        raise UsageError(f"{recipe}: describes a surface; a comparison is of films")
-    found, _ = groups(data, of_film, SceneWords(), ReadWords(), False)
-    if any(look.reading.loss not in (None, "least-squares") for looks in found for look in looks):
+def _inputs(data: list[str], recipe: str) -> Inputs:
+    candidate = inputs(data, recipe, SceneFlags(), ReadingFlags(), joint=False)
+    if candidate.loss != LEAST_SQUARES:
         raise DataError(f"{recipe}: a comparison needs least squares: leave the loss out")
-    return found
+    return candidate
 
 
-def _names(recipes: list[str]) -> list[str]:
-    """The recipes without their folders, where that tells them apart."""
-    short = [Path(path).name for path in recipes]
-    return short if len(set(short)) == len(short) else recipes
-
-
-def _one(label: str, looks: dict[str, list[Look]], folder: Path | None, as_json: bool) -> int:
-    from pellicle.fitting.comparison import compare as compared
+def _compare(
+    candidates: dict[str, Inputs], position: int, paths: list[str], folder: Path | None, as_json: bool
+) -> int:
+    """Compare the fits of one group of files, print and write the result, and return its exit code."""
+    from pellicle.api import fit
+    from pellicle.fitting.comparison import compare as compare_fits
     from pellicle.reporting.comparison import failure, report, to_json, write_comparison
+    from pellicle.reporting.json_record import one_line
 
-    progress, first = Progress(label), next(iter(looks))
+    label = ", ".join(paths)
+    progress, fits = Progress(label), {}
     try:
-        found = compared({name: _fit(name, looks[name], progress, talk=name == first) for name in looks})
+        for name, candidate in candidates.items():
+            log.info("comparison: now %s", name)
+            files: list[Input] = candidate.groups[position]
+            data, scene = measurement(files, len(files) > 1, notes=not fits)
+            fits[name] = with_flags(fit(data, scene, residual=candidate.residual, progress=progress))
+        comparison = compare_fits(fits)
     except ValueError as error:
         progress.clear()
-        message = as_flags(str(error))
-        message = message if label in message else f"{label}: {message}"
+        message = error_message(error, [label])
         say(f"pellicle: {message}")
         if as_json:
-            print(json_module.dumps(failure(label, message), allow_nan=False), flush=True)
-        return 3
+            print(one_line(failure(label, message)), flush=True)
+        return FAILED
     progress.clear()
-    print(json_module.dumps(to_json(found), allow_nan=False) if as_json else report(found), flush=True)
+    print(one_line(to_json(comparison)) if as_json else report(comparison), flush=True)
     if folder is not None:
-        say(f"{write_comparison(folder, found)}: comparison and fits written")
-    return _code(found)
-
-
-def _fit(name: str, looks: list[Look], progress: Progress, talk: bool) -> Any:
-    from pellicle.cli.batch import measurements
-    from pellicle.fitting.spectra.fit import fit
-
-    log.info("comparison: now %s", name)
-    return with_flags(fit(*measurements(looks, joint=len(looks) > 1, talk=talk), progress=progress))
-
-
-def _code(found: Comparison) -> int:
-    return 0 if found.best.fit.status == "converged" else 4
+        say(f"{write_comparison(folder, comparison)}: comparison and fits written")
+    return CONVERGED if comparison.best.fit.status == "converged" else UNCLEAR

@@ -1,4 +1,4 @@
-"""`pellicle demo`: a measurement that never was, from the recipe to the posterior."""
+"""`pellicle demo`: a simulated measurement, from the recipe to the posterior."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from pellicle.cli.batch import Batch, Sampler
-from pellicle.cli.flags import ReadWords, SceneWords
+from pellicle.cli.flags import ReadingFlags, SceneFlags
+from pellicle.cli.inputs import inputs
 from pellicle.cli.session import say, start
+from pellicle.errors import install_command
 
 RECIPE = """\
 # A layer of hematite, the red of ochre, on window glass: try other numbers.
@@ -32,50 +34,35 @@ FOLDER = "pellicle-demo"
 
 
 def demo(
-    *, out: Annotated[str, Parameter(help="The folder to make; an existing one is not touched.")] = FOLDER
+    *, out: Annotated[str, Parameter(help="Folder to make; an existing folder is not changed.")] = FOLDER
 ) -> int:
-    """Simulate a measurement, fit it, sample the posterior, and draw it: a first look at everything.
+    """Simulate a measurement, fit it, sample its posterior and draw the film's colours.
 
-    Makes a folder with a recipe, a spectrum, and results, and says which commands did it.
+    Makes a folder with a recipe, a spectrum and results, and prints the commands that made them.
     """
     from pellicle.cli.chart import chart
-    from pellicle.cli.inputs import groups
     from pellicle.cli.simulate import simulate
     from pellicle.files import write_text
-    from pellicle.recipes import read_recipe
-    from pellicle.recipes.film import FilmRecipe
     from pellicle.sampling.checks import missing
 
-    folder = _unused(Path(out))
+    folder, count = Path(out), 1
+    while folder.exists():
+        count += 1
+        folder = Path(out).with_name(f"{Path(out).name}-{count}")
     folder.mkdir(parents=True)
     recipe, data, picture = folder / "hematite.toml", folder / "hematite.csv", folder / "colours.png"
     write_text(recipe, RECIPE)
-    say(f"{recipe}: a recipe, to be changed and tried again")
-    _told(f"pellicle simulate {recipe} --out {data} --seed 1")
+    say(f"{recipe}: a recipe to change and try again")
+    say("", f"$ pellicle simulate {recipe} --out {data} --seed 1")
     simulate(str(recipe), out=str(data), seed=1)
     sampler, command = (None, "fit") if missing() else (Sampler(), "sample")
-    _told(f"pellicle {command} --recipe {recipe} --out {folder / 'result'}")
-    described = read_recipe(recipe)
-    assert isinstance(described, FilmRecipe)
-    found, together = groups([], described, SceneWords(), ReadWords(), joint=False)
+    say("", f"$ pellicle {command} --recipe {recipe} --out {folder / 'result'}")
+    files = inputs([], str(recipe), SceneFlags(), ReadingFlags(), joint=False)
     start()
-    code = Batch(str(folder / "result"), False, together, 0.0, sampler)(found)
-    _told(f"pellicle chart {recipe} --out {picture} --thickness 0:600")
+    code = Batch(files, sampler=sampler, out=str(folder / "result")).run()
+    say("", f"$ pellicle chart {recipe} --out {picture} --thickness 0:600")
     chart(str(recipe), out=str(picture), thickness="0:600")
     if sampler is None:
-        say("no posterior was sampled: pip install 'pellicle[posterior]'")
-    say(f"look into {folder}/result (report.txt, figure.png) and at {picture}")
+        say(f"no posterior was sampled: {install_command('posterior')}")
+    say(f"see {folder}/result (report.txt, figure.png) and {picture}")
     return code
-
-
-def _told(command: str) -> None:
-    say("", f"$ {command}")
-
-
-def _unused(folder: Path) -> Path:
-    """The folder itself, or with -2, -3, ... where something of that name is there."""
-    count, found = 1, folder
-    while found.exists():
-        count += 1
-        found = folder.with_name(f"{folder.name}-{count}")
-    return found

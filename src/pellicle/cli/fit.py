@@ -1,4 +1,4 @@
-"""`pellicle fit`: measured spectra in, a report out."""
+"""`pellicle fit`: fits of measured spectra and BRDF samples."""
 
 from __future__ import annotations
 
@@ -6,39 +6,30 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from pellicle.cli import fit_brdf
 from pellicle.cli.batch import Batch, Sampler
-from pellicle.cli.flags import OUTPUT, SAMPLER, SCENE, ReadWords, SceneWords, flag, switch
-from pellicle.cli.inputs import described_by, groups
+from pellicle.cli.flags import OUTPUT, SAMPLER, SCENE, ReadingFlags, SceneFlags, flag, switch
+from pellicle.cli.inputs import inputs
 from pellicle.cli.session import not_negative, start
 
 
 def fit(
     *data: Annotated[str, Parameter(help="Files to fit, one by one.")],
-    recipe: Annotated[str | None, flag(SCENE, "A TOML file that describes the scene.")] = None,
-    words: Annotated[SceneWords | None, Parameter(name="*")] = None,
-    reading: Annotated[ReadWords | None, Parameter(name="*")] = None,
-    joint: Annotated[bool, switch(SCENE, "All files are of one sample: fit them together.")] = False,
+    recipe: Annotated[str | None, flag(SCENE, "TOML file that describes the scene or surface.")] = None,
+    scene: Annotated[SceneFlags | None, Parameter(name="*")] = None,
+    reading: Annotated[ReadingFlags | None, Parameter(name="*")] = None,
+    joint: Annotated[bool, switch(SCENE, "Fit all files together: they are of one sample.")] = False,
     tolerance: Annotated[
-        float, flag(SCENE, "Leave out effects that change the signal by less than this; 0 leaves none out.")
+        float, flag(SCENE, "Leave out effects that change the signal by less than this (0: none).")
     ] = 0.0,
     posterior: Annotated[bool, switch(SAMPLER, "Sample the posterior too, as pellicle sample does.")] = False,
-    out: Annotated[str | None, flag(OUTPUT, "A folder for report, figure and tables.")] = None,
-    json: Annotated[bool, switch(OUTPUT, "One JSON object a line.")] = False,
+    out: Annotated[str | None, flag(OUTPUT, "Folder for report, figure and tables.")] = None,
+    json: Annotated[bool, switch(OUTPUT, "Print one JSON object a line.")] = False,
 ) -> int:
-    """Fit a layer to measured reflectance, transmittance, ellipsometry, or samples of a BRDF.
+    """Fit a layer to measured reflectance, transmittance, ellipsometry or BRDF samples.
 
     Example: pellicle fit oxide.csv --layer SiO2 --substrate Si --thickness 10:3000
     """
-    words, reading = words or SceneWords(), reading or ReadWords()
-    sampler = Sampler() if posterior else None
-    from pellicle.recipes.surface import SurfaceRecipe
-
-    described = described_by(recipe, reading.signal)
-    if isinstance(described, SurfaceRecipe):
-        given = fit_brdf.of_films(words, joint, tolerance)
-        return fit_brdf.fit_surface(list(data), described, given, reading, out, json, sampler)
     not_negative("--tolerance", tolerance)
-    found, together = groups(list(data), described, words, reading, joint)
+    files = inputs(list(data), recipe, scene or SceneFlags(), reading or ReadingFlags(), joint)
     start()
-    return Batch(out, json, together, tolerance, sampler)(found)
+    return Batch(files, tolerance, Sampler() if posterior else None, out, json).run()

@@ -1,56 +1,175 @@
-"""From a command line's words to what is fitted: files, each with the scene that is to explain it."""
+"""Data files of a command, each with the scene or surface that is fitted to it."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
+from logging import getLogger
 from math import inf
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
-from pellicle.cli.batch import Look
-from pellicle.cli.flags import ReadWords, SceneWords
-from pellicle.cli.options import light, merged, scene_from_words, spanned
+from pellicle.cli.flags import ReadingFlags, SceneFlags, given
+from pellicle.cli.options import light, merged, read, scene_from_flags, wavelength_range
 from pellicle.cli.session import say
 from pellicle.errors import DataError, UsageError
 
 if TYPE_CHECKING:
+    from pellicle.data.brdf_samples import BrdfSamples
+    from pellicle.data.spectrum import Spectrum
     from pellicle.recipes.film import FilmRecipe
     from pellicle.recipes.surface import SurfaceRecipe
+    from pellicle.scene.film import Scene
+    from pellicle.scene.surface import Surface
+
+log = getLogger(__name__)
+
+LEAST_SQUARES = "least-squares"
+_FOR_SURFACES = ("columns", "noise", "signal", "loss")
+"""Reading flags that BRDF samples can be given."""
 
 
-def described_by(path: str | None, signal: str | None) -> FilmRecipe | SurfaceRecipe | None:
-    """Read the recipe, if there is one. Raises DataError, and UsageError for the signal brdf without one."""
-    if path is not None:
+class Input(NamedTuple):
+    """A data file, the function that reads it, and the scene or surface that is fitted to it.
+
+    `own_scale` is true where the recipe gives this file a scale or an offset of its own.
+    """
+
+    path: str
+    read: Callable[[], Spectrum | BrdfSamples]
+    scene: Scene | Surface
+    own_scale: bool = False
+
+
+class Inputs(NamedTuple):
+    """Data files, fitted together (`joint`) or one by one, and the options of their fits."""
+
+    files: list[Input]
+    joint: bool
+    loss: str = LEAST_SQUARES
+    residual: str | None = None
+
+    @property
+    def groups(self) -> list[list[Input]]:
+        """Files of each fit."""
+        return [self.files] if self.joint else [[file] for file in self.files]
+
+
+def inputs(
+    files: list[str], recipe: str | None, scene_flags: SceneFlags, reading: ReadingFlags, joint: bool
+) -> Inputs:
+    """Combine files, recipe and flags. Raises UsageError or DataError where something is missing or wrong."""
+    if recipe is None:
+        result = _by_flags(files, scene_flags, reading)
+    else:
         from pellicle.recipes import read_recipe
+        from pellicle.recipes.surface import SurfaceRecipe
 
-        return read_recipe(path)
-    if signal == "brdf":
+        described = read_recipe(recipe)
+        if scene_flags.given():
+            flags = ", ".join(scene_flags.given())
+            raise UsageError(f"{flags} and --recipe exclude each other: describe the scene in the recipe")
+        if isinstance(described, SurfaceRecipe):
+            result = _by_surface_recipe(files, described, reading)
+        else:
+            result = _by_recipe(files, described, reading)
+    return result._replace(joint=joint or result.joint)
+
+
+def _by_flags(files: list[str], scene_flags: SceneFlags, reading: ReadingFlags) -> Inputs:
+    if reading.signal == "brdf":
         raise UsageError("--signal brdf needs a --recipe that describes the surface under [scene.surface]")
-    return None
+    _check_reading(reading, ("R", "T", "psi-delta"))
+    if not files:
+        raise UsageError(
+            "no data: name the file, as in pellicle fit oxide.csv --layer SiO2 --substrate Si, or give a"
+            " --recipe that does; pellicle demo is an example, --help lists every flag"
+        )
+    reading = replace(reading, range=wavelength_range(reading.range))
+    scene, assumed = scene_from_flags(scene_flags, reading)
+    say(*assumed)
+    _check_free(scene)
+    inputs = [_spectrum_input(file, scene, reading) for file in files]
+    return Inputs(inputs, False, reading.loss or LEAST_SQUARES)
 
 
-def groups(
-    files: list[str], recipe: FilmRecipe | None, words: SceneWords, reading: ReadWords, joint: bool
-) -> tuple[list[list[Look]], bool]:
-    """Files that are fitted together, and whether more than one may be. Raises UsageError or DataError."""
-    _check(reading)
-    reading = replace(reading, range=spanned(reading.range))
-    looks, together = _what(files, recipe, words, reading)
-    from pellicle.fitting.spectra.fit import check_free
+def _by_recipe(files: list[str], recipe: FilmRecipe, reading: ReadingFlags) -> Inputs:
+    import equinox as eqx
 
+    _check_reading(reading, ("R", "T", "psi-delta"))
+    reading = replace(reading, range=wavelength_range(reading.range))
+    if recipe.each and files:
+        raise UsageError(f"{recipe.path}: [[data.file]] and files on the command line exclude each other")
+    files = _files(files, recipe)
+    recipes = recipe.each or [recipe] * len(files)
+    inputs = []
+    for file, own in zip(files, recipes, strict=True):
+        flags = merged(reading, own)
+        scene = eqx.tree_at(lambda s: s.light, own.scene(), light(flags))
+        _check_free(scene, recipe.path)
+        own_scale = any(table.rescales for table in own.tables.data.file)
+        inputs.append(_spectrum_input(file, scene, flags, own_scale))
+    data = recipe.tables.data
+    return Inputs(inputs, data.joint, reading.loss or data.loss or LEAST_SQUARES)
+
+
+def _by_surface_recipe(files: list[str], recipe: SurfaceRecipe, reading: ReadingFlags) -> Inputs:
+    if refused := [flag for flag in reading.given() if flag not in given(_FOR_SURFACES)]:
+        raise UsageError(f"{', '.join(refused)} cannot be used on a BRDF; the recipe describes the surface")
+    if reading.signal not in (None, "brdf"):
+        raise UsageError(f"{recipe.path}: describes a surface, whose signal is brdf, not {reading.signal}")
+    _check_reading(reading, ("brdf",))
+    flags = {name: getattr(reading, name) for name in ("columns", "noise")}
+    recipe = recipe.with_data(**{name: value for name, value in flags.items() if value is not None})
+    surface = recipe.scene()
+    _check_free(surface, recipe.path)
+    paths = _files(files, recipe)
+    inputs = [Input(path, partial(_samples, recipe, surface, path), surface) for path in paths]
+    return Inputs(inputs, False, reading.loss or LEAST_SQUARES, recipe.tables.data.residual)
+
+
+def _files(files: list[str], recipe: FilmRecipe | SurfaceRecipe) -> list[str]:
+    if not (files or recipe.files):
+        raise UsageError(
+            f"{recipe.path}: names no data files: give them on the command line or in [data] files"
+        )
+    return files or recipe.files
+
+
+def _spectrum_input(path: str, scene: Scene, reading: ReadingFlags, own_scale: bool = False) -> Input:
+    from pellicle.scene.instrument import Drift
+
+    free_scale = isinstance(scene.instrument.scale, Drift)
+    return Input(path, partial(read, path, reading, free_scale=free_scale), scene, own_scale)
+
+
+def _samples(recipe: SurfaceRecipe, surface: Surface, path: str) -> BrdfSamples:
+    samples = recipe.read(path)
+    channels = ", ".join(samples.channels)
+    log.info("surface: %s, by %d samples of %s", surface.model, len(samples), channels)
+    for number in surface.free_numbers():
+        log.info("free: %s between %g and %g", number.name, number.free.lower, number.free.upper)
+    return samples
+
+
+def _check_free(scene: Scene | Surface, recipe: str = "") -> None:
+    """Raise UsageError where nothing is free to fit, DataError where a recipe says so."""
+    from pellicle.scene.free import check_free_count, free_leaves
+    from pellicle.scene.surface import Surface
+
+    free = scene.free_numbers() if isinstance(scene, Surface) else free_leaves(scene)
     try:
-        for look in looks:
-            check_free(look.scene)
+        check_free_count(len(free))
     except UsageError as error:
-        if recipe is None:
-            raise
-        raise DataError(f"{recipe.path}: {error}") from None
-    joint = joint or together
-    return [looks] if joint else [[look] for look in looks], joint
+        if recipe:
+            raise DataError(f"{recipe}: {error}") from None
+        raise
 
 
-def _check(reading: ReadWords) -> None:
-    if reading.signal not in (None, "R", "T", "psi-delta"):
-        raise UsageError(f"--signal must be R, T or psi-delta, not {reading.signal!r}")
+def _check_reading(reading: ReadingFlags, signals: tuple[str, ...]) -> None:
+    if reading.signal not in (None, *signals):
+        names = f"{', '.join(signals[:-1])} or {signals[-1]}"
+        raise UsageError(f"--signal must be {names}, not {reading.signal!r}")
     if reading.angle is not None and not 0 <= reading.angle <= 90:
         raise UsageError(f"--angle must lie in 0 to 90 degrees, got {reading.angle:g}")
     if reading.polarisation not in (None, "s", "p", "unpolarised"):
@@ -63,50 +182,11 @@ def _check(reading: ReadWords) -> None:
         check_loss(reading.loss, "--loss")
     if reading.dark is not None and reading.reference is None:
         raise UsageError("--dark needs --reference: the counts of a sample of known reflectance")
-    _check_units(reading)
-
-
-def _check_units(reading: ReadWords) -> None:
     from pellicle.data.tabular.units import SIGNAL_UNITS, WAVELENGTH_UNITS, signal_unit, wavelength_unit
 
-    for flag, given, known, find in (
+    for flag, value, known, find in (
         ("--wavelength-unit", reading.wavelength_unit, WAVELENGTH_UNITS, wavelength_unit),
         ("--signal-unit", reading.signal_unit, SIGNAL_UNITS, signal_unit),
     ):
-        if given is not None and find(given) is None:
-            raise UsageError(f"{flag} must be one of {', '.join(known)}, not {given!r}")
-
-
-def _what(
-    files: list[str], recipe: FilmRecipe | None, words: SceneWords, reading: ReadWords
-) -> tuple[list[Look], bool]:
-    """The files with their scenes, and whether they are of one sample, from a recipe or from flags."""
-    if recipe is None:
-        if not files:
-            raise UsageError(
-                "no data: name the file, as in pellicle fit oxide.csv --layer SiO2 --substrate Si, or give a "
-                "--recipe that does; pellicle demo shows it all, --help every flag"
-            )
-        scene, assumed = scene_from_words(words, reading)
-        say(*assumed)
-        return [Look(file, scene, reading) for file in files], False
-    if words.given():
-        raise UsageError(f"{', '.join(words.given())} and --recipe exclude each other: put it in the recipe")
-    if recipe.each and files:
-        raise UsageError(f"{recipe.path}: [[data.file]] and files on the command line exclude each other")
-    files = files or recipe.files
-    if not files:
-        raise UsageError(
-            f"{recipe.path}: names no data files: give them on the command line or in [data] files"
-        )
-    recipes = recipe.each or [recipe] * len(files)
-    looks = [_look(file, one, reading) for file, one in zip(files, recipes, strict=True)]
-    return looks, recipe.tables.data.joint
-
-
-def _look(file: str, recipe: FilmRecipe, reading: ReadWords) -> Look:
-    import equinox as eqx
-
-    reading = merged(reading, recipe)
-    scene = eqx.tree_at(lambda s: s.light, recipe.scene(), light(reading))
-    return Look(file, scene, reading, any(own.rescales for own in recipe.tables.data.file))
+        if value is not None and find(value) is None:
+            raise UsageError(f"{flag} must be one of {', '.join(known)}, not {value!r}")

@@ -1,4 +1,4 @@
-"""`pellicle materials`: what the catalogue holds."""
+"""`pellicle materials`: the catalogue of materials."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from pellicle.cli.session import say
 
 
 def materials(
-    name: Annotated[str | None, Parameter(help="A material, or a part of its name.")] = None,
+    name: Annotated[str | None, Parameter(help="Name of a material.")] = None,
     *,
-    out: Annotated[str | None, Parameter(help="A file for the figure of n and k (PNG, PDF, SVG).")] = None,
+    out: Annotated[str | None, Parameter(help="File for the figure of n and k (PNG, PDF, SVG).")] = None,
 ) -> int:
-    """List the catalogue, or tell all about one material and draw its n and k.
+    """List the catalogue, or describe one material and draw its n and k.
 
     Example: pellicle materials Au --out gold.png
     """

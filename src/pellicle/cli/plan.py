@@ -1,55 +1,59 @@
-"""`pellicle plan`: which effects a recipe's scene calls for, and what each of them is worth."""
+"""`pellicle plan`: effects that a simulation of a recipe's scene needs, with their errors and times."""
 
 from __future__ import annotations
 
-import json as json_module
 from math import inf
 from typing import Annotated
 
 from cyclopts import Parameter
 
 from pellicle.cli.session import cache_folder, say, start
+from pellicle.cli.wavelengths import directions, measured_scene
 from pellicle.errors import UsageError
 
 
 def plan(
-    recipe: Annotated[str, Parameter(help="A TOML file that describes the scene.")],
+    recipe: Annotated[str, Parameter(help="TOML file that describes the scene or surface.")],
     *,
     tolerance: Annotated[
-        float, Parameter(help="How far off the signal may be: a fraction, or degrees for psi-delta.")
+        float, Parameter(help="Largest error of the signal: a fraction, or degrees for psi-delta.")
     ] = 1e-4,
-    json: Annotated[bool, Parameter(help="One JSON object on stdout.", negative="")] = False,
+    json: Annotated[bool, Parameter(help="Print one JSON object.", negative="")] = False,
 ) -> int:
-    """Say which effects are simulated and why, and what leaving each out would change and save.
+    """List the effects to simulate, with reasons, and the error and time of leaving each one out.
 
     Example: pellicle plan film.toml --tolerance 1e-3
     """
-    from pellicle.cli.wavelengths import seen
     from pellicle.recipes import read_recipe
     from pellicle.recipes.surface import SurfaceRecipe
-    from pellicle.scene.film import with_wavelength
 
     if not 0 < tolerance < inf:
-        raise UsageError(f"--tolerance must be above zero, got {tolerance:g}: what error is small enough?")
-    found = read_recipe(recipe)
-    if isinstance(found, SurfaceRecipe):
-        from pellicle.cli.surface_commands import plan_surface
-
-        return plan_surface(found, tolerance, json)
-    scene = with_wavelength(*seen(found))
+        raise UsageError(f"--tolerance must be above zero, got {tolerance:g}: give the largest error")
+    described = read_recipe(recipe)
     start()
-    from pellicle.fitting.spectra import messages
-    from pellicle.planning import cost_model, film
+    from pellicle.effects.surface import exact
+    from pellicle.fitting.spectra.messages import log_scene
+    from pellicle.planning import cost_model, film, surface
     from pellicle.reporting import plans
+    from pellicle.reporting.json_record import one_line
+    from pellicle.scene.film import with_wavelength
+    from pellicle.scene.surface import surface_view
 
-    messages.log_scene(scene)
-    chosen, calibration = film.plan(scene, tolerance), cost_model.calibrated(cache_folder())
-    savings = film.savings(scene, calibration)
-    whole, planned = (calibration.seconds(film.work(p, scene)) for p in (film.full_plan(scene), chosen))
+    calibration = cost_model.calibrated(cache_folder())
+    if isinstance(described, SurfaceRecipe):
+        view = surface_view(described.scene(), directions(described))
+        chosen, savings = surface.plan(view, tolerance), surface.savings(view, calibration)
+        works = [surface.work(each, view) for each in (exact(view), chosen)]
+    else:
+        scene = with_wavelength(*measured_scene(described))
+        log_scene(scene)
+        chosen, savings = film.plan(scene, tolerance), film.savings(scene, calibration)
+        works = [film.work(each, scene) for each in (film.full_plan(scene), chosen)]
     if json:
-        print(json_module.dumps(plans.to_json(chosen, savings), allow_nan=False), flush=True)
+        print(one_line(plans.to_json(chosen, savings)), flush=True)
         return 0
-    print(plans.report_with_savings(chosen, savings, whole, planned), end="", flush=True)
+    seconds = [calibration.seconds(work) for work in works]
+    print(plans.report_with_savings(chosen, savings, *seconds), end="", flush=True)
     if chosen.error_bound > tolerance:
-        say(f"no plan is within {tolerance:g}: the averages alone are off by up to {chosen.error_bound:.1g}")
+        say(f"no plan is within {tolerance:g}: averages alone have errors up to {chosen.error_bound:.1g}")
     return 0

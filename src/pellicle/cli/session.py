@@ -1,4 +1,4 @@
-"""What every command that computes needs first: float64 and a compilation cache."""
+"""Setup of JAX, messages on stderr and progress, shared by the commands."""
 
 from __future__ import annotations
 
@@ -17,11 +17,10 @@ CACHE_VARIABLE = "PELLICLE_CACHE"
 
 
 def start(keep: bool = True) -> None:
-    """Set JAX up for the command line: float64, and compiled programs kept between runs.
+    """Set JAX to float64 and, with `keep`, to keep compiled programs between runs.
 
-    Without `keep` they are not, for whoever times compilation. The cache lies in the user's cache
-    folder; the variable PELLICLE_CACHE names another one, or is `off`. A folder that cannot be made
-    means no cache, not a failure.
+    The cache is in the user's cache folder; the variable PELLICLE_CACHE names another folder, or is `off`.
+    Without a folder that can be made there is no cache.
     """
     import jax
 
@@ -39,7 +38,7 @@ def start(keep: bool = True) -> None:
 
 
 def cache_folder() -> Path | None:
-    """Where compiled programs are kept between runs, None where they are not to be."""
+    """The folder of compiled programs, None where they are not kept."""
     chosen = os.environ.get(CACHE_VARIABLE, "")
     if chosen.lower() == "off":
         return None
@@ -53,9 +52,17 @@ def cache_folder() -> Path | None:
 
 
 def not_negative(flag: str, number: float) -> None:
-    """UsageError for a flag's number below 0, infinite or none."""
+    """Raise UsageError where the number of a flag is negative or not finite."""
     if not 0 <= number < inf:
         raise UsageError(f"{flag} must not be negative, got {number:g}")
+
+
+def check_folder(path: str) -> None:
+    """Raise UsageError, before any work is done, for a folder that pellicle did not write."""
+    if Path(path).exists():
+        from pellicle.files import new_folder
+
+        new_folder(path)
 
 
 def say(*sentences: str) -> None:
@@ -65,14 +72,14 @@ def say(*sentences: str) -> None:
 
 
 class Progress:
-    """One line on stderr that is written over; silent where nobody watches, or where each step is told."""
+    """Progress line on stderr, overwritten at each step; silent without a terminal and with --verbose."""
 
     def __init__(self, label: str):
         self.label, self.shown = label, False
 
-    def __call__(self, what: str, done: int, total: int) -> None:
+    def __call__(self, stage: str, done: int, total: int) -> None:
         if sys.stderr.isatty() and not LOG.isEnabledFor(INFO):
-            print(f"\r{self.label}: {what} {done}/{total}\033[K", end="", file=sys.stderr, flush=True)
+            print(f"\r{self.label}: {stage} {done}/{total}\033[K", end="", file=sys.stderr, flush=True)
             self.shown = True
 
     def clear(self) -> None:

@@ -1,87 +1,112 @@
-"""`pellicle simulate`: a synthetic spectrum from a recipe, with noise and the truth in its header."""
+"""`pellicle simulate`: a synthetic spectrum or BRDF samples, with the true values in the header."""
 
 from __future__ import annotations
 
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from pellicle.cli.session import not_negative, say, start
+from pellicle.cli.wavelengths import directions, wavelengths
 from pellicle.errors import DataError
 
 if TYPE_CHECKING:
     from pellicle.recipes.film import FilmRecipe
+    from pellicle.recipes.surface import SurfaceRecipe
+    from pellicle.scene.film import Scene
+    from pellicle.synthetic.spectra import Synthetic
 
 
 def simulate(
-    recipe: Annotated[str, Parameter(help="A TOML file that describes the scene.")],
+    recipe: Annotated[str, Parameter(help="TOML file that describes the scene or surface.")],
     *,
-    out: Annotated[str, Parameter(help="The CSV file to write; an existing one is not overwritten.")],
+    out: Annotated[str, Parameter(help="CSV file to write; an existing file is not overwritten.")],
     noise: Annotated[
         float | None, Parameter(help="Standard deviation of the noise (the recipe's, or 0).")
     ] = None,
     seed: Annotated[int, Parameter(help="Seed of the noise.")] = 0,
     tolerance: Annotated[
-        float, Parameter(help="Leave out effects that change the signal by less than this; 0: none.")
+        float, Parameter(help="Leave out effects that change the signal by less than this (0: none).")
     ] = 0.0,
 ) -> int:
-    """Write the spectrum, or for a surface the samples of its BRDF, that a recipe's scene would give.
+    """Simulate the spectrum of a recipe's film, or BRDF samples of its surface.
 
     Example: pellicle simulate film.toml --out film.csv --noise 0.002 --seed 1
     """
-    from pellicle.cli.wavelengths import wavelengths
-    from pellicle.files import write_text
     from pellicle.recipes import read_recipe
     from pellicle.recipes.surface import SurfaceRecipe
 
     not_negative("--noise", noise or 0.0)
     not_negative("--tolerance", tolerance)
-    found = read_recipe(recipe)
-    if isinstance(found, SurfaceRecipe):
-        from pellicle.cli.surface_commands import simulate_surface
-
-        return simulate_surface(found, out, noise, seed, tolerance)
-    scene = found.scene()
+    described = read_recipe(recipe)
     start()
-    from pellicle.fitting.spectra import messages
-    from pellicle.synthetic.spectra import synthesise, synthesise_angles
-
-    messages.log_scene(scene)
-    ellipsometric = scene.light.signal == "psi-delta"
-    if ellipsometric and found.tables.data.angle is None:
-        raise DataError(f"{found.path}: ellipsometry needs an angle of incidence: give [data] angle = 70")
-    noise = (found.tables.data.noise or 0.0) if noise is None else noise
-    wavelength = wavelengths(found, scene)
-    result = (synthesise_angles if ellipsometric else synthesise)(scene, wavelength, noise, seed, tolerance)
-    messages.log_plan(result.plan)
-    write_text(out, _csv(found, scene, result, noise, seed))
-    say(f"{out}: {len(wavelength)} points, {wavelength[0]:g} to {wavelength[-1]:g} nm")
+    noise = (described.tables.data.noise or 0.0) if noise is None else noise
+    source = f"recipe {Path(recipe).name}, seed {seed}, noise {noise:g}, pellicle {version('pellicle')}"
+    comments = ["SYNTHETIC: simulated, not measured", source]
+    if isinstance(described, SurfaceRecipe):
+        _write_samples(described, out, noise, seed, tolerance, comments)
+    else:
+        _write_spectrum(described, out, noise, seed, tolerance, comments)
     return 0
 
 
-def _csv(recipe: FilmRecipe, scene: Any, result: Any, noise: float, seed: int) -> str:
-    """The file's text: what it is, from which recipe and seed, the truth, then the numbers."""
+def _write_spectrum(
+    recipe: FilmRecipe, out: str, noise: float, seed: int, tolerance: float, comments: list[str]
+) -> None:
+    from pellicle.files import write_text
+    from pellicle.fitting.spectra.messages import log_plan, log_scene
+    from pellicle.synthetic.spectra import synthesise, synthesise_angles
+
+    scene = recipe.scene()
+    log_scene(scene)
+    ellipsometric = scene.light.signal == "psi-delta"
+    if ellipsometric and recipe.tables.data.angle is None:
+        raise DataError(f"{recipe.path}: ellipsometry needs an angle of incidence: give [data] angle = 70")
+    nm = wavelengths(recipe, scene)
+    result = (synthesise_angles if ellipsometric else synthesise)(scene, nm, noise, seed, tolerance)
+    log_plan(result.plan)
+    write_text(out, _csv(scene, result, noise, comments))
+    say(f"{out}: {len(nm)} points, {nm[0]:g} to {nm[-1]:g} nm")
+
+
+def _csv(scene: Scene, result: Synthetic, noise: float, comments: list[str]) -> str:
+    """The spectrum as CSV below its comments, which end with the true values of the parameters."""
     from pellicle.fitting.spectra.parameters import fixed_numbers, parameters
 
     light = scene.light
+    angle = f"{getattr(light.angle, 'start', light.angle):g}"
     truth = [(p.name, p.start, p.unit) for p in parameters(scene)] + fixed_numbers(scene)
-    head = [
-        "SYNTHETIC: simulated, not measured",
-        f"recipe {Path(recipe.path).name}, seed {seed}, noise {noise:g}, pellicle {version('pellicle')}",
-        f"signal {light.signal}, angle {_angle(light.angle)} degrees, {light.polarisation}",
-        "truth: "
-        + ", ".join(f"{name} = {value:.10g}{' ' + unit if unit else ''}" for name, value, unit in truth),
-    ]
+    values = ", ".join(f"{name} = {value:.10g} {unit}".rstrip() for name, value, unit in truth)
+    lines = [*comments, f"signal {light.signal}, angle {angle} degrees, {light.polarisation}"]
+    lines.append(f"truth: {values}")
     columns, middle = f"wavelength_nm,{light.signal}", ""
     if light.signal == "psi-delta":
-        columns, middle = "wavelength_nm,angle_deg,psi_deg,delta_deg", f"{_angle(light.angle)},"
+        columns, middle = "wavelength_nm,angle_deg,psi_deg,delta_deg", f"{angle},"
     columns, end = (f"{columns},sigma", f",{noise:g}") if noise else (columns, "")
-    values = [",".join(f"{v:.8f}" for v in row) for row in result.values.reshape(len(result.wavelength), -1)]
-    rows = [f"{w:.10g},{middle}{v}{end}" for w, v in zip(result.wavelength, values, strict=True)]
-    return "\n".join([*(f"# {line}" for line in head), columns, *rows, ""])
+    table = result.values.reshape(len(result.wavelength), -1)
+    rows = [
+        f"{nm:.10g},{middle}{','.join(f'{value:.8f}' for value in row)}{end}"
+        for nm, row in zip(result.wavelength, table, strict=True)
+    ]
+    return "\n".join([*(f"# {line}" for line in lines), columns, *rows, ""])
 
 
-def _angle(angle: Any) -> str:
-    return f"{getattr(angle, 'start', angle):g}"
+def _write_samples(
+    recipe: SurfaceRecipe, out: str, noise: float, seed: int, tolerance: float, comments: list[str]
+) -> None:
+    from pellicle.data.write_brdf import write_brdf_samples
+    from pellicle.fitting.spectra.messages import log_plan
+    from pellicle.synthetic.brdf import synthesise
+
+    surface = recipe.scene()
+    samples, plan = synthesise(surface, directions(recipe), noise, seed, tolerance)
+    log_plan(plan)
+    units = {parameter.key: parameter.unit for parameter in surface.brdf.parameters}
+    truth = ", ".join(
+        f"{key} = {' '.join(f'{x:.10g}' for x in numbers.reshape(-1))} {units.get(key, 'nm')}".rstrip()
+        for key, numbers in surface.start_numbers().items()
+    )
+    write_brdf_samples(out, samples, said=[*comments, f"truth: model {surface.model}, {truth}"])
+    say(f"{out}: {len(samples)} samples of {', '.join(samples.channels)}", *samples.notes)

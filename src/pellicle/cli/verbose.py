@@ -1,4 +1,4 @@
-"""`--verbose`: on stderr each step that the library logs, when it was, and where the time went."""
+"""`--verbose`: log messages of the library on stderr, with times."""
 
 from __future__ import annotations
 
@@ -12,32 +12,32 @@ from typing import Any
 from pellicle.cli.messages import as_flags
 
 LOG = logging.getLogger("pellicle")
-_MAKING, _DONE = "/jax/core/compile/", "/jax/core/compile/backend_compile_duration"
-"""What JAX calls the times of tracing, lowering and compiling a program, and of the last of these."""
+_COMPILE, _COMPILED = "/jax/core/compile/", "/jax/core/compile/backend_compile_duration"
+"""JAX's prefix of the durations of tracing, lowering and compiling, and its name of the last one."""
 
 
 @contextmanager
-def aloud() -> Iterator[None]:
-    """While it lasts, what the library logs is written to stderr with the seconds since it began."""
+def log_to_stderr() -> Iterator[None]:
+    """Write the library's log messages to stderr, with the seconds since the start of the block."""
     import jax.monitoring as monitoring
 
-    clock, making, level = _Clock(), _Making(), LOG.level
+    clock, compilation, level = _Clock(), _Compilation(), LOG.level
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(clock)
-    monitoring.register_event_duration_secs_listener(making)
+    monitoring.register_event_duration_secs_listener(compilation)
     LOG.addHandler(handler)
     LOG.setLevel(logging.INFO)
     try:
         yield
     finally:
-        LOG.info("time: %.2f s in all, %s", clock.seconds, making)
+        LOG.info("time: %.2f s, %s", clock.seconds, compilation)
         LOG.setLevel(level)
         LOG.removeHandler(handler)
-        monitoring.unregister_event_duration_listener(making)
+        monitoring.unregister_event_duration_listener(compilation)
 
 
 class _Clock(logging.Formatter):
-    """A record as one line: the seconds since the start, then the sentence."""
+    """Formats a record as one line: the seconds since the start, then the message."""
 
     def __init__(self):
         super().__init__()
@@ -51,16 +51,16 @@ class _Clock(logging.Formatter):
         return f"{self.seconds:6.2f} s  {as_flags(record.getMessage())}"
 
 
-class _Making:
-    """Counts the programs that JAX made ready, and the seconds that it took."""
+class _Compilation:
+    """Counts the programs that JAX compiles or loads, and the seconds that it takes."""
 
     def __init__(self):
         self.seconds, self.programs = 0.0, 0
 
     def __call__(self, event: str, duration_secs: float, **_: Any) -> None:
-        if event.startswith(_MAKING):
+        if event.startswith(_COMPILE):
             self.seconds += duration_secs
-            self.programs += event == _DONE
+            self.programs += event == _COMPILED
 
     def __str__(self) -> str:
-        return f"{self.seconds:.2f} s of it to trace and compile {self.programs} programs, or to load them"
+        return f"{self.seconds:.2f} s of them to compile or load {self.programs} programs"

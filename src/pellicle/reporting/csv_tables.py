@@ -23,14 +23,14 @@ def fit_csv(fit: Fit) -> str:
     """Format data, model and residuals of a fit as CSV that pellicle can read again.
 
     A spectrum has a row for each wavelength and angle, with σ; BRDF samples have one for each pair of
-    directions. In a joint fit each value has its row, with the name of the spectrum and the signal.
+    directions. Rows of a joint fit begin with the name of the file, and have one value of a spectrum each.
     """
+    if fit.layer_test is not None:
+        return _samples_csv(fit)
     if fit.joint:
         return _joint_csv(fit)
     [part] = fit.parts
-    if fit.layer_test is not None:
-        about, columns = _samples(fit, part)
-    elif part.spectral.delta_data is not None:
+    if part.spectral.delta_data is not None:
         about, columns = _psi_delta(part)
     else:
         about, columns = _spectrum(part)
@@ -88,16 +88,18 @@ def _psi_delta(part: Part) -> tuple[list[str], Columns]:
     return about, columns
 
 
-def _samples(fit: Fit, part: Part) -> tuple[list[str], Columns]:
-    samples = part.samples
-    columns = {name: getattr(samples, name) for name in DIRECTIONS}
-    columns |= dict(zip(samples.channels, samples.values.T, strict=True))
-    columns |= {f"model_{name}": m for name, m in zip(samples.channels, part.curve.model.T, strict=True)}
+def _samples_csv(fit: Fit) -> str:
+    channels = fit.parts[0].samples.channels
     about = [
-        f"BRDF in 1/sr, directions in degrees; model_{samples.channels[0]} and so on: {fit.surface.model} as"
-        " fitted"
+        f"BRDF in 1/sr, directions in degrees; model_{channels[0]} and so on: {fit.surface.model} as fitted"
     ]
-    return about, columns
+    rows = []
+    for part in fit.parts:
+        directions = [getattr(part.samples, name) for name in DIRECTIONS]
+        table = np.column_stack([*directions, part.samples.values, part.curve.model])
+        rows += [[*([part.name] if fit.joint else []), *row] for row in table.tolist()]
+    names = [*(["file"] if fit.joint else []), *DIRECTIONS, *channels, *(f"model_{c}" for c in channels)]
+    return _csv(about, fit, names, rows)
 
 
 def _joint_csv(fit: Fit) -> str:

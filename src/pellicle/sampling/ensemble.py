@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
-from pellicle.errors import UsageError
+from pellicle.errors import UsageError, install_command
 from pellicle.fitting.progress import Progress
 from pellicle.sampling import chain as chains
 from pellicle.sampling.chain import Chain
@@ -117,7 +117,7 @@ def installed() -> None:
     absent = missing()
     if absent:
         raise UsageError(
-            f"posteriors need {', '.join(absent)}, not installed here: pip install 'pellicle[posterior]'"
+            f"posteriors need {', '.join(absent)}, not installed here: {install_command('posterior')}"
         )
 
 

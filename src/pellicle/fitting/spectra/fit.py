@@ -21,7 +21,7 @@ from pellicle.fitting.robust_losses import LEAST_SQUARES, check_loss
 from pellicle.fitting.spectra import backface, messages, parts, residual_structure, summary
 from pellicle.fitting.spectra.problem import make
 from pellicle.fitting.spectra.search import search
-from pellicle.fitting.spectra.targets import Measured, measured, unscaled
+from pellicle.fitting.spectra.targets import Measured, measured, without_scale
 from pellicle.fitting.status import verdict
 from pellicle.scene.film import Scene
 from pellicle.scene.free import free_leaves
@@ -112,7 +112,7 @@ def _scenes(spectra: list[Spectrum], scene: Scene | Sequence[Scene]) -> list[Sce
         raise UsageError("there is no spectrum to fit: give one, or a list of some")
     if isinstance(scene, Scene):
         alone = len(spectra) == 1
-        return [scene if alone or s.delta is None else unscaled(scene) for s in spectra]
+        return [scene if alone else without_scale(scene, s) for s in spectra]
     scenes = list(scene)
     if len(scenes) != len(spectra):
         raise UsageError(f"{len(spectra)} spectra need as many scenes, or one for all, not {len(scenes)}")

@@ -64,8 +64,10 @@ def seen_as(scene: Scene, data: Spectrum) -> Scene:
     return eqx.tree_at(lambda s: s.light, scene, Light(data.wavelength, angle, data.signal, polarisation))
 
 
-def unscaled(scene: Scene) -> Scene:
-    """The scene with neither scale nor offset, which Ψ and Δ cannot have."""
+def without_scale(scene: Scene, data: Spectrum) -> Scene:
+    """A scene that several spectra share, for one of them: Ψ and Δ have neither scale nor offset."""
+    if data.delta is None:
+        return scene
     kept = {name: value for name, value in vars(scene.instrument).items() if name not in ("scale", "offset")}
     return eqx.tree_at(lambda s: s.instrument, scene, Instrument(**kept))
 
