@@ -19,14 +19,14 @@ ANGLES = (0.0, 30.0, 60.0, 80.0)
 
 def directional_albedo(
     brdf: Callable, parameters: Parameters, theta: Any, phi: Any = 0.0, *, rings: int = 128, spokes: int = 256
-) -> Float[Array, "3"]:
-    """Return ∫ ρ cos θ_o dω_o, the reflected fraction of light from one direction, for R, G and B.
+) -> Float[Array, " channels"]:
+    """Return ∫ ρ cos θ_o dω_o, the reflected fraction of light from one direction, by channel.
 
     The quadrature is over the disc of sin θ, Gauss-Legendre in sin² θ and equal steps in azimuth. It
     resolves lobes wider than about a degree. Above one the BRDF creates energy.
 
-    **Arguments:** `brdf` is a `Model` or any function (parameters, i, o) → (..., 3); `theta` and `phi` are
-    the polar angle and azimuth of the light in degrees; `rings` and `spokes` count the nodes.
+    **Arguments:** `brdf` is a `Model` or any function (parameters, i, o) → (..., channels); `theta` and
+    `phi` are the polar angle and azimuth of the light in degrees; `rings` and `spokes` count the nodes.
 
     >>> from pellicle.brdf.models import model
     >>> grey = {"thickness": 0.0, "n": 1.5, "diffuse": 0.1}
