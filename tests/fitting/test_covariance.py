@@ -41,7 +41,7 @@ def ordered(names):
     return [names.index(name) for name in ("thickness", "A", "B")]
 
 
-def test_absolute_sigma_as_scipy_has_it(scene, measured, model):
+def test_absolute_sigma_against_scipy(scene, measured, model):
     data = measured(scene, *TRUTH, sigma=True)
     fit = pl.fit(data, scene)
     p0 = [fit[name].value for name in ("thickness", "A", "B")]
@@ -65,7 +65,7 @@ def test_absolute_sigma_as_scipy_has_it(scene, measured, model):
     assert fit.chi2_reduced == pytest.approx(1, abs=0.3)
 
 
-def test_relative_sigma_as_lmfit_has_it(scene, measured, model):
+def test_relative_sigma_against_lmfit(scene, measured, model):
     """σ from the residuals; where their correlation counts, errors grow by its square root."""
     data = measured(scene, *TRUTH)
     fit = pl.fit(data, scene)
@@ -123,7 +123,7 @@ def test_a_film_that_is_everywhere_opaque(film, measured):
     assert "may be anything between 1000 and 4000 nm" in fit.verdict
 
 
-def test_index_and_thickness_of_a_thin_film_trade(film, measured):
+def test_index_and_thickness_of_a_thin_film_are_correlated(film, measured):
     """20 nm of something like titania: n·d is known, n and d are not."""
     scene = film(pl.Free(1, 100), pl.dispersion.Constant(pl.Free(1.8, 2.8)))
     fit = pl.fit(measured(scene, 2.4, 20.0, noise=0.005, sigma=True), scene)
@@ -135,12 +135,12 @@ def test_index_and_thickness_of_a_thin_film_trade(film, measured):
     assert fit["thickness"].stderr > 3 * alone["thickness"].stderr
 
 
-def test_a_very_strong_trade_is_warned_of(film, measured):
+def test_a_strong_correlation_gives_a_warning(film, measured):
     scene = film(pl.Free(1, 60), pl.dispersion.Constant(pl.Free(1.2, 1.8)))
     fit = pl.fit(measured(scene, 1.46, 15.0, noise=1e-3, sigma=True), scene)
     names = list(fit.correlation_names)
     assert abs(fit.correlation[names.index("n"), names.index("thickness")]) > 0.99
-    assert any("n and thickness trade against each other" in warning for warning in fit.warnings)
+    assert any(warning.startswith("n and thickness are strongly correlated") for warning in fit.warnings)
 
 
 def test_a_parameter_without_effect_has_an_infinite_error(film, measured):

@@ -1,4 +1,4 @@
-"""What trades with what, of Jacobians whose answer is known beforehand."""
+"""Correlated and undetermined parameters, from Jacobians whose answer is known."""
 
 import math
 
@@ -7,7 +7,7 @@ import pytest
 
 import pellicle as pl
 from pellicle.fitting.covariance import Scaled
-from pellicle.fitting.identifiability import bounded, naming, step, trades
+from pellicle.fitting.identifiability import bounded, correlated, naming, step
 from pellicle.fitting.result import Estimate
 
 NM = np.linspace(400.0, 900.0, 128)
@@ -38,58 +38,59 @@ def fringes(noise, share=0.0):
 
 def test_only_the_product_is_determined():
     """d n/n = −d d/d: 0.01 of 1.5 is 3.2 nm of 480."""
-    [told] = trades(fringes(0.01), {"n": N, "thickness": D})
-    assert told == (
-        "only the product n·thickness is determined: n and thickness trade against each other,"
-        " 0.01 against 3.2 nm"
+    [sentence] = correlated(fringes(0.01), {"n": N, "thickness": D})
+    assert sentence == (
+        "only the product n·thickness is determined: n and thickness are correlated, 0.01 against 3.2 nm"
     )
 
 
-def test_what_is_known_well_enough_does_not_trade():
-    """The same valley, but its length is below a step: the data tell n to 0.001."""
-    assert trades(fringes(0.01, share=10.0), {"n": N, "thickness": D}) == []
+def test_parameters_that_are_known_well_enough_are_not_named():
+    """Correlated too, but the error of n is 0.001, below its meaningful step."""
+    assert correlated(fringes(0.01, share=10.0), {"n": N, "thickness": D}) == []
 
 
 def test_only_the_quotient_is_determined():
     column = np.cos(NM / 50)
-    found = of_columns(0.01, n=column / D.value, thickness=-column * N.value / D.value**2)
-    [told] = trades(found, {"n": N, "thickness": D})
-    assert told.startswith("only the quotient n/thickness is determined")
+    jacobian = of_columns(0.01, n=column / D.value, thickness=-column * N.value / D.value**2)
+    [sentence] = correlated(jacobian, {"n": N, "thickness": D})
+    assert sentence.startswith("only the quotient n/thickness is determined")
 
 
-def test_another_valley_is_told_by_its_direction():
+def test_another_direction_is_given_in_words():
     column = np.cos(NM / 50)
-    [told] = trades(of_columns(0.01, n=column, thickness=-column / 100), {"n": N, "thickness": D})
-    assert told == (
-        "n and thickness trade against each other, 0.01 against 1 nm (one rises as the other does):"
-        " neither is known alone"
+    [sentence] = correlated(of_columns(0.01, n=column, thickness=-column / 100), {"n": N, "thickness": D})
+    assert sentence == (
+        "n and thickness are strongly correlated, 0.01 against 1 nm (one rises as the other does):"
+        " neither is determined alone"
     )
 
 
-def test_two_that_are_not_seen_do_not_trade():
-    """Both columns are zero: any combination is as unseen as any other."""
-    assert trades(of_columns(0.01, n=0.0 * NM, thickness=0.0 * NM), {"n": N, "thickness": D}) == []
+def test_two_parameters_without_effect_are_not_correlated():
+    """Both columns are zero: no combination is better determined than any other."""
+    assert correlated(of_columns(0.01, n=0.0 * NM, thickness=0.0 * NM), {"n": N, "thickness": D}) == []
 
 
 def test_three_together():
     a, b = np.cos(NM / 50), np.sin(NM / 50)
-    found = of_columns(0.001, A=a, B=b * 1e-3, thickness=(a + b) / 100)
+    jacobian = of_columns(0.001, A=a, B=b * 1e-3, thickness=(a + b) / 100)
     names = {"A": estimate("A", 1.5, 1.2, 2.0), "B": estimate("B", 100.0, 0.0, 5000.0), "thickness": D}
-    [told] = trades(found, names)
-    assert told == "A, B and thickness trade against each other: none of them is known alone"
+    [sentence] = correlated(jacobian, names)
+    assert sentence == "A, B and thickness are strongly correlated: none of them is determined alone"
 
 
-def test_scale_and_offset_are_eliminated_and_told_of_apart():
+def test_scale_and_offset_are_eliminated_and_named_apart():
     column = np.cos(NM / 50)
-    found = of_columns(0.001, n=column, **{"instrument.scale": 2 * column, "instrument.offset_1": NM / 900})
+    jacobian = of_columns(
+        0.001, n=column, **{"instrument.scale": 2 * column, "instrument.offset_1": NM / 900}
+    )
     names = {"n": N, "instrument.scale": SCALE, "instrument.offset_1": OFFSET}
-    assert trades(found, names) == [
+    assert correlated(jacobian, names) == [
         "n would be known far better with a known scale and offset of the instrument"
     ]
-    assert trades(of_columns(0.001, n=column, **{"instrument.scale": NM / 900}), names) == []
+    assert correlated(of_columns(0.001, n=column, **{"instrument.scale": NM / 900}), names) == []
 
 
-def test_a_real_fit_says_so(film, measured):
+def test_a_product_in_a_real_fit(film, measured):
     """Two weak reflections of unknown scale and offset: a + b cos(4π n d/λ) shows n·d and nothing else."""
     scene = film(
         pl.Free(10, 2000),
@@ -104,7 +105,7 @@ def test_a_real_fit_says_so(film, measured):
     assert fit["instrument.offset"].upper_limit > 0
 
 
-def test_steps_are_what_is_worth_knowing():
+def test_meaningful_steps():
     assert step("thickness", D) == pytest.approx(4.8)
     assert step("film.thickness", estimate("film.thickness", 20.0, 1, 100)) == 1.0
     assert step("instrument.bandwidth.film_R", estimate("instrument.bandwidth.film_R", 2.0, 0, 20)) == 1.0
@@ -115,7 +116,7 @@ def test_steps_are_what_is_worth_knowing():
     assert step("specular", estimate("specular", 0.0, 0, 100)) == pytest.approx(0.01)
 
 
-def test_sentences_of_bounds():
+def test_wording_of_bounds():
     unseen = estimate("n", 1.5, 1.2, 2.0, math.inf)
     small = estimate("k", 0.0, 0.0, 1.0, 1e-4, upper_limit=2.04e-4)
     thick = estimate("au.thickness", 300.0, 1.0, 4000.0, math.inf, "nm", lower_limit=180.2)
@@ -128,7 +129,7 @@ def test_sentences_of_bounds():
     assert bounded({"au.thickness": thick}, ())[0].startswith("au.thickness is at least")
 
 
-def test_sentences_beside_a_bound_that_is_not_zero():
+def test_wording_beside_a_bound_that_is_not_zero():
     smooth = estimate("roughness", 0.01, 0.003, 1.0, 0.01, upper_limit=0.0213)
     narrow = estimate("exponent", 950.0, 1.0, 1000.0, 90.0, lower_limit=771.2)
     offset = estimate("instrument.offset", 0.001, -math.inf, math.inf, 0.01, upper_limit=0.02)
@@ -139,7 +140,7 @@ def test_sentences_beside_a_bound_that_is_not_zero():
     ]
 
 
-def test_sentences_of_the_leading_parameter():
-    told = ["A and au.thickness trade against each other", "n and thickness trade against each other"]
-    assert naming("thickness", told) == told[1:]
-    assert naming("au.thickness", told) == told[:1]
+def test_sentences_that_name_the_leading_parameter():
+    sentences = ["A and au.thickness are correlated", "n and thickness are correlated"]
+    assert naming("thickness", sentences) == sentences[1:]
+    assert naming("au.thickness", sentences) == sentences[:1]

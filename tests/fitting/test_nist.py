@@ -23,7 +23,7 @@ from pellicle.fitting.levenberg_marquardt import BoundedLevenbergMarquardt
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.problem import Noise, Problem
 from pellicle.fitting.spectra.nuisance import Data
-from pellicle.fitting.spectra.problem import Local, SpectrumView
+from pellicle.fitting.spectra.view import Local, SpectrumView
 
 FOLDER = Path(__file__).parent / "nist_strd"
 

@@ -1,0 +1,166 @@
+"""Limits beside bounds against SciPy: each number fixed, the others fitted again to the same samples."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import NamedTuple
+
+import jax
+import numpy as np
+import pytest
+from scipy.optimize import brentq, least_squares
+
+import pellicle as pl
+from pellicle.brdf import direction, model
+from pellicle.data.brdf_samples import BrdfSamples
+from pellicle.fitting import estimates as shared
+from pellicle.fitting.brdf import fit as module
+from pellicle.fitting.brdf.fit import fit
+from pellicle.fitting.brdf.problem import make
+from pellicle.fitting.conclusion import Conclusion, conclude, linearised
+from pellicle.fitting.minima import Minima, minima
+from pellicle.fitting.profile_likelihood import Limits
+from pellicle.fitting.result import Status
+from pellicle.fitting.reweighting import RankedMinima, rank
+from pellicle.scene.free import Free
+from pellicle.scene.surface import Surface
+
+TRUTH = {
+    "thickness": 320.0,
+    "n": (1.5,),
+    "exponent_reflection": 60.0,
+    "exponent_transmission": 1000.0,
+    "deviation": 0.0,
+    "azimuth": 0.0,
+    "specular": 1.5,
+    "diffuse": 0.3,
+    "wavelengths": (550.0,),
+}
+BOUNDS = {"exponent_transmission": (1.0, 1000.0), "deviation": (0.0, 20.0), "specular": (0.0, 100.0)}
+FREE = {key: Free(lower, upper) for key, (lower, upper) in BOUNDS.items()}
+FIXED = {key: x for key, x in TRUTH.items() if key not in (*FREE, "wavelengths")}
+SURFACE = Surface("granier-heidrich", {**FIXED, **FREE}, (550.0,))
+WIDE = {"exponent_transmission": 100.0, "specular": 1.5}
+SIGMA = 0.1
+
+
+@pytest.fixture(scope="module")
+def simulated():
+    """Samples in a plane around the mirror direction, noisy enough for neither bound to be ruled out."""
+    theta_i = np.repeat([20.0, 40.0, 60.0], 40)
+    theta_o = theta_i + np.tile(np.linspace(-12, 12, 40), 3)
+    zero = np.zeros(120)
+    i, o = direction(theta_i, zero), direction(theta_o, zero + 180)
+    rho = jax.jit(lambda p: model("granier-heidrich")({**TRUTH, **p}, i, o))
+    values = rho({}) + SIGMA * np.random.default_rng(2).standard_normal((120, 1))
+    samples = BrdfSamples(
+        theta_i, zero, theta_o, zero + 180, np.abs(values), ("value",), np.full((120, 1), SIGMA)
+    )
+    return samples, rho
+
+
+class Judged(NamedTuple):
+    ranked: RankedMinima
+    conclusion: Conclusion
+
+
+@pytest.fixture(scope="module")
+def judged(simulated) -> Judged:
+    """The minimum below one start, without a search, and what is concluded from it."""
+    samples, _ = simulated
+    problem = make([samples], [""], SURFACE, [pl.plan(SURFACE, directions=samples)], "linear")
+    result = minima(problem, np.full((1, 3), 0.3))
+    assert result.converged[0]
+    ranked = rank(problem, result)
+    return Judged(ranked, conclude(ranked, *linearised(ranked), misfit=False, fixed=[], scans={}))
+
+
+def profile(simulated, name):
+    """χ² against one number, by SciPy."""
+    samples, rho = simulated
+    others = [key for key in BOUNDS if key != name]
+    ends = np.array([BOUNDS[key] for key in others]).T
+
+    def residual(x, value):
+        values = np.asarray(rho({name: value, **dict(zip(others, x, strict=True))}))
+        return (values - samples.values).ravel() / SIGMA
+
+    def chi2(value):
+        start = [TRUTH[key] for key in others]
+        best = least_squares(residual, start, bounds=ends, args=(value,), x_scale=(100, 1)[: len(others)])
+        return 2 * best.cost
+
+    return chi2
+
+
+@pytest.mark.parametrize(("name", "side"), [("deviation", 1), ("exponent_transmission", -1)])
+def test_a_limit_is_where_the_profile_has_risen(simulated, judged, name, side):
+    p, chi2 = judged.conclusion.parameters[name], profile(simulated, name)
+    [view_fit] = judged.ranked.fits
+    assert math.isfinite(p.stderr)
+    best = chi2(p.value)
+    end = BOUNDS[name][int(side > 0)]
+    far = p.value + side * min(6 * p.stderr, abs(end - p.value))
+    expected = brentq(lambda x: chi2(x) - best - 2.71 * view_fit.variance, p.value, far, xtol=1e-3)
+    limit, other = (p.upper_limit, p.lower_limit) if side > 0 else (p.lower_limit, p.upper_limit)
+    assert limit == pytest.approx(expected, rel=0.02)
+    assert other is None
+
+
+def search_from(start: list[float]):
+    """A replaced search that knows one start, for problems of as many numbers; baselines start anywhere."""
+
+    def search(problem, effort, progress):
+        size = len(problem.parameters)
+        unit = np.array([start]) if size == len(start) else np.full((1, size), 0.3)
+        return Minima(unit, np.zeros(1), np.ones(1, bool))
+
+    return search
+
+
+@pytest.fixture(scope="module")
+def turned():
+    """A deviation of 8 degrees at an azimuth of 60, seen at incidences around the normal."""
+    rng = np.random.default_rng(5)
+    theta_i, phi_i = rng.uniform(10, 50, 60), rng.uniform(0, 360, 60)
+    theta_o, phi_o = theta_i + rng.uniform(-15, 15, 60), phi_i + 180 + rng.uniform(-20, 20, 60)
+    surface = Surface("granier-heidrich", {**FIXED, "deviation": 8.0, "azimuth": 60.0, **WIDE}, (550.0,))
+    directions = BrdfSamples(theta_i, phi_i, np.abs(theta_o), phi_o, np.ones((60, 1)), ("value",))
+    return pl.simulate(surface, directions=directions, noise=0.01)
+
+
+@pytest.mark.parametrize(
+    ("tilt", "azimuth", "stderr"),
+    [
+        (Limits(0.1), Limits(3.0), 3.0),
+        (Limits(0.1, None, 0.3), Limits(3.0), math.inf),  # there may be no tilt: its azimuth means nothing
+        (Limits(math.inf), Limits(3.0), math.inf),
+        (Limits(0.1), Limits(math.inf, -20.0, None), math.inf),  # and a whole turn has no sides
+    ],
+)
+def test_the_azimuth_of_a_tilt(monkeypatch, turned, tilt, azimuth, stderr):
+    free = {"deviation": Free(0, 20), "azimuth": Free(-180, 180)}
+    surface = Surface("granier-heidrich", {**FIXED, **WIDE, **free}, (550.0,))
+    monkeypatch.setattr(module, "search", search_from([0.6, 0.7]))
+    monkeypatch.setattr(shared, "limits", lambda around, scans: [tilt, azimuth])
+    result = fit(turned, surface)
+    assert result["deviation"].value == pytest.approx(8.0, abs=0.1)
+    estimate = result["azimuth"]
+    assert estimate.value == pytest.approx(60.0, abs=2.0)
+    assert estimate.stderr == stderr
+    assert (estimate.lower_limit, estimate.upper_limit, estimate.at_bound) == (None, None, False)
+
+
+def test_of_a_misfit_no_limits_are_sought(monkeypatch, simulated):
+    """Values of another shape altogether, with a σ that no model can reach: errors are of the covariance."""
+    samples, _ = simulated
+    off = dataclasses.replace(samples, values=np.random.default_rng(0).random((120, 1)) * 100)
+    monkeypatch.setattr(module, "search", search_from([0.3] * 3))
+    monkeypatch.setattr(shared, "limits", lambda around, scans: pytest.fail("a profile was made"))
+    result, ranked = module.fitted(off, SURFACE, 0.0, lambda *report: None)
+    assert result.status is Status.MISFIT
+    _, errors = linearised(ranked)
+    for name in BOUNDS:
+        assert (result[name].lower_limit, result[name].upper_limit) == (None, None)
+        assert result[name].stderr in (errors.stderr[errors.names.index(name)], math.inf)

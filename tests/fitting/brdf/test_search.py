@@ -1,0 +1,149 @@
+"""Rounds of the search: what is drawn anew, what is kept, and when it stops. Programs are replaced."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import pellicle as pl
+from pellicle.fitting.brdf import search as module
+from pellicle.fitting.brdf.problem import make
+from pellicle.fitting.brdf.search import SCAN_SAMPLES, Effort, candidates, search
+from pellicle.fitting.brdf.solve_weights import Candidates
+from pellicle.fitting.minima import Minima
+from pellicle.fitting.problem import Problem
+from pellicle.fitting.progress import quiet
+from pellicle.scene.surface import Surface
+
+FEW = Effort(candidates=6, short=4, starts=2)
+LOBES = slice(2, 4)
+"""Exponent and deviation, after thickness and index."""
+
+
+@pytest.fixture
+def grey(ones, tilted) -> Problem:
+    """A problem of five numbers, the last one a weight."""
+    free = ("thickness", "n", "exponent_reflection", "deviation", "specular")
+    surface = Surface("granier-heidrich", {key: tilted.numbers[key] for key in free}, (550.0,))
+    data = ones(30.0, 0.0, np.arange(10.0, 60.0), 180.0, ("value",))
+    return make([data], [""], surface, [pl.plan(surface, directions=data)], "linear")
+
+
+class Programs:
+    """Replaced programs: χ² is what `rule` says of a candidate, and polishing leaves it where it is."""
+
+    def __init__(self, monkeypatch, rule):
+        self.rule, self.scanned, self.short, self.final = rule, [], [], []
+        monkeypatch.setattr(module, "scan", self.scan)
+        monkeypatch.setattr(module, "solve", self.solve)
+        monkeypatch.setattr(module, "minima", self.minima)
+
+    def scan(self, static, samples, fixed, box, units):
+        self.scanned.append(units)
+        return Candidates(self.rule(units), np.full((len(units), 1), 0.1))
+
+    def solve(self, few, starts, *, lanes, steps):
+        self.short.append(starts)
+        return Minima(starts, self.rule(starts), np.ones(len(starts), bool))
+
+    def minima(self, problem, starts, progress, *, lanes, followed):
+        self.final.append((starts, lanes, followed))
+        return Minima(starts, self.rule(starts), np.ones(len(starts), bool))
+
+
+def distance(units):
+    """χ² of a problem whose best thickness is 0.8 of its range and whose best index 0.2."""
+    return 1 + np.abs(units[:, 0] - 0.8) + np.abs(units[:, 1] - 0.2)
+
+
+def test_later_rounds_keep_the_lobes_and_draw_the_fringes(grey, monkeypatch):
+    programs = Programs(monkeypatch, distance)
+    search(grey, FEW, quiet)
+    first, second = (units[:6] for units in programs.scanned[:2])
+    np.testing.assert_array_equal(first, candidates(grey, 6))
+    np.testing.assert_array_equal(second[:, :2], candidates(grey, 6, seed=1)[:, :2])
+    parents = first[np.argsort(distance(first))]
+    shorts = programs.short[0][:, :4]
+    np.testing.assert_array_equal(shorts, parents[:4])  # all of them over 2 nm apart
+    np.testing.assert_array_equal(second[:, LOBES], np.resize(shorts, (6, 4))[:, LOBES])
+
+
+def test_rounds_end_with_one_that_gains_nothing(grey, monkeypatch):
+    programs = Programs(monkeypatch, lambda units: np.ones(len(units)))
+    search(grey, FEW, quiet)
+    assert len(programs.scanned) == 2
+    better = iter(range(1, 99))
+    halving = Programs(monkeypatch, lambda units: np.full(len(units), 0.5 ** next(better)))
+    search(grey, FEW, quiet)
+    assert len(halving.scanned) == 4  # at most
+
+
+def test_without_a_short_polish_there_is_one_round(grey, monkeypatch):
+    programs = Programs(monkeypatch, distance)
+    search(grey, FEW._replace(short=0), quiet)
+    assert (len(programs.scanned), len(programs.short)) == (1, 0)
+
+
+def test_the_last_starts_are_the_best_of_all_rounds_two_nanometres_apart(grey, monkeypatch):
+    programs = Programs(monkeypatch, distance)
+    search(grey, FEW, quiet)
+    [(starts, lanes, followed)] = programs.final
+    assert (starts.shape, lanes, followed) == ((2, 5), 2, 0)
+    seen = np.concatenate(programs.short)
+    assert distance(starts)[0] == distance(seen).min()
+    assert abs(starts[0, 0] - starts[1, 0]) * 1000 >= 2
+
+
+def test_starts_of_one_thickness_are_filled_up_with_the_next_best(grey, monkeypatch):
+    """Fewer thicknesses than starts: the rest are the best of what is left."""
+    monkeypatch.setattr(module, "candidates", lambda problem, count, seed=0: np.full((count, 4), 0.5))
+    programs = Programs(monkeypatch, lambda units: np.arange(1.0, len(units) + 1))
+    search(grey, FEW, quiet)
+    [(starts, _, _)] = programs.final
+    np.testing.assert_allclose(starts, np.tile([0.5, 0.5, 0.5, 0.5, 0.1], (2, 1)))
+
+
+def test_the_scan_sees_samples_of_all_values(grey, monkeypatch):
+    """150 of them, from the darkest to the brightest; where there are fewer, some twice."""
+    views = []
+
+    def watched(static, samples, fixed, box, units):
+        views.append(samples)
+        return Candidates(np.ones(len(units)), np.full((len(units), 1), 0.1))
+
+    Programs(monkeypatch, distance)
+    monkeypatch.setattr(module, "scan", watched)
+    [view] = grey.views
+    weight = np.array(view.samples.weight)
+    weight[10:20] = 0.0  # held out
+    values = np.zeros_like(view.samples.values)
+    values[: view.rows, 0] = np.arange(view.rows)
+    samples = view.samples._replace(weight=weight, values=values)
+    search(grey._replace(views=(dataclasses.replace(view, samples=samples),)), FEW, quiet)
+    chosen = views[0]
+    assert chosen.values.shape == (SCAN_SAMPLES, 1)
+    assert set(np.unique(chosen.values)) == set(range(view.rows)) - set(range(10, 20))
+
+
+def test_candidates_of_a_channel_are_near_those_of_the_first(ones, tilted):
+    data = ones(30.0, 0.0, np.arange(10.0, 60.0), np.arange(100.0, 150.0))
+    problem = make([data], [""], tilted, [pl.plan(tilted, directions=data)], "linear")
+    drawn = candidates(problem, 500, seed=3)
+    assert drawn.shape == (500, 7)
+    assert ((drawn >= 0) & (drawn <= 1)).all()
+    index = 1.05 + 1.45 * drawn[:, 1:4]
+    apart = np.abs(index[:, 1:] - index[:, :1])
+    assert apart.max() <= 0.1 + 1e-12
+    assert apart.max() > 0.09
+    np.testing.assert_array_equal(drawn, candidates(problem, 500, seed=3))
+    assert not np.array_equal(drawn, candidates(problem, 500))
+
+
+def test_folded_candidates_are_even_in_the_tilt_out_of_the_plane(ones, tilted):
+    """Uniform in y, where the coordinate is y²: a third of them below y = 1/3."""
+    data = ones(30.0, 0.0, np.arange(10.0, 60.0), 180.0)
+    problem = make([data], [""], tilted, [pl.plan(tilted, directions=data)], "linear")
+    drawn = candidates(problem, 3000)[:, 6]
+    assert np.mean(drawn < 1 / 9) == pytest.approx(1 / 3, abs=0.03)

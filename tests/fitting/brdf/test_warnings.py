@@ -1,0 +1,53 @@
+"""Warnings on what the directions of samples cannot determine, and on numbers that mean little."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pellicle.fitting.brdf.warnings import directions, numbers
+from pellicle.fitting.result import Estimate
+from pellicle.scene.free import Free
+from pellicle.scene.surface import Surface
+
+BASE = Surface("microfacet-film", {"base_n": Free(1, 3), "base_k": Free(0, 6)}, (550.0,))
+
+
+def test_warnings_on_directions(ones, tilted):
+    messages = " ".join(directions(ones(30.0, 0.0, [10.0, 40.0], 180.0), tilted))
+    assert "all light comes at one angle" in messages
+    assert "in one plane: they cannot see the sign" in messages
+    messages = " ".join(directions(ones([10.0, 30.0], 0.0, 40.0, [90.0, 180.0]), tilted))
+    assert "never turned" in messages
+    assert "at one angle" not in messages
+    messages = " ".join(directions(ones([5.0, 12.0], 0.0, 10.0, 180.0, ("value",)), BASE))
+    assert "within 12 degrees of the normal" in messages
+    assert "one channel near the normal" in messages
+    assert "base_n and base_k are both free" in messages
+
+
+def test_directions_that_determine_everything_give_no_warning(ones, tilted):
+    turned = ones([20.0, 50.0, 50.0], [0.0, 45.0, 90.0], 40.0, [180.0, 200.0, 270.0])
+    assert directions(turned, tilted) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("thickness", 3.2, "thickness 3.2 nm is next to none"),
+        ("exponent_reflection", 1.5, "exponent_reflection 1.50 is below 2"),
+        ("thickness", 320.0, ""),
+    ],
+)
+def test_warnings_on_numbers(name, value, message):
+    surface = Surface("microfacet-film", {})
+    free = Estimate(name, value, 0.1, "", 0.0, 1000.0, True)
+    fitted = {key: np.asarray(x) for key, x in surface.fixed_numbers().items()}
+    messages = numbers(surface, {name: free}, fitted)
+    assert len(messages) == bool(message)
+    assert message in " ".join(messages)
+
+
+def test_lobes_that_are_not_normalised_are_named(tilted):
+    fitted = {key: np.asarray(x) for key, x in tilted.start_numbers().items()}
+    assert any("specular is a weight and no albedo" in each for each in numbers(tilted, {}, fitted))

@@ -1,0 +1,183 @@
+"""Posteriors of a surface: against the errors of a fit, of another problem, and of a tilt."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+import pellicle as pl
+from pellicle.data.brdf_samples import BrdfSamples
+from pellicle.errors import DataError
+from pellicle.fitting.brdf import fit as fitting
+from pellicle.fitting.minima import Minima
+from pellicle.fitting.progress import quiet
+from pellicle.fitting.reweighting import RankedMinima
+from pellicle.scene.free import Free
+from pellicle.scene.surface import Surface
+
+TRUTH = {
+    "thickness": 320.0,
+    "n": (1.48, 1.5, 1.53),
+    "exponent_reflection": 60.0,
+    "exponent_transmission": 25.0,
+    "specular": 1.5,
+    "diffuse": 0.1,
+}
+BOUNDS = {
+    "thickness": (0, 1000),
+    "exponent_reflection": (1, 1000),
+    "exponent_transmission": (1, 1000),
+    "specular": (0, 100),
+    "diffuse": (0, 2),
+}
+FREE = Surface("granier-heidrich", {**TRUTH, **{key: Free(*ends) for key, ends in BOUNDS.items()}})
+UNITS = np.array([[0.32, *np.log([60, 25]) / np.log(1000), 0.015, 0.05]])
+"""The truth in the unit cube of the search."""
+
+
+def arcs() -> BrdfSamples:
+    """40 directions in the plane of incidence at each of five incidences."""
+    theta_o = np.tile(np.linspace(-78, 78, 40), 5)
+    theta_i, phi_o = np.repeat([10.0, 25, 40, 55, 70], 40), np.where(theta_o > 0, 180.0, 0.0)
+    return BrdfSamples(theta_i, np.zeros(200), np.abs(theta_o), phi_o, np.ones((200, 3)), ("R", "G", "B"))
+
+
+def search_from(units: np.ndarray):
+    """A replaced search that knows one start; baselines, of other numbers, start in the middle."""
+
+    def search(problem, effort, progress):
+        size = len(problem.parameters)
+        start = units if size == units.shape[1] else np.full((1, size), 0.5)
+        return Minima(start, np.zeros(1), np.ones(1, bool))
+
+    return search
+
+
+class Known(NamedTuple):
+    samples: BrdfSamples
+    fit: pl.Fit
+    ranked: RankedMinima
+
+
+@pytest.fixture(scope="module")
+def known():
+    """Samples of the truth with noise of 1 %, and a fit of them that starts at the truth."""
+    clean = pl.simulate(Surface("granier-heidrich", TRUTH), directions=arcs()).values
+    sigma = 0.01 * clean
+    values = np.abs(clean + sigma * np.random.default_rng(3).standard_normal(clean.shape))
+    samples = dataclasses.replace(arcs(), values=values, sigma=sigma)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(fitting, "search", search_from(UNITS))
+        return Known(samples, *fitting.fitted(samples, FREE, 0.0, quiet))
+
+
+@pytest.fixture
+def fitted_before(monkeypatch, known):
+    """Posteriors of the samples that were fitted, without another fit."""
+    monkeypatch.setattr(fitting, "fitted", lambda *args, **options: (known.fit, known.ranked))
+
+
+def test_a_posterior_is_as_wide_as_the_errors_say(fitted_before, known, tmp_path):
+    """Every number is determined and far from its bounds: the posterior is normal."""
+    posterior = pl.sample(known.samples, FREE, chain=tmp_path / "chain.h5")
+    assert posterior.trusted
+    assert list(posterior.parameters) == [p.name for p in known.fit.free]
+    for name in BOUNDS:
+        marginal, p = posterior[name], known.fit[name]
+        assert marginal.sd == pytest.approx(p.stderr, rel=0.15)
+        assert marginal.mean == pytest.approx(p.value, abs=0.2 * p.stderr)
+        assert marginal.q975 - marginal.q025 == pytest.approx(2 * 1.96 * p.stderr, rel=0.15)
+    assert str(posterior).startswith("With 95 % probability thickness lies between 3")
+    assert posterior.assumption == ""
+    for channel, band in enumerate(posterior.predictions()):
+        np.testing.assert_array_equal(band.data, known.samples.values[:, channel])
+        low, high = np.quantile(band.noisy, [0.025, 0.975], axis=0)
+        assert 0.88 <= np.mean((band.data >= low) & (band.data <= high)) <= 0.995
+        assert np.all(np.diff(np.median(band.model, axis=0)[np.argsort(band.axis.values)]) > -1e-3)
+
+
+def test_a_chain_is_resumed_and_belongs_to_its_problem(fitted_before, known, tmp_path):
+    path = tmp_path / "chain.h5"
+    assert not pl.sample(known.samples, FREE, chain=path, steps=20).trusted
+    resumed = pl.sample(known.samples, FREE, chain=path, steps=40)
+    whole = pl.sample(known.samples, FREE, steps=40)
+    np.testing.assert_array_equal(resumed.draws, whole.draws)
+    assert resumed.checks.steps == 40
+    prior = Free(0, 1000, prior=pl.priors.Normal(300.0, 50.0))
+    for samples, changed in (
+        (dataclasses.replace(known.samples, values=1.01 * known.samples.values), {}),
+        (known.samples, {"thickness": Free(0, 900)}),
+        (known.samples, {"thickness": prior}),
+    ):
+        surface = dataclasses.replace(FREE, numbers={**FREE.numbers, **changed})
+        with pytest.raises(DataError, match="is the chain of another problem"):
+            pl.sample(samples, surface, chain=path)
+
+
+def test_a_prior_narrows_the_fit_and_its_posterior_alike(known, monkeypatch):
+    """Two independent measurements of one number: their inverse variances add.
+
+    The number is determined by the others no better than by itself, so that its own error counts alone.
+    """
+    p = known.fit["specular"]
+    prior = pl.priors.Normal(p.value + p.stderr, p.stderr)
+    free = {**FREE.numbers, "specular": Free(0, 100, prior=prior)}
+    monkeypatch.setattr(fitting, "search", search_from(UNITS))
+    posterior = pl.sample(known.samples, dataclasses.replace(FREE, numbers=free))
+    narrowed = posterior.fit["specular"]
+    assert narrowed.stderr == pytest.approx(p.stderr / np.sqrt(2), rel=0.02)
+    assert narrowed.value == pytest.approx(p.value + p.stderr / 2, abs=0.03 * p.stderr)
+    assert posterior["specular"].sd == pytest.approx(p.stderr / np.sqrt(2), rel=0.12)
+    assert posterior["specular"].mean == pytest.approx(narrowed.value, abs=0.2 * p.stderr)
+
+
+def test_correlated_samples_count_as_fewer(monkeypatch, known):
+    """Where four count as one, the posterior is twice as wide."""
+    [view] = known.ranked.problem.views
+    counted = known.ranked.problem._replace(views=(view.counting(view.samples.independent_fraction / 4),))
+    [view_fit] = known.ranked.fits
+    wider = dataclasses.replace(
+        known.ranked, problem=counted, fits=(dataclasses.replace(view_fit, variance=4 * view_fit.variance),)
+    )
+    monkeypatch.setattr(fitting, "fitted", lambda *args, **options: (known.fit, wider))
+    posterior = pl.sample(known.samples, FREE)
+    assert posterior["specular"].sd == pytest.approx(2 * known.fit["specular"].stderr, rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ("status", "assumption"),
+    [(pl.Status.NOT_IDENTIFIABLE, "there is a layer"), (pl.Status.AMBIGUOUS, "")],
+)
+def test_without_evidence_of_a_layer_a_posterior_assumes_one(monkeypatch, known, status, assumption):
+    """But one of several thicknesses is a layer all the same."""
+    layer_test = dataclasses.replace(known.fit.layer_test, layered=False)
+    blind = dataclasses.replace(known.fit, layer_test=layer_test, status=status)
+    monkeypatch.setattr(fitting, "fitted", lambda *args, **options: (blind, known.ranked))
+    posterior = pl.sample(known.samples, FREE, steps=20)
+    assert posterior.assumption == assumption
+
+
+@pytest.fixture(scope="module")
+def turned():
+    """A deviation of 3 degrees at an azimuth of 170, seen from all sides with much noise."""
+    rng = np.random.default_rng(5)
+    theta_i, phi_i = rng.uniform(10, 50, 60), rng.uniform(0, 360, 60)
+    theta_o, phi_o = np.abs(theta_i + rng.uniform(-15, 15, 60)), phi_i + 180 + rng.uniform(-20, 20, 60)
+    directions = BrdfSamples(theta_i, phi_i, theta_o, phi_o, np.ones((60, 3)), ("R", "G", "B"))
+    fixed = {**TRUTH, "deviation": 3.0, "azimuth": 170.0}
+    return pl.simulate(Surface("granier-heidrich", fixed), directions=directions, noise=0.4)
+
+
+def test_an_azimuth_is_drawn_within_half_a_turn_of_the_best(turned, monkeypatch):
+    """Across the ends of its bounds, and all directions of the disc are as likely."""
+    free = {"deviation": Free(0, 20), "azimuth": Free(-180, 180)}
+    monkeypatch.setattr(fitting, "search", search_from(np.array([[0.43, 0.51]])))
+    posterior = pl.sample(turned, Surface("granier-heidrich", {**TRUTH, **free}), steps=300)
+    best = posterior.fit["azimuth"].value
+    azimuth = posterior.draws[..., posterior.names.index("azimuth")]
+    assert abs(best) > 150
+    assert np.abs(azimuth).max() > 185
+    assert np.abs(azimuth - best).max() <= 180
