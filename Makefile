@@ -80,6 +80,7 @@ lint: $(VENV)/.dev
 
 bench: $(VENV)/.dev
 	$(BIN)/python benchmarks/film.py
+	$(BIN)/python benchmarks/fit.py
 	$(BIN)/python benchmarks/cold_start.py
 
 # installs other packages (several GB) in a separate environment; writes the tables of docs/hard_cases.md
