@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import least_squares
 
-from pellicle.colour.bands import LONGEST_PATH, fit_weights, reach_of, transforms
+from pellicle.colour.bands import LONGEST_PATH, fit_weights, reach_of, sensor_transform
 from pellicle.colour.observers import sensor
 
 DATA = Path(__file__).parents[1] / "src/pellicle/colour/data"
@@ -29,8 +29,8 @@ def residual(wavelength, width, targets):
     residuals = []
     for target in targets:
         weights = fit_weights(wavelength, width, target)
-        apart = target.columns(wavelength, width) @ weights - target.exact
-        residuals.append((apart / target.white @ TO_LAB).ravel())
+        difference = target.columns(wavelength, width) @ weights - target.exact
+        residuals.append((difference / target.white @ TO_LAB).ravel())
     return np.concatenate(residuals)
 
 
@@ -44,7 +44,7 @@ def split(x, gaussian):
 
 def derive(count, reach, lamps, gaussian):
     rng, best = np.random.default_rng(0), None
-    targets = [transforms(sensor("1931", lamp), reach) for lamp in lamps]
+    targets = [sensor_transform(sensor("1931", lamp), reach) for lamp in lamps]
     share = np.cumsum(EQUAL.weights.sum(axis=1)) / EQUAL.weights.sum()
     starts = [1000 / np.interp((np.arange(count) + 0.5) / count, share, EQUAL.wavelength)]
     if gaussian:

@@ -1,4 +1,4 @@
-"""A film's colour by every way, against the Airy formula at steps of 1 nm."""
+"""Colour of a film by every method, against the Airy formula in steps of 1 nm."""
 
 from __future__ import annotations
 
@@ -21,46 +21,47 @@ MEDIA = {
     "soap": (1.33, 1.0),
     "grey film on glass": (2.0 + 0.08j, 1.5),
 }
-# mean ΔE2000 under D65 that each way may have on these films; the worst measured is beside it
+# limit of the mean ΔE2000 of each method under D65 on these films; the worst measured is beside it
 LIMITS = {
     "points-645-525-445": 35.0,
     "uniform-64": 0.05,  # 0.033
     "frequency-64": 0.1,
     "gaussians-4": 0.55,  # 0.46
-    "gaussians-8": 0.17,  # 0.14 in the grey film, whose absorption has one number a band; 0.06 in the others
+    "gaussians-8": 0.17,  # 0.14 in the grey film: one absorption for each band; else 0.06
 }
 
 
 def airy(wavelength, thickness, layer, substrate, angle):
-    """Unpolarised reflectance by the textbook formula in complex NumPy, wavelengths last."""
+    """Return the unpolarised reflectance by the textbook formula in complex NumPy, wavelengths last."""
     thickness, sine = np.asarray(thickness)[..., None], np.sin(np.deg2rad(angle))[..., None]
     n1, n2 = (np.asarray(n(wavelength) if callable(n) else n) for n in (layer, substrate))
     q0, q1, q2 = (np.sqrt(n**2 - sine**2 + 0j) for n in (1.0, n1, n2))
-    turn, total = np.exp(4j * np.pi / wavelength * q1 * thickness), 0.0
+    round_trip, total = np.exp(4j * np.pi / wavelength * q1 * thickness), 0.0
     for e1, e2 in ((1, 1), (n1**2, n2**2)):
         above, below = (e1 * q0 - q1) / (e1 * q0 + q1), (e2 * q1 - e1 * q2) / (e2 * q1 + e1 * q2)
-        total = total + 0.5 * np.abs((above + below * turn) / (1 + above * below * turn)) ** 2
+        total = total + 0.5 * np.abs((above + below * round_trip) / (1 + above * below * round_trip)) ** 2
     return total
 
 
-def truth(layer, substrate, illuminant="D65", thickness=THICKNESS, angle=ANGLE):
-    eye = sensor("1931", illuminant)
-    return np.asarray(lab(airy(eye.wavelength, thickness, layer, substrate, angle) @ eye.weights, eye.white))
+def reference(layer, substrate, illuminant="D65", thickness=THICKNESS, angle=ANGLE):
+    observer = sensor("1931", illuminant)
+    xyz = airy(observer.wavelength, thickness, layer, substrate, angle) @ observer.weights
+    return np.asarray(lab(xyz, observer.white))
 
 
 @partial(jax.jit, static_argnames=("method", "illuminant"))
-def seen(thickness, layer, substrate, angle, method, illuminant):
+def lab_by(thickness, layer, substrate, angle, method, illuminant):
     return film_colour(thickness, layer, substrate, angle=angle, method=method, illuminant=illuminant).lab
 
 
 def error(layer, substrate, name, illuminant="D65", **films):
     films = {"thickness": THICKNESS, "angle": ANGLE} | films
-    found = seen(films["thickness"], layer, substrate, films["angle"], name, illuminant)
-    return delta_e2000(np.asarray(found), truth(layer, substrate, illuminant, **films))
+    result = lab_by(films["thickness"], layer, substrate, films["angle"], name, illuminant)
+    return delta_e2000(np.asarray(result), reference(layer, substrate, illuminant, **films))
 
 
 @pytest.mark.parametrize("film", MEDIA)
-def test_every_way_is_near_the_dense_truth(film):
+def test_every_method_is_near_the_reference(film):
     for name, limit in LIMITS.items():
         assert np.mean(error(*MEDIA[film], name)) < limit, name
 
@@ -72,7 +73,7 @@ def test_every_way_is_near_the_dense_truth(film):
         ("uniform-64", "A", 0.05),
     ],
 )
-def test_other_lamps(name, illuminant, limit):
+def test_other_illuminants(name, illuminant, limit):
     """Measured: 0.071, 0.062, 0.059, 0.065, 0.078 and 0.017."""
     assert np.mean(error(*MEDIA["oxide on iron"], name, illuminant)) < limit
 
@@ -85,8 +86,8 @@ def test_optimised_samples_beat_equal_steps():
     assert ours < 0.5 < equal
 
 
-def test_belcour_and_barla_are_as_far_off_as_published_constants_are():
-    """1.40 on average over the sweep of benchmarks/colour.py; theirs is for E and transparent layers."""
+def test_error_of_the_constants_of_belcour_and_barla():
+    """1.40 on average over the sweep of benchmarks/colour.py; they are for E and transparent layers."""
     films = {"thickness": np.arange(0.0, 2001.0, 50.0), "angle": ANGLE}
     errors = np.concatenate([error(n, 1.0, "belcour-barla", "E", **films).ravel() for n in (1.33, 1.7)])
     assert 0.7 < np.mean(errors) < 2.5
@@ -98,9 +99,9 @@ def test_belcour_and_barla_are_as_far_off_as_published_constants_are():
 
 
 def test_dispersive_media():
-    """Samples follow hematite and gold (measured: 0.009 at most).
+    """Samples are accurate for hematite and gold (measured: 0.009 at most).
 
-    Gaussians, up to 3.9 off there, do for TiO2 (0.70 on average).
+    Gaussians, off by up to 3.9 there, are accurate enough for TiO2 (0.70 on average).
     """
     for layer, thickness in (("Fe2O3", [60.0, 140.0, 400.0]), ("Au", [25.0, 60.0, 100.0])):
         films = {"thickness": np.array(thickness), "angle": ANGLE}
@@ -110,16 +111,16 @@ def test_dispersive_media():
 
 
 @pytest.mark.parametrize("angle", [0.0, 40.0])
-def test_srgb_is_that_of_colour_science(angle):
-    """All of it by other hands: spectrum in NumPy, 360 to 780 nm, then colour-science."""
+def test_srgb_agrees_with_colour_science(angle):
+    """Independent from end to end: the spectrum by NumPy, 360 to 780 nm, then colour-science."""
     at = np.arange(360.0, 781.0)
     reflected = airy(at, 300.0, 1.33, 1.0, np.array(angle))
     spectrum = colour.SpectralDistribution(dict(zip(at, reflected, strict=True)))
     eye = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"].copy().align(spectrum.shape)
     lamp = colour.SDS_ILLUMINANTS["D65"].copy().align(spectrum.shape)
     expected = colour.XYZ_to_sRGB(colour.sd_to_XYZ(spectrum, eye, lamp, method="Integration") / 100)
-    found = film_colour(300.0, 1.33, 1.0, angle=angle, method="uniform-64").srgb
-    np.testing.assert_allclose(found, expected, atol=5e-4)
+    result = film_colour(300.0, 1.33, 1.0, angle=angle, method="uniform-64").srgb
+    np.testing.assert_allclose(result, expected, atol=5e-4)
 
 
 def test_the_documented_example():
@@ -130,30 +131,30 @@ def test_the_documented_example():
 def test_gradients(name):
     """∂Lab/∂(thickness, n, k, angle) against central differences; jit and vmap."""
 
-    def seen(x):
+    def lab_of(x):
         return film_colour(x[0], jax.lax.complex(x[1], x[2]), 2.7 + 2.8j, angle=x[3], method=name).lab
 
     x, h = jnp.array([230.0, 1.8, 0.02, 35.0]), 1e-5 * np.eye(4)
-    values = jax.jit(jax.vmap(seen))(jnp.concatenate([x + h, x - h]))
+    values = jax.jit(jax.vmap(lab_of))(jnp.concatenate([x + h, x - h]))
     np.testing.assert_allclose(
-        jax.jit(jax.jacfwd(seen))(x), (values[:4] - values[4:]).T / 2e-5, rtol=1e-5, atol=1e-6
+        jax.jit(jax.jacfwd(lab_of))(x), (values[:4] - values[4:]).T / 2e-5, rtol=1e-5, atol=1e-6
     )
 
 
-def test_total_reflection_inside_is_no_special_case():
-    """A film of less index than the medium above, past its critical angle."""
-    found = film_colour(300.0, 1.2, 1.5, ambient=1.5, angle=70.0, method="gaussians-8").xyz
+def test_total_reflection_in_the_film():
+    """A film of lower index than the ambient, beyond its critical angle."""
+    result = film_colour(300.0, 1.2, 1.5, ambient=1.5, angle=70.0, method="gaussians-8").xyz
     expected = film_colour(300.0, 1.2, 1.5, ambient=1.5, angle=70.0, method="uniform-64").xyz
-    np.testing.assert_allclose(found, expected, atol=0.01)
+    np.testing.assert_allclose(result, expected, atol=0.01)
 
 
-def test_no_layer_is_the_bare_substrate():
-    found = film_colour(0.0, 1.8, 1.5, method="gaussians-8", illuminant="E").xyz
-    np.testing.assert_allclose(found, 0.04 * sensor("1931", "E").white, rtol=1e-2)
+def test_zero_thickness_is_the_bare_substrate():
+    result = film_colour(0.0, 1.8, 1.5, method="gaussians-8", illuminant="E").xyz
+    np.testing.assert_allclose(result, 0.04 * sensor("1931", "E").white, rtol=1e-2)
 
 
 @pytest.mark.parametrize("name", ["rainbow", "points-645-525", "uniform-0", "nodes-7-500", "gaussians-9"])
-def test_unknown_ways_are_refused(name):
+def test_unknown_methods_are_refused(name):
     with pytest.raises(ValueError, match="expected"):
         integration_bands(name)
 

@@ -1,4 +1,4 @@
-"""The exported tables, spaces and differences against colour-science itself."""
+"""Observers, colour spaces and differences against colour-science."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ NAMES = {"1931": "CIE 1931 2 Degree Standard Observer", "1964": "CIE 1964 10 Deg
 
 @pytest.mark.parametrize("observer", NAMES)
 @pytest.mark.parametrize("illuminant", ILLUMINANTS)
-def test_white_is_that_of_colour_science(observer, illuminant):
+def test_white_agrees_with_colour_science(observer, illuminant):
     """To 5e-4 of xy: the span ends at 730 nm, and the published points have five digits."""
-    found = sensor(observer, illuminant).white
+    white = sensor(observer, illuminant).white
     published = colour.CCS_ILLUMINANTS[NAMES[observer]][illuminant]
-    np.testing.assert_allclose(found[:2] / found.sum(), published, atol=5e-4)
-    assert found[1] == pytest.approx(1.0)
+    np.testing.assert_allclose(white[:2] / white.sum(), published, atol=5e-4)
+    assert white[1] == pytest.approx(1.0)
 
 
-def test_a_reflectance_gives_the_xyz_of_colour_science():
+def test_xyz_agrees_with_colour_science():
     at = sensor("1931", "D65").wavelength
     reflectance = 0.5 + 0.4 * np.sin(at / 17.0)
     spectrum = colour.SpectralDistribution(dict(zip(at, reflectance, strict=True)))
@@ -34,7 +34,7 @@ def test_a_reflectance_gives_the_xyz_of_colour_science():
         colour.SDS_ILLUMINANTS["D65"].copy().align(spectrum.shape),
         method="Integration",
     )
-    # colour-science interpolates the lamp by a polynomial, CIE 15 and we linearly
+    # colour-science interpolates the illuminant by a polynomial; CIE 15 and pellicle, linearly
     np.testing.assert_allclose(reflectance @ sensor("1931", "D65").weights, expected / 100, atol=2e-4)
 
 
@@ -42,7 +42,7 @@ XYZ = np.array([[0.2, 0.3, 0.1], [0.5, 0.4, 0.6], [0.004, 0.003, 0.002], [0.9, 0
 D65 = np.array([0.95047, 1.0, 1.08883])
 
 
-def test_spaces_are_those_of_colour_science():
+def test_spaces_agree_with_colour_science():
     xy = D65[:2] / D65.sum()
     np.testing.assert_allclose(lab(XYZ, D65), colour.XYZ_to_Lab(XYZ, xy), atol=1e-9)
     space = colour.RGB_COLOURSPACES["sRGB"]
@@ -53,7 +53,7 @@ def test_spaces_are_those_of_colour_science():
 
 
 @pytest.mark.parametrize("illuminant", ILLUMINANTS)
-def test_white_is_white_under_every_lamp(illuminant):
+def test_white_is_white_under_every_illuminant(illuminant):
     white = sensor("1931", illuminant).white
     np.testing.assert_allclose(linear_srgb(white, white), 1.0, atol=1e-12)
     np.testing.assert_allclose(lab(white, white), [100, 0, 0], atol=1e-12)
@@ -68,7 +68,7 @@ def test_differences():
     check_grads(lambda x: delta_e76(lab(x, D65), other), (XYZ[2],), 1, eps=1e-7, rtol=1e-5)
 
 
-def test_unknown_names_say_what_is_known():
+def test_unknown_names_list_the_known_ones():
     with pytest.raises(ValueError, match="D65"):
         sensor("1931", "D60")
     with pytest.raises(ValueError, match="1964"):

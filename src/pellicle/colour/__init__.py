@@ -1,7 +1,7 @@
-"""What a film looks like: from its layer to XYZ, sRGB and Lab, by sampling or by Fourier orders.
+"""Colour of a film in XYZ, sRGB and Lab, by sampling the spectrum or by Fourier orders.
 
-`observers` holds the eye and the lamp, `bands` the ways to integrate over them, `film` the film's
-colour, `spaces` and `difference` what is done with a colour.
+`observers` has the CIE observers and illuminants, `bands` the methods of integration, `film` the colour of
+a film, `spaces` the conversions between colour spaces and `difference` the colour differences.
 """
 
 from pellicle.colour.bands import Bands as Bands

@@ -1,4 +1,4 @@
-"""The colour of one film: what each band sees of it, added up."""
+"""Colour of one film: its reflectance in each band, weighted and summed."""
 
 from __future__ import annotations
 
@@ -14,29 +14,29 @@ from pellicle.colour.bands import Bands, integration_bands
 from pellicle.colour.observers import sensor
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.optics import coherent, interface, orders, response
-from pellicle.optics.pair import is_real, real, to_pair
+from pellicle.optics.pair import Number, is_real, real, to_pair
 
 
 @final
 class Colour(eqx.Module):
-    """A colour and the white it is seen against; `xyz` has Y = 1 for a perfect reflector."""
+    """Colours relative to a white; `xyz` has Y = 1 for a perfect reflector."""
 
     xyz: Float[Array, "... 3"]
     white: tuple[float, float, float] = eqx.field(static=True)
 
     @property
-    def lab(self):
+    def lab(self) -> Float[Array, "... 3"]:
         """CIE 1976 L*, a*, b*."""
         return spaces.lab(self.xyz, self.white)
 
     @property
-    def linear_srgb(self):
-        """Linear sRGB, not clipped: interference colours leave its gamut."""
+    def linear_srgb(self) -> Float[Array, "... 3"]:
+        """Linear sRGB, not clipped: interference colours exceed its gamut."""
         return spaces.linear_srgb(self.xyz, self.white)
 
     @property
-    def srgb(self):
-        """What a display takes, 0 to 1."""
+    def srgb(self) -> Float[Array, "... 3"]:
+        """Display values, 0 to 1."""
         return spaces.srgb(self.linear_srgb)
 
 
@@ -51,19 +51,22 @@ def film_colour(
     illuminant: str = "D65",
     observer: str = "1931",
 ) -> Colour:
-    """The colour of a layer on a half space in unpolarised light.
+    """Return the colour of a layer on a half space in unpolarised light.
 
-    **Arguments:** `thickness` in nm and `angle` of incidence in degrees broadcast; `layer` and
-    `substrate` are numbers n + ik, arrays of such, or materials (`pl.material("Fe2O3")`); `ambient`
-    is real; for `method` see `pellicle.colour.integration_bands`.
+    **Arguments:** all broadcast.
 
-    **How exact:** against steps of 1 nm, the mean ΔE2000 of `gaussians-8` over the sweep of
-    `benchmarks/colour.py` is 0.06 to 0.09 under E, D50, D65, D75 and A (0.7 at most). Gaussians take a
-    material's index at their centres and its slope there, which does not do for media that change much
-    within 30 nm: 140 nm of Fe2O3 on glass are 3.6 off, and by `uniform-64` 0.005.
+    - `thickness` in nm, `angle` of incidence in degrees.
+    - `layer`, `substrate`: numbers n + ik, arrays, or materials (`pl.material("Fe2O3")`); `ambient` is real.
+    - `method`: see `pellicle.colour.integration_bands`.
+    - `illuminant`, `observer`: see `pellicle.colour.sensor`.
 
-    **Raises:** ValueError for an unknown method, observer or illuminant, and for an absorbing layer by
-    `belcour-barla`, which has none.
+    **Accuracy:** against steps of 1 nm, the mean ΔE2000 of `gaussians-8` over the sweep of
+    `benchmarks/colour.py` is 0.06 to 0.09 under E, D50, D65, D75 and A (0.7 at most). Gaussians take the
+    index of a material at their centres and its slope there, which is too coarse for media that change
+    much within 30 nm: 140 nm of Fe2O3 on glass are off by 3.6, and by `uniform-64` by 0.005.
+
+    **Raises:** ValueError for an unknown method, observer or illuminant, for an absorbing ambient, and for
+    an absorbing layer with `belcour-barla`, which does not model absorption.
 
     ```python
     >>> film_colour(300.0, 1.33, 1.0).srgb.round(2).tolist()
@@ -72,13 +75,15 @@ def film_colour(
     ```
     """
     bands, white = integration_bands(method, observer, illuminant), sensor(observer, illuminant).white
-    seen = jnp.asarray(reflectance(thickness, layer, substrate, bands, ambient=ambient, angle=angle))
-    xyz = seen @ jnp.asarray(bands.weights, seen.dtype)
+    spectrum = jnp.asarray(reflectance(thickness, layer, substrate, bands, ambient=ambient, angle=angle))
+    xyz = spectrum @ jnp.asarray(bands.weights, spectrum.dtype)
     return Colour(xyz, (float(white[0]), float(white[1]), float(white[2])))
 
 
-def reflectance(thickness, layer, substrate, bands: Bands, *, ambient: Any = 1.0, angle: Any = 0.0):
-    """What each band sees of the film, (..., N); arguments as `film_colour`."""
+def reflectance(
+    thickness: Any, layer: Any, substrate: Any, bands: Bands, *, ambient: Any = 1.0, angle: Any = 0.0
+) -> Float[Array, "... bands"]:
+    """Return the reflectance in each band, (..., N); arguments as for `film_colour`."""
     thickness, theta = (jnp.asarray(x)[..., None] * 1.0 for x in (thickness, jnp.deg2rad(angle)))
     wavelength = jnp.asarray(bands.wavelength, jnp.result_type(thickness, theta))
     n0, n2 = _index(ambient, wavelength), interface.allow_tunnelling(_index(substrate, wavelength))
@@ -86,38 +91,40 @@ def reflectance(thickness, layer, substrate, bands: Bands, *, ambient: Any = 1.0
         raise ValueError("the ambient must not absorb: give it a real index")
     n1 = _index(layer, wavelength)
     if not bands.absorbs and not is_real(n1):
-        raise ValueError("belcour-barla knows no absorbing layer: use gaussians-8 or uniform-64")
+        raise ValueError(
+            "the layer absorbs, which belcour-barla does not model: use method gaussians-8 or uniform-64"
+        )
     k0d = 2 * jnp.pi / wavelength * thickness
     if bands.width is None:
         return response.reflectance(*coherent.responses(n0, [n1], n2, [k0d], theta))
-    if not interface.propagates(layer, ambient, 90.0):  # nor at any other angle
+    if not interface.propagates(layer, ambient, 90.0):  # and so at any angle
         n1 = interface.allow_tunnelling(n1)
-    turns = _turn_slope(layer, n0, n1, theta, wavelength)
-    spread = 2 * jnp.pi * jnp.asarray(bands.width, wavelength.dtype) * 2 * thickness * turns
-    kept = jnp.exp(-0.5 * spread * spread)
+    index_slope = _phase_index(layer, n0, n1, theta, wavelength)
+    spread = 2 * jnp.pi * jnp.asarray(bands.width, wavelength.dtype) * 2 * thickness * index_slope
+    damping = jnp.exp(-0.5 * spread * spread)
     both = [
         orders.reflectance(
-            orders.airy_series(n0, n1, n2, k0d, theta, letter), lambda m: kept ** (m * m), bands.orders
+            orders.airy_series(n0, n1, n2, k0d, theta, letter), lambda m: damping ** (m * m), bands.orders
         )
         for letter in "sp"
     ]
     return 0.5 * (both[0] + both[1])
 
 
-def _index(what: Any, wavelength):
-    """The index at the bands; an array of numbers gets an axis for them."""
-    if isinstance(what, AbstractDispersion):
-        return what.index(wavelength)
-    return to_pair(jnp.asarray(what)[..., None] * 1.0)
+def _index(medium: Any, wavelength: Any) -> Number:
+    """Return the index in each band; an array of numbers gets an axis for the bands."""
+    if isinstance(medium, AbstractDispersion):
+        return medium.index(wavelength)
+    return to_pair(jnp.asarray(medium)[..., None] * 1.0)
 
 
-def _turn_slope(layer, ambient, index, theta, wavelength):
-    """d(Re q₁/λ)/d(1/λ): Re q₁ where the layer has no dispersion, else its group index's like."""
+def _phase_index(layer: Any, ambient: Any, index: Number, theta: Any, wavelength: Any) -> Any:
+    """Return d(Re q₁/λ)/d(1/λ): Re q₁ without dispersion, else the analogue of the group index."""
     if not isinstance(layer, AbstractDispersion):
         return real(interface.normal(index, ambient * jnp.sin(theta)))
 
-    def turns(wavelength):
+    def phase(wavelength):
         n1 = interface.allow_tunnelling(layer.index(wavelength))
         return real(interface.normal(n1, ambient * jnp.sin(theta))) / wavelength
 
-    return jax.jvp(turns, (wavelength,), (-(wavelength**2),))[1]
+    return jax.jvp(phase, (wavelength,), (-(wavelength**2),))[1]
