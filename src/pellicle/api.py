@@ -226,7 +226,8 @@ def fit(
     - `progress`: called with the name of a stage, the number of steps done and their total.
 
     **Returns:** `Fit`: parameters with errors, a status with a verdict, every rival minimum.
-    `print(fit)` is short, `pellicle.report(fit)` complete.
+    `print(fit)` is short; `fit.report()`, `fit.plot()` and `fit.save(folder)` are the full report, the
+    figure, and files of both.
 
     **Raises:** UsageError where nothing is free, where the scenes of a joint fit are not of one sample,
     where an uncalibrated signal has a fixed scale, for an unknown loss or residual, and for too few samples;

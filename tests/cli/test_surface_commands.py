@@ -126,7 +126,7 @@ def test_what_accuracy_costs_for_a_surface(pellicle, tmp_path):
     assert 1e-9 < found["float32"]["error"] < 1e-5 < found["one wavelength"]["error"]
     assert all(rung["seconds"] > 0 for rung in found.values())
     assert record["left_out"]["no diffuse part"] == "nothing else is left of the BRDF"
-    assert "no other colour" in record["no_colours"]
+    assert "three wavelengths only" in record["no_colours"]
     assert (tmp_path / "cost" / "cost.png").read_bytes().startswith(b"\x89PNG")
     assert "No colours:" in (tmp_path / "cost" / "report.txt").read_text()
     assert len((tmp_path / "cost" / "cost.csv").read_text().splitlines()) == 1 + len(found)

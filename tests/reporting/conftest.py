@@ -6,9 +6,22 @@ import math
 import numpy as np
 import pytest
 
+from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.spectrum import Spectrum
 from pellicle.effects.plan import Plan, Row
-from pellicle.fitting.result import Curve, Estimate, Fit, Part, Profile, Rival, Status
+from pellicle.effects.surface import exact
+from pellicle.fitting.result import (
+    BrdfCurve,
+    Curve,
+    Estimate,
+    Fit,
+    LayerTest,
+    Part,
+    Profile,
+    Rival,
+    Status,
+)
+from pellicle.scene.surface import Surface, surface_view
 
 
 @pytest.fixture
@@ -130,3 +143,45 @@ def angular(fit, with_part) -> Fit:
 def as_ellipsometry(fit, with_part):
     """Makes a fit of Ψ and Δ at any wavelengths (nm) and angles (degrees)."""
     return lambda wavelength, angle: ellipsometric(fit, wavelength, angle, with_part)
+
+
+@pytest.fixture
+def brdf_fit() -> Fit:
+    """Three samples in the plane of incidence, where the half angle is half the difference of the angles."""
+    theta_o = np.array([10.0, 30.0, 50.0])
+    samples = BrdfSamples(
+        theta_i=np.full(3, 30.0),
+        phi_i=np.zeros(3),
+        theta_o=theta_o,
+        phi_o=np.full(3, 180.0),
+        values=np.array([[0.1], [1.0], [0.2]]),
+        channels=("value",),
+        sigma=np.full((3, 1), 0.05),
+    )
+    surface = Surface("microfacet-film", {"thickness": 40.0, "n": 1.5, "base_n": 2.7}, (550.0,))
+    part = Part(
+        name="",
+        data=samples,
+        curve=BrdfCurve(samples.values + 0.1, np.full((3, 1), -2.0)),
+        plan=exact(surface_view(surface, samples)),
+        rms=1.0,
+        chi2_reduced=1.0,
+        effective_points=3.0,
+    )
+    return Fit(
+        parts=(part,),
+        status=Status.MISFIT,
+        verdict="",
+        parameters={},
+        rivals=(),
+        chi2_reduced=1.0,
+        rms=1.0,
+        effective_points=3.0,
+        correlation_names=(),
+        correlation=np.zeros((0, 0)),
+        warnings=(),
+        profile=None,
+        seconds=0.0,
+        scene=surface,
+        layer_test=LayerTest(False, 1.0, (), "linear"),
+    )

@@ -14,6 +14,7 @@ from pellicle.accuracy.measure import MethodComparison, compare_methods
 from pellicle.accuracy.simulated_data import data_sets
 from pellicle.accuracy.solver_comparison import SolverComparison, compare_solvers
 from pellicle.errors import UsageError
+from pellicle.fitting.presentation import PlotMixin
 from pellicle.fitting.progress import Progress, quiet
 from pellicle.scene.film import Scene
 from pellicle.scene.free import free_leaves
@@ -24,7 +25,7 @@ DEFAULT_TOLERANCE = 1e-3
 
 
 @dataclass
-class Cost:
+class Cost(PlotMixin):
     """Accuracy against time for one film.
 
     `methods` compares simulations, `solvers` fits and `intervals` their errors. `solvers` is None where

@@ -21,6 +21,7 @@ from pellicle.effects.plan import Plan
 from pellicle.effects.surface import exact
 from pellicle.effects.surface_removal import SurfaceRemoval
 from pellicle.errors import UsageError
+from pellicle.fitting.presentation import PlotMixin
 from pellicle.fitting.progress import Progress, quiet
 from pellicle.planning import surface
 from pellicle.planning.surface import FLOOR
@@ -35,7 +36,7 @@ COLOUR_TOLERANCE, VALUE_TOLERANCE = 0.5, 1e-3
 
 
 @dataclass
-class SurfaceCost:
+class SurfaceCost(PlotMixin):
     """Accuracy against time for one surface.
 
     `colours` is None where the surface has no film with a colour of its own, and `no_colours` says why.

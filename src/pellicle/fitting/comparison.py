@@ -17,6 +17,7 @@ import numpy as np
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
 from pellicle.fitting.noise import correlation_length
+from pellicle.fitting.presentation import ReportMixin
 from pellicle.fitting.result import BrdfCurve, Fit, Part, Status
 
 log = getLogger(__name__)
@@ -38,8 +39,8 @@ class Candidate:
     bic: float
 
 
-@dataclass(frozen=True)
-class Comparison:
+@dataclass(frozen=True, repr=False)
+class Comparison(ReportMixin):
     """Candidates in the order given, the effective points, and a verdict."""
 
     candidates: tuple[Candidate, ...]
@@ -54,6 +55,8 @@ class Comparison:
     def __str__(self) -> str:
         rows = [f"  {c.name}: BIC {c.bic - self.best.bic:+.1f}, {c.fit.status}" for c in self.candidates]
         return "\n".join([self.verdict, *rows])
+
+    __repr__ = __str__
 
 
 def compare(fits: Mapping[str, Fit]) -> Comparison:

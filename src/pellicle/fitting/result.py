@@ -10,6 +10,7 @@ import numpy as np
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.spectrum import Spectrum
 from pellicle.effects.plan import Plan
+from pellicle.fitting.presentation import PlotMixin
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface
 
@@ -188,7 +189,7 @@ class LayerTest:
 
 
 @dataclass(frozen=True, repr=False)
-class Fit:
+class Fit(PlotMixin):
     """The outcome of fitting spectra or BRDF samples of one sample: `parts`, one for each.
 
     `rms` is None where the spectra have no unit in common. `scene` is what was fitted, one for each spectrum

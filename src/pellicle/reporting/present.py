@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,7 +23,7 @@ from pellicle.reporting import (
     plans,
     posterior,
 )
-from pellicle.sampling.result import Posterior
+from pellicle.sampling.result import Posterior, verdict
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -101,3 +102,24 @@ def save(result: Fit | Posterior | Comparison | AnyCost, folder: str | os.PathLi
         case Cost() | SurfaceCost():
             return cost_files.write_cost(folder, result)
     raise TypeError(f"a {type(result).__name__} has no files; fits, posteriors and costs have")
+
+
+def html(result: Fit | Posterior | Comparison | AnyCost) -> str:
+    """Format a result for a notebook: verdict, a table of free parameters, and the report to unfold."""
+    match result:
+        case Fit():
+            head, columns = f"<b>{result.status}</b>: {escape(result.verdict)}", ("", "value", "± 1σ", "unit")
+            rows = [(p.name, f"{p.value:.8g}", f"{p.stderr:.2g}", p.unit) for p in result.free]
+        case Posterior():
+            head, columns = escape(verdict(result)), ("", "median", "2.5 %", "97.5 %", "unit")
+            rows = [
+                (m.name, *(f"{x:.6g}" for x in (m.q50, m.q025, m.q975)), m.unit)
+                for m in result.parameters.values()
+            ]
+        case _:
+            return f"<pre>{escape(report(result))}</pre>"
+    heads = "".join(f"<th>{column}</th>" for column in columns)
+    cells = ["".join(f"<td>{escape(cell)}</td>" for cell in row) for row in rows]
+    table = "".join(f"<tr>{row}</tr>" for row in (heads, *cells))
+    text = f"<details><summary>report</summary><pre>{escape(report(result))}</pre></details>"
+    return f"<p>{head}</p><table>{table}</table>{text}"

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from pellicle.fitting.presentation import PlotMixin
 from pellicle.fitting.result import Fit
 from pellicle.sampling.checks import Checks
 from pellicle.sampling.modes import Modes
@@ -36,8 +37,8 @@ class Marginal:
     modes: tuple[Mode, ...]
 
 
-@dataclass(frozen=True)
-class Posterior:
+@dataclass(frozen=True, repr=False)
+class Posterior(PlotMixin):
     """Draws from the posterior of a fit's free parameters; a spectrum's scale and offset are integrated out.
 
     `draws` (steps, walkers, parameters) in the parameters' own units, without burn-in, `log_density`
@@ -101,6 +102,8 @@ class Posterior:
             for m in self.parameters.values()
         ]
         return "\n".join([verdict(self), *lines])
+
+    __repr__ = __str__
 
 
 def verdict(posterior: Posterior) -> str:
