@@ -17,7 +17,7 @@ from pellicle.errors import UsageError
 from pellicle.fitting import identifiability
 from pellicle.fitting.brdf import warnings
 from pellicle.fitting.brdf.layer_test import evidence
-from pellicle.fitting.brdf.problem import incoherent, make, restricted, without_layer
+from pellicle.fitting.brdf.problem import incoherent, make, restricted, together, without_layer
 from pellicle.fitting.brdf.residuals import RESIDUALS
 from pellicle.fitting.brdf.search import FEW, SMOOTH, THOROUGH, Effort, search
 from pellicle.fitting.conclusion import common_rms, conclude, linearised, ranked_minima
@@ -29,6 +29,7 @@ from pellicle.fitting.progress import Progress, quiet
 from pellicle.fitting.result import Baseline, BrdfCurve, Estimate, Fit, LayerTest, Part, Status
 from pellicle.fitting.reweighting import RankedMinima
 from pellicle.fitting.robust_losses import LEAST_SQUARES, check_loss
+from pellicle.fitting.robust_losses import spread as bulk_spread
 from pellicle.fitting.status import misfits, verdict
 from pellicle.planning.surface import plan
 from pellicle.scene.surface import Surface, surface_view
@@ -126,11 +127,18 @@ def _split(samples: list[BrdfSamples]) -> _Split:
     return _Split(fitted, out, sum(rows.size * len(e.channels) for rows, e in zip(out, samples, strict=True)))
 
 
-def _held_out(whole: Problem, split: _Split, effort: Effort, progress: Progress) -> tuple[Minima, float]:
-    """Minima on the fitted rows, and the best one's error on the others."""
+def _held_out(
+    whole: Problem, split: _Split, effort: Effort, loss: str, progress: Progress
+) -> tuple[Minima, float]:
+    """Minima on the fitted rows, and the best one's error on the others: of their bulk for a robust loss."""
     result = search(restricted(whole, split.fitted), effort, progress)
     judging = restricted(whole, split.judging)
     judging = judging._replace(box=judging.box._replace(prior_weight=np.zeros(len(judging.parameters))))
+    if loss != LEAST_SQUARES:
+        values = np.asarray(judging.values(result.units[0]))
+        pairs = zip(judging.views, split.judging, strict=True)
+        rows = [v.residuals(v.local(judging.seen_by(v, values)))[own].ravel() for v, own in pairs]
+        return result, bulk_spread(np.concatenate(rows))
     [chi2] = total_deviance(judging, result.units[:1])
     return result, float(np.sqrt(chi2 / split.size))
 
@@ -153,9 +161,9 @@ def _fit(
         return make(samples, names, surface, plans, residual)
 
     def searched(problem: Problem) -> Minima:
-        result, errors["layer"] = _held_out(problem, split, THOROUGH, progress)
-        _, errors[_FLAT] = _held_out(incoherent(problem), split, SMOOTH, progress)
-        _, errors[_PLAIN] = _held_out(without_layer(problem), split, FEW, progress)
+        result, errors["layer"] = _held_out(problem, split, THOROUGH, loss, progress)
+        _, errors[_FLAT] = _held_out(incoherent(problem), split, SMOOTH, loss, progress)
+        _, errors[_PLAIN] = _held_out(without_layer(problem), split, FEW, loss, progress)
         return minima(problem, result.units, progress, **lanes)
 
     ranked, notes = ranked_minima(build, searched, tolerance, loss, **lanes)
@@ -212,7 +220,7 @@ def _fit(
         correlation=covariance.correlation,
         warnings=(
             *notes,
-            *dict.fromkeys(message for each in samples for message in warnings.directions(each, surface)),
+            *warnings.directions(together(samples), surface),
             *warnings.numbers(surface, parameters, numbers),
             *identifiability.bounded(parameters, ()),
             *conclusion.correlated,

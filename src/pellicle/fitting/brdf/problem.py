@@ -46,7 +46,7 @@ def make(
         if deviation.lower > 0 or azimuth.upper - azimuth.lower < 360:
             tilt = None
     # samples in one plane cannot tell a tilt to one side of it from one to the other: its square is searched
-    folded = tilt is not None and all(in_plane(each) for each in samples)
+    folded = tilt is not None and in_plane(together(samples))
     take = [np.log if number.log else float for number in free]
     lower, upper = (
         np.array([convert(getattr(number.free, side)) for convert, number in zip(take, free, strict=True)])
@@ -95,6 +95,13 @@ def _parameter(number: FreeNumber, tilted: bool, folded: bool) -> Parameter:
         periodic=turns,
         resolution=resolution,
     )
+
+
+def together(samples: Sequence[BrdfSamples]) -> BrdfSamples:
+    """The samples of all sets, without σ."""
+    names = ("theta_i", "phi_i", "theta_o", "phi_o", "values")
+    columns = {name: np.concatenate([getattr(each, name) for each in samples]) for name in names}
+    return BrdfSamples(**columns, channels=samples[0].channels)
 
 
 def in_plane(samples: BrdfSamples, tolerance: float = 0.5) -> bool:
