@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 
 import numpy as np
 import pytest
 
+import pellicle as pl
 from pellicle.data.brdf_samples import BrdfSamples
+from pellicle.fitting.brdf import fit as fitting
+from pellicle.fitting.minima import Minima
 from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface
 
@@ -42,3 +46,64 @@ def _tilted() -> Surface:
 @pytest.fixture(scope="session", name="ones")
 def _ones() -> Callable[..., BrdfSamples]:
     return ones
+
+
+GREY = {
+    "thickness": 320.0,
+    "n": 1.5,
+    "exponent_reflection": 60.0,
+    "exponent_transmission": 25.0,
+    "deviation": 0.0,
+    "azimuth": 0.0,
+    "specular": 1.5,
+    "diffuse": 0.1,
+}
+"""A surface of one channel at 550 nm."""
+FREE = {"thickness": (0, 1000), "exponent_reflection": (1, 1000), "specular": (0, 100)}
+START = np.array([[0.32, np.log(60) / np.log(1000), 0.015]])
+"""The truth in the unit cube of these numbers."""
+
+
+def grey(**changes) -> Surface:
+    """The surface with three free numbers, some of them changed."""
+    free = {key: Free(*ends) for key, ends in FREE.items()}
+    return Surface("granier-heidrich", {**GREY, **free, **changes}, (550.0,))
+
+
+def grey_samples(noise: float = 0.02, seed: int = 1, incidences=(15.0, 35.0, 55.0)) -> BrdfSamples:
+    """40 samples of the known surface for each incidence, with noise of that standard deviation (1/sr)."""
+    theta_i = np.repeat(incidences, 40)
+    theta_o = np.tile(np.linspace(-70, 70, 40), len(incidences))
+    phi_o = np.where(theta_o > 0, 180.0, 0.0)
+    directions = ones(theta_i, 0.0, np.abs(theta_o), phi_o, ("value",))
+    clean = pl.simulate(Surface("granier-heidrich", GREY, (550.0,)), directions=directions).values
+    values = clean + noise * np.random.default_rng(seed).standard_normal(clean.shape)
+    return dataclasses.replace(directions, values=values, sigma=np.full(clean.shape, noise))
+
+
+@pytest.fixture(scope="session", name="grey")
+def _grey() -> Callable[..., Surface]:
+    return grey
+
+
+@pytest.fixture(scope="session", name="grey_samples")
+def _grey_samples() -> Callable[..., BrdfSamples]:
+    return grey_samples
+
+
+@pytest.fixture(scope="session")
+def truth() -> dict[str, float]:
+    """The values of the numbers that `grey` leaves free."""
+    return {key: GREY[key] for key in FREE}
+
+
+@pytest.fixture
+def no_search(monkeypatch):
+    """Replace the search by the truth as the only start; baselines start in the middle of their bounds."""
+
+    def search(problem, effort, progress):
+        size = len(problem.parameters)
+        start = START if size == START.shape[1] else np.full((1, size), 0.5)
+        return Minima(start, np.zeros(1), np.ones(1, bool))
+
+    monkeypatch.setattr(fitting, "search", search)

@@ -96,6 +96,15 @@ def test_samples_in_one_plane(ones):
     assert not in_plane(ones(30.0, [0.0, 45.0, 90.0], arc, [180.0, 225.0, 270.0]))
 
 
+def test_sets_in_two_planes_see_the_sign_of_a_tilt(ones, tilted):
+    """Each set is in a plane, but together they are not."""
+    sets = [ones(30.0, phi, ARC, phi + 180.0) for phi in (0.0, 90.0)]
+    assert all(in_plane(each) for each in sets)
+    plans = [pl.plan(tilted, directions=each) for each in sets]
+    for data, folded in ((sets[:1] * 2, True), (sets, False)):
+        assert make(data, ["a", "b"], tilted, plans, "linear").coordinates.folded == folded
+
+
 def local(problem: Problem) -> Local:
     """The only view at values that every problem of TILTED has."""
     values = {"thickness": 300.0, "n": 1.5, "exponent_reflection": 60.0, "deviation": 3.0, "azimuth": 40.0}

@@ -1,0 +1,179 @@
+"""Priors, robust losses, tolerances and joint fits of BRDF samples. The search is replaced by one start."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import jax
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+import pellicle as pl
+from pellicle.brdf import direction, model
+from pellicle.data.brdf_samples import BrdfSamples
+from pellicle.effects.surface import exact
+from pellicle.effects.surface_removal import SurfaceRemoval
+from pellicle.errors import UsageError
+
+pytestmark = pytest.mark.usefixtures("no_search")
+SCALE = np.array([100.0, 10.0, 1.0])
+"""Units of thickness, exponent and weight in which SciPy fits."""
+
+
+def independent(samples: list[BrdfSamples], surface, loss="linear", prior=None):
+    """Values and errors by SciPy's least squares of the model itself; `prior` is (position, mean, sd)."""
+    names = [number.name for number in surface.free_numbers()]
+    fixed = {key: value for key, value in surface.numbers.items() if key not in names}
+    fixed["wavelengths"] = surface.wavelengths
+    every = [(direction(s.theta_i, s.phi_i), direction(s.theta_o, s.phi_o), s) for s in samples]
+    film = model("granier-heidrich")
+    rho = jax.jit(lambda p, i, o: film({**fixed, **dict(zip(names, p, strict=True))}, i, o))
+
+    def residual(scaled):
+        p = scaled * SCALE
+        found = [((s.values - np.asarray(rho(p, i, o))) / s.sigma).ravel() for i, o, s in every]
+        if prior is not None:
+            at, mean, sd = prior
+            found.append([(p[at] - mean) / sd])
+        return np.concatenate(found)
+
+    best = least_squares(
+        residual, np.array([320.0, 60.0, 1.5]) / SCALE, loss=loss, f_scale=1.345, xtol=1e-12, ftol=1e-12
+    )
+    return best.x * SCALE, np.sqrt(np.diag(np.linalg.inv(best.jac.T @ best.jac))) * SCALE
+
+
+def agrees(fit: pl.Fit, values, share: float = 0.05) -> None:
+    """Every free number within this share of its error of values in the order of the model's keys."""
+    for p, value in zip(fit.free, values, strict=True):
+        assert abs(p.value - value) < share * p.stderr, p
+
+
+def widening(fit: pl.Fit) -> float:
+    """Factor of the errors by the correlation of the residuals."""
+    return float(np.sqrt(sum(part.samples.values.size for part in fit.parts) / fit.effective_points))
+
+
+def test_a_normal_prior_pulls_as_bayes_says(grey, grey_samples):
+    """A prior as narrow as the error, two errors off: the mean of both, against SciPy with one more row."""
+    samples = grey_samples()
+    alone = pl.fit(samples, grey())
+    assert alone.status is pl.Status.CONVERGED
+    p, length = alone["specular"], widening(alone) ** 2
+    mean, sd = p.value + 2 * p.stderr, p.stderr
+    pulled = pl.fit(samples, grey(specular=pl.Free(0, 100, prior=pl.priors.Normal(mean, sd))))
+    # data count for 1/length: so does the prior in a fit where they count for one
+    values, errors = independent([samples], grey(), prior=(2, mean, sd * np.sqrt(1 / length)))
+    agrees(pulled, values)
+    np.testing.assert_allclose([q.stderr for q in pulled.free], errors * np.sqrt(length), rtol=0.02)
+    assert p.value + 0.5 * p.stderr < pulled["specular"].value < mean
+    assert pulled["specular"].stderr < 0.85 * p.stderr
+    assert not any("prior" in message for message in pulled.warnings)
+
+
+def spoiled(samples: BrdfSamples) -> BrdfSamples:
+    """8 of 120 samples too bright by 15 to 40 standard deviations."""
+    rng = np.random.default_rng(4)
+    values = samples.values.copy()
+    values[rng.choice(len(samples), 8, replace=False), 0] += rng.uniform(0.3, 0.8, 8)
+    return dataclasses.replace(samples, values=values)
+
+
+@pytest.mark.parametrize("loss", ["huber", "student-t"])
+def test_outliers_move_a_plain_fit_and_not_a_robust_one(grey, grey_samples, truth, loss):
+    samples = spoiled(grey_samples())
+    plain, robust = pl.fit(samples, grey()), pl.fit(samples, grey(), loss=loss)
+    name = "specular"
+    assert abs(plain[name].value - truth[name]) > 3 * robust[name].stderr
+    for key, value in truth.items():
+        assert abs(robust[key].value - value) < 3 * robust[key].stderr
+    assert robust.chi2_reduced < 0.2 * plain.chi2_reduced
+    assert robust.status is pl.Status.CONVERGED
+
+
+def test_huber_against_scipy(grey, grey_samples):
+    samples = spoiled(grey_samples())
+    values, _ = independent([samples], grey(), loss="huber")
+    agrees(pl.fit(samples, grey(), loss="huber"), values)
+
+
+def test_a_tolerance_leaves_an_effect_out(grey, grey_samples):
+    """A diffuse part of 1e-6 changes no value by 1 % of a hundredth of a white one."""
+    samples = grey_samples()
+    whole, reduced = (pl.fit(samples, grey(diffuse=1e-6), tolerance=t) for t in (0.0, 0.01))
+    assert whole.plan.on("diffuse")
+    assert not reduced.plan.on("diffuse")
+    assert reduced.plan.on("precision")
+    agrees(reduced, [p.value for p in whole.free], 0.1)
+    assert reduced.warnings == whole.warnings
+
+
+def test_a_fit_beyond_its_tolerance_is_done_again(grey, grey_samples, truth, monkeypatch):
+    """As where the design of the plan missed the values of the best fit."""
+
+    def careless(view, tolerance, keep):
+        return dataclasses.replace(exact(view), left_out=(SurfaceRemoval("diffuse"),), tolerance=tolerance)
+
+    monkeypatch.setattr(
+        "pellicle.fitting.brdf.fit.plan", lambda v, t, k: careless(v, t, k) if t else exact(v)
+    )
+    result = pl.fit(grey_samples(), grey(), tolerance=1e-3)
+    assert result.plan.on("diffuse")
+    assert "fitted again with every effect" in result.warnings[0]
+    for key, value in truth.items():
+        assert abs(result[key].value - value) < 4 * result[key].stderr
+
+
+@pytest.fixture
+def two(grey_samples):
+    """Two sets of samples of one surface, of other incidences and other noise."""
+    first = grey_samples(0.02, 1, (15.0, 35.0))
+    second = grey_samples(0.03, 2, (45.0, 60.0))
+    return [dataclasses.replace(s, path=f"{n}.csv") for s, n in zip((first, second), "ab", strict=True)]
+
+
+def test_a_joint_fit_is_that_of_all_samples(grey, two, truth):
+    joint, *alone = (pl.fit(data, grey()) for data in (two, *two))
+    assert joint.status is pl.Status.CONVERGED
+    assert (joint.joint, [part.name for part in joint.parts]) == (True, ["a", "b"])
+    values, errors = independent(two, grey())
+    agrees(joint, values, 0.3)  # each set counts the correlation of its own residuals
+    for p, error in zip(joint.free, errors, strict=True):
+        assert abs(p.value - truth[p.name]) < 4 * p.stderr
+        assert p.stderr < min(each[p.name].stderr for each in alone)
+        assert error <= p.stderr * 1.001 < 2 * error
+    for part, data in zip(joint.parts, two, strict=True):
+        assert part.samples is data
+        assert part.curve.model.shape == data.values.shape
+        assert 0.7 < part.chi2_reduced < 1.4
+    with pytest.raises(ValueError, match="joint fit of 2"):
+        joint.samples  # noqa: B018
+
+
+def test_a_set_in_two_halves_is_the_whole_set(grey, grey_samples):
+    whole = grey_samples()
+    halves = [dataclasses.replace(whole.at(np.arange(n, 120, 2)), path=f"{n}.csv") for n in (0, 1)]
+    one, both = pl.fit(whole, grey()), pl.fit(halves, grey())
+    for p in one.free:
+        assert abs(both[p.name].value - p.value) < 0.1 * p.stderr
+    assert both.rms == pytest.approx(one.rms, rel=1e-3)
+
+
+def test_incidences_of_all_sets_count_together(grey, grey_samples):
+    """Each set at one incidence: together they are at two."""
+    sets = [grey_samples(0.02, n, (angle,)) for n, angle in ((1, 20.0), (2, 50.0))]
+    assert any("one angle" in message for message in pl.fit(sets[0], grey()).warnings)
+    assert not any("one angle" in message for message in pl.fit(sets, grey()).warnings)
+
+
+def test_samples_need_a_surface_and_spectra_a_scene(grey, grey_samples):
+    nm = np.linspace(400.0, 700.0, 30)
+    spectrum = pl.Spectrum(nm, np.full(30, 0.2), "R")
+    for data, scene in (
+        (spectrum, grey()),
+        ([grey_samples(), spectrum], grey()),
+        (grey_samples(), pl.Scene(pl.Layer("SiO2", pl.Free(10, 500)), "Si")),
+    ):
+        with pytest.raises(UsageError, match="BRDF samples need a Surface"):
+            pl.fit(data, scene)
