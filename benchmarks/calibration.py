@@ -35,7 +35,7 @@ from pellicle.fitting.spectra.parameters import parameters  # noqa: E402
 from pellicle.fitting.spectra.search import quiet  # noqa: E402
 from pellicle.scene.free import insert  # noqa: E402
 from pellicle.scene.instrument import Drift  # noqa: E402
-from pellicle.synthetic.spectra import synthesise, synthesise_angles  # noqa: E402
+from pellicle.synthetic.spectra import simulate_signal  # noqa: E402
 
 WAVELENGTH = np.linspace(400.0, 900.0, 101)
 SILICON = pl.dispersion.Constant(3.9, 0.02)
@@ -88,10 +88,10 @@ class Count(NamedTuple):
 def simulated(scene: pl.Scene, truth: np.ndarray, noise: float, known: bool, seed: int) -> pl.Spectrum:
     fixed = insert(scene, truth)
     sigma = np.full(WAVELENGTH.size, noise) if known else None
+    values = simulate_signal(fixed, WAVELENGTH, noise, seed).values
     if scene.light.signal != "psi-delta":
-        values = synthesise(fixed, WAVELENGTH, noise, seed).values
         return pl.Spectrum(WAVELENGTH, values, scene.light.signal, sigma=sigma)
-    psi, delta = synthesise_angles(fixed, WAVELENGTH, noise, seed).values.T
+    psi, delta = values.T
     angle = np.full(WAVELENGTH.size, 70.0)
     return pl.Spectrum(WAVELENGTH, psi, "psi-delta", sigma=sigma, delta=delta, delta_sigma=sigma, angle=angle)
 

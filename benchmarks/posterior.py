@@ -29,7 +29,7 @@ from pellicle.sampling.density import log_density  # noqa: E402
 from pellicle.sampling.modes import modes  # noqa: E402
 from pellicle.sampling.run import run  # noqa: E402
 from pellicle.sampling.target import Target  # noqa: E402
-from pellicle.synthetic.spectra import synthesise  # noqa: E402
+from pellicle.synthetic.spectra import simulate_signal  # noqa: E402
 
 WALKERS, STEPS, BURN = 32, 2000, 500
 SILICON = 3.9 + 0.02j
@@ -55,7 +55,7 @@ class Problem(NamedTuple):
 def problem(truth: tuple[float, float, float], bounds: Any, wavelength: np.ndarray, noise: float, seed: int):
     thickness, n, k = truth
     scene = pl.Scene(pl.Layer(Constant(n, k), thickness), Constant(SILICON.real, SILICON.imag))
-    values = synthesise(scene, wavelength, noise, seed).values
+    values = simulate_signal(scene, wavelength, noise, seed).values
     lower, upper = np.array(bounds, dtype=float).T
     return Problem(lower, upper, wavelength, values, noise)
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import pellicle
 from pellicle.data.write_brdf import write_brdf_samples
 from pellicle.recipes import read_recipe
-from pellicle.synthetic.brdf import default_directions, simulate_brdf
+from pellicle.synthetic.brdf import default_directions, simulate_samples
 
 STUDIES = Path(__file__).resolve().parents[1] / "fits" / "brdf"
 SAMPLES, NOISE = 250, 0.002
@@ -27,7 +27,7 @@ def main(folder: Path = STUDIES) -> None:
             continue
         target.parent.mkdir(parents=True, exist_ok=True)
         surface = read_recipe(recipe).scene()
-        samples = simulate_brdf(surface, default_directions(SAMPLES), noise=NOISE, seed=seed)
+        samples = simulate_samples(surface, default_directions(SAMPLES), noise=NOISE, seed=seed).samples
         start = ", ".join(f"{key} = {' '.join(f'{x:g}' for x in number)}" for key, number in _truth(surface))
         said = [
             "SYNTHETIC: simulated, not measured",

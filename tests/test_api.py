@@ -7,8 +7,8 @@ import pellicle as pl
 from pellicle import api
 from pellicle.planning import film, surface
 from pellicle.scene.surface import surface_view
-from pellicle.synthetic.brdf import default_directions, simulate_brdf
-from pellicle.synthetic.spectra import simulate
+from pellicle.synthetic.brdf import default_directions, simulate_samples
+from pellicle.synthetic.spectra import simulate_spectrum
 
 FILM = pl.Scene(pl.Layer("SiO2", pl.Free(400, 600)), "Si")
 STEEL = pl.Surface("microfacet-film", {"thickness": pl.Free(20, 80), "n": 2.3, "base_n": 2.9, "base_k": 3.0})
@@ -18,9 +18,9 @@ DIRECTIONS = default_directions(50)
 def test_simulate_takes_a_film_or_a_surface():
     wavelength = [500.0, 600.0]
     spectrum = pl.simulate(FILM, wavelength, noise=0.01, seed=2)
-    assert np.array_equal(spectrum.values, simulate(FILM, wavelength, noise=0.01, seed=2).values)
+    assert np.array_equal(spectrum.values, simulate_spectrum(FILM, wavelength, noise=0.01, seed=2).values)
     samples = pl.simulate(STEEL, directions=DIRECTIONS, noise=0.01, seed=2)
-    assert np.array_equal(samples.values, simulate_brdf(STEEL, DIRECTIONS, noise=0.01, seed=2).values)
+    assert np.array_equal(samples.values, simulate_samples(STEEL, DIRECTIONS, 0.01, 2).samples.values)
 
 
 def test_plan_takes_a_film_or_a_surface():

@@ -26,9 +26,8 @@ from pellicle.sampling.sample import Measurement, measured
 from pellicle.sampling.sample import sample as sample_posterior
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface, SurfaceView, surface_view
-from pellicle.synthetic.brdf import Directions, default_directions, simulate_brdf
-from pellicle.synthetic.spectra import default_wavelengths
-from pellicle.synthetic.spectra import simulate as simulate_spectrum
+from pellicle.synthetic.brdf import Directions, default_directions, simulate_samples
+from pellicle.synthetic.spectra import default_wavelengths, simulate_spectrum
 
 if TYPE_CHECKING:
     from pellicle.accuracy.cost import Cost
@@ -83,7 +82,7 @@ def simulate(
     """
     if isinstance(scene, Surface):
         _refuse("a Surface", wavelength=wavelength)
-        return simulate_brdf(scene, directions, noise=noise, seed=seed)
+        return simulate_samples(scene, directions, noise, seed).samples
     _refuse("a Scene", directions=directions)
     return simulate_spectrum(scene, wavelength, noise=noise, seed=seed)
 

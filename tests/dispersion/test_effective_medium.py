@@ -15,7 +15,7 @@ from pellicle.dispersion.empirical import Cauchy, Constant
 from pellicle.materials import material, materials_in
 from pellicle.optics.pair import imag, is_real, real
 from pellicle.recipes import media_words
-from pellicle.synthetic.spectra import synthesise
+from pellicle.synthetic.spectra import simulate_signal
 
 EVERY_RULE = pytest.mark.parametrize("rule", MIXTURES.values(), ids=MIXTURES)
 AT = np.array([500.0])
@@ -129,7 +129,7 @@ def test_materials_keep_their_names_and_ranges():
     assert {m.name for m in materials_in(porous)} == {"SiO2", "TiO2"}
     scene = pl.Scene(pl.Layer(porous, 100.0), "Si")
     with pytest.raises(ValueError, match=r"SiO2 .* is known from"):
-        synthesise(scene, np.array([100.0, 5000.0]))
+        simulate_signal(scene, np.array([100.0, 5000.0]))
 
 
 @EVERY_RULE
@@ -141,7 +141,7 @@ def test_fractions_outside_0_to_1(rule, fraction):
 
 def _fit(tmp_path, truth, layer):
     wavelength = np.linspace(300, 900, 121)
-    measured = synthesise(pl.Scene(truth, "Si"), wavelength, 0.001, 1)
+    measured = simulate_signal(pl.Scene(truth, "Si"), wavelength, 0.001, 1)
     path = tmp_path / "data.csv"
     np.savetxt(path, np.c_[wavelength, measured.values], delimiter=",", header="wavelength_nm,R", comments="")
     return pl.fit(pl.read_spectrum(path, noise=0.001), pl.Scene(layer, "Si"))

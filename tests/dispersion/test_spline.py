@@ -18,7 +18,7 @@ from pellicle.dispersion.base import HC
 from pellicle.dispersion.spline import KramersKronigSpline, Spline
 from pellicle.fitting.spectra.parameters import parameters
 from pellicle.optics.pair import imag, is_real, real
-from pellicle.synthetic.spectra import synthesise
+from pellicle.synthetic.spectra import simulate_signal
 
 KNOTS = (300.0, 400.0, 500.0, 700.0, 1000.0)
 AT = np.linspace(300.0, 1000.0, 141)
@@ -125,7 +125,7 @@ def test_a_fit_scans_a_spline_as_a_whole(tmp_path):
     """The index of every knot moves together: 8 candidates a thickness, not 8 to the number of knots."""
     truth = Spline((400.0, 500.0, 600.0, 800.0), (2.9, 2.7, 2.6, 2.5))
     wavelength = np.linspace(400, 800, 101)
-    measured = synthesise(pl.Scene(pl.Layer(truth, 120.0), "Si"), wavelength, 0.001, 1)
+    measured = simulate_signal(pl.Scene(pl.Layer(truth, 120.0), "Si"), wavelength, 0.001, 1)
     path = tmp_path / "data.csv"
     np.savetxt(path, np.c_[wavelength, measured.values], delimiter=",", header="wavelength_nm,R", comments="")
     free = tuple(pl.Free(1.2, 4.0, start=1.5) for _ in truth.n)

@@ -10,7 +10,7 @@ import pytest
 
 import pellicle as pl
 from pellicle.scene.free import insert
-from pellicle.synthetic.spectra import synthesise
+from pellicle.synthetic.spectra import simulate_signal
 
 WAVELENGTH = np.linspace(400.0, 900.0, 128)
 SUBSTRATE = pl.dispersion.Constant(3.9, 0.02)
@@ -36,7 +36,7 @@ def measured(
     `sigma` says the noise in the spectrum; without it a fit has to find out.
     """
     fixed = insert(scene, truth)
-    values = synthesise(fixed, wavelength, noise, seed).values
+    values = simulate_signal(fixed, wavelength, noise, seed).values
     known = np.full(wavelength.size, noise) if sigma else None
     return pl.Spectrum(
         wavelength, values, scene.light.signal, sigma=known, polarisation=scene.light.polarisation

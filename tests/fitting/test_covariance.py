@@ -12,7 +12,7 @@ from pellicle.fitting.covariance import errors, scaled
 from pellicle.fitting.spectra.problem import make
 from pellicle.fitting.spectra.targets import measured as as_numbers
 from pellicle.simulation.functions import reflectance
-from pellicle.synthetic.spectra import synthesise
+from pellicle.synthetic.spectra import simulate_signal
 
 CAUCHY = (pl.Free(1.3, 1.7), pl.Free(0.0, 2e4))
 TRUTH = (1.45, 4000.0, 480.0)  # A, B, thickness
@@ -179,7 +179,7 @@ def test_a_lower_limit_is_where_chi2_has_risen_by_2_71(film, measured):
     fit = pl.fit(data, scene)
 
     def rise(thickness):
-        model = synthesise(film(thickness, "Au"), data.wavelength).clean
+        model = simulate_signal(film(thickness, "Au"), data.wavelength).clean
         chi2 = np.sum(((data.values - model) / data.sigma) ** 2)
         return chi2 - fit.chi2_reduced * (len(data) - 1)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.synthetic.spectra import synthesise
+from pellicle.synthetic.spectra import simulate_signal
 
 BANDS = np.array([450.0, 520.0, 600.0, 690.0, 800.0])
 
@@ -19,7 +19,7 @@ def film(lower: float = 50.0, upper: float = 1500.0, prior=None) -> pl.Scene:
 def bands(thickness: float = 650.0, noise: float = 0.04, seed: int = 3) -> pl.Spectrum:
     """Five bands of such a film with noise that is known: a thickness read from them has rivals."""
     fixed = pl.Scene(pl.Layer(1.46, thickness), pl.dispersion.Constant(3.9, 0.02))
-    values = synthesise(fixed, BANDS, noise, seed).values
+    values = simulate_signal(fixed, BANDS, noise, seed).values
     return pl.Spectrum(BANDS, values, "R", sigma=np.full(BANDS.size, noise))
 
 

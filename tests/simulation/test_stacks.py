@@ -14,7 +14,7 @@ from pellicle.dispersion.effective_medium import Bruggeman
 from pellicle.scene.free import insert
 from pellicle.scene.layers import medium
 from pellicle.simulation.film import build
-from pellicle.synthetic.spectra import synthesise
+from pellicle.synthetic.spectra import simulate_signal
 
 WAVELENGTH = np.linspace(450.0, 850.0, 9)
 NODES = np.linspace(-8.0, 8.0, 161)
@@ -229,7 +229,7 @@ def test_a_microscope_reads_a_wrong_thickness_without_its_cone():
     """The reason for the effect: 5 to 30 nm at a numerical aperture of 0.5."""
     wavelength = np.linspace(450.0, 850.0, 128)
     truth = pl.Scene(pl.Layer(1.46, 2000.0), "Si", instrument=pl.Instrument(numerical_aperture=0.5))
-    values = synthesise(truth, wavelength, 0.002, 1).values
+    values = simulate_signal(truth, wavelength, 0.002, 1).values
     spectrum = pl.Spectrum(wavelength, values, "R", sigma=np.full(128, 0.002))
     thickness = pl.Free(1500, 2500)
     cone = pl.Scene(pl.Layer(1.46, thickness), "Si", instrument=pl.Instrument(numerical_aperture=0.5))

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from pellicle.recipes.film import FilmRecipe
     from pellicle.recipes.surface import SurfaceRecipe
     from pellicle.scene.film import Scene
-    from pellicle.synthetic.spectra import Synthetic
+    from pellicle.synthetic.spectra import SimulatedSignal
 
 
 def simulate(
@@ -57,21 +57,20 @@ def _write_spectrum(
 ) -> None:
     from pellicle.files import write_text
     from pellicle.fitting.spectra.messages import log_plan, log_scene
-    from pellicle.synthetic.spectra import synthesise, synthesise_angles
+    from pellicle.synthetic.spectra import simulate_signal
 
     scene = recipe.scene()
     log_scene(scene)
-    ellipsometric = scene.light.signal == "psi-delta"
-    if ellipsometric and recipe.tables.data.angle is None:
+    if scene.light.signal == "psi-delta" and recipe.tables.data.angle is None:
         raise DataError(f"{recipe.path}: ellipsometry needs an angle of incidence: give [data] angle = 70")
     nm = wavelengths(recipe, scene)
-    result = (synthesise_angles if ellipsometric else synthesise)(scene, nm, noise, seed, tolerance)
+    result = simulate_signal(scene, nm, noise, seed, tolerance)
     log_plan(result.plan)
     write_text(out, _csv(scene, result, noise, comments))
     say(f"{out}: {len(nm)} points, {nm[0]:g} to {nm[-1]:g} nm")
 
 
-def _csv(scene: Scene, result: Synthetic, noise: float, comments: list[str]) -> str:
+def _csv(scene: Scene, result: SimulatedSignal, noise: float, comments: list[str]) -> str:
     """The spectrum as CSV below its comments, which end with the true values of the parameters."""
     from pellicle.fitting.spectra.parameters import fixed_numbers, parameters
 
@@ -98,10 +97,10 @@ def _write_samples(
 ) -> None:
     from pellicle.data.write_brdf import write_brdf_samples
     from pellicle.fitting.spectra.messages import log_plan
-    from pellicle.synthetic.brdf import synthesise
+    from pellicle.synthetic.brdf import simulate_samples
 
     surface = recipe.scene()
-    samples, plan = synthesise(surface, directions(recipe), noise, seed, tolerance)
+    samples, plan = simulate_samples(surface, directions(recipe), noise, seed, tolerance)
     log_plan(plan)
     units = {parameter.key: parameter.unit for parameter in surface.brdf.parameters}
     truth = ", ".join(

@@ -1,4 +1,4 @@
-"""Synthetic samples of a surface's BRDF: directions worth looking along, values and noise."""
+"""Simulated samples of the BRDF of a surface, and the directions where they are taken."""
 
 from __future__ import annotations
 
@@ -17,11 +17,15 @@ from pellicle.scene.surface import Surface, surface_view
 from pellicle.simulation.surface import build
 
 SAMPLES = 1000
-"""Pairs of directions where no data file says which."""
+"""Default number of pairs of directions."""
 
 
 class Directions(NamedTuple):
-    """To the light and to the eye: degrees from the normal and around it, each (samples,)."""
+    """Pairs of directions to light and eye.
+
+    `theta_i`, `phi_i` is the direction to the light and `theta_o`, `phi_o` that to the eye, in degrees from
+    the normal and around it, each of shape (samples,). The mirror side of phi_i = 0 is phi_o = 180.
+    """
 
     theta_i: np.ndarray
     phi_i: np.ndarray
@@ -30,10 +34,10 @@ class Directions(NamedTuple):
 
 
 def default_directions(count: int = SAMPLES) -> Directions:
-    """Half and difference angles of a Sobol sequence, the same at every call.
+    """Pairs of directions from a Sobol sequence of half and difference angles, the same at every call.
 
-    θ_h is spaced as its square root, as MERL's grid, so that most pairs lie where a lobe is; θ_d and
-    both azimuths evenly. Pairs with a direction below the horizon are left out.
+    √θ_h is uniform, as in MERL's grid, so that most pairs lie in the lobe; θ_d and both azimuths are uniform.
+    Pairs with a direction below the horizon are left out.
     """
     from scipy.stats import qmc  # takes longer to import than the rest of the package
 
@@ -42,63 +46,52 @@ def default_directions(count: int = SAMPLES) -> Directions:
     light, eye = from_half_difference(
         quarter * unit[:, 0] ** 2, turn * unit[:, 1], quarter * unit[:, 2], turn * unit[:, 3]
     )
-    seen = (light[2] > 0) & (eye[2] > 0)
-    found = [np.rad2deg(x[seen][:count]) for pair in (light, eye) for x in angles(pair)]
-    return Directions(*found)
+    above = (light[2] > 0) & (eye[2] > 0)
+    return Directions(*(np.rad2deg(x[above][:count]) for vector in (light, eye) for x in angles(vector)))
 
 
-def simulate_brdf(
-    surface: Surface,
-    directions: Directions | BrdfSamples | None = None,
-    *,
-    noise: float = 0.0,
-    seed: int = 0,
-) -> BrdfSamples:
-    """The samples that a surface would give, ready to be fitted; for `directions` see `synthesise`.
-
-    Without directions there are 1000 pairs, spread over the lobe and around it. `noise` (1/sr) is the
-    standard deviation of normal noise, and becomes the samples' σ.
-    """
-    looked = default_directions() if directions is None else directions
-    return synthesise(surface, looked, noise, seed).samples
-
-
-class Synthetic(NamedTuple):
-    """Samples with noise, and the plan that they went through."""
+class SimulatedSamples(NamedTuple):
+    """Simulated samples with noise, and the plan of their simulation."""
 
     samples: BrdfSamples
     plan: Plan
 
 
-def synthesise(
+def simulate_samples(
     surface: Surface,
-    looked: Directions | BrdfSamples,
+    directions: Directions | BrdfSamples | None = None,
     noise: float = 0.0,
     seed: int = 0,
     tolerance: float = 0.0,
-) -> Synthetic:
-    """The BRDF at where free numbers start, with normal noise of standard deviation `noise` (1/sr).
+) -> SimulatedSamples:
+    """Simulate samples of the BRDF of a surface with normal noise of standard deviation `noise` (1/sr).
 
-    What noise takes below zero is 0, and a note counts it. Effects that change less than the `tolerance`
-    are left out (`pellicle.plan`). **Raises:** UsageError unless the surface has one channel, or R, G
-    and B, and for a black one.
+    Free parameters take their start values. Without `directions` there are 1000 pairs, spread over the
+    lobe and around it. The noise becomes the σ of the samples; values that it takes below zero are set to 0,
+    and a note counts them. Effects that change the BRDF by less than the relative `tolerance` are left out
+    (see `pellicle.plan`).
+
+    **Raises:** UsageError for a surface that has neither one channel nor R, G and B, or reflects nothing.
     """
     channels = {len(names): names for names in CHANNELS}.get(surface.channels)
     if channels is None:
-        raise UsageError(f"samples have one channel or R, G and B: {surface.channels} wavelengths were given")
+        raise UsageError(
+            f"samples have one channel or R, G and B: the surface has {surface.channels} wavelengths"
+        )
+    pairs = default_directions() if directions is None else directions
     numbers = {key: x.tolist() for key, x in surface.start_numbers().items() if key != "wavelengths"}
     fixed = replace(surface, numbers=numbers)
-    plan = planning.plan(surface_view(fixed, looked), tolerance)
+    plan = planning.plan(surface_view(fixed, pairs), tolerance)
     with jax.enable_x64(True):
-        seen = jax.jit(build(plan.static_key))(surface_view(fixed, looked, len(looked.theta_i)))
-    clean = np.asarray(seen, dtype=float)
+        view = surface_view(fixed, pairs, len(pairs.theta_i))
+        clean = np.asarray(jax.jit(build(plan.static_key))(view), dtype=float)
     noisy = clean + np.random.default_rng(seed).normal(0.0, 1.0, clean.shape) * noise
     below = int(np.sum(noisy < 0))
     samples = BrdfSamples(
-        **{name: getattr(looked, name) for name in Directions._fields},
+        **{name: getattr(pairs, name) for name in Directions._fields},
         values=np.maximum(noisy, 0.0),
         channels=channels,
         sigma=np.full(clean.shape, noise) if noise > 0 else None,
-        notes=(f"{below} values that noise took below zero are 0",) if below else (),
+        notes=(f"{below} values below zero through noise were set to 0",) if below else (),
     )
-    return Synthetic(samples, plan)
+    return SimulatedSamples(samples, plan)

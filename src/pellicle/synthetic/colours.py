@@ -1,4 +1,4 @@
-"""What a film looks like: its colour against thickness and angle of incidence."""
+"""Interference colours of a film against thickness and angle of incidence."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from pellicle.scene.layers import Layer
 from pellicle.simulation.film import build, tabulated
 
 BANDS = "uniform-64"
-"""Colours are within ΔE2000 of 0.02 of those by steps of 1 nm, for films up to 5 µm."""
+"""Integration over the spectrum: colours within ΔE2000 = 0.02 of steps of 1 nm, for films up to 5 µm."""
 
 
 def interference_colours(
@@ -33,28 +33,32 @@ def interference_colours(
     observer: str = "1931",
     illuminant: str = "D65",
 ) -> Colour:
-    """Colours of a scene, XYZ of shape (angles, thicknesses, 3).
+    """Colours of a film, reflected or transmitted as the scene's signal says.
 
-    **Arguments:** `thickness` in nm of the `layer` of that name, or of the one that is free, or the
-    first; `angle` of incidence in degrees; both rising. Other free parameters take their values, and the
-    signal is the scene's own, reflectance or transmittance.
+    **Arguments:** `thickness` in nm, (thicknesses,), of the `layer` of that name (the free one or else the
+    first if None); `angle` of incidence in degrees, (angles,); both rising. `observer` and `illuminant` as in
+    `pellicle.colour.sensor`. Other free parameters take their start values.
 
-    **Raises:** UsageError for ellipsometry, for a layer that is none, and ValueError where a material has
+    **Returns:** `Colour` with XYZ of shape (angles, thicknesses, 3).
+
+    **Raises:** UsageError for ellipsometry and for an unknown layer; ValueError where a material has
     no data between 380 and 730 nm.
     """
     if scene.light.signal == "psi-delta":
         raise UsageError("ellipsometry has no colour: chart a recipe with signal R or T")
     bands, white = integration_bands(BANDS, observer, illuminant), sensor(observer, illuminant).white
     with jax.enable_x64(True):
-        seen = _over(with_wavelength(scene, bands.wavelength), thickness, angle, varied(scene, layer))
+        varying = _over(
+            with_wavelength(scene, bands.wavelength), thickness, angle, varied_layer(scene, layer)
+        )
         grid = np.stack(np.meshgrid(thickness, angle), axis=-1).reshape(-1, 2)
-        found = signals(exact(seen), tabulated(seen), grid, build) @ bands.weights
-        xyz = jnp.asarray(found.reshape(len(angle), len(thickness), 3))
+        weighted = signals(exact(varying), tabulated(varying), grid, build) @ bands.weights
+        xyz = jnp.asarray(weighted.reshape(len(angle), len(thickness), 3))
     return Colour(xyz, (float(white[0]), float(white[1]), float(white[2])))
 
 
-def varied(scene: Scene, layer: str | None = None) -> int:
-    """The position of the layer whose thickness a chart varies."""
+def varied_layer(scene: Scene, layer: str | None = None) -> int:
+    """Position of the layer whose thickness a chart varies. Raises UsageError for an unknown name."""
     coherent = {i: x for i, x in enumerate(scene.layers) if isinstance(x, Layer)}
     if layer is not None:
         named = [i for i, x in coherent.items() if x.name == layer]
@@ -63,20 +67,19 @@ def varied(scene: Scene, layer: str | None = None) -> int:
             raise UsageError(f"no layer {layer!r} to vary; known: {known}")
         return named[0]
     free = [i for i, x in coherent.items() if isinstance(x.thickness, Free)]
-    found = [*free, *coherent]
-    if not found:
+    candidates = [*free, *coherent]
+    if not candidates:
         raise UsageError("there is no coherent layer whose thickness could vary")
-    return found[0]
+    return candidates[0]
 
 
 def _over(scene: Scene, thickness: np.ndarray, angle: np.ndarray, position: int) -> Scene:
-    """The scene with nothing free but one thickness and the angle, within what is charted."""
+    """The scene with one thickness and the angle free over these values, and all else fixed."""
+
+    def between(values: np.ndarray) -> Free:
+        low, high = float(values[0]), float(values[-1])
+        return Free(low, high if high > low else low + 1e-9)
+
     fixed = insert(scene, start_values(scene))
     where: Any = lambda s: (s.layers[position].thickness, s.light)  # noqa: E731
-    light = replace(fixed.light, angle=_between(angle))
-    return eqx.tree_at(where, fixed, (_between(thickness), light))
-
-
-def _between(values: np.ndarray) -> Free:
-    low, high = float(values[0]), float(values[-1])
-    return Free(low, high if high > low else low + 1e-9)
+    return eqx.tree_at(where, fixed, (between(thickness), replace(fixed.light, angle=between(angle))))

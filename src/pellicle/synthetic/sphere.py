@@ -1,4 +1,4 @@
-"""A surface as the eye meets it: a sphere under a directional light, and lobes in the plane of incidence."""
+"""Pictures of a surface: a sphere under a directional light, and the BRDF in the plane of incidence."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface
 
 WAVES = 24
-"""Plane waves in the noise that a free thickness follows over the sphere."""
+"""Number of plane waves in the noise that a free thickness follows over the sphere."""
 
 
 class Relief(NamedTuple):
-    """Smooth noise over the sphere: height 0 to 1, its slope 0 to 1 and where that points (degrees)."""
+    """Smooth noise over the sphere: height and slope, both 0 to 1, and direction of the slope (degrees)."""
 
     height: np.ndarray
     slope: np.ndarray
@@ -29,12 +29,12 @@ class Relief(NamedTuple):
 def render(
     surface: Surface, light: tuple[float, float] = (35.0, 60.0), size: int = 360, seed: int = 0
 ) -> Any:
-    """Linear RGB (size, size, 3) of a unit sphere seen from the front; NaN beside it.
+    """Render a unit sphere from the front: linear RGB (size, size, 3), NaN outside the sphere.
 
-    `light` is the polar angle from the line of sight and the azimuth, in degrees; the image is the
-    radiance for an irradiance of π, so that a white diffuse surface facing the light is 1. A free
-    thickness follows smooth noise between its bounds, and with it a free deviation of the normals the
-    noise's slope up to its upper bound, in the slope's own direction. Other free numbers are halfway.
+    `light` is the polar angle from the line of sight and the azimuth, in degrees. The image is the
+    radiance at an irradiance of π: a white diffuse surface facing the light is 1. A free thickness follows
+    smooth noise between its bounds; a free deviation of the normals follows the slope of that noise, up to
+    its upper bound, in the direction of the slope. Other free parameters take their start values.
     """
     across = (np.arange(size) + 0.5) * 2 / size - 1
     x, y = np.meshgrid(across, -across)
@@ -44,26 +44,29 @@ def render(
     axes = np.asarray(jax.jit(frame)(theta, phi))
     i, o = (axes @ np.asarray(direction(*at)) for at in (light, (0.0, 0.0)))
     parameters = numbers(surface, relief(normal, axes, np.random.default_rng(seed)))
-    seen = np.asarray(_sent(surface.brdf, parameters, i, o))
-    image = np.full((size, size, seen.shape[-1]), np.nan)
-    image[inside] = np.pi * seen * np.clip(i[:, 2:], 0.0, None)
+    brdf = np.asarray(_evaluate(surface.brdf, parameters, i, o))
+    image = np.full((size, size, brdf.shape[-1]), np.nan)
+    image[inside] = np.pi * brdf * np.clip(i[:, 2:], 0.0, None)
     return image
 
 
 def in_plane(surface: Surface, incidence: float, leaving: np.ndarray) -> np.ndarray:
-    """The BRDF (angles, channels) in the plane of incidence; a positive angle is on the mirror's side."""
+    """The BRDF (angles, channels) in the plane of incidence, at angles `leaving` in degrees.
+
+    Positive angles are on the side of the mirror direction.
+    """
     i = direction(incidence, 0.0)
     o = direction(np.abs(leaving), np.where(leaving >= 0, 180.0, 0.0))
-    return np.asarray(_sent(surface.brdf, numbers(surface, None), jnp.broadcast_to(i, o.shape), o))
+    return np.asarray(_evaluate(surface.brdf, numbers(surface, None), jnp.broadcast_to(i, o.shape), o))
 
 
-@partial(jax.jit, static_argnums=0)  # as one program: its operations one by one take seconds to compile
-def _sent(brdf: Model, parameters: dict[str, Any], i: Any, o: Any) -> Any:
+@partial(jax.jit, static_argnums=0)  # one program; compiled one by one its operations take seconds
+def _evaluate(brdf: Model, parameters: dict[str, Any], i: Any, o: Any) -> Any:
     return brdf(parameters, i, o)
 
 
 def relief(normal: np.ndarray, axes: np.ndarray, rng: np.random.Generator) -> Relief:
-    """Noise of a few bumps over the sphere, at these normals (..., 3) with frames (..., 3, 3)."""
+    """Noise of a few bumps over the sphere, at normals (..., 3) with frames (..., 3, 3)."""
     waves = rng.normal(0.0, 3.0, (WAVES, 3))
     phase = normal @ waves.T + rng.uniform(0, 2 * np.pi, WAVES)
     height, gradient = np.cos(phase).sum(-1), -np.sin(phase) @ waves
@@ -74,7 +77,7 @@ def relief(normal: np.ndarray, axes: np.ndarray, rng: np.random.Generator) -> Re
 
 
 def numbers(surface: Surface, noise: Relief | None) -> dict[str, Any]:
-    """Every number of the surface: fixed ones, free ones where they start, and what follows the noise."""
+    """Every number of the surface: fixed values, start values, and those that follow the noise."""
     found = surface.start_numbers()
     if noise is not None:
         found |= _following(surface, noise)

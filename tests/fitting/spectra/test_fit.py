@@ -10,7 +10,7 @@ from pellicle.errors import DataError, UsageError
 from pellicle.scene.film import with_wavelength
 from pellicle.scene.free import free_leaves
 from pellicle.simulation.film import build
-from pellicle.synthetic.spectra import synthesise
+from pellicle.synthetic.spectra import simulate_signal
 
 NM = np.linspace(400.0, 900.0, 128)
 N, K = pl.Free(1.3, 1.9), pl.Free(0.0, 0.5)
@@ -57,7 +57,9 @@ def test_angles_of_the_spectrum_go_before_those_of_the_scene(film, measured):
 
 
 def test_two_angles_in_one_spectrum(film):
-    both = [synthesise(film(480.0, light=pl.Light(angle=a)), NM[::2], 0.003, 1).values for a in (20.0, 60.0)]
+    both = [
+        simulate_signal(film(480.0, light=pl.Light(angle=a)), NM[::2], 0.003, 1).values for a in (20.0, 60.0)
+    ]
     angle = np.repeat([20.0, 60.0], 64)
     data = pl.Spectrum(np.tile(NM[::2], 2), np.concatenate(both), "R", angle=angle)
     agrees(pl.fit(data, film()), {"thickness": 480.0})
@@ -239,7 +241,7 @@ def test_rivals_cost_what_a_fit_there_costs(film, measured):
 def test_a_shift_of_the_wavelengths(film):
     """The instrument tells 3 nm too little: the film is seen at λ + 3, its tabled substrate too."""
     nm = np.linspace(400.0, 900.0, 128)
-    seen = synthesise(film(480.0, substrate="Si"), nm + 3.0, 0.002, 1).values
+    seen = simulate_signal(film(480.0, substrate="Si"), nm + 3.0, 0.002, 1).values
     shift = pl.Instrument(wavelength_shift=pl.Free(-10.0, 10.0))
     fit = pl.fit(pl.Spectrum(nm, seen, "R"), film(substrate="Si", instrument=shift))
     agrees(fit, {"thickness": 480.0, "instrument.wavelength_shift": 3.0})

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.synthetic.spectra import synthesise
+from pellicle.synthetic.spectra import simulate_signal
 
 WAVELENGTH = np.linspace(400.0, 900.0, 192)
 NOISE = 0.003
@@ -28,7 +28,7 @@ def test_both_thicknesses_come_out(bandwidth, oxide, nitride):
     """Also through a spectrometer's window, which a stack takes by quadrature."""
     instrument = pl.Instrument(bandwidth=bandwidth)
     truth = {"oxide.thickness": 350.0, "nitride.thickness": 120.0}
-    values = synthesise(scene(350.0, 120.0, instrument=instrument), WAVELENGTH, NOISE, 1).values
+    values = simulate_signal(scene(350.0, 120.0, instrument=instrument), WAVELENGTH, NOISE, 1).values
     spectrum = pl.Spectrum(WAVELENGTH, values, "R", sigma=np.full(WAVELENGTH.size, NOISE))
     free = scene(pl.Free(*oxide), pl.Free(*nitride), instrument=instrument)
     found = pl.fit(spectrum, free)
@@ -43,7 +43,7 @@ def test_quadrature_equals_the_series_for_a_layer_split_in_two():
     instrument = pl.Instrument(bandwidth=5.0)
     whole = pl.Scene(pl.Layer("SiO2", 1500.0), "Si", instrument=instrument)
     halves = pl.Scene([pl.Layer("SiO2", 700.0), pl.Layer("SiO2", 800.0)], "Si", instrument=instrument)
-    a, b = synthesise(whole, WAVELENGTH).clean, synthesise(halves, WAVELENGTH).clean
-    none = synthesise(pl.Scene(pl.Layer("SiO2", 1500.0), "Si"), WAVELENGTH).clean
+    a, b = simulate_signal(whole, WAVELENGTH).clean, simulate_signal(halves, WAVELENGTH).clean
+    none = simulate_signal(pl.Scene(pl.Layer("SiO2", 1500.0), "Si"), WAVELENGTH).clean
     # the series takes the amplitudes at the centre of the window, the quadrature across it
     assert np.max(np.abs(a - b)) < 1e-3 < 0.01 < np.max(np.abs(none - b))

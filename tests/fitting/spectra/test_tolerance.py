@@ -11,7 +11,7 @@ import pellicle as pl
 from pellicle.effects.film import exact
 from pellicle.effects.removal import FilmRemoval
 from pellicle.fitting.spectra import fit as fitting
-from pellicle.synthetic.spectra import synthesise
+from pellicle.synthetic.spectra import simulate_signal
 
 NM = np.linspace(450.0, 850.0, 41)
 NOISE = 1e-3
@@ -23,7 +23,7 @@ def scene(extinction):
 
 
 def spectrum(thing):
-    values = synthesise(thing, NM, NOISE, seed=1).values
+    values = simulate_signal(thing, NM, NOISE, seed=1).values
     return pl.Spectrum(NM, values, "R", np.full(NM.shape, NOISE))
 
 
