@@ -34,7 +34,7 @@ def main(folder: Path = STUDIES) -> None:
             f"seed {seed}, noise {NOISE:g}, pellicle {pellicle.__version__}",
             f"truth: model {surface.model}, {start}",
         ]
-        write_brdf_samples(target, samples, said=said)
+        write_brdf_samples(target, samples, comments=said)
 
 
 def _truth(surface):

@@ -9,6 +9,7 @@ from pellicle.data.read_spectrum import read_spectrum
 from pellicle.errors import DataError, UsageError
 
 GOOD = "400,0.1\n500,0.2\n600,0.3\n"
+EITHER = '`signal="R"` or `signal="T"`'
 
 
 @pytest.fixture
@@ -131,18 +132,18 @@ def test_wavelength_not_above_zero(write, value, refused):
 @pytest.mark.parametrize("header", ["", "wavelength,R\n"])
 def test_an_axis_that_looks_like_another_unit(write, header, rows, refused):
     signal = None if header else "R"
-    refused(write(header + rows), DataError, "looks unlike nm", "--wavelength-unit", signal=signal)
+    refused(write(header + rows), DataError, "is unlike nm", "`wavelength_unit=", signal=signal)
 
 
 def test_percent_without_a_sign(write, refused):
     path = write("wavelength,R\n400,12\n500,49.5\n600,30\n")
-    refused(path, DataError, "line 3, column 'R'", "49.5 is above 1.5", "--signal-unit percent")
-    refused(path, DataError, "line 3", "above 1.5", "--range", signal_unit="fraction")
+    refused(path, DataError, "line 3, column 'R'", "49.5 is above 1.5", '`signal_unit="percent"`')
+    refused(path, DataError, "line 3", "above 1.5", "`range`", signal_unit="fraction")
 
 
 def test_above_one_and_a_half_in_percent_too(write, refused):
     path = write("wavelength,T (%)\n400,12\n500,151\n600,30\n")
-    refused(path, DataError, "line 3", "1.51 is above 1.5 for a transmittance", "--range")
+    refused(path, DataError, "line 3", "1.51 is above 1.5 for a transmittance", "`range`")
 
 
 @pytest.mark.parametrize(
@@ -152,7 +153,7 @@ def test_above_one_and_a_half_in_percent_too(write, refused):
 def test_negative_beyond_noise(write, header, row, refused):
     good = "0.1,0.001" if "sigma" in header else "0.1"
     path = write(f"wavelength,{header}\n400,{good}\n500,{row}\n600,{good}\n")
-    refused(path, DataError, "line 3, column 'R", "below zero by more than noise", "--range")
+    refused(path, DataError, "line 3, column 'R", "below zero by more than noise", "`range`")
 
 
 def test_negative_beyond_the_noise_of_the_flag(write, refused):
@@ -179,97 +180,120 @@ def test_angle_in_radians(write, refused):
 
 
 def test_no_header_and_no_signal(write, refused):
-    refused(write(GOOD), UsageError, "no header", "--signal R")
+    refused(write(GOOD), UsageError, "no header", '`signal="R"`')
 
 
 def test_no_header_and_five_columns(write, refused):
-    refused(write("1,2,3,4,5\n2,3,4,5,6\n"), UsageError, "5 columns", "--columns", signal="R")
+    refused(write("1,2,3,4,5\n2,3,4,5,6\n"), UsageError, "5 columns", "`columns=[", signal="R")
 
 
 def test_both_r_and_t(write, refused):
     refused(
-        write("wl,R,T\n400,0.1,0.2\n500,0.1,0.2\n"), UsageError, "both R and T", "--signal R or --signal T"
+        write("wl,R,T\n400,0.1,0.2\n500,0.1,0.2\n"),
+        UsageError,
+        "both R and T",
+        EITHER,
     )
 
 
 def test_intensity_without_a_signal(write, refused):
-    refused(write("wl,intensity\n400,1\n500,2\n"), UsageError, "uncalibrated", "--signal R or --signal T")
+    refused(write("wl,intensity\n400,1\n500,2\n"), UsageError, "uncalibrated", EITHER)
 
 
 def test_signal_that_is_not_there(write, refused):
-    refused(write("wl,T\n400,0.1\n500,0.2\n"), UsageError, "holds T", "--signal says R", signal="R")
+    refused(write("wl,T\n400,0.1\n500,0.2\n"), UsageError, "has T", 'contradicts `signal="R"`', signal="R")
 
 
 def test_two_polarisations(write, refused):
     path = write("wl,Rs,Rp\n400,0.1,0.2\n500,0.1,0.2\n")
-    refused(path, UsageError, "'Rs', 'Rp'", "--polarisation s")
-    refused(path, UsageError, "'Rs', 'Rp'", "--polarisation s", polarisation="unpolarised")
-    refused(write("wl,Rs\n400,0.1\n500,0.2\n"), UsageError, "measured in s", "says p", polarisation="p")
+    refused(path, UsageError, "'Rs', 'Rp'", '`polarisation="s"`')
+    refused(path, UsageError, "'Rs', 'Rp'", '`polarisation="s"`', polarisation="unpolarised")
+    refused(
+        write("wl,Rs\n400,0.1\n500,0.2\n"),
+        UsageError,
+        "measured in s",
+        'contradicts `polarisation="p"`',
+        polarisation="p",
+    )
 
 
 def test_no_signal_column(write, refused):
     path = write("wavelength,brightness,gloss\n400,0.1,0.2\n500,0.2,0.3\n")
-    refused(path, DataError, "'wavelength', 'brightness', 'gloss'", "--columns")
+    refused(path, DataError, "'wavelength', 'brightness', 'gloss'", "`columns=[")
 
 
 def test_no_wavelength_column(write, refused):
-    refused(write("x,R\n400,0.1\n500,0.2\n"), DataError, "'x', 'R'", "--columns")
+    refused(write("x,R\n400,0.1\n500,0.2\n"), DataError, "'x', 'R'", "`columns=[")
 
 
 def test_psi_and_delta_are_not_read_as_something_else(write, refused):
     path = write("wl,psi,delta\n400,20,170\n500,21,171\n")
-    refused(path, UsageError, "psi and delta", "--signal says R", signal="R")
+    refused(path, UsageError, "psi and delta", 'contradicts `signal="R"`', signal="R")
 
 
 @pytest.mark.parametrize("header", ["wavelength,R,R", "wavelength,R,r", "wavelength,wavelength,R"])
 def test_a_name_twice(write, header, refused):
-    refused(write(f"{header}\n400,0.1,0.2\n500,0.1,0.2\n"), DataError, "twice", "--columns")
+    refused(write(f"{header}\n400,0.1,0.2\n500,0.1,0.2\n"), DataError, "twice", "`columns`")
 
 
 @pytest.mark.parametrize("header", ["wavelength,lambda,R", "wavelength,energy,R", "wl,R,Reflectance"])
 def test_two_columns_that_could_be_the_same(write, header, refused):
-    refused(write(f"{header}\n400,0.1,0.2\n500,0.1,0.2\n"), DataError, "could each be", "--columns")
+    refused(write(f"{header}\n400,0.1,0.2\n500,0.1,0.2\n"), DataError, "could each be", "`columns`")
 
 
 def test_unknown_units(write, refused):
-    refused(write("wavelength (pm),R\n" + GOOD), DataError, "'pm'", "--wavelength-unit")
-    refused(write("wavelength,R (dB)\n" + GOOD), DataError, "'db'", "--signal-unit")
+    refused(write("wavelength (pm),R\n" + GOOD), DataError, "'pm'", "`wavelength_unit`")
+    refused(write("wavelength,R (dB)\n" + GOOD), DataError, "'db'", "`signal_unit=")
     path = write("wavelength,R\n" + GOOD)
     for flag in ("wavelength_unit", "signal_unit"):
-        with pytest.raises(UsageError, match=r"'furlong'.*use one of"):
+        with pytest.raises(UsageError, match=f"`{flag}` must be one of .*, not 'furlong'"):
             read_spectrum(path, **{flag: "furlong"})
 
 
 def test_a_flag_that_contradicts_the_file(write, refused):
     path = write("wavelength_um,R (%)\n0.4,10\n0.5,20\n")
-    refused(path, UsageError, "in um", "says nm", "leave the flag out", wavelength_unit="nm")
-    refused(path, UsageError, "in percent", "says fraction", "leave the flag out", signal_unit="fraction")
+    refused(
+        path,
+        UsageError,
+        "in um",
+        'contradicts `wavelength_unit="nm"`',
+        "leave that out",
+        wavelength_unit="nm",
+    )
+    refused(
+        path,
+        UsageError,
+        "in percent",
+        'contradicts `signal_unit="fraction"`',
+        "leave that out",
+        signal_unit="fraction",
+    )
 
 
 def test_columns_flag_that_fits_nothing(write, refused):
     path = write("a,b\n" + GOOD)
-    refused(path, UsageError, "3 columns", "has 2", columns="wavelength,R,T")
+    refused(path, UsageError, "3 names", "has 2", columns="wavelength,R,T")
     refused(path, UsageError, "'gloss'", "use wavelength", columns="wavelength,gloss")
     refused(path, DataError, "no column is a signal", columns="wavelength")
 
 
 @pytest.mark.parametrize("noise", [0, -0.1, np.nan, np.inf])
 def test_noise_that_is_none(write, noise):
-    with pytest.raises(UsageError, match=r"--noise .* above zero, e\.g\. --noise 0\.005"):
+    with pytest.raises(UsageError, match=r"`noise` must be .* above zero, as in `noise=0\.005`"):
         read_spectrum(write("wl,R\n" + GOOD), noise=noise)
 
 
 def test_flags_with_unknown_words(write):
     path = write("wl,R\n" + GOOD)
-    with pytest.raises(UsageError, match="--signal 'X' is not known; use one of R, T"):
+    with pytest.raises(UsageError, match="`signal` must be one of R, T, psi-delta, not 'X'"):
         read_spectrum(path, signal="X")
-    with pytest.raises(UsageError, match="--polarisation 'q' is not known; use one of s, p, unpolarised"):
+    with pytest.raises(UsageError, match="`polarisation` must be one of s, p, unpolarised, not 'q'"):
         read_spectrum(path, polarisation="q")
 
 
 def test_a_range_that_leaves_too_little(write, refused):
     path = write("wl,R\n" + GOOD + "700,0.1\n800,0.1\n")
-    refused(path, DataError, "only 4 of 5", "400 to 800 nm", "--range 450:900", "widen", range=(450, 900))
+    refused(path, DataError, "only 4 of 5", "400 to 800 nm", "`range=(450, 900)`", "widen", range=(450, 900))
     for lo, hi in ((800, 400), (500, 500), (-1, 500), (np.nan, 500)):
-        with pytest.raises(UsageError, match=r"--range .* lower wavelength in nm first"):
+        with pytest.raises(UsageError, match=r"`range=.* lower wavelength in nm first"):
             read_spectrum(path, range=(lo, hi))

@@ -8,7 +8,7 @@ import zipfile
 import pytest
 
 from pellicle.data.read_spectrum import read_spectrum
-from pellicle.data.tabular.text import no_measurement
+from pellicle.data.tabular.text import foreign_format
 from pellicle.errors import DataError
 
 
@@ -34,7 +34,10 @@ def packed(*names: str) -> bytes:
         (b'<?xml version="1.0"?>', "a web page or XML"),
         (b'{"wavelength": [400, 500]}', "JSON"),
         (b'[{"R": 0.1}]', "JSON"),
-        (b"# a film\n[data]\nsignal = 'R'\n\n[scene]\nsubstrate = 'Si'\n", "a recipe; give it with --recipe"),
+        (
+            b"# a film\n[data]\nsignal = 'R'\n\n[scene]\nsubstrate = 'Si'\n",
+            "a recipe; give it as `recipe`",
+        ),
     ],
 )
 def test_what_is_none_is_named(content, said, refusal, tmp_path):
@@ -55,4 +58,4 @@ def test_what_is_none_is_named(content, said, refusal, tmp_path):
     ],
 )
 def test_what_may_be_one_passes(content):
-    assert no_measurement(content) is None
+    assert foreign_format(content) is None

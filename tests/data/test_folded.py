@@ -53,7 +53,7 @@ def test_noise_may_take_the_contrast_above_one(write):
     spectrum = read_spectrum(write("wl,alpha,beta", NM, [0.6, 0.6, 1.0], [-0.81, -0.8, -0.01]), analyser=45)
     np.testing.assert_allclose(spectrum.values, np.rad2deg(np.arctan([2.0, 2.0, np.inf])), rtol=1e-12)
     np.testing.assert_allclose(spectrum.delta, 180.0, atol=1e-5)
-    assert any("of 2 points" in note for note in spectrum.notes)
+    assert any("at 2 points whose contrast is above 1" in note for note in spectrum.notes)
 
 
 def test_a_folded_delta(write):
@@ -68,8 +68,8 @@ def test_a_folded_delta(write):
 @pytest.mark.parametrize(
     ("header", "columns", "words", "error", "said"),
     [
-        ("wl,alpha,beta", (0.1, 0.2), {}, UsageError, "add --analyser 45"),
-        ("wl,alpha,beta,analyser", (0.1, 0.2, 45), {"analyser": 45}, UsageError, "leave --analyser out"),
+        ("wl,alpha,beta", (0.1, 0.2), {}, UsageError, "`analyser=45`"),
+        ("wl,alpha,beta,analyser", (0.1, 0.2, 45), {"analyser": 45}, UsageError, "leave `analyser` out"),
         ("wl,alpha,beta", (0.1, 0.2), {"analyser": 90}, UsageError, "between 0 and 90 degrees, got 90"),
         ("wl,alpha,beta,analyser", (0.1, 0.2, 0), {}, DataError, "line 2, column 'analyser': 0 is not"),
         ("wl,alpha,beta", (0.9, 0.9), {"analyser": 45}, DataError, "contrast of 1.27"),
@@ -78,9 +78,9 @@ def test_a_folded_delta(write):
         ("wl,psi,delta", (45, 200), {"folded": True}, DataError, "0 to 180 degrees, as a folded delta is"),
         ("wl,psi,delta", (45, -10), {"folded": True}, DataError, "0 to 180 degrees, as a folded delta is"),
         ("wl,psi,delta", (45, 90), {"analyser": 45}, UsageError, "goes with columns alpha and beta"),
-        ("wl,N,C,S", (0, 0, 1), {"folded": True}, UsageError, "hold the sign of delta"),
-        ("wl,R", (0.5,), {"folded": True}, UsageError, "--folded is for ellipsometry"),
-        ("wl,R", (0.5,), {"analyser": 45}, UsageError, "--analyser is for ellipsometry"),
+        ("wl,N,C,S", (0, 0, 1), {"folded": True}, UsageError, "contain the sign of delta"),
+        ("wl,R", (0.5,), {"folded": True}, UsageError, "`folded` is for ellipsometry"),
+        ("wl,R", (0.5,), {"analyser": 45}, UsageError, "`analyser` is for ellipsometry"),
     ],
 )
 def test_what_makes_no_sense(write, header, columns, words, error, said):

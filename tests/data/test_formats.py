@@ -263,7 +263,9 @@ def refused_words(path, *said, **kwargs):
 def test_a_file_of_several_spots_lists_them(write):
     lines = ACCURION.splitlines(keepends=True)
     again = write(ACCURION + lines[6])
-    refused_words(again, "2 spots or times", ": 1 from line 7; 2 from line 13; choose one with --spot 1 to 2")
+    refused_words(
+        again, "2 spots or times", ": 1 from line 7; 2 from line 13; choose one, from `spot=1` to `spot=2`"
+    )
     other = "1\t40.000\t365.0\t417.6\t179.8\t32.5\n1\t60.000\t365.0\t417.6\t139.8\t22.5\n"
     region = write(IMAGE + other, "image.dat")
     refused_words(region, ": 1 in region 0; 2 in region 1;")
@@ -289,9 +291,9 @@ def test_spots_measured_by_turns_at_each_angle(write):
 
 
 def test_a_spot_that_is_not_there(write):
-    refused_words(REAL / "post_synthesis.dat", "choose one with --spot 1 to 32", spot=33)
-    refused_words(write(ACCURION), "holds one spot only; choose it with --spot 1", spot=2)
-    refused_words(write(SPECTRARAY), "--spot chooses among the spots of an Accurion file", spot=1)
+    refused_words(REAL / "post_synthesis.dat", "choose one, from `spot=1` to `spot=32`", spot=33)
+    refused_words(write(ACCURION), "has one spot only; leave `spot` out", spot=2)
+    refused_words(write(SPECTRARAY), "`spot` selects a spot of an Accurion file", spot=1)
 
 
 def test_the_first_spot_is_a_part_of_the_whole():

@@ -101,7 +101,7 @@ def test_the_same_choice_every_time_and_larger_ones_hold_it(numbered):
     small, again, large = (read_brdf_samples(numbered, samples=n).values[:, 0] for n in (300, 300, 700))
     np.testing.assert_array_equal(small, again)
     assert np.isin(small, large).all()
-    with pytest.raises(UsageError, match="samples: 0 must be above zero"):
+    with pytest.raises(UsageError, match="`samples` must be above zero, got 0"):
         read_brdf_samples(numbered, samples=0)
 
 
@@ -150,7 +150,7 @@ def test_files_that_are_refused(tmp_path, shape, size, said):
 def test_a_file_without_a_valid_cell(tmp_path):
     path = head(tmp_path / "void.binary", SHAPE, 34992012)
     np.memmap(path, "<f8", "r+", offset=12, shape=(3, *SHAPE))[:] = -1
-    with pytest.raises(DataError, match="holds no valid cell"):
+    with pytest.raises(DataError, match="has no valid cell"):
         read_brdf_samples(path)
 
 

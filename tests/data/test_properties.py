@@ -77,7 +77,7 @@ def test_a_cut_keeps_what_lies_inside_and_nothing_else(path, spectrum, lo, width
     )
     inside = (wavelength >= lo) & (wavelength <= lo + width)
     if inside.sum() < 5:
-        with pytest.raises(DataError, match="--range"):
+        with pytest.raises(DataError, match="`range"):
             read_spectrum(path, range=(lo, lo + width))
     else:
         cut = read_spectrum(path, range=(lo, lo + width))

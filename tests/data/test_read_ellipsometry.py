@@ -81,7 +81,7 @@ def test_errors_of_both(write):
     spectrum = read_spectrum(path, noise=0.05)
     np.testing.assert_array_equal(spectrum.sigma, [0.05] * 3)
     np.testing.assert_array_equal(spectrum.delta_sigma, [0.05] * 3)
-    assert "the columns of errors give way to --noise" in spectrum.notes
+    assert "the given noise replaces the columns of errors" in spectrum.notes
 
 
 def test_one_sigma_for_both(write):
@@ -130,12 +130,12 @@ def test_psi_and_delta_go_before_ncs_beside_them(write):
 def test_three_columns_without_a_header(write, refused):
     path = write(rows(NM, PSI, DELTA, separator=" "))
     assert_film(read_spectrum(path, signal="psi-delta"))
-    refused(path, UsageError, "no header", "--signal")
+    refused(path, UsageError, "no header", "`signal=")
 
 
 def test_four_columns_without_a_header_need_names(write, refused):
     path = write(rows(NM, [70, 70, 70], PSI, DELTA))
-    refused(path, UsageError, "4 columns and no header", "--columns", signal="psi-delta")
+    refused(path, UsageError, "4 columns and no header", "`columns=[", signal="psi-delta")
     spectrum = read_spectrum(path, columns="wavelength,angle,psi,delta")
     assert_film(spectrum)
     np.testing.assert_array_equal(spectrum.angle, [70, 70, 70])
@@ -143,7 +143,7 @@ def test_four_columns_without_a_header_need_names(write, refused):
 
 def test_the_signal_settles_what_to_read(write, refused):
     path = write("wl,R,psi,delta\n400,0.1,20,170\n500,0.2,21,171\n")
-    refused(path, UsageError, "psi and delta as well as R", "--signal")
+    refused(path, UsageError, "psi and delta as well as R", "`signal`")
     assert read_spectrum(path, signal="R").signal == "R"
     np.testing.assert_array_equal(read_spectrum(path, signal="psi-delta").values, [20, 21])
 
@@ -180,15 +180,22 @@ def test_errors_that_are_none(write, refused):
 @pytest.mark.parametrize("header", ["wl,psi,x", "wl,delta,x", "wl,N,C", "wl,R,x"])
 def test_missing_columns(write, header, refused):
     path = write(f"{header}\n400,0.20,0.70\n500,0.21,0.71\n")
-    refused(path, DataError, "not all among", "--columns", signal="psi-delta")
+    refused(path, DataError, "not all among", "`columns=[", signal="psi-delta")
 
 
 def test_missing_delta_without_a_flag(write, refused):
-    refused(write("wl,psi\n400,20\n500,21\n"), DataError, "'psi'", "--columns wavelength,angle,psi,delta")
+    refused(
+        write("wl,psi\n400,20\n500,21\n"),
+        DataError,
+        "'psi'",
+        '`columns=["wavelength", "angle", "psi", "delta"]`',
+    )
 
 
 def test_missing_wavelength(write, refused):
-    refused(write("x,psi,delta\n400,20,170\n"), DataError, "no column is a wavelength", "angle,psi,delta")
+    refused(
+        write("x,psi,delta\n400,20,170\n"), DataError, "no column is a wavelength", '"angle", "psi", "delta"'
+    )
 
 
 def test_radians_are_not_taken_for_degrees(write, refused):
@@ -213,8 +220,8 @@ def test_angles_of_incidence(write, refused):
 
 def test_flags_without_a_meaning(write, refused):
     path = write(f"wl,psi,delta\n{rows(NM, PSI, DELTA)}")
-    refused(path, UsageError, "--signal-unit", signal_unit="percent")
-    refused(path, UsageError, "--polarisation", polarisation="p")
+    refused(path, UsageError, "`signal_unit`", signal_unit="percent")
+    refused(path, UsageError, "`polarisation`", polarisation="p")
     with pytest.raises(UsageError, match=r"R, T, psi-delta"):
         read_spectrum(path, signal="psi")
 

@@ -222,7 +222,9 @@ def test_range_cuts_before_values_are_judged(write):
 def test_noise_is_the_sigma_of_every_point(write):
     spectrum = read_spectrum(write("wavelength,R,sigma\n500,0.1,0.5\n600,0.2,0.5\n"), noise=0.005)
     np.testing.assert_array_equal(spectrum.sigma, 0.005)
-    assert any("goes before the sigma column" in note for note in spectrum.notes)
+    assert any(
+        "the given noise replaces the column of standard deviations" in note for note in spectrum.notes
+    )
 
 
 def test_small_negative_values_are_noise(write):
@@ -242,5 +244,5 @@ def test_a_spectrum_made_by_hand_is_sorted_and_read_only():
     np.testing.assert_array_equal(spectrum.values, [0.1, 0.2])
     with pytest.raises(ValueError, match="read-only"):
         spectrum.values[0] = 1
-    with pytest.raises(ValueError, match=r"sigma: expected one number per wavelength \(2\)"):
+    with pytest.raises(ValueError, match=r"`sigma`: expected one number per wavelength \(2\)"):
         Spectrum(np.array([1, 2]), np.array([0.1, 0.2]), "R", sigma=np.ones(3))

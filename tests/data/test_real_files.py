@@ -38,7 +38,7 @@ def test_soap_films_need_to_be_told_what_was_measured(shared_data):
     files = sorted((shared_data / "soap_films").glob("*.csv"))
     assert files
     for file in files:
-        with pytest.raises(UsageError, match=r"uncalibrated; .*--signal R"):
+        with pytest.raises(UsageError, match=r"uncalibrated; .*`signal=\"R\"`"):
             read_spectrum(file)
         spectrum = read_spectrum(file, signal="R", range=(510, 910))
         assert not spectrum.calibrated
@@ -61,27 +61,27 @@ def test_ellipsometry_of_hafnia(shared_data):
     np.testing.assert_array_equal(spectrum.angle, expected[:, 1])
     np.testing.assert_array_equal(spectrum.values, expected[:, 2])
     np.testing.assert_allclose(spectrum.delta, expected[:, 3] % 360, rtol=1e-15)
-    with pytest.raises(UsageError, match=r"holds psi and delta but --signal says R"):
+    with pytest.raises(UsageError, match="has psi and delta, which contradicts `signal="):
         read_spectrum(path, signal="R")
 
 
 @pytest.mark.parametrize("pair", ["SL1", "SL2"])
 def test_raw_counts_of_porous_silicon(shared_data, pair):
     folder = shared_data / "thinfilmstools_oxides"
-    with pytest.raises(DataError, match=r"'counts_ratio_percent'.*--columns"):
+    with pytest.raises(DataError, match=r"'counts_ratio_percent'.*`columns="):
         read_spectrum(folder / f"{pair}sample_raw.csv")
     sample = read_counts(folder / f"{pair}sample_raw.csv", range=(450, 950))
     reference = read_counts(folder / f"{pair}reference_raw.csv")
     spectrum = reflectance_from_counts(sample, reference, np.full(len(sample), 0.35))
     assert -0.01 < spectrum.values.min() < 0.2 < spectrum.values.max() < 1
     whole = read_counts(folder / f"{pair}sample_raw.csv")
-    with pytest.raises(DataError, match=r"reference has no counts at .* nm; .*--range"):
+    with pytest.raises(DataError, match=r"reference has no counts at .* nm; .*`range`"):
         reflectance_from_counts(whole, reference, np.full(len(whole), 0.35))
 
 
 def test_other_tables_are_refused(shared_data):
     for file in sorted((shared_data / "brdf").glob("*.csv")):
-        with pytest.raises(DataError, match=r"no column is a .*--columns"):
+        with pytest.raises(DataError, match=r"no column is a .*`columns="):
             read_spectrum(file)
     teal = shared_data / "brdf" / "teal_spectra_300_700nm.csv"
     assert len(read_spectrum(teal, columns="wavelength,R_percent")) == 401

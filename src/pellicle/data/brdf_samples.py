@@ -1,4 +1,4 @@
-"""Samples of a BRDF as arrays, wherever they came from."""
+"""Samples of a BRDF as arrays."""
 
 from __future__ import annotations
 
@@ -7,24 +7,37 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Int
 
+from pellicle.data.signal_checks import Where, refuse_first
 from pellicle.data.tabular.columns import DIRECTIONS
 from pellicle.errors import UsageError
 
 CHANNELS = (("value",), ("R", "G", "B"))
+ROUNDING = 1e-3
+"""Degrees by which theta may exceed its limits: π/2 with four decimals is not below the horizon."""
+
 _TABLES = ("values", "sigma")
 _GOLDEN = (math.sqrt(5) - 1) / 2
+_REMEDY = "correct or delete that row"
 
 
 @dataclass(frozen=True, eq=False)
 class BrdfSamples:
-    """Values of a BRDF (1/sr) at pairs of directions, in the order of the file.
+    """Values of a BRDF at pairs of directions, in the order of the file.
 
-    `theta_i`, `phi_i` is the direction to the light and `theta_o`, `phi_o` to the eye, in degrees from
-    the normal and around it; the mirror side of phi_i = 0 is phi_o = 180. `values` has shape
-    (samples, channels) and `sigma` its standard deviations, or None; `channels` is ("value",) or
-    ("R", "G", "B"). `lines` are the source line numbers of the samples, `notes` sentences on what was
-    detected.
+    **Arguments:** the angles have shape (samples,) and are in degrees.
+
+    - `theta_i`, `phi_i`: direction to the light, from the normal and around it; `theta_o`, `phi_o`: direction
+      to the viewer. The mirror direction of phi_i = 0 has phi_o = 180.
+    - `values`: the BRDF in 1/sr, shape (samples, channels).
+    - `channels`: ("value",) or ("R", "G", "B").
+    - `sigma`: standard deviations of `values`, in their shape, or None.
+    - `path`, `sha256`, `lines`: file, its digest and the source line of each sample.
+    - `notes`: sentences on how the file was read.
+
+    **Raises:** DataError for directions below the horizon, a negative BRDF and a standard deviation that is
+    not positive; ValueError for shapes.
     """
 
     theta_i: np.ndarray
@@ -41,18 +54,45 @@ class BrdfSamples:
 
     def __post_init__(self) -> None:
         if self.channels not in CHANNELS:
-            raise ValueError(f"channels: expected ('value',) or ('R', 'G', 'B'), got {self.channels}")
+            raise ValueError(f"`channels`: expected ('value',) or ('R', 'G', 'B'), got {self.channels}")
         size = np.size(self.theta_i)
         for name in (*DIRECTIONS, *_TABLES, "lines"):
-            given = getattr(self, name)
-            if given is None:
+            value = getattr(self, name)
+            if value is None:
                 continue
             shape = (size, len(self.channels)) if name in _TABLES else (size,)
-            if np.shape(given) != shape:
-                raise ValueError(f"{name}: expected the shape {shape}, got {np.shape(given)}")
-            array = np.array(given, dtype=np.int64 if name == "lines" else np.float64)
+            if np.shape(value) != shape:
+                raise ValueError(f"`{name}`: expected the shape {shape}, got {np.shape(value)}")
+            array = np.array(value, dtype=np.int64 if name == "lines" else np.float64)
+            if name in ("theta_i", "theta_o"):
+                array = self._above_horizon(name, array)
             array.flags.writeable = False
             object.__setattr__(self, name, array)
+        self._check_values()
+
+    def _above_horizon(self, name: str, theta: np.ndarray) -> np.ndarray:
+        reason = "degrees is below the horizon; write theta from 0 to 90 degrees, the far side with phi + 180"
+        inside = (theta >= -ROUNDING) & (theta <= 90 + ROUNDING)
+        refuse_first(theta, ~inside, self._place(f"{name}"), reason)
+        return np.clip(theta, 0, 90)
+
+    def _check_values(self) -> None:
+        columns = {"phi_i": self.phi_i, "phi_o": self.phi_o}
+        columns |= dict(zip(self.channels, self.values.T, strict=True))
+        sigma = np.zeros((0, len(self))) if self.sigma is None else self.sigma.T
+        errors = {f"the standard deviation of {x}": y for x, y in zip(self.channels, sigma, strict=False)}
+        for name, values in (columns | errors).items():
+            refuse_first(values, ~np.isfinite(values), self._place(name), f"is not finite; {_REMEDY}")
+        for name in self.channels:
+            wrong = columns[name] < 0
+            refuse_first(columns[name], wrong, self._place(name), f"is a BRDF below zero; {_REMEDY}")
+        for name, values in errors.items():
+            refuse_first(values, values <= 0, self._place(name), f"is not above zero; {_REMEDY}")
+
+    def _place(self, name: str) -> Where:
+        path = f"{self.path}: " if self.path else ""
+        lines = self.lines
+        return lambda row: f"{path}{'sample ' + str(row) if lines is None else f'line {lines[row]}'}: {name}"
 
     def __len__(self) -> int:
         return self.theta_i.size
@@ -61,7 +101,7 @@ class BrdfSamples:
         return f"{self.path or 'BRDF'}: {len(self)} samples of {', '.join(self.channels)}"
 
     def thinned(self, samples: int) -> BrdfSamples:
-        """At most `samples` of them, spread over the file. Raises UsageError if that is not above zero."""
+        """Keep at most `samples` samples, spread over the file. Raises UsageError unless it is positive."""
         kept = spread(len(self), samples)
         if kept.size == len(self):
             return self
@@ -69,25 +109,25 @@ class BrdfSamples:
         return dataclasses.replace(self.at(kept), notes=(*self.notes, note))
 
     def at(self, rows: np.ndarray) -> BrdfSamples:
-        """The samples of these rows, in their order."""
+        """Return the samples of these rows, in their order."""
         names = [name for name in (*DIRECTIONS, *_TABLES, "lines") if getattr(self, name) is not None]
         return dataclasses.replace(self, **{name: getattr(self, name)[rows] for name in names})
 
 
 def sigma_names(channels: tuple[str, ...]) -> tuple[str, ...]:
-    """The columns of the standard deviations of `channels`."""
+    """Return the column names of the standard deviations of `channels`."""
     return ("sigma",) if len(channels) == 1 else tuple(f"sigma_{channel}" for channel in channels)
 
 
-def spread(count: int, samples: int) -> np.ndarray:
-    """Indices, rising, of at most `samples` of `count` things, none twice, the same at every call.
+def spread(count: int, samples: int) -> Int[np.ndarray, " samples"]:
+    """Return rising indices of at most `samples` of `count` items, without repetition, the same each time.
 
-    Those with the smallest fractional parts of index times golden section: no gap is longer than 2.6
-    times the mean, without the beat that a regular step would have with the rows of a grid. A larger
-    choice holds the smaller ones. Raises UsageError if `samples` is not above zero.
+    They have the smallest fractional parts of index times golden section: no gap is longer than 2.6 times
+    the mean, without the beat that a regular step would have with the rows of a grid. A larger choice
+    includes the smaller ones. Raises UsageError if `samples` is not positive.
     """
     if samples < 1:
-        raise UsageError(f"samples: {samples} must be above zero")
+        raise UsageError(f"`samples` must be above zero, got {samples}")
     if samples >= count:
         return np.arange(count)
     return np.sort(np.argpartition(np.arange(count) * _GOLDEN % 1, samples)[:samples])

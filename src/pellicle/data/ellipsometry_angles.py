@@ -1,8 +1,11 @@
-"""What ellipsometers write in place of Ψ and Δ, turned into them; arrays of one length, angles in degrees."""
+"""Ψ and Δ from the quantities that ellipsometers write in their place; angles in degrees."""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+from jaxtyping import Float
 
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError
@@ -11,14 +14,22 @@ PSI_DELTA, NCS, ALPHA_BETA = ("psi", "delta"), ("N", "C", "S"), ("alpha", "beta"
 FORMS = (PSI_DELTA, NCS, ALPHA_BETA)
 """The columns of each form; where a file has several, the first is read."""
 POLARISED = (0.5, 1.05)
-"""Degrees of polarisation that N, C, S may have: below, noise rules; above, they are something else."""
-
-Turned = tuple[np.ndarray, np.ndarray, str]
-"""Ψ, Δ, and a sentence on what was done."""
+"""Accepted degrees of polarisation of N, C, S: below, noise dominates; above, the columns are not N, C, S."""
 
 
-def from_ncs(table: Table, position: int, ncs: np.ndarray) -> Turned:
-    """Of N, C, S (3, points), whatever their common factor, the degree of polarisation. Raises DataError."""
+class PsiDelta(NamedTuple):
+    """Ψ and Δ in degrees, and a sentence on the conversion."""
+
+    psi: Float[np.ndarray, " points"]
+    delta: Float[np.ndarray, " points"]
+    note: str | None = None
+
+
+def from_ncs(table: Table, position: int, ncs: Float[np.ndarray, "3 points"]) -> PsiDelta:
+    """Convert N = cos 2Ψ, C = sin 2Ψ cos Δ, S = sin 2Ψ sin Δ, each times the degree of polarisation.
+
+    `position` is the column that errors name. Raises DataError for an impossible degree of polarisation.
+    """
     polarised = np.sqrt(np.sum(ncs**2, axis=0))
     wrong = (polarised < POLARISED[0]) | (polarised > POLARISED[1])
     if wrong.any():
@@ -29,18 +40,25 @@ def from_ncs(table: Table, position: int, ncs: np.ndarray) -> Turned:
         )
     psi = np.rad2deg(0.5 * np.arctan2(np.hypot(ncs[1], ncs[2]), ncs[0]))
     span = f"{polarised.min():.4g} to {polarised.max():.4g}"
-    note = f"N, C, S turned into psi and delta; their degree of polarisation, {span}, was divided out"
-    return psi, np.rad2deg(np.arctan2(ncs[2], ncs[1])), note
+    note = f"N, C, S converted to psi and delta; their degree of polarisation, {span}, was divided out"
+    return PsiDelta(psi, np.rad2deg(np.arctan2(ncs[2], ncs[1])), note)
 
 
-def from_alpha_beta(table: Table, position: int, ab: np.ndarray, analyser: np.ndarray) -> Turned:
-    """Of α, β (2, points) of a rotating analyser: Δ in 0 to 180, for it sees cos Δ only. Raises DataError.
+def from_alpha_beta(
+    table: Table,
+    position: int,
+    alpha_beta: Float[np.ndarray, "2 points"],
+    analyser: Float[np.ndarray, " points"],
+) -> PsiDelta:
+    """Convert α, β of a rotating analyser; Δ is in 0 to 180, since only cos Δ is measured.
 
-    `analyser` is the angle of the polariser that stands, from the plane of incidence. tan Ψ = tan A
+    `analyser` is the angle of the fixed polariser from the plane of incidence. tan Ψ = tan A
     √((1 + α)/(1 − α)) and cos Δ = β/√(1 − α²), the inverse of `optics.ellipsometry.alpha_beta`. Where
-    noise takes β beyond √(1 − α²), Δ is 0 or 180.
+    noise takes β beyond √(1 − α²), Δ is 0 or 180. `position` is the column that errors name.
+
+    Raises DataError for a contrast above 1.
     """
-    alpha, beta = ab
+    alpha, beta = alpha_beta
     contrast = np.hypot(alpha, beta)
     wrong = (contrast > POLARISED[1]) | (np.abs(alpha) > 1)
     if wrong.any():
@@ -52,9 +70,5 @@ def from_alpha_beta(table: Table, position: int, ab: np.ndarray, analyser: np.nd
     psi = np.rad2deg(np.arctan2(np.tan(np.deg2rad(analyser)) * np.sqrt(1 + alpha), np.sqrt(1 - alpha)))
     delta = np.rad2deg(np.arctan2(np.sqrt(np.maximum(1 - contrast**2, 0.0)), beta))
     over = int(np.sum(contrast > 1))
-    note = "alpha and beta turned into psi and delta"
-    return (
-        psi,
-        delta,
-        note + (f"; of {over} points whose contrast is above 1 delta is 0 or 180" if over else ""),
-    )
+    limited = f"; delta is 0 or 180 at {over} points whose contrast is above 1" if over else ""
+    return PsiDelta(psi, delta, f"alpha and beta converted to psi and delta{limited}")

@@ -1,4 +1,4 @@
-"""Reflectance from raw counts: a sample, a reference whose reflectance is known, the dark."""
+"""Reflectance from raw counts of a sample, a reference of known reflectance, and the dark."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pellicle.data.signal_checks import check_signal
+from pellicle.data.signal_checks import check_noise, check_power
 from pellicle.data.spectrum import Spectrum
-from pellicle.data.tabular.column_selection import choose_counts
+from pellicle.data.tabular.column_selection import counts_columns
 from pellicle.data.tabular.table import read_table
 from pellicle.data.tabular.wavelength_axis import axis_note, axis_unit, read_columns
-from pellicle.errors import DataError, UsageError
+from pellicle.errors import DataError
 
 
 def read_counts(
@@ -22,13 +22,16 @@ def read_counts(
     wavelength_unit: str | None = None,
     range: tuple[float | int, float | int] | None = None,
 ) -> Spectrum:
-    """Reads raw detector counts: a wavelength column and one other, of any name and any values.
+    """Read raw detector counts: a wavelength column and one other, of any name and any values.
 
-    Arguments as in `read_spectrum`. Returns a `Spectrum` with `signal` "counts", uncalibrated.
-    Raises DataError or UsageError as `read_spectrum` does, but for the values themselves.
+    **Arguments:** as in `read_spectrum`.
+
+    **Returns:** a `Spectrum` with `signal` "counts", uncalibrated.
+
+    **Raises:** DataError or UsageError as `read_spectrum` does; any finite count is accepted.
     """
     table = read_table(path)
-    chosen = choose_counts(table, columns)
+    chosen = counts_columns(table, columns)
     axis = axis_unit(table, chosen.wavelength, wavelength_unit)
     wavelength, values, _, angle = read_columns(table, chosen, axis)
     counts = Spectrum(
@@ -53,39 +56,45 @@ def reflectance_from_counts(
     *,
     noise: float | int | None = None,
 ) -> Spectrum:
-    """Calibrated reflectance (S - D) / (Ref - D) R_ref at the wavelengths of `sample`.
+    """Calibrate counts: the reflectance (S − D) / (Ref − D) R_ref at the wavelengths of `sample`.
 
-    - `sample`, `reference`, `dark`: raw counts with the same lamp, detector and integration time.
-      The latter two are interpolated linearly where their wavelengths differ from the sample's;
-      cut only the sample to the range that matters.
+    **Arguments:**
+
+    - `sample`, `reference`, `dark`: raw counts with the same lamp, detector and integration time. Reference
+      and dark are interpolated linearly where their wavelengths differ; cut only the sample to a range.
     - `reference_reflectance`: fraction, one number per wavelength of `sample`.
     - `noise`: standard deviation of the result, a fraction; None leaves it unknown.
 
-    Raises DataError where the reference does not cover the sample, where it has no counts above the
-    dark, or where the result is no reflectance; UsageError for a noise that is not above zero.
+    **Returns:** a `Spectrum` of "R".
+
+    **Raises:** DataError where the reference does not cover the sample or has no counts above the dark, or
+    where the result is not a reflectance; UsageError for a noise that is not above zero.
     """
     known = np.asarray(reference_reflectance, dtype=np.float64)
     if known.shape != sample.wavelength.shape:
         raise ValueError(
-            f"reference_reflectance: expected one number per wavelength of the sample "
+            f"`reference_reflectance`: expected one number per wavelength of the sample "
             f"{sample.wavelength.shape}, got {known.shape}"
         )
-    if noise is not None and not (0 < noise < np.inf):
-        raise UsageError(f"--noise {noise:g} must be a standard deviation above zero, e.g. --noise 0.005")
-    background = 0.0 if dark is None else _on_grid_of(sample, dark, "dark")
-    full = _on_grid_of(sample, reference, "reference") - background
+    check_noise(noise)
+    background = 0.0 if dark is None else _interpolated(sample, dark, "dark")
+    full = _interpolated(sample, reference, "reference") - background
     if full.min() <= 0:
         first = sample.wavelength[np.argmax(full <= 0)]
         above = "" if dark is None else " above the dark"
         raise DataError(
             f"{reference.path}: the reference has no counts{above} at {first:g} nm; "
-            "leave those wavelengths out with --range"
+            "leave those wavelengths out with `range`"
         )
-    spectrum = Spectrum(
+    values = (sample.values - background) / full * known
+    sigma = None if noise is None else np.full(len(sample), noise)
+    remedy = "leave it out with `range`, or measure again"
+    check_power("R", values, sigma, sample.place("reflectance from counts"), too_high=remedy, remedy=remedy)
+    return Spectrum(
         wavelength=sample.wavelength,
-        values=(sample.values - background) / full * known,
+        values=values,
         signal="R",
-        sigma=None if noise is None else np.full(len(sample), noise),
+        sigma=sigma,
         polarisation=sample.polarisation,
         angle=sample.angle,
         path=sample.path,
@@ -93,17 +102,15 @@ def reflectance_from_counts(
         notes=(*sample.notes, f"counts divided by those of the reference {reference.path}"),
         lines=sample.lines,
     )
-    check_signal(spectrum, "reflectance from counts", stated=True)
-    return spectrum
 
 
-def _on_grid_of(sample: Spectrum, other: Spectrum, what: str) -> np.ndarray:
+def _interpolated(sample: Spectrum, other: Spectrum, name: str) -> np.ndarray:
     if np.array_equal(sample.wavelength, other.wavelength):
         return other.values
-    lo, hi = sample.wavelength[0], sample.wavelength[-1]
-    if lo < other.wavelength[0] or hi > other.wavelength[-1]:
+    low, high = sample.wavelength[0], sample.wavelength[-1]
+    if low < other.wavelength[0] or high > other.wavelength[-1]:
         raise DataError(
-            f"{other.path}: the {what} covers {other.wavelength[0]:g} to {other.wavelength[-1]:g} nm but "
-            f"{sample.path} runs from {lo:g} to {hi:g} nm; cut the sample with --range"
+            f"{other.path}: the {name} covers {other.wavelength[0]:g} to {other.wavelength[-1]:g} nm but "
+            f"{sample.path} runs from {low:g} to {high:g} nm; cut the sample with `range`"
         )
     return np.interp(sample.wavelength, other.wavelength, other.values)

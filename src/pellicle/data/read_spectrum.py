@@ -1,9 +1,7 @@
-"""Reading a measured spectrum: reflectance, transmittance or Ψ and Δ against wavelength."""
+"""Reading of spectra: reflectance, transmittance, or Ψ and Δ against wavelength."""
 
 from __future__ import annotations
 
-import dataclasses
-import math
 import os
 from collections.abc import Sequence
 from functools import partial
@@ -13,12 +11,13 @@ import numpy as np
 
 from pellicle.data.formats.detect import find_export
 from pellicle.data.read_ellipsometry import SIGNAL, is_ellipsometry, read_ellipsometry
-from pellicle.data.signal_checks import check_signal, scale_note, signal_scale
-from pellicle.data.spectrum import Spectrum
-from pellicle.data.tabular.column_selection import POLARISATIONS, SIGNALS, choose_spectrum, named_columns
-from pellicle.data.tabular.table import read_table
+from pellicle.data.signal_checks import check_noise, check_power, refuse_first
+from pellicle.data.spectrum import POLARISATIONS, Spectrum, inside_range
+from pellicle.data.tabular.column_selection import SIGNALS, SpectrumColumns, named_columns, spectrum_columns
+from pellicle.data.tabular.signal_scale import Scale, signal_scale
+from pellicle.data.tabular.table import Table, read_table
 from pellicle.data.tabular.wavelength_axis import axis_note, axis_unit, read_columns
-from pellicle.errors import UsageError
+from pellicle.errors import DataError, UsageError
 
 log = getLogger(__name__)
 
@@ -38,64 +37,55 @@ def read_spectrum(
     analyser: float | int | None = None,
     spot: int | None = None,
 ) -> Spectrum:
-    """Reads a text file of reflectance, transmittance or ellipsometry: CSV, or an instrument's export.
+    """Read reflectance, transmittance or ellipsometry from a text file: CSV, or an instrument's export.
 
-    - `signal`: "R", "T" or "psi-delta"; needed without a header, for an `intensity` column, or if
-      several are there.
-    - `columns`: names in the order of the file's columns, `_` to skip one; overrides the header.
-    - `wavelength_unit`: nm, um, A, eV or cm-1, where the file does not say (nm if nobody does).
-    - `signal_unit`: "fraction" or "percent", where the file does not say.
-    - `range`: wavelengths in nm to keep. It cuts before values are judged, so noisy ends may go.
+    **Arguments:**
+
+    - `path` of the file.
+    - `signal`: "R", "T" or "psi-delta"; needed without a header, for an `intensity` column, or where the file
+      has several signals.
+    - `columns`: names in the order of the file's columns, "_" to skip one; overrides the header.
+    - `wavelength_unit`: "nm", "um", "A", "eV" or "cm-1", where the file does not state it (else nm).
+    - `signal_unit`: "fraction" or "percent", where the file does not state it.
+    - `range`: wavelengths to keep, (low, high) in nm. Values outside it are not checked.
     - `noise`: standard deviation of every point as a fraction, or of Ψ and Δ in degrees; replaces the file's.
-    - `polarisation`: "s", "p" or "unpolarised", where the column's name does not say.
-    - `folded`: Δ is in 0 to 180, as an instrument without a compensator sees it, and its sign is not fitted.
-    - `analyser`: of columns α and β the angle of the polariser that stands, in degrees.
-    - `spot`: of an Accurion file of several spots, which: counted from 1 as they come in the file.
-    - `calibrated`: false lifts the limits on the values; by default only for an `intensity` column.
+    - `polarisation`: "s", "p" or "unpolarised", where the column's name does not state it.
+    - `calibrated`: False lifts the limits on the values; by default for an `intensity` column only.
+    - `folded`: Δ lies in 0 to 180, as from an instrument without a compensator; its sign is not fitted.
+    - `analyser`: for columns α and β, the angle of the fixed polariser in degrees.
+    - `spot`: number of the spot, from 1 in the order of the file, for an Accurion file of several spots.
 
-    Returns a `Spectrum`. Raises DataError (unreadable or impossible data) or UsageError (an
-    argument missing or wrong), one sentence with file, line and remedy.
+    **Returns:** a `Spectrum`.
+
+    **Raises:** DataError (unreadable or impossible data) or UsageError (an argument missing or wrong): one
+    sentence with file, line and remedy.
     """
-    _check_choice("--signal", signal, (*SIGNALS, SIGNAL))
-    _check_choice("--polarisation", polarisation, POLARISATIONS)
-    if noise is not None and not (0 < noise < math.inf):
-        raise UsageError(f"--noise {noise:g} must be a standard deviation above zero, e.g. --noise 0.005")
+    for name, value, known in (
+        ("signal", signal, (*SIGNALS, SIGNAL)),
+        ("polarisation", polarisation, POLARISATIONS),
+    ):
+        if value is not None and value not in known:
+            raise UsageError(f"`{name}` must be one of {', '.join(known)}, not {value!r}")
+    check_noise(noise)
     table = read_table(path, partial(find_export, spot=spot))
     if is_ellipsometry(table, named_columns(table, columns), signal):
-        _refuse_flags(table.path, signal_unit, polarisation)
-        return _told(read_ellipsometry(table, columns, wavelength_unit, noise, range, folded, analyser))
-    _refuse_ellipsometry(table.path, folded, analyser)
-    chosen = choose_spectrum(table, columns, signal, polarisation)
-    axis = axis_unit(table, chosen.wavelength, wavelength_unit)
-    scale = signal_scale(table, chosen, signal_unit)
-    wavelength, values, sigma, angle = read_columns(table, chosen, axis)
-    if calibrated is None:
-        calibrated = chosen.signal.role != "intensity"
-    spectrum = Spectrum(
-        wavelength=wavelength,
-        values=values / scale.signal,
-        signal=signal or chosen.signal.role,
-        sigma=None if sigma is None else sigma / scale.sigma,
-        polarisation=chosen.signal.polarisation or polarisation or "unpolarised",
-        angle=angle,
-        calibrated=calibrated,
-        path=table.path,
-        sha256=table.sha256,
-        notes=(*table.notes, *chosen.notes, axis_note(axis), scale_note(scale, calibrated)),
-        lines=table.lines,
-    )
-    if noise is not None:
-        replaced = ("the noise that was given goes before the sigma column",) if sigma is not None else ()
-        spectrum = dataclasses.replace(
-            spectrum, sigma=np.full(len(spectrum), noise), notes=(*spectrum.notes, *replaced)
-        )
-    if range is not None:
-        spectrum = spectrum.cut(*range)
-    check_signal(spectrum, table.label(chosen.signal.position), stated=scale.stated)
-    return _told(spectrum)
-
-
-def _told(spectrum: Spectrum) -> Spectrum:
+        if signal_unit is not None:
+            raise UsageError(f"{table.path}: psi and delta are in degrees; leave `signal_unit` out")
+        if polarisation in ("s", "p"):
+            raise UsageError(f"{table.path}: psi and delta compare p with s light; leave `polarisation` out")
+        spectrum = read_ellipsometry(table, columns, wavelength_unit, noise, range, folded, analyser)
+    else:
+        if folded or analyser is not None:
+            name = "folded" if folded else "analyser"
+            raise UsageError(
+                f"{table.path}: `{name}` is for ellipsometry, and the file has none; leave it out"
+            )
+        chosen = spectrum_columns(table, columns, signal, polarisation)
+        axis = axis_unit(table, chosen.wavelength, wavelength_unit)
+        scale = signal_scale(table, chosen, signal_unit)
+        if calibrated is None:
+            calibrated = chosen.signal.role != "intensity"
+        spectrum = _power(table, chosen, axis, scale, signal, range, noise, polarisation, calibrated)
     log.info(
         "%s: %d rows used: %s from %g to %g nm, values from %.4g to %.4g",
         spectrum.path,
@@ -109,21 +99,66 @@ def _told(spectrum: Spectrum) -> Spectrum:
     return spectrum
 
 
-def _check_choice(flag: str, given: str | None, known: Sequence[str]) -> None:
-    if given is not None and given not in known:
-        raise UsageError(f"{flag} {given!r} is not known; use one of {', '.join(known)}")
+def _power(
+    table: Table,
+    columns: SpectrumColumns,
+    axis: str | None,
+    scale: Scale,
+    signal: str | None,
+    range: tuple[float, float] | None,
+    noise: float | None,
+    polarisation: str | None,
+    calibrated: bool,
+) -> Spectrum:
+    """Reflectance or transmittance of a table, cut to `range` before its values are checked."""
+    wavelength, values, sigma, angle = read_columns(table, columns, axis)
+    values, sigma = values / scale.signal, None if sigma is None else sigma / scale.sigma
+    notes = [*table.notes, *columns.notes, axis_note(axis), scale.note(calibrated)]
+    if noise is not None:
+        notes += [] if sigma is None else ["the given noise replaces the column of standard deviations"]
+        sigma = np.full(values.shape, float(noise))
+    rows = np.arange(values.size)
+    if range is not None:
+        inside, note = inside_range(wavelength, range, table.path)
+        rows, notes = rows[inside], [*notes, note]
+    kind = signal or columns.signal.role
+    values, sigma = values[rows], None if sigma is None else sigma[rows]
+    _check_power(table, columns, kind, rows, values, sigma, calibrated, scale.stated)
+    return Spectrum(
+        wavelength=wavelength[rows],
+        values=values,
+        signal=kind,
+        sigma=sigma,
+        polarisation=columns.signal.polarisation or polarisation or "unpolarised",
+        angle=None if angle is None else angle[rows],
+        calibrated=calibrated,
+        path=table.path,
+        sha256=table.sha256,
+        notes=tuple(notes),
+        lines=table.lines[rows],
+    )
 
 
-def _refuse_ellipsometry(path: str, folded: bool, analyser: float | None) -> None:
-    """What has a meaning for Ψ and Δ only."""
-    if folded or analyser is not None:
-        flag = "--folded" if folded else "--analyser"
-        raise UsageError(f"{path}: {flag} is for ellipsometry, and the file holds none; leave it out")
-
-
-def _refuse_flags(path: str, signal_unit: str | None, polarisation: str | None) -> None:
-    """What has no meaning for Ψ and Δ."""
-    if signal_unit is not None:
-        raise UsageError(f"{path}: psi and delta are in degrees; leave --signal-unit out")
-    if polarisation in ("s", "p"):
-        raise UsageError(f"{path}: psi and delta compare p with s light; leave --polarisation out")
+def _check_power(
+    table: Table,
+    columns: SpectrumColumns,
+    signal: str,
+    rows: np.ndarray,
+    values: np.ndarray,
+    sigma: np.ndarray | None,
+    calibrated: bool,
+    unit_stated: bool,
+) -> None:
+    """Check σ and the values of these rows, naming line and column. Raises DataError."""
+    if sigma is not None and columns.sigma is not None:
+        at = table.places(columns.sigma.position, rows)
+        refuse_first(sigma, sigma <= 0, at, "is not above zero; correct or delete that row")
+    position = columns.signal.position
+    if not calibrated:
+        if values.max() <= 0:
+            raise DataError(f"{table.path}: {table.label(position)} is nowhere positive; check what it holds")
+        return
+    remedy = "leave it out with `range`, or correct that row"
+    too_high = 'if the file is in percent, say so with `signal_unit="percent"` or in its header'
+    where = table.places(position, rows)
+    check_power(signal, values, sigma, where, too_high=remedy if unit_stated else too_high, remedy=remedy)

@@ -1,4 +1,4 @@
-"""A measured spectrum as arrays, wherever it came from."""
+"""Measured spectra as arrays."""
 
 from __future__ import annotations
 
@@ -6,24 +6,43 @@ import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Bool
 
+from pellicle.data.signal_checks import Where, check_power, check_psi_delta, refuse_first
 from pellicle.errors import DataError, UsageError
 
-FEWEST_POINTS = 5  # a cut that leaves less is a mistake in the range
+SIGNALS = ("R", "T", "psi-delta", "counts")
+POLARISATIONS = ("s", "p", "unpolarised")
+FEWEST_POINTS = 5
+"""A range that keeps fewer points is a mistake in the range."""
+
 _ARRAYS = ("wavelength", "values", "sigma", "angle", "lines", "delta", "delta_sigma")
+_REMEDY = "correct or delete that point"
 
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """One measured signal against wavelength, points in rising order of wavelength (nm).
+    """One measured signal against wavelength.
 
-    `values` are fractions (any scale where `calibrated` is false) and `sigma` their standard
-    deviations in the same unit, or None. `angle` is the angle of incidence of each point in
-    degrees, or None where the file does not say: then it is for the scene to say. `lines` are the
-    source line numbers of the points, `notes` sentences on what was detected. `signal` is "R",
-    "T", "counts" for raw detector counts, or "psi-delta": then `values` is Ψ and `delta` Δ, both in
-    degrees, and `sigma` and `delta_sigma` their standard deviations; `folded` says that the sign of
-    sin Δ was not measured, and Δ is in 0 to 180. Given in any order, points are sorted here.
+    **Arguments:** arrays of shape (points,), in any order; they are sorted by wavelength.
+
+    - `wavelength` in nm.
+    - `values`: reflectance or transmittance as fractions (on any scale if `calibrated` is False), or Ψ in
+      degrees.
+    - `signal`: "R", "T", "psi-delta", or "counts" for raw detector counts.
+    - `sigma`: standard deviations of `values`, in the same unit.
+    - `polarisation`: "s", "p" or "unpolarised".
+    - `angle` of incidence in degrees; None leaves it to the scene.
+    - `calibrated`: False for values of unknown scale, which are not checked against 0 and 1.
+    - `path`, `sha256`, `lines`: file, its digest and the source line of each point.
+    - `notes`: sentences on how the file was read.
+    - `delta`, `delta_sigma`: Δ and its standard deviations in degrees, for "psi-delta".
+    - `folded`: the sign of sin Δ was not measured, and Δ lies in 0 to 180.
+
+    **Raises:** DataError for values that no sample has, UsageError for unknown words, ValueError for shapes.
+
+    >>> Spectrum(np.array([500.0, 600.0]), np.array([0.21, 0.19]), "R").values
+    array([0.21, 0.19])
     """
 
     wavelength: np.ndarray
@@ -45,16 +64,55 @@ class Spectrum:
         size = np.size(self.wavelength)
         order = np.lexsort((np.zeros(size) if self.angle is None else self.angle, self.wavelength))
         for name in _ARRAYS:
-            given = getattr(self, name)
-            if given is None:
+            value = getattr(self, name)
+            if value is None:
                 continue
-            if np.shape(given) != (size,):
+            if np.shape(value) != (size,):
                 raise ValueError(
-                    f"{name}: expected one number per wavelength ({size}), got {np.shape(given)}"
+                    f"`{name}`: expected one number per wavelength ({size}), got {np.shape(value)}"
                 )
-            array = np.asarray(given, dtype=np.int64 if name == "lines" else np.float64)[order]
+            array = np.asarray(value, dtype=np.int64 if name == "lines" else np.float64)[order]
             array.flags.writeable = False
             object.__setattr__(self, name, array)
+        self._check_words()
+        self._check_arrays()
+
+    def _check_words(self) -> None:
+        for name, known in (("signal", SIGNALS), ("polarisation", POLARISATIONS)):
+            if getattr(self, name) not in known:
+                raise UsageError(f"`{name}` must be one of {', '.join(known)}, not {getattr(self, name)!r}")
+        if (self.signal == "psi-delta") != (self.delta is not None):
+            raise UsageError('`delta` goes with `signal="psi-delta"`: give both, or neither')
+
+    def _check_arrays(self) -> None:
+        """Refuse what a file may not contain either. Raises DataError."""
+        present = {name: array for name in _ARRAYS if (array := getattr(self, name)) is not None}
+        for name, array in present.items():
+            refuse_first(array, ~np.isfinite(array), self.place(f"`{name}`"), f"is not finite; {_REMEDY}")
+            if name in ("wavelength", "sigma", "delta_sigma"):
+                refuse_first(array, array <= 0, self.place(f"`{name}`"), f"is not above zero; {_REMEDY}")
+        angle = present.get("angle", np.zeros(len(self)))
+        reason = f"is not from 0 to 90 degrees; {_REMEDY}"
+        refuse_first(angle, (angle < 0) | (angle > 90), self.place("`angle`"), reason)
+        repeated = (np.diff(self.wavelength) == 0) & (np.diff(angle) == 0)
+        reason = "comes twice at one angle; keep one of the points, or their mean"
+        refuse_first(self.wavelength[1:], repeated, lambda row: self.place("`wavelength`")(row + 1), reason)
+        values = self.place("`values`")
+        if self.delta is not None:
+            check_psi_delta(self.values, self.delta, self.folded, values, self.place("`delta`"), _REMEDY)
+        elif self.signal != "counts" and self.calibrated and len(self):
+            too_high = "divide percent by 100, or give `calibrated=False` for an arbitrary scale"
+            check_power(self.signal, self.values, self.sigma, values, too_high=too_high, remedy=_REMEDY)
+
+    def place(self, name: str) -> Where:
+        """Return the place of a point, as a function of its row, for a message about `name`."""
+        path = f"{self.path}: " if self.path else ""
+
+        def place(row: int) -> str:
+            line = "" if self.lines is None else f"line {self.lines[row]}, "
+            return f"{path}{line}{name} at {self.wavelength[row]:g} nm"
+
+        return place
 
     def __len__(self) -> int:
         return self.wavelength.size
@@ -62,26 +120,34 @@ class Spectrum:
     def __str__(self) -> str:
         span = "empty"
         if len(self):
-            lo, hi = self.wavelength[0], self.wavelength[-1]
-            span = f"{lo:g} to {hi:g} nm" if lo < hi else f"{lo:g} nm"
+            low, high = self.wavelength[0], self.wavelength[-1]
+            span = f"{low:g} to {high:g} nm" if low < high else f"{low:g} nm"
         return f"{self.path or 'spectrum'}: {len(self)} points of {self.signal}, {span}"
 
-    def cut(self, lo: float | int, hi: float | int) -> Spectrum:
-        """The points with lo ≤ wavelength ≤ hi (nm).
+    def cut(self, low: float | int, high: float | int) -> Spectrum:
+        """Return the points with low ≤ wavelength ≤ high (nm).
 
-        Raises UsageError for a range that is no range, DataError if fewer than 5 points remain.
+        Raises UsageError for an empty range, DataError if fewer than 5 points remain.
         """
-        if not (0 <= lo < hi):
-            raise UsageError(f"--range {lo:g}:{hi:g} is no range; give the lower wavelength in nm first")
-        inside = (self.wavelength >= lo) & (self.wavelength <= hi)
-        if inside.sum() < FEWEST_POINTS:
-            raise DataError(
-                f"{self.path or 'spectrum'}: only {inside.sum()} of {len(self)} points, which cover "
-                f"{self.wavelength[0]:g} to {self.wavelength[-1]:g} nm, lie in --range {lo:g}:{hi:g}; "
-                f"widen it to keep at least {FEWEST_POINTS}"
-            )
+        inside, note = inside_range(self.wavelength, (low, high), self.path)
         kept = {
             name: None if getattr(self, name) is None else getattr(self, name)[inside] for name in _ARRAYS
         }
-        note = f"{inside.sum()} of {len(self)} points kept, {lo:g} to {hi:g} nm"
         return dataclasses.replace(self, **kept, notes=(*self.notes, note))
+
+
+def inside_range(
+    wavelength: np.ndarray, limits: tuple[float, float], path: str
+) -> tuple[Bool[np.ndarray, " points"], str]:
+    """Return which wavelengths (nm) are within the limits, and a note. Raises as `Spectrum.cut` does."""
+    low, high = limits
+    if not (0 <= low < high):
+        raise UsageError(f"`range=({low:g}, {high:g})` is empty: give the lower wavelength in nm first")
+    inside = (wavelength >= low) & (wavelength <= high)
+    if inside.sum() < FEWEST_POINTS:
+        raise DataError(
+            f"{path or 'spectrum'}: only {inside.sum()} of {wavelength.size} points, which cover "
+            f"{wavelength.min():g} to {wavelength.max():g} nm, lie in `range=({low:g}, {high:g})`; widen it "
+            f"to keep at least {FEWEST_POINTS}"
+        )
+    return inside, f"{inside.sum()} of {wavelength.size} points kept, {low:g} to {high:g} nm"

@@ -1,4 +1,4 @@
-"""Writing samples of a BRDF as CSV or as text of the ALTA library."""
+"""Writing of BRDF samples as CSV or ALTA text."""
 
 from __future__ import annotations
 
@@ -16,17 +16,18 @@ Path = str | os.PathLike[str]
 
 
 def write_brdf_samples(
-    path: Path, samples: BrdfSamples, *, said: Sequence[str] = (), overwrite: bool = False
+    path: Path, samples: BrdfSamples, *, comments: Sequence[str] = (), overwrite: bool = False
 ) -> None:
-    """Writes samples as CSV, in columns that pellicle reads again as they were; `said` are comments.
+    """Write samples as CSV, which `read_brdf_samples` reads back unchanged.
 
-    Raises UsageError where `path` exists without `overwrite`, or cannot be written.
+    `comments` are lines of the header. Raises UsageError where `path` exists without `overwrite`, or cannot
+    be written.
     """
     names = [*DIRECTIONS, *samples.channels]
     names += [] if samples.sigma is None else sigma_names(samples.channels)
     header = [
         "# BRDF in 1/sr; directions in degrees, from the normal and around it",
-        *(f"# {line}" for line in said),
+        *(f"# {line}" for line in comments),
         *_source(samples),
         ",".join(names),
     ]
@@ -35,7 +36,7 @@ def write_brdf_samples(
 
 
 def write_alta(path: Path, samples: BrdfSamples, *, overwrite: bool = False) -> None:
-    """Writes samples as ALTA text: spherical coordinates in radians, sigma as the radius of intervals.
+    """Write samples as ALTA text: spherical coordinates in radians, sigma as the radius of intervals.
 
     Raises UsageError where `path` exists without `overwrite`, or cannot be written.
     """
@@ -53,7 +54,7 @@ def write_alta(path: Path, samples: BrdfSamples, *, overwrite: bool = False) -> 
 
 
 def _source(samples: BrdfSamples) -> list[str]:
-    """Comments; the blank after # keeps ALTA from taking them for a header."""
+    """Comments; the blank after # keeps ALTA from reading them as a header."""
     path = " ".join(samples.path.split()) or "samples"
     return [
         f"# from {path}, sha256 {samples.sha256 or 'unknown'}",
@@ -61,9 +62,11 @@ def _source(samples: BrdfSamples) -> list[str]:
     ]
 
 
-def _text(header: Sequence[str], directions: Sequence[np.ndarray], samples: BrdfSamples, between: str) -> str:
-    """Header and rows, each number in as many digits as it needs to be read again as it was."""
+def _text(
+    header: Sequence[str], directions: Sequence[np.ndarray], samples: BrdfSamples, delimiter: str
+) -> str:
+    """Header and rows, each number with the digits that reproduce it exactly."""
     sigma = [] if samples.sigma is None else [samples.sigma]
     table = np.column_stack([*directions, samples.values, *sigma])
-    rows = (between.join(map(repr, row)) for row in table.tolist())
+    rows = (delimiter.join(map(repr, row)) for row in table.tolist())
     return "\n".join([*header, *rows]) + "\n"

@@ -1,8 +1,8 @@
 """BRDF samples in the text format of the ALTA library (belcour/alta, its page Data File Formats).
 
 Lines of `#KEY value` begin the file: `#DIM N P` for N coordinates and P values in a row, `#PARAM_IN`
-and `#PARAM_OUT` for what they are, `#VS` for none (0), a radius (1) or both ends (2) of an interval
-about each value. Angles are in radians; L is the light and V the view.
+and `#PARAM_OUT` for their meaning, `#VS` for no interval (0), a radius (1) or both ends (2) of an interval
+about each value. Angles are in radians; L is the light and V the viewer.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ from pellicle.errors import DataError
 
 Angles = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]  # θ_i, φ_i, θ_o, φ_o in radians
 
-GRAZING = 1e-3  # degrees from 90 within which a cosine-weighted value no longer holds the BRDF
+GRAZING = 1e-3
+"""Degrees from 90 within which a cosine-weighted value does not determine the BRDF."""
 
 
 def _spherical(theta_l: np.ndarray, phi_l: np.ndarray, theta_v: np.ndarray, phi_v: np.ndarray) -> Angles:
@@ -29,7 +30,7 @@ def _spherical(theta_l: np.ndarray, phi_l: np.ndarray, theta_v: np.ndarray, phi_
 
 
 def _isotropic(theta_v: np.ndarray, theta_l: np.ndarray, phi: np.ndarray) -> Angles:
-    return theta_l, np.zeros_like(phi), theta_v, -phi  # ALTA counts from the view to the light
+    return theta_l, np.zeros_like(phi), theta_v, -phi  # ALTA counts from the viewer to the light
 
 
 def _projected(theta_l: np.ndarray, x: np.ndarray, y: np.ndarray) -> Angles:
@@ -50,8 +51,6 @@ def _half_isotropic(theta_h: np.ndarray, theta_d: np.ndarray, phi_d: np.ndarray)
     return theta_i, np.zeros_like(phi_i), theta_o, phi_o - phi_i
 
 
-#: `#PARAM_IN` → the coordinates of a row and the directions that they give. ALTA's other
-#: parametrisations leave part of the directions open, or are hardly in use.
 INPUTS: dict[str, tuple[tuple[str, ...], Callable[..., Angles]]] = {
     "SPHERICAL_TL_PL_TV_PV": (("theta_l", "phi_l", "theta_v", "phi_v"), _spherical),
     "ISOTROPIC_TV_TL_DPHI": (("theta_v", "theta_l", "dphi"), _isotropic),
@@ -60,6 +59,8 @@ INPUTS: dict[str, tuple[tuple[str, ...], Callable[..., Angles]]] = {
     "RUSIN_TH_TD_PD": (("theta_h", "theta_d", "phi_d"), _half_isotropic),
     "CARTESIAN": (("v_x", "v_y", "v_z", "l_x", "l_y", "l_z"), _cartesian),
 }
+"""Coordinates of a row for each `#PARAM_IN`, and their directions. ALTA's other parametrisations leave part
+of the directions open, or are hardly in use."""
 COSINE = "INV_STERADIAN_COSINE_FACTOR"
 OUTPUTS = ("INV_STERADIAN", COSINE, "RGB_COLOR")
 _KEYS = ("DIM", "PARAM_IN", "PARAM_OUT", "VS")
@@ -67,7 +68,7 @@ _KEYS = ("DIM", "PARAM_IN", "PARAM_OUT", "VS")
 
 @dataclass(frozen=True)
 class Header:
-    """What the lines of `#KEY value` say; `intervals` has 0, 1 or 2 for each channel."""
+    """Values of the lines `#KEY value`; `intervals` has 0, 1 or 2 for each channel."""
 
     param_in: str
     param_out: str
@@ -77,29 +78,29 @@ class Header:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The columns of a row."""
+        """Names of the columns of a row."""
         ends = {0: (), 1: ("radius_{}",), 2: ("low_{}", "high_{}")}
-        about = zip(self.channels, self.intervals, strict=True)
-        bounds = [end.format(channel) for channel, kind in about for end in ends[kind]]
+        kinds = zip(self.channels, self.intervals, strict=True)
+        bounds = [end.format(channel) for channel, kind in kinds for end in ends[kind]]
         return (*INPUTS[self.param_in][0], *self.channels, *bounds)
 
 
 def find_header(comments: Sequence[Line], path: str) -> Header | None:
-    """The header of an ALTA file among its comments, or None. Raises DataError for one that is unclear."""
-    said: dict[str, tuple[Line, str]] = {}
+    """Find the header of an ALTA file among its comments, or None. Raises DataError for a wrong header."""
+    keys: dict[str, tuple[Line, str]] = {}
     for comment in comments:
         key, _, value = comment.text.partition(" ")
         if key in _KEYS:
-            said[key] = comment, value.strip()
-    if "PARAM_IN" not in said:
+            keys[key] = comment, value.strip()
+    if "PARAM_IN" not in keys:
         return None
     for key in _KEYS[:3]:
-        if key not in said:
+        if key not in keys:
             raise DataError(f"{path}: has an ALTA header without #{key}; add that line")
 
-    param_in = _known(said["PARAM_IN"], INPUTS, path, "convert the file to SPHERICAL_TL_PL_TV_PV with ALTA")
-    param_out = _known(said["PARAM_OUT"], OUTPUTS, path, "write INV_STERADIAN if it is a BRDF in 1/sr")
-    line, dim = said["DIM"]
+    param_in = _known(keys["PARAM_IN"], INPUTS, path, "convert the file to SPHERICAL_TL_PL_TV_PV with ALTA")
+    param_out = _known(keys["PARAM_OUT"], OUTPUTS, path, "write INV_STERADIAN if it is a BRDF in 1/sr")
+    line, dim = keys["DIM"]
     coordinates = len(INPUTS[param_in][0])
     channels = next((names for names in CHANNELS if dim.split() == [f"{coordinates}", f"{len(names)}"]), None)
     if channels is None:
@@ -107,12 +108,12 @@ def find_header(comments: Sequence[Line], path: str) -> Header | None:
             f"{path}: line {line.number}: #DIM {dim} should be {coordinates} 1 or {coordinates} 3, the "
             f"coordinates of {param_in} and one value or three (R, G, B); correct that line"
         )
-    intervals = _intervals(said.get("VS"), len(channels), path)
+    intervals = _intervals(keys.get("VS"), len(channels), path)
     return Header(param_in, param_out, channels, intervals, line.number)
 
 
-def _known(said: tuple[Line, str], known: Collection[str], path: str, remedy: str) -> str:
-    line, name = said
+def _known(entry: tuple[Line, str], known: Collection[str], path: str, remedy: str) -> str:
+    line, name = entry
     if name not in known:
         raise DataError(
             f"{path}: line {line.number}: {line.text!r} is not among {', '.join(known)}, which pellicle "
@@ -121,11 +122,11 @@ def _known(said: tuple[Line, str], known: Collection[str], path: str, remedy: st
     return name
 
 
-def _intervals(said: tuple[Line, str] | None, count: int, path: str) -> tuple[int, ...]:
-    """One number for each channel; a single one holds for all."""
-    if said is None:
+def _intervals(entry: tuple[Line, str] | None, count: int, path: str) -> tuple[int, ...]:
+    """One number for each channel; a single one applies to all."""
+    if entry is None:
         return (0,) * count
-    line, text = said
+    line, text = entry
     kinds = [int(word) for word in text.split() if word in ("0", "1", "2")]
     if len(kinds) != len(text.split()) or len(kinds) not in (1, count):
         raise DataError(
@@ -136,20 +137,20 @@ def _intervals(said: tuple[Line, str] | None, count: int, path: str) -> tuple[in
 
 
 def layout(lines: Sequence[Line], comments: Sequence[Line], path: str) -> Layout | None:
-    """The rows of an ALTA file, or None. What stands above its header is no part of it."""
+    """Return the rows of an ALTA file below its header, or None for another format."""
     header = find_header(comments, path)
     if header is None:
         return None
     rows = [line for line in lines if line.number > header.line]
     if not rows:
-        raise DataError(f"{path}: holds an ALTA header but no rows; export it again")
+        raise DataError(f"{path}: has an ALTA header but no rows; export it again")
     note = f"read as an ALTA text file of {header.param_in} (radians) and {header.param_out}"
     width = len(header.names)
     return Layout(" ", ".", header.names, width, width, rows, (note,))
 
 
 def from_table(table: Table, header: Header) -> BrdfSamples:
-    """The samples of an ALTA file, whose directions and values are still to be judged."""
+    """Return the samples of an ALTA file. Raises DataError for impossible directions or values."""
     columns = table.numbers(range(len(header.names)))
     coordinates, directions = INPUTS[header.param_in]
     start = len(coordinates)
@@ -164,7 +165,7 @@ def from_table(table: Table, header: Header) -> BrdfSamples:
     if header.param_out == COSINE:
         weight = _cosine(theta_o, table)[:, None]
         values, sigma = values / weight, None if sigma is None else sigma / weight
-        notes = (*notes, "values divided by cos(theta_o), with which the header says that they are weighted")
+        notes = (*notes, "values divided by cos(theta_o), their weight according to the header")
     return BrdfSamples(
         theta_i, phi_i, theta_o, phi_o, values, header.channels, sigma, table.path, table.sha256, notes,
         table.lines,
@@ -174,18 +175,18 @@ def from_table(table: Table, header: Header) -> BrdfSamples:
 def _sigma(header: Header, bounds: Sequence[np.ndarray]) -> np.ndarray | None:
     if 0 in header.intervals:
         return None
-    left, radii = list(bounds), []
+    columns, radii = iter(bounds), []
     for kind in header.intervals:
-        radii.append(left.pop(0) if kind == 1 else (-left.pop(0) + left.pop(0)) / 2)
+        radii.append(next(columns) if kind == 1 else (-next(columns) + next(columns)) / 2)
     return np.stack(radii, axis=1)
 
 
 def _cosine(theta: np.ndarray, table: Table) -> np.ndarray:
-    """cos θ_o, 1 below the horizon, which is judged later. Raises DataError at grazing."""
+    """cos θ_o, 1 below the horizon, which `BrdfSamples` refuses. Raises DataError at grazing angles."""
     grazing = np.abs(theta - 90) < GRAZING
     if grazing.any():
         raise DataError(
             f"{table.path}: line {table.lines[np.argmax(grazing)]}: theta_o is 90 degrees, where a value "
-            "weighted with its cosine does not hold the BRDF; delete that row"
+            "weighted with its cosine does not determine the BRDF; delete that row"
         )
     return np.where(theta < 90, np.cos(np.deg2rad(theta)), 1.0)

@@ -1,8 +1,8 @@
-"""What ellipsometers export, told by its content and rewritten as plain columns.
+"""Detection of ellipsometers' exports by their content.
 
-Each reader takes the lines and the comments of a file and returns a `Layout` whose rows keep the
-numbers of the lines they came from, or None for a file that is not of its kind. So cells, units and
-axes are judged as in any other file, and messages name the user's own lines.
+Each reader takes the lines and comments of a file and returns a `Layout` of plain columns whose rows keep
+their line numbers, or None for another format. Cells, units and axes are then checked as in any other
+file, and messages name the lines of the user's file.
 """
 
 from __future__ import annotations
@@ -22,12 +22,13 @@ READERS: tuple[Reader, ...] = (woollam.layout, spectraray.layout)
 def find_export(
     lines: Sequence[Line], comments: Sequence[Line], path: str, spot: int | None = None
 ) -> Layout | None:
-    """The layout of an instrument's own format, or None.
+    """Return the layout of an instrument's format, or None.
 
-    `spot`, from 1, chooses among several in one file. Raises DataError for a file that is unclear,
-    UsageError where spots leave open which, or there is no such spot.
+    `spot`, from 1, selects one of several spots in a file. Raises DataError for an ambiguous file, UsageError
+    for a missing or wrong spot.
     """
-    found = accurion.layout(lines, comments, path, spot)
-    if found is None and spot is not None:
-        raise UsageError(f"{path}: --spot chooses among the spots of an Accurion file, which this is not")
-    return found or next((known for reader in READERS if (known := reader(lines, comments, path))), None)
+    layout = accurion.layout(lines, comments, path, spot)
+    if layout is None and spot is not None:
+        raise UsageError(f"{path}: `spot` selects a spot of an Accurion file, which this is not")
+    layouts = (reader(lines, comments, path) for reader in READERS)
+    return layout or next((layout for layout in layouts if layout), None)

@@ -1,9 +1,9 @@
-"""The binary files of the MERL BRDF database: one isotropic material on a grid of directions.
+"""Binary files of the MERL BRDF database: one isotropic material on a grid of directions.
 
 Matusik, Pfister, Brand and McMillan, A data-driven reflectance model, ACM Trans. Graph. 22 (2003).
 Three int32 (90, 90, 180), then float64, little-endian: all of R, then G, then B, each over θ_h
-(spaced as its square root), θ_d and φ_d, where φ_d stops at 180° because light and eye may be
-swapped. A cell stands for its middle. Values carry a scale per channel; negative ones are invalid.
+(spaced as its square root), θ_d and φ_d, where φ_d stops at 180° because light and viewer may be
+swapped. A cell is read at its middle. Values have a scale per channel; negative ones are invalid.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ import numpy as np
 
 from pellicle.data.brdf_samples import BrdfSamples, spread
 from pellicle.data.half_angles import angles, from_half_difference
-from pellicle.data.tabular.text import opened
+from pellicle.data.tabular.text import open_binary
 from pellicle.errors import DataError
 
 SHAPE = (90, 90, 180)
 SCALE = (1.0 / 1500, 1.15 / 1500, 1.66 / 1500)
 SAMPLES = 10_000
-"""Kept of a file unless asked otherwise: a fit gains nothing from all of about a million."""
+"""Samples kept by default: a fit gains nothing from all of about a million."""
 
 _HEADER = 12  # bytes
 _SIZE = _HEADER + 8 * 3 * SHAPE[0] * SHAPE[1] * SHAPE[2]
-_LARGEST = 1 << 16  # text read as int32 is far above, and so are most other binaries
+_LARGEST = 1 << 16  # text and most other binaries, read as int32, are far above
 
 THETA_H = np.deg2rad((np.arange(SHAPE[0]) + 0.5) ** 2 / SHAPE[0])
 THETA_D = np.deg2rad(np.arange(SHAPE[1]) + 0.5)
@@ -34,25 +34,26 @@ PHI_D = np.deg2rad(np.arange(SHAPE[2]) + 0.5)
 
 
 def is_merl(path: str | os.PathLike[str]) -> bool:
-    """True if a file begins with three plausible dimensions. Raises DataError if it cannot be read."""
+    """Return True if a file begins with three plausible dimensions. Raises DataError if it cannot be read."""
     dimensions = _dimensions(path)
     return dimensions.size == 3 and bool(((dimensions > 0) & (dimensions < _LARGEST)).all())
 
 
 def read_merl(path: str | os.PathLike[str], samples: int | None = None) -> BrdfSamples:
-    """At most `samples` (10 000 by default) of the valid cells of a MERL file, spread over its grid.
+    """Read at most `samples` (10 000 by default) valid cells of a MERL file, spread over its grid.
 
-    The file is gone through piece by piece and never held in memory. Cells with a direction below the
-    surface and invalid ones are left out and counted in the notes. The surface is isotropic, so phi_i
-    is 0. Raises DataError for other dimensions, a wrong size or no valid cell.
+    The file is read piece by piece, not into memory. Cells with a direction below the surface and invalid
+    ones are left out and counted in the notes. The surface is isotropic, so phi_i is 0.
+
+    Raises DataError for other dimensions, a wrong size or no valid cell.
     """
     _check_size(path)
-    with opened(path) as file:
+    with open_binary(path) as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
     cells = np.memmap(path, dtype="<f8", mode="r", offset=_HEADER, shape=(3, *SHAPE))
     valid, below, invalid = _valid(cells)
     if not valid.size:
-        raise DataError(f"{path}: holds no valid cell of a BRDF; download it again")
+        raise DataError(f"{path}: has no valid cell of a BRDF; download it again")
     kept = valid[spread(valid.size, SAMPLES if samples is None else samples)]
     h, d, p = np.unravel_index(kept, SHAPE)
     (theta_i, phi_i), (theta_o, phi_o) = map(
@@ -76,16 +77,16 @@ def read_merl(path: str | os.PathLike[str], samples: int | None = None) -> BrdfS
 
 
 def _dimensions(path: str | os.PathLike[str]) -> np.ndarray:
-    with opened(path) as file:
+    with open_binary(path) as file:
         head = file.read(_HEADER)
     return np.frombuffer(head[: len(head) // 4 * 4], dtype="<i4")
 
 
 def _check_size(path: str | os.PathLike[str]) -> None:
-    found, expected = (" x ".join(map(str, shape)) for shape in (_dimensions(path), SHAPE))
-    if found != expected:
+    actual, expected = (" x ".join(map(str, shape)) for shape in (_dimensions(path), SHAPE))
+    if actual != expected:
         raise DataError(
-            f"{path}: looks like a MERL file of {found} cells, where {expected} are expected; "
+            f"{path}: looks like a MERL file of {actual} cells, where {expected} are expected; "
             "convert it to text (CSV) first"
         )
     size = Path(path).stat().st_size
@@ -95,12 +96,12 @@ def _check_size(path: str | os.PathLike[str]) -> None:
 
 
 def _valid(cells: np.ndarray) -> tuple[np.ndarray, int, int]:
-    """Flat indices of the cells to use; how many others point below the surface, how many are invalid."""
+    """Flat indices of the valid cells; counts of cells below the surface and of invalid ones."""
     keep, below, invalid = np.empty(SHAPE, dtype=bool), 0, 0
     theta_d, phi_d = np.meshgrid(THETA_D, PHI_D, indexing="ij")
     for at, theta_h in enumerate(THETA_H):
-        light, eye = from_half_difference(theta_h, 0.0, theta_d, phi_d)
-        above = (light[2] > 0) & (eye[2] > 0)
+        light, viewer = from_half_difference(theta_h, 0.0, theta_d, phi_d)
+        above = (light[2] > 0) & (viewer[2] > 0)
         piece = cells[:, at]
         measured = ((piece >= 0) & (piece < np.inf)).all(axis=0)
         keep[at] = above & measured

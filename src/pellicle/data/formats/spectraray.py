@@ -1,7 +1,7 @@
-"""ASCII files of Sentech's SpectraRay: one pair of columns, Ψ and Δ, for each angle of incidence.
+"""ASCII files of Sentech's SpectraRay: a pair of columns, Ψ and Δ, for each angle of incidence.
 
 The first line is `; WAVELENGTH 50.2 50.2 60.2 60.2`: each angle in degrees, twice. The rows below
-hold the wavelength in nm and Ψ, Δ at each angle. Layout as in files that pyElli is tested with.
+hold the wavelength in nm and Ψ, Δ at each angle. The layout is that of the test files of pyElli.
 """
 
 from __future__ import annotations
@@ -12,12 +12,15 @@ from pellicle.data.tabular.layout import Layout, plain_columns
 from pellicle.data.tabular.text import Line, is_number
 from pellicle.errors import DataError
 
-#: The word in the heading → the column that it announces.
 AXES = {"WAVELENGTH": "wavelength", "ENERGY": "energy", "WAVENUMBER": "wavenumber"}
+"""Column of each word in the heading."""
 
 
 def layout(lines: Sequence[Line], comments: Sequence[Line], path: str) -> Layout | None:
-    """One row per wavelength and angle of such a file, or None. Raises DataError where pairs do not match."""
+    """Return one row per wavelength and angle, or None for another format.
+
+    Raises DataError where the pairs of columns do not match.
+    """
     words = lines[0].text.lstrip(";").replace(",", ".").split()
     numbers = words[1:]
     if not lines[0].text.startswith(";") or not words or words[0].upper() not in AXES:
@@ -39,6 +42,6 @@ def layout(lines: Sequence[Line], comments: Sequence[Line], path: str) -> Layout
             )
         rows += [(line, [cells[0], angle, *cells[1 + 2 * i : 3 + 2 * i]]) for i, angle in enumerate(angles)]
     if not rows:
-        raise DataError(f"{path}: holds a heading of SpectraRay but no rows; export it again")
+        raise DataError(f"{path}: has a heading of SpectraRay but no rows; export it again")
     names = (AXES[words[0].upper()], "angle_deg", "psi_deg", "delta_deg")
     return plain_columns(names, rows, [f"read as a SpectraRay file of {', '.join(angles)} degrees"])

@@ -1,9 +1,9 @@
 """Text files of Woollam's WVASE and CompleteEASE.
 
-Some lines of heading (a title, `VASEmethod[...]`, `Original[...]`), a line with the unit of the
-axis (`nm`, `Angstroms`, `eV`), then rows of wavelength, angle of incidence, Ψ, Δ and as a rule the
-errors of both. CompleteEASE puts `E` before such rows, and other labels (`dpolE`, `Rpp`, `uT`, ...)
-before quantities that are no Ψ and Δ. Layout as in files of both programs.
+Lines of heading (a title, `VASEmethod[...]`, `Original[...]`), a line with the unit of the axis (`nm`,
+`Angstroms`, `eV`), then rows of wavelength, angle of incidence, Ψ, Δ and usually the errors of both.
+CompleteEASE puts `E` before such rows, and other labels (`dpolE`, `Rpp`, `uT`, ...) before other
+quantities. The layout is that of files of both programs.
 """
 
 from __future__ import annotations
@@ -16,13 +16,16 @@ from pellicle.data.tabular.units import wavelength_unit
 from pellicle.errors import DataError
 
 METHOD = "VASEmethod["
-LABEL = "E"  # rows of Ψ and Δ; none of the other labels are
-_MOST_HEADING = 50  # lines among which the unit is looked for
+LABEL = "E"  # rows of Ψ and Δ
+_MOST_HEADING = 50  # lines that are searched for the unit
 _COLUMNS = ("angle_deg", "psi_deg", "delta_deg", "sigma_psi", "sigma_delta")
 
 
 def layout(lines: Sequence[Line], comments: Sequence[Line], path: str) -> Layout | None:
-    """The rows of Ψ and Δ of such a file, or None. Raises DataError where it holds none, or tan Ψ."""
+    """Return the rows of Ψ and Δ, or None for another format.
+
+    Raises DataError where the file has none, or tan Ψ and cos Δ.
+    """
     at = _unit_line(lines)
     if at is None:
         return None
@@ -31,16 +34,17 @@ def layout(lines: Sequence[Line], comments: Sequence[Line], path: str) -> Layout
     if not labelled and not any(line.text.startswith(METHOD) for line in lines[:at]):
         return None
     _refuse_tan_cos(lines[at], path)
-    kept, others = _sorted(rows)
+    kept, others = _separate(rows)
     widths = {len(cells) for _, cells in kept}
     if not kept or widths not in ({4}, {6}):
+        labels = f" (found {', '.join(others)})" if others else ""
         raise DataError(
             f"{path}: looks like a Woollam file, but its rows are not wavelength, angle, psi, delta and "
-            f"their errors{_found(others)}; export psi and delta as text"
+            f"their errors{labels}; export psi and delta as text"
         )
     names = (f"wavelength ({wavelength_unit(lines[at].text.split()[0])})", *_COLUMNS[: widths.pop() - 1])
     notes = ["read as a Woollam (WVASE, CompleteEASE) text file"]
-    if len(names) == 6 and all(_is_zero(cell) for _, cells in kept for cell in cells[4:]):
+    if len(names) == 6 and all(is_number(x) and float(x) == 0 for _, cells in kept for x in cells[4:]):
         names, kept = names[:4], [(line, cells[:4]) for line, cells in kept]  # as simulations are written
         notes.append("errors that are all zero ignored")
     if others:
@@ -49,7 +53,7 @@ def layout(lines: Sequence[Line], comments: Sequence[Line], path: str) -> Layout
 
 
 def _unit_line(lines: Sequence[Line]) -> int | None:
-    """Index of the line that holds nothing but the axis's unit, with rows of numbers below it."""
+    """Index of the line with nothing but the axis's unit, above rows of numbers."""
     for i, line in enumerate(lines[: min(_MOST_HEADING, len(lines) - 1)]):
         words, below = line.text.split(), lines[i + 1].bare.split()
         alone = len(words) == 1 or words[1].upper() == "TRIG"
@@ -61,12 +65,12 @@ def _unit_line(lines: Sequence[Line]) -> int | None:
 def _refuse_tan_cos(line: Line, path: str) -> None:
     if len(line.text.split()) > 1:
         raise DataError(
-            f"{path}: line {line.number} says that the rows are tan(psi) and cos(delta), which leave the "
-            "sign of delta open; export psi and delta in degrees"
+            f"{path}: line {line.number} states that the rows are tan(psi) and cos(delta), which lack the "
+            "sign of delta; export psi and delta in degrees"
         )
 
 
-def _sorted(
+def _separate(
     rows: Sequence[tuple[Line, list[str]]],
 ) -> tuple[list[tuple[Line, list[str]]], list[str]]:
     """The rows of Ψ and Δ without their label, and the labels of the others."""
@@ -79,11 +83,3 @@ def _sorted(
         else:
             kept.append((line, cells))
     return kept, list(others)
-
-
-def _is_zero(cell: str) -> bool:
-    return is_number(cell) and float(cell) == 0
-
-
-def _found(labels: Sequence[str]) -> str:
-    return f" (found {', '.join(labels)})" if labels else ""

@@ -1,1 +1,1 @@
-"""Tables in text files: from characters to named columns with units."""
+"""Tables in text files: decoding, layout, and named columns with units."""

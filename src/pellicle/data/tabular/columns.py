@@ -1,6 +1,6 @@
-"""What a column's name says: its role, its unit and its polarisation.
+"""Column names: the role, unit and polarisation that they state.
 
-Names are read without regard to case, with the unit in brackets (`R (%)`, `Wavelength [um]`),
+Names are matched without regard to case, with the unit in brackets (`R (%)`, `Wavelength [um]`),
 after a separator (`wavelength_nm`, `R_percent`, `lambda / nm`) or as a sign (`%R`).
 """
 
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pellicle.data.tabular import units
 from pellicle.errors import UsageError
 
-#: Role → the names it goes by. Anything else is no column of ours and is said to be ignored.
+# role → its names; a column of any other name is ignored, with a note
 _NAMES = {
     "wavelength": ("wavelength", "wavelengths", "wl", "lambda", "lam", "λ"),
     "energy": ("energy", "photon energy", "photon_energy"),
@@ -49,8 +49,8 @@ _NAMES = {
     "sigma_G": ("sigma_g",),
     "sigma_B": ("sigma_b",),
 }
-#: The directions of a sample of a BRDF: of the incident light and of the view.
 DIRECTIONS = ("theta_i", "phi_i", "theta_o", "phi_o")
+"""Angles of a BRDF sample: to the light and to the viewer."""
 _IMPLIED_UNIT = {"energy": "eV", "wavenumber": "cm-1", "angle": "deg"}
 _UNIT_OF = {
     "wavelength": units.wavelength_unit,
@@ -74,12 +74,11 @@ SKIP = "_"
 
 @dataclass(frozen=True)
 class Column:
-    """One column: where it is, what it holds and in which unit.
+    """One column: position, name, role and unit.
 
-    `role` is a key of `_NAMES`, or other. Energies and wavenumbers are wavelengths in another unit,
-    and R and T have their polarisation beside them: those keys are no roles.
-    `unit` is None where the name does not say, and `unknown_unit` keeps a unit that was written but
-    not understood.
+    `role` is a key of `_NAMES` or "other"; energies and wavenumbers have the role "wavelength", and Rs, Rp,
+    Ts, Tp the roles "R" and "T" with a polarisation. `unit` is None where the name states none;
+    `unknown_unit` keeps a unit that was not understood.
     """
 
     position: int
@@ -91,7 +90,7 @@ class Column:
 
 
 def recognise(name: str, position: int = 0) -> Column:
-    """The column that `name` announces; role "other" if it announces none of ours."""
+    """Return the column that `name` describes; role "other" for an unknown name."""
     plain = name.strip().strip("\"'").strip().lower()
     unit_alone = units.wavelength_unit(plain)
     if unit_alone and plain != "a":
@@ -128,12 +127,12 @@ def _column(position: int, name: str, role: str, written: str | None, *, bracket
 
 
 def recognise_all(names: Sequence[str]) -> tuple[Column, ...]:
-    """`recognise` over a header, positions counted from 0."""
+    """Apply `recognise` to a header, positions counted from 0."""
     return tuple(recognise(name, position) for position, name in enumerate(names))
 
 
 def is_header(names: Sequence[str]) -> bool:
-    """True if `names` announce a wavelength and something measured, or directions: no free text does."""
+    """Return True if `names` include a wavelength and a signal, or directions, as no free text does."""
     roles = {column.role for column in recognise_all(names)}
     measured = bool(roles & {"R", "T", "intensity", "counts", "psi"})
     measured = measured or {"N", "C", "S"} <= roles or {"alpha", "beta"} <= roles
@@ -141,31 +140,31 @@ def is_header(names: Sequence[str]) -> bool:
 
 
 def is_unit_row(names: Sequence[str]) -> bool:
-    """True for a line that holds only units, as some programs write below the names (`nm,%`)."""
+    """Return True for a line of units only, as some programs write below the names (`nm,%`)."""
     return bool(names) and all(
         units.wavelength_unit(name) or units.signal_unit(name) or name.lower() in ("a.u.", "counts", "deg")
         for name in names
     )
 
 
-def requested(spec: str | Sequence[str], path: str, width: int) -> tuple[Column, ...]:
-    """The columns of `--columns`, e.g. `wavelength,R` or `_,energy,R_percent`; `_` skips one.
+def parse_columns(columns: str | Sequence[str], path: str, width: int) -> tuple[Column, ...]:
+    """Parse a caller's columns, a list or as in `wavelength,R` or `_,energy,R_percent`; `_` skips one.
 
-    Raises UsageError for a name that is not one of ours, or more names than the file has columns.
+    Raises UsageError for an unknown name, or more names than the file has columns.
     """
-    names = [name.strip() for name in (spec.split(",") if isinstance(spec, str) else spec)]
+    names = [name.strip() for name in (columns.split(",") if isinstance(columns, str) else columns)]
     if len(names) > width:
         raise UsageError(
-            f"{path}: --columns names {len(names)} columns but the file has {width}; give at most {width}"
+            f"{path}: `columns` has {len(names)} names but the file has {width} columns; give at most {width}"
         )
-    columns = tuple(
+    parsed = tuple(
         Column(position, name, "other") if name in (SKIP, "") else recognise(name, position)
         for position, name in enumerate(names)
     )
-    for column in columns:
+    for column in parsed:
         if column.role == "other" and column.name not in (SKIP, ""):
             raise UsageError(
-                f"{path}: --columns does not know {column.name!r}; use {', '.join(_NAMES)}, "
-                f"or {SKIP} to skip a column"
+                f"{path}: `columns` has the unknown name {column.name!r}; use {', '.join(_NAMES)}, or "
+                f"{SKIP} to skip a column"
             )
-    return columns
+    return parsed

@@ -1,7 +1,7 @@
-"""Where the numbers are in a text file: delimiter, decimal mark, preamble, header, rows.
+"""Layout of a text file: delimiter, decimal mark, preamble, header and rows.
 
-An instrument's preamble is any text before the first row of numbers. A line of column names may
-end it. Once the rows have begun, text is an error, except a closing `>>>>>` line.
+The preamble is any text before the first row of numbers; a line of column names may end it. Text after
+the first row is an error, except a closing `>>>>>` line.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pellicle.errors import DataError
 DELIMITERS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}
 _BLANK_NAMES = re.compile(r"[^\s(\[]+(?:\s*[(\[][^)\]]*[)\]])?|\S+")  # keeps `R (%)` one name
 _MARKER = ">>>>>"  # Ocean Optics puts such lines around the rows
-_SAMPLE = 60  # lines that decide, spread over the file so that a preamble cannot outvote the rows
+_SAMPLE = 60  # lines that vote on the dialect, spread over the file so that a preamble cannot outvote rows
 
 
 @dataclass(frozen=True)
@@ -39,14 +39,14 @@ class Layout:
 def plain_columns(
     names: Sequence[str], rows: Sequence[tuple[Line, Sequence[str]]], notes: Sequence[str]
 ) -> Layout:
-    """The layout of columns that a reader has picked out: cells with the lines they came from."""
+    """Return the layout of cells that a reader has selected, with the lines they came from."""
     width = len(names)
-    written = [Line(line.number, line.text, "\t".join(cells)) for line, cells in rows]
-    return Layout("\t", ".", tuple(names), width, width, written, tuple(notes))
+    selected = [Line(line.number, line.text, "\t".join(cells)) for line, cells in rows]
+    return Layout("\t", ".", tuple(names), width, width, selected, tuple(notes))
 
 
 def find_layout(lines: Sequence[Line], comments: Sequence[Line], path: str) -> Layout:
-    """The layout of a file's lines. Raises DataError if no line holds two numbers."""
+    """Find the layout of a file's lines. Raises DataError if no line has two numbers."""
     delimiter, decimal = _dialect(lines, path)
     first = _first_numeric(lines, delimiter, decimal)
     if first is None:
@@ -60,10 +60,9 @@ def find_layout(lines: Sequence[Line], comments: Sequence[Line], path: str) -> L
     if header is not None:
         names = _header_cells(lines[header].text, delimiter, width)
         if header + 1 < start:  # a row of units below the names
-            written = split(lines[header + 1].text, delimiter)
-            names = [f"{n} ({u})" if u else n for n, u in zip(names, written, strict=False)] + names[
-                len(written) :
-            ]
+            units = split(lines[header + 1].text, delimiter)
+            units += [""] * (len(names) - len(units))
+            names = [f"{name} ({unit})" if unit else name for name, unit in zip(names, units, strict=False)]
     else:
         names = _commented_header(lines[start], comments, delimiter, width)
         if names:
@@ -90,7 +89,7 @@ def find_layout(lines: Sequence[Line], comments: Sequence[Line], path: str) -> L
 
 
 def _numbers_in(line: Line, delimiter: str, decimal: str = ",") -> tuple[int, int]:
-    """How many cells of a line are numbers, and how many cells it has."""
+    """Count the numbers and the cells of a line."""
     if line.text.startswith(_MARKER):
         return 0, 0
     decimal = "." if delimiter == "," else decimal
@@ -99,7 +98,7 @@ def _numbers_in(line: Line, delimiter: str, decimal: str = ",") -> tuple[int, in
 
 
 def _dialect(lines: Sequence[Line], path: str) -> tuple[str, str]:
-    """Delimiter under which most lines are numbers throughout (ties: tab, `;`, `,`, blank), decimal mark."""
+    """Delimiter with which most lines are all numbers (ties: tab, `;`, `,`, blank), and decimal mark."""
     sample = lines[:: max(1, len(lines) // _SAMPLE)]
 
     def votes(delimiter: str) -> tuple[int, int]:
@@ -126,7 +125,7 @@ def _dialect(lines: Sequence[Line], path: str) -> tuple[str, str]:
 
 
 def _first_numeric(lines: Sequence[Line], delimiter: str, decimal: str) -> int | None:
-    """Index of the first line that is all numbers, or failing that of the first with two numbers."""
+    """Index of the first line that is all numbers, else of the first with two numbers."""
     counted = [_numbers_in(line, delimiter, decimal) for line in lines]
     full = next((i for i, (n, cells) in enumerate(counted) if n == cells >= 2), None)
     return full if full is not None else next((i for i, (n, _) in enumerate(counted) if n >= 2), None)
@@ -137,8 +136,8 @@ def _rows_begin(
 ) -> tuple[int, int | None]:
     """Index of the first row and of the header line above it, or None.
 
-    `first` is the first faultless row; faulty ones may lie between it and the header, and they
-    must not pass for preamble.
+    `first` is the first row without fault. Faulty rows may lie between it and the header; they are not
+    preamble.
     """
     for header in range(first - 1, -1, -1):
         if is_header(_header_cells(lines[header].text, delimiter, width)):
@@ -149,7 +148,7 @@ def _rows_begin(
         start -= 1
     if start and not lines[start - 1].text.startswith(_MARKER):
         cells = split(lines[start - 1].text, delimiter)
-        # two words of free text are as many as two names; only a name of ours tells them apart
+        # two words of free text look like two names; only a known name tells them apart
         words = delimiter == " " and not any(column.role != "other" for column in recognise_all(cells))
         if len(cells) >= width and not words and not any(is_number(cell, decimal) for cell in cells):
             return start, start - 1
@@ -162,9 +161,11 @@ def _is_faulty_row(line: Line, width: int, delimiter: str, decimal: str) -> bool
 
 
 def _header_cells(text: str, delimiter: str, width: int) -> list[str]:
-    """Column names of a header line, which may be separated otherwise than the rows are."""
-    written = [_BLANK_NAMES.findall(text) if d == " " else split(text, d) for d in (delimiter, *DELIMITERS)]
-    return next((names for names in written if len(names) == width), written[0])
+    """Column names of a header line, whose delimiter may differ from that of the rows."""
+    candidates = [
+        _BLANK_NAMES.findall(text) if d == " " else split(text, d) for d in (delimiter, *DELIMITERS)
+    ]
+    return next((names for names in candidates if len(names) == width), candidates[0])
 
 
 def _commented_header(

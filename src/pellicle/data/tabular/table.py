@@ -1,7 +1,7 @@
-"""The numbers of a text file, before anything is known of their meaning.
+"""Tables of numbers in text files, before their columns are interpreted.
 
-One pass over the lines finds the layout, pandas reads the numbers, and only a file that fails is
-gone through cell by cell to name the line and column at fault.
+One pass over the lines finds the layout and pandas reads the numbers. Only a file that fails is read
+cell by cell, to name the faulty line and column.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from pellicle.errors import DataError
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """A file's layout with its path, SHA-256 and comments; `lines` is the source line of each row."""
+    """A file's layout with its path, SHA-256 and comments; `lines` are the source lines of the rows."""
 
     path: str
     sha256: str
@@ -31,23 +31,27 @@ class Table:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Sentences on what was found."""
+        """Sentences on how the file was read."""
         comma = ", decimal commas" if self.layout.decimal == "," else ""
         return (*self.layout.notes, f"columns separated by {DELIMITERS[self.layout.delimiter]}{comma}")
 
     def label(self, position: int) -> str:
-        """A column for a message: its name if it has one, else its number from 1."""
+        """Return a column for a message: its name, or without one its number from 1."""
         names = self.layout.names or ()
         name = names[position] if position < len(names) else ""
         return f"column {name!r}" if name else f"column {position + 1}"
 
     def where(self, row: int, position: int) -> str:
-        """File, line and column for a message about one cell."""
+        """Return file, line and column of a cell, for a message."""
         return f"{self.path}: line {self.lines[row]}, {self.label(position)}"
 
+    def places(self, position: int, rows: np.ndarray | None = None) -> Callable[[int], str]:
+        """Return `where` of one column as a function of the row, or of the position in `rows`."""
+        return lambda row: self.where(row if rows is None else int(rows[row]), position)
+
     def numbers(self, positions: Sequence[int]) -> list[np.ndarray]:
-        """The columns at `positions`, float64 and finite. Raises DataError naming the first bad cell."""
-        import pandas as pd  # takes 0.3 s to import, and only a reader needs it
+        """Read the columns at `positions`, float64 and finite. Raises DataError for the first bad cell."""
+        import pandas as pd  # takes 0.3 s to import; only readers need it
 
         try:
             with warnings.catch_warnings():
@@ -63,18 +67,17 @@ class Table:
                     skip_blank_lines=False,
                     low_memory=False,
                 )
-        except (
-            ValueError,
-            pd.errors.ParserWarning,
-        ):  # a ParserError is a ValueError: a later row is too long
+        # a ParserError is a ValueError: a later row is too long
+        except (ValueError, pd.errors.ParserWarning):
             return self._numbers_by_cell(positions)
-        found = [frame[position].to_numpy() for position in positions]
-        if len(frame) == len(self.lines) and all(_is_finite(values) for values in found):
-            return [values.astype(np.float64) for values in found]
+        columns = [frame[position].to_numpy() for position in positions]
+        finite = all(x.dtype.kind in "fiu" and np.isfinite(x).all() for x in columns)
+        if len(frame) == len(self.lines) and finite:
+            return [x.astype(np.float64) for x in columns]
         return self._numbers_by_cell(positions)
 
     def _numbers_by_cell(self, positions: Sequence[int]) -> list[np.ndarray]:
-        found: list[list[float]] = [[] for _ in positions]
+        columns: list[list[float]] = [[] for _ in positions]
         for row, line in enumerate(self.layout.rows):
             cells = split(line.bare, self.layout.delimiter)
             if len(cells) > self.layout.width:
@@ -83,9 +86,9 @@ class Table:
                     f"{self.path}: line {line.number} has {len(cells)} values where {self.layout.width} "
                     f"are expected; correct that line{hint}"
                 )
-            for column, position in zip(found, positions, strict=True):
+            for column, position in zip(columns, positions, strict=True):
                 column.append(self._number(cells[position] if position < len(cells) else "", row, position))
-        return [np.array(column) for column in found]
+        return [np.array(column) for column in columns]
 
     def _number(self, cell: str, row: int, position: int) -> float:
         where = self.where(row, position)
@@ -99,23 +102,19 @@ class Table:
         return value
 
 
-def _is_finite(values: np.ndarray) -> bool:
-    return values.dtype.kind in "fiu" and bool(np.isfinite(values).all())
-
-
 Finder = Callable[[Sequence[Line], Sequence[Line], str], Layout | None]
 
 
 def read_table(path: str | os.PathLike[str], export: Finder | None = None) -> Table:
-    """Layout of the text file at `path`; no cell is read yet.
+    """Find the layout of a text file; cells are read later.
 
-    `export` is asked first: it returns the layout of a format of its own, or None.
-    Raises DataError for a file that cannot be read or holds no rows of numbers.
+    `export` is tried first: it returns the layout of an instrument's format, or None.
+    Raises DataError for a file that cannot be read or has no rows of numbers.
     """
     text, digest = read_text(path)
     lines, comments = content_lines(text)
     if not lines:
-        raise DataError(f"{path}: holds only comments; expected rows of numbers")
-    known = export(lines, comments, str(path)) if export else None
-    layout = known or find_layout(lines, comments, str(path))
+        raise DataError(f"{path}: has only comments; expected rows of numbers")
+    layout = export(lines, comments, str(path)) if export else None
+    layout = layout or find_layout(lines, comments, str(path))
     return Table(str(path), digest, layout, np.array([line.number for line in layout.rows]), comments)

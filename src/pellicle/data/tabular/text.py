@@ -1,4 +1,4 @@
-"""A file as lines and cells of text: decoding, comments, what counts as a number."""
+"""Text files as lines and cells: decoding, comments, and the syntax of numbers."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
 
 @dataclass(frozen=True)
 class Line:
-    """A line that holds something: its number from 1, its text, and the text before any `#`."""
+    """A line that is not blank: its number from 1, its text, and the text before any `#`."""
 
     number: int
     text: str
@@ -31,8 +31,8 @@ class Line:
 
 
 @contextmanager
-def opened(path: str | os.PathLike[str]) -> Iterator[BufferedReader]:
-    """A file open for reading bytes. Raises DataError for a missing or unreadable file, or a folder."""
+def open_binary(path: str | os.PathLike[str]) -> Iterator[BufferedReader]:
+    """Open a file for reading bytes. Raises DataError for a missing or unreadable file, or a folder."""
     try:
         with Path(path).open("rb") as file:
             yield file
@@ -47,13 +47,13 @@ def opened(path: str | os.PathLike[str]) -> Iterator[BufferedReader]:
 
 
 def read_text(path: str | os.PathLike[str]) -> tuple[str, str]:
-    """Text and SHA-256 of a file: UTF-8, UTF-16 with its mark, or Latin-1 as older instruments write.
+    """Return text and SHA-256 of a file: UTF-8, UTF-16 with its mark, or Latin-1 as older instruments write.
 
-    Raises DataError as `opened` does, and for an empty file or one that is no table.
+    Raises DataError as `open_binary` does, and for an empty file or one that is not a table.
     """
-    with opened(path) as file:
+    with open_binary(path) as file:
         content = file.read()
-    if advice := no_measurement(content):
+    if advice := foreign_format(content):
         raise DataError(f"{path}: is {advice}")
     digest = hashlib.sha256(content).hexdigest()
     marked = content.startswith((b"\xff\xfe", b"\xfe\xff"))
@@ -69,7 +69,7 @@ def read_text(path: str | os.PathLike[str]) -> tuple[str, str]:
 
 
 def content_lines(text: str) -> tuple[list[Line], list[Line]]:
-    """Lines that hold something, and the comment lines (without their `#`), both in file order."""
+    """Return the lines that are not blank, and the comments (without their `#`), both in file order."""
     lines, comments = [], []
     for number, raw in enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), start=1):
         plain = raw.strip(" ")
@@ -81,12 +81,12 @@ def content_lines(text: str) -> tuple[list[Line], list[Line]]:
 
 
 def is_number(text: str, decimal: str = ".") -> bool:
-    """True if the whole of `text` is a number, NaN and infinity included."""
+    """Return True if all of `text` is a number, NaN and infinity included."""
     return bool(_NUMBER.fullmatch(text) or (decimal == "," and _COMMA_NUMBER.fullmatch(text)))
 
 
 def split(text: str, delimiter: str) -> list[str]:
-    """The cells of a line without blanks and quotes around them, nor empty cells at its end."""
+    """Split a line into cells, without blanks and quotes around them or empty cells at the end."""
     if '"' in text:
         cells = next(csv.reader([text], delimiter=delimiter, skipinitialspace=True))
     else:
@@ -97,7 +97,7 @@ def split(text: str, delimiter: str) -> list[str]:
     return cells
 
 
-_KINDS = {
+_FOREIGN = {
     rb"\x89PNG|\xff\xd8\xff|GIF8|II\*\x00|MM\x00\*": "a picture; give the numbers behind it, as a CSV",
     rb"%PDF": "a PDF; give the numbers in it as a CSV",
     rb"\xd0\xcf\x11\xe0|PK\x03\x04.*(\[Content_Types|spreadsheet)": "an office file; save its sheet as CSV",
@@ -105,13 +105,13 @@ _KINDS = {
     rb"\{\\rtf": "a word processor's file; save it as plain text",
     rb"\s*<(!doctype|html|\?xml|svg)": "a web page or XML; export the spectrum as a CSV",
     rb"\s*(\{|\[\s*[\{\[\"])": "JSON; give a CSV with columns as wavelength_nm,R",
-    rb"(?=.*\[\[?scene[.\]])(\s*#[^\n]*\n|\s)*\[": "a recipe; give it with --recipe",
+    rb"(?=.*\[\[?scene[.\]])(\s*#[^\n]*\n|\s)*\[": "a recipe; give it as `recipe` (Python: pl.read_recipe)",
 }
-"""Patterns of how contents begin, the narrower first, and what such a file is."""
+"""First bytes of files of other formats (narrower patterns first), and advice for each."""
 
 
-def no_measurement(content: bytes) -> str | None:
-    """What the file is instead of a table of numbers, and what to do; None if it may be one."""
+def foreign_format(content: bytes) -> str | None:
+    """Return what a file is in place of a table of numbers, with advice; None if it may be a table."""
     head = content[:4096]
     flags = re.DOTALL | re.IGNORECASE
-    return next((advice for pattern, advice in _KINDS.items() if re.match(pattern, head, flags)), None)
+    return next((advice for pattern, advice in _FOREIGN.items() if re.match(pattern, head, flags)), None)

@@ -1,14 +1,14 @@
-"""Units at the edge of a file: whatever an instrument writes becomes nm, degrees and fractions.
+"""Units of files, converted to nm, degrees and fractions.
 
-Plain constants instead of a unit library: importing one would cost more than the whole reading.
+Plain constants instead of a unit library: importing one would take longer than reading the file.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-#: h c / e in eV nm, exact in the SI of 2019 (h = 6.62607015e-34, c = 299792458, e = 1.602176634e-19).
 HC_EV_NM = 6.62607015e-34 * 299792458 / 1.602176634e-19 * 1e9
+"""hc/e in eV nm, exact in the SI of 2019 (h = 6.62607015e-34, c = 299792458, e = 1.602176634e-19)."""
 
 WAVELENGTH_UNITS = ("nm", "um", "A", "eV", "cm-1")
 SIGNAL_UNITS = ("fraction", "percent")
@@ -34,27 +34,27 @@ def _lookup(spellings: dict[str, tuple[str, ...]], text: str) -> str | None:
 
 
 def wavelength_unit(text: str) -> str | None:
-    """The member of `WAVELENGTH_UNITS` that `text` spells (`µm`, `1/cm`, `Angstrom`, ...), or None."""
+    """Return the member of `WAVELENGTH_UNITS` that `text` spells (`µm`, `1/cm`, `Angstrom`, ...), or None."""
     return _lookup(_WAVELENGTH_SPELLINGS, text)
 
 
 def signal_unit(text: str) -> str | None:
-    """`percent` or `fraction` as `text` spells it (`%`, `-`, ...), or None."""
+    """Return "percent" or "fraction", as `text` spells it (`%`, `-`, ...), or None."""
     return _lookup(_SIGNAL_SPELLINGS, text)
 
 
 def angle_unit(text: str) -> str | None:
-    """`deg` if `text` spells degrees, else None."""
+    """Return "deg" if `text` spells degrees, else None."""
     return _lookup(_ANGLE_SPELLINGS, text)
 
 
 def brdf_unit(text: str) -> str | None:
-    """`1/sr` if `text` spells the unit of a BRDF, else None."""
+    """Return "1/sr" if `text` spells the unit of a BRDF, else None."""
     return _lookup(_BRDF_SPELLINGS, text)
 
 
 def to_nm(values: np.ndarray, unit: str) -> np.ndarray:
-    """Wavelengths in nm from positive `values` in one of `WAVELENGTH_UNITS`."""
+    """Convert positive `values` in one of `WAVELENGTH_UNITS` to wavelengths in nm."""
     match unit:
         case "nm":
             return values
@@ -66,4 +66,4 @@ def to_nm(values: np.ndarray, unit: str) -> np.ndarray:
             return HC_EV_NM / values
         case "cm-1":
             return 1e7 / values
-    raise ValueError(f"unit: expected one of {', '.join(WAVELENGTH_UNITS)}, got {unit!r}")
+    raise ValueError(f"`unit`: expected one of {', '.join(WAVELENGTH_UNITS)}, got {unit!r}")
