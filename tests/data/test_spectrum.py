@@ -23,17 +23,17 @@ NM = np.array([500.0, 600.0, 700.0])
         (
             95.0,
             {"signal": "psi-delta", "delta": NM / 10},
-            "`values` at 500 nm: 95 is not from 0 to 90 degrees",
+            "`values` at 500 nm: 95 is not from 0 to 90",
         ),
         (
             45.0,
             {"signal": "psi-delta", "delta": NM},
-            "`delta` at 500 nm: 500 is not from -180 to 360 degrees",
+            "`delta` at 500 nm: 500 is not from -180 to 360",
         ),
         (
             30.0,
             {"path": "a.csv", "lines": np.arange(3)},
-            "a.csv: line 0, `values` at 500 nm: 30 is above 1.5",
+            "a.csv: line 0, `values` at 500 nm: 30 is",
         ),
     ],
 )

@@ -74,7 +74,8 @@ class FilmRecipe:
         try:
             return _scene(self.tables, Path(self.path).parent)
         except ValueError as error:
-            raise DataError(f"{self.path}: {error}") from None
+            # without backticks, which the command line would turn into flags
+            raise DataError(f"{self.path}: {error}".replace("`", "")) from None
         except RecursionError:
             raise DataError(f"{self.path}: its materials are nested too deeply") from None
 

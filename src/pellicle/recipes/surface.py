@@ -83,7 +83,8 @@ class SurfaceRecipe:
         try:
             return _surface(self.tables.scene.surface, Path(self.path).parent)
         except ValueError as error:
-            raise DataError(f"{self.path}: scene.surface: {error}") from None
+            # without backticks, which the command line would turn into flags
+            raise DataError(f"{self.path}: scene.surface: {error}".replace("`", "")) from None
         except RecursionError:
             raise DataError(f"{self.path}: scene.surface: its base is nested too deeply") from None
 

@@ -1,1 +1,1 @@
-"""Scenes: layers on a substrate, the light and the instrument; and surfaces with a layered BRDF."""
+"""Scenes of films (layers, substrate, light, instrument) and surfaces with a BRDF, with free parameters."""

@@ -1,13 +1,12 @@
-"""A scene: what is there and how it is looked at.
+"""Scenes of films: layers on a substrate, the light and the instrument.
 
-Scenes are pytrees of numbers. Wherever a number may stand, a `Free` may stand instead: a
-parameter to be fitted. What is absent is None, and costs nothing.
+Scenes are pytrees of numbers. A `Free`, a parameter to be fitted, may stand in place of any number. None
+marks an absent effect, which costs nothing.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple, final
 
@@ -17,7 +16,7 @@ import numpy as np
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.scene.free import Free
 from pellicle.scene.instrument import Instrument
-from pellicle.scene.layers import Interface, Layer, Plate, Substrate, absorbs, surroundings
+from pellicle.scene.layers import Interface, Layer, Plate, Quantity, Substrate, absorbs, ambient_medium
 
 SIGNALS = ("R", "T", "psi-delta")
 POLARISATIONS = ("unpolarised", "s", "p")
@@ -25,8 +24,16 @@ POLARISATIONS = ("unpolarised", "s", "p")
 
 @final
 class Light(eqx.Module):
-    """How the scene is looked at: signal "R", "T" or "psi-delta", polarisation, angle of incidence
-    (degrees; one for all or one per wavelength) and wavelengths (nm; None leaves them to the data)."""
+    """Light and signal of a measurement.
+
+    **Arguments:** `wavelength` in nm (None leaves it to the data); `angle` of incidence in degrees, one or
+    one per wavelength; `signal`, "R", "T" or "psi-delta"; `polarisation`, "unpolarised", "s" or "p".
+
+    **Raises:** ValueError for an unknown word, and for angles outside 0 to 90 degrees.
+
+    >>> Light(angle=70.0, signal="psi-delta").polarisation
+    'unpolarised'
+    """
 
     wavelength: Any = None
     angle: Any = 0.0
@@ -35,48 +42,50 @@ class Light(eqx.Module):
 
     def __check_init__(self):
         if self.signal not in SIGNALS:
-            raise ValueError(f"signal must be one of {', '.join(SIGNALS)}, not {self.signal!r}")
+            raise ValueError(f"`signal` must be one of {', '.join(SIGNALS)}, not {self.signal!r}")
         check_polarisation(self.polarisation)
         angle = [self.angle.lower, self.angle.upper] if isinstance(self.angle, Free) else self.angle
         if isinstance(angle, int | float | list | np.ndarray):
             wrong = [x for x in np.ravel(angle) if not 0 <= x <= 90]
             if wrong:
-                raise ValueError(f"the angle of incidence must lie in 0 to 90 degrees, got {wrong[0]:g}")
+                raise ValueError(f"`angle` of incidence must lie in 0 to 90 degrees, got {wrong[0]:g}")
 
     @property
     def largest_angle(self) -> float:
-        """The largest angle of incidence, in degrees, that values or bounds allow."""
+        """Largest angle of incidence in degrees, by value or upper bound."""
         return float(self.angle.upper if isinstance(self.angle, Free) else np.max(self.angle))
 
 
 def check_polarisation(polarisation: str) -> None:
-    """ValueError unless the word is one that we know."""
+    """Raise ValueError for an unknown polarisation."""
     if polarisation not in POLARISATIONS:
-        raise ValueError(f"polarisation must be one of {', '.join(POLARISATIONS)}, not {polarisation!r}")
-
-
-def _layers(what: Layer | Sequence[Layer | Interface | Plate]) -> tuple[Layer | Interface | Plate, ...]:
-    return (what,) if isinstance(what, Layer) else tuple(what)
+        raise ValueError(f"`polarisation` must be one of {', '.join(POLARISATIONS)}, not {polarisation!r}")
 
 
 @final
 class Scene(eqx.Module):
-    """Layers on a substrate, the medium they are seen from, the light and the instrument.
+    """Layers on a substrate, the ambient, the light and the instrument.
 
-    `layers` is one `Layer`, or several from the ambient down, with an `Interface` or a `Plate` among
-    them where there is one.
+    **Arguments:**
 
-    ```python
-    pl.Scene(pl.Layer("SiO2", thickness=pl.Free(lower=10, upper=3000)), substrate="Si")
-    ```
+    - `layers`: one `Layer`, or several from the ambient down; an `Interface` or a `Plate` may be among them.
+    - `substrate`: a `Substrate`, or its material.
+    - `ambient`: the medium of the incident light, which must not absorb.
+    - `light`: a `Light`.
+    - `instrument`: an `Instrument`.
 
-    Raises ValueError where the ambient absorbs, where there is no layer, or where what is asked for
-    has no meaning together.
+    **Raises:** ValueError where the ambient absorbs, without layers, and where the parts contradict.
+
+    >>> scene = Scene(Layer("SiO2", Free(10, 3000)), "Si", light=Light(angle=30.0))
+    >>> scene.layers[0].material.name
+    'SiO2'
     """
 
-    layers: tuple[Layer | Interface | Plate, ...] = eqx.field(converter=_layers)
+    layers: tuple[Layer | Interface | Plate, ...] = eqx.field(
+        converter=lambda layers: (layers,) if isinstance(layers, Layer) else tuple(layers)
+    )
     substrate: Substrate = eqx.field(converter=lambda s: s if isinstance(s, Substrate) else Substrate(s))
-    ambient: AbstractDispersion = eqx.field(converter=surroundings, default=1.0)
+    ambient: AbstractDispersion = eqx.field(converter=ambient_medium, default=1.0)
     light: Light = Light()
     instrument: Instrument = Instrument()
 
@@ -84,39 +93,40 @@ class Scene(eqx.Module):
         if not self.layers:
             raise ValueError("a scene needs at least one layer; a bare surface is a layer of thickness 0")
         if any(isinstance(a, Interface) and isinstance(b, Interface) for a, b in pairwise(self.layers)):
-            raise ValueError("two interfaces lie on each other: an interface mixes the media at its sides")
+            raise ValueError("two interfaces are adjacent: an interface mixes the media at its sides")
         if absorbs(self.ambient):
             raise ValueError("the ambient must not absorb: give it a real index")
-        self._check_instrument()
-
-    def _check_instrument(self):
         if self.instrument.thickness_spread is not None:
             if len(self.layers) > 1:
-                raise ValueError("with several layers give each its own thickness_spread, not the instrument")
-            only = [x for x in self.layers if isinstance(x, Layer) and x.thickness_spread is None]
-            if not only:
-                raise ValueError("thickness_spread is given twice, or for what is no coherent layer")
-        if self.instrument.has_cone:
-            half = math.degrees(self.instrument.largest_half_angle(1.0))
-            if self.light.largest_angle + half > 90:
                 raise ValueError(
-                    f"the light's cone reaches beyond 90 degrees: {self.light.largest_angle:g} and a half "
-                    f"angle of {half:.3g}"
+                    "with several layers give each its own `thickness_spread`, not the instrument"
+                )
+            if not any(isinstance(x, Layer) and x.thickness_spread is None for x in self.layers):
+                raise ValueError("`thickness_spread` is given twice, or without a coherent layer")
+        if self.instrument.has_cone:
+            half_angle = math.degrees(self.instrument.largest_half_angle(1.0))
+            if self.light.largest_angle + half_angle > 90:
+                raise ValueError(
+                    f"the cone of light reaches beyond 90 degrees: {self.light.largest_angle:g} and a half "
+                    f"angle of {half_angle:.3g}"
                 )
 
 
 class Group(NamedTuple):
-    """Coherent layers between two thick media, and what roughens each face from the top down."""
+    """Coherent layers between two thick media, and the roughness of each face from the top down."""
 
     above: AbstractDispersion
     layers: tuple[Layer, ...]
     below: AbstractDispersion
-    roughness: tuple[Any, ...]
+    roughness: tuple[Quantity | None, ...]
 
 
 def groups(scene: Scene) -> tuple[tuple[Group, ...], tuple[Plate, ...]]:
-    """The coherent groups from the ambient down, and the plates between them."""
-    plates = _plates(scene)
+    """Return the coherent groups from the ambient down, and the plates between them."""
+    substrate = scene.substrate
+    plates = [layer for layer in scene.layers if isinstance(layer, Plate)]
+    if substrate.back is not None:
+        plates.append(Plate(substrate.material, substrate.plate_mm))
     runs: list[list[Layer]] = [[]]
     for position, item in enumerate(scene.layers):
         if isinstance(item, Plate):
@@ -126,43 +136,37 @@ def groups(scene: Scene) -> tuple[tuple[Group, ...], tuple[Plate, ...]]:
         else:
             runs[-1].extend(item.slices(*_neighbours(scene, position)))
     foot = len(runs) - 1  # the group that ends on the substrate's upper face
-    if scene.substrate.back is not None:
+    if substrate.back is not None:
         runs.append([])
-    last = scene.substrate.material if scene.substrate.back is None else scene.substrate.back
+    last = substrate.material if substrate.back is None else substrate.back
     media = [scene.ambient, *(plate.material for plate in plates), last]
-    feet = [scene.substrate.roughness if i == foot else None for i in range(len(runs))]
-    found = [
-        Group(above, tuple(run), below, (*(layer.roughness for layer in run), foot))
-        for above, run, below, foot in zip(media[:-1], runs, media[1:], feet, strict=True)
+    feet = [substrate.roughness if i == foot else None for i in range(len(runs))]
+    coherent = [
+        Group(above, tuple(run), below, (*(layer.roughness for layer in run), roughness))
+        for above, run, below, roughness in zip(media[:-1], runs, media[1:], feet, strict=True)
     ]
-    return tuple(found), plates
-
-
-def _plates(scene: Scene) -> tuple[Plate, ...]:
-    own = tuple(layer for layer in scene.layers if isinstance(layer, Plate))
-    substrate = scene.substrate
-    return own if substrate.back is None else (*own, Plate(substrate.material, substrate.plate_mm))
+    return tuple(coherent), tuple(plates)
 
 
 def _neighbours(scene: Scene, position: int) -> tuple[AbstractDispersion, AbstractDispersion]:
     media = [scene.ambient, *(getattr(x, "material", None) for x in scene.layers), scene.substrate.material]
     above, below = media[position], media[position + 2]
-    assert above is not None and below is not None  # two interfaces never meet  # noqa: PT018
+    assert above is not None and below is not None  # two interfaces are never adjacent  # noqa: PT018
     return above, below
 
 
 def coherent_layers(scene: Scene) -> tuple[Layer, ...]:
-    """Every coherent layer from the ambient down, interfaces as their slices."""
+    """Return every coherent layer from the ambient down, interfaces as their slices."""
     return tuple(layer for group in groups(scene)[0] for layer in group.layers)
 
 
-def thickness_spread(scene: Scene, layer: Layer) -> Any:
-    """The standard deviation of a layer's thickness (nm): its own, or the instrument's; None if even."""
+def thickness_spread(scene: Scene, layer: Layer) -> Quantity | None:
+    """Return the standard deviation of a layer's thickness in nm: its own, or the instrument's; None if 0."""
     return scene.instrument.thickness_spread if layer.thickness_spread is None else layer.thickness_spread
 
 
 def with_wavelength(scene: Scene, wavelength: Any, angle: Any = None) -> Scene:
-    """The same scene looked at at other wavelengths (nm), and angles (degrees) if given."""
+    """Return the scene with other wavelengths (nm), and other angles (degrees) if given."""
     angle = scene.light.angle if angle is None else angle
     light = Light(wavelength, angle, scene.light.signal, scene.light.polarisation)
     return eqx.tree_at(lambda s: s.light, scene, light)

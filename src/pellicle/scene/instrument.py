@@ -1,4 +1,4 @@
-"""What the instrument does to the signal."""
+"""Effects of the instrument on the signal: scale, offset, bandwidth, spreads and the cone of light."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from pellicle.scene.layers import Quantity, check_not_negative, none_if_zero
 
 @final
 class Drift(eqx.Module):
-    """A linear nuisance solved exactly in each evaluation: a polynomial in wavelength of a degree.
+    """Linear nuisance that each evaluation solves exactly: a polynomial in wavelength.
 
-    Degree 0 is one free number. The coefficients of higher degree shrink under Gaussian priors:
-    of degree j, standard deviation `width`·2^(1−j) of the signal's own level.
+    Degree 0 is one free number. Coefficients of higher degree shrink under normal priors: that of degree j
+    has the standard deviation `width`·2^(1−j) of the signal's own level.
     """
 
     degree: int = eqx.field(static=True, default=0)
@@ -26,37 +26,47 @@ class Drift(eqx.Module):
 SLOW_SCALE, SLOW_OFFSET, ONE_NUMBER = Drift(3), Drift(2), Drift(0)
 
 
-def scale_word(what: float | str | Drift) -> float | Drift:
-    """'free', 'slow' or a number, for the scale."""
-    return _word(what, SLOW_SCALE, "scale")
+def _scale(value: float | str | Drift | Free) -> float | Drift:
+    return _number_or_drift(value, SLOW_SCALE, "scale")
 
 
-def offset_word(what: float | str | Drift) -> float | Drift:
-    """'free', 'slow' or a number, for the offset."""
-    return _word(what, SLOW_OFFSET, "offset")
+def _offset(value: float | str | Drift | Free) -> float | Drift:
+    return _number_or_drift(value, SLOW_OFFSET, "offset")
 
 
-def _word(what, slow, name):
-    if what in ("free", "slow"):
-        return ONE_NUMBER if what == "free" else slow
-    if isinstance(what, str):
-        raise ValueError(f"{name} must be 'free', 'slow' or a number, not {what!r}")
-    return what
+def _number_or_drift(value: float | str | Drift | Free, slow: Drift, name: str) -> float | Drift:
+    if isinstance(value, str):
+        drifts = {"free": ONE_NUMBER, "slow": slow}
+        if value not in drifts:
+            raise ValueError(f"`{name}` must be 'free', 'slow' or a number, not {value!r}")
+        return drifts[value]
+    if isinstance(value, Free):
+        raise ValueError(f"`{name}` has no bounds: give 'free', 'slow' or a number")
+    return value
 
 
 @final
 class Instrument(eqx.Module):
-    """What the instrument does to the signal.
+    """Effects of the instrument on the signal.
 
-    `scale` and `offset` are numbers, "free" or "slow"; `bandwidth` is the full width at half maximum
-    in nm and `thickness_spread` the standard deviation of the only layer's thickness over the spot in
-    nm. The light's cone is given by `angle_spread`, its half angle in degrees, or by
-    `numerical_aperture`, n₀ times the sine of that. `wavelength_shift` is what the true wavelength is
-    above the one that the instrument tells, in nm. None or 0 is absent.
+    **Arguments:**
+
+    - `scale`, `offset`: numbers, "free" (one fitted number) or "slow" (a fitted polynomial in wavelength).
+    - `bandwidth`: full width at half maximum in nm.
+    - `thickness_spread`: standard deviation of the only layer's thickness over the spot in nm.
+    - `angle_spread`: half angle of the cone of light in degrees; or `numerical_aperture`, n₀ times its sine.
+    - `wavelength_shift`: true wavelength minus the instrument's, in nm.
+
+    None or 0 is absent.
+
+    **Raises:** ValueError for an unknown word, a negative width, or two descriptions of the cone.
+
+    >>> Instrument(scale="slow", bandwidth=Free(0, 20)).scale.degree
+    3
     """
 
-    scale: float | Drift = eqx.field(converter=scale_word, default=1.0)
-    offset: float | Drift = eqx.field(converter=offset_word, default=0.0)
+    scale: float | Drift = eqx.field(converter=_scale, default=1.0)
+    offset: float | Drift = eqx.field(converter=_offset, default=0.0)
     bandwidth: Quantity | None = eqx.field(converter=none_if_zero, default=None)
     thickness_spread: Quantity | None = eqx.field(converter=none_if_zero, default=None)
     angle_spread: Quantity | None = eqx.field(converter=none_if_zero, default=None)
@@ -69,23 +79,23 @@ class Instrument(eqx.Module):
         check_not_negative("angle_spread", self.angle_spread, "degrees")
         check_not_negative("numerical_aperture", self.numerical_aperture, "")
         if self.angle_spread is not None and self.numerical_aperture is not None:
-            raise ValueError("give angle_spread or numerical_aperture, not both: they say the same")
-        if _most(self.angle_spread) >= 90:
-            raise ValueError("angle_spread is a half angle: it must be below 90 degrees")
+            raise ValueError("give `angle_spread` or `numerical_aperture`, not both: each describes the cone")
+        if _upper(self.angle_spread) >= 90:
+            raise ValueError("`angle_spread` is a half angle: it must be below 90 degrees")
 
     @property
     def has_cone(self) -> bool:
-        """Whether the light comes at more than one angle."""
+        """True where the light comes at more than one angle."""
         return self.angle_spread is not None or self.numerical_aperture is not None
 
     def largest_half_angle(self, ambient: float) -> float:
-        """The cone's half angle in radians, at the largest that the bounds allow, in this ambient index."""
+        """Return the cone's half angle in radians, at the upper bounds, in this ambient index."""
         if self.numerical_aperture is not None:
-            return math.asin(min(_most(self.numerical_aperture) / ambient, 1.0))
-        return math.radians(_most(self.angle_spread))
+            return math.asin(min(_upper(self.numerical_aperture) / ambient, 1.0))
+        return math.radians(_upper(self.angle_spread))
 
 
-def _most(number: Quantity | None) -> float:
+def _upper(number: Quantity | None) -> float:
     if isinstance(number, Free):
         return number.upper
     return float(number) if isinstance(number, int | float) else 0.0

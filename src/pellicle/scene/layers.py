@@ -1,82 +1,125 @@
-"""What light meets on its way down: coherent layers, mixed interfaces, thick plates, a substrate."""
+"""Layers of a scene: coherent layers, mixed interfaces, thick plates and the substrate."""
 
 from __future__ import annotations
 
-from typing import Any, final
+import math
+import re
+from typing import Any, TypeAlias, final
 
 import equinox as eqx
 import jax
 import numpy as np
 
+import pellicle.dispersion
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.effective_medium import MIXTURES
 from pellicle.dispersion.empirical import Constant
-from pellicle.materials import Material, material
+from pellicle.materials import Material, UnknownMaterial, material
 from pellicle.optics.pair import is_real
 from pellicle.scene.free import Free, insert, is_free, start_values
 
 Quantity = float | Free | jax.Array
-"""A number, one to be fitted, or one that is being traced."""
+"""A number, a parameter to be fitted, or a traced number."""
+
+MediumLike: TypeAlias = AbstractDispersion | str | complex | Free | Any
+"""A dispersion, a name of the catalogue or path of an n,k table, an index n + ik, or a `Free` index."""
 
 
-def medium(what: Any) -> AbstractDispersion:
-    """A medium from a material, a catalogue name or path, a number (n + ik), or a `Free` index.
+def medium(value: MediumLike) -> AbstractDispersion:
+    """Return the dispersion for a material, a catalogue name or path, a number (n + ik), or a `Free` index.
 
-    Raises ValueError for an absorbing index with k < 0 (gain) and for an unknown name.
+    Raises ValueError for an index with k < 0 (gain), one that is not finite, and for an unknown name.
     """
-    if isinstance(what, AbstractDispersion):
-        return what
-    if isinstance(what, str):
-        return material(what)
-    if is_free(what):
-        return Constant(what)
-    if isinstance(what, complex | np.complexfloating):
-        if what.imag < 0:
+    if isinstance(value, AbstractDispersion):
+        return value
+    if isinstance(value, str):
+        return _named(value)
+    if is_free(value):
+        return Constant(value)
+    if isinstance(value, int | float | complex | np.number):
+        if not np.isfinite(value):
+            raise ValueError(f"index {value} is not finite")
+        if np.imag(value) < 0:
             raise ValueError(
-                f"index {what} has a negative imaginary part, which is gain: absorption is n + ik with k ≥ 0"
+                f"index {value} has a negative imaginary part, which is gain: absorption is n + ik with k ≥ 0"
             )
-        return Constant(float(what.real), float(what.imag))
-    return Constant(what)
+        if np.real(value) < 0:
+            raise ValueError(f"index {value} has a negative real part")
+    if isinstance(value, complex | np.complexfloating):
+        return Constant(float(value.real), float(value.imag))
+    return Constant(value)
 
 
-def medium_or_none(what: Any) -> AbstractDispersion | None:
-    """The same; None stays None."""
-    return None if what is None else medium(what)
+def _named(name: str) -> AbstractDispersion:
+    try:
+        return material(name)
+    except UnknownMaterial:
+        models = {x.lower(): x for x in vars(pellicle.dispersion) if x[0].isupper()}
+        model = models.get(re.sub(r"[^a-z]", "", name.partition("(")[0].lower()))
+        if model is None:
+            raise
+        raise UnknownMaterial(
+            f"{name!r} is a dispersion model, not a material: give pl.dispersion.{model}(...), with"
+            " pl.Free(lower, upper) for each number to be fitted"
+        ) from None
+
+
+def medium_or_none(value: MediumLike | None) -> AbstractDispersion | None:
+    """Return `medium(value)`, or None for None."""
+    return None if value is None else medium(value)
 
 
 def absorbs(dispersion: AbstractDispersion) -> bool:
-    """False where the type of the index, or an extinction fixed at exactly 0, rules absorption out."""
+    """Return False where the type of the index, or an extinction fixed at 0, rules absorption out."""
     if isinstance(dispersion, Constant) and isinstance(dispersion.k, int | float) and dispersion.k == 0:
         return False
     numbers = insert(dispersion, start_values(dispersion))
     return not is_real(jax.eval_shape(numbers.index, jax.ShapeDtypeStruct((1,), np.float32)))
 
 
-def surroundings(what: Any) -> AbstractDispersion:
-    """A medium as an ambient: of a material with a little absorption (`CLEAR`) only the real part."""
-    found = medium(what)
-    return found.as_ambient() if isinstance(found, Material) and absorbs(found) else found
+def ambient_medium(value: MediumLike) -> AbstractDispersion:
+    """Return `medium(value)`; of a material with a little absorption (`CLEAR`) only the real part."""
+    dispersion = medium(value)
+    if isinstance(dispersion, Material) and absorbs(dispersion):
+        return dispersion.as_ambient()
+    return dispersion
 
 
-def check_not_negative(name: str, number: Any, unit: str) -> None:
-    """ValueError where a number, or the lower bound of a free one, is below 0."""
+def check_not_negative(name: str, number: Quantity | None, unit: str) -> None:
+    """Raise ValueError where a number, or the lower bound of a free one, is negative or not finite."""
     lowest = number.lower if isinstance(number, Free) else number
-    if isinstance(lowest, int | float) and lowest < 0:
-        raise ValueError(f"{name} must not be negative, got {lowest:g} {unit}")
+    if not isinstance(lowest, int | float):
+        return
+    if not math.isfinite(lowest):
+        raise ValueError(f"`{name}` must be finite, got {lowest:g}")
+    if lowest < 0:
+        raise ValueError(f"`{name}` must not be negative, got {lowest:g} {unit}".rstrip())
 
 
-def none_if_zero(number: Any) -> Any:
-    """A width of exactly 0 is absent, so that it costs nothing."""
+def none_if_zero(number: Quantity | None) -> Quantity | None:
+    """Return None for a width of exactly 0, which costs nothing."""
     return None if isinstance(number, int | float) and number == 0 else number
 
 
 @final
 class Layer(eqx.Module):
-    """A coherent layer: its material (anything `medium` takes) and its thickness in nm.
+    """Coherent layer.
 
-    `thickness_spread` is the standard deviation of the thickness over the spot and `roughness` the
-    root mean square height of the upper face (nm), which damps what that face reflects as Névot and
-    Croce do; None or 0 is absent.
+    **Arguments:**
+
+    - `material`: a catalogue name or path of an n,k table, an index n + ik, a `Free` index or a dispersion.
+    - `thickness` in nm.
+    - `name` of its parameters in results, where there are several layers.
+    - `thickness_spread`: standard deviation of the thickness over the spot in nm.
+    - `roughness`: root mean square height of the upper face in nm, which damps its reflection (Névot and
+      Croce, 1980).
+
+    A `thickness_spread` or `roughness` of None or 0 is absent.
+
+    **Raises:** ValueError for an unknown material, gain, or a negative length.
+
+    >>> Layer("SiO2", Free(10, 3000)).thickness.upper
+    3000.0
     """
 
     material: AbstractDispersion = eqx.field(converter=medium)
@@ -92,11 +135,16 @@ class Layer(eqx.Module):
 
 @final
 class Interface(eqx.Module):
-    """A rough or graded interface as a layer of its own: the media above and below it, mixed.
+    """Rough or graded interface as a layer of its own: a mixture of the media above and below.
 
-    `thickness` in nm is divided among `steps` slices, in which the medium below has the shares
-    ½/steps, 1½/steps, ... of the volume; one slice is the usual layer of half and half. `mix` is a
-    rule of `pellicle.dispersion.effective_medium`.
+    **Arguments:** `thickness` in nm, divided among `steps` slices in which the medium below has the volume
+    fractions ½/steps, 1½/steps, ...; one slice is the usual layer of half and half. `mix` is a rule of
+    `pl.mixing`, by its name in recipes. `name` as in `Layer`.
+
+    **Raises:** ValueError for a negative thickness, other than 1 to 100 steps, or an unknown rule.
+
+    >>> Interface(4.0, steps=2).mix
+    'bruggeman'
     """
 
     thickness: Quantity
@@ -112,43 +160,55 @@ class Interface(eqx.Module):
             raise ValueError(f"no mix {self.mix!r}; known: {', '.join(MIXTURES)}")
 
     def slices(self, above: AbstractDispersion, below: AbstractDispersion) -> tuple[Layer, ...]:
-        """The layers that stand for it between two media."""
-        rule, each = MIXTURES[self.mix], share(self.thickness, self.steps)
-        return tuple(Layer(rule(above, below, (i + 0.5) / self.steps), each) for i in range(self.steps))
+        """Return the layers that replace the interface between two media."""
+        rule, thickness = MIXTURES[self.mix], divided(self.thickness, self.steps)
+        return tuple(Layer(rule(above, below, (i + 0.5) / self.steps), thickness) for i in range(self.steps))
 
 
-def share(thickness: Any, parts: int) -> Any:
-    """One of several equal parts of a thickness; a free one keeps its bounds, divided."""
+def divided(thickness: Quantity, parts: int) -> Quantity:
+    """Return one of several equal parts of a thickness; a free one keeps its bounds, divided."""
     if isinstance(thickness, Free):
         return Free(thickness.lower / parts, thickness.upper / parts, start=thickness.start / parts)
     return thickness / parts
 
 
-def _check_thick(plate_mm: Any) -> None:
-    """ValueError where a plate's thickness, or the lower bound of a free one, is no thickness."""
+def _check_plate(plate_mm: Quantity) -> None:
     check_not_negative("plate_mm", plate_mm, "mm")
     if isinstance(plate_mm, int | float) and plate_mm == 0:
-        raise ValueError("plate_mm must be above 0 mm: what has no thickness is no plate")
+        raise ValueError("`plate_mm` must be above 0 mm")
 
 
 @final
 class Plate(eqx.Module):
-    """A thick, incoherent layer: light between its faces adds as intensities. `plate_mm` in mm."""
+    """Thick, incoherent layer: light between its faces adds as intensities.
+
+    **Arguments:** `material` and `name` as in `Layer`; thickness `plate_mm` in mm.
+
+    **Raises:** ValueError for an unknown material or a thickness that is not positive.
+
+    >>> Plate("BK7", 1.1).plate_mm
+    1.1
+    """
 
     material: AbstractDispersion = eqx.field(converter=medium)
     plate_mm: Quantity = 1.0
     name: str | None = eqx.field(static=True, default=None)
 
     def __check_init__(self):
-        _check_thick(self.plate_mm)
+        _check_plate(self.plate_mm)
 
 
 @final
 class Substrate(eqx.Module):
-    """What the layers lie on: a half space, or, with `back`, a plate with an incoherent back face.
+    """Substrate: a half space, or with `back` a plate with an incoherent back face.
 
-    `back` is the medium behind the plate, `plate_mm` the plate's thickness in mm and `roughness` the
-    root mean square height of its upper face in nm.
+    **Arguments:** `material` as in `Layer`; `back`, the medium behind the plate; `plate_mm`, the plate's
+    thickness in mm; `roughness`, the root mean square height of its upper face in nm.
+
+    **Raises:** ValueError for an unknown material or an impossible length.
+
+    >>> Substrate("BK7", back="air").plate_mm
+    1.0
     """
 
     material: AbstractDispersion = eqx.field(converter=medium)
@@ -157,5 +217,5 @@ class Substrate(eqx.Module):
     roughness: Quantity | None = eqx.field(converter=none_if_zero, default=None)
 
     def __check_init__(self):
-        _check_thick(self.plate_mm)
+        _check_plate(self.plate_mm)
         check_not_negative("roughness", self.roughness, "nm")

@@ -20,7 +20,7 @@ from pellicle.optics import coherent, interface, response
 from pellicle.optics.ellipsometry import normalised, psi_delta, stokes
 from pellicle.optics.pair import Number, is_real, to_complex, to_pair
 from pellicle.scene.film import check_polarisation
-from pellicle.scene.layers import medium, surroundings
+from pellicle.scene.layers import ambient_medium, medium
 
 Medium = Any
 """A number (n + ik), an array of them, a material, or a material's name."""
@@ -157,7 +157,7 @@ def _responses(wavelength, thickness, layer, substrate, ambient, angle, polarisa
     propagating = normal or interface.propagates(layer, ambient, angle)
     into_below = normal or interface.propagates(substrate, ambient, angle)
     named = isinstance(ambient, str | AbstractDispersion)
-    ambient = _index(surroundings(ambient) if named else ambient, wavelength)
+    ambient = _index(ambient_medium(ambient) if named else ambient, wavelength)
     substrate = _index(substrate, wavelength)
     if not is_real(ambient):
         raise ValueError("the ambient must not absorb: give it a real index")
