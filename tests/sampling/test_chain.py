@@ -20,9 +20,9 @@ HERE = Path(__file__).parent
 RUN = """
 import runpy, jax
 jax.config.update("jax_enable_x64", True)
-from pellicle.sampling import checks, ensemble, sample
+from pellicle.sampling import chain, checks, sample
 checks.LONG_ENOUGH = 1e9  # to the last step
-ensemble._PATIENCE = 0.0
+chain._PATIENCE = 0.0
 example = runpy.run_path({example!r})
 sample.sample(example["bands"](), example["film"](), steps=10**6, chain={path!r})
 """

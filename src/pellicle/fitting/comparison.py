@@ -19,6 +19,7 @@ from pellicle.errors import UsageError
 from pellicle.fitting.noise import correlation_length
 from pellicle.fitting.presentation import ReportMixin
 from pellicle.fitting.result import BrdfCurve, Fit, Part, Status
+from pellicle.fitting.spectra.targets import sphere
 
 log = getLogger(__name__)
 
@@ -41,16 +42,40 @@ class Candidate:
 
 @dataclass(frozen=True, repr=False)
 class Comparison(ReportMixin):
-    """Candidates in the order given, the effective points, and a verdict."""
+    """Candidates in the order given, and the effective points."""
 
     candidates: tuple[Candidate, ...]
     effective_points: float
-    verdict: str
 
     @property
     def best(self) -> Candidate:
         """The one of least BIC."""
         return min(self.candidates, key=lambda c: c.bic)
+
+    @property
+    def verdict(self) -> str:
+        """Which of the two best the data favour, and the parameters or effects that make the difference."""
+        best, second, *_ = sorted(self.candidates, key=lambda c: c.bic)
+        apart = second.bic - best.bic
+        more, less = _extra(best.fit, second.fit), _extra(second.fit, best.fit)
+        verb = "strongly favour" if apart >= STRONG else "favour"
+        if apart < UNDECIDED:
+            sentence = f"The data do not distinguish {best.name} from {second.name} (ΔBIC {apart:.1f})"
+            if best.free != second.free:
+                simpler = min((best, second), key=lambda c: c.free)
+                sentence += f": prefer {simpler.name}, which has fewer free parameters"
+        else:
+            sentence = f"{best.name} is better than {second.name} by ΔBIC {apart:.3g}: "
+            if less and not more:
+                sentence += f"{' and '.join(less)} {'is' if len(less) == 1 else 'are'} not needed"
+            else:
+                rather = f" rather than {' and '.join(less)}" if less else ""
+                sentence += f"the data {verb} {' and '.join(more) or 'its materials'}{rather}"
+        if best.fit.status is Status.MISFIT:
+            return f"{sentence}. But even {best.name} does not explain the data."
+        if best.fit.status is not Status.CONVERGED:
+            return f"{sentence}. But the fit of {best.name} is {best.fit.status}."
+        return f"{sentence}."
 
     def __str__(self) -> str:
         rows = [f"  {c.name}: BIC {c.bic - self.best.bic:+.1f}, {c.fit.status}" for c in self.candidates]
@@ -79,31 +104,31 @@ def compare(fits: Mapping[str, Fit]) -> Comparison:
             *(name, free, deviance, points, bic),
         )
         candidates.append(Candidate(name, fits[name], free, deviance, deviance + 2 * free, bic))
-    return Comparison(tuple(candidates), points, _verdict(candidates))
+    return Comparison(tuple(candidates), points)
 
 
 def _check_same(fits: Mapping[str, Fit]) -> None:
-    first, *others = fits
-    for other in others:
-        pairs = zip(fits[first].parts, fits[other].parts, strict=False)
-        same = len(fits[first].parts) == len(fits[other].parts) and all(_alike(a, b) for a, b in pairs)
-        tests = fits[first].layer_test, fits[other].layer_test
-        if not same or len({test and test.residual for test in tests}) > 1:
+    """Raise UsageError where fits differ in their points, their noise or their residual."""
+
+    def about(fit: Fit) -> tuple[list[object], list[np.ndarray | None]]:
+        columns: list[np.ndarray | None] = []
+        names: list[object] = [fit.layer_test and fit.layer_test.residual]
+        for data in (part.data for part in fit.parts):
+            names += [type(data), data.signal if isinstance(data, Spectrum) else ""]
+            light = "wavelength delta" if isinstance(data, Spectrum) else "theta_i phi_i theta_o phi_o"
+            columns += [getattr(data, name) for name in ("values", "sigma", *light.split())]
+        return names, columns
+
+    (first, names, columns), *others = ((name, *about(fit)) for name, fit in fits.items())
+    for other, other_names, others_columns in others:
+        pairs = zip(columns, others_columns, strict=False)
+        if names != other_names or not all(
+            a is b if a is None or b is None else np.array_equal(a, b) for a, b in pairs
+        ):
             raise UsageError(
                 f"{first} and {other} do not use the same points with the same noise: give both the same"
                 " range, noise and signal, or their criteria mean nothing"
             )
-
-
-def _alike(one: Part, other: Part) -> bool:
-    a, b = one.data, other.data
-    if type(a) is not type(b):
-        return False
-    names = ["values", "sigma"]
-    names += ["wavelength", "delta"] if isinstance(a, Spectrum) else ["theta_i", "phi_i", "theta_o", "phi_o"]
-    columns = [(getattr(a, name), getattr(b, name)) for name in names]
-    same_signal = not isinstance(a, Spectrum) or a.signal == getattr(b, "signal", None)
-    return same_signal and all(x is y if x is None or y is None else np.array_equal(x, y) for x, y in columns)
 
 
 def _residual(part: Part) -> np.ndarray:
@@ -115,16 +140,11 @@ def _residual(part: Part) -> np.ndarray:
     if c.delta_data is None or c.delta_model is None:
         return (c.residual if sigma is None else c.residual / sigma)[:, None]
     if sigma is None:
-        return _sphere(c.data, c.delta_data) - _sphere(c.model, c.delta_model)
+        return sphere(c.data, c.delta_data) - sphere(c.model, c.delta_model)
     across = sigma if spectrum.delta_sigma is None else spectrum.delta_sigma
     # at the poles, where Δ has no meaning, the error of Ψ leaves some to it
     sine = np.sin(2 * np.deg2rad(c.data)) / np.hypot(np.sin(2 * np.deg2rad(c.data)), 2 * np.deg2rad(sigma))
     return np.stack([c.residual / sigma, sine * c.delta_residual / across], axis=1)
-
-
-def _sphere(psi: np.ndarray, delta: np.ndarray) -> np.ndarray:
-    psi, delta = 2 * np.deg2rad(psi), np.deg2rad(delta)
-    return np.stack([np.cos(psi), np.sin(psi) * np.cos(delta), np.sin(psi) * np.sin(delta)], axis=-1)
 
 
 def _independent(part: Part, rows: np.ndarray) -> int:
@@ -141,39 +161,6 @@ def _deviance(rows: Sequence[np.ndarray], lengths: Sequence[float], fits: Mappin
         known = part.data.sigma is not None
         total += (square if known else count * math.log(max(square / count, 1e-300))) / length
     return total
-
-
-def _verdict(candidates: Sequence[Candidate]) -> str:
-    best, second, *_ = sorted(candidates, key=lambda c: c.bic)
-    apart = second.bic - best.bic
-    if apart < UNDECIDED:
-        sentence = f"The data do not distinguish {best.name} from {second.name} (ΔBIC {apart:.1f})"
-        simpler = min((best, second), key=lambda c: c.free)
-        sentence += (
-            f": prefer {simpler.name}, which has fewer free parameters" if best.free != second.free else ""
-        )
-    else:
-        sentence = (
-            f"{best.name} is better than {second.name} by ΔBIC {apart:.3g}: {_why(best, second, apart)}"
-        )
-    if best.fit.status is Status.MISFIT:
-        return f"{sentence}. But even {best.name} does not explain the data."
-    if best.fit.status is not Status.CONVERGED:
-        return f"{sentence}. But the fit of {best.name} is {best.fit.status}."
-    return f"{sentence}."
-
-
-def _why(best: Candidate, second: Candidate, apart: float) -> str:
-    """Difference of the two: free parameters and effects that only one of them has."""
-    more, less = (_extra(a.fit, b.fit) for a, b in ((best, second), (second, best)))
-    verb = "strongly favour" if apart >= STRONG else "favour"
-    if more and less:
-        return f"the data {verb} {' and '.join(more)} rather than {' and '.join(less)}"
-    if more:
-        return f"the data {verb} {' and '.join(more)}"
-    if less:
-        return f"{' and '.join(less)} {'is' if len(less) == 1 else 'are'} not needed"
-    return f"the data {verb} its materials"
 
 
 def _extra(one: Fit, other: Fit) -> list[str]:

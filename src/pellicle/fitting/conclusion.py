@@ -87,25 +87,15 @@ def conclude(
     else:
         bounded = by_curvature(ranked, covariance)
     parameters = estimates(ranked, covariance, list(amend(bounded)), fixed)
-    status = judge(
-        converged=converged,
-        misfit=misfit,
-        parameters=parameters,
-        rivals=others,
-        natural=_on_natural_bound(ranked),
-    )
-    log.info("status: %s", status)
-    return Conclusion(status, parameters, others, identifiability.correlated(jacobian, parameters))
-
-
-def _on_natural_bound(ranked: RankedMinima) -> frozenset[str]:
-    """Names of parameters at a zero that physics sets; a thickness of 0 is none of them: no layer."""
-    pairs = zip(ranked.problem.parameters, ranked.values.tolist(), strict=True)
-    return frozenset(
+    # parameters at a zero that physics sets; a thickness of 0 is none of them: no layer
+    natural = frozenset(
         p.name
-        for p, value in pairs
+        for p, value in zip(ranked.problem.parameters, ranked.values.tolist(), strict=True)
         if p.natural[0] and p.lower == 0 and p.key != "thickness" and value <= _ON_BOUND * p.upper
     )
+    status = judge(converged=converged, misfit=misfit, parameters=parameters, rivals=others, natural=natural)
+    log.info("status: %s", status)
+    return Conclusion(status, parameters, others, identifiability.correlated(jacobian, parameters))
 
 
 def common_rms(sizes: Sequence[int], rms: Sequence[float]) -> float:

@@ -9,13 +9,15 @@ stop on the saddle between the two signs and underestimate the error of what is 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from pellicle.scene.priors import LogUniform, Prior
+
+Array: TypeAlias = jax.Array | np.ndarray
 
 LEAST_SQUARE = 1e-6
 """Least y² in the disc: a fiftieth of a degree off the plane, where y² → y still has a slope."""
@@ -28,12 +30,12 @@ class Box(NamedTuple):
     posteriors use and fits do not. `reach` is the largest deviation of a tilt in degrees.
     """
 
-    lower: Any
-    upper: Any
-    prior_mean: Any
-    prior_weight: Any  # 1/sd, 0 for none
-    logarithmic: Any
-    reach: Any = np.float64(0.0)
+    lower: Array
+    upper: Array
+    prior_mean: Array
+    prior_weight: Array  # 1/sd, 0 for none
+    logarithmic: Array
+    reach: Array | np.floating = np.float64(0.0)
 
     def prior_rows(self, values: Any) -> Any:
         """Weighted distances of the values from the means of their priors, (parameters,)."""

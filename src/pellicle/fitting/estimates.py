@@ -9,8 +9,6 @@ import numpy as np
 
 from pellicle.fitting.covariance import UNSEEN, Errors
 from pellicle.fitting.neighbourhood import neighbourhood
-from pellicle.fitting.parameter import Parameter
-from pellicle.fitting.problem import Nuisance
 from pellicle.fitting.profile_likelihood import ONE_SIDED, Limits, limits
 from pellicle.fitting.result import Estimate, Profile, Rival
 from pellicle.fitting.reweighting import RankedMinima
@@ -63,27 +61,19 @@ def estimates(
 ) -> dict[str, Estimate]:
     """Every parameter by name: free ones first, thickness before all; then nuisances and fixed numbers."""
     parameters, values = ranked.problem.parameters, ranked.values.tolist()
-    free = [_free(p, value, limit) for p, value, limit in zip(parameters, values, bounded, strict=True)]
+    free = []
+    for p, value, limit in zip(parameters, values, bounded, strict=True):
+        margin = min(value - p.lower, p.upper - value)
+        at_bound = not p.periodic and margin <= _ON_BOUND * (p.upper - p.lower)
+        ends = p.lower, p.upper, True, at_bound, limit.lower, limit.upper
+        free.append(Estimate(p.name, value, float(limit.stderr), p.unit, *ends))
     order = sorted(range(len(free)), key=lambda i: parameters[i].key != "thickness")
     pairs = zip(ranked.problem.views, ranked.fits, strict=True)
     nuisances = [c for view, fit in pairs for c in view.nuisances(fit.at)]
-    linear = [
-        _nuisance(c, sd) for c, sd in zip(nuisances, errors.stderr[len(values) :].tolist(), strict=True)
-    ]
+    linear = []
+    for c, sd in zip(nuisances, errors.stderr[len(values) :].tolist(), strict=True):
+        reach = ONE_SIDED**0.5 * sd
+        # an offset compatible with 0 has an upper limit
+        upper = c.value + reach if c.not_negative and c.value < reach else None
+        linear.append(Estimate(c.name, c.value, sd, "", -math.inf, math.inf, True, upper_limit=upper))
     return {e.name: e for e in [*(free[i] for i in order), *linear, *fixed]}
-
-
-def _free(p: Parameter, value: float, limit: Limits) -> Estimate:
-    # a whole turn has no ends
-    margin = min(value - p.lower, p.upper - value)
-    at_bound = not p.periodic and margin <= _ON_BOUND * (p.upper - p.lower)
-    return Estimate(
-        p.name, value, float(limit.stderr), p.unit, p.lower, p.upper, True, at_bound, limit.lower, limit.upper
-    )
-
-
-def _nuisance(c: Nuisance, sd: float) -> Estimate:
-    """A coefficient of scale or offset; an offset compatible with 0 has an upper limit."""
-    reach = ONE_SIDED**0.5 * sd
-    upper = c.value + reach if c.not_negative and c.value < reach else None
-    return Estimate(c.name, c.value, sd, "", -math.inf, math.inf, True, upper_limit=upper)

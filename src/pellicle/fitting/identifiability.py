@@ -127,21 +127,16 @@ def _sentence(parameters: Sequence[Estimate], moves: np.ndarray) -> str:
         return f"{every} are strongly correlated: none of them is determined alone"
     moves = moves * step(names[0], parameters[0]) / moves[0]
     amounts = f"{_amount(moves[0], parameters[0])} against {_amount(abs(moves[1]), parameters[1])}"
-    if law := _law(parameters, moves):
+    relative = moves / np.array([p.value or math.inf for p in parameters])
+    near = _LAW * np.max(np.abs(relative))
+    product, quotient = abs(relative.sum()) < near, abs(relative[0] - relative[1]) < near
+    if product or quotient:
+        law = f"the product {names[0]}·{names[1]}" if product else f"the quotient {names[0]}/{names[1]}"
         return f"only {law} is determined: {names[0]} and {names[1]} are correlated, {amounts}"
     way = "one rises as the other does" if moves[1] > 0 else "one rises as the other falls"
     return (
         f"{names[0]} and {names[1]} are strongly correlated, {amounts} ({way}): neither is determined alone"
     )
-
-
-def _law(parameters: Sequence[Estimate], moves: np.ndarray) -> str:
-    """The product or the quotient that is constant along the direction, if one is."""
-    relative = moves / np.array([p.value or math.inf for p in parameters])
-    names, near = [p.name for p in parameters], _LAW * np.max(np.abs(relative))
-    if abs(relative.sum()) < near:
-        return f"the product {names[0]}·{names[1]}"
-    return f"the quotient {names[0]}/{names[1]}" if abs(relative[0] - relative[1]) < near else ""
 
 
 def _amount(size: float, p: Estimate) -> str:

@@ -41,6 +41,22 @@ class Neighbourhood(NamedTuple):
     def stderr(self) -> np.ndarray:
         return np.sqrt(np.diag(self.covariance))
 
+    def along_axes(self, reach: float) -> tuple[np.ndarray, np.ndarray]:
+        """The misfit beside the parabola of the covariance, `reach` standard errors to both sides on the axis
+        of each parameter, with the others where the covariance expects them.
+
+        Returns the standard errors moved, fewer where a bound is nearer, and the rise of χ² as a share of the
+        parabola's, each (2, parameters).
+        """
+        span, stderr = self.upper - self.lower, self.stderr
+        along = reach * self.covariance / stderr[:, None] / span
+        ends = np.clip(self.best + np.concatenate([along, -along]), 0.0, 1.0)
+        misfit = self.misfit(np.concatenate([self.best[None], ends]))
+        own = np.array([np.diag(half - self.best) for half in np.split(ends, 2)])
+        moved = np.abs(own) * (span / stderr)
+        rise = (misfit[1:] - misfit[0]).reshape(own.shape)
+        return moved, rise / np.maximum(moved, 1e-100) ** 2
+
 
 def neighbourhood(ranked: RankedMinima, covariance: np.ndarray, others: np.ndarray) -> Neighbourhood:
     """Neighbourhood of the best of the ranked minima.

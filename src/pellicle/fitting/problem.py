@@ -9,10 +9,11 @@ from __future__ import annotations
 from collections.abc import Hashable, Sequence
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
+import jax.numpy as jnp
 import numpy as np
 
 from pellicle.effects.plan import Plan
-from pellicle.fitting.coordinates import Box, Coordinates
+from pellicle.fitting.coordinates import Array, Box, Coordinates
 from pellicle.fitting.parameter import Parameter
 
 
@@ -35,9 +36,9 @@ class Noise(NamedTuple):
 class Explained(NamedTuple):
     """One view at one set of values; traced."""
 
-    model: Any  # as measured, with nuisances at their best
-    residual: Any  # weighted, with a row for each prior of a nuisance
-    deviance: Any  # −2 ln of the marginal likelihood, up to a constant
+    model: Array  # as measured, with nuisances at their best
+    residual: Array  # weighted, with a row for each prior of a nuisance
+    deviance: Array  # −2 ln of the marginal likelihood, up to a constant
 
 
 @runtime_checkable
@@ -149,6 +150,15 @@ class Problem(NamedTuple):
     def values(self, units: Any) -> Any:
         """Parameters in their own units at `units` (..., parameters) of the unit cube."""
         return self.coordinates.values(self.box, units)
+
+    def values_near(self, units: np.ndarray, best: np.ndarray) -> np.ndarray:
+        """Parameters in their own units at `units` (..., parameters), an azimuth within half a turn of the
+        one at `best` (parameters,)."""
+        values = np.array(self.values(jnp.asarray(units)))
+        if self.coordinates.tilt is not None:
+            at = self.coordinates.tilt[1]
+            values[..., at] = best[at] + (values[..., at] - best[at] + 180) % 360 - 180
+        return values
 
     def seen_by(self, view: View, values: Any) -> Any:
         """The values (..., parameters) that a view depends on."""

@@ -11,6 +11,7 @@ import hashlib
 import os
 import tempfile
 from collections.abc import Callable, Hashable
+from contextlib import suppress
 from functools import lru_cache, wraps
 from pathlib import Path
 from typing import Any, get_type_hints
@@ -50,41 +51,27 @@ def _load(
     """The program as a function of flat arrays, and the structure of its results."""
     from jax import export
 
-    path = Path(folder) / "programs" / f"{_key(function, plan, structure, shapes)}.bin"
-    try:
-        found = export.deserialize(bytearray(path.read_bytes()))
-    except (OSError, ValueError, KeyError):  # absent, or cut short: made again
-        found = export.export(jax.jit(_flat(function, plan, structure)))(
-            *[jax.ShapeDtypeStruct(shape, np.dtype(dtype)) for shape, dtype in shapes]
-        )
-        _keep(path, found.serialize())
-    return jax.jit(found.call), _output(function)
-
-
-def _flat(function: Program, plan: Hashable, structure: Any) -> Program:
-    def run(*arrays: Any) -> Any:
+    def flat(*arrays: Any) -> list[Any]:
         return jax.tree_util.tree_leaves(function(plan, *jax.tree_util.tree_unflatten(structure, arrays)))
 
-    return run
-
-
-def _output(function: Program) -> Any:
-    """Structure of the results: the named tuple of the return annotation."""
+    about = function.__qualname__, repr(plan), str(structure), shapes, jax.__version__, jax.default_backend()
+    key = hashlib.sha256(repr((*about, _sources())).encode()).hexdigest()
+    path = Path(folder) / "programs" / f"{key}.bin"
+    try:
+        program = export.deserialize(bytearray(path.read_bytes()))
+    except (OSError, ValueError, KeyError):  # absent, or cut short: made again
+        program = export.export(jax.jit(flat))(
+            *[jax.ShapeDtypeStruct(shape, np.dtype(dtype)) for shape, dtype in shapes]
+        )
+        # whole or not at all; a cache that cannot be written is no failure
+        with suppress(OSError):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            handle, name = tempfile.mkstemp(dir=path.parent)
+            with os.fdopen(handle, "wb") as file:
+                file.write(program.serialize())
+            os.replace(name, path)
     kind = get_type_hints(function)["return"]
-    return jax.tree_util.tree_structure(kind(*range(len(kind._fields))))
-
-
-def _key(function: Program, plan: Hashable, structure: Any, shapes: tuple) -> str:
-    parts = (
-        function.__qualname__,
-        repr(plan),
-        str(structure),
-        shapes,
-        jax.__version__,
-        jax.default_backend(),
-        _sources(),
-    )
-    return hashlib.sha256(repr(parts).encode()).hexdigest()
+    return jax.jit(program.call), jax.tree_util.tree_structure(kind(*range(len(kind._fields))))
 
 
 @lru_cache(maxsize=1)
@@ -93,15 +80,3 @@ def _sources() -> str:
     root = Path(__file__).resolve().parents[1]
     stats = [(p.relative_to(root).as_posix(), p.stat()) for p in sorted(root.rglob("*.py"))]
     return repr([(name, s.st_size, s.st_mtime_ns) for name, s in stats])
-
-
-def _keep(path: Path, program: bytes | bytearray) -> None:
-    """Write the program whole or not at all; a cache that cannot be written is no failure."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent)
-        with os.fdopen(handle, "wb") as file:
-            file.write(program)
-        os.replace(name, path)
-    except OSError:
-        return

@@ -76,6 +76,15 @@ class _Noise(NamedTuple):
     def reduced(self) -> float:
         return max(self.chi2 / self.freedom, 1e-12)
 
+    def view_fit(self, view: View, at: Any) -> ViewFit:
+        """Fit quality of a view whose ranked weights carry this noise."""
+        chi2 = self.chi2 if view.noise.known else self.freedom
+        # the ranked weights carry the rms already, so only the correlation remains to be counted
+        length = self.length if view.noise.correlated or not view.noise.given else 1.0
+        variance = length * (self.reduced if view.noise.drifting else 1.0)
+        outliers = int(np.sum(np.square(self.factor) < 0.5))
+        return ViewFit(at, variance * self.inflation, self.length, chi2, self.freedom, outliers)
+
 
 def rank(
     problem: Problem,
@@ -99,8 +108,11 @@ def rank(
         candidates = minima(weighted, candidates.units, lanes=lanes, followed=followed)
         again = _noise(problem, candidates.units[0], robust)
         near = 1e-3 if robust is None else 1e-6
-        settled = np.allclose(candidates.units[0], best, atol=near)
-        if settled and _agree(problem, noise, again, robust is not None):
+        # the relative weights of the views, and under a robust loss their noise too, agree within 2 %
+        a, b = ([_rescale(v, n) for v, n in zip(problem.views, ns, strict=True)] for ns in (noise, again))
+        alike = np.allclose(np.divide(a, a[0]), np.divide(b, b[0]), rtol=0.02)
+        alike = alike and (robust is None or np.allclose(a, b, rtol=0.02))
+        if alike and np.allclose(candidates.units[0], best, atol=near):
             break
         noise = again
     weighted = _reweighted(problem, noise)
@@ -109,10 +121,9 @@ def rank(
             "weights%s: residuals are correlated over %.3g points, so that %d points count as %.3g",
             *(f" of {view.name}" if view.name else "", own.length, view.rows, view.rows / own.length),
         )
-    pairs = zip(weighted.views, _local(weighted, candidates.units[0]), noise, strict=True)
-    return RankedMinima(
-        problem, weighted, replace(candidates, scan=scan), tuple(_fit(*each) for each in pairs)
-    )
+    at = zip(weighted.views, _local(weighted, candidates.units[0]), noise, strict=True)
+    fits = tuple(own.view_fit(view, local) for view, local, own in at)
+    return RankedMinima(problem, weighted, replace(candidates, scan=scan), fits)
 
 
 def _local(problem: Problem, unit: np.ndarray) -> list[Any]:
@@ -130,15 +141,6 @@ def _typical(problem: Problem, candidates: Minima, loss: Loss) -> np.ndarray:
     sizes = [1.0 if v.noise.given else size for v, size in zip(problem.views, least, strict=True)]
     losses = [sum(loss.loss(r / s).sum() for r, s in zip(rows, sizes, strict=True)) for rows in each]
     return candidates.units[int(np.argmin(losses))]
-
-
-def _fit(view: View, at: Any, noise: _Noise) -> ViewFit:
-    chi2 = noise.chi2 if view.noise.known else noise.freedom
-    # the ranked weights hold the rms already, so only the correlation is left to count
-    length = noise.length if view.noise.correlated or not view.noise.given else 1.0
-    variance = length * (noise.reduced if view.noise.drifting else 1.0)
-    outliers = int(np.sum(np.square(noise.factor) < 0.5))
-    return ViewFit(at, variance * noise.inflation, noise.length, chi2, noise.freedom, outliers)
 
 
 def _noise(problem: Problem, unit: np.ndarray, loss: Loss | None) -> list[_Noise]:
@@ -159,13 +161,6 @@ def _noise(problem: Problem, unit: np.ndarray, loss: Loss | None) -> list[_Noise
         widening = inflation(loss, residuals / bulk)
         result.append(_Noise(bulk**2 * freedom, freedom, length, np.sqrt(weight), widening))
     return result
-
-
-def _agree(problem: Problem, one: list[_Noise], other: list[_Noise], absolute: bool) -> bool:
-    """True where the relative weights of the views agree within 2 %; with `absolute` their noise too."""
-    a, b = ([_rescale(v, r) for v, r in zip(problem.views, rs, strict=True)] for rs in (one, other))
-    alike = bool(np.allclose(np.divide(a, a[0]), np.divide(b, b[0]), rtol=0.02))
-    return alike and (not absolute or bool(np.allclose(a, b, rtol=0.02)))
 
 
 def _rescale(view: View, noise: _Noise) -> float:

@@ -54,13 +54,13 @@ def judge(
     at_bound = [p for p in free if p.at_bound and p.name not in natural]
     close = distinct_rivals(parameters, rivals)
     for question, answer in (
-        ("did the solver converge?", converged),
-        ("does the scene not explain the data?", misfit),
-        ("which parameters of the sample have no finite error?", [p.name for p in unseen]),
+        ("did the solver converge?", "yes" if converged else "no"),
+        ("does the scene not explain the data?", "yes" if misfit else "no"),
+        ("which parameters of the sample have no finite error?", ", ".join(p.name for p in unseen) or "none"),
         (f"how many rivals lie within Δχ² {RIVAL:g} and outside the errors?", len(close)),
-        ("which parameters lie on a bound that was set?", [p.name for p in at_bound]),
+        ("which parameters lie on a bound that was set?", ", ".join(p.name for p in at_bound) or "none"),
     ):
-        log.info("status: %s %s", question, _answer(answer))
+        log.info("status: %s %s", question, answer)
     if not converged:
         return Status.NOT_CONVERGED
     if misfit:
@@ -70,14 +70,6 @@ def judge(
     if close:
         return Status.AMBIGUOUS
     return Status.AT_BOUND if at_bound else Status.CONVERGED
-
-
-def _answer(value: bool | int | list[str]) -> str:
-    if isinstance(value, list):
-        return ", ".join(value) or "none"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return str(value)
 
 
 def distinct_rivals(parameters: Mapping[str, Estimate], rivals: tuple[Rival, ...]) -> list[Rival]:

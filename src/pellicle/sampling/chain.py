@@ -7,6 +7,8 @@ random numbers in it, a resumed chain is the one that an undisturbed run would h
 
 from __future__ import annotations
 
+import os
+import time
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -14,10 +16,12 @@ from typing import Any
 
 import numpy as np
 
-from pellicle.errors import DataError
+from pellicle.errors import DataError, UsageError
 from pellicle.files import replacing
 
 GROUP = "mcmc"
+_PATIENCE = 2.0
+"""Seconds between two checkpoints."""
 
 
 @dataclass(frozen=True)
@@ -53,40 +57,66 @@ def empty(walkers: int, parameters: int, seed: int) -> Chain:
     return Chain(np.zeros((0, walkers, parameters)), np.zeros((0, walkers)), np.zeros(walkers), tuple(random))
 
 
-def save(path: Path, chain: Chain, fingerprint: str, names: tuple[str, ...]) -> None:
-    """Write a chain, over an earlier one of the same problem. Raises UsageError where it cannot be."""
-    import h5py
+class ChainFile:
+    """The file of a chain of one problem, which a run resumes and writes now and then; none if `path` is."""
 
-    with replacing(path, overwrite=True) as draft, h5py.File(draft, "w") as file:
-        group: Any = file.create_group(GROUP)
-        steps, walkers, size = chain.draws.shape
-        facts = {"version": version("emcee"), "nwalkers": walkers, "ndim": size, "has_blobs": False}
-        random = {f"random_state_{i}": value for i, value in enumerate(chain.random)}
-        ours = {"fingerprint": fingerprint, "names": list(names)}
-        for key, value in (facts | {"iteration": steps} | random | ours).items():
-            group.attrs[key] = value
-        group.create_dataset("chain", data=chain.draws, maxshape=(None, walkers, size))
-        group.create_dataset("log_prob", data=chain.log_density, maxshape=(None, walkers))
-        group.create_dataset("accepted", data=chain.accepted)
+    def __init__(self, path: str | os.PathLike[str] | None, fingerprint: str, names: tuple[str, ...]):
+        self.path = None if path is None else Path(path)
+        self.fingerprint, self.names = fingerprint, names
+        self.written = time.monotonic()
 
+    def begin(self, walkers: int, seed: int) -> Chain:
+        """The chain of the file, or a new one.
 
-def load(path: Path, fingerprint: str) -> Chain:
-    """The chain of a problem. Raises DataError where the file is of another one, or no chain at all."""
-    import h5py
+        Raises DataError where the file is no chain of this problem, UsageError where its walkers are not as
+        many.
+        """
+        if self.path is None or not self.path.exists():
+            return empty(walkers, len(self.names), seed)
+        import h5py
 
-    try:
-        with h5py.File(path, "r") as file:
-            group: Any = file[GROUP]
-            whose = group.attrs.get("fingerprint", "")
-            random = tuple(group.attrs[f"random_state_{i}"] for i in range(5))
-            chain = Chain(group["chain"][...], group["log_prob"][...], group["accepted"][...], random)
-    except (OSError, KeyError):
-        raise DataError(
-            f"{path}: is no chain that pellicle wrote; move it away or name another folder"
-        ) from None
-    if whose != fingerprint:
-        raise DataError(
-            f"{path}: is the chain of another problem (other data, bounds or priors); move it away or name"
-            " another folder"
-        )
-    return chain
+        try:
+            with h5py.File(self.path, "r") as file:
+                group: Any = file[GROUP]
+                fingerprint = group.attrs.get("fingerprint", "")
+                random = tuple(group.attrs[f"random_state_{i}"] for i in range(5))
+                chain = Chain(group["chain"][...], group["log_prob"][...], group["accepted"][...], random)
+        except (OSError, KeyError):
+            raise DataError(
+                f"{self.path}: is no chain that pellicle wrote; move it away or name another folder"
+            ) from None
+        if fingerprint != self.fingerprint:
+            raise DataError(
+                f"{self.path}: is the chain of another problem (other data, bounds or priors); move it away"
+                " or name another folder"
+            )
+        if chain.draws.shape[1] != walkers:
+            raise UsageError(
+                f"{self.path}: is a chain of {chain.draws.shape[1]} walkers: go on with as many,"
+                " or name another folder"
+            )
+        return chain
+
+    def keep(self, chain: Chain) -> None:
+        """Write the chain if the last checkpoint is some time ago."""
+        if time.monotonic() - self.written > _PATIENCE:
+            self.write(chain)
+
+    def write(self, chain: Chain) -> None:
+        """Write the chain, over an earlier one of the same problem. Raises UsageError where it cannot be."""
+        if self.path is None:
+            return
+        import h5py
+
+        with replacing(self.path, overwrite=True) as draft, h5py.File(draft, "w") as file:
+            group: Any = file.create_group(GROUP)
+            steps, walkers, size = chain.draws.shape
+            facts = {"version": version("emcee"), "nwalkers": walkers, "ndim": size, "has_blobs": False}
+            random = {f"random_state_{i}": value for i, value in enumerate(chain.random)}
+            ours = {"fingerprint": self.fingerprint, "names": list(self.names)}
+            for key, value in (facts | {"iteration": steps} | random | ours).items():
+                group.attrs[key] = value
+            group.create_dataset("chain", data=chain.draws, maxshape=(None, walkers, size))
+            group.create_dataset("log_prob", data=chain.log_density, maxshape=(None, walkers))
+            group.create_dataset("accepted", data=chain.accepted)
+        self.written = time.monotonic()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from dataclasses import dataclass
 from importlib.util import find_spec
+from types import ModuleType
 
 import numpy as np
 
@@ -74,15 +75,15 @@ def check(chain: Chain, modes: Modes) -> Checks:
     discard = int(min(np.ceil(_BURNED * tau), chain.steps // 2))
     kept = chain.draws[discard:]
     home = modes.nearest(kept.reshape(-1, kept.shape[-1]))
-    found = np.flatnonzero(modes.matter)
+    minima = np.flatnonzero(modes.matter)
     return Checks(
         steps=chain.steps,
         discard=discard,
         autocorrelation_time=tau,
         rhat=split_rhat(kept),
         acceptance=float(chain.accepted.mean() / chain.steps),
-        minima_found=len(found),
-        minima_visited=int(np.isin(found, home).sum()),
+        minima_found=len(minima),
+        minima_visited=int(np.isin(minima, home).sum()),
         independent=int(kept.shape[0] * kept.shape[1] / tau),
     )
 
@@ -112,7 +113,7 @@ def split_rhat(draws: np.ndarray) -> float:
         return float(max(rhat(draws[:, :, i].T, method="split") for i in range(draws.shape[2])))
 
 
-def arviz():
+def arviz() -> ModuleType:
     """ArviZ, whose import warns once a day of its next version."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

@@ -22,7 +22,7 @@ LogDensity = Callable[[np.ndarray], np.ndarray]
 class Density(NamedTuple):
     """ln posterior of each point, up to a constant; −∞ outside the bounds."""
 
-    log: Any
+    log: jax.Array
 
 
 @kept

@@ -5,16 +5,15 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import numpy as np
 
 from pellicle.errors import UsageError, install_command
 from pellicle.fitting.progress import Progress
-from pellicle.sampling import chain as chains
-from pellicle.sampling.chain import Chain
+from pellicle.fitting.result import Fit
+from pellicle.sampling.chain import ChainFile
 from pellicle.sampling.checks import missing
 from pellicle.sampling.density import LogDensity
 from pellicle.sampling.modes import Modes
@@ -26,8 +25,6 @@ from pellicle.sampling.target import Target
 STEPS = 20_000
 """Maximum number of steps of a chain."""
 FEWEST_WALKERS = 32
-_PATIENCE = 2.0
-"""Seconds between two checkpoints."""
 _LIVE = 40
 """Numbers of float64 that one point of the data of one walker keeps alive at once, roughly."""
 
@@ -39,15 +36,38 @@ class Subject(NamedTuple):
     `points` how many data one evaluation compares; `predict` makes predictions of draws, from a seed.
     """
 
-    fit: Any
+    fit: Fit
     names: tuple[str, ...]
     log_density: LogDensity
     modes: Modes
-    values: Callable[[np.ndarray], Any]
+    values: Callable[[np.ndarray], np.ndarray]
     fingerprint: str
     points: int
     predict: Callable[[np.ndarray, int], tuple[Prediction, ...]]
     assumption: str = ""
+
+    def walkers(self, count: int | None, steps: int) -> int:
+        """The number of walkers: `count` if it is possible, or four for each parameter and at least 32.
+
+        Raises UsageError where they are too few, or need more than the machine's memory.
+        """
+        size = len(self.names)
+        if count is None:
+            return max(FEWEST_WALKERS, 4 * size)
+        if count < max(2 * size, 4) or count % 2:
+            raise UsageError(f"walkers must be an even number of at least {max(2 * size, 4)}, got {count}")
+        try:
+            memory = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+        except (AttributeError, ValueError, OSError):  # unknown to the system, and so without limit
+            memory = float("inf")
+        needed = 8.0 * count * (_LIVE * self.points + 3 * steps * (size + 1))
+        if needed > memory:
+            most = int(count * memory / needed) // 2 * 2
+            raise UsageError(
+                f"{count} walkers of {steps} steps need about {needed / 2**30:.3g} GiB and the machine has"
+                f" {memory / 2**30:.3g}: take {most} at most, or fewer steps"
+            )
+        return count
 
 
 def sampled(
@@ -60,14 +80,12 @@ def sampled(
     began: float,
 ) -> Posterior:
     """The posterior, in float64, from a chain that is kept in the file `chain`. Raises as `sample` does."""
-    path = None if chain is None else Path(chain)
+    file = ChainFile(chain, subject.fingerprint, subject.names)
     with jax.enable_x64(True):
-        count = _walkers(walkers, steps, subject)
-        begun = _begun(path, subject.fingerprint, count, len(subject.names), seed)
+        count = subject.walkers(walkers, steps)
         target = Target(subject.log_density, (count + 1) // 2)
-        keep = _Keeper(path, subject.fingerprint, subject.names)
-        grown, checks = run(target, subject.modes, begun, steps, keep, progress)
-        keep.last(grown)
+        grown, checks = run(target, subject.modes, file.begin(count, seed), steps, file.keep, progress)
+        file.write(grown)
     units = grown.draws[checks.discard :]
     return Posterior(
         fit=subject.fit,
@@ -83,35 +101,6 @@ def sampled(
     )
 
 
-class _Keeper:
-    """Writes the chain now and then, where it is to be kept."""
-
-    def __init__(self, path: Path | None, fingerprint: str, names: tuple[str, ...]):
-        self.path, self.fingerprint, self.names = path, fingerprint, names
-        self.written = time.monotonic()
-
-    def __call__(self, chain: Chain) -> None:
-        if time.monotonic() - self.written > _PATIENCE:
-            self.last(chain)
-
-    def last(self, chain: Chain) -> None:
-        if self.path is not None:
-            chains.save(self.path, chain, self.fingerprint, self.names)
-            self.written = time.monotonic()
-
-
-def _begun(path: Path | None, fingerprint: str, walkers: int, parameters: int, seed: int) -> Chain:
-    if path is None or not path.exists():
-        return chains.empty(walkers, parameters, seed)
-    chain = chains.load(path, fingerprint)
-    if chain.draws.shape[1] != walkers:
-        raise UsageError(
-            f"{path}: is a chain of {chain.draws.shape[1]} walkers: go on with as many,"
-            " or name another folder"
-        )
-    return chain
-
-
 def installed() -> None:
     """UsageError where the sampler's packages are missing."""
     absent = missing()
@@ -119,29 +108,3 @@ def installed() -> None:
         raise UsageError(
             f"posteriors need {', '.join(absent)}, not installed here: {install_command('posterior')}"
         )
-
-
-def _walkers(walkers: int | None, steps: int, subject: Subject) -> int:
-    """How many walkers memory are: walkers and possible, or four for each parameter and at least 32."""
-    size = len(subject.names)
-    if walkers is None:
-        return max(FEWEST_WALKERS, 4 * size)
-    if walkers < max(2 * size, 4) or walkers % 2:
-        raise UsageError(f"walkers must be an even number of at least {max(2 * size, 4)}, got {walkers}")
-    needed = 8.0 * walkers * (_LIVE * subject.points + 3 * steps * (size + 1))
-    memory = _memory()
-    if needed > memory:
-        most = int(walkers * memory / needed) // 2 * 2
-        raise UsageError(
-            f"{walkers} walkers of {steps} steps need about {needed / 2**30:.3g} GiB and the machine has"
-            f" {memory / 2**30:.3g}: take {most} at most, or fewer steps"
-        )
-    return walkers
-
-
-def _memory() -> float:
-    """The machine's memory in bytes; unknown, and so without limit, where the system does not say."""
-    try:
-        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
-    except (AttributeError, ValueError, OSError):
-        return float("inf")

@@ -75,12 +75,12 @@ class Posterior(PlotMixin):
         """Marginals by name, whatever the checks say."""
         flat = self.draws.reshape(-1, len(self.names))
         home = self.modes.nearest(self.units.reshape(-1, len(self.names)))
-        found = {name: self._marginal(name, flat[:, i], home) for i, name in enumerate(self.names)}
-        return {name: found[name] for name in self.fit.parameters if name in found}
+        result = {name: self._marginal(name, flat[:, i], home) for i, name in enumerate(self.names)}
+        return {name: result[name] for name in self.fit.parameters if name in result}
 
     def _marginal(self, name: str, values: np.ndarray, home: np.ndarray) -> Marginal:
         shares = [(mode, float(np.mean(home == mode))) for mode in np.unique(home)]
-        held = [Mode(float(np.median(values[home == mode])), mass) for mode, mass in shares]
+        places = [Mode(float(np.median(values[home == mode])), mass) for mode, mass in shares]
         q025, q50, q975 = np.quantile(values, [0.025, 0.5, 0.975])
         return Marginal(
             name,
@@ -90,7 +90,7 @@ class Posterior(PlotMixin):
             float(q025),
             float(q50),
             float(q975),
-            tuple(sorted(held, key=lambda mode: -mode.mass)),
+            tuple(sorted(places, key=lambda mode: -mode.mass)),
         )
 
     def __getitem__(self, name: str) -> Marginal:
@@ -114,9 +114,11 @@ def verdict(posterior: Posterior) -> str:
     lead = next(iter(posterior.parameters.values()))
     unit = f" {lead.unit}" if lead.unit else ""
     opening = f"If {posterior.assumption}, with" if posterior.assumption else "With"
-    told = f"{opening} 95 % probability {lead.name} lies between {lead.q025:.5g} and {lead.q975:.5g}{unit}"
+    sentence = (
+        f"{opening} 95 % probability {lead.name} lies between {lead.q025:.5g} and {lead.q975:.5g}{unit}"
+    )
     several = [mode for mode in lead.modes if mode.mass >= 0.05]
     if len(several) < 2:
-        return f"{told}."
+        return f"{sentence}."
     shares = ", ".join(f"{mode.value:.5g}{unit} with {100 * mode.mass:.0f} %" for mode in several)
-    return f"{told}, in {len(several)} separate places: {shares}."
+    return f"{sentence}, in {len(several)} separate places: {shares}."

@@ -18,7 +18,7 @@ log = getLogger(__name__)
 
 BLOCK = 100
 """Steps between two looks at the clock and the keyboard."""
-_LOOK = 1.25
+_GROWTH = 1.25
 """The checks are made again when the chain has grown by this factor."""
 
 
@@ -35,31 +35,38 @@ def run(
     `keep` is called with the chain after every block. Ctrl-C ends the chain with what it has; before the
     first block it is raised again.
     """
-    checks, looked = None, 0
+    checks, checked = None, 0
     try:
         while chain.steps < steps:
-            if chain.steps >= 2 * BLOCK and chain.steps >= _LOOK * looked:
-                checks, looked = check(chain, modes), chain.steps
+            if chain.steps >= 2 * BLOCK and chain.steps >= _GROWTH * checked:
+                checks, checked = check(chain, modes), chain.steps
                 log.info("chain: %d steps: %s", chain.steps, "; ".join(checks.doubts) or "long enough")
                 if checks.trusted:
                     break
-            chain = _lengthened(target, modes, chain, min(BLOCK, steps - chain.steps))
+            chain = _extended(target, modes, chain, min(BLOCK, steps - chain.steps))
             keep(chain)
             progress("sample", chain.steps, steps)
     except KeyboardInterrupt:
         if not chain.steps:
             raise
-    if checks is None or chain.steps != looked:
+    if checks is None or chain.steps != checked:
         checks = check(chain, modes)
     return chain, checks
 
 
-def _lengthened(target: Target, modes: Modes, chain: Chain, steps: int) -> Chain:
+def _extended(target: Target, modes: Modes, chain: Chain, steps: int) -> Chain:
     import emcee
 
     walkers, size = chain.draws.shape[1:]
+    if chain.steps:
+        state = emcee.State(chain.draws[-1], log_prob=chain.log_density[-1], random_state=chain.random)
+    else:
+        random = np.random.RandomState()
+        random.set_state(chain.random)
+        start = modes.start(walkers, random)
+        state = emcee.State(start, log_prob=target(start), random_state=random.get_state(legacy=True))
     sampler = emcee.EnsembleSampler(walkers, size, target, moves=moves(modes), vectorize=True)
-    sampler.run_mcmc(_state(target, modes, chain), steps, skip_initial_state_check=True)
+    sampler.run_mcmc(state, steps, skip_initial_state_check=True)
     more = Chain(
         np.asarray(sampler.get_chain()),
         np.asarray(sampler.get_log_prob()),
@@ -67,17 +74,6 @@ def _lengthened(target: Target, modes: Modes, chain: Chain, steps: int) -> Chain
         tuple(sampler.random_state),
     )
     return chain.extended(more)
-
-
-def _state(target: Target, modes: Modes, chain: Chain):
-    from emcee import State
-
-    if chain.steps:
-        return State(chain.draws[-1], log_prob=chain.log_density[-1], random_state=chain.random)
-    random = np.random.RandomState()
-    random.set_state(chain.random)
-    start = modes.start(chain.draws.shape[1], random)
-    return State(start, log_prob=target(start), random_state=random.get_state(legacy=True))
 
 
 def moves(modes: Modes) -> list[tuple[Any, float]]:

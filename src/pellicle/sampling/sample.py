@@ -5,21 +5,16 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Sequence
-from functools import partial
 from typing import TypeAlias, TypeVar
 
 import jax
-import jax.numpy as jnp
-import numpy as np
 
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
 from pellicle.fitting.brdf import fit as brdf
-from pellicle.fitting.problem import Problem
 from pellicle.fitting.progress import Progress, quiet
-from pellicle.fitting.result import Fit, Status
-from pellicle.fitting.reweighting import RankedMinima
+from pellicle.fitting.result import Status
 from pellicle.fitting.spectra import fit as spectra
 from pellicle.sampling.density import fingerprint, log_density
 from pellicle.sampling.ensemble import STEPS, Subject, installed, sampled
@@ -69,14 +64,29 @@ def sample(
         fit, ranked = brdf.fitted(measurements, scene, tolerance, progress, residual=residual)
         unsure = fit.layer_test and not fit.layer_test.layered and fit.status is not Status.AMBIGUOUS
         assumption = "there is a layer" if unsure else ""
-        identity = _surface_fingerprint(measurements, scene, fit, tolerance)
+        rows = [measurements] if isinstance(measurements, BrdfSamples) else measurements
+        columns = [(s.theta_i, s.phi_i, s.theta_o, s.phi_o, s.values, s.sigma) for s in rows]
+        compared = fit.layer_test.residual if fit.layer_test else ""
+        numbers = dict(scene.numbers), scene.channel_wavelengths
+        identity = fingerprint([*columns, numbers], scene.model, compared, tolerance)
     else:
         measurements = measured(Spectrum, data)
         fit, ranked = spectra.fitted(measurements, scene, tolerance, progress)
         with jax.enable_x64(True):
             identity = fingerprint(spectra.measurements(measurements, scene), tolerance)
     with jax.enable_x64(True):
-        subject = _subject(fit, ranked, identity, assumption)
+        problem = ranked.problem.affine()
+        subject = Subject(
+            fit,
+            tuple(p.name for p in problem.parameters),
+            log_density(problem),
+            modes(ranked),
+            lambda units: problem.values_near(units, ranked.values),
+            identity,
+            max(view.independent for view in problem.views),
+            lambda units, seed: predictions(problem, fit.parts, units, seed),
+            assumption,
+        )
     return sampled(subject, walkers, steps, seed, chain, progress, began)
 
 
@@ -88,39 +98,3 @@ def measured(kind: type[Kind], data: Measurement) -> Kind | list[Kind]:
     if not all(isinstance(row, kind) for row in rows):
         raise UsageError("BRDF samples need a Surface, and spectra a Scene")
     return [row for row in rows if isinstance(row, kind)]
-
-
-def _subject(fit: Fit, ranked: RankedMinima, identity: str, assumption: str) -> Subject:
-    problem = ranked.problem.affine()
-    return Subject(
-        fit,
-        tuple(p.name for p in problem.parameters),
-        log_density(problem),
-        modes(ranked),
-        partial(_values, problem, ranked.values),
-        identity,
-        max(view.independent for view in problem.views),
-        partial(predictions, problem, fit.parts),
-        assumption,
-    )
-
-
-def _values(problem: Problem, best: np.ndarray, units: np.ndarray) -> np.ndarray:
-    """Points (..., parameters) of the unit cube in the parameters' own units, an azimuth within half a turn
-    of the best one."""
-    values = np.array(problem.values(jnp.asarray(units)))
-    if problem.coordinates.tilt is not None:
-        at = problem.coordinates.tilt[1]
-        values[..., at] = best[at] + (values[..., at] - best[at] + 180) % 360 - 180
-    return values
-
-
-def _surface_fingerprint(
-    data: BrdfSamples | list[BrdfSamples], surface: Surface, fit: Fit, tolerance: float
-) -> str:
-    samples = [data] if isinstance(data, BrdfSamples) else data
-    columns = [(s.theta_i, s.phi_i, s.theta_o, s.phi_o, s.values, s.sigma) for s in samples]
-    residual = fit.layer_test.residual if fit.layer_test else ""
-    return fingerprint(
-        [*columns, (dict(surface.numbers), surface.channel_wavelengths)], surface.model, residual, tolerance
-    )

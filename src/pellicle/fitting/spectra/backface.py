@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import equinox as eqx
 import numpy as np
 
 from pellicle.fitting.minima import minima
@@ -36,27 +36,20 @@ def comparison(spectra: Sequence[Measured], ranked: RankedMinima) -> Comparison 
     backs = [spectra[i].scene.substrate for i in dependent]
     if not dependent or any(free_leaves((plate.back, plate.plate_mm)) for plate in backs):
         return None
-    without = make(*(_bare(spectrum, view) for spectrum, view in zip(spectra, views, strict=True)))
+    targets = []
+    for spectrum, view in zip(spectra, views, strict=True):
+        substrate = dataclasses.replace(spectrum.scene.substrate, back=None)
+        scene = dataclasses.replace(spectrum.scene, substrate=substrate)
+        # with its final weights
+        sigma = 1 / view.data.weight[: view.points].reshape(view.rows, view.channels)
+        fraction = float(view.data.independent_fraction)
+        targets.append(spectrum._replace(scene=scene, sigma=sigma, independent_fraction=fraction))
+    without = make(*targets)
     values = without.values(minima(without, ranked.minima.units).units[0])
     bare = [without.views[i] for i in dependent]
     return Comparison(
         _rms([views[i] for i in dependent], [ranked.fits[i].at for i in dependent]),
         _rms(bare, [view.local(without.seen_by(view, values)) for view in bare]),
-    )
-
-
-def _bare(spectrum: Measured, view: SpectrumView) -> Measured:
-    """The spectrum with its final weights, of a sample without a back face."""
-    sigma = 1 / view.data.weight[: view.points].reshape(view.rows, view.channels)
-    return spectrum._replace(
-        scene=eqx.tree_at(
-            lambda s: s.substrate.back,
-            spectrum.scene,
-            None,
-            is_leaf=lambda x: x is None or x is spectrum.scene.substrate.back,
-        ),
-        sigma=sigma,
-        independent_fraction=float(view.data.independent_fraction),
     )
 
 

@@ -70,13 +70,23 @@ def fitted(
     with jax.enable_x64(True):
         targets = measurements(data, scene)
         spectra = [data] if isinstance(data, Spectrum) else list(data)
-        return _fit(spectra, [target.scene for target in targets], targets, tolerance, loss, progress)
+        return _fit(spectra, targets, tolerance, loss, progress)
 
 
 def measurements(data: Spectrum | Sequence[Spectrum], scene: Scene | Sequence[Scene]) -> list[Measured]:
     """The numbers and the scene of each spectrum. Raises UsageError as `fit` does."""
     spectra = [data] if isinstance(data, Spectrum) else list(data)
-    scenes = _scenes(spectra, scene)
+    if not spectra:
+        raise UsageError("there is no spectrum to fit: give one, or a list of some")
+    scenes = [scene] * len(spectra) if isinstance(scene, Scene) else list(scene)
+    if len(scenes) != len(spectra):
+        raise UsageError(f"{len(spectra)} spectra need as many scenes, or one for all, not {len(scenes)}")
+    if isinstance(scene, Scene) and len(spectra) > 1:
+        scenes = [without_scale(scene, s) for s in spectra]
+    about = [(s.layers, s.ambient, s.substrate) for s in scenes]
+    samples = [(*rest, x.material, x.plate_mm, x.roughness) for *rest, x in about]
+    if not all(eqx.tree_equal(sample, samples[0]) is True for sample in samples):
+        raise UsageError("the scenes of a joint fit must have the same layers, ambient and substrate")
     for each in scenes:
         check_free(each)
     names = [""] if isinstance(data, Spectrum) else labels(spectra)
@@ -106,30 +116,8 @@ def labels(spectra: Sequence[Spectrum]) -> list[str]:
     return numbers
 
 
-def _scenes(spectra: list[Spectrum], scene: Scene | Sequence[Scene]) -> list[Scene]:
-    """A scene for each spectrum, checked to be of one sample."""
-    if not spectra:
-        raise UsageError("there is no spectrum to fit: give one, or a list of some")
-    if isinstance(scene, Scene):
-        alone = len(spectra) == 1
-        return [scene if alone else without_scale(scene, s) for s in spectra]
-    scenes = list(scene)
-    if len(scenes) != len(spectra):
-        raise UsageError(f"{len(spectra)} spectra need as many scenes, or one for all, not {len(scenes)}")
-    of = [(s.substrate.material, s.substrate.plate_mm, s.substrate.roughness) for s in scenes]
-    samples = [(s.layers, s.ambient, substrate) for s, substrate in zip(scenes, of, strict=True)]
-    if not all(eqx.tree_equal(sample, samples[0]) is True for sample in samples):
-        raise UsageError("the scenes of a joint fit must have the same layers, ambient and substrate")
-    return scenes
-
-
 def _fit(
-    data: list[Spectrum],
-    scenes: list[Scene],
-    spectra: list[Measured],
-    tolerance: float,
-    loss: str,
-    progress: Progress,
+    data: list[Spectrum], spectra: list[Measured], tolerance: float, loss: str, progress: Progress
 ) -> tuple[Fit, RankedMinima]:
     began = time.perf_counter()
 
@@ -181,6 +169,6 @@ def _fit(
         warnings=(*warnings, *summary.warnings(spectra, ranked, unclear)),
         profile=profile,
         seconds=time.perf_counter() - began,
-        scene=scenes[0] if len(scenes) == 1 else tuple(scenes),
+        scene=spectra[0].scene if len(spectra) == 1 else tuple(m.scene for m in spectra),
     )
     return fit, ranked

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from logging import INFO, getLogger
-from typing import Any
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from pellicle.fitting.spectra.targets import Measured
 from pellicle.materials import Material
 from pellicle.scene.film import Scene
 from pellicle.scene.free import free_leaves, is_free
-from pellicle.scene.layers import Interface, Layer, Plate
+from pellicle.scene.layers import Interface, Plate
 
 log = getLogger(__name__)
 
@@ -32,17 +31,34 @@ def log_problem(spectra: Sequence[Measured], problem: Problem) -> None:
     for p in problem.parameters:
         log.info("free: %s between %g and %g%s", p.name, p.lower, p.upper, f" {p.unit}" if p.unit else "")
     for spectrum, view in zip(spectra, problem.views, strict=True):
-        log.info("data%s: %s; %s", _of(view.name), _looked(spectrum), _noise(spectrum))
+        light, nm = spectrum.scene.light, spectrum.wavelength
+        at = "free angle" if is_free(light.angle) else f"{_span(np.atleast_1d(light.angle))} degrees"
+        points = f"{light.signal} at {len(nm)} points, {_span(nm)} nm, {at}, {light.polarisation}"
+        noise = "no noise is given: equal weights, and σ from the residuals of the best fit"
+        if spectrum.noise.given:
+            noise = "its noise is given, and errors are absolute"
+        elif spectrum.noise.drifting:
+            noise = "no noise is given; scale drifts, so weights are the error that a lamp is allowed"
+        log.info("data%s: %s; %s", _of(view.name), points, noise)
         log_plan(view.plan, view.name)
 
 
 def log_scene(scene: Scene) -> None:
     """Log the layers: `from air: Fe2O3 (main/Fe2O3/Querry-o), 1 to 1000 nm, on BK7 (...)`."""
     if log.isEnabledFor(INFO):
-        layers = ", then ".join(_layer(layer) for layer in scene.layers)
+        layers = []
+        for layer in scene.layers:
+            medium = "a mixed interface" if isinstance(layer, Interface) else medium_in_words(layer.material)
+            if isinstance(layer, Plate):
+                medium, size, unit = f"a plate of {medium}", layer.plate_mm, "mm"
+            else:
+                size, unit = layer.thickness, "nm"
+            size = f"{size.lower:g} to {size.upper:g}" if is_free(size) else f"{float(size):g}"
+            layers.append(f"{medium}, {size} {unit}")
         on, back = medium_in_words(scene.substrate.material), scene.substrate.back
         behind = "" if back is None else f", a plate with {medium_in_words(back)} behind it"
-        log.info("scene: from %s: %s, on %s%s", medium_in_words(scene.ambient), layers, on, behind)
+        stack = ", then ".join(layers)
+        log.info("scene: from %s: %s, on %s%s", medium_in_words(scene.ambient), stack, on, behind)
 
 
 def log_plan(plan: Plan, name: str = "") -> None:
@@ -70,37 +86,9 @@ def medium_in_words(medium: AbstractDispersion) -> str:
     return f"{type(medium).__name__}{of}{free}"
 
 
-def _layer(layer: Layer | Interface | Plate) -> str:
-    if isinstance(layer, Interface):
-        return f"a mixed interface, {_number(layer.thickness, 'nm')}"
-    if isinstance(layer, Plate):
-        return f"a plate of {medium_in_words(layer.material)}, {_number(layer.plate_mm, 'mm')}"
-    return f"{medium_in_words(layer.material)}, {_number(layer.thickness, 'nm')}"
-
-
-def _number(number: Any, unit: str) -> str:
-    if is_free(number):
-        return f"{number.lower:g} to {number.upper:g} {unit}"
-    return f"{float(number):g} {unit}"
-
-
-def _looked(spectrum: Measured) -> str:
-    light, nm = spectrum.scene.light, spectrum.wavelength
-    at = "free angle" if is_free(light.angle) else f"{_span(np.atleast_1d(light.angle))} degrees"
-    return f"{light.signal} at {len(nm)} points, {_span(nm)} nm, {at}, {light.polarisation}"
-
-
 def _span(values: np.ndarray) -> str:
     low, high = values.min(), values.max()
     return f"{low:g} to {high:g}" if low < high else f"{low:g}"
-
-
-def _noise(spectrum: Measured) -> str:
-    if spectrum.noise.given:
-        return "its noise is given, and errors are absolute"
-    if spectrum.noise.drifting:
-        return "no noise is given; scale drifts, so weights are the error that a lamp is allowed"
-    return "no noise is given: equal weights, and σ from the residuals of the best fit"
 
 
 def _of(name: str) -> str:

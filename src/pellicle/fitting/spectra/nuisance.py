@@ -20,6 +20,7 @@ import numpy as np
 from jax.scipy.linalg import cho_factor, cho_solve
 from jaxtyping import ScalarLike
 
+from pellicle.fitting.coordinates import Array
 from pellicle.optics.layout import stack_rows
 from pellicle.scene.instrument import Drift, Instrument
 
@@ -34,12 +35,12 @@ _SLACK = 1e-6
 class Data(NamedTuple):
     """A spectrum as the fit sees it, padded to a round length with points of zero weight."""
 
-    values: Any
-    weight: Any  # 1/σ, 0 for padding
-    position: Any  # wavelength mapped to −1..1
-    independent_fraction: Any  # effective points per point: correlated errors count less
-    level: Any  # median of the values: the size an offset is measured in
-    frame: Any = None  # of N, C, S at each point, where Ψ and Δ have errors of their own
+    values: Array
+    weight: Array  # 1/σ, 0 for padding
+    position: Array  # wavelength mapped to −1..1
+    independent_fraction: Array | np.floating  # effective points per point: correlated errors count less
+    level: Array | np.floating  # median of the values: the size an offset is measured in
+    frame: Array | None = None  # of N, C, S at each point, where Ψ and Δ have errors of their own
 
 
 @dataclass(frozen=True)
@@ -57,11 +58,11 @@ class Coefficient:
 class Solved(NamedTuple):
     """The nuisances solved for one simulated signal."""
 
-    model: Any  # g f + o at every point
-    residual: Any  # weighted, tempered, with a row for each prior
-    gain: Any  # g at every point
-    offset: Any  # o at every point
-    deviance: Any  # −2 ln of the marginal likelihood, up to a constant
+    model: Array  # g f + o at every point
+    residual: Array  # weighted, tempered, with a row for each prior
+    gain: Array  # g at every point
+    offset: Array  # o at every point
+    deviance: Array  # −2 ln of the marginal likelihood, up to a constant
 
 
 def chebyshev(position, degree: int) -> list:
@@ -75,37 +76,44 @@ def chebyshev(position, degree: int) -> list:
 def solve(signal, data: Data, instrument: Instrument) -> Solved:
     """The best scale and offset for a simulated signal, and the deviance."""
     weight = data.weight * jnp.sqrt(data.independent_fraction)
-    gains, scale = _split(instrument.scale, lambda drift: _gains(signal, weight, data, drift))
-    shifts, offset = _split(instrument.offset, lambda drift: _shifts(data, drift))
-    one = jnp.ones_like(signal)
-    known = scale * signal + offset * one
-    columns = [g * signal for g in gains.basis] if gains else []
-    columns = stack_rows([*columns, *(shifts.basis if shifts else [])]) if gains or shifts else None
-    if columns is None:
+    square, one = weight * weight, jnp.ones_like(signal)
+    # the plain scale, which a single free number would have
+    plain = jnp.sum(square * data.values * signal) / (jnp.sum(square * signal * signal) + 1e-30)
+    gains = _series(instrument.scale, scale_prior, plain, data)
+    shifts = _series(instrument.offset, offset_prior, data.level, data)
+    known = gains.known * signal + shifts.known * one
+    columns = [*(g * signal for g in gains.basis), *shifts.basis]
+    if not columns:
         residual = weight * (data.values - known)
-        return Solved(known, residual, scale * one, offset * one, jnp.sum(residual**2))
-    prior = _join(gains, shifts)
-    coefficients, deviance = _project(columns * weight, weight * (data.values - known), prior, shifts)
-    first = len(gains.basis) if gains else 0
+        return Solved(known, residual, gains.known * one, shifts.known * one, jnp.sum(residual**2))
+    columns, first = stack_rows(columns), len(gains.basis)
+    mean, sd = np.concatenate([gains.mean, shifts.mean]), np.concatenate([gains.sd, shifts.sd])
+    weighted = columns * weight, weight * (data.values - known)
+    coefficients, log_determinant = _project(*weighted, mean, sd, len(shifts.basis))
     model = known + coefficients @ columns
-    residual = jnp.concatenate([weight * (data.values - model), (coefficients - prior.mean) / prior.sd])
-    gain = coefficients[:first] @ jnp.stack(gains.basis) if gains else scale * one
-    shift = coefficients[first:] @ jnp.stack(shifts.basis) if shifts else offset * one
-    deviance = deviance + jnp.sum(residual**2) + _penalty(gain, weight)
-    return Solved(model, residual, gain, shift, deviance)
+    residual = jnp.concatenate([weight * (data.values - model), (coefficients - mean) / sd])
+    gain = coefficients[:first] @ jnp.stack(gains.basis) if gains.basis else gains.known * one
+    shift = coefficients[first:] @ jnp.stack(shifts.basis) if shifts.basis else shifts.known * one
+    negative = jnp.where(jnp.min(jnp.where(weight > 0, gain, jnp.inf)) > 0, 0.0, 1e9)
+    return Solved(model, residual, gain, shift, log_determinant + jnp.sum(residual**2) + negative)
 
 
 class _Series(NamedTuple):
-    """Functions of wavelength with a normal prior on their coefficients."""
+    """Functions of wavelength with a normal prior on their coefficients, and the number that is `known`."""
 
     basis: list
     mean: np.ndarray
     sd: np.ndarray
+    known: ScalarLike
 
 
-def _split(given: ScalarLike | Drift, series: Callable[[Drift], _Series]) -> tuple[_Series | None, Any]:
-    """A nuisance as a series to solve for and 0, or as no series and a known number."""
-    return (series(given), 0.0) if isinstance(given, Drift) else (None, given)
+def _series(
+    number: ScalarLike | Drift, prior: Callable[[Drift], tuple[np.ndarray, np.ndarray]], unit: Any, data: Data
+) -> _Series:
+    """A nuisance as Chebyshev terms times `unit`, or as a known number without terms."""
+    if not isinstance(number, Drift):
+        return _Series([], np.zeros(0), np.zeros(0), number)
+    return _Series([unit * t for t in chebyshev(data.position, number.degree)], *prior(number), 0.0)
 
 
 def scale_prior(drift: Drift) -> tuple[np.ndarray, np.ndarray]:
@@ -150,49 +158,35 @@ def coefficients(
     return result
 
 
-def _gains(signal, weight, data: Data, drift: Drift) -> _Series:
-    """Chebyshev terms in units of the plain scale, which a single free number would have."""
-    square = weight * weight
-    plain = jnp.sum(square * data.values * signal) / (jnp.sum(square * signal * signal) + 1e-30)
-    return _Series([plain * t for t in chebyshev(data.position, drift.degree)], *scale_prior(drift))
-
-
-def _shifts(data: Data, drift: Drift) -> _Series:
-    """Chebyshev terms in units of the signal's level."""
-    return _Series([data.level * t for t in chebyshev(data.position, drift.degree)], *offset_prior(drift))
-
-
-def _join(*series: _Series | None) -> _Series:
-    present = [s for s in series if s]
-    return _Series([], np.concatenate([s.mean for s in present]), np.concatenate([s.sd for s in present]))
-
-
-def _project(rows, values, prior: _Series, shifts: _Series | None):
-    """Coefficients of the weighted rows under their prior, and the deviance's log-determinant."""
-    precision = np.diag(1 / prior.sd**2)
+def _project(rows, values, mean: np.ndarray, sd: np.ndarray, offsets: int):
+    """Coefficients of the weighted rows under their prior, of which the last `offsets` are those of the
+    offset, and the deviance's log-determinant."""
+    precision = np.diag(1 / sd**2)
     matrix = rows @ rows.T + precision
-    target = rows @ values + precision @ prior.mean
-    stiffness = _stiffness(*jax.lax.stop_gradient((matrix, target)), shifts)
+    target = rows @ values + precision @ mean
+    stiffness = _stiffness(*jax.lax.stop_gradient((matrix, target)), offsets)
     factor = cho_factor(jax.lax.stop_gradient(matrix) + stiffness)
     coefficients = cho_solve(factor, jax.lax.stop_gradient(target))
     # adds nothing, but carries the implicit derivative A⁻¹(db − dA x): no factorisation is differentiated
     coefficients = coefficients + cho_solve(factor, target - (matrix + stiffness) @ coefficients)
     _, log_determinant = jnp.linalg.slogdet(matrix)
-    return coefficients, log_determinant + 2 * float(np.sum(np.log(prior.sd)))
+    return coefficients, log_determinant + 2 * float(np.sum(np.log(sd)))
 
 
-def _stiffness(matrix, target, shifts: _Series | None):
+def _stiffness(matrix, target, count: int):
     """Matrix to add so that the offset's solution is nowhere negative.
 
-    The offset is zero nonnegative through its Bernstein coefficients (enough, and for so low a degree
-    little more than needed). There are few of them, so every set that could be zero is tried and the
-    best feasible one is the exact solution of this convex problem: it moves continuously with the
-    data, as a solver needs. Which set it is counts as a constant.
+    The offset, the last `count` coefficients, is kept nonnegative through its Bernstein coefficients
+    (enough, and for so low a degree little more than needed). There are few of them, so every set that could
+    be zero is tried and the best feasible one is the exact solution of this convex problem: it moves
+    continuously with the data, as a solver needs. Which set it is counts as a constant.
     """
-    if shifts is None:
+    if not count:
         return jnp.zeros_like(matrix)
-    count = len(shifts.basis)
-    bernstein = _to_bernstein(count)
+    degree, points = count - 1, np.linspace(0.0, 1.0, count)
+    values = [[comb(degree, i) * t**i * (1 - t) ** (degree - i) for i in range(count)] for t in points]
+    # from Chebyshev coefficients on −1..1 to Bernstein coefficients of the same degree
+    bernstein = np.linalg.solve(values, np.polynomial.chebyshev.chebvander(2 * points - 1, degree))
     rows = jnp.zeros((count, matrix.shape[0])).at[:, -count:].set(bernstein)
     zero = np.array(list(itertools.product((0.0, 1.0), repeat=count)))
     stiff = _STIFF * jnp.trace(matrix) * jnp.einsum("si,ip,iq->spq", zero, rows, rows)
@@ -205,17 +199,3 @@ def _stiffness(matrix, target, shifts: _Series | None):
         )
 
     return stiff[jnp.argmin(jax.vmap(trial)(stiff))]
-
-
-def _to_bernstein(count: int) -> np.ndarray:
-    """Matrix from Chebyshev coefficients on −1..1 to Bernstein coefficients of the same degree."""
-    degree, points = count - 1, np.linspace(0.0, 1.0, count)
-    values = np.array(
-        [[comb(degree, i) * t**i * (1 - t) ** (degree - i) for i in range(count)] for t in points]
-    )
-    return np.linalg.solve(values, np.polynomial.chebyshev.chebvander(2 * points - 1, degree))
-
-
-def _penalty(gain, weight):
-    """Penalty that rules out a gain below zero."""
-    return jnp.where(jnp.min(jnp.where(weight > 0, gain, jnp.inf)) > 0, 0.0, 1e9)

@@ -62,7 +62,12 @@ def _own(path: tuple, name: str) -> str:
 
 
 def _full_name(scene: Scene, path: tuple, last: str, name: str) -> str:
-    return ".".join(part for part in (*_owner(scene, path), last, _own(path, name)) if part)
+    """Owner, last part and own scene; the owner is not named for the light and the only layer."""
+    owner = path[0].name
+    owners = _layer(scene, path[1].idx) if owner == "layers" else [owner] if owner != "light" else []
+    if owner == "substrate" and path[1].name == "back":
+        owners = ["back"]
+    return ".".join(part for part in (*owners, last, _own(path, name)) if part)
 
 
 def _parameter(scene: Scene, path: tuple, free: Free, name: str) -> Parameter:
@@ -100,16 +105,6 @@ def _place(scene: Scene, path: tuple) -> ParameterLocation:
     return ParameterLocation(key, key, key, None)
 
 
-def _owner(scene: Scene, path: tuple) -> list[str]:
-    """Prefix of a parameter's name: nothing for the only layer of a scene."""
-    first = path[0].name
-    if first == "substrate" and path[1].name == "back":
-        return ["back"]
-    if first != "layers":
-        return [] if first == "light" else [first]
-    return _layer(scene, path[1].idx)
-
-
 def _layer(scene: Scene, position: int) -> list[str]:
     """Prefix of the names of a layer's parameters: nothing if it is the only one."""
     return [] if len(scene.layers) == 1 else [scene.layers[position].name or f"layer{position + 1}"]
@@ -141,11 +136,6 @@ def fixed_numbers(scene: Scene, name: str = "") -> list[tuple[str, float, str]]:
         if path[0].name not in ("layers", "instrument") or not isinstance(leaf, int | float):
             continue
         location = _place(scene, path)
-        rows.append(
-            (
-                _full_name(scene, path, location.name, name),
-                float(leaf),
-                location.unit or _UNITS.get(location.key, ""),
-            )
-        )
+        unit = location.unit or _UNITS.get(location.key, "")
+        rows.append((_full_name(scene, path, location.name, name), float(leaf), unit))
     return rows

@@ -21,20 +21,18 @@ The noise, from differences of neighbouring points, takes the place of a given �
 
 def parts(data: list[Spectrum], ranked: RankedMinima, errors: Errors) -> tuple[Part, ...]:
     """One part for each spectrum, in their order."""
-    views = zip(data, ranked.problem.views, ranked.fits, strict=True)
-    return tuple(_part(spectrum, view, met, errors) for spectrum, view, met in views)
-
-
-def _part(spectrum: Spectrum, view: SpectrumView, fit: ViewFit, errors: Errors) -> Part:
-    return Part(
-        name=view.name,
-        data=spectrum,
-        curve=_curve(view, fit, errors),
-        plan=view.plan,
-        rms=view.rms(fit.at.model),
-        chi2_reduced=fit.chi2 / fit.freedom,
-        effective_points=view.rows / fit.length,
-        sigma_from="given" if view.noise.given else "model" if view.noise.drifting else "residuals",
+    return tuple(
+        Part(
+            name=view.name,
+            data=spectrum,
+            curve=_curve(view, fit, errors),
+            plan=view.plan,
+            rms=view.rms(fit.at.model),
+            chi2_reduced=fit.chi2 / fit.freedom,
+            effective_points=view.rows / fit.length,
+            sigma_from="given" if view.noise.given else "model" if view.noise.drifting else "residuals",
+        )
+        for spectrum, view, fit in zip(data, ranked.problem.views, ranked.fits, strict=True)
     )
 
 
@@ -51,26 +49,24 @@ def together(parts: tuple[Part, ...]) -> float | None:
 
 def missed(parts: tuple[Part, ...], ranked: RankedMinima) -> tuple[Part, ...]:
     """Spectra that the scene does not explain."""
-    views = zip(parts, ranked.problem.views, ranked.fits, strict=True)
-    several = len(parts) > 1
-    return tuple(part for part, view, met in views if _misses(part, view, met, several))
-
-
-def _misses(part: Part, view: SpectrumView, met: ViewFit, several: bool) -> bool:
-    values = view.in_columns(view.data.values)
-    rms = part.rms if view.channels == 1 else math.radians(2 * part.rms)
-    floor = np.sqrt(np.mean([np.median(noise.local_noise(column)) ** 2 for column in values.T]))
-    # beside others a spectrum may be given up, its σ growing with its residuals, without much structure
-    given_up = several and rms > FAR * floor
-    return misfits(
-        chi2_reduced=part.chi2_reduced,
-        sigma_known=view.noise.given,
-        drifting=view.noise.drifting,
-        effective_share=0.0 if given_up else 1 / met.length,
-        rms=rms,
-        span=float(np.max(np.ptp(values, axis=0))),
-        calibrated=part.spectrum.calibrated,
-    )
+    result = []
+    for part, view, fit in zip(parts, ranked.problem.views, ranked.fits, strict=True):
+        values = view.in_columns(view.data.values)
+        rms = part.rms if view.channels == 1 else math.radians(2 * part.rms)
+        floor = np.sqrt(np.mean([np.median(noise.local_noise(column)) ** 2 for column in values.T]))
+        # beside others a spectrum may be given up, its σ growing with its residuals, without much structure
+        given_up = len(parts) > 1 and rms > FAR * floor
+        if misfits(
+            chi2_reduced=part.chi2_reduced,
+            sigma_known=view.noise.given,
+            drifting=view.noise.drifting,
+            effective_share=0.0 if given_up else 1 / fit.length,
+            rms=rms,
+            span=float(np.max(np.ptp(values, axis=0))),
+            calibrated=part.spectrum.calibrated,
+        ):
+            result.append(part)
+    return tuple(result)
 
 
 def _curve(view: SpectrumView, fit: ViewFit, errors: Errors) -> Curve:
@@ -79,7 +75,7 @@ def _curve(view: SpectrumView, fit: ViewFit, errors: Errors) -> Curve:
     n_stderr, k_stderr = layer_errors(at, errors.covariance[np.ix_(takes, takes)], rows)
     n, k = np.asarray(at.layer)[:, :rows]
     data, model = view.in_columns(view.data.values), view.in_columns(at.model)
-    sigma = 1 / view.data.weight[: view.points : view.channels]
+    sigma = 1 / np.asarray(view.data.weight)[: view.points : view.channels]
     angles = {}
     if view.channels > 1:
         (data, delta_data), (model, delta_model) = psi_delta(data), psi_delta(model)

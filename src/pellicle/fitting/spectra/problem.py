@@ -31,33 +31,32 @@ def make(*spectra: Measured, tolerance: float = 0.0) -> Problem:
     Raises ValueError where a material has no data at a wavelength.
     """
     free, positions = shared([m.scene for m in spectra], [m.name for m in spectra])
-    views = [_view(spectrum, takes, tolerance) for spectrum, takes in zip(spectra, positions, strict=True)]
+    views = []
+    for spectrum, takes in zip(spectra, positions, strict=True):
+        scene, wavelength, values = spectrum.scene, spectrum.wavelength, spectrum.values
+        points, channels = len(wavelength), values.size // len(wavelength)
+        extra = -points % ROUND
+        wavelength, values, angle = _pad(wavelength, extra), _pad(values, extra), scene.light.angle
+        scene = with_wavelength(scene, wavelength, _pad(angle, extra) if np.ndim(angle) else angle)
+        chosen = plan(scene, tolerance, _KEPT_EFFECTS)
+        span = max(wavelength.max() - wavelength.min(), 1e-9)  # one wavelength at many angles has none
+        sigma = np.reshape(spectrum.sigma, (-1, 1)) if np.ndim(spectrum.sigma) < 2 else spectrum.sigma
+        weight = np.concatenate([1 / np.broadcast_to(sigma, (points, channels)), np.zeros((extra, channels))])
+        data = Data(
+            values=values.reshape(-1),
+            weight=weight.reshape(-1),
+            position=np.repeat(2 * (wavelength - wavelength.min()) / span - 1, channels),
+            independent_fraction=np.float64(spectrum.independent_fraction),
+            level=np.float64(max(float(np.median(np.abs(values[:points]))), 1e-12)),
+            frame=None if spectrum.frame is None else _pad(spectrum.frame, extra),
+        )
+        scene = tabulated(scene, chosen.on("coherence") or scene.instrument.wavelength_shift is not None)
+        steepest = max((largest_index(x.material, wavelength) for x in coherent_layers(scene)), default=1.0)
+        numbers = points * channels, steepest
+        views.append(
+            SpectrumView(spectrum.name, chosen, anonymous(scene), data, takes, spectrum.noise, *numbers)
+        )
     return Problem(tuple(views), free, box(*bounds(free), [p.prior for p in free]))
-
-
-def _view(spectrum: Measured, takes: tuple[int, ...], tolerance: float) -> SpectrumView:
-    scene, wavelength, values = spectrum.scene, spectrum.wavelength, spectrum.values
-    points, channels = len(wavelength), values.size // len(wavelength)
-    extra = -points % ROUND
-    wavelength, values, angle = _pad(wavelength, extra), _pad(values, extra), scene.light.angle
-    scene = with_wavelength(scene, wavelength, _pad(angle, extra) if np.ndim(angle) else angle)
-    chosen = plan(scene, tolerance, _KEPT_EFFECTS)
-    span = max(wavelength.max() - wavelength.min(), 1e-9)  # one wavelength at many angles has none
-    sigma = np.reshape(spectrum.sigma, (-1, 1)) if np.ndim(spectrum.sigma) < 2 else spectrum.sigma
-    weight = np.concatenate([1 / np.broadcast_to(sigma, (points, channels)), np.zeros((extra, channels))])
-    data = Data(
-        values=values.reshape(-1),
-        weight=weight.reshape(-1),
-        position=np.repeat(2 * (wavelength - wavelength.min()) / span - 1, channels),
-        independent_fraction=np.float64(spectrum.independent_fraction),
-        level=np.float64(max(float(np.median(np.abs(values[:points]))), 1e-12)),
-        frame=None if spectrum.frame is None else _pad(spectrum.frame, extra),
-    )
-    scene = tabulated(scene, chosen.on("coherence") or scene.instrument.wavelength_shift is not None)
-    steepest = max((largest_index(x.material, wavelength) for x in coherent_layers(scene)), default=1.0)
-    return SpectrumView(
-        spectrum.name, chosen, anonymous(scene), data, takes, spectrum.noise, points * channels, steepest
-    )
 
 
 def _pad(x: np.ndarray, extra: int) -> np.ndarray:

@@ -39,34 +39,24 @@ def windows(z: np.ndarray) -> list[Window]:
     """
     z, size, result = np.clip(z, -_CLIP, _CLIP), len(z), []
     bar = math.sqrt(2 * math.log(max(size, 2) / _CHANCE))
-    for _ in range(_MOST):
-        best = max((_strongest(z, width) for width in _widths(size)), key=lambda w: w.score, default=None)
-        if best is None or best.score < bar:
+    widths = []
+    while (width := _NARROWEST * 1.5 ** len(widths)) <= size / 2:
+        widths.append(int(width))
+    for _ in range(_MOST if widths else 0):
+        strongest = []
+        for width in widths:
+            sums = np.abs(np.convolve(z, np.ones(width), mode="valid")) / math.sqrt(width)
+            at = int(np.argmax(sums))
+            strongest.append(Window(at, at + width - 1, float(sums[at])))
+        best = max(strongest, key=lambda w: w.score)
+        if best.score < bar:
             break
         result.append(best)
         z[best.first : best.last + 1] = 0.0
-    return _merged(sorted(result))
-
-
-def _widths(size: int) -> list[int]:
-    widths, width = [], float(_NARROWEST)
-    while width <= size / 2:
-        widths.append(int(width))
-        width *= 1.5
-    return widths
-
-
-def _strongest(z: np.ndarray, width: int) -> Window:
-    sums = np.convolve(z, np.ones(width), mode="valid") / math.sqrt(width)
-    at = int(np.argmax(np.abs(sums)))
-    return Window(at, at + width - 1, float(abs(sums[at])))
-
-
-def _merged(windows: list[Window]) -> list[Window]:
-    """Windows, merged where their gap is narrower than the narrower one: a wave has two signs."""
     merged: list[Window] = []
-    for window in windows:
+    for window in sorted(result):
         last = merged[-1] if merged else None
+        # where their gap is narrower than the narrower one: a wave has two signs
         if last and window.first - last.last <= min(last.last - last.first, window.last - window.first) + 1:
             merged[-1] = Window(last.first, max(last.last, window.last), max(last.score, window.score))
         else:
@@ -101,7 +91,10 @@ def missed(view: SpectrumView, fit: ViewFit) -> Missed | None:
     residuals = (view.data.values - np.asarray(fit.at.model))[: view.points].reshape(shape)[:, columns]
     nm = np.asarray(view.scene.light.wavelength)[: view.rows]
     stretches, covered = [], 0
-    for part in _sweeps(nm):
+    # monotone runs of wavelengths, one for each angle of incidence
+    steps = np.sign(np.diff(nm))
+    edges = [0, *(np.flatnonzero(steps != steps[:1]) + 1).tolist(), len(nm)]
+    for part in (slice(a, b) for a, b in pairwise(edges) if b - a >= 2 * _NARROWEST):
         for column, inverse in zip(residuals[part].T, weight[part].T, strict=True):
             known = view.noise.given or view.noise.drifting
             scale = inverse if known else 1 / max(np.median(local_noise(column)), 1e-300)
@@ -117,11 +110,3 @@ def missed(view: SpectrumView, fit: ViewFit) -> Missed | None:
     return Missed(
         spans, stretches[0][2] if view.channels == 1 else None, covered > _EVERYWHERE * residuals.size
     )
-
-
-def _sweeps(nm: np.ndarray) -> list[slice]:
-    """Monotone runs of wavelengths: one for each angle of incidence."""
-    steps = np.sign(np.diff(nm))
-    turns = np.flatnonzero(steps != steps[0]) + 1 if len(nm) > 1 else np.zeros(0, int)
-    edges = [0, *turns.tolist(), len(nm)]
-    return [slice(a, b) for a, b in pairwise(edges) if b - a >= 2 * _NARROWEST]

@@ -29,17 +29,19 @@ _MOST_DESIGNS = 1200
 
 def search(problem: Problem, progress: Progress) -> Minima:
     """Scan the box, polish the best distinct local minima, sort them."""
-    thinned = problem.thinned()
-    depth = problem.thickness_axis
-    grid = _thickness_grid(problem)
+    thinned, depth = problem.thinned(), problem.thickness_axis
     design = _design(problem)
+    grid = _thickness_grid(problem, len(design))
     units = np.repeat(design, max(len(grid), 1), axis=0)
-    _log_scan(problem, len(grid), len(design))
     if depth is not None:
         units[:, depth] = np.tile(grid, len(design))
     table = scanned(thinned, units, progress).reshape(len(design), max(len(grid), 1), -1)
     batches = 1 if len(design) == 1 else 3 if len(problem.parameters) < 4 else 6
-    starts = units[_local_minima(table.sum(-1), most=batches * LANES)]
+    # the lowest local minima along the thickness axis of (design, thickness)
+    total = np.pad(table.sum(-1), ((0, 0), (1, 1)), constant_values=np.inf)
+    middle = total[:, 1:-1]
+    lowest = np.flatnonzero(((middle <= total[:, :-2]) & (middle <= total[:, 2:])).ravel())
+    starts = units[lowest[np.argsort(middle.ravel()[lowest])][: batches * LANES]]
     result = minima(problem, starts, progress)
     best = zip(problem.parameters, problem.values(result.units[0]), strict=True)
     log.info(
@@ -53,36 +55,25 @@ def search(problem: Problem, progress: Progress) -> Minima:
         return result
     p = problem.parameters[depth]
     every = np.concatenate([scanned(thinned, result.units[:1], quiet), table.reshape(len(units), -1)])
-    lowest = every[np.argmin(every.sum(-1))]
-    return replace(result, scan=Scan(p.lower + grid * (p.upper - p.lower), table - lowest))
+    best_of_scan = every[np.argmin(every.sum(-1))]
+    return replace(result, scan=Scan(p.lower + grid * (p.upper - p.lower), table - best_of_scan))
 
 
-def _log_scan(problem: Problem, thicknesses: int, others: int) -> None:
+def _thickness_grid(problem: Problem, choices: int) -> np.ndarray:
+    """Positions in 0..1 no further apart than λ_min/(8 n_max): an eighth of the shortest fringe's period
+    in optical thickness, as n_max is the largest that the bounds allow. Logs the size of the scan, with as
+    many `choices` of the other parameters."""
     if problem.thickness_axis is None:
-        log.info("scan: no thickness is free; %d starting points for the other parameters", others)
-        return
-    p = problem.parameters[problem.thickness_axis]
+        log.info("scan: no thickness is free; %d starting points for the other parameters", choices)
+        return np.zeros(0)
+    p, shortest = problem.parameters[problem.thickness_axis], shortest_wavelength(problem)
+    count = int(np.clip(np.ceil((p.upper - p.lower) / (shortest / 8)) + 1, 9, _MOST_STEPS))
     log.info(
         "scan: %d values of %s, %.3g nm apart (an eighth of the shortest wavelength in a layer, %.3g), "
         "with %d choice%s of the other parameters each: %d candidates",
-        thicknesses,
-        p.name,
-        (p.upper - p.lower) / max(thicknesses - 1, 1),
-        shortest_wavelength(problem),
-        others,
-        "s" * (others != 1),
-        thicknesses * others,
+        *(count, p.name, (p.upper - p.lower) / (count - 1), shortest),
+        *(choices, "s" * (choices != 1), count * choices),
     )
-
-
-def _thickness_grid(problem: Problem) -> np.ndarray:
-    """Positions in 0..1 no further apart than λ_min/(8 n_max): an eighth of the shortest fringe's period
-    in optical thickness, as n_max is the largest that the bounds allow."""
-    if problem.thickness_axis is None:
-        return np.zeros(0)
-    p = problem.parameters[problem.thickness_axis]
-    step = shortest_wavelength(problem) / 8
-    count = int(np.clip(np.ceil((p.upper - p.lower) / step) + 1, 9, _MOST_STEPS))
     return np.linspace(0.0, 1.0, count)
 
 
@@ -118,19 +109,16 @@ def _levels(p: Parameter, problem: Problem) -> np.ndarray:
         return _even(p.levels)
     count = np.ceil((p.upper - p.lower) / 0.2)
     if p.key == "B":
-        count = np.ceil(_dispersion_fringes(p, problem))
+        # by how many fringes the ends of the spectra part over the bounds of Cauchy's B
+        thickest = max([q.upper for q in problem.parameters if q.key == "thickness"], default=1000.0)
+        wavelengths = [view.scene.light.wavelength for view in problem.views]
+        blue, red = min(nm.min() for nm in wavelengths), max(nm.max() for nm in wavelengths)
+        orders = 2 * min(thickest, 2000.0) / blue * (p.upper - p.lower) * (1 / blue**2 - 1 / red**2)
+        count = np.ceil(orders)
     if p.key == "thickness":
         step = shortest_wavelength(problem) / 4
         return _even(int(np.clip(np.ceil((p.upper - p.lower) / step), 3, 24)))
     return _even(int(np.clip(count, 3, 8)))
-
-
-def _dispersion_fringes(p: Parameter, problem: Problem) -> float:
-    """By how many fringes the ends of the spectra part over the bounds of Cauchy's B."""
-    thickest = max([q.upper for q in problem.parameters if q.key == "thickness"], default=1000.0)
-    wavelengths = [view.scene.light.wavelength for view in problem.views]
-    blue, red = min(nm.min() for nm in wavelengths), max(nm.max() for nm in wavelengths)
-    return 2 * min(thickest, 2000.0) / blue * (p.upper - p.lower) * (1 / blue**2 - 1 / red**2)
 
 
 def scanned(problem: Problem, units: np.ndarray, progress: Progress) -> np.ndarray:
@@ -149,11 +137,3 @@ def scanned(problem: Problem, units: np.ndarray, progress: Progress) -> np.ndarr
         progress("scan", min(first + _CHUNK, len(units)), len(units))
     table[:, 0] += np.sum(problem.box.prior_rows(values) ** 2, axis=1)
     return np.where(np.isfinite(table), table, np.inf)
-
-
-def _local_minima(table: np.ndarray, most: int) -> np.ndarray:
-    """Flat indices of the lowest local minima along the thickness axis of (design, thickness)."""
-    wall = np.full((len(table), 1), np.inf)
-    left, right = np.hstack([wall, table[:, :-1]]), np.hstack([table[:, 1:], wall])
-    lowest = np.flatnonzero(((table <= left) & (table <= right)).ravel())
-    return lowest[np.argsort(table.ravel()[lowest])][:most]

@@ -11,7 +11,6 @@ from pellicle.fitting.profile_likelihood import Limits
 from pellicle.fitting.result import Estimate, Profile
 from pellicle.fitting.reweighting import RankedMinima, ViewFit
 from pellicle.fitting.spectra import residual_structure
-from pellicle.fitting.spectra.nuisance import Data
 from pellicle.fitting.spectra.parameters import fixed_numbers, thickness_name
 from pellicle.fitting.spectra.targets import Measured, drifts
 from pellicle.fitting.spectra.view import SpectrumView
@@ -32,17 +31,15 @@ def scan_profile(ranked: RankedMinima) -> Profile | None:
     scan = ranked.minima.scan
     if scan is None:
         return None
-    views = zip(ranked.searched.views, ranked.problem.views, strict=True)
-    ratio = np.array([_reweighted(before.data, after.data) for before, after in views])
+    ratio = []
+    for before, after in zip(ranked.searched.views, ranked.problem.views, strict=True):
+        old, new = before.data, after.data
+        # a robust loss lowers the weights of some points
+        raised = np.max(new.weight / np.where(old.weight > 0, old.weight, np.inf))
+        ratio.append(float(raised**2 * new.independent_fraction / old.independent_fraction))
     above = (scan.deviance * ratio).sum(-1).min(axis=0)
     # on their new weights several views together may have their least misfit elsewhere in the scan
     return Profile(scan.thickness, np.minimum(above - min(above.min(), 0.0), _RULED_OUT))
-
-
-def _reweighted(before: Data, after: Data) -> float:
-    # a robust loss lowers the weights of some points
-    ratio = np.max(after.weight / np.where(before.weight > 0, before.weight, np.inf))
-    return float(ratio**2 * after.independent_fraction / before.independent_fraction)
 
 
 def amended(spectra: Sequence[Measured], ranked: RankedMinima, limits: list[Limits]) -> list[Limits]:
@@ -92,30 +89,26 @@ def warnings(spectra: Sequence[Measured], ranked: RankedMinima, unclear: Sequenc
     """Warnings that a reader needs before using the numbers; `unclear` is what the data do not determine."""
     messages = [w for m in spectra for material in materials_in(m.scene) for w in material.warnings()]
     for spectrum, view, fit in zip(spectra, ranked.problem.views, ranked.fits, strict=True):
-        own = f"{view.name}: " if view.name else ""
-        messages += [own + sentence for sentence in _of_view(spectrum, view, fit)]
+        scene, length, own = spectrum.scene, fit.length, f"{view.name}: " if view.name else ""
+        orders = view.plan.row("orders")
+        if orders.on and orders.error_bound > max(1e-4, view.plan.tolerance):
+            messages.append(
+                f"{own}{orders.count} orders leave an error of up to {orders.error_bound:.1g}: |q| is near 1"
+            )
+        if length >= 10:
+            messages.append(
+                f"{own}residuals are correlated over {length:.0f} points: {view.rows} points"
+                f" count as {view.rows / length:.0f}"
+            )
+        if place := residual_structure.missed(view, fit):
+            messages.append(f"{own}the model misses structure {place.words}")
+        if fit.outliers:
+            messages.append(
+                f"{own}{fit.outliers} of {view.rows} points are outliers that count for less than half"
+            )
+        if scene.light.signal == "T" and scene.substrate.back is None:
+            messages.append(
+                f"{own}transmittance into the substrate, as if the detector were inside it; "
+                '`back="air"` makes it a plate'
+            )
     return tuple(dict.fromkeys([*messages, *unclear]))
-
-
-def _of_view(spectrum: Measured, view: SpectrumView, fit: ViewFit) -> list[str]:
-    messages, scene, length = [], spectrum.scene, fit.length
-    orders = view.plan.row("orders")
-    if orders.on and orders.error_bound > max(1e-4, view.plan.tolerance):
-        messages.append(
-            f"{orders.count} orders leave an error of up to {orders.error_bound:.1g}: |q| is near 1"
-        )
-    if length >= 10:
-        messages.append(
-            f"residuals are correlated over {length:.0f} points: {view.rows} points"
-            f" count as {view.rows / length:.0f}"
-        )
-    if place := residual_structure.missed(view, fit):
-        messages.append(f"the model misses structure {place.words}")
-    if fit.outliers:
-        messages.append(f"{fit.outliers} of {view.rows} points are outliers that count for less than half")
-    if scene.light.signal == "T" and scene.substrate.back is None:
-        messages.append(
-            "transmittance into the substrate, as if the detector were inside it; "
-            '`back="air"` makes it a plate'
-        )
-    return messages

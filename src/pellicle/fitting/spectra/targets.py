@@ -42,11 +42,25 @@ def measured(data: Spectrum, scene: Scene, name: str = "") -> Measured:
     _check(data, scene)
     source = Noise(data.sigma is not None, data.sigma is None and drifts(scene))
     independent_fraction = 1 / noise.DRIFT_CORRELATION if source.drifting else 1.0
-    values, sigma, frame = _values(data), _sigma(data, source), None
+    values, sigma, frame = data.values, _sigma(data, source), None
+    if data.delta is not None:
+        values = sphere(data.values, data.delta)[:, : 2 if data.folded else 3]
     if data.delta is not None and data.sigma is not None and not data.folded:
-        frame = _frame(data)
+        # along Ψ, along Δ and outwards: there the measured point is (0, 0, 1), and errors of Ψ and of Δ are
+        # errors of one component each
+        psi, delta = 2 * np.deg2rad(data.values), np.deg2rad(data.delta)
+        zero, outwards = np.zeros_like(psi), values
+        along = np.stack([-np.sin(psi), np.cos(psi) * np.cos(delta), np.cos(psi) * np.sin(delta)], axis=1)
+        across = np.stack([zero, -np.sin(delta), np.cos(delta)], axis=1)
+        frame = np.stack([along, across, outwards], axis=1)
         values = np.einsum("pij,pj->pi", frame, values)
     return Measured(scene, data.wavelength, values, sigma, independent_fraction, source, name, frame)
+
+
+def sphere(psi: np.ndarray, delta: np.ndarray) -> np.ndarray:
+    """N, C, S (points, 3) of Ψ and Δ in degrees."""
+    psi, delta = 2 * np.deg2rad(psi), np.deg2rad(delta)
+    return np.stack([np.cos(psi), np.sin(psi) * np.cos(delta), np.sin(psi) * np.sin(delta)], axis=-1)
 
 
 def seen_as(scene: Scene, data: Spectrum) -> Scene:
@@ -96,63 +110,28 @@ def _check(data: Spectrum, scene: Scene) -> None:
         )
 
 
-def _values(data: Spectrum) -> np.ndarray:
-    if data.delta is None:
-        return data.values
-    psi, delta = 2 * np.deg2rad(data.values), np.deg2rad(data.delta)
-    sphere = np.stack([np.cos(psi), np.sin(psi) * np.cos(delta), np.sin(psi) * np.sin(delta)], -1)
-    return sphere[:, :2] if data.folded else sphere
-
-
-def _frame(data: Spectrum) -> np.ndarray:
-    """At each measured point of the sphere of N, C, S: along Ψ, along Δ, and outwards, (points, 3, 3).
-
-    There the measured point is (0, 0, 1), and errors of Ψ and of Δ are errors of one component each.
-    """
-    psi, delta = 2 * np.deg2rad(data.values), np.deg2rad(np.asarray(data.delta))
-    sine, cosine, zero = np.sin(psi), np.cos(psi), np.zeros_like(psi)
-    along = [-sine, cosine * np.cos(delta), cosine * np.sin(delta)]
-    across = [zero, -np.sin(delta), np.cos(delta)]
-    outwards = [cosine, sine * np.cos(delta), sine * np.sin(delta)]
-    return np.moveaxis(np.array([along, across, outwards]), 2, 0)
-
-
 def _sigma(data: Spectrum, source: Noise) -> np.ndarray:
-    """σ of each point: given, the model's own error, or a guess that the residuals will replace."""
-    if data.sigma is not None and data.delta is not None:
-        given = data.sigma if data.delta_sigma is None else data.delta_sigma
-        psi, delta, psi_sigma, delta_sigma = np.deg2rad([data.values, data.delta, data.sigma, given])
-        if not data.folded:
-            return _sigma_in_frame(psi, psi_sigma, delta_sigma)
-        return _sigma_folded(psi, delta, psi_sigma, delta_sigma)
-    if data.sigma is not None:
-        return data.sigma
-    if data.delta is not None:
+    """σ of each point: the data's, the model's own error, or a guess that the residuals will replace.
+
+    On the sphere of N, C, S an error of Ψ moves a point by 2σ_Ψ along its meridian, one of Δ by sin(2Ψ) σ_Δ
+    across it, of which Ψ's own error leaves something at the poles. Outwards there is no first order: the
+    mean serves. A folded Δ leaves N and C, which share one σ: the mean square of what both errors move. An
+    error of Δ at 0 or 180° moves neither to first order; the second order of σ_Ψ keeps σ above zero.
+    """
+    if data.sigma is None and data.delta is not None:
         return np.full(len(data), 0.01)
-    if source.drifting:
+    if data.sigma is None and source.drifting:
         return noise.drifting_sigma(data.values)
-    guess = max(0.01 * float(np.ptp(data.values)), float(np.median(noise.local_noise(data.values))), 1e-12)
-    return np.full(len(data), guess)
-
-
-def _sigma_in_frame(psi: np.ndarray, psi_sigma: np.ndarray, delta_sigma: np.ndarray) -> np.ndarray:
-    """Along Ψ, along Δ and outwards, (points, 3), all in radians.
-
-    An error of Ψ moves a point of the sphere by 2σ_Ψ along its meridian, one of Δ by sin(2Ψ) σ_Δ across it,
-    of which Ψ's own error leaves something at the poles. Outwards there is no first order: the mean serves.
-    """
-    along = 2 * psi_sigma
-    across = np.hypot(np.sin(2 * psi), along) * delta_sigma
+    if data.sigma is None:
+        guess = max(0.01 * np.ptp(data.values), np.median(noise.local_noise(data.values)), 1e-12)
+        return np.full(len(data), float(guess))
+    if data.delta is None:
+        return data.sigma
+    delta_sigma = data.sigma if data.delta_sigma is None else data.delta_sigma
+    psi, delta, psi_sigma, delta_sigma = np.deg2rad([data.values, data.delta, data.sigma, delta_sigma])
+    along, sine = 2 * psi_sigma, np.sin(2 * psi)
+    if data.folded:
+        visible = sine**2 + (np.cos(2 * psi) * np.cos(delta)) ** 2
+        return np.sqrt(0.5 * (visible * along**2 + (sine * delta_sigma * np.sin(delta)) ** 2 + along**4))
+    across = np.hypot(sine, along) * delta_sigma
     return np.stack([along, across, np.sqrt(0.5 * (along**2 + across**2))], axis=1)
-
-
-def _sigma_folded(
-    psi: np.ndarray, delta: np.ndarray, psi_sigma: np.ndarray, delta_sigma: np.ndarray
-) -> np.ndarray:
-    """Where only N and C are visible: the mean square of what errors of Ψ and of Δ move, all in radians.
-
-    An error of Δ at 0 or 180° moves neither to first order; the second order of σ_Ψ keeps σ above zero.
-    """
-    along, across = 2 * psi_sigma, np.sin(2 * psi) * delta_sigma
-    visible = np.sin(2 * psi) ** 2 + (np.cos(2 * psi) * np.cos(delta)) ** 2
-    return np.sqrt(0.5 * (visible * along**2 + (across * np.sin(delta)) ** 2 + along**4))

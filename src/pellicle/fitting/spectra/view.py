@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from pellicle.effects.plan import Plan
+from pellicle.fitting.coordinates import Array
 from pellicle.fitting.noise import DRIFT_CORRELATION, correlation_length
 from pellicle.fitting.problem import Explained, Noise
 from pellicle.fitting.program_cache import kept
@@ -65,13 +66,13 @@ class SpectrumForm:
 class Local(NamedTuple):
     """The model of a spectrum around one point, for errors and reports."""
 
-    signal: Any  # simulated, without scale and offset
-    slope: Any  # ∂ signal / ∂ parameter in its own unit, (points, parameters)
-    model: Any
-    gain: Any
-    offset: Any
-    layer: Any  # n and k of the layer at each wavelength
-    layer_slope: Any  # their derivatives, (2, points, parameters)
+    signal: Array  # simulated, without scale and offset
+    slope: Array  # ∂ signal / ∂ parameter in its own unit, (points, parameters)
+    model: Array
+    gain: Array
+    offset: Array
+    layer: Array  # n and k of the layer at each wavelength
+    layer_slope: Array  # their derivatives, (2, points, parameters)
 
 
 def reported_layer(scene: Scene) -> int | None:
@@ -145,7 +146,7 @@ class SpectrumView:
 
     def residuals(self, at: Local) -> np.ndarray:
         """Weighted residuals (rows, channels)."""
-        weighted = (self.data.values - np.asarray(at.model)) * self.data.weight
+        weighted = np.asarray((self.data.values - np.asarray(at.model)) * self.data.weight)
         return weighted[: self.points].reshape(self.rows, self.channels)
 
     def nuisances(self, at: Local) -> list[Coefficient]:
