@@ -13,23 +13,17 @@ from __future__ import annotations
 
 import argparse
 import math
-import time
 from collections import Counter
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import jax
 import numpy as np
-from pellicle.fitting.brdf.estimates import local, rivals
-from pellicle.sampling.brdf import sample_brdf
 from scipy.stats import binomtest
 
+import pellicle as pl
 from pellicle.brdf import direction
 from pellicle.data.brdf_samples import BrdfSamples
-from pellicle.fitting.brdf.fit import judged, problem
-from pellicle.fitting.brdf.search import THOROUGH, search, settle
-from pellicle.fitting.result import Status
-from pellicle.fitting.spectra.search import quiet
 from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface
 
@@ -44,7 +38,7 @@ class Run(NamedTuple):
     """Result of one fit: reduced χ², status, time, and (z, reported error) of each free parameter."""
 
     chi2_reduced: float
-    status: Status
+    status: pl.Status
     seconds: float
     scores: dict[str, tuple[float, float]]
 
@@ -105,20 +99,15 @@ def simulated(surface: Surface, truth: dict[str, Any], noise: float, rng: np.ran
 
 
 def run(surface: Surface, noise: float, seed: int) -> Run:
+    """Fit samples of one random surface."""
     rng = np.random.default_rng(seed)
     truth = random_values(rng, surface)
-    samples = simulated(surface, truth, noise, rng)
-    began = time.perf_counter()
-    whole = problem(samples, surface, "linear", surface.brdf.evaluate)
-    minima = settle(whole, search(whole, THOROUGH, quiet), quiet)
-    at = local(whole, minima.units[0], sigma_known=True)
-    status, estimates = judged(surface, whole, minima, at, rivals(whole, minima, at), sigma_known=True)
-    seconds = time.perf_counter() - began
-    true = {leaf.name: float(np.ravel(truth[leaf.key])[leaf.channel or 0]) for leaf in surface.free_numbers()}
-    scores = {
-        k: ((estimates[k].value - x) / estimates[k].stderr, estimates[k].stderr) for k, x in true.items()
-    }
-    return Run(at.chi2_reduced, status, seconds, scores)
+    fit = pl.fit(simulated(surface, truth, noise, rng), surface)
+    scores = {}
+    for number in surface.free_numbers():
+        estimate, true = fit[number.name], float(np.ravel(truth[number.key])[number.channel or 0])
+        scores[number.name] = (estimate.value - true) / estimate.stderr, estimate.stderr
+    return Run(fit.chi2_reduced, fit.status, fit.seconds, scores)
 
 
 def share(hits: np.ndarray) -> str:
@@ -134,12 +123,12 @@ def print_recovery(name: str, runs: int, noise: float) -> None:
     surface = SURFACES[name]
     results = [run(surface, noise, seed) for seed in range(runs)]
     right = np.array([r.chi2_reduced < RIGHT for r in results])
-    claimed = np.array([r.status is Status.CONVERGED for r in results])
+    claimed = np.array([r.status is pl.Status.CONVERGED for r in results])
     statuses = ", ".join(
         f"{count} {status}" for status, count in Counter(r.status for r in results).most_common()
     )
     median = float(np.median([r.seconds for r in results]))
-    print(f"\n### {name}\n\n{runs} runs, noise {100 * noise:g} %; median {median:.1f} s per search.")
+    print(f"\n### {name}\n\n{runs} runs, noise {100 * noise:g} %; median {median:.1f} s per fit.")
     print(f"Right minimum in {share(right)}; {statuses}; right if claimed: {share(right[claimed])}.\n")
     print(
         "| parameter | within 2 errors, all runs | within 2, claimed | within 3, claimed | sd of z, claimed |"
@@ -159,7 +148,7 @@ def print_coverage(name: str, runs: int, noise: float) -> None:
     for seed in range(runs):
         rng = np.random.default_rng(seed)
         truth = random_values(rng, surface)
-        posterior = sample_brdf(simulated(surface, truth, noise, rng), surface, seed=seed)
+        posterior = pl.sample(simulated(surface, truth, noise, rng), surface, seed=seed)
         refused += not posterior.trusted
         for leaf in surface.free_numbers() if posterior.trusted else ():
             values = posterior.draws[..., posterior.names.index(leaf.name)].ravel()

@@ -25,14 +25,14 @@ import numpy as np
 
 jax.config.update("jax_enable_x64", True)
 
-from pellicle.fitting.spectra.covariance import errors  # noqa: E402
 
 import pellicle as pl  # noqa: E402
-from pellicle.fitting.neighbourhood import valley  # noqa: E402
+from pellicle.fitting.conclusion import linearised  # noqa: E402
+from pellicle.fitting.neighbourhood import neighbourhood  # noqa: E402
 from pellicle.fitting.profile_likelihood import interval  # noqa: E402
+from pellicle.fitting.progress import quiet  # noqa: E402
 from pellicle.fitting.spectra.fit import fitted  # noqa: E402
 from pellicle.fitting.spectra.parameters import parameters  # noqa: E402
-from pellicle.fitting.spectra.search import quiet  # noqa: E402
 from pellicle.scene.free import insert  # noqa: E402
 from pellicle.scene.instrument import Drift  # noqa: E402
 from pellicle.synthetic.spectra import simulate_signal  # noqa: E402
@@ -123,10 +123,10 @@ def _some(which: range) -> list[Count]:
 
 def _profiles(data: pl.Spectrum, scene: pl.Scene) -> dict[str, tuple[float, float]]:
     with jax.enable_x64(True):
-        _, weighed = fitted(data, scene, 0.0, quiet)
-        problem, met = weighed.problem, weighed.met
-        covariance = errors(problem, [m.at for m in met], [m.variance for m in met]).covariance
-        return {p.name: interval(valley(weighed, covariance), i) for i, p in enumerate(problem.parameters)}
+        _, ranked = fitted(data, scene, 0.0, quiet)
+        _, errors = linearised(ranked)
+        around = neighbourhood(ranked, errors.covariance, np.zeros((0, len(ranked.problem.parameters))))
+        return {p.name: interval(around, i) for i, p in enumerate(ranked.problem.parameters)}
 
 
 def _count(

@@ -22,8 +22,8 @@ jax.config.update("jax_enable_x64", True)
 
 import pellicle as pl  # noqa: E402
 from pellicle.dispersion import Constant  # noqa: E402
+from pellicle.fitting.progress import quiet  # noqa: E402
 from pellicle.fitting.spectra.fit import fitted  # noqa: E402
-from pellicle.fitting.spectra.search import quiet  # noqa: E402
 from pellicle.sampling.chain import empty  # noqa: E402
 from pellicle.sampling.density import log_density  # noqa: E402
 from pellicle.sampling.modes import modes  # noqa: E402
@@ -122,24 +122,23 @@ class PellicleSampler:
             Constant(SILICON.real, SILICON.imag),
         )
         data = pl.Spectrum(p.wavelength, p.values, "R", sigma=np.full(p.wavelength.size, p.noise))
-        self.fit, self.weighed = fitted(data, scene, 0.0, quiet)
-        self.box = self.weighed.problem.box
-        names = [q.name for q in self.weighed.problem.parameters]
+        self.fit, self.ranked = fitted(data, scene, 0.0, quiet)
+        names = [q.name for q in self.ranked.problem.parameters]
         self.order = [names.index(name) for name in ("thickness", "n", "k") if name in names]
         self(0, 20)
 
     @property
     def best(self) -> np.ndarray:
-        return self.box.values(self.weighed.minima.units[0])[self.order]
+        return self.ranked.problem.values(self.ranked.minima.units[0])[self.order]
 
     def __call__(self, seed: int, steps: int = 20_000) -> Sampled:
         began = time.process_time()
-        starts = modes(self.weighed)
-        target = Target(log_density(self.weighed.problem), WALKERS // 2)
+        starts = modes(self.ranked)
+        target = Target(log_density(self.ranked.problem), WALKERS // 2)
         chain = empty(WALKERS, len(self.order), seed)
         chain, checks = run(target, starts, chain, steps, lambda chain: None, quiet)
         seconds = time.process_time() - began
-        return Sampled(self.box.values(chain.draws[checks.discard :])[..., self.order], seconds)
+        return Sampled(self.ranked.problem.values(chain.draws[checks.discard :])[..., self.order], seconds)
 
 
 def share_near(sampled: Sampled, thickness: float) -> float:
