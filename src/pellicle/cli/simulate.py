@@ -107,5 +107,5 @@ def _write_samples(
         f"{key} = {' '.join(f'{x:.10g}' for x in numbers.reshape(-1))} {units.get(key, 'nm')}".rstrip()
         for key, numbers in surface.start_numbers().items()
     )
-    write_brdf_samples(out, samples, said=[*comments, f"truth: model {surface.model}, {truth}"])
+    write_brdf_samples(out, samples, comments=[*comments, f"truth: model {surface.model}, {truth}"])
     say(f"{out}: {len(samples)} samples of {', '.join(samples.channels)}", *samples.notes)

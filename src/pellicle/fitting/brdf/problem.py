@@ -100,8 +100,8 @@ def _parameter(number: FreeNumber, tilted: bool, folded: bool) -> Parameter:
 def together(samples: Sequence[BrdfSamples]) -> BrdfSamples:
     """The samples of all sets, without σ."""
     names = ("theta_i", "phi_i", "theta_o", "phi_o", "values")
-    columns = {name: np.concatenate([getattr(each, name) for each in samples]) for name in names}
-    return BrdfSamples(**columns, channels=samples[0].channels)
+    columns = (np.concatenate([getattr(each, name) for each in samples]) for name in names)
+    return BrdfSamples(*columns, channels=samples[0].channels)
 
 
 def in_plane(samples: BrdfSamples, tolerance: float = 0.5) -> bool:
