@@ -44,7 +44,7 @@ class Posterior(PlotMixin):
     `draws` (steps, walkers, parameters) in the parameters' own units, without burn-in, `log_density`
     (steps, walkers) beside them. `parameters` holds each one's marginal, or nothing where the checks do
     not carry an interval: `checks.doubts` says why. `units` is the same as `draws` between 0 and 1.
-    `assumption` is what the posterior takes for assumption though the fit doubts it, empty if nothing.
+    `assumption` is what the posterior assumes though the fit does not show it; empty if nothing.
     """
 
     fit: Fit
