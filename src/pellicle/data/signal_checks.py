@@ -19,6 +19,9 @@ DELTA = (-180.0, 360.0)
 FOLDED_DELTA = (0.0, 180.0)
 """Limits of Δ in degrees for an instrument without a compensator, which measures cos Δ only."""
 
+ROUNDING = 1e-3
+"""Degrees by which Ψ and Δ may exceed their limits, as rounded or differenced values do."""
+
 Where = Callable[[int], str]
 """The place of a row for a message: file, line and column."""
 
@@ -72,4 +75,5 @@ def _check_limits(
 ) -> None:
     low, high = limits
     reason = f"is not from {low:g} to {high:g} degrees, as {name} is; {remedy}"
-    refuse_first(values, (values < low) | (values > high), where, reason)
+    wrong = (values < low - ROUNDING) | (values > high + ROUNDING)
+    refuse_first(values, wrong, where, reason)
