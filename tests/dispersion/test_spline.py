@@ -130,7 +130,7 @@ def test_a_fit_scans_a_spline_as_a_whole(tmp_path):
     np.savetxt(path, np.c_[wavelength, measured.values], delimiter=",", header="wavelength_nm,R", comments="")
     free = tuple(pl.Free(1.2, 4.0, start=1.5) for _ in truth.n)
     layer = pl.Layer(Spline(truth.knots, free), pl.Free(110, 130))
-    assert {p.together for p in parameters(pl.Scene(layer, "Si"))} == {"n", "thickness"}
+    assert {p.group for p in parameters(pl.Scene(layer, "Si"))} == {"n", "thickness"}
     fit = pl.fit(pl.read_spectrum(path, noise=0.001), pl.Scene(layer, "Si"))
     for i, n in enumerate(truth.n):
         found = fit.parameters[f"n{i + 1}"]

@@ -23,5 +23,5 @@ def properties():
 
 def test_stacks_are_finite_and_conserve_energy(properties):
     rows = properties.scenes(np.random.default_rng(3), 10_000, 3)
-    for law, bad in properties.broken(rows, 3).items():
+    for law, bad in properties.violations(rows, 3).items():
         assert not np.any(bad), (law, rows[bad][0].tolist())

@@ -178,7 +178,7 @@ def test_water_as_ambient_where_it_is_clear(function):
 
 @BOTH
 def test_an_unknown_polarisation_is_refused(function):
-    with pytest.raises(ValueError, match="polarisation must be one of unpolarised, s, p, not 'TE'"):
+    with pytest.raises(ValueError, match="polarisation` must be one of unpolarised, s, p, not 'TE'"):
         call(function, "TE")
 
 

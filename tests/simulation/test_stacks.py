@@ -244,10 +244,10 @@ REFUSED = [
         lambda: scene(pl.Layer(1.5, 1), angle=88.0, instrument=pl.Instrument(angle_spread=5)),
         "beyond 90 degrees",
     ),
-    (lambda: scene([pl.Interface(1.0), pl.Interface(2.0)]), "two interfaces lie on each other"),
+    (lambda: scene([pl.Interface(1.0), pl.Interface(2.0)]), "two interfaces are adjacent"),
     (lambda: pl.Interface(1.0, steps=0), "1 to 100 steps"),
     (lambda: pl.Interface(1.0, mix="brugeman"), "no mix 'brugeman'"),
-    (lambda: pl.Layer(1.5, 1.0, roughness=-1), "roughness must not be negative, got -1 nm"),
+    (lambda: pl.Layer(1.5, 1.0, roughness=-1), "roughness` must not be negative, got -1 nm"),
 ]
 
 

@@ -16,7 +16,6 @@ from pellicle.brdf import direction, model
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.fitting import estimates as shared
 from pellicle.fitting.brdf import fit as module
-from pellicle.fitting.brdf import held_out
 from pellicle.fitting.brdf.fit import fit
 from pellicle.fitting.brdf.problem import make
 from pellicle.fitting.conclusion import Conclusion, conclude, linearised
@@ -143,7 +142,7 @@ def turned():
 def test_the_azimuth_of_a_tilt(monkeypatch, turned, tilt, azimuth, stderr):
     free = {"deviation": Free(0, 20), "azimuth": Free(-180, 180)}
     surface = Surface("granier-heidrich", {**FIXED, **WIDE, **free}, (550.0,))
-    monkeypatch.setattr(held_out, "search", search_from([0.6, 0.7]))
+    monkeypatch.setattr(module, "search", search_from([0.6, 0.7]))
     monkeypatch.setattr(shared, "limits", lambda around, scans: [tilt, azimuth])
     result = fit(turned, surface)
     assert result["deviation"].value == pytest.approx(8.0, abs=0.1)
@@ -157,7 +156,7 @@ def test_of_a_misfit_no_limits_are_sought(monkeypatch, simulated):
     """Values of another shape altogether, with a σ that no model can reach: errors are of the covariance."""
     samples, _ = simulated
     off = dataclasses.replace(samples, values=np.random.default_rng(0).random((120, 1)) * 100)
-    monkeypatch.setattr(held_out, "search", search_from([0.3] * 3))
+    monkeypatch.setattr(module, "search", search_from([0.3] * 3))
     monkeypatch.setattr(shared, "limits", lambda around, scans: pytest.fail("a profile was made"))
     result, ranked = module.fitted(off, SURFACE, 0.0, lambda *report: None)
     assert result.status is Status.MISFIT

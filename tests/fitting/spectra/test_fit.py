@@ -182,7 +182,7 @@ def test_one_point_is_no_spectrum(film):
 def test_an_uncalibrated_intensity_needs_a_scale(film, measured):
     data = measured(film(), 480.0)
     counts = pl.Spectrum(data.wavelength, 900 * data.values, "R", calibrated=False, path="lamp.csv")
-    with pytest.raises(UsageError, match=r"lamp\.csv: .*--scale slow"):
+    with pytest.raises(UsageError, match=r'lamp\.csv: .*`scale="slow"`'):
         pl.fit(counts, film())
     fit = pl.fit(counts, film(instrument=pl.Instrument("free", "free")))
     agrees(fit, {"thickness": 480.0})
