@@ -25,20 +25,20 @@ def test_inside_the_range_nothing_happens():
             "Si/Aspnes",
             [900, 300, 850],
             "Si/Aspnes (main/Si/Aspnes) is known from 206.6 to 826.6 nm, not at 850 to 900 nm: "
-            "cut the data with --range 300:826.6 or use a page that covers them all "
+            "cut the data with `range=(300, 826.6)` or use a page that covers them all "
             "(Si/Franta-25C, Si/Green-2008, Si/Schinke)",
         ),
         (
             "Si",
             [200, 500],
             "Si (main/Si/Green-2008) is known from 250 to 1450 nm, not at 200 nm: cut the data with "
-            "--range 250:500 or use a page that covers them all (Si/Franta-25C)",
+            "`range=(250, 500)` or use a page that covers them all (Si/Franta-25C)",
         ),
         (
             "Si",
             [300, 2000],
             "Si (main/Si/Green-2008) is known from 250 to 1450 nm, not at 2000 nm: cut the data with "
-            "--range 300:1450 or use a page that covers them all (Si/Franta-25C)",
+            "`range=(300, 1450)` or use a page that covers them all (Si/Franta-25C)",
         ),
         (
             "Au",

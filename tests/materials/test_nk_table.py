@@ -70,7 +70,7 @@ def test_the_range_check_names_the_file(write):
     with pytest.raises(ValueError, match="film") as caught:
         material(path).check_range([300, 500])
     assert path in str(caught.value)
-    assert "--range 400:500" in str(caught.value)
+    assert "`range=(400, 500)`" in str(caught.value)
 
 
 BAD = [

@@ -16,7 +16,7 @@ from pellicle.optics.pair import Number, Pair, imag, is_real, real
 
 @final
 class Constant(AbstractDispersion):
-    """The same index at every wavelength; `k=None` means that the medium cannot absorb."""
+    """Index that is constant in wavelength; `k=None` means that the medium cannot absorb."""
 
     n: Any
     k: Any = None

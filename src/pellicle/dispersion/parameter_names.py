@@ -1,4 +1,4 @@
-"""What a number inside a dispersion is called: `A`, `B1`, `fraction`, `host.E0`, `term2.gamma`."""
+"""Names of numbers inside a dispersion: `A`, `B1`, `fraction`, `host.E0`, `term2.gamma`."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class ParameterLocation(NamedTuple):
 
 
 def locate_parameter(tree: Any, path: tuple) -> ParameterLocation:
-    """Where the leaf at `path` (as of `jax.tree_util`) stands in a dispersion.
+    """Location of the leaf at `path` (as of `jax.tree_util`) in a dispersion.
 
     The numbers of a tuple are counted from 1 (`B1`); a mixture's components and, where there are
     several, the terms of a sum go in front.

@@ -54,7 +54,7 @@ class Comparison(ReportMixin):
 
     @property
     def verdict(self) -> str:
-        """Which of the two best the data favour, and the parameters or effects that make the difference."""
+        """Verdict on the two best candidates, and the parameters or effects in which they differ."""
         best, second, *_ = sorted(self.candidates, key=lambda c: c.bic)
         apart = second.bic - best.bic
         more, less = _extra(best.fit, second.fit), _extra(second.fit, best.fit)

@@ -56,7 +56,7 @@ def box(lower: np.ndarray, upper: np.ndarray, priors: Sequence[Prior | None], re
 
 
 class Coordinates(NamedTuple):
-    """How points of the unit cube become values: static and hashable, a part of what a program depends on."""
+    """Map from the unit cube to values: static and hashable, a part of a program's key."""
 
     log: tuple[bool, ...] = ()  # coordinates that are logarithms, none where empty
     tilt: tuple[int, int] | None = None  # positions of deviation and azimuth where they are x and y of a disc

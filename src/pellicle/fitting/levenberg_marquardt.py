@@ -150,7 +150,7 @@ class BoundedLevenbergMarquardt(optx.AbstractGaussNewton):
 
 
 def _dense(residual: Callable) -> Callable:
-    """The same residuals with a Jacobian that is one matrix wherever they are linearised.
+    """Residuals whose linearisation is one dense Jacobian matrix.
 
     Optimistix keeps a linearised function in its loop and chooses between the old and the new one; left
     to itself that is every intermediate of the model, and choosing between hundreds of arrays was most

@@ -1,4 +1,4 @@
-"""Local minima of a problem: polished in lanes of one compiled program, told apart, and sorted."""
+"""Local minima of a problem: polished in lanes of one compiled program, made distinct, sorted."""
 
 from __future__ import annotations
 

@@ -172,7 +172,7 @@ class Problem(NamedTuple):
 
     @property
     def static(self) -> tuple[Coordinates, tuple[tuple[Form, tuple[int, ...]], ...]]:
-        """What a compiled program of all views depends on."""
+        """Static part of a compiled program of all views."""
         return self.coordinates, tuple((view.form, view.takes) for view in self.views)
 
     @property
@@ -185,7 +185,7 @@ class Problem(NamedTuple):
         return self._replace(views=tuple(view.thinned() for view in self.views))
 
     def affine(self) -> Problem:
-        """The same problem in coordinates that go evenly between the parameters' own bounds; a tilt stays a
+        """Problem in coordinates that go evenly between the parameters' own bounds; a tilt stays a
         disc, half a one where its sign is not seen."""
         lower, upper = (np.array([getattr(p, side) for p in self.parameters]) for side in ("lower", "upper"))
         tilt, folded = self.coordinates.tilt, self.coordinates.folded

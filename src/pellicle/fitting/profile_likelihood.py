@@ -79,7 +79,7 @@ def interval(around: Neighbourhood, which: int) -> tuple[float, float]:
 
 
 class _Side(NamedTuple):
-    """Where the misfit has not ruled a value out yet, and where it has."""
+    """Interval in which the misfit crosses a level: a value inside and a value outside."""
 
     inside: float
     outside: float
@@ -143,7 +143,7 @@ class _OneParameter:
         return Limits(np.inf, lower, upper)
 
     def sides(self, bounds: Sequence[float], level: float) -> list[_Side | None]:
-        """Where the misfit rises above `level` on the way to each bound, None where it never does.
+        """Interval in which the misfit crosses `level` on the way to each bound, None where it never does.
 
         It is computed at values from the best one outwards, each so many times further away than the last.
         """
@@ -159,7 +159,7 @@ class _OneParameter:
         return result
 
     def crossing(self, side: _Side, level: float) -> float:
-        """Where the misfit reaches `level`: between two of several values its root is straight enough."""
+        """Value at which the misfit reaches `level`, by interpolation of its root between several values."""
         values = np.linspace(side.inside, side.outside, _STEPS + 1)
         root = np.sqrt(self.rise(values)) / level**0.5
         last = max(int(np.argmax(root > 1)), 1)

@@ -1,4 +1,4 @@
-"""What a fit returns: small frozen records with plain numbers."""
+"""Results of a fit: small frozen records with plain numbers."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pellicle.scene.surface import Surface
 
 
 class Status(StrEnum):
-    """How far a fit can be trusted; the first that holds, in this order, is given."""
+    """Status of a fit: the first that holds, in this order."""
 
     FAILED = "failed"
     NOT_CONVERGED = "not-converged"
@@ -227,7 +227,7 @@ class Fit(PlotMixin):
 
     @property
     def joint(self) -> bool:
-        """Whether a list of spectra was fitted, if only of one."""
+        """True where a list of data was fitted, even of one."""
         return bool(self.parts[0].name)
 
     @property
@@ -264,7 +264,7 @@ class Fit(PlotMixin):
 
     @property
     def plan(self) -> Plan:
-        """What was simulated for the only spectrum. Raises ValueError where there are several."""
+        """Plan of the only data. Raises ValueError where there are several."""
         return self._only.plan
 
     @property

@@ -17,7 +17,7 @@ from pellicle.errors import UsageError
 LEAST_SQUARES = "least-squares"
 
 _HUBER = 1.345
-"""Where Huber's loss turns straight: 95 % of the efficiency of least squares where noise is normal."""
+"""Residual at which Huber's loss turns linear: 95 % of the efficiency of least squares for normal noise."""
 _FREEDOM = 4.0
 """Degrees of freedom of Student's t (Lange, Little and Taylor, 1989, J. Am. Stat. Assoc. 84, 881)."""
 _MAD = 1.4826

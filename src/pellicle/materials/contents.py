@@ -1,4 +1,4 @@
-"""What is on the shelves: the vendored pages and the short names, without opening any page.
+"""Contents of the catalogue: vendored pages and short names, without opening a page.
 
 `data/pages.csv` is written by scripts/index_materials.py; `data/catalogue.toml` by hand.
 """

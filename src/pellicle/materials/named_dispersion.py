@@ -27,7 +27,7 @@ _SAMPLES = 200
 
 @final
 class Material(AbstractDispersion):
-    """What a named source says about n + ik.
+    """Dispersion n + ik from a named source.
 
     `name` is what was asked for, `page` the source (shelf/book/page, or a file), `citation` its
     reference in plain text, `wavelength_range` (nm) where both n and k are known, `has_extinction`
@@ -77,7 +77,7 @@ class Material(AbstractDispersion):
         source = "" if self.page == self.name else f" ({self.page})"
         remedies = []
         if at.min() < high and at.max() > low:
-            remedies.append(f"cut the data with --range {max(low, at.min()):g}:{min(high, at.max()):g}")
+            remedies.append(f"cut the data with `range=({max(low, at.min()):g}, {min(high, at.max()):g})`")
         others = covering(self.page, float(at.min()), float(at.max()))
         remedies.append(
             f"use a page that covers them all ({', '.join(others)})" if others else "use another page"
@@ -92,7 +92,7 @@ class Material(AbstractDispersion):
         if k.max() > CLEAR:
             raise DataError(
                 f"the ambient must not absorb: {self.name} has k = {k.max():.2g} at {at[k.argmax()]:g} nm, "
-                f"and up to {CLEAR:g} is left out: cut the data with --range, or give it a real index"
+                f"and up to {CLEAR:g} is left out: cut the data with `range`, or give it a real index"
             )
 
     def _extinction(self, at: np.ndarray) -> np.ndarray:

@@ -32,7 +32,7 @@ class Quantity(NamedTuple):
 
 
 class Contents(NamedTuple):
-    """What a page gives: a dispersion, its range (nm), and whether it says anything about k."""
+    """Contents of a page: a dispersion, its range (nm), and whether it has k."""
 
     dispersion: AbstractDispersion
     wavelength_range: tuple[float, float]
@@ -160,7 +160,7 @@ def plain_text(markup: str | None) -> str:
 
 
 def short_citation(markup: str | None) -> str:
-    """First author and year ("Johnson et al. 1972"), as well as the reference's text tells them."""
+    """First author and year ("Johnson et al. 1972"), parsed from the text of the reference."""
     lines = [text for text in map(plain_text, (markup or "").splitlines()) if text]
     if not lines:
         return ""

@@ -54,7 +54,7 @@ def work(simulate: Callable[[Any], Any], numbers: Any) -> Work:
 def savings(
     full: Plan, cheaper: Mapping[str, list[Plan]], evaluation: Evaluation, seconds: Callable[[Plan], float]
 ) -> dict[str, Saving]:
-    """What the cheaper plan of each effect changes and saves, compared with the `full` one.
+    """Error and time saved by leaving out each effect, compared with the `full` plan.
 
     `cheaper` has at most one plan for each effect; `seconds` estimates the time of a plan.
     """

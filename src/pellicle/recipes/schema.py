@@ -96,7 +96,7 @@ class InstrumentTable(_Table):
 
 
 class _Reading(_Table):
-    """How files are read and looked at: the words of the command line's flags."""
+    """Reading options of data files, named as the flags of the command line."""
 
     signal: Literal["R", "T", "psi-delta"] | None = None
     angle: Annotated[float, Field(ge=0, le=90)] | FreeTable | None = None
@@ -120,7 +120,7 @@ class FileTable(_Reading):
 
     @property
     def rescales(self) -> bool:
-        """Whether it gives this file a scale or an offset of its own."""
+        """True where this file has a scale or an offset of its own."""
         return self.instrument.scale != 1.0 or self.instrument.offset != 0.0
 
     @model_validator(mode="before")

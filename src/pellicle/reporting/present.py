@@ -82,7 +82,7 @@ def plot(result: Fit | Posterior | AnyCost) -> Figure:
 
 
 def save(result: Fit | Posterior | Comparison | AnyCost, folder: str | os.PathLike[str]) -> Path:
-    """Write a result into a folder, as `--out` does: report, JSON record, tables and figures.
+    """Write a result into a folder, as the command line does: report, JSON record, tables and figures.
 
     **Arguments:** `result` of `pl.fit`, `pl.sample`, `pl.compare` or `pl.cost`; `folder`, which is made if it
     is absent. Files of an earlier result in it are replaced.

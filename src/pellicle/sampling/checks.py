@@ -1,4 +1,4 @@
-"""Whether a chain is long enough, mixed enough and wide enough to be believed."""
+"""Convergence checks of a chain: length, mixing, minima visited, acceptance."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _BURNED = 5
 
 @dataclass(frozen=True)
 class Checks:
-    """What a chain says of itself.
+    """Convergence checks of one chain.
 
     `discard` first steps are burn-in. `autocorrelation_time` is the longest of all parameters' and of the
     shares of the minima; `rhat` the largest split R̂, each walker a chain. `minima_found` counts the minima

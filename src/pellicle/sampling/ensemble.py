@@ -30,7 +30,7 @@ _LIVE = 40
 
 
 class Subject(NamedTuple):
-    """What is sampled: a finished fit, and the posterior of its parameters in the unit cube of their bounds.
+    """A finished fit and the posterior of its parameters, in the unit cube of their bounds.
 
     `values` takes points of the cube to the parameters' own units; `fingerprint` identifies the problem;
     `points` how many data one evaluation compares; `predict` makes predictions of draws, from a seed.

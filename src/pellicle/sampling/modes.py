@@ -34,7 +34,7 @@ class Modes:
 
     @property
     def matter(self) -> np.ndarray:
-        """Which of them hold enough of the posterior to be missed, (modes,)."""
+        """Mask of the modes that hold a relevant share of the posterior, (modes,)."""
         return self.share >= MATTERS
 
     def draw(self, count: int, random: np.random.RandomState) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""What the posterior says that each point of the data should have been."""
+"""Posterior predictions of the data."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _SIGNALS = {"R": "reflectance", "T": "transmittance"}
 
 
 class Axis(NamedTuple):
-    """What data are drawn against: its name in files, its label in figures, and its values (points,)."""
+    """Abscissa of data: its name in files, its label in figures, and its values (points,)."""
 
     name: str
     label: str

@@ -1,4 +1,4 @@
-"""What sampling returns: small frozen records with plain numbers."""
+"""Results of sampling: small frozen records with plain numbers."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Posterior(PlotMixin):
     assumption: str = ""
 
     def predictions(self, seed: int = 0) -> tuple[Prediction, ...]:
-        """What draws from the posterior say of each measured quantity."""
+        """Posterior predictions of each measured quantity."""
         return self.predict(self.units, seed)
 
     @property

@@ -14,7 +14,7 @@ GAIN = 0.10
 FLATTEST = 2.0
 """A lobe of a smaller exponent is a second diffuse part."""
 ROUGHEST = 0.7
-"""The same for microfacets: α = √(2/(e + 2)) has as wide a lobe as an exponent e."""
+"""GGX roughness above which a lobe is none: α = √(2/(e + 2)) is as wide as an exponent e."""
 
 
 class Evidence(NamedTuple):

@@ -119,13 +119,13 @@ def linear_count(problem: Problem) -> int:
 
 
 def restricted(problem: Problem, rows: Sequence[np.ndarray]) -> Problem:
-    """The same problem, and program, with weight on these rows of each view alone."""
+    """Problem of the same program with weight on these rows of each view alone."""
     views = (view.restricted(own) for view, own in zip(problem.views, rows, strict=True))
     return problem._replace(views=tuple(views))
 
 
 def incoherent(problem: Problem) -> Problem:
-    """The same surface without interference, which a layer must beat.
+    """Problem of the surface without interference, which a layer must beat.
 
     On PTFE, which has no film, interference halves the error of a fit: a small misfit proves nothing.
     """
@@ -133,7 +133,7 @@ def incoherent(problem: Problem) -> Problem:
 
 
 def without_layer(problem: Problem) -> Problem:
-    """The same samples, to be fitted with two plain lobes, which a layer must beat too."""
+    """Problem of two plain lobes without a layer, which a layer must beat too."""
     count = problem.views[0].samples.values.shape[1]
     shapes = {"roughness_1": _ROUGHNESS, "roughness_2": _ROUGHNESS, "normal": _NORMAL}
     weights = [(key, channel) for key in ("lobe_1", "lobe_2", "diffuse") for channel in range(count)]

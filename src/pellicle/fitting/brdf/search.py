@@ -39,7 +39,7 @@ _DISPERSION = 0.1
 
 
 class Effort(NamedTuple):
-    """How many candidates are tried, how many of them polished for a few steps, and how many to the end."""
+    """Numbers of candidates, of those polished for a few steps, and of those polished to the end."""
 
     candidates: int
     short: int

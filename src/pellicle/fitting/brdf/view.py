@@ -167,7 +167,7 @@ class SamplesView:
         return replace(self, samples=self.samples._replace(independent_fraction=np.float64(fraction)))
 
     def restricted(self, rows: np.ndarray) -> SamplesView:
-        """The same view, and program, with weight on the samples of these rows alone."""
+        """View of the same program with weight on the samples of these rows alone."""
         kept_rows = np.zeros((len(self.samples.weight), 1))
         kept_rows[rows] = 1.0
         return replace(self, samples=self.samples._replace(weight=self.samples.weight * kept_rows))

@@ -1,4 +1,4 @@
-"""What the back face of a plate is worth: the same fit without it."""
+"""Comparison of a fit with and without the back face of a plate."""
 
 from __future__ import annotations
 

@@ -65,7 +65,7 @@ def fitted(
     progress: Progress,
     loss: str = LEAST_SQUARES,
 ) -> tuple[Fit, RankedMinima]:
-    """What `fit` returns, and the minima and weights that it rests on, for whoever goes on from there."""
+    """The result of `fit`, and the ranked minima that it rests on."""
     check_loss(loss)
     with jax.enable_x64(True):
         targets = measurements(data, scene)
@@ -94,16 +94,16 @@ def measurements(data: Spectrum | Sequence[Spectrum], scene: Scene | Sequence[Sc
 
 
 def check_free(scene: Scene) -> None:
-    """UsageError where a scene has nothing to fit."""
+    """Raise UsageError where a scene has nothing to fit."""
     if not free_leaves(scene):
         raise UsageError(
-            "nothing is free to fit: give bounds to the thickness, as in --thickness 10:3000, or in a recipe "
-            "thickness = { lower = 10, upper = 3000 }"
+            "nothing is free to fit: give bounds to the thickness, as in `thickness=Free(10, 3000)`, or in a "
+            "recipe thickness = { lower = 10, upper = 3000 }"
         )
 
 
 def labels(spectra: Sequence[Spectrum]) -> list[str]:
-    """What tells spectra apart, without dots: files' stems, else with their signals, else numbered.
+    """Unique names of spectra, without dots: files' stems, else with their signals, else numbered.
 
     Where a name would read as a parameter's it is numbered.
     """

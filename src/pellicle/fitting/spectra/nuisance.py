@@ -29,7 +29,7 @@ _LOOSE = 10.0
 _STIFF = 1e8
 """Weight that holds an offset at zero where it would turn negative."""
 _SLACK = 1e-6
-"""How far below zero, in units of the signal's level, an offset held at zero may come out."""
+"""Tolerance below zero, in units of the signal's level, of an offset fixed at zero."""
 
 
 class Data(NamedTuple):

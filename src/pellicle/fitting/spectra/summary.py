@@ -1,4 +1,4 @@
-"""What a fit of spectra adds to the shared conclusion: scan profile, drift limits, opacity, warnings."""
+"""Summary of a fit of spectra: scan profile, drift limits, opaque layers, warnings."""
 
 from __future__ import annotations
 
