@@ -41,8 +41,8 @@ class Spectrum:
 
     **Raises:** DataError for values that no sample has, UsageError for unknown words, ValueError for shapes.
 
-    >>> Spectrum(np.array([500.0, 600.0]), np.array([0.21, 0.19]), "R").values
-    array([0.21, 0.19])
+    >>> Spectrum(np.array([500.0, 600.0]), np.array([0.21, 0.19]), "R").values.tolist()
+    [0.21, 0.19]
     """
 
     wavelength: np.ndarray
