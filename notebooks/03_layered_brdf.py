@@ -249,10 +249,12 @@ doubted = pl.fit(measure(bare, LAMPS, seed=4), unknown)
 print(doubted.status, "-", doubted.verdict)
 
 figure, axes = plt.subplots(figsize=(7, 2.6))
-rivals = ["the layer", *(b.name for b in fit.baselines)]
+rivals = ["the layer", *(b.name for b in fit.layer_test.baselines)]
 at = np.arange(len(rivals))
 for one, label, mark in ((fit, "surface with a layer", "o"), (doubted, "surface without", "s")):
-    axes.plot([one.held_out, *(b.held_out for b in one.baselines)], at, mark, label=label)
+    axes.plot(
+        [one.layer_test.held_out, *(b.held_out for b in one.layer_test.baselines)], at, mark, label=label
+    )
 axes.set_yticks(at, rivals)
 axes.set(xscale="log", xlim=(0.7, None), ylim=(2.5, -0.5), xlabel="error on held-out samples (σ)")
 axes.grid(axis="y", alpha=0.4)
