@@ -1,5 +1,7 @@
 """Simulated and fitted again: the truth comes back within its errors, for every kind of scene."""
 
+import time
+
 import jax
 import numpy as np
 import pytest
@@ -208,7 +210,9 @@ def test_the_record(film, measured):
     """What a fit returns beside the parameters."""
     scene = film(material=Constant(N))
     data = measured(scene, 1.5, 480.0, sigma=True)
+    began = time.perf_counter()
     fit = pl.fit(data, scene)
+    elapsed = time.perf_counter() - began
     assert fit.free[0].name == "thickness"
     assert len(free_leaves(scene)) == len(fit.free)
     assert fit.curve.wavelength.shape == fit.curve.model.shape == (128,)
@@ -222,7 +226,7 @@ def test_the_record(film, measured):
     best = fit.profile.delta_chi2.argmin()
     assert abs(fit.profile.thickness[best] - 480) < 40
     assert fit.spectrum is data
-    assert 0 < fit.seconds < 300
+    assert 0 < fit.seconds <= elapsed
 
 
 def test_rivals_cost_what_a_fit_there_costs(film, measured):
