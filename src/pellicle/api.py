@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.spectrum import Spectrum
 from pellicle.effects.plan import Plan
-from pellicle.errors import UsageError
 from pellicle.fitting.brdf.fit import fit as fit_brdf
 from pellicle.fitting.comparison import Comparison
 from pellicle.fitting.comparison import compare as compare_fits
@@ -246,8 +245,6 @@ def fit(
         samples = measured(BrdfSamples, data)
         return fit_brdf(samples, scene, residual=residual, tolerance=tolerance, loss=loss, progress=progress)
     _refuse("a Scene", residual=residual)
-    if isinstance(scene, str):
-        raise UsageError(f"`scene` must be a Scene, a Surface or a list of scenes, not {scene!r}")
     return fit_spectra(measured(Spectrum, data), scene, tolerance=tolerance, loss=loss, progress=progress)
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-import math
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,7 +13,7 @@ import numpy as np
 from pellicle.data.brdf_samples import BrdfSamples, spread
 from pellicle.errors import UsageError
 from pellicle.fitting import identifiability
-from pellicle.fitting.brdf import warnings
+from pellicle.fitting.brdf import summary, warnings
 from pellicle.fitting.brdf.layer_test import evidence
 from pellicle.fitting.brdf.problem import incoherent, make, restricted, together, without_layer
 from pellicle.fitting.brdf.residuals import RESIDUALS
@@ -24,13 +22,12 @@ from pellicle.fitting.conclusion import common_rms, conclude, linearised, ranked
 from pellicle.fitting.evaluation import total_deviance
 from pellicle.fitting.minima import Minima, minima
 from pellicle.fitting.problem import Problem
-from pellicle.fitting.profile_likelihood import Limits
 from pellicle.fitting.progress import Progress, quiet
-from pellicle.fitting.result import Baseline, BrdfCurve, Estimate, Fit, LayerTest, Part, Status
+from pellicle.fitting.result import Baseline, Fit, LayerTest, Status
 from pellicle.fitting.reweighting import RankedMinima
 from pellicle.fitting.robust_losses import LEAST_SQUARES, check_loss
 from pellicle.fitting.robust_losses import spread as bulk_spread
-from pellicle.fitting.status import misfits, verdict
+from pellicle.fitting.status import verdict
 from pellicle.planning.surface import plan
 from pellicle.scene.surface import Surface, surface_view
 
@@ -173,31 +170,19 @@ def _fit(
         ranked,
         jacobian,
         covariance,
-        misfit=any(_misses(view, fit) for view, fit in pairs),
-        fixed=_fixed(surface),
+        misfit=any(summary.misses(view, fit) for view, fit in pairs),
+        fixed=summary.fixed(surface),
         scans={},
         near=True,
-        amend=lambda limits: _amended(ranked.problem, limits),
+        amend=lambda limits: summary.amended(ranked.problem, limits),
     )
     baselines = tuple(Baseline(name, errors[name]) for name in (_FLAT, _PLAIN))
     status, parameters = conclusion.status, conclusion.parameters
     layer = evidence(parameters, conclusion.rivals, errors["layer"], baselines)
     if not layer.layered and not layer.several:
-        parameters = _unlayered(parameters)
+        parameters = summary.without_layer_error(parameters)
         status = status if status in (Status.NOT_CONVERGED, Status.MISFIT) else Status.NOT_IDENTIFIABLE
-    parts = tuple(
-        Part(
-            name=view.name,
-            data=each,
-            curve=BrdfCurve(np.asarray(fit.at.model)[: view.rows], view.compared(fit.at)),
-            plan=view.plan,
-            rms=view.rms(fit.at),
-            chi2_reduced=fit.chi2 / fit.freedom,
-            effective_points=view.independent / fit.length,
-            sigma_from="given" if view.noise.given else "residuals",
-        )
-        for each, (view, fit) in zip(samples, pairs, strict=True)
-    )
+    parts = summary.parts(samples, ranked)
     rms = common_rms([view.independent for view, _ in pairs], [part.rms for part in parts])
     of_lead = identifiability.naming(next(iter(parameters)), conclusion.correlated)
     sentence = verdict(status, parameters, conclusion.rivals, rms, trading=of_lead)
@@ -231,53 +216,3 @@ def _fit(
         layer_test=LayerTest(layer.layered, errors["layer"], baselines, residual),
     )
     return result, ranked
-
-
-def _misses(view, fit) -> bool:
-    return misfits(
-        chi2_reduced=fit.chi2 / fit.freedom,
-        sigma_known=view.noise.given,
-        drifting=False,
-        effective_share=1 / fit.length,
-        rms=view.rms(fit.at),
-        span=view.span(),
-        calibrated=False,
-    )
-
-
-def _amended(problem: Problem, limits: list[Limits]) -> list[Limits]:
-    """Limits without an azimuth where there is no tilt: an azimuth has no bounds to lie beside."""
-    if problem.coordinates.tilt is None:
-        return limits
-    deviation, azimuth = problem.coordinates.tilt
-    tilt, turn = limits[deviation], limits[azimuth]
-    upright = tilt.upper is not None or not math.isfinite(tilt.stderr)
-    one_sided = (turn.lower is None) != (turn.upper is None)
-    unknown = upright or (one_sided and not problem.coordinates.folded)
-    return [Limits(math.inf) if unknown and at == azimuth else each for at, each in enumerate(limits)]
-
-
-def _fixed(surface: Surface) -> list[Estimate]:
-    """Every fixed number, one for each channel where they differ by channel."""
-    numbers, result = surface.fixed_numbers(), []
-    for about in surface.brdf.parameters:
-        if about.key not in numbers:
-            continue
-        value = numbers[about.key]
-        names = [about.key]
-        if value.ndim:
-            letters = ("r", "g", "b") if value.size == 3 else range(1, value.size + 1)
-            names = [f"{about.key}_{letter}" for letter in letters]
-        result += [
-            Estimate(name, x, 0.0, about.unit, x, x, False)
-            for name, x in zip(names, np.ravel(value).tolist(), strict=True)
-        ]
-    return result
-
-
-def _unlayered(parameters: dict[str, Estimate]) -> dict[str, Estimate]:
-    """Without evidence of a layer its thickness has no finite error, and no lower limit."""
-    depth = parameters.get("thickness")
-    if depth is None or not depth.free:
-        return parameters
-    return {**parameters, "thickness": dataclasses.replace(depth, stderr=math.inf, lower_limit=None)}

@@ -79,6 +79,8 @@ def measurements(data: Spectrum | Sequence[Spectrum], scene: Scene | Sequence[Sc
     if not spectra:
         raise UsageError("there is no spectrum to fit: give one, or a list of some")
     scenes = [scene] * len(spectra) if isinstance(scene, Scene) else list(scene)
+    if not all(isinstance(each, Scene) for each in scenes):
+        raise UsageError(f"`scene` must be a Scene, a Surface or a list of scenes, not {scene!r}")
     if len(scenes) != len(spectra):
         raise UsageError(f"{len(spectra)} spectra need as many scenes, or one for all, not {len(scenes)}")
     if isinstance(scene, Scene) and len(spectra) > 1:

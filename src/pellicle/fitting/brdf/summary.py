@@ -1,0 +1,86 @@
+"""Summary of a fit of BRDF samples: parts, misfit, limits, fixed numbers."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+
+from pellicle.data.brdf_samples import BrdfSamples
+from pellicle.fitting.brdf.view import SamplesView
+from pellicle.fitting.problem import Problem
+from pellicle.fitting.profile_likelihood import Limits
+from pellicle.fitting.result import BrdfCurve, Estimate, Part
+from pellicle.fitting.reweighting import RankedMinima, ViewFit
+from pellicle.fitting.status import misfits
+from pellicle.scene.surface import Surface
+
+
+def parts(samples: list[BrdfSamples], ranked: RankedMinima) -> tuple[Part, ...]:
+    """One part for each set of samples, in their order."""
+    views = zip(samples, ranked.problem.views, ranked.fits, strict=True)
+    return tuple(
+        Part(
+            name=view.name,
+            data=each,
+            curve=BrdfCurve(np.asarray(fit.at.model)[: view.rows], view.compared(fit.at)),
+            plan=view.plan,
+            rms=view.rms(fit.at),
+            chi2_reduced=fit.chi2 / fit.freedom,
+            effective_points=view.independent / fit.length,
+            sigma_from="given" if view.noise.given else "residuals",
+        )
+        for each, view, fit in views
+    )
+
+
+def misses(view: SamplesView, fit: ViewFit) -> bool:
+    """True where the surface does not explain the samples of a view."""
+    return misfits(
+        chi2_reduced=fit.chi2 / fit.freedom,
+        sigma_known=view.noise.given,
+        drifting=False,
+        effective_share=1 / fit.length,
+        rms=view.rms(fit.at),
+        span=view.span(),
+        calibrated=False,
+    )
+
+
+def amended(problem: Problem, limits: list[Limits]) -> list[Limits]:
+    """Limits without an azimuth where there is no tilt: an azimuth has no bounds to lie beside."""
+    if problem.coordinates.tilt is None:
+        return limits
+    deviation, azimuth = problem.coordinates.tilt
+    tilt, turn = limits[deviation], limits[azimuth]
+    upright = tilt.upper is not None or not math.isfinite(tilt.stderr)
+    one_sided = (turn.lower is None) != (turn.upper is None)
+    unknown = upright or (one_sided and not problem.coordinates.folded)
+    return [Limits(math.inf) if unknown and at == azimuth else each for at, each in enumerate(limits)]
+
+
+def fixed(surface: Surface) -> list[Estimate]:
+    """Every fixed number, one for each channel where they differ by channel."""
+    numbers, result = surface.fixed_numbers(), []
+    for about in surface.brdf.parameters:
+        if about.key not in numbers:
+            continue
+        value = numbers[about.key]
+        names = [about.key]
+        if value.ndim:
+            letters = ("r", "g", "b") if value.size == 3 else range(1, value.size + 1)
+            names = [f"{about.key}_{letter}" for letter in letters]
+        result += [
+            Estimate(name, x, 0.0, about.unit, x, x, False)
+            for name, x in zip(names, np.ravel(value).tolist(), strict=True)
+        ]
+    return result
+
+
+def without_layer_error(parameters: dict[str, Estimate]) -> dict[str, Estimate]:
+    """Without evidence of a layer its thickness has no finite error, and no lower limit."""
+    depth = parameters.get("thickness")
+    if depth is None or not depth.free:
+        return parameters
+    return {**parameters, "thickness": dataclasses.replace(depth, stderr=math.inf, lower_limit=None)}
