@@ -35,6 +35,7 @@ WAYS = {
     "one film": ("films", 1, coherent.responses),
     "one film by matrices": ("films", 1, stack),
     "three layers": ("stacks", 3, coherent.responses),
+    "three layers by a loop": ("stacks", 3, stack),
 }
 """What is computed: table, number of layers, function."""
 
@@ -80,6 +81,7 @@ RUNS = [
     ("one film by matrices", np.float32),
     ("three layers", np.float64),
     ("three layers", np.float32),
+    ("three layers by a loop", np.float32),
 ]
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from pellicle.optics import coherent, film, interface, response, stack
+from pellicle.optics import coherent, few_layers, film, interface, response, stack
 from pellicle.optics.pair import Pair, to_complex
 
 AMBIENT, SUBSTRATE, ANGLE = 1.3, Pair(np.array([1.7, 4.0]), np.array([0.0, 0.1])), 0.7
@@ -24,12 +26,43 @@ def test_one_smooth_layer_takes_the_closed_form(propagating):
     np.testing.assert_array_equal(amplitudes(result), amplitudes(expected))
 
 
-@pytest.mark.parametrize("count", [0, 2, 3])
+@pytest.mark.parametrize("count", [0, 2, 3, 4])
 def test_other_numbers_of_layers_take_matrices(count):
-    layers, phases = [2.1, Pair(1.5, 0.2), 1.4][:count], [0.3, 1.0, 2.0][:count]
+    layers, phases = [2.1, Pair(1.5, 0.2), 1.4, 1.8][:count], [0.3, 1.0, 2.0, 0.5][:count]
     result = coherent.responses(AMBIENT, layers, SUBSTRATE, phases, ANGLE)
-    expected = stack.stack(AMBIENT, layers, SUBSTRATE, phases, ANGLE)
+    by = stack.stack if count > 3 else few_layers.few_layers
+    expected = by(AMBIENT, layers, SUBSTRATE, phases, ANGLE)
     np.testing.assert_array_equal(amplitudes(result), amplitudes(expected))
+
+
+@pytest.mark.parametrize("propagating", [False, True])
+@pytest.mark.parametrize("angle", [None, ANGLE])
+@pytest.mark.parametrize("count", [0, 1, 2, 3])
+def test_few_layers_agree_with_the_loop(count, angle, propagating):
+    layers, phases = [2.1, Pair(1.5, 0.2), 1.4][:count], [0.3, 1.0, 2.0][:count]
+    few = few_layers.few_layers(AMBIENT, layers, SUBSTRATE, phases, angle, propagating=propagating)
+    for one, many in zip(few, stack.stack(AMBIENT, layers, SUBSTRATE, phases, angle), strict=True):
+        for power in POWERS:
+            np.testing.assert_allclose(power(one), power(many), rtol=1e-13)
+        for name in ("reflected", "below"):
+            r, expected = (to_complex(getattr(x, name)) / to_complex(x.denominator) for x in (one, many))
+            np.testing.assert_allclose(r, expected, rtol=1e-13)
+
+
+def test_few_layers_stay_finite_in_single_precision():
+    """A metal, a total reflection at its critical angle and a gap, each a millimetre thick."""
+    angle = np.float32(np.arcsin(1 / 1.5))
+    media = [Pair(np.float32(0.05), np.float32(8.0)), np.float32(1.0), np.float32(0.8)]
+    phase = np.float32(2 * np.pi * 1e6 / 400)
+
+    def powers(k):
+        responses = coherent.responses(np.float32(1.5), media, np.float32(1.5), [k, k, k], angle)
+        return jnp.stack([power(x) for x in responses for power in POWERS])
+
+    value, slope = jax.jit(lambda k: (powers(k), jax.jacfwd(powers)(k)))(phase)
+    assert value.dtype == np.float32
+    assert np.all(np.isfinite(value))
+    assert np.all(np.isfinite(slope))
 
 
 def test_no_layer_is_the_bare_interface():

@@ -1,10 +1,11 @@
-"""Response of any number of coherent layers: the closed form of a film, or the matrices of a stack."""
+"""Response of any number of coherent layers: the closed form of a film, or characteristic matrices."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Any
 
+from pellicle.optics.few_layers import FEW, few_layers
 from pellicle.optics.film import film
 from pellicle.optics.pair import Number
 from pellicle.optics.response import Response
@@ -24,8 +25,9 @@ def responses(
 ) -> tuple[Response, ...]:
     """Return the response of coherent layers between two half spaces, for each polarisation.
 
-    One smooth layer takes the closed form of `pellicle.optics.film`; several layers, none, or rough
-    interfaces take the characteristic matrices of `pellicle.optics.stack`.
+    One smooth layer takes the closed form of `pellicle.optics.film`; none, two or three of them take their
+    product of matrices in `pellicle.optics.few_layers`; more, or rough interfaces, take the loop of
+    `pellicle.optics.stack`.
 
     **Arguments:** all arrays broadcast.
 
@@ -52,4 +54,6 @@ def responses(
     """
     if len(layers) == 1 and roughness is None:
         return film(ambient, layers[0], substrate, phases[0], angle, polarisations, propagating)
+    if len(layers) <= FEW and roughness is None:
+        return few_layers(ambient, layers, substrate, phases, angle, polarisations, propagating)
     return stack(ambient, layers, substrate, phases, angle, polarisations, roughness)

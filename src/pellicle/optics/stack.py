@@ -4,7 +4,7 @@ The fields (E, H) at a layer's lower face give those at its upper face by the el
 `characteristic.matrix_elements`, times their scale. After each layer the fields are divided by their
 norm, so that 50 layers with an opaque one among them stay finite without clamping. Complex arithmetic:
 separate real arrays bring nothing here. One `lax.scan` runs over the layers; unrolled, 50 of them do not
-compile in minutes.
+compile in minutes. Two or three smooth layers take `pellicle.optics.few_layers`.
 
 Source: Born and Wolf, Principles of Optics, section 1.6 (characteristic matrices).
 """
@@ -29,9 +29,6 @@ from pellicle.optics.interface import (
 )
 from pellicle.optics.pair import Number, abs2, to_complex
 from pellicle.optics.response import Amplitudes, Response
-
-UNROLLED = 3
-"""Smooth layers up to which the loop over them is unrolled: several times as fast as a scan over few."""
 
 
 def stack(
@@ -58,10 +55,7 @@ def stack(
     def rows(numbers: Sequence[Any]) -> Any:
         return jnp.stack([full(n) for n in numbers]) if numbers else jnp.zeros((0, *shape), dtype)
 
-    if len(layers) <= UNROLLED and roughness is None:
-        index, depth = [full(n) for n in layers], [jnp.real(full(k)) for k in phases]
-    else:
-        index, depth = rows(layers), jnp.real(rows(phases))
+    index, depth = rows(layers), jnp.real(rows(phases))
     bottom, top, q_top = full(substrate), full(ambient), full(q0)
     q_bottom = normal(bottom, a)
     empty = equal_media(ambient, substrate, *layers)
@@ -136,10 +130,5 @@ def _fields(index: Any, depth: Any, admittance: Any, faces: Any, a: Any, polaris
 
     start = (jnp.ones_like(admittance), admittance), jnp.ones_like(jnp.real(admittance))
     inner = None if faces is None else jnp.moveaxis(faces[:, :-1], 0, 1)
-    if isinstance(index, list):
-        for layer in zip(index, depth, strict=True):
-            start, _ = through_layer(start, (*layer, None))
-        (E, H), scale_square = start
-    else:
-        ((E, H), scale_square), _ = jax.lax.scan(through_layer, start, (index, depth, inner))
+    ((E, H), scale_square), _ = jax.lax.scan(through_layer, start, (index, depth, inner))
     return ((E, H) if faces is None else (E * faces[0, -1], H * faces[1, -1])), scale_square

@@ -154,7 +154,10 @@ def _responses(wavelength, thickness, layer, substrate, ambient, angle, polarisa
     _warn_of_lost_precision(wavelength, thickness, layer, substrate, ambient, angle)
     wavelength = _floating(wavelength)
     normal = isinstance(angle, int | float) and angle == 0
-    propagating = normal or interface.propagates(layer, ambient, angle)
+    several = isinstance(layer, list | tuple)
+    propagating = normal or all(
+        interface.propagates(n, ambient, angle) for n in (layer if several else [layer])
+    )
     into_below = normal or interface.propagates(substrate, ambient, angle)
     named = isinstance(ambient, str | AbstractDispersion)
     ambient = _index(ambient_medium(ambient) if named else ambient, wavelength)
@@ -166,7 +169,7 @@ def _responses(wavelength, thickness, layer, substrate, ambient, angle, polarisa
     theta = None if normal else jnp.deg2rad(_floating(angle))
     letters = "sp" if polarisation == "unpolarised" else polarisation
     layers, thicknesses = [layer], [thickness]
-    if isinstance(layer, list | tuple):
+    if several:
         layers, thicknesses = layer, thickness
         count = len(thickness) if isinstance(thickness, list | tuple) else np.shape(thickness)[:1]
         if count not in (len(layers), (len(layers),)):
