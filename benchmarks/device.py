@@ -1,0 +1,64 @@
+"""The device of a benchmark: the flag --device, time on it, and the bandwidth of its memory.
+
+Programs run asynchronously on a GPU, and most of them for less time than a call takes: `seconds` starts several
+calls, waits for the last one and measures the wall time.
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import sys
+import time
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+COPIED_BYTES = {"cpu": 2**28, "gpu": 2**31}
+"""Size of the array that is copied: far above the caches."""
+LEAST_SECONDS = 0.05
+
+
+def add_flag(parser: argparse.ArgumentParser) -> None:
+    """Add --device to the flags of a benchmark."""
+    parser.add_argument("--device", choices=("cpu", "gpu"), default="cpu", help="where JAX computes (cpu)")
+
+
+def chosen(kind: str) -> Any:
+    """The first JAX device of a kind. Without one, prints why and exits with code 2."""
+    try:
+        return jax.devices(kind)[0]
+    except RuntimeError:
+        here = ", ".join(sorted({device.platform for device in jax.devices()}))
+        print(
+            f"--device {kind}: JAX finds no {kind.upper()} on this machine, only {here}. Run on a machine with one"
+            " and install JAX for it (pip install 'jax[cuda12]' for NVIDIA), or leave the flag out.",
+            file=sys.stderr,
+        )
+        raise SystemExit(2) from None
+
+
+def seconds(run: Callable[[], Any], rounds: int = 9) -> float:
+    """Median wall time of a call, among several that are started together, after one that compiles."""
+    jax.block_until_ready(run())
+    began = time.perf_counter()
+    jax.block_until_ready(run())
+    calls = max(1, min(1000, round(LEAST_SECONDS / (time.perf_counter() - began))))
+    times = []
+    for _ in range(rounds):
+        began = time.perf_counter()
+        answers = [run() for _ in range(calls)][-1]
+        jax.block_until_ready(answers)
+        times.append((time.perf_counter() - began) / calls)
+    return statistics.median(times)
+
+
+def bandwidth(device: Any) -> float:
+    """Bytes per second that a copy reads and writes in the memory of a device."""
+    size = COPIED_BYTES.get(device.platform, COPIED_BYTES["gpu"])
+    with jax.default_device(device):
+        source = jnp.zeros(size // 4, jnp.float32)
+        copy = jax.jit(lambda x: x + 1)
+        return 2 * size / seconds(lambda: copy(source))

@@ -1,0 +1,81 @@
+"""The other programs: least squares of SciPy and lmfit from several starts, and differential evolution."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import lmfit
+import numpy as np
+from scipy.optimize import differential_evolution, least_squares
+from whole_fits.problem import Problem
+
+Array = np.ndarray
+
+
+class Competitor(NamedTuple):
+    """A program; `find(problem, effort, seed)` returns its answer in the unit cube.
+
+    `efforts` are numbers of starts, or population sizes for each parameter.
+    """
+
+    name: str
+    effort: str
+    efforts: tuple[int, ...]
+    find: Callable[[Problem, int, int], Array]
+
+
+def polished(problem: Problem, start: Array) -> Array:
+    """Minimum that SciPy's least squares reaches from a start, with a Jacobian by differences."""
+    return least_squares(lambda u: problem.residuals(u[None])[0], start, bounds=(0.0, 1.0)).x
+
+
+def _scipy(problem: Problem, effort: int, seed: int) -> Array:
+    return _best(problem, [polished(problem, start) for start in problem.starts(effort)])
+
+
+def _random_starts(problem: Problem, effort: int, seed: int) -> Array:
+    starts = np.random.default_rng(seed).uniform(size=(effort, len(problem.lower)))
+    return _best(problem, [polished(problem, start) for start in starts])
+
+
+def _lmfit(problem: Problem, effort: int, seed: int) -> Array:
+    names = [f"x{i}" for i in range(len(problem.lower))]  # lmfit wants identifiers
+
+    def residual(parameters: lmfit.Parameters) -> Array:
+        return problem.residuals(np.array([[parameters[name].value for name in names]]))[0]
+
+    found = []
+    for start in problem.starts(effort):
+        parameters = lmfit.Parameters()
+        for name, value in zip(names, np.clip(start, 1e-3, 1 - 1e-3), strict=True):  # at a bound it has no slope
+            parameters.add(name, value=value, min=0.0, max=1.0)
+        answer = lmfit.minimize(residual, parameters, method="leastsq")
+        found.append(np.array([answer.params[name].value for name in names]))
+    return _best(problem, found)
+
+
+def _differential_evolution(problem: Problem, effort: int, seed: int) -> Array:
+    bounds = [(0.0, 1.0)] * len(problem.lower)
+    return differential_evolution(
+        lambda units: problem.chi2(np.atleast_2d(units.T)) if units.ndim > 1 else problem.chi2(units[None])[0],
+        bounds,
+        popsize=effort,
+        rng=seed,
+        vectorized=True,
+        updating="deferred",
+        polish=True,
+    ).x
+
+
+def _best(problem: Problem, found: list[Array]) -> Array:
+    return found[int(np.argmin(problem.chi2(np.array(found))))]
+
+
+SCANNED = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
+COMPETITORS = (
+    Competitor("SciPy, scan", "starts", SCANNED, _scipy),
+    Competitor("lmfit, scan", "starts", SCANNED, _lmfit),
+    Competitor("SciPy, random", "starts", (4, 8, 16, 32, 64, 128), _random_starts),
+    Competitor("SciPy, differential evolution", "per parameter", (5, 10, 15, 30, 60), _differential_evolution),
+)
