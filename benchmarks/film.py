@@ -5,8 +5,9 @@ Run `python benchmarks/film.py`. A point is one (wavelength, thickness) with unp
 the minimum for any film formula: one exponential, and one sine and cosine by the same polynomial, at
 every point, written to one array as large as pellicle's. Competitors take turns in each round; the
 table gives medians, and the median of each round's ratio to the floor of the same precision.
-Compilation is timed separately. Packages take part if they are installed (`pip install tmm_fast tmmax
-tmm-faster`); slow ones compute fewer points.
+Compilation is timed separately. A second table, the only one with `--device gpu`, has points per second
+of pellicle by wall time, beside the limit by the bandwidth of the device's memory. Packages take part if
+they are installed (`pip install tmm_fast tmmax tmm-faster`); slow ones compute fewer points.
 """
 
 from __future__ import annotations
@@ -25,24 +26,30 @@ from typing import Any, NamedTuple
 os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
+import device as on_device
 import jax
 import jax.numpy as jnp
 import numpy as np
-import tmm
+from film_packages import (
+    ABSORBING,
+    ANGLE,
+    SUBSTRATE,
+    Run,
+    by_tmm,
+    by_tmm_fast,
+    by_tmm_faster,
+    by_tmmax,
+)
 
 import pellicle as pl
 from pellicle.optics.elementary import sincos
 
 jax.config.update("jax_enable_x64", True)
 
-ANGLE = 45.0
 WAVELENGTH = np.linspace(400.0, 800.0, 401)
-ABSORBING, TRANSPARENT, SUBSTRATE = 2.9 + 0.2j, 1.46, 1.52
+TRANSPARENT = 1.46
 DISPERSING = ABSORBING + (0.3 + 0.1j) * (550.0 / WAVELENGTH[None, :]) ** 2
 TMM_POINTS = 20
-
-Run = Callable[[np.ndarray, np.ndarray], Any]
-"""(wavelength, thickness) → R and T, or both packed in one complex array."""
 
 
 class Runner(NamedTuple):
@@ -69,17 +76,6 @@ def numpy_airy(
         reflected = reflected + 0.5 * np.abs((r12 + r23 * half**2) / (1 + r12 * r23 * half**2)) ** 2
         transmitted = transmitted + 0.5 * np.abs(t) ** 2 * np.real(q2 / e2) / q0
     return reflected, transmitted
-
-
-def by_tmm(wavelength: np.ndarray, thickness: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The tmm package, point by point."""
-    points = np.broadcast(wavelength, thickness)
-    answers = [
-        tmm.unpolarized_RT([1.0, ABSORBING, SUBSTRATE], [np.inf, d, np.inf], np.deg2rad(ANGLE), w)
-        for w, d in points
-    ]
-    shape = points.shape
-    return tuple(np.array([p[key] for p in answers]).reshape(shape) for key in "RT")  # type: ignore[return-value]
 
 
 def _compiled(both: Callable, dtype: type, *media: np.ndarray) -> Run:
@@ -119,70 +115,6 @@ def floor(dtype: type) -> Run:
         return jax.lax.complex(damping * sine, damping * cosine)
 
     return _compiled(both, dtype)
-
-
-def by_tmm_fast() -> Run:
-    """Return tmm_fast with its own broadcasting."""
-    import torch
-    from tmm_fast import coh_tmm
-
-    torch.set_num_threads(1)
-
-    def run(wavelength, thickness):
-        count, size = thickness.size, wavelength.size
-        index = torch.tensor([1.0, ABSORBING, SUBSTRATE], dtype=torch.complex128)
-        index = index[None, :, None].expand(count, 3, size).clone()
-        depth = torch.tensor(np.stack([np.full(count, np.inf), thickness.ravel(), np.full(count, np.inf)], 1))
-        theta, light = torch.tensor([np.deg2rad(ANGLE)]), torch.tensor(wavelength.ravel())
-        both = [coh_tmm(p, index, depth, theta, light) for p in "sp"]
-        return tuple(np.asarray(0.5 * (both[0][k] + both[1][k]))[:, 0, :] for k in "RT")  # type: ignore[return-value]
-
-    return run
-
-
-def by_tmmax() -> Run:
-    """Return tmmax, float32: its function for tables under our jit and vmap over thickness."""
-    from tmmax.tmm import vectorized_coh_tmm
-
-    with jax.enable_x64(False):
-        axis = jnp.array([300e-9, 900e-9])
-        media = ((1.0, 0.0), (ABSORBING.real, ABSORBING.imag), (SUBSTRATE, 0.0))
-        table = jnp.stack([jnp.stack([axis, n + 0 * axis, k + 0 * axis]) for n, k in media])
-        theta, order = jnp.array([np.deg2rad(ANGLE)], dtype=jnp.float32), jnp.array([0, 1, 2])
-
-    @jax.jit
-    def both(light, thickness):
-        def one(d):
-            pairs = [
-                vectorized_coh_tmm(table, order, d[None], light, theta, jnp.array([p])) for p in (False, True)
-            ]
-            return [0.5 * (s.reshape(-1) + p.reshape(-1)) for s, p in zip(*pairs, strict=True)]
-
-        return jax.vmap(one)(thickness)
-
-    def run(wavelength, thickness):
-        with jax.enable_x64(False):
-            nm = (jnp.asarray(x.ravel() * 1e-9, jnp.float32) for x in (wavelength, thickness))
-            R, T = jax.block_until_ready(both(*nm))
-        return np.asarray(R), np.asarray(T)
-
-    return run
-
-
-def by_tmm_faster() -> Run:
-    """Return tmm_faster, with one call for all wavelengths of a thickness."""
-    from tmm_faster import calc_coherent
-
-    def run(wavelength, thickness):
-        index = np.tile(np.array([1.0, ABSORBING, SUBSTRATE], dtype=complex), (wavelength.size, 1))
-        found = [
-            calc_coherent(index, [np.inf, d, np.inf], [ANGLE], wavelength.ravel()) for d in thickness.ravel()
-        ]
-        return tuple(
-            np.stack([0.5 * (np.ravel(f[f"{k}_s"]) + np.ravel(f[f"{k}_p"])) for f in found]) for k in "RT"
-        )  # type: ignore[return-value]
-
-    return run
 
 
 def keep_pages() -> None:
@@ -267,9 +199,57 @@ def _table(times: dict[str, list[float]], first: dict[str, float], floors: dict[
         print(f"{name:<30}{each * 1e9:>14.1f}{1 / each:>16.3g}{ratio:>10.2f}{first[name]:>14.2f}")
 
 
+def device_table(device: Any, thicknesses: int) -> None:
+    """Points per second of pellicle on a device, beside the limit by the bandwidth of its memory.
+
+    The time is the wall time of queued calls; the limit is that of writing R and T of each point. The error
+    is the largest of R and T against the formula in float64 in NumPy, on a part of the thicknesses.
+    """
+    bandwidth = on_device.bandwidth(device)
+    print(f"{device.device_kind}, jax {jax.__version__}: a copy moves {bandwidth / 1e9:.0f} GB/s")
+    print(f"{'':<32}{'points per s':>14}{'limit':>12}{'share':>8}{'error':>10}")
+    for dtype in (np.float32, np.float64):
+        limit = bandwidth / (2 * np.dtype(dtype).itemsize)
+        for layer, kind in (
+            (TRANSPARENT, "transparent"),
+            (ABSORBING, "absorbing"),
+            (DISPERSING, "dispersing"),
+        ):
+            rate, error = _on(device, dtype, layer, thicknesses)
+            name = f"{np.dtype(dtype).name}, {kind}"
+            print(f"{name:<32}{rate:>14.3g}{limit:>12.3g}{rate / limit:>8.1%}{error:>10.1e}")
+
+
+def _on(device: Any, dtype: type, layer: complex | np.ndarray, thicknesses: int) -> tuple[float, float]:
+    """Points per second and the error of one film on a device."""
+    kind = np.result_type(dtype, np.complex64) if np.iscomplexobj(layer) else dtype
+    axes = WAVELENGTH[None, :], np.linspace(0.0, 1000.0, thicknesses)[:, None]
+    wavelength, thickness = (jax.device_put(axis.astype(dtype), device) for axis in axes)
+    index = jax.device_put(np.asarray(layer, kind), device)
+
+    @jax.jit
+    def both(wavelength: Any, thickness: Any, index: Any) -> Any:
+        media = index, dtype(SUBSTRATE)
+        return tuple(
+            f(wavelength, thickness, *media, angle=dtype(ANGLE)) for f in (pl.reflectance, pl.transmittance)
+        )
+
+    rate = thicknesses * WAVELENGTH.size / on_device.seconds(lambda: both(wavelength, thickness, index))
+    some = np.asarray(thickness[:: max(1, thicknesses // 1000)])
+    truth = numpy_airy(layer, np.asarray(wavelength, float), np.asarray(some, float))
+    found = both(wavelength, jax.device_put(some, device), index)
+    assert all(x.dtype == dtype for x in found), [x.dtype for x in found]
+    return rate, max(float(np.max(np.abs(np.asarray(a) - b))) for a, b in zip(found, truth, strict=True))
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rounds", type=int, default=31)
-    parser.add_argument("--thicknesses", type=int, default=1000)
+    parser.add_argument("--thicknesses", type=int, help="of 401 points each (1000; 100000 on a GPU)")
+    on_device.add_flag(parser)
     given = parser.parse_args()
-    main(given.rounds, given.thicknesses)
+    where = on_device.chosen(given.device)
+    if given.device == "cpu":
+        main(given.rounds, given.thicknesses or 1000)
+        print()
+    device_table(where, given.thicknesses or (1000 if given.device == "cpu" else 100_000))

@@ -6,15 +6,17 @@ Jacobian in p parameters; all in ns per data point and evaluation of 64 candidat
 time, and as ratios. The goals: deviance at most 3 (R, T) or 5 (Ψ and Δ) times the film function; residuals
 with Jacobian at most (1 + p/2) times the deviance.
 
-The other tables are of whole fits of simulated files with random true values (`whole_fits`). The first has `pl.fit`:
-the first call of a new process with an empty cache of compiled programs, which compiles, and with a filled one;
-then the median of the next calls, each of another file. The second has it beside SciPy and lmfit with the film in
-vectorised NumPy, in turns: least squares from the best local minima of a scan of the thickness or from random
-starts, and differential evolution, each with the fewest starts or the smallest population that is right in 95 % of
-the files. A fit is right where its χ² is within 4 of the minimum reached from the true values; programs that are
-right in fewer than 95 % of the files are struck out. The others return the best values; lmfit also their covariance,
-and SciPy the Jacobian for it. `pl.fit` also estimates the noise, computes standard errors, the limits by profile
-likelihood, the rivals, and the status.
+The other tables are of whole fits of simulated files with random true values (`whole_fits`). The first has
+`pl.fit`: the first call of a new process with an empty cache of compiled programs, which compiles, and with
+a filled one; then the median of the next calls, each of another file. The second has it beside SciPy and
+lmfit with the film in vectorised NumPy, in turns: least squares from the best local minima of a scan of the
+thickness or from random starts, and differential evolution, each with the fewest starts or the smallest
+population that is right in 95 % of the files. A fit is right where its χ² is within 4 of the minimum reached
+from the true values; programs that are right in fewer than 95 % of the files are struck out. The others
+return the best values, lmfit also their covariance. `pl.fit` also estimates the noise, and computes standard
+errors, limits by profile likelihood, rivals and the status.
+
+`--device gpu` has one table instead, of the search on a GPU: candidates of the scan, in points per second.
 """
 
 from __future__ import annotations
@@ -31,6 +33,7 @@ from typing import Any, NamedTuple
 os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+import device as on_device
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -168,6 +171,32 @@ def rows(case: Case, rounds: int) -> tuple[str, ...]:
     )
 
 
+def search(case: Case, device: Any) -> list[tuple[str, ...]]:
+    """Lines of the table of the search on a device: points per second of the deviances of many candidates."""
+    problem = make(measured(spectrum(case), case.scene))
+    [view] = problem.views
+    size = 2**22 // view.rows if device.platform != "cpu" else 4 * CANDIDATES
+    units = np.random.default_rng(1).uniform(0.1, 0.9, (size, len(problem.parameters)))
+    values = problem.seen_by(view, np.asarray(problem.values(units)))
+
+    def found(dtype: type, device: Any, values: np.ndarray) -> tuple[Callable[[], Any], np.ndarray]:
+        arrays, values = jax.tree_util.tree_map(
+            lambda x: jax.device_put(np.asarray(x, dtype), device), (view.arrays, values)
+        )
+        run = lambda: deviances(view.form, arrays, values).value  # noqa: E731
+        return run, np.asarray(run())
+
+    _, truth = found(np.float64, jax.devices("cpu")[0], values[:CANDIDATES])
+    lines = []
+    for dtype in (np.float32, np.float64):
+        with jax.enable_x64(dtype is np.float64):
+            run, answer = found(dtype, device, values)
+            rate = size * view.rows / on_device.seconds(run)
+        error = np.max(np.abs(answer[:CANDIDATES] / truth - 1))
+        lines.append((f"{case.name}, {np.dtype(dtype).name}", f"{rate:.3g}", f"{error:.1e}"))
+    return lines
+
+
 def whole_fits(chosen: list[str], files: int | None) -> None:
     """Print the tables of whole fits, of all cases or of those whose name contains a word of `chosen`."""
     from whole_fits import cases, comparison, tables
@@ -198,7 +227,14 @@ def main() -> None:
     parser.add_argument("--no-evaluations", action="store_true", help="only the whole fits")
     parser.add_argument("--only", nargs="*", default=[], help="words in the names of the whole fits to time")
     parser.add_argument("--files", type=int, help="files of each whole fit (20; 119 of soap films)")
+    on_device.add_flag(parser)
     asked = parser.parse_args()
+    device = on_device.chosen(asked.device)
+    if asked.device == "gpu":
+        print(f"{device.device_kind}, jax {jax.__version__}\n")
+        header = "search", "points per s", "largest relative error of the deviance"
+        table(header, [line for case in CASES for line in search(case, device)])
+        return
     print(f"jax {jax.__version__}, Python {platform.python_version()}, {platform.machine()}, one thread\n")
     if not asked.no_evaluations:
         head = ("ns per point", "film function", "deviance", "x film", "residuals and Jacobian", "x deviance")

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from whole_fits.numpy_film import plate_transmittance, psi_delta, reflectance
 
 import pellicle as pl
+from whole_fits.numpy_film import plate_transmittance, psi_delta, reflectance
 
 Array = np.ndarray
 Limit = tuple[float, float, float, float]
@@ -24,9 +24,9 @@ class Case:
 
     `limits` are in the order of the film's parameters, by pellicle's names of them.
     `film(wavelength, angle)` tabulates the indices of these points and returns their simulation. The scan of
-    the other programs takes thicknesses `step` nm apart, an eighth of the shortest wavelength in the layer, and
-    `levels` values of each of the other parameters. `noise` is the standard deviation of R, T or Ψ (degrees);
-    that of Δ is larger by 2/sin 2Ψ.
+    the other programs takes thicknesses `step` nm apart, an eighth of the shortest wavelength in the layer,
+    and `levels` values of each of the other parameters. `noise` is the standard deviation of R, T or Ψ
+    (degrees); that of Δ is larger by 2/sin 2Ψ.
     """
 
     name: str

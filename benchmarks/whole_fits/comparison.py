@@ -1,9 +1,9 @@
 """Pellicle and the other programs in turn on the files of a case, in a process of their own.
 
-The first call of pellicle is timed in two new processes: one with an empty cache of compiled programs, one with the
-cache that the first has filled. The second process then fits every file with every program, the programs in turn.
-Other programs get the least effort (starts, or size of the population) with which they find the right answer
-in 95 % of the files; the search for it is not timed.
+The first call of pellicle is timed in two new processes: one with an empty cache of compiled programs, one
+with the cache that the first has filled. The second process then fits every file with every program, in
+turns. The other programs get the least effort (starts, or size of the population) with which they find the
+right answer in 95 % of the files; the search for it is not timed.
 """
 
 from __future__ import annotations
@@ -17,7 +17,9 @@ from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from typing import Any, NamedTuple
 
+import jax
 import numpy as np
+
 from whole_fits.cases import Case, cases, measurement
 from whole_fits.competitors import COMPETITORS, Competitor, polished
 from whole_fits.problem import Problem
@@ -25,8 +27,8 @@ from whole_fits.problem import Problem
 Array = np.ndarray
 RIGHT_CHI2 = 4.0
 """An answer is right where χ², with the simulated noise as σ, is at most this much above the minimum that is
-reached from the true values: within two standard errors. In pellicle the drift of a lamp has a prior, which moves
-the minimum of soap films by up to 2; otherwise right answers agree within 0.1."""
+reached from the true values: within two standard errors. In pellicle the drift of a lamp has a prior, which
+moves the minimum of soap films by up to 2; otherwise right answers agree within 0.1."""
 FEWEST_RIGHT = 0.95
 TUNING_FILES = 20
 
@@ -122,6 +124,7 @@ def all_files(chosen: int, folder: str, files: int) -> tuple[Time, list[Result]]
 def _start(folder: str) -> None:
     from pellicle.cli import session
 
+    jax.config.update("jax_platforms", "cpu")
     os.environ[session.CACHE_VARIABLE] = folder
     session.start()
 

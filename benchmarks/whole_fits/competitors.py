@@ -8,6 +8,7 @@ from typing import NamedTuple
 import lmfit
 import numpy as np
 from scipy.optimize import differential_evolution, least_squares
+
 from whole_fits.problem import Problem
 
 Array = np.ndarray
@@ -48,7 +49,8 @@ def _lmfit(problem: Problem, effort: int, seed: int) -> Array:
     found = []
     for start in problem.starts(effort):
         parameters = lmfit.Parameters()
-        for name, value in zip(names, np.clip(start, 1e-3, 1 - 1e-3), strict=True):  # at a bound it has no slope
+        inside = np.clip(start, 1e-3, 1 - 1e-3)  # at a bound lmfit's parameter has no slope
+        for name, value in zip(names, inside, strict=True):
             parameters.add(name, value=value, min=0.0, max=1.0)
         answer = lmfit.minimize(residual, parameters, method="leastsq")
         found.append(np.array([answer.params[name].value for name in names]))
@@ -56,10 +58,12 @@ def _lmfit(problem: Problem, effort: int, seed: int) -> Array:
 
 
 def _differential_evolution(problem: Problem, effort: int, seed: int) -> Array:
-    bounds = [(0.0, 1.0)] * len(problem.lower)
+    def chi2(units: Array) -> Array:  # (parameters, candidates), or one candidate in the polish
+        return problem.chi2(units.T) if units.ndim > 1 else problem.chi2(units[None])[0]
+
     return differential_evolution(
-        lambda units: problem.chi2(np.atleast_2d(units.T)) if units.ndim > 1 else problem.chi2(units[None])[0],
-        bounds,
+        chi2,
+        [(0.0, 1.0)] * len(problem.lower),
         popsize=effort,
         rng=seed,
         vectorized=True,
@@ -77,5 +81,5 @@ COMPETITORS = (
     Competitor("SciPy, scan", "starts", SCANNED, _scipy),
     Competitor("lmfit, scan", "starts", SCANNED, _lmfit),
     Competitor("SciPy, random", "starts", (4, 8, 16, 32, 64, 128), _random_starts),
-    Competitor("SciPy, differential evolution", "per parameter", (5, 10, 15, 30, 60), _differential_evolution),
+    Competitor("SciPy, evolution", "a parameter", (5, 10, 15, 30, 60), _differential_evolution),
 )

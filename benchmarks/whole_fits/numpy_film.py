@@ -6,6 +6,7 @@ product of characteristic matrices and takes fewer operations. Arrays are (candi
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -52,8 +53,8 @@ def amplitudes(
         phase_factor(4 * np.pi / wavelength * one * depth)
         for one, (_, depth) in zip(q[1:-1], layers, strict=True)
     ]
-    steps = zip(admittance[:-1], admittance[1:], strict=True)
-    faces = [(down - up) / (up + down) if p else (up - down) / (up + down) for up, down in steps]
+    faces = [(up - down) / (up + down) for up, down in itertools.pairwise(admittance)]
+    faces = [-face for face in faces] if p else faces
     r = faces[-1]
     for face, turn in zip(reversed(faces[:-1]), reversed(turns), strict=True):
         inner = r * turn
@@ -86,7 +87,7 @@ def plate_transmittance(wavelength: Array, layers: Sequence[tuple[Any, Any]], pl
 def psi_delta(
     wavelength: Array, layers: Sequence[tuple[Any, Any]], substrate: Any, angle: Array
 ) -> tuple[Array, Array]:
-    """Ψ and Δ in degrees, Δ from 0 to 360; Δ of a bare transparent substrate below Brewster's angle is 180."""
+    """Ψ and Δ in degrees, Δ from 0 to 360: 180 for a bare transparent substrate below Brewster's angle."""
     sine = np.sin(np.deg2rad(angle))
     s, p = (amplitudes(wavelength, layers, substrate, sine, p).r for p in (False, True))
     ratio = p / s

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
+
 from whole_fits.cases import Case, Measurement
 
 Array = np.ndarray
@@ -22,7 +23,7 @@ class Problem:
         self.case = case
         self.lower, self.width = case.bounds[:, 0], np.ptp(case.bounds, axis=1)
         self.truth = (measured.truth - self.lower) / self.width
-        nm, angle = case.points
+        nm, _ = case.points
         self.all_points = _Points(case, measured, np.ones(nm.size, bool))
         stride = -(-len(case.wavelength) // SCAN_WAVELENGTHS)
         self.few_points = _Points(case, measured, np.isin(nm, case.wavelength[::stride]))
@@ -35,7 +36,7 @@ class Problem:
         return np.sum(self.residuals(units) ** 2, axis=-1)
 
     def starts(self, count: int) -> Array:
-        """The lowest local minima along the thickness of a scan with few wavelengths, (≤ count, parameters)."""
+        """The lowest local minima of a scan of the thickness with few wavelengths, (≤ count, parameters)."""
         case, axis = self.case, self.case.thickness_axis
         depths = np.linspace(0.0, 1.0, int(np.ceil(self.width[axis] / case.step)) + 1)
         levels = [(np.arange(n) + 0.5) / n for n in case.levels]

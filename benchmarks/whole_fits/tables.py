@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from whole_fits.comparison import Compared, Result
 
+
 def calls(some: list[Compared]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Header and lines of the table of pellicle's calls."""
     header = (
