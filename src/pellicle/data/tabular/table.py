@@ -1,16 +1,14 @@
 """Tables of numbers in text files, before their columns are interpreted.
 
-One pass over the lines finds the layout and pandas reads the numbers. Only a file that fails is read
+One pass over the lines finds the layout and `numpy.loadtxt` reads the numbers. Only a file that fails is read
 cell by cell, to name the faulty line and column.
 """
 
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from io import StringIO
 
 import numpy as np
 
@@ -51,29 +49,20 @@ class Table:
 
     def numbers(self, positions: Sequence[int]) -> list[np.ndarray]:
         """Read the columns at `positions`, float64 and finite. Raises DataError for the first bad cell."""
-        import pandas as pd  # takes 0.3 s to import; only readers need it
-
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("error", pd.errors.ParserWarning)  # the first row is too long
-                frame = pd.read_csv(
-                    StringIO("\n".join(line.bare for line in self.layout.rows)),
-                    sep=r"\s+" if self.layout.delimiter == " " else self.layout.delimiter,
-                    header=None,
-                    names=list(range(self.layout.raw_width)),
-                    index_col=False,
-                    decimal=self.layout.decimal,
-                    skipinitialspace=True,
-                    skip_blank_lines=False,
-                    low_memory=False,
-                )
-        # a ParserError is a ValueError: a later row is too long
-        except (ValueError, pd.errors.ParserWarning):
+        delimiter = None if self.layout.delimiter == " " else self.layout.delimiter
+        rows = [line.bare for line in self.layout.rows]
+        if any(len(row.split(delimiter)) > self.layout.raw_width for row in rows):
             return self._numbers_by_cell(positions)
-        columns = [frame[position].to_numpy() for position in positions]
-        finite = all(x.dtype.kind in "fiu" and np.isfinite(x).all() for x in columns)
-        if len(frame) == len(self.lines) and finite:
-            return [x.astype(np.float64) for x in columns]
+        if self.layout.decimal == ",":
+            rows = [row.replace(",", ".") for row in rows]
+        try:
+            found = np.loadtxt(
+                rows, delimiter=delimiter, comments=None, quotechar='"', usecols=positions, ndmin=2, unpack=True
+            )
+        except ValueError:  # a cell that is empty, missing or no number
+            return self._numbers_by_cell(positions)
+        if found.shape[1] == len(rows) and np.isfinite(found).all():
+            return list(found)
         return self._numbers_by_cell(positions)
 
     def _numbers_by_cell(self, positions: Sequence[int]) -> list[np.ndarray]:
