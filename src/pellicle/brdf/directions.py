@@ -34,6 +34,7 @@ def dot(a: Any, b: Any) -> Any:
 
 def length(v: Any) -> Float[Array, "..."]:
     """Return |v|, with slope zero at v = 0."""
+    v = jnp.asarray(v)
     return sqrt(dot(v, v))
 
 

@@ -6,9 +6,12 @@ import abc
 from typing import Any, ClassVar
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Complex
 
+from pellicle.optics.array_namespace import namespace
 from pellicle.optics.pair import Number, to_complex
 
 HC = 1239.841984
@@ -32,6 +35,17 @@ class AbstractDispersion(eqx.Module):
         return to_complex(self.index(jnp.asarray(wavelength, dtype=jnp.result_type(float, wavelength))))
 
 
+def known_index(dispersion: AbstractDispersion, wavelength: np.ndarray) -> Number:
+    """Index of a dispersion of numbers at `wavelength` (nm), in NumPy arrays: nothing is compiled.
+
+    It is not finite where the formula of a model is not.
+    """
+    # NumPy's numbers keep the formulas in NumPy where they combine parameters alone
+    numbers = jax.tree_util.tree_map(lambda number: np.asarray(number)[()], dispersion)
+    with np.errstate(all="ignore"):
+        return jax.tree_util.tree_map(np.asarray, numbers.index(np.asarray(wavelength, dtype=float)))
+
+
 def bounds_of(number: Any) -> tuple[float, float] | None:
     """The least and the largest value of a parameter, free or fixed; None for an array or a tracer."""
     if isinstance(number, int | float):
@@ -51,4 +65,4 @@ def require_nonnegative(model: str, **parameters: Any) -> None:
 
 def cast_like(values: Any, wavelength: Any):
     """A table's column in the precision of the wavelengths, so that float32 stays float32."""
-    return jnp.asarray(values, dtype=jnp.result_type(float, wavelength))
+    return namespace(values, wavelength).asarray(values, dtype=jnp.result_type(float, wavelength))

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any, ClassVar, final
 
-import jax.numpy as jnp
-
 from pellicle.dispersion.base import bounds_of
 from pellicle.dispersion.oscillators import AbstractOscillator, check
+from pellicle.optics.array_namespace import namespace
 from pellicle.optics.pair import Pair
 from pellicle.optics.special import arctan_over_root, log_abs, scaled_ei
 
@@ -45,10 +44,11 @@ class CodyLorentz(AbstractOscillator):
 
     def epsilon(self, energy):
         onset = self.Eg + self.Et
-        above = jnp.maximum(energy, onset)
+        xp = namespace(energy, onset)
+        above = xp.maximum(energy, onset)
         tail = self._product(onset) * onset
-        below = tail / energy * jnp.exp(jnp.minimum(energy - onset, 0.0) / self.Eu)
-        im = jnp.where(energy > onset, self._product(above), below)
+        below = tail / energy * xp.exp(xp.minimum(energy - onset, 0.0) / self.Eu)
+        im = xp.where(energy > onset, self._product(above), below)
         re = 2 / math.pi * self.A * self.E0 * self.C * self._rational(energy, onset)
         return Pair(re + tail / (math.pi * energy) * self._tail(energy, onset), im)
 
@@ -72,6 +72,7 @@ class CodyLorentz(AbstractOscillator):
         = ∫ (aξ + b)/[(ξ − Eg)² + Ep²] + (qξ + r)/(ξ² − E²) + (p₃ξ³ + ... + p₀)/[(ξ² − E0²)² + C²ξ²].
         """
         E0, C, Eg, Ep, square = self.E0, self.C, self.Eg, self.Ep, E * E
+        xp = namespace(E, T)
         centre, alpha2, gamma2 = E0 * E0, 4 * E0 * E0 - C * C, E0 * E0 - 0.5 * C * C
         v = self._at_gap_pole(square)
         a, b = -Ep * v.im, -Ep * Ep * v.re + Ep * v.im * Eg
@@ -79,14 +80,14 @@ class CodyLorentz(AbstractOscillator):
         q, r = (up - down) / (2 * E), 0.5 * (up + down)
         p3, p2, p1, p0 = self._remainder(square, a, b, q, r)
 
-        gap_part = -0.5 * a * jnp.log((T - Eg) ** 2 + Ep * Ep) - Ep * v.re * jnp.arctan2(Ep, T - Eg)
+        gap_part = -0.5 * a * xp.log((T - Eg) ** 2 + Ep * Ep) - Ep * v.re * xp.arctan2(Ep, T - Eg)
         # the same ln|T − E| as the tail's, so that both cancel at E = T
-        edge = log_abs((T - E) / self.Eu) + jnp.log(self.Eu)
-        edge_part = -0.5 / E * (up * edge - down * jnp.log(T + E))
+        edge = log_abs((T - E) / self.Eu) + xp.log(self.Eu)
+        edge_part = -0.5 / E * (up * edge - down * xp.log(T + E))
         odd = arctan_over_root(alpha2, 0.5 * C, T * T - gamma2) / C
-        even = 0.5 * (p2 + p0 / centre) * jnp.arctan2(C * T, T * T - centre) / C
+        even = 0.5 * (p2 + p0 / centre) * xp.arctan2(C * T, T * T - centre) / C
         even += 0.5 * (p2 - p0 / centre) * arctan_over_root(-alpha2, T, T * T + centre)
-        return gap_part + edge_part - 0.25 * p3 * jnp.log(self._lorentz(T)) + (p1 + gamma2 * p3) * odd + even
+        return gap_part + edge_part - 0.25 * p3 * xp.log(self._lorentz(T)) + (p1 + gamma2 * p3) * odd + even
 
     def _at_gap_pole(self, square):
         """c²/{[(c² − E0²)² + C²c²] (c² − E²)} at c = Eg + iEp."""
@@ -112,6 +113,6 @@ class CodyLorentz(AbstractOscillator):
 
     def _tail(self, E, T):
         """P∫ from 0 to T of exp((ξ − T)/Eu) [1/(ξ − E) − 1/(ξ + E)] dξ."""
-        y, start = E / self.Eu, jnp.exp(-T / self.Eu)
+        y, start = E / self.Eu, namespace(E, T).exp(-T / self.Eu)
         forward = scaled_ei((T - E) / self.Eu) - start * scaled_ei(-y)
         return forward - scaled_ei((T + E) / self.Eu) + start * scaled_ei(y)

@@ -10,10 +10,11 @@ from __future__ import annotations
 from typing import Any, final
 
 import jax
-import jax.numpy as jnp
+import numpy as np
 
 from pellicle.dispersion.base import AbstractDispersion, bounds_of
 from pellicle.optics import pair
+from pellicle.optics.array_namespace import namespace
 from pellicle.optics.pair import Number, Pair, abs2, imag, is_real, real, times_i
 
 
@@ -112,19 +113,22 @@ def _permittivities(mixture: Any, wavelength: Any) -> tuple[Number, Number]:
 def _root(epsilon: Number) -> Number:
     """√ε of a passive medium: an Im ε rounded below zero counts as zero, its slope unchanged."""
     if is_real(epsilon):
-        return jnp.sqrt(real(epsilon))
+        return namespace(epsilon).sqrt(real(epsilon))
     im = imag(epsilon)
-    return pair.sqrt(Pair(real(epsilon), im - jax.lax.stop_gradient(jnp.minimum(im, 0.0))))
+    xp = namespace(im)
+    below = xp.minimum(im, 0.0)
+    return pair.sqrt(Pair(real(epsilon), im - (below if xp is np else jax.lax.stop_gradient(below))))
 
 
 def _principal(z: Number) -> Number:
     """The square root with a nonnegative real part."""
-    return jnp.sqrt(real(z)) if is_real(z) else -times_i(pair.sqrt(-z))
+    return namespace(z).sqrt(real(z)) if is_real(z) else -times_i(pair.sqrt(-z))
 
 
 def _two_thirds(n: Number) -> Number:
     """n^(2/3) = ε^(1/3) of an index in the first quadrant."""
     if is_real(n):
         return real(n) ** (2 / 3)
-    size, angle = abs2(n) ** (1 / 3), 2 / 3 * jnp.arctan2(imag(n), real(n))
-    return Pair(size * jnp.cos(angle), size * jnp.sin(angle))
+    xp = namespace(n)
+    size, angle = abs2(n) ** (1 / 3), 2 / 3 * xp.arctan2(imag(n), real(n))
+    return Pair(size * xp.cos(angle), size * xp.sin(angle))

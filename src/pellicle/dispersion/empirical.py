@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, final
 
-import jax.numpy as jnp
+import numpy as np
 
 from pellicle.dispersion.base import HC, AbstractDispersion, bounds_of, cast_like, require_nonnegative
+from pellicle.optics.array_namespace import namespace
 from pellicle.optics.pair import Number, Pair, imag, is_real, real
 
 
@@ -22,7 +23,7 @@ class Constant(AbstractDispersion):
     k: Any = None
 
     def index(self, wavelength):
-        one = jnp.ones_like(wavelength)
+        one = namespace(wavelength).ones_like(wavelength)
         return self.n * one if self.k is None else Pair(self.n * one, self.k * one)
 
 
@@ -40,8 +41,9 @@ class Table(AbstractDispersion):
 
     def index(self, wavelength):
         def column(values):
-            at = cast_like(self.wavelength, wavelength)
-            return jnp.interp(wavelength, at, cast_like(values, wavelength), left=jnp.nan, right=jnp.nan)
+            at, values = cast_like(self.wavelength, wavelength), cast_like(values, wavelength)
+            interp = namespace(wavelength, at, values).interp
+            return interp(wavelength, at, values, left=np.nan, right=np.nan)
 
         return column(self.n) if self.k is None else Pair(column(self.n), column(self.k))
 
@@ -86,7 +88,8 @@ class CauchyUrbach(AbstractDispersion):
 
     def index(self, wavelength):
         u = 1 / (wavelength * wavelength)
-        edge = self.k0 * jnp.exp((HC / wavelength - self.Eb) / self.Eu)
+        exponent = (HC / wavelength - self.Eb) / self.Eu
+        edge = self.k0 * namespace(exponent).exp(exponent)
         return Pair(self.A + u * (self.B + u * self.C), edge)
 
 
@@ -104,7 +107,8 @@ class Sellmeier(AbstractDispersion):
 
     def index(self, wavelength):
         square = wavelength * wavelength
-        return jnp.sqrt(1 + sum(b * square / (square - c) for b, c in zip(self.B, self.C, strict=True)))
+        n2 = 1 + sum(b * square / (square - c) for b, c in zip(self.B, self.C, strict=True))
+        return namespace(n2).sqrt(n2)
 
 
 @final

@@ -10,10 +10,10 @@ import math
 from typing import Any, ClassVar, final
 
 import equinox as eqx
-import jax.numpy as jnp
 
 from pellicle.dispersion.base import HC, AbstractDispersion, bounds_of, require_nonnegative
 from pellicle.optics import pair
+from pellicle.optics.array_namespace import namespace
 from pellicle.optics.pair import Pair
 from pellicle.optics.special import arctan_over_root, dawson, log_abs
 
@@ -118,7 +118,8 @@ class Gaussian(AbstractOscillator):
         x, y = (energy - self.E0) / width, (energy + self.E0) / width
         re = self.A * (2 / math.sqrt(math.pi)) * (dawson(y) - dawson(x))
         # the difference of the two, which keeps its sign where both are nearly equal
-        return Pair(re, -self.A * jnp.exp(-x * x) * jnp.expm1(x * x - y * y))
+        xp = namespace(x)
+        return Pair(re, -self.A * xp.exp(-x * x) * xp.expm1(x * x - y * y))
 
 
 @final
@@ -144,20 +145,21 @@ class TaucLorentz(AbstractOscillator):
         E, A, E0, C, Eg = energy, self.A, self.E0, self.C, self.Eg
         centre, gap, width, square = E0 * E0, Eg * Eg, C * C, E * E
         zeta4 = (square - centre) ** 2 + width * square
-        above = jnp.maximum(E - Eg, 0.0)
+        above = namespace(E - Eg).maximum(E - Eg, 0.0)
         im = A * E0 * C * above * above / (zeta4 * E)
         return Pair(A / (math.pi * zeta4) * self._bracket(E, centre, gap, width, square), im)
 
     def _bracket(self, E, centre, gap, width, square):
         """π ζ⁴ ε₁/A, term by term in the order of eq. 6."""
         E0, C, Eg = self.E0, self.C, self.Eg
+        xp = namespace(E, centre, gap, width)
         alpha2, gamma2 = 4 * centre - width, centre - 0.5 * width
         a_ln = (gap - centre) * square + gap * width - centre * (centre + 3 * gap)
         a_atan = (square - centre) * (centre + gap) + gap * width
         # ln[(E0² + Eg² + αEg)/(E0² + Eg² − αEg)] = 2 artanh(αEg/(E0² + Eg²))
         first = C * a_ln / E0 * arctan_over_root(-alpha2, Eg, centre + gap)
         # π − atan[(α + 2Eg)/C] + atan[(α − 2Eg)/C] holds no α
-        second = -a_atan / E0 * jnp.arctan2(Eg * C, gap - centre)
+        second = -a_atan / E0 * xp.arctan2(Eg * C, gap - centre)
         third = (
             4
             * E0
@@ -166,6 +168,6 @@ class TaucLorentz(AbstractOscillator):
             * arctan_over_root(alpha2, 2 * C, 2 * (width + 2 * (gap - centre)))
         )
         # both logarithms of |E − Eg| under the factor (E − Eg)² that they have together
-        edge = (E + Eg) ** 2 * jnp.log(E + Eg) - (E - Eg) ** 2 * log_abs(E - Eg)
-        at_gap = jnp.log((centre - gap) ** 2 + gap * width)
+        edge = (E + Eg) ** 2 * xp.log(E + Eg) - (E - Eg) ** 2 * log_abs(E - Eg)
+        at_gap = xp.log((centre - gap) ** 2 + gap * width)
         return first + second + third + E0 * C * (edge / E - Eg * at_gap)

@@ -12,9 +12,9 @@ from collections.abc import Callable
 from typing import Any, final
 
 import equinox as eqx
-import jax.numpy as jnp
 
 from pellicle.dispersion.base import AbstractDispersion
+from pellicle.optics.array_namespace import namespace
 
 Coefficients = tuple[float, ...]
 
@@ -35,6 +35,10 @@ def _power(x: Any, exponent: float):
     return x ** int(exponent) if exponent == int(exponent) else x**exponent
 
 
+def _sqrt(x: Any):
+    return namespace(x).sqrt(x)
+
+
 def _polynomial(x, c: Coefficients):
     return c[0] + sum(a * _power(x, e) for a, e in _pairs(c) if a)
 
@@ -42,18 +46,18 @@ def _polynomial(x, c: Coefficients):
 def _sellmeier(x, c: Coefficients):
     """1: n² − 1 = C1 + Σ B λ²/(λ² − C²)."""
     u = x * x
-    return jnp.sqrt(1 + c[0] + sum(b * u / (u - r * r) for b, r in _pairs(c)))
+    return _sqrt(1 + c[0] + sum(b * u / (u - r * r) for b, r in _pairs(c)))
 
 
 def _sellmeier_2(x, c: Coefficients):
     """2: n² − 1 = C1 + Σ B λ²/(λ² − C)."""
     u = x * x
-    return jnp.sqrt(1 + c[0] + sum(b * u / (u - r) for b, r in _pairs(c)))
+    return _sqrt(1 + c[0] + sum(b * u / (u - r) for b, r in _pairs(c)))
 
 
 def _polynomial_of_square(x, c: Coefficients):
     """3: n² = C1 + Σ C λ^e."""
-    return jnp.sqrt(_polynomial(x, c))
+    return _sqrt(_polynomial(x, c))
 
 
 def _refractiveindex_info(x, c: Coefficients):
@@ -64,7 +68,7 @@ def _refractiveindex_info(x, c: Coefficients):
     for b, e, r, f in (c[1:5], c[5:9]):
         if b:
             square = square + b * _power(x, e) / (u - r**f)
-    return jnp.sqrt(square)
+    return _sqrt(square)
 
 
 def _cauchy(x, c: Coefficients):
@@ -91,14 +95,14 @@ def _retro(x, c: Coefficients):
     c = _at(c, 4)
     u = x * x
     ratio = c[0] + c[1] * u / (u - c[2]) + c[3] * u
-    return jnp.sqrt((1 + 2 * ratio) / (1 - ratio))
+    return _sqrt((1 + 2 * ratio) / (1 - ratio))
 
 
 def _exotic(x, c: Coefficients):
     """9: n² = C1 + C2/(λ² − C3) + C4 (λ − C5)/((λ − C5)² + C6)."""
     c = _at(c, 6)
     off = x - c[4]
-    return jnp.sqrt(c[0] + c[1] / (x * x - c[2]) + c[3] * off / (off * off + c[5]))
+    return _sqrt(c[0] + c[1] / (x * x - c[2]) + c[3] * off / (off * off + c[5]))
 
 
 _FORMULAS: dict[int, Callable[[Any, Coefficients], Any]] = {
@@ -133,5 +137,6 @@ class Formula(AbstractDispersion):
             raise ValueError("coefficients: expected at least one, got none")
 
     def index(self, wavelength):
-        micrometres = jnp.asarray(wavelength) * 1e-3
-        return jnp.broadcast_to(_FORMULAS[self.number](micrometres, self.coefficients), micrometres.shape)
+        xp = namespace(wavelength)
+        micrometres = xp.asarray(wavelength) * 1e-3
+        return xp.broadcast_to(_FORMULAS[self.number](micrometres, self.coefficients), micrometres.shape)

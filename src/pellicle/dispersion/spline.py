@@ -15,10 +15,10 @@ from collections.abc import Sequence
 from typing import Any, final
 
 import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 
 from pellicle.dispersion.base import HC, AbstractDispersion, cast_like, require_nonnegative
+from pellicle.optics.array_namespace import namespace
 from pellicle.optics.pair import Pair
 from pellicle.optics.special import log_abs
 
@@ -64,7 +64,7 @@ class Spline(AbstractDispersion):
         sites = np.array(self.knots)
         inner = [sites[i : i + degree].mean() for i in range(1, len(sites) - degree)]
         around = np.concatenate([[sites[0]] * (degree + 1), inner, [sites[-1]] * (degree + 1)])
-        inside = jnp.clip(wavelength, self.knots[0], self.knots[-1])
+        inside = namespace(wavelength).clip(wavelength, self.knots[0], self.knots[-1])
         basis = b_splines(inside, around, degree)
         n = _combine(basis, self.n)
         return n if self.k is None else Pair(n, _combine(basis, self.k))
@@ -113,10 +113,11 @@ def b_splines(x: Any, knots: np.ndarray, degree: int) -> Any:
 
     Zero outside the knots; the last interval holds its right end.
     """
-    x, t = jnp.asarray(x)[..., None], cast_like(knots, x)
+    xp = namespace(x)
+    x, t = xp.asarray(x)[..., None], cast_like(knots, x)
     last = knots[1:] == knots[-1]
-    held = (x >= t[:-1]) & ((x < t[1:]) | (jnp.asarray(last & (knots[:-1] < knots[-1])) & (x <= t[-1])))
-    basis = jnp.where(held, jnp.ones_like(x), jnp.zeros_like(x))
+    held = (x >= t[:-1]) & ((x < t[1:]) | (xp.asarray(last & (knots[:-1] < knots[-1])) & (x <= t[-1])))
+    basis = xp.where(held, xp.ones_like(x), xp.zeros_like(x))
     for d in range(1, degree + 1):
         spans = knots[d:] - knots[:-d]
         slope = cast_like(np.divide(1.0, spans, out=np.zeros_like(spans), where=spans > 0), x)
@@ -137,4 +138,4 @@ def _conjugates(energy: Any, knots: np.ndarray) -> Any:
         for i in range(5):
             weights[j + i, j] = (own[4] - own[0]) / np.prod(own[i] - np.delete(own, i))
     at = cast_like(weights, energy)
-    return jnp.sum(parts[..., None] * at, axis=-2)
+    return (parts[..., None] * at).sum(axis=-2)

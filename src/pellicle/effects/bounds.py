@@ -5,11 +5,10 @@ from __future__ import annotations
 import itertools
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.dispersion.base import AbstractDispersion
+from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.dispersion.empirical import Tabulated
 from pellicle.optics import interface, orders
 from pellicle.optics.pair import abs2, real
@@ -25,17 +24,12 @@ def is_zero(number: Any) -> bool:
 def least_ambient(scene: Scene) -> float:
     """The ambient's smallest index at the light's wavelengths."""
     ambient = insert(scene.ambient, start_values(scene.ambient))
-    return float(np.min(np.real(ambient(np.atleast_1d(scene.light.wavelength)))))
+    return float(np.min(real(known_index(ambient, np.atleast_1d(scene.light.wavelength)))))
 
 
 def upper(number: Any) -> float:
     """The largest value of a number, or of the bounds of a free one; 0 for None."""
     return float(number.upper if isinstance(number, Free) else number or 0.0)
-
-
-@jax.jit
-def _real_index(material: AbstractDispersion, wavelength: Any) -> Any:
-    return real(material.index(wavelength))
 
 
 def largest_index(material: AbstractDispersion, wavelength: np.ndarray) -> float:
@@ -53,7 +47,7 @@ def _corner_indices(material: AbstractDispersion, wavelength: np.ndarray) -> np.
         return np.asarray(real(material.value))
     free = [leaf for _, leaf in free_leaves(material)]
     corners = itertools.islice(itertools.product(*[(f.lower, f.upper) for f in free]), 64)
-    return np.stack([np.asarray(_real_index(insert(material, c), wavelength)) for c in corners])
+    return np.stack([real(known_index(insert(material, corner), wavelength)) for corner in corners])
 
 
 def largest_ratio(scene: Scene) -> float:

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from pellicle.dispersion.base import AbstractDispersion
+from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.dispersion.empirical import Constant
 from pellicle.effects.bounds import is_zero, upper
 from pellicle.effects.plan import Row
 from pellicle.materials import Material
+from pellicle.optics.pair import real
 from pellicle.scene.film import Scene, coherent_layers, groups
 from pellicle.scene.free import Free, free_leaves
 from pellicle.scene.layers import Interface, absorbs
@@ -86,7 +87,7 @@ def _propagates(material, scene: Scene) -> bool:
     if free_leaves(material) or isinstance(angle, Free) or wavelength is None or free_leaves(scene.ambient):
         return False
     at = np.asarray(wavelength, dtype=float)
-    index, ambient = np.real(material(at)), np.real(scene.ambient(at))
+    index, ambient = (real(known_index(medium, at)) for medium in (material, scene.ambient))
     steepest = np.deg2rad(angle) + scene.instrument.largest_half_angle(float(np.min(ambient)))
     return bool(np.all(index > ambient * np.sin(np.minimum(steepest, np.pi / 2)) * (1 + 1e-6)))
 

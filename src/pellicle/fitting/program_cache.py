@@ -1,8 +1,10 @@
 """Compiled programs that outlive the process.
 
-XLA's own cache saves the compilation; the rest of a cold start is tracing the solver in Python. Where a
-session has a compilation cache, the traced program is kept beside it, keyed by everything that it depends
-on, and the next process neither traces it nor imports the solver.
+JAX's own cache saves the compilation; the rest of a start is tracing and lowering programs in Python. Where
+a session has a compilation cache, programs are kept beside it, each under a key of everything that it depends
+on. The next process neither traces nor lowers them, and does not import the solver. What is kept is machine
+code where no one but the user can write the files (`executables`); elsewhere (Windows, a shared folder, a
+GPU) it is the traced program, which is data: JAX lowers it again and finds the machine code in its cache.
 """
 
 from __future__ import annotations
@@ -10,7 +12,7 @@ from __future__ import annotations
 import hashlib
 import os
 import tempfile
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from contextlib import suppress
 from functools import lru_cache, wraps
 from pathlib import Path
@@ -18,6 +20,8 @@ from typing import Any, get_type_hints
 
 import jax
 import numpy as np
+
+from pellicle.fitting import executables
 
 Program = Callable[..., Any]
 
@@ -33,7 +37,7 @@ def kept(function: Program) -> Program:
     @wraps(function)
     def call(plan: Hashable, *arguments: Any) -> Any:
         folder = jax.config.jax_compilation_cache_dir  # pyright: ignore[reportAttributeAccessIssue]
-        if not folder:
+        if not folder or "://" in folder:  # JAX can cache in a cloud, too
             return jitted(plan, *arguments)
         leaves, structure = jax.tree_util.tree_flatten(arguments)
         arrays = [np.asarray(leaf) for leaf in leaves]
@@ -49,20 +53,31 @@ def _load(
     function: Program, plan: Hashable, structure: Any, shapes: tuple, folder: str
 ) -> tuple[Program, Any]:
     """The program as a function of flat arrays, and the structure of its results."""
-    from jax import export
 
     def flat(*arrays: Any) -> list[Any]:
         return jax.tree_util.tree_leaves(function(plan, *jax.tree_util.tree_unflatten(structure, arrays)))
 
-    about = function.__qualname__, repr(plan), str(structure), shapes, jax.__version__, jax.default_backend()
-    key = hashlib.sha256(repr((*about, _sources())).encode()).hexdigest()
-    path = Path(folder) / "programs" / f"{key}.bin"
+    cache = Path(folder)
+    about = function.__module__, function.__qualname__, repr(plan), str(structure), shapes
+    key = hashlib.sha256(repr((*about, _environment(), _sources())).encode()).digest()
+    path = cache / "programs" / key.hex()
+    inputs = [jax.ShapeDtypeStruct(shape, np.dtype(dtype)) for shape, dtype in shapes]
+    run = None
+    if jax.default_backend() == "cpu":
+        run = executables.load(path, key) or executables.make(path, key, flat, inputs, cache)
+    run = run or _traced(path.with_suffix(".export"), flat, inputs)
+    kind = get_type_hints(function)["return"]
+    return run, jax.tree_util.tree_structure(kind(*range(len(kind._fields))))
+
+
+def _traced(path: Path, flat: Program, inputs: Sequence[jax.ShapeDtypeStruct]) -> Program:
+    """The traced program at `path`, made if it is not there."""
+    from jax import export
+
     try:
         program = export.deserialize(bytearray(path.read_bytes()))
     except (OSError, ValueError, KeyError):  # absent, or cut short: made again
-        program = export.export(jax.jit(flat))(
-            *[jax.ShapeDtypeStruct(shape, np.dtype(dtype)) for shape, dtype in shapes]
-        )
+        program = export.export(jax.jit(flat))(*inputs)
         # whole or not at all; a cache that cannot be written is no failure
         with suppress(OSError):
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -70,8 +85,24 @@ def _load(
             with os.fdopen(handle, "wb") as file:
                 file.write(program.serialize())
             os.replace(name, path)
-    kind = get_type_hints(function)["return"]
-    return jax.jit(program.call), jax.tree_util.tree_structure(kind(*range(len(kind._fields))))
+    return jax.jit(program.call)
+
+
+@lru_cache(maxsize=1)
+def _hardware() -> str:
+    """JAX's fingerprint of the device: on a CPU it covers the instructions that the CPU has."""
+    from jaxlib import xla_client
+
+    return hex(xla_client.get_topology_for_devices(jax.devices()[:1]).fingerprint())
+
+
+def _environment() -> tuple[Any, ...]:
+    """Versions, device and settings that change a program."""
+    from jaxlib.version import __version__ as jaxlib
+
+    settings = [jax.config.values[name] for name in ("jax_enable_x64", "jax_default_matmul_precision")]
+    flags = os.environ.get("XLA_FLAGS", "")
+    return jax.__version__, jaxlib, jax.default_backend(), _hardware(), flags, *settings
 
 
 @lru_cache(maxsize=1)

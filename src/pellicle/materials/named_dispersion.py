@@ -10,9 +10,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.dispersion.base import AbstractDispersion
+from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.errors import DataError
 from pellicle.materials.contents import covering
+from pellicle.optics.array_namespace import namespace
 from pellicle.optics.pair import Pair, imag, is_real, real
 
 CLEAR = 1e-5
@@ -52,17 +53,18 @@ class Material(AbstractDispersion):
         Where `clear`, it is real, and NaN beyond `CLEAR`.
         """
         # a Python number or whole ones would let a table fall back to float32
-        wavelength = jnp.asarray(wavelength, dtype=jnp.result_type(float, wavelength))
+        xp = namespace(wavelength)
+        wavelength = xp.asarray(wavelength, dtype=jnp.result_type(float, wavelength))
         value = self.dispersion.index(wavelength)
         if self.clear:
-            value = jnp.where(imag(value) <= CLEAR, real(value), jnp.nan)
+            value = xp.where(imag(value) <= CLEAR, real(value), np.nan)
         low, high = self.wavelength_range
         if low <= 0 and high == np.inf:
             return value
         inside = (wavelength >= low) & (wavelength <= high)
         if is_real(value):
-            return jnp.where(inside, value, jnp.nan)
-        return Pair(jnp.where(inside, real(value), jnp.nan), jnp.where(inside, imag(value), jnp.nan))
+            return xp.where(inside, value, np.nan)
+        return Pair(xp.where(inside, real(value), np.nan), xp.where(inside, imag(value), np.nan))
 
     def check_range(self, wavelengths: Any) -> None:
         """Raise DataError (a ValueError) if any of the concrete `wavelengths` (nm) is outside the range."""
@@ -96,8 +98,7 @@ class Material(AbstractDispersion):
             )
 
     def _extinction(self, at: np.ndarray) -> np.ndarray:
-        with jax.ensure_compile_time_eval():  # a table is no tracer, wherever it is asked
-            return np.asarray(imag(self.dispersion.index(at)))
+        return np.asarray(imag(known_index(self.dispersion, at)))
 
     def as_ambient(self) -> Material:
         """Without its k, if that is small somewhere; elsewhere `check_range` refuses it."""

@@ -13,6 +13,8 @@ from typing import Any, TypeAlias
 import jax
 import jax.numpy as jnp
 
+from pellicle.optics.array_namespace import custom_jvp, namespace
+
 Number: TypeAlias = Any
 """A real array, a complex array or a `Pair`."""
 
@@ -91,7 +93,7 @@ def parts(z: Number) -> tuple[Any, Any]:
     if isinstance(z, Pair):
         return z.re, z.im
     if jnp.iscomplexobj(z):
-        return jnp.real(z), jnp.imag(z)
+        return z.real, z.imag
     return z, None
 
 
@@ -119,7 +121,7 @@ def conj(z: Number) -> Number:
     """Return the complex conjugate, of the same type."""
     if isinstance(z, Pair):
         return Pair(z.re, _minus(z.im))
-    return jnp.conj(z) if jnp.iscomplexobj(z) else z
+    return z.conjugate() if jnp.iscomplexobj(z) else z
 
 
 def abs2(z: Number) -> Any:
@@ -138,7 +140,7 @@ def times_i(z: Number) -> Number:
 
 def to_pair(z: Number) -> Number:
     """Convert a complex array to a `Pair`; return anything else unchanged."""
-    return Pair(jnp.real(z), jnp.imag(z)) if not isinstance(z, Pair) and jnp.iscomplexobj(z) else z
+    return Pair(z.real, z.imag) if not isinstance(z, Pair) and jnp.iscomplexobj(z) else z
 
 
 def to_complex(z: Number) -> Any:
@@ -150,35 +152,37 @@ def to_complex(z: Number) -> Any:
 
 
 def where(test: Any, yes: Number, no: Number) -> Number:
-    """Apply `jnp.where` part by part; a part that is absent on both sides stays absent."""
+    """Apply `where` part by part; a part that is absent on both sides stays absent."""
+    xp = namespace(test, yes, no)
     if not isinstance(yes, Pair) and not isinstance(no, Pair):
-        return jnp.where(test, yes, no)
+        return xp.where(test, yes, no)
     (a, b), (c, d) = parts(yes), parts(no)
 
     def pick(p, q):
-        return None if p is None and q is None else jnp.where(test, _or_zero(p), _or_zero(q))
+        return None if p is None and q is None else xp.where(test, _or_zero(p), _or_zero(q))
 
     return narrow(pick(a, c), pick(b, d))
 
 
-@jax.custom_jvp
+@custom_jvp
 def sqrt(z: Number) -> Number:
     """Return the square root with a nonnegative imaginary part: waves decay away from their source.
 
     A real array is a promise that no element is negative. At zero, where the true slope is infinite, the
     derivative returned is zero.
     """
+    xp = namespace(z)
     if not isinstance(z, Pair):
-        root = jnp.sqrt(z)
-        return jnp.where(jnp.imag(root) < 0, -root, root) if jnp.iscomplexobj(z) else root
+        root = xp.sqrt(z)
+        return xp.where(root.imag < 0, -root, root) if jnp.iscomplexobj(z) else root
     re, im = real(z), imag(z)
     # hypot keeps 1e-300 from vanishing in a square
-    size = jnp.hypot(re, im)
-    big = jnp.sqrt(0.5 * (size + jnp.abs(re)))
-    small = 0.5 * jnp.abs(im) / jnp.where(big == 0, 1.0, big)
+    size = xp.hypot(re, im)
+    big = xp.sqrt(0.5 * (size + xp.abs(re)))
+    small = 0.5 * xp.abs(im) / xp.where(big == 0, 1.0, big)
     across = re >= 0
-    root_re = jnp.where(across, big, small)
-    return Pair(jnp.where(im < 0, -root_re, root_re), jnp.where(across, small, big))
+    root_re = xp.where(across, big, small)
+    return Pair(xp.where(im < 0, -root_re, root_re), xp.where(across, small, big))
 
 
 @sqrt.defjvp

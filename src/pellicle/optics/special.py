@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import jax
 import jax.numpy as jnp
+
+from pellicle.optics.array_namespace import custom_jvp, fori_loop, namespace
 
 _STEP = 0.2
 _TERMS = 17
@@ -18,10 +19,10 @@ def _tiny(x: Any) -> Any:
     return 1e12 * jnp.finfo(jnp.result_type(float, x)).tiny
 
 
-@jax.custom_jvp
+@custom_jvp
 def log_abs(x: Any) -> Any:
     """Return ln|x|; at 0 a large negative number with slope zero, for use with a factor that vanishes."""
-    return 0.5 * jnp.log(x * x + _tiny(x))
+    return 0.5 * namespace(x).log(x * x + _tiny(x))
 
 
 @log_abs.defjvp
@@ -31,7 +32,7 @@ def _log_abs_slope(primals, tangents):
     return log_abs(x), x / (x * x + _tiny(x)) * dx
 
 
-@jax.custom_jvp
+@custom_jvp
 def dawson(x: Any) -> Any:
     """Return Dawson's integral exp(−x²) ∫₀ˣ exp(t²) dt of a real array, to 4e-16 of its maximum.
 
@@ -41,16 +42,17 @@ def dawson(x: Any) -> Any:
     >>> round(float(dawson(1.0)), 5)
     0.53808
     """
-    even = 2 * jnp.round(x / (2 * _STEP))
+    xp = namespace(x)
+    even = 2 * xp.round(x / (2 * _STEP))
     rest = x - even * _STEP
-    first = jnp.exp(2 * rest * _STEP)
+    first = xp.exp(2 * rest * _STEP)
     power, square, total = first, first * first, 0.0
     for i in range(_TERMS):
         odd = 2 * i + 1
         weight = math.exp(-((odd * _STEP) ** 2))
         total = total + weight * (power / (even + odd) + 1 / ((even - odd) * power))
         power = power * square
-    return jnp.exp(-rest * rest) * total / math.sqrt(math.pi)
+    return xp.exp(-rest * rest) * total / math.sqrt(math.pi)
 
 
 @dawson.defjvp
@@ -65,19 +67,20 @@ def arctan_over_root(u: Any, y: Any, x: Any) -> Any:
 
     Requires x > 0 wherever u ≤ 0.
     """
-    near = (x > 0) & (jnp.abs(u) * y * y < 1e-3 * x * x)
+    xp = namespace(u, y, x)
+    near = (x > 0) & (xp.abs(u) * y * y < 1e-3 * x * x)
     positive, negative = (u > 0) & ~near, (u < 0) & ~near
-    ratio = jnp.where(positive, 0.0, y) / jnp.where(positive, 1.0, x)
-    t = jnp.where(near, -u, 0.0) * ratio * ratio
+    ratio = xp.where(positive, 0.0, y) / xp.where(positive, 1.0, x)
+    t = xp.where(near, -u, 0.0) * ratio * ratio
     series = ratio * (1 + t * (1 / 3 + t * (1 / 5 + t * (1 / 7 + t * (1 / 9 + t / 11)))))
-    root = jnp.sqrt(jnp.where(positive, u, 1.0))
-    imaginary_root = jnp.sqrt(jnp.where(negative, -u, 1.0))
-    circular = jnp.arctan2(y * root, x) / root
-    hyperbolic = jnp.arctanh(jnp.where(negative, imaginary_root * ratio, 0.5)) / imaginary_root
-    return jnp.where(near, series, jnp.where(positive, circular, hyperbolic))
+    root = xp.sqrt(xp.where(positive, u, 1.0))
+    imaginary_root = xp.sqrt(xp.where(negative, -u, 1.0))
+    circular = xp.arctan2(y * root, x) / root
+    hyperbolic = xp.arctanh(xp.where(negative, imaginary_root * ratio, 0.5)) / imaginary_root
+    return xp.where(near, series, xp.where(positive, circular, hyperbolic))
 
 
-@jax.custom_jvp
+@custom_jvp
 def scaled_ei(x: Any) -> Any:
     """Return exp(−x) Ei(x) of a real array, Ei the exponential integral (a principal value for x > 0).
 
@@ -90,29 +93,30 @@ def scaled_ei(x: Any) -> Any:
     >>> round(float(scaled_ei(1.0)), 5)
     0.69717
     """
+    xp = namespace(x)
     near = (x > -2) & (x < 40)
-    inner = jnp.where(near, x, 1.0)
+    inner = xp.where(near, x, 1.0)
 
     def add(k, state):
         term, total = state
         term = term * inner / k
         return term, total + term / k
 
-    _, series = jax.lax.fori_loop(1, 160, add, (jnp.ones_like(inner), jnp.zeros_like(inner)))
-    middle = jnp.exp(-inner) * (_EULER + log_abs(inner) + series)
-    y = jnp.where(x <= -2, -x, 2.0)
+    _, series = fori_loop(1, 160, add, (xp.ones_like(inner), xp.zeros_like(inner)))
+    middle = xp.exp(-inner) * (_EULER + log_abs(inner) + series)
+    y = xp.where(x <= -2, -x, 2.0)
 
     def divide(i, below):
         k = 80 - i
         return y + 2 * k - 1 - k * k / below
 
     # 1/(y + 1 − 1/(y + 3 − 4/(y + 5 − ...)))
-    left = -1 / jax.lax.fori_loop(0, 80, divide, y + 161)
-    z = jnp.where(x >= 40, x, 40.0)
-    right = jnp.zeros_like(z)
+    left = -1 / fori_loop(0, 80, divide, y + 161)
+    z = xp.where(x >= 40, x, 40.0)
+    right = xp.zeros_like(z)
     for k in range(24, 0, -1):
         right = (1 + right) * k / z
-    return jnp.where(near, middle, jnp.where(x < 0, left, (1 + right) / z))
+    return xp.where(near, middle, xp.where(x < 0, left, (1 + right) / z))
 
 
 @scaled_ei.defjvp

@@ -8,10 +8,11 @@ from typing import Any, TypeAlias, final
 
 import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 import pellicle.dispersion
-from pellicle.dispersion.base import AbstractDispersion
+from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.dispersion.effective_medium import MIXTURES
 from pellicle.dispersion.empirical import Constant
 from pellicle.materials import Material, UnknownMaterial, material
@@ -74,7 +75,9 @@ def absorbs(dispersion: AbstractDispersion) -> bool:
     if isinstance(dispersion, Constant) and isinstance(dispersion.k, int | float) and dispersion.k == 0:
         return False
     numbers = insert(dispersion, start_values(dispersion))
-    return not is_real(jax.eval_shape(numbers.index, jax.ShapeDtypeStruct((1,), np.float32)))
+    # the type does not depend on the numbers, which may be tracers
+    zeros = jax.tree_util.tree_map(lambda x: np.zeros(np.shape(x), jnp.result_type(x)), numbers)
+    return not is_real(known_index(zeros, np.ones(1)))
 
 
 def ambient_medium(value: MediumLike) -> AbstractDispersion:

@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.dispersion.base import AbstractDispersion
+from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.dispersion.empirical import Tabulated
 from pellicle.effects.plan import Plan
 from pellicle.materials import materials_in
@@ -56,8 +56,9 @@ def _tabulated(dispersion: AbstractDispersion, wavelength: np.ndarray, slope: bo
         material.check_range(wavelength)
     if free_leaves(dispersion):
         return dispersion
-    index, rate = jax.device_get(_index_and_slope(dispersion, wavelength))
-    return Tabulated(wavelength, index, rate if slope else None)
+    if not slope:
+        return Tabulated(wavelength, known_index(dispersion, wavelength), None)
+    return Tabulated(wavelength, *jax.device_get(_index_and_slope(dispersion, wavelength)))
 
 
 @jax.jit

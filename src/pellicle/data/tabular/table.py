@@ -56,13 +56,12 @@ class Table:
         if self.layout.decimal == ",":
             rows = [row.replace(",", ".") for row in rows]
         try:
-            found = np.loadtxt(
-                rows, delimiter=delimiter, comments=None, quotechar='"', usecols=positions, ndmin=2, unpack=True
-            )
+            options = {"delimiter": delimiter, "comments": None, "quotechar": '"', "ndmin": 2}
+            found = np.loadtxt(rows, usecols=positions, **options).T
         except ValueError:  # a cell that is empty, missing or no number
             return self._numbers_by_cell(positions)
         if found.shape[1] == len(rows) and np.isfinite(found).all():
-            return list(found)
+            return [np.ascontiguousarray(column) for column in found]
         return self._numbers_by_cell(positions)
 
     def _numbers_by_cell(self, positions: Sequence[int]) -> list[np.ndarray]:

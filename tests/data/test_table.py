@@ -1,0 +1,66 @@
+"""Numbers of text files as pandas reads them."""
+
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pellicle.data.formats.detect import find_export
+from pellicle.data.tabular.table import read_table
+
+ROOT = Path(__file__).resolve().parents[2]
+FILES = [*(ROOT / "measurements").rglob("*nm*.csv"), *(ROOT / "measurements").rglob("*.txt")]
+
+
+def by_pandas(table):
+    """Every column."""
+    frame = pd.read_csv(
+        StringIO("\n".join(line.bare for line in table.layout.rows)),
+        sep=r"\s+" if table.layout.delimiter == " " else table.layout.delimiter,
+        header=None,
+        names=list(range(table.layout.raw_width)),
+        index_col=False,
+        decimal=table.layout.decimal,
+        skipinitialspace=True,
+    )
+    return [frame[i].to_numpy() for i in range(table.layout.width)]
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
+def test_measurements(path):
+    table = read_table(path, find_export)
+    expected = by_pandas(table)
+    plain = [
+        i for i, column in enumerate(expected) if column.dtype.kind in "fiu" and np.isfinite(column).all()
+    ]
+    assert plain
+    for own, other in zip(table.numbers(plain), [expected[i] for i in plain], strict=True):
+        np.testing.assert_array_equal(own, other)
+
+
+number = st.floats(-1e9, 1e9, allow_nan=False).map(lambda x: f"{x:.9g}") | st.integers(-99, 9999).map(str)
+
+
+@given(
+    rows=st.lists(st.tuples(number, number, number), min_size=2, max_size=6),
+    delimiter=st.sampled_from([",", ";", "\t", " ", ", ", ";  "]),
+    comma=st.booleans(),
+    quoted=st.booleans(),
+    closed=st.booleans(),
+)
+def test_delimiters_decimals_and_quotes(tmp_path_factory, rows, delimiter, comma, quoted, closed):
+    mark = delimiter.strip() or delimiter
+    comma = comma and mark != ","
+    quoted = quoted and mark != " "
+    rows = [[cell.replace(".", ",") if comma else cell for cell in row] for row in rows]
+    end = mark if closed and mark != " " else ""
+    lines = [delimiter.join(f'"{cell}"' if quoted else cell for cell in row) + end for row in rows]
+    path = tmp_path_factory.mktemp("table") / "rows.csv"
+    path.write_text("\n".join(lines))
+    table = read_table(path)
+    for own, other in zip(table.numbers([0, 1, 2]), by_pandas(table), strict=False):
+        np.testing.assert_array_equal(own, other)

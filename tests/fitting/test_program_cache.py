@@ -1,0 +1,193 @@
+"""Programs kept between processes: which files are loaded, which are not."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from pellicle.fitting import executables, private_files, program_cache
+from pellicle.fitting.program_cache import kept
+
+pytestmark = pytest.mark.skipif(not hasattr(os, "geteuid"), reason="files have no owners")
+
+KEY = b"key of one program"
+VECTOR = [jax.ShapeDtypeStruct((3,), np.float64)]
+
+
+@pytest.fixture
+def path(tmp_path) -> Path:
+    """A program x + 1 that is kept."""
+    path = tmp_path / "programs" / "one"
+    assert executables.make(path, KEY, lambda x: [x + 1], VECTOR, tmp_path) is not None
+    return path
+
+
+def test_a_kept_program_computes_what_was_compiled(path):
+    program = executables.load(path, KEY)
+    assert program is not None
+    np.testing.assert_array_equal(program(np.arange(3.0))[0], [1, 2, 3])
+
+
+def test_a_program_that_calls_lapack_runs_in_a_new_process(tmp_path):
+    """Without the initialisation of LAPACK that process is killed by a signal."""
+    path, matrix = tmp_path / "programs" / "one", [jax.ShapeDtypeStruct((2, 2), np.float64)]
+    assert executables.make(path, KEY, lambda x: [jnp.linalg.cholesky(x)], matrix, tmp_path) is not None
+    code = (
+        "import sys, pathlib, jax, numpy as np; jax.config.update('jax_enable_x64', True)\n"
+        "from pellicle.fitting import executables\n"
+        f"program = executables.load(pathlib.Path({str(path)!r}), {KEY!r})\n"
+        "print(float(np.asarray(program(np.array([[4.0, 2.0], [2.0, 5.0]]))[0]).sum()))"
+    )
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (ran.returncode, ran.stdout.strip(), ran.stderr) == (0, "5.0", "")
+
+
+def test_a_file_or_folder_that_others_can_write_is_not_loaded(path):
+    for place in (path, path.parent):
+        mode = place.stat().st_mode
+        for bit in (0o020, 0o002):
+            place.chmod(mode | bit)
+            assert executables.load(path, KEY) is None
+        place.chmod(mode)
+    assert executables.load(path, KEY) is not None
+
+
+def test_a_file_or_folder_of_another_user_is_not_loaded(path, monkeypatch):
+    owner = os.stat(path).st_uid
+    monkeypatch.setattr(os, "geteuid", lambda: owner + 1)
+    assert executables.load(path, KEY) is None
+    assert executables.make(path, KEY, lambda x: [x + 1], VECTOR, path.parent) is None
+
+
+@pytest.mark.skipif(os.name != "posix" or os.geteuid() != 0, reason="only root can give files away")
+def test_a_file_that_was_given_away_is_not_loaded(path):
+    os.chown(path, 12345, -1)
+    assert executables.load(path, KEY) is None
+    os.chown(path, 0, -1)
+    os.chown(path.parent, 12345, -1)
+    assert executables.load(path, KEY) is None
+
+
+def test_a_symbolic_link_is_not_followed(path):
+    link = path.with_name("two")
+    link.symlink_to(path)
+    assert executables.load(link, KEY) is None
+    folder = path.parent.with_name("linked")
+    folder.symlink_to(path.parent)
+    assert executables.load(folder / path.name, KEY) is None
+    assert not private_files.make_folder(folder)
+
+
+def test_a_pipe_does_not_stop_the_process(path):
+    pipe = path.with_name("pipe")
+    os.mkfifo(pipe, 0o600)
+    assert executables.load(pipe, KEY) is None
+
+
+def test_a_damaged_file_or_one_of_another_key_is_not_loaded(path, monkeypatch):
+    whole = path.read_bytes()
+    unpickled = []
+    monkeypatch.setattr(executables.pickle, "loads", unpickled.append)
+    assert executables.load(path, b"another key") is None
+    for damaged in (b"", whole[:20], whole[:-1], whole[:1000] + bytes([whole[1000] ^ 1]) + whole[1001:]):
+        path.write_bytes(damaged)
+        assert executables.load(path, KEY) is None
+    assert not unpickled
+
+
+def test_what_cannot_be_deserialised_is_not_loaded(path):
+    body = executables.pickle.dumps((False, (b"no program", None, None)))
+    path.write_bytes(executables._digest(KEY, body) + body)
+    assert executables.load(path, KEY) is None
+
+
+def test_the_oldest_files_make_room(tmp_path):
+    folder = tmp_path / "programs"
+    assert private_files.make_folder(folder)
+    for age, name in enumerate(["new", "older", "oldest"]):
+        private_files.write(folder / name, bytes(100), 1000)
+        os.utime(folder / name, (1e9 - age, 1e9 - age))
+    private_files.write(folder / "last", bytes(100), 250)
+    assert {file.name for file in folder.iterdir()} == {"new", "last"}
+
+
+class Sum(NamedTuple):
+    total: Any
+
+
+TRACED = []
+
+
+@kept
+def scaled(factor: float, x: Any) -> Sum:
+    TRACED.append(factor)
+    return Sum(factor * jnp.sum(x))
+
+
+@pytest.fixture
+def new_process():
+    """Forget the programs of this process, as a new one would."""
+    TRACED.clear()
+    program_cache._load.cache_clear()
+    yield program_cache._load.cache_clear
+    program_cache._load.cache_clear()
+
+
+@pytest.fixture
+def cache(tmp_path):
+    before = jax.config.values["jax_compilation_cache_dir"]
+    jax.config.update("jax_compilation_cache_dir", str(tmp_path))
+    yield tmp_path
+    jax.config.update("jax_compilation_cache_dir", before)
+
+
+def test_a_program_is_traced_once_in_all_processes(cache, new_process):
+    for _ in range(3):
+        assert scaled(2, np.arange(4.0)).total == 12
+        assert scaled(2, np.arange(4.0)).total == 12
+        new_process()
+    assert TRACED == [2]
+
+
+def test_a_program_is_kept_by_its_plan_its_shapes_and_the_settings(cache, new_process, monkeypatch):
+    scaled(2, np.arange(4.0))
+    assert scaled(3, np.arange(4.0)).total == 18
+    assert scaled(2, np.arange(5.0)).total == 20
+    assert scaled(2, np.arange(4.0, dtype=np.float32)).total.dtype == np.float32
+    assert len(TRACED) == 4
+    for change in ({"XLA_FLAGS": "--xla_cpu_max_isa=AVX"}, {"XLA_FLAGS": ""}):
+        monkeypatch.setenv(*next(iter(change.items())))
+        new_process()
+        scaled(2, np.arange(4.0))
+    assert len(TRACED) == 6
+    monkeypatch.setattr(program_cache, "_hardware", lambda: "another CPU")
+    new_process()
+    scaled(2, np.arange(4.0))
+    assert len(TRACED) == 7
+
+
+def test_without_owners_the_traced_program_is_kept(cache, new_process, monkeypatch):
+    monkeypatch.delattr(os, "geteuid")
+    for _ in range(2):
+        assert scaled(2, np.arange(4.0)).total == 12
+        new_process()
+    assert TRACED == [2]
+    assert [file.suffix for file in (cache / "programs").iterdir()] == [".export"]
+
+
+def test_in_a_folder_of_others_the_traced_program_is_kept(cache, new_process):
+    (cache / "programs").mkdir()
+    (cache / "programs").chmod(0o777)
+    for _ in range(2):
+        assert scaled(2, np.arange(4.0)).total == 12
+        new_process()
+    assert TRACED == [2]
+    assert [file.suffix for file in (cache / "programs").iterdir()] == [".export"]
