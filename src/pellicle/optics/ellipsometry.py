@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
+from pellicle.optics.hoisting import compute_once
 from pellicle.optics.pair import abs2, conj, imag, real, to_complex
 from pellicle.optics.response import Response, transmittance
 
@@ -31,7 +32,8 @@ class Stokes(NamedTuple):
 
 def stokes(s: Response, p: Response) -> Stokes:
     """Return the Stokes sums of light reflected by layers, from their responses to s and p."""
-    rs, rp = s.reflected / s.denominator, p.reflected / p.denominator
+    # stored, as complex arrays that one loop computes: else each sum computes both again
+    rs, rp = (compute_once(to_complex(x.reflected / x.denominator)) for x in (s, p))
     both = 2 * (conj(rp) * rs)
     return Stokes(abs2(rs) - abs2(rp), real(both), imag(both), abs2(rs) + abs2(rp))
 

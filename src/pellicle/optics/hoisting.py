@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import jax
@@ -28,12 +29,34 @@ def hoist(value: Number, grid: Any) -> Number:
     if not is_reused(value, grid):
         return value
     leaves, tree = jax.tree.flatten(value)
-    with set_xla_metadata(inlineable="false"):
-        # as one array: with many, the compiler gives up on vector instructions
-        rows = _identity(jnp.stack(jnp.broadcast_arrays(*leaves)))
+    # as one array: with many, the compiler gives up on vector instructions
+    rows = compute_once(jnp.stack(jnp.broadcast_arrays(*leaves)))
     return jax.tree.unflatten(tree, list(rows))
 
 
+@jax.custom_jvp
+def compute_once(value: Any) -> Any:
+    """Return `value` unchanged, stored where it is computed and loaded wherever it is used."""
+    with set_xla_metadata(inlineable="false"):
+        return _identity(value)
+
+
+@compute_once.defjvp
+def _compute_slope_once(primal: Any, tangent: Any) -> tuple[Any, Any]:
+    return compute_once(primal[0]), compute_once(tangent[0])
+
+
 @jax.jit
-def _identity(rows: Any) -> Any:
-    return rows
+def _identity(value: Any) -> Any:
+    return value
+
+
+def not_inlined(function: Callable[..., Any], *arguments: Any) -> Any:
+    """Return function(*arguments), compiled apart: its arguments and results are stored."""
+
+    def inside(*arguments: Any) -> Any:
+        with set_xla_metadata(inlineable=None):
+            return function(*arguments)
+
+    with set_xla_metadata(inlineable="false"):
+        return jax.jit(inside)(*arguments)

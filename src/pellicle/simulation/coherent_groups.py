@@ -17,22 +17,16 @@ from pellicle.scene.layers import Layer
 
 
 class CoherentGroup(NamedTuple):
-    """Coherent layers between two thick media: their indices at each wavelength, of the types that the plan
-    needs, and their phases."""
+    """Coherent layers between two thick media: numbers at each wavelength, of the types the plan needs."""
 
-    scene: Scene
-    group: Group
     above: Number
     layers: list[Number]
     below: Number
     phases: list[Any]
     angle: Any  # of incidence in radians; None is normal, `Inside` within a plate
     internal: Any  # internal transmittance of the plate below, None on a half space
-
-    @property
-    def rough(self) -> bool:
-        """True where any of its faces is rough."""
-        return any(face is not None for face in self.group.roughness)
+    roughness: list[Any] | None  # k₀σ of each face, None where all are smooth
+    phase_variance: Any  # of the round-trip phase, None without damped orders
 
 
 def coherent_groups(plan: Plan, scene: Scene) -> list[CoherentGroup]:
@@ -51,13 +45,26 @@ def coherent_groups(plan: Plan, scene: Scene) -> list[CoherentGroup]:
         if i < len(plates):
             extinction = imag(interface.normal(thick[i + 1], a))
             internal = plate.internal_transmittance(extinction, plates[i].plate_mm, wavelength)
-        layers = [_layer_index(plan, layer, wavelength) for layer in group.layers]
-        phases = [2 * jnp.pi / wavelength * layer.thickness for layer in group.layers]
-        incidence = angle if i == 0 or angle is None else interface.Inside(a)
         evaluated.append(
-            CoherentGroup(scene, group, thick[i], layers, thick[i + 1], phases, incidence, internal)
+            CoherentGroup(
+                above=thick[i],
+                layers=[_layer_index(plan, layer, wavelength) for layer in group.layers],
+                below=thick[i + 1],
+                phases=[2 * jnp.pi / wavelength * layer.thickness for layer in group.layers],
+                angle=angle if i == 0 or angle is None else interface.Inside(a),
+                internal=internal,
+                roughness=_roughness(group, wavelength),
+                phase_variance=_phase_variance(plan, scene, group, angle),
+            )
         )
     return evaluated
+
+
+def _roughness(group: Group, wavelength: Any) -> list[Any] | None:
+    if all(face is None for face in group.roughness):
+        return None
+    wavenumber = 2 * jnp.pi / wavelength
+    return [0.0 if face is None else wavenumber * face for face in group.roughness]
 
 
 def _layer_index(plan: Plan, layer: Layer, wavelength: Any) -> Number:
@@ -95,7 +102,7 @@ class _Powers(NamedTuple):
 
 
 def _powers(plan: Plan, group: CoherentGroup, polarisation: str) -> _Powers:
-    if not group.layers and not group.rough:
+    if not group.layers and group.roughness is None:
         return _bare_face(group, polarisation)
     if plan.on("orders"):
         return _damped_orders(plan, group, polarisation)
@@ -116,8 +123,6 @@ def _bare_face(group: CoherentGroup, polarisation: str) -> _Powers:
 
 def response_of(plan: Plan, group: CoherentGroup, polarisation: str) -> response.Response:
     """The response of a group to one polarisation."""
-    wavenumber = 2 * jnp.pi / group.scene.light.wavelength
-    faces = [0.0 if x is None else wavenumber * x for x in group.group.roughness] if group.rough else None
     (group_response,) = coherent.responses(
         group.above,
         group.layers,
@@ -126,7 +131,7 @@ def response_of(plan: Plan, group: CoherentGroup, polarisation: str) -> response
         group.angle,
         polarisation,
         propagating=not plan.on("tunnelling"),
-        roughness=faces,
+        roughness=group.roughness,
     )
     return group_response
 
@@ -135,8 +140,8 @@ def _damped_orders(plan: Plan, group: CoherentGroup, polarisation: str) -> _Powe
     """Sums of orders of interference, each damped by the instrument."""
     layer = interface.allow_tunnelling(group.layers[0]) if plan.on("tunnelling") else group.layers[0]
     series = orders.airy_series(group.above, layer, group.below, group.phases[0], group.angle, polarisation)
-    widths = (group.scene.instrument.bandwidth, thickness_spread(group.scene, group.group.layers[0]))
-    window = orders.monochromatic if widths == (None, None) else orders.gaussian(_phase_variance(plan, group))
+    damped = group.phase_variance is not None
+    window = orders.gaussian(group.phase_variance) if damped else orders.monochromatic
     count = plan.row("orders").count
     from_below = orders.reversed_series(series)
     return _Powers(
@@ -146,10 +151,14 @@ def _damped_orders(plan: Plan, group: CoherentGroup, polarisation: str) -> _Powe
     )
 
 
-def _phase_variance(plan: Plan, group: CoherentGroup):
-    """Variance of the round-trip phase from the bandwidth and the thickness spread."""
-    scene, layer = group.scene, group.group.layers[0]
-    angle = None if group.angle is None else jnp.deg2rad(scene.light.angle)
+def _phase_variance(plan: Plan, scene: Scene, group: Group, angle: Any) -> Any:
+    """Variance of the round-trip phase from bandwidth and thickness spread; None without damped orders."""
+    if not plan.on("orders") or not group.layers:
+        return None
+    layer = group.layers[0]
+    widths = (scene.instrument.bandwidth, thickness_spread(scene, layer))
+    if widths == (None, None):
+        return None
     wavelength = scene.light.wavelength
 
     def cosine_index(at):
@@ -162,6 +171,5 @@ def _phase_variance(plan: Plan, group: CoherentGroup):
         return 4 * jnp.pi / at * cosine_index(at) * layer.thickness
 
     _, slope = jax.jvp(phase, (wavelength,), (jnp.ones_like(wavelength),))
-    widths = (scene.instrument.bandwidth, thickness_spread(scene, layer))
     bandwidth, spread = (0.0 if width is None else width for width in widths)
     return orders.phase_variance(slope, bandwidth, cosine_index(wavelength), spread, wavelength)

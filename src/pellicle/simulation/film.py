@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import equinox as eqx
@@ -17,6 +17,7 @@ from pellicle.effects.plan import Plan
 from pellicle.materials import materials_in
 from pellicle.optics import ellipsometry, plate
 from pellicle.optics.layout import stack_rows
+from pellicle.optics.pointwise import pointwise
 from pellicle.scene.film import Scene, thickness_spread
 from pellicle.scene.free import free_leaves
 from pellicle.scene.layers import Interface, Layer
@@ -75,20 +76,28 @@ def build(plan: Plan) -> Simulate:
     is pure and can be traced.
     """
     ellipsometric = plan.signal == "psi-delta"
-    intensities = _ellipsometer(plan) if ellipsometric else _photometer(plan)
+    powers = partial(_stokes_rows if ellipsometric else _power_rows, plan)
+    finish = _normalised_rows if ellipsometric else _mean
+    averaged = plan.row("coherence").count or plan.on("angle-spread")
+    at_each_wavelength = powers if averaged else lambda groups: finish(powers(groups))
+
+    def monochromatic(scene: Scene, /) -> Any:
+        return pointwise(at_each_wavelength, coherent_groups(plan, scene))
+
+    intensities: Intensities = monochromatic
     if plan.row("coherence").count:
         intensities = _averaged(intensities, plan.row("coherence").count)
     if plan.on("angle-spread"):
         cone = plan.row("angle-spread")
         mix = instrument.unmixed if ellipsometric else instrument.mixed(plan.polarisation)
         intensities = instrument.over_cone(intensities, cone.count, cone.around, mix)
-    finish = _normalised_stokes if ellipsometric else _mean
 
     def simulate(scene: Scene) -> Any:
         scene = _shifted(scene)
         for remove in plan.left_out:
             scene = remove(scene)
-        return finish(intensities(scene))
+        rows = finish(intensities(scene)) if averaged else intensities(scene)
+        return rows.T.reshape(-1) if ellipsometric else rows
 
     return simulate
 
@@ -124,38 +133,28 @@ def _mean(rows: Any) -> Any:
     return rows[0] if len(rows) == 1 else 0.5 * (rows[0] + rows[1])
 
 
-def _normalised_stokes(rows: Any) -> Any:
-    """N, C and S of each wavelength in one array."""
-    return stack_rows(ellipsometry.normalised(ellipsometry.Stokes(*rows))).T.reshape(-1)
+def _normalised_rows(rows: Any) -> Any:
+    """N, C and S, (3, wavelengths)."""
+    return stack_rows(ellipsometry.normalised(ellipsometry.Stokes(*rows)))
 
 
-def _photometer(plan: Plan) -> Intensities:
+def _power_rows(plan: Plan, groups: list[CoherentGroup]) -> Any:
     """R or T of one polarisation, or of both, (polarisations, wavelengths)."""
     power = reflected if plan.signal == "R" else transmitted
     polarisations = "sp"
     if not plan.on("polarisation"):
         one = plan.on("oblique") and plan.polarisation != "unpolarised"
         polarisations = plan.polarisation if one else "s"
-
-    def intensities(scene: Scene):
-        groups = coherent_groups(plan, scene)
-        return stack_rows([power(plan, groups, p) for p in polarisations])
-
-    return intensities
+    return stack_rows([power(plan, groups, p) for p in polarisations])
 
 
-def _ellipsometer(plan: Plan) -> Intensities:
+def _stokes_rows(plan: Plan, groups: list[CoherentGroup]) -> Any:
     """Stokes parameters before normalisation, (4, wavelengths)."""
-
-    def intensities(scene: Scene):
-        groups = coherent_groups(plan, scene)
-        if len(groups) == 1:
-            s, p = (response_of(plan, groups[0], polarisation) for polarisation in "sp")
-            return stack_rows(ellipsometry.stokes(s, p))
-        s, p = (reflected(plan, groups, polarisation) for polarisation in "sp")
-        return stack_rows(ellipsometry.stokes_from_sums(s, p, _cross_product(plan, groups)))
-
-    return intensities
+    if len(groups) == 1:
+        s, p = (response_of(plan, groups[0], polarisation) for polarisation in "sp")
+        return stack_rows(ellipsometry.stokes(s, p))
+    s, p = (reflected(plan, groups, polarisation) for polarisation in "sp")
+    return stack_rows(ellipsometry.stokes_from_sums(s, p, _cross_product(plan, groups)))
 
 
 def _cross_product(plan: Plan, groups: list[CoherentGroup]):

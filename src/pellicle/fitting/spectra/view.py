@@ -16,6 +16,7 @@ from pellicle.fitting.problem import Explained, Noise
 from pellicle.fitting.program_cache import kept
 from pellicle.fitting.spectra import nuisance
 from pellicle.fitting.spectra.nuisance import Coefficient, Data
+from pellicle.optics.hoisting import compute_once
 from pellicle.optics.layout import stack_rows
 from pellicle.planning.differences import largest_difference, signals
 from pellicle.planning.film import full_plan
@@ -59,7 +60,9 @@ class SpectrumForm:
     def explain(self, arrays: tuple[Scene, Data], values: Any, /) -> Explained:
         """The spectrum with the free parameters of its scene at `values`."""
         scene, data = arrays
-        solved = nuisance.solve(self.simulate(insert(scene, values), data), data, scene.instrument)
+        # stored: fused into sums over the points, the simulation runs in scalar loops
+        signal = compute_once(self.simulate(insert(scene, values), data))
+        solved = nuisance.solve(signal, data, scene.instrument)
         return Explained(solved.model, solved.residual, solved.deviance)
 
 
