@@ -5,6 +5,7 @@ Apart from the solver, which imports Optimistix: a cached program needs no solve
 
 from __future__ import annotations
 
+import jax
 import jax.numpy as jnp
 from jax.scipy.linalg import cho_solve
 
@@ -40,3 +41,71 @@ def _unrolled(matrix, b):
     for i in reversed(range(n)):
         x[i] = (z[i] - sum(lower[k, i] * x[k] for k in range(i + 1, n))) / lower[i, i]
     return jnp.stack(x)
+
+
+def nonnegative(matrix, b, bounded, slack: float):
+    """Minimise ½ xᵀ `matrix` x − bᵀ x with x ≥ 0 where `bounded`, for a positive definite matrix.
+
+    Block principal pivoting: all variables that violate their sign or that of their slope change sides at
+    once; where that no longer reduces their number, only the last of them, which ends in any case. Most
+    problems take one or two rounds, however many variables are bounded.
+
+    **Arguments:** `matrix` (n, n); `b` (n,); `bounded` (n,) booleans; `slack`, by which a variable may be
+    negative before it counts as violating.
+
+    **Returns:** the inverse of the matrix of the free variables, with zeros for those held at zero, and x.
+
+    **Source:** J. Kim and H. Park, SIAM J. Sci. Comput. 33, 3261 (2011).
+    """
+    n, position = len(b), jnp.arange(len(b))
+
+    def solved(free):
+        inverse = _inverse(matrix, free)
+        x = inverse @ b
+        return inverse, x + inverse @ (b - matrix @ x)
+
+    def violating(free, x):
+        slope = matrix @ x - b
+        rounding = 64 * jnp.finfo(x.dtype).eps * (jnp.abs(matrix) @ jnp.abs(x) + jnp.abs(b))
+        return bounded & jnp.where(free, x < -slack, slope < -rounding)
+
+    def unfinished(state):
+        *_, count, rounds = state
+        return (count > 0) & (rounds < 8 * n)
+
+    def exchange(state):
+        free, _, _, fewest, patience, _, rounds = state
+        inverse, x = solved(free)
+        wrong = violating(free, x)
+        count = jnp.sum(wrong)
+        patience = jnp.where(count < fewest, 3, patience - 1)
+        last = position == jnp.max(jnp.where(wrong, position, -1))
+        free = free ^ (wrong & (last | (patience > 0)))
+        return free, inverse, x, jnp.minimum(count, fewest), patience, count, rounds + 1
+
+    free = jnp.ones(n, bool)
+    if not any(bounded):
+        return solved(free)
+    start = (free, jnp.zeros_like(matrix), jnp.zeros_like(b), n + 1, 3, n, 0)
+    _, inverse, x, *_ = jax.lax.while_loop(unfinished, exchange, start)
+    return inverse, x
+
+
+def _inverse(matrix, free):
+    """Inverse of the rows and columns of `matrix` that are `free`, zero elsewhere, by the sweep operator."""
+    size = jax.lax.rsqrt(jnp.diagonal(matrix))
+    scaled = matrix * size * size[:, None]
+    position, tiny = jnp.arange(len(scaled)), jnp.finfo(scaled.dtype).tiny
+
+    def sweep(k, scaled):
+        row, column = position[:, None] == k, position == k
+        across = jnp.sum(jnp.where(row, scaled, 0.0), axis=0)
+        inverse = 1 / jnp.maximum(jnp.sum(jnp.where(column, across, 0.0)), tiny)
+        ratio = across * inverse
+        swept = scaled - across[:, None] * ratio
+        swept = jnp.where(row, ratio, jnp.where(column, ratio[:, None], swept))
+        swept = jnp.where(row & column, -inverse, swept)
+        return jnp.where(jnp.any(free & column), swept, scaled)
+
+    swept = jax.lax.fori_loop(0, len(scaled), sweep, scaled)
+    return jnp.where(free & free[:, None], -swept * size * size[:, None], 0.0)

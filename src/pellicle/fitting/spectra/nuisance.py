@@ -8,7 +8,6 @@ Gaussian model: Bishop 2006, section 3.5). Physical signs: o ≥ 0 is imposed, g
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import comb
@@ -17,19 +16,16 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.scipy.linalg import cho_factor, cho_solve
 from jaxtyping import ScalarLike
 
 from pellicle.fitting.coordinates import Array
-from pellicle.optics.layout import stack_rows
+from pellicle.fitting.positive_definite import nonnegative
 from pellicle.scene.instrument import Drift, Instrument
 
 _LOOSE = 10.0
 """Prior standard deviation of a single free number, in units of its expected size: next to no prior."""
-_STIFF = 1e8
-"""Weight that holds an offset at zero where it would turn negative."""
 _SLACK = 1e-6
-"""Tolerance below zero, in units of the signal's level, of an offset fixed at zero."""
+"""Tolerance below zero, in units of the signal's level, of an offset that is not held at zero."""
 
 
 class Data(NamedTuple):
@@ -76,44 +72,65 @@ def chebyshev(position, degree: int) -> list:
 def solve(signal, data: Data, instrument: Instrument) -> Solved:
     """The best scale and offset for a simulated signal, and the deviance."""
     weight = data.weight * jnp.sqrt(data.independent_fraction)
-    square, one = weight * weight, jnp.ones_like(signal)
-    # the plain scale, which a single free number would have
-    plain = jnp.sum(square * data.values * signal) / (jnp.sum(square * signal * signal) + 1e-30)
-    gains = _series(instrument.scale, scale_prior, plain, data)
-    shifts = _series(instrument.offset, offset_prior, data.level, data)
-    known = gains.known * signal + shifts.known * one
-    columns = [*(g * signal for g in gains.basis), *shifts.basis]
-    if not columns:
-        residual = weight * (data.values - known)
+    gains, shifts = (
+        _series(instrument.scale, scale_prior, data),
+        _series(instrument.offset, offset_prior, data),
+    )
+    first = len(gains.mean)
+    known = gains.known * signal + shifts.known * jnp.ones_like(signal)
+    rest = data.values - known
+    if not first and not len(shifts.mean):
+        residual = weight * rest
+        one = jnp.ones_like(signal)
         return Solved(known, residual, gains.known * one, shifts.known * one, jnp.sum(residual**2))
-    columns, first = stack_rows(columns), len(gains.basis)
+    # sums over the points are products with terms and pairs of them that all candidates share
+    square = weight * weight
+    on_signal = square * signal
+    across = _sums(on_signal, gains.terms, shifts.terms)
+    gram = jnp.block(
+        [
+            [_sums(on_signal * signal, gains.terms, gains.terms), across],
+            [across.T, _sums(square, shifts.terms, shifts.terms)],
+        ]
+    )
+    projected = jnp.concatenate([gains.terms @ (on_signal * rest), shifts.terms @ (square * rest)])
+    # the plain scale, which a single free number would have
+    plain = jnp.sum(on_signal * data.values) / (jnp.sum(on_signal * signal) + 1e-30)
+    unit = jnp.concatenate([jnp.full(first, plain), jnp.full(len(shifts.mean), data.level)])
     mean, sd = np.concatenate([gains.mean, shifts.mean]), np.concatenate([gains.sd, shifts.sd])
-    weighted = columns * weight, weight * (data.values - known)
-    coefficients, log_determinant = _project(*weighted, mean, sd, len(shifts.basis))
-    model = known + coefficients @ columns
+    coefficients, log_determinant = _project(
+        gram * unit * unit[:, None], projected * unit, mean, sd, len(shifts.mean)
+    )
+    in_units = coefficients * unit
+    gain = gains.known + in_units[:first] @ gains.terms
+    shift = shifts.known + in_units[first:] @ shifts.terms
+    model = gain * signal + shift
     residual = jnp.concatenate([weight * (data.values - model), (coefficients - mean) / sd])
-    gain = coefficients[:first] @ jnp.stack(gains.basis) if gains.basis else gains.known * one
-    shift = coefficients[first:] @ jnp.stack(shifts.basis) if shifts.basis else shifts.known * one
     negative = jnp.where(jnp.min(jnp.where(weight > 0, gain, jnp.inf)) > 0, 0.0, 1e9)
     return Solved(model, residual, gain, shift, log_determinant + jnp.sum(residual**2) + negative)
+
+
+def _sums(weight, left, right):
+    """Σ weight · left · right over the points, for all terms (terms, points) of both sides."""
+    return jnp.einsum("p,ijp->ij", weight, left[:, None] * right)
 
 
 class _Series(NamedTuple):
     """Functions of wavelength with a normal prior on their coefficients, and the number that is `known`."""
 
-    basis: list
+    terms: Array  # (terms, points)
     mean: np.ndarray
     sd: np.ndarray
     known: ScalarLike
 
 
 def _series(
-    number: ScalarLike | Drift, prior: Callable[[Drift], tuple[np.ndarray, np.ndarray]], unit: Any, data: Data
+    number: ScalarLike | Drift, prior: Callable[[Drift], tuple[np.ndarray, np.ndarray]], data: Data
 ) -> _Series:
-    """A nuisance as Chebyshev terms times `unit`, or as a known number without terms."""
+    """A nuisance as Chebyshev terms, or as a known number without terms."""
     if not isinstance(number, Drift):
-        return _Series([], np.zeros(0), np.zeros(0), number)
-    return _Series([unit * t for t in chebyshev(data.position, number.degree)], *prior(number), 0.0)
+        return _Series(jnp.zeros((0, len(data.position))), np.zeros(0), np.zeros(0), number)
+    return _Series(jnp.stack(chebyshev(data.position, number.degree)), *prior(number), 0.0)
 
 
 def scale_prior(drift: Drift) -> tuple[np.ndarray, np.ndarray]:
@@ -158,44 +175,28 @@ def coefficients(
     return result
 
 
-def _project(rows, values, mean: np.ndarray, sd: np.ndarray, offsets: int):
-    """Coefficients of the weighted rows under their prior, of which the last `offsets` are those of the
-    offset, and the deviance's log-determinant."""
-    precision = np.diag(1 / sd**2)
-    matrix = rows @ rows.T + precision
-    target = rows @ values + precision @ mean
-    stiffness = _stiffness(*jax.lax.stop_gradient((matrix, target)), offsets)
-    factor = cho_factor(jax.lax.stop_gradient(matrix) + stiffness)
-    coefficients = cho_solve(factor, jax.lax.stop_gradient(target))
-    # adds nothing, but carries the implicit derivative A⁻¹(db − dA x): no factorisation is differentiated
-    coefficients = coefficients + cho_solve(factor, target - (matrix + stiffness) @ coefficients)
+def _project(gram, projected, mean: np.ndarray, sd: np.ndarray, offsets: int):
+    """Coefficients under their prior, of which the last `offsets` are those of the offset, and the deviance's
+    log-determinant.
+
+    The offset is kept nonnegative through its Bernstein coefficients: enough, and for so low a degree little
+    more than needed. Which of them are zero counts as a constant.
+    """
+    matrix = gram + np.diag(1 / sd**2)
+    to_chebyshev = np.eye(len(mean))
+    if offsets:
+        to_chebyshev[-offsets:, -offsets:] = _from_bernstein(offsets)
+    own = to_chebyshev.T @ matrix @ to_chebyshev, to_chebyshev.T @ (projected + mean / sd**2)
+    not_negative = np.arange(len(mean)) >= len(mean) - offsets
+    inverse, start = nonnegative(*jax.lax.stop_gradient(own), not_negative, _SLACK)
+    # adds nothing but a rounding error, and carries the implicit derivative A⁻¹(db − dA x)
+    coefficients = to_chebyshev @ (start + inverse @ (own[1] - own[0] @ start))
     _, log_determinant = jnp.linalg.slogdet(matrix)
     return coefficients, log_determinant + 2 * float(np.sum(np.log(sd)))
 
 
-def _stiffness(matrix, target, count: int):
-    """Matrix to add so that the offset's solution is nowhere negative.
-
-    The offset, the last `count` coefficients, is kept nonnegative through its Bernstein coefficients
-    (enough, and for so low a degree little more than needed). There are few of them, so every set that could
-    be zero is tried and the best feasible one is the exact solution of this convex problem: it moves
-    continuously with the data, as a solver needs. Which set it is counts as a constant.
-    """
-    if not count:
-        return jnp.zeros_like(matrix)
+def _from_bernstein(count: int) -> np.ndarray:
+    """Matrix from Bernstein coefficients to Chebyshev coefficients on −1..1 of the same degree."""
     degree, points = count - 1, np.linspace(0.0, 1.0, count)
     values = [[comb(degree, i) * t**i * (1 - t) ** (degree - i) for i in range(count)] for t in points]
-    # from Chebyshev coefficients on −1..1 to Bernstein coefficients of the same degree
-    bernstein = np.linalg.solve(values, np.polynomial.chebyshev.chebvander(2 * points - 1, degree))
-    rows = jnp.zeros((count, matrix.shape[0])).at[:, -count:].set(bernstein)
-    zero = np.array(list(itertools.product((0.0, 1.0), repeat=count)))
-    stiff = _STIFF * jnp.trace(matrix) * jnp.einsum("si,ip,iq->spq", zero, rows, rows)
-
-    def trial(stiffness):
-        coefficients = cho_solve(cho_factor(matrix + stiffness), target)
-        feasible = jnp.all(rows @ coefficients >= -_SLACK)
-        return jnp.where(
-            feasible, coefficients @ (matrix @ coefficients) - 2 * target @ coefficients, jnp.inf
-        )
-
-    return stiff[jnp.argmin(jax.vmap(trial)(stiff))]
+    return np.linalg.solve(np.polynomial.chebyshev.chebvander(2 * points - 1, degree), values)
