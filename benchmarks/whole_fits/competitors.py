@@ -80,6 +80,7 @@ SCANNED = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
 COMPETITORS = (
     Competitor("SciPy, scan", "starts", SCANNED, _scipy),
     Competitor("lmfit, scan", "starts", SCANNED, _lmfit),
+    Competitor("SciPy, 16 minima", "starts", (16,), _scipy),  # for the rivals that pl.fit lists
     Competitor("SciPy, random", "starts", (4, 8, 16, 32, 64, 128), _random_starts),
     Competitor("SciPy, evolution", "a parameter", (5, 10, 15, 30, 60), _differential_evolution),
 )
