@@ -33,7 +33,7 @@ def test_table_and_record_say_the_same(pellicle, recipe):
     for gone in ("absorption", "oblique", "precision"):
         assert not rows[gone]["on"]
         assert "left out" in rows[gone]["why"]
-        assert rows[gone]["cost"] > 0
+        assert abs(rows[gone]["cost"]) < 1  # seconds: it is measured, and may be below the noise
         assert 0 < rows[gone]["error_without"] < 1e-3
     assert (rows["back-face"]["cost"], rows["back-face"]["error_without"]) == (0.0, None)
     table = pellicle("plan", recipe, "--tolerance", 1e-3).out.splitlines()

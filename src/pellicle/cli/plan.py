@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from pellicle.cli.session import cache_folder, say, start
+from pellicle.cli.session import say, start
 from pellicle.cli.wavelengths import directions, measured_scene
 from pellicle.errors import UsageError
 
@@ -31,29 +31,26 @@ def plan(
         raise UsageError(f"--tolerance must be above zero, got {tolerance:g}: give the largest error")
     described = read_recipe(recipe)
     start()
-    from pellicle.effects.surface import exact
     from pellicle.fitting.spectra.messages import log_scene
-    from pellicle.planning import cost_model, film, surface
+    from pellicle.planning import film, surface
     from pellicle.reporting import plans
     from pellicle.reporting.json_record import one_line
     from pellicle.scene.film import with_wavelength
     from pellicle.scene.surface import surface_view
 
-    calibration = cost_model.calibrated(cache_folder())
     if isinstance(described, SurfaceRecipe):
         view = surface_view(described.scene(), directions(described))
-        chosen, savings = surface.plan(view, tolerance), surface.savings(view, calibration)
-        works = [surface.work(each, view) for each in (exact(view), chosen)]
+        chosen = surface.plan(view, tolerance)
+        savings = surface.savings(view, chosen)
     else:
         scene = with_wavelength(*measured_scene(described))
         log_scene(scene)
-        chosen, savings = film.plan(scene, tolerance), film.savings(scene, calibration)
-        works = [film.work(each, scene) for each in (film.full_plan(scene), chosen)]
+        chosen = film.plan(scene, tolerance)
+        savings = film.savings(scene, chosen)
     if json:
         print(one_line(plans.to_json(chosen, savings)), flush=True)
         return 0
-    seconds = [calibration.seconds(work) for work in works]
-    print(plans.report_with_savings(chosen, savings, *seconds), end="", flush=True)
+    print(plans.report_with_savings(chosen, savings), end="", flush=True)
     if chosen.error_bound > tolerance:
         say(f"no plan is within {tolerance:g}: averages alone have errors up to {chosen.error_bound:.1g}")
     return 0

@@ -1,1 +1,1 @@
-"""Plans within a tolerance, and the cost model behind them."""
+"""Plans within a tolerance, and what leaving out each effect saves."""

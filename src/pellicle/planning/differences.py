@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+import statistics
+import time
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -20,6 +22,8 @@ Build = Callable[[Plan], Callable[[Any], Any]]
 POINTS = 256
 CORNERS = 64
 _BATCH = 16
+TIMING_SECONDS, FEWEST_ROUNDS = 0.3, 5
+"""How long plans are timed in turns, and how often at least."""
 
 
 def design(scene: Any) -> np.ndarray:
@@ -55,6 +59,24 @@ class Evaluation(NamedTuple):
     def signals(self, plan: Plan) -> np.ndarray:
         """Signal of a plan at each point, (points, values)."""
         return signals(plan, self.scene, self.points, self.build) / self.scale
+
+    def seconds(self, plans: Sequence[Plan]) -> list[float]:
+        """Median time of an evaluation by each plan, all points in one call, as in a fit's scan.
+
+        The plans take turns, so that other processes affect all of them.
+        """
+        structure, free, *numbers = _split(self.scene, self.points)
+        numbers = jax.device_put(numbers)
+        runs = [partial(_signals, self.build, plan.static_key, structure, free, *numbers) for plan in plans]
+        times: list[list[float]] = [[] for _ in runs]
+        jax.block_until_ready([run() for run in runs])  # compiles
+        end = time.perf_counter() + TIMING_SECONDS
+        while len(times[0]) < FEWEST_ROUNDS or time.perf_counter() < end:
+            for run, some in zip(runs, times, strict=True):
+                began = time.perf_counter()
+                run().block_until_ready()
+                some.append((time.perf_counter() - began) / len(self.points))
+        return [statistics.median(some) for some in times]
 
     def slope_change(self, one: Plan, other: Plan, count: int) -> float:
         """`largest_slope_change` between two plans at the last `count` points; 0 if nothing is free."""

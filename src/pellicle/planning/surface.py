@@ -17,8 +17,8 @@ import numpy as np
 from pellicle.effects.plan import Plan
 from pellicle.effects.surface import exact
 from pellicle.effects.surface_removal import REMOVABLE, SurfaceRemoval
-from pellicle.planning import cost_model
 from pellicle.planning.differences import Evaluation, design, signals
+from pellicle.planning.savings import Savings, measured
 from pellicle.planning.tolerance import (
     Stage,
     Step,
@@ -28,7 +28,7 @@ from pellicle.planning.tolerance import (
     reduced_plan,
     removal_steps,
 )
-from pellicle.scene.free import insert, is_free, start_values
+from pellicle.scene.free import is_free
 from pellicle.scene.surface import SurfaceView
 from pellicle.simulation.surface import build
 
@@ -69,18 +69,11 @@ def alternatives(effect: str, view: SurfaceView) -> list[Plan]:
     return plans_after(partial(_removal, effect), exact(view), view)
 
 
-def work(plan: Plan, view: SurfaceView) -> cost_model.Work:
-    """Operations of one simulation along all directions at the start values, as XLA counts them."""
-    with jax.enable_x64(True):
-        return cost_model.work(build(plan.static_key), insert(view, start_values(view)))
-
-
-def savings(view: SurfaceView, calibration: cost_model.Calibration) -> dict[str, cost_model.Saving]:
-    """Error and time saved by leaving out each effect of the exact plan, one at a time."""
+def savings(view: SurfaceView, chosen: Plan) -> Savings:
+    """Error and time saved by leaving each effect out of the exact plan, and the time of `chosen`."""
     with jax.enable_x64(True):
         cheaper = {effect: alternatives(effect, view)[:1] for effect in REMOVABLE}
-        seconds = lambda plan: calibration.seconds(work(plan, view))  # noqa: E731
-        return cost_model.savings(exact(view), cheaper, evaluation(view), seconds)
+        return measured(exact(view), chosen, cheaper, evaluation(view))
 
 
 def _removal(effect: str, stage: Stage) -> Iterator[Step]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from pellicle.effects.plan import Plan, Row
 
 if TYPE_CHECKING:
-    from pellicle.planning.cost_model import Saving
+    from pellicle.planning.savings import Savings
 
 _UNITS = {
     "psi-delta": "degrees on the sphere of N, C, S",
@@ -23,18 +23,16 @@ def report(plan: Plan) -> str:
     return "\n".join([*_aligned(rows), "", *_summary(plan)]) + "\n"
 
 
-def report_with_savings(plan: Plan, savings: dict[str, Saving], exact: float, planned: float) -> str:
-    """Format a plan with the error and the time of leaving each effect out of the exact plan.
-
-    `exact` and `planned` are seconds of one evaluation of the exact plan and of `plan`.
-    """
+def report_with_savings(plan: Plan, savings: Savings) -> str:
+    """Format a plan with the error and the time of leaving each effect out of the exact plan."""
     rows = [("effect", "", "error bound", "if left out", "saves", "why")]
     for row in plan.rows:
-        saving = savings.get(row.effect)
+        saving = savings.effects.get(row.effect)
         change, time = ("", "") if saving is None else (f"{saving.error:.1e}", _time(saving.seconds))
         rows.append((row.effect, "on" if row.on else "off", _bound(row), change, time, row.why))
     error, *gradients = _summary(plan)
-    times = f"an evaluation takes about {_time(planned)}, with every effect that is present {_time(exact)}"
+    planned, exact = _time(savings.planned), _time(savings.exact)
+    times = f"an evaluation takes {planned}, with every effect that is present {exact}"
     return "\n".join([*_aligned(rows), "", error, times, *gradients]) + "\n"
 
 
@@ -65,7 +63,7 @@ def _time(seconds: float) -> str:
     return f"{seconds / 1e-9:.3g} ns"
 
 
-def to_json(plan: Plan, savings: dict[str, Saving]) -> dict[str, Any]:
+def to_json(plan: Plan, savings: Savings) -> dict[str, Any]:
     """Convert a plan to dictionaries.
 
     `cost` is the seconds that leaving an effect out of the exact plan saves, 0 where it is absent or must
@@ -73,7 +71,7 @@ def to_json(plan: Plan, savings: dict[str, Saving]) -> dict[str, Any]:
     """
     effects = []
     for row in plan.rows:
-        saving = savings.get(row.effect)
+        saving = savings.effects.get(row.effect)
         effects.append(
             {
                 "effect": row.effect,
