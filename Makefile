@@ -15,7 +15,7 @@ PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
 NOTEBOOKS := $(wildcard notebooks/*.ipynb)
 EXECUTED := executed/done
 
-.PHONY: schema fit fits notebooks test coverage docs lint bench peers properties tolerance measurements slow clean figures
+.PHONY: schema fit fits notebooks test coverage docs lint bench verdicts peers properties tolerance measurements slow clean figures
 
 # on Debian, pip for virtual environments is a separate package; without it, the system's pip is used
 $(VENV)/bin/python:
@@ -82,6 +82,10 @@ bench: $(VENV)/.dev
 	$(BIN)/python benchmarks/film.py
 	$(BIN)/python benchmarks/fit.py
 	$(BIN)/python benchmarks/cold_start.py
+
+# verdicts on simulated measurements with the flaws of real ones; a list of those that should be others
+verdicts: $(VENV)/.dev
+	$(BIN)/python benchmarks/verdicts
 
 # installs other packages (several GB) in a separate environment; writes the tables of docs/hard_cases.md
 peers: $(VENV)/.dev
