@@ -2,16 +2,14 @@
 
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
-import lineax
 import numpy as np
 import optimistix as optx
 import pytest
 from scipy.optimize import least_squares as scipy_least_squares
 
-from pellicle.fitting.levenberg_marquardt import BoundedLevenbergMarquardt, Trust, least_squares
+from pellicle.fitting.levenberg_marquardt import BoundedLevenbergMarquardt
 from pellicle.simulation.functions import reflectance
 
 WAVELENGTH = np.linspace(400.0, 900.0, 64)
@@ -24,6 +22,19 @@ def model(y):
     """Reflectance of a film of thickness, n and k (in units of the box) on silicon-like 3.9 + 0.02i."""
     d, n, k = jnp.asarray(LOWER, y.dtype) + y * jnp.asarray(UPPER - LOWER, y.dtype)
     return reflectance(jnp.asarray(WAVELENGTH, y.dtype), d, n + 1j * k, 3.9 + 0.02j)
+
+
+def least_squares(residual, start, *, rtol=1e-8, steps=100):
+    """The minimum in the unit box, and whether the solver has settled."""
+    solution = optx.least_squares(
+        lambda y, _: residual(y),
+        BoundedLevenbergMarquardt(rtol, 0.0),
+        start,
+        options={"lower": 0.0, "upper": 1.0},
+        max_steps=steps,
+        throw=False,
+    )
+    return solution.value, solution.result == optx.RESULTS.successful
 
 
 class Films(NamedTuple):
@@ -124,27 +135,16 @@ def test_never_an_increase(films):
         shapes = jax.eval_shape(lambda: fn(start, None))
         state = solver.init(fn, start, None, options, *shapes, tags)
 
-        arrays, rest = eqx.partition(state, eqx.is_array)  # the state holds the model's own trace
-
         def step(carry, _):
-            y, arrays = carry
-            y, state, _ = solver.step(fn, y, None, options, eqx.combine(arrays, rest), tags)
-            return (y, eqx.filter(state, eqx.is_array)), jnp.sum(residual(y, data) ** 2)
+            y, state, _ = solver.step(fn, *carry[:1], None, options, carry[1], tags)
+            return (y, state), jnp.sum(residual(y, data) ** 2)
 
-        return jax.lax.scan(step, (start, arrays), None, length=25)[1]
+        return jax.lax.scan(step, (start, state), None, length=25)[1]
 
     chi2 = np.asarray(course(far, films.data[:4]))
     assert (np.diff(chi2, axis=1) <= 1e-9 * chi2[:, :-1]).all()
     assert (chi2[:, -1] < chi2[:, 0]).all()
     assert (np.diff(chi2, axis=1) == 0).any()  # some steps were rejected
-
-
-def test_a_step_that_the_box_has_bent_uphill_promises_nothing():
-    """Optimistix would accept a small increase where the linear model predicts a larger one."""
-    jacobian = lineax.MatrixLinearOperator(jnp.eye(2))
-    info = optx.FunctionInfo.ResidualJac(jnp.array([1.0, 1.0]), jacobian)
-    assert Trust().predict_reduction(jnp.array([0.5, 0.5]), info) == 0
-    assert Trust().predict_reduction(jnp.array([-0.5, -0.5]), info) < 0
 
 
 def test_a_start_outside_the_box_is_brought_in():
@@ -196,3 +196,16 @@ def test_a_parameter_without_effect_does_not_disturb_the_others():
     found, converged = least_squares(lambda y: jnp.array([y[0] - 0.3, 0.0 * y[1]]), jnp.array([0.9, 0.4]))
     assert converged
     np.testing.assert_allclose(found, [0.3, 0.4])
+
+
+def test_large_residuals_at_the_minimum_do_not_slow_the_end():
+    """x + 1 and λx² + x − 1 have their minimum at 0, where Gauss-Newton converges linearly with ratio λ:
+    0.95²⁰ is 0.36 (K. Madsen, H. Nielsen and O. Tingleff, 2004, example 3.4)."""
+    found, converged = least_squares(
+        lambda y: jnp.concatenate([(y - 0.5) + 1, 0.95 * (y - 0.5) ** 2 + (y - 0.5) - 1]),
+        jnp.array([0.9]),
+        rtol=1e-10,
+        steps=20,
+    )
+    assert converged
+    np.testing.assert_allclose(found, 0.5, atol=1e-6)

@@ -37,11 +37,11 @@ class Solver(NamedTuple):
     left: float
     calls: list[np.ndarray]
 
-    def __call__(self, static, arrays, bounds, units):
-        self.calls.append(np.asarray(units))
+    def __call__(self, static, arrays, bounds, units, until):
+        self.calls.append(np.asarray(units)[: until.count])
         nearer = unit(HOME) + (units - unit(HOME)) * self.left
         away = np.abs(nearer - unit(HOME))[:, 0] * (UPPER - LOWER)
-        return Polished(nearer, away, away < 1e-3)
+        return Polished(nearer, away, away < 1e-3, np.ones(len(units), int))
 
 
 @pytest.fixture
@@ -95,11 +95,12 @@ def test_a_best_that_has_settled_is_not_polished_again(solver):
     assert len(third.calls) == 1
 
 
-def test_starts_go_in_lanes_and_come_back_in_their_order(solver):
+def test_starts_go_in_calls_of_one_size_and_come_back_in_their_order(solver, monkeypatch):
+    monkeypatch.setattr(module, "SLOTS", 2)
     third = solver(1 / 3)
     reports = []
-    result = solve(problem(), unit([100.0, 400.0, 1000.0]), lanes=2, progress=lambda *r: reports.append(r))
-    assert [len(call) for call in third.calls] == [2, 2]
+    result = solve(problem(), unit([100.0, 400.0, 1000.0]), progress=lambda *r: reports.append(r))
+    assert [len(call) for call in third.calls] == [2, 1]
     np.testing.assert_allclose(result.units, unit([500.0, 600.0, 800.0]))
     assert reports == [("polish", 2, 3), ("polish", 3, 3)]
 
@@ -108,12 +109,13 @@ def test_a_fixed_parameter_has_no_room(monkeypatch):
     """Its bounds meet at the value asked of each start; a start of the padding has the last one's."""
     boxes = []
 
-    def stay(static, arrays, bounds, units):
+    def stay(static, arrays, bounds, units, until):
         boxes.append(bounds)
-        return Polished(units, units[:, 0], np.ones(len(units), bool))
+        return Polished(units, units[:, 0], np.ones(len(units), bool), np.ones(len(units), int))
 
     monkeypatch.setattr(module, "polish", stay)
-    solve(problem(), unit([100.0, 400.0]), fixed=(0, np.array([150.0, 250.0])), lanes=3)
+    monkeypatch.setattr(module, "SLOTS", 3)
+    solve(problem(), unit([100.0, 400.0]), fixed=(0, np.array([150.0, 250.0])))
     [bounds] = boxes
     assert bounds.lower.tolist() == bounds.upper.tolist() == [[150.0], [250.0], [250.0]]
 

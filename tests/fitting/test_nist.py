@@ -118,11 +118,12 @@ def digits(values, certified) -> float:
 @pytest.mark.parametrize(
     ("name", "least"),
     [
-        ("Misra1a", 10),
+        ("Misra1a", 9),
         ("Eckerle4", 9),
-        ("MGH09", 6),
-        ("Thurber", 7),
-        ("Hahn1", 6),
+        ("MGH09", 8),
+        ("Thurber", 8),
+        ("Hahn1", 8),
+        ("MGH17", 8),
     ],
 )
 def test_certified_values_from_both_starts(name, least):
@@ -134,7 +135,7 @@ def test_certified_values_from_both_starts(name, least):
         np.testing.assert_allclose(squares, problem.squares, rtol=1e-10)
 
 
-@pytest.mark.parametrize("name", ["BoxBOD", "MGH10", "MGH17"])
+@pytest.mark.parametrize("name", ["BoxBOD", "MGH10"])
 def test_hard_problems_do_not_converge_from_the_far_start(name):
     """Known failures: where a better solver succeeds, move them to the list above."""
     problem, values, converged = solve(name)

@@ -85,19 +85,3 @@ def deviance_and_slope(form: Form, arrays: Any, box: Any, unit: Any) -> Any:
     """Deviance at one point, and its gradient by forward mode."""
     value, push = jax.linearize(lambda u: deviance(form, arrays, box, u), unit)
     return value, jax.vmap(push)(jnp.eye(len(unit)))
-
-
-FEW_STEPS = 4
-
-
-@partial(jax.jit, static_argnums=0)
-def descend(form: Form, arrays: Any, box: Any, units: Any) -> tuple[Any, Any]:
-    """Take a few steps of bounded Levenberg-Marquardt from each start (starts, parameters); return the points
-    and their deviance."""
-    from pellicle.fitting.levenberg_marquardt import least_squares  # slow to import
-
-    def one(unit):
-        there, _ = least_squares(lambda u: residual(form, arrays, box, u), unit, steps=FEW_STEPS)
-        return there, deviance(form, arrays, box, there)
-
-    return jax.vmap(one)(units)

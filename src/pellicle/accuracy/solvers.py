@@ -14,8 +14,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.accuracy.simulated_data import DataSet, descend, deviance, deviance_and_slope, residual
-from pellicle.fitting.minima import LANES, solve
+from pellicle.accuracy.simulated_data import DataSet, deviance, deviance_and_slope, residual
+from pellicle.fitting.minima import solve
 from pellicle.fitting.problem import Form
 from pellicle.fitting.progress import quiet
 from pellicle.fitting.spectra.search import search
@@ -25,6 +25,7 @@ STEPS = 100
 CANDIDATES, SURVIVORS = 256, (64, 16, 4)
 """Successive halving: random starts, and how many of them continue after every few steps, the last ones to
 convergence."""
+FEW_STEPS = 4
 
 
 @dataclass(frozen=True)
@@ -42,17 +43,8 @@ def _best(units: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
     return units[np.argsort(np.where(np.isfinite(values), values, np.inf), kind="stable")[:count]]
 
 
-def _in_lanes(program: Callable[[np.ndarray], Any], starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points and misfits of a program that takes one start or `LANES` of them, and no other number."""
-    size = 1 if len(starts) == 1 else LANES
-    padded = np.concatenate([starts, np.repeat(starts[-1:], -len(starts) % size, axis=0)])
-    found = [jax.device_get(program(padded[i : i + size])[:2]) for i in range(0, len(padded), size)]
-    units, values = (np.concatenate(column)[: len(starts)] for column in zip(*found, strict=True))
-    return units, values
-
-
 def _from(data: DataSet, starts: np.ndarray) -> np.ndarray:
-    polished = solve(data.problem, starts, lanes=1 if len(starts) == 1 else LANES)
+    polished = solve(data.problem, starts)
     return _best(polished.units, polished.deviance, 1)[0]
 
 
@@ -72,7 +64,8 @@ def _multistart(count: int, data: DataSet) -> np.ndarray:
 def _halving(data: DataSet) -> np.ndarray:
     units = _random(data, CANDIDATES)
     for count in SURVIVORS:
-        units = _best(*_in_lanes(partial(descend, *data.program), units), count)
+        after = solve(data.problem, units, steps=FEW_STEPS)
+        units = _best(after.units, after.deviance, count)
     return _from(data, units)
 
 

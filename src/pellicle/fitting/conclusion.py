@@ -28,15 +28,15 @@ def ranked_minima(
     search: Callable[[Problem], Minima],
     tolerance: float,
     loss: str,
-    **lanes: int,
+    **kept: int,
 ) -> tuple[RankedMinima, list[str]]:
     """Ranked minima of the problem that `make` returns for a tolerance, and warnings.
 
     Where the plan turns out to be off by more than the tolerance at the best fit, the fit is done again with
-    every effect. `lanes` are those of `fitting.reweighting.rank`.
+    every effect. `kept` are the numbers of minima of `fitting.reweighting.rank`.
     """
     problem = make(tolerance)
-    ranked = rank(problem, search(problem), loss, **lanes)
+    ranked = rank(problem, search(problem), loss, **kept)
     off = max(view.off_tolerance(problem.seen_by(view, ranked.values)) for view in ranked.problem.views)
     if off <= tolerance:
         return ranked, []
@@ -46,7 +46,7 @@ def ranked_minima(
         f"at the best fit what was left out changes the signal by {off:.2g}, more than the tolerance "
         f"{tolerance:g}: fitted again with every effect"
     )
-    return rank(exact, search(exact), loss, **lanes), [warning]
+    return rank(exact, search(exact), loss, **kept), [warning]
 
 
 def linearised(ranked: RankedMinima) -> tuple[Scaled, Errors]:

@@ -49,38 +49,55 @@ def explained(static: Static, arrays: tuple[Any, ...], box: Box, unit: Any) -> t
 
 
 class Polished(NamedTuple):
-    """Local minima in the unit cube, (starts, parameters), their deviance, and whether they settled."""
+    """Local minima in the unit cube, (starts, parameters), their deviance, whether they settled, and in how
+    many steps."""
 
     units: Any
     deviance: Any
     converged: Any
+    steps: Any
+
+
+class Until(NamedTuple):
+    """The number of starts that are polished, and until when: see `lanes.least_squares`."""
+
+    count: Any
+    steps: Any
+    atol: Any
+    coarse: Any
 
 
 @kept
-def polish(static: tuple[Static, int], arrays: tuple[Any, ...], box: Box, units: Any) -> Polished:
+def polish(
+    static: tuple[Static, int], arrays: tuple[Any, ...], box: Box, units: Any, until: Until
+) -> Polished:
     """The local minimum below each start (starts, parameters), in all views together.
 
-    `static` ends with the most steps of the solver. The bounds of the box may be one for all starts, or
+    `static` ends with the number of lanes. The bounds of the box are
     (starts, parameters): where lower and upper meet, a parameter is fixed.
     """
-    from pellicle.fitting.levenberg_marquardt import least_squares  # a kept program needs no solver
+    from pellicle.fitting.lanes import least_squares  # a kept program needs no solver
 
-    looks, steps = static
+    looks, lanes = static
 
-    def one(unit, lower, upper):
-        own = box._replace(lower=lower, upper=upper)
+    def residual(unit, bounds):
+        own = box._replace(lower=bounds[0], upper=bounds[1])
+        views, values = explained(looks, arrays, own, unit)
+        prior = own.prior_rows(values)
+        deviance = sum(view.deviance for view in views) + jnp.sum(prior**2)
+        return [*(view.residual for view in views), prior], deviance
 
-        def residual(unit):
-            views, values = explained(looks, arrays, own, unit)
-            return jnp.concatenate([*(view.residual for view in views), own.prior_rows(values)])
-
-        best, converged = least_squares(residual, unit, steps=steps)
-        views, values = explained(looks, arrays, own, best)
-        prior = jnp.sum(own.prior_rows(values) ** 2)
-        return Polished(best, sum(view.deviance for view in views) + prior, converged)
-
-    sides = (jnp.broadcast_to(side, units.shape) for side in (box.lower, box.upper))
-    return jax.vmap(one)(units, *sides)
+    solutions = least_squares(
+        residual,
+        units,
+        (box.lower, box.upper),
+        until.count,
+        lanes=lanes,
+        steps=until.steps,
+        atol=until.atol,
+        coarse=until.coarse,
+    )
+    return Polished(solutions.y, solutions.aux, solutions.converged, solutions.steps)
 
 
 def total_deviance(problem: Problem, units: np.ndarray) -> np.ndarray:

@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from logging import getLogger
 
 import jax
 import numpy as np
 
-from pellicle.fitting.evaluation import polish
+from pellicle.fitting.evaluation import Until, polish
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.progress import Progress, quiet
 
-LANES = 16
-"""Starts that one call of the solver polishes side by side."""
+log = getLogger(__name__)
+
+SLOTS = 64
+"""Starts that one call of the solver takes."""
 STEPS = 100
 """Most steps of one polish."""
+_WORK = 16384
+"""Data values that are evaluated in one step of the solver, about: lanes of many points are few."""
+MOST = 16
+"""Most minima that are kept."""
 _MOST_ROUNDS = 50
 """Polishes of the best minima where the best of all has not settled: some valleys take thousands of steps (an
 oscillator's parameters; 2400 on a retroreflective tape, with an exponent at its bound)."""
@@ -49,32 +56,39 @@ def solve(
     starts: np.ndarray,
     *,
     fixed: tuple[int, np.ndarray] | None = None,
-    lanes: int = LANES,
     steps: int = STEPS,
+    atol: float = 0.0,
+    coarse: float = 0.0,
     progress: Progress = quiet,
 ) -> Minima:
     """The local minimum below each start (starts, parameters), in their order.
 
-    `fixed` is the position of a parameter and its value in each start, in the coordinate's unit. All calls of
-    one shape share a program: starts are padded to `lanes`.
+    `fixed` is the position of a parameter and its value in each start, in the coordinate's unit. A start has
+    settled where the deviance would fall by less than `atol`², or by less than the share `coarse` of its
+    distance to the best of all. All numbers of starts share a program: they are padded to `SLOTS`.
     """
     box, shape = problem.box, np.shape(starts)
     lower, upper = (np.array(np.broadcast_to(side, shape), dtype=float) for side in (box.lower, box.upper))
     if fixed is not None:
         lower[:, fixed[0]] = upper[:, fixed[0]] = fixed[1]
+    rows = max(sum(view.rows for view in problem.views), 1)
+    lanes = int(np.clip(2 ** int(np.log2(_WORK / rows)), 2, MOST))
     pieces = []
-    for first in range(0, len(starts), lanes):
-        low, high, units = (_padded(x[first : first + lanes], lanes) for x in (lower, upper, starts))
+    for first in range(0, len(starts), SLOTS):
+        low, high, units = (_padded(x[first : first + SLOTS]) for x in (lower, upper, starts))
+        count = min(SLOTS, len(starts) - first)
+        until = Until(np.int64(count), np.int64(steps), np.float64(atol), np.float64(coarse))
         own = box._replace(lower=low, upper=high)
-        polished = jax.device_get(polish((problem.static, steps), problem.arrays, own, units))
-        pieces.append([np.asarray(column)[: len(starts) - first] for column in polished])
-        progress("polish", min(first + lanes, len(starts)), len(starts))
+        polished = jax.device_get(polish((problem.static, lanes), problem.arrays, own, units, until))
+        log.debug("polish: %d starts in %d lanes, %d evaluations", count, lanes, polished.steps[:count].sum())
+        pieces.append([np.asarray(column)[:count] for column in polished[:3]])
+        progress("polish", min(first + SLOTS, len(starts)), len(starts))
     units, deviance, converged = (np.concatenate(column) for column in zip(*pieces, strict=True))
     return Minima(units, np.where(np.isfinite(deviance), deviance, np.inf), converged)
 
 
-def _padded(rows: np.ndarray, lanes: int) -> np.ndarray:
-    return np.concatenate([rows, np.repeat(rows[-1:], lanes - len(rows), axis=0)])
+def _padded(rows: np.ndarray) -> np.ndarray:
+    return np.concatenate([rows, np.repeat(rows[-1:], SLOTS - len(rows), axis=0)])
 
 
 def minima(
@@ -82,25 +96,26 @@ def minima(
     starts: np.ndarray,
     progress: Progress = quiet,
     *,
-    lanes: int = LANES,
-    followed: int = LANES,
+    most: int = MOST,
+    followed: int = MOST,
+    coarse: float = 0.0,
 ) -> Minima:
     """The distinct local minima below `starts` (starts, parameters), best first.
 
     While the best has not settled, the best `followed` minima are polished again; none where that is 0.
     """
-    result = solve(problem, starts, lanes=lanes, progress=progress)
+    result = solve(problem, starts, coarse=coarse, progress=progress)
     units, deviance, converged = result.units, result.deviance, result.converged
     for _ in range(_MOST_ROUNDS if followed else 0):
         best = np.argsort(deviance, kind="stable")[:followed]
         before = deviance[best[0]]
         if converged[best[0]] or not np.isfinite(before):
             break
-        again = solve(problem, units[best], lanes=followed)
+        again = solve(problem, units[best], coarse=coarse)
         units[best], deviance[best], converged[best] = again.units, again.deviance, again.converged
         if before - deviance.min() <= _GAIN * abs(before) and not converged[np.argmin(deviance)]:
             break
-    return distinct(problem, Minima(units, deviance, converged), lanes)
+    return distinct(problem, Minima(units, deviance, converged), most)
 
 
 def distinct(problem: Problem, minima: Minima, most: int) -> Minima:

@@ -11,6 +11,9 @@ from pellicle.fitting.evaluation import total_deviance
 from pellicle.fitting.minima import solve
 from pellicle.fitting.reweighting import RankedMinima
 
+_SETTLED = 0.03
+"""Square root of the change of χ² that does not matter to a limit at a rise of 2.7 and more."""
+
 
 class Neighbourhood(NamedTuple):
     """χ² around a best point, above some constant; it counts points as the covariance does.
@@ -74,7 +77,7 @@ def neighbourhood(ranked: RankedMinima, covariance: np.ndarray, others: np.ndarr
 
     def profile(which: int, at: np.ndarray, starts: np.ndarray) -> np.ndarray:
         every = np.repeat(at, starts.shape[1])
-        deviance = solve(own, starts.reshape(len(every), -1), fixed=(which, every)).deviance
+        deviance = solve(own, starts.reshape(len(every), -1), fixed=(which, every), atol=_SETTLED).deviance
         return deviance.reshape(len(at), -1).min(axis=1)
 
     return Neighbourhood(

@@ -18,29 +18,45 @@ def solve_positive(matrix, b):
 
     A matrix that is singular to rounding gives a large step or b itself, never a NaN.
     """
-    return _unrolled(matrix, b) if b.shape[0] <= UNROLLED else _lapack(matrix, b)
+    if b.shape[0] <= UNROLLED:
+        return _unrolled(matrix, b, 0.0)[0]
+    return _lapack(matrix, b)[0]
+
+
+def solve_if_positive(matrix, b):
+    """x with `matrix` x = b, and whether the matrix is positive definite; else x is of no use but finite."""
+    if b.shape[0] <= UNROLLED:
+        return _unrolled(matrix, b, 50 * float(jnp.finfo(matrix.dtype).eps))
+    return _lapack(matrix, b)
 
 
 def _lapack(matrix, b):
     x = cho_solve((jnp.linalg.cholesky(matrix), True), b)
-    return jnp.where(jnp.all(jnp.isfinite(x)), x, b)
+    positive = jnp.all(jnp.isfinite(x))
+    return jnp.where(positive, x, b), positive
 
 
-def _unrolled(matrix, b):
-    """A pivot below rounding is held at the smallest number."""
-    n, tiny = b.shape[0], jnp.finfo(matrix.dtype).tiny
+def _unrolled(matrix, b, least):
+    """A pivot below the share `least` of its diagonal element is held there; False where there is one."""
+    n, tiny, positive = b.shape[0], jnp.finfo(matrix.dtype).tiny, jnp.array(True)
     lower: dict = {}
     for i in range(n):
         for j in range(i + 1):
             s = matrix[i, j] - sum(lower[i, k] * lower[j, k] for k in range(j))
-            lower[i, j] = jnp.sqrt(jnp.maximum(s, tiny)) if i == j else s / lower[j, j]
+            if i == j:
+                floor = jnp.maximum(least * jnp.abs(matrix[i, i]), tiny)
+                positive = positive & (s > floor)
+                s = jnp.sqrt(jnp.maximum(s, floor))
+            else:
+                s = s / lower[j, j]
+            lower[i, j] = s
     z: list = [None] * n
     x: list = [None] * n
     for i in range(n):
         z[i] = (b[i] - sum(lower[i, k] * z[k] for k in range(i))) / lower[i, i]
     for i in reversed(range(n)):
         x[i] = (z[i] - sum(lower[k, i] * x[k] for k in range(i + 1, n))) / lower[i, i]
-    return jnp.stack(x)
+    return jnp.stack(x), positive
 
 
 def nonnegative(matrix, b, bounded, slack: float):

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pellicle.fitting.minima import LANES, Minima, minima
+from pellicle.fitting.minima import MOST, Minima, minima
 from pellicle.fitting.problem import Problem, View
 from pellicle.fitting.robust_losses import LEAST_SQUARES, LOSSES, Loss, inflation, spread
 
@@ -91,8 +91,8 @@ def rank(
     candidates: Minima,
     loss: str = LEAST_SQUARES,
     *,
-    lanes: int = LANES,
-    followed: int = LANES,
+    most: int = MOST,
+    followed: int = MOST,
 ) -> RankedMinima:
     """Estimate σ and the effective points of each view from the best fit's residuals, and rank again.
 
@@ -105,7 +105,7 @@ def rank(
     noise = _noise(problem, unit, robust)
     for _ in range(_ROUNDS if robust is None else _ROBUST_ROUNDS):
         best, weighted = candidates.units[0], _reweighted(problem, noise)
-        candidates = minima(weighted, candidates.units, lanes=lanes, followed=followed)
+        candidates = minima(weighted, candidates.units, most=most, followed=followed)
         again = _noise(problem, candidates.units[0], robust)
         near = 1e-3 if robust is None else 1e-6
         # the relative weights of the views, and under a robust loss their noise too, agree within 2 %

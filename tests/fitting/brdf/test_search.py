@@ -44,12 +44,12 @@ class Programs:
         self.scanned.append(units)
         return Candidates(self.rule(units), np.full((len(units), 1), 0.1))
 
-    def solve(self, few, starts, *, lanes, steps):
+    def solve(self, few, starts, *, steps):
         self.short.append(starts)
         return Minima(starts, self.rule(starts), np.ones(len(starts), bool))
 
-    def minima(self, problem, starts, progress, *, lanes, followed):
-        self.final.append((starts, lanes, followed))
+    def minima(self, problem, starts, progress, *, most, followed):
+        self.final.append((starts, most, followed))
         return Minima(starts, self.rule(starts), np.ones(len(starts), bool))
 
 
@@ -89,8 +89,8 @@ def test_without_a_short_polish_there_is_one_round(grey, monkeypatch):
 def test_the_last_starts_are_the_best_of_all_rounds_two_nanometres_apart(grey, monkeypatch):
     programs = Programs(monkeypatch, distance)
     search(grey, FEW, quiet)
-    [(starts, lanes, followed)] = programs.final
-    assert (starts.shape, lanes, followed) == ((2, 5), 2, 0)
+    [(starts, most, followed)] = programs.final
+    assert (starts.shape, most, followed) == ((2, 5), 2, 0)
     seen = np.concatenate(programs.short)
     assert distance(starts)[0] == distance(seen).min()
     assert abs(starts[0, 0] - starts[1, 0]) * 1000 >= 2

@@ -151,7 +151,7 @@ def _fit(
 ) -> tuple[Fit, RankedMinima]:
     began = time.perf_counter()
     split, errors = _split(samples), {}
-    lanes = {"lanes": THOROUGH.starts, "followed": 1}
+    kept = {"most": THOROUGH.starts, "followed": 1}
 
     def build(allowed: float) -> Problem:
         plans = [plan(surface_view(surface, each, len(each)), allowed, _KEPT_EFFECTS) for each in samples]
@@ -161,9 +161,9 @@ def _fit(
         result, errors["layer"] = _held_out(problem, split, THOROUGH, loss, progress)
         _, errors[_FLAT] = _held_out(incoherent(problem), split, SMOOTH, loss, progress)
         _, errors[_PLAIN] = _held_out(without_layer(problem), split, FEW, loss, progress)
-        return minima(problem, result.units, progress, **lanes)
+        return minima(problem, result.units, progress, **kept)
 
-    ranked, notes = ranked_minima(build, searched, tolerance, loss, **lanes)
+    ranked, notes = ranked_minima(build, searched, tolerance, loss, **kept)
     jacobian, covariance = linearised(ranked)
     pairs = list(zip(ranked.problem.views, ranked.fits, strict=True))
     conclusion = conclude(

@@ -70,7 +70,7 @@ def search(problem: Problem, effort: Effort, progress: Progress) -> Minima:
             if done:
                 break
     starts = _best(problem, units, chi2, effort.starts)
-    return minima(problem, starts, progress, lanes=effort.starts, followed=0)
+    return minima(problem, starts, progress, most=effort.starts, followed=0)
 
 
 def _scan(few: Problem, units: np.ndarray, progress: Progress) -> tuple[np.ndarray, np.ndarray]:
@@ -93,7 +93,7 @@ def _short(
     """The best `most` after a few steps of the solver, and their χ²."""
     starts = _best(problem, units, chi2, most)
     progress("short polish", 0, len(starts))
-    result = solve(few, starts, lanes=most, steps=_SHORT)
+    result = solve(few, starts, steps=_SHORT)
     return result.units, result.deviance
 
 

@@ -14,7 +14,7 @@ from logging import getLogger
 import numpy as np
 
 from pellicle.fitting.evaluation import deviances
-from pellicle.fitting.minima import LANES, Minima, Scan, minima
+from pellicle.fitting.minima import MOST, Minima, Scan, minima
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.progress import Progress, quiet
@@ -25,6 +25,9 @@ log = getLogger(__name__)
 _CHUNK = 256
 _MOST_STEPS = 4000
 _MOST_DESIGNS = 1200
+_COARSE = 0.01
+"""Share of its distance to the best deviance within which a minimum is computed at first; those that remain
+are computed to the end when they are ranked."""
 
 
 def search(problem: Problem, progress: Progress) -> Minima:
@@ -41,8 +44,8 @@ def search(problem: Problem, progress: Progress) -> Minima:
     total = np.pad(table.sum(-1), ((0, 0), (1, 1)), constant_values=np.inf)
     middle = total[:, 1:-1]
     lowest = np.flatnonzero(((middle <= total[:, :-2]) & (middle <= total[:, 2:])).ravel())
-    starts = units[lowest[np.argsort(middle.ravel()[lowest])][: batches * LANES]]
-    result = minima(problem, starts, progress)
+    starts = units[lowest[np.argsort(middle.ravel()[lowest])][: batches * MOST]]
+    result = minima(problem, starts, progress, coarse=_COARSE)
     best = zip(problem.parameters, problem.values(result.units[0]), strict=True)
     log.info(
         "polished: %d minima of the scan, %d of them distinct, %d converged; best: %s",

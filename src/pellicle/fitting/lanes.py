@@ -1,0 +1,98 @@
+"""Many least-squares problems of one kind, solved side by side in lanes that are refilled from a queue.
+
+A vmapped solver runs until its slowest lane has settled; in searches with false minima half of that work and
+more is spent on lanes that have ended. Here a lane that has ended takes the next start in the same compiled
+loop.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import optimistix as optx
+
+from pellicle.fitting.levenberg_marquardt import BoundedLevenbergMarquardt
+
+_LEAST = 4
+"""Evaluations before a lane is given up: the promise of a first step may err."""
+
+
+class Solutions(NamedTuple):
+    """Minima below the starts, in their order: points, their cost ‖r‖², the auxiliary output of the function
+    there, whether the solver settled, and evaluations."""
+
+    y: Any
+    cost: Any
+    aux: Any
+    converged: Any
+    steps: Any
+
+
+def least_squares(
+    fn: Callable[[Any, Any], tuple[Any, Any]],
+    starts: Any,
+    args: Any,
+    count: Any,
+    *,
+    lanes: int,
+    steps: Any = 100,
+    rtol: Any = 1e-8,
+    atol: Any = 0.0,
+    coarse: Any = 0.0,
+) -> Solutions:
+    """Minimise ‖fn(y, args)[0]‖² for y in the unit box from each of the first `count` starts.
+
+    `fn` returns residuals and an auxiliary output. `starts` (starts, parameters) and the leaves of `args`
+    (starts, ...) have a row for each start. A lane ends where it has settled by `rtol` and `atol`, after
+    `steps` evaluations, or where an undamped step promises less than the share `coarse` of its distance to
+    the best cost of all: it cannot become the best.
+    """
+    solver = BoundedLevenbergMarquardt(rtol, atol)
+    options = {"lower": 0.0, "upper": 1.0}
+    size, tags = len(starts), frozenset()
+    shapes = jax.eval_shape(lambda: fn(starts[0], jax.tree.map(lambda leaf: leaf[0], args)))
+
+    def begin(y):
+        return solver.init(fn, y, None, options, *shapes, tags)
+
+    def advance(y, state, which):
+        own = jax.tree.map(lambda leaf: leaf[jnp.minimum(which, size - 1)], args)
+        y, state, _ = solver.step(fn, y, own, options, state, tags)
+        done, result = solver.terminate(fn, y, own, options, state, tags)
+        return y, state, done, result == optx.RESULTS.successful
+
+    def proceed(carry):
+        y, state, which, used, following, results = carry
+        y, state, done, success = jax.vmap(advance)(y, state, which)
+        active, used = which < count, used + 1
+        best = jnp.minimum(jnp.min(results.cost), jnp.min(jnp.where(active, state.cost, jnp.inf)))
+        hopeless = (used >= _LEAST) & (state.promise <= coarse * (state.cost - best))
+        ended = active & (done | hopeless | (used >= steps))
+        at = jnp.where(ended, which, size)  # out of range: dropped
+        new = Solutions(y, state.cost, state.aux, hopeless | (done & success), used)
+        results = jax.tree.map(lambda old, row: old.at[at].set(row, mode="drop"), results, new)
+        # lanes that have ended take the next starts of the queue
+        which = jnp.where(ended, following + jnp.cumsum(ended) - 1, which)
+        start = starts[jnp.minimum(which, size - 1)]
+        y, state = jax.tree.map(
+            lambda new, old: jnp.where(ended.reshape(-1, *[1] * (old.ndim - 1)), new, old),
+            (start, jax.vmap(begin)(start)),
+            (y, state),
+        )
+        return y, state, which, jnp.where(ended, 0, used), following + jnp.sum(ended), results
+
+    first = jnp.arange(lanes)
+    start = starts[jnp.minimum(first, size - 1)]
+    state = jax.vmap(begin)(start)
+    empty = Solutions(
+        jnp.array(starts),
+        jnp.full(size, jnp.inf, starts.dtype),
+        jax.tree.map(lambda leaf: jnp.zeros((size, *leaf.shape), leaf.dtype), shapes[1]),
+        jnp.zeros(size, bool),
+        jnp.zeros(size, int),
+    )
+    carry = start, state, first, jnp.zeros(lanes, int), jnp.asarray(lanes), empty
+    return jax.lax.while_loop(lambda carry: jnp.any(carry[2] < count), proceed, carry)[-1]

@@ -1,0 +1,101 @@
+"""Lanes that take new starts from a queue: the same minima as one by one, in the order of the starts."""
+
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.optimize import least_squares as scipy_least_squares
+
+from pellicle.fitting.lanes import least_squares
+
+GRID = np.linspace(0.0, 1.0, 40)
+STARTS = np.random.default_rng(0).uniform(0.05, 0.95, (9, 2))
+TARGETS = np.random.default_rng(1).uniform(0.2, 0.8, (9, 2))
+
+
+def curve(y):
+    """A damped oscillation with several minima in its frequency, (points,)."""
+    return jnp.cos(60 * y[0] * GRID) * jnp.exp(-y[1] * GRID)
+
+
+def residual(y, target):
+    rows = curve(y) - curve(target)
+    return [rows[:15], rows[15:]], jnp.sum(rows**2)
+
+
+@partial(jax.jit, static_argnames="lanes")
+def compiled(starts, targets, count, *, lanes, steps, coarse):
+    return least_squares(residual, starts, targets, count, lanes=lanes, steps=steps, coarse=coarse)
+
+
+def run(lanes, count=9, targets=TARGETS, steps=200, coarse=0.0):
+    return jax.device_get(compiled(STARTS, targets, count, lanes=lanes, steps=steps, coarse=coarse))
+
+
+@pytest.fixture(scope="module")
+def three():
+    return run(3)
+
+
+def test_each_start_reaches_the_minimum_of_its_own_data(three):
+    for start, target, y, cost in zip(STARTS, TARGETS, three.y, three.cost, strict=True):
+        theirs = scipy_least_squares(
+            lambda y, t=target: np.asarray(curve(jnp.asarray(y)) - curve(jnp.asarray(t))),
+            y,
+            bounds=(0.0, 1.0),
+            x_scale=1.0,
+            xtol=1e-12,
+        )
+        assert 2 * theirs.cost == pytest.approx(cost, abs=1e-9)
+        began = float(jnp.sum((curve(jnp.asarray(start)) - curve(jnp.asarray(target))) ** 2))
+        assert cost <= began
+    assert three.converged.all()
+    np.testing.assert_allclose(three.aux, three.cost, atol=1e-12)
+
+
+@pytest.mark.parametrize("lanes", [1, 4, 16])
+def test_the_number_of_lanes_does_not_matter(three, lanes):
+    """16 lanes have more room than there are starts."""
+    other = run(lanes)
+    np.testing.assert_allclose(other.y, three.y, atol=1e-9)
+    assert other.steps.tolist() == three.steps.tolist()
+
+
+def test_starts_beyond_the_count_are_left_alone(three):
+    some = run(3, count=5)
+    np.testing.assert_allclose(some.y[:5], three.y[:5], atol=1e-9)
+    np.testing.assert_array_equal(some.y[5:], STARTS[5:])
+    assert some.steps[5:].tolist() == [0] * 4
+
+
+def test_a_minimum_far_above_the_best_is_not_computed_to_the_end():
+    """It ends where a step promises less than the share of its distance; the best is computed to the end."""
+    one = np.tile(TARGETS[0], (len(STARTS), 1))
+    full, coarse = run(3, targets=one), run(3, targets=one, coarse=0.01)
+    best = np.argmin(full.cost)
+    far = full.cost > full.cost[best] + 0.1
+    assert far.sum() >= 2
+    assert coarse.steps[far].sum() < 0.7 * full.steps[far].sum()
+    assert np.argmin(coarse.cost) == best
+    np.testing.assert_allclose(coarse.y[best], full.y[best], atol=1e-6)
+    above = full.cost - full.cost[best]
+    np.testing.assert_allclose(coarse.cost - coarse.cost[best], above, rtol=0.02, atol=1e-9)
+
+
+def test_a_lane_of_too_many_steps_makes_room(three):
+    slow = run(3, steps=4)
+    assert (slow.steps <= 4).all()
+    assert slow.steps.max() == 4
+    assert not slow.converged[slow.steps == 4].all()
+
+
+def test_a_start_without_a_number_ends_and_the_others_go_on(three):
+    targets = TARGETS.copy()
+    targets[2] = np.nan
+    result = run(3, targets=targets)
+    assert not result.converged[2]
+    assert result.steps[2] == 1
+    rest = np.arange(9) != 2
+    np.testing.assert_allclose(result.y[rest], three.y[rest], atol=1e-9)
