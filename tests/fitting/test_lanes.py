@@ -30,8 +30,8 @@ def compiled(starts, targets, count, *, lanes, steps, coarse):
     return least_squares(residual, starts, targets, count, lanes=lanes, steps=steps, coarse=coarse)
 
 
-def run(lanes, count=9, targets=TARGETS, steps=200, coarse=0.0):
-    return jax.device_get(compiled(STARTS, targets, count, lanes=lanes, steps=steps, coarse=coarse))
+def run(lanes, count=9, starts=STARTS, targets=TARGETS, steps=200, coarse=0.0):
+    return jax.device_get(compiled(starts, targets, count, lanes=lanes, steps=steps, coarse=coarse))
 
 
 @pytest.fixture(scope="module")
@@ -70,18 +70,16 @@ def test_starts_beyond_the_count_are_left_alone(three):
     assert some.steps[5:].tolist() == [0] * 4
 
 
-def test_a_minimum_far_above_the_best_is_not_computed_to_the_end():
-    """It ends where a step promises less than the share of its distance; the best is computed to the end."""
-    one = np.tile(TARGETS[0], (len(STARTS), 1))
-    full, coarse = run(3, targets=one), run(3, targets=one, coarse=0.01)
-    best = np.argmin(full.cost)
-    far = full.cost > full.cost[best] + 0.1
-    assert far.sum() >= 2
-    assert coarse.steps[far].sum() < 0.7 * full.steps[far].sum()
-    assert np.argmin(coarse.cost) == best
-    np.testing.assert_allclose(coarse.y[best], full.y[best], atol=1e-6)
-    above = full.cost - full.cost[best]
-    np.testing.assert_allclose(coarse.cost - coarse.cost[best], above, rtol=0.02, atol=1e-9)
+def test_minima_far_above_the_best_are_not_computed_to_the_end_and_none_of_the_best_is_lost():
+    """A lane on a plateau promises little, too, and may yet become the best."""
+    starts = np.random.default_rng(5).uniform(0.02, 0.98, (120, 2))
+    targets = np.tile([0.3, 0.5], (len(starts), 1))
+    full, coarse = (run(3, 120, starts, targets, coarse=share) for share in (0.0, 1e-3))
+    best = full.cost < full.cost.min() + 1e-6
+    assert 10 < best.sum() < 60
+    np.testing.assert_allclose(coarse.y[best], full.y[best], atol=1e-4)
+    assert coarse.steps[~best].sum() < 0.75 * full.steps[~best].sum()
+    assert (coarse.cost[~best] > full.cost.min() + 0.1).all()
 
 
 def test_a_lane_of_too_many_steps_makes_room(three):

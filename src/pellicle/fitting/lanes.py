@@ -16,8 +16,9 @@ import optimistix as optx
 
 from pellicle.fitting.levenberg_marquardt import BoundedLevenbergMarquardt
 
-_LEAST = 4
-"""Evaluations before a lane is given up: the promise of a first step may err."""
+_LEAST, _SETTLING = 4, 0.1
+"""Evaluations before a lane is given up, and the share of the promise before to which that of a step falls in
+the neighbourhood of a minimum: on a plateau it is small, too, but does not fall."""
 
 
 class Solutions(NamedTuple):
@@ -53,10 +54,10 @@ def least_squares(
     solver = BoundedLevenbergMarquardt(rtol, atol)
     options = {"lower": 0.0, "upper": 1.0}
     size, tags = len(starts), frozenset()
-    shapes = jax.eval_shape(lambda: fn(starts[0], jax.tree.map(lambda leaf: leaf[0], args)))
+    shapes: Any = jax.eval_shape(lambda: fn(starts[0], jax.tree.map(lambda leaf: leaf[0], args)))
 
     def begin(y):
-        return solver.init(fn, y, None, options, *shapes, tags)
+        return solver.init(fn, y, None, options, shapes[0], shapes[1], tags)
 
     def advance(y, state, which):
         own = jax.tree.map(lambda leaf: leaf[jnp.minimum(which, size - 1)], args)
@@ -66,10 +67,12 @@ def least_squares(
 
     def proceed(carry):
         y, state, which, used, following, results = carry
+        before = state.promise
         y, state, done, success = jax.vmap(advance)(y, state, which)
         active, used = which < count, used + 1
         best = jnp.minimum(jnp.min(results.cost), jnp.min(jnp.where(active, state.cost, jnp.inf)))
-        hopeless = (used >= _LEAST) & (state.promise <= coarse * (state.cost - best))
+        settling = state.promise <= _SETTLING * before
+        hopeless = (used >= _LEAST) & settling & (state.promise <= coarse * (state.cost - best))
         ended = active & (done | hopeless | (used >= steps))
         at = jnp.where(ended, which, size)  # out of range: dropped
         new = Solutions(y, state.cost, state.aux, hopeless | (done & success), used)

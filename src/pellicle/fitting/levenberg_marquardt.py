@@ -17,7 +17,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import optimistix as optx
-from jaxtyping import Array, Bool, Float, ScalarLike
+from jaxtyping import Array, Bool, Float
 
 from pellicle.fitting.positive_definite import solve_if_positive
 
@@ -126,8 +126,8 @@ class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
     is wrong at an active bound.
     """
 
-    rtol: ScalarLike
-    atol: ScalarLike
+    rtol: Any  # a number, also a traced one
+    atol: Any
     norm: Any = optx.two_norm
 
     def init(self, fn, y, args, options, f_struct, aux_struct, tags):

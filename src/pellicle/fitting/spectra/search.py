@@ -25,7 +25,7 @@ log = getLogger(__name__)
 _CHUNK = 256
 _MOST_STEPS = 4000
 _MOST_DESIGNS = 1200
-_COARSE = 0.01
+_COARSE = 1e-3
 """Share of its distance to the best deviance within which a minimum is computed at first; those that remain
 are computed to the end when they are ranked."""
 
