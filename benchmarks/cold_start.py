@@ -1,8 +1,12 @@
-"""Start-up time: a complete `pellicle fit` in a new process, compared with JAX and one operation.
+"""Start-up time: complete `pellicle fit` commands in new processes, compared with JAX and one operation.
 
-Run `python benchmarks/cold_start.py`. The first fit starts with an empty cache, later fits with a
-filled one. The commands take turns; the table gives medians of processor and wall time (s), and the
-ratio of a fit with a filled cache to bare JAX.
+Run `python benchmarks/cold_start.py`. First fits start with an empty cache of programs, later
+ones with a filled cache. The commands take turns; the table gives medians of wall and processor time (s), and
+their ratios to bare JAX, the least that any program of JAX takes.
+
+Linux, 2 cores shared with other work, JAX 0.10.2, Python 3.11:
+
+TABLE
 """
 
 from __future__ import annotations
@@ -18,46 +22,72 @@ import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-RECIPE = ROOT / "measurements" / "recipes" / "hematite_on_glass_140nm.toml"
+RECIPE = ("--recipe", "measurements/recipes/hematite_on_glass_140nm.toml")
+OXIDE = (
+    "docs/examples/oxide_um_percent.csv",
+    "--layer",
+    "SiO2",
+    "--substrate",
+    "Si",
+    "--thickness",
+    "10:1000",
+)
+FITS = {
+    "R by a recipe": RECIPE,
+    "R, CSV by flags": OXIDE,
+    "psi and delta, recipe": ("--recipe", "fits/brush_15-1-1/recipe.toml"),
+}
 BARE = "import jax, jax.numpy as jnp; jnp.ones(3).sum().block_until_ready()"
 PELLICLE = "import sys; from pellicle.cli import main; sys.exit(main())"
+GOOD = (0, 4)
+"""Exit codes of a fit that was made: one answer, no clear answer."""
 
 
 def times_of(command: list[str], environment: dict[str, str]) -> tuple[float, float]:
-    """Return the processor and wall time (s) of one process."""
+    """Return the wall and processor time (s) of one process."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     began = time.perf_counter()
-    subprocess.run(command, env=environment, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    ran = subprocess.run(command, cwd=ROOT, env=environment, check=False, capture_output=True)
     wall = time.perf_counter() - began
+    if ran.returncode not in GOOD:
+        raise RuntimeError(ran.stderr.decode())
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, wall
+    return wall, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def pellicle(*words: str) -> list[str]:
+    """The command in this interpreter."""
+    return [sys.executable, "-c", PELLICLE, *words]
 
 
 def main(rounds: int) -> None:
-    with tempfile.TemporaryDirectory() as cache:
-        environment = os.environ | {"PELLICLE_CACHE": cache}
-        fit = [sys.executable, "-c", PELLICLE, "fit", "--recipe", str(RECIPE), "--json"]
-        commands = {
-            "bare jax": [sys.executable, "-c", BARE],
-            "pellicle --help": [sys.executable, "-c", PELLICLE, "--help"],
-            "fit, cache filled": fit,
+    """Measure and print the table."""
+    with tempfile.TemporaryDirectory() as folder:
+        environment = os.environ | {
+            "PELLICLE_CACHE": f"{folder}/cache",
+            "PYTHONPYCACHEPREFIX": f"{folder}/code",
         }
-        print(f"{'':<22}{'cpu s':>8}{'wall s':>8}")
-        first = times_of(fit, environment)
-        print(f"{'fit, cache empty':<22}{first[0]:>8.2f}{first[1]:>8.2f}")
-        times: dict[str, list[tuple[float, float]]] = {name: [] for name in commands}
+        environment.pop("PYTHONDONTWRITEBYTECODE", None)  # an installed package has its bytecode
+        commands = {
+            "bare JAX": [sys.executable, "-c", BARE],
+            "pellicle --help": pellicle("--help"),
+            **{name: pellicle("fit", *words) for name, words in FITS.items()},
+            "R by a recipe, --out": pellicle("fit", *RECIPE, "--out", f"{folder}/out"),
+        }
+        times_of(pellicle("fit", *RECIPE, "--out", f"{folder}/out"), environment | {"PELLICLE_CACHE": "off"})
+        rows: dict[str, list[tuple[float, float]]] = {name: [] for name in commands}
+        for name, words in FITS.items():
+            own = environment | {"PELLICLE_CACHE": f"{folder}/{name}"}
+            rows[f"{name}, empty cache"] = [times_of(pellicle("fit", *words), own)]
+            times_of(commands[name], environment)
         for _ in range(rounds):
             for name, command in commands.items():
-                times[name].append(times_of(command, environment))
-    medians = {
-        name: [statistics.median(column) for column in zip(*t, strict=True)] for name, t in times.items()
-    }
-    for name, (cpu, wall) in medians.items():
-        print(f"{name:<22}{cpu:>8.2f}{wall:>8.2f}")
-    ratios = [a / b for a, b in zip(medians["fit, cache filled"], medians["bare jax"], strict=True)]
-    print(
-        f"fit with filled cache / bare jax: {ratios[0]:.2f} in processor time, {ratios[1]:.2f} in wall time"
-    )
+                rows[name].append(times_of(command, environment))
+    medians = {name: [statistics.median(c) for c in zip(*times, strict=True)] for name, times in rows.items()}
+    print(f"{'':<36}{'wall s':>8}{'cpu s':>8}{'wall ratio':>12}{'cpu ratio':>11}")
+    bare = medians["bare JAX"]
+    for name, (wall, cpu) in medians.items():
+        print(f"{name:<36}{wall:>8.2f}{cpu:>8.2f}{wall / bare[0]:>12.2f}{cpu / bare[1]:>11.2f}")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""What a command costs before it does anything: imports, and where compiled programs are kept."""
+"""Imports of a command, programs kept between processes, and where they are kept."""
 
 import json
 import os
@@ -12,6 +12,7 @@ import pytest
 from pellicle.cli import main, session
 from pellicle.recipes.dispersion_models import MODELS
 
+ROOT = Path(__file__).resolve().parents[2]
 TELL = "import sys; from pellicle.cli import main; code = main(); print(*sys.modules, file=sys.stderr); "
 
 
@@ -51,6 +52,55 @@ def test_a_plain_fit_imports_nothing_slow_and_keeps_its_programs(spectrum_file, 
     assert not modules(ran) & {"matplotlib", "pint", "colour", "emcee", "arviz", "scipy.optimize"}
     assert any(cache.iterdir())
     assert not (tmp_path / "home").exists()
+
+
+COUNT = """import sys, jax
+heard = []
+jax.monitoring.register_event_duration_secs_listener(lambda event, *_, **__: heard.append(event))
+from pellicle.cli import main
+code = main()
+print("heard", *heard, file=sys.stderr)
+print(*sys.modules, file=sys.stderr)
+sys.exit(code)"""
+"""A command in a process that prints what JAX traced, lowered, compiled or took from its own cache."""
+
+
+@pytest.mark.parametrize("kind", ["reflectance", "psi-delta"])
+def test_a_second_process_traces_nothing(kind, spectrum_file, scene, tmp_path):
+    words = ["fit", spectrum_file(), *scene]
+    if kind == "psi-delta":
+        words = ["fit", "--recipe", str(ROOT / "fits" / "brush_15-1-1" / "recipe.toml")]
+    command = [sys.executable, "-c", COUNT, *map(str, words), "--json"]
+    environment = os.environ | {"PELLICLE_CACHE": str(tmp_path / "programs")}
+    first, second = (
+        subprocess.run(command, capture_output=True, text=True, env=environment, check=False, timeout=300)
+        for _ in range(2)
+    )
+    assert (first.returncode, second.returncode) == (0, 0), second.stderr
+
+    def answer(ran):
+        result = json.loads(ran.stdout)
+        return [result[key] for key in ("status", "parameters", "chi2_reduced")]
+
+    def heard(ran):
+        return ran.stderr.splitlines()[-2].split()[1:]
+
+    assert answer(first) == answer(second)
+    assert any("trace" in event for event in heard(first))
+    assert not heard(second)
+    loaded = set(second.stderr.splitlines()[-1].split())
+    assert not loaded & {"pandas", "matplotlib", "optimistix", "lineax", "scipy.linalg"}
+
+
+def test_a_folder_that_others_can_write_keeps_no_machine_code(spectrum_file, tmp_path):
+    flags = ("--layer", "1.46", "--substrate", "3.9", "--thickness", "299:301")
+    cache = tmp_path / "programs"
+    cache.mkdir()
+    cache.chmod(0o777)
+    ran = run("fit", spectrum_file(), *flags, PELLICLE_CACHE=str(cache))
+    assert ran.returncode in (0, 4), ran.stderr
+    assert not list(cache.iterdir())
+    assert f"{cache}: others can write to this folder" in ran.stderr
 
 
 def test_no_cache_where_it_is_off(spectrum_file, tmp_path):

@@ -20,7 +20,8 @@ def start(keep: bool = True) -> None:
     """Set JAX to float64 and, with `keep`, to keep compiled programs between runs.
 
     The cache is in the user's cache folder; the variable PELLICLE_CACHE names another folder, or is `off`.
-    Without a folder that can be made there is no cache.
+    Compiled programs run with the user's rights, so there is no cache in a folder that others can write, nor
+    without a folder that can be made.
     """
     import jax
 
@@ -28,9 +29,17 @@ def start(keep: bool = True) -> None:
     folder = cache_folder() if keep else None
     if folder is None:
         return
+    from pellicle.fitting.private_files import others_can_write
+
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     except OSError:
+        return
+    if others_can_write(folder):
+        say(
+            f"{folder}: others can write to this folder, so no compiled programs are kept in it: take"
+            f" the right from them, or choose another folder with {CACHE_VARIABLE}"
+        )
         return
     jax.config.update("jax_compilation_cache_dir", str(folder))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0)

@@ -65,6 +65,14 @@ def make_folder(path: Path) -> bool:
         return False
 
 
+def others_can_write(path: Path) -> bool:
+    """True where a file or folder belongs to another user, or another user can write it."""
+    if not hasattr(os, "geteuid"):
+        return False
+    status = path.stat()
+    return status.st_uid != os.geteuid() or bool(status.st_mode & _OTHERS_WRITE)
+
+
 @contextmanager
 def _opened(path: str | Path, kind: int, folder: int | None = None) -> Iterator[int]:
     # O_NONBLOCK: a pipe in the place of the file must not stop the process

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pellicle.dispersion.base import known_index
 from pellicle.fitting.profile_likelihood import Limits
 from pellicle.fitting.result import Estimate, Profile
 from pellicle.fitting.reweighting import RankedMinima, ViewFit
@@ -15,6 +16,7 @@ from pellicle.fitting.spectra.parameters import fixed_numbers, thickness_name
 from pellicle.fitting.spectra.targets import Measured, drifts
 from pellicle.fitting.spectra.view import SpectrumView
 from pellicle.materials import materials_in
+from pellicle.optics.pair import imag
 from pellicle.scene.free import insert
 from pellicle.scene.layers import Layer
 
@@ -77,11 +79,11 @@ def opaque(spectra: Sequence[Measured], ranked: RankedMinima) -> frozenset[str]:
     """Names of the thicknesses of layers that absorb at the best fit."""
     view = ranked.problem.views[0]
     scene = insert(view.scene, ranked.problem.seen_by(view, ranked.values))
-    wavelength = scene.light.wavelength  # of a padded length, so that nothing is compiled for it again
+    wavelength = np.asarray(scene.light.wavelength)
     return frozenset(
         thickness_name(spectra[0].scene, i)
         for i, layer in enumerate(scene.layers)
-        if isinstance(layer, Layer) and np.median(layer.material(wavelength).imag) > _ABSORBS
+        if isinstance(layer, Layer) and np.median(imag(known_index(layer.material, wavelength))) > _ABSORBS
     )
 
 
