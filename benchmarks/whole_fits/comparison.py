@@ -113,7 +113,7 @@ def all_files(chosen: int, folder: str, files: int) -> tuple[Time, list[Result]]
             times[name].append(spent)
             unit = (answer - problem.lower) / problem.width if name == "pellicle" else answer
             right[name] += bool(_chi2(problem, unit) < least[seed] + RIGHT_CHI2)
-    words = ["", *(f"{n} {each.effort}" for n, each in zip(efforts, COMPETITORS, strict=True))]
+    words = ["", *(f"{n} {each.unit}" for n, each in zip(efforts, COMPETITORS, strict=True))]
     medians = [Time(*(statistics.median(column) for column in zip(*times[n], strict=True))) for n in names]
     return loads, [
         Result(name, spent, word, right[name], files)

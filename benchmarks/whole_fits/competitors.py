@@ -17,11 +17,11 @@ Array = np.ndarray
 class Competitor(NamedTuple):
     """A program; `find(problem, effort, seed)` returns its answer in the unit cube.
 
-    `efforts` are numbers of starts, or population sizes for each parameter.
+    `efforts` are numbers of starts, or of the population for each parameter, as `unit` says.
     """
 
     name: str
-    effort: str
+    unit: str
     efforts: tuple[int, ...]
     find: Callable[[Problem, int, int], Array]
 
@@ -78,9 +78,9 @@ def _best(problem: Problem, found: list[Array]) -> Array:
 
 SCANNED = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
 COMPETITORS = (
-    Competitor("SciPy, scan", "starts", SCANNED, _scipy),
-    Competitor("lmfit, scan", "starts", SCANNED, _lmfit),
-    Competitor("SciPy, 16 minima", "starts", (16,), _scipy),  # for the rivals that pl.fit lists
-    Competitor("SciPy, random", "starts", (4, 8, 16, 32, 64, 128), _random_starts),
+    Competitor("SciPy, scan", "of a scan", SCANNED, _scipy),
+    Competitor("lmfit, scan", "of a scan", SCANNED, _lmfit),
+    Competitor("SciPy, 16 minima", "of a scan", (16,), _scipy),  # for the rivals that pl.fit lists
+    Competitor("SciPy, random", "random", (4, 8, 16, 32, 64, 128), _random_starts),
     Competitor("SciPy, evolution", "a parameter", (5, 10, 15, 30, 60), _differential_evolution),
 )
