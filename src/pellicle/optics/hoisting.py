@@ -55,7 +55,7 @@ def not_inlined(function: Callable[..., Any], *arguments: Any) -> Any:
     """Return function(*arguments), compiled apart: its arguments and results are stored."""
 
     def inside(*arguments: Any) -> Any:
-        with set_xla_metadata(inlineable=None):
+        with set_xla_metadata(inlineable="true"):
             return function(*arguments)
 
     with set_xla_metadata(inlineable="false"):

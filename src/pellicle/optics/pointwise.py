@@ -34,15 +34,18 @@ def _pointwise_slope(function: Callable[[Any], Any], primal: Any, tangent: Any) 
     tangents = jax.tree.leaves(tangent[0], is_leaf=lambda x: isinstance(x, SymbolicZero))
     varying = [i for i, t in enumerate(tangents) if not isinstance(t, SymbolicZero)]
 
+    if not varying:
+        value = function(primal[0])
+        return value, jnp.zeros_like(value)
+
     def value_and_slopes(*leaves: Any) -> Any:
         def along(i: int) -> Any:
             of_one = lambda x: function(structure.unflatten([*leaves[:i], x, *leaves[i + 1 :]]))  # noqa: E731
-            return jax.jvp(of_one, (leaves[i],), (jnp.ones_like(leaves[i]),))[1]
+            return jax.jvp(of_one, (leaves[i],), (jnp.ones_like(leaves[i]),))
 
-        return function(structure.unflatten(leaves)), [along(i) for i in varying]
+        values, slopes = zip(*(along(i) for i in varying), strict=True)
+        return values[0], slopes
 
     # compiled apart: else the slopes are computed again for each parameter
     value, slopes = not_inlined(value_and_slopes, *leaves)
-    if not varying:
-        return value, jnp.zeros_like(value)
     return value, sum(slope * tangents[i] for i, slope in zip(varying, slopes, strict=True))
