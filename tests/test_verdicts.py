@@ -102,10 +102,11 @@ def test_mixtures_fulfil_bruggemans_equation(bench):
 
 
 def test_clean_ellipsometry_is_that_of_the_recipe(bench):
-    """The scene of a family, with the truth in place of its free number, explains its clean data."""
-    family = bench["families"].FAMILIES["oxide-psi3"]
+    """The scene of a family, with the truth in place of its free numbers, explains its clean data."""
+    family = bench["families"].FAMILIES["polymer-psi3"]
     theta = family.draw(np.random.default_rng(5))
-    fixed = insert(family.scene(), theta)
+    thickness, a, b = theta
+    fixed = insert(family.scene(), (a, b, thickness))
     light = pl.Light(angle=family.view.angle, signal="psi-delta")
     truth = pl.simulate(pl.Scene(fixed.layers, fixed.substrate, light=light), family.view.wavelength)
     psi, delta = family.signal(theta)

@@ -38,7 +38,10 @@ def _linear(family: Family, found: np.ndarray, sigma: np.ndarray) -> np.ndarray 
 
 
 def bound(family: Family, theta: Theta, data: np.ndarray, sigma: np.ndarray) -> float:
-    """Cramér-Rao bound of the thickness in nm at `theta`, which explains the noise-free `data` exactly."""
+    """Cramér-Rao bound of the thickness in nm at `theta`, which explains the noise-free `data` exactly.
+
+    A free scale and offset have no prior here: where pellicle's have one, its errors may be smaller.
+    """
 
     def at(point: np.ndarray) -> np.ndarray:
         return residuals(family, family.signal(tuple(point)), data, sigma)

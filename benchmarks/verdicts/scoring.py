@@ -193,7 +193,7 @@ def failures(answers: Sequence[Answer]) -> str:
             lines.append(
                 f"  {a.name} | {a.detail}: {a.outcome}; truth {a.truth:.6g}, answer {a.value:.6g}"
                 f" ± {a.stderr:.2g} nm ({100 * a.relative:.2g} %), {a.status}, χ² {a.chi2_reduced:.3g},"
-                f" rms {a.rms:.3g}"
+                f" rms {a.rms:.3g}, evidence {a.evidence:.3g}"
             )
             lines.append(f"    {a.verdict}")
     return "\n".join(lines)
