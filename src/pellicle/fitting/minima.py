@@ -18,7 +18,7 @@ SLOTS = 64
 """Starts that one call of the solver takes."""
 STEPS = 100
 """Most steps of one polish."""
-_WORK = 16384
+_WORK = 4096
 """Data values that are evaluated in one step of the solver, about: lanes of many points are few."""
 MOST = 16
 """Most minima that are kept."""

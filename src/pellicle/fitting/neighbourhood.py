@@ -23,7 +23,8 @@ class Neighbourhood(NamedTuple):
     sets it.
     `misfit` returns χ² at points (points, parameters) of the cube; `profile(which, values, starts)` the least
     χ² with one parameter fixed at each value and the others polished from `starts` (values, starts,
-    parameters). `others` (points, parameters) are further minima from which a profile may be reached.
+    parameters), and the points (values, parameters) where it is. `others` (points, parameters) are further
+    minima from which a profile may be reached.
     """
 
     best: np.ndarray
@@ -32,7 +33,7 @@ class Neighbourhood(NamedTuple):
     covariance: np.ndarray
     natural: tuple[tuple[bool, bool], ...]
     misfit: Callable[[np.ndarray], np.ndarray]
-    profile: Callable[[int, np.ndarray, np.ndarray], np.ndarray]
+    profile: Callable[[int, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
     others: np.ndarray = np.zeros((0, 0))
 
     @property
@@ -75,10 +76,12 @@ def neighbourhood(ranked: RankedMinima, covariance: np.ndarray, others: np.ndarr
     lower, upper = np.asarray(box.lower), np.asarray(box.upper)
     best, *further = np.clip((np.vstack([values, *others]) - lower) / (upper - lower), 0.0, 1.0)
 
-    def profile(which: int, at: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    def profile(which: int, at: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         every = np.repeat(at, starts.shape[1])
-        deviance = solve(own, starts.reshape(len(every), -1), fixed=(which, every), atol=_SETTLED).deviance
-        return deviance.reshape(len(at), -1).min(axis=1)
+        result = solve(own, starts.reshape(len(every), -1), fixed=(which, every), atol=_SETTLED)
+        deviance = result.deviance.reshape(len(at), -1)
+        chosen = np.arange(len(at)), np.argmin(deviance, axis=1)
+        return deviance[chosen], result.units.reshape(starts.shape)[chosen]
 
     return Neighbourhood(
         best,

@@ -9,7 +9,7 @@ A. López and J. Conrad, 2005, Nucl. Instrum. Methods A 551, 493).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -32,7 +32,9 @@ _STEEP = 3.3
 """A limit nearer than this many standard errors to a bound on which the best value rests: the misfit rises
 from there, as it would not for a parameter that the data do not see."""
 _STEPS = 7
-"""Values on each side of the best one at which a profile is looked at, and again around a limit."""
+"""Values on each side of the best one at which a profile is computed, unless it has risen enough before."""
+_EXACT = 2e-3
+"""Share of the interval in which a limit lies that its error may be."""
 
 
 class Limits(NamedTuple):
@@ -85,6 +87,13 @@ class _Side(NamedTuple):
     outside: float
 
 
+class _Answer(NamedTuple):
+    """The fit with the parameter fixed at one value."""
+
+    deviance: float
+    unit: np.ndarray
+
+
 class _OneParameter:
     """The profile likelihood of one parameter: its best value, its bounds, its standard error `sd` by the
     parabola."""
@@ -93,31 +102,54 @@ class _OneParameter:
         self.around, self.which = around, which
         self.value, self.sd = float(around.values[which]), float(around.stderr[which])
         self.lower, self.upper = float(around.lower[which]), float(around.upper[which])
+        # where the covariance expects the others
+        slope = around.covariance[which] / around.covariance[which, which]
+        self.along = slope / (around.upper - around.lower)
+        self.known: dict[float, _Answer] = {}
 
     @property
     def error(self) -> float:
         """The standard error, infinite where it says no more than the bounds."""
         return self.sd if self.sd <= UNSEEN * (self.upper - self.lower) else np.inf
 
-    def rise(self, values: np.ndarray) -> np.ndarray:
+    def rise(self, values: Sequence[float]) -> list[float]:
         """χ² above the best with the parameter fixed at each value and all others fitted again.
 
-        The others start at their best values, where the covariance expects them, along a curved valley, and
-        at further minima.
+        The others start from the answer at the nearest value so far, there and moved along the line through
+        the two nearest on its side, and at further minima.
         """
-        around, which, best = self.around, self.which, self.around.best
-        slope = around.covariance[which] / around.covariance[which, which] / (around.upper - around.lower)
-        values = np.append(values, self.value)
-        moved = np.clip(best + (values - self.value)[:, None] * slope, 0.0, 1.0)
-        starts = np.stack([moved, *(np.broadcast_to(x, moved.shape) for x in (best, *around.others))], axis=1)
-        deviance = around.profile(which, values, starts)
-        return np.maximum(deviance[:-1] - deviance[-1], 0.0)
+        if not self.known:
+            self._fit([self.value])
+        self._fit([value for value in values if value not in self.known])
+        best = self.known[self.value].deviance
+        return [max(self.known[value].deviance - best, 0.0) for value in values]
+
+    def _fit(self, values: list[float]) -> None:
+        if values:
+            starts = np.array([[*self._ahead(value), *self.around.others] for value in values])
+            deviance, units = self.around.profile(self.which, np.array(values), starts)
+            self.known |= {
+                v: _Answer(*each) for v, *each in zip(values, deviance.tolist(), units, strict=True)
+            }
+
+    def _ahead(self, value: float) -> tuple[np.ndarray, np.ndarray]:
+        """Two starts for a fit with the parameter at `value`, by what is known nearer to the best one."""
+        if not self.known:
+            return self.around.best, self.around.best
+        side = [v for v in self.known if (v - self.value) * (value - self.value) >= 0]
+        near, *rest = sorted(side, key=lambda v: abs(v - value))
+        unit = self.known[near].unit
+        if rest and rest[0] != near:
+            slope = (unit - self.known[rest[0]].unit) / (near - rest[0])
+        else:
+            slope = self.along
+        return np.clip(unit + (value - near) * slope, 0.0, 1.0), unit
 
     def beside(self, end: float) -> Limits:
         """Limits where the best value may as well be `end`, a bound that physics sets."""
         below = end == self.lower
         [side] = self.sides([self.upper if below else self.lower], ONE_SIDED)
-        if self.rise(np.array([end]))[0] > ONE_SIDED:
+        if self.rise([end])[0] > ONE_SIDED:
             return Limits(self.error)
         if side is None:
             return Limits(np.inf)
@@ -147,25 +179,32 @@ class _OneParameter:
 
         It is computed at values from the best one outwards, each so many times further away than the last.
         """
-        ways = []
-        for room in np.array(bounds) - self.value:
+        ways = {}
+        for bound in bounds:
+            room = bound - self.value
             first = min(ONE_SIDED**0.5 * self.sd / max(abs(room), 1e-300), 0.3)
-            ways.append(self.value + room * np.geomspace(max(first, 1e-6), 1.0, _STEPS))
-        result: list[_Side | None] = []
-        for way, rise in zip(ways, np.split(self.rise(np.concatenate(ways)), len(ways)), strict=True):
-            first = int(np.argmax(rise > level))
-            near = [self.value, *way[:first][rise[:first] < ONE_SIDED]]
-            result.append(_Side(float(near[-1]), float(way[first])) if rise[first] > level else None)
-        return result
+            ways[bound] = (self.value + room * np.geomspace(max(first, 1e-6), 1.0, _STEPS)).tolist()
+        inside, result = dict.fromkeys(bounds, self.value), dict.fromkeys(bounds)
+        for step in range(_STEPS):
+            going = [bound for bound in bounds if result[bound] is None]
+            values = [ways[bound][step] for bound in going]
+            for bound, value, rise in zip(going, values, self.rise(values), strict=True):
+                if rise > level:
+                    result[bound] = _Side(inside[bound], value)
+                elif rise < ONE_SIDED:
+                    inside[bound] = value
+        return [result[bound] for bound in bounds]
 
     def crossing(self, side: _Side, level: float) -> float:
-        """Value at which the misfit reaches `level`, by interpolation of its root between several values."""
-        values = np.linspace(side.inside, side.outside, _STEPS + 1)
-        root = np.sqrt(self.rise(values)) / level**0.5
-        last = max(int(np.argmax(root > 1)), 1)
-        near, far = root[last - 1 : last + 1]
-        share = np.clip((1 - near) / max(far - near, 1e-12), 0.0, 1.0)
-        return float(values[last - 1] + (values[last] - values[last - 1]) * share)
+        """Value at which the misfit reaches `level`: its root grows nearly linearly."""
+
+        from scipy.optimize import brentq  # takes 0.2 s to import, and few fits need it
+
+        def above(value: float) -> float:
+            return (self.rise([value])[0] / level) ** 0.5 - 1
+
+        root: Any = brentq(above, *side, xtol=_EXACT * abs(side.outside - side.inside))
+        return root
 
     def flat_sides(self, scan: Profile) -> tuple[bool, bool]:
         """On which sides of the best thickness the misfit of the search's scan never rises."""
