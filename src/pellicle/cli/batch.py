@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Iterator
+from concurrent.futures import BrokenExecutor
+from contextlib import nullcontext, redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field, replace
+from io import StringIO
+from logging import INFO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pellicle.cli.inputs import LEAST_SQUARES, Input, Inputs
 from pellicle.cli.messages import as_flags, with_flags
 from pellicle.cli.session import Progress, check_folder, say
+from pellicle.cli.verbose import LOG, log_to_stderr
 from pellicle.errors import UsageError
 
 if TYPE_CHECKING:
@@ -43,7 +50,8 @@ class Sampler(NamedTuple):
 class Batch:
     """Fits of several files; with a `sampler` each is followed by its posterior.
 
-    A file that fails does not stop the others. `records` are the JSON records of the results so far.
+    A file that fails does not stop the others. `records` are the JSON records of the results so far. Several
+    files are fitted by as many processes as there are `jobs`.
     """
 
     inputs: Inputs
@@ -51,6 +59,8 @@ class Batch:
     sampler: Sampler | None = None
     out: str | None = None
     as_json: bool = False
+    jobs: int = 1
+    verbose: bool = field(default_factory=lambda: LOG.isEnabledFor(INFO))
     records: list[dict[str, Any]] = field(default_factory=list)
 
     def run(self) -> int:
@@ -66,14 +76,40 @@ class Batch:
             folders = [*folder_per_file(self.out, [files[0].path for files in groups])]
         worst = CONVERGED
         try:
-            for files, folder in zip(groups, folders, strict=True):
-                worst = max(worst, self._fit(files, folder))
+            for code in self._codes(groups, folders):
+                worst = max(worst, code)
         except KeyboardInterrupt:
             say(f"interrupted after {len(self.records)} of {len(groups)} files; finished results are kept")
             worst = INTERRUPTED
+        except BrokenExecutor:
+            say(
+                f"pellicle: a worker process ended before its fit did, often for lack of memory:"
+                f" {len(self.records)} of {len(groups)} files are done; fit the others with fewer --jobs"
+            )
+            worst = FAILED
         if self.out is not None and len(groups) > 1 and self.records:
             write_summary(Path(self.out) / SUMMARY, self.records)
         return worst
+
+    def _codes(self, groups: list[list[Input]], folders: list[Path | None]) -> Iterator[int]:
+        """Fit the groups one by one, or in worker processes, and yield their exit codes in order."""
+        tasks = list(zip(groups, folders, strict=True))
+        if self.jobs == 1 or len(tasks) == 1:
+            yield from (self._fit(*task) for task in tasks)
+            return
+        from pellicle.cli.workers import in_order
+
+        own = [replace(self, inputs=self.inputs._replace(files=files), records=[]) for files in groups]
+        progress = Progress(f"{len(tasks)} files")
+        progress("fit", 0, len(tasks))
+        for done, result in enumerate(in_order(_captured, zip(own, folders, strict=True), self.jobs), 1):
+            progress.clear()
+            print(result.err, end="", file=sys.stderr, flush=True)
+            print(result.out, end="", flush=True)
+            self.records.append(result.record)
+            yield result.code
+            progress("fit", done, len(tasks))
+        progress.clear()
 
     def _fit(self, files: list[Input], folder: Path | None) -> int:
         """Fit one group of files, print and write the result, and return its exit code."""
@@ -116,6 +152,24 @@ class Batch:
         posterior = sample(data, scene, progress=progress, **self.sampler.options(folder), **options)
         posterior = replace(posterior, fit=with_flags(posterior.fit))
         return posterior.fit, posterior
+
+
+class _Captured(NamedTuple):
+    """A finished fit of a worker process: exit code, record, and its text on both streams."""
+
+    code: int
+    record: dict[str, Any]
+    out: str
+    err: str
+
+
+def _captured(task: tuple[Batch, Path | None]) -> _Captured:
+    """Fit the one group of a batch, and write its folder."""
+    batch, folder = task
+    out, err = StringIO(), StringIO()
+    with redirect_stdout(out), redirect_stderr(err), log_to_stderr() if batch.verbose else nullcontext():
+        code = batch._fit(batch.inputs.files, folder)
+    return _Captured(code, batch.records[0], out.getvalue(), err.getvalue())
 
 
 def measurement(

@@ -10,6 +10,7 @@ from pellicle.cli.batch import Batch, Sampler
 from pellicle.cli.flags import OUTPUT, SAMPLER, SCENE, ReadingFlags, SceneFlags, flag, switch
 from pellicle.cli.inputs import inputs
 from pellicle.cli.session import not_negative, start
+from pellicle.errors import UsageError
 
 
 def fit(
@@ -24,12 +25,15 @@ def fit(
     posterior: Annotated[bool, switch(SAMPLER, "Sample the posterior too, as pellicle sample does.")] = False,
     out: Annotated[str | None, flag(OUTPUT, "Folder for report, figure and tables.")] = None,
     json: Annotated[bool, switch(OUTPUT, "Print one JSON object a line.")] = False,
+    jobs: Annotated[int, flag(OUTPUT, "Number of processes that share several files (1).")] = 1,
 ) -> int:
     """Fit a layer to measured reflectance, transmittance, ellipsometry or BRDF samples.
 
     Example: pellicle fit oxide.csv --layer SiO2 --substrate Si --thickness 10:3000
     """
     not_negative("--tolerance", tolerance)
+    if jobs < 1:
+        raise UsageError(f"--jobs must be at least 1, got {jobs}")
     files = inputs(list(data), recipe, scene or SceneFlags(), reading or ReadingFlags(), joint)
     start()
-    return Batch(files, tolerance, Sampler() if posterior else None, out, json).run()
+    return Batch(files, tolerance, Sampler() if posterior else None, out, json, jobs).run()

@@ -33,16 +33,19 @@ def sample(
         str | None, flag(OUTPUT, "Folder for report, figures and chain; an interrupted chain is continued.")
     ] = None,
     json: Annotated[bool, switch(OUTPUT, "Print one JSON object a line.")] = False,
+    jobs: Annotated[int, flag(OUTPUT, "Number of processes that share several files (1).")] = 1,
 ) -> int:
     """Fit, then sample the posterior of every free parameter, starting from every minimum that matters.
 
     Example: pellicle sample oxide.csv --layer SiO2 --substrate Si --free n --out results/oxide
     """
     not_negative("--tolerance", tolerance)
+    if jobs < 1:
+        raise UsageError(f"--jobs must be at least 1, got {jobs}")
     if steps is not None and steps < FEWEST_STEPS:
         raise UsageError(f"--steps must be at least {FEWEST_STEPS}, got {steps}")
     if not 0 <= seed < 2**32:
         raise UsageError(f"--seed must lie in 0 to 4294967295, got {seed}")
     files = inputs(list(data), recipe, scene or SceneFlags(), reading or ReadingFlags(), joint)
     start()
-    return Batch(files, tolerance, Sampler(walkers, steps, seed), out, json).run()
+    return Batch(files, tolerance, Sampler(walkers, steps, seed), out, json, jobs).run()

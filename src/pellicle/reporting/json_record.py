@@ -7,6 +7,7 @@ import math
 import os
 import sys
 from collections.abc import Mapping, Sequence
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
 
@@ -174,7 +175,8 @@ def indented(record: Mapping[str, Any]) -> str:
     return json.dumps(record, allow_nan=False, ensure_ascii=False, indent=1) + "\n"
 
 
-def versions() -> dict[str, str | None]:
+@cache
+def versions() -> Mapping[str, str | None]:
     """Versions of pellicle, Python and the packages that numbers depend on, without importing them."""
     installed: dict[str, str | None] = {
         "pellicle": version("pellicle"),

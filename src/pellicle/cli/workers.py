@@ -1,0 +1,87 @@
+"""Worker processes for the fits of many files."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
+from contextlib import contextmanager, redirect_stderr
+from io import StringIO
+from multiprocessing import get_context
+from typing import TypeVar
+
+from pellicle.cli.session import start
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+_THREADS = ("NPROC", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+"""Numbers of threads. XLA takes its own from NPROC, which, unlike XLA_FLAGS, does not enter the key of a
+compiled program: workers share their programs with all other runs."""
+
+
+def in_order(function: Callable[[Task], Result], tasks: Iterable[Task], workers: int) -> Iterator[Result]:
+    """Compute `function` of each task in worker processes and yield the results in the order of the tasks.
+
+    After Ctrl-C, or where a worker dies, no other task is begun, and the results that are finished are
+    yielded before KeyboardInterrupt or BrokenExecutor is raised. `function`, tasks and results are pickled.
+    """
+    # spawned: a forked process would inherit the locks of JAX's threads in any state
+    pool = ProcessPoolExecutor(workers, get_context("spawn"), _begin)
+    waiting: list[Future[Result]] = []
+    try:
+        with _quiet_and_single_threaded():
+            waiting = [pool.submit(_run, function, task) for task in tasks]
+        while waiting:
+            result = waiting[0].result()
+            del waiting[0]
+            yield result
+    except (KeyboardInterrupt, BrokenExecutor):
+        pool.shutdown(cancel_futures=True)
+        yield from (x.result() for x in waiting if not x.cancelled() and x.exception() is None)
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def _quiet_and_single_threaded() -> Iterator[None]:
+    """Processes started in the block ignore Ctrl-C until they have a task, and use one thread each."""
+    before = {name: os.environ.get(name) for name in _THREADS}
+    handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.environ |= dict.fromkeys(_THREADS, "1")
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+        signal.signal(signal.SIGINT, handler)
+
+
+def _begin() -> None:
+    sys.unraisablehook = _unraisable
+    with redirect_stderr(StringIO()):  # this process has printed what there is to say
+        start()
+
+
+def _unraisable(raised: sys.UnraisableHookArgs) -> None:
+    """Report an exception that Python ignores, unless it is Ctrl-C in JAX's callback of the garbage
+    collector: the fit goes on to its end then."""
+    if not issubclass(raised.exc_type, KeyboardInterrupt):
+        sys.__unraisablehook__(raised)
+
+
+def _run(function: Callable[[Task], Result], task: Task) -> Result:
+    """The result of one task; Ctrl-C ends the process, so that it takes no other."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        return function(task)
+    except KeyboardInterrupt:
+        os._exit(130)
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)

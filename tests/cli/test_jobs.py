@@ -1,0 +1,96 @@
+"""`--jobs`: fits of several files in worker processes."""
+
+import os
+import signal
+import time
+from concurrent.futures import BrokenExecutor
+
+import pytest
+
+from pellicle.cli.workers import in_order
+
+
+@pytest.fixture(autouse=True)
+def no_cache(monkeypatch):
+    monkeypatch.setenv("PELLICLE_CACHE", "off")
+
+
+def _slowest_first(seconds):
+    time.sleep(seconds)
+    return seconds, os.environ["NPROC"], os.getpid()
+
+
+def test_results_come_in_order_from_several_processes():
+    results = list(in_order(_slowest_first, [0.5, 0.0, 0.1], 2))
+    assert [task for task, *_ in results] == [0.5, 0.0, 0.1]
+    assert {threads for _, threads, _ in results} == {"1"}
+    assert len({process for *_, process in results}) == 2
+    assert os.getpid() not in {process for *_, process in results}
+    assert "NPROC" not in os.environ or os.environ["NPROC"] != "1"
+
+
+def _dies_at_two(task):
+    if task == 2:
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(60)
+    return task
+
+
+def test_a_dead_worker_is_an_error_after_the_finished_results():
+    results = in_order(_dies_at_two, range(5), 1)
+    assert [next(results), next(results)] == [0, 1]
+    with pytest.raises(BrokenExecutor):
+        next(results)
+
+
+def _interrupts_its_parent(task):
+    if task == 1:
+        for process in (os.getppid(), os.getpid()):  # as a terminal does
+            os.kill(process, signal.SIGINT)
+        time.sleep(60)
+    return task
+
+
+def test_after_ctrl_c_finished_results_are_kept_and_no_task_is_begun():
+    began, results = time.monotonic(), in_order(_interrupts_its_parent, range(5), 1)
+    assert next(results) == 0
+    with pytest.raises(KeyboardInterrupt):
+        next(results)
+    assert time.monotonic() - began < 50  # nobody waits for the sleeper
+
+
+def test_two_processes_find_what_one_finds(pellicle, spectrum_file, scene, tmp_path):
+    one, two, gone = spectrum_file("one.csv", 250.0), spectrum_file("two.csv", 420.0), tmp_path / "gone.csv"
+    arguments = ("fit", one, gone, two, *scene, "--json", "--out")
+    together = pellicle(*arguments, tmp_path / "b", "--jobs", "2")
+    alone = pellicle(*arguments, tmp_path / "a")
+    assert together.code == alone.code == 3
+    for ran in (together, alone):
+        assert [found["data"]["path"] for found in ran.objects] == [str(one), str(gone), str(two)]
+    for a, b in zip(alone.objects, together.objects, strict=True):
+        assert a | {"seconds": None} == b | {"seconds": None}
+    talk = [line for line in alone.err.splitlines() if "written" not in line]
+    assert [line for line in together.err.splitlines() if "written" not in line] == talk
+    a, b = ((tmp_path / name / "summary.csv").read_text() for name in "ab")
+    assert a == b
+    assert (tmp_path / "b" / "two" / "figure.png").exists()
+
+
+def test_a_worker_that_dies_is_one_sentence(pellicle, spectrum_file, scene, monkeypatch):
+    def dies(function, tasks, workers):
+        raise BrokenExecutor
+        yield
+
+    monkeypatch.setattr("pellicle.cli.workers.in_order", dies)
+    pellicle("fit", spectrum_file(), spectrum_file("b.csv"), *scene, "--jobs", "2").refused(
+        3, "worker process", "0 of 2 files", "--jobs"
+    )
+
+
+def test_no_worker_for_a_single_file(pellicle, tmp_path, scene, monkeypatch):
+    monkeypatch.delattr("pellicle.cli.workers.in_order")
+    assert pellicle("fit", tmp_path / "gone.csv", *scene, "--jobs", "2").code == 3
+
+
+def test_jobs_are_at_least_one(pellicle, scene):
+    pellicle("fit", "oxide.csv", *scene, "--jobs", "0").refused(2, "--jobs")
