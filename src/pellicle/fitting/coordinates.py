@@ -9,12 +9,14 @@ stop on the saddle between the two signs and underestimate the error of what is 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, NamedTuple, TypeAlias
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
+from pellicle.optics.array_namespace import namespace
 from pellicle.scene.priors import LogUniform, Prior
 
 Array: TypeAlias = jax.Array | np.ndarray
@@ -65,26 +67,29 @@ class Coordinates(NamedTuple):
     def values(self, box: Box, unit: Any) -> Any:
         """The parameters in their own units at `unit` (..., parameters)."""
         x = box.lower + unit * (box.upper - box.lower)
+        xp = namespace(x)
         if any(self.log):
             log = np.array(self.log)
-            x = jnp.where(log, jnp.exp(jnp.where(log, x, 0.0)), x)
+            x = xp.where(log, xp.exp(xp.where(log, x, 0.0)), x)
         if self.tilt is None:
             return x
-        x = jnp.asarray(x)
         a, b = self.tilt
-        y = jnp.sqrt(x[..., b]) if self.folded else x[..., b]
+        y = xp.sqrt(x[..., b]) if self.folded else x[..., b]
         # the square onto the disc, smoothly and edge to edge: see `log_area`
-        u, v = x[..., a] * jnp.sqrt(1 - 0.5 * y**2), y * jnp.sqrt(1 - 0.5 * x[..., a] ** 2)
+        u, v = x[..., a] * xp.sqrt(1 - 0.5 * y**2), y * xp.sqrt(1 - 0.5 * x[..., a] ** 2)
         # its azimuth has a slope everywhere but at the centre
-        u = jnp.where(u * u + v * v < 1e-20, 1e-10, u)
-        radius, azimuth = box.reach * jnp.sqrt(u * u + v * v), jnp.rad2deg(jnp.arctan2(v, u))
-        return x.at[..., a].set(radius).at[..., b].set(azimuth)
+        u = xp.where(u * u + v * v < 1e-20, 1e-10, u)
+        radius, azimuth = box.reach * xp.sqrt(u * u + v * v), xp.rad2deg(xp.arctan2(v, u))
+        if xp is jnp:
+            return x.at[..., a].set(radius).at[..., b].set(azimuth)
+        x[..., a], x[..., b] = radius, azimuth
+        return x
 
     def slope(self, box: Box, unit: np.ndarray) -> np.ndarray:
         """∂ values / ∂ unit at one point, (parameters, parameters)."""
         if not any(self.log) and self.tilt is None:
             return np.diag(box.upper - box.lower)
-        return np.asarray(jax.jacfwd(lambda u: self.values(box, u))(jnp.asarray(unit)))
+        return np.asarray(_slope(self, box, unit))
 
     def log_area(self, box: Box, unit: Any) -> Any:
         """ln of the area of the disc of tilts that a step in the unit cube covers, up to a constant; not
@@ -94,3 +99,8 @@ class Coordinates(NamedTuple):
         x, y = (box.lower[at] + unit[at] * (box.upper[at] - box.lower[at]) for at in self.tilt)
         sides = jnp.sqrt((1 - 0.5 * y**2) * (1 - 0.5 * x**2))
         return jnp.log(sides - (0.5 * x * y) ** 2 / sides)
+
+
+@partial(jax.jit, static_argnums=0)
+def _slope(coordinates: Coordinates, box: Box, unit: Any) -> Any:
+    return jax.jacfwd(lambda unit: coordinates.values(box, unit))(unit)

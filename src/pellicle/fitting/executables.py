@@ -26,6 +26,10 @@ log = logging.getLogger(__name__)
 LIMIT = 256 * 2**20
 """Size of the folder (bytes) above which its oldest files are removed. A program takes 0.05 to 1 MB."""
 
+_OPTIONS: dict[str, str | bool] = {"xla_cpu_use_fusion_emitters": False}
+"""XLA's older code generator compiles the programs of a fit in 5 to 22 s of processor time, not 7 to 30 s;
+they are as fast within 10 % (jaxlib 0.10, `benchmarks/fit.py` and `benchmarks/cold_start.py`)."""
+
 _DIGEST = hashlib.sha256().digest_size
 _CALLS = re.compile(r"custom_call @([\w.]+)")
 
@@ -61,7 +65,10 @@ def make(
         return None  # a library that the loading process may not have initialised
     from jax.experimental import serialize_executable
 
-    compiled = lowered.compile()
+    try:
+        compiled = lowered.compile(compiler_options=_OPTIONS)
+    except jax.errors.JaxRuntimeError:  # XLA of another version
+        compiled = lowered.compile()
     with suppress(OSError):
         for copy in cache.glob(f"*{name}*"):
             copy.unlink()
