@@ -22,8 +22,8 @@ from pellicle.optics.hoisting import not_inlined
 def pointwise(function: Callable[[Any], Any], numbers: Any) -> Any:
     """Return function(numbers), differentiated by its slopes in those arrays of `numbers` that vary.
 
-    **Arguments:** `function` returns one array and acts along all common axes element by element; `numbers`
-    is a pytree of real arrays, which broadcast against each other.
+    **Arguments:** `function` returns a pytree of arrays and acts along all common axes element by element;
+    `numbers` is a pytree of real arrays, which broadcast against each other.
     """
     return function(numbers)
 
@@ -36,7 +36,7 @@ def _pointwise_slope(function: Callable[[Any], Any], primal: Any, tangent: Any) 
 
     if not varying:
         value = function(primal[0])
-        return value, jnp.zeros_like(value)
+        return value, jax.tree.map(jnp.zeros_like, value)
 
     def value_and_slopes(*leaves: Any) -> Any:
         def along(i: int) -> Any:
@@ -48,4 +48,8 @@ def _pointwise_slope(function: Callable[[Any], Any], primal: Any, tangent: Any) 
 
     # compiled apart: else the slopes are computed again for each parameter
     value, slopes = not_inlined(value_and_slopes, *leaves)
-    return value, sum(slope * tangents[i] for i, slope in zip(varying, slopes, strict=True))
+
+    def change(*slopes: Any) -> Any:
+        return sum(slope * tangents[i] for i, slope in zip(varying, slopes, strict=True))
+
+    return value, jax.tree.map(change, *slopes)

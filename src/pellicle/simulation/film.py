@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache, partial
 from typing import Any
 
@@ -79,7 +79,9 @@ def build(plan: Plan) -> Simulate:
     powers = partial(_stokes_rows if ellipsometric else _power_rows, plan)
     finish = _normalised_rows if ellipsometric else _mean
     averaged = plan.row("coherence").count or plan.on("angle-spread")
-    at_each_wavelength = powers if averaged else lambda groups: finish(powers(groups))
+
+    def at_each_wavelength(groups: list[CoherentGroup]) -> Sequence[Any]:
+        return list(powers(groups)) if averaged else finish(powers(groups))
 
     def monochromatic(scene: Scene, /) -> Any:
         return pointwise(at_each_wavelength, coherent_groups(plan, scene))
@@ -97,7 +99,7 @@ def build(plan: Plan) -> Simulate:
         for remove in plan.left_out:
             scene = remove(scene)
         rows = finish(intensities(scene)) if averaged else intensities(scene)
-        return rows.T.reshape(-1) if ellipsometric else rows
+        return stack_rows(rows).T.reshape(-1) if ellipsometric else rows[0]
 
     return simulate
 
@@ -128,33 +130,33 @@ def _averaged(intensities: Intensities, count: int) -> Intensities:
     return average
 
 
-def _mean(rows: Any) -> Any:
+def _mean(rows: Sequence[Any]) -> Sequence[Any]:
     """The mean over polarisations."""
-    return rows[0] if len(rows) == 1 else 0.5 * (rows[0] + rows[1])
+    return rows if len(rows) == 1 else [0.5 * (rows[0] + rows[1])]
 
 
-def _normalised_rows(rows: Any) -> Any:
-    """N, C and S, (3, wavelengths)."""
-    return stack_rows(ellipsometry.normalised(ellipsometry.Stokes(*rows)))
+def _normalised_rows(rows: Sequence[Any]) -> Sequence[Any]:
+    """N, C and S."""
+    return ellipsometry.normalised(ellipsometry.Stokes(*rows))
 
 
-def _power_rows(plan: Plan, groups: list[CoherentGroup]) -> Any:
-    """R or T of one polarisation, or of both, (polarisations, wavelengths)."""
+def _power_rows(plan: Plan, groups: list[CoherentGroup]) -> list[Any]:
+    """R or T of one polarisation, or of both."""
     power = reflected if plan.signal == "R" else transmitted
     polarisations = "sp"
     if not plan.on("polarisation"):
         one = plan.on("oblique") and plan.polarisation != "unpolarised"
         polarisations = plan.polarisation if one else "s"
-    return stack_rows([power(plan, groups, p) for p in polarisations])
+    return [power(plan, groups, p) for p in polarisations]
 
 
-def _stokes_rows(plan: Plan, groups: list[CoherentGroup]) -> Any:
-    """Stokes parameters before normalisation, (4, wavelengths)."""
+def _stokes_rows(plan: Plan, groups: list[CoherentGroup]) -> ellipsometry.Stokes:
+    """Stokes parameters before normalisation."""
     if len(groups) == 1:
         s, p = (response_of(plan, groups[0], polarisation) for polarisation in "sp")
-        return stack_rows(ellipsometry.stokes(s, p))
+        return ellipsometry.stokes(s, p)
     s, p = (reflected(plan, groups, polarisation) for polarisation in "sp")
-    return stack_rows(ellipsometry.stokes_from_sums(s, p, _cross_product(plan, groups)))
+    return ellipsometry.stokes_from_sums(s, p, _cross_product(plan, groups))
 
 
 def _cross_product(plan: Plan, groups: list[CoherentGroup]):

@@ -1,6 +1,6 @@
 """Averages over a bandwidth, a thickness spread and a cone of light.
 
-Each wraps a forward model and averages intensities (rows, wavelengths), never amplitudes or ratios. Errors
+Each wraps a forward model and averages rows of intensities, never amplitudes or ratios. Errors
 of the quadrature rules are in `pellicle.optics.quadrature`.
 """
 
@@ -19,13 +19,18 @@ from pellicle.optics.quadrature import cone_rays, normal_rule
 from pellicle.scene.film import Scene, thickness_spread
 
 Intensities = Callable[[Scene], Any]
-"""A scene in numbers → intensities, (rows, wavelengths)."""
+"""A scene in numbers → rows of intensities, each (wavelengths,)."""
 
 
 def _weighted(at: Callable[[Any], Any], nodes: Any, weights: np.ndarray, wavelength: Any) -> Any:
     """Σ weights · at(nodes), in the precision of the wavelengths."""
     like = jnp.result_type(wavelength)
-    return jnp.tensordot(jnp.asarray(weights, like), jax.vmap(at)(jnp.asarray(nodes, like)), 1)
+    return _mean(jnp.asarray(weights, like), jax.vmap(at)(jnp.asarray(nodes, like)))
+
+
+def _mean(weights: Any, rows: list[Any]) -> list[Any]:
+    """Σ weights · row over the first axis of each row."""
+    return [jnp.tensordot(weights, row, 1) for row in rows]
 
 
 def over_bandwidth(simulate: Intensities, count: int) -> Intensities:
@@ -81,9 +86,7 @@ def over_cone(simulate: Intensities, count: int, around: int, mix: Callable[[Any
             return mix(simulate(turned), s_share)
 
         share = jnp.broadcast_to(jnp.asarray(rays.s_share, like), jnp.shape(rays.angle))
-        return jnp.tensordot(
-            jnp.asarray(rays.weight, like), jax.vmap(at)(jnp.asarray(rays.angle, like), share), 1
-        )
+        return _mean(jnp.asarray(rays.weight, like), jax.vmap(at)(jnp.asarray(rays.angle, like), share))
 
     return average
 
@@ -93,7 +96,7 @@ def mixed(polarisation: str) -> Callable[[Any, Any], Any]:
 
     def mix(rows, s_share):
         share = {"s": s_share, "p": 1 - s_share, "unpolarised": 0.5}[polarisation]
-        return (share * rows[0] + (1 - share) * rows[1])[None]
+        return [share * rows[0] + (1 - share) * rows[1]]
 
     return mix
 
