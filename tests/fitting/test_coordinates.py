@@ -36,6 +36,17 @@ def test_the_corners_are_the_bounds(coordinates):
     np.testing.assert_allclose(middle[:2], [505.0, np.sqrt(1000)], rtol=1e-12)
 
 
+@pytest.mark.parametrize("coordinates", [DISC, FOLDED])
+def test_numpy_agrees_with_a_traced_program(coordinates):
+    own, units = bounds(coordinates), np.random.default_rng(3).uniform(0, 1, (50, 4))
+    units[0, 2:] = 0.5  # the centre of the disc
+    before = units.copy()
+    found = coordinates.values(own, units)
+    assert isinstance(found, np.ndarray)
+    np.testing.assert_array_equal(units, before)
+    np.testing.assert_allclose(found, jax.jit(coordinates.values)(own, units), rtol=1e-13)
+
+
 def test_plain_coordinates_go_evenly():
     plain = Coordinates()
     np.testing.assert_allclose(

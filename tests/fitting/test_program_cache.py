@@ -50,6 +50,13 @@ def test_a_program_that_calls_lapack_runs_in_a_new_process(tmp_path):
     assert (ran.returncode, ran.stdout.strip(), ran.stderr) == (0, "5.0", "")
 
 
+def test_an_option_that_xla_does_not_have_is_left_out(tmp_path, monkeypatch):
+    monkeypatch.setattr(executables, "_OPTIONS", {"xla_of_another_version": True})
+    program = executables.make(tmp_path / "programs" / "one", KEY, lambda x: [x + 1], VECTOR, tmp_path)
+    assert program is not None
+    np.testing.assert_array_equal(program(np.arange(3.0))[0], [1, 2, 3])
+
+
 def test_a_file_or_folder_that_others_can_write_is_not_loaded(path):
     for place in (path, path.parent):
         mode = place.stat().st_mode
