@@ -1,10 +1,11 @@
 """Time per point of what a fit evaluates, compared with the forward model alone, and time of whole fits.
 
-Run `python benchmarks/fit.py`. The first table has one line for each signal and depth of stack: the film
-function itself, the deviance of a candidate (simulation, scale and offset, misfit), and residuals with their
-Jacobian in p parameters; all in ns per data point and evaluation of 64 candidates in one call, by processor
-time, and as ratios. The goals: deviance at most 3 (R, T) or 5 (Ψ and Δ) times the film function; residuals
-with Jacobian at most (1 + p/2) times the deviance.
+Run `python benchmarks/fit.py`. The first table has one line for each signal and depth of stack: the public
+function of as many layers itself (of Ψ and Δ it also takes arctangents), the deviance of a candidate
+(simulation, scale and offset, misfit), and residuals with their Jacobian in p parameters; all in ns per data
+point and evaluation of 64 candidates in one call, by processor time, and as ratios. The goals: deviance at
+most 3 (R, T) or 5 (Ψ and Δ) times the film function; residuals with Jacobian at most (1 + p/2) times the
+deviance.
 
 The other tables are of whole fits of simulated files with random true values (`whole_fits`). The first has
 `pl.fit`: the first call of a new process with an empty cache of compiled programs, which compiles, and with
@@ -127,17 +128,28 @@ def seconds(run: Callable[[], Any], rounds: int) -> float:
     return statistics.median(times)
 
 
-def film(case: Case, thickness: np.ndarray) -> Callable[[], Any]:
-    """The public film function on as many points, with indices already evaluated."""
+def film(case: Case, thicknesses: np.ndarray) -> Callable[[], Any]:
+    """The public film function of as many layers and points, with indices already evaluated.
+
+    `thicknesses` are (candidates, layers).
+    """
     wavelength = np.linspace(400.0, 900.0, case.points)
-    n, substrate = cauchy()(wavelength), pl.refractive_index(wavelength, "Si")
-    light = case.scene.light
-    if light.signal == "psi-delta":
-        run = jax.jit(lambda d: pl.ellipsometry(wavelength, d, n, substrate, angle=light.angle))
-    else:
-        run = jax.jit(lambda d: pl.reflectance(wavelength, d, n, substrate))
-    depth = jnp.asarray(thickness)[:, None]
-    return lambda: run(depth)
+    n, oxide = cauchy()(wavelength), pl.refractive_index(wavelength, "SiO2").real
+    below, light = pl.refractive_index(wavelength, "Si"), case.scene.light
+    depths = tuple(jnp.asarray(x)[:, None] for x in thicknesses.T)
+
+    @jax.jit
+    def run(*depths: Any) -> Any:
+        film = (
+            (wavelength, list(depths), [n, oxide], below)
+            if len(depths) > 1
+            else (wavelength, *depths, n, below)
+        )
+        if light.signal == "psi-delta":
+            return pl.ellipsometry(*film, angle=light.angle)
+        return pl.reflectance(*film)
+
+    return lambda: run(*depths)
 
 
 def rows(case: Case, rounds: int) -> tuple[str, ...]:
@@ -157,7 +169,8 @@ def rows(case: Case, rounds: int) -> tuple[str, ...]:
         return jax.vmap(one)(values)
 
     scale = 1e9 / (CANDIDATES * view.rows)
-    bare = scale * seconds(film(case, values[:, -1]), rounds)
+    layers = sum(p.key == "thickness" for p in problem.parameters)
+    bare = scale * seconds(film(case, values[:, -layers:]), rounds)
     misfit = scale * seconds(lambda: deviances(view.form, view.arrays, values).value, rounds)
     slopes = scale * seconds(lambda: residuals(view.arrays, values), rounds)
     goals = 5 if view.channels > 1 else 3, 1 + size / 2
