@@ -3,7 +3,7 @@
 The data are modelled as y = g(λ) f(λ) + o(λ), with f the simulated signal and g and o numbers or
 Chebyshev series in wavelength with Gaussian priors. Their least-squares values follow from a small
 linear system; what they cost in evidence is a log-determinant (marginal likelihood of a linear
-Gaussian model: Bishop 2006, section 3.5). Physical signs: o ≥ 0 is imposed, g > 0 is required.
+Gaussian model: Bishop 2006, section 3.5). Physical signs are imposed: g ≥ 0 and o ≥ 0.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from pellicle.scene.instrument import Drift, Instrument
 _LOOSE = 10.0
 """Prior standard deviation of a single free number, in units of its expected size: next to no prior."""
 _SLACK = 1e-6
-"""Tolerance below zero, in units of the signal's level, of an offset that is not held at zero."""
+"""Tolerance below zero of a scale or an offset that is not held there, in units of its size."""
 
 
 class Data(NamedTuple):
@@ -99,15 +99,14 @@ def solve(signal, data: Data, instrument: Instrument) -> Solved:
     unit = jnp.concatenate([jnp.full(first, plain), jnp.full(len(shifts.mean), data.level)])
     mean, sd = np.concatenate([gains.mean, shifts.mean]), np.concatenate([gains.sd, shifts.sd])
     coefficients, log_determinant = _project(
-        gram * unit * unit[:, None], projected * unit, mean, sd, len(shifts.mean)
+        gram * unit * unit[:, None], projected * unit, mean, sd, (first, len(shifts.mean))
     )
     in_units = coefficients * unit
     gain = gains.known + in_units[:first] @ gains.terms
     shift = shifts.known + in_units[first:] @ shifts.terms
     model = gain * signal + shift
     residual = jnp.concatenate([weight * (data.values - model), (coefficients - mean) / sd])
-    negative = jnp.where(jnp.min(jnp.where(weight > 0, gain, jnp.inf)) > 0, 0.0, 1e9)
-    return Solved(model, residual, gain, shift, log_determinant + jnp.sum(residual**2) + negative)
+    return Solved(model, residual, gain, shift, log_determinant + jnp.sum(residual**2))
 
 
 def _sums(weight, left, right):
@@ -175,20 +174,20 @@ def coefficients(
     return result
 
 
-def _project(gram, projected, mean: np.ndarray, sd: np.ndarray, offsets: int):
-    """Coefficients under their prior, of which the last `offsets` are those of the offset, and the deviance's
+def _project(gram, projected, mean: np.ndarray, sd: np.ndarray, counts: tuple[int, int]):
+    """Coefficients under their prior, so many of the scale and of the offset, and the deviance's
     log-determinant.
 
-    The offset is kept nonnegative through its Bernstein coefficients: enough, and for so low a degree little
-    more than needed. Which of them are zero counts as a constant.
+    Both curves are kept nonnegative through their Bernstein coefficients: enough, and for so low a degree
+    little more than needed. Which of them are zero counts as a constant.
     """
     matrix = gram + np.diag(1 / sd**2)
-    to_chebyshev = np.eye(len(mean))
-    if offsets:
-        to_chebyshev[-offsets:, -offsets:] = _from_bernstein(offsets)
+    to_chebyshev = np.zeros(matrix.shape)
+    for part, count in zip((slice(counts[0]), slice(counts[0], None)), counts, strict=True):
+        if count:
+            to_chebyshev[part, part] = _from_bernstein(count)
     own = to_chebyshev.T @ matrix @ to_chebyshev, to_chebyshev.T @ (projected + mean / sd**2)
-    not_negative = np.arange(len(mean)) >= len(mean) - offsets
-    inverse, start = nonnegative(*jax.lax.stop_gradient(own), not_negative, _SLACK)
+    inverse, start = nonnegative(*jax.lax.stop_gradient(own), np.ones(len(mean), bool), _SLACK)
     # adds nothing but a rounding error, and carries the implicit derivative A⁻¹(db − dA x)
     coefficients = to_chebyshev @ (start + inverse @ (own[1] - own[0] @ start))
     _, log_determinant = jnp.linalg.slogdet(matrix)
