@@ -17,7 +17,7 @@ import pellicle as pl
 from pellicle.dispersion import effective_medium, empirical, oscillators, spline
 from pellicle.dispersion.cody_lorentz import CodyLorentz
 
-NAMESPACES = ("dispersion", "mixing", "priors")
+NAMESPACES = ("dispersion", "fitting", "mixing", "priors")
 PAGES = (Path(__file__).parents[1] / "docs" / "reference").glob("*.md")
 LISTED = [
     name for page in PAGES for name in re.findall(r"^::: ([\w.]+)$", page.read_text("utf-8"), re.MULTILINE)
@@ -25,11 +25,12 @@ LISTED = [
 
 
 def in_namespaces():
-    """Every class of the namespaces, by the name that a user types."""
+    """Every class of the namespaces, and every name of `pl.fitting`, by the name that a user types."""
     models = {**vars(pl.dispersion), **vars(pl.mixing)}
     kinds = (empirical.AbstractDispersion, oscillators.AbstractOscillator)
     found = {name: x for name, x in models.items() if inspect.isclass(x) and issubclass(x, kinds)}
     priors = {name: x for name, x in vars(pl.priors).items() if x in typing.get_args(pl.priors.Prior)}
+    found |= {name: getattr(pl.fitting, name) for name in pl.fitting.__all__}
     return {name: x for name, x in {**found, **priors}.items() if not name.startswith("Abstract")}
 
 
@@ -55,7 +56,7 @@ def test_every_name_loads_and_type_checkers_see_the_same():
 def test_no_name_is_shadowed_by_a_subpackage():
     """Importing `pellicle.x` sets `pl.x` to that module, whatever `pl.x` was before."""
     modules = {path.stem for path in Path(pl.__file__).parent.iterdir()}
-    assert modules & set(pl.__all__) == {"dispersion"}
+    assert modules & set(pl.__all__) == {"dispersion", "fitting"}
 
 
 def test_every_model_of_a_medium_is_offered():

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from pellicle import dispersion as dispersion
+    from pellicle import fitting as fitting
     from pellicle.api import compare as compare
     from pellicle.api import cost as cost
     from pellicle.api import fit as fit
@@ -64,6 +65,7 @@ _NAMES = {
 _MODULE = {name: module for module, names in _NAMES.items() for name in names}
 _NAMESPACES = {
     "dispersion": "pellicle.dispersion",
+    "fitting": "pellicle.fitting",
     "mixing": "pellicle.dispersion.effective_medium",
     "priors": "pellicle.scene.priors",
 }

@@ -1,1 +1,21 @@
-"""Least-squares fits: minima, uncertainties, identifiability and status."""
+"""Least-squares fits: minima, uncertainties, identifiability and status.
+
+Public names are imported when first used: many modules below need little of what these import.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pellicle.fitting.spectra.functional import Prepared as Prepared
+    from pellicle.fitting.spectra.functional import Solution as Solution
+    from pellicle.fitting.spectra.functional import prepare as prepare
+    from pellicle.fitting.spectra.functional import solve as solve
+
+__all__ = ["Prepared", "Solution", "prepare", "solve"]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in __all__:
+        raise AttributeError(f"module 'pellicle.fitting' has no attribute {name!r}")
+    return getattr(import_module("pellicle.fitting.spectra.functional"), name)

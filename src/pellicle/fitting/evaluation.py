@@ -67,8 +67,7 @@ class Until(NamedTuple):
     coarse: Any
 
 
-@kept
-def polish(
+def polished(
     static: tuple[Static, int], arrays: tuple[Any, ...], box: Box, units: Any, until: Until
 ) -> Polished:
     """The local minimum below each start (starts, parameters), in all views together.
@@ -98,6 +97,9 @@ def polish(
         coarse=until.coarse,
     )
     return Polished(solutions.y, solutions.aux, solutions.converged, solutions.steps)
+
+
+polish = kept(polished)
 
 
 def total_deviance(problem: Problem, units: np.ndarray) -> np.ndarray:
