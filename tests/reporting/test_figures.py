@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -68,6 +69,26 @@ def test_the_misfit_reaches_the_bottom_of_valleys_that_the_grid_missed(fit):
     curve = draw(fit).axes[2].lines[0]
     assert [486.28, 0.0] in curve.get_xydata().tolist()
     assert np.all(np.diff(curve.get_xdata()) > 0)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e6])
+def test_panels_and_their_labels_are_apart_and_inside_the_figure(fit, with_part, scale):
+    curve = replace(
+        fit.curve,
+        k=np.full(41, 0.01),
+        k_stderr=np.full(41, 0.002),
+        **{name: scale * getattr(fit.curve, name) for name in ("data", "model", "sigma")},
+    )
+    drawn = draw(with_part(replace(fit, verdict=20 * "A long verdict. "), curve=curve))
+    drawn.canvas.draw()
+    renderer = drawn.canvas.get_renderer()
+    *panels, n, k = [axes.get_tightbbox(renderer) for axes in drawn.axes]
+    boxes = [drawn._suptitle.get_window_extent(renderer), *panels, type(n).union([n, k])]
+    for above, below in pairwise(boxes):
+        assert above.y0 >= below.y1
+    assert max(box.y1 for box in boxes) <= drawn.bbox.y1
+    assert min(box.y0 for box in boxes) >= 0
+    assert all(box.x0 >= 0 and box.x1 <= drawn.bbox.x1 for box in boxes)
 
 
 def test_hopeless_thicknesses_are_left_out(fit):

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from pellicle.fitting.result import Fit, Part, Profile
 
 WIDTH_INCHES = 8.0
+_LINE, _AXIS, _GAP = 0.2, 0.55, 0.1
+"""Heights in inches: a line of text, an axis with numbers and label, a gap."""
 MOST_LABELS = 6
 ROOM_FOR_LABEL = 0.025
 """Least distance between two labels, as a share of the axis."""
@@ -39,11 +41,13 @@ _SIGNALS = {"R": "reflectance", "T": "transmittance"}
 
 
 class _Panel(NamedTuple):
-    """One panel: what draws it, its height in inches, and the spectrum whose axis it shares."""
+    """One panel: what draws it, its height in inches, the spectrum whose axis it shares, and how many lines
+    of text are above it."""
 
     draw: Callable[[Axes], None]
     height: float
     part: Part | None = None
+    lines_above: int = 0
 
 
 def draw(fit: Fit) -> Figure:
@@ -52,12 +56,11 @@ def draw(fit: Fit) -> Figure:
         return brdf_figure.draw(fit)
     panels = [panel for part in fit.parts for panel in _panels_of_data(part)]
     if fit.profile is not None and fit.profile.thickness.size > 1:
-        panels.append(_Panel(partial(_misfit, fit=fit), 1.9))
+        panels.append(_Panel(partial(_misfit, fit=fit), 1.9, lines_above=1))
     if _index_is_free(fit):
         panels.append(_Panel(partial(_index, fit=fit), 1.5))
-    heights = [panel.height for panel in panels]
-    figure = new_figure(WIDTH_INCHES, sum(heights) + 1.2)
-    rows = figure.subplots(len(panels), 1, squeeze=False, height_ratios=heights)[:, 0]
+    figure = new_figure(WIDTH_INCHES, 1.0, constrained=False)
+    rows = figure.subplots(len(panels), 1, squeeze=False)[:, 0]
     for part in fit.parts:
         first, *rest = [axes for axes, panel in zip(rows, panels, strict=True) if panel.part is part]
         for axes in rest:
@@ -66,8 +69,40 @@ def draw(fit: Fit) -> Figure:
             first.set_title(part.name.replace("$", r"\$"), fontsize="small", loc="left")
     for panel, axes in zip(panels, rows, strict=True):
         panel.draw(axes)
-    figure.suptitle(_title(fit), fontsize="medium", x=0.01, ha="left")
+    _arrange(figure, list(rows), panels, _title(fit))
     return figure
+
+
+def _arrange(figure: Figure, rows: list[Axes], panels: list[_Panel], title: str) -> None:
+    """Place the panels below each other and below the title.
+
+    Matplotlib's constrained layout measures every text twice at each drawing: half of the time of a figure.
+    Here heights are those of lines of text, and only the labels beside the panels are measured.
+    """
+    heights = [panel.height for panel in panels]
+    labelled = [axes.xaxis.get_tick_params().get("labelbottom", True) for axes in rows]
+    titled = [bool(axes.get_title(loc="left")) for axes in rows]
+    above = [_LINE * (panel.lines_above + own) for panel, own in zip(panels, titled, strict=True)]
+    below = [_AXIS if shown else _GAP for shown in labelled]
+    top = _LINE * (title.count("\n") + 1) + 2 * _GAP
+    height = top + sum(above) + sum(heights) + sum(below)
+    figure.set_size_inches(WIDTH_INCHES, height)
+    figure.suptitle(title, fontsize="medium", x=0.01, y=1 - _GAP / height, ha="left", va="top")
+    bottoms = []
+    for axes, over, own, under in zip(rows, above, heights, below, strict=True):
+        top += over + own
+        bottoms.append(1 - top / height)
+        axes.set_position((0.1, bottoms[-1], 0.8, own / height))  # the number of ticks depends on the height
+        top += under
+    renderer: Any = figure.canvas.get_renderer()  # pyright: ignore[reportAttributeAccessIssue]
+    left = right = 0.0
+    for axes in figure.axes:
+        inside = axes.get_window_extent(renderer)
+        box = axes.yaxis.get_tightbbox(renderer) or inside
+        left, right = max(left, inside.x0 - box.x0), max(right, box.x1 - inside.x1)
+    left, right = (room / figure.dpi / WIDTH_INCHES + 0.01 for room in (left, right))
+    for axes, bottom, own in zip(rows, bottoms, heights, strict=True):
+        axes.set_position((left, bottom, 1 - left - right, own / height))
 
 
 def _panels_of_data(part: Part) -> list[_Panel]:

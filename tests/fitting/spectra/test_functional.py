@@ -24,7 +24,7 @@ def programs():
     """Programs that JAX traces, lowers, compiles or loads."""
     events = []
 
-    def listen(event, duration, **about):
+    def listen(event, duration_secs, **about):
         if event.startswith("/jax/core/compile/"):
             events.append((event, about.get("fun_name")))
 
