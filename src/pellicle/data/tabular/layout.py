@@ -126,9 +126,14 @@ def _dialect(lines: Sequence[Line], path: str) -> tuple[str, str]:
 
 def _first_numeric(lines: Sequence[Line], delimiter: str, decimal: str) -> int | None:
     """Index of the first line that is all numbers, else of the first with two numbers."""
-    counted = [_numbers_in(line, delimiter, decimal) for line in lines]
-    full = next((i for i, (n, cells) in enumerate(counted) if n == cells >= 2), None)
-    return full if full is not None else next((i for i, (n, _) in enumerate(counted) if n >= 2), None)
+    partial = None
+    for i, line in enumerate(lines):
+        numbers, cells = _numbers_in(line, delimiter, decimal)
+        if numbers == cells >= 2:
+            return i
+        if numbers >= 2 and partial is None:
+            partial = i
+    return partial
 
 
 def _rows_begin(
