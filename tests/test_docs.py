@@ -70,7 +70,10 @@ ELSEWHERE = {
     **dict.fromkeys(CI, "run by CI: .ci/run"),
     "make fits": "tests/test_fits.py: one study in every run, all of them in make slow",
     **dict.fromkeys(("make slow", "make coverage"), "run these tests"),
-    "make bench": "speed is measured by benchmarks, never tested",
+    **dict.fromkeys(
+        ("make bench", "python benchmarks/fit.py", "python benchmarks/film.py"),
+        "speed is measured by benchmarks, never tested",
+    ),
     "make properties": "tests/properties: the same on a hundred scenes",
     "make peers": "installs several GB; tests/test_peers.py needs no other package",
     "make schema": "tests/recipes/test_schema.py: the kept schema",
