@@ -9,13 +9,14 @@ deviance.
 
 The other tables are of whole fits of simulated files with random true values (`whole_fits`). The first has
 `pl.fit`: the first call of a new process with an empty cache of compiled programs, which compiles, and with
-a filled one; then the median of the next calls, each of another file. The second has it beside SciPy and
-lmfit with the film in vectorised NumPy, in turns: least squares from the best local minima of a scan of the
-thickness or from random starts, and differential evolution, each with the fewest starts or the smallest
-population that is right in 95 % of the files. A fit is right where its χ² is within 4 of the minimum reached
-from the true values; programs that are right in fewer than 95 % of the files are struck out. The others
-return the best values, lmfit also their covariance. `pl.fit` also estimates the noise, and computes standard
-errors, limits by profile likelihood, rivals and the status.
+a filled one; then the median of the next calls, each of another file. The second has it, and its search
+alone, beside SciPy and lmfit with the film in vectorised NumPy, in turns: least squares from the best local
+minima of a scan of the thickness or from random starts, and differential evolution, each with the fewest
+starts or the smallest population that is right in 95 % of the files; the third has the ratios. A fit is
+right where its χ² is within 4 of the minimum reached from the true values; programs that are right in fewer
+than 95 % of the files are struck out. The others return the best values, lmfit also their covariance.
+`pl.fit` also estimates the noise, and computes standard errors, limits by profile likelihood, rivals and the
+status.
 
 `--device gpu` has one table instead, of the search on a GPU: candidates of the scan, in points per second.
 """
@@ -222,6 +223,7 @@ def whole_fits(chosen: list[str], files: int | None) -> None:
         print(f"{len(found)} of {len(of)}: {names[i]}", file=sys.stderr, flush=True)
     table(*tables.calls(found))
     table(*tables.others(found))
+    table(*tables.ratios(found))
 
 
 def table(header: tuple[str, ...], lines: list[tuple[str, ...]]) -> None:

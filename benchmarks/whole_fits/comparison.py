@@ -31,6 +31,7 @@ reached from the true values: within two standard errors. In pellicle the drift 
 moves the minimum of soap films by up to 2; otherwise right answers agree within 0.1."""
 FEWEST_RIGHT = 0.95
 TUNING_FILES = 20
+PELLICLE, SEARCH = "pl.fit", "its search"
 
 
 class Time(NamedTuple):
@@ -55,7 +56,8 @@ class Result(NamedTuple):
 
 
 class Compared(NamedTuple):
-    """The results of a case, pellicle's first, and pellicle's first calls without and with a filled cache."""
+    """The results of a case, those of `pl.fit` and of its search first, and the first calls of `pl.fit` with an
+    empty and with a filled cache."""
 
     case: str
     target: float
@@ -102,18 +104,23 @@ def all_files(chosen: int, folder: str, files: int) -> tuple[Time, list[Result]]
     problems = [Problem(case, one) for one in measured]
     least = [_chi2(problem, polished(problem, problem.truth)) for problem in problems]
     efforts = [_least_effort(each, problems, least) for each in COMPETITORS]
-    names = "pellicle", *(each.name for each in COMPETITORS)
+    _search(case, measured[0].spectrum)  # loads what a first fit has not loaded
+    names = PELLICLE, SEARCH, *(each.name for each in COMPETITORS)
     times, right = {name: [] for name in names}, dict.fromkeys(names, 0)
     for seed, (one, problem) in enumerate(zip(measured, problems, strict=True)):
-        runs = {"pellicle": lambda one=one: _by_pellicle(case, one.spectrum)}
+        runs = {
+            PELLICLE: lambda one=one: _by_pellicle(case, one.spectrum),
+            SEARCH: lambda one=one: _search(case, one.spectrum),
+        }
         for each, effort in zip(COMPETITORS, efforts, strict=True):
             runs[each.name] = lambda each=each, effort=effort, p=problem, s=seed: each.find(p, effort, s)
         for name, run in runs.items():
             spent, answer = timed(run)
             times[name].append(spent)
-            unit = (answer - problem.lower) / problem.width if name == "pellicle" else answer
+            ours = name in (PELLICLE, SEARCH)
+            unit = (answer - problem.lower) / problem.width if ours else answer
             right[name] += bool(_chi2(problem, unit) < least[seed] + RIGHT_CHI2)
-    words = ["", *(f"{n} {each.unit}" for n, each in zip(efforts, COMPETITORS, strict=True))]
+    words = ["", "", *(f"{n} {each.unit}" for n, each in zip(efforts, COMPETITORS, strict=True))]
     medians = [Time(*(statistics.median(column) for column in zip(*times[n], strict=True))) for n in names]
     return loads, [
         Result(name, spent, word, right[name], files)
@@ -134,6 +141,20 @@ def _by_pellicle(case: Case, spectrum: Any) -> Array:
 
     fit = pl.fit(spectrum, case.scene)
     return np.array([fit[name].value for name in case.limits])
+
+
+def _search(case: Case, spectrum: Any) -> Array:
+    """The best values by the part of a fit that the other programs do: scan and polish."""
+    from pellicle.fitting.progress import quiet
+    from pellicle.fitting.spectra.fit import measurements
+    from pellicle.fitting.spectra.problem import make
+    from pellicle.fitting.spectra.search import search
+
+    with jax.enable_x64(True):
+        problem = make(*measurements(spectrum, case.scene))
+        best = np.asarray(problem.values(search(problem, quiet).units[0]))
+    values = {p.name: value for p, value in zip(problem.parameters, best, strict=True)}
+    return np.array([values[name] for name in case.limits])
 
 
 def _chi2(problem: Problem, unit: Array) -> float:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from whole_fits.comparison import Compared, Result
+from whole_fits.comparison import PELLICLE, SEARCH, Compared, Result
+
+WITHOUT_SCAN, SIXTEEN = ("SciPy, random", "SciPy, evolution"), "SciPy, 16 minima"
 
 
 def calls(some: list[Compared]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
@@ -30,25 +32,40 @@ def _call(one: Compared) -> tuple[str, ...]:
 
 
 def others(some: list[Compared]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Header and lines of the table of all programs, with the ratio of the best other program to pellicle."""
+    """Header and lines of the table of all programs."""
     names = [result.name for result in some[0].results]
-    header = ("processor time, ms", *names, "best other / pellicle", "16 minima / pellicle")
-    return header, [(one.case, *map(_cell, one.results), *_ratios(one)) for one in some]
+    return ("processor time, ms", *names), [(one.case, *map(_cell, one.results)) for one in some]
+
+
+def ratios(some: list[Compared]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Header and lines of the table of how many times longer the others take than `pl.fit` and its search.
+
+    It has the fastest program that is right, the fastest without a scan, and the polish of sixteen minima.
+    """
+    header = (
+        "times longer than",
+        "pl.fit: best",
+        "no scan",
+        "16 minima",
+        "its search: best",
+        "no scan",
+        "16 minima",
+    )
+    return header, [(one.case, *_ratios(one, 0), *_ratios(one, 1)) for one in some]
+
+
+def _ratios(one: Compared, which: int) -> list[str]:
+    ours, rest = one.results[which], one.results[2:]
+    times = {result.name: result.time.processor for result in rest if result.succeeds}
+    plain = [time for name, time in times.items() if name in WITHOUT_SCAN]
+    chosen = min(times.values(), default=None), min(plain, default=None), times.get(SIXTEEN)
+    return [f"{time / ours.time.processor:.2g}" if time and ours.succeeds else "–" for time in chosen]
 
 
 def _cell(result: Result) -> str:
     effort = f"{result.effort}, " if result.effort else ""
     text = f"{_ms(result.time.processor)} ({effort}{result.right}/{result.files})"
     return text if result.succeeds else f"~~{text}~~"
-
-
-def _ratios(one: Compared) -> tuple[str, str]:
-    """How many times longer the fastest of the others takes, and the one that polishes as many minima."""
-    ours, *rest = one.results
-    times = {result.name: result.time.processor for result in rest if result.succeeds}
-    chosen = min(times.values(), default=None), times.get("SciPy, 16 minima")
-    ratios = [f"{time / ours.time.processor:.2g}" if time and ours.succeeds else "–" for time in chosen]
-    return ratios[0], ratios[1]
 
 
 def _ms(seconds: float) -> str:
