@@ -56,8 +56,8 @@ class Result(NamedTuple):
 
 
 class Compared(NamedTuple):
-    """The results of a case, those of `pl.fit` and of its search first, and the first calls of `pl.fit` with an
-    empty and with a filled cache."""
+    """The results of a case, those of `pl.fit` and of its search first, and the first calls of `pl.fit` with
+    an empty and with a filled cache."""
 
     case: str
     target: float

@@ -114,9 +114,7 @@ SOLVERS = (
         "the search: one descent from the recipe's start",
         lambda data: _from(data, data.start[None]),
     ),
-    Solver(
-        "scan + LM", "nothing: the search of pellicle fit", lambda data: search(data.problem, quiet).units[0]
-    ),
+    Solver("scan + LM", "nothing: the search of `pl.fit`", lambda data: search(data.problem, quiet).units[0]),
     Solver("successive halving", "the scan: most of 256 random starts, soon", _halving),
     Solver("multistart, 16", "the scan: 16 random starts", partial(_multistart, 16)),
     Solver("multistart, 64", "the scan: 64 random starts", partial(_multistart, 64)),
