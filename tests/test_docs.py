@@ -71,7 +71,7 @@ ELSEWHERE = {
     "make fits": "tests/test_fits.py: one study in every run, all of them in make slow",
     **dict.fromkeys(("make slow", "make coverage"), "run these tests"),
     **dict.fromkeys(
-        ("make bench", "python benchmarks/fit.py", "python benchmarks/film.py"),
+        ("make bench", *(f"python benchmarks/{name}.py" for name in ("fit", "film", "cold_start"))),
         "speed is measured by benchmarks, never tested",
     ),
     "make properties": "tests/properties: the same on a hundred scenes",
