@@ -209,3 +209,19 @@ def test_large_residuals_at_the_minimum_do_not_slow_the_end():
     )
     assert converged
     np.testing.assert_allclose(found, 0.5, atol=1e-6)
+
+
+def test_residuals_with_rounding_errors_settle_soon():
+    """Residuals rounded to 1e-12, as differences of values ten thousand times as large are: no step near the
+    minimum lowers χ² any more, and the last point has settled all the same."""
+
+    def residual(y):
+        exact = jnp.concatenate([jnp.sin(3 * y) - 0.6, 2 * y - 0.5, 1 - y])
+        return exact + jax.lax.stop_gradient(jnp.round(exact * 1e12) / 1e12 - exact)
+
+    found, converged = least_squares(residual, jnp.array([0.9]), rtol=1e-14, steps=18)
+    assert converged
+    best = scipy_least_squares(
+        lambda y: [np.sin(3 * y[0]) - 0.6, 2 * y[0] - 0.5, 1 - y[0]], [0.5], xtol=1e-14
+    )
+    np.testing.assert_allclose(found, best.x, atol=1e-5)

@@ -17,7 +17,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import optimistix as optx
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, Int
 
 from pellicle.fitting.positive_definite import solve_if_positive
 
@@ -25,6 +25,11 @@ _START = 1e-3
 """First damping, in units of the largest curvature so far: near Gauss-Newton."""
 _UNCERTAIN = 1e-3
 """Share of Gauss-Newton's promise that counts where the corrected matrix promises less: a secant may err."""
+_ROUNDING = 0.75
+"""Power of the machine's precision: relative rounding error of the cost where residuals are differences of
+values many times their noise."""
+_FRUITLESS = 5
+"""Steps that change nothing after which such a point has settled."""
 _RANK_ONE = 1e-8
 """Least cosine between step and secant error for which a rank-one correction is defined."""
 
@@ -44,6 +49,7 @@ class State(eqx.Module):
     predicted: Float[Array, "2"]  # fall of the cost at the trial point, by JᵀJ alone and corrected
     corrected: Bool[Array, ""]  # the correction predicts better
     promise: Float[Array, ""]  # fall that an undamped step inside the box would bring
+    fruitless: Int[Array, ""]  # steps since the cost fell by more than rounding errors
     aux: Any
 
 
@@ -148,6 +154,7 @@ class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
             predicted=jnp.zeros(2, y.dtype),
             corrected=jnp.array(False),
             promise=zero + jnp.inf,
+            fruitless=jnp.array(0),
             aux=jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), aux_struct),
         )
 
@@ -196,6 +203,9 @@ class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
             predicted=predicted,
             corrected=corrected,
             promise=promise,
+            fruitless=jnp.where(
+                fall > jnp.finfo(y.dtype).eps ** _ROUNDING * state.cost, 0, state.fruitless + 1
+            ),
             aux=aux,
         )
         return y, state, aux
@@ -206,6 +216,7 @@ class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
         size, promise = jnp.sqrt(state.cost), jnp.sqrt(state.promise)
         rounding = eps * jnp.max(jnp.sqrt(jnp.diagonal(state.hessian)) * jnp.abs(y))
         done = promise <= self.atol + self.rtol * size + rounding
+        done = done | ((state.fruitless >= _FRUITLESS) & (state.promise <= eps**_ROUNDING * state.cost))
         stuck = ~done & jnp.all(jnp.abs(state.y_eval - y) <= eps * jnp.abs(y))
         lost, results = ~jnp.isfinite(size), optx.RESULTS
         result = results.where(
