@@ -161,7 +161,7 @@ KNOWN = {
     "chi2_reduced": 1.0,
     "sigma_known": False,
     "drifting": False,
-    "effective_share": 0.05,
+    "structured": True,
     "rms": 0.03,
     "span": 1.0,
     "calibrated": True,
@@ -172,7 +172,7 @@ KNOWN = {
     ("changed", "misfit"),
     [
         ({}, True),
-        ({"effective_share": 0.11}, False),
+        ({"structured": False}, False),
         ({"rms": 0.019}, False),
         ({"rms": 0.019, "span": 0.3}, True),  # above 5 % of the span
         ({"calibrated": False}, False),  # then only the span counts

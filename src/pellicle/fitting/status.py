@@ -14,6 +14,8 @@ RIVAL = 6.0
 """A distinct rival within this Δχ² on the effective points makes a fit ambiguous."""
 MISFIT_CHI2 = 4.0
 MISFIT_RMS, MISFIT_SPAN = 0.02, 0.05
+STRUCTURED_SHARE = 0.1
+"""Residuals of which fewer points than this share count as independent are structured."""
 
 
 def misfits(
@@ -21,7 +23,7 @@ def misfits(
     chi2_reduced: float,
     sigma_known: bool,
     drifting: bool,
-    effective_share: float,
+    structured: bool,
     rms: float,
     span: float,
     calibrated: bool,
@@ -36,7 +38,7 @@ def misfits(
     if drifting and chi2_reduced < 1:
         return False
     large = rms > MISFIT_SPAN * span or (calibrated and rms > MISFIT_RMS)
-    return effective_share < 0.1 and large
+    return structured and large
 
 
 def judge(

@@ -13,7 +13,7 @@ from pellicle.fitting.problem import Problem
 from pellicle.fitting.profile_likelihood import Limits
 from pellicle.fitting.result import BrdfCurve, Estimate, Part
 from pellicle.fitting.reweighting import RankedMinima, ViewFit
-from pellicle.fitting.status import misfits
+from pellicle.fitting.status import STRUCTURED_SHARE, misfits
 from pellicle.scene.surface import Surface
 
 
@@ -41,7 +41,7 @@ def misses(view: SamplesView, fit: ViewFit) -> bool:
         chi2_reduced=fit.chi2 / fit.freedom,
         sigma_known=view.noise.given,
         drifting=False,
-        effective_share=1 / fit.length,
+        structured=1 / fit.length < STRUCTURED_SHARE,
         rms=view.rms(fit.at),
         span=view.span(),
         calibrated=False,

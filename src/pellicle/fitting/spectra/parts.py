@@ -12,11 +12,11 @@ from pellicle.fitting.covariance import Errors
 from pellicle.fitting.result import Curve, Part
 from pellicle.fitting.reweighting import RankedMinima, ViewFit
 from pellicle.fitting.spectra.view import Local, SpectrumView
-from pellicle.fitting.status import MISFIT_CHI2, misfits
+from pellicle.fitting.status import MISFIT_CHI2, STRUCTURED_SHARE, misfits
 
 FAR = math.sqrt(MISFIT_CHI2)
-"""Ratio of residuals to noise above which the residuals of one spectrum among several count as structured.
-The noise, from differences of neighbouring points, takes the place of a given σ; the bound is the same."""
+"""Ratio of residuals to noise above which residuals without a given σ count as structured. The noise, from
+differences of neighbouring points, takes the place of σ; the bound is the same."""
 
 
 def parts(data: list[Spectrum], ranked: RankedMinima, errors: Errors) -> tuple[Part, ...]:
@@ -53,14 +53,17 @@ def missed(parts: tuple[Part, ...], ranked: RankedMinima) -> tuple[Part, ...]:
     for part, view, fit in zip(parts, ranked.problem.views, ranked.fits, strict=True):
         values = view.in_columns(view.data.values)
         rms = part.rms if view.channels == 1 else math.radians(2 * part.rms)
-        floor = np.sqrt(np.mean([np.median(noise.local_noise(column)) ** 2 for column in values.T]))
-        # beside others a spectrum may be given up, its σ growing with its residuals, without much structure
-        given_up = len(parts) > 1 and rms > FAR * floor
+        squares = [
+            len(sweep) * np.median(noise.local_noise(column)) ** 2
+            for sweep in view.sweeps()
+            for column in values[sweep].T
+        ]
+        floor = math.sqrt(sum(squares) / values.size)
         if misfits(
             chi2_reduced=part.chi2_reduced,
             sigma_known=view.noise.given,
             drifting=view.noise.drifting,
-            effective_share=0.0 if given_up else 1 / fit.length,
+            structured=1 / fit.length < STRUCTURED_SHARE or rms > FAR * floor,
             rms=rms,
             span=float(np.max(np.ptp(values, axis=0))),
             calibrated=part.spectrum.calibrated,

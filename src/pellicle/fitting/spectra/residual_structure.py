@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -91,10 +90,7 @@ def missed(view: SpectrumView, fit: ViewFit) -> Missed | None:
     residuals = (view.data.values - np.asarray(fit.at.model))[: view.points].reshape(shape)[:, columns]
     nm = np.asarray(view.scene.light.wavelength)[: view.rows]
     stretches, covered = [], 0
-    # monotone runs of wavelengths, one for each angle of incidence
-    steps = np.sign(np.diff(nm))
-    edges = [0, *(np.flatnonzero(steps != steps[:1]) + 1).tolist(), len(nm)]
-    for part in (slice(a, b) for a, b in pairwise(edges) if b - a >= 2 * _NARROWEST):
+    for part in (part for part in view.sweeps() if len(part) >= 2 * _NARROWEST):
         for column, inverse in zip(residuals[part].T, weight[part].T, strict=True):
             known = view.noise.given or view.noise.drifting
             scale = inverse if known else 1 / max(np.median(local_noise(column)), 1e-300)
