@@ -54,6 +54,14 @@ def test_only_local_minima_are_polished_and_all_of_them_are_kept(film, measured,
     assert 3 <= lowest.sum() < 16
 
 
+def test_wide_bounds_are_scanned_as_finely_or_the_fit_warns(film, measured):
+    data = measured(film(), 430.0)
+    wide, too_wide = (pl.fit(data, film(pl.Free(1, upper))) for upper in (1e6, 1e8))
+    assert wide["thickness"].value == pytest.approx(430.0, abs=1.0)
+    assert not any("narrow the bounds" in warning for warning in wide.warnings)
+    assert any("narrow the bounds" in warning for warning in too_wide.warnings)
+
+
 def test_minima_are_distinct_and_best_first(film, measured):
     scene = film(pl.Free(10, 1000), pl.dispersion.Constant(pl.Free(1.3, 1.7)))
     problem = built(scene, measured(scene, 1.46, 700.0))

@@ -23,7 +23,8 @@ from pellicle.fitting.spectra.problem import shortest_wavelength
 log = getLogger(__name__)
 
 _CHUNK = 256
-_MOST_STEPS = 4000
+_MOST_STEPS, _MOST_CANDIDATES = 4000, 400_000
+"""Values of the thickness that are scanned at most: so many, or more while all candidates are not as many."""
 _MOST_DESIGNS = 1200
 _COARSE = 1e-3
 """Share of its distance to the best deviance within which a minimum is computed at first; those that remain
@@ -70,7 +71,8 @@ def _thickness_grid(problem: Problem, choices: int) -> np.ndarray:
         log.info("scan: no thickness is free; %d starting points for the other parameters", choices)
         return np.zeros(0)
     p, shortest = problem.parameters[problem.thickness_axis], shortest_wavelength(problem)
-    count = int(np.clip(np.ceil((p.upper - p.lower) / (shortest / 8)) + 1, 9, _MOST_STEPS))
+    most = max(_MOST_STEPS, _MOST_CANDIDATES // choices)
+    count = int(np.clip(np.ceil((p.upper - p.lower) / (shortest / 8)) + 1, 9, most))
     log.info(
         "scan: %d values of %s, %.3g nm apart (an eighth of the shortest wavelength in a layer, %.3g), "
         "with %d choice%s of the other parameters each: %d candidates",

@@ -13,6 +13,7 @@ from pellicle.fitting.result import Estimate, Profile
 from pellicle.fitting.reweighting import RankedMinima, ViewFit
 from pellicle.fitting.spectra import residual_structure
 from pellicle.fitting.spectra.parameters import fixed_numbers, thickness_name
+from pellicle.fitting.spectra.problem import shortest_wavelength
 from pellicle.fitting.spectra.targets import Measured, drifts
 from pellicle.fitting.spectra.view import SpectrumView
 from pellicle.materials import materials_in
@@ -90,6 +91,13 @@ def opaque(spectra: Sequence[Measured], ranked: RankedMinima) -> frozenset[str]:
 def warnings(spectra: Sequence[Measured], ranked: RankedMinima, unclear: Sequence[str]) -> tuple[str, ...]:
     """Warnings that a reader needs before using the numbers; `unclear` is what the data do not determine."""
     messages = [w for m in spectra for material in materials_in(m.scene) for w in material.warnings()]
+    scan, finest = ranked.minima.scan, shortest_wavelength(ranked.problem) / 8
+    if scan is not None and scan.thickness[1] - scan.thickness[0] > 1.01 * finest:
+        messages.append(
+            "the bounds of the thickness are so wide that its scan has steps of"
+            f" {scan.thickness[1] - scan.thickness[0]:.3g} nm, where fringes call for {finest:.3g}: minima"
+            " may be missed; narrow the bounds"
+        )
     for spectrum, view, fit in zip(spectra, ranked.problem.views, ranked.fits, strict=True):
         scene, length, own = spectrum.scene, fit.length, f"{view.name}: " if view.name else ""
         orders = view.plan.row("orders")
