@@ -28,7 +28,8 @@ LIMIT = 256 * 2**20
 
 _OPTIONS: dict[str, str | bool] = {"xla_cpu_use_fusion_emitters": False}
 """XLA's older code generator compiles the programs of a fit in 5 to 22 s of processor time, not 7 to 30 s;
-they are as fast within 10 % (jaxlib 0.10, `benchmarks/fit.py` and `benchmarks/cold_start.py`)."""
+most run as fast within 20 %, those of a slow scale and offset a third slower (jaxlib 0.10, by
+`benchmarks/fit.py` and `benchmarks/cold_start.py`)."""
 
 _DIGEST = hashlib.sha256().digest_size
 _CALLS = re.compile(r"custom_call @([\w.]+)")
@@ -55,8 +56,8 @@ def make(
     """
     if not private_files.make_folder(path.parent):
         return None
-    # A program that comes from JAX's cache crashes when it is serialised, loaded and run (jaxlib 0.10): a
-    # name of its own keeps it out of there.
+    # JAX makes no promise that a program from its own cache can be serialised again: a name of its own keeps
+    # this one out of there.
     name = f"program_{secrets.token_hex(8)}"
     function.__name__ = name
     lowered = jax.jit(function).lower(*inputs)
