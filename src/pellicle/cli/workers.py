@@ -77,11 +77,16 @@ def _unraisable(raised: sys.UnraisableHookArgs) -> None:
 
 
 def _run(function: Callable[[Task], Result], task: Task) -> Result:
-    """The result of one task; Ctrl-C ends the process, so that it takes no other."""
+    """The result of one task. After Ctrl-C this process begins no other: it keeps the signal's handler."""
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        raise KeyboardInterrupt
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    interrupted = False
     try:
         return function(task)
-    except KeyboardInterrupt:
-        os._exit(130)
+    except KeyboardInterrupt:  # the process that waits may have missed it: this exception goes there, too
+        interrupted = True
+        raise
     finally:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        if not interrupted:
+            signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -11,6 +11,7 @@ from pellicle.fitting import noise
 from pellicle.fitting.covariance import Errors
 from pellicle.fitting.result import Curve, Part
 from pellicle.fitting.reweighting import RankedMinima, ViewFit
+from pellicle.fitting.robust_losses import spread
 from pellicle.fitting.spectra.view import Local, SpectrumView
 from pellicle.fitting.status import MISFIT_CHI2, STRUCTURED_SHARE, misfits
 
@@ -59,11 +60,13 @@ def missed(parts: tuple[Part, ...], ranked: RankedMinima) -> tuple[Part, ...]:
             for column in values[sweep].T
         ]
         floor = math.sqrt(sum(squares) / values.size)
+        # of most points: a few outliers are no structure
+        typical = spread((view.data.values - np.asarray(fit.at.model))[: view.points])
         if misfits(
             chi2_reduced=part.chi2_reduced,
             sigma_known=view.noise.given,
             drifting=view.noise.drifting,
-            structured=1 / fit.length < STRUCTURED_SHARE or rms > FAR * floor,
+            structured=1 / fit.length < STRUCTURED_SHARE or typical > FAR * floor,
             rms=rms,
             span=float(np.max(np.ptp(values, axis=0))),
             calibrated=part.spectrum.calibrated,

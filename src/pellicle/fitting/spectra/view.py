@@ -22,7 +22,7 @@ from pellicle.optics.layout import stack_rows
 from pellicle.planning.differences import largest_difference, signals
 from pellicle.planning.film import full_plan
 from pellicle.scene.film import Scene
-from pellicle.scene.free import free_leaves, insert
+from pellicle.scene.free import free_leaves, insert, is_free
 from pellicle.scene.layers import Interface
 from pellicle.simulation.film import build
 
@@ -170,9 +170,10 @@ class SpectrumView:
     def sweeps(self) -> list[np.ndarray]:
         """Positions of the rows of each sweep."""
         light, rows = self.scene.light, slice(self.rows)
-        wavelength = np.asarray(light.wavelength)[rows]
-        angle = np.broadcast_to(np.asarray(light.angle, dtype=float), np.shape(light.wavelength))[rows]
-        return sweeps(wavelength, angle)
+        angle: Any = 0.0 if is_free(light.angle) else light.angle  # a free one is the same for all
+        return sweeps(
+            np.asarray(light.wavelength)[rows], np.broadcast_to(angle, np.shape(light.wavelength))[rows]
+        )
 
     def correlation_length(self, residuals: np.ndarray) -> float:
         """Number of points of one channel whose residuals count as one: neighbours in a sweep, times the
