@@ -52,11 +52,10 @@ test: $(VENV)/.dev lint
 coverage: $(VENV)/.dev
 	$(PYTEST) --cov --cov-report=term
 
-# executed once, for the reader and for the documentation. PELLICLE_SHORT=1 is for tests: fewer points, and the one
-# flag of QUICK_COMPILE that saves a third of the compilation without slowing the programs down
+# executed once, for the reader and for the documentation. PELLICLE_SHORT=1 is for tests: fewer points, quick compilation
 notebooks: $(VENV)/.dev
 	rm -rf executed && mkdir executed && cp notebooks/*.ipynb notebooks/matplotlibrc executed
-	$(if $(PELLICLE_SHORT),XLA_FLAGS=--xla_cpu_use_fusion_emitters=false) PYTHONWARNINGS="ignore:Error reading persistent compilation cache entry" \
+	$(if $(PELLICLE_SHORT),$(QUICK_COMPILE)) PYTHONWARNINGS="ignore:Error reading persistent compilation cache entry" \
 	  JAX_COMPILATION_CACHE_DIR=$(CURDIR)/executed/compiled \
 	  JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS=0 PELLICLE_CACHE=$(CURDIR)/executed/compiled \
 	  $(BIN)/python -m pytest -n 2 --nbmake --nbmake-timeout 300 --overwrite --durations 8 executed
