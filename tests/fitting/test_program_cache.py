@@ -13,7 +13,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from pellicle.fitting import executables, private_files, program_cache
+from pellicle import private_files
+from pellicle.fitting import executables, program_cache
 from pellicle.fitting.program_cache import kept
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "geteuid"), reason="files have no owners")

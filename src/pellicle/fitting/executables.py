@@ -19,7 +19,7 @@ from typing import Any
 
 import jax
 
-from pellicle.fitting import private_files
+from pellicle import private_files
 
 log = logging.getLogger(__name__)
 

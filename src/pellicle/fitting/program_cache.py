@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import tempfile
 from collections.abc import Callable, Hashable, Sequence
 from contextlib import suppress
 from functools import lru_cache, wraps
@@ -21,6 +20,8 @@ from typing import Any, get_type_hints
 import jax
 import numpy as np
 
+from pellicle.errors import UsageError
+from pellicle.files import replacing
 from pellicle.fitting import executables
 
 Program = Callable[..., Any]
@@ -78,13 +79,11 @@ def _traced(path: Path, flat: Program, inputs: Sequence[jax.ShapeDtypeStruct]) -
         program = export.deserialize(bytearray(path.read_bytes()))
     except (OSError, ValueError, KeyError):  # absent, or cut short: made again
         program = export.export(jax.jit(flat))(*inputs)
-        # whole or not at all; a cache that cannot be written is no failure
-        with suppress(OSError):
+        # a cache that cannot be written is no failure
+        with suppress(OSError, UsageError):
             path.parent.mkdir(parents=True, exist_ok=True)
-            handle, name = tempfile.mkstemp(dir=path.parent)
-            with os.fdopen(handle, "wb") as file:
-                file.write(program.serialize())
-            os.replace(name, path)
+            with replacing(path, overwrite=True) as temporary:
+                temporary.write_bytes(program.serialize())
     return jax.jit(program.call)
 
 

@@ -23,7 +23,7 @@ POINTS = 256
 CORNERS = 64
 _BATCH = 16
 TIMING_SECONDS, FEWEST_ROUNDS = 0.3, 5
-"""How long plans are timed in turns, and how often at least."""
+"""Seconds for which plans are timed in turns, and the least number of rounds."""
 
 
 def design(scene: Any) -> np.ndarray:
