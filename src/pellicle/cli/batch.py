@@ -50,8 +50,9 @@ class Sampler(NamedTuple):
 class Batch:
     """Fits of several files; with a `sampler` each is followed by its posterior.
 
-    A file that fails does not stop the others. `records` are the JSON records of the results so far. Several
-    files are fitted by as many processes as there are `jobs`.
+    A file that fails does not stop the others. `records` are the JSON records of the results so far, and
+    `fits` the fits of repeated measurements. Several files are fitted by as many processes as there are
+    `jobs`.
     """
 
     inputs: Inputs
@@ -62,6 +63,7 @@ class Batch:
     jobs: int = 1
     verbose: bool = field(default_factory=lambda: LOG.isEnabledFor(INFO))
     records: list[dict[str, Any]] = field(default_factory=list)
+    fits: list[Fit] = field(default_factory=list)
 
     def run(self) -> int:
         """Fit every group of files, print and write each result, and return the largest exit code."""
@@ -89,7 +91,26 @@ class Batch:
             worst = FAILED
         if self.out is not None and len(groups) > 1 and self.records:
             write_summary(Path(self.out) / SUMMARY, self.records)
+        if self.inputs.repeats and worst != INTERRUPTED:
+            self._compare()
         return worst
+
+    def _compare(self) -> None:
+        """Compare the scatter of repeated measurements with their errors, print and write the result."""
+        from pellicle.fitting.repeated_measurements import repeats
+        from pellicle.reporting.json_record import one_line
+        from pellicle.reporting.repeats import failure, report, to_json, write_repeats
+
+        try:
+            found = repeats(self.fits)
+        except UsageError as error:
+            say(f"pellicle: {error}")
+            if self.as_json:
+                print(one_line(failure([file.path for file in self.inputs.files], str(error))), flush=True)
+            return
+        print(one_line(to_json(found)) if self.as_json else report(found), flush=True)
+        if self.out is not None:
+            write_repeats(self.out, found)
 
     def _codes(self, groups: list[list[Input]], folders: list[Path | None]) -> Iterator[int]:
         """Fit the groups one by one, or in worker processes, and yield their exit codes in order."""
@@ -99,7 +120,9 @@ class Batch:
             return
         from pellicle.cli.workers import in_order
 
-        own = [replace(self, inputs=self.inputs._replace(files=files), records=[]) for files in groups]
+        own = [
+            replace(self, inputs=self.inputs._replace(files=files), records=[], fits=[]) for files in groups
+        ]
         progress = Progress(f"{len(tasks)} files")
         progress("fit", 0, len(tasks))
         for done, result in enumerate(in_order(_captured, zip(own, folders, strict=True), self.jobs), 1):
@@ -107,6 +130,7 @@ class Batch:
             print(result.err, end="", file=sys.stderr, flush=True)
             print(result.out, end="", flush=True)
             self.records.append(result.record)
+            self.fits += result.fits
             yield result.code
             progress("fit", done, len(tasks))
         progress.clear()
@@ -132,6 +156,8 @@ class Batch:
         progress.clear()
         record = to_json(fit, posterior)
         self.records.append(record)
+        if self.inputs.repeats:
+            self.fits.append(fit)
         print(one_line(record) if self.as_json else report(fit, posterior), flush=True)
         if folder is not None:
             write_fit(folder, fit, posterior)
@@ -155,10 +181,12 @@ class Batch:
 
 
 class _Captured(NamedTuple):
-    """A finished fit of a worker process: exit code, record, and its text on both streams."""
+    """A finished fit of a worker process: exit code, record, and its text on both streams; `fits` has the
+    fit itself where it is compared with others."""
 
     code: int
     record: dict[str, Any]
+    fits: list[Fit]
     out: str
     err: str
 
@@ -169,7 +197,7 @@ def _captured(task: tuple[Batch, Path | None]) -> _Captured:
     out, err = StringIO(), StringIO()
     with redirect_stdout(out), redirect_stderr(err), log_to_stderr() if batch.verbose else nullcontext():
         code = batch._fit(batch.inputs.files, folder)
-    return _Captured(code, batch.records[0], out.getvalue(), err.getvalue())
+    return _Captured(code, batch.records[0], batch.fits, out.getvalue(), err.getvalue())
 
 
 def measurement(

@@ -19,6 +19,9 @@ def fit(
     scene: Annotated[SceneFlags | None, Parameter(name="*")] = None,
     reading: Annotated[ReadingFlags | None, Parameter(name="*")] = None,
     joint: Annotated[bool, switch(SCENE, "Fit all files together: they are of one sample.")] = False,
+    repeats: Annotated[
+        bool, switch(SCENE, "Compare all files: they are repeated measurements of one spot.")
+    ] = False,
     tolerance: Annotated[
         float, flag(SCENE, "Leave out effects that change the signal by less than this (0: none).")
     ] = 0.0,
@@ -34,6 +37,6 @@ def fit(
     not_negative("--tolerance", tolerance)
     if jobs < 1:
         raise UsageError(f"--jobs must be at least 1, got {jobs}")
-    files = inputs(list(data), recipe, scene or SceneFlags(), reading or ReadingFlags(), joint)
+    files = inputs(list(data), recipe, scene or SceneFlags(), reading or ReadingFlags(), joint, repeats)
     start()
     return Batch(files, tolerance, Sampler() if posterior else None, out, json, jobs).run()

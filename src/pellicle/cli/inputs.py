@@ -42,12 +42,16 @@ class Input(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """Data files, fitted together (`joint`) or one by one, and the options of their fits."""
+    """Data files, fitted together (`joint`) or one by one, and the options of their fits.
+
+    `repeats` is true where the files are repeated measurements of one spot.
+    """
 
     files: list[Input]
     joint: bool
     loss: str = LEAST_SQUARES
     residual: str | None = None
+    repeats: bool = False
 
     @property
     def groups(self) -> list[list[Input]]:
@@ -56,7 +60,12 @@ class Inputs(NamedTuple):
 
 
 def inputs(
-    files: list[str], recipe: str | None, scene_flags: SceneFlags, reading: ReadingFlags, joint: bool
+    files: list[str],
+    recipe: str | None,
+    scene_flags: SceneFlags,
+    reading: ReadingFlags,
+    joint: bool,
+    repeats: bool = False,
 ) -> Inputs:
     """Combine files, recipe and flags. Raises UsageError or DataError where something is missing or wrong."""
     if recipe is None:
@@ -73,7 +82,14 @@ def inputs(
             result = _by_surface_recipe(files, described, reading)
         else:
             result = _by_recipe(files, described, reading)
-    return result._replace(joint=joint or result.joint)
+    result = result._replace(joint=joint or result.joint, repeats=repeats or result.repeats)
+    if result.repeats and result.joint:
+        raise UsageError(
+            "repeats are fitted one by one, and a joint fit takes all files together: choose one"
+        )
+    if result.repeats and len(result.files) < 2:
+        raise UsageError("repeats are two files or more: name every file, or leave --repeats out")
+    return result
 
 
 def _by_flags(files: list[str], scene_flags: SceneFlags, reading: ReadingFlags) -> Inputs:
@@ -110,7 +126,8 @@ def _by_recipe(files: list[str], recipe: FilmRecipe, reading: ReadingFlags) -> I
         own_scale = any(table.rescales for table in own.tables.data.file)
         inputs.append(_spectrum_input(file, scene, flags, own_scale))
     data = recipe.tables.data
-    return Inputs(inputs, data.joint, reading.loss or data.loss or LEAST_SQUARES)
+    loss = reading.loss or data.loss or LEAST_SQUARES
+    return Inputs(inputs, data.joint, loss, repeats=data.repeats)
 
 
 def _by_surface_recipe(files: list[str], recipe: SurfaceRecipe, reading: ReadingFlags) -> Inputs:

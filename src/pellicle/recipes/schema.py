@@ -138,12 +138,15 @@ class DataTable(_Reading):
     file: list[FileTable] = []
     wavelengths: GridTable | list[float] | None = None
     joint: bool = False
+    repeats: bool = False
     loss: Literal["least-squares", "huber", "student-t"] | None = None
 
     @model_validator(mode="after")
     def _one_list(self):
         if self.files and self.file:
             raise ValueError("files and [[data.file]] exclude each other: name every file in one of them")
+        if self.joint and self.repeats:
+            raise ValueError("joint and repeats exclude each other: repeats are fitted one by one")
         return self
 
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from pellicle.files import MARKER, new_folder, write_text
 from pellicle.reporting.csv_tables import fit_csv, nk_csv
 from pellicle.reporting.json_record import indented, to_json, versions
+from pellicle.reporting.repeats import FILES as REPEATS
 
 if TYPE_CHECKING:
     from pellicle.fitting.result import Fit
@@ -75,7 +76,7 @@ def folder_per_file(folder: str | os.PathLike[str], paths: Sequence[str | os.Pat
     """
     if len(paths) < 2:
         return [Path(folder) for _ in paths]
-    root, taken, names = new_folder(folder), {MARKER, SUMMARY}, []
+    root, taken, names = new_folder(folder), {MARKER, SUMMARY, *REPEATS}, []
     for path in paths:
         stem = name = Path(path).stem or "spectrum"
         count = 1

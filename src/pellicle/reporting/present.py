@@ -1,4 +1,4 @@
-"""Report, figure and folder of any result: a fit, a posterior, a comparison, a plan, or a cost."""
+"""Report, figure and folder of any result: a fit, a posterior, a comparison, repeats, a plan, or a cost."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from pellicle.accuracy.cost import Cost
 from pellicle.accuracy.surface import SurfaceCost
 from pellicle.effects.plan import Plan
 from pellicle.fitting.comparison import Comparison
+from pellicle.fitting.repeated_measurements import Repeats
 from pellicle.fitting.result import Fit
 from pellicle.reporting import (
     comparison,
@@ -22,6 +23,7 @@ from pellicle.reporting import (
     folders,
     plans,
     posterior,
+    repeats,
 )
 from pellicle.sampling.result import Posterior, verdict
 
@@ -31,10 +33,11 @@ if TYPE_CHECKING:
 AnyCost = Cost | SurfaceCost
 
 
-def report(result: Fit | Posterior | Comparison | Plan | AnyCost) -> str:
+def report(result: Fit | Posterior | Comparison | Repeats | Plan | AnyCost) -> str:
     """Format a result as plain text.
 
-    **Arguments:** `result` of `pl.fit`, `pl.sample`, `pl.compare`, `pl.plan` or `pl.cost`.
+    **Arguments:** `result` of `pl.fit`, `pl.sample`, `pl.compare`, `pl.fitting.repeats`, `pl.plan` or
+    `pl.cost`.
 
     **Returns:** the text that the command line prints: the verdict first, then the numbers behind it.
 
@@ -54,6 +57,8 @@ def report(result: Fit | Posterior | Comparison | Plan | AnyCost) -> str:
             return fit_text.report(result.fit, result)
         case Comparison():
             return comparison.report(result)
+        case Repeats():
+            return repeats.report(result)
         case Plan():
             return plans.report(result)
         case Cost() | SurfaceCost():
@@ -81,11 +86,11 @@ def plot(result: Fit | Posterior | AnyCost) -> Figure:
     raise TypeError(f"a {type(result).__name__} has no figure; fits, posteriors and costs have")
 
 
-def save(result: Fit | Posterior | Comparison | AnyCost, folder: str | os.PathLike[str]) -> Path:
+def save(result: Fit | Posterior | Comparison | Repeats | AnyCost, folder: str | os.PathLike[str]) -> Path:
     """Write a result into a folder, as the command line does: report, JSON record, tables and figures.
 
-    **Arguments:** `result` of `pl.fit`, `pl.sample`, `pl.compare` or `pl.cost`; `folder`, which is made if it
-    is absent. Files of an earlier result in it are replaced.
+    **Arguments:** `result` of `pl.fit`, `pl.sample`, `pl.compare`, `pl.fitting.repeats` or `pl.cost`;
+    `folder`, which is made if it is absent. Files of an earlier result in it are replaced.
 
     **Returns:** the folder.
 
@@ -99,12 +104,14 @@ def save(result: Fit | Posterior | Comparison | AnyCost, folder: str | os.PathLi
             return folders.write_fit(folder, result.fit, result)
         case Comparison():
             return comparison.write_comparison(folder, result)
+        case Repeats():
+            return repeats.write_repeats(folder, result)
         case Cost() | SurfaceCost():
             return cost_files.write_cost(folder, result)
     raise TypeError(f"a {type(result).__name__} has no files; fits, posteriors and costs have")
 
 
-def html(result: Fit | Posterior | Comparison | AnyCost) -> str:
+def html(result: Fit | Posterior | Comparison | Repeats | AnyCost) -> str:
     """Format a result for a notebook: verdict, a table of free parameters, and the report to unfold."""
     match result:
         case Fit():

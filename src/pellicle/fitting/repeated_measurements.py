@@ -1,0 +1,301 @@
+"""Fits of repeated measurements: their scatter, compared with the errors that the fits state.
+
+The Guide to the expression of uncertainty in measurement (JCGM 100:2008, GUM) numbers the equations.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from logging import getLogger
+
+import numpy as np
+
+from pellicle.errors import UsageError
+from pellicle.fitting.presentation import ReportMixin
+from pellicle.fitting.result import Estimate, Fit, Status
+from pellicle.fitting.status import describe
+
+log = getLogger(__name__)
+
+LEVEL, _PERCENT = 0.95, "95 %"
+"""Level of confidence of the expanded uncertainty."""
+UNLIKELY = 0.01
+"""Probability of χ², on either side, below which scatter and stated errors do not agree."""
+_UNUSABLE = (Status.FAILED, Status.NOT_CONVERGED, Status.MISFIT)
+_NEARER = 5.0
+"""A rival so many times nearer to the other repeats than the best minimum is the one they share."""
+
+
+class Agreement(StrEnum):
+    """Scatter of repeats against their stated noise errors."""
+
+    AGREES = "agrees"
+    LARGER = "larger"
+    SMALLER = "smaller"
+
+
+@dataclass(frozen=True)
+class RepeatedParameter:
+    """One parameter in repeated measurements.
+
+    - `values` and `noise`, the standard errors of the noise that the fits state, one for each repeat.
+    - `common`: the standard error from effects that all repeats share, which no scatter shows (type B).
+    """
+
+    name: str
+    unit: str
+    values: tuple[float, ...]
+    noise: tuple[float, ...]
+    common: float = 0.0
+
+    @property
+    def mean(self) -> float:
+        """Arithmetic mean (GUM eq. 3)."""
+        return float(np.mean(self.values))
+
+    @property
+    def sd(self) -> float:
+        """Experimental standard deviation of one value (GUM eq. 4)."""
+        return float(np.std(self.values, ddof=1))
+
+    @property
+    def sd_mean(self) -> float:
+        """Experimental standard deviation of the mean (GUM eq. 5): the type A standard uncertainty."""
+        return self.sd / math.sqrt(len(self.values))
+
+    @property
+    def freedom(self) -> int:
+        """Degrees of freedom of `sd` and `sd_mean`."""
+        return len(self.values) - 1
+
+    @property
+    def sd_uncertainty(self) -> float:
+        """Relative standard uncertainty of `sd` itself, from the few values it rests on (GUM table E.1)."""
+        n = len(self.values)
+        c4 = math.sqrt(2 / (n - 1)) * math.exp(math.lgamma(n / 2) - math.lgamma((n - 1) / 2))
+        return math.sqrt(1 / c4**2 - 1)
+
+    @property
+    def stated(self) -> float:
+        """Root mean square of the stated noise errors."""
+        return float(np.sqrt(np.mean(np.square(self.noise))))
+
+    @property
+    def chi2(self) -> float:
+        """χ² of the values about their mean weighted by the stated noise errors, on `freedom`."""
+        values, weights = np.array(self.values), 1 / np.square(self.noise)
+        return float(np.sum(weights * (values - np.average(values, weights=weights)) ** 2))
+
+    @property
+    def ratio(self) -> float:
+        """Scatter over the stated noise errors, √(χ² / degrees of freedom): the Birge ratio (R. Birge 1932,
+        Phys. Rev. 40, 207)."""
+        return math.sqrt(self.chi2 / self.freedom)
+
+    @property
+    def probability(self) -> float:
+        """Probability that noise as stated gives at least this χ²."""
+        from scipy.special import chdtrc  # slow to import
+
+        return float(chdtrc(self.freedom, self.chi2))
+
+    @property
+    def agreement(self) -> Agreement:
+        """Whether the scatter is what the stated noise errors let expect."""
+        if self.probability < UNLIKELY:
+            return Agreement.LARGER
+        return Agreement.SMALLER if self.probability > 1 - UNLIKELY else Agreement.AGREES
+
+    @property
+    def stderr(self) -> float:
+        """Combined standard uncertainty of the mean, of types A and B (GUM eq. 10)."""
+        return math.hypot(self.sd_mean, self.common)
+
+    @property
+    def effective_freedom(self) -> float:
+        """Effective degrees of freedom of `stderr` (GUM eq. G.2b); type B has infinitely many."""
+        return self.freedom * (self.stderr / self.sd_mean) ** 4 if self.sd_mean else math.inf
+
+    @property
+    def coverage_factor(self) -> float:
+        """Factor of `stderr` for a level of 95 %: a quantile of the t distribution (GUM eq. G.1d)."""
+        from scipy.special import ndtri, stdtrit
+
+        level = (1 + LEVEL) / 2
+        few = math.isfinite(self.effective_freedom)
+        return float(stdtrit(self.effective_freedom, level) if few else ndtri(level))
+
+    @property
+    def expanded(self) -> float:
+        """Expanded uncertainty of the mean at 95 %."""
+        return self.coverage_factor * self.stderr
+
+
+@dataclass(frozen=True)
+class Repeat:
+    """One repeat: its files, the status of its fit, and the reason why it is left out, if it is."""
+
+    path: str
+    status: Status
+    left_out: str = ""
+
+
+@dataclass(frozen=True, repr=False)
+class Repeats(ReportMixin):
+    """Fits of repeated measurements of one sample: their scatter against the errors that they state.
+
+    `parameters` are the free ones with a finite error in two repeats or more, the leading one first;
+    `uncompared` are the names of the others.
+    """
+
+    repeats: tuple[Repeat, ...]
+    parameters: dict[str, RepeatedParameter]
+    uncompared: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+    @property
+    def verdict(self) -> str:
+        """Mean of the leading parameter, its scatter, and whether the stated noise error agrees with it."""
+        p = next(iter(self.parameters.values()))
+        unit = f" {p.unit}" if p.unit else ""
+        mean = describe(Estimate(p.name, p.mean, p.sd_mean, p.unit, -math.inf, math.inf, True))
+        times = f"{_short(p.ratio)} times the stated noise error of {_short(p.stated)}{unit}"
+        sentence = f"{len(p.values)} repeats: {mean} (mean and its standard deviation)."
+        sentence += f" They scatter by {_short(p.sd)}{unit}, {times}:"
+        match p.agreement:
+            case Agreement.LARGER:
+                sentence += " the stated error is too small."
+            case Agreement.SMALLER:
+                sentence += " less than independent repeats would. They may share their noise."
+            case _:
+                sentence += " the stated error agrees with the scatter."
+        if p.common:
+            sentence += (
+                f" With {_short(p.common)}{unit} from effects that all repeats share, the mean is known to"
+                f" ± {_short(p.expanded)}{unit} ({_PERCENT}, coverage factor {p.coverage_factor:.3g})."
+            )
+        else:
+            sentence += f" At {_PERCENT} the mean is known to ± {_short(p.expanded)}{unit}."
+        return sentence
+
+    def __getitem__(self, name: str) -> RepeatedParameter:
+        return self.parameters[name]
+
+    def __str__(self) -> str:
+        return "\n".join([self.verdict, *self.warnings])
+
+    __repr__ = __str__
+
+
+def repeats(fits: Sequence[Fit]) -> Repeats:
+    """Compare the scatter of repeated measurements with the errors that their fits state.
+
+    Repeats are measurements of one spot of one sample, fitted with one scene. What differs from one to the
+    next is noise; an effect that they share moves all values alike and remains beside their scatter.
+
+    **Arguments:** `fits`: two or more. Those that did not converge or do not explain their data, and copies
+    of an earlier one, are named and left out.
+
+    **Returns:** `Repeats`: for each free parameter the mean, the experimental standard deviation, and χ² of
+    the values against the stated noise errors; a verdict.
+
+    **Raises:** UsageError where fewer than two fits are usable, or none of their parameters has an error.
+
+    **Source:** JCGM 100:2008 (GUM), 4.2 for the mean and its standard deviation, annex G for the expanded
+    uncertainty.
+
+    ```python
+    >>> film = pl.Scene(pl.Layer("SiO2", pl.Free(100, 1000)), "Si")
+    >>> truth = pl.Scene(pl.Layer("SiO2", 500.0), "Si")
+    >>> fits = [pl.fit(pl.simulate(truth, noise=0.002, seed=seed), film) for seed in range(3)]
+    >>> found = pl.fitting.repeats(fits)
+    >>> found["thickness"].freedom, found["thickness"].agreement.value
+    (2, 'agrees')
+
+    ```
+    """
+    paths = [_path(fit, i) for i, fit in enumerate(fits)]
+    triples = zip(paths, fits, _reasons(fits, paths), strict=True)
+    every = tuple(Repeat(path, fit.status, reason) for path, fit, reason in triples)
+    used = [(each.path, fit) for each, fit in zip(every, fits, strict=True) if not each.left_out]
+    warnings = [f"{each.path} is left out: {each.left_out}" for each in every if each.left_out]
+    if len(used) < 2:
+        raise UsageError(
+            f"repeats need two usable fits or more, and {len(used)} of {len(every)} are"
+            + "".join(f"; {warning}" for warning in warnings)
+        )
+    names, compared = dict.fromkeys(p.name for _, fit in used for p in fit.free), {}
+    for name in names:
+        known = [(path, fit, fit.parameters[name]) for path, fit in used if name in fit.parameters]
+        known = [
+            (path, fit, p) for path, fit, p in known if p.free and _noise(p) > 0 and math.isfinite(p.stderr)
+        ]
+        if len(known) < 2:
+            continue
+        estimates = [p for *_, p in known]
+        shared = float(np.mean([max(p.stderr**2 - _noise(p) ** 2, 0.0) for p in estimates]))
+        compared[name] = RepeatedParameter(
+            name,
+            estimates[0].unit,
+            tuple(p.value for p in estimates),
+            tuple(map(_noise, estimates)),
+            math.sqrt(shared),
+        )
+        own = compared[name]
+        log.info(
+            "repeats: %s scatters by %.3g, stated noise error %.3g: chi-square %.3g on %d degrees of freedom",
+            *(name, own.sd, own.stated, own.chi2, own.freedom),
+        )
+        if own.agreement is Agreement.LARGER:
+            warnings += _other_minima(known, name)
+    if not compared:
+        raise UsageError(f"no parameter has a finite error in two of the {len(used)} repeats")
+    return Repeats(every, compared, tuple(n for n in names if n not in compared), tuple(warnings))
+
+
+def _noise(p: Estimate) -> float:
+    """Standard error of the noise alone."""
+    return getattr(p, "stderr_noise", p.stderr)
+
+
+def _path(fit: Fit, position: int) -> str:
+    return ", ".join(part.data.path for part in fit.parts if part.data.path) or f"repeat {position + 1}"
+
+
+def _reasons(fits: Sequence[Fit], paths: Sequence[str]) -> list[str]:
+    """Why the numbers of each fit are left out: it is not usable, or of a copy; empty where they are used."""
+    reasons = []
+    for i, fit in enumerate(fits):
+        copied = [path for path, earlier in zip(paths, fits[:i], strict=False) if _same_data(fit, earlier)]
+        reason = f"its fit is {fit.status}" if fit.status in _UNUSABLE else ""
+        reasons.append(f"it holds the same numbers as {copied[0]}" if copied else reason)
+    return reasons
+
+
+def _same_data(one: Fit, other: Fit) -> bool:
+    pairs = zip(one.parts, other.parts, strict=False)
+    return all(np.array_equal(a.data.values, b.data.values) for a, b in pairs)
+
+
+def _other_minima(known: Sequence[tuple[str, Fit, Estimate]], name: str) -> list[str]:
+    """Sentences on fits whose best minimum is not that of the others, though a rival of theirs is."""
+    result = []
+    for path, fit, p in known:
+        others = float(np.median([q.value for other, _, q in known if other != path]))
+        values = {r.parameters.get(name, math.inf): r.delta_chi2 for r in fit.rivals}
+        nearest = min(values, key=lambda value: abs(value - others), default=math.inf)
+        if _NEARER * abs(nearest - others) < abs(p.value - others):
+            unit = f" {p.unit}" if p.unit else ""
+            result.append(
+                f"{path} lies in another minimum: {name} {p.value:.5g}{unit}, while its rival of"
+                f" {nearest:.5g}{unit} (Δχ² {values[nearest]:.2g}) is near the other repeats: narrow the"
+                " bounds"
+            )
+    return result
+
+
+def _short(number: float) -> str:
+    return f"{number:.2g}" if number < 100 else f"{number:.0f}"

@@ -1,0 +1,130 @@
+"""Report, JSON record and files of repeated measurements."""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Sequence
+from importlib.metadata import version
+from io import StringIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pellicle.files import MARKER, new_folder, write_text
+from pellicle.reporting.json_record import indented, number, versions
+from pellicle.reporting.plain_text import block, facts, table, wrapped
+
+if TYPE_CHECKING:
+    from pellicle.fitting.repeated_measurements import RepeatedParameter, Repeats
+
+SCHEMA = "pellicle.repeats/1"
+FILES = RECORD, TABLE, TEXT = "repeats.json", "repeats.csv", "repeats.txt"
+
+
+def report(repeats: Repeats) -> str:
+    """Format the verdict, a row for each parameter, and what was left out."""
+    rows = [("", "mean", "± its sd", "scatter", "stated noise", "ratio", "probability", "± 95 %", "unit")]
+    rows += [
+        (
+            p.name,
+            f"{p.mean:.7g}",
+            f"{p.sd_mean:.2g}",
+            f"{p.sd:.2g}",
+            f"{p.stated:.2g}",
+            f"{p.ratio:.2g}",
+            f"{p.probability:.2g}",
+            f"{p.expanded:.2g}",
+            p.unit,
+        )
+        for p in repeats.parameters.values()
+    ]
+    few = next(iter(repeats.parameters.values()))
+    notes = [
+        (
+            "scatter",
+            f"standard deviation of one value; from {len(few.values)} values it is known within"
+            f" {100 * few.sd_uncertainty:.0f} %",
+        ),
+        ("ratio", f"of the scatter to the stated noise errors: √(χ² / {few.freedom})"),
+        ("probability", "that noise as stated scatters at least so much"),
+        ("± 95 %", "expanded uncertainty of the mean, with the effects that all repeats share"),
+    ]
+    warnings = list(repeats.warnings)
+    if repeats.uncompared:
+        warnings.append(
+            f"not compared, without a finite error in two repeats: {', '.join(repeats.uncompared)}"
+        )
+    return (
+        block("Repeats", wrapped(repeats.verdict))
+        + block("Scatter of the parameters", [*table(rows), "", *facts(notes)])
+        + (
+            block("Warnings", [line for text in warnings for line in wrapped(text, "- ", "  ")])
+            if warnings
+            else ""
+        )
+    )
+
+
+def to_json(repeats: Repeats) -> dict[str, Any]:
+    """Convert to dictionaries of the schema; infinite numbers are None."""
+    return {
+        "schema": SCHEMA,
+        "data": [{"path": r.path, "status": str(r.status), "used": not r.left_out} for r in repeats.repeats],
+        "verdict": repeats.verdict,
+        "parameters": {name: _parameter(p) for name, p in repeats.parameters.items()},
+        "uncompared": list(repeats.uncompared),
+        "warnings": list(repeats.warnings),
+        "versions": versions(),
+    }
+
+
+def failure(paths: Sequence[str], error: str) -> dict[str, Any]:
+    """Build the record of repeats that could not be compared."""
+    data = [{"path": path, "status": None, "used": False} for path in paths]
+    return {"schema": SCHEMA, "data": data, "status": "failed", "error": error, "versions": versions()}
+
+
+def _parameter(p: RepeatedParameter) -> dict[str, Any]:
+    return {
+        "unit": p.unit,
+        "values": list(map(number, p.values)),
+        "stderr_noise": list(map(number, p.noise)),
+        "mean": number(p.mean),
+        "sd": number(p.sd),
+        "sd_mean": number(p.sd_mean),
+        "degrees_of_freedom": p.freedom,
+        "chi2": number(p.chi2),
+        "probability": number(p.probability),
+        "ratio": number(p.ratio),
+        "agreement": str(p.agreement),
+        "stderr_common": number(p.common),
+        "stderr": number(p.stderr),
+        "effective_degrees_of_freedom": number(p.effective_freedom),
+        "coverage_factor": number(p.coverage_factor),
+        "expanded": number(p.expanded),
+    }
+
+
+def repeats_csv(repeats: Repeats) -> str:
+    """Format one row for each parameter as CSV."""
+    text = StringIO(f"# scatter of repeated measurements; written by pellicle {version('pellicle')}\n")
+    text.seek(0, os.SEEK_END)
+    rows = [{"parameter": name, **_parameter(p)} for name, p in repeats.parameters.items()]
+    header = [name for name in rows[0] if name not in ("values", "stderr_noise")]
+    writer = csv.DictWriter(text, header, extrasaction="ignore", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows({k: f"{v:.10g}" if isinstance(v, float) else v for k, v in row.items()} for row in rows)
+    return text.getvalue()
+
+
+def write_repeats(folder: str | os.PathLike[str], repeats: Repeats) -> Path:
+    """Write repeats.json, repeats.csv and repeats.txt into a folder.
+
+    Returns the folder. Raises UsageError where it holds files that pellicle did not write.
+    """
+    target, record = new_folder(folder), indented(to_json(repeats))
+    if not (target / MARKER).exists():
+        write_text(target / MARKER, record)
+    for name, text in zip(FILES, (record, repeats_csv(repeats), report(repeats)), strict=True):
+        write_text(target / name, text, overwrite=True)
+    return target

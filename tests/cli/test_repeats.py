@@ -1,0 +1,69 @@
+"""`pellicle fit --repeats`: files of one spot, fitted one by one and compared."""
+
+import csv
+import json
+import math
+
+import numpy as np
+import pytest
+
+
+@pytest.fixture
+def recipe(tmp_path):
+    def write(data=""):
+        path = tmp_path / "film.toml"
+        path.write_text(
+            f"[data]\n{data}\n[scene]\nsubstrate = '3.9+0.02j'\n"
+            "[[scene.layer]]\nmaterial = 1.46\nthickness = { lower = 10, upper = 800 }\n"
+        )
+        return path
+
+    return write
+
+
+def test_repeats_of_one_thickness_agree(pellicle, spectrum_file, scene, tmp_path):
+    files = [spectrum_file(f"{seed}.csv", seed=seed) for seed in range(4)]
+    out = tmp_path / "out"
+    ran = pellicle("fit", *files, *scene, "--repeats", "--json", "--out", out, "--jobs", "2")
+    assert ran.code == 0
+    *fits, found = ran.objects
+    assert [fit["schema"] for fit in fits] == ["pellicle.fit/1"] * 4
+    assert found["schema"] == "pellicle.repeats/1"
+    assert [each["path"] for each in found["data"]] == list(map(str, files))
+    values = [fit["parameters"]["thickness"]["value"] for fit in fits]
+    thickness = found["parameters"]["thickness"]
+    assert thickness["values"] == values
+    assert thickness["mean"] == pytest.approx(np.mean(values))
+    assert thickness["sd"] == pytest.approx(np.std(values, ddof=1))
+    assert thickness["agreement"] == "agrees"
+    assert abs(thickness["mean"] - 300.0) < thickness["expanded"]
+    assert json.loads((out / "repeats.json").read_text())["parameters"] == found["parameters"]
+    [row] = csv.DictReader((out / "repeats.csv").read_text().splitlines()[1:])
+    assert float(row["sd_mean"]) == pytest.approx(np.std(values, ddof=1) / math.sqrt(4))
+    assert "[[Repeats]]" in (out / "repeats.txt").read_text()
+    assert (out / "summary.csv").exists()
+
+
+def test_thicknesses_that_differ_are_told(pellicle, spectrum_file, recipe):
+    for name, thickness in zip("abc", (299.0, 300.0, 301.5), strict=True):
+        spectrum_file(f"{name}.csv", thickness)
+    ran = pellicle("fit", "--recipe", recipe("files = ['a.csv', 'b.csv', 'c.csv']\nrepeats = true"))
+    assert ran.code == 0
+    assert ran.out.count("[[Verdict]]") == 3
+    assert "the stated error is too small" in " ".join(ran.out.split())
+
+
+def test_a_file_that_cannot_be_read_is_not_waited_for(pellicle, spectrum_file, scene, tmp_path):
+    ran = pellicle("fit", spectrum_file(), tmp_path / "gone.csv", *scene, "--repeats", "--json")
+    assert ran.code == 3
+    assert "repeats need two usable fits" in ran.err
+    failed = ran.objects[-1]
+    assert (failed["schema"], failed["status"]) == ("pellicle.repeats/1", "failed")
+
+
+def test_what_repeats_are_not(pellicle, spectrum_file, scene, recipe):
+    file = spectrum_file()
+    pellicle("fit", file, *scene, "--repeats").refused(2, "two files or more", "--repeats")
+    pellicle("fit", file, file, *scene, "--repeats", "--joint").refused(2, "one by one", "choose one")
+    path = recipe("joint = true\nrepeats = true")
+    pellicle("fit", file, "--recipe", path).refused(3, "joint and repeats exclude each other")
