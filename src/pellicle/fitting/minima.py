@@ -104,8 +104,16 @@ def minima(
 
     While the best has not settled, the best `followed` minima are polished again; none where that is 0.
     """
-    result = solve(problem, starts, coarse=coarse, progress=progress)
-    units, deviance, converged = result.units, result.deviance, result.converged
+    return settled(problem, solve(problem, starts, coarse=coarse, progress=progress), most, followed, coarse)
+
+
+def settled(
+    problem: Problem, polished: Minima, most: int = MOST, followed: int = MOST, coarse: float = 0.0
+) -> Minima:
+    """The distinct ones of polished minima, best first; the best of them polished on as in `minima`."""
+    units, deviance, converged = (
+        np.array(x) for x in (polished.units, polished.deviance, polished.converged)
+    )
     for _ in range(_MOST_ROUNDS if followed else 0):
         best = np.argsort(deviance, kind="stable")[:followed]
         before = deviance[best[0]]

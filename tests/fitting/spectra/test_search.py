@@ -35,9 +35,9 @@ def test_the_scan_resolves_the_shortest_fringe(film, measured):
         assert np.diff(scan.thickness).max() > 0.5 * 400 / (8 * largest)
 
 
-def test_only_local_minima_are_polished_and_all_of_them_are_kept(film, measured, monkeypatch):
-    scene = film()
-    problem = built(scene, measured(scene, 700.0))
+@pytest.fixture
+def polished(monkeypatch):
+    """Starts that the solver takes, as a list of arrays that grows."""
     starts = []
     real = solver.polish
 
@@ -46,12 +46,41 @@ def test_only_local_minima_are_polished_and_all_of_them_are_kept(film, measured,
         return real(static, arrays, box, units, until)
 
     monkeypatch.setattr(solver, "polish", watched)
+    return starts
+
+
+def local_minima(deviance):
+    """Where values along a line are not above their neighbours."""
+    padded = np.pad(deviance, 1, constant_values=np.inf)
+    return (deviance <= padded[:-2]) & (deviance <= padded[2:])
+
+
+def test_only_local_minima_are_polished_and_all_of_them_are_kept(film, measured, polished):
+    scene = film()
+    problem = built(scene, measured(scene, 700.0))
     scan = search(problem, quiet).scan
-    deviance = np.concatenate([[np.inf], scan.deviance[0, :, 0], [np.inf]])
-    lowest = (deviance[1:-1] <= deviance[:-2]) & (deviance[1:-1] <= deviance[2:])
-    tried = np.unique(np.concatenate(starts)) * 990 + 10
+    lowest = local_minima(scan.deviance[0, :, 0])
+    tried = np.unique(np.concatenate(polished)) * 990 + 10
     np.testing.assert_allclose(tried, scan.thickness[lowest], atol=1e-6)
     assert 3 <= lowest.sum() < 16
+
+
+def test_orders_that_noise_hides_are_all_polished(film, measured, polished):
+    """Fringes far below the noise: the least coarse misfit says nothing about which order is best."""
+    scene = film(pl.Free(10, 9000), 1.47, substrate=1.46)
+    problem = built(scene, measured(scene, 4000.0, noise=0.01))
+    scan = search(problem, quiet).scan
+    lowest = scan.thickness[local_minima(scan.deviance[0, :, 0])]
+    tried = np.unique(np.concatenate(polished)) * 8990 + 10
+    assert len(lowest) > 16
+    assert np.isclose(tried[:, None], lowest, atol=1e-6).any(axis=0).all()
+
+
+def test_orders_out_of_reach_cost_nothing(film, measured, polished):
+    """Fringes far above the noise: of some forty orders only the nearest are worth a start."""
+    scene = film(pl.Free(10, 9000))
+    scan = search(built(scene, measured(scene, 4000.0)), quiet).scan
+    assert local_minima(scan.deviance[0, :, 0]).sum() > 2 * len(np.unique(np.concatenate(polished)))
 
 
 def test_wide_bounds_are_scanned_as_finely_or_the_fit_warns(film, measured):

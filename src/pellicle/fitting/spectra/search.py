@@ -2,7 +2,10 @@
 
 A single start finds the right thickness in one case of ten. The scan's thickness step resolves the
 shortest fringe, the other parameters take a few values each, and only *local minima in thickness*
-go on to the solver: otherwise the best starts are all neighbours.
+go on to the solver: otherwise the best starts are all neighbours. The lowest are polished at once. Any
+other thickness at which the misfit, least over the other parameters, has a local minimum is an interference
+order of its own: it is polished too, unless it is further above the best minimum than polishing has lowered
+any start by.
 """
 
 from __future__ import annotations
@@ -14,7 +17,7 @@ from logging import getLogger
 import numpy as np
 
 from pellicle.fitting.evaluation import deviances
-from pellicle.fitting.minima import MOST, Minima, Scan, minima
+from pellicle.fitting.minima import MOST, SLOTS, Minima, Scan, settled, solve
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.progress import Progress, quiet
@@ -29,6 +32,10 @@ _MOST_DESIGNS = 1200
 _COARSE = 1e-3
 """Share of its distance to the best deviance within which a minimum is computed at first; those that remain
 are computed to the end when they are ranked."""
+_REACH = 1.25
+"""An order is polished unless ‖r‖ is above the best by so many times the largest fall by polishing."""
+_MOST_POLISHED = 2048
+"""Starts after which no more are polished."""
 
 
 def search(problem: Problem, progress: Progress) -> Minima:
@@ -40,17 +47,16 @@ def search(problem: Problem, progress: Progress) -> Minima:
     if depth is not None:
         units[:, depth] = np.tile(grid, len(design))
     table = scanned(thinned, units, progress).reshape(len(design), max(len(grid), 1), -1)
+    total = table.sum(-1)
     batches = 1 if len(design) == 1 else 3 if len(problem.parameters) < 4 else 6
-    # the lowest local minima along the thickness axis of (design, thickness)
-    total = np.pad(table.sum(-1), ((0, 0), (1, 1)), constant_values=np.inf)
-    middle = total[:, 1:-1]
-    lowest = np.flatnonzero(((middle <= total[:, :-2]) & (middle <= total[:, 2:])).ravel())
-    starts = units[lowest[np.argsort(middle.ravel()[lowest])][: batches * MOST]]
-    result = minima(problem, starts, progress, coarse=_COARSE)
+    lowest = np.flatnonzero(_lowest_within(total, 1).ravel())
+    first = lowest[np.argsort(total.ravel()[lowest])][: batches * MOST]
+    polished, tried = _every_order(problem, units, total, first, progress)
+    result = settled(problem, polished, coarse=_COARSE)
     best = zip(problem.parameters, problem.values(result.units[0]), strict=True)
     log.info(
         "polished: %d minima of the scan, %d of them distinct, %d converged; best: %s",
-        len(starts),
+        tried,
         len(result.units),
         int(np.sum(result.converged)),
         ", ".join(f"{p.name} {value:.6g}" for p, value in best),
@@ -61,6 +67,51 @@ def search(problem: Problem, progress: Progress) -> Minima:
     every = np.concatenate([scanned(thinned, result.units[:1], quiet), table.reshape(len(units), -1)])
     best_of_scan = every[np.argmin(every.sum(-1))]
     return replace(result, scan=Scan(p.lower + grid * (p.upper - p.lower), table - best_of_scan))
+
+
+def _lowest_within(values: np.ndarray, reach: int) -> np.ndarray:
+    """Where `values` (..., thickness) are least among those up to `reach` steps away on both sides."""
+    padded = np.pad(values, [(0, 0)] * (values.ndim - 1) + [(reach, reach)], constant_values=np.inf)
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1, axis=-1)
+    return values <= windows.min(-1)
+
+
+def _every_order(
+    problem: Problem, units: np.ndarray, total: np.ndarray, first: np.ndarray, progress: Progress
+) -> tuple[Minima, int]:
+    """The candidates `first` polished, then those of all other orders that could be better; and how many.
+
+    `total` (design, thickness) are deviances of the candidates `units`. Residuals obey the triangle
+    inequality, ‖r(polished)‖ ≥ ‖r(start)‖ − ‖change of the model‖: an order is excluded where the best
+    deviance is out of reach by more than `_REACH` times the largest fall of ‖r‖ seen so far.
+    """
+    deviance = total.ravel()
+    polished = solve(problem, units[first], coarse=_COARSE, progress=progress)
+    profile, row = total.min(axis=0), total.argmin(axis=0)
+    # orders are at least four steps of the grid apart
+    orders = np.flatnonzero(_lowest_within(profile, 2 if len(total) > 1 else 1))
+    rest = np.setdiff1d(row[orders] * total.shape[1] + orders, first)
+    rest, tried = rest[np.argsort(deviance[rest])], first
+    while len(rest) and len(tried) < _MOST_POLISHED:
+        reached = _root(polished.deviance)
+        fall = np.max(_root(deviance[tried]) - reached, where=np.isfinite(reached), initial=0.0)
+        near = _root(deviance[rest]) - _REACH * fall < reached.min()
+        now = rest[near][:SLOTS]
+        if not len(now):
+            break
+        more = solve(problem, units[now], coarse=_COARSE, progress=progress)
+        polished = Minima(
+            np.concatenate([polished.units, more.units]),
+            np.concatenate([polished.deviance, more.deviance]),
+            np.concatenate([polished.converged, more.converged]),
+        )
+        rest, tried = rest[~np.isin(rest, now)], np.concatenate([tried, now])
+    return polished, len(tried)
+
+
+def _root(deviance: np.ndarray) -> np.ndarray:
+    """‖r‖ of a deviance; evidence may take it below zero."""
+    return np.sqrt(np.maximum(deviance, 0.0))
 
 
 def _thickness_grid(problem: Problem, choices: int) -> np.ndarray:
