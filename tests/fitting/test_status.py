@@ -149,6 +149,31 @@ def test_natural_bounds_and_instrument_bounds_do_not_count():
     assert judge(**(right | {"natural": frozenset({"k"})})) is Status.CONVERGED
 
 
+@pytest.mark.parametrize(
+    ("parameters", "status"),
+    [
+        ([estimate(), estimate("B", 0.0, 9.0, True, default_bounds=True)], Status.CONVERGED),
+        ([estimate(), estimate("B", 0.0, 9.0, True)], Status.AT_BOUND),
+        ([estimate(stderr=31.0), estimate("B", 0.0, 9.0, True, default_bounds=True)], Status.AT_BOUND),
+        ([estimate(at_bound=True, default_bounds=True)], Status.AT_BOUND),
+        # the thickness of its own layer counts, and without a free thickness the leading number
+        (
+            [
+                estimate("a.thickness", stderr=31.0),
+                estimate("b.thickness"),
+                estimate("b.A", 1.5, 0.1, True, default_bounds=True),
+            ],
+            Status.CONVERGED,
+        ),
+        ([estimate("n", 1.5, 0.1), estimate("k", 1.0, 0.1, True, default_bounds=True)], Status.CONVERGED),
+        ([estimate("n", 1.5, 0.1, True, default_bounds=True), estimate("k", 1.0, 0.1)], Status.AT_BOUND),
+    ],
+)
+def test_a_default_bound_is_a_remark_beside_a_thickness_that_is_known(parameters, status):
+    given = {"converged": True, "misfit": False, "rivals": (), "natural": frozenset()}
+    assert judge(parameters={p.name: p for p in parameters}, **given) is status
+
+
 def test_without_a_thickness_every_free_parameter_must_be_unseen():
     right = dict(EVERYTHING_WRONG) | {"converged": True, "misfit": False, "rivals": ()}
     one = {"n": estimate("n", 1.5, math.inf), "k": estimate("k", 0.1, 0.01)}
@@ -208,6 +233,12 @@ UNSEEN = {"thickness": estimate(stderr=math.inf)}
             {},
             "The best fit, thickness 300.0 ± 1.0 nm, lies on a bound that was set: n (1.5 nm)."
             " Widen the bound; if the best value moves with it, the scene may be wrong.",
+        ),
+        (
+            Status.AT_BOUND,
+            {"thickness": estimate(stderr=60.0), "n": estimate("n", 1.5, 0.1, True, default_bounds=True)},
+            {},
+            "The best fit, thickness 300 ± 60 nm, lies on a default bound: n (1.5 nm). Give it bounds.",
         ),
         (
             Status.AMBIGUOUS,

@@ -342,7 +342,7 @@ def test_a_constant_index_of_a_layer(scene):
     assert found(film(f'{{ model = "constant", n = 1.8, k = {K} }}')) == Constant(1.8, Free(0, 0.5))
     assert found(film(CONSTANT)) == Constant(Free(1.5, 2.5), Free(0, 0.5))
     assert found(film('{ model = "constant" }')) == Constant(1.5)
-    freed = Constant(Free(1.7, 1.9, start=1.9), Free(0, 1, start=0.25))
+    freed = Constant(Free(1.7, 1.9, start=1.9), Free(0, 1, start=0.25, limits=(0, 20)))
     assert found(film(CONSTANT) + 'free = ["n=1.7:1.9", "k"]\n') == freed
 
 

@@ -9,8 +9,8 @@ import pytest
 from pellicle.dispersion.empirical import Cauchy, Constant, Sellmeier, Shifted
 from pellicle.errors import UsageError
 from pellicle.recipes import media_words
-from pellicle.recipes.dispersion_models import MODELS, build_model
-from pellicle.scene.free import Free
+from pellicle.recipes.dispersion_models import MODELS, TERMS, build_model
+from pellicle.scene.free import Free, free_leaves
 
 AT = np.array([450.0, 633.0, 850.0])
 
@@ -110,7 +110,7 @@ def test_models_by_name():
 
 
 def test_freeing_a_number_replaces_it():
-    """n ± 0.5 but at least 1, k from 0 to 1, started where the number was."""
+    """n ± 0.5 but at least 1 where nothing is absorbed, k from 0 to 1, started where the number was."""
     layer = media_words.medium("1.46", ["n", "k"])
     assert isinstance(layer, Constant)
     assert free_part(layer.n) == pytest.approx((1.46, 1.0, 1.96))
@@ -118,7 +118,7 @@ def test_freeing_a_number_replaces_it():
     assert free_part(media_words.medium("2.9+0.1j", ["n", "k"]).n) == pytest.approx((2.9, 2.4, 3.4))
     assert media_words.medium("2.9+0.1j", ["k"]).k.start == 0.1
     assert media_words.medium("2.9+0.1j", ["n"]).k == 0.1
-    assert free_part(media_words.medium("0.2+3j", ["n"]).n)[1:] == (1.0, 1.5)
+    assert free_part(media_words.medium("0.2+3j", ["n"]).n) == pytest.approx((0.2, 0.01, 0.7))
 
 
 def test_own_bounds():
@@ -171,9 +171,10 @@ def test_scale_and_offset():
 
 
 def test_free_or_a_number():
-    assert free_part(media_words.free_or_number("free", "`bandwidth`", 0.0, 20.0, 2.0)) == (2, 0, 20)
-    assert free_part(media_words.free_or_number("1:3", "`bandwidth`", 0.0, 20.0, 2.0)) == (2, 1, 3)
-    assert media_words.free_or_number("4", "`bandwidth`", 0.0, 20.0, 2.0) == 4
+    default = Free(0.0, 20.0, start=2.0, limits=(0.0, 50.0))
+    assert media_words.free_or_number("free", "`bandwidth`", default) is default
+    assert free_part(media_words.free_or_number("1:3", "`bandwidth`", default)) == (2, 1, 3)
+    assert media_words.free_or_number("4", "`bandwidth`", default) == 4
 
 
 @pytest.mark.parametrize(("name", "specs"), MODELS.items())
@@ -188,3 +189,43 @@ def test_the_documented_defaults_are_these(name, specs):
         assert (bool(bold), *map(float, numbers)) == (spec.free, spec.value, spec.lower, spec.upper)
     others = specs.keys() - {key for _, key, *_ in listed}
     assert others <= {"eps_inf"} or "as " in row
+    limits = re.findall(r"((?:\w+, )*\w+) (\S+) to ([^\s,;]+)", row.split("|")[3])
+    assert limits
+    for keys, *ends in limits:
+        for key in keys.split(", "):
+            assert specs[key].limits == tuple(map(float, ends))
+
+
+EVERY = [*MODELS.items(), *((name, specs) for name, (_, specs) in TERMS.items())]
+
+
+@pytest.mark.parametrize(("name", "specs"), EVERY)
+def test_every_default_lies_within_its_bounds_and_these_within_their_limits(name, specs):
+    for key, spec in specs.items():
+        assert spec.limits[0] <= spec.lower <= spec.value <= spec.upper <= spec.limits[1], key
+
+
+def limits_in(dispersion):
+    return [free.limits for _, free in free_leaves(dispersion)]
+
+
+@pytest.mark.parametrize(
+    ("layer", "free", "limits"),
+    [
+        ("cauchy", (), [(1.0, 6.0), (0.0, 1e6)]),
+        ("cauchy(1.5,3000)", ("A", "B=0:2e4"), [(1.0, 6.0), None]),
+        ("1.46", ("n", "k"), [(1.0, 6.0), (0.0, 20.0)]),
+        ("0.4+3j", ("n",), [(0.01, 10.0)]),
+        ("1.46", ("n=1.3:1.6", "k=0:1"), [None, None]),
+        ("SiO2", ("n=-0.1:0.1",), [None]),
+    ],
+)
+def test_only_default_bounds_may_be_widened(layer, free, limits):
+    assert limits_in(media_words.medium(layer, free)) == limits
+
+
+def test_a_shift_of_a_known_index_may_not_go_below_vacuum():
+    [(lower, upper)] = limits_in(media_words.medium("SiO2", ["n"]))
+    least = float(np.real(media_words.medium("SiO2")(np.linspace(250.0, 1700.0, 200))).min())
+    assert lower == pytest.approx(1 - least, abs=1e-3)
+    assert upper == 2.0

@@ -21,6 +21,7 @@ def scene_from_flags(flags: SceneFlags, reading: ReadingFlags) -> tuple[Scene, l
     """Build the scene that the flags describe; returns it and the assumptions made. Raises UsageError."""
     from pellicle.recipes import media_words as w
     from pellicle.scene.film import Scene
+    from pellicle.scene.free import Free
     from pellicle.scene.instrument import Instrument
     from pellicle.scene.layers import Layer, Substrate
 
@@ -38,7 +39,7 @@ def scene_from_flags(flags: SceneFlags, reading: ReadingFlags) -> tuple[Scene, l
     assumed = [] if flags.thickness else ["thickness: 1 to 5000 nm, since no --thickness was given"]
     layer = Layer(w.medium(flags.layer, free), w.thickness(flags.thickness or DEFAULT_THICKNESS))
     back = None if flags.back is None else w.medium(flags.back, name="`back`")
-    bandwidth = flags.bandwidth
+    bandwidth, slit = flags.bandwidth, Free(0.0, 20.0, start=2.0, limits=(0.0, 50.0))
     scene = Scene(
         layer,
         Substrate(w.medium(flags.substrate, name="`substrate`"), back, flags.plate_mm or 1.0),
@@ -47,7 +48,7 @@ def scene_from_flags(flags: SceneFlags, reading: ReadingFlags) -> tuple[Scene, l
         instrument=Instrument(
             w.drift(flags.scale or "1", "`scale`"),
             w.drift(flags.offset or "0", "`offset`"),
-            None if bandwidth is None else w.free_or_number(bandwidth, "`bandwidth`", 0.0, 20.0, 2.0),
+            None if bandwidth is None else w.free_or_number(bandwidth, "`bandwidth`", slit),
         ),
     )
     return scene, assumed

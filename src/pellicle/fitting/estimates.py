@@ -65,7 +65,7 @@ def estimates(
     for p, value, limit in zip(parameters, values, bounded, strict=True):
         margin = min(value - p.lower, p.upper - value)
         at_bound = not p.periodic and margin <= _ON_BOUND * (p.upper - p.lower)
-        ends = p.lower, p.upper, True, at_bound, limit.lower, limit.upper
+        ends = p.lower, p.upper, True, at_bound, limit.lower, limit.upper, p.limits is not None
         free.append(Estimate(p.name, value, float(limit.stderr), p.unit, *ends))
     order = sorted(range(len(free)), key=lambda i: parameters[i].key != "thickness")
     pairs = zip(ranked.problem.views, ranked.fits, strict=True)

@@ -31,7 +31,8 @@ class Status(StrEnum):
 class Estimate:
     """A parameter's value and standard error (infinite where the data see nothing).
 
-    `lower_limit` and `upper_limit` are one-sided 95 % limits, where only one side is bounded.
+    `lower_limit` and `upper_limit` are one-sided 95 % limits, where only one side is bounded. With
+    `default_bounds` nobody chose `lower` and `upper` for this sample.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Estimate:
     at_bound: bool = False
     lower_limit: float | None = None
     upper_limit: float | None = None
+    default_bounds: bool = False
 
 
 def in_short(status: str, verdict: str, free: tuple[Estimate, ...]) -> str:

@@ -16,6 +16,8 @@ MISFIT_CHI2 = 4.0
 MISFIT_RMS, MISFIT_SPAN = 0.02, 0.05
 STRUCTURED_SHARE = 0.1
 """Residuals of which fewer points than this share count as independent are structured."""
+_WELL_KNOWN = 0.1
+"""Largest relative error of a thickness beside which a default bound is a remark."""
 
 
 def misfits(
@@ -49,18 +51,23 @@ def judge(
     rivals: tuple[Rival, ...],
     natural: frozenset[str],
 ) -> Status:
-    """The first status that holds. `natural` names parameters that rest on a bound that physics sets."""
+    """The first status that holds. `natural` names parameters that rest on a bound that physics sets.
+
+    A default bound counts only where the thickness is not well determined.
+    """
     free = [p for p in parameters.values() if p.free and not p.name.startswith("instrument.")]
     depths = [p for p in free if p.name.split(".")[-1] == "thickness"]
     unseen = [p for p in (depths or free) if not math.isfinite(p.stderr)]
-    at_bound = [p for p in free if p.at_bound and p.name not in natural]
+    resting = [p for p in free if p.at_bound and p.name not in natural]
+    at_bound = [p for p in resting if not (p.default_bounds and _well_known(p, depths, free[0]))]
     close = distinct_rivals(parameters, rivals)
     for question, answer in (
         ("did the solver converge?", "yes" if converged else "no"),
         ("does the scene not explain the data?", "yes" if misfit else "no"),
         ("which parameters of the sample have no finite error?", ", ".join(p.name for p in unseen) or "none"),
         (f"how many rivals lie within Δχ² {RIVAL:g} and outside the errors?", len(close)),
-        ("which parameters lie on a bound that was set?", ", ".join(p.name for p in at_bound) or "none"),
+        ("which parameters lie on a bound?", ", ".join(p.name for p in resting) or "none"),
+        ("which of these bounds matter?", ", ".join(p.name for p in at_bound) or "none"),
     ):
         log.info("status: %s %s", question, answer)
     if not converged:
@@ -72,6 +79,15 @@ def judge(
     if close:
         return Status.AMBIGUOUS
     return Status.AT_BOUND if at_bound else Status.CONVERGED
+
+
+def _well_known(resting: Estimate, depths: Sequence[Estimate], lead: Estimate) -> bool:
+    """True where the answer stands beside a number on a default bound: the thickness of its layer, else every
+    thickness, is well determined; without any, the leading number is another one."""
+    if not depths or resting in depths:
+        return resting is not lead and not depths
+    own = [d for d in depths if resting.name.startswith(d.name.removesuffix("thickness"))]
+    return all(d.stderr <= _WELL_KNOWN * d.value for d in own or depths)
 
 
 def distinct_rivals(parameters: Mapping[str, Estimate], rivals: tuple[Rival, ...]) -> list[Rival]:
@@ -112,7 +128,10 @@ def verdict(
         return f"The data determine {lead.name}: {value}.{besides}"
     if status is Status.AT_BOUND:
         resting = [p for p in parameters.values() if p.free and p.at_bound]
-        names = " and ".join(f"{p.name} ({p.value:.6g}{_unit(p)})" for p in resting)
+        given = [p for p in resting if not p.default_bounds]
+        names = " and ".join(f"{p.name} ({p.value:.6g}{_unit(p)})" for p in given or resting)
+        if not given:
+            return f"The best fit, {lead.name} {value}, lies on a default bound: {names}. Give it bounds."
         return (
             f"The best fit, {lead.name} {value}, lies on a bound that was set: {names}."
             " Widen the bound; if the best value moves with it, the scene may be wrong."

@@ -31,84 +31,114 @@ _Built = TypeVar("_Built", bound=AbstractDispersion | AbstractOscillator)
 
 
 class ParameterSpec(NamedTuple):
-    """Default bounds and value of a model's parameter, and whether the model's bare name frees it."""
+    """A model's parameter: default bounds, default value, and whether the model's bare name frees it.
+
+    A fit whose best value lies on a default bound may widen the bounds up to `limits`: what physics allows,
+    or what no known film in the infrared to ultraviolet exceeds.
+    """
 
     lower: float
     upper: float
     value: float
+    limits: tuple[float, float]
     free: bool = True
 
+    def parameter(self, start: float | None) -> Free:
+        """The parameter free within its default bounds; None starts in their middle."""
+        return Free(self.lower, self.upper, start=start, limits=self.limits)
 
+
+# A is the index at long waves: at least that of vacuum, at most that of lead telluride (5.7). Where nothing
+# is absorbed, n falls with wavelength (Landau and Lifshitz, Electrodynamics of Continuous Media, section 84):
+# no transparent film has B < 0. Of the films of `benchmarks/verdicts` with flawed data only those of wrong
+# scenes rest on B = 0; a negative B lowers their misfit (χ² to a third) and makes no thickness right. B of
+# silicon is 1.5e5 nm^2, of germanium 5e5.
 _CAUCHY = {
-    "A": ParameterSpec(1.2, 3.0, 1.5),
-    "B": ParameterSpec(0.0, 1e5, 0.0),
-    "C": ParameterSpec(-1e10, 1e10, 0.0, False),
+    "A": ParameterSpec(1.2, 3.0, 1.5, (1.0, 6.0)),
+    "B": ParameterSpec(0.0, 1e5, 0.0, (0.0, 1e6)),
+    "C": ParameterSpec(-1e10, 1e10, 0.0, (-1e12, 1e12), False),
 }
-_EPS_INF = ParameterSpec(1.0, 6.0, 1.0)
+# the index of silicon is 12**0.5 far below its band gap, that of germanium 16**0.5
+_EPS_INF = ParameterSpec(1.0, 6.0, 1.0, (1.0, 40.0))
+# energies from the far infrared (62 um) to the vacuum ultraviolet
+_ENERGY, _WIDTH = (0.02, 20.0), (0.001, 20.0)
+_TAUC_LORENTZ = {
+    "A": ParameterSpec(0.0, 300.0, 100.0, (0.0, 1000.0)),
+    "E0": ParameterSpec(2.0, 8.0, 4.0, _ENERGY),
+    "C": ParameterSpec(0.2, 6.0, 2.0, _WIDTH),
+    "Eg": ParameterSpec(0.5, 5.0, 2.0, (0.0, 12.0)),
+}
 
 TERMS: dict[str, tuple[type[AbstractOscillator], dict[str, ParameterSpec]]] = {
     "lorentz": (
         Lorentz,
         {
-            "A": ParameterSpec(0.0, 10.0, 1.0),
-            "E0": ParameterSpec(1.0, 10.0, 4.0),
-            "gamma": ParameterSpec(0.01, 4.0, 0.5),
+            "A": ParameterSpec(0.0, 10.0, 1.0, (0.0, 100.0)),
+            "E0": ParameterSpec(1.0, 10.0, 4.0, _ENERGY),
+            "gamma": ParameterSpec(0.01, 4.0, 0.5, _WIDTH),
         },
     ),
-    "drude": (Drude, {"Ep": ParameterSpec(0.0, 15.0, 3.0), "gamma": ParameterSpec(0.01, 2.0, 0.1)}),
+    # the plasma energy of beryllium, with the most conduction electrons of all metals, is 19 eV
+    "drude": (
+        Drude,
+        {
+            "Ep": ParameterSpec(0.0, 15.0, 3.0, (0.0, 20.0)),
+            "gamma": ParameterSpec(0.01, 2.0, 0.1, _WIDTH),
+        },
+    ),
     "gaussian": (
         Gaussian,
         {
-            "A": ParameterSpec(0.0, 10.0, 1.0),
-            "E0": ParameterSpec(1.0, 10.0, 4.0),
-            "fwhm": ParameterSpec(0.05, 4.0, 0.5),
+            "A": ParameterSpec(0.0, 10.0, 1.0, (0.0, 100.0)),
+            "E0": ParameterSpec(1.0, 10.0, 4.0, _ENERGY),
+            "fwhm": ParameterSpec(0.05, 4.0, 0.5, _WIDTH),
         },
     ),
-    "tauc-lorentz": (
-        TaucLorentz,
-        {
-            "A": ParameterSpec(0.0, 300.0, 100.0),
-            "E0": ParameterSpec(2.0, 8.0, 4.0),
-            "C": ParameterSpec(0.2, 6.0, 2.0),
-            "Eg": ParameterSpec(0.5, 5.0, 2.0),
-        },
-    ),
+    "tauc-lorentz": (TaucLorentz, _TAUC_LORENTZ),
     "cody-lorentz": (
         CodyLorentz,
         {
-            "A": ParameterSpec(0.0, 300.0, 100.0),
-            "E0": ParameterSpec(2.0, 8.0, 4.0),
-            "C": ParameterSpec(0.2, 6.0, 2.0),
-            "Eg": ParameterSpec(0.5, 5.0, 2.0),
-            "Ep": ParameterSpec(0.1, 5.0, 1.0),
-            "Et": ParameterSpec(0.0, 1.0, 0.0, False),
-            "Eu": ParameterSpec(0.01, 0.5, 0.05, False),
+            **_TAUC_LORENTZ,
+            "Ep": ParameterSpec(0.1, 5.0, 1.0, (0.01, 20.0)),
+            "Et": ParameterSpec(0.0, 1.0, 0.0, (0.0, 3.0), False),
+            "Eu": ParameterSpec(0.01, 0.5, 0.05, (0.001, 2.0), False),
         },
     ),
 }
 """Oscillators and their parameters; energies in eV, the strength A of lorentz and gaussian without unit."""
 
-_INDEX = {"n": ParameterSpec(1.2, 4.0, 1.5), "k": ParameterSpec(0.0, 2.0, 0.01)}
+# silver has the least n of metals (0.05), and n or k above 10 are those of metals beyond 2 um
+_INDEX = {
+    "n": ParameterSpec(1.2, 4.0, 1.5, (0.01, 10.0)),
+    "k": ParameterSpec(0.0, 2.0, 0.01, (0.0, 20.0)),
+}
+# B of silicon is 10.7 and of germanium 15; a resonance at 800 nm, the band gap of gallium arsenide is there
+_B, _C = (0.0, 40.0), (0.0, 6.4e5)
 MODELS: dict[str, dict[str, ParameterSpec]] = {
-    "constant": {"n": _INDEX["n"], "k": ParameterSpec(0.0, 2.0, 0.0, False)},
+    "constant": {
+        "n": ParameterSpec(1.2, 4.0, 1.5, (1.0, 6.0)),
+        "k": ParameterSpec(0.0, 2.0, 0.0, (0.0, 20.0), False),
+    },
     "cauchy": _CAUCHY,
     "cauchy-urbach": {
         **_CAUCHY,
-        "k0": ParameterSpec(0.0, 1.0, 0.01),
-        "Eu": ParameterSpec(0.05, 2.0, 0.5),
-        "Eb": ParameterSpec(1.0, 6.0, 3.1, False),
+        # beside an absorption n may fall towards the blue
+        "B": ParameterSpec(0.0, 1e5, 0.0, (-1e5, 1e6)),
+        "k0": ParameterSpec(0.0, 1.0, 0.01, (0.0, 5.0)),
+        "Eu": ParameterSpec(0.05, 2.0, 0.5, (0.005, 10.0)),
+        "Eb": ParameterSpec(1.0, 6.0, 3.1, (1.0, 6.0), False),
     },
     "sellmeier": {
-        "B1": ParameterSpec(0.1, 6.0, 1.1),
-        "C1": ParameterSpec(0.0, 6e4, 8e3),
-        "B2": ParameterSpec(0.0, 6.0, 0.0, False),
-        "C2": ParameterSpec(0.0, 6e4, 2e4, False),
-        "B3": ParameterSpec(0.0, 6.0, 0.0, False),
-        "C3": ParameterSpec(1e6, 1e9, 1e8, False),
+        "B1": ParameterSpec(0.1, 6.0, 1.1, _B),
+        "C1": ParameterSpec(0.0, 6e4, 8e3, _C),
+        "B2": ParameterSpec(0.0, 6.0, 0.0, _B, False),
+        "C2": ParameterSpec(0.0, 6e4, 2e4, _C, False),
+        "B3": ParameterSpec(0.0, 6.0, 0.0, _B, False),
+        "C3": ParameterSpec(1e6, 1e9, 1e8, (6.4e5, 1e10), False),
     },
     **{name: {**specs, "eps_inf": _EPS_INF} for name, (_, specs) in TERMS.items()},
     "spline": _INDEX,
-    "spline-kk": {"k": _INDEX["k"], "n_inf": ParameterSpec(1.0, 3.0, 1.5)},
+    "spline-kk": {"k": _INDEX["k"], "n_inf": ParameterSpec(1.0, 3.0, 1.5, (1.0, 6.0))},
 }
 """Dispersion models by name. Lengths in nm (Cauchy's B in nm², C in nm⁴, Sellmeier's C1 in nm²),
 energies in eV. `spline` has one n and one k at each knot."""
@@ -126,7 +156,7 @@ def free_model(name: str) -> AbstractDispersion:
     return build_model(
         name,
         {
-            key: Free(spec.lower, spec.upper, start=None if middle else spec.value)
+            key: spec.parameter(None if middle else spec.value)
             for key, spec in MODELS[name].items()
             if spec.free
         },
@@ -140,7 +170,7 @@ def fixed_model(name: str, numbers: Sequence[float], label: str) -> AbstractDisp
     """
     specs = MODELS[name]
     if name in SPLINES:
-        free = {key: Free(spec.lower, spec.upper, start=spec.value) for key, spec in specs.items()}
+        free = {key: spec.parameter(spec.value) for key, spec in specs.items()}
         return build_model(name, {"knots": numbers, **free})
     if not 0 < len(numbers) <= len(specs):
         raise UsageError(
@@ -186,17 +216,26 @@ def check_dispersion(dispersion: AbstractDispersion, label: str) -> AbstractDisp
     return dispersion
 
 
-def default_bounds(at: ParameterLocation, number: Parameter) -> tuple[float, float] | None:
-    """Return a parameter's default bounds, else its own; None where there are none."""
+def free_by_default(at: ParameterLocation, number: Parameter) -> Free | None:
+    """Return a parameter free within its default bounds, else within its own; None where there are none.
+
+    It starts at a fixed number within the bounds, else in their middle.
+    """
+    spec = _spec(at)
+    if spec is None:
+        return Free(number.lower, number.upper, limits=number.limits) if is_free(number) else None
+    if isinstance(number, Free) or not spec.lower <= number <= spec.upper:
+        return spec.parameter(None)
+    return spec.parameter(number)
+
+
+def _spec(at: ParameterLocation) -> ParameterSpec | None:
     if at.field == "fraction":
-        return 0.0, 1.0
+        return ParameterSpec(0.0, 1.0, 0.5, (0.0, 1.0))
     for name, specs in MODELS.items():
         if _TYPES.get(name) is type(at.owner) and (at.key in specs or at.field in specs):
-            spec = specs.get(at.key) or specs[at.field]
-            return spec.lower, spec.upper
-    if at.field == "eps_inf":
-        return _EPS_INF.lower, _EPS_INF.upper
-    return (number.lower, number.upper) if is_free(number) else None
+            return specs.get(at.key) or specs[at.field]
+    return _EPS_INF if at.field == "eps_inf" else None
 
 
 def _constant(values: Values) -> Constant:

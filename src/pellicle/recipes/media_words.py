@@ -18,8 +18,8 @@ from pellicle.recipes.dispersion_models import (
     MODELS,
     Parameter,
     check_dispersion,
-    default_bounds,
     fixed_model,
+    free_by_default,
     free_model,
 )
 from pellicle.recipes.number_words import parse_number, parse_range
@@ -41,10 +41,10 @@ def thickness(text: str) -> Free | float:
     return Free(low, high)
 
 
-def free_or_number(text: str, name: str, lower: float, upper: float, start: float) -> Free | float:
-    """Parse `free` (with these bounds), `LO:HI` or a number. Raises UsageError."""
+def free_or_number(text: str, name: str, default: Free) -> Free | float:
+    """Parse `free` (the default), `LO:HI` or a number. Raises UsageError."""
     if text == "free":
-        return Free(lower, upper, start=start)
+        return default
     if ":" in text:
         return Free(*parse_range(text, name))
     return parse_number(text, name)
@@ -101,24 +101,24 @@ def _material(name: str) -> AbstractDispersion:
 def free_numbers(dispersion: AbstractDispersion, items: Iterable[str]) -> AbstractDispersion:
     """Free the named numbers of a dispersion: `n`, `k`, or a model's own, each with optional bounds.
 
-    A constant index is replaced: n ± 0.5 but at least 1, k from 0 to 1. For any other dispersion a constant
-    is added: to n within ± 0.5 as long as the sum stays at least 1 (or a tenth of its least value, for a
-    metal), to k from 0 to 1. Raises UsageError.
+    A constant index is replaced: n ± 0.5 but at least 1 (or 0.01, where it absorbs), k from 0 to 1. For any
+    other dispersion a constant is added: to n within ± 0.5 as long as the sum stays at least 1 (or a tenth of
+    its least value, for a metal), to k from 0 to 1. Raises UsageError.
     """
     for item in items:
-        name, _, bounds = item.partition("=")
-        limits = parse_range(bounds, f"the range of {name}") if bounds else None
+        name, _, words = item.partition("=")
+        bounds = parse_range(words, f"the range of {name}") if words else None
         if name in ("n", "k"):
-            dispersion = _free_index(dispersion, name, limits)
+            dispersion = _free_index(dispersion, name, bounds)
         else:
-            dispersion = _free_parameter(dispersion, name, limits)
+            dispersion = _free_parameter(dispersion, name, bounds)
     return dispersion
 
 
 def _free_parameter(
-    dispersion: AbstractDispersion, name: str, limits: tuple[float, float] | None
+    dispersion: AbstractDispersion, name: str, bounds: tuple[float, float] | None
 ) -> AbstractDispersion:
-    """Free the model's own number of that name within `limits` or the model's default bounds."""
+    """Free the model's own number of that name within `bounds` or the model's default ones."""
     leaves, structure = jax.tree_util.tree_flatten_with_path(dispersion, is_leaf=is_free)
     numbers = [i for i, (_, leaf) in enumerate(leaves) if is_free(leaf) or isinstance(leaf, int | float)]
     known = {locate_parameter(dispersion, leaves[i][0]).name: i for i in numbers}
@@ -130,48 +130,56 @@ def _free_parameter(
         close = did_you_mean(name, known)
         raise UsageError(f"cannot free {name!r}{close}: the layer has {listed}, and n and k can be added")
     path, leaf = leaves[known[name]]
-    bounds = limits or default_bounds(locate_parameter(dispersion, path), leaf)
-    if bounds is None:
+    free = Free(*bounds) if bounds else free_by_default(locate_parameter(dispersion, path), leaf)
+    if free is None:
         raise UsageError(f"cannot free {name!r} without bounds: write {name}=LO:HI")
-    value = leaf.start if is_free(leaf) else leaf
-    start = value if limits is None and bounds[0] <= value <= bounds[1] and not is_free(leaf) else None
     replaced = [leaf for _, leaf in leaves]
-    replaced[known[name]] = Free(*bounds, start=start)
+    replaced[known[name]] = free
     return check_dispersion(jax.tree_util.tree_unflatten(structure, replaced), f"cannot free {name!r}")
 
 
 def _free_index(
-    dispersion: AbstractDispersion, name: str, limits: tuple[float, float] | None
+    dispersion: AbstractDispersion, name: str, bounds: tuple[float, float] | None
 ) -> AbstractDispersion:
     if isinstance(dispersion, Constant):
         n, k = _start(dispersion.n), _start(dispersion.k or 0.0)
         if name == "k":
-            return Constant(dispersion.n, _free_k(k, limits))
-        low, high = limits or (max(1.0, n - 0.5), max(1.0, n) + 0.5)
-        return Constant(Free(low, high, start=min(max(n, low), high)), dispersion.k)
+            return Constant(dispersion.n, _free_k(k, bounds))
+        least, most = (1.0, 6.0) if dispersion.k is None else (0.01, 10.0)  # of transparent films, of metals
+        low, high = max(least, n - 0.5), max(least, n) + 0.5
+        default = Free(low, high, start=max(n, low), limits=(least, max(most, high)))
+        return Constant(_within(bounds, default), dispersion.k)
     shifted = dispersion if isinstance(dispersion, Shifted) else Shifted(dispersion)
     if name == "k":
-        return Shifted(shifted.base, shifted.n, _free_k(0.0, limits))
-    low, high = limits or _shift_bounds(dispersion)
-    return Shifted(shifted.base, Free(low, high, start=min(max(0.0, low), high)), shifted.k)
+        return Shifted(shifted.base, shifted.n, _free_k(0.0, bounds))
+    return Shifted(shifted.base, _within(bounds, _free_shift(dispersion)), shifted.k)
 
 
 def _start(number: Parameter) -> float:
     return number.start if isinstance(number, Free) else float(number)
 
 
-def _free_k(value: float, limits: tuple[float, float] | None) -> Free:
-    low, high = limits or (0.0, 1.0)
+def _within(bounds: tuple[float, float] | None, default: Free) -> Free:
+    """A number free within the bounds that the user gives, else the default."""
+    if bounds is None:
+        return default
+    low, high = bounds
+    return Free(low, high, start=min(max(default.start, low), high))
+
+
+def _free_k(value: float, bounds: tuple[float, float] | None) -> Free:
+    low, high = bounds or (0.0, 1.0)
     if low < 0:
         raise UsageError(f"cannot free 'k': an extinction coefficient must not be negative, got {low:g}")
     start = value if value > low else low + 0.05 * (high - low)
-    return Free(low, high, start=min(start, high))
+    return Free(low, high, start=min(start, high), limits=None if bounds else (0.0, 20.0))
 
 
-def _shift_bounds(dispersion: AbstractDispersion) -> tuple[float, float]:
-    """Bounds of a constant that is added to n."""
+def _free_shift(dispersion: AbstractDispersion) -> Free:
+    """A constant that is added to n. With more than 2 of it the material is another one."""
     low, high = getattr(dispersion, "wavelength_range", (380.0, 780.0))
     wavelength = np.linspace(max(low, 250.0), min(high, 1700.0), 64)
     rises = wavelength[0] < wavelength[-1]
     least = float(np.nanmin(np.real(dispersion(wavelength)))) if rises else 1.0
-    return (max(-0.5, 1.0 - least) if least >= 1 else -0.9 * least, 0.5)
+    lowest = 1.0 - least if least >= 1 else -0.9 * least
+    return Free(max(-0.5, lowest), 0.5, start=0.0, limits=(lowest, 2.0))

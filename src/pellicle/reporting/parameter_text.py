@@ -49,8 +49,15 @@ def _unit(p: Estimate) -> str:
 def _bounds(p: Estimate) -> str:
     if not p.free or not (math.isfinite(p.lower) and math.isfinite(p.upper)):
         return ""
+    bounds = f"[{p.lower:g}, {p.upper:g}]"
+    if not p.at_bound:
+        return bounds
     side = "lower" if p.value - p.lower <= p.upper - p.value else "upper"
-    return f"[{p.lower:g}, {p.upper:g}]" + (f"  AT ITS {side.upper()} BOUND" if p.at_bound else "")
+    return (
+        f"{bounds}  at its default {side} bound"
+        if p.default_bounds
+        else f"{bounds}  AT ITS {side.upper()} BOUND"
+    )
 
 
 def correlations(fit: Fit) -> list[str]:

@@ -23,9 +23,12 @@ class Free(eqx.Module):
     """Parameter to be fitted, in place of a number.
 
     **Arguments:** `lower` and `upper` bounds, `start` value (the middle of the bounds if None) and `prior`
-    (uniform between the bounds if None), all in the parameter's own unit.
+    (uniform between the bounds if None), all in the parameter's own unit. `limits` marks default bounds,
+    which nobody chose for this sample: a fit of spectra may widen them up to these limits (lower, upper) of
+    physics, and a best value on one of them is a remark, not the status `at-bound`.
 
-    **Raises:** ValueError where bounds are reversed or infinite, or the start or the prior is outside them.
+    **Raises:** ValueError where bounds are reversed or infinite, or the start or the prior is outside them,
+    or they are outside the limits.
 
     >>> Free(10, 3000).start
     1505.0
@@ -34,9 +37,18 @@ class Free(eqx.Module):
     lower: float = eqx.field(static=True)
     upper: float = eqx.field(static=True)
     start: float = eqx.field(static=True)
+    limits: tuple[float, float] | None = eqx.field(static=True)
     prior: Prior | None
 
-    def __init__(self, lower: float, upper: float, *, start: float | None = None, prior: Prior | None = None):
+    def __init__(
+        self,
+        lower: float,
+        upper: float,
+        *,
+        start: float | None = None,
+        prior: Prior | None = None,
+        limits: tuple[float, float] | None = None,
+    ):
         if not lower < upper:
             raise ValueError(f"bounds are reversed or equal: lower {lower:g} is not below upper {upper:g}")
         if not (math.isfinite(lower) and math.isfinite(upper)):
@@ -46,7 +58,10 @@ class Free(eqx.Module):
             raise ValueError(f"the start value {start:g} is outside its bounds {lower:g} to {upper:g}")
         if prior is not None:
             prior.check(lower, upper)
+        if limits is not None and not limits[0] <= lower < upper <= limits[1]:
+            raise ValueError(f"the bounds {lower:g} to {upper:g} are outside {limits[0]:g} to {limits[1]:g}")
         self.lower, self.upper, self.start, self.prior = float(lower), float(upper), float(start), prior
+        self.limits = limits
 
 
 def check_free_count(count: int, least: int = 1) -> None:

@@ -13,12 +13,13 @@ from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
 from pellicle.fitting import identifiability
 from pellicle.fitting.conclusion import conclude, linearised, ranked_minima
+from pellicle.fitting.minima import Minima
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.progress import Progress, quiet
 from pellicle.fitting.result import Fit
 from pellicle.fitting.reweighting import RankedMinima
 from pellicle.fitting.robust_losses import LEAST_SQUARES, check_loss
-from pellicle.fitting.spectra import backface, messages, parts, residual_structure, summary
+from pellicle.fitting.spectra import backface, default_bounds, messages, parts, residual_structure, summary
 from pellicle.fitting.spectra.problem import make
 from pellicle.fitting.spectra.search import search
 from pellicle.fitting.spectra.targets import Measured, measured, without_scale
@@ -129,6 +130,14 @@ def _fit(
         return problem
 
     ranked, warnings = ranked_minima(build, lambda problem: search(problem, progress), tolerance, loss)
+    if wider := default_bounds.wider(spectra, ranked, tolerance, loss, progress):
+        spectra = default_bounds.measured_within(spectra, ranked, wider.parameters)
+
+        def again(problem: Problem) -> Minima:
+            return default_bounds.joined(problem, search(problem, progress), wider.values)
+
+        ranked, warnings = ranked_minima(build, again, tolerance, loss)
+        warnings = [*wider.warnings, *warnings]
     profile, depth = summary.scan_profile(ranked), ranked.problem.thickness_axis
     jacobian, covariance = linearised(ranked)
     each = parts.parts(data, ranked, covariance)
@@ -156,7 +165,11 @@ def _fit(
         dark,
         identifiability.naming(next(iter(parameters)), conclusion.correlated),
     )
-    unclear = [*identifiability.bounded(parameters, dark), *conclusion.correlated]
+    unclear = [
+        *default_bounds.remarks(ranked),
+        *identifiability.bounded(parameters, dark),
+        *conclusion.correlated,
+    ]
     fit = Fit(
         parts=each,
         status=conclusion.status,

@@ -86,6 +86,7 @@ def _parameter(scene: Scene, path: tuple, free: Free, name: str) -> Parameter:
         lower=free.lower,
         upper=free.upper,
         prior=free.prior,
+        limits=free.limits,
         natural=((strength or (field or key) in _NATURAL_ZERO) and free.lower == 0, False),
         resolution=_RESOLUTION if key == "thickness" else None,
         searched=key in _SEARCHED or (owner is Spline and field == "n"),
@@ -118,6 +119,16 @@ def thickness_name(scene: Scene, position: int) -> str:
 def bounds(parameters: tuple[Parameter, ...]) -> tuple[np.ndarray, np.ndarray]:
     """Lower and upper bounds, each of shape (parameters,)."""
     return np.array([p.lower for p in parameters]), np.array([p.upper for p in parameters])
+
+
+def with_bounds(scene: Scene, parameters: Sequence[Parameter]) -> Scene:
+    """The scene with the bounds of these parameters, which are its own in their order."""
+    pairs = zip(free_leaves(scene), parameters, strict=True)
+    free = [
+        Free(p.lower, p.upper, start=free.start, prior=free.prior, limits=free.limits)
+        for (_, free), p in pairs
+    ]
+    return insert(scene, free)
 
 
 def anonymous(scene: Scene) -> Scene:
