@@ -34,6 +34,9 @@ _COARSE = 1e-3
 are computed to the end when they are ranked."""
 _REACH = 1.25
 """An order is polished unless ‖r‖ is above the best by so many times the largest fall by polishing."""
+_CHANCE = 20.0
+"""Δχ² in units of the noise that an order may be above the best and is polished in any case: three times
+that of a rival, as correlated residuals count for less."""
 _MOST_POLISHED = 2048
 """Starts after which no more are polished."""
 
@@ -83,8 +86,10 @@ def _every_order(
 
     `total` (design, thickness) are deviances of the candidates `units`. Residuals obey the triangle
     inequality, ‖r(polished)‖ ≥ ‖r(start)‖ − ‖change of the model‖: an order is excluded where the best
-    deviance is out of reach by more than `_REACH` times the largest fall of ‖r‖ seen so far.
+    deviance is out of reach by more than `_REACH` times the largest fall of ‖r‖ seen so far, and where noise
+    of the size of the best residuals does not explain the difference.
     """
+    independent = sum(view.independent * float(view.data.independent_fraction) for view in problem.views)
     deviance = total.ravel()
     polished = solve(problem, units[first], coarse=_COARSE, progress=progress)
     profile, row = total.min(axis=0), total.argmin(axis=0)
@@ -95,7 +100,9 @@ def _every_order(
     while len(rest) and len(tried) < _MOST_POLISHED:
         reached = _root(polished.deviance)
         fall = np.max(_root(deviance[tried]) - reached, where=np.isfinite(reached), initial=0.0)
-        near = _root(deviance[rest]) - _REACH * fall < reached.min()
+        best = polished.deviance.min()
+        level = best + _CHANCE * max(best / independent, 1.0)
+        near = _root(deviance[rest]) - _REACH * fall < _root(level)
         now = rest[near][:SLOTS]
         if not len(now):
             break
@@ -109,7 +116,7 @@ def _every_order(
     return polished, len(tried)
 
 
-def _root(deviance: np.ndarray) -> np.ndarray:
+def _root(deviance: np.ndarray | np.floating) -> np.ndarray:
     """‖r‖ of a deviance; evidence may take it below zero."""
     return np.sqrt(np.maximum(deviance, 0.0))
 
