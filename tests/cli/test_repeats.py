@@ -67,3 +67,17 @@ def test_what_repeats_are_not(pellicle, spectrum_file, scene, recipe):
     pellicle("fit", file, file, *scene, "--repeats", "--joint").refused(2, "one by one", "choose one")
     path = recipe("joint = true\nrepeats = true")
     pellicle("fit", file, "--recipe", path).refused(3, "joint and repeats exclude each other")
+
+
+def test_sweeps_of_one_file_are_repeats(pellicle, spectrum_file, scene, tmp_path):
+    texts = [spectrum_file(f"{seed}.csv", seed=seed).read_text().split("\n", 1) for seed in range(3)]
+    together = tmp_path / "sweeps.csv"
+    together.write_text(texts[0][0] + "\n" + "".join(rows for _, rows in texts))
+    mean = pellicle("fit", together, *scene, "--json").objects[0]
+    assert mean["data"]["points"] == 100
+    assert mean["data"]["sweeps"]["number"] == 3
+    assert abs(mean["data"]["sweeps"]["sd"] - 0.002) < 0.0003
+    each = pellicle("fit", together, *scene, "--repeats", "--json").objects
+    alone = pellicle("fit", *(tmp_path / f"{seed}.csv" for seed in range(3)), *scene, "--repeats", "--json")
+    assert each[-1]["parameters"] == alone.objects[-1]["parameters"]
+    assert [x["path"] for x in each[-1]["data"]] == [f"{together} ({i})" for i in (1, 2, 3)]

@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import partial
 from logging import getLogger
 from math import inf
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pellicle.cli.flags import ReadingFlags, SceneFlags, given
 from pellicle.cli.options import light, merged, read, scene_from_flags, wavelength_range
@@ -87,9 +87,27 @@ def inputs(
         raise UsageError(
             "repeats are fitted one by one, and a joint fit takes all files together: choose one"
         )
-    if result.repeats and len(result.files) < 2:
-        raise UsageError("repeats are two files or more: name every file, or leave --repeats out")
+    if not result.repeats:
+        return result
+    result = result._replace(files=[sweep for file in result.files for sweep in _sweeps(file)])
+    if len(result.files) < 2:
+        raise UsageError("repeats are two files or more, or several sweeps in one; leave --repeats out")
     return result
+
+
+def _sweeps(file: Input) -> list[Input]:
+    """One input for each sweep of a file; the file itself where it has one, or cannot be read."""
+    try:
+        count = len(getattr(file.read(), "sweeps", ()))
+    except ValueError:
+        return [file]  # reported when it is fitted
+    return [file._replace(read=partial(_sweep, file.read, i)) for i in range(count)] or [file]
+
+
+def _sweep(read_file: Callable[[], Any], number: int) -> Spectrum:
+    sweeps = read_file().sweeps
+    note = f"sweep {number + 1} of {len(sweeps)}"
+    return replace(sweeps[number], notes=(*sweeps[number].notes, note))
 
 
 def _by_flags(files: list[str], scene_flags: SceneFlags, reading: ReadingFlags) -> Inputs:

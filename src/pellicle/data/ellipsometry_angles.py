@@ -25,12 +25,25 @@ class PsiDelta(NamedTuple):
     note: str | None = None
 
 
-def from_ncs(table: Table, position: int, ncs: Float[np.ndarray, "3 points"]) -> PsiDelta:
+def ncs(psi: Float[np.ndarray, " points"], delta: Float[np.ndarray, " points"]) -> np.ndarray:
+    """N, C, S (points, 3) of Ψ and Δ in degrees: a point on the unit sphere."""
+    psi, delta = 2 * np.deg2rad(psi), np.deg2rad(delta)
+    return np.stack([np.cos(psi), np.sin(psi) * np.cos(delta), np.sin(psi) * np.sin(delta)], axis=-1)
+
+
+def psi_delta(sphere: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Ψ and Δ in degrees from N, C, S (..., 3), or from N and C (..., 2): then Δ is in 0 to 180."""
+    n, c, *measured = np.moveaxis(sphere, -1, 0)
+    s = measured[0] if measured else np.sqrt(np.maximum(1 - n**2 - c**2, 0.0))
+    return np.rad2deg(np.arctan2(np.hypot(c, s), n)) / 2, np.rad2deg(np.arctan2(s, c)) % 360.0
+
+
+def from_ncs(table: Table, position: int, columns: Float[np.ndarray, "3 points"]) -> PsiDelta:
     """Convert N = cos 2Ψ, C = sin 2Ψ cos Δ, S = sin 2Ψ sin Δ, each times the degree of polarisation.
 
     `position` is the column that errors name. Raises DataError for an impossible degree of polarisation.
     """
-    polarised = np.sqrt(np.sum(ncs**2, axis=0))
+    polarised = np.sqrt(np.sum(columns**2, axis=0))
     wrong = (polarised < POLARISED[0]) | (polarised > POLARISED[1])
     if wrong.any():
         row = int(np.argmax(wrong))
@@ -38,10 +51,10 @@ def from_ncs(table: Table, position: int, ncs: Float[np.ndarray, "3 points"]) ->
             f"{table.where(row, position)}: N, C and S make a degree of polarisation of "
             f"{polarised[row]:.3g}, where about 1 is possible; correct or delete that row"
         )
-    psi = np.rad2deg(0.5 * np.arctan2(np.hypot(ncs[1], ncs[2]), ncs[0]))
+    psi = np.rad2deg(0.5 * np.arctan2(np.hypot(columns[1], columns[2]), columns[0]))
     span = f"{polarised.min():.4g} to {polarised.max():.4g}"
     note = f"N, C, S converted to psi and delta; their degree of polarisation, {span}, was divided out"
-    return PsiDelta(psi, np.rad2deg(np.arctan2(ncs[2], ncs[1])), note)
+    return PsiDelta(psi, np.rad2deg(np.arctan2(columns[2], columns[1])), note)
 
 
 def from_alpha_beta(

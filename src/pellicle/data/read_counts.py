@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pellicle.data.repeated_sweeps import of_rows, sweep_numbers
 from pellicle.data.signal_checks import check_noise, check_power
 from pellicle.data.spectrum import Spectrum
 from pellicle.data.tabular.column_selection import counts_columns
@@ -34,16 +35,14 @@ def read_counts(
     chosen = counts_columns(table, columns)
     axis = axis_unit(table, chosen.wavelength, wavelength_unit)
     wavelength, values, _, angle = read_columns(table, chosen, axis)
-    counts = Spectrum(
-        wavelength=wavelength,
-        values=values,
+    counts = of_rows(
+        sweep_numbers(wavelength, angle),
+        {"wavelength": wavelength, "values": values, "angle": angle, "lines": table.lines},
         signal="counts",
-        angle=angle,
         calibrated=False,
         path=table.path,
         sha256=table.sha256,
         notes=(*table.notes, *chosen.notes, axis_note(axis)),
-        lines=table.lines,
     )
     return counts if range is None else counts.cut(*range)
 
@@ -63,7 +62,7 @@ def reflectance_from_counts(
     - `sample`, `reference`, `dark`: raw counts with the same lamp, detector and integration time. Reference
       and dark are interpolated linearly where their wavelengths differ; cut only the sample to a range.
     - `reference_reflectance`: fraction, one number per wavelength of `sample`.
-    - `noise`: standard deviation of the result, a fraction; None leaves it unknown.
+    - `noise`: standard deviation of the result of one sweep, a fraction; None leaves it unknown.
 
     **Returns:** a `Spectrum` of "R".
 
@@ -87,9 +86,10 @@ def reflectance_from_counts(
             "leave those wavelengths out with `range`"
         )
     values = (sample.values - background) / full * known
-    sigma = None if noise is None else np.full(len(sample), noise)
+    sigma = None if noise is None else np.full(len(sample), noise / np.sqrt(max(len(sample.sweeps), 1)))
     remedy = "leave it out with `range`, or measure again"
     check_power("R", values, sigma, sample.place("reflectance from counts"), too_high=remedy, remedy=remedy)
+    each = [reflectance_from_counts(sweep, reference, known, dark, noise=noise) for sweep in sample.sweeps]
     return Spectrum(
         wavelength=sample.wavelength,
         values=values,
@@ -101,6 +101,7 @@ def reflectance_from_counts(
         sha256=sample.sha256,
         notes=(*sample.notes, f"counts divided by those of the reference {reference.path}"),
         lines=sample.lines,
+        sweeps=tuple(each),
     )
 
 

@@ -21,6 +21,7 @@ from pellicle.data.ellipsometry_angles import (
     from_alpha_beta,
     from_ncs,
 )
+from pellicle.data.repeated_sweeps import of_rows, sweep_numbers
 from pellicle.data.signal_checks import check_psi_delta, refuse_first
 from pellicle.data.spectrum import Spectrum, inside_range
 from pellicle.data.tabular.column_selection import listed, named_columns, only, wavelength_and_angle
@@ -95,18 +96,21 @@ def read_ellipsometry(
         rows, notes = rows[inside], [*notes, note]
     sigma = [error[rows] for error in errors]
     _check(table, chosen, rows, psi[rows], delta[rows], sigma, folded)
-    return Spectrum(
-        wavelength[rows],
-        psi[rows],
-        SIGNAL,
-        sigma=sigma[0] if sigma else None,
-        angle=None if angle is None else angle[rows],
+    angle = None if angle is None else angle[rows]
+    arrays = {
+        "wavelength": wavelength[rows],
+        "values": psi[rows],
+        "delta": delta[rows] % 360.0,
+        "angle": angle,
+    }
+    errors = {"sigma": sigma[0] if sigma else None, "delta_sigma": sigma[-1] if sigma else None}
+    return of_rows(
+        sweep_numbers(arrays["wavelength"], angle),
+        arrays | errors | {"lines": table.lines[rows]},
+        signal=SIGNAL,
         path=table.path,
         sha256=table.sha256,
         notes=tuple(notes),
-        lines=table.lines[rows],
-        delta=delta[rows] % 360.0,
-        delta_sigma=sigma[-1] if sigma else None,
         folded=folded,
     )
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from pellicle.data.formats.detect import find_export
 from pellicle.data.read_ellipsometry import SIGNAL, is_ellipsometry, read_ellipsometry
+from pellicle.data.repeated_sweeps import of_rows, sweep_numbers
 from pellicle.data.signal_checks import check_noise, check_power, refuse_first
 from pellicle.data.spectrum import POLARISATIONS, Spectrum, inside_range
 from pellicle.data.tabular.column_selection import SIGNALS, SpectrumColumns, named_columns, spectrum_columns
@@ -124,18 +125,17 @@ def _power(
     kind = signal or columns.signal.role
     values, sigma = values[rows], None if sigma is None else sigma[rows]
     _check_power(table, columns, kind, rows, values, sigma, calibrated, scale.stated)
-    return Spectrum(
-        wavelength=wavelength[rows],
-        values=values,
+    angle = None if angle is None else angle[rows]
+    arrays = {"wavelength": wavelength[rows], "values": values, "sigma": sigma, "angle": angle}
+    return of_rows(
+        sweep_numbers(arrays["wavelength"], angle),
+        arrays | {"lines": table.lines[rows]},
         signal=kind,
-        sigma=sigma,
         polarisation=columns.signal.polarisation or polarisation or "unpolarised",
-        angle=None if angle is None else angle[rows],
         calibrated=calibrated,
         path=table.path,
         sha256=table.sha256,
         notes=tuple(notes),
-        lines=table.lines[rows],
     )
 
 

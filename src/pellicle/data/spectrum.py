@@ -38,6 +38,7 @@ class Spectrum:
     - `notes`: sentences on how the file was read.
     - `delta`, `delta_sigma`: Δ and its standard deviations in degrees, for "psi-delta".
     - `folded`: the sign of sin Δ was not measured, and Δ lies in 0 to 180.
+    - `sweeps`: the repeated measurements of which this is the mean (`data.repeated_sweeps.mean_spectrum`).
 
     **Raises:** DataError for values that no sample has, UsageError for unknown words, ValueError for shapes.
 
@@ -59,6 +60,7 @@ class Spectrum:
     delta: np.ndarray | None = None
     delta_sigma: np.ndarray | None = None
     folded: bool = False
+    sweeps: tuple[Spectrum, ...] = ()
 
     def __post_init__(self) -> None:
         size = np.size(self.wavelength)
@@ -133,7 +135,8 @@ class Spectrum:
         kept = {
             name: None if getattr(self, name) is None else getattr(self, name)[inside] for name in _ARRAYS
         }
-        return dataclasses.replace(self, **kept, notes=(*self.notes, note))
+        sweeps = tuple(sweep.cut(low, high) for sweep in self.sweeps)
+        return dataclasses.replace(self, **kept, notes=(*self.notes, note), sweeps=sweeps)
 
 
 def inside_range(

@@ -14,12 +14,12 @@ from logging import getLogger
 
 import numpy as np
 
+from pellicle.data.ellipsometry_angles import ncs
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
 from pellicle.fitting.noise import correlation_length
 from pellicle.fitting.presentation import ReportMixin
 from pellicle.fitting.result import BrdfCurve, Fit, Part, Status
-from pellicle.fitting.spectra.targets import sphere
 
 log = getLogger(__name__)
 
@@ -140,7 +140,7 @@ def _residual(part: Part) -> np.ndarray:
     if c.delta_data is None or c.delta_model is None:
         return (c.residual if sigma is None else c.residual / sigma)[:, None]
     if sigma is None:
-        return sphere(c.data, c.delta_data) - sphere(c.model, c.delta_model)
+        return ncs(c.data, c.delta_data) - ncs(c.model, c.delta_model)
     across = sigma if spectrum.delta_sigma is None else spectrum.delta_sigma
     # at the poles, where Δ has no meaning, the error of Ψ leaves some to it
     sine = np.sin(2 * np.deg2rad(c.data)) / np.hypot(np.sin(2 * np.deg2rad(c.data)), 2 * np.deg2rad(sigma))

@@ -6,6 +6,7 @@ The Guide to the expression of uncertainty in measurement (JCGM 100:2008, GUM) n
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -217,7 +218,7 @@ def repeats(fits: Sequence[Fit]) -> Repeats:
 
     ```
     """
-    paths = [_path(fit, i) for i, fit in enumerate(fits)]
+    paths = _paths(fits)
     triples = zip(paths, fits, _reasons(fits, paths), strict=True)
     every = tuple(Repeat(path, fit.status, reason) for path, fit, reason in triples)
     used = [(each.path, fit) for each, fit in zip(every, fits, strict=True) if not each.left_out]
@@ -261,8 +262,16 @@ def _noise(p: Estimate) -> float:
     return getattr(p, "stderr_noise", p.stderr)
 
 
-def _path(fit: Fit, position: int) -> str:
-    return ", ".join(part.data.path for part in fit.parts if part.data.path) or f"repeat {position + 1}"
+def _paths(fits: Sequence[Fit]) -> list[str]:
+    """Names of repeats: their files, numbered where one file has several."""
+    names = [", ".join(part.data.path for part in fit.parts if part.data.path) for fit in fits]
+    names = [name or "repeat" for name in names]
+    seen: Counter[str] = Counter()
+    result = []
+    for name in names:
+        seen[name] += 1
+        result.append(f"{name} ({seen[name]})" if names.count(name) > 1 else name)
+    return result
 
 
 def _reasons(fits: Sequence[Fit], paths: Sequence[str]) -> list[str]:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pellicle.fitting.lack_of_fit import lack_of_fit
 from pellicle.fitting.result import Curve, Status
 from pellicle.fitting.status import RIVAL
 from pellicle.reporting import parameter_text
@@ -126,7 +127,7 @@ def _statistics(fit: Fit) -> list[str]:
         over = "" if fit.parts[0].data.sigma is None else " over sigma"
         rows.append(("compared", _RESIDUALS[fit.layer_test.residual] + over))
     for part in fit.parts:
-        rows += _residuals(part)
+        rows += [*_residuals(part), *_sweeps(part, len(fit.free))]
     chi2 = ("reduced chi-square", f"{fit.chi2_reduced:.4g}")
     return facts([*rows, chi2, ("seconds", f"{fit.seconds:.2f}")])
 
@@ -148,6 +149,17 @@ def _residuals(part: Part) -> list[tuple[str, str]]:
         psi, delta = (np.sqrt(np.mean(r**2)) for r in (curve.residual, curve.delta_residual))
         rows.append(("of psi and of delta", f"{psi:.4g} and {delta:.4g} degrees"))
     return rows
+
+
+def _sweeps(part: Part, free: int) -> list[tuple[str, str]]:
+    """Scatter of the repeated sweeps of one part, and what it makes of the residuals."""
+    found = lack_of_fit(part, free)
+    if found is None:
+        return []
+    unit = " degrees" if part.spectrum.delta is not None else ""
+    scatter = f"{found.sweeps}, of which a point scatters by {found.repeatability:.2g}{unit}"
+    of = f" of {part.name}" if part.name else ""
+    return [(f"sweeps{of}", f"{scatter}; {found.verdict} (probability {found.probability:.2g})")]
 
 
 def _plan(part: Part) -> list[str]:

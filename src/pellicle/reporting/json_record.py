@@ -33,7 +33,7 @@ def to_json(fit: Fit, posterior: Posterior | None = None) -> dict[str, Any]:
     noise = [{"sigma": number(part.sigma), "source": part.sigma_from} for part in fit.parts]
     record = {
         "schema": SCHEMA,
-        "data": [_joint_part(part) for part in fit.parts] if fit.joint else _data(fit.parts[0]),
+        "data": [_joint_part(part, fit) for part in fit.parts] if fit.joint else _data(fit.parts[0], fit),
         "status": str(fit.status),
         "verdict": fit.verdict,
         "parameters": {name: _parameter(p) for name, p in fit.parameters.items()},
@@ -61,21 +61,39 @@ def to_json(fit: Fit, posterior: Posterior | None = None) -> dict[str, Any]:
     return record if posterior is None else record | {"posterior": posterior_to_json(posterior)}
 
 
-def _data(part: Part) -> dict[str, Any]:
+def _data(part: Part, fit: Fit) -> dict[str, Any]:
     data = part.data
     return {
         "path": data.path,
         "sha256": data.sha256,
         "signal": getattr(data, "signal", "brdf"),
         "points": int(part.curve.model.size),
+        **_sweeps(part, fit),
     }
 
 
-def _joint_part(part: Part) -> dict[str, Any]:
+def _sweeps(part: Part, fit: Fit) -> dict[str, Any]:
+    """The scatter of repeated sweeps, and the lack of fit of their mean."""
+    from pellicle.fitting.lack_of_fit import lack_of_fit  # imports JAX, which records of failures do not need
+
+    found = lack_of_fit(part, len(fit.free))
+    if found is None:
+        return {}
+    numbers = {
+        "number": found.sweeps,
+        "sd": number(found.repeatability),
+        "lack_of_fit": number(found.ratio),
+        "degrees_of_freedom": [int(x) for x in found.freedom],
+        "probability": number(found.probability),
+    }
+    return {"sweeps": numbers}
+
+
+def _joint_part(part: Part, fit: Fit) -> dict[str, Any]:
     """One spectrum of a joint fit: its name, which its own parameters end in, and its fit quality."""
     return {
         "name": part.name,
-        **_data(part),
+        **_data(part, fit),
         "rms": number(part.rms),
         "chi2_reduced": number(part.chi2_reduced),
         "effective_points": number(part.effective_points),

@@ -8,12 +8,12 @@ import jax
 import numpy as np
 
 from pellicle.data.brdf_samples import BrdfSamples
+from pellicle.data.ellipsometry_angles import psi_delta
 from pellicle.fitting.brdf.residuals import INVERSES, RESIDUALS
 from pellicle.fitting.brdf.view import SamplesView
 from pellicle.fitting.evaluation import curves
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.result import BrdfCurve, Part
-from pellicle.fitting.spectra.parts import psi_delta
 from pellicle.fitting.spectra.view import SpectrumView
 
 DRAWS = 256

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pellicle.data.repeated_sweeps import are_sweeps, sweep_numbers
 from pellicle.data.signal_checks import refuse_first
 from pellicle.data.tabular.column_selection import SpectrumColumns
 from pellicle.data.tabular.columns import Column
@@ -65,7 +66,7 @@ def read_axis(
 
     `unit` is the result of `axis_unit`; None means nm, assumed. Raises DataError for a cell that is not a
     finite number, an impossible wavelength or angle, or an axis that is not strictly monotone within one
-    angle.
+    angle and is not that of several complete sweeps.
     """
     columns = [wavelength, *others, *([angle] if angle else [])]
     values, *read = table.numbers([column.position for column in columns])
@@ -81,6 +82,8 @@ def read_axis(
             f"{values.max():g}, which is unlike nm; state its unit: "
             '`wavelength_unit="um"`, `wavelength_unit="eV"` or `wavelength_unit="nm"`'
         )
+    if are_sweeps(values, angles, sweep_numbers(values, angles)):
+        return to_nm(values, unit or "nm"), angles, read
     groups = np.zeros(values.size) if angles is None else angles
     for group in np.unique(groups):
         _check_monotone(table, wavelength, values, np.flatnonzero(groups == group))
@@ -96,6 +99,6 @@ def _check_monotone(table: Table, column: Column, values: np.ndarray, rows: np.n
         verb = "repeats" if values[here] == values[before] else "turns back after"
         raise DataError(
             f"{table.where(here, column.position)}: {values[here]:.10g} {verb} {values[before]:.10g} of line "
-            f"{table.lines[before]}; within one angle wavelengths must rise or fall strictly, so delete or "
-            "correct one of the rows"
+            f"{table.lines[before]}; within one angle wavelengths must rise or fall strictly, or come in "
+            "several complete sweeps, so delete or correct one of the rows"
         )

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from pellicle.data.ellipsometry_angles import psi_delta
 from pellicle.data.spectrum import Spectrum
 from pellicle.fitting import noise
 from pellicle.fitting.covariance import Errors
@@ -105,10 +106,3 @@ def layer_errors(at: Local, covariance: np.ndarray, points: int) -> tuple[np.nda
     variance = np.einsum("cip,pq,ciq->ci", slope, covariance, slope)
     n, k = np.sqrt(np.maximum(variance, 0.0))
     return n, k
-
-
-def psi_delta(sphere: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Ψ and Δ in degrees from N, C, S (..., 3), or from N and C (..., 2): then Δ is in 0 to 180."""
-    n, c, *measured = np.moveaxis(sphere, -1, 0)
-    s = measured[0] if measured else np.sqrt(np.maximum(1 - n**2 - c**2, 0.0))
-    return np.rad2deg(np.arctan2(np.hypot(c, s), n)) / 2, np.rad2deg(np.arctan2(s, c)) % 360.0

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import numpy as np
 
+from pellicle.data.ellipsometry_angles import ncs
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import DataError, UsageError
 from pellicle.fitting import noise
@@ -44,7 +45,7 @@ def measured(data: Spectrum, scene: Scene, name: str = "") -> Measured:
     independent_fraction = 1 / noise.DRIFT_CORRELATION if source.drifting else 1.0
     values, sigma, frame = data.values, _sigma(data, source), None
     if data.delta is not None:
-        values = sphere(data.values, data.delta)[:, : 2 if data.folded else 3]
+        values = ncs(data.values, data.delta)[:, : 2 if data.folded else 3]
     if data.delta is not None and data.sigma is not None and not data.folded:
         # along Ψ, along Δ and outwards: there the measured point is (0, 0, 1), and errors of Ψ and of Δ are
         # errors of one component each
@@ -55,12 +56,6 @@ def measured(data: Spectrum, scene: Scene, name: str = "") -> Measured:
         frame = np.stack([along, across, outwards], axis=1)
         values = np.einsum("pij,pj->pi", frame, values)
     return Measured(scene, data.wavelength, values, sigma, independent_fraction, source, name, frame)
-
-
-def sphere(psi: np.ndarray, delta: np.ndarray) -> np.ndarray:
-    """N, C, S (points, 3) of Ψ and Δ in degrees."""
-    psi, delta = 2 * np.deg2rad(psi), np.deg2rad(delta)
-    return np.stack([np.cos(psi), np.sin(psi) * np.cos(delta), np.sin(psi) * np.sin(delta)], axis=-1)
 
 
 def seen_as(scene: Scene, data: Spectrum) -> Scene:

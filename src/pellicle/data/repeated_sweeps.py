@@ -1,0 +1,163 @@
+"""Spectra that were measured in several sweeps over the same wavelengths: their mean and their spread."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from pellicle.data.ellipsometry_angles import ncs, psi_delta
+from pellicle.data.spectrum import FEWEST_POINTS, Spectrum
+from pellicle.errors import DataError, UsageError
+
+MOST_APART = 0.1
+"""Share of the signal (for Ψ and Δ of the radius of the sphere of N, C, S) by which sweeps may differ, alike
+at neighbouring points. A lamp drifts by less; other angles and samples differ by more."""
+_ALIKE = 0.5
+"""Share of the variance of sweeps that is alike at neighbouring points, above which they differ by more than
+noise."""
+
+
+def sweep_numbers(
+    wavelength: Float[np.ndarray, " rows"], angle: Float[np.ndarray, " rows"] | None = None
+) -> Int[np.ndarray, " rows"]:
+    """Number of the sweep of each row: how many earlier rows have the same wavelength and angle."""
+    seen: Counter[tuple[float, float]] = Counter()
+    angles = np.zeros(len(wavelength)) if angle is None else angle
+    numbers = np.empty(len(wavelength), dtype=np.int64)
+    for row, point in enumerate(zip(wavelength.tolist(), angles.tolist(), strict=True)):
+        numbers[row] = seen[point]
+        seen[point] += 1
+    return numbers
+
+
+def are_sweeps(
+    wavelength: Float[np.ndarray, " rows"],
+    angle: Float[np.ndarray, " rows"] | None,
+    number: Int[np.ndarray, " rows"],
+) -> bool:
+    """True for several complete sweeps: each has every point, and goes one way within each angle."""
+    counts = np.bincount(number)
+    if len(counts) < 2 or counts.min() != counts.max() or counts[0] < FEWEST_POINTS:
+        return False
+    groups = np.zeros(len(wavelength)) if angle is None else angle
+    return all(
+        _one_way(wavelength[(number == k) & (groups == group)])
+        for k in range(len(counts))
+        for group in np.unique(groups)
+    )
+
+
+def _one_way(wavelength: np.ndarray) -> bool:
+    return len(np.unique(np.sign(np.diff(wavelength)))) <= 1
+
+
+def of_rows(number: Int[np.ndarray, " rows"], arrays: dict[str, Any], **words: Any) -> Spectrum:
+    """Build a `Spectrum` of rows, or the mean of their sweeps.
+
+    `arrays` are arguments of `Spectrum` with one number per row, or None. Raises DataError as
+    `mean_spectrum` does.
+    """
+    sweeps = []
+    for k in range(number.max(initial=0) + 1):
+        rows = number == k
+        own = {name: None if array is None else array[rows] for name, array in arrays.items()}
+        sweeps.append(Spectrum(**own, **words))
+    return sweeps[0] if len(sweeps) == 1 else mean_spectrum(sweeps)
+
+
+def mean_spectrum(sweeps: Sequence[Spectrum]) -> Spectrum:
+    """Average repeated measurements of one spectrum, and keep them as its `sweeps`.
+
+    With equal weights, a fit of the mean is the fit of all sweeps together. Ψ and Δ are averaged as N, C, S.
+
+    **Arguments:** `sweeps`: two or more, of one signal at the same wavelengths and angles.
+
+    **Returns:** the mean, with the standard deviations of the mean where all sweeps have theirs.
+
+    **Raises:** UsageError for spectra of different points or signals; DataError where they differ by more
+    than repeats do: by over 10 % of the signal, alike at neighbouring points.
+
+    ```python
+    >>> from pellicle.data.repeated_sweeps import mean_spectrum
+    >>> scene = pl.Scene(pl.Layer("SiO2", 500.0), "Si")
+    >>> mean = mean_spectrum([pl.simulate(scene, noise=0.002, seed=seed) for seed in range(4)])
+    >>> len(mean.sweeps), mean.sigma[0].item()
+    (4, 0.001)
+
+    ```
+    """
+    first, count = sweeps[0], len(sweeps)
+    if count < 2:
+        raise UsageError("a mean needs two sweeps or more")
+    for name in ("signal", "polarisation", "folded", "wavelength", "angle"):
+        if any(not np.array_equal(getattr(first, name), getattr(sweep, name)) for sweep in sweeps):
+            raise UsageError(f"sweeps that are averaged must have the same {name}")
+    size, alike = repeatability(sweeps), _alike(_deviations(sweeps))
+    mean = _mean(sweeps)
+    level, unit = float(np.sqrt(np.mean(mean["values"] ** 2))), ""
+    if first.delta is not None:
+        level, unit = math.degrees(0.5), " degrees"
+    apart = size / level
+    if alike > _ALIKE and apart > MOST_APART:
+        place = f"{first.path}: the" if first.path else "the"
+        raise DataError(
+            f"{place} {count} sweeps over the same wavelengths differ by {100 * apart:.0f} % of the signal,"
+            " alike at neighbouring points, too much for repeats of one measurement; keep the rows of one"
+            " sweep, or add the column in which they differ, such as angle_deg"
+        )
+    note = f"{count} sweeps over the same wavelengths, averaged; a point scatters by {size:.2g}{unit}"
+    if alike > _ALIKE:
+        note += ", for the most part alike at neighbouring points: the sweeps drift"
+    return dataclasses.replace(first, **mean, notes=(*first.notes, note), sweeps=tuple(sweeps))
+
+
+def repeatability(sweeps: Sequence[Spectrum]) -> float:
+    """Standard deviation of a point of one sweep, from the differences between sweeps, in any scene.
+
+    It is pooled over all points, on (sweeps − 1) · points degrees of freedom, twice as many for Ψ and Δ. For
+    these it is in degrees of Ψ: half the distance on the sphere of N, C, S, in each of its two directions.
+    """
+    deviations = _deviations(sweeps)
+    count, points, channels = deviations.shape
+    size = math.sqrt(float(np.sum(deviations**2)) / ((count - 1) * points * min(channels, 2)))
+    return size if sweeps[0].delta is None else math.degrees(size) / 2
+
+
+def coordinates(spectrum: Spectrum) -> Float[np.ndarray, "points channels"]:
+    """The values as differences of them are compared: as they are, or N, C and S, of a folded Δ N and C."""
+    if spectrum.delta is None:
+        return spectrum.values[:, None]
+    return ncs(spectrum.values, spectrum.delta)[:, : 2 if spectrum.folded else 3]
+
+
+def _deviations(sweeps: Sequence[Spectrum]) -> Float[np.ndarray, "sweeps points channels"]:
+    """Each sweep less the mean of all."""
+    points = np.stack([coordinates(sweep) for sweep in sweeps])
+    return points - points.mean(axis=0)
+
+
+def _alike(deviations: Float[np.ndarray, "sweeps points channels"]) -> float:
+    """Share of the variance that neighbouring points have in common, from their covariance."""
+    variance = float(np.mean(deviations**2))
+    common = float(np.mean(deviations[:, 1:] * deviations[:, :-1]))
+    return min(max(common / variance, 0.0), 1.0) if variance > 0 else 0.0
+
+
+def _mean(sweeps: Sequence[Spectrum]) -> dict[str, Any]:
+    """Values and standard deviations of the mean."""
+    first, count = sweeps[0], len(sweeps)
+    found: dict[str, Any] = {"values": np.mean([sweep.values for sweep in sweeps], axis=0)}
+    if first.delta is not None:
+        mean = np.mean([coordinates(sweep) for sweep in sweeps], axis=0)
+        found["values"], found["delta"] = psi_delta(mean)
+    for name in ("sigma", "delta_sigma"):
+        own = [getattr(sweep, name) for sweep in sweeps]
+        known = all(x is not None for x in own)
+        found[name] = np.sqrt(np.sum(np.square(own), axis=0)) / count if known else None
+    return found

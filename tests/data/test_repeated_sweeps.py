@@ -1,0 +1,152 @@
+"""Files and spectra of several sweeps over the same wavelengths: what is averaged, and what is refused."""
+
+import numpy as np
+import pytest
+
+import pellicle as pl
+from pellicle.data.ellipsometry_angles import ncs
+from pellicle.data.read_counts import read_counts, reflectance_from_counts
+from pellicle.data.repeated_sweeps import coordinates, mean_spectrum, repeatability
+from pellicle.errors import DataError, UsageError
+
+NM = np.arange(400.0, 500.0, 10.0)
+LEVELS = 0.3 + 0.1 * np.cos(NM / 20)
+SWEEPS = LEVELS + np.random.default_rng(0).normal(0, 0.003, (3, NM.size)).round(6)
+
+
+def rows(*columns) -> str:
+    return "".join(",".join(f"{x:.10g}" for x in row) + "\n" for row in zip(*columns, strict=True))
+
+
+UP = [rows(NM, sweep) for sweep in SWEEPS]
+DOWN = [rows(NM[::-1], sweep[::-1]) for sweep in SWEEPS]
+ORDERS = {
+    "up and up": UP[0] + UP[1] + UP[2],
+    "there and back": UP[0] + DOWN[1] + UP[2],
+    "down and down": DOWN[0] + DOWN[1] + DOWN[2],
+    "each wavelength three times": rows(np.repeat(NM, 3), SWEEPS.T.ravel()),
+}
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_the_mean_of_complete_sweeps(tmp_path, order):
+    path = tmp_path / "film.csv"
+    path.write_text("wavelength_nm,R\n" + ORDERS[order])
+    found = pl.read_spectrum(path)
+    np.testing.assert_array_equal(found.wavelength, NM)
+    np.testing.assert_allclose(found.values, SWEEPS.mean(axis=0), atol=1e-9)
+    np.testing.assert_allclose([s.values for s in found.sweeps], SWEEPS, atol=1e-9)
+    assert found.sigma is None
+    pooled = np.sqrt(np.mean(SWEEPS.var(axis=0, ddof=1)))
+    assert repeatability(found.sweeps) == pytest.approx(pooled)
+    assert (
+        found.notes[-1] == f"3 sweeps over the same wavelengths, averaged; a point scatters by {pooled:.2g}"
+    )
+
+
+def test_standard_deviations_and_ranges_follow(tmp_path):
+    path = tmp_path / "film.csv"
+    sigma = np.full(NM.size, 0.006)
+    path.write_text("wavelength_nm,R,sigma\n" + rows(NM, SWEEPS[0], sigma) + rows(NM, SWEEPS[1], sigma / 2))
+    found = pl.read_spectrum(path, range=(420, 470))
+    assert len(found) == 6
+    assert [len(sweep) for sweep in found.sweeps] == [6, 6]
+    # of a mean of two: half the root of the sum of squares
+    assert found.sigma is not None
+    np.testing.assert_allclose(found.sigma, 0.5 * np.hypot(0.006, 0.003))
+    again = pl.read_spectrum(path, noise=0.004).cut(420, 470)
+    assert again.sigma is not None
+    np.testing.assert_allclose(again.sigma, 0.004 / np.sqrt(2))
+    assert [len(sweep) for sweep in again.sweeps] == [6, 6]
+
+
+def test_several_angles_at_one_wavelength(tmp_path):
+    """As imaging ellipsometers measure: Δ around 0 is averaged across 360 degrees."""
+    path = tmp_path / "brush.csv"
+    angle = np.arange(50.0, 70.0, 4.0)
+    nm = np.full(5, 658.0)
+    sweeps = [rows(nm, angle, angle / 2 + s, (359.0 + 2 * s) % 360 + 0 * nm) for s in (0, 1)]
+    path.write_text("wavelength_nm,angle_deg,psi_deg,delta_deg\n" + "".join(sweeps))
+    found = pl.read_spectrum(path)
+    assert found.delta is not None
+    np.testing.assert_array_equal(found.angle, angle)
+    # the direction of the mean vector, by its definition
+    vectors = np.mean([coordinates(sweep) for sweep in found.sweeps], axis=0)
+    expected = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    np.testing.assert_allclose(ncs(found.values, found.delta), expected, atol=1e-12)
+    np.testing.assert_allclose(found.values, angle / 2 + 0.5, atol=0.01)
+    assert np.all(np.minimum(found.delta, 360 - found.delta) < 0.2)
+
+
+def test_repeatability_of_psi_and_delta_is_that_of_psi():
+    """Noise of 0.1 in Ψ and of 0.1 / sin 2Ψ in Δ / 2 is 0.1 degrees of Ψ in both directions."""
+    rng, psi, delta = np.random.default_rng(0), np.full(400, 30.0), np.full(400, 120.0)
+    across = 2 * 0.1 / np.sin(np.deg2rad(60.0))
+    nm = np.linspace(400.0, 800.0, 400)
+    sweeps = [
+        pl.Spectrum(nm, psi + 0.1 * a, "psi-delta", angle=np.full(400, 70.0), delta=delta + across * b)
+        for a, b in rng.normal(size=(4, 2, 400))
+    ]
+    # 2400 degrees of freedom: 1.4 % standard error
+    assert repeatability(sweeps) == pytest.approx(0.1, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (UP[0] + UP[1][: len(UP[1]) // 2 + 1], ("line 12", "400 turns back after 490", "complete sweeps")),
+        (rows(NM[[0, 2, 1, 3, 4, 5]], LEVELS[:6]) * 2, ("line 4", "410 turns back after 420")),
+        (rows(NM[:4], LEVELS[:4]) * 2, ("line 6", "400 turns back")),  # too short for a sweep
+        (rows(NM, LEVELS) + rows(NM, 1.5 * LEVELS), ("2 sweeps", "differ by 28 %", "angle_deg")),
+    ],
+    ids=["incomplete", "disorder", "short", "different"],
+)
+def test_other_repetitions_are_refused(tmp_path, text, words):
+    path = tmp_path / "film.csv"
+    path.write_text("wavelength_nm,R\n" + text)
+    with pytest.raises(DataError) as caught:
+        pl.read_spectrum(path)
+    assert [word for word in words if word not in str(caught.value)] == []
+    assert str(caught.value).startswith(f"{path}: ")
+    assert "\n" not in str(caught.value)
+
+
+def test_two_angles_without_their_column_are_no_repeats(tmp_path):
+    nm, path = np.arange(400.0, 800.0, 10.0), tmp_path / "film.csv"
+    text = "".join(rows(nm, *pl.ellipsometry(nm, 100.0, "SiO2", "Si", angle=a)) for a in (65.0, 75.0))
+    path.write_text("wavelength_nm,psi_deg,delta_deg\n" + text)
+    with pytest.raises(DataError, match="2 sweeps over the same wavelengths differ by"):
+        pl.read_spectrum(path)
+
+
+def test_noise_is_no_difference(tmp_path):
+    """Noise as large as the signal is none between sweeps; a lamp that drifts by 5 % is told."""
+    noisy = [0.1 + np.abs(x) for x in np.random.default_rng(1).normal(0, 0.1, (2, NM.size * 20))]
+    nm = np.linspace(400.0, 800.0, NM.size * 20)
+    assert len(mean_spectrum([pl.Spectrum(nm, x, "R") for x in noisy]).sweeps) == 2
+    drift = mean_spectrum([pl.Spectrum(NM, LEVELS * gain, "R") for gain in (0.975, 1.025)])
+    assert drift.notes[-1].endswith("the sweeps drift")
+
+
+def test_sweeps_of_raw_counts(tmp_path):
+    path = tmp_path / "counts.csv"
+    path.write_text("wavelength_nm,counts\n" + rows(NM, 1000 * SWEEPS[0]) + rows(NM, 1000 * SWEEPS[1]))
+    reference = pl.Spectrum(NM, np.full(NM.size, 2000.0), "counts")
+    found = reflectance_from_counts(read_counts(path), reference, np.full(NM.size, 0.5), noise=0.002)
+    np.testing.assert_allclose(found.values, 0.25 * SWEEPS[:2].mean(axis=0), atol=1e-9)
+    np.testing.assert_allclose([s.values for s in found.sweeps], 0.25 * SWEEPS[:2], atol=1e-9)
+    assert found.sigma is not None
+    np.testing.assert_allclose(found.sigma, 0.002 / np.sqrt(2))
+
+
+def test_a_mean_needs_equal_points():
+    one = pl.Spectrum(NM, LEVELS, "R")
+    with pytest.raises(UsageError, match="two sweeps or more"):
+        mean_spectrum([one])
+    for other, name in (
+        (pl.Spectrum(NM + 1, LEVELS, "R"), "wavelength"),
+        (pl.Spectrum(NM, LEVELS, "T"), "signal"),
+        (pl.Spectrum(NM, LEVELS, "R", angle=np.full(NM.size, 30.0)), "angle"),
+    ):
+        with pytest.raises(UsageError, match=f"the same {name}"):
+            mean_spectrum([one, other])
