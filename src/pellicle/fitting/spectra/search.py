@@ -13,6 +13,7 @@ from __future__ import annotations
 import itertools
 from dataclasses import replace
 from logging import getLogger
+from typing import Any
 
 import numpy as np
 
@@ -116,7 +117,7 @@ def _every_order(
     return polished, len(tried)
 
 
-def _root(deviance: np.ndarray | np.floating) -> np.ndarray:
+def _root(deviance: Any) -> Any:
     """‖r‖ of a deviance; evidence may take it below zero."""
     return np.sqrt(np.maximum(deviance, 0.0))
 
