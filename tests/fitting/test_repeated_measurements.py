@@ -106,7 +106,7 @@ def test_levels_by_simulation():
     [
         ((123.1, 123.4, 123.3), Agreement.AGREES, "the stated error agrees with the scatter"),
         ((122.5, 123.4, 124.1), Agreement.LARGER, "the stated error is too small"),
-        ((123.4, 123.41, 123.42), Agreement.SMALLER, "They may share their noise"),
+        ((123.4, 123.41, 123.42), Agreement.SMALLER, "is the same in all repeats"),
     ],
 )
 def test_verdicts(values, agreement, words):
@@ -124,6 +124,12 @@ def test_effects_that_repeats_share_remain():
     assert thickness.noise == (0.3,) * 4
     assert thickness.common == pytest.approx(0.4)
     assert "With 0.4 nm from effects that all repeats share" in found.verdict
+
+
+def test_what_does_not_scatter_remains():
+    """Stated errors of 0.2 and values that agree within 0.01: nearly all of the 0.2 is shared."""
+    thickness = pl.fitting.repeats([fit(value) for value in (123.4, 123.41, 123.42)])["thickness"]
+    assert thickness.stderr == pytest.approx(math.sqrt(0.2**2 - 0.01**2 + 0.01**2 / 3))
 
 
 def test_fits_that_are_no_use_are_left_out_and_named():
@@ -145,6 +151,12 @@ def test_parameters_without_an_error_are_not_compared():
     found = pl.fitting.repeats([fit(100.0, k=seen, n=fixed), fit(100.3, k=seen, n=fixed)])
     assert list(found.parameters) == ["thickness"]
     assert found.uncompared == ("k",)
+    resting = Estimate("A", 1.3, 0.1, "", 1.3, 1.7, True, at_bound=True)
+    found = pl.fitting.repeats(
+        [fit(100.0, A=resting), fit(100.3, A=resting, status=Status.AT_BOUND, path="b")]
+    )
+    assert found.uncompared == ("A",)
+    assert found.warnings == ("b: its fit is at-bound",)
     with pytest.raises(UsageError, match="no parameter has a finite error"):
         pl.fitting.repeats([fit(100.0, math.inf), fit(100.3, math.inf)])
 

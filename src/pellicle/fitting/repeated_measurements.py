@@ -111,9 +111,16 @@ class RepeatedParameter:
         return Agreement.SMALLER if self.probability > 1 - UNLIKELY else Agreement.AGREES
 
     @property
+    def shared(self) -> float:
+        """Standard error of type B: `common`, and where the scatter is too small for the stated noise errors,
+        what these have beyond it: it is the same in all repeats, as a misfit of the scene is."""
+        hidden = max(self.stated**2 - self.sd**2, 0.0) if self.agreement is Agreement.SMALLER else 0.0
+        return math.hypot(self.common, math.sqrt(hidden))
+
+    @property
     def stderr(self) -> float:
         """Combined standard uncertainty of the mean, of types A and B (GUM eq. 10)."""
-        return math.hypot(self.sd_mean, self.common)
+        return math.hypot(self.sd_mean, self.shared)
 
     @property
     def effective_freedom(self) -> float:
@@ -148,8 +155,8 @@ class Repeat:
 class Repeats(ReportMixin):
     """Fits of repeated measurements of one sample: their scatter against the errors that they state.
 
-    `parameters` are the free ones with a finite error in two repeats or more, the leading one first;
-    `uncompared` are the names of the others.
+    `parameters` are the free ones with a finite error in two repeats or more, the leading one first. Those on
+    a bound are not compared: `uncompared` are the names of the others.
     """
 
     repeats: tuple[Repeat, ...]
@@ -170,16 +177,16 @@ class Repeats(ReportMixin):
             case Agreement.LARGER:
                 sentence += " the stated error is too small."
             case Agreement.SMALLER:
-                sentence += " less than independent repeats would. They may share their noise."
+                sentence += " what the stated error has beyond the scatter is the same in all repeats."
             case _:
                 sentence += " the stated error agrees with the scatter."
-        if p.common:
+        if p.shared:
             sentence += (
-                f" With {_short(p.common)}{unit} from effects that all repeats share, the mean is known to"
+                f" With {_short(p.shared)}{unit} from effects that all repeats share, the mean is known to"
                 f" ± {_short(p.expanded)}{unit} ({_PERCENT}, coverage factor {p.coverage_factor:.3g})."
             )
         else:
-            sentence += f" At {_PERCENT} the mean is known to ± {_short(p.expanded)}{unit}."
+            sentence += f" At {_PERCENT} the mean is repeatable within ± {_short(p.expanded)}{unit}."
         return sentence
 
     def __getitem__(self, name: str) -> RepeatedParameter:
@@ -223,17 +230,16 @@ def repeats(fits: Sequence[Fit]) -> Repeats:
     every = tuple(Repeat(path, fit.status, reason) for path, fit, reason in triples)
     used = [(each.path, fit) for each, fit in zip(every, fits, strict=True) if not each.left_out]
     warnings = [f"{each.path} is left out: {each.left_out}" for each in every if each.left_out]
+    unclear = [each for each in every if not each.left_out and each.status is not Status.CONVERGED]
     if len(used) < 2:
         raise UsageError(
             f"repeats need two usable fits or more, and {len(used)} of {len(every)} are"
             + "".join(f"; {warning}" for warning in warnings)
         )
+    warnings += [f"{each.path}: its fit is {each.status}" for each in unclear]
     names, compared = dict.fromkeys(p.name for _, fit in used for p in fit.free), {}
     for name in names:
-        known = [(path, fit, fit.parameters[name]) for path, fit in used if name in fit.parameters]
-        known = [
-            (path, fit, p) for path, fit, p in known if p.free and _noise(p) > 0 and math.isfinite(p.stderr)
-        ]
+        known = [(path, fit, p) for path, fit in used if (p := fit.parameters.get(name)) and _usable(p)]
         if len(known) < 2:
             continue
         estimates = [p for *_, p in known]
@@ -255,6 +261,11 @@ def repeats(fits: Sequence[Fit]) -> Repeats:
     if not compared:
         raise UsageError(f"no parameter has a finite error in two of the {len(used)} repeats")
     return Repeats(every, compared, tuple(n for n in names if n not in compared), tuple(warnings))
+
+
+def _usable(p: Estimate) -> bool:
+    """True for a free parameter with an error; one that rests on a bound does not scatter."""
+    return p.free and not p.at_bound and _noise(p) > 0 and math.isfinite(p.stderr)
 
 
 def _noise(p: Estimate) -> float:
@@ -307,4 +318,4 @@ def _other_minima(known: Sequence[tuple[str, Fit, Estimate]], name: str) -> list
 
 
 def _short(number: float) -> str:
-    return f"{number:.2g}" if number < 100 else f"{number:.0f}"
+    return f"{number:.2g}" if number < 99.5 else f"{number:.0f}"

@@ -28,12 +28,12 @@ def report(repeats: Repeats) -> str:
         (
             p.name,
             f"{p.mean:.7g}",
-            f"{p.sd_mean:.2g}",
-            f"{p.sd:.2g}",
-            f"{p.stated:.2g}",
-            f"{p.ratio:.2g}",
+            _short(p.sd_mean),
+            _short(p.sd),
+            _short(p.stated),
+            _short(p.ratio),
             f"{p.probability:.2g}",
-            f"{p.expanded:.2g}",
+            _short(p.expanded),
             p.unit,
         )
         for p in repeats.parameters.values()
@@ -52,7 +52,7 @@ def report(repeats: Repeats) -> str:
     warnings = list(repeats.warnings)
     if repeats.uncompared:
         warnings.append(
-            f"not compared, without a finite error in two repeats: {', '.join(repeats.uncompared)}"
+            f"not compared, on a bound or without a finite error: {', '.join(repeats.uncompared)}"
         )
     return (
         block("Repeats", wrapped(repeats.verdict))
@@ -63,6 +63,10 @@ def report(repeats: Repeats) -> str:
             else ""
         )
     )
+
+
+def _short(number: float) -> str:
+    return f"{number:.2g}" if number < 99.5 else f"{number:.0f}"
 
 
 def to_json(repeats: Repeats) -> dict[str, Any]:
@@ -97,7 +101,7 @@ def _parameter(p: RepeatedParameter) -> dict[str, Any]:
         "probability": number(p.probability),
         "ratio": number(p.ratio),
         "agreement": str(p.agreement),
-        "stderr_common": number(p.common),
+        "stderr_common": number(p.shared),
         "stderr": number(p.stderr),
         "effective_degrees_of_freedom": number(p.effective_freedom),
         "coverage_factor": number(p.coverage_factor),
