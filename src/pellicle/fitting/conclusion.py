@@ -74,12 +74,14 @@ def conclude(
     fixed: list[Estimate],
     scans: Mapping[int, Profile],
     near: bool = False,
+    binding: frozenset[str] = frozenset(),
     amend: Callable[[list[Limits]], Sequence[Limits]] = lambda limits: limits,
 ) -> Conclusion:
     """Judge the best of the ranked minima.
 
     Limits come from profiles where the fit is usable, else from the covariance alone; with `near` profiles
-    start from near rivals too. `amend` has the last word on them.
+    start from near rivals too. `amend` has the last word on them. `binding` names parameters whose default
+    bounds count as those of the user.
     """
     converged, others = bool(ranked.minima.converged[0]), rivals(ranked)
     if converged and not misfit:
@@ -93,7 +95,14 @@ def conclude(
         for p, value in zip(ranked.problem.parameters, ranked.values.tolist(), strict=True)
         if p.natural[0] and p.lower == 0 and p.key != "thickness" and value <= _ON_BOUND * p.upper
     )
-    status = judge(converged=converged, misfit=misfit, parameters=parameters, rivals=others, natural=natural)
+    status = judge(
+        converged=converged,
+        misfit=misfit,
+        parameters=parameters,
+        rivals=others,
+        natural=natural,
+        binding=binding,
+    )
     log.info("status: %s", status)
     return Conclusion(status, parameters, others, identifiability.correlated(jacobian, parameters))
 

@@ -50,16 +50,18 @@ def judge(
     parameters: Mapping[str, Estimate],
     rivals: tuple[Rival, ...],
     natural: frozenset[str],
+    binding: frozenset[str] = frozenset(),
 ) -> Status:
     """The first status that holds. `natural` names parameters that rest on a bound that physics sets.
 
-    A default bound counts only where the thickness is not well determined.
+    A default bound counts only if `binding` names it or the thickness is not well determined.
     """
     free = [p for p in parameters.values() if p.free and not p.name.startswith("instrument.")]
     depths = [p for p in free if p.name.split(".")[-1] == "thickness"]
     unseen = [p for p in (depths or free) if not math.isfinite(p.stderr)]
     resting = [p for p in free if p.at_bound and p.name not in natural]
-    at_bound = [p for p in resting if not (p.default_bounds and _well_known(p, depths, free[0]))]
+    remarks = [p for p in resting if p.default_bounds and _well_known(p, depths, free[0])]
+    at_bound = [p for p in resting if p not in remarks or p.name in binding]
     close = distinct_rivals(parameters, rivals)
     for question, answer in (
         ("did the solver converge?", "yes" if converged else "no"),

@@ -145,7 +145,7 @@ def _free_index(
         n, k = _start(dispersion.n), _start(dispersion.k or 0.0)
         if name == "k":
             return Constant(dispersion.n, _free_k(k, bounds))
-        least, most = (1.0, 6.0) if dispersion.k is None else (0.01, 10.0)  # of transparent films, of metals
+        least, most = (1.0, 5.0) if dispersion.k is None else (0.01, 10.0)  # of transparent films, of metals
         low, high = max(least, n - 0.5), max(least, n) + 0.5
         default = Free(low, high, start=max(n, low), limits=(least, max(most, high)))
         return Constant(_within(bounds, default), dispersion.k)

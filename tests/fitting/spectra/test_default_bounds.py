@@ -49,11 +49,21 @@ def test_bounds_of_the_user_are_kept(film, measured):
     assert not said(fit, "widened")
 
 
-def test_no_bound_goes_beyond_its_limit(film, measured):
-    fit = pl.fit(measured(film(), 430.0), film(material=constant(1.2, 1.4, (1.2, 1.45))))
-    assert fit["n"].value == fit["n"].upper == 1.45
-    assert said(fit, "n rests on 1.45, the largest value that physics allows")
-    assert fit.status is not pl.Status.AT_BOUND
+def test_a_limit_of_physics_is_a_remark(film, measured):
+    fit = pl.fit(measured(film(), 430.0), film(material=constant(1.2, 1.459, (1.2, 1.459))))
+    assert fit["n"].value == fit["n"].upper == 1.459
+    assert fit.status is pl.Status.CONVERGED
+    assert said(fit, "n rests on 1.459, the largest value that physics allows")
+
+
+def test_an_answer_that_runs_on_is_at_a_bound(film, measured):
+    """Its thickness depends on where the bound is."""
+    fit = pl.fit(measured(film(), 430.0), film(material=constant(1.2, 1.44, (1.2, 1.45))))
+    assert fit["n"].value == fit["n"].upper == 1.44
+    assert fit.status is pl.Status.AT_BOUND
+    assert "lies on a default bound: n (1.44)" in fit.verdict
+    assert said(fit, "the best fit rests on the default bounds of n, and within wider ones on their end")
+    assert not said(fit, "n rests on")
 
 
 def test_where_the_data_do_not_want_it_a_bound_is_a_remark(film, measured):

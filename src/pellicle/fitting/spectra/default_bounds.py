@@ -6,7 +6,7 @@ explained better there, the fit is done again within wider bounds.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import replace
 from logging import getLogger
 from typing import NamedTuple
@@ -33,21 +33,23 @@ _ON_BOUND = 1e-6
 
 
 class Wider(NamedTuple):
-    """A problem's parameters with wider default bounds, the minima (minima, parameters) found within them in
-    the parameters' own units, and what was done."""
+    """Default bounds that were widened, and what was done, in words.
+
+    `parameters` are the problem's with their bounds; `values` (minima, parameters) are minima found within
+    them, in the parameters' own units. `binding` names parameters that rest on a default bound and, within
+    wider ones, on their end: those are then not used.
+    """
 
     parameters: tuple[Parameter, ...]
     values: np.ndarray
-    warnings: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
+    binding: frozenset[str] = frozenset()
 
 
 def wider(
     spectra: Sequence[Measured], ranked: RankedMinima, tolerance: float, loss: str, progress: Progress
-) -> Wider | None:
-    """Widen the default bounds on which the best fit rests.
-
-    None where it rests on none that can be moved, or where χ² falls by no more than the distance of a rival.
-    """
+) -> Wider:
+    """Widen the default bounds on which the best fit rests, if χ² falls by more than a rival's distance."""
     old, now, gains = ranked.problem.parameters, ranked, 0.0
     for _ in range(_ROUNDS):
         before, values = now.problem.parameters, now.values
@@ -66,15 +68,23 @@ def wider(
         if not gain > RIVAL:
             break
         now, gains = again, gains + gain
-    if now is ranked:
-        return None
+    found, values = now.problem.parameters, np.asarray(now.problem.values(now.minima.units))
+    pairs = list(zip(old, found, values[0].tolist(), strict=True))
+    if any(_at_moved_bound(*each) for each in pairs):
+        resting = [p for p, value in zip(old, ranked.values.tolist(), strict=True) if _moved(p, value) != p]
+        words = tuple(
+            f"the best fit rests on the default bounds of {p.name}, and within wider ones on their end"
+            f" (Δχ² {gains:.3g}): the scene may be wrong"
+            for p in resting
+        )
+        return Wider(old, ranked.values[None], words, frozenset(p.name for p in resting))
     words = tuple(
         f"the default bounds of {p.name} were widened from {_range(p)} to {_range(q)}: the best fit lay on"
         f" them (Δχ² {gains:.3g})"
-        for p, q in zip(old, now.problem.parameters, strict=True)
+        for p, q, _ in pairs
         if p != q
     )
-    return Wider(now.problem.parameters, np.asarray(now.problem.values(now.minima.units)), words)
+    return Wider(found, values, words)
 
 
 def _moved(p: Parameter, value: float) -> Parameter:
@@ -88,6 +98,12 @@ def _moved(p: Parameter, value: float) -> Parameter:
     if not (low and p.lower > least) and not (high and p.upper < most):
         return p
     return replace(p, lower=max(p.lower - span, least), upper=min(p.upper + span, most))
+
+
+def _at_moved_bound(old: Parameter, new: Parameter, value: float) -> bool:
+    """Whether a value rests on a bound that is not the old one."""
+    low, high = _rests(new, value)
+    return (low and new.lower < old.lower) or (high and new.upper > old.upper)
 
 
 def _slabs(before: Sequence[Parameter], moved: Sequence[Parameter]) -> Iterator[tuple[Parameter, ...]]:
@@ -129,12 +145,13 @@ def joined(problem: Problem, found: Minima, values: np.ndarray) -> Minima:
     return distinct(problem, replace(found, **both), MOST)
 
 
-def remarks(ranked: RankedMinima) -> list[str]:
-    """A sentence for each parameter that rests on a default bound, other than a zero that has a limit."""
+def remarks(ranked: RankedMinima, binding: Container[str]) -> list[str]:
+    """A sentence for each parameter that rests on a default bound, other than a zero that has a limit and
+    `binding` ones."""
     sentences = []
     for p, value in zip(ranked.problem.parameters, ranked.values.tolist(), strict=True):
         low, high = _rests(p, value)
-        if p.limits is None or not (low or high) or (low and p.natural[0]):
+        if p.limits is None or p.name in binding or not (low or high) or (low and p.natural[0]):
             continue
         words = f"{p.name} rests on {_amount(value, p)}"
         if value in p.limits:

@@ -130,14 +130,16 @@ def _fit(
         return problem
 
     ranked, warnings = ranked_minima(build, lambda problem: search(problem, progress), tolerance, loss)
-    if wider := default_bounds.wider(spectra, ranked, tolerance, loss, progress):
+    wider = default_bounds.wider(spectra, ranked, tolerance, loss, progress)
+    warnings += wider.warnings
+    if wider.parameters != ranked.problem.parameters:
         spectra = default_bounds.measured_within(spectra, ranked, wider.parameters)
 
         def again(problem: Problem) -> Minima:
             return default_bounds.joined(problem, search(problem, progress), wider.values)
 
         ranked, warnings = ranked_minima(build, again, tolerance, loss)
-        warnings = [*wider.warnings, *warnings]
+        warnings += wider.warnings
     profile, depth = summary.scan_profile(ranked), ranked.problem.thickness_axis
     jacobian, covariance = linearised(ranked)
     each = parts.parts(data, ranked, covariance)
@@ -147,6 +149,7 @@ def _fit(
         jacobian,
         covariance,
         misfit=bool(missed),
+        binding=wider.binding,
         fixed=summary.fixed(spectra),
         scans={} if profile is None or depth is None else {depth: profile},
         amend=lambda limits: summary.amended(spectra, ranked, limits),
@@ -166,7 +169,7 @@ def _fit(
         identifiability.naming(next(iter(parameters)), conclusion.correlated),
     )
     unclear = [
-        *default_bounds.remarks(ranked),
+        *default_bounds.remarks(ranked, wider.binding),
         *identifiability.bounded(parameters, dark),
         *conclusion.correlated,
     ]
