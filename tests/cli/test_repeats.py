@@ -81,3 +81,11 @@ def test_sweeps_of_one_file_are_repeats(pellicle, spectrum_file, scene, tmp_path
     alone = pellicle("fit", *(tmp_path / f"{seed}.csv" for seed in range(3)), *scene, "--repeats", "--json")
     assert each[-1]["parameters"] == alone.objects[-1]["parameters"]
     assert [x["path"] for x in each[-1]["data"]] == [f"{together} ({i})" for i in (1, 2, 3)]
+
+
+def test_other_commands_ignore_the_key(pellicle, spectrum_file, recipe, tmp_path):
+    """A recipe of repeats still describes one scene: `compare` takes one file of it."""
+    path = recipe("repeats = true")
+    other = tmp_path / "other.toml"
+    other.write_text(path.read_text().replace("1.46", "1.5"))
+    assert pellicle("compare", spectrum_file(), "--recipe", path, "--recipe", other).code in (0, 4)

@@ -6,7 +6,7 @@ import pytest
 import pellicle as pl
 from pellicle.data.ellipsometry_angles import ncs
 from pellicle.data.read_counts import read_counts, reflectance_from_counts
-from pellicle.data.repeated_sweeps import coordinates, mean_spectrum, repeatability
+from pellicle.data.repeated_sweeps import coordinates, mean_spectrum, repeatability, sweep_numbers
 from pellicle.errors import DataError, UsageError
 
 NM = np.arange(400.0, 500.0, 10.0)
@@ -150,3 +150,12 @@ def test_a_mean_needs_equal_points():
     ):
         with pytest.raises(UsageError, match=f"the same {name}"):
             mean_spectrum([one, other])
+
+
+def test_sweep_numbers_count_earlier_rows():
+    rng = np.random.default_rng(0)
+    nm, angle = rng.integers(0, 5, 200).astype(float), rng.integers(0, 3, 200).astype(float)
+    points = list(zip(nm, angle, strict=True))
+    expected = [points[:i].count(point) for i, point in enumerate(points)]
+    assert sweep_numbers(nm, angle).tolist() == expected
+    assert sweep_numbers(nm).tolist() == [nm[:i].tolist().count(x) for i, x in enumerate(nm)]

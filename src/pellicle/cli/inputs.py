@@ -65,9 +65,12 @@ def inputs(
     scene_flags: SceneFlags,
     reading: ReadingFlags,
     joint: bool,
-    repeats: bool = False,
+    repeats: bool | None = None,
 ) -> Inputs:
-    """Combine files, recipe and flags. Raises UsageError or DataError where something is missing or wrong."""
+    """Combine files, recipe and flags; with `repeats` None that of the recipe is ignored.
+
+    Raises UsageError or DataError where something is missing or wrong.
+    """
     if recipe is None:
         result = _by_flags(files, scene_flags, reading)
     else:
@@ -82,17 +85,22 @@ def inputs(
             result = _by_surface_recipe(files, described, reading)
         else:
             result = _by_recipe(files, described, reading)
-    result = result._replace(joint=joint or result.joint, repeats=repeats or result.repeats)
-    if result.repeats and result.joint:
+    result = result._replace(joint=joint or result.joint)
+    return result if repeats is None else _as_repeats(result, repeats or result.repeats)
+
+
+def _as_repeats(files: Inputs, repeats: bool) -> Inputs:
+    """Inputs of repeated measurements, each sweep of a file by itself; unchanged where they are none."""
+    if not repeats:
+        return files
+    if files.joint:
         raise UsageError(
             "repeats are fitted one by one, and a joint fit takes all files together: choose one"
         )
-    if not result.repeats:
-        return result
-    result = result._replace(files=[sweep for file in result.files for sweep in _sweeps(file)])
-    if len(result.files) < 2:
+    each = [sweep for file in files.files for sweep in _sweeps(file)]
+    if len(each) < 2:
         raise UsageError("repeats are two files or more, or several sweeps in one; leave --repeats out")
-    return result
+    return files._replace(files=each, repeats=True)
 
 
 def _sweeps(file: Input) -> list[Input]:

@@ -46,6 +46,6 @@ def sample(
         raise UsageError(f"--steps must be at least {FEWEST_STEPS}, got {steps}")
     if not 0 <= seed < 2**32:
         raise UsageError(f"--seed must lie in 0 to 4294967295, got {seed}")
-    files = inputs(list(data), recipe, scene or SceneFlags(), reading or ReadingFlags(), joint)
+    files = inputs(list(data), recipe, scene or SceneFlags(), reading or ReadingFlags(), joint, False)
     start()
     return Batch(files, tolerance, Sampler(walkers, steps, seed), out, json, jobs).run()

@@ -56,7 +56,7 @@ def read_spectrum(
     - `analyser`: for columns α and β, the angle of the fixed polariser in degrees.
     - `spot`: number of the spot, from 1 in the order of the file, for an Accurion file of several spots.
 
-    **Returns:** a `Spectrum`.
+    **Returns:** a `Spectrum`; of several complete sweeps over the same wavelengths, their mean.
 
     **Raises:** DataError (unreadable or impossible data) or UsageError (an argument missing or wrong): one
     sentence with file, line and remedy.

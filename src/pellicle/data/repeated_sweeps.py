@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -27,12 +26,12 @@ def sweep_numbers(
     wavelength: Float[np.ndarray, " rows"], angle: Float[np.ndarray, " rows"] | None = None
 ) -> Int[np.ndarray, " rows"]:
     """Number of the sweep of each row: how many earlier rows have the same wavelength and angle."""
-    seen: Counter[tuple[float, float]] = Counter()
     angles = np.zeros(len(wavelength)) if angle is None else angle
+    order = np.lexsort((angles, wavelength))  # stable: equal points stay in the order of the rows
+    points = np.stack([wavelength, angles], axis=1)[order]
+    begins = np.flatnonzero(np.any(np.diff(points, axis=0, prepend=np.nan) != 0, axis=1))
     numbers = np.empty(len(wavelength), dtype=np.int64)
-    for row, point in enumerate(zip(wavelength.tolist(), angles.tolist(), strict=True)):
-        numbers[row] = seen[point]
-        seen[point] += 1
+    numbers[order] = np.arange(len(order)) - np.repeat(begins, np.diff(begins, append=len(order)))
     return numbers
 
 
