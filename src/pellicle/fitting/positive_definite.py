@@ -59,7 +59,7 @@ def _unrolled(matrix, b, least):
     return jnp.stack(x), positive
 
 
-def nonnegative(matrix, b, bounded, slack: float):
+def nonnegative(matrix, b, bounded, slack: float, free=None):
     """Minimise ½ xᵀ `matrix` x − bᵀ x with x ≥ 0 where `bounded`, for a positive definite matrix.
 
     Block principal pivoting: all variables that violate their sign or that of their slope change sides at
@@ -67,7 +67,7 @@ def nonnegative(matrix, b, bounded, slack: float):
     problems take one or two rounds, however many variables are bounded.
 
     **Arguments:** `matrix` (n, n); `b` (n,); `bounded` (n,) booleans; `slack`, by which a variable may be
-    negative before it counts as violating.
+    negative before it counts as violating; `free`, the variables that are not at zero at first, all if None.
 
     **Returns:** the inverse of the matrix of the free variables, with zeros for those held at zero, and x.
 
@@ -99,7 +99,7 @@ def nonnegative(matrix, b, bounded, slack: float):
         free = free ^ (wrong & (last | (patience > 0)))
         return free, inverse, x, jnp.minimum(count, fewest), patience, count, rounds + 1
 
-    free = jnp.ones(n, bool)
+    free = jnp.ones(n, bool) if free is None else free
     if not any(bounded):
         return solved(free)
     start = (free, jnp.zeros_like(matrix), jnp.zeros_like(b), n + 1, 3, n, 0)

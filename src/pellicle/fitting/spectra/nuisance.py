@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import comb
 from typing import Any, NamedTuple
 
 import jax
@@ -19,7 +18,7 @@ import numpy as np
 from jaxtyping import ScalarLike
 
 from pellicle.fitting.coordinates import Array
-from pellicle.fitting.positive_definite import nonnegative
+from pellicle.fitting.spectra.nonnegative_curves import nonnegative_curves
 from pellicle.scene.instrument import Drift, Instrument
 
 _LOOSE = 10.0
@@ -178,24 +177,14 @@ def _project(gram, projected, mean: np.ndarray, sd: np.ndarray, counts: tuple[in
     """Coefficients under their prior, so many of the scale and of the offset, and the deviance's
     log-determinant.
 
-    Both curves are kept nonnegative through their Bernstein coefficients: enough, and for so low a degree
-    little more than needed. Which of them are zero counts as a constant.
+    Both curves are nowhere negative. The determinant is that of all coefficients, whether or not a curve is
+    held at zero somewhere: the volume that this cuts off is left out.
     """
-    matrix = gram + np.diag(1 / sd**2)
-    to_chebyshev = np.zeros(matrix.shape)
-    for part, count in zip((slice(counts[0]), slice(counts[0], None)), counts, strict=True):
-        if count:
-            to_chebyshev[part, part] = _from_bernstein(count)
-    own = to_chebyshev.T @ matrix @ to_chebyshev, to_chebyshev.T @ (projected + mean / sd**2)
-    inverse, start = nonnegative(*jax.lax.stop_gradient(own), np.ones(len(mean), bool), _SLACK)
+    matrix, target = gram + np.diag(1 / sd**2), projected + mean / sd**2
+    degrees = tuple(count - 1 for count in counts if count)
+    inverse, start = nonnegative_curves(*jax.lax.stop_gradient((matrix, target)), degrees, _SLACK)
     # adds nothing but a rounding error, and carries the implicit derivative A⁻¹(db − dA x)
-    coefficients = to_chebyshev @ (start + inverse @ (own[1] - own[0] @ start))
+    target = target - jax.lax.stop_gradient(target) - (matrix - jax.lax.stop_gradient(matrix)) @ start
+    coefficients = start + inverse @ target
     _, log_determinant = jnp.linalg.slogdet(matrix)
     return coefficients, log_determinant + 2 * float(np.sum(np.log(sd)))
-
-
-def _from_bernstein(count: int) -> np.ndarray:
-    """Matrix from Bernstein coefficients to Chebyshev coefficients on −1..1 of the same degree."""
-    degree, points = count - 1, np.linspace(0.0, 1.0, count)
-    values = [[comb(degree, i) * t**i * (1 - t) ** (degree - i) for i in range(count)] for t in points]
-    return np.linalg.solve(np.polynomial.chebyshev.chebvander(2 * points - 1, degree), values)
