@@ -97,7 +97,7 @@ def mean_spectrum(sweeps: Sequence[Spectrum]) -> Spectrum:
     for name in ("signal", "polarisation", "folded", "wavelength", "angle"):
         if any(not np.array_equal(getattr(first, name), getattr(sweep, name)) for sweep in sweeps):
             raise UsageError(f"sweeps that are averaged must have the same {name}")
-    size, alike = repeatability(sweeps), _alike(_deviations(sweeps))
+    size, alike = repeatability(sweeps), _alike(deviations(sweeps))
     mean = _mean(sweeps)
     level, unit = float(np.sqrt(np.mean(mean["values"] ** 2))), ""
     if first.delta is not None:
@@ -122,9 +122,9 @@ def repeatability(sweeps: Sequence[Spectrum]) -> float:
     It is pooled over all points, on (sweeps − 1) · points degrees of freedom, twice as many for Ψ and Δ. For
     these it is in degrees of Ψ: half the distance on the sphere of N, C, S, in each of its two directions.
     """
-    deviations = _deviations(sweeps)
-    count, points, channels = deviations.shape
-    size = math.sqrt(float(np.sum(deviations**2)) / ((count - 1) * points * min(channels, 2)))
+    apart = deviations(sweeps)
+    count, points, channels = apart.shape
+    size = math.sqrt(float(np.sum(apart**2)) / ((count - 1) * points * min(channels, 2)))
     return size if sweeps[0].delta is None else math.degrees(size) / 2
 
 
@@ -135,7 +135,7 @@ def coordinates(spectrum: Spectrum) -> Float[np.ndarray, "points channels"]:
     return ncs(spectrum.values, spectrum.delta)[:, : 2 if spectrum.folded else 3]
 
 
-def _deviations(sweeps: Sequence[Spectrum]) -> Float[np.ndarray, "sweeps points channels"]:
+def deviations(sweeps: Sequence[Spectrum]) -> Float[np.ndarray, "sweeps points channels"]:
     """Each sweep less the mean of all."""
     points = np.stack([coordinates(sweep) for sweep in sweeps])
     return points - points.mean(axis=0)

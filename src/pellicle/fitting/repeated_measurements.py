@@ -170,9 +170,9 @@ class Repeats(ReportMixin):
         p = next(iter(self.parameters.values()))
         unit = f" {p.unit}" if p.unit else ""
         mean = describe(Estimate(p.name, p.mean, p.sd_mean, p.unit, -math.inf, math.inf, True))
-        times = f"{_short(p.ratio)} times the stated noise error of {_short(p.stated)}{unit}"
+        times = f"{short(p.ratio)} times the stated noise error of {short(p.stated)}{unit}"
         sentence = f"{len(p.values)} repeats: {mean} (mean and its standard deviation)."
-        sentence += f" They scatter by {_short(p.sd)}{unit}, {times}:"
+        sentence += f" They scatter by {short(p.sd)}{unit}, {times}:"
         match p.agreement:
             case Agreement.LARGER:
                 sentence += " the stated error is too small."
@@ -182,11 +182,11 @@ class Repeats(ReportMixin):
                 sentence += " the stated error agrees with the scatter."
         if p.shared:
             sentence += (
-                f" With {_short(p.shared)}{unit} from effects that all repeats share, the mean is known to"
-                f" ± {_short(p.expanded)}{unit} ({_PERCENT}, coverage factor {p.coverage_factor:.3g})."
+                f" With {short(p.shared)}{unit} from effects that all repeats share, the mean is known to"
+                f" ± {short(p.expanded)}{unit} ({_PERCENT}, coverage factor {p.coverage_factor:.3g})."
             )
         else:
-            sentence += f" At {_PERCENT} the mean is repeatable within ± {_short(p.expanded)}{unit}."
+            sentence += f" At {_PERCENT} the mean is repeatable within ± {short(p.expanded)}{unit}."
         return sentence
 
     def __getitem__(self, name: str) -> RepeatedParameter:
@@ -317,5 +317,5 @@ def _other_minima(known: Sequence[tuple[str, Fit, Estimate]], name: str) -> list
     return result
 
 
-def _short(number: float) -> str:
+def short(number: float) -> str:
     return f"{number:.2g}" if number < 99.5 else f"{number:.0f}"

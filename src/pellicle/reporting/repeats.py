@@ -23,17 +23,19 @@ FILES = RECORD, TABLE, TEXT = "repeats.json", "repeats.csv", "repeats.txt"
 
 def report(repeats: Repeats) -> str:
     """Format the verdict, a row for each parameter, and what was left out."""
+    from pellicle.fitting.repeated_measurements import short
+
     rows = [("", "mean", "± its sd", "scatter", "stated noise", "ratio", "probability", "± 95 %", "unit")]
     rows += [
         (
             p.name,
             f"{p.mean:.7g}",
-            _short(p.sd_mean),
-            _short(p.sd),
-            _short(p.stated),
-            _short(p.ratio),
+            short(p.sd_mean),
+            short(p.sd),
+            short(p.stated),
+            short(p.ratio),
             f"{p.probability:.2g}",
-            _short(p.expanded),
+            short(p.expanded),
             p.unit,
         )
         for p in repeats.parameters.values()
@@ -63,10 +65,6 @@ def report(repeats: Repeats) -> str:
             else ""
         )
     )
-
-
-def _short(number: float) -> str:
-    return f"{number:.2g}" if number < 99.5 else f"{number:.0f}"
 
 
 def to_json(repeats: Repeats) -> dict[str, Any]:

@@ -19,7 +19,15 @@ from pellicle.fitting.progress import Progress, quiet
 from pellicle.fitting.result import Fit
 from pellicle.fitting.reweighting import RankedMinima
 from pellicle.fitting.robust_losses import LEAST_SQUARES, check_loss
-from pellicle.fitting.spectra import backface, default_bounds, messages, parts, residual_structure, summary
+from pellicle.fitting.spectra import (
+    backface,
+    default_bounds,
+    messages,
+    parts,
+    residual_structure,
+    summary,
+    sweep_scatter,
+)
 from pellicle.fitting.spectra.problem import make
 from pellicle.fitting.spectra.search import search
 from pellicle.fitting.spectra.targets import Measured, measured, without_scale
@@ -154,7 +162,8 @@ def _fit(
         scans={} if profile is None or depth is None else {depth: profile},
         amend=lambda limits: summary.amended(spectra, ranked, limits),
     )
-    parameters, dark = conclusion.parameters, summary.opaque(spectra, ranked)
+    parameters, drifts = sweep_scatter.with_sweeps(data, ranked, jacobian, conclusion.parameters)
+    dark = summary.opaque(spectra, ranked)
     worst = (missed or each)[0]
     at = next(i for i, part in enumerate(each) if part is worst)
     structure = residual_structure.missed(ranked.problem.views[at], ranked.fits[at])
@@ -169,6 +178,7 @@ def _fit(
         identifiability.naming(next(iter(parameters)), conclusion.correlated),
     )
     unclear = [
+        *drifts,
         *default_bounds.remarks(ranked, wider.binding),
         *identifiability.bounded(parameters, dark),
         *conclusion.correlated,

@@ -1,0 +1,76 @@
+"""Scatter of the parameters between repeated sweeps, to first order, where it exceeds the stated noise.
+
+A fit of the mean of sweeps takes their noise from the residuals. These do not show what moves a whole sweep
+as a parameter does, such as a drift of the lamp or of the wavelengths. The sweeps do: each deviates from the
+mean, and the linearised fit turns its deviation into steps of the parameters. Their experimental standard
+deviation of the mean (GUM 4.2) replaces the stated noise where the two do not agree.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pellicle.data.repeated_sweeps import deviations
+from pellicle.data.spectrum import Spectrum
+from pellicle.fitting.covariance import Scaled
+from pellicle.fitting.repeated_measurements import Agreement, RepeatedParameter, short
+from pellicle.fitting.result import Estimate
+from pellicle.fitting.reweighting import RankedMinima
+
+
+def with_sweeps(
+    data: Sequence[Spectrum],
+    ranked: RankedMinima,
+    jacobian: Scaled,
+    parameters: Mapping[str, Estimate],
+) -> tuple[dict[str, Estimate], list[str]]:
+    """Estimates whose errors include the scatter between sweeps, and sentences on those that it enlarges."""
+    result, sentences = dict(parameters), []
+    for view, (shifts, stated) in zip(ranked.problem.views, _steps(data, ranked, jacobian), strict=True):
+        for name, own, noise in zip(jacobian.names, shifts.T, stated, strict=True):
+            p = result[name]
+            if len(own) < 2 or p.at_bound or not math.isfinite(p.stderr) or not noise > 0:
+                continue
+            each = (float(noise) * math.sqrt(len(own)),) * len(own)
+            repeated = RepeatedParameter(name, p.unit, tuple(own.tolist()), each)
+            if repeated.agreement is not Agreement.LARGER:
+                continue
+            more = repeated.sd_mean**2 - noise**2
+            errors = [key for key in ("stderr", "stderr_noise") if getattr(p, key, None) is not None]
+            changed = {key: math.sqrt(getattr(p, key) ** 2 + more) for key in errors}
+            result[name] = replace(p, **changed)
+            unit, of = f" {p.unit}" if p.unit else "", f" of {view.name}" if view.name else ""
+            sentences.append(
+                f"the sweeps{of} drift: {name} differs by {short(repeated.sd)}{unit} from one to the next, so"
+                f" the error of their mean is {short(result[name].stderr)}{unit}, where the residuals alone"
+                f" say {short(p.stderr)}{unit}"
+            )
+    return result, sentences
+
+
+def _steps(
+    data: Sequence[Spectrum], ranked: RankedMinima, jacobian: Scaled
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """For each spectrum the steps (sweeps, columns) of all parameters and nuisances that its sweeps make, and
+    the standard error (columns,) that its noise contributes, in their own units."""
+    _, values, rows = np.linalg.svd(jacobian.jacobian, full_matrices=False)
+    values = np.maximum(values, np.finfo(float).eps * len(jacobian.jacobian) * max(values.max(), 1e-100))
+    inverse = jacobian.stretch @ (rows.T / values**2) @ rows  # of the normal equations
+    result, first = [], 0
+    for spectrum, view, fit in zip(data, ranked.problem.views, ranked.fits, strict=True):
+        gain = inverse @ jacobian.jacobian[first : first + view.points].T
+        first += view.points
+        if not spectrum.sweeps:
+            result.append((np.zeros((0, len(gain))), np.zeros(len(gain))))
+            continue
+        apart = deviations(spectrum.sweeps)
+        if view.data.frame is not None:
+            apart = np.einsum("pij,spj->spi", np.asarray(view.data.frame)[: view.rows], apart)
+        weight = np.asarray(view.data.weight)[: view.points] / math.sqrt(fit.variance)
+        shifts = apart.reshape(len(apart), -1) * weight @ gain.T
+        result.append((shifts, np.sqrt(np.sum(gain**2, axis=1))))
+    return result
