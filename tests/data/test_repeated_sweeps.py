@@ -1,5 +1,7 @@
 """Files and spectra of several sweeps over the same wavelengths: what is averaged, and what is refused."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -159,3 +161,25 @@ def test_sweep_numbers_count_earlier_rows():
     expected = [points[:i].count(point) for i, point in enumerate(points)]
     assert sweep_numbers(nm, angle).tolist() == expected
     assert sweep_numbers(nm).tolist() == [nm[:i].tolist().count(x) for i, x in enumerate(nm)]
+
+
+def test_four_zones_of_a_real_ellipsometer(tmp_path):
+    """The rows of zones 1 to 4, as sweeps, have the mean that the instrument wrote as zone 0."""
+    file = Path(__file__).parents[2] / "measurements" / "ellipsometry" / "19-1-1.dat"
+    heading, _, *lines = (line.split("\t") for line in file.read_text().splitlines())
+    columns = [heading.index(name) for name in ("Zone", "AOI", "Psi", "Delta")]
+    table = np.array([[float(line[i]) for i in columns] for line in lines])
+    zones = [table[table[:, 0] == zone, 1:].T for zone in (1, 2, 3, 4)]
+    path = tmp_path / "zones.csv"
+    nm = np.full(zones[0].shape[1], 658.0)
+    path.write_text("wavelength_nm,angle_deg,psi_deg,delta_deg\n" + "".join(rows(nm, *z) for z in zones))
+    found, own = pl.read_spectrum(path), pl.read_spectrum(file)
+    assert len(found.sweeps) == 4
+    assert found.delta is not None
+    assert own.delta is not None
+    assert found.angle is not None
+    assert own.angle is not None
+    np.testing.assert_array_equal(found.angle, own.angle)
+    # written to 0.001 degrees; the instrument averages angles, this averages N, C and S
+    np.testing.assert_allclose(found.values, own.values, atol=2e-3)
+    np.testing.assert_allclose(found.delta, own.delta, atol=5e-3)
