@@ -30,6 +30,8 @@ def with_sweeps(
 ) -> tuple[dict[str, Estimate], list[str]]:
     """Estimates whose errors include the scatter between sweeps, and sentences on those that it enlarges."""
     result, sentences = dict(parameters), []
+    if not any(spectrum.sweeps for spectrum in data):
+        return result, []
     for view, (shifts, stated) in zip(ranked.problem.views, _steps(data, ranked, jacobian), strict=True):
         for name, own, noise in zip(jacobian.names, shifts.T, stated, strict=True):
             p = result[name]
