@@ -62,6 +62,21 @@ def test_standard_deviations_and_ranges_follow(tmp_path):
     assert [len(sweep) for sweep in again.sweeps] == [6, 6]
 
 
+def test_copies_are_left_out(tmp_path):
+    """An export that holds one sweep twice is no better known for it."""
+    path = tmp_path / "film.csv"
+    path.write_text("wavelength_nm,R\n" + UP[0] + UP[0])
+    found = pl.read_spectrum(path, noise=0.004)
+    assert found.sweeps == ()
+    assert found.sigma is not None
+    np.testing.assert_array_equal(found.sigma, np.full(NM.size, 0.004))
+    assert found.notes[-1] == "1 of 2 sweeps hold the same numbers as an earlier one and are left out"
+    path.write_text("wavelength_nm,R\n" + UP[0] + DOWN[0] + UP[1])
+    found = pl.read_spectrum(path)
+    np.testing.assert_allclose(found.values, SWEEPS[:2].mean(axis=0), atol=1e-9)
+    assert len(found.sweeps) == 2
+
+
 def test_several_angles_at_one_wavelength(tmp_path):
     """As imaging ellipsometers measure: Δ around 0 is averaged across 360 degrees."""
     path = tmp_path / "brush.csv"

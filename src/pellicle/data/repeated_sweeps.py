@@ -77,7 +77,8 @@ def mean_spectrum(sweeps: Sequence[Spectrum]) -> Spectrum:
 
     **Arguments:** `sweeps`: two or more, of one signal at the same wavelengths and angles.
 
-    **Returns:** the mean, with the standard deviations of the mean where all sweeps have theirs.
+    **Returns:** the mean, with the standard deviations of the mean where all sweeps have theirs. Copies of a
+    sweep are left out, with a note.
 
     **Raises:** UsageError for spectra of different points or signals; DataError where they differ by more
     than repeats do: by over 10 % of the signal, alike at neighbouring points.
@@ -97,6 +98,12 @@ def mean_spectrum(sweeps: Sequence[Spectrum]) -> Spectrum:
     for name in ("signal", "polarisation", "folded", "wavelength", "angle"):
         if any(not np.array_equal(getattr(first, name), getattr(sweep, name)) for sweep in sweeps):
             raise UsageError(f"sweeps that are averaged must have the same {name}")
+    copies = [i for i in range(1, count) if any(_same(sweeps[i], earlier) for earlier in sweeps[:i])]
+    if copies:
+        note = f"{len(copies)} of {count} sweeps hold the same numbers as an earlier one and are left out"
+        kept = [sweep for i, sweep in enumerate(sweeps) if i not in copies]
+        one = kept[0] if len(kept) == 1 else mean_spectrum(kept)
+        return dataclasses.replace(one, notes=(*one.notes, note))
     size, alike = repeatability(sweeps), _alike(deviations(sweeps))
     mean = _mean(sweeps)
     level, unit = float(np.sqrt(np.mean(mean["values"] ** 2))), ""
@@ -139,6 +146,10 @@ def deviations(sweeps: Sequence[Spectrum]) -> Float[np.ndarray, "sweeps points c
     """Each sweep less the mean of all."""
     points = np.stack([coordinates(sweep) for sweep in sweeps])
     return points - points.mean(axis=0)
+
+
+def _same(one: Spectrum, other: Spectrum) -> bool:
+    return np.array_equal(one.values, other.values) and np.array_equal(one.delta, other.delta)
 
 
 def _alike(deviations: Float[np.ndarray, "sweeps points channels"]) -> float:
