@@ -149,7 +149,7 @@ def deviations(sweeps: Sequence[Spectrum]) -> Float[np.ndarray, "sweeps points c
 
 
 def _same(one: Spectrum, other: Spectrum) -> bool:
-    return np.array_equal(one.values, other.values) and np.array_equal(one.delta, other.delta)
+    return np.array_equal(coordinates(one), coordinates(other))
 
 
 def _alike(deviations: Float[np.ndarray, "sweeps points channels"]) -> float:
