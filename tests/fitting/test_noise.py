@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 
-from pellicle.fitting.noise import MODEL_ERROR, correlation_length, drifting_sigma, local_noise
+from pellicle.fitting.noise import MODEL_ERROR, correlation_length, drifting_sigma, local_noise, student
 
 RANDOM = np.random.default_rng(8)
 POSITION = np.linspace(0.0, 1.0, 1000)
@@ -64,3 +65,12 @@ def test_drifting_sigma_is_a_share_of_the_signal_plus_the_noise():
     expected = MODEL_ERROR * 10 * FRINGES + noise
     assert 0.10 <= MODEL_ERROR <= 0.15
     assert np.median(np.abs(found / expected - 1)) < 0.02
+
+
+@pytest.mark.parametrize("chi2", [3.84, 6.0])
+@pytest.mark.parametrize("freedom", [1.0, 1.5, 2.0, 7.3, 60.0, 999.0, 1001.0, 1e6])
+def test_student_is_wider_than_normal(freedom, chi2):
+    z = np.sqrt(chi2)
+    expected = stats.t.isf(stats.norm.sf(z), freedom) / z
+    assert student(freedom, chi2) == pytest.approx(expected, rel=1e-4)
+    assert student(np.inf, chi2) == 1.0

@@ -102,3 +102,26 @@ def test_an_interval_by_profile_is_that_of_a_scan(film, measured):
     for end in (low, high):
         assert profile(end) - best == pytest.approx(3.84, abs=0.1)
     assert low < fit["thickness"].value < high
+
+
+@pytest.mark.parametrize(("rise", "status"), [(7.5, "not-identifiable"), (40.0, "converged")])
+def test_a_plateau_within_reach_of_noise_is_open(film, rise, status):
+    """An absorbing film of 250 nm, of which any thicker one differs by `rise` in χ²: among so many
+    thicknesses noise favours one by 7.5 too easily."""
+    nm, n = np.linspace(400.0, 900.0, 128), 2.0 + 1.0j
+    values, thick = airy(nm, 250.0, n), airy(nm, 1e5, n)
+    sigma = np.sqrt(np.sum((values - thick) ** 2) / rise)
+    data = pl.Spectrum(nm, values, "R", sigma=np.full(128, sigma))
+    fit = pl.fit(data, film(pl.Free(10, 3000), pl.dispersion.Constant(n.real, n.imag)))
+    assert fit.status == status
+    assert fit["thickness"].lower_limit is None or fit["thickness"].lower_limit < 250.0
+
+
+def test_errors_from_three_points_are_those_of_student(film, measured):
+    """Two residuals set σ, so 1.96 normal standard errors would hold in 81 % only."""
+    scene, nm = film(pl.Free(280, 330)), np.array([460.0, 530.0, 630.0])
+    inside = []
+    for seed in range(150):
+        fit = pl.fit(measured(scene, 300.0, noise=0.002, seed=seed, wavelength=nm), scene)
+        inside.append(abs(fit["thickness"].value - 300.0) < 1.96 * fit["thickness"].stderr)
+    assert 0.9 < np.mean(inside) < 0.99

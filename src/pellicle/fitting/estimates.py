@@ -9,6 +9,7 @@ import numpy as np
 
 from pellicle.fitting.covariance import UNSEEN, Errors
 from pellicle.fitting.neighbourhood import neighbourhood
+from pellicle.fitting.noise import student
 from pellicle.fitting.profile_likelihood import ONE_SIDED, Limits, limits
 from pellicle.fitting.result import Estimate, Profile, Rival
 from pellicle.fitting.reweighting import RankedMinima
@@ -20,9 +21,12 @@ _MOST_RIVALS, _MOST_NEAR = 10, 3
 
 
 def rivals(ranked: RankedMinima) -> tuple[Rival, ...]:
-    """Every other minimum with its Δχ² on the effective points, best first."""
+    """Every other minimum with its Δχ² on the effective points, best first.
+
+    Where few residuals set the noise it is less by what Student's t is wider at the threshold of a rival.
+    """
     problem, minima = ranked.problem, ranked.minima
-    above = minima.deviance - minima.deviance[0]
+    above = (minima.deviance - minima.deviance[0]) / student(ranked.freedom, RIVAL) ** 2
     return tuple(
         Rival(
             dict(zip((p.name for p in problem.parameters), np.asarray(values).tolist(), strict=True)),

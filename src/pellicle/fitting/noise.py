@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 MODEL_ERROR = 0.12
@@ -9,6 +11,27 @@ MODEL_ERROR = 0.12
 DRIFT_CORRELATION = 10.0
 """Points that count as one where scale and offset drift slowly: the drift's own polynomials hide the
 correlation from the residuals of a short or featureless spectrum, so fewer is never assumed."""
+_MANY = 1000.0
+"""Degrees of freedom beyond which Student's t is nearly normal."""
+
+
+def student(freedom: float, chi2: float) -> float:
+    """By how much Student's t is wider than a normal distribution: the ratio of their quantiles where the
+    square of the normal one is `chi2`.
+
+    It widens errors and thresholds where residuals with so many degrees of `freedom` set the noise: with two
+    of them a 95 % interval (3.84) is 2.2 times as wide as with known noise, with ten 1.14 times.
+
+    **Source:** JCGM 100:2008, Guide to the expression of uncertainty in measurement, section G.3.
+    """
+    if freedom > _MANY:
+        return 1 + (chi2 + 1) / (4 * freedom)  # Abramowitz and Stegun 26.7.5
+    # t = √ν tan θ has the density cos^(ν−1) θ
+    angle = np.linspace(0.0, np.pi / 2, 4001)
+    density = np.cos(angle) ** (max(freedom, 1.0) - 1)
+    share = np.cumsum(density[1:] + density[:-1])
+    at = np.interp(math.erf((chi2 / 2) ** 0.5) * share[-1], share, angle[1:])
+    return math.sqrt(max(freedom, 1.0) / chi2) * math.tan(at)
 
 
 def local_noise(values: np.ndarray, window: int = 51) -> np.ndarray:

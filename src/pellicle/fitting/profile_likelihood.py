@@ -16,12 +16,16 @@ import numpy as np
 from pellicle.fitting.covariance import UNSEEN
 from pellicle.fitting.neighbourhood import Neighbourhood
 from pellicle.fitting.result import Profile
+from pellicle.fitting.reweighting import TWO_SIDED
 from pellicle.fitting.status import RIVAL
 
-ONE_SIDED, TWO_SIDED = 2.71, 3.84
-"""χ² above the best at a 95 % limit, where one side is bounded and where both are."""
+ONE_SIDED = 2.71
+"""χ² above the best at a 95 % limit where one side is bounded; `TWO_SIDED` where both are."""
 _OPEN = RIVAL
 """A side is open where the misfit never rises by this, which would rule out a rival."""
+_PLATEAU, _LEVEL = 10.0, 1.0
+"""A side is open, too, where the outer half of the misfit is below `_PLATEAU` and level within `_LEVEL`. An
+absorbing film looks the same at any large thickness, and noise favours one of many by that much."""
 _REACH = 2.0
 """Standard errors at which the parabola is compared with the misfit, and within which a bound matters."""
 _FLAT, _CURVED = 0.5, 4.0
@@ -208,8 +212,16 @@ class _OneParameter:
 
     def flat_sides(self, scan: Profile) -> tuple[bool, bool]:
         """On which sides of the best thickness the misfit of the search's scan never rises."""
-        close, level = scan.delta_chi2 < ONE_SIDED, scan.delta_chi2 < _OPEN
+        close = scan.delta_chi2 < ONE_SIDED
         thinner, thicker = scan.thickness < self.value - _NEAR, scan.thickness > self.value + _NEAR
-        below = level[thinner].all() if thinner.any() else close[thicker][:1].all()
-        above = level[thicker].all() if thicker.any() else close[thinner][-1:].all()
+        outwards = scan.delta_chi2[thinner][::-1], scan.delta_chi2[thicker]
+        below = _open(outwards[0]) if thinner.any() else close[thicker][:1].all()
+        above = _open(outwards[1]) if thicker.any() else close[thinner][-1:].all()
         return bool(below), bool(above)
+
+
+def _open(rise: np.ndarray) -> bool:
+    """True where the misfit along a way to a bound never rises, or only to a plateau."""
+    far = rise[len(rise) // 2 :]
+    plateau = len(far) > 1 and far.max() < _PLATEAU and np.ptp(far) < _LEVEL
+    return bool(rise.max() < _OPEN or plateau)

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pellicle.dispersion.base import known_index
+from pellicle.fitting.noise import student
 from pellicle.fitting.profile_likelihood import Limits
 from pellicle.fitting.result import Estimate, Profile
 from pellicle.fitting.reweighting import RankedMinima, ViewFit
@@ -16,6 +17,7 @@ from pellicle.fitting.spectra.parameters import fixed_numbers, thickness_name
 from pellicle.fitting.spectra.problem import shortest_wavelength
 from pellicle.fitting.spectra.targets import Measured, drifts
 from pellicle.fitting.spectra.view import SpectrumView
+from pellicle.fitting.status import RIVAL
 from pellicle.materials import materials_in
 from pellicle.optics.pair import imag
 from pellicle.scene.free import insert
@@ -40,7 +42,7 @@ def scan_profile(ranked: RankedMinima) -> Profile | None:
         # a robust loss lowers the weights of some points
         raised = np.max(new.weight / np.where(old.weight > 0, old.weight, np.inf))
         ratio.append(float(raised**2 * new.independent_fraction / old.independent_fraction))
-    above = (scan.deviance * ratio).sum(-1).min(axis=0)
+    above = (scan.deviance * ratio).sum(-1).min(axis=0) / student(ranked.freedom, RIVAL) ** 2
     # on their new weights several views together may have their least misfit elsewhere in the scan
     return Profile(scan.thickness, np.minimum(above - min(above.min(), 0.0), _RULED_OUT))
 
