@@ -19,6 +19,7 @@ from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.progress import Progress
 from pellicle.fitting.reweighting import RankedMinima, rank
+from pellicle.fitting.spectra import residual_structure
 from pellicle.fitting.spectra.parameters import bounds, with_bounds
 from pellicle.fitting.spectra.problem import make
 from pellicle.fitting.spectra.search import search
@@ -29,6 +30,8 @@ log = getLogger(__name__)
 
 _ROUNDS = 3
 """Times that bounds are moved outwards, each time by the width of the range."""
+_THIN = 0.05
+"""Share of the range within which what was added needs no search of its own."""
 _ON_BOUND = 1e-6
 
 
@@ -58,7 +61,10 @@ def wider(
             break
         problem = make(*measured_within(spectra, ranked, moved), tolerance=tolerance)
         starts = [np.asarray(now.problem.values(now.minima.units))]
-        for slab in _slabs(before, moved):
+        views = zip(now.problem.views, now.fits, strict=True)
+        missed = any(residual_structure.missed(view, fit) for view, fit in views)
+        # where noise alone is left, nothing far away can be better
+        for slab in _slabs(before, moved) if missed else ():
             beside = _within(problem, slab)
             starts.append(np.asarray(beside.values(search(beside, progress).units)))
         again = rank(problem, minima(problem, _inside(problem, np.concatenate(starts))), loss)
@@ -107,10 +113,13 @@ def _at_moved_bound(old: Parameter, new: Parameter, value: float) -> bool:
 
 
 def _slabs(before: Sequence[Parameter], moved: Sequence[Parameter]) -> Iterator[tuple[Parameter, ...]]:
-    """Bounds of what was added to the box on each side of each parameter, of the others all."""
+    """Bounds of what was added to the box on each side of each parameter, of the others all.
+
+    Thin slabs are left out: what they contain is near the minima that rest on the bound.
+    """
     for i, (p, q) in enumerate(zip(before, moved, strict=True)):
         for lower, upper in ((q.lower, p.lower), (p.upper, q.upper)):
-            if lower < upper:
+            if upper - lower > _THIN * (p.upper - p.lower):
                 yield (*moved[:i], replace(q, lower=lower, upper=upper), *moved[i + 1 :])
 
 
