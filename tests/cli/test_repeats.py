@@ -50,7 +50,7 @@ def test_thicknesses_that_differ_are_told(pellicle, spectrum_file, recipe):
     ran = pellicle("fit", "--recipe", recipe("files = ['a.csv', 'b.csv', 'c.csv']\nrepeats = true"))
     assert ran.code == 0
     assert ran.out.count("[[Verdict]]") == 3
-    assert "the stated error is too small" in " ".join(ran.out.split())
+    assert "the stated noise error is too small" in " ".join(ran.out.split())
 
 
 def test_a_file_that_cannot_be_read_is_not_waited_for(pellicle, spectrum_file, scene, tmp_path):

@@ -104,8 +104,8 @@ def test_levels_by_simulation():
 @pytest.mark.parametrize(
     ("values", "agreement", "words"),
     [
-        ((123.1, 123.4, 123.3), Agreement.AGREES, "the stated error agrees with the scatter"),
-        ((122.5, 123.4, 124.1), Agreement.LARGER, "the stated error is too small"),
+        ((123.1, 123.4, 123.3), Agreement.AGREES, "the stated noise error agrees with the scatter"),
+        ((122.5, 123.4, 124.1), Agreement.LARGER, "the stated noise error is too small"),
         ((123.4, 123.41, 123.42), Agreement.SMALLER, "is the same in all repeats"),
     ],
 )
@@ -124,6 +124,14 @@ def test_effects_that_repeats_share_remain():
     assert thickness.noise == (0.3,) * 4
     assert thickness.common == pytest.approx(0.4)
     assert "With 0.4 nm from effects that all repeats share" in found.verdict
+
+
+def test_the_whole_stated_error_may_cover_the_scatter():
+    """A wavelength error of each spectrum scatters, and is no noise: stated it was, nevertheless."""
+    values = (122.5, 123.4, 124.1)
+    covered = pl.fitting.repeats([fit(value, stderr=1.0) for value in values]).verdict
+    assert "too small, though the whole stated error, 1 nm, covers the scatter." in covered
+    assert "covers the scatter" not in pl.fitting.repeats([fit(x, stderr=0.5) for x in values]).verdict
 
 
 def test_what_does_not_scatter_remains():

@@ -175,11 +175,15 @@ class Repeats(ReportMixin):
         sentence += f" They scatter by {short(p.sd)}{unit}, {times}:"
         match p.agreement:
             case Agreement.LARGER:
-                sentence += " the stated error is too small."
+                sentence += " the stated noise error is too small"
+                whole = math.hypot(p.stated, p.common)
+                if p.common and p.sd <= whole:
+                    sentence += f", though the whole stated error, {short(whole)}{unit}, covers the scatter"
+                sentence += "."
             case Agreement.SMALLER:
-                sentence += " what the stated error has beyond the scatter is the same in all repeats."
+                sentence += " what the stated noise error has beyond the scatter is the same in all repeats."
             case _:
-                sentence += " the stated error agrees with the scatter."
+                sentence += " the stated noise error agrees with the scatter."
         if p.shared:
             sentence += (
                 f" With {short(p.shared)}{unit} from effects that all repeats share, the mean is known to"

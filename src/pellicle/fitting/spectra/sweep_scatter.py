@@ -46,10 +46,11 @@ def with_sweeps(
             changed = {key: math.sqrt(getattr(p, key) ** 2 + more) for key in errors}
             result[name] = replace(p, **changed)
             unit, of = f" {p.unit}" if p.unit else "", f" of {view.name}" if view.name else ""
+            before, after = (getattr(x, "stderr_noise", x.stderr) for x in (p, result[name]))
             sentences.append(
                 f"the sweeps{of} drift: {name} differs by {short(repeated.sd)}{unit} from one to the next, so"
-                f" the error of their mean is {short(result[name].stderr)}{unit}, where the residuals alone"
-                f" say {short(p.stderr)}{unit}"
+                f" the noise error of their mean is {short(after)}{unit}, where the residuals alone say"
+                f" {short(before)}{unit}"
             )
     return result, sentences
 
