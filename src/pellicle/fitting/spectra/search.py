@@ -5,7 +5,7 @@ shortest fringe, the other parameters take a few values each, and only *local mi
 go on to the solver: otherwise the best starts are all neighbours. The lowest are polished at once. Any
 other thickness at which the misfit, least over the other parameters, has a local minimum is an interference
 order of its own: it is polished too, unless it is further above the best minimum than polishing has lowered
-any start by.
+any start by. The period of the fringes (`fringes.py`) proposes more.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from pellicle.fitting.minima import MOST, SLOTS, Minima, Scan, settled, solve
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.progress import Progress, quiet
+from pellicle.fitting.spectra.fringes import proposed
 from pellicle.fitting.spectra.problem import shortest_wavelength
 
 log = getLogger(__name__)
@@ -38,6 +39,9 @@ _REACH = 1.25
 _CHANCE = 20.0
 """Δχ² in units of the noise that an order may be above the best and is polished in any case: three times
 that of a rival, as correlated residuals count for less."""
+_NEAR, _INDEX = 4, 0.4
+"""Candidates that are polished near the thickness that the fringes suggest, and the difference of ln n up to
+which they are near: from 1.3 to 2.0, or back."""
 _MOST_POLISHED = 2048
 """Starts after which no more are polished."""
 
@@ -54,7 +58,8 @@ def search(problem: Problem, progress: Progress) -> Minima:
     total = table.sum(-1)
     batches = 1 if len(design) == 1 else 3 if len(problem.parameters) < 4 else 6
     lowest = np.flatnonzero(_lowest_within(total, 1).ravel())
-    first = lowest[np.argsort(total.ravel()[lowest])][: batches * MOST]
+    lowest = lowest[np.argsort(total.ravel()[lowest])]
+    first = np.union1d(lowest[: batches * MOST], _near_fringes(problem, units, lowest))
     polished, tried = _every_order(problem, units, total, first, progress)
     result = settled(problem, polished, coarse=_COARSE)
     best = zip(problem.parameters, problem.values(result.units[0]), strict=True)
@@ -78,6 +83,16 @@ def _lowest_within(values: np.ndarray, reach: int) -> np.ndarray:
     padded = np.pad(values, [(0, 0)] * (values.ndim - 1) + [(reach, reach)], constant_values=np.inf)
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1, axis=-1)
     return values <= windows.min(-1)
+
+
+def _near_fringes(problem: Problem, units: np.ndarray, lowest: np.ndarray) -> np.ndarray:
+    """The first of the candidates `lowest` whose thickness is what the fringes suggest, by an index that may
+    be wrong."""
+    chosen = []
+    for thickness in proposed(problem):
+        found = np.asarray(problem.values(units[lowest]))[:, problem.thickness_axis]
+        chosen.append(lowest[np.abs(np.log(np.maximum(found, 1e-9) / thickness)) < _INDEX][:_NEAR])
+    return np.concatenate([lowest[:0], *chosen])
 
 
 def _every_order(

@@ -12,7 +12,7 @@ from pellicle.fitting.noise import student
 from pellicle.fitting.profile_likelihood import Limits
 from pellicle.fitting.result import Estimate, Profile
 from pellicle.fitting.reweighting import RankedMinima, ViewFit
-from pellicle.fitting.spectra import residual_structure
+from pellicle.fitting.spectra import fringes, residual_structure
 from pellicle.fitting.spectra.parameters import fixed_numbers, thickness_name
 from pellicle.fitting.spectra.problem import shortest_wavelength
 from pellicle.fitting.spectra.targets import Measured, drifts
@@ -100,6 +100,7 @@ def warnings(spectra: Sequence[Measured], ranked: RankedMinima, unclear: Sequenc
             f" {scan.thickness[1] - scan.thickness[0]:.3g} nm, where fringes call for {finest:.3g}: minima"
             " may be missed; narrow the bounds"
         )
+    messages += fringes.disagreement(ranked.problem, ranked.fits, ranked.values)
     for spectrum, view, fit in zip(spectra, ranked.problem.views, ranked.fits, strict=True):
         scene, length, own = spectrum.scene, fit.length, f"{view.name}: " if view.name else ""
         orders = view.plan.row("orders")
