@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from pellicle.scene.layers import Plate as Plate
     from pellicle.scene.layers import Substrate as Substrate
     from pellicle.scene.surface import Surface as Surface
+    from pellicle.scene.uncertainty import Uncertainty as Uncertainty
     from pellicle.simulation.functions import ellipsometry as ellipsometry
     from pellicle.simulation.functions import reflectance as reflectance
     from pellicle.simulation.functions import refractive_index as refractive_index
@@ -57,6 +58,7 @@ _NAMES = {
     "pellicle.scene.film": ("Light", "Scene"),
     "pellicle.scene.free": ("Free",),
     "pellicle.scene.instrument": ("Instrument",),
+    "pellicle.scene.uncertainty": ("Uncertainty",),
     "pellicle.scene.layers": ("Interface", "Layer", "Plate", "Substrate"),
     "pellicle.scene.surface": ("Surface",),
     "pellicle.simulation.functions": ("ellipsometry", "reflectance", "refractive_index", "transmittance"),

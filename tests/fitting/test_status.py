@@ -8,14 +8,14 @@ import pytest
 import pellicle as pl
 from pellicle.fitting import minima
 from pellicle.fitting.result import Estimate, Rival, Status
-from pellicle.fitting.status import describe, judge, misfits, verdict
+from pellicle.fitting.status import describe, expanded, judge, verdict
 
 
 def test_converged(film, measured):
     scene = film()
     fit = pl.fit(measured(scene, 430.0), scene)
     assert fit.status is pl.Status.CONVERGED
-    assert describe(fit["thickness"]).removeprefix("thickness ") in fit.verdict
+    assert fit.verdict == f"The data determine thickness: {expanded(fit['thickness'])}."
 
 
 def test_at_a_bound_that_the_user_set(film, measured):
@@ -182,36 +182,6 @@ def test_without_a_thickness_every_free_parameter_must_be_unseen():
     assert judge(**(right | {"parameters": none})) is Status.NOT_IDENTIFIABLE
 
 
-KNOWN = {
-    "chi2_reduced": 1.0,
-    "sigma_known": False,
-    "drifting": False,
-    "structured": True,
-    "rms": 0.03,
-    "span": 1.0,
-    "calibrated": True,
-}
-
-
-@pytest.mark.parametrize(
-    ("changed", "misfit"),
-    [
-        ({}, True),
-        ({"structured": False}, False),
-        ({"rms": 0.019}, False),
-        ({"rms": 0.019, "span": 0.3}, True),  # above 5 % of the span
-        ({"calibrated": False}, False),  # then only the span counts
-        ({"calibrated": False, "rms": 0.06}, True),
-        ({"sigma_known": True}, False),
-        ({"sigma_known": True, "chi2_reduced": 4.1, "rms": 0.001}, True),
-        ({"drifting": True, "chi2_reduced": 0.5}, False),
-        ({"drifting": True, "chi2_reduced": 1.5}, True),
-    ],
-)
-def test_what_is_a_misfit(changed, misfit):
-    assert misfits(**(KNOWN | changed)) is misfit
-
-
 LEAD = estimate(value=300.0, stderr=1.0)
 RIVALS = (Rival({"thickness": 500.0}, 1.0), Rival({"thickness": 700.0}, 2.0))
 UNSEEN = {"thickness": estimate(stderr=math.inf)}
@@ -220,38 +190,40 @@ UNSEEN = {"thickness": estimate(stderr=math.inf)}
 @pytest.mark.parametrize(
     ("status", "parameters", "options", "text"),
     [
-        (Status.CONVERGED, {}, {}, "The data determine thickness: 300.0 ± 1.0 nm."),
+        (Status.CONVERGED, {}, {}, "The data determine thickness: 300.0 ± 2.0 nm (95 %)."),
         (
             Status.CONVERGED,
             {},
             {"trading": ["n and thickness are correlated", "another"]},
-            "The data determine thickness: 300.0 ± 1.0 nm. But n and thickness are correlated.",
+            "The data determine thickness: 300.0 ± 2.0 nm (95 %). But n and thickness are correlated.",
         ),
         (
             Status.AT_BOUND,
             {"n": estimate("n", 1.5, 0.1, True)},
             {},
-            "The best fit, thickness 300.0 ± 1.0 nm, lies on a bound that was set: n (1.5 nm)."
+            "The best fit, thickness 300.0 ± 2.0 nm (95 %), lies on a bound that was set: n (1.5 nm)."
             " Widen the bound; if the best value moves with it, the scene may be wrong.",
         ),
         (
             Status.AT_BOUND,
             {"thickness": estimate(stderr=60.0), "n": estimate("n", 1.5, 0.1, True, default_bounds=True)},
             {},
-            "The best fit, thickness 300 ± 60 nm, lies on a default bound: n (1.5 nm). Give it bounds.",
+            "The best fit, thickness 300 ± 118 nm (95 %), lies on a default bound: n (1.5 nm). Give it"
+            " bounds.",
         ),
         (
             Status.AMBIGUOUS,
             {},
             {"rivals": RIVALS},
-            "The data do not determine thickness: 300.0 ± 1.0 nm fits best, but 500 nm fits nearly as well.",
+            "The data do not determine thickness: 300.0 ± 2.0 nm (95 %) fits best, but 500 nm fits nearly as"
+            " well.",
         ),
         (
             Status.AMBIGUOUS,
             {"n": estimate("n", 1.5, 0.01)},
             {"rivals": (Rival({"thickness": 300.1, "n": 2.5}, 1.0),)},
-            "The data do not determine thickness: 300.0 ± 1.0 nm fits best, but n 2.5 nm fits nearly as"
-            " well.",
+            "The data do not determine thickness: 300.0 ± 2.0 nm (95 %) fits best, but n 2.5 nm fits nearly"
+            " as well.",
         ),
         (
             Status.NOT_IDENTIFIABLE,
@@ -281,8 +253,9 @@ UNSEEN = {"thickness": estimate(stderr=math.inf)}
             Status.MISFIT,
             {},
             {"where": "690-710 nm", "missed": "film.csv"},
-            "The scene does not explain film.csv: even the best fit misses by 0.012 on average, far more than"
-            " noise would, most of all 690-710 nm. Its thickness 300 nm should not be used.",
+            "The scene does not explain film.csv: even the best fit misses by 0.012 on average, more than"
+            " noise and the usual errors of instruments and samples would, most of all 690-710 nm. Its"
+            " thickness 300 nm should not be used.",
         ),
         (
             Status.NOT_CONVERGED,
@@ -308,3 +281,26 @@ def test_wording_of_verdicts(status, parameters, options, text):
 )
 def test_values_with_two_digits_of_their_errors(value, stderr, text):
     assert describe(estimate(value=value, stderr=stderr)) == text
+
+
+@pytest.mark.parametrize(
+    ("noise", "freedom", "text"),
+    [
+        (1.0, math.inf, "300.0 ± 2.0 nm (95 %)"),
+        (0.2, math.inf, "300.0 ± 2.0 nm (95 %; ± 0.39 nm by noise alone)"),
+        # Student's t of 4 degrees of freedom is 2.776 (GUM 2008, table G.2)
+        (1.0, 4.0, "300.0 ± 2.8 nm (95 %)"),
+    ],
+)
+def test_an_expanded_uncertainty_says_its_level(noise, freedom, text):
+    assert expanded(estimate(stderr_noise=noise, degrees_of_freedom=freedom)) == text
+
+
+def test_degrees_of_freedom_by_welch_and_satterthwaite():
+    """A quarter of the variance from four degrees of freedom: 4 / (1/4)² = 64 (GUM 2008, eq. G.2b)."""
+    p = estimate(stderr=2.0, stderr_noise=1.0, degrees_of_freedom=4.0)
+    assert p.effective_degrees_of_freedom == pytest.approx(64)
+    assert p.stderr_systematic == pytest.approx(3**0.5)
+    assert p.coverage_factor == pytest.approx(1.998, abs=1e-3)  # t of 64 degrees of freedom
+    assert estimate().coverage_factor == pytest.approx(1.960, abs=1e-3)
+    assert math.isinf(estimate(stderr=math.inf).expanded)

@@ -23,8 +23,8 @@ from pellicle.reporting.json_record import failure, one_line, to_json
 
 FILES = ["figure.png", "fit.csv", "nk.csv", "report.txt", "result.json"]
 KEYS = (
-    "schema data status verdict parameters rivals chi2_reduced rms effective_points correlation plan"
-    " warnings versions seconds"
+    "schema data status verdict parameters rivals chi2_reduced rms effective_points correlation"
+    " budget plan warnings versions seconds"
 )
 
 
@@ -104,6 +104,10 @@ def test_parameters_keep_limits_only_where_there_are_any(fit):
     assert parameters["thickness"] == {
         "value": 486.28,
         "stderr": 0.12,
+        "stderr_noise": 0.12,
+        "expanded": pytest.approx(1.959964 * 0.12),
+        "coverage_factor": pytest.approx(1.959964),
+        "degrees_of_freedom": None,
         "unit": "nm",
         "lower": 10.0,
         "upper": 3000.0,

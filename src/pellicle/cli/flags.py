@@ -63,6 +63,10 @@ class SceneFlags(_Flags):
     bandwidth: Annotated[
         str | None, flag(INSTRUMENT, "Full width at half maximum in nm, free, or LO:HI.")
     ] = None
+    uncertainty: Annotated[
+        str | None,
+        flag(INSTRUMENT, "usual: errors include those of ordinary instruments and samples; or none."),
+    ] = None
 
 
 @dataclass(frozen=True)

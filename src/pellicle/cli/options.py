@@ -24,6 +24,7 @@ def scene_from_flags(flags: SceneFlags, reading: ReadingFlags) -> tuple[Scene, l
     from pellicle.scene.free import Free
     from pellicle.scene.instrument import Instrument
     from pellicle.scene.layers import Layer, Substrate
+    from pellicle.scene.uncertainty import Uncertainty
 
     if flags.layer is None or flags.substrate is None:
         missing = "--layer" if flags.layer is None else "--substrate"
@@ -31,6 +32,8 @@ def scene_from_flags(flags: SceneFlags, reading: ReadingFlags) -> tuple[Scene, l
             f"{missing} is missing: give layer and substrate, as in "
             "--layer SiO2 --substrate Si, or give a --recipe"
         )
+    if flags.uncertainty not in (None, "usual", "none"):
+        raise UsageError(f"--uncertainty must be usual or none, not {flags.uncertainty!r}")
     if flags.plate_mm is not None and flags.back is None:
         raise UsageError("--plate-mm needs --back: which medium lies behind the plate, as in --back air")
     if flags.plate_mm is not None and not 0 < flags.plate_mm < inf:
@@ -50,6 +53,7 @@ def scene_from_flags(flags: SceneFlags, reading: ReadingFlags) -> tuple[Scene, l
             w.drift(flags.offset or "0", "`offset`"),
             None if bandwidth is None else w.free_or_number(bandwidth, "`bandwidth`", slit),
         ),
+        uncertainty=Uncertainty() if flags.uncertainty != "none" else Uncertainty.none(),
     )
     return scene, assumed
 

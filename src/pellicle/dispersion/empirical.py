@@ -142,6 +142,18 @@ class Shifted(AbstractDispersion):
 
 
 @final
+class Scaled(AbstractDispersion):
+    """A dispersion times 1 + `change`·`shape`, with `shape` one number or one for each wavelength."""
+
+    base: AbstractDispersion
+    change: Any
+    shape: Any = 1.0
+
+    def index(self, wavelength):
+        return self.base.index(wavelength) * (1 + self.change * self.shape)
+
+
+@final
 class Tabulated(AbstractDispersion):
     """Index and slope (1/nm) of another dispersion at the wavelengths of a measurement.
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from pellicle.effects.bounds import (
-    is_zero,
     largest_index,
     largest_ratio,
     least_ambient,
+    normal_incidence,
     smallest_index,
     upper,
 )
@@ -189,7 +189,7 @@ def _rays(scene: Scene) -> tuple[int, int, float]:
         return path * np.sqrt(np.maximum(index**2 - (ambient * np.sin(angle)) ** 2, 0.0))
 
     def rays(count: int) -> tuple[int, int, float]:
-        around = 1 if is_zero(scene.light.angle) else count
+        around = 1 if normal_incidence(scene) else count
         return count, around, quadrature.cone_error(phase, float(axis), float(sine), count, around)
 
     tried = map(rays, RAYS)

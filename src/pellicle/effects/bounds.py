@@ -21,6 +21,11 @@ def is_zero(number: Any) -> bool:
     return number is None or (not isinstance(number, Free) and np.ndim(number) == 0 and float(number) == 0.0)
 
 
+def normal_incidence(scene: Scene) -> bool:
+    """True where the axis of the light is provably normal to the layers."""
+    return is_zero(scene.light.angle) and scene.instrument.angle_shift is None
+
+
 def least_ambient(scene: Scene) -> float:
     """The ambient's smallest index at the light's wavelengths."""
     ambient = insert(scene.ambient, start_values(scene.ambient))
@@ -76,7 +81,8 @@ def _ratio(scene: Scene) -> float:
 
 def _extreme_angles(scene: Scene) -> list[Any]:
     """The angles of incidence in radians, also at the rim of a cone; None is normal incidence."""
-    angle = None if is_zero(scene.light.angle) else jnp.deg2rad(scene.light.angle)
+    shift = upper(scene.instrument.angle_shift)
+    angle = None if normal_incidence(scene) else jnp.deg2rad(scene.light.angle + shift)
     if not scene.instrument.has_cone:
         return [angle]
     rim = (0.0 if angle is None else angle) + scene.instrument.largest_half_angle(least_ambient(scene))

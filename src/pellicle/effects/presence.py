@@ -10,7 +10,7 @@ import numpy as np
 
 from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.dispersion.empirical import Constant
-from pellicle.effects.bounds import is_zero, upper
+from pellicle.effects.bounds import normal_incidence, upper
 from pellicle.effects.plan import Row
 from pellicle.materials import Material
 from pellicle.optics.pair import real
@@ -49,10 +49,12 @@ def oblique(scene: Scene) -> Row:
     angle = scene.light.angle
     if scene.instrument.has_cone:
         return Row("oblique", True, "the light's cone has oblique rays")
-    if is_zero(angle):
+    if normal_incidence(scene):
         return Row("oblique", False, "normal incidence, and the angle is not free")
     if isinstance(angle, Free):
         return Row("oblique", True, "the angle of incidence is free")
+    if scene.instrument.angle_shift is not None:
+        return Row("oblique", True, "the angle of incidence is shifted")
     span = " to ".join(f"{x:g}" for x in sorted({np.min(angle), np.max(angle)}))
     return Row("oblique", True, f"incidence at {span}°")
 
@@ -88,7 +90,8 @@ def _propagates(material, scene: Scene) -> bool:
         return False
     at = np.asarray(wavelength, dtype=float)
     index, ambient = (real(known_index(medium, at)) for medium in (material, scene.ambient))
-    steepest = np.deg2rad(angle) + scene.instrument.largest_half_angle(float(np.min(ambient)))
+    shift = scene.instrument.angle_shift
+    steepest = np.deg2rad(angle + upper(shift)) + scene.instrument.largest_half_angle(float(np.min(ambient)))
     return bool(np.all(index > ambient * np.sin(np.minimum(steepest, np.pi / 2)) * (1 + 1e-6)))
 
 
@@ -98,7 +101,7 @@ def polarisation(scene: Scene) -> Row:
         return Row("polarisation", True, "ellipsometry compares p with s")
     if scene.instrument.has_cone:
         return Row("polarisation", True, "the light's cone has s and p")
-    if is_zero(scene.light.angle):
+    if normal_incidence(scene):
         return Row("polarisation", False, "s and p are equal at normal incidence")
     if scene.light.polarisation != "unpolarised":
         return Row("polarisation", False, f"the light is {scene.light.polarisation}-polarised")

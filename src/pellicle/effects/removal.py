@@ -80,7 +80,8 @@ def _opaque(scene: Scene, removal: FilmRemoval) -> Scene:
 
 def _oblique(scene: Scene, _: FilmRemoval) -> Scene:
     """Take normal incidence."""
-    return _with(scene, light=_with(scene.light, angle=0.0))
+    instrument = _with(scene.instrument, angle_shift=None)
+    return _with(scene, light=_with(scene.light, angle=0.0), instrument=instrument)
 
 
 def _roughness(scene: Scene, _: FilmRemoval) -> Scene:

@@ -10,6 +10,7 @@ import numpy as np
 
 from pellicle.fitting import identifiability
 from pellicle.fitting.covariance import Errors, Scaled, errors, scaled
+from pellicle.fitting.discrepancy import Discrepancy
 from pellicle.fitting.estimates import by_curvature, by_profile, estimates, rivals
 from pellicle.fitting.minima import Minima
 from pellicle.fitting.problem import Problem
@@ -69,6 +70,7 @@ def conclude(
     ranked: RankedMinima,
     jacobian: Scaled,
     covariance: Errors,
+    discrepancy: Discrepancy,
     *,
     misfit: bool,
     fixed: list[Estimate],
@@ -79,16 +81,17 @@ def conclude(
 ) -> Conclusion:
     """Judge the best of the ranked minima.
 
-    Limits come from profiles where the fit is usable, else from the covariance alone; with `near` profiles
-    start from near rivals too. `amend` has the last word on them. `binding` names parameters whose default
-    bounds count as those of the user.
+    The `discrepancy` enlarges errors, and differences in χ² count less by it. Limits come from profiles
+    where the fit is usable, else from the covariance alone; with `near` profiles start from near rivals too.
+    `amend` has the last word on them. `binding` names parameters whose default bounds count as those of the
+    user.
     """
-    converged, others = bool(ranked.minima.converged[0]), rivals(ranked)
+    converged, others = bool(ranked.minima.converged[0]), rivals(ranked, discrepancy.evidence_share)
     if converged and not misfit:
         bounded = by_profile(ranked, covariance, scans, others if near else ())
     else:
         bounded = by_curvature(ranked, covariance)
-    parameters = estimates(ranked, covariance, list(amend(bounded)), fixed)
+    parameters = estimates(ranked, covariance, discrepancy, list(amend(bounded)), fixed)
     # parameters at a zero that physics sets; a thickness of 0 is none of them: no layer
     natural = frozenset(
         p.name

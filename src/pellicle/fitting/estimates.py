@@ -8,6 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from pellicle.fitting.covariance import UNSEEN, Errors
+from pellicle.fitting.discrepancy import Discrepancy
 from pellicle.fitting.neighbourhood import neighbourhood
 from pellicle.fitting.noise import student
 from pellicle.fitting.profile_likelihood import ONE_SIDED, Limits, limits
@@ -20,13 +21,14 @@ _ON_BOUND = 1e-6
 _MOST_RIVALS, _MOST_NEAR = 10, 3
 
 
-def rivals(ranked: RankedMinima) -> tuple[Rival, ...]:
+def rivals(ranked: RankedMinima, share: float = 1.0) -> tuple[Rival, ...]:
     """Every other minimum with its Δχ² on the effective points, best first.
 
-    Where few residuals set the noise it is less by what Student's t is wider at the threshold of a rival.
+    Of a difference in χ² only a `share` is evidence where residuals are larger than noise. Where few
+    residuals set the noise it is less by what Student's t is wider at the threshold of a rival.
     """
     problem, minima = ranked.problem, ranked.minima
-    above = (minima.deviance - minima.deviance[0]) / student(ranked.freedom, RIVAL) ** 2
+    above = share * (minima.deviance - minima.deviance[0]) / student(ranked.freedom, RIVAL) ** 2
     return tuple(
         Rival(
             dict(zip((p.name for p in problem.parameters), np.asarray(values).tolist(), strict=True)),
@@ -61,23 +63,51 @@ def by_profile(
 
 
 def estimates(
-    ranked: RankedMinima, errors: Errors, bounded: list[Limits], fixed: list[Estimate]
+    ranked: RankedMinima,
+    errors: Errors,
+    discrepancy: Discrepancy,
+    bounded: list[Limits],
+    fixed: list[Estimate],
 ) -> dict[str, Estimate]:
-    """Every parameter by name: free ones first, thickness before all; then nuisances and fixed numbers."""
+    """Every parameter by name: free ones first, thickness before all; then nuisances and fixed numbers.
+
+    `errors` and the limits are those of the noise alone.
+    """
     parameters, values = ranked.problem.parameters, ranked.values.tolist()
+    # a profile likelihood has corrected the error of the noise; what is not noise adds to it
+    more = np.maximum(discrepancy.variance - errors.stderr**2, 0.0).tolist()
     free = []
-    for p, value, limit in zip(parameters, values, bounded, strict=True):
+    for p, value, own, extra in zip(parameters, values, bounded, more[: len(values)], strict=True):
+        limit = _widened(own, value, extra, ranked.freedom, (p.lower, p.upper))
         margin = min(value - p.lower, p.upper - value)
         at_bound = not p.periodic and margin <= _ON_BOUND * (p.upper - p.lower)
         ends = p.lower, p.upper, True, at_bound, limit.lower, limit.upper, p.limits is not None
-        free.append(Estimate(p.name, value, float(limit.stderr), p.unit, *ends))
+        noise = float(own.stderr), max(ranked.freedom, 1.0)
+        free.append(Estimate(p.name, value, float(limit.stderr), p.unit, *ends, *noise))
     order = sorted(range(len(free)), key=lambda i: parameters[i].key != "thickness")
     pairs = zip(ranked.problem.views, ranked.fits, strict=True)
     nuisances = [c for view, fit in pairs for c in view.nuisances(fit.at)]
     linear = []
-    for c, sd in zip(nuisances, errors.stderr[len(values) :].tolist(), strict=True):
+    widths = zip(errors.stderr[len(values) :].tolist(), more[len(values) :], strict=True)
+    for c, (noise_sd, extra) in zip(nuisances, widths, strict=True):
+        sd = math.sqrt(noise_sd**2 + extra)
         reach = ONE_SIDED**0.5 * sd
         # an offset compatible with 0 has an upper limit
         upper = c.value + reach if c.not_negative and c.value < reach else None
-        linear.append(Estimate(c.name, c.value, sd, "", -math.inf, math.inf, True, upper_limit=upper))
+        ends = "", -math.inf, math.inf, True
+        linear.append(Estimate(c.name, c.value, sd, *ends, upper_limit=upper, stderr_noise=noise_sd))
     return {e.name: e for e in [*(free[i] for i in order), *linear, *fixed]}
+
+
+def _widened(
+    limits: Limits, value: float, variance: float, freedom: float, bounds: tuple[float, float]
+) -> Limits:
+    """Limits with a further variance, and as Student's t has them, within the bounds."""
+    reach, wider = math.sqrt(ONE_SIDED * variance), student(freedom, ONE_SIDED)
+    lower = None if limits.lower is None else value - math.hypot(wider * (value - limits.lower), reach)
+    upper = None if limits.upper is None else value + math.hypot(wider * (limits.upper - value), reach)
+    return Limits(
+        math.sqrt(limits.stderr**2 + variance),
+        None if lower is None else max(lower, bounds[0]),
+        None if upper is None else min(upper, bounds[1]),
+    )

@@ -26,6 +26,7 @@ STEPS = {
     "bandwidth": 1.0,
     "wavelength_shift": 0.1,
     "angle": 0.1,  # degrees
+    "angle_shift": 0.1,
     "n": 0.01,
     "A": 0.01,
     "n_inf": 0.01,

@@ -98,6 +98,11 @@ class View(Protocol):
         ...
 
     @property
+    def channels(self) -> int:
+        """Data values of each point."""
+        ...
+
+    @property
     def independent(self) -> int:
         """Independent data values."""
         ...

@@ -16,11 +16,10 @@ import numpy as np
 from pellicle.fitting.covariance import UNSEEN
 from pellicle.fitting.neighbourhood import Neighbourhood
 from pellicle.fitting.result import Profile
-from pellicle.fitting.reweighting import TWO_SIDED
 from pellicle.fitting.status import RIVAL
 
-ONE_SIDED = 2.71
-"""χ² above the best at a 95 % limit where one side is bounded; `TWO_SIDED` where both are."""
+ONE_SIDED, TWO_SIDED = 2.71, 3.84
+"""χ² above the best at a 95 % limit, where one side is bounded and where both are."""
 _OPEN = RIVAL
 """A side is open where the misfit never rises by this, which would rule out a rival."""
 _PLATEAU, _LEVEL = 10.0, 1.0

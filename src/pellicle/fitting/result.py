@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 
@@ -10,9 +11,15 @@ import numpy as np
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.spectrum import Spectrum
 from pellicle.effects.plan import Plan
+from pellicle.fitting.noise import student
 from pellicle.fitting.presentation import PlotMixin
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface
+
+LEVEL = 0.95
+"""Level of confidence of expanded uncertainties."""
+_NORMAL = 1.959964
+"""Quantile of the normal distribution at that level."""
 
 
 class Status(StrEnum):
@@ -29,9 +36,11 @@ class Status(StrEnum):
 
 @dataclass(frozen=True)
 class Estimate:
-    """A parameter's value and standard error (infinite where the data see nothing).
+    """A parameter's value and its standard error (infinite where the data see nothing).
 
-    `lower_limit` and `upper_limit` are one-sided 95 % limits, where only one side is bounded. With
+    `stderr` is the combined standard uncertainty of the GUM: it includes systematic effects and what the
+    model misses. `stderr_noise` is that of the noise alone, with its `degrees_of_freedom` (infinite where σ
+    is given). `lower_limit` and `upper_limit` are one-sided 95 % limits, where only one side is bounded. With
     `default_bounds` nobody chose `lower` and `upper` for this sample.
     """
 
@@ -46,12 +55,63 @@ class Estimate:
     lower_limit: float | None = None
     upper_limit: float | None = None
     default_bounds: bool = False
+    stderr_noise: float = math.nan  # not given: that of `stderr`
+    degrees_of_freedom: float = math.inf
+
+    def __post_init__(self):
+        if math.isnan(self.stderr_noise):
+            object.__setattr__(self, "stderr_noise", self.stderr)
+
+    @property
+    def stderr_systematic(self) -> float:
+        """The part of the standard error that is not noise (type B)."""
+        if not math.isfinite(self.stderr):
+            return self.stderr
+        return math.sqrt(max(self.stderr**2 - self.stderr_noise**2, 0.0))
+
+    @property
+    def effective_degrees_of_freedom(self) -> float:
+        """Degrees of freedom of `stderr` (Welch-Satterthwaite: GUM 2008, eq. G.2b), systematic effects taken
+        as known to infinitely many."""
+        if not 0 < self.stderr_noise < math.inf:
+            return math.inf
+        return self.degrees_of_freedom * (self.stderr / self.stderr_noise) ** 4
+
+    @property
+    def coverage_factor(self) -> float:
+        """Factor from `stderr` to the half width of a 95 % interval: Student's t (GUM 2008, G.3.2)."""
+        return _NORMAL * student(self.effective_degrees_of_freedom, _NORMAL**2)
+
+    @property
+    def expanded(self) -> float:
+        """Expanded uncertainty: half width of the 95 % interval."""
+        return self.coverage_factor * self.stderr
 
 
 def in_short(status: str, verdict: str, free: tuple[Estimate, ...]) -> str:
     """A fit as it prints: status and verdict, then each free parameter with its error."""
     lines = [f"  {p.name} = {p.value:.8g} ± {p.stderr:.2g} {p.unit}".rstrip() for p in free]
     return "\n".join([f"{status}: {verdict}", *lines])
+
+
+@dataclass(frozen=True)
+class SystematicEffect:
+    """A row of the uncertainty budget: what the scene states or leaves out, and what it does to the result.
+
+    `uncertainty` is its standard uncertainty in `unit` (relative where that is empty). `changes` are those of
+    the free parameters by one of it, if nobody allows for it. `amount` is the size at which the effect
+    explains the residuals best, together with all others. `explains` is the share of their sum of squares
+    that it would take away alone, at the size `alone`, and `shifts` what the parameters would then change by.
+    """
+
+    name: str
+    uncertainty: float
+    unit: str
+    changes: dict[str, float]
+    amount: float
+    explains: float
+    alone: float
+    shifts: dict[str, float]
 
 
 @dataclass(frozen=True)
@@ -195,7 +255,8 @@ class Fit(PlotMixin):
     """The outcome of fitting spectra or BRDF samples of one sample: `parts`, one for each.
 
     `rms` is None where the spectra have no unit in common. `scene` is what was fitted, one for each spectrum
-    where there are several, or a `Surface`. `profile` is the scan against thickness of a fit of spectra,
+    where there are several, or a `Surface`. `budget` has the systematic effects that `stderr` includes, the
+    largest first. `profile` is the scan against thickness of a fit of spectra,
     `layer_test` the evidence for a layer of a fit of BRDF samples; None else.
     """
 
@@ -214,6 +275,7 @@ class Fit(PlotMixin):
     seconds: float
     scene: Scene | tuple[Scene, ...] | Surface | None = None
     layer_test: LayerTest | None = None
+    budget: tuple[SystematicEffect, ...] = ()
 
     def __getitem__(self, name: str) -> Estimate:
         return self.parameters[name]

@@ -15,15 +15,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pellicle.fitting.minima import MOST, Minima, minima
-from pellicle.fitting.noise import student
 from pellicle.fitting.problem import Problem, View
 from pellicle.fitting.robust_losses import LEAST_SQUARES, LOSSES, Loss, inflation, spread
 
 log = getLogger(__name__)
 
 _ROUNDS, _ROBUST_ROUNDS = 3, 12
-TWO_SIDED = 3.84
-"""χ² above the best at a 95 % limit of one parameter."""
 
 
 @dataclass(frozen=True)
@@ -93,8 +90,6 @@ class _Noise(NamedTuple):
         # the ranked weights carry the rms already, so only the correlation remains to be counted
         length = self.length if view.noise.correlated or not view.noise.given else 1.0
         variance = length * (self.reduced if view.noise.drifting else 1.0)
-        if not view.noise.given:
-            variance *= student(self.freedom / self.length, TWO_SIDED) ** 2
         outliers = int(np.sum(np.square(self.factor) < 0.5))
         return ViewFit(at, variance * self.inflation, self.length, chi2, self.freedom, outliers)
 

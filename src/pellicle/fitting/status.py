@@ -4,43 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Container, Mapping, Sequence
+from dataclasses import replace
 from logging import getLogger
 
-from pellicle.fitting.result import Estimate, Rival, Status
+from pellicle.fitting.result import LEVEL, Estimate, Rival, Status
 
 log = getLogger(__name__)
 
 RIVAL = 6.0
 """A distinct rival within this Δχ² on the effective points makes a fit ambiguous."""
-MISFIT_CHI2 = 4.0
-MISFIT_RMS, MISFIT_SPAN = 0.02, 0.05
-STRUCTURED_SHARE = 0.1
-"""Residuals of which fewer points than this share count as independent are structured."""
 _WELL_KNOWN = 0.1
 """Largest relative error of a thickness beside which a default bound is a remark."""
-
-
-def misfits(
-    *,
-    chi2_reduced: float,
-    sigma_known: bool,
-    drifting: bool,
-    structured: bool,
-    rms: float,
-    span: float,
-    calibrated: bool,
-) -> bool:
-    """True where the model misses the data: by χ² where σ is known, else by structured, large residuals.
-
-    Where scale and offset drift, the weights are the model's own error, and residuals within it (reduced χ²
-    below 1) are no misfit: their structure is that of the lamp.
-    """
-    if sigma_known:
-        return chi2_reduced > MISFIT_CHI2
-    if drifting and chi2_reduced < 1:
-        return False
-    large = rms > MISFIT_SPAN * span or (calibrated and rms > MISFIT_RMS)
-    return structured and large
 
 
 def judge(
@@ -124,7 +98,7 @@ def verdict(
     lead = next((p for p in parameters.values() if p.free), None)
     if lead is None:
         return "Nothing was free to fit."
-    value, best = describe(lead).removeprefix(f"{lead.name} "), f"{lead.name} {lead.value:.4g}{_unit(lead)}"
+    value, best = expanded(lead), f"{lead.name} {lead.value:.4g}{_unit(lead)}"
     besides = "".join(f" But {sentence}." for sentence in trading[:1])
     if status is Status.CONVERGED:
         return f"The data determine {lead.name}: {value}.{besides}"
@@ -147,8 +121,9 @@ def verdict(
         return f"The data do not determine {lead.name}: it {limits_in_words(lead)}.{besides}"
     if status is Status.MISFIT:
         return (
-            f"The scene does not explain {missed}: even the best fit misses by {rms:.2g} on average, far more"
-            f" than noise would{f', most of all {where}' if where else ''}. Its {best} should not be used."
+            f"The scene does not explain {missed}: even the best fit misses by {rms:.2g} on average, more"
+            " than noise and the usual errors of instruments and samples would"
+            f"{f', most of all {where}' if where else ''}. Its {best} should not be used."
         )
     return f"The fit did not converge: its best point so far, {best}, should not be used."
 
@@ -165,8 +140,20 @@ def _other(parameters: Mapping[str, Estimate], rivals: tuple[Rival, ...], lead: 
     return " and ".join(f"{name} {rival.parameters[name]:.4g}{_unit(parameters[name])}" for name in apart[:2])
 
 
+def expanded(p: Estimate) -> str:
+    """`751.7 ± 8.6 nm (95 %; ± 0.42 nm by noise alone)`: the value with its expanded uncertainty."""
+    if not math.isfinite(p.stderr):
+        return f"{p.value:.6g}{_unit(p)}"
+    value = describe(replace(p, stderr=p.expanded)).removeprefix(f"{p.name} ")
+    level = f"{100 * LEVEL:.0f} %"
+    noise = p.coverage_factor * p.stderr_noise
+    if noise > 0.95 * p.expanded:
+        return f"{value} ({level})"
+    return f"{value} ({level}; ± {noise:.2g}{_unit(p)} by noise alone)"
+
+
 def describe(p: Estimate) -> str:
-    """`thickness 751.66 ± 0.12 nm`."""
+    """`thickness 751.66 ± 0.12 nm`: the value with its standard error."""
     if not math.isfinite(p.stderr):
         return f"{p.name} {p.value:.6g}{_unit(p)}"
     digits = 2 if p.stderr == 0 else max(0, min(12, 1 - math.floor(math.log10(p.stderr))))

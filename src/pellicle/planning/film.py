@@ -96,7 +96,8 @@ def _removals(effect: str, stage: Stage) -> Iterator[Step]:
         "oblique": light.signal == "psi-delta",
         "back-face": light.signal == "T",
         "polarisation": light.signal == "psi-delta"
-        or is_free(light.angle)  # with the angle s and p change in opposite directions
+        or is_free(light.angle)
+        or is_free(scene.instrument.angle_shift)  # with the angle s and p change in opposite directions
         or scene.instrument.has_cone,
     }
     removals = []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,7 @@ from pellicle.scene.film import Light, Scene
 from pellicle.scene.free import Free, check_free_count, free_leaves
 from pellicle.scene.instrument import Instrument
 from pellicle.scene.layers import Interface, Layer, Plate, Substrate
+from pellicle.scene.uncertainty import Uncertainty
 
 TABLES: dict[str, type[BaseModel]] = {
     "": RecipeTable,
@@ -45,6 +46,7 @@ TABLES: dict[str, type[BaseModel]] = {
     "angle_spread": FreeTable,
     "numerical_aperture": FreeTable,
     "wavelength_shift": FreeTable,
+    "angle_shift": FreeTable,
     "prior": PriorTable,
 }
 """The table under each key of a recipe, for messages that list the known keys."""
@@ -100,10 +102,23 @@ def _scene(tables: RecipeTable, folder: Path) -> Scene:
             optional(instrument.angle_spread, "angle_spread"),
             optional(instrument.numerical_aperture, "numerical_aperture"),
             optional(instrument.wavelength_shift, "wavelength_shift", minimum=None),
+            optional(instrument.angle_shift, "angle_shift", minimum=None),
         ),
+        uncertainty=_uncertainty(scene, instrument),
     )
     check_free_count(len(free_leaves(built)), least=0)
     return built
+
+
+def _uncertainty(scene: SceneTable, instrument: InstrumentTable) -> Uncertainty:
+    """The usual uncertainties, or none, with those that a recipe gives in their place."""
+    stated = {}
+    for name in (field.name for field in fields(Uncertainty)):
+        for table in (scene, instrument):
+            value = getattr(table, f"{name}_uncertainty", None)
+            if value is not None:
+                stated[name] = value
+    return replace(Uncertainty() if scene.uncertainty == "usual" else Uncertainty.none(), **stated)
 
 
 def _layer(table: LayerTable, folder: Path) -> Layer | Interface | Plate:
@@ -115,7 +130,8 @@ def _layer(table: LayerTable, folder: Path) -> Layer | Interface | Plate:
     if table.plate_mm is not None:
         return Plate(material, number(table.plate_mm, "plate_mm", minimum=0.0), table.name)
     spread = optional(table.thickness_spread, "thickness_spread")
-    return Layer(material, thickness, table.name, spread, optional(table.roughness, "roughness"))
+    roughness = optional(table.roughness, "roughness")
+    return Layer(material, thickness, table.name, spread, roughness, table.index_uncertainty)
 
 
 def _substrate(value: Medium | PlateTable, folder: Path) -> Substrate:
@@ -123,7 +139,8 @@ def _substrate(value: Medium | PlateTable, folder: Path) -> Substrate:
         return Substrate(medium(value, folder, "substrate"))
     back = None if value.back is None else medium(value.back, folder, "back")
     plate_mm = number(value.plate_mm, "plate_mm", minimum=0.0)
-    return Substrate(medium(value.material, folder), back, plate_mm, optional(value.roughness, "roughness"))
+    roughness = optional(value.roughness, "roughness")
+    return Substrate(medium(value.material, folder), back, plate_mm, roughness, value.index_uncertainty)
 
 
 def optional(value: Number | None, name: str, minimum: float | None = 0.0) -> float | Free | None:

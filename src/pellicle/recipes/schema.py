@@ -30,13 +30,18 @@ class _Table(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=False, allow_inf_nan=False)
 
 
+Uncertain = Annotated[float, Field(ge=0)] | None
+"""Standard uncertainty of a number that is taken as known; None leaves the usual one."""
+
+
 class PlateTable(_Table):
-    """A substrate that is a plate with an incoherent back face."""
+    """A substrate with more than a material, such as a plate with an incoherent back face."""
 
     material: Medium
     back: Medium | None = None
     plate_mm: Number = 1.0
     roughness: Number | None = None
+    index_uncertainty: Uncertain = None
 
 
 class LayerTable(_Table):
@@ -51,6 +56,7 @@ class LayerTable(_Table):
     plate_mm: Number | None = None
     thickness_spread: Number | None = None
     roughness: Number | None = None
+    index_uncertainty: Uncertain = None
     free: list[str] = []
 
     @model_validator(mode="after")
@@ -71,8 +77,12 @@ class LayerTable(_Table):
 
     def _foreign(self) -> set[str]:
         if self.between is not None:
-            return {"plate_mm", "thickness_spread", "roughness", "free"}
-        return {"steps", "thickness_spread", "roughness"} if self.plate_mm is not None else {"steps"}
+            return {"plate_mm", "thickness_spread", "roughness", "index_uncertainty", "free"}
+        return (
+            {"steps", "thickness_spread", "roughness", "index_uncertainty"}
+            if self.plate_mm is not None
+            else {"steps"}
+        )
 
 
 class GridTable(_Table):
@@ -93,6 +103,16 @@ class InstrumentTable(_Table):
     angle_spread: Number | None = None
     numerical_aperture: Number | None = None
     wavelength_shift: Number | None = None
+    angle_shift: Number | None = None
+    wavelength_uncertainty: Uncertain = None
+    bandwidth_uncertainty: Uncertain = None
+    angle_uncertainty: Uncertain = None
+    angle_spread_uncertainty: Uncertain = None
+    scale_uncertainty: Uncertain = None
+    offset_uncertainty: Uncertain = None
+    psi_uncertainty: Uncertain = None
+    delta_uncertainty: Uncertain = None
+    depolarisation_uncertainty: Uncertain = None
 
 
 class _Reading(_Table):
@@ -156,6 +176,12 @@ class SceneTable(_Table):
     ambient: Medium = 1.0
     substrate: Medium | PlateTable
     layer: list[LayerTable] = Field(min_length=1)
+    uncertainty: Literal["usual", "none"] = "usual"
+    index_uncertainty: Uncertain = None
+    dispersion_uncertainty: Uncertain = None
+    roughness_uncertainty: Uncertain = None
+    thickness_spread_uncertainty: Uncertain = None
+    interlayer_uncertainty: Uncertain = None
 
 
 class RecipeTable(_Table):

@@ -9,7 +9,7 @@ import numpy as np
 from pellicle.fitting.lack_of_fit import lack_of_fit
 from pellicle.fitting.result import Curve, Status
 from pellicle.fitting.status import RIVAL
-from pellicle.reporting import parameter_text
+from pellicle.reporting import budget_text, parameter_text
 from pellicle.reporting.parameter_text import LEAST_CORRELATION
 from pellicle.reporting.plain_text import COLUMNS, INDENT, block, facts, wrapped
 
@@ -51,6 +51,7 @@ def report(fit: Fit, posterior: Posterior | None = None) -> str:
         ("With and without a layer", _layer_test(fit)),
         ("Fit statistics", _statistics(fit)),
         ("Parameters", parameter_text.parameters(fit)),
+        ("Uncertainty budget", budget_text.budget(fit)),
         (f"Correlations above {LEAST_CORRELATION:g}", parameter_text.correlations(fit)),
         (
             f"Rivals: other minima and how much worse they fit (Δχ² below {RIVAL:g}: about as well)",

@@ -15,7 +15,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from pellicle.effects.plan import Row
-    from pellicle.fitting.result import Estimate, Fit, Part
+    from pellicle.fitting.result import Estimate, Fit, Part, SystematicEffect
     from pellicle.sampling.result import Marginal, Posterior
 
 SCHEMA = "pellicle.fit/1"
@@ -51,6 +51,7 @@ def to_json(fit: Fit, posterior: Posterior | None = None) -> dict[str, Any]:
             "names": list(fit.correlation_names),
             "matrix": [[number(value) for value in row] for row in matrix],
         },
+        "budget": [_systematic(effect) for effect in fit.budget],
         "plan": [_effect(row, part.name) for part in fit.parts for row in part.plan.rows],
         "warnings": list(fit.warnings),
         "versions": versions(),
@@ -97,6 +98,18 @@ def _joint_part(part: Part, fit: Fit) -> dict[str, Any]:
         "rms": number(part.rms),
         "chi2_reduced": number(part.chi2_reduced),
         "effective_points": number(part.effective_points),
+    }
+
+
+def _systematic(effect: SystematicEffect) -> dict[str, Any]:
+    """A row of the uncertainty budget."""
+    return {
+        "effect": effect.name,
+        "uncertainty": number(effect.uncertainty),
+        "unit": effect.unit,
+        "changes": {name: number(value) for name, value in effect.changes.items()},
+        "amount": number(effect.amount),
+        "explains": number(effect.explains),
     }
 
 
@@ -217,6 +230,10 @@ def _parameter(p: Estimate) -> dict[str, Any]:
     written = {
         "value": number(p.value),
         "stderr": number(p.stderr),
+        "stderr_noise": number(p.stderr_noise),
+        "expanded": number(p.expanded),
+        "coverage_factor": number(p.coverage_factor),
+        "degrees_of_freedom": number(p.effective_degrees_of_freedom),
         "unit": p.unit,
         "lower": number(p.lower),
         "upper": number(p.upper),

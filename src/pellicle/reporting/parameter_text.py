@@ -31,7 +31,8 @@ def parameters(fit: Fit) -> list[str]:
 
 
 def _free(p: Estimate) -> str:
-    """`751.66 ± 0.12 nm (0.016 %)`, or the best value and its limits where the error is infinite."""
+    """`751.66 ± 0.12 nm (0.016 %)`, with its standard error, or the best value and its limits where that is
+    infinite."""
     sides = (("at least", p.lower_limit), ("at most", p.upper_limit))
     limits = [f"{side} {limit:.4g}{_unit(p)} at 95 %" for side, limit in sides if limit is not None]
     if not math.isfinite(p.stderr):

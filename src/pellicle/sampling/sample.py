@@ -13,14 +13,19 @@ from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
 from pellicle.fitting.brdf import fit as brdf
+from pellicle.fitting.brdf.summary import evidence as sample_evidence
+from pellicle.fitting.conclusion import linearised
+from pellicle.fitting.discrepancy import discrepancy
 from pellicle.fitting.progress import Progress, quiet
 from pellicle.fitting.result import Status
 from pellicle.fitting.spectra import fit as spectra
+from pellicle.fitting.spectra.evidence import evidence as spectrum_evidence
 from pellicle.sampling.density import fingerprint, log_density
 from pellicle.sampling.ensemble import STEPS, Subject, installed, sampled
 from pellicle.sampling.modes import modes
 from pellicle.sampling.predict import predictions
 from pellicle.sampling.result import Posterior
+from pellicle.sampling.systematics import systematics
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface
 
@@ -42,11 +47,11 @@ def sample(
 ) -> Posterior:
     """Fit as `pellicle.fit` does, then sample the posterior between the bounds, in float64.
 
-    Priors are those of the `Free` parameters, uniform between the bounds by default; scale and offset
-    are integrated out. Walkers start in every minimum in proportion to its share and move by
-    differential evolution, its snooker update, and jumps between minima. The chain ends when it is 50
-    autocorrelation times long and passes the other checks, or after `steps`. With a `chain` file it is
-    kept there as it grows, and a run that was cut short goes on where it stopped.
+    Priors are those of the `Free` parameters, uniform between the bounds by default; scale and offset, and
+    the systematic effects of the scene's `uncertainty`, are integrated out. Walkers start in every minimum in
+    proportion to its share and move by differential evolution, its snooker update, and jumps between minima.
+    The chain ends when it is 50 autocorrelation times long and passes the other checks, or after `steps`.
+    With a `chain` file it is kept there as it grows, and a run that was cut short goes on where it stopped.
 
     BRDF samples are taken to have normal errors in the unit of the `residual` (ρ, or its cube root): of the
     given σ, or of the rms of the best fit's residuals. Where these are correlated in neighbouring samples the
@@ -62,6 +67,8 @@ def sample(
     if isinstance(scene, Surface):
         measurements = measured(BrdfSamples, data)
         fit, ranked = brdf.fitted(measurements, scene, tolerance, progress, residual=residual)
+        jacobian, _ = linearised(ranked)
+        residuals = sample_evidence(ranked, jacobian)
         unsure = fit.layer_test and not fit.layer_test.layered and fit.status is not Status.AMBIGUOUS
         assumption = "there is a layer" if unsure else ""
         rows = [measurements] if isinstance(measurements, BrdfSamples) else measurements
@@ -73,13 +80,19 @@ def sample(
         measurements = measured(Spectrum, data)
         fit, ranked = spectra.fitted(measurements, scene, tolerance, progress)
         with jax.enable_x64(True):
-            identity = fingerprint(spectra.measurements(measurements, scene), tolerance)
+            targets = spectra.measurements(measurements, scene)
+            identity = fingerprint(targets, tolerance)
+            jacobian, _ = linearised(ranked)
+            residuals = spectrum_evidence(targets, ranked, jacobian)
     with jax.enable_x64(True):
+        effects = systematics(
+            ranked.problem, residuals, discrepancy(residuals, jacobian, ranked.minima.units[0])
+        )
         problem = ranked.problem.affine()
         subject = Subject(
             fit,
             tuple(p.name for p in problem.parameters),
-            log_density(problem),
+            log_density(problem, effects),
             modes(ranked),
             lambda units: problem.values_near(units, ranked.values),
             identity,

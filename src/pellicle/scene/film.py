@@ -17,6 +17,7 @@ from pellicle.dispersion.base import AbstractDispersion
 from pellicle.scene.free import Free
 from pellicle.scene.instrument import Instrument
 from pellicle.scene.layers import Interface, Layer, Plate, Quantity, Substrate, absorbs, ambient_medium
+from pellicle.scene.uncertainty import Uncertainty
 
 SIGNALS = ("R", "T", "psi-delta")
 POLARISATIONS = ("unpolarised", "s", "p")
@@ -73,6 +74,7 @@ class Scene(eqx.Module):
     - `ambient`: the medium of the incident light, which must not absorb.
     - `light`: a `Light`.
     - `instrument`: an `Instrument`.
+    - `uncertainty`: an `Uncertainty` of what the scene states or leaves out; it enters the errors of a fit.
 
     **Raises:** ValueError where the ambient absorbs, without layers, and where the parts contradict.
 
@@ -88,6 +90,7 @@ class Scene(eqx.Module):
     ambient: AbstractDispersion = eqx.field(converter=ambient_medium, default=1.0)
     light: Light = Light()
     instrument: Instrument = Instrument()
+    uncertainty: Uncertainty = eqx.field(static=True, default=Uncertainty())
 
     def __check_init__(self):
         if not self.layers:

@@ -56,6 +56,7 @@ class Instrument(eqx.Module):
     - `thickness_spread`: standard deviation of the only layer's thickness over the spot in nm.
     - `angle_spread`: half angle of the cone of light in degrees; or `numerical_aperture`, n₀ times its sine.
     - `wavelength_shift`: true wavelength minus the instrument's, in nm.
+    - `angle_shift`: true angle of incidence minus the instrument's, in degrees.
 
     None or 0 is absent.
 
@@ -72,6 +73,7 @@ class Instrument(eqx.Module):
     angle_spread: Quantity | None = eqx.field(converter=none_if_zero, default=None)
     numerical_aperture: Quantity | None = eqx.field(converter=none_if_zero, default=None)
     wavelength_shift: Quantity | None = eqx.field(converter=none_if_zero, default=None)
+    angle_shift: Quantity | None = eqx.field(converter=none_if_zero, default=None)
 
     def __check_init__(self):
         check_not_negative("bandwidth", self.bandwidth, "nm")

@@ -18,6 +18,7 @@ from pellicle.dispersion.empirical import Constant
 from pellicle.materials import Material, UnknownMaterial, material
 from pellicle.optics.pair import is_real
 from pellicle.scene.free import Free, insert, is_free, start_values
+from pellicle.scene.uncertainty import check_uncertainty
 
 Quantity = float | Free | jax.Array
 """A number, a parameter to be fitted, or a traced number."""
@@ -117,9 +118,11 @@ class Layer(eqx.Module):
     - `roughness`: root mean square height of the upper face in nm, which damps its reflection (Névot and
       Croce, 1980).
 
+    - `index_uncertainty`: relative standard uncertainty of a given index; None takes the scene's.
+
     A `thickness_spread` or `roughness` of None or 0 is absent.
 
-    **Raises:** ValueError for an unknown material, gain, or a negative length.
+    **Raises:** ValueError for an unknown material, gain, a negative length or uncertainty.
 
     >>> Layer("SiO2", Free(10, 3000)).thickness.upper
     3000.0
@@ -130,8 +133,10 @@ class Layer(eqx.Module):
     name: str | None = eqx.field(static=True, default=None)
     thickness_spread: Quantity | None = eqx.field(converter=none_if_zero, default=None)
     roughness: Quantity | None = eqx.field(converter=none_if_zero, default=None)
+    index_uncertainty: float | None = eqx.field(static=True, default=None)
 
     def __check_init__(self):
+        check_uncertainty("index", self.index_uncertainty)
         for key in ("thickness", "thickness_spread", "roughness"):
             check_not_negative(key, getattr(self, key), "nm")
 
@@ -206,9 +211,10 @@ class Substrate(eqx.Module):
     """Substrate: a half space, or with `back` a plate with an incoherent back face.
 
     **Arguments:** `material` as in `Layer`; `back`, the medium behind the plate; `plate_mm`, the plate's
-    thickness in mm; `roughness`, the root mean square height of its upper face in nm.
+    thickness in mm; `roughness`, the root mean square height of its upper face in nm; `index_uncertainty` as
+    in `Layer`.
 
-    **Raises:** ValueError for an unknown material or an impossible length.
+    **Raises:** ValueError for an unknown material, an impossible length or a negative uncertainty.
 
     >>> Substrate("BK7", back="air").plate_mm
     1.0
@@ -218,7 +224,9 @@ class Substrate(eqx.Module):
     back: AbstractDispersion | None = eqx.field(converter=medium_or_none, default=None)
     plate_mm: Quantity = 1.0
     roughness: Quantity | None = eqx.field(converter=none_if_zero, default=None)
+    index_uncertainty: float | None = eqx.field(static=True, default=None)
 
     def __check_init__(self):
+        check_uncertainty("index", self.index_uncertainty)
         _check_plate(self.plate_mm)
         check_not_negative("roughness", self.roughness, "nm")

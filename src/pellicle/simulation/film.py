@@ -105,14 +105,16 @@ def build(plan: Plan) -> Simulate:
 
 
 def _shifted(scene: Scene) -> Scene:
-    """The scene at its true wavelengths, where the instrument has a wavelength shift.
+    """The scene at its true wavelengths and angles, where the instrument's are shifted.
 
     A tabulated medium follows to first order, which is enough for the few nm of a calibration.
     """
-    shift = scene.instrument.wavelength_shift
-    if shift is None:
-        return scene
-    return eqx.tree_at(lambda s: s.light.wavelength, scene, scene.light.wavelength + shift)
+    nm, degrees = scene.instrument.wavelength_shift, scene.instrument.angle_shift
+    if nm is not None:
+        scene = eqx.tree_at(lambda s: s.light.wavelength, scene, scene.light.wavelength + nm)
+    if degrees is not None:
+        scene = eqx.tree_at(lambda s: s.light.angle, scene, scene.light.angle + degrees)
+    return scene
 
 
 def _averaged(intensities: Intensities, count: int) -> Intensities:

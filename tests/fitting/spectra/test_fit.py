@@ -106,7 +106,7 @@ def test_free_scale_and_offset(film, measured):
     assert fit.status == "converged"
     for name, value in truth.items():
         assert fit[name].free
-        assert abs(fit[name].value - value) <= 4 * fit[name].stderr < 0.2 * value
+        assert abs(fit[name].value - value) <= 4 * fit[name].stderr_noise < 0.2 * value
 
 
 def test_a_prior_pulls_and_sharpens(film, measured):

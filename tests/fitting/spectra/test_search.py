@@ -154,7 +154,7 @@ def recovered(film, measured, case, films, noise):
         fit = pl.fit(measured(scene, *values, noise=noise, seed=seed, sigma=True), scene)
         tolerance = max(0.02 * truth, 5.0)
         right.append(abs(fit["thickness"].value - truth) < tolerance)
-        identifiable.append(fit["thickness"].stderr < tolerance / 2)
+        identifiable.append(fit["thickness"].stderr_noise < tolerance / 2)
     return np.array(right), np.array(identifiable)
 
 

@@ -32,8 +32,8 @@ def test_the_scatter_between_sweeps_is_that_of_their_own_fits(measure):
     found = pl.fit(mean_spectrum(sweeps), FILM)
     own = [pl.fit(sweep, FILM)["thickness"] for sweep in sweeps]
     expected = np.std([p.value for p in own], ddof=1) / 2
-    assert own[0].stderr < expected / 2
-    assert found["thickness"].stderr == pytest.approx(expected, rel=0.05)
+    assert own[0].stderr_noise < expected / 2
+    assert found["thickness"].stderr_noise == pytest.approx(expected, rel=0.05)
     [warning] = [text for text in found.warnings if "drift" in text]
     assert warning.startswith("the sweeps drift: thickness differs by ")
 
@@ -64,4 +64,4 @@ def test_one_of_two_spectra_drifts():
     [warning] = [text for text in both.warnings if "drift" in text]
     assert warning.startswith("the sweeps of R drift: thickness differs by ")
     assert not any("drift" in text for text in calm.warnings)
-    assert both["thickness"].stderr > calm["thickness"].stderr
+    assert both["thickness"].stderr_noise > calm["thickness"].stderr_noise

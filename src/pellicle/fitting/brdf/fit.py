@@ -19,6 +19,7 @@ from pellicle.fitting.brdf.problem import incoherent, make, restricted, together
 from pellicle.fitting.brdf.residuals import RESIDUALS
 from pellicle.fitting.brdf.search import FEW, SMOOTH, THOROUGH, Effort, search
 from pellicle.fitting.conclusion import common_rms, conclude, linearised, ranked_minima
+from pellicle.fitting.discrepancy import discrepancy
 from pellicle.fitting.evaluation import total_deviance
 from pellicle.fitting.minima import Minima, minima
 from pellicle.fitting.problem import Problem
@@ -166,10 +167,12 @@ def _fit(
     ranked, notes = ranked_minima(build, searched, tolerance, loss, **kept)
     jacobian, covariance = linearised(ranked)
     pairs = list(zip(ranked.problem.views, ranked.fits, strict=True))
+    found = discrepancy(summary.evidence(ranked, jacobian), jacobian, ranked.minima.units[0])
     conclusion = conclude(
         ranked,
         jacobian,
         covariance,
+        found,
         misfit=any(summary.misses(view, fit) for view, fit in pairs),
         fixed=summary.fixed(surface),
         scans={},
@@ -202,7 +205,7 @@ def _fit(
         rms=rms,
         effective_points=sum(part.effective_points for part in parts),
         correlation_names=covariance.names,
-        correlation=covariance.correlation,
+        correlation=found.errors.correlation,
         warnings=(
             *notes,
             *warnings.directions(together(samples), surface),

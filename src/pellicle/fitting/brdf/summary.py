@@ -9,12 +9,20 @@ import numpy as np
 
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.fitting.brdf.view import SamplesView
+from pellicle.fitting.covariance import Scaled
+from pellicle.fitting.discrepancy import Evidence
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.profile_likelihood import Limits
 from pellicle.fitting.result import BrdfCurve, Estimate, Part
 from pellicle.fitting.reweighting import RankedMinima, ViewFit
-from pellicle.fitting.status import STRUCTURED_SHARE, misfits
 from pellicle.scene.surface import Surface
+
+_FAR = 4.0
+"""Reduced χ² on a given σ above which residuals are not noise."""
+_STRUCTURED = 0.1
+"""Share of independent samples below which residuals without a given σ are not noise."""
+_LARGE = 0.05
+"""Share of the range of the compared data above which residuals are large: models of surfaces are rough."""
 
 
 def parts(samples: list[BrdfSamples], ranked: RankedMinima) -> tuple[Part, ...]:
@@ -36,16 +44,23 @@ def parts(samples: list[BrdfSamples], ranked: RankedMinima) -> tuple[Part, ...]:
 
 
 def misses(view: SamplesView, fit: ViewFit) -> bool:
-    """True where the surface does not explain the samples of a view."""
-    return misfits(
-        chi2_reduced=fit.chi2 / fit.freedom,
-        sigma_known=view.noise.given,
-        drifting=False,
-        structured=1 / fit.length < STRUCTURED_SHARE,
-        rms=view.rms(fit.at),
-        span=view.span(),
-        calibrated=False,
-    )
+    """True where the surface does not explain the samples of a view: residuals are large, and not noise."""
+    structured = fit.chi2 / fit.freedom > _FAR if view.noise.given else 1 / fit.length < _STRUCTURED
+    return structured and view.rms(fit.at) > _LARGE * view.span()
+
+
+def evidence(ranked: RankedMinima, jacobian: Scaled) -> list[Evidence]:
+    """Residuals of each view in units of its noise, without effects: models of surfaces know none."""
+    result, first = [], 0
+    for view, fit in zip(ranked.problem.views, ranked.fits, strict=True):
+        residual = view.residuals(fit.at)
+        block = jacobian.jacobian[first : first + residual.size] * math.sqrt(fit.variance)
+        first += residual.size
+        columns = block.reshape(*residual.shape, -1)
+        one = np.ones(residual.shape)
+        weights = math.sqrt(view.samples.independent_fraction) * one
+        result.append(Evidence(residual, columns, one, 1.0, weights, (), view.correlation_length))
+    return result
 
 
 def amended(problem: Problem, limits: list[Limits]) -> list[Limits]:

@@ -132,6 +132,11 @@ class SamplesView:
         return self.samples, self.fixed
 
     @property
+    def channels(self) -> int:
+        """Measured numbers of each sample."""
+        return self.samples.values.shape[1]
+
+    @property
     def independent(self) -> int:
         """Measured numbers: samples times channels."""
         return self.rows * self.samples.values.shape[1]

@@ -12,7 +12,9 @@ import jax
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
 from pellicle.fitting import identifiability
+from pellicle.fitting.budget import budget, likely_cause
 from pellicle.fitting.conclusion import conclude, linearised, ranked_minima
+from pellicle.fitting.discrepancy import discrepancy
 from pellicle.fitting.minima import Minima
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.progress import Progress, quiet
@@ -28,6 +30,7 @@ from pellicle.fitting.spectra import (
     summary,
     sweep_scatter,
 )
+from pellicle.fitting.spectra.evidence import evidence
 from pellicle.fitting.spectra.problem import make
 from pellicle.fitting.spectra.search import search
 from pellicle.fitting.spectra.targets import Measured, measured, without_scale
@@ -150,12 +153,14 @@ def _fit(
         warnings += wider.warnings
     profile, depth = summary.scan_profile(ranked), ranked.problem.thickness_axis
     jacobian, covariance = linearised(ranked)
-    each = parts.parts(data, ranked, covariance)
-    missed = parts.missed(each, ranked)
+    found = discrepancy(evidence(spectra, ranked, jacobian), jacobian, ranked.minima.units[0])
+    each = parts.parts(data, ranked, found.errors)
+    missed = parts.missed(each, ranked, found)
     conclusion = conclude(
         ranked,
         jacobian,
         covariance,
+        found,
         misfit=bool(missed),
         binding=wider.binding,
         fixed=summary.fixed(spectra),
@@ -177,8 +182,10 @@ def _fit(
         dark,
         identifiability.naming(next(iter(parameters)), conclusion.correlated),
     )
+    rows, lead = budget(found, ranked.problem.parameters), next(iter(parameters.values()))
     unclear = [
         *drifts,
+        *filter(None, [likely_cause(rows, lead.name, lead.unit)]),
         *default_bounds.remarks(ranked, wider.binding),
         *identifiability.bounded(parameters, dark),
         *conclusion.correlated,
@@ -193,10 +200,11 @@ def _fit(
         rms=parts.together(each),
         effective_points=sum(part.effective_points for part in each),
         correlation_names=covariance.names,
-        correlation=covariance.correlation,
+        correlation=found.errors.correlation,
         warnings=(*warnings, *summary.warnings(spectra, ranked, unclear)),
         profile=profile,
         seconds=time.perf_counter() - began,
+        budget=rows,
         scene=spectra[0].scene if len(spectra) == 1 else tuple(m.scene for m in spectra),
     )
     return fit, ranked

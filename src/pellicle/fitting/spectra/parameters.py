@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-import equinox as eqx
 import jax
 import numpy as np
 
@@ -18,9 +17,18 @@ from pellicle.dispersion.spline import Spline
 from pellicle.fitting.parameter import Parameter
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free, free_leaves, insert, is_free
+from pellicle.scene.layers import Layer
+from pellicle.scene.uncertainty import Uncertainty
 
 _WIDTHS = {"bandwidth": "nm", "thickness_spread": "nm", "roughness": "nm", "angle_spread": "deg"}
-_UNITS = {"thickness": "nm", "wavelength_shift": "nm", "plate_mm": "mm", "angle": "deg", **_WIDTHS}
+_UNITS = {
+    "thickness": "nm",
+    "wavelength_shift": "nm",
+    "plate_mm": "mm",
+    "angle": "deg",
+    "angle_shift": "deg",
+    **_WIDTHS,
+}
 _NATURAL_ZERO = ("k", "k0", "fraction", "offset", "numerical_aperture", *_WIDTHS)
 _STRENGTHS = (Lorentz, Gaussian, TaucLorentz, CodyLorentz)
 """Their A is a strength, which cannot be negative; the A of Cauchy is an index."""
@@ -132,9 +140,14 @@ def with_bounds(scene: Scene, parameters: Sequence[Parameter]) -> Scene:
 
 
 def anonymous(scene: Scene) -> Scene:
-    """The scene without bounds and layers' names: neither may make a new program."""
+    """The scene without bounds, names and uncertainties: none of them may make a new program."""
     scene = insert(scene, [Free(0.0, 1.0, start=0.5)] * len(free_leaves(scene)))
-    return eqx.tree_at(lambda s: s.layers, scene, tuple(replace(layer, name=None) for layer in scene.layers))
+    layers = tuple(
+        replace(layer, name=None, **({"index_uncertainty": None} if isinstance(layer, Layer) else {}))
+        for layer in scene.layers
+    )
+    substrate = replace(scene.substrate, index_uncertainty=None)
+    return replace(scene, layers=layers, substrate=substrate, uncertainty=Uncertainty())
 
 
 def fixed_numbers(scene: Scene, name: str = "") -> list[tuple[str, float, str]]:

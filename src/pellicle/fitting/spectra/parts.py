@@ -8,17 +8,15 @@ import numpy as np
 
 from pellicle.data.ellipsometry_angles import psi_delta
 from pellicle.data.spectrum import Spectrum
-from pellicle.fitting import noise
 from pellicle.fitting.covariance import Errors
+from pellicle.fitting.discrepancy import Discrepancy
+from pellicle.fitting.misfit import Accuracy, misfit
 from pellicle.fitting.result import Curve, Part
 from pellicle.fitting.reweighting import RankedMinima, ViewFit
-from pellicle.fitting.robust_losses import spread
 from pellicle.fitting.spectra.view import Local, SpectrumView
-from pellicle.fitting.status import MISFIT_CHI2, STRUCTURED_SHARE, misfits
 
-FAR = math.sqrt(MISFIT_CHI2)
-"""Ratio of residuals to noise above which residuals without a given σ count as structured. The noise, from
-differences of neighbouring points, takes the place of σ; the bound is the same."""
+LARGEST_POWER, LARGEST_ANGLES = 0.02, 0.02
+"""Structure in residuals of R and T, and of N, C and S (0.6° of Ψ), that no calibrated instrument makes."""
 
 
 def parts(data: list[Spectrum], ranked: RankedMinima, errors: Errors) -> tuple[Part, ...]:
@@ -49,31 +47,18 @@ def together(parts: tuple[Part, ...]) -> float | None:
     return math.sqrt(np.average([part.rms**2 for part in parts], weights=sizes))
 
 
-def missed(parts: tuple[Part, ...], ranked: RankedMinima) -> tuple[Part, ...]:
+def missed(parts: tuple[Part, ...], ranked: RankedMinima, found: Discrepancy) -> tuple[Part, ...]:
     """Spectra that the scene does not explain."""
-    result = []
-    for part, view, fit in zip(parts, ranked.problem.views, ranked.fits, strict=True):
-        values = view.in_columns(view.data.values)
-        rms = part.rms if view.channels == 1 else math.radians(2 * part.rms)
-        squares = [
-            len(sweep) * np.median(noise.local_noise(column)) ** 2
-            for sweep in view.sweeps()
-            for column in values[sweep].T
-        ]
-        floor = math.sqrt(sum(squares) / values.size)
-        # of most points: a few outliers are no structure
-        typical = spread((view.data.values - np.asarray(fit.at.model))[: view.points])
-        if misfits(
-            chi2_reduced=part.chi2_reduced,
-            sigma_known=view.noise.given,
-            drifting=view.noise.drifting,
-            structured=1 / fit.length < STRUCTURED_SHARE or typical > FAR * floor,
-            rms=rms,
-            span=float(np.max(np.ptp(values, axis=0))),
-            calibrated=part.spectrum.calibrated,
-        ):
-            result.append(part)
-    return tuple(result)
+    triples = zip(parts, ranked.problem.views, found.remaining, strict=True)
+    return tuple(part for part, view, left in triples if misfit(found, left, _accuracy(part, view)))
+
+
+def _accuracy(part: Part, view: SpectrumView) -> Accuracy:
+    if view.channels > 1:
+        # of Ψ and Δ the range says nothing: on a thin oxide it is that of the substrate
+        return Accuracy(LARGEST_ANGLES, math.inf)
+    values = np.asarray(view.data.values)[: view.points]
+    return Accuracy(LARGEST_POWER if part.spectrum.calibrated else math.inf, float(np.ptp(values)))
 
 
 def _curve(view: SpectrumView, fit: ViewFit, errors: Errors) -> Curve:

@@ -1,0 +1,162 @@
+"""A fitted scene with further numbers: one for each systematic effect of light and sample."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+
+from pellicle.dispersion.base import known_index
+from pellicle.dispersion.empirical import Constant, Scaled, Tabulated
+from pellicle.effects.film import exact
+from pellicle.fitting.program_cache import kept
+from pellicle.fitting.spectra.nuisance import Data
+from pellicle.fitting.spectra.parameters import anonymous
+from pellicle.fitting.spectra.view import SpectrumForm, SpectrumView
+from pellicle.optics.pair import Pair, imag, real
+from pellicle.scene.film import Scene
+from pellicle.scene.free import Free, free_leaves, insert
+from pellicle.scene.layers import Interface, Layer
+
+OXIDE_INDEX = 1.46
+"""Index of a native oxide, about that of SiO₂."""
+_LIKE_OXIDE = 0.05
+_OXIDISES = 2.0
+"""Substrates of a higher index than this, or with absorption, are semiconductors and metals with an oxide."""
+_GAS = 0.01
+"""Media whose index is within this of 1 are gases."""
+_WIDEST = 10.0
+"""Upper bound of the further numbers, in their own units."""
+
+
+class Simulated(NamedTuple):
+    """The signal of each candidate, (candidates, data values)."""
+
+    signal: Any
+
+
+@kept
+def simulated(form: SpectrumForm, scene: Scene, data: Data, values: Any) -> Simulated:
+    """Signals of a scene at candidates `values` (candidates, its free numbers)."""
+    return Simulated(jax.vmap(lambda each: form.simulate(insert(scene, each), data))(values))
+
+
+class Number(NamedTuple):
+    """A further number of a scene: its position among them, and the value that the fit has."""
+
+    position: int
+    value: float
+
+
+class ExtendedScene:
+    """The scene of a view at the best fit, with further numbers; None stands for those that it cannot have.
+
+    `wavelength` and `angle` are shifts, `roughness` that of the upper face, `oxide` and `mixture` thicknesses
+    on the substrate. Of each coherent layer, by its position: `thickness`; `index`, a relative change of a
+    given one; `shape`, one of a model with free numbers. `substrate_index` is a relative change.
+    """
+
+    def __init__(self, view: SpectrumView, values: np.ndarray):
+        self._view, self._free = view, []
+        scene = insert(view.scene, np.asarray(values).tolist())
+        nm = np.asarray(scene.light.wavelength)
+        instrument = scene.instrument
+        self.wavelength = self.angle = self.roughness = self.oxide = self.mixture = None
+        self.substrate_index: Number | None = None
+        self.thickness: dict[int, Number] = {}
+        self.index: dict[int, Number] = {}
+        self.shape: dict[int, Number] = {}
+        if instrument.wavelength_shift is None:
+            self.wavelength, shift = self._number(0.0, -_WIDEST)
+            instrument = replace(instrument, wavelength_shift=shift)
+        if instrument.angle_shift is None:
+            self.angle, turn = self._number(0.0, -_WIDEST)
+            instrument = replace(instrument, angle_shift=turn)
+        # a spread of the only layer, which will not be the only one
+        spread, instrument = instrument.thickness_spread, replace(instrument, thickness_spread=None)
+        layers: list[Any] = list(scene.layers)
+        for i, layer in enumerate(scene.layers):
+            if isinstance(layer, Layer):
+                own = layer if spread is None else replace(layer, thickness_spread=spread)
+                layers[i] = self._layer(i, own, nm)
+        top, foot, below = layers[0], scene.layers[-1], _with_slope(scene.substrate.material, nm)
+        if _solid(below, nm):
+            self.substrate_index, change = self._number(0.0, -0.5)
+            if isinstance(top, Layer) and top.roughness is None:
+                self.roughness, rough = self._number(0.0)
+                layers[0] = replace(top, roughness=rough)
+            if isinstance(foot, Layer) and _oxidises(below, nm):
+                fixed = not free_leaves(getattr(view.scene.layers[-1], "material", None))
+                if not (fixed and abs(_median(foot.material, nm) - OXIDE_INDEX) < _LIKE_OXIDE):
+                    self.oxide, thin = self._number(0.0)
+                    layers.append(Layer(Constant(OXIDE_INDEX), thin))
+                self.mixture, thin = self._number(0.0)
+                layers.append(Interface(thin))
+            below = Scaled(below, change)
+        self._scene = replace(
+            scene,
+            layers=tuple(layers),
+            substrate=replace(scene.substrate, material=below),
+            ambient=_with_slope(scene.ambient, nm),
+            instrument=instrument,
+        )
+
+    def _number(self, value: float, lower: float = 0.0) -> tuple[Number, Free]:
+        free = Free(min(lower, value), value + _WIDEST, start=value)
+        self._free.append(free)
+        return Number(len(self._free) - 1, value), free
+
+    def _layer(self, i: int, layer: Layer, nm: np.ndarray) -> Layer:
+        material = _with_slope(layer.material, nm)
+        if _solid(material, nm):
+            position = 2 * (nm - nm.min()) / max(np.ptp(nm), 1e-9) - 1
+            given = not free_leaves(getattr(self._view.scene.layers[i], "material", None))
+            number, change = self._number(0.0, -0.5)
+            (self.index if given else self.shape)[i] = number
+            # level and slope of a model are its own: what it may lack is a curvature
+            material = Scaled(material, change, 1.0 if given else 2 * position**2 - 1)
+        self.thickness[i], thickness = self._number(float(np.asarray(layer.thickness)))
+        return replace(layer, material=material, thickness=thickness)
+
+    def signals(self, changes: list[tuple[Number, float]]) -> np.ndarray:
+        """Signals (changes, data values) with one number changed in each, without scale and offset."""
+        # the order of a pytree is that of its fields
+        order = [next(i for i, own in enumerate(self._free) if own is x) for _, x in free_leaves(self._scene)]
+        values = np.tile([own.start for own in self._free], (len(changes), 1))
+        for row, (number, change) in zip(values, changes, strict=True):
+            row[number.position] += change
+        form = SpectrumForm(exact(self._scene).static_key)
+        scene = jax.tree_util.tree_map(np.asarray, anonymous(self._scene))
+        return np.asarray(simulated(form, scene, self._view.data, values[:, order]).signal)
+
+
+def _with_slope(medium: Any, nm: np.ndarray) -> Any:
+    """A tabulated medium with its slope in wavelength, from neighbouring points; others as they are."""
+    if not isinstance(medium, Tabulated) or medium.slope is not None:
+        return medium
+    order, first, inverse = np.unique(nm, return_index=True, return_inverse=True)
+
+    def slope(x: Any) -> Any:
+        column = np.broadcast_to(np.asarray(x), nm.shape)[first]
+        return (np.gradient(column, order) if len(order) > 1 else np.zeros(1))[inverse]
+
+    value = medium.value
+    if isinstance(value, Pair):
+        parts = [None if x is None else slope(x) for x in (value.re, value.im)]
+        return Tabulated(medium.wavelength, value, Pair(*parts))
+    return Tabulated(medium.wavelength, value, slope(value))
+
+
+def _median(medium: Any, nm: np.ndarray) -> float:
+    return float(np.median(np.asarray(real(known_index(medium, nm)))))
+
+
+def _solid(medium: Any, nm: np.ndarray) -> bool:
+    index = known_index(medium, nm)
+    return bool(np.max(np.hypot(np.asarray(real(index)) - 1, np.asarray(imag(index)))) > _GAS)
+
+
+def _oxidises(medium: Any, nm: np.ndarray) -> bool:
+    return bool(_median(medium, nm) > _OXIDISES or np.median(np.asarray(imag(known_index(medium, nm)))) > 0.1)

@@ -1,0 +1,191 @@
+"""Systematic effects of a spectrum: what each that a scene takes for granted does to the signal."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pellicle.fitting.discrepancy import HALF_NORMAL, Effect
+from pellicle.fitting.spectra.extended_scene import ExtendedScene, Number
+from pellicle.fitting.spectra.view import Local, SpectrumView
+from pellicle.optics.orders import FWHM
+from pellicle.scene.film import Scene
+from pellicle.scene.free import is_free
+from pellicle.scene.instrument import Drift
+from pellicle.scene.layers import Layer
+from pellicle.scene.uncertainty import Uncertainty
+
+_STEP = 1e-2
+"""Finite step of a linear effect, in standard uncertainties: on a thick film a whole one is not linear."""
+_WIDEST_SPREAD = 12.0
+"""Largest usual spread of a thickness (nm)."""
+_ROUND_PUPIL = 0.5
+"""Standard deviation of the angle in the plane of incidence over an evenly lit cone, by its half angle."""
+
+
+class _Simulation(NamedTuple):
+    """An effect that is simulated: weighted sum of signals with one number changed."""
+
+    name: str
+    size: float
+    unit: str
+    number: Number
+    changes: tuple[tuple[float, float], ...]  # of the number, and the weight of its signal
+    power: int = 1
+    positive: bool = False
+    shared: bool = True
+
+
+def systematic_effects(view: SpectrumView, values: np.ndarray, at: Local, scene: Scene) -> list[Effect]:
+    """Every effect to which the `scene` gives an uncertainty, at `values` (the parameters of the view,).
+
+    `at` is the local model there. What the scene describes itself, free or fixed, is no effect.
+    """
+    simulations = _simulations(view, values, scene)
+    result = []
+    if simulations:
+        extended, every = simulations
+        each = [(row.number, change) for row in every for change, _ in row.changes]
+        signals = extended.signals(each) if each else np.zeros((0, 0))
+        gain, first = np.asarray(at.gain), 0
+        for row in every:
+            weights = np.array([weight for _, weight in row.changes])
+            change = weights @ signals[first : first + len(weights)]
+            first += len(weights)
+            change = _columns(view, gain * change)
+            about = row.name, row.size, row.unit, _on_sphere(view, at, change)
+            result.append(Effect(*about, row.power, row.positive, row.shared))
+    return [*result, *_of_signal(view, at, scene)]
+
+
+def _simulations(
+    view: SpectrumView, values: np.ndarray, scene: Scene
+) -> tuple[ExtendedScene, list[_Simulation]] | None:
+    allowed, instrument = scene.uncertainty, scene.instrument
+    extended, rows = ExtendedScene(view, values), []
+
+    def add(name: str, size: float, unit: str, number: Number | None, changes: Any, **kind: Any) -> None:
+        if number is not None and size > 0:
+            rows.append(_Simulation(name, size, unit, number, tuple(changes), **kind))
+
+    def linear(name: str, size: float, unit: str, number: Number | None, shared: bool = True) -> None:
+        step, weight = _STEP * size, 0.5 / _STEP
+        add(name, size, unit, number, [(step, weight), (-step, -weight)], shared=shared)
+
+    def width(name: str, size: float, unit: str, number: Number | None, sd: float, **kind: Any) -> None:
+        # a normal distribution by three nodes, for a variance of the prior's root mean square
+        reach = math.sqrt(3) * sd
+        nodes = [(reach, HALF_NORMAL / 6), (-reach, HALF_NORMAL / 6), (0.0, -HALF_NORMAL / 3)]
+        add(name, size, unit, number, nodes, power=2, **kind)
+
+    linear("wavelength shift", allowed.wavelength, "nm", extended.wavelength, shared=False)
+    if instrument.bandwidth is None:
+        sd = allowed.bandwidth / FWHM
+        width("bandwidth", allowed.bandwidth, "nm", extended.wavelength, sd, shared=False)
+    free = is_free(view.scene.light.angle)
+    oblique = free or bool(np.any(np.asarray(view.scene.light.angle)))
+    if oblique and not free:
+        linear("angle of incidence", allowed.angle, "deg", extended.angle, shared=False)
+    if not instrument.has_cone:
+        # at normal incidence both directions of the cone turn the light away from the normal
+        sd = allowed.angle_spread * _ROUND_PUPIL * (1.0 if oblique else math.sqrt(2))
+        width("angle spread", allowed.angle_spread, "deg", extended.angle, sd, shared=False)
+    several = len(scene.layers) > 1
+    for i, layer in enumerate(scene.layers):
+        if not isinstance(layer, Layer):
+            continue
+        of = f" of {layer.name or f'layer{i + 1}'}" if several else ""
+        if i in extended.index:
+            own = allowed.index if layer.index_uncertainty is None else layer.index_uncertainty
+            linear(f"index{of or ' of the layer'}", own, "", extended.index[i])
+        if i in extended.shape:
+            linear(f"dispersion{of}", allowed.dispersion, "", extended.shape[i])
+        if instrument.thickness_spread is None and layer.thickness_spread is None:
+            size = min(allowed.thickness_spread * extended.thickness[i].value, _WIDEST_SPREAD)
+            width(f"thickness spread{of}", size, "nm", extended.thickness[i], size)
+    substrate = scene.substrate
+    own = allowed.index if substrate.index_uncertainty is None else substrate.index_uncertainty
+    linear("index of the substrate", own, "", extended.substrate_index)
+    reach = allowed.roughness
+    both = [(reach, HALF_NORMAL), (0.0, -HALF_NORMAL)]
+    add("roughness", reach, "nm", extended.roughness, both, power=2)
+    for name, size, number in (
+        ("native oxide", allowed.interlayer, extended.oxide),
+        ("mixed interface with the substrate", allowed.interlayer / 2, extended.mixture),
+    ):
+        add(name, size, "nm", number, [(size, 1.0), (0.0, -1.0)], positive=True)
+    return (extended, rows) if rows else None
+
+
+def _of_signal(view: SpectrumView, at: Local, scene: Scene) -> list[Effect]:
+    """Effects that act on the signal alone."""
+    allowed, signal = scene.uncertainty, np.asarray(at.signal)
+    if view.channels > 1:
+        return _of_angles(view, at, allowed)
+    position, curves = np.asarray(view.data.position), []
+    if not isinstance(scene.instrument.scale, Drift):
+        size, bent = allowed.scale, allowed.scale / 2
+        curves += [
+            ("scale", size, size * signal),
+            ("slope of the scale", size, size * signal * position),
+            ("curvature of the scale", bent, bent * signal * (2 * position**2 - 1)),
+        ]
+    if not isinstance(scene.instrument.offset, Drift):
+        curves.append(("offset", allowed.offset, np.full(len(signal), allowed.offset)))
+    return [
+        Effect(name, size, "", _columns(view, change), shared=False) for name, size, change in curves if size
+    ]
+
+
+def _of_angles(view: SpectrumView, at: Local, allowed: Uncertainty) -> list[Effect]:
+    """Offsets of Ψ and Δ, and depolarisation as a rotating analyser takes it: N and C lose a share."""
+    n, c, s = _sphere(view, at).T
+    sine = np.maximum(np.hypot(c, s), 1e-9)
+    psi, delta, share = np.deg2rad(2 * allowed.psi), np.deg2rad(allowed.delta), 1 - allowed.depolarisation
+    third = np.where(s < 0, -1, 1) * np.sqrt(np.maximum(1 - (share * n) ** 2 - (share * c) ** 2, 0.0))
+    less = np.stack([share * n - n, share * c - c, third - s])
+    changes = (
+        ("offset of psi", allowed.psi, "deg", psi * np.stack([-sine, n * c / sine, n * s / sine]), False),
+        ("offset of delta", allowed.delta, "deg", delta * np.stack([0 * n, -s, c]), False),
+        ("depolarisation", allowed.depolarisation, "", less, True),
+    )
+    result = []
+    for name, size, unit, change, positive in changes:
+        if size:
+            data = change.T[: view.rows]
+            if view.data.frame is not None:
+                data = np.einsum("pij,pj->pi", np.asarray(view.data.frame)[: view.rows], data)
+            data = data[:, : measured_channels(view)]
+            result.append(Effect(name, size, unit, data, positive=positive, shared=False))
+    return result
+
+
+def measured_channels(view: SpectrumView) -> int:
+    """Channels that are measured: outwards from the sphere nothing is."""
+    return view.channels if view.data.frame is None else 2
+
+
+def _columns(view: SpectrumView, values: np.ndarray) -> np.ndarray:
+    """Data values, or a change of them, as (rows, measured channels)."""
+    return values[: view.points].reshape(view.rows, view.channels)[:, : measured_channels(view)]
+
+
+def _on_sphere(view: SpectrumView, at: Local, change: np.ndarray) -> np.ndarray:
+    """Change of N, C, S without its part outwards: Ψ and Δ do not depend on the degree of polarisation."""
+    if view.channels < 3 or view.data.frame is not None:
+        return change
+    outwards = _sphere(view, at)[: view.rows]
+    return change - outwards * np.sum(change * outwards, axis=1, keepdims=True)
+
+
+def _sphere(view: SpectrumView, at: Local) -> np.ndarray:
+    """N, C, S of the model, (wavelengths with padding, 3)."""
+    columns = np.asarray(at.signal).reshape(len(view.scene.light.wavelength), -1)
+    if view.data.frame is not None:
+        return np.einsum("pij,pi->pj", np.asarray(view.data.frame), columns)
+    if columns.shape[1] == 3:
+        return columns
+    third = np.sqrt(np.maximum(1 - np.sum(columns**2, axis=1), 0.0))
+    return np.column_stack([columns, third])

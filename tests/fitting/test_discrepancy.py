@@ -1,0 +1,146 @@
+"""Discrepancies of linear problems, against generalised least squares with explicit covariances."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from pellicle.fitting.covariance import Scaled
+from pellicle.fitting.discrepancy import HALF_NORMAL, Effect, Evidence, _improbable, discrepancy
+
+X = np.linspace(-1, 1, 200)
+SIGMA = 0.01
+
+
+def problem(residual, *effects, least=1.0, correlation=lambda rest: 1.0):
+    """A straight line of two parameters with wide bounds, at the middle of them."""
+    jacobian = np.stack([np.ones_like(X), X], axis=1)
+    one = Evidence(
+        residual[:, None],
+        jacobian[:, None, :],
+        np.full((X.size, 1), SIGMA),
+        SIGMA,
+        np.full((X.size, 1), 1 / SIGMA),
+        effects,
+        correlation,
+        least,
+    )
+    scaled = Scaled(np.vstack([jacobian / SIGMA, np.zeros((2, 2))]), np.eye(2), ("level", "slope"))
+    return discrepancy([one], scaled, np.full(2, 0.5)), jacobian
+
+
+def effect(change, size=1.0, **more):
+    return Effect("effect", size, "nm", change[:, None], **more)
+
+
+def noise(seed=0):
+    """Residuals of a best fit: without the line."""
+    rest = np.random.default_rng(seed).normal(0, SIGMA, X.size)
+    return rest - np.polyval(np.polyfit(X, rest, 1), X)
+
+
+def test_generalised_least_squares_with_the_effect_in_the_covariance():
+    change = 0.03 * np.exp(X)
+    residual = noise() + 0.8 * (change - np.polyval(np.polyfit(X, change, 1), X))
+    found, jacobian = problem(residual, effect(change))
+    inverse = np.linalg.inv(SIGMA**2 * np.eye(X.size) + np.outer(change, change))
+    covariance = np.linalg.inv(jacobian.T @ inverse @ jacobian)
+    np.testing.assert_allclose(found.errors.covariance, covariance, rtol=1e-6)
+    np.testing.assert_allclose(found.shift, covariance @ jacobian.T @ inverse @ residual, rtol=1e-3)
+    np.testing.assert_allclose(found.variance, np.diag(covariance) + found.shift**2)
+
+
+def test_an_effect_that_nobody_allows_for_moves_the_parameters():
+    change = 0.03 * np.exp(X)
+    found, _ = problem(noise(), effect(change))
+    [row] = found.contributions
+    slope, level = -np.polyfit(X, change, 1)
+    np.testing.assert_allclose(row.changes, [level, slope], rtol=1e-6)
+
+
+def test_an_effect_is_found_at_its_size_and_share():
+    change = 0.05 * (2 * X**2 - 1)
+    structure = change - np.polyval(np.polyfit(X, change, 1), X)
+    found, _ = problem(noise() + 2 * structure, effect(change, size=3.0))
+    [row] = found.contributions
+    assert row.alone == pytest.approx(6.0, rel=0.05)
+    total = np.sum((noise() + 2 * structure) ** 2)
+    assert row.explains == pytest.approx(1 - np.sum(noise() ** 2) / total, abs=0.01)
+    assert found.remaining[0].ratio == pytest.approx(1.0, abs=0.2)
+    assert not found.implausible
+
+
+def test_effects_far_beyond_their_sizes_are_implausible():
+    change = 0.05 * (2 * X**2 - 1)
+    found, _ = problem(noise() + 10 * change, effect(change))
+    assert found.implausible
+
+
+def test_a_width_cannot_be_negative():
+    change = 0.05 * (2 * X**2 - 1)
+    for kind in ({"power": 2}, {"positive": True}):
+        found, _ = problem(noise() - change, effect(change, **kind))
+        assert found.contributions[0].amount == 0.0
+        assert found.remaining[0].ratio > 2
+
+
+def test_a_parameter_does_not_leave_its_bounds():
+    """A residual that asks for a level far above the upper end of the box."""
+    found, _ = problem(noise() + 5.0, effect(0.01 * X**2))
+    assert found.shift[0] == pytest.approx(0.5)
+
+
+def test_what_remains_widens_the_error_by_its_size_and_correlation():
+    plain, _ = problem(noise())
+    assert plain.remaining[0].variance == 1.0  # noise by chance
+    wave = 3 * SIGMA * np.sqrt(2) * np.cos(8 * np.pi * X)
+    rest = wave - np.polyval(np.polyfit(X, wave, 1), X)
+    wide, _ = problem(rest, correlation=lambda rest: 7.0)
+    assert wide.remaining[0].variance == pytest.approx(9 * 7, rel=0.05)
+    ratio = wide.errors.stderr / plain.errors.stderr
+    np.testing.assert_allclose(ratio, np.sqrt(wide.remaining[0].variance), rtol=1e-6)
+    assert wide.evidence_share == pytest.approx(1 / wide.remaining[0].variance)
+    assert plain.evidence_share == 1.0
+
+
+def test_outliers_hardly_count():
+    """Three of 20 standard deviations: 7 without Huber's loss."""
+    spiked = noise()
+    spiked[[20, 90, 150]] += 0.2
+    assert problem(spiked)[0].remaining[0].variance < 3
+
+
+def test_effects_of_the_sample_are_shared_by_its_data():
+    """Twice the same data: one shared effect is known better than two of their own."""
+    change = 0.03 * np.exp(X)
+    jacobian = np.stack([np.ones_like(X), X], axis=1)
+
+    def both(shared):
+        own = effect(change, shared=shared)
+        one = Evidence(
+            noise()[:, None],
+            jacobian[:, None, :],
+            np.full((X.size, 1), SIGMA),
+            SIGMA,
+            np.full((X.size, 1), 1 / SIGMA),
+            [own],
+            lambda rest: 1.0,
+        )
+        rows = np.vstack([jacobian / SIGMA, jacobian / SIGMA, np.zeros((2, 2))])
+        return discrepancy([one, one], Scaled(rows, np.eye(2), ("level", "slope")), np.full(2, 0.5))
+
+    assert len(both(True).contributions) == 1
+    assert len(both(False).contributions) == 2
+    assert np.all(both(True).errors.stderr > both(False).errors.stderr)
+
+
+def test_the_amount_of_a_width():
+    one = Effect("spread", 2.0, "nm", np.zeros((1, 1)), power=2)
+    assert one.amount(1 / HALF_NORMAL) == pytest.approx(2.0)
+    assert dataclasses.replace(one, power=1).amount(0.5) == 1.0
+
+
+@pytest.mark.parametrize("count", [1, 5, 12, 30])
+def test_the_threshold_of_the_implausible(count):
+    assert _improbable(count) == pytest.approx(chi2.isf(1e-3, count), rel=0.04)
