@@ -22,9 +22,8 @@ def fit(value, noise=0.2, path="", status=Status.CONVERGED, stderr=None, rivals=
     nm = np.linspace(400.0, 800.0, 5)
     data = np.full(5, value % 1)
     curve = Curve(nm, data, data, data, nm, nm, nm, nm)
-    estimate = Estimate("thickness", value, noise if stderr is None else stderr, "nm", 10, 3000, True)
-    if stderr is not None:
-        object.__setattr__(estimate, "stderr_noise", noise)
+    whole = noise if stderr is None else stderr
+    estimate = Estimate("thickness", value, whole, "nm", 10, 3000, True, stderr_noise=noise)
     parameters = {"thickness": estimate} | others
     plan = pl.plan(pl.Scene(pl.Layer(1.46, 100.0), 3.9))
     part = Part("", pl.Spectrum(nm, data, "R", path=path), curve, plan, 0.0, 1.0, 5.0)

@@ -247,12 +247,12 @@ def repeats(fits: Sequence[Fit]) -> Repeats:
         if len(known) < 2:
             continue
         estimates = [p for *_, p in known]
-        shared = float(np.mean([max(p.stderr**2 - _noise(p) ** 2, 0.0) for p in estimates]))
+        shared = float(np.mean([max(p.stderr**2 - p.stderr_noise**2, 0.0) for p in estimates]))
         compared[name] = RepeatedParameter(
             name,
             estimates[0].unit,
             tuple(p.value for p in estimates),
-            tuple(map(_noise, estimates)),
+            tuple(p.stderr_noise for p in estimates),
             math.sqrt(shared),
         )
         own = compared[name]
@@ -269,12 +269,7 @@ def repeats(fits: Sequence[Fit]) -> Repeats:
 
 def _usable(p: Estimate) -> bool:
     """True for a free parameter with an error; one that rests on a bound does not scatter."""
-    return p.free and not p.at_bound and _noise(p) > 0 and math.isfinite(p.stderr)
-
-
-def _noise(p: Estimate) -> float:
-    """Standard error of the noise alone."""
-    return getattr(p, "stderr_noise", p.stderr)
+    return p.free and not p.at_bound and p.stderr_noise > 0 and math.isfinite(p.stderr)
 
 
 def _paths(fits: Sequence[Fit]) -> list[str]:

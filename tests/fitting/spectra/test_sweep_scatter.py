@@ -34,6 +34,8 @@ def test_the_scatter_between_sweeps_is_that_of_their_own_fits(measure):
     expected = np.std([p.value for p in own], ddof=1) / 2
     assert own[0].stderr_noise < expected / 2
     assert found["thickness"].stderr_noise == pytest.approx(expected, rel=0.05)
+    # the sweeps are all that speaks of this noise: three degrees of freedom, and little from the residuals
+    assert 3 <= found["thickness"].degrees_of_freedom < 4
     [warning] = [text for text in found.warnings if "drift" in text]
     assert warning.startswith("the sweeps drift: thickness differs by ")
 

@@ -42,15 +42,20 @@ def with_sweeps(
             if repeated.agreement is not Agreement.LARGER:
                 continue
             more = repeated.sd_mean**2 - noise**2
-            errors = [key for key in ("stderr", "stderr_noise") if getattr(p, key, None) is not None]
-            changed = {key: math.sqrt(getattr(p, key) ** 2 + more) for key in errors}
-            result[name] = replace(p, **changed)
+            noise_error = math.sqrt(p.stderr_noise**2 + more)
+            # Welch-Satterthwaite (GUM eq. G.2b) for the two parts of the noise
+            parts = p.stderr_noise**4 / p.degrees_of_freedom + more**2 / repeated.freedom
+            result[name] = replace(
+                p,
+                stderr=math.sqrt(p.stderr**2 + more),
+                stderr_noise=noise_error,
+                degrees_of_freedom=noise_error**4 / parts,
+            )
             unit, of = f" {p.unit}" if p.unit else "", f" of {view.name}" if view.name else ""
-            before, after = (getattr(x, "stderr_noise", x.stderr) for x in (p, result[name]))
             sentences.append(
                 f"the sweeps{of} drift: {name} differs by {short(repeated.sd)}{unit} from one to the next, so"
-                f" the noise error of their mean is {short(after)}{unit}, where the residuals alone say"
-                f" {short(before)}{unit}"
+                f" the noise error of their mean is {short(noise_error)}{unit}, where the residuals alone say"
+                f" {short(p.stderr_noise)}{unit}"
             )
     return result, sentences
 
