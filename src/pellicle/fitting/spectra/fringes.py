@@ -153,25 +153,32 @@ def _of_views(problem: Problem, values: np.ndarray, depth: int) -> list[Fringes 
     return result
 
 
-def disagreement(problem: Problem, fits: tuple[ViewFit, ...], values: np.ndarray) -> list[str]:
-    """A sentence for each spectrum whose clear fringes the best fit misses, with the thickness they suggest.
+def missed(problem: Problem, fits: tuple[ViewFit, ...], values: np.ndarray) -> list[Fringes | None]:
+    """The clear fringes of each spectrum that the best fit, at `values`, misses; None where it misses none.
 
     The fit's index gives the period, so that dispersion is counted. Where the model has the fringes of the
-    data, harmonics included, the residuals keep little of their amplitude and nothing is said.
+    data, harmonics included, the residuals keep little of their amplitude.
     """
-    depth, sentences = problem.thickness_axis, []
+    depth, result = problem.thickness_axis, []
     if depth is None:
-        return []
-    best = float(values[depth])
+        return [None] * len(problem.views)
     for view, fit, found in zip(problem.views, fits, _of_views(problem, values, depth), strict=True):
-        if found is None or abs(found.thickness - best) < found.resolution:
-            continue
-        x = phase_per_thickness(view, problem.seen_by(view, values), best)
-        if x is None:
+        x = phase_per_thickness(view, problem.seen_by(view, values), values[depth])
+        if x is None or found is None or abs(found.thickness - values[depth]) < found.resolution:
+            result.append(None)
             continue
         even, left = _even(x, (np.asarray(view.data.values) - np.asarray(fit.at.model))[: view.points])
-        if abs(_amplitude(even, left, found.thickness)) > _MISSED * abs(found.amplitude):
-            own = f"{view.name}: " if view.name else ""
+        kept = abs(_amplitude(even, left, found.thickness)) / abs(found.amplitude)
+        result.append(found if kept > _MISSED else None)
+    return result
+
+
+def disagreement(problem: Problem, fits: tuple[ViewFit, ...], values: np.ndarray) -> list[str]:
+    """A sentence for each spectrum whose clear fringes the best fit misses: which thickness they suggest."""
+    sentences = []
+    for view, found in zip(problem.views, missed(problem, fits, values), strict=True):
+        if found is not None:
+            own, best = f"{view.name}: " if view.name else "", values[problem.thickness_axis]
             sentences.append(
                 f"{own}the period of the fringes ({found.number:.2g} of them) suggests a thickness of"
                 f" {found.thickness:.4g} nm, the best fit has {best:.4g} nm and misses them"

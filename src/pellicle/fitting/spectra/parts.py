@@ -13,6 +13,7 @@ from pellicle.fitting.discrepancy import Discrepancy
 from pellicle.fitting.misfit import Accuracy, misfit
 from pellicle.fitting.result import Curve, Part
 from pellicle.fitting.reweighting import RankedMinima, ViewFit
+from pellicle.fitting.spectra import fringes
 from pellicle.fitting.spectra.view import Local, SpectrumView
 
 LARGEST_POWER, LARGEST_ANGLES = 0.02, 0.02
@@ -48,9 +49,14 @@ def together(parts: tuple[Part, ...]) -> float | None:
 
 
 def missed(parts: tuple[Part, ...], ranked: RankedMinima, found: Discrepancy) -> tuple[Part, ...]:
-    """Spectra that the scene does not explain."""
-    triples = zip(parts, ranked.problem.views, found.remaining, strict=True)
-    return tuple(part for part, view, left in triples if misfit(found, left, _accuracy(part, view)))
+    """Spectra that the scene does not explain, and those of which it misses clear fringes."""
+    silent = fringes.missed(ranked.problem, ranked.fits, ranked.values)
+    each = zip(parts, ranked.problem.views, found.remaining, silent, strict=True)
+    return tuple(
+        part
+        for part, view, left, fringe in each
+        if fringe is not None or misfit(found, left, _accuracy(part, view))
+    )
 
 
 def _accuracy(part: Part, view: SpectrumView) -> Accuracy:
