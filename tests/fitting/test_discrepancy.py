@@ -51,6 +51,24 @@ def test_generalised_least_squares_with_the_effect_in_the_covariance():
     np.testing.assert_allclose(found.variance, np.diag(covariance) + found.shift**2)
 
 
+def test_a_prior_that_pulls_the_fit_is_no_discrepancy():
+    """At the best fit under a prior the residuals are not free of the line, and the shift is zero."""
+    jacobian = np.stack([np.ones_like(X), X], axis=1)
+    mean, weight = np.array([0.004, 0.0]), np.array([1500.0, 0.0])
+    measured = np.random.default_rng(0).normal(0, SIGMA, X.size)
+    normal = jacobian.T @ jacobian / SIGMA**2 + np.diag(weight**2)
+    best = np.linalg.solve(normal, jacobian.T @ measured / SIGMA**2 + weight**2 * mean)
+    sigma = np.full((X.size, 1), SIGMA)
+    residual = (measured - jacobian @ best)[:, None]
+    one = Evidence(residual, jacobian[:, None, :], sigma, SIGMA, 1 / sigma, (), lambda rest: 1.0)
+    rows = np.vstack([jacobian / SIGMA, np.diag(weight)])
+    scaled = Scaled(rows, np.eye(2), ("level", "slope"), weight * (best - mean))
+    found = discrepancy([one], scaled, np.full(2, 0.5))
+    assert abs(best[0] - np.mean(measured)) > 1e-3
+    np.testing.assert_allclose(found.shift, 0.0, atol=1e-12)
+    np.testing.assert_allclose(found.errors.covariance, np.linalg.inv(normal), rtol=1e-6)
+
+
 def test_an_effect_that_nobody_allows_for_moves_the_parameters():
     change = 0.03 * np.exp(X)
     found, _ = problem(noise(), effect(change))

@@ -15,7 +15,7 @@ NOTHING = np.zeros(1)
 
 def found(explains=0.0, alone=0.0, implausible=False):
     row = Contribution(ONE, NOTHING, 0.0, explains, alone, NOTHING)
-    return Discrepancy(Errors(("d",), np.eye(1)), NOTHING, (), (row,), implausible, 1.0)
+    return Discrepancy(Errors(("d",), np.eye(1)), NOTHING, (), (row,), implausible, (1.0,), 1.0)
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,12 @@ BANDS = np.array([450.0, 520.0, 600.0, 690.0, 800.0])
 
 
 def film(lower: float = 50.0, upper: float = 1500.0, prior=None) -> pl.Scene:
-    """A layer of index 1.46 whose thickness is free."""
-    return pl.Scene(pl.Layer(1.46, pl.Free(lower, upper, prior=prior)), pl.dispersion.Constant(3.9, 0.02))
+    """A layer of index 1.46 whose thickness is free, and nothing that is not known but the noise."""
+    return pl.Scene(
+        pl.Layer(1.46, pl.Free(lower, upper, prior=prior)),
+        pl.dispersion.Constant(3.9, 0.02),
+        uncertainty=pl.Uncertainty.none(),
+    )
 
 
 def bands(thickness: float = 650.0, noise: float = 0.04, seed: int = 3) -> pl.Spectrum:

@@ -42,12 +42,14 @@ class Scaled(NamedTuple):
 
     `jacobian` (points and priors, parameters and nuisances): parameters by the unit interval of their
     coordinate, nuisances by the standard deviation of their prior; the last rows are those of the priors.
-    `stretch` takes steps in these units to steps in the parameters' own units.
+    `stretch` takes steps in these units to steps in the parameters' own units. `pull` is the distance from
+    the means of the priors (parameters and nuisances,), in their standard deviations.
     """
 
     jacobian: np.ndarray
     stretch: np.ndarray
     names: tuple[str, ...]
+    pull: np.ndarray | float = 0.0
 
     def by_range(self, ranges: np.ndarray) -> np.ndarray:
         """The Jacobian with its columns in steps of `ranges` (columns,) of the parameters' own units."""
@@ -78,7 +80,8 @@ def scaled(problem: Problem, unit: np.ndarray, at: Sequence[Any], variance: Sequ
     stretch[:count, :count] = slope
     stretch[count:, count:] = np.diag([c.prior_sd for c in every])
     names = (*(p.name for p in problem.parameters), *(c.name for c in every))
-    return Scaled(np.vstack([*blocks, priors]), stretch, names)
+    pull = [*np.asarray(problem.box.prior_rows(problem.values(unit))), *(c.pull for c in every)]
+    return Scaled(np.vstack([*blocks, priors]), stretch, names, np.array(pull, float))
 
 
 def errors(scaled: Scaled) -> Errors:

@@ -112,8 +112,8 @@ class Discrepancy:
 
     `errors` are those of parameters and nuisances about the values that the effects would give, which are
     `shift` away from those of the fit. `implausible` is true where the effects would have to be larger
-    together than they are. `evidence_share` is the share of a difference in χ², as the fit counts points,
-    that is left when residuals count as what they are.
+    together than they are. `evidence_shares` are the shares of a difference in χ² of each view, as the fit
+    counts points, that are left when residuals count as what they are; `evidence_share` is their mean.
     """
 
     errors: Errors
@@ -121,6 +121,7 @@ class Discrepancy:
     remaining: tuple[Remaining, ...]
     contributions: tuple[Contribution, ...]
     implausible: bool
+    evidence_shares: tuple[float, ...]
     evidence_share: float
 
     @property
@@ -142,7 +143,7 @@ def discrepancy(evidence: Sequence[Evidence], scaled: Scaled, unit: np.ndarray) 
     for view, own, size in zip(evidence, system.residuals(solution), state.variance, strict=True):
         typical = spread(own * view.sigma)
         remaining.append(Remaining(typical / view.noise, typical, size))
-    sizes = solution[known:]
+    sizes, shares = solution[known:], _evidence_shares(evidence, state.variance)
     # the σ of a drifting lamp would hide what an effect explains
     judged = [view._replace(sigma=np.full(view.sigma.shape, view.noise), least=1.0) for view in evidence]
     other = _System(judged, scaled, unit)
@@ -158,7 +159,8 @@ def discrepancy(evidence: Sequence[Evidence], scaled: Scaled, unit: np.ndarray) 
             for i, (effect, size) in enumerate(zip(system.effects, sizes.tolist(), strict=True))
         ),
         implausible=bool(len(sizes) and np.sum(sizes**2) > _improbable(len(sizes))),
-        evidence_share=_evidence_share(evidence, state.variance),
+        evidence_shares=shares,
+        evidence_share=float(np.average(shares, weights=[view.residual.size for view in evidence])),
     )
 
 
@@ -183,13 +185,11 @@ def _balanced(system: _System, evidence: Sequence[Evidence]) -> _Balance:
     return state
 
 
-def _evidence_share(evidence: Sequence[Evidence], variance: Sequence[float]) -> float:
+def _evidence_shares(evidence: Sequence[Evidence], variance: Sequence[float]) -> tuple[float, ...]:
     """Variance of a point by which the fit counted it, over that which stands for it now; at most 1."""
     now = [own * np.median(view.sigma) ** 2 for view, own in zip(evidence, variance, strict=True)]
-    sizes = [view.residual.size for view in evidence]
     counted = [np.median(1 / view.weights) ** 2 for view in evidence]
-    shares = [min(1.0, one / own) for one, own in zip(counted, now, strict=True)]
-    return float(np.average(shares, weights=sizes))
+    return tuple(float(min(1.0, one / own)) for one, own in zip(counted, now, strict=True))
 
 
 def _weights(residual: np.ndarray) -> np.ndarray:
@@ -220,7 +220,7 @@ class _System:
         )
         order = {name: len(scaled.names) + i for i, name in enumerate(self.names)}
         self.effects: list[Effect] = [None] * len(order)  # type: ignore[list-item]
-        self.known, self.stretch = len(scaled.names), scaled.stretch
+        self.known, self.stretch, self.pull = len(scaled.names), scaled.stretch, scaled.pull
         self.blocks, self.data, self.shapes = [], [], []
         for i, view in enumerate(evidence):
             block = np.zeros((view.residual.size, self.known + len(order)))
@@ -256,7 +256,9 @@ class _System:
     def solved(self, variance: Sequence[float], robust: Sequence[np.ndarray]) -> np.ndarray:
         """Least-squares coefficients, those of positive effects not below zero."""
         rows, data = self._weighted(variance, robust)
-        return _least_squares(rows, data, self.priors, (self.lower, self.upper))
+        prior_data = np.zeros(len(self.priors))
+        prior_data[: self.known] -= self.pull
+        return _least_squares(rows, data, self.priors, (self.lower, self.upper), prior_data)
 
     def residuals(self, solution: np.ndarray) -> list[np.ndarray]:
         """What remains in each view, in units of its noise."""
@@ -292,11 +294,13 @@ class _System:
         parameters by it."""
         rows, data = self._weighted(variance, robust)
         own, both = np.arange(self.known), np.append(np.arange(self.known), self.known + which)
-        best = _least_squares(rows[:, own], data, self.priors[np.ix_(own, own)])
+        prior_data = np.append(np.zeros(self.known) - self.pull, 0.0)
+        best = _least_squares(rows[:, own], data, self.priors[np.ix_(own, own)], None, prior_data[:-1])
         before = float(np.sum((data - rows[:, own] @ best) ** 2))
         free = self.priors[np.ix_(both, both)].copy()
         free[-1, -1] = 1e-6  # whatever its size
-        solution = _least_squares(rows[:, both], data, free, (self.lower[both], self.upper[both]))
+        bounds = self.lower[both], self.upper[both]
+        solution = _least_squares(rows[:, both], data, free, bounds, prior_data)
         after = float(np.sum((data - rows[:, both] @ solution) ** 2))
         size = self.effects[which].amount(float(solution[-1]))
         return 1 - after / max(before, 1e-300), size, self.stretch @ (solution[:-1] - best)
@@ -307,13 +311,15 @@ def _least_squares(
     data: np.ndarray,
     priors: np.ndarray,
     bounds: tuple[np.ndarray, np.ndarray] | None = None,
+    prior_data: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Coefficients of least squares with prior rows; those that would leave their bounds stay on them.
+    """Coefficients of least squares with prior rows, zeros or `prior_data`; those that would leave their
+    bounds stay on them.
 
     None of these is let go again, which a solver such as SciPy's would do: it takes 0.25 s to import.
     """
     matrix = np.vstack([rows, priors])
-    right = np.concatenate([data, np.zeros(len(priors))])
+    right = np.concatenate([data, np.zeros(len(priors)) if prior_data is None else prior_data])
     solution: np.ndarray = np.linalg.lstsq(matrix, right, rcond=None)[0]
     if bounds is None:
         return solution

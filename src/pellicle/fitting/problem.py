@@ -61,6 +61,11 @@ class Nuisance(Protocol):
     @property
     def prior_sd(self) -> float: ...
     @property
+    def pull(self) -> float:
+        """Distance from the mean of its prior, in standard deviations of that."""
+        ...
+
+    @property
     def not_negative(self) -> bool: ...
 
 

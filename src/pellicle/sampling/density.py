@@ -14,7 +14,7 @@ from pellicle.fitting.coordinates import Box
 from pellicle.fitting.evaluation import Static, explained
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.program_cache import kept
-from pellicle.sampling.systematics import Systematics
+from pellicle.sampling.systematics import Systematics, without_effects
 
 LogDensity = Callable[[np.ndarray], np.ndarray]
 """ln posterior (points,), up to a constant, at points (points, parameters) of the unit cube."""
@@ -27,9 +27,7 @@ class Density(NamedTuple):
 
 
 @kept
-def density(
-    static: Static, arrays: tuple[Any, ...], box: Box, effects: tuple[Systematics, ...], units: Any
-) -> Density:
+def density(static: Static, arrays: tuple[Any, ...], box: Box, effects: Systematics, units: Any) -> Density:
     """ln posterior at `units` (points, parameters): the likelihood of every view, nuisances and systematic
     effects integrated out, times the priors. A prior is one on the parameter in its own unit."""
     coordinates, _ = static
@@ -37,19 +35,17 @@ def density(
     def one(unit):
         views, values = explained(static, arrays, box, unit)
         prior = box.log_prior(values) + coordinates.log_area(box, unit)
-        pairs = zip(views, effects, strict=True)
-        log = -0.5 * sum(own.deviance(view.residual, view.deviance) for view, own in pairs) + prior
+        log = -0.5 * effects.deviance(views) + prior
         return jnp.where(jnp.all((unit >= 0) & (unit <= 1)) & jnp.isfinite(log), log, -jnp.inf)
 
     return Density(jax.vmap(one)(units))
 
 
-def log_density(problem: Problem, effects: tuple[Systematics, ...] = ()) -> LogDensity:
-    """ln posterior of a ranked, affine problem, with the systematic effects of each view, or none at all."""
-    static, nothing = problem.static, Systematics(np.zeros((0, 0)), np.float64(1.0))
-    effects = effects or (nothing,) * len(problem.views)
-    arrays, box, columns = jax.device_put((problem.arrays, problem.box, effects))
-    return lambda units: np.asarray(density(static, arrays, box, columns, units).log)
+def log_density(problem: Problem, effects: Systematics | None = None) -> LogDensity:
+    """ln posterior of a ranked, affine problem; without `effects` that of the noise alone."""
+    static = problem.static
+    arrays, box, known = jax.device_put((problem.arrays, problem.box, effects or without_effects(problem)))
+    return lambda units: np.asarray(density(static, arrays, box, known, units).log)
 
 
 def fingerprint(parts: Sequence[tuple[Any, ...]], *settings: Any) -> str:

@@ -18,7 +18,9 @@ from pellicle.fitting import estimates as shared
 from pellicle.fitting.brdf import fit as module
 from pellicle.fitting.brdf.fit import fit
 from pellicle.fitting.brdf.problem import make
+from pellicle.fitting.brdf.summary import evidence
 from pellicle.fitting.conclusion import Conclusion, conclude, linearised
+from pellicle.fitting.discrepancy import discrepancy
 from pellicle.fitting.minima import Minima, minima
 from pellicle.fitting.profile_likelihood import Limits
 from pellicle.fitting.result import Status
@@ -73,7 +75,9 @@ def judged(simulated) -> Judged:
     result = minima(problem, np.full((1, 3), 0.3))
     assert result.converged[0]
     ranked = rank(problem, result)
-    return Judged(ranked, conclude(ranked, *linearised(ranked), misfit=False, fixed=[], scans={}))
+    jacobian, errors = linearised(ranked)
+    found = discrepancy(evidence(ranked, jacobian), jacobian, ranked.minima.units[0])
+    return Judged(ranked, conclude(ranked, jacobian, errors, found, misfit=False, fixed=[], scans={}))
 
 
 def profile(simulated, name):
@@ -148,12 +152,14 @@ def test_the_azimuth_of_a_tilt(monkeypatch, turned, tilt, azimuth, stderr):
     assert result["deviation"].value == pytest.approx(8.0, abs=0.1)
     estimate = result["azimuth"]
     assert estimate.value == pytest.approx(60.0, abs=2.0)
-    assert estimate.stderr == stderr
+    # a minimum is found to a part of the error: the distance to it counts
+    assert estimate.stderr == pytest.approx(stderr, rel=1e-6)
     assert (estimate.lower_limit, estimate.upper_limit, estimate.at_bound) == (None, None, False)
 
 
 def test_of_a_misfit_no_limits_are_sought(monkeypatch, simulated):
-    """Values of another shape altogether, with a σ that no model can reach: errors are of the covariance."""
+    """Values of another shape altogether, with a σ that no model can reach: errors of the noise are those of
+    the covariance, and residuals enlarge them."""
     samples, _ = simulated
     off = dataclasses.replace(samples, values=np.random.default_rng(0).random((120, 1)) * 100)
     monkeypatch.setattr(module, "search", search_from([0.3] * 3))
@@ -163,4 +169,5 @@ def test_of_a_misfit_no_limits_are_sought(monkeypatch, simulated):
     _, errors = linearised(ranked)
     for name in BOUNDS:
         assert (result[name].lower_limit, result[name].upper_limit) == (None, None)
-        assert result[name].stderr in (errors.stderr[errors.names.index(name)], math.inf)
+        assert result[name].stderr_noise in (errors.stderr[errors.names.index(name)], math.inf)
+        assert result[name].stderr >= 0.9 * math.sqrt(result.chi2_reduced) * result[name].stderr_noise

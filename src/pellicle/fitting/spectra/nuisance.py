@@ -49,6 +49,13 @@ class Coefficient:
     on_signal: bool
     not_negative: bool  # one number that cannot be below zero
 
+    @property
+    def pull(self) -> float:
+        """Distance from the mean of its prior, in standard deviations of that."""
+        # the mean of a plain scale is the scale itself
+        plain = self.on_signal and bool(np.all(self.basis == 1))
+        return 0.0 if plain else float(self.value / self.prior_sd)
+
 
 class Solved(NamedTuple):
     """The nuisances solved for one simulated signal."""
