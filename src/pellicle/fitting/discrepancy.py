@@ -38,6 +38,7 @@ class Effect:
     `change` is (rows, channels), in the unit of the data. With `power` 2 the signal depends on the square of
     the size, as on a width: `change` is that by `HALF_NORMAL` times the square of `size`. Such effects, and
     those with `positive`, cannot be below zero. Effects of the sample are `shared` by all its data.
+    `material` marks the index of a medium, which another material changes by far more than its uncertainty.
     """
 
     name: str
@@ -47,6 +48,7 @@ class Effect:
     power: int = 1
     positive: bool = False
     shared: bool = True
+    material: bool = False
 
     def amount(self, coefficient: float) -> float:
         """The size of the effect at a coefficient of its change."""
@@ -80,12 +82,14 @@ class Evidence(NamedTuple):
 class Remaining(NamedTuple):
     """Residuals of one view that no effect explains.
 
-    `typical` is their size in the unit of the data, of most points, and `ratio` that to the noise of
-    neighbouring points; `variance` is the factor on σ² that stands for them and for their correlation.
+    `typical` is their size in the unit of the data, of most points, `ratio` that to the noise of neighbouring
+    points, and `weighted` that to the σ of the points. `variance` is the factor on σ² that stands for them
+    and for their correlation.
     """
 
     ratio: float
     typical: float
+    weighted: float
     variance: float
 
 
@@ -142,7 +146,7 @@ def discrepancy(evidence: Sequence[Evidence], scaled: Scaled, unit: np.ndarray) 
     remaining = []
     for view, own, size in zip(evidence, system.residuals(solution), state.variance, strict=True):
         typical = spread(own * view.sigma)
-        remaining.append(Remaining(typical / view.noise, typical, size))
+        remaining.append(Remaining(typical / view.noise, typical, spread(own), size))
     sizes, shares = solution[known:], _evidence_shares(evidence, state.variance)
     # the σ of a drifting lamp would hide what an effect explains
     judged = [view._replace(sigma=np.full(view.sigma.shape, view.noise), least=1.0) for view in evidence]

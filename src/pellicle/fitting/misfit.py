@@ -7,6 +7,7 @@ they do not have.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from pellicle.fitting.discrepancy import Discrepancy, Remaining
@@ -16,19 +17,25 @@ STRUCTURED = 2.5
 SPAN = 0.015
 """Share of the signal's range above which unexplained structure is a large one."""
 _BEYOND = 5.0
-"""Standard uncertainties beyond which an effect is not one of ordinary size."""
+"""Standard uncertainties beyond which an index is that of another material."""
 _EXPLAINS = 0.6
-"""Share of the residuals' sum of squares that such an effect explains alone where the scene has it wrong."""
+"""Share of the residuals' sum of squares that such an index explains alone where the scene has it wrong."""
+_BETTER = 0.1
+"""Share that it explains more than any effect of ordinary size does."""
 _DOUBTFUL = 1.5
-"""Ratio of unexplained residuals to noise above which such an effect is looked for."""
+"""Ratio of unexplained residuals to noise above which such an index is looked for."""
 
 
 class Accuracy(NamedTuple):
-    """The structure in residuals that no instrument makes: in the unit of the data, and the signal's range
-    (infinite where it says nothing)."""
+    """The structure in residuals that no instrument makes; infinite where a number says nothing.
 
-    largest: float
-    span: float
+    `largest` is in the unit of the data, `span` the signal's range, and `weighted` in units of the σ of the
+    points, where that is the error of a model whose lamp drifts.
+    """
+
+    largest: float = math.inf
+    span: float = math.inf
+    weighted: float = math.inf
 
 
 def misfit(discrepancy: Discrepancy, remaining: Remaining, accuracy: Accuracy) -> bool:
@@ -36,8 +43,13 @@ def misfit(discrepancy: Discrepancy, remaining: Remaining, accuracy: Accuracy) -
     if discrepancy.implausible:
         return True
     large = remaining.typical > min(accuracy.largest, SPAN * accuracy.span)
-    if remaining.ratio > STRUCTURED and large:
+    if remaining.ratio > STRUCTURED and (large or remaining.weighted > accuracy.weighted):
         return True
+    rows = discrepancy.contributions
+    usual = max((c.explains for c in rows if abs(c.alone) <= _BEYOND * c.effect.size), default=0.0)
     return remaining.ratio > _DOUBTFUL and any(
-        c.explains > _EXPLAINS and abs(c.alone) > _BEYOND * c.effect.size for c in discrepancy.contributions
+        c.effect.material
+        and c.explains > max(_EXPLAINS, usual + _BETTER)
+        and abs(c.alone) > _BEYOND * c.effect.size
+        for c in rows
     )

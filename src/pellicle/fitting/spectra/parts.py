@@ -18,6 +18,8 @@ from pellicle.fitting.spectra.view import Local, SpectrumView
 
 LARGEST_POWER, LARGEST_ANGLES = 0.02, 0.02
 """Structure in residuals of R and T, and of N, C and S (0.6° of Ψ), that no calibrated instrument makes."""
+LARGEST_DRIFT = 0.6
+"""The same where scale and offset drift, in units of the error that the model of such data has."""
 
 
 def parts(data: list[Spectrum], ranked: RankedMinima, errors: Errors) -> tuple[Part, ...]:
@@ -62,7 +64,9 @@ def missed(parts: tuple[Part, ...], ranked: RankedMinima, found: Discrepancy) ->
 def _accuracy(part: Part, view: SpectrumView) -> Accuracy:
     if view.channels > 1:
         # of Ψ and Δ the range says nothing: on a thin oxide it is that of the substrate
-        return Accuracy(LARGEST_ANGLES, math.inf)
+        return Accuracy(largest=LARGEST_ANGLES)
+    if view.noise.drifting:
+        return Accuracy(weighted=LARGEST_DRIFT)
     values = np.asarray(view.data.values)[: view.points]
     return Accuracy(LARGEST_POWER if part.spectrum.calibrated else math.inf, float(np.ptp(values)))
 

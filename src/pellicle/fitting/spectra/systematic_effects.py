@@ -21,6 +21,8 @@ _STEP = 1e-2
 """Finite step of a linear effect, in standard uncertainties: on a thick film a whole one is not linear."""
 _WIDEST_SPREAD = 12.0
 """Largest usual spread of a thickness (nm)."""
+_LAMP, _LAMP_TERMS = 0.12, 16
+"""Usual size of a term of a lamp's structure, relative, and the highest one."""
 _ROUND_PUPIL = 0.5
 """Standard deviation of the angle in the plane of incidence over an evenly lit cone, by its half angle."""
 
@@ -36,6 +38,7 @@ class _Simulation(NamedTuple):
     power: int = 1
     positive: bool = False
     shared: bool = True
+    material: bool = False
 
 
 def systematic_effects(view: SpectrumView, values: np.ndarray, at: Local, scene: Scene) -> list[Effect]:
@@ -56,7 +59,7 @@ def systematic_effects(view: SpectrumView, values: np.ndarray, at: Local, scene:
             first += len(weights)
             change = _columns(view, gain * change)
             about = row.name, row.size, row.unit, _on_sphere(view, at, change)
-            result.append(Effect(*about, row.power, row.positive, row.shared))
+            result.append(Effect(*about, row.power, row.positive, row.shared, row.material))
     return [*result, *_of_signal(view, at, scene)]
 
 
@@ -70,9 +73,9 @@ def _simulations(
         if number is not None and size > 0:
             rows.append(_Simulation(name, size, unit, number, tuple(changes), **kind))
 
-    def linear(name: str, size: float, unit: str, number: Number | None, shared: bool = True) -> None:
+    def linear(name: str, size: float, unit: str, number: Number | None, **kind: Any) -> None:
         step, weight = _STEP * size, 0.5 / _STEP
-        add(name, size, unit, number, [(step, weight), (-step, -weight)], shared=shared)
+        add(name, size, unit, number, [(step, weight), (-step, -weight)], **kind)
 
     def width(name: str, size: float, unit: str, number: Number | None, sd: float, **kind: Any) -> None:
         # a normal distribution by three nodes, for a variance of the prior's root mean square
@@ -99,7 +102,7 @@ def _simulations(
         of = f" of {layer.name or f'layer{i + 1}'}" if several else ""
         if i in extended.index:
             own = allowed.index if layer.index_uncertainty is None else layer.index_uncertainty
-            linear(f"index{of or ' of the layer'}", own, "", extended.index[i])
+            linear(f"index{of or ' of the layer'}", own, "", extended.index[i], material=True)
         if i in extended.shape:
             linear(f"dispersion{of}", allowed.dispersion, "", extended.shape[i])
         if instrument.thickness_spread is None and layer.thickness_spread is None:
@@ -107,7 +110,7 @@ def _simulations(
             width(f"thickness spread{of}", size, "nm", extended.thickness[i], size)
     substrate = scene.substrate
     own = allowed.index if substrate.index_uncertainty is None else substrate.index_uncertainty
-    linear("index of the substrate", own, "", extended.substrate_index)
+    linear("index of the substrate", own, "", extended.substrate_index, material=True)
     reach = allowed.roughness
     both = [(reach, HALF_NORMAL), (0.0, -HALF_NORMAL)]
     add("roughness", reach, "nm", extended.roughness, both, power=2)
@@ -132,11 +135,25 @@ def _of_signal(view: SpectrumView, at: Local, scene: Scene) -> list[Effect]:
             ("slope of the scale", size, size * signal * position),
             ("curvature of the scale", bent, bent * signal * (2 * position**2 - 1)),
         ]
+    elif scene.instrument.scale.degree:
+        curves += _lamp_structure(view, np.asarray(at.gain) * signal, scene.instrument.scale.degree)
     if not isinstance(scene.instrument.offset, Drift):
         curves.append(("offset", allowed.offset, np.full(len(signal), allowed.offset)))
     return [
         Effect(name, size, "", _columns(view, change), shared=False) for name, size, change in curves if size
     ]
+
+
+def _lamp_structure(
+    view: SpectrumView, signal: np.ndarray, degree: int
+) -> list[tuple[str, float, np.ndarray]]:
+    """Structure of a lamp that a scale of this degree does not follow: terms of the scale up to half the
+    frequency of the fringes, which they must not imitate."""
+    position, real = np.asarray(view.data.position), signal[: view.points]
+    extrema = int(np.sum(np.diff(np.sign(np.diff(real))) != 0))
+    terms = range(degree + 1, min(extrema // 2, _LAMP_TERMS) + 1)
+    wave = {k: np.cos(k * np.arccos(np.clip(position, -1, 1))) for k in terms}
+    return [(f"term {k} of the scale", _LAMP, _LAMP * signal * wave[k]) for k in terms]
 
 
 def _of_angles(view: SpectrumView, at: Local, allowed: Uncertainty) -> list[Effect]:
