@@ -24,7 +24,7 @@ def test_it_leaves_a_folder_to_look_at(ran, tmp_path):
     found = json.loads((folder / "result" / "result.json").read_text())
     thickness = found["parameters"]["thickness"]
     assert found["status"] == "converged"
-    assert abs(thickness["value"] - 140.0) < 4 * thickness["stderr"]  # what the recipe simulates
+    assert abs(thickness["value"] - 140.0) < 4 * thickness["stderr_noise"]  # what the recipe simulates
     assert found["posterior"]["trusted"] is True
     for name in ("colours.png", "result/figure.png", "result/corner.png"):
         assert np.ptp(imread(folder / name)[..., :3]) > 0.5

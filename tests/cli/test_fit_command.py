@@ -18,6 +18,7 @@ RESULT_KEYS = [
     "chi2_reduced",
     "rms",
     "correlation",
+    "budget",
     "plan",
     "warnings",
     "versions",
@@ -49,8 +50,11 @@ def test_json_is_one_strict_object_a_line_with_the_contracts_keys(pellicle, spec
         "points": 100,
     }
     thickness = found["parameters"]["thickness"]
-    assert abs(thickness["value"] - 300) < 4 * thickness["stderr"] < 4
-    assert {"value", "stderr", "unit", "lower", "upper", "free"} <= set(thickness)
+    assert abs(thickness["value"] - 300) < 4 * thickness["stderr_noise"] < 4
+    assert {"value", "stderr", "stderr_noise", "unit", "lower", "upper", "free"} <= set(thickness)
+    assert thickness["stderr"] > thickness["stderr_noise"]  # of usual instruments and samples
+    assert thickness["expanded"] == pytest.approx(thickness["coverage_factor"] * thickness["stderr"])
+    assert {"effect", "uncertainty", "unit", "changes", "amount", "explains"} == set(found["budget"][0])
     assert (thickness["unit"], thickness["lower"], thickness["upper"]) == ("nm", 10, 800)
     assert {"effect", "on", "why", "error_bound"} <= set(found["plan"][0])
     assert found["correlation"]["names"] == ["thickness"]

@@ -26,7 +26,7 @@ def test_one_object_whose_data_is_a_list(pellicle, files, scene, tmp_path):
         ("b", str(files[1]), 100),
     ]
     thickness = found["parameters"]["thickness"]
-    assert abs(thickness["value"] - 300.0) < 4 * thickness["stderr"]
+    assert abs(thickness["value"] - 300.0) < 4 * thickness["stderr_noise"]
     assert json.loads((out / "result.json").read_text())["data"] == found["data"]
     assert not (out / "summary.csv").exists()
 

@@ -52,6 +52,7 @@ FLAGS = {
     "substrate": "--substrate",
     "thickness": "--thickness",
     "tolerance": "--tolerance",
+    "uncertainty": "--uncertainty",
     "walkers": "--walkers",
     "wavelength_unit": "--wavelength-unit",
 }

@@ -189,6 +189,7 @@ def failure(
         "rms": None,
         "effective_points": None,
         "correlation": {"names": [], "matrix": []},
+        "budget": [],
         "plan": [],
         "warnings": [],
         "versions": versions(),
