@@ -20,6 +20,7 @@ from pellicle.errors import UsageError
 from pellicle.fitting.noise import correlation_length
 from pellicle.fitting.presentation import ReportMixin
 from pellicle.fitting.result import BrdfCurve, Fit, Part, Status
+from pellicle.fitting.spectra.sweeps import correlation_in_sweeps, sweeps
 
 log = getLogger(__name__)
 
@@ -91,8 +92,8 @@ def compare(fits: Mapping[str, Fit]) -> Comparison:
     _check_same(fits)
     residuals = {name: [_residual(part) for part in fit.parts] for name, fit in fits.items()}
     nearest = min(residuals.values(), key=lambda rows: _deviance(rows, [1.0] * len(rows), fits))
-    lengths = [float(np.mean([correlation_length(c) for c in rows.T])) for rows in nearest]
     parts = next(iter(fits.values())).parts
+    lengths = [_correlation(part, rows) for part, rows in zip(parts, nearest, strict=True)]
     counts = [_independent(part, rows) for part, rows in zip(parts, nearest, strict=True)]
     points = sum(count / length for count, length in zip(counts, lengths, strict=True))
     candidates = []
@@ -145,6 +146,14 @@ def _residual(part: Part) -> np.ndarray:
     # at the poles, where Δ has no meaning, the error of Ψ leaves some to it
     sine = np.sin(2 * np.deg2rad(c.data)) / np.hypot(np.sin(2 * np.deg2rad(c.data)), 2 * np.deg2rad(sigma))
     return np.stack([c.residual / sigma, sine * c.delta_residual / across], axis=1)
+
+
+def _correlation(part: Part, rows: np.ndarray) -> float:
+    """Number of points that count as one: neighbours in a sweep, or in a file of BRDF samples."""
+    if isinstance(part.curve, BrdfCurve):
+        return float(np.mean([correlation_length(column) for column in rows.T]))
+    wavelength, angle = part.curve.wavelength, part.spectrum.angle
+    return correlation_in_sweeps(rows, sweeps(wavelength, 0.0 * wavelength if angle is None else angle))
 
 
 def _independent(part: Part, rows: np.ndarray) -> int:

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from jaxtyping import Float, Int
+
+from pellicle.fitting.noise import integrated_time
 
 _SHORT = 5
 """Fewest points of a sweep, on average; rows that turn back more often are in no order."""
@@ -33,6 +37,22 @@ def sweeps(
         else:
             result.extend(np.split(rows, turns))
     return result
+
+
+def correlation_in_sweeps(
+    residuals: Float[np.ndarray, "rows channels"], parts: Sequence[Int[np.ndarray, " points"]]
+) -> float:
+    """Number of points of one channel whose residuals count as one: neighbours in a sweep, times the sweeps
+    that have the same residuals, as angles have of one model's error. `parts` are the rows of each sweep."""
+    total = 0.0
+    for size in {len(part) for part in parts}:
+        # those of one length have one estimate: each alone may be too short for it
+        alike = np.stack([residuals[part] for part in parts if len(part) == size], axis=1)
+        among = alike.shape[1] * np.mean(np.mean(alike, axis=1) ** 2, axis=0)
+        among = np.clip(among / np.maximum(np.mean(alike**2, axis=(0, 1)), 1e-300), 1.0, alike.shape[1])
+        along = [integrated_time(channel) for channel in np.moveaxis(alike, -1, 0)]
+        total += float(np.mean(along * among)) * alike.shape[0] * alike.shape[1]
+    return total / len(residuals)
 
 
 def _count(values: np.ndarray) -> int:

@@ -11,12 +11,12 @@ import numpy as np
 
 from pellicle.effects.plan import Plan
 from pellicle.fitting.coordinates import Array
-from pellicle.fitting.noise import DRIFT_CORRELATION, integrated_time
+from pellicle.fitting.noise import DRIFT_CORRELATION
 from pellicle.fitting.problem import Explained, Noise
 from pellicle.fitting.program_cache import kept
 from pellicle.fitting.spectra import nuisance
 from pellicle.fitting.spectra.nuisance import Coefficient, Data
-from pellicle.fitting.spectra.sweeps import sweeps
+from pellicle.fitting.spectra.sweeps import correlation_in_sweeps, sweeps
 from pellicle.optics.hoisting import compute_once
 from pellicle.optics.layout import stack_rows
 from pellicle.planning.differences import largest_difference, signals
@@ -176,19 +176,10 @@ class SpectrumView:
         )
 
     def correlation_length(self, residuals: np.ndarray) -> float:
-        """Number of points of one channel whose residuals count as one: neighbours in a sweep, times the
-        sweeps that have the same residuals, as angles have of one model's error."""
+        """Number of points of one channel whose residuals count as one: see `correlation_in_sweeps`."""
         # outwards from the sphere nothing is measured
         columns = residuals if self.data.frame is None else residuals[:, :2]
-        total, parts = 0.0, self.sweeps()
-        for size in {len(part) for part in parts}:
-            # those of one length have one estimate: each alone may be too short for it
-            alike = np.stack([columns[part] for part in parts if len(part) == size], axis=1)
-            among = alike.shape[1] * np.mean(np.mean(alike, axis=1) ** 2, axis=0)
-            among = np.clip(among / np.maximum(np.mean(alike**2, axis=(0, 1)), 1e-300), 1.0, alike.shape[1])
-            along = [integrated_time(channel) for channel in np.moveaxis(alike, -1, 0)]
-            total += float(np.mean(along * among)) * alike.shape[0] * alike.shape[1]
-        return total / len(residuals)
+        return correlation_in_sweeps(columns, self.sweeps())
 
     def reweighted(self, factor: Any, fraction: float) -> SpectrumView:
         """Weights times `factor` (a number or (rows, channels)), each point for `fraction` of one."""
