@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pellicle.fitting.discrepancy import Discrepancy
+from pellicle.fitting.misfit import other_material
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.result import SystematicEffect
 
@@ -33,24 +34,30 @@ def budget(discrepancy: Discrepancy, parameters: Sequence[Parameter]) -> tuple[S
             changes=named(row.changes),
             amount=row.amount,
             explains=row.explains,
-            alone=row.alone,
-            shifts=named(row.shift),
         )
         for row in rows
     )
 
 
-def likely_cause(rows: Sequence[SystematicEffect], lead: str, unit: str) -> str:
-    """A sentence on the effect of ordinary size that alone explains most of the residuals, empty without one.
-
-    `lead` is the parameter whose change is told, in `unit`.
-    """
-    usual = [r for r in rows if abs(r.alone) <= _USUAL * r.uncertainty and r.explains > _STRUCTURE]
-    if not usual or lead not in usual[0].shifts:
-        return ""
-    best = max(usual, key=lambda row: row.explains)
-    size = f"{best.alone:.2g} {best.unit}" if best.unit else f"{100 * best.alone:.2g} %"
-    return (
-        f"{best.name} of {size} would explain {100 * best.explains:.0f} % of the residuals and change {lead}"
-        f" by {best.shifts[lead]:+.2g}{f' {unit}' if unit else ''}: describe it in the scene if it is real"
-    )
+def likely_cause(found: Discrepancy, parameters: Sequence[Parameter]) -> list[str]:
+    """A sentence on the effect of ordinary size that alone explains most of the residuals, or on the index of
+    another material that does; none without either."""
+    at = next((i for i, p in enumerate(parameters) if p.key == "thickness"), 0)
+    rows, lead = found.contributions, parameters[at]
+    usual = [c for c in rows if abs(c.alone) <= _USUAL * c.effect.size and c.explains > _STRUCTURE]
+    best = max(usual, key=lambda c: c.explains, default=None)
+    other = other_material(found)
+    if other is not None:
+        far = f"{100 * abs(other.alone):.2g} % {'higher' if other.alone > 0 else 'lower'}"
+        return [
+            f"an {other.effect.name} that is {far} would explain {100 * other.explains:.0f} % of the"
+            " residuals, and nothing of ordinary size does: check the material"
+        ]
+    if best is None:
+        return []
+    size = f"{best.alone:.2g} {best.effect.unit}" if best.effect.unit else f"{100 * best.alone:.2g} %"
+    return [
+        f"{best.effect.name} of {size} would explain {100 * best.explains:.0f} % of the residuals and change"
+        f" {lead.name} by {best.shift[at]:+.2g}{f' {lead.unit}' if lead.unit else ''}: describe it in the"
+        " scene if it is real"
+    ]

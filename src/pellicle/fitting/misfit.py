@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from pellicle.fitting.discrepancy import Discrepancy, Remaining
+from pellicle.fitting.discrepancy import Contribution, Discrepancy, Remaining
 
 STRUCTURED = 2.5
 """Ratio of unexplained residuals to the noise of neighbouring points, above which they have structure."""
@@ -45,11 +45,13 @@ def misfit(discrepancy: Discrepancy, remaining: Remaining, accuracy: Accuracy) -
     large = remaining.typical > min(accuracy.largest, SPAN * accuracy.span)
     if remaining.ratio > STRUCTURED and (large or remaining.weighted > accuracy.weighted):
         return True
+    return remaining.ratio > _DOUBTFUL and other_material(discrepancy) is not None
+
+
+def other_material(discrepancy: Discrepancy) -> Contribution | None:
+    """The index far from the given one that explains the residuals as no effect of ordinary size does."""
     rows = discrepancy.contributions
     usual = max((c.explains for c in rows if abs(c.alone) <= _BEYOND * c.effect.size), default=0.0)
-    return remaining.ratio > _DOUBTFUL and any(
-        c.effect.material
-        and c.explains > max(_EXPLAINS, usual + _BETTER)
-        and abs(c.alone) > _BEYOND * c.effect.size
-        for c in rows
-    )
+    far = [c for c in rows if c.effect.material and abs(c.alone) > _BEYOND * c.effect.size]
+    best = max(far, key=lambda c: c.explains, default=None)
+    return best if best is not None and best.explains > max(_EXPLAINS, usual + _BETTER) else None

@@ -100,8 +100,8 @@ class SystematicEffect:
 
     `uncertainty` is its standard uncertainty in `unit` (relative where that is empty). `changes` are those of
     the free parameters by one of it, if nobody allows for it. `amount` is the size at which the effect
-    explains the residuals best, together with all others. `explains` is the share of their sum of squares
-    that it would take away alone, at the size `alone`, and `shifts` what the parameters would then change by.
+    explains the residuals best, together with all others; `explains` is the share of their sum of squares
+    that it would take away alone, whatever its size.
     """
 
     name: str
@@ -110,8 +110,6 @@ class SystematicEffect:
     changes: dict[str, float]
     amount: float
     explains: float
-    alone: float
-    shifts: dict[str, float]
 
 
 @dataclass(frozen=True)

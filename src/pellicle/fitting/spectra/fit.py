@@ -182,10 +182,9 @@ def _fit(
         dark,
         identifiability.naming(next(iter(parameters)), conclusion.correlated),
     )
-    rows, lead = budget(found, ranked.problem.parameters), next(iter(parameters.values()))
     unclear = [
         *drifts,
-        *filter(None, [likely_cause(rows, lead.name, lead.unit)]),
+        *likely_cause(found, ranked.problem.parameters),
         *default_bounds.remarks(ranked, wider.binding),
         *identifiability.bounded(parameters, dark),
         *conclusion.correlated,
@@ -204,7 +203,7 @@ def _fit(
         warnings=(*warnings, *summary.warnings(spectra, ranked, unclear)),
         profile=profile,
         seconds=time.perf_counter() - began,
-        budget=rows,
+        budget=budget(found, ranked.problem.parameters),
         scene=spectra[0].scene if len(spectra) == 1 else tuple(m.scene for m in spectra),
     )
     return fit, ranked

@@ -1,0 +1,66 @@
+"""Causes of structured residuals, in words."""
+
+import numpy as np
+import pytest
+
+from pellicle.fitting.budget import budget, likely_cause
+from pellicle.fitting.covariance import Errors
+from pellicle.fitting.discrepancy import Contribution, Discrepancy, Effect
+from pellicle.fitting.parameter import Parameter
+
+DEPTH = Parameter("thickness", "thickness", "nm", 300.0, 10.0, 1000.0)
+A = Parameter("A", "A", "", 1.5, 1.2, 3.0)
+
+
+def row(name, size, unit, explains, alone, change=1.0, **more):
+    effect = Effect(name, size, unit, np.zeros((1, 1)), **more)
+    return Contribution(effect, np.array([0.01, change]), 0.0, explains, alone, np.array([0.0, -2.6]))
+
+
+def found(*rows):
+    return Discrepancy(Errors(("A", "thickness"), np.eye(2)), np.zeros(2), (), rows, False, (1.0,), 1.0)
+
+
+OXIDE = row("native oxide", 1.0, "nm", 0.55, 2.4)
+SCALE = row("scale", 0.01, "", 0.35, 0.012)
+INDEX = row("index of the layer", 0.005, "", 0.97, -0.0376, material=True)
+
+
+@pytest.mark.parametrize(
+    ("rows", "sentences"),
+    [
+        (
+            [SCALE, OXIDE],
+            [
+                "native oxide of 2.4 nm would explain 55 % of the residuals and change thickness by -2.6 nm:"
+                " describe it in the scene if it is real"
+            ],
+        ),
+        (
+            [SCALE],
+            [
+                "scale of 1.2 % would explain 35 % of the residuals and change thickness by -2.6 nm:"
+                " describe it in the scene if it is real"
+            ],
+        ),
+        (
+            [OXIDE, INDEX],
+            [
+                "an index of the layer that is 3.8 % lower would explain 97 % of the residuals, and nothing"
+                " of ordinary size does: check the material"
+            ],
+        ),
+        ([row("slit", 2.0, "nm", 0.25, 2.0)], []),  # noise is the rest
+        ([row("slit", 2.0, "nm", 0.9, 20.0)], []),  # no slit of ordinary size
+        ([], []),
+    ],
+)
+def test_a_likely_cause(rows, sentences):
+    assert likely_cause(found(*rows), [A, DEPTH]) == sentences
+
+
+def test_a_budget_begins_with_what_changes_the_thickness_most():
+    rows = budget(found(OXIDE, row("offset", 0.005, "", 0.0, 0.0, change=-3.0)), [A, DEPTH])
+    assert [each.name for each in rows] == ["offset", "native oxide"]
+    assert rows[1].changes == {"A": 0.01, "thickness": 1.0}
+    assert (rows[0].uncertainty, rows[0].unit) == (0.005, "")
