@@ -85,10 +85,10 @@ def sample(
             jacobian, _ = linearised(ranked)
             residuals = spectrum_evidence(targets, ranked, jacobian)
     with jax.enable_x64(True):
-        effects = systematics(
-            ranked.problem, residuals, discrepancy(residuals, jacobian, ranked.minima.units[0])
-        )
         problem = ranked.problem.affine()
+        shares = discrepancy(residuals, jacobian, ranked.minima.units[0]).evidence_shares
+        channels = [view.channels for view in problem.views]
+        effects = systematics(residuals, shares, channels, len(problem.parameters))
         subject = Subject(
             fit,
             tuple(p.name for p in problem.parameters),

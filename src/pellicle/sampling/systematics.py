@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.fitting.discrepancy import Discrepancy, Evidence
+from pellicle.fitting.discrepancy import Evidence
 from pellicle.fitting.problem import Explained, Problem
 
 
@@ -41,28 +41,30 @@ def without_effects(problem: Problem) -> Systematics:
     return Systematics((none,) * len(problem.views), np.ones(len(problem.views)))
 
 
-def systematics(problem: Problem, evidence: Sequence[Evidence], discrepancy: Discrepancy) -> Systematics:
-    """Effects on a ranked problem, from the evidence of its best minimum.
+def systematics(
+    evidence: Sequence[Evidence], shares: Sequence[float], channels: Sequence[int], known: int
+) -> Systematics:
+    """Effects on a ranked problem of so many `known` parameters, from the evidence of its best minimum.
 
-    An effect of the sample is one and the same in all views.
+    `shares` of the deviance of each view are evidence; `channels` are the data values of each of its rows. An
+    effect of the sample is one and the same in all views.
     """
-    known, order = len(problem.parameters), {}
+    order: dict[tuple[str, int | None], int] = {}
     for i, view in enumerate(evidence):
         for effect in view.effects:
             order.setdefault((effect.name, None if effect.shared else i), len(order))
-    shares, columns = discrepancy.evidence_shares, []
-    information = np.eye(len(order))
-    for i, (view, own, share) in enumerate(zip(problem.views, evidence, shares, strict=True)):
-        rows, channels = own.residual.shape
-        changes = np.zeros((len(order), rows, view.channels))
+    columns, information = [], np.eye(len(order))
+    for i, (own, share, width) in enumerate(zip(evidence, shares, channels, strict=True)):
+        rows, measured = own.residual.shape
+        changes = np.zeros((len(order), rows, width))
         for effect in own.effects:
             at = order[effect.name, None if effect.shared else i]
-            changes[at, :, :channels] = effect.change * own.weights
-        linear = np.zeros((rows, view.channels, own.jacobian.shape[2] - known))
-        linear[:, :channels] = own.jacobian[:, :, known:] * own.weights[:, :, None]
-        flat = changes.reshape(len(order), rows * view.channels)
+            changes[at, :, :measured] = effect.change * own.weights
+        linear = np.zeros((rows, width, own.jacobian.shape[2] - known))
+        linear[:, :measured] = own.jacobian[:, :, known:] * own.weights[:, :, None]
+        flat = changes.reshape(len(order), rows * width)
         # the residuals are those with scale and offset at their best, under their priors of unit width
-        nuisances = linear.reshape(rows * view.channels, -1)
+        nuisances = linear.reshape(rows * width, -1)
         across = nuisances.T @ flat.T
         normal = nuisances.T @ nuisances + np.eye(nuisances.shape[1])
         information += share * (flat @ flat.T - across.T @ np.linalg.solve(normal, across))
