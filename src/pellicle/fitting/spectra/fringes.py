@@ -27,14 +27,14 @@ from pellicle.scene.free import insert
 from pellicle.scene.layers import Layer
 
 _GRID = 1024
-_TREND = 3
-"""Degree of the polynomial in x that is taken for lamp and mean."""
-_FEWEST = 2.0
-"""Fringes that a spectrum must show."""
+_TRENDS = (3, 2.0), (9, 5.0)
+"""Degrees of the polynomial in x that is taken for lamp and mean, and the fewest fringes beside each."""
 _NOISES = 8.0
 """Amplitude of a fringe in units of its own noise, at least."""
 _SHARE = 0.5
 """Share of what the trend leaves that the fringes must make up, to call them clear."""
+_SWING = 0.25
+"""Share of the largest swing between extrema that counts as one: where a lamp fades, noise has extrema."""
 _REGULAR = 0.15
 """Scatter of the extrema around even spacing, in units of the spacing, up to which fringes are clear; and by
 how much of itself their spacing may differ from the period of the Fourier transform."""
@@ -79,22 +79,27 @@ def phase_per_thickness(view: SpectrumView, values: np.ndarray, thickness: float
     return (2 * np.sqrt(np.maximum(n**2 - sine**2, 1e-6)) / wavelength)[rows]
 
 
-def fringes(x: np.ndarray, values: np.ndarray, longest: float = np.inf) -> Fringes | None:
-    """The clear fringes of `values` (points,) against x (points,), of thicknesses up to `longest`; None where
-    there are none."""
-    even, level = _even(x, values)
-    span = even[-1] - even[0]
-    spectrum = np.fft.rfft(level * np.hanning(_GRID), 8 * _GRID)
+def fringes(x: np.ndarray, values: np.ndarray) -> Fringes | None:
+    """The clear fringes of `values` (points,) against x (points,); None where there are none."""
+    every = (_with_trend(x, values, degree, fewest) for degree, fewest in _TRENDS)
+    return next((found for found in every if found is not None), None)
+
+
+def _with_trend(x: np.ndarray, values: np.ndarray, degree: int, fewest: float) -> Fringes | None:
+    even, level = _even(x, values, degree)
+    span, window = even[-1] - even[0], np.hanning(_GRID)
+    spectrum = np.fft.rfft(level * window, 8 * _GRID)
     thickness = np.arange(len(spectrum)) / (8 * _GRID * (even[1] - even[0]))
-    allowed = (thickness * span >= _FEWEST) & (thickness <= min(longest, len(x) / (2.5 * span)))
+    allowed = (thickness * span >= fewest) & (thickness <= len(x) / (2.5 * span))
     if not allowed.any():
         return None
-    peak = int(np.argmax(np.where(allowed, np.abs(spectrum), 0.0)))
-    at = float(thickness[peak])
+    at = float(thickness[np.argmax(np.where(allowed, np.abs(spectrum), 0.0))])
     amplitude = _amplitude(even, level, at)
     # white noise of N points leaves an amplitude of σ √(2/N), and 1.22 times that in a Hann window
     noise = 1.22 * float(np.median(local_noise(values))) * np.sqrt(2 / len(x))
-    if abs(amplitude) < _NOISES * noise or abs(amplitude) ** 2 / 2 < _SHARE * np.mean(level**2):
+    if abs(amplitude) < _NOISES * noise or abs(amplitude) ** 2 / 2 < _SHARE * np.average(
+        level**2, weights=window
+    ):
         return None
     spacing, scatter = _extrema(even, level, at)
     if not scatter < _REGULAR or abs(spacing * at * 2 - 1) > _REGULAR:
@@ -102,12 +107,12 @@ def fringes(x: np.ndarray, values: np.ndarray, longest: float = np.inf) -> Fring
     return Fringes(0.5 / spacing, 0.6 / span, 0.5 / spacing * span, amplitude)
 
 
-def _even(x: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _even(x: np.ndarray, values: np.ndarray, degree: int = 3) -> tuple[np.ndarray, np.ndarray]:
     """`_GRID` even positions and the values there, without their trend."""
     order = np.argsort(x)
     even = np.linspace(x.min(), x.max(), _GRID)
     level = np.interp(even, x[order], values[order])
-    basis = np.polynomial.chebyshev.chebvander(np.linspace(-1, 1, _GRID), _TREND)
+    basis = np.polynomial.chebyshev.chebvander(np.linspace(-1, 1, _GRID), degree)
     return even, level - basis @ np.linalg.lstsq(basis, level, rcond=None)[0]
 
 
@@ -124,6 +129,10 @@ def _extrema(even: np.ndarray, level: np.ndarray, thickness: float) -> tuple[flo
     smooth = np.convolve(level, window / window.sum(), mode="valid")
     at = even[reach:-reach]
     turns = np.flatnonzero(np.diff(np.sign(np.diff(smooth))) != 0) + 1
+    swing = np.abs(np.diff(smooth[turns]))
+    small = np.concatenate([[-1], np.flatnonzero(swing < _SWING * swing.max(initial=0.0)), [len(swing)]])
+    longest = np.argmax(np.diff(small))
+    turns = turns[small[longest] + 1 : small[longest + 1] + 1]
     if len(turns) < 4:
         return np.inf, np.inf
     number = np.arange(len(turns))
