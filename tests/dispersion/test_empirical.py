@@ -10,6 +10,7 @@ import pytest
 from pellicle.dispersion.empirical import (
     Cauchy,
     Constant,
+    Scaled,
     Sellmeier,
     Shifted,
     Table,
@@ -33,6 +34,7 @@ MODELS = {
     "Sellmeier": BK7,
     "with extinction": WithExtinction(BK7, TABLE),
     "shifted": Shifted(TABLE, 0.01, 0.02),
+    "scaled": Scaled(TABLE, 0.02, 0.5),
 }
 EVERY_MODEL = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
 
@@ -47,6 +49,9 @@ def test_values():
     np.testing.assert_allclose(TABLE(WAVELENGTH[[0, 1, 2, 8]]), [1.5 + 0.3j, 1.45 + 0.25j, 1.4 + 0.2j, 1.3])
     np.testing.assert_array_equal(Constant(2.1, 0.3)(WAVELENGTH), np.full(9, 2.1 + 0.3j))
     np.testing.assert_allclose(MODELS["shifted"](500.0), 1.41 + 0.22j)
+    np.testing.assert_allclose(MODELS["scaled"](500.0), (1.4 + 0.2j) * 1.01)
+    tilted = Scaled(Constant(1.5), 0.1, np.linspace(-1, 1, 9))
+    np.testing.assert_allclose(tilted(WAVELENGTH), 1.5 + 0.15 * np.linspace(-1, 1, 9))
     np.testing.assert_allclose(MODELS["with extinction"](500.0), BK7.index(500.0) + 0.2j)
 
 

@@ -9,6 +9,7 @@ from pellicle.fitting.spectra.parameters import parameters
 from pellicle.recipes import read_recipe
 from pellicle.scene.free import Free
 from pellicle.scene.instrument import Drift
+from pellicle.scene.uncertainty import Uncertainty
 
 AT = np.array([500.0, 700.0])
 LAYER = '[[scene.layer]]\nmaterial = "SiO2"\nthickness = { lower = 10, upper = 3000 }\n'
@@ -326,6 +327,70 @@ wavelength_shift = {{ lower = -2, upper = 2 }}
     path.write_text(text.format(angle="91"))
     with pytest.raises(DataError, match="angle"):
         read_recipe(path)
+
+
+def test_an_angle_shift(scene):
+    shift = "{ lower = -0.5, upper = 0.5 }"
+    found = scene(f"[data]\nsignal = 'psi-delta'\nangle = 70\n{BASE}[instrument]\nangle_shift = {shift}\n")
+    assert found.instrument.angle_shift == Free(-0.5, 0.5)
+    assert [(p.name, p.unit) for p in parameters(found)][1] == ("instrument.angle_shift", "deg")
+    assert scene(f"{BASE}[instrument]\nangle_shift = -0.2\n").instrument.angle_shift == -0.2
+
+
+INSTRUMENT = [
+    "wavelength",
+    "bandwidth",
+    "angle",
+    "angle_spread",
+    "scale",
+    "offset",
+    "psi",
+    "delta",
+    "depolarisation",
+]
+SAMPLE = ["index", "dispersion", "roughness", "thickness_spread", "interlayer"]
+
+
+@pytest.mark.parametrize("name", INSTRUMENT + SAMPLE)
+def test_an_uncertainty_replaces_the_usual_one(scene, name):
+    """All others stay usual, or none."""
+    line = f"{name}_uncertainty = 0.25\n"
+    if name in INSTRUMENT:
+        text = BASE + "[instrument]\n" + line
+    else:
+        text = BASE.replace("[scene]\n", "[scene]\n" + line)
+    assert scene(text).uncertainty == Uncertainty(**{name: 0.25})
+    nothing = text.replace("[scene]\n", '[scene]\nuncertainty = "none"\n')
+    usual = dict.fromkeys(INSTRUMENT + SAMPLE, 0.0)
+    assert scene(nothing).uncertainty == Uncertainty(**usual | {name: 0.25})
+
+
+def test_uncertainties_of_a_layer_and_the_substrate(scene):
+    found = scene(
+        BASE.replace('"Si"', '{ material = "Si", index_uncertainty = 0.001 }') + "index_uncertainty = 0\n"
+    )
+    assert (found.layers[0].index_uncertainty, found.substrate.index_uncertainty) == (0, 0.001)
+    plain = scene(BASE)
+    assert plain.uncertainty == Uncertainty()
+    assert (plain.layers[0].index_uncertainty, plain.substrate.index_uncertainty) == (None, None)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (BASE + "[instrument]\nscale_uncertainty = -0.1\n", ("instrument.scale_uncertainty", "0")),
+        (BASE + "[instrument]\nscale_uncertainty = 'low'\n", ("instrument.scale_uncertainty", "'low'")),
+        (BASE + "[instrument]\nindex_uncertainty = 0.1\n", ("instrument.index_uncertainty",)),
+        (BASE + "index_uncertainty = -1\n", ("index_uncertainty", "0")),
+        (BASE.replace("[scene]\n", '[scene]\nuncertainty = "some"\n'), ("scene.uncertainty", "'some'")),
+        (
+            BASE.replace('material = "SiO2"\n', 'between = "linear"\nindex_uncertainty = 0.1\n'),
+            ("index_uncertainty does not go with between",),
+        ),
+    ],
+)
+def test_uncertainties_refused(refused, text, said):
+    refused(text, *said)
 
 
 N, K = "{ lower = 1.5, upper = 2.5 }", "{ lower = 0, upper = 0.5 }"

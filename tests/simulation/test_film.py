@@ -86,6 +86,28 @@ def test_a_model_is_the_front_door(name):
     np.testing.assert_allclose(predict(thing), direct, rtol=1e-12, atol=1e-15)
 
 
+SHIFTED = pl.Instrument(angle_shift=-0.3)
+
+
+def test_ellipsometry_at_shifted_angles():
+    """Three angles in one measurement, all 0.3° smaller than the instrument's; the data keep its angles."""
+    nm, angle = np.repeat([450.0, 600.0, 800.0], 3), np.tile([65.0, 70.0, 75.0], 3)
+    light = {"wavelength": nm, "angle": angle, "signal": "psi-delta"}
+    found = pl.simulate(scene(instrument=SHIFTED, **light), nm)
+    psi, delta = pl.ellipsometry(nm, 300.0, 1.46, 3.9 + 0.02j, angle=angle - 0.3)
+    np.testing.assert_allclose(found.values, psi, atol=1e-9)
+    np.testing.assert_allclose(found.delta, np.mod(delta, 360), atol=1e-9)
+    np.testing.assert_array_equal(found.angle, angle)
+
+
+@pytest.mark.parametrize(("angle", "polarisation"), [(0.0, "unpolarised"), (50.0, "s")])
+def test_reflectance_at_a_shifted_angle(angle, polarisation):
+    """At normal incidence, too, where nothing else makes the light oblique."""
+    thing = scene(angle=angle, polarisation=polarisation, instrument=pl.Instrument(angle_shift=4.0))
+    truth = pl.reflectance(WAVELENGTH, 300.0, 1.46, 3.9 + 0.02j, angle=angle + 4.0, polarisation=polarisation)
+    np.testing.assert_allclose(predict(thing), truth, rtol=1e-12)
+
+
 def primitives(thing, plan=None):
     """Number of operations that a model is made of, those inside others counted too."""
 
@@ -108,6 +130,7 @@ LEAVES_NO_TRACE = {
         scene(Constant(1.46, 0.1)),
     ),
     "oblique": (scene(polarisation="p"), scene(polarisation="p", angle=30.0)),
+    "angle shift": (scene(angle=30.0), scene(angle=30.0, instrument=SHIFTED)),
     "polarisation": (scene(angle=30.0, polarisation="s"), scene(angle=30.0)),
     "tunnelling": (scene(angle=80.0), scene(angle=80.0, ambient=1.6)),
     "back face": (scene(substrate=1.52), scene(substrate=PLATE)),
