@@ -25,8 +25,10 @@ HALF_NORMAL = math.sqrt(3)
 _ROUNDS = 4
 _OUTLIER = 4.0
 """Residuals beyond this many standard deviations of their bulk count less (Huber's loss)."""
-_SCATTER = 3.0
-"""Standard deviations of χ² within which residuals are noise."""
+_SCATTER = 2.0
+"""Standard deviations within which the size and correlation of residuals are those of noise."""
+_WINDOW = 5.0
+"""Points over which the correlation of noise is summed (A. Sokal, 1997: see `noise.integrated_time`)."""
 _CHANCE_QUANTILE = 3.0902
 """Normal quantile of the probability, 1e-3, of effects as large together as those that are implausible."""
 
@@ -141,8 +143,8 @@ def discrepancy(evidence: Sequence[Evidence], scaled: Scaled, unit: np.ndarray) 
     """
     system = _System(evidence, scaled, unit)
     state = _balanced(system, evidence)
-    covariance = system.covariance(*state)
-    known, stretch, solution = len(scaled.names), scaled.stretch, system.solved(*state)
+    covariance = system.covariance(state.reduced)
+    known, stretch, solution = len(scaled.names), scaled.stretch, system.solved(state.reduced)
     remaining = []
     for view, own, size in zip(evidence, system.residuals(solution), state.variance, strict=True):
         typical = spread(own * view.sigma)
@@ -152,14 +154,17 @@ def discrepancy(evidence: Sequence[Evidence], scaled: Scaled, unit: np.ndarray) 
     judged = [view._replace(sigma=np.full(view.sigma.shape, view.noise), least=1.0) for view in evidence]
     other = _System(judged, scaled, unit)
     by_noise = _balanced(other, judged)
+
+    def row(which: int, effect: Effect, size: float) -> Contribution:
+        changes = stretch @ system.response(which, state.reduced)
+        return Contribution(effect, changes, effect.amount(size), *other.alone(which, by_noise.reduced))
+
     return Discrepancy(
         errors=Errors(scaled.names, stretch @ covariance[:known, :known] @ stretch.T),
         shift=stretch @ solution[:known],
         remaining=tuple(remaining),
         contributions=tuple(
-            Contribution(
-                effect, stretch @ system.response(i, *state), effect.amount(size), *other.alone(i, *by_noise)
-            )
+            row(i, effect, size)
             for i, (effect, size) in enumerate(zip(system.effects, sizes.tolist(), strict=True))
         ),
         implausible=bool(len(sizes) and np.sum(sizes**2) > _improbable(len(sizes))),
@@ -168,25 +173,34 @@ def discrepancy(evidence: Sequence[Evidence], scaled: Scaled, unit: np.ndarray) 
     )
 
 
+class _Reduced(NamedTuple):
+    """Weighted rows and data of all views as a triangle of the same sums of squares, of as few rows as
+    columns."""
+
+    rows: np.ndarray
+    data: np.ndarray
+
+
 class _Balance(NamedTuple):
-    """Factors on the σ² of each view, and square roots of the weights of its points."""
+    """Factors on the σ² of each view, square roots of the weights of its points, and the rows with them."""
 
     variance: list[float]
     robust: list[np.ndarray]
+    reduced: _Reduced
 
 
 def _balanced(system: _System, evidence: Sequence[Evidence]) -> _Balance:
     """Factors and weights that stand for the residuals which they leave."""
-    state = _Balance(
-        [max(1.0, view.least) for view in evidence], [np.ones(view.residual.shape) for view in evidence]
-    )
+    variance = [max(1.0, view.least) for view in evidence]
+    robust = [np.ones(view.residual.shape) for view in evidence]
+    reduced = system.reduced(variance, robust)
     for _ in range(_ROUNDS):
-        rest = system.residuals(system.solved(*state))
+        rest = system.residuals(system.solved(reduced))
         robust = [_weights(view) for view in rest]
-        used = system.used(state.variance, robust)
-        rows = zip(evidence, rest, robust, used, strict=True)
-        state = _Balance([_variance(*row) for row in rows], robust)
-    return state
+        used = system.used(reduced, variance, robust)
+        variance = [_variance(*row) for row in zip(evidence, rest, robust, used, strict=True)]
+        reduced = system.reduced(variance, robust)
+    return _Balance(variance, robust, reduced)
 
 
 def _evidence_shares(evidence: Sequence[Evidence], variance: Sequence[float]) -> tuple[float, ...]:
@@ -208,7 +222,8 @@ def _variance(view: Evidence, residual: np.ndarray, weight: np.ndarray, used: fl
     freedom = max(rest.size - used, 1.0)
     reduced = max(1.0, float(np.sum(rest**2)) / freedom)
     factor = reduced * max(view.correlation(rest), view.least)
-    by_chance = 1 + _SCATTER * math.hypot(math.sqrt(2 / freedom), view.uncertain)
+    of_length = math.sqrt(2 * (2 * _WINDOW + 1) / freedom)  # standard error of the correlation length: ibid.
+    by_chance = 1 + _SCATTER * math.hypot(math.sqrt(2 / freedom), of_length, view.uncertain)
     return factor if factor > by_chance else 1.0
 
 
@@ -247,56 +262,50 @@ class _System:
             if effect.positive or effect.power == 2:
                 self.lower[self.known + i] = 0.0
 
-    def _weighted(
-        self, variance: Sequence[float], robust: Sequence[np.ndarray]
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def reduced(self, variance: Sequence[float], robust: Sequence[np.ndarray]) -> _Reduced:
+        """Rows and data with these factors on σ² and weights."""
         scale = [weight.ravel() / math.sqrt(own) for weight, own in zip(robust, variance, strict=True)]
         pairs = zip(self.blocks, self.data, scale, strict=True)
         every = np.vstack([np.column_stack([block, data]) * own[:, None] for block, data, own in pairs])
-        # a triangle of the same sums of squares, of as few rows as columns
         triangle: Any = np.linalg.qr(every, mode="r")
-        return triangle[:, :-1], triangle[:, -1]
+        return _Reduced(triangle[:, :-1], triangle[:, -1])
 
-    def solved(self, variance: Sequence[float], robust: Sequence[np.ndarray]) -> np.ndarray:
+    def solved(self, reduced: _Reduced) -> np.ndarray:
         """Least-squares coefficients, those of positive effects not below zero."""
-        rows, data = self._weighted(variance, robust)
         prior_data = np.zeros(len(self.priors))
         prior_data[: self.known] -= self.pull
-        return _least_squares(rows, data, self.priors, (self.lower, self.upper), prior_data)
+        return _least_squares(*reduced, self.priors, (self.lower, self.upper), prior_data)
 
     def residuals(self, solution: np.ndarray) -> list[np.ndarray]:
         """What remains in each view, in units of its noise."""
         pairs = zip(self.blocks, self.data, self.shapes, strict=True)
         return [(data - block @ solution).reshape(shape) for block, data, shape in pairs]
 
-    def covariance(self, variance: Sequence[float], robust: Sequence[np.ndarray]) -> np.ndarray:
+    def covariance(self, reduced: _Reduced) -> np.ndarray:
         """Covariance of all coefficients, by singular values: see `covariance.errors`."""
-        rows, _ = self._weighted(variance, robust)
-        _, values, directions = np.linalg.svd(np.vstack([rows, self.priors]), full_matrices=False)
-        floor = np.finfo(float).eps * len(rows) * max(values.max(initial=0.0), 1e-100)
+        _, values, directions = np.linalg.svd(np.vstack([reduced.rows, self.priors]), full_matrices=False)
+        points = sum(len(data) for data in self.data)
+        floor = np.finfo(float).eps * points * max(values.max(initial=0.0), 1e-100)
         half = directions.T / np.maximum(values, floor)
         return half @ half.T
 
-    def used(self, variance: Sequence[float], robust: Sequence[np.ndarray]) -> list[float]:
+    def used(self, reduced: _Reduced, variance: Sequence[float], robust: Sequence[np.ndarray]) -> list[float]:
         """Degrees of freedom that the coefficients take from each view: the trace of its hat matrix."""
-        covariance = self.covariance(variance, robust)
+        covariance = self.covariance(reduced)
         return [
             float(np.sum((block @ covariance) * block * (weight.ravel() ** 2)[:, None])) / own
             for block, weight, own in zip(self.blocks, robust, variance, strict=True)
         ]
 
-    def response(self, which: int, variance: Sequence[float], robust: Sequence[np.ndarray]) -> np.ndarray:
+    def response(self, which: int, reduced: _Reduced) -> np.ndarray:
         """Change of the parameters by one standard uncertainty of an effect that nobody allows for."""
-        rows, _ = self._weighted(variance, robust)
-        own = np.arange(self.known)
+        own, rows = np.arange(self.known), reduced.rows
         return _least_squares(rows[:, own], -rows[:, self.known + which], self.priors[np.ix_(own, own)])
 
-    def alone(
-        self, which: int, variance: Sequence[float], robust: Sequence[np.ndarray]
-    ) -> tuple[float, float, np.ndarray]:
+    def alone(self, which: int, reduced: _Reduced) -> tuple[float, float, np.ndarray]:
         """Share of the residuals that one effect explains without the others, its size, and the shift of the
         parameters by it."""
-        rows, data = self._weighted(variance, robust)
+        rows, data = reduced
         own, both = np.arange(self.known), np.append(np.arange(self.known), self.known + which)
         prior_data = np.append(np.zeros(self.known) - self.pull, 0.0)
         best = _least_squares(rows[:, own], data, self.priors[np.ix_(own, own)], None, prior_data[:-1])

@@ -40,7 +40,8 @@ class Simulated(NamedTuple):
 @kept
 def simulated(form: SpectrumForm, scene: Scene, data: Data, values: Any) -> Simulated:
     """Signals of a scene at candidates `values` (candidates, its free numbers)."""
-    return Simulated(jax.vmap(lambda each: form.simulate(insert(scene, each), data))(values))
+    # one after the other: a cone of light through a stack may need gigabytes for all at once
+    return Simulated(jax.lax.map(lambda each: form.simulate(insert(scene, each), data), values))
 
 
 class Number(NamedTuple):
