@@ -138,7 +138,7 @@ def posterior(monkeypatch, fits):
             fit=fit,
             names=("thickness",),
             log_density=lambda units: -0.5 * ((units[:, 0] - 0.5) / 0.01) ** 2,
-            modes=mixture(np.array([[0.5]]), np.zeros(1), lambda unit: np.array([[1e-4]])),
+            modes=mixture(np.array([[0.5]]), np.zeros(1), np.array([[[1e-4]]])),
             values=lambda units: 10 + 690 * units,
             fingerprint="paint",
             points=90,

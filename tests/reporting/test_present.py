@@ -76,7 +76,7 @@ def posterior(fit) -> Posterior:
         draws=draws,
         units=0.5 + 0.01 * np.random.default_rng(2).random((200, 8, 2)),
         log_density=np.zeros((200, 8)),
-        modes=mixture(np.full((1, 2), 0.5), np.zeros(1), lambda unit: 1e-4 * np.eye(2)),
+        modes=mixture(np.full((1, 2), 0.5), np.zeros(1), 1e-4 * np.eye(2)[None]),
         checks=Checks(200, 0, 2.0, 1.0, 0.3, 1, 1, 800),
         predict=lambda units, seed: (Prediction("R", "reflectance", axis, fit.curve.data, rows, rows),),
         seconds=1.0,

@@ -44,7 +44,7 @@ class View(NamedTuple):
         data = np.concatenate([self.residual / SIGMA, np.zeros(self.nuisances.shape[1])])
         rest = data - matrix @ np.linalg.lstsq(matrix, data, rcond=None)[0]
         padded = np.concatenate([rest[:ROWS], np.zeros(4), rest[ROWS:]])
-        return Explained(np.zeros(ROWS), padded, np.sum(rest**2))
+        return Explained(np.zeros(ROWS), padded, np.asarray(np.sum(rest**2)))
 
 
 def effect(name: str, shared: bool = True) -> Effect:
@@ -97,16 +97,17 @@ def test_an_effect_of_the_sample_is_the_same_in_all_views():
     assert deviance(views) == pytest.approx(explicit(views, [[0, 1], [2, 0]]), rel=1e-9)
 
 
+def reflectance(nm: np.ndarray, thickness: float, index: float = 1.46) -> np.ndarray:
+    """R of the film, by the tmm package."""
+    stack = [1.0, index, 3.9 + 0.02j], [np.inf, thickness, np.inf]
+    return np.array([tmm.coh_tmm("s", *stack, 0.0, each)["R"] for each in nm])
+
+
 def slope(nm: np.ndarray, thickness: float, index: float) -> np.ndarray:
-    """∂R / ∂ thickness and ∂R / ∂ relative index of the film, by the tmm package, (points, 2)."""
-
-    def reflectance(thickness: float, index: float) -> np.ndarray:
-        stack = [1.0, index, 3.9 + 0.02j], [np.inf, thickness, np.inf]
-        return np.array([tmm.coh_tmm("s", *stack, 0.0, each)["R"] for each in nm])
-
+    """∂R / ∂ thickness and ∂R / ∂ relative index of the film, (points, 2)."""
     step = 1e-4
-    by_thickness = reflectance(thickness + step, index) - reflectance(thickness - step, index)
-    by_index = reflectance(thickness, index * (1 + step)) - reflectance(thickness, index * (1 - step))
+    by_thickness = reflectance(nm, thickness + step, index) - reflectance(nm, thickness - step, index)
+    by_index = reflectance(nm, thickness, index * (1 + step)) - reflectance(nm, thickness, index * (1 - step))
     return np.stack([by_thickness, by_index], axis=1) / (2 * step)
 
 
@@ -130,3 +131,29 @@ def test_an_uncertain_index_widens_a_posterior_as_it_does_the_error(bands, film,
     assert (estimate.stderr > 3 * estimate.stderr_noise) == bool(uncertainty)
     # the sd of a chain of 50 autocorrelation times and 32 walkers is known to 2 %
     assert posterior["thickness"].sd == pytest.approx(expected, rel=0.08)
+
+
+def test_effects_bring_back_minima_that_noise_rules_out(bands, film):
+    """Scale, its slope and curvature, and offset are badly known: five bands are next to one number.
+
+    By noise alone the second thickness has a Δχ² of 76, with the effects a tenth of the posterior.
+    """
+    data, noise, scale, offset = bands(650.0, 0.01), 0.01, 0.2, 0.1
+    allowed = dataclasses.replace(pl.Uncertainty.none(), scale=scale, offset=offset)
+    posterior = pl.sample(data, dataclasses.replace(film(), uncertainty=allowed))
+    grid = np.arange(50.0, 1500.5)
+    residual = data.values - np.array([reflectance(data.wavelength, d) for d in grid])
+    alone = np.sum(residual**2, axis=1) / noise**2
+    best = reflectance(data.wavelength, grid[np.argmin(alone)])
+    x = (data.wavelength - 625.0) / 175.0
+    columns = [scale * best, scale * best * x, scale / 2 * best * (2 * x**2 - 1), np.full(5, offset)]
+    covariance = noise**2 * np.eye(5) + sum(np.outer(own, own) for own in columns)
+    chi2 = np.einsum("gi,ij,gj->g", residual, np.linalg.inv(covariance), residual)
+    weight = np.exp(-0.5 * (chi2 - chi2.min()))
+    expected = weight[abs(grid - 421.0) < 60].sum() / weight.sum()
+    assert alone[grid == 421.0] - alone.min() > 60
+    assert expected > 0.05
+    assert posterior.trusted
+    # 2000 independent draws know a share to ± 0.01
+    drawn = posterior.draws[..., 0]
+    assert np.mean(abs(drawn - 421.0) < 60) == pytest.approx(expected, abs=0.04)

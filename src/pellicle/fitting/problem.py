@@ -112,6 +112,11 @@ class View(Protocol):
         """Independent data values."""
         ...
 
+    @property
+    def independent_fraction(self) -> float:
+        """Effective points per point: correlated errors count less."""
+        ...
+
     def local(self, values: Any) -> Any:
         """The model and its derivatives at `values` (its parameters,)."""
         ...

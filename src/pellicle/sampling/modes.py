@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from pellicle.fitting.covariance import scaled
+from pellicle.fitting.problem import Problem
 from pellicle.fitting.reweighting import RankedMinima
+from pellicle.sampling.systematics import Systematics, without_effects
 
 FREEDOM = 5.0
 """Degrees of freedom of the t distributions: their tails are heavier than those of what is sampled."""
@@ -18,6 +20,10 @@ _LEAST = 1e-3
 """Every minimum found is given this share, in case its quadratic estimate is wrong."""
 _HOPELESS = 60.0
 """Minima with a χ² further above the best hold nothing, whatever their width."""
+_STEPS = 5
+"""Most steps from a minimum of the noise's likelihood to that of the posterior."""
+_SAME = 0.1
+"""Standard deviations within which two minima are one."""
 
 
 @dataclass(frozen=True)
@@ -85,12 +91,12 @@ class Modes:
         return -0.5 * (FREEDOM + size) * np.log1p(square / FREEDOM) - log_volume
 
 
-def mixture(centre: np.ndarray, chi2: np.ndarray, covariance: Callable[[np.ndarray], np.ndarray]) -> Modes:
-    """Minima `centre` (minima, parameters) of −2 ln posterior, `chi2`, best first, each with its covariance;
-    all in the unit cube."""
-    kept = chi2 - chi2[0] < _HOPELESS
-    factor = np.array([np.linalg.cholesky(covariance(unit)) for unit in centre[kept]])
-    log = -0.5 * (chi2[kept] - chi2[0])
+def mixture(centre: np.ndarray, chi2: np.ndarray, covariance: np.ndarray) -> Modes:
+    """Minima `centre` (minima, parameters) of −2 ln posterior, `chi2`, each with its covariance (minima,
+    parameters, parameters); all in the unit cube."""
+    kept = chi2 - chi2.min() < _HOPELESS
+    factor = np.linalg.cholesky(covariance[kept])
+    log = -0.5 * (chi2[kept] - chi2.min())
     log += np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
     share = np.exp(log - log.max())
     return Modes(centre[kept], factor, share / share.sum())
@@ -106,15 +112,63 @@ def confined(jacobian: np.ndarray, size: int) -> np.ndarray:
     return np.linalg.inv(jacobian.T @ jacobian + np.diag(uniform))[:size, :size]
 
 
-def modes(ranked: RankedMinima) -> Modes:
-    """The minima of a fit in affine coordinates, each with the covariance of its own Jacobian; nuisances are
-    integrated out."""
-    problem, variance = ranked.problem.affine(), [fit.variance for fit in ranked.fits]
+class _Expansion(NamedTuple):
+    """Linearisation of a posterior at one point: the Jacobian in units of the noise with columns of nuisances
+    and effects, the residuals of its rows, and −2 ln posterior up to a constant."""
 
-    def covariance(unit: np.ndarray) -> np.ndarray:
-        values = np.asarray(problem.values(unit))
-        at = [view.local(problem.seen_by(view, values)) for view in problem.views]
-        return confined(scaled(problem, unit, at, variance).jacobian, len(unit))
+    jacobian: np.ndarray
+    residual: np.ndarray
+    chi2: float
 
-    centre = np.array([ranked.problem.in_affine(unit) for unit in ranked.minima.units])
-    return mixture(centre, ranked.minima.deviance, covariance)
+
+def _expansion(problem: Problem, effects: Systematics, unit: np.ndarray) -> _Expansion:
+    """Linearisation of an affine problem at a point (parameters,) of the unit cube."""
+    values = np.asarray(problem.values(unit))
+    at = [view.local(problem.seen_by(view, values)) for view in problem.views]
+    counted = np.array([view.independent_fraction for view in problem.views])
+    matrix, _, names, pull = scaled(problem, unit, at, (1 / (counted * effects.shares)).tolist())
+    pairs = list(zip(problem.views, at, counted.tolist(), strict=True))
+    rest = [view.residuals(local).ravel() * fraction**0.5 for view, local, fraction in pairs]
+    count, width, first = len(effects.changes[0]), len(names), 0
+    jacobian = np.zeros((len(matrix) + count, width + count))
+    jacobian[: len(matrix), :width] = matrix
+    jacobian[len(matrix) :, width:] = np.eye(count)
+    residual = np.zeros(len(jacobian))
+    residual[len(matrix) - width : len(matrix)] -= pull
+    explained = np.zeros(count)
+    for changes, columns, share, own in zip(*effects, rest, strict=True):
+        rows = slice(first, first + len(own))
+        jacobian[rows, width:], residual[rows] = share**0.5 * changes.T, share**0.5 * own
+        explained += columns @ own
+        first += len(own)
+    return _Expansion(jacobian, residual, float(np.sum(residual**2) - np.sum(explained**2)))
+
+
+def modes(ranked: RankedMinima, effects: Systematics | None = None) -> Modes:
+    """The minima of a fit in affine coordinates, each with the covariance of its own Jacobian; nuisances and
+    systematic effects are integrated out. With effects a minimum moves by steps of least squares."""
+    problem = ranked.problem.affine()
+    noise = without_effects(problem)
+    centres, deviances, covariances = [], [], []
+    for own, deviance in zip(ranked.minima.units, ranked.minima.deviance.tolist(), strict=True):
+        unit = ranked.problem.in_affine(own)
+        here = _expansion(problem, effects or noise, unit)
+        if effects:
+            deviance += here.chi2 - _expansion(problem, noise, unit).chi2
+            start = here.chi2
+            for _ in range(_STEPS):
+                step = np.linalg.lstsq(here.jacobian, here.residual, rcond=None)[0][: len(unit)]
+                trial = np.clip(unit + step, 0.0, 1.0)
+                there = _expansion(problem, effects, trial)
+                if not there.chi2 < here.chi2:
+                    break
+                unit, here = trial, there
+            deviance += here.chi2 - start
+        covariance = confined(here.jacobian, len(unit))
+        near = _SAME * np.sqrt(np.diag(covariance))
+        if any(np.all(np.abs(unit - other) < near) for other in centres):
+            continue  # two minima of the noise's likelihood that the effects make one
+        centres.append(unit)
+        deviances.append(deviance)
+        covariances.append(covariance)
+    return mixture(np.array(centres), np.array(deviances), np.array(covariances))

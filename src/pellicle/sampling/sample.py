@@ -93,7 +93,7 @@ def sample(
             fit,
             tuple(p.name for p in problem.parameters),
             log_density(problem, effects),
-            modes(ranked),
+            modes(ranked, effects),
             lambda units: problem.values_near(units, ranked.values),
             identity,
             max(view.independent for view in problem.views),

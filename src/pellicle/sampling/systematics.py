@@ -16,10 +16,12 @@ class Systematics(NamedTuple):
     """Effects on all views, taken at the best minimum.
 
     Of the deviance of each view only a share (`shares`, (views,)) is evidence where residuals are larger than
-    noise. `columns` of each view (effects, data values), times its weighted residuals and added over the
-    views, are what the effects explain: the sum of their squares is no misfit.
+    noise. `changes` of each view (effects, data values) are those of its weighted data by one standard
+    uncertainty. `columns`, of the same shape, times its weighted residuals and added over the views, are what
+    the effects explain: the sum of their squares is no misfit.
     """
 
+    changes: tuple[Any, ...]
     columns: tuple[Any, ...]
     shares: Any
 
@@ -37,8 +39,8 @@ class Systematics(NamedTuple):
 
 def without_effects(problem: Problem) -> Systematics:
     """No systematic effects: the likelihood is that of the noise."""
-    none = np.zeros((0, 0))
-    return Systematics((none,) * len(problem.views), np.ones(len(problem.views)))
+    none = tuple(np.zeros((0, view.rows * view.channels)) for view in problem.views)
+    return Systematics(none, none, np.ones(len(problem.views)))
 
 
 def systematics(
@@ -53,7 +55,7 @@ def systematics(
     for i, view in enumerate(evidence):
         for effect in view.effects:
             order.setdefault((effect.name, None if effect.shared else i), len(order))
-    columns, information = [], np.eye(len(order))
+    every, columns, information = [], [], np.eye(len(order))
     for i, (own, share, width) in enumerate(zip(evidence, shares, channels, strict=True)):
         rows, measured = own.residual.shape
         changes = np.zeros((len(order), rows, width))
@@ -68,6 +70,8 @@ def systematics(
         across = nuisances.T @ flat.T
         normal = nuisances.T @ nuisances + np.eye(nuisances.shape[1])
         information += share * (flat @ flat.T - across.T @ np.linalg.solve(normal, across))
+        every.append(flat)
         columns.append(share * flat)
     factor = np.linalg.cholesky(information)
-    return Systematics(tuple(np.linalg.solve(factor, own) for own in columns), np.array(shares))
+    columns = tuple(np.linalg.solve(factor, own) for own in columns)
+    return Systematics(tuple(every), columns, np.array(shares))

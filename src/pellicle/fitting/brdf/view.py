@@ -141,6 +141,11 @@ class SamplesView:
         """Measured numbers: samples times channels."""
         return self.rows * self.samples.values.shape[1]
 
+    @property
+    def independent_fraction(self) -> float:
+        """Effective points per point: correlated errors count less."""
+        return float(self.samples.independent_fraction)
+
     def local(self, values: Any) -> Local:
         """The model around `values` (free numbers,)."""
         return jax.device_get(local(self.form, self.samples, self.fixed, values))

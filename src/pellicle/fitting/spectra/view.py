@@ -144,6 +144,11 @@ class SpectrumView:
         """Independent data values: N, C and S lie on a sphere, so two of the three."""
         return self.points if self.channels < 3 else 2 * self.rows
 
+    @property
+    def independent_fraction(self) -> float:
+        """Effective points per point: correlated errors count less."""
+        return float(self.data.independent_fraction)
+
     def local(self, values: Any) -> Local:
         """The model around `values` (its parameters,)."""
         return jax.device_get(local(self.form, self.scene, self.data, values))
