@@ -35,8 +35,6 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
 
 EXIT_4 = (
     "pellicle fit --recipe measurements/recipes/gold_on_glass_300nm.toml",
-    "pellicle fit window.csv --layer TiO2 --substrate SiO2 --thickness 10:500",
-    "pellicle fit oxide.csv --layer SiO2 --substrate Si --thickness 1000:3000",
     "pellicle sample --recipe docs/examples/five_bands.toml --out results/five_bands",
 )
 """Their fits do not converge to one answer (exit code 4), as their pages say."""
