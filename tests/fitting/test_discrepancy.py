@@ -162,3 +162,12 @@ def test_the_amount_of_a_width():
 @pytest.mark.parametrize("count", [1, 5, 12, 30])
 def test_the_threshold_of_the_implausible(count):
     assert _improbable(count) == pytest.approx(chi2.isf(1e-3, count), rel=0.04)
+
+
+@pytest.mark.parametrize(("least", "expected"), [(1.0, 1.0), (10.0, 10.0)])
+def test_small_residuals_are_correlated_only_by_their_own_size(least, expected):
+    """A tenth of σ, of which 50 points count as one: a factor of 0.5 on σ², less than that of the noise."""
+    found, _ = problem(0.1 * noise(), least=least, correlation=lambda rest: 50.0)
+    assert found.remaining[0].variance == pytest.approx(expected)
+    large, _ = problem(2 * noise(), least=least, correlation=lambda rest: 50.0)
+    assert large.remaining[0].variance == pytest.approx(200.0, rel=0.3)

@@ -220,8 +220,9 @@ def _variance(view: Evidence, residual: np.ndarray, weight: np.ndarray, used: fl
     """Factor on σ² for the size and correlation of what remains, where that is no noise by chance."""
     rest = weight * residual
     freedom = max(rest.size - used, 1.0)
-    reduced = max(1.0, float(np.sum(rest**2)) / freedom)
-    factor = reduced * max(view.correlation(rest), view.least)
+    reduced = float(np.sum(rest**2)) / freedom
+    # only what remains is correlated: of a σ that allows for a lamp it may be a tenth
+    factor = max(reduced * view.correlation(rest), max(1.0, reduced) * view.least)
     of_length = math.sqrt(2 * (2 * _WINDOW + 1) / freedom)  # standard error of the correlation length: ibid.
     by_chance = 1 + _SCATTER * math.hypot(math.sqrt(2 / freedom), of_length, view.uncertain)
     return factor if factor > by_chance else 1.0
