@@ -64,7 +64,9 @@ def test_oxides_on_a_plate_are_better_with_its_back_face(shared_data, name, trut
     assert found.status == "converged"
     assert abs(found["thickness"].value - truth) < tolerance
     assert found.rms < 0.25 * without.rms
-    assert without.status == "misfit"
+    # a thickness of the wrong scene is refused, or its error includes the right one
+    shift = abs(without["thickness"].value - truth)
+    assert without.status == "misfit" or shift < without["thickness"].expanded
     told = f"The back face matters: rms {found.rms:.4f} with it, {without.rms:.4f} without."
     assert told in found.verdict
 

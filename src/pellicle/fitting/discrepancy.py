@@ -84,9 +84,9 @@ class Evidence(NamedTuple):
 class Remaining(NamedTuple):
     """Residuals of one view that no effect explains.
 
-    `typical` is their size in the unit of the data, of most points, `ratio` that to the noise of neighbouring
-    points, and `weighted` that to the σ of the points. `variance` is the factor on σ² that stands for them
-    and for their correlation.
+    `typical` is their size in the unit of the data, of most points, and `ratio` that to the noise of
+    neighbouring points; `weighted` is their root mean square in units of the σ of the points. `variance` is
+    the factor on σ² that stands for them and for their correlation.
     """
 
     ratio: float
@@ -148,7 +148,8 @@ def discrepancy(evidence: Sequence[Evidence], scaled: Scaled, unit: np.ndarray) 
     remaining = []
     for view, own, size in zip(evidence, system.residuals(solution), state.variance, strict=True):
         typical = spread(own * view.sigma)
-        remaining.append(Remaining(typical / view.noise, typical, spread(own), size))
+        weighted = math.sqrt(np.mean((_weights(own) * own) ** 2))
+        remaining.append(Remaining(typical / view.noise, typical, weighted, size))
     sizes, shares = solution[known:], _evidence_shares(evidence, state.variance)
     # the σ of a drifting lamp would hide what an effect explains
     judged = [view._replace(sigma=np.full(view.sigma.shape, view.noise), least=1.0) for view in evidence]
