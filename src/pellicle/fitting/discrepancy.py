@@ -241,7 +241,9 @@ class _System:
         )
         order = {name: len(scaled.names) + i for i, name in enumerate(self.names)}
         self.effects: list[Effect] = [None] * len(order)  # type: ignore[list-item]
-        self.known, self.stretch, self.pull = len(scaled.names), scaled.stretch, scaled.pull
+        self.known, self.stretch = len(scaled.names), scaled.stretch
+        # a drift stays where the fit has it: its prior would pull it as soon as residuals count less
+        self.pull = np.where(np.arange(self.known) < len(unit), scaled.pull, 0.0)
         self.blocks, self.data, self.shapes = [], [], []
         for i, view in enumerate(evidence):
             block = np.zeros((view.residual.size, self.known + len(order)))
