@@ -3,6 +3,7 @@
 First study: simulated data sets of seven kinds of film, three noise levels, with sigma given and estimated.
 True values are drawn uniformly between the bounds, and the share of them inside the 68 % and 95 % intervals
 is counted: for the covariance of the best fit, its profile likelihood (95 % only) and the sampled posterior.
+The data have noise and no systematic effects, and so have the scenes (`pl.Uncertainty.none`).
 Second study: sixty films. A scan of the likelihood in plain NumPy classifies the thickness of thirty of them
 as determined and of thirty as undetermined; the fit should agree.
 
@@ -16,6 +17,7 @@ import sys
 import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -39,6 +41,7 @@ from pellicle.synthetic.spectra import simulate_signal  # noqa: E402
 
 WAVELENGTH = np.linspace(400.0, 900.0, 101)
 SILICON = pl.dispersion.Constant(3.9, 0.02)
+EXACT = pl.Uncertainty.none()
 LEVELS = {"R": (0.001, 0.004, 0.015), "T": (0.001, 0.004, 0.015), "psi-delta": (0.02, 0.1, 0.5)}
 
 
@@ -52,7 +55,7 @@ def kinds() -> dict[str, pl.Scene]:
     glass, t = pl.dispersion.Constant(1.52, 0.0), pl.Light(None, 0.0, "T", "unpolarised")
     plate = pl.Substrate(glass, pl.dispersion.Constant(1.0, 0.0))
     scaled = pl.Instrument(scale=Drift(0))
-    return {
+    scenes = {
         "R: d": pl.Scene(pl.Layer(1.46, thickness()), SILICON),
         "R: d, n": pl.Scene(pl.Layer(pl.dispersion.Constant(index, 0.0), thickness()), SILICON),
         "R: d, n, k": pl.Scene(pl.Layer(pl.dispersion.Constant(index, extinction), thickness()), SILICON),
@@ -71,6 +74,7 @@ def kinds() -> dict[str, pl.Scene]:
             light=pl.Light(None, 70.0, "psi-delta", "unpolarised"),
         ),
     }
+    return {kind: replace(scene, uncertainty=EXACT) for kind, scene in scenes.items()}
 
 
 class Count(NamedTuple):
@@ -229,7 +233,7 @@ def claims(count: int) -> list[Claim]:
         clean = reflectance(case.thickness, case.n + 1j * case.k, case.wavelength)
         values = clean + random.normal(0, case.noise, clean.size)
         index = pl.dispersion.Constant(pl.Free(max(case.n - 0.3, 1.0), case.n + 0.3), case.k)
-        scene = pl.Scene(pl.Layer(index, pl.Free(1.0, 3000.0)), SILICON)
+        scene = pl.Scene(pl.Layer(index, pl.Free(1.0, 3000.0)), SILICON, uncertainty=EXACT)
         data = pl.Spectrum(case.wavelength, values, "R", sigma=np.full(clean.size, case.noise))
         fit = pl.fit(data, scene)
         error = fit["thickness"].stderr

@@ -2,7 +2,8 @@
 
 Compared are emcee in its usual form (stretch moves from a ball around the best fit, a log-probability in
 plain NumPy, one walker at a time), the same with vectorised NumPy, and `pellicle.sample`, whose time includes
-its checks. All sample the same film in turn in each round; compilation and the fit are not included.
+its checks. All sample the same film in turn in each round; compilation and the fit are not included. The
+posterior is that of the noise, without systematic effects, as emcee's.
 
     python benchmarks/posterior.py [--rounds 5]
 """
@@ -120,6 +121,7 @@ class PellicleSampler:
         scene = pl.Scene(
             pl.Layer(Constant(n, k), thickness),
             Constant(SILICON.real, SILICON.imag),
+            uncertainty=pl.Uncertainty.none(),
         )
         data = pl.Spectrum(p.wavelength, p.values, "R", sigma=np.full(p.wavelength.size, p.noise))
         self.fit, self.ranked = fitted(data, scene, 0.0, quiet)

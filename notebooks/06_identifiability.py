@@ -91,7 +91,9 @@ assert maps["120 nm"].min(axis=1).max() > 1000
 # contour that is too small to be visible here.
 #
 # Next we fit spectra with noise. The noise determines where in the valley the best fit lies: for this
-# spectrum it is where the valley meets the bound of n.
+# spectrum it is where the valley meets the bound of n. A fit also allows for systematic effects, such as a
+# scale that is a little off; this notebook studies the noise alone, so its scenes state that everything else
+# is exact.
 
 
 # %%
@@ -100,7 +102,8 @@ def measured(thickness):
     return pl.simulate(pl.Scene(pl.Layer(1.46, thickness), "Si"), nm, noise=NOISE, seed=1)
 
 
-both_free = pl.Scene(pl.Layer(pl.Free(1.3, 1.7), pl.Free(0, 200)), "Si")
+noise_alone = pl.Uncertainty.none()
+both_free = pl.Scene(pl.Layer(pl.Free(1.3, 1.7), pl.Free(0, 200)), "Si", uncertainty=noise_alone)
 for thickness in (15.0, 120.0):
     fit = pl.fit(measured(thickness), both_free)
     print(f"{thickness:.0f} nm, both free: {fit}")
@@ -112,7 +115,7 @@ for thickness in (15.0, 120.0):
 # determines the thickness:
 
 # %%
-fixed = pl.Scene(pl.Layer(1.46, pl.Free(0, 200)), "Si")
+fixed = pl.Scene(pl.Layer(1.46, pl.Free(0, 200)), "Si", uncertainty=noise_alone)
 fit = pl.fit(measured(15.0), fixed)
 print(f"n fixed: {fit}")
 assert fit.status == "converged"
@@ -171,7 +174,7 @@ assert places[0] > places[-1] == 1
 
 # %%
 five = pl.read_spectrum("../docs/examples/five_bands.csv")
-scene = pl.Scene(pl.Layer(1.46, pl.Free(50, 1500)), "Si")
+scene = pl.Scene(pl.Layer(1.46, pl.Free(50, 1500)), "Si", uncertainty=noise_alone)
 ambiguous = pl.fit(five, scene)
 print(ambiguous)
 for rival in sorted(ambiguous.rivals, key=lambda rival: rival.delta_chi2)[:3]:
@@ -191,7 +194,7 @@ assert ambiguous.status == "ambiguous"
 
 # %%
 gold = pl.read_spectrum("../measurements/gold_on_glass_300nm.csv")
-opaque = pl.fit(gold, pl.Scene(pl.Layer("Au", pl.Free(10, 1000)), "BK7"))
+opaque = pl.fit(gold, pl.Scene(pl.Layer("Au", pl.Free(10, 1000)), "BK7", uncertainty=noise_alone))
 print(opaque)
 limit = opaque["thickness"].lower_limit
 assert opaque.status == "not-identifiable"
@@ -305,7 +308,8 @@ plt.show()
 # with a standard deviation of 100 nm. This prior, written beside the bounds, changes the result:
 
 # %%
-believed = pl.Scene(pl.Layer(1.46, pl.Free(50, 1500, prior=pl.priors.Normal(430, 100))), "Si")
+thickness = pl.Free(50, 1500, prior=pl.priors.Normal(430, 100))
+believed = pl.Scene(pl.Layer(1.46, thickness), "Si", uncertainty=noise_alone)
 informed = pl.sample(five, believed)
 prior = np.exp(-0.5 * ((grid - 430) / 100) ** 2)
 exact = float((weight * prior)[abs(grid - 438) < 80].sum() / (weight * prior).sum())
