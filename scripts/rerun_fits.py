@@ -1,7 +1,7 @@
 """Repeat the fits of `fits/` and compare the results with the kept ones.
 
 Run `python scripts/rerun_fits.py [STUDY...]` (default: all). The exit code is 1 if a status has changed
-or a value has moved by more than a tenth of its kept standard error. `--keep` replaces the kept
+or a value has moved by more than a tenth of its kept error by noise alone. `--keep` replaces the kept
 results; review the change and give the reason in the commit.
 """
 
@@ -27,7 +27,7 @@ KEPT = ("result.json", "report.txt", "figure.png")
 VOLATILE = ("versions", "seconds")
 """Keys that differ between runs and are not kept."""
 SHARE = 0.1
-"""Allowed change of a value in kept standard errors: rounding differs between machines and JAX versions."""
+"""Allowed change of a value in kept errors by noise alone: rounding differs between machines and versions."""
 
 
 def studies(folder: Path = FITS) -> list[Path]:
@@ -70,9 +70,9 @@ def _change(kept: Mapping[str, Any], new: Mapping[str, Any]) -> str | None:
     if kept["stderr"] is None or new["stderr"] is None:  # infinite: the value is not determined
         same = kept["stderr"] == new["stderr"]
         return None if same else f"has a standard error of {new['stderr']}, had {kept['stderr']}"
-    if abs(new["value"] - kept["value"]) <= SHARE * kept["stderr"]:
+    if abs(new["value"] - kept["value"]) <= SHARE * kept["stderr_noise"]:
         return None
-    return f"{new['value']:.8g}, was {kept['value']:.8g} ± {kept['stderr']:.2g}"
+    return f"{new['value']:.8g}, was {kept['value']:.8g} ± {kept['stderr_noise']:.2g} by noise alone"
 
 
 def keep(out: Path, study: Path) -> None:

@@ -59,13 +59,14 @@ def test_kept_samples_follow_from_their_recipes(tmp_path):
 
 
 def test_changes_are_reported(script):
-    kept = {"status": "converged", "parameters": {"d": {"value": 3.0, "stderr": 0.5}}}
-    near = {"status": "converged", "parameters": {"d": {"value": 3.04, "stderr": 0.5}}}
-    far = {"status": "ambiguous", "parameters": {"d": {"value": 3.06, "stderr": 0.5}}}
+    kept = {"status": "converged", "parameters": {"d": {"value": 3.0, "stderr": 5.0, "stderr_noise": 0.5}}}
+    near = {"status": "converged", "parameters": {"d": {"value": 3.04, "stderr": 5.0, "stderr_noise": 0.5}}}
+    far = {"status": "ambiguous", "parameters": {"d": {"value": 3.06, "stderr": 5.0, "stderr_noise": 0.5}}}
     assert list(script.differences(kept, near)) == []
-    assert list(script.differences(kept, far)) == ["status ambiguous, was converged", "d 3.06, was 3 ± 0.5"]
+    moved = ["status ambiguous, was converged", "d 3.06, was 3 ± 0.5 by noise alone"]
+    assert list(script.differences(kept, far)) == moved
     lost = {"status": "converged", "parameters": {"d": {"value": 3.0, "stderr": None}, "n": {}}}
-    assert list(script.differences(kept, lost)) == ["d has a standard error of None, had 0.5", "n is new"]
+    assert list(script.differences(kept, lost)) == ["d has a standard error of None, had 5.0", "n is new"]
 
 
 def test_one_study_is_reproduced(script, monkeypatch):
