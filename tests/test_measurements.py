@@ -72,7 +72,7 @@ def fitted(recipe: Path):
 def test_the_fit_finds_the_truth(recipe):
     found, truth = fitted(recipe)
     assert found.status == "converged"
-    assert abs(found["thickness"].value - truth) < 4 * found["thickness"].stderr
+    assert abs(found["thickness"].value - truth) < 4 * found["thickness"].stderr_noise
     assert found["thickness"].stderr < 0.02 * truth
     assert 0.5 < found.chi2_reduced < 1.5
 

@@ -159,9 +159,9 @@ def test_a_fit_finds_the_porosity(tmp_path):
     )
     found = fit.parameters
     assert fit.status.value == "converged"
-    assert found["fraction"].value == pytest.approx(0.35, abs=4 * found["fraction"].stderr)
-    assert found["fraction"].stderr < 0.005
-    assert found["thickness"].value == pytest.approx(230.0, abs=4 * found["thickness"].stderr)
+    assert found["fraction"].value == pytest.approx(0.35, abs=4 * found["fraction"].stderr_noise)
+    assert found["fraction"].stderr_noise < 0.005
+    assert found["thickness"].value == pytest.approx(230.0, abs=4 * found["thickness"].stderr_noise)
 
 
 def test_a_fit_finds_a_tauc_lorentz_layer(tmp_path):
@@ -175,6 +175,6 @@ def test_a_fit_finds_a_tauc_lorentz_layer(tmp_path):
     assert fit.status.value == "converged"
     for name, value in truth.items():
         found = fit.parameters[name]
-        assert found.value == pytest.approx(value, abs=4 * found.stderr)
-        assert found.stderr < 0.05 * value
+        assert found.value == pytest.approx(value, abs=4 * found.stderr_noise)
+        assert found.stderr_noise < 0.05 * value
     assert fit.parameters["Eg"].unit == "eV"

@@ -134,4 +134,4 @@ def test_a_fit_scans_a_spline_as_a_whole(tmp_path):
     fit = pl.fit(pl.read_spectrum(path, noise=0.001), pl.Scene(layer, "Si"))
     for i, n in enumerate(truth.n):
         found = fit.parameters[f"n{i + 1}"]
-        assert found.value == pytest.approx(n, abs=4 * found.stderr)
+        assert found.value == pytest.approx(n, abs=4 * found.stderr_noise)
