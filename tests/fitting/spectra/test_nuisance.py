@@ -177,6 +177,7 @@ def test_a_gain_that_would_turn_negative_at_one_end_is_the_best_that_does_not():
     dense = Dense(values, "slow", None)
     best = dense.least_squares()
     assert np.min(dense.columns[:, : dense.first] @ best / SIGNAL) < -1e-3
+    # signs hold at a few positions, between which a polynomial dips by less than this
     assert np.min(found.gain) >= -0.01 * np.max(found.gain)
     np.testing.assert_allclose(found.model, dense.columns @ dense.held(), atol=1e-5)
 
