@@ -27,6 +27,8 @@ _OXIDISES = 2.0
 """Substrates of a higher index than this, or with absorption, are semiconductors and metals with an oxide."""
 _GAS = 0.01
 """Media whose index is within this of 1 are gases."""
+_ROUND = 16
+"""Numbers of candidates are multiples of this."""
 _WIDEST = 10.0
 """Upper bound of the further numbers, in their own units."""
 
@@ -125,12 +127,15 @@ class ExtendedScene:
         """Signals (changes, data values) with one number changed in each, without scale and offset."""
         # the order of a pytree is that of its fields
         order = [next(i for i, own in enumerate(self._free) if own is x) for _, x in free_leaves(self._scene)]
-        values = np.tile([own.start for own in self._free], (len(changes), 1))
-        for row, (number, change) in zip(values, changes, strict=True):
+        # padded: scenes with other uncertainties share a program
+        count = -(-len(changes) // _ROUND) * _ROUND
+        values = np.tile([own.start for own in self._free], (count, 1))
+        for row, (number, change) in zip(values, changes, strict=False):
             row[number.position] += change
         form = SpectrumForm(exact(self._scene).static_key)
         scene = jax.tree_util.tree_map(np.asarray, anonymous(self._scene))
-        return np.asarray(simulated(form, scene, self._view.data, values[:, order]).signal)
+        signals = simulated(form, scene, self._view.data, values[:, order]).signal
+        return np.asarray(signals)[: len(changes)]
 
 
 def _with_slope(medium: Any, nm: np.ndarray) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -60,7 +61,9 @@ def systematic_effects(view: SpectrumView, values: np.ndarray, at: Local, scene:
             change = _columns(view, gain * change)
             about = row.name, row.size, row.unit, _on_sphere(view, at, change)
             result.append(Effect(*about, row.power, row.positive, row.shared, row.material))
-    return [*result, *_of_signal(view, at, scene)]
+    every_effect = [*result, *_of_signal(view, at, scene)]
+    of = f" of {view.name}" if view.name else ""
+    return [e if e.shared else replace(e, name=f"{e.name}{of}") for e in every_effect]
 
 
 def _simulations(
