@@ -110,6 +110,7 @@ def test_every_view_counts_and_scale_is_integrated_out(bands):
         pl.Layer(1.46, pl.Free(500.0, 560.0)),
         pl.dispersion.Constant(3.9, 0.02),
         instrument=pl.Instrument(scale=Drift(0)),
+        uncertainty=pl.Uncertainty.none(),
     )
     found = pl.sample([bands(530.0, 0.004, 1), bands(530.0, 0.004, 2)], scene)
     at = found["thickness"]

@@ -43,7 +43,8 @@ class View(NamedTuple):
         matrix = np.vstack([self.nuisances / SIGMA, np.eye(self.nuisances.shape[1])])
         data = np.concatenate([self.residual / SIGMA, np.zeros(self.nuisances.shape[1])])
         rest = data - matrix @ np.linalg.lstsq(matrix, data, rcond=None)[0]
-        padded = np.concatenate([rest[:ROWS], np.zeros(4), rest[ROWS:]])
+        # of a prior the residual is the coefficient less its mean
+        padded = np.concatenate([rest[:ROWS], np.zeros(4), -rest[ROWS:]])
         return Explained(np.zeros(ROWS), padded, np.asarray(np.sum(rest**2)))
 
 
@@ -81,6 +82,14 @@ def residual(seed: int) -> np.ndarray:
 def test_the_likelihood_is_that_of_a_dense_covariance(nuisances, share):
     view = View(residual(1), (effect("shift"), effect("bend")), nuisances, share)
     assert deviance([view]) == pytest.approx(explicit([view], [[0, 1]]), rel=1e-9)
+
+
+def test_effects_explain_no_more_than_there_is():
+    """Far from the best fit the scale follows another signal than the one that the effects were taken at."""
+    here = View(0.0 * X, (effect("shift"), effect("bend")), 100 * NUISANCES, 1.0)
+    far = here._replace(residual=X**2, nuisances=100 * np.stack([X**3, np.cos(9 * X)], axis=1))
+    with jax.enable_x64(True):
+        assert systematics([here.evidence], [1.0], [1], 0).deviance([far.explained]) > 0
 
 
 def test_without_effects_the_likelihood_is_that_of_the_noise():

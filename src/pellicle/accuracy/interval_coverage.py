@@ -1,4 +1,4 @@
-"""Coverage of 95 % intervals by several methods on simulated data sets, with their times."""
+"""Coverage of 95 % intervals by several methods on simulated data sets with noise alone, with their times."""
 
 from __future__ import annotations
 

@@ -126,10 +126,10 @@ def _expansion(problem: Problem, effects: Systematics, unit: np.ndarray) -> _Exp
     values = np.asarray(problem.values(unit))
     at = [view.local(problem.seen_by(view, values)) for view in problem.views]
     counted = np.array([view.independent_fraction for view in problem.views])
-    matrix, _, names, pull = scaled(problem, unit, at, (1 / (counted * effects.shares)).tolist())
-    pairs = list(zip(problem.views, at, counted.tolist(), strict=True))
+    matrix, _, names, pulls = scaled(problem, unit, at, (1 / (counted * effects.shares)).tolist())
+    pull, pairs = np.asarray(pulls), list(zip(problem.views, at, counted.tolist(), strict=True))
     rest = [view.residuals(local).ravel() * fraction**0.5 for view, local, fraction in pairs]
-    count, width, first = len(effects.changes[0]), len(names), 0
+    count, width, first, priors = len(effects.changes[0]), len(names), 0, len(unit)
     jacobian = np.zeros((len(matrix) + count, width + count))
     jacobian[: len(matrix), :width] = matrix
     jacobian[len(matrix) :, width:] = np.eye(count)
@@ -139,8 +139,9 @@ def _expansion(problem: Problem, effects: Systematics, unit: np.ndarray) -> _Exp
     for changes, columns, share, own in zip(*effects, rest, strict=True):
         rows = slice(first, first + len(own))
         jacobian[rows, width:], residual[rows] = share**0.5 * changes.T, share**0.5 * own
-        explained += columns @ own
-        first += len(own)
+        several = columns.shape[1] - len(own)
+        explained += columns @ np.concatenate([own, pull[priors : priors + several]])
+        first, priors = first + len(own), priors + several
     return _Expansion(jacobian, residual, float(np.sum(residual**2) - np.sum(explained**2)))
 
 

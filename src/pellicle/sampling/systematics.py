@@ -17,8 +17,9 @@ class Systematics(NamedTuple):
 
     Of the deviance of each view only a share (`shares`, (views,)) is evidence where residuals are larger than
     noise. `changes` of each view (effects, data values) are those of its weighted data by one standard
-    uncertainty. `columns`, of the same shape, times its weighted residuals and added over the views, are what
-    the effects explain: the sum of their squares is no misfit.
+    uncertainty. `columns` (effects, data values and nuisances), times its weighted residuals and those of the
+    priors of its nuisances, added over the views, are what the effects explain: the sum of their squares is
+    no misfit.
     """
 
     changes: tuple[Any, ...]
@@ -32,7 +33,12 @@ class Systematics(NamedTuple):
         I + E Eᵀ by M. Woodbury, 1950.
         """
         pairs = list(zip(self.columns, views, strict=True))
-        explained = sum(own @ view.residual[: own.shape[1]] for own, view in pairs)
+        explained = jnp.zeros(len(self.columns[0]))
+        for changes, (own, view) in zip(self.changes, pairs, strict=True):
+            points = changes.shape[1]
+            priors = own.shape[1] - points
+            explained += own[:, :points] @ view.residual[:points]
+            explained += own[:, points:] @ view.residual[len(view.residual) - priors :]
         total = sum(share * view.deviance for share, view in zip(self.shares, views, strict=True))
         return total - jnp.sum(jnp.square(explained))
 
@@ -65,13 +71,16 @@ def systematics(
         linear = np.zeros((rows, width, own.jacobian.shape[2] - known))
         linear[:, :measured] = own.jacobian[:, :, known:] * own.weights[:, :, None]
         flat = changes.reshape(len(order), rows * width)
-        # the residuals are those with scale and offset at their best, under their priors of unit width
+        # less what scale and offset, under their priors of unit width, follow: only so the effects explain no
+        # more than there is where the signal, and with it what the scale follows, is another
         nuisances = linear.reshape(rows * width, -1)
-        across = nuisances.T @ flat.T
+        nuisances = nuisances[:, np.any(nuisances != 0, axis=0)]  # without those of other views
         normal = nuisances.T @ nuisances + np.eye(nuisances.shape[1])
-        information += share * (flat @ flat.T - across.T @ np.linalg.solve(normal, across))
+        followed = np.linalg.solve(normal, nuisances.T @ flat.T)
+        rest = np.hstack([flat - (nuisances @ followed).T, followed.T])
+        information += share * rest @ rest.T
         every.append(flat)
-        columns.append(share * flat)
+        columns.append(share * rest)
     factor = np.linalg.cholesky(information)
     columns = tuple(np.linalg.solve(factor, own) for own in columns)
     return Systematics(tuple(every), columns, np.array(shares))
