@@ -1,5 +1,7 @@
 """Errors against lmfit and SciPy, and the films that the data do not see."""
 
+from dataclasses import replace
+
 import jax
 import jax.numpy as jnp
 import lmfit
@@ -30,7 +32,8 @@ def model():
 
 @pytest.fixture
 def scene(film):
-    return film(material=pl.dispersion.Cauchy(*CAUCHY))
+    """A scene of which everything else is known: its errors are those of the noise."""
+    return replace(film(material=pl.dispersion.Cauchy(*CAUCHY)), uncertainty=pl.Uncertainty.none())
 
 
 def covariance(fit):
@@ -67,7 +70,7 @@ def test_absolute_sigma_against_scipy(scene, measured, model):
 
 
 def test_relative_sigma_against_lmfit(scene, measured, model):
-    """σ from the residuals; where correlation counts, errors grow by its root; and as Student's t."""
+    """σ from the residuals; where correlation counts, errors grow by its root, and Student's t has them."""
     data = measured(scene, *TRUTH)
     fit = pl.fit(data, scene)
     start = lmfit.Parameters()
@@ -80,8 +83,9 @@ def test_relative_sigma_against_lmfit(scene, measured, model):
     assert share > 0.7  # white noise, as far as 128 points can tell
     widened = stats.t.isf(0.025, (len(data) - 3) * share) / stats.norm.isf(0.025)
     for name, unit in (("thickness", 100), ("A", 1), ("B", 1e4)):
-        expected = theirs.params[name].stderr * unit / np.sqrt(share) * widened
-        assert fit[name].stderr == pytest.approx(expected, rel=1e-3), name
+        expected = theirs.params[name].stderr * unit / np.sqrt(share)
+        assert fit[name].stderr_noise == pytest.approx(expected, rel=1e-3), name
+        assert fit[name].coverage_factor == pytest.approx(stats.norm.isf(0.025) * widened, rel=1e-3)
     names = list(fit.correlation_names)
     found = fit.correlation[names.index("thickness"), names.index("A")]
     assert found == pytest.approx(theirs.params["thickness"].correl["A"], abs=1e-3)
@@ -89,7 +93,7 @@ def test_relative_sigma_against_lmfit(scene, measured, model):
 
 def test_twice_the_noise_twice_the_error(scene, measured):
     one, two = (pl.fit(measured(scene, *TRUTH, noise=s, sigma=True), scene) for s in (0.002, 0.004))
-    assert two["thickness"].stderr == pytest.approx(2 * one["thickness"].stderr, rel=0.02)
+    assert two["thickness"].stderr_noise == pytest.approx(2 * one["thickness"].stderr_noise, rel=0.02)
 
 
 def test_errors_cover_the_truth(film, measured):
@@ -98,7 +102,7 @@ def test_errors_cover_the_truth(film, measured):
     inside = 0
     for seed in range(40):
         fit = pl.fit(measured(scene, 430.0, seed=seed, sigma=True), scene)
-        inside += abs(fit["thickness"].value - 430) < 1.96 * fit["thickness"].stderr
+        inside += abs(fit["thickness"].value - 430) < 1.96 * fit["thickness"].stderr_noise
     assert inside >= 33
 
 
@@ -128,13 +132,14 @@ def test_a_film_that_is_everywhere_opaque(film, measured):
 def test_index_and_thickness_of_a_thin_film_are_correlated(film, measured):
     """20 nm of something like titania: n·d is known, n and d are not."""
     scene = film(pl.Free(1, 100), pl.dispersion.Constant(pl.Free(1.8, 2.8)))
+    scene = replace(scene, uncertainty=pl.Uncertainty.none())
     fit = pl.fit(measured(scene, 2.4, 20.0, noise=0.005, sigma=True), scene)
     names = list(fit.correlation_names)
     assert fit.correlation[names.index("n"), names.index("thickness")] < -0.95
     assert fit["thickness"].stderr > 0.2
     known = film(pl.Free(1, 100), 2.4)
     alone = pl.fit(measured(known, 20.0, noise=0.005, sigma=True), known)
-    assert fit["thickness"].stderr > 3 * alone["thickness"].stderr
+    assert fit["thickness"].stderr_noise > 3 * alone["thickness"].stderr_noise
 
 
 def test_a_strong_correlation_gives_a_warning(film, measured):

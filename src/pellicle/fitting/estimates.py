@@ -102,7 +102,12 @@ def estimates(
 def _widened(
     limits: Limits, value: float, variance: float, freedom: float, bounds: tuple[float, float]
 ) -> Limits:
-    """Limits with a further variance, and as Student's t has them, within the bounds."""
+    """Limits with a further variance, and as Student's t has them, within the bounds.
+
+    Where the data do not see a side there is no variance to add: its limit is that of the noise.
+    """
+    if not math.isfinite(limits.stderr):
+        return limits
     reach, wider = math.sqrt(ONE_SIDED * variance), student(freedom, ONE_SIDED)
     lower = None if limits.lower is None else value - math.hypot(wider * (value - limits.lower), reach)
     upper = None if limits.upper is None else value + math.hypot(wider * (limits.upper - value), reach)
