@@ -30,9 +30,9 @@ def test_outliers_move_the_plain_fit_and_not_the_robust_one(film, measured, loss
     plain, robust = pl.fit(data, scene), pl.fit(data, scene, loss=loss)
     assert abs(plain["thickness"].value - 430) > 10
     assert robust.status == "converged"
-    assert robust["thickness"].stderr < 1
+    assert robust["thickness"].stderr_noise < 1
     for name, truth in zip(("n", "thickness"), TRUTH, strict=True):
-        assert abs(robust[name].value - truth) < 3 * robust[name].stderr
+        assert abs(robust[name].value - truth) < 3 * robust[name].stderr_noise
     assert any("count for less than half" in warning for warning in robust.warnings)
 
 

@@ -11,7 +11,7 @@ from pellicle.reporting.fit_text import report
 
 
 def effect(name, change, uncertainty=0.5, unit="nm"):
-    return SystematicEffect(name, uncertainty, unit, {"thickness": change, "A": 0.0}, 0.0, 0.0, 0.0, {})
+    return SystematicEffect(name, uncertainty, unit, {"thickness": change, "A": 0.0}, 0.0, 0.0)
 
 
 def with_budget(fit, *rows, **changes):
