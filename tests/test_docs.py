@@ -230,11 +230,22 @@ def test_commands_parse_and_their_files_exist(page):
         written.add(out)
 
 
-@pytest.mark.parametrize("page", PAGES_WITH_COMMANDS)
+IN_EVERY_RUN = ("README.md", "CONTRIBUTING.md", "docs/tour.md", "docs/howto/uncertainty.md")
+"""Pages whose commands run in every run of the tests; the others take two minutes, in `make slow`."""
+
+
+@pytest.mark.parametrize(
+    "page",
+    [
+        page if page in IN_EVERY_RUN else pytest.param(page, marks=pytest.mark.slow)
+        for page in PAGES_WITH_COMMANDS
+    ],
+)
 def test_commands_run(page, run_page):
     run_page(page)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", [page for page in PAGES_WITH_COMMANDS if results(PAGES[page])])
 def test_quoted_results_are_printed(page, run_page, outputs):
     """By a command of the page, or of another one that shows the same command."""

@@ -124,6 +124,7 @@ def test_a_plateau_within_reach_of_noise_is_open(film, rise, status):
     assert fit["thickness"].lower_limit is None or fit["thickness"].lower_limit < 250.0
 
 
+@pytest.mark.slow  # 150 fits
 def test_errors_from_three_points_are_those_of_student(film, measured):
     """Two residuals set σ, so 1.96 normal standard errors would hold in 81 % only."""
     scene, nm = film(pl.Free(280, 330)), np.array([460.0, 530.0, 630.0])
