@@ -19,7 +19,7 @@ _USUAL = 3.0
 
 def budget(discrepancy: Discrepancy, parameters: Sequence[Parameter]) -> tuple[SystematicEffect, ...]:
     """Rows of the budget, those first that change the leading parameter most."""
-    lead = next((i for i, p in enumerate(parameters) if p.key == "thickness"), 0)
+    lead = _lead(parameters)
     names = [p.name for p in parameters]
 
     def named(values: np.ndarray) -> dict[str, float]:
@@ -39,10 +39,15 @@ def budget(discrepancy: Discrepancy, parameters: Sequence[Parameter]) -> tuple[S
     )
 
 
+def _lead(parameters: Sequence[Parameter]) -> int:
+    """Position of the leading parameter: the first thickness, else the first of all."""
+    return next((i for i, p in enumerate(parameters) if p.key == "thickness"), 0)
+
+
 def likely_cause(found: Discrepancy, parameters: Sequence[Parameter]) -> list[str]:
     """A sentence on the effect of ordinary size that alone explains most of the residuals, or on the index of
     another material that does; none without either."""
-    at = next((i for i, p in enumerate(parameters) if p.key == "thickness"), 0)
+    at = _lead(parameters)
     rows, lead = found.contributions, parameters[at]
     usual = [c for c in rows if abs(c.alone) <= _USUAL * c.effect.size and c.explains > _STRUCTURE]
     best = max(usual, key=lambda c: c.explains, default=None)

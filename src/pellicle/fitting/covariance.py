@@ -51,6 +51,11 @@ class Scaled(NamedTuple):
     names: tuple[str, ...]
     pull: np.ndarray | float = 0.0
 
+    def blocks(self, sizes: Sequence[int], variance: Sequence[float]) -> list[np.ndarray]:
+        """Rows of each view, of so many data values, by the σ of its weights: without its `variance`."""
+        rows = np.split(self.jacobian, np.cumsum(sizes))[: len(sizes)]
+        return [block * np.sqrt(widened) for block, widened in zip(rows, variance, strict=True)]
+
     def by_range(self, ranges: np.ndarray) -> np.ndarray:
         """The Jacobian with its columns in steps of `ranges` (columns,) of the parameters' own units."""
         return self.jacobian @ np.linalg.pinv(self.stretch) * ranges

@@ -281,7 +281,7 @@ class _System:
         return _least_squares(*reduced, self.priors, (self.lower, self.upper), prior_data)
 
     def residuals(self, solution: np.ndarray) -> list[np.ndarray]:
-        """What remains in each view, in units of its noise."""
+        """Residuals of each view after a solution, in units of its noise."""
         pairs = zip(self.blocks, self.data, self.shapes, strict=True)
         return [(data - block @ solution).reshape(shape) for block, data, shape in pairs]
 

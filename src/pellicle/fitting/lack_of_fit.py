@@ -36,7 +36,7 @@ class LackOfFit:
 
     @property
     def verdict(self) -> str:
-        """Whether the residuals are what the scatter of the sweeps leaves in their mean."""
+        """Verdict of the test: residuals larger than the noise left in the mean, smaller, or equal to it."""
         times = math.sqrt(self.ratio)
         if self.probability < _UNLIKELY:
             return (

@@ -105,7 +105,7 @@ class RepeatedParameter:
 
     @property
     def agreement(self) -> Agreement:
-        """Whether the scatter is what the stated noise errors let expect."""
+        """Agreement of the scatter with the stated noise errors."""
         if self.probability < UNLIKELY:
             return Agreement.LARGER
         return Agreement.SMALLER if self.probability > 1 - UNLIKELY else Agreement.AGREES
@@ -317,4 +317,5 @@ def _other_minima(known: Sequence[tuple[str, Fit, Estimate]], name: str) -> list
 
 
 def short(number: float) -> str:
+    """Format a positive number with two digits, or without decimals where it has more."""
     return f"{number:.2g}" if number < 99.5 else f"{number:.0f}"

@@ -51,11 +51,10 @@ def misses(view: SamplesView, fit: ViewFit) -> bool:
 
 def evidence(ranked: RankedMinima, jacobian: Scaled) -> list[Evidence]:
     """Residuals of each view in units of its noise, without effects: models of surfaces know none."""
-    result, first = [], 0
-    for view, fit in zip(ranked.problem.views, ranked.fits, strict=True):
+    views, fits, result = ranked.problem.views, ranked.fits, []
+    blocks = jacobian.blocks([view.independent for view in views], [fit.variance for fit in fits])
+    for view, fit, block in zip(views, fits, blocks, strict=True):
         residual = view.residuals(fit.at)
-        block = jacobian.jacobian[first : first + residual.size] * math.sqrt(fit.variance)
-        first += residual.size
         columns = block.reshape(*residual.shape, -1)
         one = np.ones(residual.shape)
         weights = math.sqrt(view.samples.independent_fraction) * one

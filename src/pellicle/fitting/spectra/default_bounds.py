@@ -107,7 +107,7 @@ def _moved(p: Parameter, value: float) -> Parameter:
 
 
 def _at_moved_bound(old: Parameter, new: Parameter, value: float) -> bool:
-    """Whether a value rests on a bound that is not the old one."""
+    """True where a value rests on a bound that is not the old one."""
     low, high = _rests(new, value)
     return (low and new.lower < old.lower) or (high and new.upper > old.upper)
 
@@ -171,7 +171,7 @@ def remarks(ranked: RankedMinima, binding: Container[str]) -> list[str]:
 
 
 def _rests(p: Parameter, value: float) -> tuple[bool, bool]:
-    """Whether a value lies on the lower and on the upper bound."""
+    """True for the lower and the upper bound where a value lies on it."""
     margin = _ON_BOUND * (p.upper - p.lower)
     return value - p.lower <= margin, p.upper - value <= margin
 

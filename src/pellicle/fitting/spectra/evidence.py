@@ -24,12 +24,11 @@ median absolute value of second differences of normal noise (simulated: 2.8 to 3
 
 def evidence(spectra: Sequence[Measured], ranked: RankedMinima, jacobian: Scaled) -> list[Evidence]:
     """Evidence of each spectrum at the best of the ranked minima, of which `jacobian` is the scaled one."""
-    result, first = [], 0
-    for spectrum, view, fit in zip(spectra, ranked.problem.views, ranked.fits, strict=True):
+    views, fits, result = ranked.problem.views, ranked.fits, []
+    blocks = jacobian.blocks([view.points for view in views], [fit.variance for fit in fits])
+    for spectrum, view, fit, block in zip(spectra, views, fits, blocks, strict=True):
         keep, shape = measured_channels(view), (view.rows, view.channels, -1)
         weight = np.asarray(view.data.weight)[: view.points]
-        block = jacobian.jacobian[first : first + view.points] * math.sqrt(fit.variance)
-        first += view.points
         columns = (block / weight[:, None]).reshape(shape)[:, :keep]
         residual = np.asarray(view.data.values) - np.asarray(fit.at.model)
         residual = residual[: view.points].reshape(view.rows, view.channels)[:, :keep]

@@ -19,7 +19,7 @@ from pellicle.fitting.spectra.view import Local, SpectrumView
 LARGEST_POWER, LARGEST_ANGLES = 0.02, 0.02
 """Structure in residuals of R and T, and of N, C and S (0.6° of Ψ), that no calibrated instrument makes."""
 LARGEST_DRIFT = 1.0
-"""The same where scale and offset drift, in units of the error that the model of such data has: 0.7 of it
+"""Structure in residuals that no drifting lamp makes, in units of the error that its model has: 0.7 of it
 remains in a soap film of known thickness, 1.3 of titania on silicon that is fitted as a soap film."""
 
 

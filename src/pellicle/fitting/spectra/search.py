@@ -79,7 +79,7 @@ def search(problem: Problem, progress: Progress) -> Minima:
 
 
 def _lowest_within(values: np.ndarray, reach: int) -> np.ndarray:
-    """Where `values` (..., thickness) are least among those up to `reach` steps away on both sides."""
+    """Mask of the local minima of `values` (..., thickness) within `reach` steps on both sides."""
     padded = np.pad(values, [(0, 0)] * (values.ndim - 1) + [(reach, reach)], constant_values=np.inf)
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1, axis=-1)
     return values <= windows.min(-1)
