@@ -370,7 +370,7 @@ print(fits[0], "\n")
 there = [abs(fit["thickness"].value - 80) < 5 for fit in fits]
 near = [fit for fit, is_near in zip(fits, there, strict=True) if is_near]
 answers = np.array([[fit[name].value for name in NAMES] for fit in near])
-stated = np.array([[fit[name].stderr for name in NAMES] for fit in near])
+stated = np.array([[fit[name].stderr_noise for name in NAMES] for fit in near])
 print(f"           bound    stated   scatter of {len(near)} fits near 80 nm")
 for i, name in enumerate(NAMES):
     least = limits["R at 0°"][i]
