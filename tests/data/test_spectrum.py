@@ -31,6 +31,16 @@ NM = np.array([500.0, 600.0, 700.0])
             "`delta` at 500 nm: 500 is not from -180 to 360",
         ),
         (
+            45.0,
+            {"signal": "psi-delta", "delta": NM / 10, "depolarisation": np.full(3, 2.3)},
+            "`depolarisation` at 500 nm: 2.3 is not from -0.5 to 1.05, as a depolarisation is, a fraction",
+        ),
+        (
+            30.0,
+            {"path": "a.csv", "name": "Rp"},
+            "a.csv [Rp]: `values` at 500 nm: 30 is",
+        ),
+        (
             30.0,
             {"path": "a.csv", "lines": np.arange(3)},
             "a.csv: line 0, `values` at 500 nm: 30 is",
@@ -52,6 +62,11 @@ def test_impossible_values(values, changes, message):
         ({"polarisation": "x"}, "`polarisation` must be one of s, p, unpolarised, not 'x'"),
         ({"signal": "psi-delta"}, "`delta` goes with `signal"),
         ({"delta": NM}, "`delta` goes with `signal"),
+        ({"depolarisation": NM / 1e4}, "`depolarisation` goes with `signal"),
+        (
+            {"signal": "psi-delta", "delta": NM / 10, "depolarisation_sigma": NM},
+            "`depolarisation_sigma` goes with `depolarisation`",
+        ),
     ],
 )
 def test_unknown_words(changes, message):

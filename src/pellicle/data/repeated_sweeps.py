@@ -166,8 +166,12 @@ def _mean(sweeps: Sequence[Spectrum]) -> dict[str, Any]:
     if first.delta is not None:
         mean = np.mean([coordinates(sweep) for sweep in sweeps], axis=0)
         found["values"], found["delta"] = psi_delta(mean)
-    for name in ("sigma", "delta_sigma"):
+    depolarised = [sweep.depolarisation for sweep in sweeps if sweep.depolarisation is not None]
+    found["depolarisation"] = np.mean(depolarised, axis=0) if len(depolarised) == count else None
+    for name in ("sigma", "delta_sigma", "depolarisation_sigma"):
         own = [getattr(sweep, name) for sweep in sweeps]
-        known = all(x is not None for x in own)
+        known = all(x is not None for x in own) and not (
+            name == "depolarisation_sigma" and found["depolarisation"] is None
+        )
         found[name] = np.sqrt(np.sum(np.square(own), axis=0)) / count if known else None
     return found

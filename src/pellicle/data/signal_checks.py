@@ -19,6 +19,9 @@ DELTA = (-180.0, 360.0)
 FOLDED_DELTA = (0.0, 180.0)
 """Limits of Δ in degrees for an instrument without a compensator, which measures cos Δ only."""
 
+DEPOLARISATION = (-0.5, 1.05)
+"""Limits of 1 − N² − C² − S²: noise and calibration take it below 0 and beyond 1; 2.3 is a percentage."""
+
 ROUNDING = 1e-3
 """Degrees by which Ψ and Δ may exceed their limits, as rounded or differenced values do."""
 
@@ -68,6 +71,13 @@ def check_psi_delta(
     name, limits = ("a folded delta", FOLDED_DELTA) if folded else ("delta", DELTA)
     _check_limits(psi, PSI, "psi", where_psi, remedy)
     _check_limits(delta, limits, name, where_delta, remedy)
+
+
+def check_depolarisation(values: np.ndarray, where: Where, remedy: str) -> None:
+    """Refuse a depolarisation that is no fraction. Raises DataError."""
+    low, high = DEPOLARISATION
+    reason = f"is not from {low:g} to {high:g}, as a depolarisation is, a fraction; {remedy}"
+    refuse_first(values, (values < low) | (values > high), where, reason)
 
 
 def _check_limits(

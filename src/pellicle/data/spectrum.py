@@ -8,7 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool
 
-from pellicle.data.signal_checks import Where, check_power, check_psi_delta, refuse_first
+from pellicle.data.signal_checks import (
+    Where,
+    check_depolarisation,
+    check_power,
+    check_psi_delta,
+    refuse_first,
+)
 from pellicle.errors import DataError, UsageError
 
 SIGNALS = ("R", "T", "psi-delta", "counts")
@@ -16,7 +22,17 @@ POLARISATIONS = ("s", "p", "unpolarised")
 FEWEST_POINTS = 5
 """A range that keeps fewer points is a mistake in the range."""
 
-_ARRAYS = ("wavelength", "values", "sigma", "angle", "lines", "delta", "delta_sigma")
+_ARRAYS = (
+    "wavelength",
+    "values",
+    "sigma",
+    "angle",
+    "lines",
+    "delta",
+    "delta_sigma",
+    "depolarisation",
+    "depolarisation_sigma",
+)
 _REMEDY = "correct or delete that point"
 
 
@@ -39,6 +55,10 @@ class Spectrum:
     - `delta`, `delta_sigma`: Δ and its standard deviations in degrees, for "psi-delta".
     - `folded`: the sign of sin Δ was not measured, and Δ lies in 0 to 180.
     - `sweeps`: the repeated measurements of which this is the mean (`data.repeated_sweeps.mean_spectrum`).
+    - `name` of the spectrum within its file, empty where the file has one spectrum.
+    - `declared`: (key, value) pairs that the file states, such as its instrument and date.
+    - `depolarisation`, `depolarisation_sigma`: 1 − N² − C² − S² and its standard deviations, as fractions,
+      for "psi-delta".
 
     **Raises:** DataError for values that no sample has, UsageError for unknown words, ValueError for shapes.
 
@@ -61,6 +81,10 @@ class Spectrum:
     delta_sigma: np.ndarray | None = None
     folded: bool = False
     sweeps: tuple[Spectrum, ...] = ()
+    name: str = ""
+    declared: tuple[tuple[str, str], ...] = ()
+    depolarisation: np.ndarray | None = None
+    depolarisation_sigma: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         size = np.size(self.wavelength)
@@ -85,13 +109,17 @@ class Spectrum:
                 raise UsageError(f"`{name}` must be one of {', '.join(known)}, not {getattr(self, name)!r}")
         if (self.signal == "psi-delta") != (self.delta is not None):
             raise UsageError('`delta` goes with `signal="psi-delta"`: give both, or neither')
+        if self.depolarisation is not None and self.delta is None:
+            raise UsageError('`depolarisation` goes with `signal="psi-delta"`: leave it out')
+        if self.depolarisation_sigma is not None and self.depolarisation is None:
+            raise UsageError("`depolarisation_sigma` goes with `depolarisation`: give both, or neither")
 
     def _check_arrays(self) -> None:
         """Refuse what a file may not contain either. Raises DataError."""
         present = {name: array for name in _ARRAYS if (array := getattr(self, name)) is not None}
         for name, array in present.items():
             refuse_first(array, ~np.isfinite(array), self.place(f"`{name}`"), f"is not finite; {_REMEDY}")
-            if name in ("wavelength", "sigma", "delta_sigma"):
+            if name == "wavelength" or name.endswith("sigma"):
                 refuse_first(array, array <= 0, self.place(f"`{name}`"), f"is not above zero; {_REMEDY}")
         angle = present.get("angle", np.zeros(len(self)))
         reason = f"is not from 0 to 90 degrees; {_REMEDY}"
@@ -102,13 +130,20 @@ class Spectrum:
         values = self.place("`values`")
         if self.delta is not None:
             check_psi_delta(self.values, self.delta, self.folded, values, self.place("`delta`"), _REMEDY)
+            if self.depolarisation is not None:
+                check_depolarisation(self.depolarisation, self.place("`depolarisation`"), _REMEDY)
         elif self.signal != "counts" and self.calibrated and len(self):
             too_high = "divide percent by 100, or give `calibrated=False` for an arbitrary scale"
             check_power(self.signal, self.values, self.sigma, values, too_high=too_high, remedy=_REMEDY)
 
+    @property
+    def source(self) -> str:
+        """Path of the file, and the name of the spectrum within it: `film.dat [Rp]`."""
+        return " ".join(part for part in (self.path, f"[{self.name}]" if self.name else "") if part)
+
     def place(self, name: str) -> Where:
         """Return the place of a point, as a function of its row, for a message about `name`."""
-        path = f"{self.path}: " if self.path else ""
+        path = f"{self.source}: " if self.source else ""
 
         def place(row: int) -> str:
             line = "" if self.lines is None else f"line {self.lines[row]}, "
@@ -124,14 +159,14 @@ class Spectrum:
         if len(self):
             low, high = self.wavelength[0], self.wavelength[-1]
             span = f"{low:g} to {high:g} nm" if low < high else f"{low:g} nm"
-        return f"{self.path or 'spectrum'}: {len(self)} points of {self.signal}, {span}"
+        return f"{self.source or 'spectrum'}: {len(self)} points of {self.signal}, {span}"
 
     def cut(self, low: float | int, high: float | int) -> Spectrum:
         """Return the points with low ≤ wavelength ≤ high (nm).
 
         Raises UsageError for an empty range, DataError if fewer than 5 points remain.
         """
-        inside, note = inside_range(self.wavelength, (low, high), self.path)
+        inside, note = inside_range(self.wavelength, (low, high), self.source)
         kept = {
             name: None if getattr(self, name) is None else getattr(self, name)[inside] for name in _ARRAYS
         }

@@ -117,14 +117,17 @@ def check_free(scene: Scene) -> None:
 
 
 def labels(spectra: Sequence[Spectrum]) -> list[str]:
-    """Unique names of spectra, without dots: files' stems, else with their signals, else numbered.
+    """Unique names of spectra, without dots: files' stems, else with the names of spectra within a file (or
+    with their signals), else numbered.
 
     Where a name would read as a parameter's it is numbered.
     """
     stems = [Path(s.path).stem.replace(".", "_") or s.signal for s in spectra]
-    signals = [f"{stem}-{s.signal}" for stem, s in zip(stems, spectra, strict=True)]
+    pairs = list(zip(stems, spectra, strict=True))
+    own = [f"{stem}-{s.name}".replace(".", "_") if s.name else stem for stem, s in pairs]
+    signals = [f"{stem}-{s.signal}" for stem, s in pairs]
     numbers = [f"{stem}-{i}" for i, stem in enumerate(stems, start=1)]
-    for names in (stems, signals):
+    for names in (stems, own, signals):
         if len(set(names)) == len(names) and "thickness" not in names:
             return names
     return numbers
