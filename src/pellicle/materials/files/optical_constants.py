@@ -1,0 +1,117 @@
+"""Columns of a material file, checked and converted to n + ik against wavelength in nm."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from pellicle.data.tabular.units import to_nm
+from pellicle.dispersion.base import AbstractDispersion
+from pellicle.errors import DataError
+from pellicle.materials.page import NOISE_IN_K, table
+
+_ROW = "correct or delete that row"
+_SIGN = "absorption is n + ik with k ≥ 0 here, so turn its sign"
+
+
+class MaterialFile(NamedTuple):
+    """A dispersion read from a file, and what was understood of the file.
+
+    `format` is the kind of file, `columns` the columns and unit as they were read, `assumed` a sentence on
+    what the file does not state, `title`, `citation` and `comments` what it says of the material.
+    """
+
+    dispersion: AbstractDispersion
+    wavelength_range: tuple[float, float]
+    has_extinction: bool
+    format: str
+    columns: str
+    assumed: str = ""
+    title: str = ""
+    citation: str = ""
+    comments: str = ""
+
+
+class OpticalConstants(NamedTuple):
+    """Columns of a file: the axis in `unit`, then n and k or, where `dielectric`, eps1 and eps2.
+
+    `names` are those of the three columns in messages, `where` gives file, line and column of a number by
+    row and name. `second` is None for a table of n alone.
+    """
+
+    path: str
+    axis: np.ndarray
+    unit: str
+    first: np.ndarray
+    second: np.ndarray | None
+    dielectric: bool
+    names: tuple[str, str, str]
+    where: Callable[[int, str], str]
+
+
+def nk_from_dielectric(eps1: np.ndarray, eps2: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return n and k of eps1 + i·eps2, (n + ik)², for eps2 ≥ 0, to rounding also where eps2 is small.
+
+    2n² = |ε| + ε₁ and 2k² = |ε| − ε₁ cancel for small ε₂, one on either side of ε₁ = 0; the other of the two
+    follows from ε₂ = 2nk.
+    """
+    larger = np.sqrt((np.hypot(eps1, eps2) + np.abs(eps1)) / 2)
+    smaller = np.divide(eps2, 2 * larger, out=np.zeros_like(larger), where=larger > 0)
+    return np.where(eps1 >= 0, larger, smaller), np.where(eps1 >= 0, smaller, larger)
+
+
+def material_file(found: OpticalConstants, kind: str, title: str = "", assumed: str = "") -> MaterialFile:
+    """Check the columns of a file and make a dispersion of them.
+
+    Raises DataError, one sentence with file, line, column and remedy.
+    """
+    axis, first, second = found.names
+    _refuse(found, axis, found.axis, found.axis <= 0, "above 0", _ROW)
+    _check_order(found)
+    with np.errstate(over="ignore"):
+        nm = np.round(to_nm(found.axis, found.unit), 9)
+    _refuse(found, axis, found.axis, ~((nm > 0) & np.isfinite(nm)), "of a finite wavelength", _ROW)
+    n, k = found.first, found.second
+    if k is not None:
+        _refuse(found, second, k, k < -NOISE_IN_K, "0 or above", _SIGN)
+    if found.dielectric:
+        assert k is not None
+        n, k = nk_from_dielectric(n, np.maximum(k, 0.0))
+        _refuse(found, first, found.first, n <= 0, "of an index n above 0", _ROW)
+    else:
+        _refuse(found, first, n, n <= 0, "above 0", _ROW)
+    made = table(nm, n, k)
+    return MaterialFile(
+        made.dispersion,
+        (made.low, made.high),
+        k is not None,
+        kind,
+        f"{axis} in {found.unit}, {first}{f', {second}' if k is not None else ''}; {len(nm)} rows",
+        assumed,
+        title,
+    )
+
+
+def _refuse(
+    found: OpticalConstants, name: str, values: np.ndarray, wrong: np.ndarray, expected: str, remedy: str
+) -> None:
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise DataError(
+            f"{found.where(row, name)}: expected {name} {expected}, found {values[row]:g}; {remedy}"
+        )
+
+
+def _check_order(found: OpticalConstants) -> None:
+    steps = np.diff(found.axis)
+    if not steps.size:
+        raise DataError(f"{found.path}: expected at least two rows, found one; add the others")
+    wrong = steps * np.sign(steps[0]) <= 0
+    if wrong.any():
+        row = int(np.argmax(wrong)) + 1
+        raise DataError(
+            f"{found.where(row, found.names[0])}: expected wavelengths that only rise or only fall, found "
+            f"{found.axis[row]:g} after {found.axis[row - 1]:g}; sort the rows and delete repeated ones"
+        )

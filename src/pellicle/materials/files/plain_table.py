@@ -1,0 +1,178 @@
+"""Plain tables of optical constants: a wavelength or energy, then n and k, or ε₁ and ε₂.
+
+Whatever `pellicle.data` reads: commas, semicolons, tabs or blanks, decimal commas, `#` comments. With a
+header, columns are found by name (`wavelength_nm`, `Wavelength, µm`, `Energy (eV)`; `n`, `k`; `eps1`,
+`eps2`); without one they are wavelength in nm, n, k.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+
+from pellicle.data.tabular.columns import Column, is_unit_row, recognise_all
+from pellicle.data.tabular.table import Table, read_table
+from pellicle.data.tabular.text import split
+from pellicle.data.tabular.units import wavelength_unit
+from pellicle.errors import DataError
+from pellicle.materials.files.optical_constants import MaterialFile, OpticalConstants, material_file
+from pellicle.materials.files.text import MaterialText
+
+SHORTEST_ASSUMED = 30.0
+"""Wavelengths that all lie below this (nm), in a file that gives no unit, are more likely µm or eV."""
+
+_REMEDY = "write the table as wavelength_nm,n,k with that header"
+_CHOICES = "`wavelength_um,n,k`, `wavelength_nm,n,k`, `energy_eV,n,k` or `energy_eV,eps1,eps2`"
+_NAMES = {
+    "wavelength": ("e(ev)", "hv(ev)", "hν(ev)"),
+    "n": ("n", "re(n)", "real(n)", "refractiveindex", "indexofrefraction", "index"),
+    "k": ("k", "κ", "kappa", "im(n)", "imag(n)", "extinctioncoefficient", "extinction"),
+    "eps1": (
+        "eps1",
+        "e1",
+        "ε1",
+        "ϵ1",
+        "epsilon1",
+        "re(eps)",
+        "real(eps)",
+        "re(epsilon)",
+        "re(ε)",
+        "εr",
+        "epsr",
+    ),
+    "eps2": (
+        "eps2",
+        "e2",
+        "ε2",
+        "ϵ2",
+        "epsilon2",
+        "im(eps)",
+        "imag(eps)",
+        "im(epsilon)",
+        "im(ε)",
+        "εi",
+        "epsi",
+    ),
+}
+"""Names of columns, in lower case without blanks and underscores."""
+
+
+def read(text: MaterialText) -> MaterialFile:
+    """Read a plain table.
+
+    Raises DataError, one sentence with file, line, column and remedy.
+    """
+    found = read_table(text.path)
+    names = _header(text, found)
+    columns = _by_position(text, found) if names is None else _by_name(text, found, names)
+    order = list(columns)
+    values = dict(zip(order, found.numbers([columns[name].position for name in order]), strict=True))
+    axis = columns["wavelength"]
+
+    def label(what: str) -> str:
+        column = columns[what]
+        return f"column {column.name!r}" if column.name else f"column {column.position + 1}"
+
+    if axis.unknown_unit:
+        raise DataError(
+            f"{text.path}: {label('wavelength')} is in an unknown unit {axis.unknown_unit!r}; "
+            f"convert it to nm and {_REMEDY}"
+        )
+    assumed = ""
+    if axis.unit is None:
+        low, high = values["wavelength"].min(), values["wavelength"].max()
+        if high < SHORTEST_ASSUMED:
+            raise DataError(
+                f"{text.path}: {label('wavelength')} runs from {low:g} to {high:g} without a "
+                f"{'unit' if names else 'header'}, which is no wavelength in nm; make the header {_CHOICES}"
+            )
+        assumed = f"{text.path} states no unit of its wavelengths: they were read as nm"
+        assumed += "." if names else ", and its columns, without a header, as n and k."
+    dielectric = "eps1" in columns
+    first, second = ("eps1", "eps2") if dielectric else ("n", "k")
+    constants = OpticalConstants(
+        text.path,
+        values["wavelength"],
+        axis.unit or "nm",
+        values[first],
+        values.get(second),
+        dielectric,
+        ("wavelength", first, second),
+        lambda row, what: f"{text.path}: line {found.lines[row]}, {label(what)}",
+    )
+    return material_file(constants, "table", assumed=assumed)
+
+
+def _header(text: MaterialText, found: Table) -> Sequence[str] | None:
+    """Names of the columns, with their units where a row of units follows; None without a header.
+
+    Separated by commas, a header may name more columns than the rows have.
+    """
+    if found.layout.names and _is_header(found.layout.names):
+        return found.layout.names
+    delimiter = found.layout.delimiter
+    above = [line.text for line in text.lines if line.number < found.lines[0]]
+    names = split(above[-1], delimiter) if above else []
+    if is_unit_row(names) and len(above) > 1:
+        units = names
+        names = split(above[-2], delimiter)
+        units += [""] * (len(names) - len(units))
+        names = [f"{n} ({u})" if wavelength_unit(u) else n for n, u in zip(names, units, strict=False)]
+    fits = len(names) == _cells_per_row(text, found) or delimiter != " "
+    return names if fits and _is_header(names) else found.layout.names
+
+
+def _is_header(names: Sequence[str]) -> bool:
+    roles = {_recognised(column)[0] for column in recognise_all(names)}
+    return "wavelength" in roles and bool(roles & {"n", "eps1"})
+
+
+def _by_name(text: MaterialText, found: Table, names: Sequence[str]) -> dict[str, Column]:
+    """The columns for wavelength and n, k or eps1, eps2; k may be absent."""
+    columns: dict[str, Column] = {}
+    for plain in recognise_all(names):
+        what, column = _recognised(plain)
+        if what in columns and what in _NAMES:
+            raise DataError(f"{text.path}: two columns are named {what}; rename one, or {_REMEDY}")
+        columns[what] = column
+    if "n" in columns and "eps1" in columns:
+        columns = {what: column for what, column in columns.items() if not what.startswith("eps")}
+    expected = ("wavelength", "eps1", "eps2") if columns.keys() & {"eps1", "eps2"} else ("wavelength", "n")
+    for what in expected:
+        if what not in columns:
+            raise DataError(
+                f"{text.path}: expected a column named {what}, found {', '.join(names)}; {_REMEDY}"
+            )
+    if "k" in columns and columns["k"].position >= _cells_per_row(text, found):
+        del columns["k"]  # named in the header, absent from every row, as refellips writes
+    return {what: columns[what] for what in _NAMES if what in columns}
+
+
+def _recognised(column: Column) -> tuple[str, Column]:
+    """The role of a column in a table of optical constants, and the column."""
+    plain = re.sub(r"[\s_]+|[(\[](?:-|1)?[)\]]$", "", column.name.strip().strip('"').lower())
+    what = next((role for role, names in _NAMES.items() if plain in names), column.role)
+    if what == "wavelength" and column.role != "wavelength":
+        return what, replace(column, role=what, unit="eV")
+    return what, column
+
+
+def _cells_per_row(text: MaterialText, found: Table) -> int:
+    """The largest number of cells in any row."""
+    rows = (line.text for line in text.lines if line.number >= found.lines[0])
+    return max(len(split(row, found.layout.delimiter)) for row in rows)
+
+
+def _by_position(text: MaterialText, found: Table) -> dict[str, Column]:
+    if text.lines[0].number < found.lines[0]:
+        raise DataError(
+            f"{text.path}: expected a header right above the rows, found none above line "
+            f"{found.lines[0]}; {_REMEDY}, other lines marked with #"
+        )
+    width = _cells_per_row(text, found)
+    if width not in (2, 3):
+        raise DataError(
+            f"{text.path}: expected 2 or 3 columns where there is no header, found {width}; {_REMEDY}"
+        )
+    return {what: Column(i, "", what) for i, what in enumerate(("wavelength", "n", "k")[:width])}

@@ -1,0 +1,121 @@
+"""Downloads of refractiveindex.info: the page as YAML, and its table as CSV or text, in µm.
+
+The CSV holds a block `wl,n` and, where the page has k, a second block `wl,k` below it, at other wavelengths
+if n and k come from different sources.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+
+from pellicle.errors import DataError
+from pellicle.materials.files.optical_constants import MaterialFile, OpticalConstants, material_file
+from pellicle.materials.files.text import Line, MaterialText, Rows, read_rows
+from pellicle.materials.page import combine, contents, extinction, plain_text, table, to_nm
+
+_CSV = "refractiveindex.info table"
+LONGEST_UM = 30.0
+"""A `wl` that lies above this throughout is more likely one's own table in nm: such a file states no unit."""
+
+
+def read_yaml(text: MaterialText) -> MaterialFile | None:
+    """Read a page of the database; None for another file.
+
+    Raises DataError for a page that is cut off, faulty, or gives no n.
+    """
+    if text.suffix not in (".yml", ".yaml") and not re.search(r"^DATA:\s*$", text.text, re.MULTILINE):
+        return None
+    import yaml
+
+    class Loader(yaml.SafeLoader):  # in Python: the C parser crashes on deep nesting
+        def compose_node(self, parent: Any, index: Any) -> Any:
+            if self.check_event(yaml.AliasEvent):  # a few of them expand to gigabytes
+                raise yaml.YAMLError
+            return super().compose_node(parent, index)
+
+    try:
+        page = yaml.load(text.text, Loader)
+        found = contents(page)
+        citation, comments = plain_text(page.get("REFERENCES")), plain_text(page.get("COMMENTS"))
+    except yaml.MarkedYAMLError as error:
+        line = f"line {error.problem_mark.line + 1} " if error.problem_mark else ""
+        raise DataError(
+            f"{text.path}: {line}is not YAML ({error.problem}); download the page again"
+        ) from None
+    except DataError as error:
+        raise DataError(f"{text.path}: {error}") from None
+    except (yaml.YAMLError, KeyError, TypeError, ValueError, IndexError, AttributeError, RecursionError):
+        raise DataError(
+            f"{text.path}: is not a complete page of refractiveindex.info, which has DATA with a table or a "
+            "formula, and numbers in it; download the full database record again"
+        ) from None
+    low, high = found.wavelength_range
+    at = np.linspace(low, high, 64)
+    if not (0 < low < high < np.inf) or not np.isfinite(found.dispersion(at)).all():
+        raise DataError(
+            f"{text.path}: gives no finite index over its range of {low:g} to {high:g} nm; download it again"
+        )
+    kinds = ", ".join(str(block["type"]) for block in page["DATA"])
+    return MaterialFile(
+        found.dispersion,
+        found.wavelength_range,
+        found.has_extinction,
+        "refractiveindex.info page",
+        f"wavelength in um; {kinds}",
+        citation=citation,
+        comments=comments,
+    )
+
+
+def read_table(text: MaterialText) -> MaterialFile | None:
+    """Read the blocks of a CSV or text download; None for another file.
+
+    Raises DataError for faulty rows, and where the unit is in doubt.
+    """
+    headers = [(i, kind) for i, line in enumerate(text.lines) if (kind := _header(line.text))]
+    if [kind for _, kind in headers] not in (["n"], ["n", "k"]) or headers[0][0] != 0:
+        return None
+    ends = [*(i for i, _ in headers[1:]), len(text.lines)]
+    blocks = [
+        _block(text, text.lines[i + 1 : end], kind) for (i, kind), end in zip(headers, ends, strict=True)
+    ]
+    (wl, n), where = blocks[0][0], blocks[0][1]
+    if wl.min() >= LONGEST_UM:
+        if len(blocks) == 1:
+            return None
+        raise DataError(
+            f"{text.path}: has the layout of refractiveindex.info, which is in µm, but begins at "
+            f"{wl.min():g}; write the unit into both headers, as wavelength_nm,n,k in one table"
+        )
+    names = ("wl", "n", "k")
+    found = material_file(OpticalConstants(text.path, wl, "um", n, None, False, names, where), _CSV)
+    if len(blocks) == 1:
+        return found
+    (wl_k, k), where_k = blocks[1]
+    both = np.array_equal(wl, wl_k)
+    checked = OpticalConstants(
+        text.path, wl_k, "um", n if both else np.ones_like(k), k, False, names, where_k
+    )
+    with_k = material_file(checked, _CSV)
+    if both:
+        return with_k
+    try:
+        made = combine(table(to_nm(wl), n), extinction(to_nm(wl_k), np.maximum(k, 0.0)))
+    except DataError as error:
+        raise DataError(f"{text.path}: {error}") from None
+    columns = f"wl in um, n; {len(wl)} rows, then wl in um, k; {len(wl_k)} rows"
+    return MaterialFile(made.dispersion, made.wavelength_range, True, _CSV, columns)
+
+
+def _header(text: str) -> str | None:
+    """Return n or k for a line `wl,n` or `wl,k`, separated in any way."""
+    words = re.split(r"[\s,;]+", text.lower().replace('"', "").strip())
+    return words[1] if len(words) == 2 and words[0] == "wl" and words[1] in ("n", "k") else None
+
+
+def _block(text: MaterialText, lines: tuple[Line, ...], kind: str):
+    rows: Rows = read_rows(text.path, lines, ("wl", kind))
+    return (rows.columns["wl"], rows.columns[kind]), rows.where
