@@ -36,9 +36,14 @@ def write(path: Path, content: bytes, limit: int) -> None:
     The oldest files of the folder are removed until it holds at most `limit` bytes. Raises OSError.
     """
     handle, name = tempfile.mkstemp(dir=path.parent)  # readable and writable by the user alone
-    with os.fdopen(handle, "wb") as file:
-        file.write(content)
-    os.replace(name, path)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+        os.replace(name, path)
+    except OSError:
+        with suppress(OSError):
+            os.unlink(name)
+        raise
     files = [(file, file.stat()) for file in path.parent.iterdir()]
     excess = sum(status.st_size for _, status in files) - limit
     for file, status in sorted(files, key=lambda each: each[1].st_mtime_ns):

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import sys
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from typing import Annotated
 
 from cyclopts import App, Parameter
@@ -13,15 +14,17 @@ from pellicle.cli.compare import compare
 from pellicle.cli.cost import cost
 from pellicle.cli.demo import demo
 from pellicle.cli.fit import fit
+from pellicle.cli.interruption import interruptible
 from pellicle.cli.materials import materials
+from pellicle.cli.messages import as_flags
 from pellicle.cli.plan import plan
 from pellicle.cli.sample import sample
 from pellicle.cli.session import say
 from pellicle.cli.simulate import simulate
 from pellicle.cli.verbose import log_to_stderr
-from pellicle.errors import DataError, UsageError
+from pellicle.errors import UsageError
 
-INTERRUPTED = 130
+WRONG_USAGE, BAD_DATA, INTERRUPTED = 2, 3, 130
 
 app = App(
     name="pellicle",
@@ -62,22 +65,43 @@ def _any(
 def main() -> int:
     """Run the command line and return its exit code.
 
-    0 good, 2 wrong usage, 3 bad data, 4 no clear answer, 5 a chain that is too short, 130 interrupted.
+    0 good, 2 wrong usage, 3 bad data or a disk that is full, 4 no clear answer, 5 a chain that is too short,
+    130 interrupted. With --json an error is printed on stdout too, as a JSON object.
     """
+    with interruptible():
+        code, error = _outcome(sys.argv[1:])
+    if error and "--json" in sys.argv:
+        from pellicle.reporting.json_record import error_record, one_line
+
+        with suppress(OSError):
+            print(one_line(error_record(error, code)), flush=True)
+    return code
+
+
+def _outcome(words: list[str]) -> tuple[int, str]:
+    """Run a command: its exit code, and what is wrong with its arguments or recipe."""
     from cyclopts import CycloptsError
 
     try:
-        return int(command(sys.argv[1:]) or 0)
-    except CycloptsError:
-        return 2  # cyclopts has printed the error
-    except UsageError as error:
-        say(f"pellicle: {error}")
-        return 2
-    except (DataError, ValueError) as error:
-        say(f"pellicle: {error}")
-        return 3
+        return int(command(words) or 0), ""
+    except CycloptsError as error:
+        return WRONG_USAGE, str(error)  # cyclopts has printed the error
+    except BrokenPipeError:
+        _abandon_stdout()
+        return 0, ""
     except KeyboardInterrupt:
         say("pellicle: interrupted")
-        return INTERRUPTED
-    except BrokenPipeError:
-        return 0
+        return INTERRUPTED, ""
+    except (ValueError, OSError) as error:
+        message = as_flags(str(error))
+        if isinstance(error, OSError) and error.filename is None and error.errno is not None:  # of a stream
+            _abandon_stdout()
+            message = f"the result cannot be printed ({error.strerror})"
+        say(f"pellicle: {message}")
+        return (WRONG_USAGE if isinstance(error, UsageError) else BAD_DATA), message
+
+
+def _abandon_stdout() -> None:
+    """Discard what stdout cannot take, which Python would try to write once more when it ends."""
+    with suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

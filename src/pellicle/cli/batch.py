@@ -53,6 +53,10 @@ class Batch:
     A file that fails does not stop the others. `records` are the JSON records of the results so far, and
     `fits` the fits of repeated measurements. Several files are fitted by as many processes as there are
     `jobs`.
+
+    Results of several files that an earlier run left in the folder `out`, from the same data by the same
+    scene, settings and version, are printed and not computed again, unless `refit` is true. `kept` counts
+    them.
     """
 
     inputs: Inputs
@@ -61,13 +65,15 @@ class Batch:
     out: str | None = None
     as_json: bool = False
     jobs: int = 1
+    refit: bool = False
     verbose: bool = field(default_factory=lambda: LOG.isEnabledFor(INFO))
     records: list[dict[str, Any]] = field(default_factory=list)
     fits: list[Fit] = field(default_factory=list)
+    kept: int = 0
 
     def run(self) -> int:
         """Fit every group of files, print and write each result, and return the largest exit code."""
-        from pellicle.reporting.folders import SUMMARY, folder_per_file, write_summary
+        from pellicle.reporting.folders import folder_per_file
 
         if self.sampler is not None and self.inputs.loss != LEAST_SQUARES:
             raise UsageError("a posterior needs least squares: leave the loss out, or the posterior")
@@ -76,12 +82,17 @@ class Batch:
         if self.out is not None:
             check_folder(self.out)
             folders = [*folder_per_file(self.out, [files[0].path for files in groups])]
+            self.refit |= len(groups) == 1 or self.inputs.repeats  # repeats compare fits, not records
+        again = "" if self.out is None else ": the same command goes on from there"
         worst = CONVERGED
         try:
             for code in self._codes(groups, folders):
-                worst = max(worst, code)
+                worst = max(worst, code, self._summarise(len(groups)))
         except KeyboardInterrupt:
-            say(f"interrupted after {len(self.records)} of {len(groups)} files; finished results are kept")
+            say(
+                f"interrupted after {len(self.records)} of {len(groups)} files; finished results are kept"
+                f"{again}"
+            )
             worst = INTERRUPTED
         except BrokenExecutor:
             say(
@@ -89,11 +100,28 @@ class Batch:
                 f" {len(self.records)} of {len(groups)} files are done; fit the others with fewer --jobs"
             )
             worst = FAILED
-        if self.out is not None and len(groups) > 1 and self.records:
-            write_summary(Path(self.out) / SUMMARY, self.records)
+        if self.kept:
+            say(
+                f"{self.kept} of {len(groups)} files were not fitted again: an earlier run has their results,"
+                " of the same data, scene, settings and version; --refit fits them, too"
+            )
         if self.inputs.repeats and worst != INTERRUPTED:
             self._compare()
         return worst
+
+    def _summarise(self, files: int) -> int:
+        """Write the table of all results so far, and return FAILED where it cannot be written."""
+        from pellicle.reporting.folders import SUMMARY, write_summary
+
+        if self.out is None or files == 1:
+            return CONVERGED
+        try:
+            write_summary(Path(self.out) / SUMMARY, self.records)
+        except ValueError as error:
+            if len(self.records) == files:  # said once
+                say(f"pellicle: {error}")
+            return FAILED
+        return CONVERGED
 
     def _compare(self) -> None:
         """Compare the scatter of repeated measurements with their errors, print and write the result."""
@@ -131,20 +159,31 @@ class Batch:
             print(result.out, end="", flush=True)
             self.records.append(result.record)
             self.fits += result.fits
+            self.kept += result.kept
             yield result.code
             progress("fit", done, len(tasks))
         progress.clear()
 
     def _fit(self, files: list[Input], folder: Path | None) -> int:
         """Fit one group of files, print and write the result, and return its exit code."""
+        from pellicle.cli.resume import earlier, fingerprint
         from pellicle.reporting.fit_text import report
-        from pellicle.reporting.folders import write_fit
         from pellicle.reporting.json_record import failure, one_line, to_json
 
-        paths = [file.path for file in files]
+        paths, identity = [file.path for file in files], ""
         progress = Progress(", ".join(paths))
         try:
-            fit, posterior = self._result(files, folder, progress)
+            data, scene = measurement(files, self.inputs.joint)
+            if folder is not None:
+                settings = self.tolerance, self.inputs.loss, self.inputs.residual, self.sampler
+                identity = fingerprint(data, scene, settings)
+                if not self.refit and (found := earlier(folder, identity)):
+                    self.kept += 1
+                    self.records.append(found.record)
+                    self._print(found.record, found.report)
+                    say(f"{folder}: from an earlier run")
+                    return CONVERGED if found.record["status"] == "converged" else UNCLEAR
+            fit, posterior = self._result(data, scene, folder, progress)
         except ValueError as error:
             progress.clear()
             message = error_message(error, paths)
@@ -158,26 +197,41 @@ class Batch:
         self.records.append(record)
         if self.inputs.repeats:
             self.fits.append(fit)
-        print(one_line(record) if self.as_json else report(fit, posterior), flush=True)
-        if folder is not None:
-            write_fit(folder, fit, posterior)
-            say(f"{folder}: report, figures and tables written")
+        self._print(record, "" if self.as_json else report(fit, posterior))
+        code = CONVERGED if fit.status == "converged" else UNCLEAR
         if posterior is not None and not posterior.trusted:
-            return TOO_SHORT
-        return CONVERGED if fit.status == "converged" else UNCLEAR
+            code = TOO_SHORT
+        return code if folder is None else max(code, _write(folder, fit, posterior, identity))
+
+    def _print(self, record: dict[str, Any], report: str) -> None:
+        from pellicle.reporting.json_record import one_line
+
+        print(one_line(record) if self.as_json else report, flush=True)
 
     def _result(
-        self, files: list[Input], folder: Path | None, progress: Progress
+        self, data: Any, scene: Any, folder: Path | None, progress: Progress
     ) -> tuple[Fit, Posterior | None]:
         from pellicle.api import fit, sample
 
-        data, scene = measurement(files, self.inputs.joint)
         options: dict[str, Any] = {"tolerance": self.tolerance, "residual": self.inputs.residual}
         if self.sampler is None:
             return with_flags(fit(data, scene, loss=self.inputs.loss, progress=progress, **options)), None
         posterior = sample(data, scene, progress=progress, **self.sampler.options(folder), **options)
         posterior = replace(posterior, fit=with_flags(posterior.fit))
         return posterior.fit, posterior
+
+
+def _write(folder: Path, fit: Fit, posterior: Posterior | None, identity: str) -> int:
+    """Write the folder of a result, and return FAILED where it cannot be written."""
+    from pellicle.reporting.folders import write_fit
+
+    try:
+        write_fit(folder, fit, posterior, identity)
+    except ValueError as error:  # the result is printed, and the other files go on
+        say(f"pellicle: {error}; the result is printed, and the same command writes its files")
+        return FAILED
+    say(f"{folder}: report, figures and tables written")
+    return CONVERGED
 
 
 class _Captured(NamedTuple):
@@ -187,6 +241,7 @@ class _Captured(NamedTuple):
     code: int
     record: dict[str, Any]
     fits: list[Fit]
+    kept: int
     out: str
     err: str
 
@@ -197,7 +252,7 @@ def _captured(task: tuple[Batch, Path | None]) -> _Captured:
     out, err = StringIO(), StringIO()
     with redirect_stdout(out), redirect_stderr(err), log_to_stderr() if batch.verbose else nullcontext():
         code = batch._fit(batch.inputs.files, folder)
-    return _Captured(code, batch.records[0], batch.fits, out.getvalue(), err.getvalue())
+    return _Captured(code, batch.records[0], batch.fits, batch.kept, out.getvalue(), err.getvalue())
 
 
 def measurement(

@@ -29,6 +29,9 @@ def fit(
     out: Annotated[str | None, flag(OUTPUT, "Folder for report, figure and tables.")] = None,
     json: Annotated[bool, switch(OUTPUT, "Print one JSON object a line.")] = False,
     jobs: Annotated[int, flag(OUTPUT, "Number of processes that share several files (1).")] = 1,
+    refit: Annotated[
+        bool, switch(OUTPUT, "Fit all files, also those whose results an earlier run left in --out.")
+    ] = False,
 ) -> int:
     """Fit a layer to measured reflectance, transmittance, ellipsometry or BRDF samples.
 
@@ -39,4 +42,4 @@ def fit(
         raise UsageError(f"--jobs must be at least 1, got {jobs}")
     files = inputs(list(data), recipe, scene or SceneFlags(), reading or ReadingFlags(), joint, repeats)
     start()
-    return Batch(files, tolerance, Sampler() if posterior else None, out, json, jobs).run()
+    return Batch(files, tolerance, Sampler() if posterior else None, out, json, jobs, refit).run()

@@ -34,6 +34,9 @@ def sample(
     ] = None,
     json: Annotated[bool, switch(OUTPUT, "Print one JSON object a line.")] = False,
     jobs: Annotated[int, flag(OUTPUT, "Number of processes that share several files (1).")] = 1,
+    refit: Annotated[
+        bool, switch(OUTPUT, "Fit all files, also those whose results an earlier run left in --out.")
+    ] = False,
 ) -> int:
     """Fit, then sample the posterior of every free parameter, starting from every minimum that matters.
 
@@ -48,4 +51,4 @@ def sample(
         raise UsageError(f"--seed must lie in 0 to 4294967295, got {seed}")
     files = inputs(list(data), recipe, scene or SceneFlags(), reading or ReadingFlags(), joint, False)
     start()
-    return Batch(files, tolerance, Sampler(walkers, steps, seed), out, json, jobs).run()
+    return Batch(files, tolerance, Sampler(walkers, steps, seed), out, json, jobs, refit).run()

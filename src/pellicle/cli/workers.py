@@ -12,6 +12,7 @@ from io import StringIO
 from multiprocessing import get_context
 from typing import TypeVar
 
+from pellicle.cli.interruption import end_with_parent, send_again
 from pellicle.cli.session import start
 
 Task = TypeVar("Task")
@@ -64,16 +65,10 @@ def _quiet_and_single_threaded() -> Iterator[None]:
 
 
 def _begin() -> None:
-    sys.unraisablehook = _unraisable
+    end_with_parent()
+    sys.unraisablehook = send_again
     with redirect_stderr(StringIO()):  # this process has printed what there is to say
         start()
-
-
-def _unraisable(raised: sys.UnraisableHookArgs) -> None:
-    """Report an exception that Python ignores, unless it is Ctrl-C in JAX's callback of the garbage
-    collector: the fit goes on to its end then."""
-    if not issubclass(raised.exc_type, KeyboardInterrupt):
-        sys.__unraisablehook__(raised)
 
 
 def _run(function: Callable[[Task], Result], task: Task) -> Result:

@@ -20,7 +20,7 @@ from typing import Any, get_type_hints
 import jax
 import numpy as np
 
-from pellicle.errors import UsageError
+from pellicle.errors import DataError, UsageError
 from pellicle.files import replacing
 from pellicle.fitting import executables
 
@@ -80,7 +80,7 @@ def _traced(path: Path, flat: Program, inputs: Sequence[jax.ShapeDtypeStruct]) -
     except (OSError, ValueError, KeyError):  # absent, or cut short: made again
         program = export.export(jax.jit(flat))(*inputs)
         # a cache that cannot be written is no failure
-        with suppress(OSError, UsageError):
+        with suppress(OSError, UsageError, DataError):
             path.parent.mkdir(parents=True, exist_ok=True)
             with replacing(path, overwrite=True) as temporary:
                 temporary.write_bytes(program.serialize())

@@ -22,28 +22,35 @@ if TYPE_CHECKING:
 INDEX_SCHEMA = "pellicle.fits/1"
 CHAIN_SCHEMA = "pellicle.chain/1"
 CHAIN = "chain.h5"
+REPORT = "report.txt"
 SUMMARY = "summary.csv"
+FINGERPRINT = "fingerprint"
+"""Key of result.json that only a folder with all its files has."""
 
 
-def write_fit(folder: str | os.PathLike[str], fit: Fit, posterior: Posterior | None = None) -> Path:
+def write_fit(
+    folder: str | os.PathLike[str], fit: Fit, posterior: Posterior | None = None, fingerprint: str = ""
+) -> Path:
     """Write a fit, and its posterior if there is one, into a folder.
 
     A fit has result.json, report.txt, fit.csv, figure.png and, of films, nk.csv; a posterior adds
     posterior.nc, corner.png and predictive.png. Each file appears complete or not at all; files of an earlier
-    result are replaced.
+    result are replaced. A `fingerprint` of what was fitted is added to result.json when all files are
+    written.
 
     **Returns:** the folder.
 
-    **Raises:** UsageError where the folder holds files that pellicle did not write, or cannot be written.
+    **Raises:** UsageError where the folder holds files that pellicle did not write, or cannot be written;
+    DataError for a full disk.
     """
     from pellicle.reporting.drawing import save_figure
     from pellicle.reporting.fit_figure import draw
     from pellicle.reporting.fit_text import report
 
     target = new_folder(folder)
-    record = indented(to_json(fit, posterior))
-    write_text(target / MARKER, record, overwrite=True)  # first: it marks the folder as ours
-    write_text(target / "report.txt", report(fit, posterior), overwrite=True)
+    record = to_json(fit, posterior)
+    write_text(target / MARKER, indented(record), overwrite=True)  # first: it marks the folder as ours
+    write_text(target / REPORT, report(fit, posterior), overwrite=True)
     write_text(target / "fit.csv", fit_csv(fit), overwrite=True)
     if fit.layer_test is None:
         write_text(target / "nk.csv", nk_csv(fit), overwrite=True)
@@ -56,6 +63,8 @@ def write_fit(folder: str | os.PathLike[str], fit: Fit, posterior: Posterior | N
         write_netcdf(target / "posterior.nc", posterior, predictions, overwrite=True)
         save_figure(corner_figure(posterior), target / "corner.png", overwrite=True, bbox_inches="tight")
         save_figure(predictive_figure(predictions), target / "predictive.png", overwrite=True)
+    if fingerprint:
+        write_text(target / MARKER, indented(record | {FINGERPRINT: fingerprint}), overwrite=True)
     return target
 
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from pellicle.sampling.result import Marginal, Posterior
 
 SCHEMA = "pellicle.fit/1"
+ERROR_SCHEMA = "pellicle.error/1"
 
 _PACKAGES = ("jax", "optimistix", "numpy")
 
@@ -195,6 +196,11 @@ def failure(
         "versions": versions(),
         "seconds": 0.0,
     }
+
+
+def error_record(error: str, exit_code: int) -> dict[str, Any]:
+    """Build the record of a command that an error in its arguments or recipe ended, before any result."""
+    return {"schema": ERROR_SCHEMA, "status": "failed", "error": error, "exit_code": exit_code}
 
 
 def one_line(record: Mapping[str, Any]) -> str:
