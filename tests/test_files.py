@@ -1,12 +1,15 @@
 """Nothing a user had is overwritten or lost; nothing half written stays."""
 
+import errno
 import os
 import stat
+import subprocess
+import sys
 
 import pytest
 
-from pellicle.errors import UsageError
-from pellicle.files import new_folder, replacing, write_text
+from pellicle.errors import DataError, UsageError
+from pellicle.files import _TEMPORARY, _machine, new_folder, replacing, write_text
 
 
 def test_text_arrives_whole_and_readable_as_other_files_are(tmp_path):
@@ -93,3 +96,61 @@ def test_a_file_is_no_folder(tmp_path):
         new_folder(tmp_path / "out")
     with pytest.raises(UsageError, match=r"cannot be made .*`folder`"):
         new_folder(tmp_path / "out" / "deeper")
+
+
+def _stray(folder, process, name="figure", machine=None):
+    """A temporary file as a killed process leaves it."""
+    path = folder / f".{name}.{machine or _machine()}-{process}-ab12cd_e.png"
+    path.write_text("half")
+    return path
+
+
+@pytest.fixture
+def dead():
+    """The number of a process that has ended."""
+    process = subprocess.Popen([sys.executable, "-c", ""])
+    process.wait()
+    return process.pid
+
+
+def test_temporary_files_of_killed_processes_are_removed(tmp_path, dead):
+    write_text(tmp_path / "result.json", '{"schema": "pellicle.fit/1"}')
+    gone = _stray(tmp_path, dead)
+    elsewhere, alive = _stray(tmp_path, dead, machine="00000000"), _stray(tmp_path, os.getppid(), "nk")
+    mine = tmp_path / ".figure.png"
+    mine.write_text("mine")
+    new_folder(tmp_path)
+    assert [path.exists() for path in (gone, elsewhere, alive, mine)] == [False, True, True, True]
+    os.utime(elsewhere, (1e9, 1e9))  # of 2001: its process has ended, wherever it ran
+    new_folder(tmp_path)
+    assert [path.exists() for path in (elsewhere, alive)] == [False, True]
+
+
+def test_outside_a_result_folder_only_those_of_the_file_are_removed(tmp_path, dead):
+    same, other = _stray(tmp_path, dead), _stray(tmp_path, dead, "corner")
+    write_text(tmp_path / "figure.png", "whole")
+    assert [same.exists(), other.exists()] == [False, True]
+
+
+def test_a_killed_process_leaves_a_name_that_is_recognised(tmp_path):
+    with replacing(tmp_path / "figure.png") as temporary:
+        found = _TEMPORARY.fullmatch(temporary.name)
+        assert found
+        assert (found["stem"], found["process"]) == ("figure", str(os.getpid()))
+
+
+@pytest.mark.parametrize(
+    "error",
+    [OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)), OSError("HDF5: " + os.strerror(errno.ENOSPC))],
+    ids=["by number", "by text"],
+)
+def test_a_full_disk_is_one_sentence_and_leaves_the_old_file(tmp_path, error):
+    target = tmp_path / "chain.h5"
+    target.write_text("old")
+    with (
+        pytest.raises(DataError, match=r"chain\.h5: cannot be written \(.*No space left.*make room"),
+        replacing(target, overwrite=True),
+    ):
+        raise error
+    assert target.read_text() == "old"
+    assert os.listdir(tmp_path) == ["chain.h5"]

@@ -277,6 +277,26 @@ def test_unknown_flags_and_commands_are_2(pellicle, spectrum_file, scene):
         assert "Traceback" not in ran.out + ran.err
 
 
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (("fit", "a.csv", "--tickness", "3"), 2, "--thickness"),
+        (("fit", "a.csv", "--thickness"), 2, "requires an argument"),
+        (("fit", "a.csv", "--plate-mm", "thin"), 2, "thin"),
+        (("fitt",), 2, "fitt"),
+        (("fit", "a.csv"), 2, "--layer is missing"),
+        (("plan", "gone.toml"), 3, "gone.toml"),
+    ],
+)
+def test_wrong_usage_is_a_json_object_with_the_exit_code(pellicle, words, code, said):
+    ran = pellicle(*words, "--json")
+    (record,) = ran.objects
+    assert (ran.code, record["exit_code"], record["status"]) == (code, code, "failed")
+    assert said in record["error"]
+    assert said in ran.err
+    assert pellicle(*words).out == ""
+
+
 def test_talk_goes_to_stderr(capsys):
     say("one", "two")
     captured = capsys.readouterr()

@@ -2,8 +2,11 @@
 
 import os
 import signal
+import subprocess
+import sys
 import time
 from concurrent.futures import BrokenExecutor
+from pathlib import Path
 
 import pytest
 
@@ -65,6 +68,47 @@ def test_after_ctrl_c_finished_results_are_kept_and_no_task_is_begun():
     with pytest.raises(KeyboardInterrupt):
         next(results)
     assert time.monotonic() - began < 50  # nobody waits for the sleeper
+
+
+_PARENT = """
+import os, sys, time
+from pellicle.cli.workers import in_order
+
+if __name__ == "__main__":
+    for process in in_order(sleeper.process, range(4), 2):
+        print(process, flush=True)
+"""
+_SLEEPER = """
+import os, time
+
+def process(task):
+    time.sleep(60 * (task > 1))
+    return os.getpid()
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+def test_workers_end_with_a_parent_that_is_killed(tmp_path):
+    (tmp_path / "sleeper.py").write_text(_SLEEPER)
+    (tmp_path / "parent.py").write_text("import sleeper\n" + _PARENT)
+    parent = subprocess.Popen([sys.executable, tmp_path / "parent.py"], stdout=subprocess.PIPE, text=True)
+    with parent, parent.stdout or pytest.fail("no pipe") as printed:
+        workers = {int(printed.readline()) for _ in range(2)}
+        parent.kill()
+    deadline = time.monotonic() + 30  # seconds, of the 60 that they would sleep
+    while running := [process for process in workers if _runs(process)]:
+        assert time.monotonic() < deadline, running
+        time.sleep(0.1)
+
+
+def _runs(process):
+    """True unless the process has ended, or waits for somebody to ask how."""
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    status = Path(f"/proc/{process}/stat")
+    return not (status.exists() and status.read_text().rpartition(")")[2].split()[0] == "Z")
 
 
 def test_two_processes_find_what_one_finds(pellicle, spectrum_file, scene, tmp_path):

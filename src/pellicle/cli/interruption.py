@@ -36,11 +36,19 @@ def send_again(raised: sys.UnraisableHookArgs) -> None:
     """
     if issubclass(raised.exc_type, KeyboardInterrupt):
         # not at once: it would be raised in this hook, and ignored
-        timer = threading.Timer(_PAUSE, _thread.interrupt_main)
+        timer = threading.Timer(_PAUSE, _interrupt_main_thread)
         timer.daemon = True
         timer.start()
     else:
         sys.__unraisablehook__(raised)
+
+
+def _interrupt_main_thread() -> None:
+    main = threading.main_thread().ident
+    if hasattr(signal, "pthread_kill") and main is not None:  # it wakes a thread that waits, too
+        signal.pthread_kill(main, signal.SIGINT)
+    else:
+        _thread.interrupt_main()
 
 
 def end_with_parent() -> None:
