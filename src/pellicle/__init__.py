@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from pellicle.api import simulate as simulate
     from pellicle.data.brdf_samples import BrdfSamples as BrdfSamples
     from pellicle.data.read_brdf import read_brdf_samples as read_brdf_samples
+    from pellicle.data.read_spectrum import read_spectra as read_spectra
     from pellicle.data.read_spectrum import read_spectrum as read_spectrum
     from pellicle.data.spectrum import Spectrum as Spectrum
     from pellicle.dispersion import effective_medium as mixing  # noqa: F401
@@ -48,7 +49,7 @@ _NAMES = {
     "pellicle.api": ("compare", "cost", "fit", "plan", "sample", "simulate"),
     "pellicle.data.brdf_samples": ("BrdfSamples",),
     "pellicle.data.read_brdf": ("read_brdf_samples",),
-    "pellicle.data.read_spectrum": ("read_spectrum",),
+    "pellicle.data.read_spectrum": ("read_spectra", "read_spectrum"),
     "pellicle.data.spectrum": ("Spectrum",),
     "pellicle.fitting.result": ("Fit", "Status"),
     "pellicle.materials": ("material",),

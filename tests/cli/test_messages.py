@@ -121,7 +121,7 @@ def test_the_error_of_a_file_that_fails(pellicle, spectrum_file, scene, monkeypa
     def refused(*_, **__):
         raise ValueError("too few points: give a wider `range`")
 
-    monkeypatch.setattr("pellicle.data.read_spectrum.read_spectrum", refused)
+    monkeypatch.setattr("pellicle.data.read_spectrum.read_spectra", refused)
     ran = pellicle("fit", spectrum_file(), *scene, "--json")
     assert ran.code == 3
     assert "give a wider --range" in ran.err

@@ -219,7 +219,8 @@ def test_two_polarisations(write, refused):
 
 def test_no_signal_column(write, refused):
     path = write("wavelength,brightness,gloss\n400,0.1,0.2\n500,0.2,0.3\n")
-    refused(path, DataError, "'wavelength', 'brightness', 'gloss'", "`columns=[")
+    refused(path, UsageError, "'brightness', 'gloss' state no quantity", '`signal="R"`', "`columns=[")
+    refused(write("wavelength,psi_err\n400,1\n500,2\n"), DataError, "no column is a signal", "`columns=[")
 
 
 def test_no_wavelength_column(write, refused):
@@ -236,9 +237,14 @@ def test_a_name_twice(write, header, refused):
     refused(write(f"{header}\n400,0.1,0.2\n500,0.1,0.2\n"), DataError, "twice", "`columns`")
 
 
-@pytest.mark.parametrize("header", ["wavelength,lambda,R", "wavelength,energy,R", "wl,R,Reflectance"])
+@pytest.mark.parametrize("header", ["wavelength,lambda,R", "wavelength,energy,R"])
 def test_two_columns_that_could_be_the_same(write, header, refused):
     refused(write(f"{header}\n400,0.1,0.2\n500,0.1,0.2\n"), DataError, "could each be", "`columns`")
+
+
+def test_two_signals_of_one_kind(write, refused):
+    path = write("wl,R,Reflectance\n400,0.1,0.2\n500,0.1,0.2\n")
+    refused(path, UsageError, "has 2 spectra", "'R', 'Reflectance'", "`spectrum=", '`spectrum="all"`')
 
 
 def test_unknown_units(write, refused):

@@ -51,7 +51,12 @@ from pellicle.data.tabular.columns import is_header, recognise
         ("R_sigma_as_stated", "other", None),
         ("Rubbish", "other", None),
         ("temperature", "other", None),
-        ("A", "other", None),
+        ("A", "T", "absorbance"),
+        ("Abs", "T", "absorbance"),
+        ("Absorbance (AU)", "T", "absorbance"),
+        ("T (Abs)", "T", None),
+        ("log(1/R)", "R", "absorbance"),
+        ("frequency (THz)", "wavelength", "THz"),
         ("", "other", None),
     ],
 )

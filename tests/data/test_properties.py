@@ -12,6 +12,7 @@ from pellicle.errors import DataError, UsageError
 
 NAMES = {
     "nm": "wavelength (nm)",
+    "THz": "frequency (THz)",
     "um": "Wavelength_um",
     "A": "lambda [Å]",
     "eV": "energy",
@@ -110,6 +111,7 @@ def test_any_file_is_read_or_refused_in_one_sentence(path, content):
 ROLES = {
     *("wavelength", "R", "T", "intensity", "counts", "sigma", "angle"),
     *("psi", "delta", "sigma_psi", "sigma_delta", "N", "C", "S", "alpha", "beta", "analyser"),
+    *("depolarisation", "sigma_depolarisation"),
     *("theta_i", "phi_i", "theta_o", "phi_o", "value", "G", "B", "sigma_R", "sigma_G", "sigma_B"),
     "other",
 }

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pellicle.data.formats.detect import find_export
+from pellicle.data.formats.detect import read_tables
 from pellicle.data.tabular.table import read_table
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -18,13 +18,14 @@ FILES = [*(ROOT / "measurements").rglob("*nm*.csv"), *(ROOT / "measurements").rg
 
 def by_pandas(table):
     """Every column."""
+    cells = table.layout.cells
     frame = pd.read_csv(
-        StringIO("\n".join(line.bare for line in table.layout.rows)),
-        sep=r"\s+" if table.layout.delimiter == " " else table.layout.delimiter,
+        StringIO("\n".join(line.bare for line in cells.rows)),
+        sep=r"\s+" if cells.delimiter == " " else cells.delimiter,
         header=None,
-        names=list(range(table.layout.raw_width)),
+        names=list(range(cells.raw_width)),
         index_col=False,
-        decimal=table.layout.decimal,
+        decimal=cells.decimal,
         skipinitialspace=True,
     )
     return [frame[i].to_numpy() for i in range(table.layout.width)]
@@ -32,7 +33,7 @@ def by_pandas(table):
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
 def test_measurements(path):
-    table = read_table(path, find_export)
+    [table] = read_tables(path)
     expected = by_pandas(table)
     plain = [
         i for i, column in enumerate(expected) if column.dtype.kind in "fiu" and np.isfinite(column).all()

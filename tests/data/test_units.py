@@ -27,5 +27,5 @@ def test_one_wavelength_in_every_unit(value, unit, nm):
 
 def test_an_unknown_unit_is_none_as_text_and_an_error_as_a_unit():
     assert wavelength_unit("furlong") is None
-    with pytest.raises(ValueError, match="expected one of nm, um, A, eV, cm-1, got 'furlong'"):
+    with pytest.raises(ValueError, match="expected one of nm, um, A, eV, cm-1, THz, got 'furlong'"):
         to_nm(np.ones(1), "furlong")

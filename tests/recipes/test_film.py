@@ -278,8 +278,11 @@ def test_how_files_are_read(tmp_path):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ("wavelength_unit = 'mm'", "data.wavelength_unit: must be one of nm, um, A, eV, cm-1, not 'mm'"),
-        ("signal_unit = 'permille'", "data.signal_unit: must be one of fraction, percent, not 'permille'"),
+        ("wavelength_unit = 'mm'", "data.wavelength_unit: must be one of nm, um, A, eV, cm-1, THz, not 'mm'"),
+        (
+            "signal_unit = 'permille'",
+            "data.signal_unit: must be one of fraction, percent, absorbance, not 'permille'",
+        ),
         ("spot = 0", "data.spot: "),
         ("analyser = 90", "data.analyser: "),
     ],

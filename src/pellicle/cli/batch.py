@@ -269,14 +269,16 @@ def measurement(
 
     data, scenes = [], []
     for file in files:
-        values, scene = file.read(), file.scene
-        say(*(f"{file.path}: {note}" for note in values.notes if notes))
-        data.append(values)
-        shared = len(files) > 1 and not file.own_scale
-        if shared and isinstance(values, Spectrum) and isinstance(scene, Scene):
-            scene = without_scale(scene, values)
-        scenes.append(scene)
-    if not joint:
+        found = file.read()
+        for values in found:
+            say(*(f"{file.path}: {note}" for note in values.notes if notes))
+            shared = len(files) + len(found) > 2 and not file.own_scale
+            scene = file.scene
+            if shared and isinstance(values, Spectrum) and isinstance(scene, Scene):
+                scene = without_scale(scene, values)
+            data.append(values)
+            scenes.append(scene)
+    if not joint and len(data) == 1:
         return data[0], scenes[0]
     return data, scenes[0] if isinstance(scenes[0], Surface) else scenes
 

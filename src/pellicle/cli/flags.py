@@ -73,6 +73,7 @@ class SceneFlags(_Flags):
 class ReadingFlags(_Flags):
     """Flags for reading files; a recipe's [data] supplies what is None."""
 
+    spectrum: Annotated[str | None, flag(READING, "Name of one of several spectra in a file, or all.")] = None
     signal: Annotated[str | None, flag(READING, "R, T or psi-delta, if the file does not name it.")] = None
     angle: Annotated[float | None, flag(READING, "Angle of incidence in degrees (0).")] = None
     polarisation: Annotated[str | None, flag(READING, "s, p or unpolarised.")] = None
@@ -92,8 +93,8 @@ class ReadingFlags(_Flags):
             group=READING, help="Names of the columns in order, _ to skip.", metavar="NAME,...", negative=""
         ),
     ] = None
-    wavelength_unit: Annotated[str | None, flag(READING, "nm, um, A, eV or cm-1.")] = None
-    signal_unit: Annotated[str | None, flag(READING, "fraction or percent.")] = None
+    wavelength_unit: Annotated[str | None, flag(READING, "nm, um, A, eV, cm-1 or THz.")] = None
+    signal_unit: Annotated[str | None, flag(READING, "fraction, percent or absorbance.")] = None
     reference: Annotated[
         str | None, flag(READING, "Raw counts of a bare reference; DATA are then raw counts too.")
     ] = None

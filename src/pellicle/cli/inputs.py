@@ -32,11 +32,12 @@ _FOR_SURFACES = ("columns", "noise", "signal", "loss")
 class Input(NamedTuple):
     """A data file, the function that reads it, and the scene or surface that is fitted to it.
 
+    Several spectra of one film in one file are fitted together.
     `own_scale` is true where the recipe gives this file a scale or an offset of its own.
     """
 
     path: str
-    read: Callable[[], Spectrum | BrdfSamples]
+    read: Callable[[], list[Spectrum] | list[BrdfSamples]]
     scene: Scene | Surface
     own_scale: bool = False
 
@@ -106,16 +107,17 @@ def _as_repeats(files: Inputs, repeats: bool) -> Inputs:
 def _sweeps(file: Input) -> list[Input]:
     """One input for each sweep of a file; the file itself where it has one, or cannot be read."""
     try:
-        count = len(getattr(file.read(), "sweeps", ()))
-    except ValueError:
-        return [file]  # reported when it is fitted
+        [one] = file.read()
+        count = len(getattr(one, "sweeps", ()))
+    except ValueError:  # more than one, or an error that is reported when it is fitted
+        return [file]
     return [file._replace(read=partial(_sweep, file.read, i)) for i in range(count)] or [file]
 
 
-def _sweep(read_file: Callable[[], Any], number: int) -> Spectrum:
-    sweeps = read_file().sweeps
-    note = f"sweep {number + 1} of {len(sweeps)}"
-    return replace(sweeps[number], notes=(*sweeps[number].notes, note))
+def _sweep(read_file: Callable[[], Any], number: int) -> list[Spectrum]:
+    [one] = read_file()
+    note = f"sweep {number + 1} of {len(one.sweeps)}"
+    return [replace(one.sweeps[number], notes=(*one.sweeps[number].notes, note))]
 
 
 def _by_flags(files: list[str], scene_flags: SceneFlags, reading: ReadingFlags) -> Inputs:
@@ -131,7 +133,7 @@ def _by_flags(files: list[str], scene_flags: SceneFlags, reading: ReadingFlags) 
     scene, assumed = scene_from_flags(scene_flags, reading)
     say(*assumed)
     _check_free(scene)
-    inputs = [_spectrum_input(file, scene, reading) for file in files]
+    inputs = [one for file in files for one in _spectrum_inputs(file, scene, reading)]
     return Inputs(inputs, False, reading.loss or LEAST_SQUARES)
 
 
@@ -150,7 +152,7 @@ def _by_recipe(files: list[str], recipe: FilmRecipe, reading: ReadingFlags) -> I
         scene = eqx.tree_at(lambda s: s.light, own.scene(), light(flags))
         _check_free(scene, recipe.path)
         own_scale = any(table.rescales for table in own.tables.data.file)
-        inputs.append(_spectrum_input(file, scene, flags, own_scale))
+        inputs += _spectrum_inputs(file, scene, flags, own_scale)
     data = recipe.tables.data
     loss = reading.loss or data.loss or LEAST_SQUARES
     return Inputs(inputs, data.joint, loss, repeats=data.repeats)
@@ -179,20 +181,29 @@ def _files(files: list[str], recipe: FilmRecipe | SurfaceRecipe) -> list[str]:
     return files or recipe.files
 
 
-def _spectrum_input(path: str, scene: Scene, reading: ReadingFlags, own_scale: bool = False) -> Input:
+def _spectrum_inputs(path: str, scene: Scene, reading: ReadingFlags, own_scale: bool = False) -> list[Input]:
+    """One input for a file, or with --spectrum all one for each of its spectra."""
+    from pellicle.data.file_spectra import ALL
     from pellicle.scene.instrument import Drift
 
-    free_scale = isinstance(scene.instrument.scale, Drift)
-    return Input(path, partial(read, path, reading, free_scale=free_scale), scene, own_scale)
+    read_file = partial(read, path, reading, free_scale=isinstance(scene.instrument.scale, Drift))
+    if reading.spectrum == ALL:
+        try:
+            found = read_file()
+        except ValueError:
+            found = []  # reported when it is fitted
+        if len(found) > 1:
+            return [Input(f"{path} [{one.name}]", partial(list, [one]), scene, own_scale) for one in found]
+    return [Input(path, read_file, scene, own_scale)]
 
 
-def _samples(recipe: SurfaceRecipe, surface: Surface, path: str) -> BrdfSamples:
+def _samples(recipe: SurfaceRecipe, surface: Surface, path: str) -> list[BrdfSamples]:
     samples = recipe.read(path)
     channels = ", ".join(samples.channels)
     log.info("surface: %s, by %d samples of %s", surface.model, len(samples), channels)
     for number in surface.free_numbers():
         log.info("free: %s between %g and %g", number.name, number.free.lower, number.free.upper)
-    return samples
+    return [samples]
 
 
 def _check_free(scene: Scene | Surface, recipe: str = "") -> None:

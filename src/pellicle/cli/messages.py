@@ -47,6 +47,7 @@ FLAGS = {
     "seed": "--seed",
     "signal": "--signal",
     "signal_unit": "--signal-unit",
+    "spectrum": "--spectrum",
     "spot": "--spot",
     "steps": "--steps",
     "substrate": "--substrate",

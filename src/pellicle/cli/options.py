@@ -74,14 +74,18 @@ def merged(reading: ReadingFlags, recipe: FilmRecipe) -> ReadingFlags:
     return replace(reading, **{name: getattr(data, name, None) for name in absent})
 
 
-def read(path: str, flags: ReadingFlags, *, free_scale: bool) -> Spectrum:
-    """Read one spectrum; with a `free_scale` any level is acceptable. Raises DataError or UsageError."""
-    from pellicle.data.read_spectrum import read_spectrum
+def read(path: str, flags: ReadingFlags, *, free_scale: bool) -> list[Spectrum]:
+    """Read the spectra of a file that are meant; with a `free_scale` any level is acceptable.
+
+    Raises DataError or UsageError.
+    """
+    from pellicle.data.read_spectrum import read_spectra
 
     if flags.reference is not None:
-        return _from_counts(path, flags)
-    return read_spectrum(
+        return [_from_counts(path, flags)]
+    return read_spectra(
         path,
+        spectrum=flags.spectrum,
         signal=flags.signal,
         columns=flags.columns,
         wavelength_unit=flags.wavelength_unit,

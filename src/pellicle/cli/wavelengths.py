@@ -46,7 +46,7 @@ def _as_measured(recipe: FilmRecipe) -> tuple[Scene, np.ndarray]:
     path = recipe.files[0]
     own = recipe if recipe.tables.data.files else recipe.each[0]  # the first [[data.file]] has its own keys
     scene, flags = own.scene(), merged(ReadingFlags(), own)
-    spectrum = read(path, flags, free_scale=isinstance(scene.instrument.scale, Drift))
+    spectrum = read(path, flags, free_scale=isinstance(scene.instrument.scale, Drift))[0]
     say(f"wavelengths: those of {path} (the recipe gives none)")
     stated = light(flags)
     angle = stated.angle if spectrum.angle is None else float(spectrum.angle[0])

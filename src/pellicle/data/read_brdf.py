@@ -12,7 +12,9 @@ from pellicle.data.formats import alta
 from pellicle.data.formats.merl import is_merl, read_merl
 from pellicle.data.tabular.column_selection import listed, named_columns, only
 from pellicle.data.tabular.columns import DIRECTIONS, Column
-from pellicle.data.tabular.table import Table, read_table
+from pellicle.data.tabular.layout import find_layout
+from pellicle.data.tabular.table import Table
+from pellicle.data.tabular.text import read_bytes, text_file
 from pellicle.data.tabular.units import brdf_unit
 from pellicle.errors import DataError, UsageError
 
@@ -44,8 +46,10 @@ def read_brdf_samples(
     """
     if is_merl(path):
         return read_merl(path, samples)
-    table = read_table(path, alta.layout)
-    header = alta.find_header(table.comments, table.path)
+    file = text_file(*read_bytes(path), path)
+    header = alta.find_header(file.comments, file.path)
+    layout = alta.layout(file, header) if header else find_layout(file)
+    table = Table(file.path, file.sha256, layout)
     every = alta.from_table(table, header) if header else _from_csv(table, columns)
     return every if samples is None else every.thinned(samples)
 

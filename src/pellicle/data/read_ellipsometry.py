@@ -48,18 +48,10 @@ class EllipsometryColumns:
     notes: tuple[str, ...]
 
 
-def is_ellipsometry(table: Table, columns: Sequence[Column] | None, signal: str | None) -> bool:
-    """Return True if Ψ and Δ are to be read, in any form. Raises UsageError where there is a power too."""
+def has_ellipsometry(columns: Sequence[Column] | None) -> bool:
+    """Return True if Ψ and Δ are among the columns, in any form."""
     roles = {column.role for column in columns or ()}
-    present = bool(roles & set(PSI_DELTA)) or any(roles.issuperset(form) for form in FORMS)
-    if signal is not None or not present:
-        return signal == SIGNAL
-    powers = sorted(roles & {"R", "T", "intensity"})
-    if powers:
-        raise UsageError(
-            f"{table.path}: has psi and delta as well as {', '.join(powers)}; choose one with `signal`"
-        )
-    return True
+    return bool(roles & set(PSI_DELTA)) or any(roles.issuperset(form) for form in FORMS)
 
 
 def read_ellipsometry(
@@ -75,7 +67,7 @@ def read_ellipsometry(
 
     Raises DataError or UsageError.
     """
-    chosen = _choose_columns(table, named_columns(table, columns))
+    chosen = ellipsometry_columns(table, named_columns(table, columns))
     _check_form(table, chosen, folded, analyser)
     unit = axis_unit(table, chosen.wavelength, wavelength_unit)
     cells = (*chosen.values, *([chosen.analyser] if chosen.analyser else []), *chosen.errors)
@@ -106,7 +98,7 @@ def read_ellipsometry(
     errors = {"sigma": sigma[0] if sigma else None, "delta_sigma": sigma[-1] if sigma else None}
     return of_rows(
         sweep_numbers(arrays["wavelength"], angle),
-        arrays | errors | {"lines": table.lines[rows]},
+        arrays | errors | {"lines": table.source_lines(rows)},
         signal=SIGNAL,
         path=table.path,
         sha256=table.sha256,
@@ -153,7 +145,8 @@ def _psi_delta(
     return from_alpha_beta(table, position, np.array(read[:2]), angles)
 
 
-def _choose_columns(table: Table, columns: Sequence[Column] | None) -> EllipsometryColumns:
+def ellipsometry_columns(table: Table, columns: Sequence[Column] | None) -> EllipsometryColumns:
+    """Choose the columns of Ψ and Δ, in any form. Raises DataError or UsageError."""
     if columns is None:
         return _by_position(table)
     roles = {column.role for column in columns}

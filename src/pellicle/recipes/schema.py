@@ -118,6 +118,7 @@ class InstrumentTable(_Table):
 class _Reading(_Table):
     """Reading options of data files, named as the flags of the command line."""
 
+    spectrum: str | None = None
     signal: Literal["R", "T", "psi-delta"] | None = None
     angle: Annotated[float, Field(ge=0, le=90)] | FreeTable | None = None
     polarisation: Literal["unpolarised", "s", "p"] | None = None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import os
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from importlib.metadata import version
 from io import StringIO
@@ -80,6 +81,7 @@ def chain_file(folder: str | os.PathLike[str]) -> Path:
 def folder_per_file(folder: str | os.PathLike[str], paths: Sequence[str | os.PathLike[str]]) -> list[Path]:
     """Folder of each file's fit: `folder` itself for one file, else sub-folders named by the files' stems.
 
+    A path may end with the name of one of the file's spectra in brackets, which is added to the stem.
     A stem that occurred before, in whatever case, gets -2, -3, ... For several files `folder` is made, and
     its result.json lists the sub-folder of each file. Raises UsageError as `write_fit` does.
     """
@@ -87,7 +89,9 @@ def folder_per_file(folder: str | os.PathLike[str], paths: Sequence[str | os.Pat
         return [Path(folder) for _ in paths]
     root, taken, names = new_folder(folder), {MARKER, SUMMARY, *REPEATS}, []
     for path in paths:
-        stem = name = Path(path).stem or "spectrum"
+        file, _, spectrum = os.fspath(path).removesuffix("]").partition(" [")
+        words = [Path(file).stem, *re.findall(r"[\w.+%-]+", spectrum)]
+        stem = name = "-".join(word for word in words if word) or "spectrum"
         count = 1
         while name.casefold() in taken:
             count += 1

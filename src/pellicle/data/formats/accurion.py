@@ -13,7 +13,7 @@ from math import dist
 from typing import TypeAlias
 
 from pellicle.data.tabular.layout import Layout, plain_columns
-from pellicle.data.tabular.text import Line, is_number
+from pellicle.data.tabular.text import Line, TextFile, is_number
 from pellicle.errors import DataError, UsageError
 
 MEAN_ZONE = "0"
@@ -29,14 +29,13 @@ _MOST_LISTED = 40
 Rows: TypeAlias = list[tuple[Line, list[str]]]
 
 
-def layout(
-    lines: Sequence[Line], comments: Sequence[Line], path: str, spot: int | None = None
-) -> Layout | None:
+def layout(file: TextFile, spot: int | None = None) -> Layout | None:
     """Return Ψ and Δ of one spot, or None for another format.
 
     Raises UsageError where `spot`, from 1, is missing or wrong, DataError for several zones.
     """
-    headings = [comment.text.split("\t") for comment in comments]
+    lines, path = file.lines, file.path
+    headings = [comment.text.split("\t") for comment in file.comments]
     at = next((i for i, names in enumerate(headings) if set(_UNITS) <= set(names)), None)
     if at is None or not lines:
         return None

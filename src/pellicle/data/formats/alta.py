@@ -14,9 +14,10 @@ import numpy as np
 
 from pellicle.data.brdf_samples import CHANNELS, BrdfSamples
 from pellicle.data.half_angles import angles, from_half_difference
+from pellicle.data.tabular.cells import TextCells
 from pellicle.data.tabular.layout import Layout
 from pellicle.data.tabular.table import Table
-from pellicle.data.tabular.text import Line
+from pellicle.data.tabular.text import Line, TextFile
 from pellicle.errors import DataError
 
 Angles = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]  # θ_i, φ_i, θ_o, φ_o in radians
@@ -136,17 +137,14 @@ def _intervals(entry: tuple[Line, str] | None, count: int, path: str) -> tuple[i
     return tuple(kinds * count if len(kinds) == 1 else kinds)
 
 
-def layout(lines: Sequence[Line], comments: Sequence[Line], path: str) -> Layout | None:
-    """Return the rows of an ALTA file below its header, or None for another format."""
-    header = find_header(comments, path)
-    if header is None:
-        return None
-    rows = [line for line in lines if line.number > header.line]
+def layout(file: TextFile, header: Header) -> Layout:
+    """Return the rows of an ALTA file below its header. Raises DataError where there is none."""
+    rows = [line for line in file.lines if line.number > header.line]
     if not rows:
-        raise DataError(f"{path}: has an ALTA header but no rows; export it again")
+        raise DataError(f"{file.path}: has an ALTA header but no rows; export it again")
     note = f"read as an ALTA text file of {header.param_in} (radians) and {header.param_out}"
     width = len(header.names)
-    return Layout(" ", ".", header.names, width, width, rows, (note,))
+    return Layout(header.names, width, TextCells(" ", ".", width, width, rows), (note,))
 
 
 def from_table(table: Table, header: Header) -> BrdfSamples:
@@ -186,7 +184,7 @@ def _cosine(theta: np.ndarray, table: Table) -> np.ndarray:
     grazing = np.abs(theta - 90) < GRAZING
     if grazing.any():
         raise DataError(
-            f"{table.path}: line {table.lines[np.argmax(grazing)]}: theta_o is 90 degrees, where a value "
+            f"{table.path}: {table.place(int(np.argmax(grazing)))}: theta_o is 90 degrees, where a value "
             "weighted with its cosine does not determine the BRDF; delete that row"
         )
     return np.where(theta < 90, np.cos(np.deg2rad(theta)), 1.0)

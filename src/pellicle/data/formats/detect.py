@@ -1,34 +1,47 @@
-"""Detection of ellipsometers' exports by their content.
+"""Detection of a file's format by its content, and the tables in it.
 
-Each reader takes the lines and comments of a file and returns a `Layout` of plain columns whose rows keep
-their line numbers, or None for another format. Cells, units and axes are then checked as in any other
-file, and messages name the lines of the user's file.
+A text reader takes a `TextFile` and returns the layouts of plain columns of its spectra, whose rows keep
+their line numbers, or None for another format. A binary reader takes the content. Cells, units and axes are
+then checked as in any other file, and messages name the lines of the user's file.
 """
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 
 from pellicle.data.formats import accurion, spectraray, woollam
-from pellicle.data.tabular.layout import Layout
-from pellicle.data.tabular.text import Line
+from pellicle.data.tabular.layout import Layout, find_layout
+from pellicle.data.tabular.table import Table
+from pellicle.data.tabular.text import TextFile, read_bytes, text_file
 from pellicle.errors import UsageError
 
-Reader = Callable[[Sequence[Line], Sequence[Line], str], Layout | None]
+TextReader = Callable[[TextFile], Sequence[Layout] | None]
+BinaryReader = Callable[[bytes, str], Sequence[Layout] | None]
 
-READERS: tuple[Reader, ...] = (woollam.layout, spectraray.layout)
+TEXT_READERS: tuple[TextReader, ...] = (woollam.layouts, spectraray.layouts)
+BINARY_READERS: tuple[BinaryReader, ...] = ()
 
 
-def find_export(
-    lines: Sequence[Line], comments: Sequence[Line], path: str, spot: int | None = None
-) -> Layout | None:
-    """Return the layout of an instrument's format, or None.
+def read_tables(path: str | os.PathLike[str], spot: int | None = None) -> list[Table]:
+    """Read the tables of a file: one for each spectrum of an instrument's format, one of any other text.
 
-    `spot`, from 1, selects one of several spots in a file. Raises DataError for an ambiguous file, UsageError
-    for a missing or wrong spot.
+    `spot`, from 1, selects one of several spots of an Accurion file. Raises DataError for an unreadable or
+    ambiguous file, UsageError for a missing or wrong spot.
     """
-    layout = accurion.layout(lines, comments, path, spot)
-    if layout is None and spot is not None:
-        raise UsageError(f"{path}: `spot` selects a spot of an Accurion file, which this is not")
-    layouts = (reader(lines, comments, path) for reader in READERS)
-    return layout or next((layout for layout in layouts if layout), None)
+    content, digest = read_bytes(path)
+    for reader in BINARY_READERS:
+        if layouts := reader(content, str(path)):
+            return [Table(str(path), digest, layout) for layout in layouts]
+    file = text_file(content, digest, path)
+    return [Table(file.path, digest, layout) for layout in _text_layouts(file, spot)]
+
+
+def _text_layouts(file: TextFile, spot: int | None) -> Sequence[Layout]:
+    layout = accurion.layout(file, spot)
+    if layout is not None:
+        return [layout]
+    if spot is not None:
+        raise UsageError(f"{file.path}: `spot` selects a spot of an Accurion file, which this is not")
+    found = (reader(file) for reader in TEXT_READERS)
+    return next((layouts for layouts in found if layouts), None) or [find_layout(file)]

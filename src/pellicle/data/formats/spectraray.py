@@ -6,21 +6,20 @@ hold the wavelength in nm and Ψ, Δ at each angle. The layout is that of the te
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from pellicle.data.tabular.layout import Layout, plain_columns
-from pellicle.data.tabular.text import Line, is_number
+from pellicle.data.tabular.text import TextFile, is_number
 from pellicle.errors import DataError
 
 AXES = {"WAVELENGTH": "wavelength", "ENERGY": "energy", "WAVENUMBER": "wavenumber"}
 """Column of each word in the heading."""
 
 
-def layout(lines: Sequence[Line], comments: Sequence[Line], path: str) -> Layout | None:
+def layouts(file: TextFile) -> list[Layout] | None:
     """Return one row per wavelength and angle, or None for another format.
 
     Raises DataError where the pairs of columns do not match.
     """
+    lines, path = file.lines, file.path
     words = lines[0].text.lstrip(";").replace(",", ".").split()
     numbers = words[1:]
     if not lines[0].text.startswith(";") or not words or words[0].upper() not in AXES:
@@ -44,4 +43,4 @@ def layout(lines: Sequence[Line], comments: Sequence[Line], path: str) -> Layout
     if not rows:
         raise DataError(f"{path}: has a heading of SpectraRay but no rows; export it again")
     names = (AXES[words[0].upper()], "angle_deg", "psi_deg", "delta_deg")
-    return plain_columns(names, rows, [f"read as a SpectraRay file of {', '.join(angles)} degrees"])
+    return [plain_columns(names, rows, [f"read as a SpectraRay file of {', '.join(angles)} degrees"])]

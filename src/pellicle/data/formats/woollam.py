@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from pellicle.data.tabular.layout import Layout, plain_columns
-from pellicle.data.tabular.text import Line, is_number
+from pellicle.data.tabular.text import Line, TextFile, is_number
 from pellicle.data.tabular.units import wavelength_unit
 from pellicle.errors import DataError
 
@@ -21,11 +21,12 @@ _MOST_HEADING = 50  # lines that are searched for the unit
 _COLUMNS = ("angle_deg", "psi_deg", "delta_deg", "sigma_psi", "sigma_delta")
 
 
-def layout(lines: Sequence[Line], comments: Sequence[Line], path: str) -> Layout | None:
+def layouts(file: TextFile) -> list[Layout] | None:
     """Return the rows of Ψ and Δ, or None for another format.
 
     Raises DataError where the file has none, or tan Ψ and cos Δ.
     """
+    lines, path = file.lines, file.path
     at = _unit_line(lines)
     if at is None:
         return None
@@ -49,7 +50,7 @@ def layout(lines: Sequence[Line], comments: Sequence[Line], path: str) -> Layout
         notes.append("errors that are all zero ignored")
     if others:
         notes.append(f"rows of other quantities ignored: {', '.join(others)}")
-    return plain_columns(names, kept, notes)
+    return [plain_columns(names, kept, notes)]
 
 
 def _unit_line(lines: Sequence[Line]) -> int | None:

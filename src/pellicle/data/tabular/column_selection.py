@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pellicle.data.tabular.columns import Column, parse_columns, recognise_all
+from pellicle.data.tabular.declarations import Declared
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError, UsageError
 
@@ -26,12 +28,13 @@ class SpectrumColumns:
     notes: tuple[str, ...]
 
 
-def spectrum_columns(
+def signal_columns(
     table: Table, columns: str | Sequence[str] | None, signal: str | None, polarisation: str | None
-) -> SpectrumColumns:
-    """Choose the columns of a reflectance or transmittance; arguments as in `read_spectrum`.
+) -> list[SpectrumColumns]:
+    """Find the reflectances and transmittances of a table; arguments as in `read_spectra`.
 
-    Raises UsageError or DataError where the choice is ambiguous, with the argument that settles it.
+    Several are returned where the arguments do not tell them apart. Raises UsageError or DataError where
+    there is none, with the argument that settles it.
     """
     named = named_columns(table, columns)
     if named is None:
@@ -39,8 +42,11 @@ def spectrum_columns(
             raise UsageError(
                 f"{table.path}: has no header, so say what its second column is with {_EITHER_SIGNAL}"
             )
-        return _by_position(table, signal)
-    return _with_wavelength(table, named, _signal_column(table, named, signal, polarisation))
+        return [_by_position(table, signal)]
+    return [
+        _with_wavelength(table, named, column)
+        for column in _signals(table, named, signal, polarisation, by_caller=columns is not None)
+    ]
 
 
 def counts_columns(table: Table, columns: str | Sequence[str] | None) -> SpectrumColumns:
@@ -58,19 +64,55 @@ def counts_columns(table: Table, columns: str | Sequence[str] | None) -> Spectru
 
 
 def named_columns(table: Table, columns: str | Sequence[str] | None) -> tuple[Column, ...] | None:
-    """Return the columns by the caller's names or the header; None without either."""
+    """Return the columns by the caller's names, or by the header and what the file declares; None without.
+
+    Raises DataError where the file contradicts itself.
+    """
     if columns is not None:
         return parse_columns(columns, table.path, table.layout.width)
-    names = table.layout.names
+    names, declared = table.layout.names, table.layout.declared
     if names is None:
-        return None
+        return _declared_columns(table)
     lowered = [name.lower() for name in names]
     twice = next((name for i, name in enumerate(names) if name and name.lower() in lowered[:i]), None)
     if twice is not None:
         raise DataError(
             f"{table.path}: the header names {twice!r} twice; rename one, or name the columns with `columns`"
         )
-    return recognise_all(names)
+    found = recognise_all(names)
+    signals = [column for column in found if column.role in SIGNALS]
+    unnamed = () if signals else [c for c in found if c.role in ("other", "intensity", "counts") and c.name]
+    return tuple(_with_declared(table, column, declared, column in unnamed) for column in found)
+
+
+def _declared_columns(table: Table) -> tuple[Column, ...] | None:
+    """The columns of a table without a header, whose quantity the file declares above it; None otherwise."""
+    declared = table.layout.declared
+    if declared.signal is None or table.layout.width not in (2, 3):
+        return None
+    signal = declared.signal.column
+    axis = declared.axis.column.unit if declared.axis else None
+    label = f"declared {signal.name}"
+    columns = [Column(0, "column 1", "wavelength", axis), dataclasses.replace(signal, position=1, name=label)]
+    return (*columns, *([Column(2, "column 3", "sigma")] if table.layout.width == 3 else []))
+
+
+def _with_declared(table: Table, column: Column, declared: Declared, unnamed: bool) -> Column:
+    """A column of the header with the role and the unit that the file declares. Raises DataError."""
+    statement = declared.axis if column.role == "wavelength" else declared.signal
+    if statement is None or not (unnamed or column.role in ("wavelength", *SIGNALS)):
+        return column
+    stated = statement.column
+    roles = (column.role, stated.role) if not unnamed else (stated.role,) * 2
+    units = {column.unit, stated.unit} - {None}
+    if roles[0] != roles[1] or len(units) > 1:
+        raise DataError(
+            f"{table.path}: line {statement.line} declares {stated.name!r}, which contradicts "
+            f"{table.label(column.position)}; correct the file, or name its columns with `columns`"
+        )
+    if column.unit is None and stated.unit:
+        column = dataclasses.replace(column, unit=stated.unit, unknown_unit=None)
+    return dataclasses.replace(column, role=roles[1])
 
 
 def _by_position(table: Table, role: str) -> SpectrumColumns:
@@ -133,46 +175,59 @@ def only(table: Table, columns: Sequence[Column], role: str) -> Column | None:
     return matching[0] if matching else None
 
 
-def _signal_column(
-    table: Table, columns: Sequence[Column], signal: str | None, polarisation: str | None
-) -> Column:
-    measured = [c for c in columns if c.role in SIGNALS and signal in (None, c.role)]
-    quantities = {c.role for c in measured}
-    if len(quantities) > 1:
-        raise UsageError(f"{table.path}: has both R and T; choose one with {_EITHER_SIGNAL}")
-    if not measured:
-        return _intensity_column(table, columns, signal)
-    if len(measured) > 1:
-        wanted = [c for c in measured if polarisation and (c.polarisation or "unpolarised") == polarisation]
-        if not wanted and len({c.polarisation for c in measured}) > 1:
-            raise UsageError(
-                f'{table.path}: has {listed(measured)}; choose one with `polarisation="s"`, '
-                '`polarisation="p"` or `polarisation="unpolarised"`'
-            )
-        measured = wanted or measured
-    if len(measured) > 1:
+def _signals(
+    table: Table,
+    columns: Sequence[Column],
+    signal: str | None,
+    polarisation: str | None,
+    by_caller: bool,
+) -> list[Column]:
+    """The columns that may be meant. Raises UsageError or DataError where none is."""
+    foreign = next((c for c in columns if c.role == "foreign"), None)
+    if foreign is not None:
         raise DataError(
-            f"{table.path}: {listed(measured)} could each be the signal; choose one with `columns`, "
-            "_ for the others"
+            f"{table.path}: declares {foreign.name.removeprefix('declared ')!r}, which is neither a "
+            "reflectance nor a transmittance; export one of these, or raw counts with `reference`"
         )
-    if polarisation and measured[0].polarisation and measured[0].polarisation != polarisation:
+    measured = [c for c in columns if c.role in SIGNALS]
+    absorbed = [c for c in measured if c.role == "T" and c.unit == "absorbance"]
+    if signal == "R" and measured and measured == absorbed and not by_caller:
+        raise UsageError(
+            f"{table.path}: {listed(measured)} is an absorbance, read as T = 10^-A, which contradicts "
+            '`signal="R"`; leave that out, or if it is log(1/R), say so with '
+            f'`columns="{_renamed(columns, absorbed[0])}"`'
+        )
+    measured = [c for c in measured if signal in (None, c.role)]
+    if not measured:
+        return _unnamed_signals(table, columns, signal)
+    wanted = [c for c in measured if polarisation and (c.polarisation or "unpolarised") == polarisation]
+    measured = wanted or measured
+    stated = {c.polarisation for c in measured}
+    if polarisation and None not in stated and len(stated) == 1 and stated != {polarisation}:
         raise UsageError(
             f"{table.path}: {listed(measured)} is measured in {measured[0].polarisation} light, which "
             f'contradicts `polarisation="{polarisation}"`; leave that out'
         )
-    return measured[0]
+    return measured
 
 
-def _intensity_column(table: Table, columns: Sequence[Column], signal: str | None) -> Column:
+def _renamed(columns: Sequence[Column], column: Column) -> str:
+    """Names for the argument `columns` with which a column of absorbance is log(1/R)."""
+    words = {"wavelength": "wavelength", "sigma": "sigma", "angle": "angle"}
+    return ",".join("log(1/R)" if c is column else words.get(c.role, "_") for c in columns)
+
+
+def _unnamed_signals(table: Table, columns: Sequence[Column], signal: str | None) -> list[Column]:
+    """An intensity, or columns whose names state no quantity, where the caller states it."""
     intensity = only(table, columns, "intensity")
     if intensity and signal is None:
         raise UsageError(
             f"{table.path}: {listed([intensity])} is uncalibrated; state the signal with {_EITHER_SIGNAL}"
         )
     if intensity:
-        return intensity
+        return [intensity]
     roles = {c.role for c in columns}
-    if other := roles & {"R", "T"}:
+    if other := roles & set(SIGNALS):
         raise UsageError(
             f'{table.path}: has {other.pop()}, which contradicts `signal="{signal}"`; correct that'
         )
@@ -180,9 +235,17 @@ def _intensity_column(table: Table, columns: Sequence[Column], signal: str | Non
         raise UsageError(
             f'{table.path}: has psi and delta, which contradicts `signal="{signal}"`; leave that out'
         )
+    unnamed = [c for c in columns if c.role == "other" and c.name not in ("_", "")]
+    if signal is not None and unnamed and "wavelength" in roles:
+        return [dataclasses.replace(c, role=signal) for c in unnamed]
+    if unnamed and "wavelength" in roles:
+        raise UsageError(
+            f"{table.path}: {listed(unnamed)} state no quantity; say what they are with {_EITHER_SIGNAL}, or "
+            'name the columns in order, as in `columns=["wavelength", "R"]`'
+        )
     raise DataError(
-        f"{table.path}: no column is a signal (R, T, Rs, Rp, Ts, Tp or intensity) among {listed(columns)}; "
-        'name the columns in order, as in `columns=["wavelength", "R"]`'
+        f"{table.path}: no column is a signal (R, T, Rs, Rp, Ts, Tp, absorbance or intensity) among "
+        f'{listed(columns)}; name the columns in order, as in `columns=["wavelength", "R"]`'
     )
 
 

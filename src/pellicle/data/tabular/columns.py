@@ -18,12 +18,15 @@ _NAMES = {
     "wavelength": ("wavelength", "wavelengths", "wl", "lambda", "lam", "λ"),
     "energy": ("energy", "photon energy", "photon_energy"),
     "wavenumber": ("wavenumber", "wavenumbers", "wave number"),
+    "frequency": ("frequency",),
     "R": ("r", "reflectance", "reflectivity", "reflection"),
     "Rs": ("rs", "r_s", "reflectance_s"),
     "Rp": ("rp", "r_p", "reflectance_p"),
     "T": ("t", "transmittance", "transmissivity", "transmission"),
     "Ts": ("ts", "t_s", "transmittance_s"),
     "Tp": ("tp", "t_p", "transmittance_p"),
+    "absorbance": ("a", "abs", "absorbance", "optical density", "optical_density", "od", "o.d."),
+    "log(1/R)": ("log(1/r)", "log 1/r", "log_1_r", "apparent absorbance"),
     "intensity": ("intensity", "relative intensity", "relative_intensity"),
     "counts": ("counts", "raw"),
     "sigma": ("sigma", "σ"),
@@ -64,6 +67,10 @@ _NAMES = {
 DIRECTIONS = ("theta_i", "phi_i", "theta_o", "phi_o")
 """Angles of a BRDF sample: to the light and to the viewer."""
 _IMPLIED_UNIT = {"energy": "eV", "wavenumber": "cm-1", "angle": "deg"}
+_AXES = ("energy", "wavenumber", "frequency")
+_ABSORBANCES = {"absorbance": "T", "log(1/R)": "R"}
+_OF_ABSORBANCE = {"a", "au", "a.u.", "abs", "abs.", "absorbance", "od", "o.d.", "-", "1", ""}
+"""Units that programs write behind an absorbance."""
 _UNIT_OF = {
     "wavelength": units.wavelength_unit,
     "angle": units.angle_unit,
@@ -88,8 +95,9 @@ SKIP = "_"
 class Column:
     """One column: position, name, role and unit.
 
-    `role` is a key of `_NAMES` or "other"; energies and wavenumbers have the role "wavelength", and Rs, Rp,
-    Ts, Tp the roles "R" and "T" with a polarisation. `unit` is None where the name states none;
+    `role` is a key of `_NAMES` or "other"; energies, wavenumbers and frequencies have the role "wavelength",
+    Rs, Rp, Ts, Tp the roles "R" and "T" with a polarisation, an absorbance the role "T" with that unit.
+    `unit` is None where the name states none;
     `unknown_unit` keeps a unit that was not understood.
     """
 
@@ -123,9 +131,17 @@ def recognise(name: str, position: int = 0) -> Column:
 
 
 def _column(position: int, name: str, role: str, written: str | None, *, bracketed: bool) -> Column:
+    if role in _ABSORBANCES:
+        known = written is None or written.replace(" ", "").lower() in _OF_ABSORBANCE
+        if not known and not bracketed:
+            return Column(position, name, "other")
+        unit = "absorbance" if known else None
+        return Column(position, name, _ABSORBANCES[role], unit, unknown_unit=None if known else written)
     polarisation = role[1] if role in ("Rs", "Rp", "Ts", "Tp") else None
-    base = "wavelength" if role in ("energy", "wavenumber") else role[0] if polarisation else role
+    base = "wavelength" if role in _AXES else role[0] if polarisation else role
     unit = _IMPLIED_UNIT.get(role)
+    if written is None and role == "frequency":
+        return Column(position, name, base, unknown_unit="frequency")
     if written is None:
         return Column(position, name, base, unit, polarisation)
     known = _UNIT_OF.get(base, units.signal_unit)(written)

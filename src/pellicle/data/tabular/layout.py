@@ -10,43 +10,70 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
+from pellicle.data.tabular.cells import DELIMITERS, ArrayCells, TextCells
 from pellicle.data.tabular.columns import is_header, is_unit_row, recognise_all
-from pellicle.data.tabular.text import Line, is_number, split
+from pellicle.data.tabular.declarations import NOTHING_DECLARED, Declared, declarations
+from pellicle.data.tabular.text import Line, TextFile, is_number, split
 from pellicle.errors import DataError
 
-DELIMITERS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}
 _BLANK_NAMES = re.compile(r"[^\s(\[]+(?:\s*[(\[][^)\]]*[)\]])?|\S+")  # keeps `R (%)` one name
 _MARKER = ">>>>>"  # Ocean Optics puts such lines around the rows
 _SAMPLE = 60  # lines that vote on the dialect, spread over the file so that a preamble cannot outvote rows
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Layout:
-    """Delimiter and decimal mark, column names or None, number of columns, and the rows.
+    """Column names or None, number of columns and cells of one table in a file.
 
-    `raw_width` also counts empty cells at the end of a row, after a closing delimiter.
+    `name` identifies it among the spectra of a file ("" where the file has one), `declared` is what the file
+    says of it.
     """
 
-    delimiter: str
-    decimal: str
     names: tuple[str, ...] | None
     width: int
-    raw_width: int
-    rows: Sequence[Line]
+    cells: TextCells | ArrayCells
     notes: tuple[str, ...]
+    name: str = ""
+    declared: Declared = NOTHING_DECLARED
 
 
 def plain_columns(
-    names: Sequence[str], rows: Sequence[tuple[Line, Sequence[str]]], notes: Sequence[str]
+    names: Sequence[str],
+    rows: Sequence[tuple[Line, Sequence[str]]],
+    notes: Sequence[str],
+    *,
+    name: str = "",
+    facts: Sequence[tuple[str, str]] = (),
+    decimal: str = ".",
 ) -> Layout:
-    """Return the layout of cells that a reader has selected, with the lines they came from."""
+    """Return the layout of cells that a reader has selected, with the lines they came from.
+
+    `names` state quantity and unit as a header does; `facts` as in `Declared`.
+    """
     width = len(names)
     selected = [Line(line.number, line.text, "\t".join(cells)) for line, cells in rows]
-    return Layout("\t", ".", tuple(names), width, width, selected, tuple(notes))
+    cells = TextCells("\t", decimal, width, width, selected)
+    return Layout(tuple(names), width, cells, tuple(notes), name, Declared(facts=tuple(facts)))
 
 
-def find_layout(lines: Sequence[Line], comments: Sequence[Line], path: str) -> Layout:
+def array_columns(
+    names: Sequence[str],
+    columns: Sequence[np.ndarray],
+    notes: Sequence[str],
+    *,
+    name: str = "",
+    facts: Sequence[tuple[str, str]] = (),
+) -> Layout:
+    """Return the layout of numbers that a reader of a binary file has found; names as in `plain_columns`."""
+    cells = ArrayCells(tuple(np.asarray(column, dtype=np.float64) for column in columns))
+    return Layout(tuple(names), len(names), cells, tuple(notes), name, Declared(facts=tuple(facts)))
+
+
+def find_layout(file: TextFile) -> Layout:
     """Find the layout of a file's lines. Raises DataError if no line has two numbers."""
+    lines, path = file.lines, file.path
     delimiter, decimal = _dialect(lines, path)
     first = _first_numeric(lines, delimiter, decimal)
     if first is None:
@@ -64,7 +91,7 @@ def find_layout(lines: Sequence[Line], comments: Sequence[Line], path: str) -> L
             units += [""] * (len(names) - len(units))
             names = [f"{name} ({unit})" if unit else name for name, unit in zip(names, units, strict=False)]
     else:
-        names = _commented_header(lines[start], comments, delimiter, width)
+        names = _commented_header(lines[start], file.comments, delimiter, width)
         if names:
             notes.append("column names taken from the comment above the first row")
     if names and width > len(names):
@@ -77,15 +104,11 @@ def find_layout(lines: Sequence[Line], comments: Sequence[Line], path: str) -> L
         notes.insert(0, f"{skipped} line{'s' * (skipped > 1)} of preamble skipped")
     rows = [line for line in lines[start:] if not line.text.startswith(_MARKER)]
     trailing = len(lines[first].bare.split(delimiter)) if delimiter != " " else width
-    return Layout(
-        delimiter,
-        decimal,
-        tuple(names) if names else None,
-        max(width, len(names or ())),
-        max(width, len(names or ()), trailing),
-        rows,
-        tuple(notes),
-    )
+    above = [comment for comment in file.comments if comment.number < lines[start].number]
+    declared = declarations([*above, *lines[:skipped]])
+    width = max(width, len(names or ()))
+    cells = TextCells(delimiter, decimal, width, max(width, trailing), rows)
+    return Layout(tuple(names) if names else None, width, cells, tuple(notes), declared=declared)
 
 
 def _numbers_in(line: Line, delimiter: str, decimal: str = ",") -> tuple[int, int]:

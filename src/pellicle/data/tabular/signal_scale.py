@@ -1,8 +1,10 @@
-"""Unit of a reflectance or transmittance: fractions or percent, as the file or the caller states it."""
+"""Unit of a reflectance or transmittance: fraction, percent or absorbance, as file or caller state it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+
+import numpy as np
 
 from pellicle.data.tabular.column_selection import SpectrumColumns
 from pellicle.data.tabular.table import Table
@@ -12,22 +14,38 @@ from pellicle.errors import DataError, UsageError
 
 @dataclass(frozen=True)
 class Scale:
-    """Divisors that turn a file's signal and σ into fractions, and whether the unit was stated."""
+    """Units of a file's signal and σ, members of `SIGNAL_UNITS`, and whether file or caller states it."""
 
-    signal: float
-    sigma: float
+    signal: str
+    sigma: str
     stated: bool
 
-    def note(self, calibrated: bool) -> str:
+    def fractions(self, values: np.ndarray, sigma: np.ndarray | None) -> tuple[np.ndarray, np.ndarray | None]:
+        """Convert the signal and its σ to fractions.
+
+        An absorbance A becomes 10⁻ᴬ with the error ln 10 · 10⁻ᴬ σ.
+        """
+        if self.signal == "absorbance":
+            values = 10.0**-values
+        elif self.signal == "percent":
+            values = values / 100
+        if sigma is not None and self.sigma == "absorbance":
+            sigma = np.log(10.0) * values * sigma
+        elif sigma is not None and self.sigma == "percent":
+            sigma = sigma / 100
+        return values, sigma
+
+    def note(self, quantity: str, calibrated: bool) -> str:
         """Return a sentence on the unit in which the signal was read."""
+        if self.signal == "absorbance":
+            return f"signal unit: absorbance A, converted to {quantity} = 10^-A"
         if not calibrated:
             return "signal unit: arbitrary (uncalibrated)"
-        unit = "percent" if self.signal == 100 else "fraction"
-        return f"signal unit: {unit}" + ("" if self.stated else ", assumed")
+        return f"signal unit: {self.signal}" + ("" if self.stated else ", assumed")
 
 
 def signal_scale(table: Table, columns: SpectrumColumns, requested: str | None) -> Scale:
-    """Return the scale from the column's name or from `requested`. Percent is never guessed from values.
+    """Return the scale from the column's name or from `requested`. It is never guessed from values.
 
     Raises UsageError if `requested` is unknown or contradicts the name, DataError if the name's unit is
     unknown and none is requested.
@@ -40,7 +58,7 @@ def signal_scale(table: Table, columns: SpectrumColumns, requested: str | None) 
     if column.unknown_unit and asked is None:
         raise DataError(
             f"{place} is in an unknown unit {column.unknown_unit!r}; state it with "
-            '`signal_unit="fraction"` or `signal_unit="percent"`'
+            '`signal_unit="fraction"`, `signal_unit="percent"` or `signal_unit="absorbance"`'
         )
     if asked and column.unit and asked != column.unit:
         raise UsageError(
@@ -49,8 +67,4 @@ def signal_scale(table: Table, columns: SpectrumColumns, requested: str | None) 
         )
     unit = column.unit or asked
     sigma_unit = columns.sigma.unit if columns.sigma else None
-    return Scale(_divisor(unit), _divisor(sigma_unit or unit), unit is not None)
-
-
-def _divisor(unit: str | None) -> float:
-    return 100.0 if unit == "percent" else 1.0
+    return Scale(unit or "fraction", sigma_unit or unit or "fraction", unit is not None)

@@ -6,7 +6,7 @@ import csv
 import hashlib
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from io import BufferedReader
@@ -18,7 +18,9 @@ _NUMBER = re.compile(
     r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|nan|inf(?:inity)?)", re.IGNORECASE | re.ASCII
 )
 _COMMA_NUMBER = re.compile(r"[+-]?\d+,\d+(?:e[+-]?\d+)?", re.IGNORECASE | re.ASCII)
-_CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
+_CONTROL = re.compile(r"[\x00-\x08\x0e-\x19\x1b-\x1f\x7f]")  # but the end-of-file mark of DOS, 0x1a
+_MOST_ZEROS = 0.1  # share of zero bytes in a text
+_HEAD = 4096  # bytes that tell the kind of a file
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,21 @@ class Line:
     number: int
     text: str
     bare: str
+
+
+@dataclass(frozen=True, eq=False)
+class TextFile:
+    """A text file: its lines that are not blank, and its comments (without their `#`), in file order."""
+
+    path: str
+    sha256: str
+    lines: Sequence[Line]
+    comments: Sequence[Line] = ()
+
+    @property
+    def all_lines(self) -> list[Line]:
+        """Lines and comments together, for formats in which `#` does not begin a comment."""
+        return sorted((*self.lines, *self.comments), key=lambda line: line.number)
 
 
 @contextmanager
@@ -46,32 +63,59 @@ def open_binary(path: str | os.PathLike[str]) -> Iterator[BufferedReader]:
         ) from None
 
 
-def read_text(path: str | os.PathLike[str]) -> tuple[str, str]:
-    """Return text and SHA-256 of a file: UTF-8, UTF-16 with its mark, or Latin-1 as older instruments write.
-
-    Raises DataError as `open_binary` does, and for an empty file or one that is not a table.
-    """
+def read_bytes(path: str | os.PathLike[str]) -> tuple[bytes, str]:
+    """Return the content of a file and its SHA-256. Raises DataError as `open_binary` does."""
     with open_binary(path) as file:
         content = file.read()
+    return content, hashlib.sha256(content).hexdigest()
+
+
+def text_file(content: bytes, sha256: str, path: str | os.PathLike[str]) -> TextFile:
+    """Split the content of a text file into lines.
+
+    Raises DataError for an empty file and for one that is not a table.
+    """
     if advice := foreign_format(content):
         raise DataError(f"{path}: is {advice}")
-    digest = hashlib.sha256(content).hexdigest()
-    marked = content.startswith((b"\xff\xfe", b"\xfe\xff"))
-    try:
-        text = content.decode("utf-16" if marked else "utf-8-sig")
-    except UnicodeDecodeError:
-        text = content.decode("latin-1")
+    text = decoded(content)
     if _CONTROL.search(text):
-        raise DataError(f"{path}: is a binary file; export it as text (CSV) first")
+        raise DataError(f"{path}: is a binary file of an unknown format; export it as text (CSV) first")
     if not text.strip():
         raise DataError(f"{path}: is empty; expected rows of numbers")
-    return text, digest
+    lines, comments = content_lines(text)
+    if not lines:
+        raise DataError(f"{path}: has only comments; expected rows of numbers")
+    return TextFile(str(path), sha256, lines, comments)
+
+
+def decoded(content: bytes) -> str:
+    """Decode UTF-8, UTF-16 (by its mark or its zeros), or Latin-1 as older instruments write.
+
+    Single zeros in a text, with which some programs fill fields of fixed length, are left out. The text of a
+    binary file keeps control characters.
+    """
+    marked = content.startswith((b"\xff\xfe", b"\xfe\xff"))
+    head = content[: min(_HEAD, len(content) & ~1)]
+    zeros = [head[start::2].count(0) for start in (0, 1)]
+    encoding = "utf-16" if marked else "utf-16-be" if zeros[0] > zeros[1] else "utf-16-le"
+    if marked or (max(zeros) > 0.4 * len(head) and min(zeros) < 0.01 * len(head)):
+        try:
+            return content.decode(encoding)
+        except UnicodeDecodeError:
+            return content.decode("latin-1")
+    if content.count(0) < _MOST_ZEROS * len(content):
+        content = content.replace(b"\0", b"")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return content.decode("latin-1")
 
 
 def content_lines(text: str) -> tuple[list[Line], list[Line]]:
     """Return the lines that are not blank, and the comments (without their `#`), both in file order."""
     lines, comments = [], []
-    for number, raw in enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), start=1):
+    plain_text = text.replace("\r\n", "\n").replace("\r", "\n").rstrip("\x1a")
+    for number, raw in enumerate(plain_text.split("\n"), start=1):
         plain = raw.strip(" ")
         if plain.startswith("#"):
             comments.append(Line(number, plain.lstrip("# "), ""))
@@ -112,6 +156,6 @@ _FOREIGN = {
 
 def foreign_format(content: bytes) -> str | None:
     """Return what a file is in place of a table of numbers, with advice; None if it may be a table."""
-    head = content[:4096]
+    head = content[:_HEAD]
     flags = re.DOTALL | re.IGNORECASE
     return next((advice for pattern, advice in _FOREIGN.items() if re.match(pattern, head, flags)), None)

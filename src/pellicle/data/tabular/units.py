@@ -10,8 +10,11 @@ import numpy as np
 HC_EV_NM = 6.62607015e-34 * 299792458 / 1.602176634e-19 * 1e9
 """hc/e in eV nm, exact in the SI of 2019 (h = 6.62607015e-34, c = 299792458, e = 1.602176634e-19)."""
 
-WAVELENGTH_UNITS = ("nm", "um", "A", "eV", "cm-1")
-SIGNAL_UNITS = ("fraction", "percent")
+THZ_NM = 299792458 / 1e12 * 1e9
+"""c in THz nm."""
+
+WAVELENGTH_UNITS = ("nm", "um", "A", "eV", "cm-1", "THz")
+SIGNAL_UNITS = ("fraction", "percent", "absorbance")
 
 _WAVELENGTH_SPELLINGS = {
     "nm": ("nm", "nanometer", "nanometers", "nanometre", "nanometres"),
@@ -19,10 +22,12 @@ _WAVELENGTH_SPELLINGS = {
     "A": ("a", "å", "ang", "angstrom", "angstroms", "ångström", "ångstrom"),
     "eV": ("ev",),
     "cm-1": ("cm-1", "1/cm", "cm^-1", "cm**-1", "cm⁻¹", "cm−1", "/cm", "cm^{-1}", "percm"),
+    "THz": ("thz", "terahertz"),
 }
 _SIGNAL_SPELLINGS = {
     "percent": ("%", "percent", "pct", "perc"),
-    "fraction": ("fraction", "frac", "1", "-", "", "0-1", "0..1", "abs", "unitless", "dimensionless"),
+    "fraction": ("fraction", "frac", "1", "-", "", "0-1", "0..1", "unitless", "dimensionless"),
+    "absorbance": ("absorbance", "od", "opticaldensity"),
 }
 _BRDF_SPELLINGS = {"1/sr": ("1/sr", "sr-1", "sr^-1", "sr**-1", "sr⁻¹", "sr−1", "/sr", "persr")}
 _ANGLE_SPELLINGS = {"deg": ("deg", "degree", "degrees", "°", "º")}
@@ -39,7 +44,10 @@ def wavelength_unit(text: str) -> str | None:
 
 
 def signal_unit(text: str) -> str | None:
-    """Return "percent" or "fraction", as `text` spells it (`%`, `-`, ...), or None."""
+    """Return the member of `SIGNAL_UNITS` that `text` spells (`%`, `-`, ...), or None.
+
+    `abs` is none: some programs write it for absolute, others for absorbance.
+    """
     return _lookup(_SIGNAL_SPELLINGS, text)
 
 
@@ -66,4 +74,6 @@ def to_nm(values: np.ndarray, unit: str) -> np.ndarray:
             return HC_EV_NM / values
         case "cm-1":
             return 1e7 / values
+        case "THz":
+            return THZ_NM / values
     raise ValueError(f"`unit`: expected one of {', '.join(WAVELENGTH_UNITS)}, got {unit!r}")

@@ -16,8 +16,12 @@ from pellicle.errors import DataError, UsageError
 
 SHORTEST_ASSUMED = 30.0
 """An axis below this (nm) whose unit is not stated is more likely in µm or eV."""
+LONGEST_ASSUMED = 3300.0
+"""An axis that goes beyond this (nm) without a unit is more likely in cm⁻¹ or Å; spectrometers with gratings
+end at 3300 nm."""
 
 _REMEDY = "correct or delete that row"
+_LONG = '`wavelength_unit="cm-1"`, `wavelength_unit="A"`'
 
 
 def axis_unit(table: Table, column: Column, requested: str | None) -> str | None:
@@ -76,11 +80,12 @@ def read_axis(
         refuse_first(angles, (angles < 0) | (angles >= 90), table.places(angle.position), reason)
     place = table.places(wavelength.position)
     refuse_first(values, values <= 0, place, f"is not above zero; {_REMEDY}")
-    if unit is None and values.max() < SHORTEST_ASSUMED:
+    if unit is None and not SHORTEST_ASSUMED <= values.max() <= LONGEST_ASSUMED:
+        small = values.max() < SHORTEST_ASSUMED
+        likely = '`wavelength_unit="um"`, `wavelength_unit="eV"`' if small else _LONG
         raise DataError(
             f"{table.path}: {table.label(wavelength.position)} runs from {values.min():g} to "
-            f"{values.max():g}, which is unlike nm; state its unit: "
-            '`wavelength_unit="um"`, `wavelength_unit="eV"` or `wavelength_unit="nm"`'
+            f'{values.max():g}, which is unlike nm; state its unit: {likely} or `wavelength_unit="nm"`'
         )
     if are_sweeps(values, angles, sweep_numbers(values, angles)):
         return to_nm(values, unit or "nm"), angles, read
@@ -98,7 +103,7 @@ def _check_monotone(table: Table, column: Column, values: np.ndarray, rows: np.n
         here, before = int(rows[wrong[0] + 1]), int(rows[wrong[0]])
         verb = "repeats" if values[here] == values[before] else "turns back after"
         raise DataError(
-            f"{table.where(here, column.position)}: {values[here]:.10g} {verb} {values[before]:.10g} of line "
-            f"{table.lines[before]}; within one angle wavelengths must rise or fall strictly, or come in "
+            f"{table.where(here, column.position)}: {values[here]:.10g} {verb} {values[before]:.10g} of "
+            f"{table.place(before)}; within one angle wavelengths must rise or fall strictly, or come in "
             "several complete sweeps, so delete or correct one of the rows"
         )

@@ -1,0 +1,108 @@
+"""Spectra in one file: what there is to choose from, and the choice."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from pellicle.data.read_ellipsometry import (
+    SIGNAL,
+    EllipsometryColumns,
+    ellipsometry_columns,
+    has_ellipsometry,
+)
+from pellicle.data.tabular.column_selection import (
+    SIGNALS,
+    SpectrumColumns,
+    listed,
+    named_columns,
+    signal_columns,
+)
+from pellicle.data.tabular.table import Table
+from pellicle.errors import UsageError
+
+ALL = "all"
+_MOST_LISTED = 40
+
+
+class Candidate(NamedTuple):
+    """A spectrum of a file: its table and columns, and its name, signal and polarisation."""
+
+    table: Table
+    columns: SpectrumColumns | EllipsometryColumns
+    name: str
+    signal: str
+    polarisation: str | None
+
+
+def candidates(
+    table: Table, columns: str | Sequence[str] | None, signal: str | None, polarisation: str | None
+) -> list[Candidate]:
+    """Find the spectra of a table; arguments as in `read_spectrum`.
+
+    Raises UsageError or DataError where there is none.
+    """
+    named = named_columns(table, columns)
+    own = table.layout.name
+    found = []
+    if signal == SIGNAL or (signal is None and has_ellipsometry(named)):
+        angles = ellipsometry_columns(table, named)
+        found.append(Candidate(table, angles, own or SIGNAL, SIGNAL, None))
+        if signal == SIGNAL or not any(column.role in SIGNALS for column in named or ()):
+            return found
+    powers = signal_columns(table, columns, signal, polarisation)
+    for power in powers:
+        column = power.signal
+        alone = len(powers) + len(found) == 1
+        label = own if alone else " ".join(part for part in (own, column.name) if part)
+        found.append(Candidate(table, power, label or column.name, column.role, column.polarisation))
+    return found
+
+
+def chosen(found: Sequence[Candidate], spectrum: str | None, *, together: bool) -> list[Candidate]:
+    """Return the spectrum of this name, or all; without a name the only one.
+
+    `together` also returns Ψ and Δ with the reflectances and transmittances beside them, which are of one
+    film. Raises UsageError where the choice is open, with the arguments that settle it.
+    """
+    path = found[0].table.path
+    if spectrum == ALL:
+        return list(found)
+    if spectrum is not None:
+        wanted = spectrum.strip().lower()
+        named = [one for one in found if one.name.lower() == wanted]
+        if len(named) == 1:
+            return named
+        reason = f"has no spectrum {spectrum!r}" if not named else f"has {len(named)} spectra {spectrum!r}"
+        raise UsageError(f"{path}: {reason}; it has {_listed(found)}")
+    if len(found) == 1:
+        return list(found)
+    signals = {one.signal for one in found}
+    if SIGNAL in signals and [one.signal for one in found].count(SIGNAL) == 1:
+        if together:
+            return list(found)
+        powers = sorted(signals - {SIGNAL})
+        raise UsageError(
+            f"{path}: has psi and delta as well as {', '.join(powers)}; choose one with `signal`, or read "
+            "all with pl.read_spectra"
+        )
+    every = '`spectrum="all"`'
+    if signals == set(SIGNALS):
+        raise UsageError(
+            f'{path}: has both R and T; choose one with `signal="R"` or `signal="T"`, or take {every}'
+        )
+    if len({one.polarisation for one in found}) == len(found) > 1:
+        names = listed([one.columns.signal for one in found if isinstance(one.columns, SpectrumColumns)])
+        raise UsageError(
+            f'{path}: has {names}; choose one with `polarisation="s"`, `polarisation="p"` or '
+            f'`polarisation="unpolarised"`, or take {every}'
+        )
+    raise UsageError(
+        f"{path}: has {len(found)} spectra: {_listed(found)}; choose one, as in "
+        f'`spectrum="{found[0].name}"`, or take {every}'
+    )
+
+
+def _listed(found: Sequence[Candidate]) -> str:
+    more = f" and {len(found) - _MOST_LISTED} more" if len(found) > _MOST_LISTED else ""
+    return ", ".join(repr(one.name) for one in found[:_MOST_LISTED]) + more

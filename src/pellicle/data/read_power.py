@@ -1,0 +1,86 @@
+"""Reading of reflectance and transmittance from a table: their units and checks."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pellicle.data.repeated_sweeps import of_rows, sweep_numbers
+from pellicle.data.signal_checks import check_power, refuse_first
+from pellicle.data.spectrum import Spectrum, inside_range
+from pellicle.data.tabular.column_selection import SpectrumColumns
+from pellicle.data.tabular.signal_scale import signal_scale
+from pellicle.data.tabular.table import Table
+from pellicle.data.tabular.wavelength_axis import axis_note, axis_unit, read_columns
+from pellicle.errors import DataError
+
+
+def read_power(
+    table: Table,
+    columns: SpectrumColumns,
+    wavelength_unit: str | None,
+    signal_unit: str | None,
+    signal: str | None,
+    range: tuple[float, float] | None,
+    noise: float | None,
+    polarisation: str | None,
+    calibrated: bool,
+) -> Spectrum:
+    """Read a reflectance or transmittance, cut to `range` before its values are checked.
+
+    Arguments as in `read_spectrum`. Raises DataError or UsageError.
+    """
+    kind = signal or columns.signal.role
+    axis = axis_unit(table, columns.wavelength, wavelength_unit)
+    scale = signal_scale(table, columns, signal_unit)
+    wavelength, values, sigma, angle = read_columns(table, columns, axis)
+    values, sigma = scale.fractions(values, sigma)
+    notes = [*table.notes, *columns.notes, axis_note(axis), scale.note(kind, calibrated)]
+    if noise is not None:
+        notes += [] if sigma is None else ["the given noise replaces the column of standard deviations"]
+        sigma = np.full(values.shape, float(noise))
+    rows = np.arange(values.size)
+    if range is not None:
+        inside, note = inside_range(wavelength, range, table.path)
+        rows, notes = rows[inside], [*notes, note]
+    values, sigma = values[rows], None if sigma is None else sigma[rows]
+    _check(table, columns, kind, rows, values, sigma, calibrated, scale.stated)
+    angle = None if angle is None else angle[rows]
+    arrays = {"wavelength": wavelength[rows], "values": values, "sigma": sigma, "angle": angle}
+    return of_rows(
+        sweep_numbers(arrays["wavelength"], angle),
+        arrays | {"lines": table.source_lines(rows)},
+        signal=kind,
+        polarisation=columns.signal.polarisation or polarisation or "unpolarised",
+        calibrated=calibrated,
+        path=table.path,
+        sha256=table.sha256,
+        notes=tuple(notes),
+    )
+
+
+def _check(
+    table: Table,
+    columns: SpectrumColumns,
+    signal: str,
+    rows: np.ndarray,
+    values: np.ndarray,
+    sigma: np.ndarray | None,
+    calibrated: bool,
+    unit_stated: bool,
+) -> None:
+    """Check σ and the values of these rows, naming line and column. Raises DataError."""
+    if sigma is not None and columns.sigma is not None:
+        at = table.places(columns.sigma.position, rows)
+        refuse_first(sigma, sigma <= 0, at, "is not above zero; correct or delete that row")
+    position = columns.signal.position
+    if not calibrated:
+        if values.max() <= 0:
+            raise DataError(f"{table.path}: {table.label(position)} is nowhere positive; check what it holds")
+        return
+    remedy = "leave it out with `range`, or correct that row"
+    too_high = (
+        'if the file is in percent or an absorbance, say so with `signal_unit="percent"` or '
+        '`signal_unit="absorbance"`, or in its header'
+    )
+    where = table.places(position, rows)
+    check_power(signal, values, sigma, where, too_high=remedy if unit_stated else too_high, remedy=remedy)

@@ -1,0 +1,114 @@
+"""Cells of a table: text that is read as numbers column by column, or arrays of a binary file.
+
+`numpy.loadtxt` reads the numbers of a text. Only a text on which it fails is read cell by cell, to name the
+faulty line and column.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from pellicle.data.tabular.text import Line, is_number, split
+from pellicle.errors import DataError
+
+DELIMITERS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}
+
+Place = Callable[[int, int], str]
+"""File, line and column of a cell, by its row and column, for a message."""
+
+
+@dataclass(frozen=True, eq=False)
+class TextCells:
+    """Rows of text with their delimiter and decimal mark.
+
+    `raw_width` also counts empty cells at the end of a row, after a closing delimiter.
+    """
+
+    delimiter: str
+    decimal: str
+    width: int
+    raw_width: int
+    rows: Sequence[Line]
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """A sentence on how the cells are written."""
+        comma = ", decimal commas" if self.decimal == "," else ""
+        return (f"columns separated by {DELIMITERS[self.delimiter]}{comma}",)
+
+    @cached_property
+    def lines(self) -> np.ndarray:
+        """Source line of each row."""
+        return np.array([line.number for line in self.rows], dtype=np.int64)
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def numbers(self, positions: Sequence[int], path: str, where: Place) -> list[np.ndarray]:
+        """Read the columns at `positions`, float64 and finite. Raises DataError for the first bad cell."""
+        delimiter = None if self.delimiter == " " else self.delimiter
+        rows = [line.bare for line in self.rows]
+        if any(len(row.split(delimiter)) > self.raw_width for row in rows):
+            return self._by_cell(positions, path, where)
+        if self.decimal == ",":
+            rows = [row.replace(",", ".") for row in rows]
+        try:
+            options = {"delimiter": delimiter, "comments": None, "quotechar": '"', "ndmin": 2}
+            found = np.loadtxt(rows, usecols=positions, **options).T
+        except ValueError:  # a cell that is empty, missing or no number
+            return self._by_cell(positions, path, where)
+        if found.shape[1] == len(rows) and np.isfinite(found).all():
+            return [np.ascontiguousarray(column) for column in found]
+        return self._by_cell(positions, path, where)
+
+    def _by_cell(self, positions: Sequence[int], path: str, where: Place) -> list[np.ndarray]:
+        columns: list[list[float]] = [[] for _ in positions]
+        for row, line in enumerate(self.rows):
+            cells = split(line.bare, self.delimiter)
+            if len(cells) > self.width:
+                hint = "; a decimal comma looks like this" if self.delimiter == "," else ""
+                raise DataError(
+                    f"{path}: line {line.number} has {len(cells)} values where {self.width} are expected; "
+                    f"correct that line{hint}"
+                )
+            for column, position in zip(columns, positions, strict=True):
+                cell = cells[position] if position < len(cells) else ""
+                column.append(self._number(cell, where(row, position)))
+        return [np.array(column) for column in columns]
+
+    def _number(self, cell: str, where: str) -> float:
+        if not cell:
+            raise DataError(f"{where} is empty; fill it in or delete that row")
+        if not is_number(cell, self.decimal):
+            raise DataError(f"{where}: expected a number but found {cell!r}; correct or delete that row")
+        value = float(cell.replace(",", "."))
+        if not np.isfinite(value):
+            raise DataError(f"{where}: {cell} is not a finite number; delete that row or put # before it")
+        return value
+
+
+@dataclass(frozen=True, eq=False)
+class ArrayCells:
+    """Columns of a binary file, float64, all of one length; its rows have no source lines."""
+
+    columns: tuple[np.ndarray, ...]
+    lines: None = None
+    notes: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.columns[0])
+
+    def numbers(self, positions: Sequence[int], path: str, where: Place) -> list[np.ndarray]:
+        """Return the columns at `positions`. Raises DataError for a number that is not finite."""
+        found = [self.columns[position] for position in positions]
+        for position, column in zip(positions, found, strict=True):
+            if not np.isfinite(column).all():
+                row = int(np.argmin(np.isfinite(column)))
+                raise DataError(
+                    f"{where(row, position)}: {column[row]} is not a finite number; export it again"
+                )
+        return found

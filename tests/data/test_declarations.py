@@ -1,0 +1,133 @@
+"""What a file declares above its rows: axis, quantity and unit, and several spectra beside each other."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+import pellicle as pl
+from pellicle.data.read_spectrum import read_spectra, read_spectrum
+from pellicle.errors import DataError, UsageError
+
+
+@pytest.fixture
+def refused(refusal):
+    return partial(refusal, read_spectrum)
+
+
+AXES = ["XUNITS=1/CM", "X-Axis: cm-1", "Wavelength unit; 1/cm", '"x unit","cm^-1"']
+
+
+@pytest.mark.parametrize("axis", AXES)
+@pytest.mark.parametrize("quantity", ["YUNITS=ABSORBANCE", "Data mode: Abs", "Y-axis mode\tA"])
+def test_axis_and_absorbance_of_a_preamble(write, axis, quantity):
+    spectrum = read_spectrum(write(f"{axis}\n{quantity}\n25000,1.0\n20000,0.5\n12500,0\n"))
+    assert spectrum.signal == "T"
+    np.testing.assert_allclose(spectrum.wavelength, [400, 500, 800], rtol=1e-15)
+    np.testing.assert_allclose(spectrum.values, [0.1, 10**-0.5, 1], rtol=1e-15)
+    assert any("absorbance A, converted to T" in note for note in spectrum.notes)
+
+
+def test_percent_of_a_comment(write):
+    spectrum = read_spectrum(write("# Photometric mode: %R\nwavelength,R\n400,10\n500,20\n"))
+    np.testing.assert_allclose(spectrum.values, [0.1, 0.2])
+
+
+@pytest.mark.parametrize(
+    ("text", "flags", "parts"),
+    [
+        ("XUNITS=1/CM\nwavelength_nm,R\n400,0.1\n500,0.2\n", {}, ("line 1 declares '1/CM'", "`columns`")),
+        ("Mode: x\nData mode: %T\nnm,%R\n400,10\n500,20\n", {}, ("line 2 declares '%T'", "`columns`")),
+        ("Y-axis: Irradiance\n400,0.1\n500,0.2\n", {"signal": "T"}, ("'Irradiance'", "`reference`")),
+        ("Y-axis: Counts\nnm,R\n400,0.1\n500,0.2\n", {"signal": "T"}, ("'Counts'",)),
+    ],
+)
+def test_a_contradiction(write, refused, text, flags, parts):
+    refused(write(text), DataError, *parts, **flags)
+
+
+@pytest.mark.parametrize(
+    ("flags", "parts"),
+    [
+        ({"wavelength_unit": "nm"}, ("in cm-1", '`wavelength_unit="nm"`')),
+        ({"signal_unit": "percent"}, ("in absorbance", '`signal_unit="percent"`')),
+        ({"signal": "R"}, ("T = 10^-A", '`signal="R"`', '`columns="wavelength,log(1/R)"`')),
+    ],
+)
+def test_a_flag_against_a_declaration(write, refused, flags, parts):
+    refused(write("XUNITS=1/CM\nYUNITS=ABSORBANCE\n25000,1\n20000,0.5\n"), UsageError, *parts, **flags)
+
+
+def test_log_of_the_inverse_reflectance(write):
+    path = write("XUNITS=1/CM\nYUNITS=ABSORBANCE\n25000,1\n20000,0.5\n")
+    spectrum = read_spectrum(path, columns="wavelength,log(1/R)", wavelength_unit="cm-1")
+    assert spectrum.signal == "R"
+    np.testing.assert_allclose(spectrum.values, [0.1, 10**-0.5])
+
+
+def test_error_of_an_absorbance(write):
+    spectrum = read_spectrum(write("nm,A,sigma\n400,1,0.01\n500,2,0.01\n"))
+    step = 1e-6
+    slope = (10 ** -(np.array([1, 2]) - step) - 10 ** -(np.array([1, 2]) + step)) / (2 * step)
+    np.testing.assert_allclose(spectrum.sigma, 0.01 * slope, rtol=1e-8)
+
+
+def test_absorbance_by_flag(write):
+    spectrum = read_spectrum(write("400,1\n500,2\n"), signal="T", signal_unit="absorbance")
+    np.testing.assert_allclose(spectrum.values, [0.1, 0.01])
+
+
+@pytest.mark.parametrize("name", ["T (Abs)", "R (abs.)"])
+def test_absolute_or_absorbance(write, refused, name):
+    refused(write(f"nm,{name}\n400,0.1\n500,0.2\n"), DataError, "unit 'abs", '`signal_unit="absorbance"`')
+
+
+@pytest.mark.parametrize(("first", "last"), [(25000, 12500), (4000, 8000), (0.4, 0.8), (3.1, 1.5)])
+def test_an_axis_that_is_unlike_nm(write, refused, first, last):
+    path = write(f"{first},0.1\n{(first + last) / 2},0.2\n{last},0.3\n")
+    refused(path, DataError, "unlike nm", '`wavelength_unit="nm"`', signal="R")
+    assert len(read_spectrum(path, signal="R", wavelength_unit="nm")) == 3
+
+
+WIDE = "Wavelength (nm),film a,film b,film c\n400,10,20,30\n500,11,21,31\n"
+
+
+def test_several_samples_beside_each_other(write, refused):
+    path = write(WIDE)
+    refused(path, UsageError, "'film a', 'film b', 'film c'", '`spectrum="film a"`', signal="R")
+    refused(path, UsageError, "no spectrum 'film d'", "'film a'", signal="R", spectrum="film d")
+    one = read_spectrum(path, signal="R", signal_unit="percent", spectrum="Film B")
+    np.testing.assert_allclose(one.values, [0.2, 0.21])
+    every = pl.read_spectra(path, signal="R", signal_unit="percent", spectrum="all")
+    assert [spectrum.name for spectrum in every] == ["film a", "film b", "film c"]
+    np.testing.assert_allclose([spectrum.values[0] for spectrum in every], [0.1, 0.2, 0.3])
+
+
+def test_quantity_of_samples_is_declared(write):
+    every = read_spectra(write("Y units: %T\n" + WIDE), spectrum="all")
+    np.testing.assert_allclose([spectrum.values[0] for spectrum in every], [0.1, 0.2, 0.3])
+    assert {spectrum.signal for spectrum in every} == {"T"}
+
+
+def test_both_polarisations(write, refused):
+    path = write("nm,Rs,Rp\n400,0.3,0.1\n500,0.3,0.1\n")
+    refused(path, UsageError, '`polarisation="s"`', '`spectrum="all"`')
+    s, p = read_spectra(path, spectrum="all")
+    assert (s.polarisation, p.polarisation, s.values[0], p.values[0]) == ("s", "p", 0.3, 0.1)
+
+
+def test_ellipsometry_with_reflectances_is_of_one_film(write, refused):
+    path = write("nm,psi,delta,Rs,Rp\n400,20,170,0.3,0.1\n500,21,160,0.3,0.1\n")
+    refused(path, UsageError, "psi and delta as well as R", "`signal`")
+    assert [spectrum.signal for spectrum in read_spectra(path)] == ["psi-delta", "R", "R"]
+    assert [spectrum.name for spectrum in read_spectra(path)] == ["psi-delta", "Rs", "Rp"]
+    assert read_spectrum(path, signal="psi-delta").delta is not None
+    assert read_spectrum(path, spectrum="Rp").values[0] == 0.1
+
+
+def test_facts(write):
+    text = "Spectrometer: SD2000\nDate; 2024-03-05 10:00\nSample name: wafer 7\nnm,R\n400,0.1\n500,0.2\n"
+    declared = dict(read_spectrum(write(text)).declared)
+    assert declared == {"instrument": "SD2000", "date": "2024-03-05 10:00", "sample": "wafer 7"}
