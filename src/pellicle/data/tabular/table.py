@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pellicle.data.tabular.cells import TextCells
 from pellicle.data.tabular.layout import Layout, find_layout
 from pellicle.data.tabular.text import read_bytes, text_file
 
@@ -29,6 +30,13 @@ class Table:
     def lines(self) -> np.ndarray | None:
         """Source line of each row, None for a binary file."""
         return self.layout.cells.lines
+
+    @property
+    def text(self) -> TextCells:
+        """Cells of a text file. Raises TypeError for a binary one."""
+        if isinstance(self.layout.cells, TextCells):
+            return self.layout.cells
+        raise TypeError(f"{self.path} is no text")
 
     def source_lines(self, rows: np.ndarray) -> np.ndarray | None:
         """Return the source lines of these rows, None for a binary file."""

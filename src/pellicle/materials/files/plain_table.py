@@ -99,7 +99,7 @@ def read(text: MaterialText) -> MaterialFile:
         values.get(second),
         dielectric,
         ("wavelength", first, second),
-        lambda row, what: f"{text.path}: line {found.lines[row]}, {label(what)}",
+        lambda row, what: f"{text.path}: line {found.text.lines[row]}, {label(what)}",
     )
     return material_file(constants, "table", assumed=assumed)
 
@@ -111,8 +111,8 @@ def _header(text: MaterialText, found: Table) -> Sequence[str] | None:
     """
     if found.layout.names and _is_header(found.layout.names):
         return found.layout.names
-    delimiter = found.layout.delimiter
-    above = [line.text for line in text.lines if line.number < found.lines[0]]
+    delimiter = found.text.delimiter
+    above = [line.text for line in text.lines if line.number < found.text.lines[0]]
     names = split(above[-1], delimiter) if above else []
     if is_unit_row(names) and len(above) > 1:
         units = names
@@ -160,15 +160,15 @@ def _recognised(column: Column) -> tuple[str, Column]:
 
 def _cells_per_row(text: MaterialText, found: Table) -> int:
     """The largest number of cells in any row."""
-    rows = (line.text for line in text.lines if line.number >= found.lines[0])
-    return max(len(split(row, found.layout.delimiter)) for row in rows)
+    rows = (line.text for line in text.lines if line.number >= found.text.lines[0])
+    return max(len(split(row, found.text.delimiter)) for row in rows)
 
 
 def _by_position(text: MaterialText, found: Table) -> dict[str, Column]:
-    if text.lines[0].number < found.lines[0]:
+    if text.lines[0].number < found.text.lines[0]:
         raise DataError(
             f"{text.path}: expected a header right above the rows, found none above line "
-            f"{found.lines[0]}; {_REMEDY}, other lines marked with #"
+            f"{found.text.lines[0]}; {_REMEDY}, other lines marked with #"
         )
     width = _cells_per_row(text, found)
     if width not in (2, 3):
