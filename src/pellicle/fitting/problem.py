@@ -33,6 +33,14 @@ class Noise(NamedTuple):
         return self.given or self.drifting
 
 
+class NoiseGroup(NamedTuple):
+    """Channels of a view that share one noise, whether it is known, and their independent data values."""
+
+    channels: tuple[int, ...]
+    known: bool
+    independent: int
+
+
 class Explained(NamedTuple):
     """One view at one set of values; traced."""
 
@@ -113,6 +121,11 @@ class View(Protocol):
         ...
 
     @property
+    def noise_groups(self) -> tuple[NoiseGroup, ...]:
+        """All channels, those of one noise together."""
+        ...
+
+    @property
     def independent_fraction(self) -> float:
         """Effective points per point: correlated errors count less."""
         ...
@@ -137,8 +150,8 @@ class View(Protocol):
         ...
 
     def reweighted(self, factor: Any, fraction: float) -> View:
-        """The view with its weights times `factor` (a number or (rows, channels)), each point counting for
-        `fraction` of an independent one."""
+        """The view with its weights times `factor` (a number, (channels,) or (rows, channels)), each point
+        counting for `fraction` of an independent one."""
         ...
 
     def counting(self, fraction: float) -> View:

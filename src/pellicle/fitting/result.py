@@ -124,7 +124,8 @@ class Rival:
 class Curve:
     """Data and model at each wavelength (nm), and the layer's index with standard errors.
 
-    For ellipsometry `data`, `model` and `sigma` are Ψ, and `delta_data` and `delta_model` Δ, in degrees.
+    For ellipsometry `data`, `model` and `sigma` are Ψ, and `delta_data` and `delta_model` Δ, in degrees;
+    `depolarisation_data` and `depolarisation_model` are fractions, None where it was not measured.
     """
 
     wavelength: np.ndarray
@@ -137,6 +138,8 @@ class Curve:
     k_stderr: np.ndarray
     delta_data: np.ndarray | None = None
     delta_model: np.ndarray | None = None
+    depolarisation_data: np.ndarray | None = None
+    depolarisation_model: np.ndarray | None = None
 
     @property
     def residual(self) -> np.ndarray:
@@ -148,6 +151,12 @@ class Curve:
         if self.delta_data is None or self.delta_model is None:
             raise ValueError("only ellipsometry has a Δ")
         return (self.delta_data - self.delta_model + 180.0) % 360.0 - 180.0
+
+    @property
+    def depolarisation_residual(self) -> np.ndarray:
+        if self.depolarisation_data is None or self.depolarisation_model is None:
+            raise ValueError("no depolarisation was measured")
+        return self.depolarisation_data - self.depolarisation_model
 
 
 @dataclass(frozen=True)

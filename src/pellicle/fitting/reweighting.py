@@ -71,12 +71,15 @@ class RankedMinima:
 class _Noise(NamedTuple):
     """Noise of one view by its residuals: χ², its degrees of freedom, and the correlation length.
 
-    Where a loss is robust, `factor` multiplies the weight of each point, and `inflation` the variance.
+    `scale` (channels,) multiplies the weights, so that a noise that is not known becomes the rms of the
+    residuals of its channels; `chi2` is the misfit after that. Where a loss is robust, `factor` multiplies
+    the weight of each point, and `inflation` the variance.
     """
 
     chi2: float
     freedom: float
     length: float
+    scale: np.ndarray
     factor: Any = 1.0
     inflation: float = 1.0
 
@@ -86,12 +89,11 @@ class _Noise(NamedTuple):
 
     def view_fit(self, view: View, at: Any) -> ViewFit:
         """Fit quality of a view whose ranked weights carry this noise."""
-        chi2 = self.chi2 if view.noise.known else self.freedom
         # the ranked weights carry the rms already, so only the correlation remains to be counted
         length = self.length if view.noise.correlated or not view.noise.given else 1.0
         variance = length * (self.reduced if view.noise.drifting else 1.0)
         outliers = int(np.sum(np.square(self.factor) < 0.5))
-        return ViewFit(at, variance * self.inflation, self.length, chi2, self.freedom, outliers)
+        return ViewFit(at, variance * self.inflation, self.length, self.chi2, self.freedom, outliers)
 
 
 def rank(
@@ -117,8 +119,8 @@ def rank(
         again = _noise(problem, candidates.units[0], robust)
         near = 1e-3 if robust is None else 1e-6
         # the relative weights of the views, and under a robust loss their noise too, agree within 2 %
-        a, b = ([_rescale(v, n) for v, n in zip(problem.views, ns, strict=True)] for ns in (noise, again))
-        alike = np.allclose(np.divide(a, a[0]), np.divide(b, b[0]), rtol=0.02)
+        a, b = (np.concatenate([own.scale for own in each]) for each in (noise, again))
+        alike = np.allclose(a / a[0], b / b[0], rtol=0.02)
         alike = alike and (robust is None or np.allclose(a, b, rtol=0.02))
         if alike and np.allclose(candidates.units[0], best, atol=near):
             break
@@ -155,27 +157,32 @@ def _noise(problem: Problem, unit: np.ndarray, loss: Loss | None) -> list[_Noise
     """Noise of every view. A parameter that several views share costs each a share of it, by their points."""
     result = []
     for view, at in zip(problem.views, _local(problem, unit), strict=True):
-        residuals = view.residuals(at)
+        residuals, groups = view.residuals(at), view.noise_groups
         totals = [sum(v.independent for v in problem.views if i in v.takes) for i in view.takes]
         used = sum(view.independent / total for total in totals) + len(view.nuisances(at))
         freedom = max(view.independent - used, 1)
+        scale, chi2, size = np.ones(residuals.shape[1]), 0.0, np.ones(residuals.shape[1])
+        for group in groups:
+            channels, own = list(group.channels), freedom * group.independent / view.independent
+            if loss is None:
+                misfit = float(np.sum(residuals[:, channels] ** 2))
+            else:
+                bulk = spread(residuals[:, channels].ravel()) * math.sqrt(group.independent / own)
+                misfit, size[channels] = bulk**2 * own, bulk
+            if not group.known:
+                scale[channels] = 1 / math.sqrt(max(misfit / own, 1e-12))
+            chi2 += misfit if group.known else own
         if loss is None:
-            chi2 = float(np.sum(residuals**2))
-            result.append(_Noise(chi2, freedom, view.correlation_length(residuals)))
+            result.append(_Noise(chi2, freedom, view.correlation_length(residuals), scale))
             continue
-        bulk = spread(residuals.ravel()) * math.sqrt(view.independent / freedom)
-        weight = loss.weight(residuals if view.noise.given else residuals / bulk)
+        weight = loss.weight(residuals if view.noise.given else residuals / size)
         length = view.correlation_length(np.sqrt(weight) * residuals)
-        widening = inflation(loss, residuals / bulk)
-        result.append(_Noise(bulk**2 * freedom, freedom, length, np.sqrt(weight), widening))
+        widening = inflation(loss, residuals / size)
+        result.append(_Noise(chi2, freedom, length, scale, np.sqrt(weight), widening))
     return result
-
-
-def _rescale(view: View, noise: _Noise) -> float:
-    return 1.0 if view.noise.known else 1 / math.sqrt(noise.reduced)
 
 
 def _reweighted(problem: Problem, noise: Sequence[_Noise]) -> Problem:
     pairs = zip(problem.views, noise, strict=True)
-    views = tuple(v.reweighted(_rescale(v, own) * own.factor, 1 / own.length) for v, own in pairs)
+    views = tuple(v.reweighted(own.scale * own.factor, 1 / own.length) for v, own in pairs)
     return problem._replace(views=views)

@@ -79,12 +79,20 @@ def _spectrum(
     if curve.delta_data is None:
         signal = part.spectrum.signal
         return [Prediction(signal + suffix, prefix + _SIGNALS[signal], axis, curve.data, model, noisy)]
-    angles = zip(*(psi_delta(view.in_columns(x)) for x in (model, noisy)), strict=True)
+    columns = [view.in_columns(x) for x in (model, noisy)]
+    result = []
+    if view.depolarisation is not None and curve.depolarisation_data is not None:
+        drawn = [own[..., -1] for own in columns]
+        columns = [own[..., :-1] for own in columns]
+        name = "depolarisation"
+        result.append(Prediction(name + suffix, prefix + name, axis, curve.depolarisation_data, *drawn))
+    angles = zip(*(psi_delta(own) for own in columns), strict=True)
     names, data = (("psi", "Ψ"), ("delta", "Δ")), (curve.data, curve.delta_data)
-    return [
+    of_angles = [
         Prediction(f"{name}{suffix}", f"{prefix}{sign} (degrees)", axis, measured, *drawn_angles)
         for (name, sign), measured, drawn_angles in zip(names, data, angles, strict=True)
     ]
+    return [*of_angles, *result]
 
 
 def _samples(

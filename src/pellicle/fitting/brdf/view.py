@@ -17,7 +17,7 @@ from pellicle.effects.plan import Plan
 from pellicle.effects.surface import exact
 from pellicle.fitting.brdf.residuals import RESIDUALS, slope
 from pellicle.fitting.noise import correlation_length
-from pellicle.fitting.problem import Explained, Noise
+from pellicle.fitting.problem import Explained, Noise, NoiseGroup
 from pellicle.fitting.program_cache import kept
 from pellicle.planning.surface import evaluation
 from pellicle.scene.surface import SurfaceView
@@ -142,6 +142,11 @@ class SamplesView:
         return self.rows * self.samples.values.shape[1]
 
     @property
+    def noise_groups(self) -> tuple[NoiseGroup, ...]:
+        """One group of all channels."""
+        return (NoiseGroup(tuple(range(self.channels)), self.noise.known, self.independent),)
+
+    @property
     def independent_fraction(self) -> float:
         """Effective points per point: correlated errors count less."""
         return float(self.samples.independent_fraction)
@@ -167,7 +172,8 @@ class SamplesView:
         return float(np.mean([correlation_length(column) for column in residuals.T]))
 
     def reweighted(self, factor: Any, fraction: float) -> SamplesView:
-        """Weights times `factor` (a number or (rows, channels)), each point for `fraction` of one."""
+        """Weights times `factor` (a number, (channels,) or (rows, channels)), each point for `fraction` of
+        one."""
         weight = np.array(self.samples.weight)
         weight[: self.rows] *= factor
         return replace(self, samples=self.samples._replace(weight=weight)).counting(fraction)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from pellicle.fitting.covariance import Scaled
 from pellicle.fitting.discrepancy import Evidence
 from pellicle.fitting.noise import DRIFT_CORRELATION, local_noise
 from pellicle.fitting.reweighting import RankedMinima
-from pellicle.fitting.spectra.systematic_effects import measured_channels, systematic_effects
+from pellicle.fitting.spectra.systematic_effects import systematic_effects
 from pellicle.fitting.spectra.targets import Measured
 from pellicle.fitting.spectra.view import SpectrumView
 
@@ -27,27 +28,36 @@ def evidence(spectra: Sequence[Measured], ranked: RankedMinima, jacobian: Scaled
     views, fits, result = ranked.problem.views, ranked.fits, []
     blocks = jacobian.blocks([view.points for view in views], [fit.variance for fit in fits])
     for spectrum, view, fit, block in zip(spectra, views, fits, blocks, strict=True):
-        keep, shape = measured_channels(view), (view.rows, view.channels, -1)
+        keep, shape = view.measured_channels, (view.rows, view.channels, -1)
         weight = np.asarray(view.data.weight)[: view.points]
         columns = (block / weight[:, None]).reshape(shape)[:, :keep]
         residual = np.asarray(view.data.values) - np.asarray(fit.at.model)
         residual = residual[: view.points].reshape(view.rows, view.channels)[:, :keep]
-        noise = short_range_noise(view, residual)
         sigma = (1 / weight).reshape(view.rows, view.channels)[:, :keep]
         counted = np.sqrt(view.data.independent_fraction) / sigma
-        if not view.noise.known:
-            # the weights have the rms of all residuals: noise is no larger than that
-            noise = min(noise, float(np.median(sigma)))
-            sigma = np.full(residual.shape, noise)
+        noises = np.empty(keep)
+        for group in view.noise_groups:
+            own = [channel for channel in group.channels if channel < keep]
+            noise = short_range_noise(view, residual[:, own])
+            if not group.known:
+                # the weights have the rms of all residuals: noise is no larger than that
+                noise = min(noise, float(np.median(sigma[:, own])))
+                sigma[:, own] = noise
+            elif not view.noise.drifting:
+                noise = max(noise, float(np.median(sigma[:, own])))
+            noises[own] = noise
         values = ranked.problem.seen_by(view, ranked.values)
+        effects = systematic_effects(view, values, fit.at, spectrum.scene)
+        # all channels in units of the noise of the first
+        unit = noises[0] / noises
         result.append(
             Evidence(
-                residual,
-                columns,
-                sigma,
-                max(noise, float(np.median(sigma))) if view.noise.given else noise,
-                counted,
-                systematic_effects(view, values, fit.at, spectrum.scene),
+                residual * unit,
+                columns * unit[:, None],
+                sigma * unit,
+                float(noises[0]),
+                counted / unit,
+                [replace(effect, change=effect.change * unit) for effect in effects],
                 view.correlation_length,
                 DRIFT_CORRELATION if view.noise.drifting else 1.0,
                 0.0 if view.noise.known else _SCATTER / math.sqrt(view.rows),

@@ -132,7 +132,7 @@ class ExtendedScene:
         values = np.tile([own.start for own in self._free], (count, 1))
         for row, (number, change) in zip(values, changes, strict=False):
             row[number.position] += change
-        form = SpectrumForm(exact(self._scene).static_key)
+        form = SpectrumForm(exact(self._scene).static_key, self._view.form.depolarisation)
         scene = jax.tree_util.tree_map(np.asarray, anonymous(self._scene))
         signals = simulated(form, scene, self._view.data, values[:, order]).signal
         return np.asarray(signals)[: len(changes)]

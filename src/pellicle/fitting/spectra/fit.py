@@ -24,6 +24,7 @@ from pellicle.fitting.robust_losses import LEAST_SQUARES, check_loss
 from pellicle.fitting.spectra import (
     backface,
     default_bounds,
+    depolarisation,
     messages,
     parts,
     residual_structure,
@@ -187,6 +188,7 @@ def _fit(
     )
     unclear = [
         *drifts,
+        *depolarisation.unexplained(data, spectra, ranked.problem.views),
         *likely_cause(found, ranked.problem.parameters),
         *default_bounds.remarks(ranked, wider.binding),
         *identifiability.bounded(parameters, dark),

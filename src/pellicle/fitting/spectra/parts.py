@@ -29,7 +29,7 @@ def parts(data: list[Spectrum], ranked: RankedMinima, errors: Errors) -> tuple[P
         Part(
             name=view.name,
             data=spectrum,
-            curve=_curve(view, fit, errors),
+            curve=_curve(spectrum, view, fit, errors),
             plan=view.plan,
             rms=view.rms(fit.at.model),
             chi2_reduced=fit.chi2 / fit.freedom,
@@ -72,7 +72,7 @@ def _accuracy(part: Part, view: SpectrumView) -> Accuracy:
     return Accuracy(LARGEST_POWER if part.spectrum.calibrated else math.inf, float(np.ptp(values)))
 
 
-def _curve(view: SpectrumView, fit: ViewFit, errors: Errors) -> Curve:
+def _curve(spectrum: Spectrum, view: SpectrumView, fit: ViewFit, errors: Errors) -> Curve:
     """Data, model and the layer's index with errors, at the real points."""
     at, rows, takes = fit.at, view.rows, list(view.takes)
     n_stderr, k_stderr = layer_errors(at, errors.covariance[np.ix_(takes, takes)], rows)
@@ -80,9 +80,16 @@ def _curve(view: SpectrumView, fit: ViewFit, errors: Errors) -> Curve:
     data, model = view.in_columns(view.data.values), view.in_columns(at.model)
     sigma = 1 / np.asarray(view.data.weight)[: view.points : view.channels]
     angles = {}
+    if spectrum.depolarisation is not None:
+        # a scene without depolarisation has none at any wavelength
+        share = np.zeros(rows) if view.depolarisation is None else model[:, -1]
+        angles = {"depolarisation_data": spectrum.depolarisation, "depolarisation_model": share}
+    if view.depolarisation is not None:
+        data, model = data[:, :-1], model[:, :-1]
     if view.channels > 1:
         (data, delta_data), (model, delta_model) = psi_delta(data), psi_delta(model)
-        sigma, angles = np.rad2deg(sigma) / 2, {"delta_data": delta_data, "delta_model": delta_model}
+        sigma = np.rad2deg(sigma) / 2
+        angles |= {"delta_data": delta_data, "delta_model": delta_model}
     return Curve(
         wavelength=np.asarray(view.scene.light.wavelength)[:rows],
         data=np.ravel(data),

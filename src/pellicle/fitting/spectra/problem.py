@@ -54,7 +54,16 @@ def make(*spectra: Measured, tolerance: float = 0.0) -> Problem:
         steepest = max((largest_index(x.material, wavelength) for x in coherent_layers(scene)), default=1.0)
         numbers = points * channels, steepest
         views.append(
-            SpectrumView(spectrum.name, chosen, anonymous(scene), data, takes, spectrum.noise, *numbers)
+            SpectrumView(
+                spectrum.name,
+                chosen,
+                anonymous(scene),
+                data,
+                takes,
+                spectrum.noise,
+                *numbers,
+                spectrum.depolarisation,
+            )
         )
     return Problem(tuple(views), free, box(*bounds(free), [p.prior for p in free]))
 

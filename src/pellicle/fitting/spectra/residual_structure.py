@@ -85,7 +85,7 @@ class Missed(NamedTuple):
 
 def missed(view: SpectrumView, fit: ViewFit) -> Missed | None:
     """Structure in the residuals of the best fit, None where they may be noise."""
-    shape, columns = (view.rows, view.channels), slice(None) if view.data.frame is None else slice(2)
+    shape, columns = (view.rows, view.channels), slice(view.measured_channels)
     weight = np.asarray(view.data.weight)[: view.points].reshape(shape)[:, columns]
     residuals = (view.data.values - np.asarray(fit.at.model))[: view.points].reshape(shape)[:, columns]
     nm = np.asarray(view.scene.light.wavelength)[: view.rows]

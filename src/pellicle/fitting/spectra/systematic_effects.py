@@ -56,10 +56,12 @@ def systematic_effects(view: SpectrumView, values: np.ndarray, at: Local, scene:
         gain, first = np.asarray(at.gain), 0
         for row in every:
             weights = np.array([weight for _, weight in row.changes])
-            change = weights @ signals[first : first + len(weights)]
+            own = signals[first : first + len(weights)]
             first += len(weights)
-            change = _columns(view, gain * change)
-            about = row.name, row.size, row.unit, _on_sphere(view, at, change)
+            change = _on_sphere(view, at, _columns(view, gain * (weights @ own)))
+            if view.depolarisation is not None:
+                change[:, -1] = _depolarising(view, at, own, weights)
+            about = row.name, row.size, row.unit, change
             result.append(Effect(*about, row.power, row.positive, row.shared, row.material))
     every_effect = [*result, *_of_signal(view, at, scene)]
     of = f" of {view.name}" if view.name else ""
@@ -161,7 +163,7 @@ def _lamp_structure(
 
 def _of_angles(view: SpectrumView, at: Local, allowed: Uncertainty) -> list[Effect]:
     """Offsets of Ψ and Δ, and depolarisation as a rotating analyser takes it: N and C lose a share."""
-    n, c, s = _sphere(view, at).T
+    n, c, s = _sphere(view, at.signal).T
     sine = np.maximum(np.hypot(c, s), 1e-9)
     psi, delta, share = np.deg2rad(2 * allowed.psi), np.deg2rad(allowed.delta), 1 - allowed.depolarisation
     third = np.where(s < 0, -1, 1) * np.sqrt(np.maximum(1 - (share * n) ** 2 - (share * c) ** 2, 0.0))
@@ -174,37 +176,62 @@ def _of_angles(view: SpectrumView, at: Local, allowed: Uncertainty) -> list[Effe
     result = []
     for name, size, unit, change, positive in changes:
         if size:
-            data = change.T[: view.rows]
-            if view.data.frame is not None:
-                data = np.einsum("pij,pj->pi", np.asarray(view.data.frame)[: view.rows], data)
-            data = data[:, : measured_channels(view)]
+            data = _in_frame(view, change.T[: view.rows])
             result.append(Effect(name, size, unit, data, positive=positive, shared=False))
+    size = allowed.depolarisation
+    if size and view.depolarisation is not None:
+        change = np.zeros((view.rows, view.measured_channels))
+        change[:, -1] = size
+        result.append(Effect("offset of the depolarisation", size, "", change, shared=False))
     return result
 
 
-def measured_channels(view: SpectrumView) -> int:
-    """Channels that are measured: outwards from the sphere nothing is."""
-    return view.channels if view.data.frame is None else 2
+def _in_frame(view: SpectrumView, change: np.ndarray) -> np.ndarray:
+    """A change of N, C and S (rows, 3), which leaves the depolarisation, as (rows, measured channels)."""
+    keep = view.measured_channels
+    if view.depolarisation is not None:
+        change = np.insert(change, 3 if view.channels == 4 else 2, 0.0, axis=1)
+    if view.data.frame is not None:
+        change = np.einsum("pij,pj->pi", np.asarray(view.data.frame)[: view.rows], change)
+    return change[:, :keep]
 
 
 def _columns(view: SpectrumView, values: np.ndarray) -> np.ndarray:
     """Data values, or a change of them, as (rows, measured channels)."""
-    return values[: view.points].reshape(view.rows, view.channels)[:, : measured_channels(view)]
+    return values[: view.points].reshape(view.rows, view.channels)[:, : view.measured_channels]
 
 
 def _on_sphere(view: SpectrumView, at: Local, change: np.ndarray) -> np.ndarray:
     """Change of N, C, S without its part outwards: Ψ and Δ do not depend on the degree of polarisation."""
-    if view.channels < 3 or view.data.frame is not None:
+    sphere = view.channels if view.depolarisation is None else view.channels - 1
+    if sphere < 3 or view.data.frame is not None:
         return change
-    outwards = _sphere(view, at)[: view.rows]
-    return change - outwards * np.sum(change * outwards, axis=1, keepdims=True)
+    outwards = _sphere(view, at.signal)[: view.rows]
+    change[:, :3] -= outwards * np.sum(change[:, :3] * outwards, axis=1, keepdims=True)
+    return change
 
 
-def _sphere(view: SpectrumView, at: Local) -> np.ndarray:
-    """N, C, S of the model, (wavelengths with padding, 3)."""
-    columns = np.asarray(at.signal).reshape(len(view.scene.light.wavelength), -1)
+def _depolarising(view: SpectrumView, at: Local, signals: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Change of the depolarisation (rows,) by a weighted sum of signals.
+
+    Averaged are N, C, S before they are brought to their sphere: of v = (N, C, S), 1 − v² changes by −2 v dv.
+    """
+
+    def polarised(signal: Any) -> np.ndarray:
+        share = np.asarray(signal)[: view.points].reshape(view.rows, -1)[:, view.measured_channels - 1]
+        return _sphere(view, signal)[: view.rows] * np.sqrt(np.maximum(1 - share, 0.0))[:, None]
+
+    change = sum(weight * polarised(signal) for weight, signal in zip(weights, signals, strict=True))
+    return -2 * np.sum(polarised(at.signal) * change, axis=1)
+
+
+def _sphere(view: SpectrumView, signal: Any) -> np.ndarray:
+    """N, C, S of a signal, (wavelengths with padding, 3)."""
+    columns = np.asarray(signal).reshape(len(view.scene.light.wavelength), -1)
     if view.data.frame is not None:
-        return np.einsum("pij,pi->pj", np.asarray(view.data.frame), columns)
+        columns = np.einsum("pij,pi->pj", np.asarray(view.data.frame), columns)
+    if view.depolarisation is not None:
+        columns = columns[:, :-1]
     if columns.shape[1] == 3:
         return columns
     third = np.sqrt(np.maximum(1 - np.sum(columns**2, axis=1), 0.0))

@@ -9,12 +9,17 @@ import numpy as np
 
 from pellicle.data.ellipsometry_angles import ncs
 from pellicle.data.spectrum import Spectrum
+from pellicle.effects.film import exact
 from pellicle.errors import DataError, UsageError
 from pellicle.fitting import noise
 from pellicle.fitting.problem import Noise
+from pellicle.fitting.spectra.view import depolarises
 from pellicle.scene.film import Light, Scene
 from pellicle.scene.free import free_leaves, is_free
 from pellicle.scene.instrument import Drift, Instrument
+
+_ROUGH = 0.01
+"""First guess of the noise of N, C, S and of a depolarisation."""
 
 
 class Measured(NamedTuple):
@@ -23,8 +28,9 @@ class Measured(NamedTuple):
     `values` are fractions (points,), or N, C, S (points, 3) for ellipsometry, which have no wrap-around,
     or N and C alone (points, 2) where Δ is folded;
     `wavelength` (nm) is (points,), `sigma` too or the shape of `values`; `independent_fraction` is
-    how many independent points each counts for. With a `frame` (points, 3, 3) the values are those of
-    N, C, S in it.
+    how many independent points each counts for. Where some light is unpolarised and its depolarisation was
+    measured, that follows N, C, S (or N, C), and `depolarisation` is its noise. With a `frame` (points,
+    channels, channels) the values are those of N, C, S and depolarisation in it.
     """
 
     scene: Scene
@@ -35,6 +41,7 @@ class Measured(NamedTuple):
     noise: Noise = Noise()
     name: str = ""  # that of one among several
     frame: np.ndarray | None = None
+    depolarisation: Noise | None = None
 
 
 def measured(data: Spectrum, scene: Scene, name: str = "") -> Measured:
@@ -44,8 +51,11 @@ def measured(data: Spectrum, scene: Scene, name: str = "") -> Measured:
     source = Noise(data.sigma is not None, data.sigma is None and drifts(scene))
     independent_fraction = 1 / noise.DRIFT_CORRELATION if source.drifting else 1.0
     values, sigma, frame = data.values, _sigma(data, source), None
+    depolarisation = None
     if data.delta is not None:
         values = ncs(data.values, data.delta)[:, : 2 if data.folded else 3]
+    if data.depolarisation is not None and depolarises(exact(scene)):
+        depolarisation = Noise(data.depolarisation_sigma is not None)
     if data.delta is not None and data.sigma is not None and not data.folded:
         # along Ψ, along Δ and outwards: there the measured point is (0, 0, 1), and errors of Ψ and of Δ are
         # errors of one component each
@@ -55,7 +65,18 @@ def measured(data: Spectrum, scene: Scene, name: str = "") -> Measured:
         across = np.stack([zero, -np.sin(delta), np.cos(delta)], axis=1)
         frame = np.stack([along, across, outwards], axis=1)
         values = np.einsum("pij,pj->pi", frame, values)
-    return Measured(scene, data.wavelength, values, sigma, independent_fraction, source, name, frame)
+    if depolarisation is not None:
+        # the last of what is measured: before the direction outwards
+        at = values.shape[1] if frame is None else values.shape[1] - 1
+        own = _ROUGH if data.depolarisation_sigma is None else data.depolarisation_sigma
+        sigma = np.broadcast_to(np.reshape(sigma, (len(data), -1)), values.shape)
+        values = np.insert(values, at, data.depolarisation, axis=1)
+        sigma = np.insert(sigma, at, own, axis=1)
+        if frame is not None:
+            frame = np.insert(np.insert(frame, at, 0.0, axis=1), 3, 0.0, axis=2)
+            frame[:, at, 3] = 1.0
+    known = scene, data.wavelength, values, sigma, independent_fraction, source, name, frame
+    return Measured(*known, depolarisation)
 
 
 def seen_as(scene: Scene, data: Spectrum) -> Scene:
@@ -114,7 +135,7 @@ def _sigma(data: Spectrum, source: Noise) -> np.ndarray:
     error of Δ at 0 or 180° moves neither to first order; the second order of σ_Ψ keeps σ above zero.
     """
     if data.sigma is None and data.delta is not None:
-        return np.full(len(data), 0.01)
+        return np.full(len(data), _ROUGH)
     if data.sigma is None and source.drifting:
         return noise.drifting_sigma(data.values)
     if data.sigma is None:

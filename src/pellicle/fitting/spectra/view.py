@@ -12,7 +12,7 @@ import numpy as np
 from pellicle.effects.plan import Plan
 from pellicle.fitting.coordinates import Array
 from pellicle.fitting.noise import DRIFT_CORRELATION
-from pellicle.fitting.problem import Explained, Noise
+from pellicle.fitting.problem import Explained, Noise, NoiseGroup
 from pellicle.fitting.program_cache import kept
 from pellicle.fitting.spectra import nuisance
 from pellicle.fitting.spectra.nuisance import Coefficient, Data
@@ -35,23 +35,29 @@ SCAN_POINTS = 448
 
 @dataclass(frozen=True)
 class SpectrumForm:
-    """The simulation of a spectrum by a plan without words, compared with data by variable projection."""
+    """The simulation of a spectrum by a plan without words, compared with data by variable projection.
+
+    With `depolarisation` a channel of it follows N, C, S.
+    """
 
     plan: Plan
+    depolarisation: bool = False
 
     def simulate(self, scene: Scene, data: Data) -> Any:
         """The signal as measured: all of it, or of N, C, S the N and C that a folded Δ leaves.
 
         Ψ and Δ do not depend on the degree of polarisation, so where some light is unpolarised, N, C, S are
-        brought to their sphere; a rotating analyser measures N and C as they are.
+        brought to their sphere; a rotating analyser measures N and C as they are. 1 − N² − C² − S² is the
+        depolarisation.
         """
         signal = build(self.plan)(scene).reshape(scene.light.wavelength.size, -1)
         channels = data.values.size // len(signal)
-        # intensities of several polarisations add
-        depolarised = (
-            self.plan.on("back-face") or self.plan.on("angle-spread") or self.plan.row("coherence").count
-        )
-        if channels == 3 and depolarised:
+        if self.depolarisation:
+            square = jnp.sum(signal**2, axis=1)
+            length = jnp.where(square > 0, jax.lax.rsqrt(jnp.where(square > 0, square, 1.0)), 0.0)
+            columns = [signal[:, i] * length for i in range(channels - 1)]
+            signal = stack_rows([*columns, 1 - square]).T
+        elif channels == 3 and depolarises(self.plan):
             square = jnp.sum(signal**2, axis=1, keepdims=True)
             signal = signal * jnp.where(square > 0, jax.lax.rsqrt(jnp.where(square > 0, square, 1.0)), 0.0)
         if data.frame is not None:
@@ -65,6 +71,11 @@ class SpectrumForm:
         signal = compute_once(self.simulate(insert(scene, values), data))
         solved = nuisance.solve(signal, data, scene.instrument)
         return Explained(solved.model, solved.residual, solved.deviance)
+
+
+def depolarises(plan: Plan) -> bool:
+    """True where intensities of several polarisations add, so that some light is unpolarised."""
+    return plan.on("back-face") or plan.on("angle-spread") or bool(plan.row("coherence").count)
 
 
 class Local(NamedTuple):
@@ -109,7 +120,8 @@ class SpectrumView:
     """One spectrum of a problem.
 
     `scene` has anonymous free parameters and sampled media; `takes` are the positions of its parameters in
-    the problem. `data` is padded to a round length.
+    the problem. `data` is padded to a round length. `depolarisation` is the noise of a measured one, where
+    that is a channel.
     """
 
     name: str  # empty where there is no other
@@ -118,12 +130,13 @@ class SpectrumView:
     data: Data
     takes: tuple[int, ...]
     noise: Noise
-    points: int  # data values: N, C, S, or N and C, for each wavelength in ellipsometry
+    points: int  # data values: N, C, S, or N and C, and depolarisation for each wavelength in ellipsometry
     largest_index: float
+    depolarisation: Noise | None = None
 
     @property
     def form(self) -> SpectrumForm:
-        return SpectrumForm(self.plan.static_key)
+        return SpectrumForm(self.plan.static_key, self.depolarisation is not None)
 
     @property
     def arrays(self) -> tuple[Scene, Data]:
@@ -140,9 +153,27 @@ class SpectrumView:
         return self.points // self.channels
 
     @property
+    def measured_channels(self) -> int:
+        """The first channels, which are measured: outwards from the sphere of N, C, S nothing is."""
+        return self.channels if self.data.frame is None else self.channels - 1
+
+    @property
     def independent(self) -> int:
         """Independent data values: N, C and S lie on a sphere, so two of the three."""
-        return self.points if self.channels < 3 else 2 * self.rows
+        return sum(group.independent for group in self.noise_groups)
+
+    @property
+    def noise_groups(self) -> tuple[NoiseGroup, ...]:
+        """The channels of the signal, and that of the depolarisation."""
+        every = tuple(range(self.channels))
+        if self.depolarisation is None:
+            return (NoiseGroup(every, self.noise.known, min(self.channels, 2) * self.rows),)
+        own = self.measured_channels - 1
+        others = tuple(channel for channel in every if channel != own)
+        return (
+            NoiseGroup(others, self.noise.known, 2 * self.rows),
+            NoiseGroup((own,), self.depolarisation.known, self.rows),
+        )
 
     @property
     def independent_fraction(self) -> float:
@@ -182,12 +213,11 @@ class SpectrumView:
 
     def correlation_length(self, residuals: np.ndarray) -> float:
         """Number of points of one channel whose residuals count as one: see `correlation_in_sweeps`."""
-        # outwards from the sphere nothing is measured
-        columns = residuals if self.data.frame is None else residuals[:, :2]
-        return correlation_in_sweeps(columns, self.sweeps())
+        return correlation_in_sweeps(residuals[:, : self.measured_channels], self.sweeps())
 
     def reweighted(self, factor: Any, fraction: float) -> SpectrumView:
-        """Weights times `factor` (a number or (rows, channels)), each point for `fraction` of one."""
+        """Weights times `factor` (a number, (channels,) or (rows, channels)), each point for `fraction` of
+        one."""
         whole = np.ones(len(self.data.weight))
         whole[: self.points] = np.broadcast_to(factor, (self.rows, self.channels)).reshape(-1)
         most = 1 / DRIFT_CORRELATION if self.noise.drifting else 1.0
@@ -233,7 +263,7 @@ class SpectrumView:
 
     def in_columns(self, values: Any) -> np.ndarray:
         """Data values or a model of them (..., data values) as signals, or as N, C and S, without padding,
-        (..., rows, channels)."""
+        (..., rows, channels). A depolarisation is the last channel."""
         values = np.asarray(values)[..., : self.points]
         columns = values.reshape(*values.shape[:-1], self.rows, self.channels)
         if self.data.frame is None:
@@ -243,7 +273,8 @@ class SpectrumView:
     def rms(self, model: Any) -> float:
         """rms of the residuals. For ellipsometry it is in degrees of Ψ: half the distance on the sphere, in
         each of its two directions."""
-        residual = (self.data.values - np.asarray(model))[: self.points]
         if self.channels == 1:
-            return float(np.sqrt(np.mean(residual**2)))
-        return float(np.rad2deg(np.sqrt(residual @ residual / (2 * self.rows))) / 2)
+            return float(np.sqrt(np.mean((self.data.values - np.asarray(model))[: self.points] ** 2)))
+        residual = self.in_columns(self.data.values - np.asarray(model))
+        residual = residual if self.depolarisation is None else residual[:, :-1]
+        return float(np.rad2deg(np.sqrt(np.sum(residual**2) / (2 * self.rows))) / 2)
