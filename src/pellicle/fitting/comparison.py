@@ -11,6 +11,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from logging import getLogger
+from typing import NamedTuple
 
 import numpy as np
 
@@ -90,15 +91,14 @@ def compare(fits: Mapping[str, Fit]) -> Comparison:
     if len(fits) < 2:
         raise UsageError("a comparison needs two descriptions or more")
     _check_same(fits)
-    residuals = {name: [_residual(part) for part in fit.parts] for name, fit in fits.items()}
-    nearest = min(residuals.values(), key=lambda rows: _deviance(rows, [1.0] * len(rows), fits))
-    parts = next(iter(fits.values())).parts
-    lengths = [_correlation(part, rows) for part, rows in zip(parts, nearest, strict=True)]
-    counts = [_independent(part, rows) for part, rows in zip(parts, nearest, strict=True)]
+    residuals = {name: [r for part in fit.parts for r in _residuals(part)] for name, fit in fits.items()}
+    nearest = min(residuals.values(), key=lambda rows: _deviance(rows, [1.0] * len(rows)))
+    lengths = [_correlation(own) for own in nearest]
+    counts = [own.independent for own in nearest]
     points = sum(count / length for count, length in zip(counts, lengths, strict=True))
     candidates = []
     for name, rows in residuals.items():
-        free, deviance = len(fits[name].free), _deviance(rows, lengths, fits)
+        free, deviance = len(fits[name].free), _deviance(rows, lengths)
         bic = deviance + free * math.log(max(points, 2.0))
         log.info(
             "comparison: %s has %d free parameters and -2 ln L %.6g on %.4g points: BIC %.6g",
@@ -115,8 +115,10 @@ def _check_same(fits: Mapping[str, Fit]) -> None:
         columns: list[np.ndarray | None] = []
         names: list[object] = [fit.layer_test and fit.layer_test.residual]
         for data in (part.data for part in fit.parts):
-            names += [type(data), data.signal if isinstance(data, Spectrum) else ""]
-            light = "wavelength delta" if isinstance(data, Spectrum) else "theta_i phi_i theta_o phi_o"
+            names += [type(data), (data.signal, data.folded) if isinstance(data, Spectrum) else ""]
+            light = "theta_i phi_i theta_o phi_o"
+            if isinstance(data, Spectrum):
+                light = "wavelength delta delta_sigma depolarisation depolarisation_sigma"
             columns += [getattr(data, name) for name in ("values", "sigma", *light.split())]
         return names, columns
 
@@ -130,6 +132,30 @@ def _check_same(fits: Mapping[str, Fit]) -> None:
                 f"{first} and {other} do not use the same points with the same noise: give both the same"
                 " range, noise and signal, or their criteria mean nothing"
             )
+
+
+class _Residuals(NamedTuple):
+    """Residuals (points, channels) of one noise, in units of σ where that is `known`."""
+
+    part: Part
+    rows: np.ndarray
+    known: bool
+
+    @property
+    def independent(self) -> int:
+        """Independent numbers: three on the sphere of N, C and S are two."""
+        points, channels = self.rows.shape
+        return points * (channels if isinstance(self.part.curve, BrdfCurve) else min(channels, 2))
+
+
+def _residuals(part: Part) -> list[_Residuals]:
+    """Residuals of a part, and of its depolarisation, where that was measured."""
+    result = [_Residuals(part, _residual(part), part.data.sigma is not None)]
+    if not isinstance(part.curve, BrdfCurve) and part.curve.depolarisation_data is not None:
+        sigma = part.spectrum.depolarisation_sigma
+        own = part.curve.depolarisation_residual / (1.0 if sigma is None else sigma)
+        result.append(_Residuals(part, own[:, None], sigma is not None))
+    return result
 
 
 def _residual(part: Part) -> np.ndarray:
@@ -148,27 +174,21 @@ def _residual(part: Part) -> np.ndarray:
     return np.stack([c.residual / sigma, sine * c.delta_residual / across], axis=1)
 
 
-def _correlation(part: Part, rows: np.ndarray) -> float:
+def _correlation(residuals: _Residuals) -> float:
     """Number of points that count as one: neighbours in a sweep, or in a file of BRDF samples."""
+    part, rows, _ = residuals
     if isinstance(part.curve, BrdfCurve):
         return float(np.mean([correlation_length(column) for column in rows.T]))
     wavelength, angle = part.curve.wavelength, part.spectrum.angle
     return correlation_in_sweeps(rows, sweeps(wavelength, 0.0 * wavelength if angle is None else angle))
 
 
-def _independent(part: Part, rows: np.ndarray) -> int:
-    """Independent numbers: three on the sphere of N, C and S are two."""
-    return rows.size if isinstance(part.curve, BrdfCurve) else rows.shape[0] * min(rows.shape[1], 2)
-
-
-def _deviance(rows: Sequence[np.ndarray], lengths: Sequence[float], fits: Mapping[str, Fit]) -> float:
+def _deviance(residuals: Sequence[_Residuals], lengths: Sequence[float]) -> float:
     """−2 ln L up to a constant, each point counting for 1/length; an unknown σ takes its best value."""
-    parts = next(iter(fits.values())).parts
     total = 0.0
-    for part, residuals, length in zip(parts, rows, lengths, strict=True):
-        square, count = float(np.sum(residuals**2)), _independent(part, residuals)
-        known = part.data.sigma is not None
-        total += (square if known else count * math.log(max(square / count, 1e-300))) / length
+    for own, length in zip(residuals, lengths, strict=True):
+        square, count = float(np.sum(own.rows**2)), own.independent
+        total += (square if own.known else count * math.log(max(square / count, 1e-300))) / length
     return total
 
 

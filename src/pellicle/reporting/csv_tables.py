@@ -84,6 +84,14 @@ def _psi_delta(part: Part) -> tuple[list[str], Columns]:
     }
     if data.sigma is not None and data.delta_sigma is not None:
         columns |= {"sigma_psi": data.sigma, "sigma_delta": data.delta_sigma}
+    if curve.depolarisation_data is not None and curve.depolarisation_model is not None:
+        columns |= {
+            "depolarisation": curve.depolarisation_data,
+            "depolarisation_model": curve.depolarisation_model,
+            "depolarisation_residual": curve.depolarisation_residual,
+        }
+    if data.depolarisation_sigma is not None:
+        columns |= {"sigma_depolarisation": data.depolarisation_sigma}
     about = ["fit of psi and delta in degrees: data, model, residual = data - model (of delta: -180 to 180)"]
     return about, columns
 
@@ -109,7 +117,7 @@ def _joint_csv(fit: Fit) -> str:
 
 
 def _joint_rows(part: Part) -> Iterable[tuple[str | float, ...]]:
-    """A row for each value; Ψ and Δ are two."""
+    """A row for each value; Ψ, Δ and depolarisation are three."""
     curve, data = part.spectral, part.spectrum
     unknown = np.full(curve.wavelength.size, np.nan)
     angle = unknown if data.angle is None else data.angle
@@ -118,6 +126,10 @@ def _joint_rows(part: Part) -> Iterable[tuple[str | float, ...]]:
     if curve.delta_data is not None and curve.delta_model is not None:
         sigma = unknown if data.delta_sigma is None else data.delta_sigma
         columns["delta"] = (curve.delta_data, curve.delta_model, curve.delta_residual, sigma)
+    share, share_model = curve.depolarisation_data, curve.depolarisation_model
+    if share is not None and share_model is not None:
+        sigma = unknown if data.depolarisation_sigma is None else data.depolarisation_sigma
+        columns["depolarisation"] = (share, share_model, curve.depolarisation_residual, sigma)
     for signal, values in columns.items():
         for row in zip(curve.wavelength, angle, *values, strict=True):
             yield part.name, signal, *row

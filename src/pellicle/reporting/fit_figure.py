@@ -109,7 +109,9 @@ def _panels_of_data(part: Part) -> list[_Panel]:
     if part.spectral.delta_data is None:
         rows = ((_data, 3.0), (_residuals, 1.3))
     else:
-        rows = ((psi_delta.psi, 2.2), (psi_delta.delta, 2.2), (psi_delta.residuals, 1.5))
+        rows = [(psi_delta.psi, 2.2), (psi_delta.delta, 2.2), (psi_delta.residuals, 1.5)]
+        if part.spectral.depolarisation_data is not None:
+            rows.insert(2, (psi_delta.depolarisation, 1.5))
     return [_Panel(partial(panel, part=part), height, part) for panel, height in rows]
 
 

@@ -149,6 +149,9 @@ def _residuals(part: Part) -> list[tuple[str, str]]:
     if isinstance(curve, Curve) and curve.delta_data is not None:
         psi, delta = (np.sqrt(np.mean(r**2)) for r in (curve.residual, curve.delta_residual))
         rows.append(("of psi and of delta", f"{psi:.4g} and {delta:.4g} degrees"))
+    if isinstance(curve, Curve) and curve.depolarisation_data is not None:
+        share = np.sqrt(np.mean(curve.depolarisation_residual**2))
+        rows.append(("of depolarisation", f"{share:.4g}"))
     return rows
 
 

@@ -1,4 +1,4 @@
-"""Panels of an ellipsometric fit: Ψ, Δ and their residuals against wavelength or angle."""
+"""Panels of an ellipsometric fit: Ψ, Δ, their residuals and depolarisation against wavelength or angle."""
 
 from __future__ import annotations
 
@@ -33,6 +33,15 @@ def delta(axes: Axes, part: Part) -> None:
     assert curve.delta_model is not None
     _pair(axes, part, curve.delta_data, curve.delta_model, turns=True)
     axes.set_ylabel("Δ (degrees)")
+
+
+def depolarisation(axes: Axes, part: Part) -> None:
+    """Draw the depolarisation of data and model, one line for each angle."""
+    curve = part.spectral
+    assert curve.depolarisation_data is not None
+    assert curve.depolarisation_model is not None
+    _pair(axes, part, curve.depolarisation_data, curve.depolarisation_model)
+    axes.set_ylabel("depolarisation")
 
 
 def residuals(axes: Axes, part: Part) -> None:

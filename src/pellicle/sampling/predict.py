@@ -79,14 +79,13 @@ def _spectrum(
     if curve.delta_data is None:
         signal = part.spectrum.signal
         return [Prediction(signal + suffix, prefix + _SIGNALS[signal], axis, curve.data, model, noisy)]
-    columns = [view.in_columns(x) for x in (model, noisy)]
+    of_model, of_noisy = view.in_columns(model), view.in_columns(noisy)
     result = []
     if view.depolarisation is not None and curve.depolarisation_data is not None:
-        drawn = [own[..., -1] for own in columns]
-        columns = [own[..., :-1] for own in columns]
-        name = "depolarisation"
+        name, drawn = "depolarisation", (of_model[..., -1], of_noisy[..., -1])
         result.append(Prediction(name + suffix, prefix + name, axis, curve.depolarisation_data, *drawn))
-    angles = zip(*(psi_delta(own) for own in columns), strict=True)
+        of_model, of_noisy = of_model[..., :-1], of_noisy[..., :-1]
+    angles = zip(*(psi_delta(own) for own in (of_model, of_noisy)), strict=True)
     names, data = (("psi", "Ψ"), ("delta", "Δ")), (curve.data, curve.delta_data)
     of_angles = [
         Prediction(f"{name}{suffix}", f"{prefix}{sign} (degrees)", axis, measured, *drawn_angles)

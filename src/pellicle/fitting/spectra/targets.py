@@ -65,7 +65,7 @@ def measured(data: Spectrum, scene: Scene, name: str = "") -> Measured:
         across = np.stack([zero, -np.sin(delta), np.cos(delta)], axis=1)
         frame = np.stack([along, across, outwards], axis=1)
         values = np.einsum("pij,pj->pi", frame, values)
-    if depolarisation is not None:
+    if depolarisation is not None and data.depolarisation is not None:
         # the last of what is measured: before the direction outwards
         at = values.shape[1] if frame is None else values.shape[1] - 1
         own = _ROUGH if data.depolarisation_sigma is None else data.depolarisation_sigma
