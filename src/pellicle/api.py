@@ -36,7 +36,12 @@ if TYPE_CHECKING:
 
 @overload
 def simulate(
-    scene: Scene, wavelength: ArrayLike | None = None, *, noise: float = 0.0, seed: int = 0
+    scene: Scene,
+    wavelength: ArrayLike | None = None,
+    *,
+    noise: float = 0.0,
+    seed: int = 0,
+    depolarisation_noise: float | None = None,
 ) -> Spectrum: ...
 @overload
 def simulate(
@@ -53,6 +58,7 @@ def simulate(
     directions: Directions | BrdfSamples | None = None,
     noise: float = 0.0,
     seed: int = 0,
+    depolarisation_noise: float | None = None,
 ) -> Spectrum | BrdfSamples:
     """Simulate a measurement of `scene`: a spectrum of a film, or samples of the BRDF of a surface.
 
@@ -67,6 +73,8 @@ def simulate(
     - `noise`: standard deviation of the normal noise, in the unit of the signal: a fraction for R and T,
       degrees for Ψ and Δ, 1/sr for a BRDF. It becomes the σ of the result.
     - `seed` of the noise.
+    - `depolarisation_noise`: standard deviation of a measured depolarisation, a fraction, which then becomes
+      part of a spectrum of Ψ and Δ; 0 for one without noise.
 
     **Returns:** `Spectrum` or `BrdfSamples`, as `pellicle.fit` takes them.
 
@@ -81,10 +89,12 @@ def simulate(
     ```
     """
     if isinstance(scene, Surface):
-        _refuse("a Surface", wavelength=wavelength)
+        _refuse("a Surface", wavelength=wavelength, depolarisation_noise=depolarisation_noise)
         return simulate_samples(scene, directions, noise, seed).samples
     _refuse("a Scene", directions=directions)
-    return simulate_spectrum(scene, wavelength, noise=noise, seed=seed)
+    return simulate_spectrum(
+        scene, wavelength, noise=noise, seed=seed, depolarisation_noise=depolarisation_noise
+    )
 
 
 def plan(

@@ -117,7 +117,8 @@ def test_ncs_are_turned_into_psi_and_delta(write):
     spectrum = read_spectrum(write(f"wavelength,N,C,S\n{rows(NM, n, c, s)}"))
     np.testing.assert_allclose(spectrum.values, PSI, rtol=1e-9)
     np.testing.assert_allclose(spectrum.delta, DELTA, rtol=1e-9)
-    assert any("0.99 to 0.99, was divided out" in note for note in spectrum.notes)
+    assert any("1 - N² - C² - S² read as the depolarisation" in note for note in spectrum.notes)
+    np.testing.assert_allclose(spectrum.depolarisation, 1 - 0.99**2, rtol=1e-9)
 
 
 def test_psi_and_delta_go_before_ncs_beside_them(write):
@@ -250,3 +251,50 @@ def test_what_is_written_is_read_again(write):
     again = read_spectrum(write(",".join(names) + "\n" + table))
     for name in names.values():
         np.testing.assert_allclose(getattr(again, name), getattr(made, name), rtol=1e-11)
+
+
+SHARE = np.array([0.01, 0.2, -0.004])
+
+
+@pytest.mark.parametrize(
+    ("names", "size"),
+    [
+        ("depolarisation,sigma_depolarisation", 1),
+        ("depol,depol_err", 1),
+        ("%depol,%depol_sigma", 100),
+        ("Depolarization (%),sigma_depol (%)", 100),
+    ],
+)
+def test_depolarisation(write, names, size):
+    text = f"wl,psi,delta,{names}\n{rows(NM, PSI, DELTA, size * SHARE, size * SHARE**2)}"
+    spectrum = read_spectrum(write(text))
+    assert_film(spectrum)
+    np.testing.assert_allclose(spectrum.depolarisation, SHARE, rtol=1e-12)
+    np.testing.assert_allclose(spectrum.depolarisation_sigma, SHARE**2, rtol=1e-12)
+    unit = "in percent" if size == 100 else "a fraction"
+    name = names.split(",")[0]
+    assert f"'{name}' read as the depolarisation, {unit}" in spectrum.notes
+    assert not any("ignored" in note for note in spectrum.notes)
+
+
+def test_n_c_s_of_polarised_light_have_no_depolarisation(write):
+    """Rounded to three decimals."""
+    psi, delta = 2 * np.deg2rad(PSI), np.deg2rad(DELTA)
+    n, c, s = np.round([np.cos(psi), np.sin(psi) * np.cos(delta), np.sin(psi) * np.sin(delta)], 3)
+    assert read_spectrum(write(f"wl,N,C,S\n{rows(NM, n, c, s)}")).depolarisation is None
+
+
+@pytest.mark.parametrize(
+    ("names", "cells", "said"),
+    [
+        ("depol", "2.5", "column 'depol': 2.5 is not from -0.5 to 1.05"),
+        ("depol", "2.5", "if it is in percent, name the column `depolarisation (%)`"),
+        ("depol (%)", "250", "column 'depol (%)': 2.5 is not"),
+        ("depol (ppm)", "2", "'depol (ppm)' is in 'ppm'; write a depolarisation as a fraction"),
+        ("depol,depol_err", "0.1,0", "column 'depol_err': 0 is a standard deviation not above zero"),
+        ("depol,%depol", "0.1,10", "could each be the depolarisation"),
+        ("depol", "x", "line 2"),
+    ],
+)
+def test_what_is_no_depolarisation(write, refused, names, cells, said):
+    refused(write(f"wl,psi,delta,{names}\n400,20,170,{cells}\n500,20,175,{cells}\n"), DataError, said)

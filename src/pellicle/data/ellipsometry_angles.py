@@ -15,14 +15,17 @@ FORMS = (PSI_DELTA, NCS, ALPHA_BETA)
 """The columns of each form; where a file has several, the first is read."""
 POLARISED = (0.5, 1.05)
 """Accepted degrees of polarisation of N, C, S: below, noise dominates; above, the columns are not N, C, S."""
+_ROUNDED = 3e-3
+"""1 − N² − C² − S² below this is rounding: of three decimals in each it reaches 0.0017."""
 
 
 class PsiDelta(NamedTuple):
-    """Ψ and Δ in degrees, and a sentence on the conversion."""
+    """Ψ and Δ in degrees, a sentence on the conversion, and the depolarisation, where it is known."""
 
     psi: Float[np.ndarray, " points"]
     delta: Float[np.ndarray, " points"]
     note: str | None = None
+    depolarisation: Float[np.ndarray, " points"] | None = None
 
 
 def ncs(psi: Float[np.ndarray, " points"], delta: Float[np.ndarray, " points"]) -> np.ndarray:
@@ -52,9 +55,11 @@ def from_ncs(table: Table, position: int, columns: Float[np.ndarray, "3 points"]
             f"{polarised[row]:.3g}, where about 1 is possible; correct or delete that row"
         )
     psi = np.rad2deg(0.5 * np.arctan2(np.hypot(columns[1], columns[2]), columns[0]))
-    span = f"{polarised.min():.4g} to {polarised.max():.4g}"
-    note = f"N, C, S converted to psi and delta; their degree of polarisation, {span}, was divided out"
-    return PsiDelta(psi, np.rad2deg(np.arctan2(columns[2], columns[1])), note)
+    delta, share = np.rad2deg(np.arctan2(columns[2], columns[1])), 1 - polarised**2
+    note = "N, C, S converted to psi and delta"
+    if np.max(np.abs(share)) < _ROUNDED:
+        return PsiDelta(psi, delta, note)
+    return PsiDelta(psi, delta, f"{note}, and 1 - N² - C² - S² read as the depolarisation", share)
 
 
 def from_alpha_beta(

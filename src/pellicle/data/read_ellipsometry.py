@@ -2,7 +2,8 @@
 
 Both are in degrees, with tan Ψ exp(iΔ) = conj(r_p / r_s) for n + ik: Δ is near 180 for bare silicon
 at small angles, as instruments write it. N = cos 2Ψ, C = sin 2Ψ cos Δ, S = sin 2Ψ sin Δ are equivalent;
-α and β of a rotating analyser lack only the sign of S, as does a Δ that is folded into 0 to 180.
+α and β of a rotating analyser lack only the sign of S, as does a Δ that is folded into 0 to 180. A column of
+depolarisation, 1 − N² − C² − S², is read with them.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pellicle.data import depolarisation
 from pellicle.data.ellipsometry_angles import (
     ALPHA_BETA,
     FORMS,
@@ -37,7 +39,8 @@ _EXAMPLE = '`columns=["wavelength", "angle", "psi", "delta"]`'
 
 @dataclass(frozen=True)
 class EllipsometryColumns:
-    """Columns of one form, with the errors of Ψ and Δ or none, and sentences on the choice."""
+    """Columns of one form, with the errors of Ψ and Δ or none, the depolarisation (and its error) or none,
+    and sentences on the choice."""
 
     wavelength: Column
     angle: Column | None
@@ -45,6 +48,7 @@ class EllipsometryColumns:
     values: tuple[Column, ...]
     analyser: Column | None
     errors: tuple[Column, ...]
+    depolarisation: tuple[Column, ...]
     notes: tuple[str, ...]
 
 
@@ -71,9 +75,15 @@ def read_ellipsometry(
     _check_form(table, chosen, folded, analyser)
     unit = axis_unit(table, chosen.wavelength, wavelength_unit)
     cells = (*chosen.values, *([chosen.analyser] if chosen.analyser else []), *chosen.errors)
-    wavelength, angle, read = read_axis(table, chosen.wavelength, chosen.angle, cells, unit)
-    psi, delta, note = _psi_delta(table, chosen, read, analyser)
+    wavelength, angle, every = read_axis(
+        table, chosen.wavelength, chosen.angle, (*cells, *chosen.depolarisation), unit
+    )
+    read, shares = every[: len(cells)], every[len(cells) :]
+    psi, delta, note, share = _psi_delta(table, chosen, read, analyser)
     errors = read[len(cells) - len(chosen.errors) :]
+    shares = depolarisation.fractions(chosen.depolarisation, shares)
+    if not shares and share is not None:
+        shares = [share]
     notes = [*table.notes, *chosen.notes, axis_note(unit), *([note] if note else [])]
     if noise is not None:
         errors = [np.full(psi.size, float(noise))] * 2
@@ -87,7 +97,9 @@ def read_ellipsometry(
         inside, note = inside_range(wavelength, range, table.path)
         rows, notes = rows[inside], [*notes, note]
     sigma = [error[rows] for error in errors]
+    shares = [share[rows] for share in shares]
     _check(table, chosen, rows, psi[rows], delta[rows], sigma, folded)
+    depolarisation.check(table, chosen.depolarisation, rows, shares)
     angle = None if angle is None else angle[rows]
     arrays = {
         "wavelength": wavelength[rows],
@@ -96,6 +108,7 @@ def read_ellipsometry(
         "angle": angle,
     }
     errors = {"sigma": sigma[0] if sigma else None, "delta_sigma": sigma[-1] if sigma else None}
+    errors |= dict(zip(("depolarisation", "depolarisation_sigma"), shares, strict=False))
     return of_rows(
         sweep_numbers(arrays["wavelength"], angle),
         arrays | errors | {"lines": table.source_lines(rows)},
@@ -166,13 +179,22 @@ def ellipsometry_columns(table: Table, columns: Sequence[Column] | None) -> Elli
     wavelength, angle = wavelength_and_angle(table, columns, _EXAMPLE)
     errors = _error_columns(table, columns) if form == PSI_DELTA else ()
     analyser = only(table, columns, "analyser") if form == ALPHA_BETA else None
-    read = [wavelength, *values, *errors, *([angle] if angle else []), *([analyser] if analyser else [])]
+    shares = depolarisation.columns(table, columns)
+    read = [
+        wavelength,
+        *values,
+        *errors,
+        *shares,
+        *([angle] if angle else []),
+        *([analyser] if analyser else []),
+    ]
     ignored = [c for c in columns if c not in read and c.name not in ("_", "")]
     notes = [f"{listed([wavelength])} read as the wavelength, {listed(values)} as {', '.join(form)}"]
     notes += [f"{listed(errors)} read as the standard deviation of psi and delta"] if errors else []
+    notes += depolarisation.notes(shares)
     notes += [f"{listed([angle])} read as the angle of incidence in degrees"] if angle else []
     notes += [f"ignored: {listed(ignored)}"] if ignored else []
-    return EllipsometryColumns(wavelength, angle, form, values, analyser, errors, tuple(notes))
+    return EllipsometryColumns(wavelength, angle, form, values, analyser, errors, shares, tuple(notes))
 
 
 def _by_position(table: Table) -> EllipsometryColumns:
@@ -183,7 +205,7 @@ def _by_position(table: Table) -> EllipsometryColumns:
         )
     wavelength, psi, delta = (Column(i, "", role) for i, role in enumerate(("wavelength", "psi", "delta")))
     note = "no header: column 1 read as the wavelength, column 2 as psi, column 3 as delta"
-    return EllipsometryColumns(wavelength, None, PSI_DELTA, (psi, delta), None, (), (note,))
+    return EllipsometryColumns(wavelength, None, PSI_DELTA, (psi, delta), None, (), (), (note,))
 
 
 def _error_columns(table: Table, columns: Sequence[Column]) -> tuple[Column, ...]:

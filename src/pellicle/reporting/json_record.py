@@ -70,7 +70,7 @@ def _data(part: Part, fit: Fit) -> dict[str, Any]:
         "sha256": data.sha256,
         "signal": getattr(data, "signal", "brdf"),
         "points": int(part.curve.model.size),
-        **({"spectrum": data.name} if getattr(data, "name", "") else {}),
+        **({"spectrum": name} if (name := getattr(data, "name", "")) else {}),
         **_depolarisation(part),
         **_sweeps(part, fit),
     }
@@ -78,12 +78,12 @@ def _data(part: Part, fit: Fit) -> dict[str, Any]:
 
 def _depolarisation(part: Part) -> dict[str, Any]:
     """Mean of a measured depolarisation and of its model, and the rms of the residuals."""
-    data = getattr(part.curve, "depolarisation_data", None)
-    if data is None:
+    data, model = (getattr(part.curve, f"depolarisation_{x}", None) for x in ("data", "model"))
+    if data is None or model is None:
         return {}
     numbers = {
         "mean": number(np.mean(data)),
-        "model": number(np.mean(part.spectral.depolarisation_model)),
+        "model": number(np.mean(model)),
         "rms": number(np.sqrt(np.mean(part.spectral.depolarisation_residual**2))),
     }
     return {"depolarisation": numbers}

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from pellicle.data.spectrum import Spectrum
 from pellicle.effects.plan import Plan
+from pellicle.errors import UsageError
 from pellicle.optics.ellipsometry import psi_delta
 from pellicle.planning.film import plan
 from pellicle.scene.film import Scene, with_wavelength
@@ -24,27 +25,45 @@ VISIBLE = (380.0, 780.0, 2.0)
 
 
 class SimulatedSignal(NamedTuple):
-    """A simulated signal with and without noise, (wavelengths,) or Ψ and Δ (wavelengths, 2), and its plan."""
+    """A simulated signal with and without noise, (wavelengths,) or Ψ and Δ (wavelengths, 2), and its plan.
+
+    `depolarisation` (wavelengths,) is without noise; None for R and T.
+    """
 
     wavelength: np.ndarray
     values: np.ndarray
     clean: np.ndarray
     plan: Plan
+    depolarisation: np.ndarray | None = None
 
 
 def simulate_spectrum(
-    scene: Scene, wavelength: ArrayLike | None = None, *, noise: float = 0.0, seed: int = 0
+    scene: Scene,
+    wavelength: ArrayLike | None = None,
+    *,
+    noise: float = 0.0,
+    seed: int = 0,
+    depolarisation_noise: float | None = None,
 ) -> Spectrum:
     """Simulate a spectrum of a film, as `pellicle.simulate` does.
 
     **Arguments:** `wavelength` in nm (`default_wavelengths` if None); `noise` the standard deviation of the
-    normal noise, in the unit of the signal, which becomes the σ of the spectrum; `seed` of the noise.
+    normal noise, in the unit of the signal, which becomes the σ of the spectrum; `seed` of the noise;
+    `depolarisation_noise` that of the depolarisation, a fraction; None leaves the depolarisation out.
 
-    **Raises:** ValueError where a material has no data at a wavelength.
+    **Raises:** ValueError where a material has no data at a wavelength; UsageError for a depolarisation of R
+    or T.
     """
     nm = default_wavelengths(scene) if wavelength is None else np.asarray(wavelength, dtype=float)
     light, ellipsometric = scene.light, scene.light.signal == "psi-delta"
-    values = simulate_signal(scene, nm, noise, seed).values
+    if depolarisation_noise is not None and not ellipsometric:
+        raise UsageError('`depolarisation_noise` goes with `signal="psi-delta"`: leave it out')
+    simulated = simulate_signal(scene, nm, noise, seed)
+    values, share, share_sigma = simulated.values, None, None
+    if depolarisation_noise is not None and simulated.depolarisation is not None:
+        own = np.random.default_rng((seed, 1)).normal(0.0, 1.0, nm.shape)
+        share = simulated.depolarisation + depolarisation_noise * own
+        share_sigma = np.full(nm.shape, depolarisation_noise) if depolarisation_noise > 0 else None
     psi_or_power, delta = values.T if ellipsometric else (values, None)
     sigma = np.full(nm.shape, noise) if noise > 0 else None
     angle = getattr(light.angle, "start", light.angle)
@@ -57,6 +76,8 @@ def simulate_spectrum(
         angle=np.broadcast_to(angle, nm.shape),
         delta=delta,
         delta_sigma=sigma if ellipsometric else None,
+        depolarisation=share,
+        depolarisation_sigma=share_sigma,
     )
 
 
@@ -80,13 +101,14 @@ def simulate_signal(
         fixed = eqx.tree_at(lambda s: s.instrument, fixed, instrument)
         chosen = plan(fixed, tolerance)
         signal = np.asarray(jax.jit(build(chosen))(tabulated(fixed, chosen.on("coherence"))))
-    clean = float(scale) * signal + float(offset)
+    clean, depolarisation = float(scale) * signal + float(offset), None
     if scene.light.signal == "psi-delta":
+        depolarisation = 1 - np.sum(clean.reshape(-1, 3) ** 2, axis=1)
         clean = np.stack(np.broadcast_arrays(*psi_delta(*clean.reshape(-1, 3).T)), axis=1)
     values = clean + noise * np.random.default_rng(seed).normal(0.0, 1.0, clean.shape)
     if scene.light.signal == "psi-delta":
         values = np.stack([np.clip(values[:, 0], 0.0, 90.0), np.mod(values[:, 1], 360.0)], axis=1)
-    return SimulatedSignal(wavelength, values, clean, chosen)
+    return SimulatedSignal(wavelength, values, clean, chosen, depolarisation)
 
 
 def default_wavelengths(scene: Scene) -> np.ndarray:

@@ -11,9 +11,12 @@ import tmm
 import pellicle as pl
 from pellicle.data.ellipsometry_angles import psi_delta
 from pellicle.data.repeated_sweeps import mean_spectrum
+from pellicle.errors import UsageError
 from pellicle.fitting.comparison import compare
+from pellicle.fitting.discrepancy import HALF_NORMAL
 from pellicle.fitting.problem import Problem
-from pellicle.fitting.spectra.fit import fitted
+from pellicle.fitting.spectra.fit import fitted, measurements
+from pellicle.fitting.spectra.systematic_effects import systematic_effects
 from pellicle.sampling.predict import predictions
 
 WAVELENGTH = np.linspace(400.0, 900.0, 64)
@@ -180,3 +183,41 @@ def test_the_mean_of_sweeps(measured):
     np.testing.assert_allclose(mean.depolarisation_sigma, SHARE / np.sqrt(3), rtol=1e-12)
     fit = pl.fit(mean, scene(WIDTH))
     assert any("thickness_spread differs by" in warning for warning in fit.warnings)
+
+
+def test_a_simulation_is_the_average_of_tmm(measured):
+    light = pl.Light(signal="psi-delta", angle=70.0)
+    instrument = pl.Instrument(thickness_spread=SPREAD)
+    film = pl.Scene(pl.Layer(1.46, THICKNESS), "Si", light=light, instrument=instrument)
+    _, _, share = averaged(THICKNESS, SPREAD)
+    clean = pl.simulate(film, WAVELENGTH, depolarisation_noise=0.0)
+    # nine nodes of the average here, more there
+    np.testing.assert_allclose(clean.depolarisation, share, atol=1e-6)
+    assert clean.depolarisation_sigma is None
+    noisy = pl.simulate(film, WAVELENGTH, noise=PSI, depolarisation_noise=SHARE)
+    assert np.std(noisy.depolarisation - share) == pytest.approx(SHARE, rel=0.3)
+    assert set(noisy.depolarisation_sigma) == {SHARE}
+    assert pl.simulate(film, WAVELENGTH, noise=PSI).depolarisation is None
+    with pytest.raises(UsageError, match="`depolarisation_noise` goes with"):
+        pl.simulate(pl.Scene(pl.Layer(1.46, 100.0), "Si"), depolarisation_noise=0.0)
+
+
+def test_effects_depolarise(ranked, measured):
+    """A bandwidth that the scene leaves out, against a simulation that has it: of its own size, times the
+    root mean square of a half-normal prior on the variance."""
+    _, problem = ranked
+    [view], values = problem.views, np.array([THICKNESS, SPREAD])
+    allowed = scene(WIDTH)
+    allowed = replace(allowed, uncertainty=replace(pl.Uncertainty.none(), bandwidth=0.5))
+    [target] = measurements(measured, allowed)
+    [effect] = systematic_effects(view, values, view.local(values), target.scene)
+    light = pl.Light(signal="psi-delta", angle=70.0)
+
+    def share(**more):
+        instrument = pl.Instrument(thickness_spread=SPREAD, **more)
+        film = pl.Scene(pl.Layer(1.46, THICKNESS), "Si", light=light, instrument=instrument)
+        return pl.simulate(film, WAVELENGTH, depolarisation_noise=0.0).depolarisation
+
+    expected = HALF_NORMAL * (share(bandwidth=0.5) - share())
+    # the average of normalised Stokes parameters instead of intensities
+    np.testing.assert_allclose(effect.change[:, -1], expected, atol=0.1 * np.abs(expected).max())
