@@ -9,13 +9,23 @@ from pathlib import Path
 from pellicle.materials.page import contents, csv_contents, load_yaml, plain_text, short_citation
 
 DATA = Path(__file__).parents[1] / "src/pellicle/materials/data"
-SHELVES = ("glass", "main", "other", "popular_glass")
+SHELVES = ("glass", "main", "organic", "other", "popular_glass", "specs")
+BOOKS_OF_SEVERAL_WORDS = (
+    "Microchem_SU8_3000",
+    "poly_methyl_methacrylate",
+    "polyethylene_terephthalate",
+    "polyvinyl_alcohol",
+    "stainless_steel",
+)
 SOPRA = {
     "CU2O": "Cu2O",
     "CUO": "CuO",
     "HFO2": "HfO2",
     "ITO2": "In2O3-SnO2",
+    "MO": "Mo",
+    "PBS": "PbS",
     "SIO": "SiO",
+    "TA": "Ta",
     "TIO2": "TiO2",
     "TIO2B": "TiO2",
     "Y2O3": "Y2O3",
@@ -31,7 +41,10 @@ MODEL_CITATION = (
 def database_rows():
     for file in sorted((DATA / "refractiveindex.info").glob("*.yml")):
         shelf = next(s for s in SHELVES if file.stem.startswith(s + "_"))
-        book, page = file.stem.removeprefix(shelf + "_").split("_", 1)
+        name = file.stem.removeprefix(shelf + "_")
+        several = next((b for b in BOOKS_OF_SEVERAL_WORDS if name.startswith(b + "_")), None)
+        book = several or name.split("_", 1)[0]
+        page = name.removeprefix(book + "_")
         content = load_yaml(file.read_text(encoding="utf-8"))
         page_contents = contents(content)
         references = content["REFERENCES"]

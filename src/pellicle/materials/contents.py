@@ -116,13 +116,22 @@ def pages_of_book(book: str) -> list[Page]:
 
 
 def covering(path: str, low: float, high: float) -> list[str]:
-    """The pages of the same book that cover `low` to `high` nm, as book/page."""
-    book = path.split("/")[-2] if path.count("/") == 2 else None
+    """The pages of the same form of the same material that cover `low` to `high` nm, as book/page."""
     return [
-        page.path if book is None else f"{page.book}/{page.page}"
+        f"{page.book}/{page.page}"
         for page in pages()
-        if page.book == book and page.low <= low and page.high >= high
+        if page.low <= low and page.high >= high and _form(page.path) == _form(path)
     ]
+
+
+def _form(path: str) -> tuple[str, str, bool]:
+    """What a page describes: its book, the form of the material, and whether the extraordinary ray.
+
+    A form has a name of its own beside that of the book, as amorphous silicon in the book of silicon.
+    """
+    book, page = path.split("/")[-2:] if path.count("/") == 2 else ("", path)
+    own = next((entry.name for entry in names() if entry.page and entry.page.path == path), book)
+    return book, own if find_name(book) else book, page.endswith("-e")
 
 
 def known_words() -> list[str]:

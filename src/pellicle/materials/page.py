@@ -164,7 +164,7 @@ def short_citation(markup: str | None) -> str:
     lines = [text for text in map(plain_text, (markup or "").splitlines()) if text]
     if not lines:
         return ""
-    names = _END_OF_NAMES.split(re.sub(r"^\d\)\s*", "", lines[0]))[0]
+    names = _END_OF_NAMES.split(re.sub(r"^\d\)\s*|\s*\(.*|\.$", "", lines[0]))[0]
     authors = [name for name in re.split(r"\s*,\s*|\s+and\s+", names) if re.search(r"[^\W\d_]{2}", name)]
     surname = _INITIALS.sub("", authors[0]) if authors else names[:30]
     shared = " et al." if len(authors) > 1 else ""
