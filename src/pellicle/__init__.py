@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from pellicle.data.read_spectrum import read_spectra as read_spectra
     from pellicle.data.read_spectrum import read_spectrum as read_spectrum
     from pellicle.data.spectrum import Spectrum as Spectrum
+    from pellicle.data.write_spectrum import write_spectrum as write_spectrum
     from pellicle.dispersion import effective_medium as mixing  # noqa: F401
     from pellicle.fitting.result import Fit as Fit
     from pellicle.fitting.result import Status as Status
@@ -51,6 +52,7 @@ _NAMES = {
     "pellicle.data.read_brdf": ("read_brdf_samples",),
     "pellicle.data.read_spectrum": ("read_spectra", "read_spectrum"),
     "pellicle.data.spectrum": ("Spectrum",),
+    "pellicle.data.write_spectrum": ("write_spectrum",),
     "pellicle.fitting.result": ("Fit", "Status"),
     "pellicle.materials": ("material",),
     "pellicle.recipes.read": ("read_recipe",),

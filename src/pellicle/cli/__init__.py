@@ -18,6 +18,7 @@ from pellicle.cli.interruption import interruptible
 from pellicle.cli.materials import materials
 from pellicle.cli.messages import as_flags
 from pellicle.cli.plan import plan
+from pellicle.cli.read import read
 from pellicle.cli.sample import sample
 from pellicle.cli.session import say
 from pellicle.cli.simulate import simulate
@@ -37,6 +38,7 @@ app = App(
 )
 app.command(fit)
 app.command(sample)
+app.command(read)
 app.command(simulate)
 app.command(plan)
 app.command(compare)

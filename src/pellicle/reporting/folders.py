@@ -81,13 +81,24 @@ def chain_file(folder: str | os.PathLike[str]) -> Path:
 def folder_per_file(folder: str | os.PathLike[str], paths: Sequence[str | os.PathLike[str]]) -> list[Path]:
     """Folder of each file's fit: `folder` itself for one file, else sub-folders named by the files' stems.
 
-    A path may end with the name of one of the file's spectra in brackets, which is added to the stem.
-    A stem that occurred before, in whatever case, gets -2, -3, ... For several files `folder` is made, and
-    its result.json lists the sub-folder of each file. Raises UsageError as `write_fit` does.
+    For several files `folder` is made, and its result.json lists the sub-folder of each file. Raises
+    UsageError as `write_fit` does.
     """
     if len(paths) < 2:
         return [Path(folder) for _ in paths]
-    root, taken, names = new_folder(folder), {MARKER, SUMMARY, *REPEATS}, []
+    root, names = new_folder(folder), distinct_stems(paths, {MARKER, SUMMARY, *REPEATS})
+    files = [{"path": os.fspath(path), "folder": name} for path, name in zip(paths, names, strict=True)]
+    index = {"schema": INDEX_SCHEMA, "files": files, "versions": versions()}
+    write_text(root / MARKER, indented(index), overwrite=True)
+    return [root / name for name in names]
+
+
+def distinct_stems(paths: Sequence[str | os.PathLike[str]], taken: Iterable[str] = ()) -> list[str]:
+    """Name for each file: its stem, and -2, -3, ... where that is taken, in whatever case.
+
+    A path may end with the name of one of the file's spectra in brackets, which is added to the stem.
+    """
+    taken, names = {name.casefold() for name in taken}, []
     for path in paths:
         file, _, spectrum = os.fspath(path).removesuffix("]").partition(" [")
         words = [Path(file).stem, *re.findall(r"[\w.+%-]+", spectrum)]
@@ -98,10 +109,7 @@ def folder_per_file(folder: str | os.PathLike[str], paths: Sequence[str | os.Pat
             name = f"{stem}-{count}"
         names.append(name)
         taken.add(name.casefold())
-    files = [{"path": os.fspath(path), "folder": name} for path, name in zip(paths, names, strict=True)]
-    index = {"schema": INDEX_SCHEMA, "files": files, "versions": versions()}
-    write_text(root / MARKER, indented(index), overwrite=True)
-    return [root / name for name in names]
+    return names
 
 
 def write_summary(path: str | os.PathLike[str], records: Iterable[Mapping[str, Any]]) -> None:

@@ -1,0 +1,108 @@
+"""`pellicle read`: what a file of measurements holds, and its conversion to CSV, NetCDF or NeXus."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from pellicle.cli.flags import OUTPUT, ReadingFlags, flag, switch
+from pellicle.cli.messages import as_flags
+from pellicle.cli.session import say
+from pellicle.errors import UsageError
+
+if TYPE_CHECKING:
+    from pellicle.data.spectrum import Spectrum
+
+SUFFIXES = {"csv": ".csv", "netcdf": ".nc", "nexus": ".nxs"}
+GOOD, BAD_DATA = 0, 3
+
+
+def read(
+    *data: Annotated[str, Parameter(help="Files of measurements.")],
+    reading: Annotated[ReadingFlags | None, Parameter(name="*")] = None,
+    out: Annotated[
+        str | None, flag(OUTPUT, "Folder for the spectra and their figures; existing files stay.")
+    ] = None,
+    to: Annotated[
+        str, flag(OUTPUT, "Format of the spectra: csv, netcdf or nexus, or several (csv,nexus).")
+    ] = "csv",
+    json: Annotated[bool, switch(OUTPUT, "Print one JSON object per spectrum.")] = False,
+) -> int:
+    """Show what is understood of files, without fitting, and convert them.
+
+    Example: pellicle read wafer.txt --out converted --to csv,nexus
+    """
+    flags = reading or ReadingFlags()
+    if not data:
+        raise UsageError("no data: name the files, as in pellicle read oxide.csv")
+    if unused := [
+        name for name in ("reference", "reference_material", "dark", "loss") if getattr(flags, name)
+    ]:
+        raise UsageError(f"--{unused[0].replace('_', '-')} is for a fit; leave it out")
+    formats = [word.strip() for word in to.split(",")]
+    if unknown := [word for word in formats if word not in SUFFIXES]:
+        raise UsageError(f"--to must be of {', '.join(SUFFIXES)}, not {unknown[0]!r}")
+    worst, found = GOOD, []
+    for path in data:
+        try:
+            found += _spectra(path, flags)
+        except ValueError as error:
+            worst = BAD_DATA
+            _report_error(path, as_flags(str(error)), json)
+            continue
+    for spectrum in found:
+        _show(spectrum, json)
+    if out is not None:
+        _write(Path(out), found, [SUFFIXES[word] for word in formats])
+    return worst
+
+
+def _spectra(path: str, flags: ReadingFlags) -> list[Spectrum]:
+    """Every spectrum of a file, unless one is chosen."""
+    from dataclasses import replace
+
+    from pellicle.cli.options import read as read_file
+    from pellicle.cli.options import wavelength_range
+
+    every = replace(flags, spectrum=flags.spectrum or "all", range=wavelength_range(flags.range))
+    return read_file(path, every, free_scale=False)
+
+
+def _report_error(path: str, message: str, as_json: bool) -> None:
+    from pellicle.reporting.json_record import error_record, one_line
+
+    message = message if path in message else f"{path}: {message}"
+    say(f"pellicle: {message}")
+    if as_json:
+        print(one_line(error_record(message, BAD_DATA)), flush=True)
+
+
+def _show(spectrum: Spectrum, as_json: bool) -> None:
+    from pellicle.reporting.json_record import one_line
+    from pellicle.reporting.spectrum_text import describe, to_json
+
+    if as_json:
+        print(one_line(to_json(spectrum)), flush=True)
+    else:
+        print(describe(spectrum, tuple(map(as_flags, spectrum.notes))), flush=True)
+
+
+def _write(folder: Path, spectra: list[Spectrum], suffixes: list[str]) -> None:
+    from pellicle.data.write_spectrum import write_spectrum
+    from pellicle.reporting.drawing import save_figure
+    from pellicle.reporting.folders import distinct_stems
+    from pellicle.reporting.spectrum_figure import draw
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(
+            f"--out {folder}: cannot be made ({error.strerror}); choose another folder"
+        ) from None
+    labels = [f"{one.path} [{one.name}]" if one.name else one.path for one in spectra]
+    for spectrum, stem in zip(spectra, distinct_stems(labels), strict=True):
+        written = [write_spectrum(folder / f"{stem}{suffix}", spectrum) for suffix in suffixes]
+        written.append(save_figure(draw(spectrum), folder / f"{stem}.png"))
+        say(f"{folder}: {', '.join(path.name for path in written)} written")

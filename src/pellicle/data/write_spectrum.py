@@ -1,0 +1,156 @@
+"""Writing of spectra as CSV, NetCDF or NeXus."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pellicle.data.spectrum import Spectrum
+from pellicle.errors import UsageError, install_command
+from pellicle.files import replacing
+
+_POLARISED = {"s": "s", "p": "p", "unpolarised": ""}
+
+
+class _Column(NamedTuple):
+    """A column of a CSV, its unit, and its name in NetCDF and NeXus."""
+
+    header: str
+    values: np.ndarray
+    unit: str
+    name: str
+
+
+def write_spectrum(path: str | os.PathLike[str], spectrum: Spectrum, *, overwrite: bool = False) -> Path:
+    """Write a spectrum as CSV, NetCDF or NeXus, by the suffix of the path: .csv, .nc or .nxs.
+
+    A CSV is read back unchanged by `read_spectrum`, repeated sweeps included. NetCDF is for xarray
+    (`xarray.open_dataset(path, engine="h5netcdf")`). NeXus has an NXdata group under the definition
+    NXellipsometry for Ψ and Δ, NXoptical_spectroscopy for reflectance and transmittance. NetCDF and NeXus
+    hold the mean of repeated sweeps and need the extra `formats`.
+
+    **Arguments:** `path` of the file; `spectrum`; `overwrite` an existing file.
+
+    **Returns:** the path.
+
+    **Raises:** UsageError for another suffix, a missing package, or a file that exists without `overwrite` or
+    cannot be written.
+    """
+    target = Path(path)
+    write = _WRITERS.get(target.suffix.lower())
+    if write is None:
+        raise UsageError(f"`path` {target}: expected a name ending in {', '.join(_WRITERS)}")
+    with replacing(target, overwrite=overwrite) as draft:
+        write(draft, spectrum)
+    return target
+
+
+def _columns(spectrum: Spectrum) -> list[_Column]:
+    """Axis, angle, values and errors of a spectrum, as far as it has them."""
+    found = [_Column("wavelength_nm", spectrum.wavelength, "nm", "wavelength")]
+    if spectrum.angle is not None:
+        found.append(_Column("angle_deg", spectrum.angle, "degree", "angle_of_incidence"))
+    if spectrum.delta is not None:
+        found.append(_Column("psi_deg", spectrum.values, "degree", "psi"))
+        found.append(_Column("delta_deg", spectrum.delta, "degree", "delta"))
+        errors = [("sigma_psi", spectrum.sigma, "psi"), ("sigma_delta", spectrum.delta_sigma, "delta")]
+        found += [_Column(f"{n}_deg", x, "degree", f"{of}_errors") for n, x, of in errors if x is not None]
+        for header, values in (
+            ("depolarisation", spectrum.depolarisation),
+            ("sigma_depolarisation", spectrum.depolarisation_sigma),
+        ):
+            if values is not None:
+                name = header if header == "depolarisation" else "depolarisation_errors"
+                found.append(_Column(header, values, "", name))
+        return found
+    header = f"{spectrum.signal}{_POLARISED[spectrum.polarisation]}"
+    if spectrum.signal == "counts" or not spectrum.calibrated:
+        header = "counts" if spectrum.signal == "counts" else "intensity"
+    name = {"R": "reflectance", "T": "transmittance"}.get(spectrum.signal, "counts")
+    found.append(_Column(header, spectrum.values, "", name))
+    if spectrum.sigma is not None:
+        found.append(_Column("sigma", spectrum.sigma, "", f"{name}_errors"))
+    return found
+
+
+def _facts(spectrum: Spectrum) -> list[tuple[str, str]]:
+    """Origin of a spectrum, as pairs of a key and a value without line breaks."""
+    pairs = [
+        ("source", Path(spectrum.path).name),
+        ("sha256", spectrum.sha256),
+        ("name", spectrum.name),
+        *spectrum.declared,
+        ("signal" if spectrum.calibrated else "uncalibrated", spectrum.signal),
+        ("polarisation", spectrum.polarisation if spectrum.delta is None else ""),
+        ("delta", "folded into 0 to 180 degrees" if spectrum.folded else ""),
+        ("written_by", f"pellicle {version('pellicle')}"),
+    ]
+    return [(key, " ".join(value.split())) for key, value in pairs if value.strip()]
+
+
+def _write_csv(path: Path, spectrum: Spectrum) -> None:
+    columns = [_columns(sweep) for sweep in spectrum.sweeps or (spectrum,)]
+    headers = ",".join(column.header for column in columns[0])
+    rows = [
+        ",".join(repr(float(x)) for x in row)
+        for sweep in columns
+        for row in zip(*(column.values for column in sweep), strict=True)
+    ]
+    comments = [f"# {key} = {value}" for key, value in _facts(spectrum)]
+    path.write_text("\n".join([*comments, headers, *rows, ""]), encoding="utf-8", newline="\n")
+
+
+def _write_netcdf(path: Path, spectrum: Spectrum) -> None:
+    xarray = _imported("xarray")
+    _imported("h5netcdf")
+    columns = _columns(spectrum)
+    arrays = {c.name: ("point", c.values, {"units": c.unit or "1"}) for c in columns}
+    # several angles repeat the wavelengths, so that these are no index
+    xarray.Dataset(arrays, attrs=dict(_facts(spectrum))).to_netcdf(path, engine="h5netcdf")
+
+
+def _write_nexus(path: Path, spectrum: Spectrum) -> None:
+    h5py = _imported("h5py")
+    of_angles = spectrum.delta is not None
+    with h5py.File(path, "w") as file:
+        entry = _group(file, "entry", "NXentry", default="data")
+        entry["definition"] = "NXellipsometry" if of_angles else "NXoptical_spectroscopy"
+        entry["title"] = spectrum.name or Path(spectrum.path).stem or "spectrum"
+        process = _group(entry, "origin", "NXprocess")
+        for key, value in _facts(spectrum):
+            process[key] = value
+        columns = _columns(spectrum)
+        signals = [c.name for c in columns if c.name in ("psi", "reflectance", "transmittance", "counts")]
+        others = [c.name for c in columns if c.name in ("delta", "depolarisation")]
+        data = _group(entry, "data", "NXdata", signal=signals[0], axes=["wavelength"])
+        if others:
+            data.attrs["auxiliary_signals"] = others
+        for column in columns:
+            data.create_dataset(column.name, data=column.values).attrs["units"] = column.unit
+
+
+def _group(parent: Any, name: str, kind: str, **attributes: Any) -> Any:
+    group = parent.create_group(name)
+    group.attrs.update({"NX_class": kind, **attributes})
+    return group
+
+
+def _imported(package: str) -> Any:
+    import importlib
+
+    try:
+        return importlib.import_module(package)
+    except ImportError:
+        raise UsageError(f"NetCDF and NeXus need {package}: {install_command('formats')}") from None
+
+
+_WRITERS: dict[str, Callable[[Path, Spectrum], None]] = {
+    ".csv": _write_csv,
+    ".nc": _write_netcdf,
+    ".nxs": _write_nexus,
+}

@@ -1,0 +1,63 @@
+"""Figure of a measured spectrum."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pellicle.data.spectrum import Spectrum
+from pellicle.reporting.drawing import BLACK, BLUE, GREEN, ORANGE, marker_size, new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_LABELS = {"R": "reflectance", "T": "transmittance", "counts": "counts", "psi-delta": "Ψ (degrees)"}
+
+
+def draw(spectrum: Spectrum) -> Figure:
+    """Draw the values against wavelength, with their errors; Ψ, Δ and the depolarisation in panels.
+
+    Values at one wavelength are drawn against the angle of incidence.
+    """
+    label = _LABELS[spectrum.signal] + ("" if spectrum.calibrated else " × unknown scale")
+    panels = [(label, spectrum.values, spectrum.sigma)]
+    if spectrum.delta is not None:
+        panels.append(("Δ (degrees)", spectrum.delta, spectrum.delta_sigma))
+    if spectrum.depolarisation is not None:
+        panels.append(("depolarisation", spectrum.depolarisation, spectrum.depolarisation_sigma))
+    figure = new_figure(7.0, 1.6 + 2.0 * len(panels))
+    rows = figure.subplots(len(panels), sharex=True, squeeze=False)[:, 0]
+    for axes, (name, values, errors) in zip(rows, panels, strict=True):
+        _panel(axes, spectrum, values, errors)
+        axes.set_ylabel(name)
+        axes.margins(x=0.01)
+    against_angle = _against_angle(spectrum)
+    rows[-1].set_xlabel("angle of incidence (degrees)" if against_angle else "wavelength (nm)")
+    if spectrum.angle is not None and not against_angle:
+        rows[0].legend(frameon=False, markerscale=3, fontsize="small")
+    title = f"{spectrum.path} [{spectrum.name}]" if spectrum.name else spectrum.path
+    figure.suptitle(title.replace("$", r"\$"), fontsize="medium")
+    return figure
+
+
+def _against_angle(spectrum: Spectrum) -> bool:
+    return spectrum.angle is not None and spectrum.wavelength[0] == spectrum.wavelength[-1]
+
+
+def _panel(axes: Axes, spectrum: Spectrum, values: np.ndarray, errors: np.ndarray | None) -> None:
+    """One panel, a colour for each angle of incidence."""
+    against_angle = _against_angle(spectrum)
+    x = spectrum.angle if against_angle else spectrum.wavelength
+    angles = [None] if spectrum.angle is None or against_angle else np.unique(spectrum.angle)
+    colours = (BLACK, ORANGE, BLUE, GREEN)
+    for i, angle in enumerate(angles):
+        rows = np.arange(len(spectrum)) if angle is None else np.flatnonzero(spectrum.angle == angle)
+        at, own, colour = x[rows], values[rows], colours[i % len(colours)]
+        size = marker_size(rows.size)
+        name = None if angle is None else f"{angle:g}°"
+        axes.plot(at, own, ".-", color=colour, markersize=size, linewidth=0.6, label=name)
+        if errors is not None:
+            sigma = errors[rows]
+            axes.fill_between(at, own - sigma, own + sigma, color=colour, alpha=0.2, linewidth=0)

@@ -1,0 +1,63 @@
+"""`pellicle read`: what is understood of files, and their conversion."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pellicle.data.read_spectrum import read_spectrum
+
+WIDE = "Instrument: X-100\nY units: %R\nWavelength (nm),left,right\n" + "".join(
+    f"{nm},{20 + nm / 100},{30 + nm / 100}\n" for nm in range(400, 500, 10)
+)
+
+
+def test_every_spectrum_is_described(pellicle, write):
+    path = write(WIDE)
+    ran = pellicle("read", path)
+    assert ran.code == 0
+    assert ran.out.count(str(path)) == 2
+    for words in ("left", "right", "400 to 490 nm", "10 points", "X-100", "signal unit: percent"):
+        assert words in ran.out
+
+
+def test_the_record(pellicle, write):
+    ran = pellicle("read", write(WIDE), "--spectrum", "right", "--json")
+    [record] = ran.objects
+    assert record["name"] == "right"
+    assert record["values"]["values"] == [0.34, 0.349]
+    assert record["declared"] == {"instrument": "X-100"}
+    assert record["range_nm"] == [400, 490]
+
+
+def test_noise_is_the_scatter_of_neighbours(pellicle, write):
+    noise = np.random.default_rng(5).normal(0, 0.01, 2000)
+    rows = [f"{400 + i / 10},{0.3 + 0.1 * np.sin(i / 300) + x}" for i, x in enumerate(noise)]
+    [record] = pellicle("read", write("nm,R\n" + "\n".join(rows)), "--json").objects
+    np.testing.assert_allclose(record["noise"]["values"], 0.01, rtol=0.1)
+
+
+def test_conversion(pellicle, write, tmp_path):
+    folder = tmp_path / "converted"
+    ran = pellicle("read", write(WIDE), "--out", folder)
+    assert ran.code == 0
+    assert sorted(path.name for path in folder.iterdir()) == [
+        *("film-left.csv", "film-left.png", "film-right.csv", "film-right.png"),
+    ]
+    np.testing.assert_allclose(read_spectrum(folder / "film-right.csv").values[0], 0.34, rtol=1e-15)
+    again = pellicle("read", write(WIDE), "--out", folder)
+    assert again.code == 2
+    assert "is not overwritten" in again.err
+
+
+def test_a_bad_file_does_not_stop_the_others(pellicle, write):
+    ran = pellicle("read", write("nothing", "bad.csv"), write(WIDE), "--json")
+    assert ran.code == 3
+    assert [record["schema"] for record in ran.objects] == ["pellicle.error/1"] + ["pellicle.spectrum/1"] * 2
+    assert "bad.csv" in ran.err
+
+
+def test_wrong_usage(pellicle, write):
+    path = write(WIDE)
+    assert pellicle("read").code == 2
+    assert "csv, netcdf, nexus" in pellicle("read", path, "--to", "xlsx").err
+    assert "--dark is for a fit" in pellicle("read", path, "--dark", "dark.csv").err
