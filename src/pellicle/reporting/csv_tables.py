@@ -138,7 +138,8 @@ def _joint_rows(part: Part) -> Iterable[tuple[str | float, ...]]:
 def _csv(about: Iterable[str], fit: Fit, names: list[str], rows: Iterable[Iterable[str | float]]) -> str:
     """The table below its comments: what it is, the path (on one line) and hash of each source."""
     sources = [
-        f"from {' '.join(part.data.path.split()) or 'no file'}, sha256 {part.data.sha256 or 'unknown'}"
+        f"from {' '.join(getattr(part.data, 'source', part.data.path).split()) or 'no file'},"
+        f" sha256 {part.data.sha256 or 'unknown'}"
         for part in fit.parts
     ]
     text = StringIO()

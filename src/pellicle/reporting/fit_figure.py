@@ -116,10 +116,22 @@ def _panels_of_data(part: Part) -> list[_Panel]:
 
 
 def _title(fit: Fit) -> str:
-    name = " and ".join(part.data.path.replace("\\", "/").rsplit("/", 1)[-1] for part in fit.parts)
+    name = " and ".join(_file_names(fit))
     verdict = textwrap.wrap(fit.verdict.replace(" ± ", "\u00a0±\u00a0"), 108, break_on_hyphens=False)
     text = "\n".join([f"{textwrap.shorten(name, 70) or 'spectrum'}: {fit.status}", *verdict])
     return text.replace("$", r"\$")  # no mathematics in a file's name
+
+
+def _file_names(fit: Fit) -> list[str]:
+    """Each file without its folder, and the names of its spectra: `film.dat [psi-delta, Rp]`."""
+    spectra: dict[str, list[str]] = {}
+    for part in fit.parts:
+        names = spectra.setdefault(part.data.path, [])
+        names += [own] if (own := getattr(part.data, "name", "")) else []
+    return [
+        path.replace("\\", "/").rsplit("/", 1)[-1] + (f" [{', '.join(names)}]" if names else "")
+        for path, names in spectra.items()
+    ]
 
 
 def _series(part: Part) -> list[np.ndarray]:

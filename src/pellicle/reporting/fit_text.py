@@ -71,7 +71,7 @@ def report(fit: Fit, posterior: Posterior | None = None) -> str:
 def _verdict(fit: Fit) -> list[str]:
     rows = [("status", f"{fit.status}. {ADVICE[fit.status]}")]
     for part in fit.parts:
-        path = part.data.path
+        path = getattr(part.data, "source", part.data.path)
         room = COLUMNS - 2 * len(INDENT) - len("status")
         short = path if len(path) <= room else "…" + path[1 - room :]
         rows += [("file", short)] if path else []
@@ -84,7 +84,8 @@ def _verdict(fit: Fit) -> list[str]:
 def _spectrum(part: Part) -> str:
     """`R, 41 points from 400 to 800 nm`."""
     data, nm = part.spectrum, part.spectral.wavelength
-    text = f"{data.signal}, {nm.size} points"
+    light = "" if data.polarisation == "unpolarised" else f" of {data.polarisation}-polarised light"
+    text = f"{data.signal}{light}, {nm.size} points"
     if nm.size:
         text += _range(nm, "nm")
         if data.signal == "psi-delta" and data.angle is not None:

@@ -16,6 +16,9 @@ from pellicle.fitting.evaluation import deviances, total_deviance
 from pellicle.fitting.spectra.fit import labels, measurements
 from pellicle.fitting.spectra.problem import make
 from pellicle.fitting.spectra.targets import measured
+from pellicle.reporting.fit_figure import draw
+from pellicle.reporting.fit_text import report
+from pellicle.reporting.json_record import to_json
 
 WAVELENGTH = np.linspace(400.0, 900.0, 60)
 GLASS = 1.52
@@ -236,3 +239,49 @@ def test_an_absorbing_film_on_a_plate_from_both_its_faces():
     assert "The back face matters" in found.verdict
     for name, truth in (("thickness", 150.0), ("A", 2.0), ("B", 2e4), ("k0", 0.1), ("Eu", 0.3)):
         assert abs(found[name].value - truth) < 4 * found[name].stderr
+
+
+@pytest.fixture(scope="module")
+def polarised() -> str:
+    """Ψ, Δ, R_p and R_s at 70° of one film in one table, as ellipsometers with a photometer write it."""
+    rng, rows = np.random.default_rng(3), []
+    for nm in WAVELENGTH:
+        stack = [1, 2.0 + 2e4 / nm**2, GLASS], [np.inf, 150.0, np.inf], np.deg2rad(70.0), nm
+        p, s = (tmm.coh_tmm(x, *stack)["R"] + rng.normal(0, 0.002) for x in "ps")
+        angles = tmm.ellips(*stack)
+        psi = np.rad2deg(angles["psi"]) + rng.normal(0, 0.05)
+        delta = (180.0 - np.rad2deg(angles["Delta"]) + rng.normal(0, 0.1)) % 360
+        rows.append(f"{nm:.10g},70,{psi:.8g},{delta:.8g},{p:.8g},{s:.8g}")
+    return "wavelength_nm,angle_deg,psi_deg,delta_deg,Rp,Rs\n" + "\n".join(rows) + "\n"
+
+
+def test_ellipsometry_with_both_polarised_reflectances(polarised, write):
+    """One scene for all: each spectrum brings its signal and its polarisation."""
+    spectra = pl.read_spectra(write(polarised))
+    assert [(s.name, s.signal, s.polarisation) for s in spectra] == [
+        ("psi-delta", "psi-delta", "unpolarised"),
+        ("Rp", "R", "p"),
+        ("Rs", "R", "s"),
+    ]
+    layer = pl.Layer(pl.dispersion.Cauchy(FREE[1], FREE[2]), FREE[0])
+    fit = pl.fit(spectra, pl.Scene(layer, GLASS))
+    assert fit.status == "converged"
+    for name, truth in (("thickness", 150.0), ("A", 2.0), ("B", 2e4)):
+        # σ comes from the residuals of each
+        assert abs(fit[name].value - truth) < 4 * fit[name].stderr_noise
+    assert [part.name for part in fit.parts] == ["film-psi-delta", "film-Rp", "film-Rs"]
+    assert [(part.plan.signal, part.plan.polarisation) for part in fit.parts] == [
+        ("psi-delta", "unpolarised"),
+        ("R", "p"),
+        ("R", "s"),
+    ]
+    for part in fit.parts[1:]:
+        assert part.rms == pytest.approx(0.002, rel=0.3)
+    text = " ".join(report(fit).split())
+    for name in ("psi-delta", "Rp", "Rs"):
+        assert f"film.csv [{name}]" in text
+    assert [one["spectrum"] for one in to_json(fit)["data"]] == ["psi-delta", "Rp", "Rs"]
+    figure = draw(fit)
+    assert "film.csv [psi-delta, Rp, Rs]: converged" in figure.get_suptitle()
+    titles = [axes.get_title(loc="left") for axes in figure.axes]
+    assert [title for title in titles if title] == ["film-psi-delta", "film-Rp", "film-Rs"]
