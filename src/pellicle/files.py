@@ -14,6 +14,7 @@ import errno
 import os
 import platform
 import re
+import shutil
 import tempfile
 import time
 import zlib
@@ -67,6 +68,19 @@ def replacing(path: str | os.PathLike[str], *, overwrite: bool = False) -> Itera
         raise _not_written(target, error) from None
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def check_space(path: Path, size: int) -> None:
+    """Raise OSError where the disk has no room for `size` bytes in a file, which stays empty.
+
+    For writers that cannot take the error themselves.
+    """
+    with path.open("rb+") as file:
+        if hasattr(os, "posix_fallocate"):
+            os.posix_fallocate(file.fileno(), 0, size)  # knows quotas and limits of file sizes, too
+            file.truncate(0)
+        elif shutil.disk_usage(path.parent).free < size:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
 def write_text(path: str | os.PathLike[str], text: str, *, overwrite: bool = False) -> None:

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import json
 import math
+from datetime import UTC, datetime, timedelta
+from hashlib import sha256
+from importlib.metadata import version
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -57,6 +61,10 @@ def test_files_open_in_the_programs_they_are_for(sampled, folder):
     repeated, measured = data.posterior_predictive["R"], data.observed_data["R"]
     low, high = np.quantile(repeated[0], [0.025, 0.975], axis=0)
     assert 0.88 <= float(np.mean((measured >= low) & (measured <= high))) <= 1.0
+    assert data.attrs["data_sha256"] == sha256(Path(found["data"]["path"]).read_bytes()).hexdigest()
+    assert data.attrs["pellicle_version"] == version("pellicle")
+    assert "upper=800" in data.attrs["scene"]
+    assert datetime.fromisoformat(data.attrs["date"]) > datetime.now(UTC) - timedelta(hours=1)
     for name in ("corner.png", "predictive.png", "figure.png"):
         assert np.ptp(imread(folder / name)[..., :3]) > 0.5
 

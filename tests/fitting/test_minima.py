@@ -102,7 +102,7 @@ def test_starts_go_in_calls_of_one_size_and_come_back_in_their_order(solver, mon
     result = solve(problem(), unit([100.0, 400.0, 1000.0]), progress=lambda *r: reports.append(r))
     assert [len(call) for call in third.calls] == [2, 1]
     np.testing.assert_allclose(result.units, unit([500.0, 600.0, 800.0]))
-    assert reports == [("polish", 2, 3), ("polish", 3, 3)]
+    assert reports == [("polish", 0, 3), ("polish", 2, 3), ("polish", 3, 3)]
 
 
 def test_a_fixed_parameter_has_no_room(monkeypatch):

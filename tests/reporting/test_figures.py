@@ -91,6 +91,14 @@ def test_panels_and_their_labels_are_apart_and_inside_the_figure(fit, with_part,
     assert all(box.x0 >= 0 and box.x1 <= drawn.bbox.x1 for box in boxes)
 
 
+def test_no_legend_hides_residuals(fit):
+    figure = draw(fit)
+    figure.canvas.draw()
+    for axes in figure.axes:
+        if axes.get_ylabel().startswith("data − fit"):
+            assert axes.get_legend().get_window_extent().y0 >= axes.get_window_extent().y1
+
+
 def test_hopeless_thicknesses_are_left_out(fit):
     profile = Profile(np.linspace(10.0, 3000.0, 60), np.where(np.arange(60) < 20, 5.0, 1e8))
     _, right = draw(replace(fit, profile=profile)).axes[2].get_xlim()

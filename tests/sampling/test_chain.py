@@ -15,6 +15,7 @@ import pytest
 
 import pellicle as pl
 from pellicle.errors import DataError, UsageError
+from pellicle.reporting.netcdf import write_netcdf
 
 HERE = Path(__file__).parent
 RUN = """
@@ -99,3 +100,19 @@ def test_an_interrupted_chain_keeps_what_it_has(bands, film, tmp_path):
     found = pl.sample(bands(), film(), chain=path, progress=impatient)
     assert found.checks.steps == 200
     assert len(_draws(path)) == 200
+
+
+@pytest.mark.filterwarnings("ignore:Error writing persistent compilation cache")
+def test_a_full_disk_ends_neither_the_chain_nor_python(bands, film, tmp_path, caplog):
+    resource = pytest.importorskip("resource")
+    before, path = resource.getrlimit(resource.RLIMIT_FSIZE), tmp_path / "chain.h5"
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, before[1]))
+    try:
+        found = pl.sample(bands(), film(), chain=path)
+        with pytest.raises(DataError, match=r"posterior\.nc: cannot be written \(File too large\)"):
+            write_netcdf(tmp_path / "posterior.nc", found, found.predictions())
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert found.trusted
+    assert "chain.h5: cannot be written (File too large)" in caplog.text
+    assert not list(tmp_path.iterdir())

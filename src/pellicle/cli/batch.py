@@ -14,11 +14,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pellicle.cli.inputs import LEAST_SQUARES, Input, Inputs
 from pellicle.cli.messages import as_flags, with_flags
-from pellicle.cli.session import Progress, check_folder, say
+from pellicle.cli.progress import Progress, TimeLeft, duration
+from pellicle.cli.session import check_folder, say
 from pellicle.cli.verbose import LOG, log_to_stderr
 from pellicle.errors import UsageError
 
 if TYPE_CHECKING:
+    from pellicle.cli.resume import Earlier
     from pellicle.data.brdf_samples import BrdfSamples
     from pellicle.data.spectrum import Spectrum
     from pellicle.fitting.result import Fit
@@ -144,55 +146,57 @@ class Batch:
         """Fit the groups one by one, or in worker processes, and yield their exit codes in order."""
         tasks = list(zip(groups, folders, strict=True))
         if self.jobs == 1 or len(tasks) == 1:
-            yield from (self._fit(*task) for task in tasks)
+            left = TimeLeft()
+            for number, task in enumerate(tasks):
+                seconds = left("files", number - self.kept, len(tasks) - self.kept)
+                position = f"file {number + 1} of {len(tasks)}" if len(tasks) > 1 else ""
+                rest = duration(seconds)
+                yield self._fit(*task, f"{position}, {rest} left" if rest else position)
             return
         from pellicle.cli.workers import in_order
 
         own = [
             replace(self, inputs=self.inputs._replace(files=files), records=[], fits=[]) for files in groups
         ]
-        progress = Progress(f"{len(tasks)} files")
-        progress("fit", 0, len(tasks))
-        for done, result in enumerate(in_order(_captured, zip(own, folders, strict=True), self.jobs), 1):
-            progress.clear()
-            print(result.err, end="", file=sys.stderr, flush=True)
-            print(result.out, end="", flush=True)
-            self.records.append(result.record)
-            self.fits += result.fits
-            self.kept += result.kept
-            yield result.code
-            progress("fit", done, len(tasks))
-        progress.clear()
+        with Progress(f"{len(tasks)} files") as progress:
+            progress("fit", 0, len(tasks))
+            for done, result in enumerate(in_order(_captured, zip(own, folders, strict=True), self.jobs), 1):
+                progress.clear()
+                print(result.err, end="", file=sys.stderr, flush=True)
+                print(result.out, end="", flush=True)
+                self.records.append(result.record)
+                self.fits += result.fits
+                self.kept += result.kept
+                yield result.code
+                progress("fit", done, len(tasks))
 
-    def _fit(self, files: list[Input], folder: Path | None) -> int:
-        """Fit one group of files, print and write the result, and return its exit code."""
+    def _fit(self, files: list[Input], folder: Path | None, position: str = "") -> int:
+        """Fit one group of files, print and write the result, and return its exit code.
+
+        `position` in the batch is a part of the progress line.
+        """
         from pellicle.cli.resume import earlier, fingerprint
         from pellicle.reporting.fit_text import report
         from pellicle.reporting.json_record import failure, one_line, to_json
 
         paths, identity = [file.path for file in files], ""
-        progress = Progress(", ".join(paths))
+        place = f"{', '.join(paths)} ({position})" if position else ", ".join(paths)
         try:
             data, scene = measurement(files, self.inputs.joint)
             if folder is not None:
                 settings = self.tolerance, self.inputs.loss, self.inputs.residual, self.sampler
                 identity = fingerprint(data, scene, settings)
                 if not self.refit and (found := earlier(folder, identity)):
-                    self.kept += 1
-                    self.records.append(found.record)
-                    self._print(found.record, found.report)
-                    say(f"{folder}: from an earlier run")
-                    return CONVERGED if found.record["status"] == "converged" else UNCLEAR
-            fit, posterior = self._result(data, scene, folder, progress)
+                    return self._repeat(found, folder)
+            with Progress(place) as progress:
+                fit, posterior = self._result(data, scene, folder, progress)
         except ValueError as error:
-            progress.clear()
             message = error_message(error, paths)
             say(f"pellicle: {message}")
             self.records.append(failure(paths if self.inputs.joint else paths[0], message))
             if self.as_json:
                 print(one_line(self.records[-1]), flush=True)
             return FAILED  # also where the error is one of usage: the other files go on
-        progress.clear()
         record = to_json(fit, posterior)
         self.records.append(record)
         if self.inputs.repeats:
@@ -202,6 +206,14 @@ class Batch:
         if posterior is not None and not posterior.trusted:
             code = TOO_SHORT
         return code if folder is None else max(code, _write(folder, fit, posterior, identity))
+
+    def _repeat(self, found: Earlier, folder: Path) -> int:
+        """Print the result of an earlier run, and return its exit code."""
+        self.kept += 1
+        self.records.append(found.record)
+        self._print(found.record, found.report)
+        say(f"{folder}: from an earlier run")
+        return CONVERGED if found.record["status"] == "converged" else UNCLEAR
 
     def _print(self, record: dict[str, Any], report: str) -> None:
         from pellicle.reporting.json_record import one_line

@@ -12,7 +12,8 @@ from pellicle.cli.batch import CONVERGED, FAILED, UNCLEAR, error_message, measur
 from pellicle.cli.flags import OUTPUT, SCENE, ReadingFlags, SceneFlags, flag, switch
 from pellicle.cli.inputs import LEAST_SQUARES, Input, Inputs, inputs
 from pellicle.cli.messages import with_flags
-from pellicle.cli.session import Progress, check_folder, say, start
+from pellicle.cli.progress import Progress
+from pellicle.cli.session import check_folder, say, start
 from pellicle.errors import DataError, UsageError
 
 log = getLogger(__name__)
@@ -69,23 +70,27 @@ def _compare(
     from pellicle.reporting.json_record import one_line
 
     label = ", ".join(paths)
-    progress, fits = Progress(label), {}
+    fits = {}
     try:
         for name, candidate in candidates.items():
             log.info("comparison: now %s", name)
             files: list[Input] = candidate.groups[position]
             data, scene = measurement(files, len(files) > 1, notes=not fits)
-            fits[name] = with_flags(fit(data, scene, residual=candidate.residual, progress=progress))
+            with Progress(f"{label}, {name}") as progress:
+                fits[name] = with_flags(fit(data, scene, residual=candidate.residual, progress=progress))
         comparison = compare_fits(fits)
     except ValueError as error:
-        progress.clear()
         message = error_message(error, [label])
         say(f"pellicle: {message}")
         if as_json:
             print(one_line(failure(label, message)), flush=True)
         return FAILED
-    progress.clear()
     print(one_line(to_json(comparison)) if as_json else report(comparison), flush=True)
     if folder is not None:
-        say(f"{write_comparison(folder, comparison)}: comparison and fits written")
+        try:
+            write_comparison(folder, comparison)
+        except ValueError as error:  # the result is printed, and the other files go on
+            say(f"pellicle: {error}")
+            return FAILED
+        say(f"{folder}: comparison and fits written")
     return CONVERGED if comparison.best.fit.status == "converged" else UNCLEAR

@@ -7,7 +7,8 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from pellicle.cli.session import Progress, check_folder, say, start
+from pellicle.cli.progress import Progress
+from pellicle.cli.session import check_folder, say, start
 from pellicle.cli.wavelengths import directions, measured_scene
 from pellicle.errors import UsageError
 
@@ -59,11 +60,8 @@ def cost(
     from pellicle.reporting.cost_text import text
     from pellicle.reporting.json_record import one_line
 
-    progress = Progress(recipe)
-    try:
+    with Progress(recipe) as progress:
         result = api.cost(scene, tolerance=tolerance, progress=progress, **options)
-    finally:
-        progress.clear()
     print(one_line(to_json(result, recipe)) if json else text(result, recipe), flush=True)
     if out is not None:
         say(f"{write_cost(out, result, recipe)}: report, figure and tables written")

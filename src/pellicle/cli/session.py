@@ -1,15 +1,13 @@
-"""Setup of JAX, messages on stderr and progress, shared by the commands."""
+"""Setup of JAX and messages on stderr, shared by the commands."""
 
 from __future__ import annotations
 
 import os
 import sys
-from logging import INFO
 from math import inf
 from pathlib import Path
 
 from pellicle.cli.messages import as_flags
-from pellicle.cli.verbose import LOG
 from pellicle.errors import UsageError
 
 CACHE_VARIABLE = "PELLICLE_CACHE"
@@ -78,19 +76,3 @@ def say(*sentences: str) -> None:
     """Print to stderr; arguments in backticks become flags."""
     for sentence in sentences:
         print(as_flags(sentence), file=sys.stderr)
-
-
-class Progress:
-    """Progress line on stderr, overwritten at each step; silent without a terminal and with --verbose."""
-
-    def __init__(self, label: str):
-        self.label, self.shown = label, False
-
-    def __call__(self, stage: str, done: int, total: int) -> None:
-        if sys.stderr.isatty() and not LOG.isEnabledFor(INFO):
-            print(f"\r{self.label}: {stage} {done}/{total}\033[K", end="", file=sys.stderr, flush=True)
-            self.shown = True
-
-    def clear(self) -> None:
-        if self.shown:
-            print("\r\033[K", end="", file=sys.stderr, flush=True)

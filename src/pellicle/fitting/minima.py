@@ -74,6 +74,7 @@ def solve(
     rows = max(sum(view.rows for view in problem.views), 1)
     lanes = int(np.clip(2 ** int(np.log2(_WORK / rows)), 2, MOST))
     pieces = []
+    progress("polish", 0, len(starts))
     for first in range(0, len(starts), SLOTS):
         low, high, units = (_padded(x[first : first + SLOTS]) for x in (lower, upper, starts))
         count = min(SLOTS, len(starts) - first)

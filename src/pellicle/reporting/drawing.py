@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,6 +18,13 @@ FORMATS = (".png", ".pdf", ".svg")
 BLACK, ORANGE, BLUE, GREEN, GREY = "#000000", "#D55E00", "#0072B2", "#009E73", "#777777"
 """Okabe and Ito's colours, which the colour-blind can distinguish."""
 FITTED = {"color": ORANGE, "linewidth": 1.4}
+ABOVE: dict[str, Any] = {
+    "frameon": False,
+    "loc": "lower right",
+    "bbox_to_anchor": (1, 1),
+    "borderaxespad": 0,
+}
+"""Place of a legend above its panel, where it hides nothing."""
 GAP = 10
 """A step this many times the median step is a gap in the data, which no line crosses."""
 

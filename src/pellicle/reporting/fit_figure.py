@@ -11,7 +11,7 @@ import numpy as np
 
 from pellicle.fitting.status import RIVAL
 from pellicle.reporting import brdf_figure, psi_delta
-from pellicle.reporting.drawing import BLACK, BLUE, FITTED, GAP, GREY, ORANGE, marker_size, new_figure
+from pellicle.reporting.drawing import ABOVE, BLACK, BLUE, FITTED, GAP, GREY, ORANGE, marker_size, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -107,12 +107,12 @@ def _arrange(figure: Figure, rows: list[Axes], panels: list[_Panel], title: str)
 
 def _panels_of_data(part: Part) -> list[_Panel]:
     if part.spectral.delta_data is None:
-        rows = ((_data, 3.0), (_residuals, 1.3))
+        rows = [(_data, 3.0, 0), (_residuals, 1.3, 1)]
     else:
-        rows = [(psi_delta.psi, 2.2), (psi_delta.delta, 2.2), (psi_delta.residuals, 1.5)]
+        rows = [(psi_delta.psi, 2.2, 0), (psi_delta.delta, 2.2, 0), (psi_delta.residuals, 1.5, 1)]
         if part.spectral.depolarisation_data is not None:
-            rows.insert(2, (psi_delta.depolarisation, 1.5))
-    return [_Panel(partial(panel, part=part), height, part) for panel, height in rows]
+            rows.insert(2, (psi_delta.depolarisation, 1.5, 0))
+    return [_Panel(partial(panel, part=part), height, part, lines) for panel, height, lines in rows]
 
 
 def _title(fit: Fit) -> str:
@@ -167,7 +167,7 @@ def _residuals(axes: Axes, part: Part) -> None:
         axes.plot(nm, curve.residual[line], color=BLACK, linewidth=0.8)
     axes.axhline(0, color=GREY, linewidth=0.6)
     axes.set(xlabel="wavelength (nm)", ylabel="data − fit")
-    axes.legend(loc="upper right", edgecolor="none")
+    axes.legend(**ABOVE, fontsize="small")
 
 
 def _misfit(axes: Axes, fit: Fit) -> None:
@@ -187,7 +187,7 @@ def _misfit(axes: Axes, fit: Fit) -> None:
     _scale(axes, misfit, minima)
     searched = f"searched {thickness.min():.5g} to {thickness.max():.5g}"
     axes.set(xlabel=f"thickness (nm; {searched})", ylabel="misfit Δχ²", xlim=(left, right))
-    axes.legend(frameon=False, ncols=3, loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0)
+    axes.legend(**ABOVE, ncols=3)
 
 
 def _minima(fit: Fit) -> list[tuple[float, float]]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pellicle.reporting.drawing import BLACK, BLUE, FITTED, GAP, GREEN, GREY, ORANGE, marker_size
+from pellicle.reporting.drawing import ABOVE, BLACK, BLUE, FITTED, GAP, GREEN, GREY, ORANGE, marker_size
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -56,7 +56,7 @@ def residuals(axes: Axes, part: Part) -> None:
             axes.plot(x[points], part.spectral.delta_residual[points], **of_delta, label=hidden or "Δ")
     axes.axhline(0, color=GREY, linewidth=0.6)
     axes.set(xlabel=label, ylabel="data − fit (degrees)")
-    axes.legend(frameon=False, ncols=2, fontsize="small")
+    axes.legend(**ABOVE, ncols=2, fontsize="small")
 
 
 def abscissa(part: Part) -> tuple[np.ndarray, str]:

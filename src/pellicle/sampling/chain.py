@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import os
 import time
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from importlib.metadata import version
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -98,17 +100,20 @@ class ChainFile:
         return chain
 
     def keep(self, chain: Chain) -> None:
-        """Write the chain if the last checkpoint is some time ago."""
+        """Write the chain if the last checkpoint is some time ago; a full disk does not end the chain."""
         if time.monotonic() - self.written > _PATIENCE:
-            self.write(chain)
+            with suppress(DataError):
+                self.write(chain)
+            self.written = time.monotonic()
 
     def write(self, chain: Chain) -> None:
-        """Write the chain, over an earlier one of the same problem. Raises UsageError where it cannot be."""
+        """Write the chain, over an earlier one of the same problem. Raises as `files.replacing` does."""
         if self.path is None:
             return
         import h5py
 
-        with replacing(self.path, overwrite=True) as draft, h5py.File(draft, "w") as file:
+        image = BytesIO()  # the HDF5 library crashes where a disk is full
+        with h5py.File(image, "w") as file:
             group: Any = file.create_group(GROUP)
             steps, walkers, size = chain.draws.shape
             facts = {"version": version("emcee"), "nwalkers": walkers, "ndim": size, "has_blobs": False}
@@ -119,4 +124,5 @@ class ChainFile:
             group.create_dataset("chain", data=chain.draws, maxshape=(None, walkers, size))
             group.create_dataset("log_prob", data=chain.log_density, maxshape=(None, walkers))
             group.create_dataset("accepted", data=chain.accepted)
-        self.written = time.monotonic()
+        with replacing(self.path, overwrite=True) as draft:
+            draft.write_bytes(image.getbuffer())

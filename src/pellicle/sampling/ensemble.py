@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
+from logging import getLogger
 from typing import NamedTuple
 
 import jax
 import numpy as np
 
-from pellicle.errors import UsageError, install_command
+from pellicle.errors import DataError, UsageError, install_command
 from pellicle.fitting.progress import Progress
 from pellicle.fitting.result import Fit
 from pellicle.sampling.chain import ChainFile
@@ -21,6 +22,8 @@ from pellicle.sampling.predict import Prediction
 from pellicle.sampling.result import Posterior
 from pellicle.sampling.run import run
 from pellicle.sampling.target import Target
+
+log = getLogger(__name__)
 
 STEPS = 20_000
 """Maximum number of steps of a chain."""
@@ -85,7 +88,10 @@ def sampled(
         count = subject.walkers(walkers, steps)
         target = Target(subject.log_density, (count + 1) // 2)
         grown, checks = run(target, subject.modes, file.begin(count, seed), steps, file.keep, progress)
-        file.write(grown)
+        try:
+            file.write(grown)
+        except DataError as error:  # of the disk: the chain in memory is complete
+            log.warning("%s; this chain cannot be continued", error)
     units = grown.draws[checks.discard :]
     return Posterior(
         fit=subject.fit,

@@ -36,6 +36,7 @@ def run(
     first block it is raised again.
     """
     checks, checked = None, 0
+    progress("sample", chain.steps, steps)
     try:
         while chain.steps < steps:
             if chain.steps >= 2 * BLOCK and chain.steps >= _GROWTH * checked:
@@ -46,6 +47,7 @@ def run(
             chain = _extended(target, modes, chain, min(BLOCK, steps - chain.steps))
             keep(chain)
             progress("sample", chain.steps, steps)
+        progress("sample", chain.steps, chain.steps)
     except KeyboardInterrupt:
         if not chain.steps:
             raise

@@ -116,7 +116,7 @@ def test_progress_is_reported(film, measured):
     scene = film()
     search(built(scene, measured(scene, 700.0)), lambda *report: reports.append(report))
     assert {stage for stage, _, _ in reports} == {"scan", "polish"}
-    assert all(0 < done <= total for _, done, total in reports)
+    assert all(0 <= done <= total for _, done, total in reports)
     for stage in ("scan", "polish"):
         assert [done == total for name, done, total in reports if name == stage][-1]
 

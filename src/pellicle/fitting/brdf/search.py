@@ -77,6 +77,7 @@ def _scan(few: Problem, units: np.ndarray, progress: Progress) -> tuple[np.ndarr
     """Candidates with their weights beside them, and their χ²."""
     chi2, weights = np.empty(len(units)), np.empty((len(units), linear_count(few)))
     [view] = few.views
+    progress("scan", 0, len(units))
     for first in range(0, len(units), _CHUNK):
         part = slice(first, first + _CHUNK)
         padded = np.resize(units[part], (_CHUNK, units.shape[1]))

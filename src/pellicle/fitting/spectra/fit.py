@@ -155,6 +155,7 @@ def _fit(
 
         ranked, warnings = ranked_minima(build, again, tolerance, loss)
         warnings += wider.warnings
+    progress("errors", 0, 1)
     profile, depth = summary.scan_profile(ranked), ranked.problem.thickness_axis
     jacobian, covariance = linearised(ranked)
     found = discrepancy(evidence(spectra, ranked, jacobian), jacobian, ranked.minima.units[0])

@@ -207,6 +207,7 @@ def scanned(problem: Problem, units: np.ndarray, progress: Progress) -> np.ndarr
     """
     table = np.empty((len(units), len(problem.views)))
     values = np.asarray(problem.values(units))
+    progress("scan", 0, len(units))
     for first in range(0, len(units), _CHUNK):
         chunk = values[first : first + _CHUNK]
         padded = np.concatenate([chunk, np.repeat(chunk[-1:], _CHUNK - len(chunk), axis=0)])

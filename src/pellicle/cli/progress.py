@@ -1,0 +1,99 @@
+"""Progress of long work as one line on stderr: stage, steps, time left, and whether JAX compiles."""
+
+from __future__ import annotations
+
+import sys
+import time
+from logging import INFO
+from shutil import get_terminal_size
+from typing import Any
+
+from pellicle.cli.verbose import LOG
+
+COMPILING = "compiling (only in the first run of a kind of scene)"
+_LOWERED, _COMPILED = (
+    "/jax/core/compile/jaxpr_to_mlir_module_duration",
+    "/jax/core/compile/backend_compile_duration",
+)
+"""JAX's names of the durations that end right before it compiles a program, and right after."""
+_SHORTEST = 5.0
+"""Seconds left that are worth a word."""
+_AT_MOST = ("sample",)
+"""Stages that often end before their last step."""
+
+
+class TimeLeft:
+    """Estimate of the time that a stage still takes.
+
+    The first step of a stage is left out: it includes the compilation.
+    """
+
+    def __init__(self):
+        self.stage, self.first, self.began = "", 0, 0.0
+
+    def __call__(self, stage: str, done: int, total: int) -> float:
+        """Seconds that are left, 0 while nothing is known."""
+        now = time.monotonic()
+        if stage != self.stage or done <= self.first or not self.first:
+            self.stage, self.first, self.began = stage, done, now
+            return 0.0
+        return (now - self.began) / (done - self.first) * (total - done)
+
+
+class Progress:
+    """Progress line on stderr, overwritten at each step; silent without a terminal and with --verbose."""
+
+    def __init__(self, label: str):
+        self.label, self.steps, self.shown, self.compiling = label, "", False, False
+        self.left = TimeLeft()
+        self.visible = sys.stderr.isatty() and not LOG.isEnabledFor(INFO)
+        if self.visible:
+            import jax.monitoring as monitoring
+
+            monitoring.register_event_duration_secs_listener(self._compilation)
+
+    def __call__(self, stage: str, done: int, total: int) -> None:
+        left = duration(self.left(stage, done, total))
+        bound = stage in _AT_MOST and done < total
+        self.steps = f"{stage} {done} of at most {total}" if bound else f"{stage} {done}/{total}"
+        self.steps += f", {'at most ' * bound}{left} left" if left else ""
+        self._show()
+
+    def __enter__(self) -> Progress:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Remove the line, and stop listening to JAX."""
+        self.clear()
+        if self.visible:
+            import jax.monitoring as monitoring
+
+            monitoring.unregister_event_duration_listener(self._compilation)
+        self.visible = False
+
+    def clear(self) -> None:
+        """Remove the line."""
+        if self.shown:
+            print("\r\033[K", end="", file=sys.stderr, flush=True)
+        self.shown = False
+
+    def _compilation(self, event: str, duration_secs: float, **_: Any) -> None:
+        if event in (_LOWERED, _COMPILED):
+            self.compiling = event == _LOWERED
+            self._show()
+
+    def _show(self) -> None:
+        if self.visible:
+            parts = [part for part in (self.steps, COMPILING * self.compiling) if part]
+            line = f"{self.label}: {', '.join(parts)}"[: get_terminal_size().columns - 1]  # on one line
+            print(f"\r{line}\033[K", end="", file=sys.stderr, flush=True)
+            self.shown = True
+
+
+def duration(seconds: float) -> str:
+    """A time for a reader: `12 s`, `3 min`, `2.5 h`; empty where it is not worth a word."""
+    if seconds < _SHORTEST:
+        return ""
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
