@@ -122,6 +122,20 @@ def test_media(scene, material, index):
         np.testing.assert_allclose(medium(AT), index)
 
 
+def test_a_porous_top_mixes_the_film_below(scene):
+    found = scene(
+        BASE.replace(
+            LAYER,
+            '[[scene.layer]]\nname = "top"\nbetween = "bruggeman"\nfraction = { lower = 0.2, upper = 1 }\n'
+            "thickness = 20\n"
+            '[[scene.layer]]\nname = "film"\nthickness = 300\n'
+            'material = { model = "cauchy", A = { lower = 1.4, upper = 1.8 } }\n',
+        )
+    )
+    assert found.layers[0].fraction.lower == 0.2
+    assert [p.name for p in parameters(found)] == ["top.fraction", "film.A"]
+
+
 def test_a_thickness_may_be_a_number_or_a_value(scene):
     thickness = lambda text: scene(BASE.replace("{ lower = 10, upper = 3000 }", text)).layers[0].thickness  # noqa: E731
     assert thickness("120") == 120

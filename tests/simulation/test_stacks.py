@@ -11,6 +11,8 @@ import tmm
 
 import pellicle as pl
 from pellicle.dispersion.effective_medium import Bruggeman
+from pellicle.dispersion.empirical import Cauchy
+from pellicle.fitting.spectra.parameters import parameters
 from pellicle.scene.free import insert
 from pellicle.scene.layers import medium
 from pellicle.simulation.film import build
@@ -147,6 +149,15 @@ def test_an_interface_is_a_mixed_layer():
     np.testing.assert_allclose(predict(rough), predict(mixed), rtol=1e-13)
 
 
+def test_a_fraction_is_the_share_of_the_medium_below_whose_numbers_are_free_once():
+    film = Cauchy(pl.Free(1.9, 2.3, start=2.1), 0.0)
+    porous = scene([pl.Interface(80.0, fraction=0.7), pl.Layer(film, 100.0)])
+    mixed = scene([pl.Layer(Bruggeman(medium(1.0), medium(2.1), 0.7), 80.0), pl.Layer(2.1, 100.0)])
+    np.testing.assert_allclose(predict(insert(porous, [2.1])), predict(mixed), rtol=1e-13)
+    free = scene([pl.Interface(80.0, fraction=pl.Free(0, 1), name="top"), pl.Layer(film, 100.0, name="film")])
+    assert [p.name for p in parameters(free)] == ["top.fraction", "film.A"]
+
+
 def test_a_graded_interface_converges():
     def reflected(steps):
         return predict(scene([pl.Interface(200.0, steps=steps, mix="linear"), pl.Layer(2.1, 0.0)], 2.1))
@@ -247,6 +258,9 @@ REFUSED = [
     (lambda: scene([pl.Interface(1.0), pl.Interface(2.0)]), "two interfaces are adjacent"),
     (lambda: pl.Interface(1.0, steps=0), "1 to 100 steps"),
     (lambda: pl.Interface(1.0, mix="brugeman"), "no mix 'brugeman'"),
+    (lambda: pl.Interface(1.0, fraction=1.5), "fraction must lie in 0 to 1"),
+    (lambda: pl.Interface(1.0, fraction=pl.Free(-0.1, 1)), "fraction must lie in 0 to 1"),
+    (lambda: pl.Interface(1.0, steps=5, fraction=0.5), "goes with one step"),
     (lambda: pl.Layer(1.5, 1.0, roughness=-1), "roughness` must not be negative, got -1 nm"),
 ]
 

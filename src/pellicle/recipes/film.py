@@ -43,6 +43,7 @@ TABLES: dict[str, type[BaseModel]] = {
     "bandwidth": FreeTable,
     "thickness_spread": FreeTable,
     "roughness": FreeTable,
+    "fraction": FreeTable,
     "angle_spread": FreeTable,
     "numerical_aperture": FreeTable,
     "wavelength_shift": FreeTable,
@@ -124,7 +125,10 @@ def _uncertainty(scene: SceneTable, instrument: InstrumentTable) -> Uncertainty:
 def _layer(table: LayerTable, folder: Path) -> Layer | Interface | Plate:
     thickness: Any = optional(table.thickness, "thickness")
     if table.between is not None:
-        return Interface(thickness, 1 if table.steps is None else table.steps, table.between, table.name)
+        fraction = optional(table.fraction, "fraction")
+        return Interface(
+            thickness, 1 if table.steps is None else table.steps, table.between, table.name, fraction
+        )
     stated: Any = table.material  # LayerTable has checked that it is there
     material = media_words.free_numbers(medium(stated, folder), table.free)
     if table.plate_mm is not None:

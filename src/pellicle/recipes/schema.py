@@ -46,12 +46,14 @@ class PlateTable(_Table):
 
 class LayerTable(_Table):
     """One `[[scene.layer]]`: a material with a thickness, or with plate_mm where it is incoherent, or
-    `between`, a mixing rule for the media above and below, in `steps` slices."""
+    `between`, a mixing rule for the media above and below, in `steps` slices or with a `fraction` of the one
+    below."""
 
     name: str | None = None
     material: Medium | None = None
     between: str | None = None
     steps: int | None = None
+    fraction: Number | None = None
     thickness: Number | None = None
     plate_mm: Number | None = None
     thickness_spread: Number | None = None
@@ -79,9 +81,9 @@ class LayerTable(_Table):
         if self.between is not None:
             return {"plate_mm", "thickness_spread", "roughness", "index_uncertainty", "free"}
         return (
-            {"steps", "thickness_spread", "roughness", "index_uncertainty"}
+            {"steps", "fraction", "thickness_spread", "roughness", "index_uncertainty"}
             if self.plate_mm is not None
-            else {"steps"}
+            else {"steps", "fraction"}
         )
 
 

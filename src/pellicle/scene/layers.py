@@ -147,9 +147,11 @@ class Interface(eqx.Module):
 
     **Arguments:** `thickness` in nm, divided among `steps` slices in which the medium below has the volume
     fractions ½/steps, 1½/steps, ...; one slice is the usual layer of half and half. `mix` is a rule of
-    `pl.mixing`, by its name in recipes. `name` as in `Layer`.
+    `pl.mixing`, by its name in recipes. `name` as in `Layer`. `fraction` is another share of the medium below
+    in the one slice, as of a porous top of the film below: the numbers of that film are the same in both.
 
-    **Raises:** ValueError for a negative thickness, other than 1 to 100 steps, or an unknown rule.
+    **Raises:** ValueError for a negative thickness, other than 1 to 100 steps, an unknown rule, a fraction
+    outside 0 to 1, and one for several steps.
 
     >>> Interface(4.0, steps=2).mix
     'bruggeman'
@@ -159,6 +161,7 @@ class Interface(eqx.Module):
     steps: int = eqx.field(static=True, default=1)
     mix: str = eqx.field(static=True, default="bruggeman")
     name: str | None = eqx.field(static=True, default=None)
+    fraction: Quantity | None = None
 
     def __check_init__(self):
         check_not_negative("thickness", self.thickness, "nm")
@@ -166,10 +169,15 @@ class Interface(eqx.Module):
             raise ValueError(f"an interface has 1 to 100 steps, not {self.steps}")
         if self.mix not in MIXTURES:
             raise ValueError(f"no mix {self.mix!r}; known: {', '.join(MIXTURES)}")
+        if self.fraction is not None and self.steps != 1:
+            raise ValueError(f"`fraction` goes with one step, not with a gradient of {self.steps}")
+        MIXTURES[self.mix](Constant(1.0), Constant(1.0), 0.5 if self.fraction is None else self.fraction)
 
     def slices(self, above: AbstractDispersion, below: AbstractDispersion) -> tuple[Layer, ...]:
         """Return the layers that replace the interface between two media."""
         rule, thickness = MIXTURES[self.mix], divided(self.thickness, self.steps)
+        if self.fraction is not None:
+            return (Layer(rule(above, below, self.fraction), thickness),)
         return tuple(Layer(rule(above, below, (i + 0.5) / self.steps), thickness) for i in range(self.steps))
 
 
