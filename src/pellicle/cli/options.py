@@ -81,7 +81,7 @@ def read(path: str, flags: ReadingFlags, *, free_scale: bool) -> list[Spectrum]:
     """
     from pellicle.data.read_spectrum import read_spectra
 
-    if flags.reference is not None:
+    if flags.reference is not None or flags.reference_material is not None:
         return [_from_counts(path, flags)]
     return read_spectra(
         path,
@@ -110,10 +110,13 @@ def wavelength_range(value: str | tuple[float, float] | None) -> tuple[float, fl
 
 
 def _from_counts(path: str, flags: ReadingFlags) -> Spectrum:
-    """Reflectance from raw counts of a sample and of a bare reference (a polished surface)."""
+    """Reflectance from raw counts of a sample and of a bare reference (a polished surface).
+
+    Without a file of the reference, its counts and those without light lie beside those of the sample.
+    """
     import numpy as np
 
-    from pellicle.data.read_counts import read_counts, reflectance_from_counts
+    from pellicle.data.read_counts import read_counts, read_counts_beside, reflectance_from_counts
     from pellicle.recipes.media_words import medium
     from pellicle.simulation.functions import reflectance
 
@@ -123,8 +126,16 @@ def _from_counts(path: str, flags: ReadingFlags) -> Spectrum:
         raise UsageError("--reference needs a known angle of incidence: give one number")
     options: dict[str, Any] = {"columns": flags.columns, "wavelength_unit": flags.wavelength_unit}
     sample = read_counts(path, range=wavelength_range(flags.range), **options)
-    reference = read_counts(str(flags.reference), **options)
-    dark = None if flags.dark is None else read_counts(flags.dark, **options)
+    if flags.reference is not None:
+        reference = read_counts(flags.reference, **options)
+    else:
+        reference = read_counts_beside(path, "reference counts", **options)
+    if reference is None:
+        raise UsageError(f"{path}: has no column of reference counts; give their file with --reference")
+    if flags.dark is not None:
+        dark = read_counts(flags.dark, **options)
+    else:
+        dark = read_counts_beside(path, "dark counts", **options)
     known = reflectance(
         sample.wavelength,
         0.0,

@@ -11,13 +11,9 @@ from pellicle.data.read_ellipsometry import (
     ellipsometry_columns,
     has_ellipsometry,
 )
-from pellicle.data.tabular.column_selection import (
-    SIGNALS,
-    SpectrumColumns,
-    listed,
-    named_columns,
-    signal_columns,
-)
+from pellicle.data.tabular.column_selection import SpectrumColumns, signal_columns
+from pellicle.data.tabular.columns import SIGNALS, listed
+from pellicle.data.tabular.named_columns import named_columns
 from pellicle.data.tabular.table import Table
 from pellicle.errors import UsageError
 

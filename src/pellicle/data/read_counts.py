@@ -7,13 +7,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pellicle.data.formats.detect import read_tables
 from pellicle.data.repeated_sweeps import of_rows, sweep_numbers
 from pellicle.data.signal_checks import check_noise, check_power
 from pellicle.data.spectrum import Spectrum
-from pellicle.data.tabular.column_selection import counts_columns
-from pellicle.data.tabular.table import read_table
+from pellicle.data.tabular.column_selection import (
+    SpectrumColumns,
+    counts_columns,
+    counts_columns_beside,
+)
+from pellicle.data.tabular.table import Table
 from pellicle.data.tabular.wavelength_axis import axis_note, axis_unit, read_columns
-from pellicle.errors import DataError
+from pellicle.errors import DataError, UsageError
 
 
 def read_counts(
@@ -23,7 +28,7 @@ def read_counts(
     wavelength_unit: str | None = None,
     range: tuple[float | int, float | int] | None = None,
 ) -> Spectrum:
-    """Read raw detector counts: a wavelength column and one other, of any name and any values.
+    """Read raw detector counts: those of the sample, or a wavelength column and one other of any name.
 
     **Arguments:** as in `read_spectrum`.
 
@@ -31,11 +36,40 @@ def read_counts(
 
     **Raises:** DataError or UsageError as `read_spectrum` does; any finite count is accepted.
     """
-    table = read_table(path)
-    chosen = counts_columns(table, columns)
+    table = _only_table(path)
+    counts = _read(table, counts_columns(table, columns), wavelength_unit)
+    return counts if range is None else counts.cut(*range)
+
+
+def read_counts_beside(
+    path: str | os.PathLike[str],
+    part: str,
+    *,
+    columns: str | Sequence[str] | None = None,
+    wavelength_unit: str | None = None,
+) -> Spectrum | None:
+    """Read the counts of a reference or without light that a file has beside those of the sample.
+
+    **Arguments:** `part` is "reference counts" or "dark counts", the others as in `read_counts`.
+
+    **Returns:** a `Spectrum` as `read_counts` does; None where the file has none.
+    """
+    table = _only_table(path)
+    chosen = counts_columns_beside(table, columns, part)
+    return None if chosen is None else _read(table, chosen, wavelength_unit)
+
+
+def _only_table(path: str | os.PathLike[str]) -> Table:
+    table, *others = read_tables(path)
+    if others:
+        raise UsageError(f"{path}: has {len(others) + 1} spectra where raw counts of one are expected")
+    return table
+
+
+def _read(table: Table, chosen: SpectrumColumns, wavelength_unit: str | None) -> Spectrum:
     axis = axis_unit(table, chosen.wavelength, wavelength_unit)
     wavelength, values, _, angle = read_columns(table, chosen, axis)
-    counts = of_rows(
+    return of_rows(
         sweep_numbers(wavelength, angle),
         {"wavelength": wavelength, "values": values, "angle": angle, "lines": table.lines},
         signal="counts",
@@ -44,7 +78,6 @@ def read_counts(
         sha256=table.sha256,
         notes=(*table.notes, *chosen.notes, axis_note(axis)),
     )
-    return counts if range is None else counts.cut(*range)
 
 
 def reflectance_from_counts(

@@ -26,8 +26,9 @@ from pellicle.data.ellipsometry_angles import (
 from pellicle.data.repeated_sweeps import of_rows, sweep_numbers
 from pellicle.data.signal_checks import check_psi_delta, refuse_first
 from pellicle.data.spectrum import Spectrum, inside_range
-from pellicle.data.tabular.column_selection import listed, named_columns, only, wavelength_and_angle
-from pellicle.data.tabular.columns import Column
+from pellicle.data.tabular.column_selection import only, wavelength_and_angle
+from pellicle.data.tabular.columns import Column, listed
+from pellicle.data.tabular.named_columns import named_columns
 from pellicle.data.tabular.table import Table
 from pellicle.data.tabular.wavelength_axis import axis_note, axis_unit, read_axis
 from pellicle.errors import DataError, UsageError

@@ -14,7 +14,8 @@ from pellicle.data.read_ellipsometry import SIGNAL, read_ellipsometry
 from pellicle.data.read_power import read_power
 from pellicle.data.signal_checks import check_noise
 from pellicle.data.spectrum import POLARISATIONS, Spectrum
-from pellicle.data.tabular.column_selection import SIGNALS, SpectrumColumns
+from pellicle.data.tabular.column_selection import SpectrumColumns
+from pellicle.data.tabular.columns import SIGNALS
 from pellicle.errors import UsageError
 
 log = getLogger(__name__)

@@ -6,26 +6,28 @@ import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from pellicle.data.tabular.columns import Column, parse_columns, recognise_all
-from pellicle.data.tabular.declarations import Declared
+from pellicle.data.tabular.columns import COUNTS, SIGNALS, Column, listed
+from pellicle.data.tabular.named_columns import named_columns
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError, UsageError
-
-SIGNALS = ("R", "T")
-"""Signals of one column; psi-delta has two."""
 
 _EITHER_SIGNAL = '`signal="R"` or `signal="T"`'
 
 
 @dataclass(frozen=True)
 class SpectrumColumns:
-    """Columns to read, and sentences on the choice."""
+    """Columns to read, and sentences on the choice.
+
+    With a `reference`, the signal is (sample - dark) / (reference - dark) of three columns of counts.
+    """
 
     wavelength: Column
     signal: Column
     sigma: Column | None
     angle: Column | None
     notes: tuple[str, ...]
+    reference: Column | None = None
+    dark: Column | None = None
 
 
 def signal_columns(
@@ -43,18 +45,20 @@ def signal_columns(
                 f"{table.path}: has no header, so say what its second column is with {_EITHER_SIGNAL}"
             )
         return [_by_position(table, signal)]
-    return [
-        _with_wavelength(table, named, column)
-        for column in _signals(table, named, signal, polarisation, by_caller=columns is not None)
-    ]
+    chosen = _signals(table, named, signal, polarisation, by_caller=columns is not None)
+    if [column.role for column in chosen] == ["sample counts"]:
+        return [_quotient(table, named, chosen[0])]
+    return [_with_wavelength(table, named, column) for column in chosen]
 
 
 def counts_columns(table: Table, columns: str | Sequence[str] | None) -> SpectrumColumns:
-    """Choose the columns of raw counts: the wavelength and the one other column, whatever its name."""
+    """Choose the columns of raw counts: those of the sample, or the one column beside the wavelength."""
     named = named_columns(table, columns)
     if named is None:
         return _by_position(table, "counts")
-    counts = [c for c in named if c.role not in ("wavelength", "sigma", "angle") and c.name not in ("_", "")]
+    sample = [c for c in named if c.role == "sample counts"]
+    free = [c for c in named if c.role not in ("wavelength", "sigma", "angle") and c.name not in ("_", "")]
+    counts = sample or free
     if len(counts) != 1:
         raise UsageError(
             f"{table.path}: expected one column of counts beside the wavelength, found "
@@ -63,56 +67,13 @@ def counts_columns(table: Table, columns: str | Sequence[str] | None) -> Spectru
     return _with_wavelength(table, named, counts[0])
 
 
-def named_columns(table: Table, columns: str | Sequence[str] | None) -> tuple[Column, ...] | None:
-    """Return the columns by the caller's names, or by the header and what the file declares; None without.
-
-    Raises DataError where the file contradicts itself.
-    """
-    if columns is not None:
-        return parse_columns(columns, table.path, table.layout.width)
-    names, declared = table.layout.names, table.layout.declared
-    if names is None:
-        return _declared_columns(table)
-    lowered = [name.lower() for name in names]
-    twice = next((name for i, name in enumerate(names) if name and name.lower() in lowered[:i]), None)
-    if twice is not None:
-        raise DataError(
-            f"{table.path}: the header names {twice!r} twice; rename one, or name the columns with `columns`"
-        )
-    found = recognise_all(names)
-    signals = [column for column in found if column.role in SIGNALS]
-    unnamed = () if signals else [c for c in found if c.role in ("other", "intensity", "counts") and c.name]
-    return tuple(_with_declared(table, column, declared, column in unnamed) for column in found)
-
-
-def _declared_columns(table: Table) -> tuple[Column, ...] | None:
-    """The columns of a table without a header, whose quantity the file declares above it; None otherwise."""
-    declared = table.layout.declared
-    if declared.signal is None or table.layout.width not in (2, 3):
-        return None
-    signal = declared.signal.column
-    axis = declared.axis.column.unit if declared.axis else None
-    label = f"declared {signal.name}"
-    columns = [Column(0, "column 1", "wavelength", axis), dataclasses.replace(signal, position=1, name=label)]
-    return (*columns, *([Column(2, "column 3", "sigma")] if table.layout.width == 3 else []))
-
-
-def _with_declared(table: Table, column: Column, declared: Declared, unnamed: bool) -> Column:
-    """A column of the header with the role and the unit that the file declares. Raises DataError."""
-    statement = declared.axis if column.role == "wavelength" else declared.signal
-    if statement is None or not (unnamed or column.role in ("wavelength", *SIGNALS)):
-        return column
-    stated = statement.column
-    roles = (column.role, stated.role) if not unnamed else (stated.role,) * 2
-    units = {column.unit, stated.unit} - {None}
-    if roles[0] != roles[1] or len(units) > 1:
-        raise DataError(
-            f"{table.path}: line {statement.line} declares {stated.name!r}, which contradicts "
-            f"{table.label(column.position)}; correct the file, or name its columns with `columns`"
-        )
-    if column.unit is None and stated.unit:
-        column = dataclasses.replace(column, unit=stated.unit, unknown_unit=None)
-    return dataclasses.replace(column, role=roles[1])
+def counts_columns_beside(
+    table: Table, columns: str | Sequence[str] | None, part: str
+) -> SpectrumColumns | None:
+    """Return the columns of one of `COUNTS`, None where the table has none."""
+    named = named_columns(table, columns) or ()
+    counts = only(table, named, part)
+    return _with_wavelength(table, named, counts) if counts else None
 
 
 def _by_position(table: Table, role: str) -> SpectrumColumns:
@@ -144,6 +105,16 @@ def _with_wavelength(table: Table, columns: Sequence[Column], signal: Column) ->
     if ignored:
         notes.append(f"ignored: {listed(ignored)}")
     return SpectrumColumns(wavelength, signal, sigma, angle, tuple(notes))
+
+
+def _quotient(table: Table, columns: Sequence[Column], sample: Column) -> SpectrumColumns:
+    """The transmittance that counts of a sample, a reference and possibly the dark make."""
+    chosen = _with_wavelength(table, [c for c in columns if c.role not in COUNTS or c is sample], sample)
+    reference, dark = only(table, columns, "reference counts"), only(table, columns, "dark counts")
+    formula = "(sample - dark) / (reference - dark)" if dark else "sample / reference"
+    notes = (*chosen.notes, f"transmittance computed from counts: {formula}")
+    signal = dataclasses.replace(sample, role="T", unit="fraction", unknown_unit=None)
+    return dataclasses.replace(chosen, signal=signal, reference=reference, dark=dark, notes=notes)
 
 
 def wavelength_and_angle(
@@ -183,12 +154,6 @@ def _signals(
     by_caller: bool,
 ) -> list[Column]:
     """The columns that may be meant. Raises UsageError or DataError where none is."""
-    foreign = next((c for c in columns if c.role == "foreign"), None)
-    if foreign is not None:
-        raise DataError(
-            f"{table.path}: declares {foreign.name.removeprefix('declared ')!r}, which is neither a "
-            "reflectance nor a transmittance; export one of these, or raw counts with `reference`"
-        )
     measured = [c for c in columns if c.role in SIGNALS]
     absorbed = [c for c in measured if c.role == "T" and c.unit == "absorbance"]
     if signal == "R" and measured and measured == absorbed and not by_caller:
@@ -235,20 +200,32 @@ def _unnamed_signals(table: Table, columns: Sequence[Column], signal: str | None
         raise UsageError(
             f'{table.path}: has psi and delta, which contradicts `signal="{signal}"`; leave that out'
         )
-    unnamed = [c for c in columns if c.role == "other" and c.name not in ("_", "")]
+    unnamed = [c for c in columns if c.role in ("processed", "other") and c.name not in ("_", "")]
+    processed = [c for c in unnamed if c.role == "processed"]
+    unnamed = processed or unnamed
     if signal is not None and unnamed and "wavelength" in roles:
         return [dataclasses.replace(c, role=signal) for c in unnamed]
+    sample = only(table, columns, "sample counts")
+    if sample and "reference counts" in roles and signal == "T":
+        return [sample]
+    if sample and "reference counts" in roles and not processed:
+        raise UsageError(
+            f'{table.path}: has counts of a sample and a reference; `signal="T"` takes their quotient, and a '
+            'reflectance needs the material of the reference as well, as in `reference_material="Si"`'
+        )
     if unnamed and "wavelength" in roles:
         raise UsageError(
             f"{table.path}: {listed(unnamed)} state no quantity; say what they are with {_EITHER_SIGNAL}, or "
             'name the columns in order, as in `columns=["wavelength", "R"]`'
         )
+    foreign = [c for c in columns if c.role in ("foreign", "counts", *COUNTS)]
+    if foreign:
+        raise DataError(
+            f"{table.path}: {listed(foreign[:1]).replace('declared ', '')} is neither a reflectance nor a "
+            "transmittance; export one of these, give raw counts with `reference`, or if it is one, name it: "
+            '`columns=["wavelength", "R"]`'
+        )
     raise DataError(
         f"{table.path}: no column is a signal (R, T, Rs, Rp, Ts, Tp, absorbance or intensity) among "
         f'{listed(columns)}; name the columns in order, as in `columns=["wavelength", "R"]`'
     )
-
-
-def listed(columns: Sequence[Column]) -> str:
-    """Return the names of columns, for a message."""
-    return ", ".join(repr(c.name) for c in columns)

@@ -15,20 +15,40 @@ from pellicle.errors import UsageError
 
 # role → its names; a column of any other name is ignored, with a note
 _NAMES = {
-    "wavelength": ("wavelength", "wavelengths", "wl", "lambda", "lam", "λ"),
-    "energy": ("energy", "photon energy", "photon_energy"),
-    "wavenumber": ("wavenumber", "wavenumbers", "wave number"),
-    "frequency": ("frequency",),
-    "R": ("r", "reflectance", "reflectivity", "reflection"),
+    "wavelength": (
+        *("wavelength", "wavelengths", "wave length", "wave", "wl", "lambda", "lam", "λ"),
+        *("wellenlänge", "wellenlaenge", "longueur d'onde", "longueur d’onde", "longitud de onda"),
+        *("lunghezza d'onda", "lunghezza d’onda", "comprimento de onda", "golflengte", "波長", "波长"),
+    ),
+    "energy": ("energy", "photon energy", "photon_energy", "energie", "photonenergie"),
+    "wavenumber": (
+        *("wavenumber", "wavenumbers", "wave number", "wellenzahl", "nombre d'onde", "nombre d’onde"),
+        *("número de onda", "波数"),
+    ),
+    "frequency": ("frequency", "frequenz"),
+    "R": (
+        *("r", "reflectance", "reflectivity", "reflection", "reflexion", "réflexion", "réflectance"),
+        *("reflexionsgrad", "reflektivität", "reflektanz", "reflectancia", "riflettanza", "反射率"),
+    ),
     "Rs": ("rs", "r_s", "reflectance_s"),
     "Rp": ("rp", "r_p", "reflectance_p"),
-    "T": ("t", "transmittance", "transmissivity", "transmission"),
+    "T": (
+        *("t", "transmittance", "transmissivity", "transmission", "transmissionsgrad"),
+        *("transmitancia", "trasmittanza", "透過率", "透过率"),
+    ),
     "Ts": ("ts", "t_s", "transmittance_s"),
     "Tp": ("tp", "t_p", "transmittance_p"),
-    "absorbance": ("a", "abs", "absorbance", "optical density", "optical_density", "od", "o.d."),
+    "absorbance": (
+        *("a", "abs", "abs.", "absorbance", "optical density", "optical_density", "od", "o.d."),
+        *("extinktion", "absorbanz", "absorbancia", "assorbanza", "吸光度"),
+    ),
     "log(1/R)": ("log(1/r)", "log 1/r", "log_1_r", "apparent absorbance"),
     "intensity": ("intensity", "relative intensity", "relative_intensity"),
     "counts": ("counts", "raw"),
+    "processed": ("processed",),
+    "sample counts": ("sample counts",),
+    "reference counts": ("reference counts",),
+    "dark counts": ("dark counts",),
     "sigma": ("sigma", "σ"),
     "angle": ("angle", "aoi", "angle of incidence", "angle_of_incidence"),
     "psi": ("psi", "ψ"),
@@ -64,6 +84,16 @@ _NAMES = {
     "sigma_G": ("sigma_g",),
     "sigma_B": ("sigma_b",),
 }
+_FOREIGN = (
+    *("absorptance", "cd", "circular dichroism", "emission", "f(r)", "fluorescence", "irradiance", "k/s"),
+    *("kubelka-munk", "photoluminescence", "pl", "pl intensity", "power", "radiance", "raman"),
+    *("raman intensity", "scope", "single beam"),
+)
+"""Names of quantities that are neither a reflectance nor a transmittance."""
+SIGNALS = ("R", "T")
+"""Roles of the signals of one column; psi-delta has two."""
+COUNTS = ("sample counts", "reference counts", "dark counts")
+"""Raw counts of a sample, of a reference and without light, as some programs write beside their quotient."""
 DIRECTIONS = ("theta_i", "phi_i", "theta_o", "phi_o")
 """Angles of a BRDF sample: to the light and to the viewer."""
 _IMPLIED_UNIT = {"energy": "eV", "wavenumber": "cm-1", "angle": "deg"}
@@ -71,6 +101,7 @@ _AXES = ("energy", "wavenumber", "frequency")
 _ABSORBANCES = {"absorbance": "T", "log(1/R)": "R"}
 _OF_ABSORBANCE = {"a", "au", "a.u.", "abs", "abs.", "absorbance", "od", "o.d.", "-", "1", ""}
 """Units that programs write behind an absorbance."""
+_OTHER_UNITS = ("a.u.", "abs", "abs.", "a", "counts", "deg", "°")
 _UNIT_OF = {
     "wavelength": units.wavelength_unit,
     "angle": units.angle_unit,
@@ -84,9 +115,10 @@ _UNIT_OF = {
     "intensity": lambda text: None,
 }
 _ALIASES = sorted(
-    ((name, role) for role, names in _NAMES.items() for name in names), key=lambda a: -len(a[0])
+    ((name, role) for role, names in (*_NAMES.items(), ("foreign", _FOREIGN)) for name in names),
+    key=lambda alias: -len(alias[0]),
 )
-_TAIL = re.compile(r"\s*(?:(?P<open>[(\[])\s*(?P<inside>.*?)\s*[)\]]|[_\s/,:-]+(?P<after>.+?))\s*")
+_TAIL = re.compile(r"\s*(?:(?P<open>[(\[])\s*(?P<inside>.*?)\s*[)\]]|[_\s/,:-]+(?:in\s+)?(?P<after>.+?))\s*")
 
 SKIP = "_"
 
@@ -95,9 +127,9 @@ SKIP = "_"
 class Column:
     """One column: position, name, role and unit.
 
-    `role` is a key of `_NAMES` or "other"; energies, wavenumbers and frequencies have the role "wavelength",
-    Rs, Rp, Ts, Tp the roles "R" and "T" with a polarisation, an absorbance the role "T" with that unit.
-    `unit` is None where the name states none;
+    `role` is a key of `_NAMES`, "foreign" for a quantity that is not read, or "other"; energies, wavenumbers
+    and frequencies have the role "wavelength", Rs, Rp, Ts, Tp the roles "R" and "T" with a polarisation, an
+    absorbance the role "T" with that unit. `unit` is None where the name states none;
     `unknown_unit` keeps a unit that was not understood.
     """
 
@@ -117,7 +149,7 @@ def recognise(name: str, position: int = 0) -> Column:
         return Column(position, name, "wavelength", unit_alone)
     percent = plain.startswith("%") or plain.endswith("%")
     if percent:
-        plain = plain.strip("% _/,:-")
+        plain = plain.strip("% _/,:-").removesuffix(" in")
     for alias, role in _ALIASES:
         if plain == alias:
             return _column(position, name, role, "%" if percent else None, bracketed=False)
@@ -144,6 +176,8 @@ def _column(position: int, name: str, role: str, written: str | None, *, bracket
         return Column(position, name, base, unknown_unit="frequency")
     if written is None:
         return Column(position, name, base, unit, polarisation)
+    if base in ("foreign", *COUNTS):
+        return Column(position, name, base if bracketed else "other")
     known = _UNIT_OF.get(base, units.signal_unit)(written)
     if known:
         return Column(position, name, base, known, polarisation)
@@ -155,7 +189,14 @@ def _column(position: int, name: str, role: str, written: str | None, *, bracket
 
 
 def recognise_all(names: Sequence[str]) -> tuple[Column, ...]:
-    """Apply `recognise` to a header, positions counted from 0."""
+    """Apply `recognise` to a header, positions counted from 0.
+
+    `sample` beside `reference` means counts of both.
+    """
+    plain = {name.strip().lower() for name in names}
+    if {"sample", "reference"} <= plain:
+        parts = ("sample", "reference", "dark")
+        names = [f"{name} counts" if name.strip().lower() in parts else name for name in names]
     return tuple(recognise(name, position) for position, name in enumerate(names))
 
 
@@ -168,10 +209,10 @@ def is_header(names: Sequence[str]) -> bool:
 
 
 def is_unit_row(names: Sequence[str]) -> bool:
-    """Return True for a line of units only, as some programs write below the names (`nm,%`)."""
-    return bool(names) and all(
-        units.wavelength_unit(name) or units.signal_unit(name) or name.lower() in ("a.u.", "counts", "deg")
-        for name in names
+    """Return True for a line of units only, as some programs write below the names (`nm,%`, `[nm];[%]`)."""
+    plain = [name.strip("[]() ").lower() for name in names]
+    return bool(plain) and all(
+        units.wavelength_unit(name) or units.signal_unit(name) or name in _OTHER_UNITS for name in plain
     )
 
 
@@ -196,3 +237,8 @@ def parse_columns(columns: str | Sequence[str], path: str, width: int) -> tuple[
                 f"{SKIP} to skip a column"
             )
     return parsed
+
+
+def listed(columns: Sequence[Column]) -> str:
+    """Return the names of columns, for a message."""
+    return ", ".join(repr(column.name) for column in columns)

@@ -1,7 +1,7 @@
 """Layout of a text file: delimiter, decimal mark, preamble, header and rows.
 
-The preamble is any text before the first row of numbers; a line of column names may end it. Text after
-the first row is an error, except a closing `>>>>>` line.
+The preamble is any text before the first row of numbers; a line of column names may end it. Text between
+rows is an error; a closing `>>>>>` line and text below a blank line that follows the rows are not.
 """
 
 from __future__ import annotations
@@ -89,6 +89,7 @@ def find_layout(file: TextFile) -> Layout:
         if header + 1 < start:  # a row of units below the names
             units = split(lines[header + 1].text, delimiter)
             units += [""] * (len(names) - len(units))
+            units = [unit.strip("[]() ") for unit in units]
             names = [f"{name} ({unit})" if unit else name for name, unit in zip(names, units, strict=False)]
     else:
         names = _commented_header(lines[start], file.comments, delimiter, width)
@@ -102,10 +103,13 @@ def find_layout(file: TextFile) -> Layout:
     skipped = start if header is None else header
     if skipped:
         notes.insert(0, f"{skipped} line{'s' * (skipped > 1)} of preamble skipped")
-    rows = [line for line in lines[start:] if not line.text.startswith(_MARKER)]
+    end = _rows_end(lines, delimiter, decimal)
+    if end < len(lines):
+        notes.append(f"text from line {lines[end].number} on, below the rows, skipped")
+    rows = [line for line in lines[start:end] if not line.text.startswith(_MARKER)]
     trailing = len(lines[first].bare.split(delimiter)) if delimiter != " " else width
     above = [comment for comment in file.comments if comment.number < lines[start].number]
-    declared = declarations([*above, *lines[:skipped]])
+    declared = declarations([*above, *lines[:skipped], *lines[end:]])
     width = max(width, len(names or ()))
     cells = TextCells(delimiter, decimal, width, max(width, trailing), rows)
     return Layout(tuple(names) if names else None, width, cells, tuple(notes), declared=declared)
@@ -181,6 +185,17 @@ def _rows_begin(
         if len(cells) >= width and not words and not any(is_number(cell, decimal) for cell in cells):
             return start, start - 1
     return start, None
+
+
+def _rows_end(lines: Sequence[Line], delimiter: str, decimal: str) -> int:
+    """Index of the first line of a trailer: below a blank line, or in brackets, and without rows after it."""
+    last = len(lines) - 1
+    while last and not is_number((split(lines[last].bare, delimiter) or [""])[0], decimal):
+        last -= 1
+    if last + 1 == len(lines):
+        return len(lines)
+    below = lines[last + 1]
+    return last + 1 if below.number > lines[last].number + 1 or below.text[0] in "[<" else len(lines)
 
 
 def _is_faulty_row(line: Line, width: int, delimiter: str, decimal: str) -> bool:

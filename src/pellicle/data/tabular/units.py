@@ -35,7 +35,8 @@ _ANGLE_SPELLINGS = {"deg": ("deg", "degree", "degrees", "°", "º")}
 
 def _lookup(spellings: dict[str, tuple[str, ...]], text: str) -> str | None:
     plain = text.strip().lower().replace(" ", "").replace("µ", "u").replace("μ", "u")
-    return next((unit for unit, known in spellings.items() if plain in known), None)
+    spelt = (plain, plain.rstrip("."))  # Shimadzu writes `nm.`
+    return next((unit for unit, known in spellings.items() if set(spelt) & set(known)), None)
 
 
 def wavelength_unit(text: str) -> str | None:

@@ -56,11 +56,19 @@ def read_columns(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray | None, np.ndarray | None]:
     """Return wavelength (nm), signal, sigma and angle (degrees) in file order; None for a missing column.
 
-    Raises DataError as `read_axis` does.
+    A quotient of counts is infinite where the reference has none. Raises DataError as `read_axis` does.
     """
-    others = [columns.signal, *([columns.sigma] if columns.sigma else [])]
+    optional = (columns.sigma, columns.reference, columns.dark)
+    others = [columns.signal, *(column for column in optional if column)]
     wavelength, angle, read = read_axis(table, columns.wavelength, columns.angle, others, unit)
-    return wavelength, read[0], read[1] if columns.sigma else None, angle
+    signal, *rest = read
+    sigma, reference, dark = (rest.pop(0) if column else None for column in optional)
+    if reference is not None:
+        background = 0.0 if dark is None else dark
+        with np.errstate(divide="ignore", invalid="ignore"):
+            quotient = (signal - background) / (reference - background)
+        signal = np.where(reference > background, quotient, np.inf)
+    return wavelength, signal, sigma, angle
 
 
 def read_axis(

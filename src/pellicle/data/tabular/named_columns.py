@@ -1,0 +1,77 @@
+"""Columns of a table by the caller's names, or by its header and what the file declares above it."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+from pellicle.data.tabular.columns import SIGNALS, Column, listed, parse_columns, recognise_all
+from pellicle.data.tabular.declarations import Declared
+from pellicle.data.tabular.table import Table
+from pellicle.errors import DataError
+
+
+def named_columns(table: Table, columns: str | Sequence[str] | None) -> tuple[Column, ...] | None:
+    """Return the columns by the caller's names, or by the header and what the file declares; None without.
+
+    Raises DataError where the file contradicts itself.
+    """
+    if columns is not None:
+        return parse_columns(columns, table.path, table.layout.width)
+    names, declared = table.layout.names, table.layout.declared
+    if names is None:
+        return _declared_columns(table)
+    lowered = [name.lower() for name in names]
+    twice = next((name for i, name in enumerate(names) if name and name.lower() in lowered[:i]), None)
+    if twice is not None:
+        raise DataError(
+            f"{table.path}: the header names {twice!r} twice; rename one, or name the columns with `columns`"
+        )
+    found = recognise_all(names)
+    signals = [column for column in found if column.role in SIGNALS]
+    _refuse_optical_constants(table, found)
+    open_roles = ("other", "intensity", "counts", "processed")
+    unnamed = () if signals else [c for c in found if c.role in open_roles and c.name]
+    return tuple(_with_declared(table, column, declared, column in unnamed) for column in found)
+
+
+def _refuse_optical_constants(table: Table, columns: Sequence[Column]) -> None:
+    """Raise DataError for a table of n and k, which is no measurement."""
+    names = {column.name.strip().lower() for column in columns if column.name}
+    roles = {column.role for column in columns}
+    constants = any({a, b} <= names for a, b in (("n", "k"), ("n", "kappa"), ("e1", "e2"), ("eps1", "eps2")))
+    if constants and roles <= {"wavelength", "N", "other"}:
+        raise DataError(
+            f"{table.path}: contains optical constants ({listed(columns)}), not a measured spectrum; give "
+            "the file as `layer` or `substrate`"
+        )
+
+
+def _declared_columns(table: Table) -> tuple[Column, ...] | None:
+    """The columns of a table without a header, whose quantity the file declares above it; None otherwise."""
+    declared = table.layout.declared
+    if declared.signal is None or table.layout.width not in (2, 3):
+        return None
+    signal = declared.signal.column
+    axis = declared.axis.column.unit if declared.axis else None
+    label = f"declared {signal.name}"
+    columns = [Column(0, "column 1", "wavelength", axis), dataclasses.replace(signal, position=1, name=label)]
+    return (*columns, *([Column(2, "column 3", "sigma")] if table.layout.width == 3 else []))
+
+
+def _with_declared(table: Table, column: Column, declared: Declared, unnamed: bool) -> Column:
+    """A column of the header with the role and the unit that the file declares. Raises DataError."""
+    statement = declared.axis if column.role == "wavelength" else declared.signal
+    if statement is None or not (unnamed or column.role in ("wavelength", *SIGNALS)):
+        return column
+    stated = statement.column
+    roles = (column.role, stated.role) if not unnamed else (stated.role,) * 2
+    units = {column.unit, stated.unit} - {None}
+    if roles[0] != roles[1] or len(units) > 1:
+        raise DataError(
+            f"{table.path}: line {statement.line} declares {stated.name!r}, which contradicts "
+            f"{table.label(column.position)}; correct the file, or name its columns with `columns`"
+        )
+    if column.unit is None and stated.unit:
+        column = dataclasses.replace(column, unit=stated.unit, unknown_unit=None)
+    return dataclasses.replace(column, role=roles[1])
