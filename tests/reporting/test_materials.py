@@ -38,6 +38,23 @@ def test_a_description_gives_page_reason_citation_and_the_other_pages():
         describe("unobtainium")
 
 
+def test_a_file_is_described_as_it_was_understood(tmp_path):
+    path = tmp_path / "si.mat"
+    path.write_text("Silicon of 1992\nmicrons\nNK\n0.5 4.4 0.05\n0.7 3.8 0.01\n")
+    text = describe(str(path))
+    for words in (
+        "WVASE",
+        "wavelength in um, n, k; 2 rows",
+        "500-700 nm",
+        "Silicon of 1992",
+        "n = 4.1321, k = 0.03214 at 589.3 nm",
+    ):
+        assert words in text
+    path = tmp_path / "si.txt"
+    path.write_text("500 4.3 0.05\n700 3.8 0.01\n")
+    assert "read as nm" in describe(str(path))
+
+
 @pytest.mark.parametrize(("name", "suffix"), [("HgS", ".png"), ("SiO2", ".pdf"), ("CuO/Brimhall", ".svg")])
 def test_a_figure_is_written_whole_and_alone(tmp_path, name, suffix):
     path = figure(name, tmp_path / f"nk{suffix}")
@@ -67,7 +84,7 @@ def test_a_failed_figure_leaves_nothing(tmp_path, monkeypatch):
         raise OSError("no space left")
 
     monkeypatch.setattr(Figure, "savefig", full)
-    with pytest.raises(OSError, match="space"):
+    with pytest.raises(UsageError, match="space"):
         figure("Au", tmp_path / "nk.png")
     assert list(tmp_path.iterdir()) == []
 

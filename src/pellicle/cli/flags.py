@@ -44,7 +44,7 @@ class SceneFlags(_Flags):
         str | None,
         flag(
             SCENE,
-            "Layer: a material (SiO2), an index (1.46, 2.9+0.1j), an n,k CSV, or a dispersion model: "
+            "Layer: a material (SiO2), an index (1.46, 2.9+0.1j), a file of n and k, or a dispersion model: "
             "constant, cauchy, cauchy-urbach, sellmeier, lorentz, drude, gaussian, tauc-lorentz, "
             "cody-lorentz, spline or spline-kk, with free parameters; cauchy(1.46,3000) fixes them. Recipes "
             "can also mix and add models.",

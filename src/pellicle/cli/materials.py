@@ -10,11 +10,13 @@ from pellicle.cli.session import say
 
 
 def materials(
-    name: Annotated[str | None, Parameter(help="Name of a material.")] = None,
+    name: Annotated[str | None, Parameter(help="Name of a material, or a file of n and k.")] = None,
     *,
     out: Annotated[str | None, Parameter(help="File for the figure of n and k (PNG, PDF, SVG).")] = None,
 ) -> int:
-    """List the catalogue, or describe one material and draw its n and k.
+    """List the catalogue, or describe one material or its file, and draw its n and k.
+
+    Of a file it says what is understood: format, columns, unit and range.
 
     Example: pellicle materials Au --out gold.png
     """

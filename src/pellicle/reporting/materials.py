@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pellicle.materials import Material, contents, material
+from pellicle.materials.files import read_material_file
 from pellicle.reporting.drawing import figure_path, new_figure, save_figure
 
 if TYPE_CHECKING:
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
 HEADINGS = ("name", "page", "range (nm)", "k data", "source")
 SHOWN_NM = (190.0, 2500.0)
+SODIUM_NM = 589.3
 POINTS = 1200
 
 
@@ -58,25 +60,26 @@ def table(pattern: str | None = None) -> str:
 def describe(name: str) -> str:
     """Describe a material: the page of its name, why that one, its reference, other pages of its book.
 
-    Raises what `material` raises.
+    Of a file it gives format, columns and unit, as they were understood. Raises what `material` raises.
     """
     source, entry = material(name), contents.find_name(name)
     if not isinstance(source, Material):
         return f"{name}\n"
     low, high = source.wavelength_range
+    is_file = entry is None and source.page == name.strip()
     facts = [
-        ("page", source.page),
+        *(_facts_of_file(source.page) if is_file else [("page", source.page)]),
         ("range", "all wavelengths" if high == np.inf else f"{_range(low, high)} nm"),
         ("k data", "yes" if source.has_extinction else "no: taken as transparent"),
+        ("index", _index(source)),
         ("caution", source.caution),
-        ("why" if entry else "sample", source.note),
+        ("why" if entry else "sample", "" if is_file else source.note),
         ("reference", source.citation),
         ("aliases", ", ".join(entry.aliases) if entry else ""),
-        ("pages", ""),
     ]
     text = [source.name, *(_fact(label, value) for label, value in facts if value)]
     parts = source.page.split("/")
-    others = contents.pages_of_book(parts[1]) if len(parts) == 3 else []
+    others = contents.pages_of_book(parts[1]) if len(parts) == 3 and not is_file else []
     if others:
         rows = (_row(f"{p.book}/{p.page}", p)[:1] + _row("", p)[2:] + (p.comments[:60],) for p in others)
         text += [
@@ -85,6 +88,26 @@ def describe(name: str) -> str:
             textwrap.indent(_align(rows), "  ").rstrip(),
         ]
     return "\n".join(text) + "\n"
+
+
+def _facts_of_file(path: str) -> list[tuple[str, str]]:
+    found = read_material_file(path)
+    return [
+        ("file", path),
+        ("format", found.format),
+        ("columns", found.columns),
+        ("title", found.title),
+        ("comments", found.comments),
+    ]
+
+
+def _index(source: Material) -> str:
+    """n, and k where it is known, at the sodium line, or in the middle of a range without it."""
+    low, high = source.wavelength_range
+    at = SODIUM_NM if low <= SODIUM_NM <= high else round((low + high) / 2)
+    value = complex(source(at))
+    k = f", k = {value.imag:.4g}" if source.has_extinction else ""
+    return f"n = {value.real:.5g}{k} at {at:g} nm"
 
 
 def _fact(label: str, value: str) -> str:

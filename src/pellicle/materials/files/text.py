@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pellicle.data.tabular.text import foreign_format, is_number, open_binary
+from pellicle.data.tabular.text import decoded, foreign_format, is_number, open_binary
 from pellicle.errors import DataError
 
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
@@ -53,7 +53,7 @@ class Rows:
 
 
 def read_lines(path: str | Path) -> MaterialText:
-    """Read a text file: UTF-8, UTF-16 with its mark, or Latin-1.
+    """Read a text file: UTF-8, UTF-16 or Latin-1.
 
     Raises DataError for a file that is missing, empty, too large or not a text.
     """
@@ -65,7 +65,7 @@ def read_lines(path: str | Path) -> MaterialText:
         raise DataError(f"{path}: is a MATLAB file; save its table as text with the header wavelength_nm,n,k")
     if advice := foreign_format(content):
         raise DataError(f"{path}: is {advice}")
-    text = _decoded(content)
+    text = decoded(content).rstrip("\x1a")
     if _CONTROL.search(text):
         raise DataError(f"{path}: is a binary file; export it as text (CSV) first")
     if not text.strip():
@@ -73,15 +73,6 @@ def read_lines(path: str | Path) -> MaterialText:
     plain = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     numbered = (Line(i, line.partition("#")[0].strip()) for i, line in enumerate(plain, start=1))
     return MaterialText(str(path), "\n".join(plain), tuple(line for line in numbered if line.text))
-
-
-def _decoded(content: bytes) -> str:
-    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return content.decode("utf-16", errors="replace")
-    try:
-        return content.decode("utf-8-sig").rstrip("\x1a")
-    except UnicodeDecodeError:
-        return content.decode("latin-1").rstrip("\x1a")
 
 
 def cells(text: str) -> list[str]:
