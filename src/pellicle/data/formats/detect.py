@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 
-from pellicle.data.formats import accurion, spectraray, woollam
+from pellicle.data.formats import accurion, film_sense, horiba, regress_pro, spectraray, woollam
 from pellicle.data.tabular.layout import Layout, find_layout
 from pellicle.data.tabular.table import Table
 from pellicle.data.tabular.text import TextFile, read_bytes, text_file
@@ -19,7 +19,13 @@ from pellicle.errors import UsageError
 TextReader = Callable[[TextFile], Sequence[Layout] | None]
 BinaryReader = Callable[[bytes, str], Sequence[Layout] | None]
 
-TEXT_READERS: tuple[TextReader, ...] = (woollam.layouts, spectraray.layouts)
+TEXT_READERS: tuple[TextReader, ...] = (
+    woollam.layouts,
+    spectraray.layouts,
+    film_sense.layouts,
+    regress_pro.layouts,
+    horiba.layouts,
+)
 BINARY_READERS: tuple[BinaryReader, ...] = ()
 
 

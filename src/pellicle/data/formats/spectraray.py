@@ -1,7 +1,8 @@
 """ASCII files of Sentech's SpectraRay: a pair of columns, Ψ and Δ, for each angle of incidence.
 
-The first line is `; WAVELENGTH 50.2 50.2 60.2 60.2`: each angle in degrees, twice. The rows below
-hold the wavelength in nm and Ψ, Δ at each angle. The layout is that of the test files of pyElli.
+The first line is `; WAVELENGTH 50.2 50.2 60.2 60.2`, with or without `;`: each angle in degrees, twice. The
+rows below hold the wavelength in nm and Ψ, Δ at each angle. With each angle 16 times the columns are the
+elements of a Mueller matrix. The layout is that of the test files of pyElli.
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ from pellicle.errors import DataError
 
 AXES = {"WAVELENGTH": "wavelength", "ENERGY": "energy", "WAVENUMBER": "wavenumber"}
 """Column of each word in the heading."""
+ELEMENTS = 16
+"""Elements of a Mueller matrix."""
 
 
 def layouts(file: TextFile) -> list[Layout] | None:
@@ -22,10 +25,15 @@ def layouts(file: TextFile) -> list[Layout] | None:
     lines, path = file.lines, file.path
     words = lines[0].text.lstrip(";").replace(",", ".").split()
     numbers = words[1:]
-    if not lines[0].text.startswith(";") or not words or words[0].upper() not in AXES:
+    if not words or words[0].upper() not in AXES:
         return None
     if not numbers or not all(is_number(number) for number in numbers):
         return None
+    if len(numbers) == ELEMENTS * len(set(numbers)):
+        raise DataError(
+            f"{path}: line {lines[0].number} names each angle {ELEMENTS} times, as a Mueller matrix is "
+            "written; export psi and delta"
+        )
     if numbers[::2] != numbers[1::2] or len(set(numbers)) != len(numbers) // 2:
         raise DataError(
             f"{path}: line {lines[0].number} should name each angle of incidence twice, for psi and for "
@@ -43,4 +51,5 @@ def layouts(file: TextFile) -> list[Layout] | None:
     if not rows:
         raise DataError(f"{path}: has a heading of SpectraRay but no rows; export it again")
     names = (AXES[words[0].upper()], "angle_deg", "psi_deg", "delta_deg")
-    return [plain_columns(names, rows, [f"read as a SpectraRay file of {', '.join(angles)} degrees"])]
+    notes = [f"read as a SpectraRay file of {', '.join(angles)} degrees"]
+    return [plain_columns(names, rows, notes, facts=[("format", "Sentech SpectraRay text")])]

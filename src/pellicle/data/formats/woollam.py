@@ -1,15 +1,20 @@
 """Text files of Woollam's WVASE and CompleteEASE.
 
-Lines of heading (a title, `VASEmethod[...]`, `Original[...]`), a line with the unit of the axis (`nm`,
-`Angstroms`, `eV`), then rows of wavelength, angle of incidence, Ψ, Δ and usually the errors of both.
-CompleteEASE puts `E` before such rows, and other labels (`dpolE`, `Rpp`, `uT`, ...) before other
-quantities. The layout is that of files of both programs.
+Lines of heading (a title, `VASEmethod[...]`, `Original[...]`, `Dynamic`), a line with the unit of the axis
+(`nm`, `Angstroms`, `eV`, `1/cm`), then rows of wavelength, angle of incidence, values and usually their
+errors. A label before a row names its quantity: `E` or none is Ψ and Δ, `dpolE` the depolarisation in
+percent, `pR`, `sR`, `uR`, `pT`, `sT`, `uT` a reflectance or transmittance of p, s or unpolarised light. Rows
+of dynamic data end with their time in minutes. The layout is that of files of both programs.
 """
 
 from __future__ import annotations
 
+import re
+from collections import defaultdict
 from collections.abc import Sequence
 
+from pellicle.data.formats import woollam_rows
+from pellicle.data.formats.woollam_rows import Rows, Selected
 from pellicle.data.tabular.layout import Layout, plain_columns
 from pellicle.data.tabular.text import Line, TextFile, is_number
 from pellicle.data.tabular.units import wavelength_unit
@@ -17,70 +22,145 @@ from pellicle.errors import DataError
 
 METHOD = "VASEmethod["
 LABEL = "E"  # rows of Ψ and Δ
+DEPOLARISATION = "dpole"  # in lower case; programs write dpolE and dPolE
+TRIGONOMETRIC = "TRIG"  # behind the unit: tan Ψ and cos Δ in place of Ψ and Δ
+NOTE = "read as a Woollam (WVASE, CompleteEASE) text file"
+_POWERS = {f"{p}{q}": q if p == "u" else f"{q}{p}" for p in "psu" for q in "RT"}
+"""Labels of reflectances and transmittances, and the column names of these."""
+_KNOWN = re.compile(r"(?i:dpole|AnE|Aps|Asp|mm[1-4][1-4])|E|[psu][RT][rb]?|R[ps][ps]|T[ps][ps]")
+_OTHERS = {
+    r"(?i:mm[1-4][1-4])": "a Mueller matrix",
+    r"(?i:AnE|Aps|Asp)": "generalised ellipsometry",
+    r"[psu][RT][rb]": "measurements from the back",
+}
+_FACTS = {
+    "software": r"\b((?:WVASE|CompleteEASE)=[\d.]+)",
+    "date": r"\b((?:Mon|Tue|Wed|Thu|Fri|Sat|Sun) [A-Z][a-z]{2} +\d+ [\d:]+ \d{4})",
+}
 _MOST_HEADING = 50  # lines that are searched for the unit
-_COLUMNS = ("angle_deg", "psi_deg", "delta_deg", "sigma_psi", "sigma_delta")
+_MOST_LISTED = 8
 
 
 def layouts(file: TextFile) -> list[Layout] | None:
-    """Return the rows of Ψ and Δ, or None for another format.
+    """Return a layout for each quantity (and time) that can be fitted, or None for another format.
 
-    Raises DataError where the file has none, or tan Ψ and cos Δ.
+    Raises DataError where the file has none.
     """
     lines, path = file.lines, file.path
     at = _unit_line(lines)
     if at is None:
         return None
-    rows = [(line, line.bare.split()) for line in lines[at + 1 :]]
-    labelled = any(cells[0] == LABEL for _, cells in rows)
-    if not labelled and not any(line.text.startswith(METHOD) for line in lines[:at]):
+    heading, unit = lines[:at], lines[at].text.split()
+    method = next((line.text for line in heading if line.text.startswith(METHOD)), "")
+    rows = [(line, _cells(line)) for line in lines[at + 1 :] if line.bare.strip()]
+    trigonometric = TRIGONOMETRIC in [word.upper() for word in unit[1:]]
+    if not (method or trigonometric or any(_KNOWN.fullmatch(cells[0]) for _, cells in rows)):
         return None
-    _refuse_tan_cos(lines[at], path)
-    kept, others = _separate(rows)
-    widths = {len(cells) for _, cells in kept}
-    if not kept or widths not in ({4}, {6}):
-        labels = f" (found {', '.join(others)})" if others else ""
+    dynamic = any(line.text.strip().lower() == "dynamic" for line in heading)
+    transmitted = "TransmissionMeas=1" in method.replace(" ", "")
+    facts = _facts(heading, method)
+    axis = f"wavelength ({wavelength_unit(unit[0])})"
+    found, left_out = [], {}
+    for time, groups in _by_time(rows, dynamic, path).items():
+        name = f"{time} min" if dynamic else ""
+        tables = _tables(groups, trigonometric, transmitted, path)
+        left_out |= dict.fromkeys(groups)
+        for quantity, (names, own, notes) in tables:
+            alone = f"{name} {quantity}" if quantity and dynamic else name
+            found.append((alone, (axis, *names), own, [NOTE, *notes]))
+    ignored = _described(left_out, transmitted)
+    if not found:
         raise DataError(
-            f"{path}: looks like a Woollam file, but its rows are not wavelength, angle, psi, delta and "
-            f"their errors{labels}; export psi and delta as text"
+            f"{path}: looks like a Woollam file, but has no psi and delta, reflectance or transmittance, "
+            f"only {ignored or 'a heading'}; export psi and delta as text"
         )
-    names = (f"wavelength ({wavelength_unit(lines[at].text.split()[0])})", *_COLUMNS[: widths.pop() - 1])
-    notes = ["read as a Woollam (WVASE, CompleteEASE) text file"]
-    if len(names) == 6 and all(is_number(x) and float(x) == 0 for _, cells in kept for x in cells[4:]):
-        names, kept = names[:4], [(line, cells[:4]) for line, cells in kept]  # as simulations are written
-        notes.append("errors that are all zero ignored")
-    if others:
-        notes.append(f"rows of other quantities ignored: {', '.join(others)}")
-    return [plain_columns(names, kept, notes)]
+    said = [f"rows of other quantities ignored: {ignored}"] if ignored else []
+    return [
+        plain_columns(names, own, [*notes, *said], name=name, facts=facts)
+        for name, names, own, notes in found
+    ]
+
+
+def _tables(
+    groups: dict[str, Rows], trigonometric: bool, transmitted: bool, path: str
+) -> list[tuple[str, Selected]]:
+    """The tables of one time and their quantities, "" for Ψ and Δ. Labels that are read leave `groups`."""
+    tables = []
+    if LABEL in groups and trigonometric:
+        tables.append(("", woollam_rows.tan_cos(groups.pop(LABEL), path)))
+    elif LABEL in groups and not transmitted:
+        selected = woollam_rows.psi_delta(groups.pop(LABEL), path)
+        shares = next((label for label in groups if label.lower() == DEPOLARISATION), None)
+        if shares is not None:
+            selected = woollam_rows.with_depolarisation(selected, shares, groups.pop(shares))
+        tables.append(("", selected))
+    for label, quantity in _POWERS.items():
+        if label in groups and (own := woollam_rows.power(label, quantity, groups[label], path)):
+            del groups[label]
+            tables.append((quantity, own))
+    return tables
 
 
 def _unit_line(lines: Sequence[Line]) -> int | None:
     """Index of the line with nothing but the axis's unit, above rows of numbers."""
     for i, line in enumerate(lines[: min(_MOST_HEADING, len(lines) - 1)]):
-        words, below = line.text.split(), lines[i + 1].bare.split()
-        alone = len(words) == 1 or words[1].upper() == "TRIG"
+        words, below = line.text.split(), _cells(lines[i + 1])
+        alone = len(words) == 1 or (len(words) == 2 and words[1].upper() == TRIGONOMETRIC)
         if alone and wavelength_unit(words[0]) and len(below) >= 4 and is_number(below[1]):
             return i
     return None
 
 
-def _refuse_tan_cos(line: Line, path: str) -> None:
-    if len(line.text.split()) > 1:
-        raise DataError(
-            f"{path}: line {line.number} states that the rows are tan(psi) and cos(delta), which lack the "
-            "sign of delta; export psi and delta in degrees"
-        )
+def _cells(line: Line) -> list[str]:
+    """The cells of a row; a comma can only be a decimal mark between tabs or blanks."""
+    return line.bare.replace(",", ".").split()
 
 
-def _separate(
-    rows: Sequence[tuple[Line, list[str]]],
-) -> tuple[list[tuple[Line, list[str]]], list[str]]:
-    """The rows of Ψ and Δ without their label, and the labels of the others."""
-    kept, others = [], {}
+def _by_time(rows: Sequence[tuple[Line, list[str]]], dynamic: bool, path: str) -> dict[str, dict[str, Rows]]:
+    """The rows of each time and label, without both, in the order of the file.
+
+    The time of static data is "".
+    """
+    times: dict[str, dict[str, Rows]] = defaultdict(lambda: defaultdict(list))
     for line, cells in rows:
-        if cells[0] == LABEL:
-            kept.append((line, cells[1:]))
-        elif cells[0][0].isalpha() and not is_number(cells[0]):
-            others[cells[0]] = None
-        else:
-            kept.append((line, cells))
-    return kept, list(others)
+        label = LABEL
+        if cells[0][0].isalpha() and not is_number(cells[0]):
+            label, *cells = cells
+        time = ""
+        if dynamic:
+            if len(cells) not in (5, 7) or not is_number(cells[-1]):
+                raise DataError(
+                    f"{path}: line {line.number} of dynamic data does not end with its time behind "
+                    f"wavelength, angle, values and errors: {len(cells)} values; correct that line"
+                )
+            *cells, time = cells
+        times[time][label].append((line, cells))
+    return times
+
+
+def _facts(heading: Sequence[Line], method: str) -> list[tuple[str, str]]:
+    """What the heading says of the program, the date and the sample."""
+    facts = [("format", "Woollam text")]
+    for key, pattern in _FACTS.items():
+        if match := re.search(pattern, method):
+            facts.append((key, match[1]))
+    if heading and not heading[0].text.startswith((METHOD, "Original[")):
+        facts.append(("sample", heading[0].text.strip()))
+    return facts
+
+
+def _described(labels: dict[str, None], transmitted: bool) -> str:
+    """Labels of rows that are not read, and what they are, for a message."""
+    kinds: dict[str, list[str]] = defaultdict(list)
+    for label in labels:
+        kind = next((text for pattern, text in _OTHERS.items() if re.fullmatch(pattern, label)), "")
+        if label in _POWERS:
+            kind = "intensities, with errors of 1"
+        elif label == LABEL and transmitted:
+            kind = "psi and delta in transmission"
+        kinds[kind].append(label)
+    parts = []
+    for kind, own in kinds.items():
+        listed = ", ".join(own[:_MOST_LISTED]) + (", ..." if len(own) > _MOST_LISTED else "")
+        parts.append(f"{kind} ({listed})" if kind else listed)
+    return "; ".join(parts)

@@ -1,0 +1,149 @@
+"""Columns of the rows of Woollam's text files: Ψ and Δ, tan Ψ and cos Δ, depolarisation, reflectance.
+
+Each function takes rows of wavelength, angle, values and errors, and returns the names of the columns behind
+the wavelength, the rows and sentences on what was done.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from typing import NamedTuple, TypeAlias
+
+from pellicle.data.formats.tan_psi_cos_delta import COLUMNS, cells_of
+from pellicle.data.tabular.text import Line, is_number
+from pellicle.errors import DataError
+
+Rows: TypeAlias = list[tuple[Line, list[str]]]
+
+
+class Selected(NamedTuple):
+    """Names of the columns behind the wavelength, rows, and sentences on them."""
+
+    names: tuple[str, ...]
+    rows: Rows
+    notes: list[str]
+
+
+def psi_delta(rows: Rows, path: str) -> Selected:
+    """Ψ, Δ and, where they are not all zero, their errors. Raises DataError for rows of other lengths."""
+    notes: list[str] = []
+    width = len(rows[0][1])
+    odd = next((line for line, cells in rows if len(cells) != width), None)
+    if odd is not None or width not in (4, 6, 8):
+        place = f"line {(odd or rows[0][0]).number}"
+        raise DataError(
+            f"{path}: looks like a Woollam file, but {place} is not wavelength, angle, psi, delta and their "
+            "errors, as the other rows; export psi and delta as text, or correct that line"
+        )
+    if width == 8:  # CompleteEASE and programs of other makers write 1 and 1 there
+        rows = [(line, cells[:6]) for line, cells in rows]
+        notes.append("2 columns behind the errors ignored")
+    rows, missing = _measured(rows, (2, 3))
+    if not rows:
+        raise DataError(f"{path}: has no point with psi and delta; check the measurement")
+    names = ("angle_deg", "psi_deg", "delta_deg", "sigma_psi", "sigma_delta")[: len(rows[0][1]) - 1]
+    if len(names) == 5 and all(_is(x, 0.0) for _, cells in rows for x in cells[4:]):
+        names, rows = names[:3], [(line, cells[:4]) for line, cells in rows]  # as simulations are written
+        notes.append("errors that are all zero ignored")
+    return Selected(names, rows, [*notes, *missing])
+
+
+def tan_cos(rows: Rows, path: str) -> Selected:
+    """α and β of tan Ψ and cos Δ, which lack the sign of Δ as these do; errors are left out."""
+    notes = ["tan(psi) and cos(delta) read, which leave the sign of delta open"]
+    if any(len(cells) > 4 for _, cells in rows):
+        notes.append("errors of tan(psi) and cos(delta) ignored")
+    for line, cells in rows:
+        if len(cells) < 4:
+            raise DataError(
+                f"{path}: line {line.number} has {len(cells)} values where wavelength, angle, tan(psi) and "
+                "cos(delta) are expected; correct that line"
+            )
+    rows, missing = _measured(rows, (2, 3))
+    found = [(line, [*cells[:2], *cells_of(cells[2], cells[3], line, path)]) for line, cells in rows]
+    return Selected(("angle_deg", *COLUMNS), found, [*notes, *missing])
+
+
+def with_depolarisation(selected: Selected, label: str, shares: Rows) -> Selected:
+    """Ψ and Δ with the depolarisation of the same points, in percent; without it where points are missing.
+
+    CompleteEASE writes an angle of 0 beside the depolarisation of all points of one angle.
+    """
+    names, rows, notes = selected
+
+    def without(reason: str) -> Selected:
+        return Selected(names, rows, [*notes, f"{label} ignored: {reason}"])
+
+    if any(len(cells) not in (3, 4) for _, cells in shares):
+        return without("its rows are not wavelength, angle, a value and its error")
+    one_angle = len({cells[1] for _, cells in rows}) == 1 and all(_is(cells[1], 0.0) for _, cells in shares)
+    values = [cells[2:] for _, cells in shares]
+    found = dict(zip(_points(shares, one_angle), values, strict=True))
+    beside = [found.get(point, []) for point in _points(rows, one_angle)]
+    lacking = sum(not cells or not all(map(_finite, cells)) for cells in beside)
+    if lacking:
+        return without(f"{lacking} of {len(rows)} points have none")
+    notes = [*notes]
+    if len(shares) > len(rows):
+        notes.append(f"{len(shares) - len(rows)} rows of {label} without psi and delta ignored")
+    errors = [cells[1] for cells in beside if len(cells) == 2]
+    with_error = len(errors) == len(rows)
+    for placeholder in (0.0, 1.0):  # CompleteEASE writes 1 where it has no error
+        if with_error and all(_is(error, placeholder) for error in errors):
+            with_error = False
+            notes.append(f"errors of {label} that are all {placeholder:g} ignored")
+    count = 2 if with_error else 1
+    own = [(line, [*cells, *more[:count]]) for (line, cells), more in zip(rows, beside, strict=True)]
+    return Selected((*names, *("depolarisation (%)", "sigma_depolarisation (%)")[:count]), own, notes)
+
+
+def power(label: str, quantity: str, rows: Rows, path: str) -> Selected | None:
+    """A reflectance or transmittance and its error; None for an intensity, whose errors are written as 1.
+
+    Raises DataError for rows of other lengths.
+    """
+    width = len(rows[0][1])
+    odd = next((line for line, cells in rows if len(cells) != width), None)
+    if odd is not None or width not in (3, 4):
+        raise DataError(
+            f"{path}: line {(odd or rows[0][0]).number} is not {label}, wavelength, angle, a value and its "
+            "error, as the other rows; correct that line"
+        )
+    errors = [cells[3] for _, cells in rows] if width == 4 else []
+    if errors and all(_is(error, 1.0) for error in errors):
+        return None
+    names, notes = ("angle_deg", quantity, "sigma")[: width - 1], []
+    if errors and all(_is(error, 0.0) for error in errors):
+        names, rows = names[:2], [(line, cells[:3]) for line, cells in rows]
+        notes.append("errors that are all zero ignored")
+    rows, missing = _measured(rows, (2,))
+    return Selected(names, rows, [*notes, *missing]) if rows else None
+
+
+def _measured(rows: Rows, positions: Sequence[int]) -> tuple[Rows, list[str]]:
+    """The rows whose values are not written NaN, and a sentence on the others."""
+    kept = [(line, cells) for line, cells in rows if not any(cells[i].lower() == "nan" for i in positions)]
+    missing = len(rows) - len(kept)
+    return kept, [f"{missing} of {len(rows)} points, written NaN, left out"] if missing else []
+
+
+def _points(rows: Rows, one_angle: bool) -> list[tuple[float | str, float | str, int]]:
+    """What identifies each row: wavelength, angle, and its number among repeats of both."""
+    counts: Counter[tuple[float | str, float | str]] = Counter()
+    points = []
+    for _, cells in rows:
+        wavelength, angle = (float(cell) if is_number(cell) else cell for cell in cells[:2])
+        point = (wavelength, "" if one_angle else angle)
+        counts[point] += 1
+        points.append((*point, counts[point]))
+    return points
+
+
+def _is(cell: str, value: float) -> bool:
+    return is_number(cell) and float(cell) == value
+
+
+def _finite(cell: str) -> bool:
+    return is_number(cell) and math.isfinite(float(cell))

@@ -1,0 +1,273 @@
+"""Woollam's text files: static, dynamic, with depolarisation, reflectance and transmittance."""
+
+import re
+
+import numpy as np
+import pytest
+
+from pellicle.data.read_spectrum import read_spectra, read_spectrum
+
+WVASE = """\
+oxide on silicon, 3 zones
+VASEmethod[EllipsometerType=5, Isotropic, WVASE=3.688, HardVer=6.256, Mon Jul 10 14:15:02 2023]
+Original[oxide.dat]
+nm
+400.000000\t65.000000\t20.5\t170.25\t0.05\t0.4
+410.000000\t65.000000\t21.5\t-10.5\t0.06\t0.5
+400.000000\t75.000000\t12.5\t120.25\t0.07\t0.6
+"""
+COMPLETE_EASE = """\
+oxide on silicon
+VASEmethod[EllipsometerType=7, Isotropic+Depolarization]
+Original[oxide.SE]
+eV
+E\t3.0\t65.0\t20.5\t170.25\t0.05\t0.4
+E\t2.0\t65.0\t21.5\t265.5\t0.06\t0.5
+dpolE\t3.0\t65.0\t1.5\t0.1
+dpolE\t2.0\t65.0\t-0.25\t0.2
+"""
+IN_SITU = """\
+
+VASEmethod[EllipsometerType=4, CompleteEASE=3.65, AcqTime=30.0]
+nm
+400.5\t70.000\t21.5\t145.5\t0.0140\t0.0318\t
+dPolE\t400.5\t0.000\t-5.25\t1.0000
+uR\t400.5\t0.000\t0.6504\t1.0000
+401.5\t70.000\t21.0\t147.5\t0.0130\t0.0295\t
+dPolE\t401.5\t0.000\t-4.50\t1.0000
+uR\t401.5\t0.000\t0.7099\t1.0000
+"""
+DYNAMIC = """\
+
+VASEmethod[EllipsometerType=4, CompleteEASE=3.65, AcqTime=0.978]
+Dynamic
+nm
+400.5\t70.000\t30.5\t121.5\t0.05\t0.22\t\t0.0232
+402.5\t70.000\t29.5\t122.5\t0.06\t0.20\t\t0.0232
+400.5\t70.000\t30.25\t121.25\t0.07\t0.22\t\t0.1071
+402.5\t70.000\t29.25\t122.25\t0.08\t0.20\t\t0.1071
+"""
+JOINT = """\
+oxide on silicon
+VASEmethod[EllipsometerType=5, Isotropic, WVASE=3.688]
+Original[oxide.dat]
+nm
+E\t400\t65\t20.5\t170.25\t0.05\t0.4
+E\t410\t65\t21.5\t169.5\t0.06\t0.5
+pR\t400\t25\t0.45\t0.002
+pR\t410\t25\t0.44\t0.003
+sR\t400\t25\t0.55\t0.004
+sR\t410\t25\t0.54\t0.005
+uT\t400\t0\t0.12\t0.001
+"""
+REFLECTANCE = """\
+Measured data written by ADAP
+nm
+uR  418.2788  0.000000  0.443593  0.010000
+uR  421.5761  0.000000  0.439625  0.020000
+"""
+TRIGONOMETRIC = "nm  TRIG\n300 70  1.0    0.5\n400 70  .5    -.5\n"
+
+
+def test_static(write):
+    spectrum = read_spectrum(write(WVASE))
+    np.testing.assert_array_equal(spectrum.wavelength, [400, 400, 410])
+    np.testing.assert_array_equal(spectrum.angle, [65, 75, 65])
+    np.testing.assert_array_equal(spectrum.values, [20.5, 12.5, 21.5])
+    np.testing.assert_array_equal(spectrum.delta, [170.25, 120.25, 349.5])
+    np.testing.assert_array_equal(spectrum.sigma, [0.05, 0.07, 0.06])
+    np.testing.assert_array_equal(spectrum.delta_sigma, [0.4, 0.6, 0.5])
+    np.testing.assert_array_equal(spectrum.lines, [5, 7, 6])
+    assert spectrum.notes[0] == "read as a Woollam (WVASE, CompleteEASE) text file"
+    assert dict(spectrum.declared) == {
+        "format": "Woollam text",
+        "software": "WVASE=3.688",
+        "date": "Mon Jul 10 14:15:02 2023",
+        "sample": "oxide on silicon, 3 zones",
+    }
+
+
+def test_rows_without_errors(write):
+    spectrum = read_spectrum(write(re.sub(r"(?m)^(4.*)\t[\d.]+\t[\d.]+$", r"\1", WVASE)))
+    np.testing.assert_array_equal(spectrum.values, [20.5, 12.5, 21.5])
+    assert spectrum.sigma is None
+    assert spectrum.delta_sigma is None
+
+
+@pytest.mark.parametrize(
+    ("unit", "first", "second"),
+    [("Angstroms", "4000", "4100"), ("1/cm", "25000", "24390.243902439026"), ("um", "0.4", "0.41")],
+)
+def test_units_of_the_axis(write, unit, first, second):
+    text = WVASE.replace("400.000000", first).replace("410.000000", second).replace("\nnm", f"\n{unit}")
+    np.testing.assert_allclose(read_spectrum(write(text)).wavelength, [400, 400, 410])
+
+
+def test_an_axis_in_energies(write):
+    spectrum = read_spectrum(write(COMPLETE_EASE))
+    np.testing.assert_allclose(spectrum.wavelength, 1239.8419843320026 / np.array([3.0, 2.0]))
+    np.testing.assert_array_equal(spectrum.delta, [170.25, 265.5])
+    np.testing.assert_array_equal(spectrum.lines, [5, 6])
+
+
+def test_depolarisation_in_percent(write):
+    spectrum = read_spectrum(write(COMPLETE_EASE))
+    np.testing.assert_allclose(spectrum.depolarisation, [0.015, -0.0025])
+    np.testing.assert_allclose(spectrum.depolarisation_sigma, [0.001, 0.002])
+
+
+def test_depolarisation_of_some_points_only_is_left_out(write):
+    lines = COMPLETE_EASE.splitlines(keepends=True)
+    some = read_spectrum(write("".join(lines[:-1])))
+    assert some.depolarisation is None
+    assert "dpolE ignored: 1 of 2 points have none" in some.notes
+    more = read_spectrum(write(COMPLETE_EASE + "dpolE\t1.0\t65.0\t0.2\t0.2\n"))
+    np.testing.assert_allclose(more.depolarisation, [0.015, -0.0025])
+    assert "1 rows of dpolE without psi and delta ignored" in more.notes
+    angle = read_spectrum(write(COMPLETE_EASE.replace("dpolE\t3.0\t65.0", "dpolE\t3.0\t75.0")))
+    assert angle.depolarisation is None
+    wide = read_spectrum(write(re.sub(r"(?m)^(dpolE.*)$", r"\1\t0\t0", COMPLETE_EASE)))
+    assert any(note.startswith("dpolE ignored: its rows") for note in wide.notes)
+
+
+def test_in_situ_rows_whose_angle_is_zero_beside_the_depolarisation(write):
+    """CompleteEASE writes the intensity as `uR` with an error of 1: it is no reflectance."""
+    [spectrum] = read_spectra(write(IN_SITU))
+    np.testing.assert_array_equal(spectrum.angle, [70, 70])
+    np.testing.assert_allclose(spectrum.depolarisation, [-0.0525, -0.045])
+    assert spectrum.depolarisation_sigma is None
+    assert "errors of dPolE that are all 1 ignored" in spectrum.notes
+    assert "rows of other quantities ignored: intensities, with errors of 1 (uR)" in spectrum.notes
+
+
+def test_dynamic_data_are_a_spectrum_for_each_time(write, refused):
+    refused(DYNAMIC, "has 2 spectra: '0.0232 min', '0.1071 min'; choose one", '`spectrum="0.0232 min"`')
+    spectrum = read_spectrum(write(DYNAMIC), spectrum="0.1071 min")
+    np.testing.assert_array_equal(spectrum.values, [30.25, 29.25])
+    np.testing.assert_array_equal(spectrum.sigma, [0.07, 0.08])
+    np.testing.assert_array_equal(spectrum.lines, [6, 7])
+    assert [one.name for one in read_spectra(write(DYNAMIC), spectrum="all")] == ["0.0232 min", "0.1071 min"]
+    refused(DYNAMIC.replace("\t\t0.1071", "", 1), "line 6 of dynamic data", "6 values")
+
+
+def test_dynamic_reflectances_are_named_by_time_and_quantity(write):
+    rows = "".join(f"{p}R\t{w}\t20\t0.25\t0.01\t\t0.0232\n" for p in "ps" for w in (400.5, 402.5))
+    text = "".join(DYNAMIC.splitlines(keepends=True)[:6]) + rows
+    found = read_spectra(write(text), spectrum="all")
+    assert [one.name for one in found] == ["0.0232 min", "0.0232 min Rp", "0.0232 min Rs"]
+    assert [one.signal for one in found] == ["psi-delta", "R", "R"]
+    assert len(read_spectra(write(text))) == 3  # of one time: one measurement
+
+
+def test_reflectances_beside_psi_and_delta(write, refused):
+    psi, p, s, t = read_spectra(write(JOINT))
+    assert [one.name for one in (psi, p, s, t)] == ["psi-delta", "Rp", "Rs", "T"]
+    assert (psi.signal, p.signal, s.signal, t.signal) == ("psi-delta", "R", "R", "T")
+    assert (p.polarisation, s.polarisation, t.polarisation) == ("p", "s", "unpolarised")
+    np.testing.assert_array_equal(psi.angle, [65, 65])
+    np.testing.assert_array_equal(p.angle, [25, 25])
+    np.testing.assert_array_equal(p.values, [0.45, 0.44])
+    np.testing.assert_array_equal(s.sigma, [0.004, 0.005])
+    np.testing.assert_array_equal(t.angle, [0])
+    assert len(read_spectra(write(JOINT), signal="psi-delta")) == 1
+
+
+def test_reflectances_alone(write):
+    [spectrum] = read_spectra(write(REFLECTANCE))
+    assert (spectrum.signal, spectrum.polarisation) == ("R", "unpolarised")
+    np.testing.assert_array_equal(spectrum.wavelength, [418.2788, 421.5761])
+    np.testing.assert_array_equal(spectrum.values, [0.443593, 0.439625])
+    np.testing.assert_array_equal(spectrum.sigma, [0.01, 0.02])
+    np.testing.assert_array_equal(spectrum.angle, [0, 0])
+    zero = read_spectrum(write(REFLECTANCE.replace("0.010000", "0").replace("0.020000", "0.0")))
+    assert zero.sigma is None
+
+
+def test_refused_reflectances(refused):
+    refused(re.sub(r"0\.0[12]0000", "1.000000", REFLECTANCE), "intensities, with errors of 1 (uR)")
+    refused(REFLECTANCE.replace("  0.020000", ""), "line 4 is not uR, wavelength, angle, a value")
+    refused(REFLECTANCE.replace("0.443593", "44.3593"), "line 3", "44.3593", "`signal_unit")
+    refused(REFLECTANCE.replace("0.443593", "x"), "line 3", "'x'")
+
+
+def test_trigonometric_tables_leave_the_sign_of_delta_open(write, refused):
+    spectrum = read_spectrum(write(TRIGONOMETRIC))
+    assert spectrum.signal == "psi-delta"
+    assert spectrum.folded
+    np.testing.assert_allclose(spectrum.values, [45.0, np.rad2deg(np.arctan(0.5))])
+    np.testing.assert_allclose(spectrum.delta, [60.0, 120.0])
+    np.testing.assert_array_equal(spectrum.angle, [70, 70])
+    refused(TRIGONOMETRIC.replace("-.5", "-1.2"), "line 3", "'-1.2' is no cos(delta)")
+    refused(TRIGONOMETRIC.replace(".5 ", "-.5 "), "line 3", "no tan(psi)")
+    refused(TRIGONOMETRIC.replace("-.5", ""), "line 3 has 3 values")
+    refused(WVASE.replace("nm\n", "nm  TRIG\n"), "line 5", "'170.25' is no cos(delta)")
+
+
+def test_mueller_and_generalised_rows_are_named(write, refused):
+    rows = "mm11\t3.0\t65\t1\t0.1\nmm12\t3.0\t65\t.1\t.1\t0.1\t.1\nAnE\t3\t65\t20\t100\t1\t1\n"
+    spectrum = read_spectrum(write(COMPLETE_EASE + rows))
+    words = "rows of other quantities ignored: a Mueller matrix (mm11, mm12); generalised ellipsometry (AnE)"
+    assert words in spectrum.notes
+    heading = "".join(COMPLETE_EASE.splitlines(keepends=True)[:4])
+    refused(heading + rows, "only a Mueller matrix (mm11, mm12); generalised ellipsometry (AnE)", "export psi")
+    back = JOINT.replace("pR", "uRb").replace("sR", "uRb").replace("E\t", "Aps\t")
+    assert read_spectra(write(back))[0].signal == "T"
+
+
+def test_ellipsometry_in_transmission_is_not_read(write, refused):
+    text = JOINT.replace("WVASE=3.688", "WVASE=3.688, TransmissionMeas=1")
+    assert [one.name for one in read_spectra(write(text), spectrum="all")] == ["Rp", "Rs", "T"]
+    refused(WVASE.replace("WVASE", "TransmissionMeas=1, WVASE"), "only psi and delta in transmission (E)")
+
+
+def test_columns_behind_the_errors_and_points_without_a_value(write, refused):
+    text = "VASEmethod[M2000 ellipsometer]\nnm\nE 400 65 20 170 .1 .2 1.0 1.0\nE 410 65 21 169 .1 .2 1.0 1.0\n"
+    spectrum = read_spectrum(write(text))
+    np.testing.assert_array_equal(spectrum.delta_sigma, [0.2, 0.2])
+    assert "2 columns behind the errors ignored" in spectrum.notes
+    spectrum = read_spectrum(write(text.replace("21 169", "NaN nan")))
+    assert "1 of 2 points, written NaN, left out" in spectrum.notes
+    refused(text.replace("21 169", "NaN nan").replace("20 170", "NaN nan"), "no point with psi and delta")
+
+
+def test_errors_that_are_all_zero_are_none(write):
+    spectrum = read_spectrum(write(re.sub(r"\t[\d.]+\t[\d.]+$", "\t0\t0.0000", WVASE, flags=re.MULTILINE)))
+    assert spectrum.sigma is None
+    assert "errors that are all zero ignored" in spectrum.notes
+
+
+def test_rows_with_a_label_need_no_method_above_them(write):
+    assert len(read_spectrum(write("\n".join(["title", *COMPLETE_EASE.splitlines()[3:]])))) == 2
+
+
+def test_a_lone_unit_alone_makes_no_woollam_file(write):
+    assert read_spectrum(write("nm\n400 0.1 0.01\n500 0.2 0.01\n"), signal="R").signal == "R"
+
+
+def test_repeated_sweeps_are_averaged(write):
+    rows = "".join(f"{w}\t65\t{20 + 0.01 * k}\t170\n" for k in range(2) for w in range(400, 420, 2))
+    spectrum = read_spectrum(write("\n".join(WVASE.splitlines()[:4]) + "\n" + rows))
+    assert len(spectrum.sweeps) == 2
+    np.testing.assert_allclose(spectrum.values, 20.005)
+
+
+def test_refused(refused):
+    heading = "".join(WVASE.splitlines(keepends=True)[:4])
+    refused(WVASE + "420\t65\t20\n", "looks like a Woollam file, but line 8 is not")
+    refused(WVASE.replace("21.5", "91.5"), "line 6, column 'psi_deg': 91.5", "0 to 90")
+    refused(WVASE.replace("21.5", "x"), "line 6, column 'psi_deg': expected a number", "'x'")
+    refused(WVASE.replace("410.", "400."), "line 6", "400 repeats 400 of line 5")
+    refused(WVASE.replace("\nnm\n", "\nfurlongs\n"))
+    refused(heading)
+    refused(WVASE[:-20], "line 7 is not")
+
+
+@pytest.mark.parametrize("text", [WVASE, COMPLETE_EASE, IN_SITU, DYNAMIC, JOINT, REFLECTANCE, TRIGONOMETRIC])
+def test_encodings(same_in_every_encoding, text):
+    same_in_every_encoding(text)
+
+
+def test_decimal_commas(write):
+    heading, rows = WVASE.split("nm\n")
+    comma = read_spectrum(write(heading + "nm\n" + rows.replace(".", ",")))
+    np.testing.assert_array_equal(comma.delta, [170.25, 120.25, 349.5])
