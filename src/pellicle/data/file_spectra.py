@@ -15,7 +15,7 @@ from pellicle.data.tabular.column_selection import SpectrumColumns, signal_colum
 from pellicle.data.tabular.columns import SIGNALS, listed
 from pellicle.data.tabular.named_columns import named_columns
 from pellicle.data.tabular.table import Table
-from pellicle.errors import UsageError
+from pellicle.errors import DataError, UsageError
 
 ALL = "all"
 _MOST_LISTED = 40
@@ -52,6 +52,30 @@ def candidates(
         alone = len(powers) + len(found) == 1
         label = own if alone else " ".join(part for part in (own, column.name) if part)
         found.append(Candidate(table, power, label or column.name, column.role, column.polarisation))
+    return found
+
+
+def file_candidates(
+    tables: Sequence[Table],
+    columns: str | Sequence[str] | None,
+    signal: str | None,
+    polarisation: str | None,
+) -> list[Candidate]:
+    """Find the spectra of all tables of a file that have the wanted signal and polarisation.
+
+    Raises as `candidates` does where no table has them.
+    """
+    found: list[Candidate] = []
+    refusals: list[DataError | UsageError] = []
+    for table in tables:
+        try:
+            found += candidates(table, columns, signal, polarisation)
+        except (DataError, UsageError) as refusal:
+            if len(tables) == 1 or (signal is None and polarisation is None):
+                raise
+            refusals.append(refusal)
+    if not found:
+        raise refusals[0]
     return found
 
 

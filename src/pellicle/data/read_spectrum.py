@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from logging import getLogger
 from typing import Any
 
-from pellicle.data.file_spectra import ALL, Candidate, candidates, chosen
+from pellicle.data.file_spectra import ALL, Candidate, chosen, file_candidates
 from pellicle.data.formats.detect import read_tables
 from pellicle.data.read_ellipsometry import SIGNAL, read_ellipsometry
 from pellicle.data.read_power import read_power
@@ -126,8 +126,7 @@ class _Reading:
     def find(self, path: str | os.PathLike[str]) -> list[Candidate]:
         """Find the spectra of a file that these arguments may mean."""
         tables = read_tables(path, self.spot)
-        words = self.columns, self.signal, self.polarisation
-        found = [one for table in tables for one in candidates(table, *words)]
+        found = file_candidates(tables, self.columns, self.signal, self.polarisation)
         if (self.folded or self.analyser is not None) and all(one.signal != SIGNAL for one in found):
             name = "folded" if self.folded else "analyser"
             raise UsageError(f"{path}: `{name}` is for ellipsometry, and the file has none; leave it out")

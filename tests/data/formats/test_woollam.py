@@ -145,9 +145,9 @@ def test_dynamic_data_are_a_spectrum_for_each_time(write, refused):
     spectrum = read_spectrum(write(DYNAMIC), spectrum="0.1071 min")
     np.testing.assert_array_equal(spectrum.values, [30.25, 29.25])
     np.testing.assert_array_equal(spectrum.sigma, [0.07, 0.08])
-    np.testing.assert_array_equal(spectrum.lines, [6, 7])
+    np.testing.assert_array_equal(spectrum.lines, [7, 8])
     assert [one.name for one in read_spectra(write(DYNAMIC), spectrum="all")] == ["0.0232 min", "0.1071 min"]
-    refused(DYNAMIC.replace("\t\t0.1071", "", 1), "line 6 of dynamic data", "6 values")
+    refused(DYNAMIC.replace("\t\t0.1071", "", 1), "line 7 of dynamic data", "6 values")
 
 
 def test_dynamic_reflectances_are_named_by_time_and_quantity(write):
@@ -159,7 +159,7 @@ def test_dynamic_reflectances_are_named_by_time_and_quantity(write):
     assert len(read_spectra(write(text))) == 3  # of one time: one measurement
 
 
-def test_reflectances_beside_psi_and_delta(write, refused):
+def test_reflectances_beside_psi_and_delta(write):
     psi, p, s, t = read_spectra(write(JOINT))
     assert [one.name for one in (psi, p, s, t)] == ["psi-delta", "Rp", "Rs", "T"]
     assert (psi.signal, p.signal, s.signal, t.signal) == ("psi-delta", "R", "R", "T")
@@ -169,7 +169,25 @@ def test_reflectances_beside_psi_and_delta(write, refused):
     np.testing.assert_array_equal(p.values, [0.45, 0.44])
     np.testing.assert_array_equal(s.sigma, [0.004, 0.005])
     np.testing.assert_array_equal(t.angle, [0])
-    assert len(read_spectra(write(JOINT), signal="psi-delta")) == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "signal", "polarisation", "first"),
+    [
+        ({"signal": "psi-delta"}, "psi-delta", "unpolarised", 20.5),
+        ({"signal": "R", "polarisation": "s"}, "R", "s", 0.55),
+        ({"signal": "T"}, "T", "unpolarised", 0.12),
+        ({"spectrum": "Rp"}, "R", "p", 0.45),
+    ],
+)
+def test_choice_of_one_of_several_quantities(write, words, signal, polarisation, first):
+    [spectrum] = read_spectra(write(JOINT), **words)
+    assert (spectrum.signal, spectrum.polarisation, spectrum.values[0]) == (signal, polarisation, first)
+
+
+def test_a_quantity_that_the_file_does_not_have(refused):
+    refused(WVASE, "which contradicts `signal", signal="T")
+    refused(JOINT.replace("uT", "uRb"), "contradicts", signal="T")
 
 
 def test_reflectances_alone(write):
@@ -209,7 +227,9 @@ def test_mueller_and_generalised_rows_are_named(write, refused):
     words = "rows of other quantities ignored: a Mueller matrix (mm11, mm12); generalised ellipsometry (AnE)"
     assert words in spectrum.notes
     heading = "".join(COMPLETE_EASE.splitlines(keepends=True)[:4])
-    refused(heading + rows, "only a Mueller matrix (mm11, mm12); generalised ellipsometry (AnE)", "export psi")
+    refused(
+        heading + rows, "only a Mueller matrix (mm11, mm12); generalised ellipsometry (AnE)", "export psi"
+    )
     back = JOINT.replace("pR", "uRb").replace("sR", "uRb").replace("E\t", "Aps\t")
     assert read_spectra(write(back))[0].signal == "T"
 
@@ -221,7 +241,9 @@ def test_ellipsometry_in_transmission_is_not_read(write, refused):
 
 
 def test_columns_behind_the_errors_and_points_without_a_value(write, refused):
-    text = "VASEmethod[M2000 ellipsometer]\nnm\nE 400 65 20 170 .1 .2 1.0 1.0\nE 410 65 21 169 .1 .2 1.0 1.0\n"
+    text = (
+        "VASEmethod[M2000 ellipsometer]\nnm\nE 400 65 20 170 .1 .2 1.0 1.0\nE 410 65 21 169 .1 .2 1.0 1.0\n"
+    )
     spectrum = read_spectrum(write(text))
     np.testing.assert_array_equal(spectrum.delta_sigma, [0.2, 0.2])
     assert "2 columns behind the errors ignored" in spectrum.notes

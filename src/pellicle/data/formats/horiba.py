@@ -17,7 +17,7 @@ from pellicle.errors import DataError
 DATA, ANGLE = "DATA", "INCIDENCE ANGLE"
 NOTE = "read as a Horiba (DeltaPsi2) file"
 _FACTS = {"DATE": "date", "SAMPLE": "sample"}
-_NAMES = {"psi": "psi_deg", "delta": "delta_deg"}
+_READ = ("psi", "delta")
 
 
 def layouts(file: TextFile) -> list[Layout] | None:
@@ -41,8 +41,8 @@ def layouts(file: TextFile) -> list[Layout] | None:
             f"{path}: a Horiba file should give its angle below {ANGLE} and the names of its columns, nm or "
             f"eV first, below {DATA}; export it again"
         )
-    columns = [_NAMES.get(name.lower(), name) for name in names[1:]]
-    if not set(_NAMES.values()) <= set(columns):
+    columns = [name.lower() for name in names]
+    if not set(_READ) <= set(columns):
         raise DataError(
             f"{path}: line {header[0].number} names {', '.join(names)}, not Psi and Delta; export these, "
             "since the meaning of Is and Ic depends on the setting of the modulator"
@@ -53,10 +53,17 @@ def layouts(file: TextFile) -> list[Layout] | None:
         raise DataError(
             f"{path}: {place} {len(names)} columns of the heading; correct that, or export it again"
         )
-    found = [(line, [cells[0], angle, *cells[1:]]) for line, cells in rows]
+    psi, delta = (columns.index(name) for name in _READ)
+    found = [(line, [cells[0], angle, cells[psi], cells[delta]]) for line, cells in rows]
+    ignored = [name for name, column in zip(names[1:], columns[1:], strict=True) if column not in _READ]
+    notes = [NOTE, *([f"columns ignored: {', '.join(ignored)}"] if ignored else [])]
     facts = [("format", "Horiba DeltaPsi2 text")]
     facts += [(fact, blocks[name][0].text.strip()) for name, fact in _FACTS.items() if blocks.get(name)]
-    return [plain_columns((f"wavelength ({unit})", "angle_deg", *columns), found, [NOTE], facts=facts)]
+    return [
+        plain_columns(
+            (f"wavelength ({unit})", "angle_deg", "psi_deg", "delta_deg"), found, notes, facts=facts
+        )
+    ]
 
 
 def _blocks(file: TextFile) -> dict[str, Sequence[Line]]:
