@@ -1,0 +1,162 @@
+"""Data files of Accurion's imaging ellipsometers: small samples, and the real files of an EP4."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pellicle.data.read_spectrum import read_spectrum
+from pellicle.errors import UsageError
+
+REAL = Path(__file__).resolve().parents[3] / "measurements" / "ellipsometry"
+
+ACCURION = """\
+#Lambda\tBandwidth\tAOI\tDelta\tPsi\tZone\tROIidx\tX_pos
+#nm\tnm\tdeg\tdeg\tdeg\t-\t-\tmm
+658.0\t2.0\t50.000\t170.0\t31.0\t1\t000\t-6.980
+658.0\t2.0\t50.000\t171.0\t31.2\t2\t000\t-6.980
+658.0\t2.0\t60.000\t160.0\t23.0\t1\t000\t-6.978
+658.0\t2.0\t60.000\tNaN\tNaN\t2\t000\t-6.978
+658.0\t2.0\t50.000\t170.5\t31.1\t0\t000\t-6.980
+658.0\t2.0\t60.000\tNaN\tNaN\t0\t000\t-6.978
+658.0\t2.0\t70.000\t140.5\t11.1\t0\t000\t-6.973
+658.0\t2.0\t50.000\t1.0\t0.2\t5\t000\t-6.980
+658.0\t2.0\t60.000\tNaN\tNaN\t5\t000\t-6.978
+658.0\t2.0\t70.000\t1.5\t0.3\t5\t000\t-6.973
+"""
+IMAGE = """\
+#ROIidx\tAOI\tLambda\tROI_x\tDelta\tPsi
+#-\tdeg\tnm\tµm\tdeg\tdeg
+0\t40.000\t365.0\t417.6\t179.75\t32.5
+0\t40.000\t370.0\t417.6\t180.25\t33.5
+0\t50.000\t365.0\t417.6\t178.75\t24.5
+"""
+
+
+def assert_read(spectrum, **expected):
+    assert spectrum.signal == "psi-delta"
+    for name, values in expected.items():
+        np.testing.assert_allclose(getattr(spectrum, name), values, rtol=1e-12, err_msg=name)
+
+
+def refused_words(path, *said, **kwargs):
+    with pytest.raises(UsageError) as caught:
+        read_spectrum(path, **kwargs)
+    message = str(caught.value)
+    assert message.startswith(f"{path}: ")
+    assert all(words in message for words in said), message
+    assert "\n" not in message
+
+
+def test_accurion_with_zones(write):
+    spectrum = read_spectrum(write(ACCURION))
+    assert_read(
+        spectrum,
+        wavelength=[658, 658],
+        angle=[50, 70],
+        values=[31.1, 11.1],
+        delta=[170.5, 140.5],
+        lines=[7, 9],
+    )
+    assert spectrum.sigma is None
+    assert spectrum.notes[:3] == (
+        "read as an Accurion data file",
+        "zone 0, the mean of the zones, taken",
+        "1 of 3 points, written NaN, left out",
+    )
+
+
+def test_accurion_without_zones(write):
+    spectrum = read_spectrum(write(IMAGE))
+    assert_read(
+        spectrum,
+        wavelength=[365, 365, 370],
+        angle=[40, 50, 40],
+        values=[32.5, 24.5, 33.5],
+        delta=[179.75, 178.75, 180.25],
+    )
+
+
+def test_accurion_with_one_zone(write):
+    lines = ACCURION.splitlines(keepends=True)
+    spectrum = read_spectrum(write("".join(lines[:3] + lines[4:5])))
+    np.testing.assert_array_equal(spectrum.values, [31.0, 23.0])
+    assert "measured in zone 1 only" in spectrum.notes
+
+
+def test_accurion_files_that_are_refused(refused):
+    lines = ACCURION.splitlines(keepends=True)
+    refused("".join(lines[:6]), "zones 1, 2 without their mean", "one zone")
+    refused(IMAGE.replace("#-\tdeg\tnm", "#-\tdeg\tum"), "Lambda in 'um', not in 'nm'")
+    refused(IMAGE.replace("\t24.5", ""), "line 5 has fewer values")
+    refused(IMAGE.replace("24.5", "94.5"), "line 5, column 'psi_deg': 94.5")
+    refused("".join(lines[:2] + lines[5:6]), "no point with psi and delta")
+
+
+@pytest.mark.parametrize(("name", "points"), [("15-1-1", 8), ("19-1-1", 11), ("post_synthesis_spot_1", 5)])
+def test_real_accurion_files(name, points):
+    spectrum = read_spectrum(REAL / f"{name}.dat")
+    assert len(spectrum) == points
+    np.testing.assert_array_equal(spectrum.wavelength, 658)
+    assert np.all(np.diff(spectrum.angle) > 0)
+    assert np.all(np.diff(spectrum.delta) < 0)  # from near 180 at small angles down, as instruments write
+    zones = [row.split("\t") for row in (REAL / f"{name}.dat").read_text().splitlines()[2:]]
+    for angle, psi, delta in zip(spectrum.angle, spectrum.values, spectrum.delta, strict=True):
+        four = [row for row in zones if float(row[2]) == angle and row[5] in "1234"]
+        assert abs(np.mean([float(row[4]) for row in four]) - psi) < 0.002
+        assert abs(np.mean([float(row[3]) for row in four]) - delta) < 0.002
+
+
+def test_a_file_of_several_spots_lists_them(write):
+    lines = ACCURION.splitlines(keepends=True)
+    again = write(ACCURION + lines[6])
+    refused_words(
+        again, "2 spots or times", ": 1 from line 7; 2 from line 13; choose one, from `spot=1` to `spot=2`"
+    )
+    other = "1\t40.000\t365.0\t417.6\t179.8\t32.5\n1\t60.000\t365.0\t417.6\t139.8\t22.5\n"
+    region = write(IMAGE + other, "image.dat")
+    refused_words(region, ": 1 in region 0; 2 in region 1;")
+    refused_words(
+        REAL / "post_synthesis.dat", "32 spots", ": 1 at -18.183, -30.305 mm; 2 at -6.061, -30.305 mm;"
+    )
+    assert read_spectrum(again, spot=2).lines.tolist() == [13]
+    assert read_spectrum(region, spot=2).lines.tolist() == [6, 7]
+
+
+def test_spots_measured_by_turns_at_each_angle(write, refused):
+    """A stage that drifts by micrometres is still at its spot, in whatever order the rows come."""
+    head = ACCURION.splitlines(keepends=True)[:2]
+    row = "658.0\t2.0\t{}\t170.0\t{}\t0\t000\t{}\n".format
+    given = [row(a, 10 * s + i, 6 * s + 0.004 * i) for i, a in enumerate((50, 60, 70)) for s in (1, 2)]
+    path = write("".join([*head, *given]))
+    for spot in (1, 2):
+        spectrum = read_spectrum(path, spot=spot)
+        assert spectrum.values.tolist() == [10 * spot + i for i in range(3)]
+        assert f"spot {spot} of 2 at {6 * spot} mm" in spectrum.notes
+
+    refused("".join([*head, *given[1:]]), "line 4 lies 6 mm from line 3")
+
+
+def test_a_spot_that_is_not_there(write):
+    refused_words(REAL / "post_synthesis.dat", "choose one, from `spot=1` to `spot=32`", spot=33)
+    refused_words(write(ACCURION), "has one spot only; leave `spot` out", spot=2)
+    refused_words(
+        write("; WAVELENGTH 70 70\n500 20 170\n"), "`spot` selects a spot of an Accurion file", spot=1
+    )
+
+
+def test_the_first_spot_is_a_part_of_the_whole():
+    """And is what `spot = 1` reads of it."""
+    whole, first = (read_spectrum(REAL / f"post_synthesis{end}.dat", spot=1) for end in ("", "_spot_1"))
+    for name in ("wavelength", "angle", "values", "delta"):
+        np.testing.assert_array_equal(getattr(whole, name), getattr(first, name))
+    whole = (REAL / "post_synthesis.dat").read_text().splitlines()
+    part = (REAL / "post_synthesis_spot_1.dat").read_text().splitlines()
+    assert len(part) == 2 + 5 * 6
+    assert part == [line for line in whole if line in set(part)]
+    assert len({tuple(line.split("\t")[11:13]) for line in part[2:]}) == 1
+
+
+@pytest.mark.parametrize("text", [ACCURION, IMAGE])
+def test_encodings(same_in_every_encoding, text):
+    same_in_every_encoding(text)
