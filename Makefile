@@ -81,6 +81,7 @@ bench: $(VENV)/.dev
 	$(BIN)/python benchmarks/film.py
 	$(BIN)/python benchmarks/fit.py
 	$(BIN)/python benchmarks/cold_start.py
+	$(BIN)/python benchmarks/read.py
 
 # verdicts on simulated measurements with the flaws of real ones; a list of those that should be others
 verdicts: $(VENV)/.dev

@@ -38,17 +38,16 @@ def read_power(
     if noise is not None:
         notes += [] if sigma is None else ["the given noise replaces the column of standard deviations"]
         sigma = np.full(values.shape, float(noise))
-    rows = np.arange(values.size)
+    lines, rows = table.lines, None
     if range is not None:
         inside, note = inside_range(wavelength, range, table.path)
-        rows, notes = rows[inside], [*notes, note]
-    values, sigma = values[rows], None if sigma is None else sigma[rows]
+        rows, notes = np.flatnonzero(inside), [*notes, note]
+        wavelength, values = wavelength[rows], values[rows]
+        sigma, angle, lines = (None if array is None else array[rows] for array in (sigma, angle, lines))
     _check(table, columns, kind, rows, values, sigma, calibrated, scale.stated)
-    angle = None if angle is None else angle[rows]
-    arrays = {"wavelength": wavelength[rows], "values": values, "sigma": sigma, "angle": angle}
     return of_rows(
-        sweep_numbers(arrays["wavelength"], angle),
-        arrays | {"lines": table.source_lines(rows)},
+        sweep_numbers(wavelength, angle),
+        {"wavelength": wavelength, "values": values, "sigma": sigma, "angle": angle, "lines": lines},
         signal=kind,
         polarisation=columns.signal.polarisation or polarisation or "unpolarised",
         calibrated=calibrated,
@@ -62,7 +61,7 @@ def _check(
     table: Table,
     columns: SpectrumColumns,
     signal: str,
-    rows: np.ndarray,
+    rows: np.ndarray | None,
     values: np.ndarray,
     sigma: np.ndarray | None,
     calibrated: bool,

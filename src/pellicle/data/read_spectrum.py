@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from logging import getLogger
+from logging import INFO, getLogger
 from typing import Any
 
 from pellicle.data.file_spectra import ALL, Candidate, chosen, file_candidates
@@ -165,16 +165,12 @@ class _Reading:
                 self.folded,
                 self.analyser,
             )
-        declared = table.layout.declared.facts
-        spectrum = replace(spectrum, name=one.name if several else "", declared=declared)
-        log.info(
-            "%s: %d rows used: %s from %g to %g nm, values from %.4g to %.4g",
-            spectrum.path,
-            len(spectrum),
-            spectrum.signal,
-            spectrum.wavelength.min(),
-            spectrum.wavelength.max(),
-            spectrum.values.min(),
-            spectrum.values.max(),
-        )
+        name, declared = one.name if several else "", table.layout.declared.facts
+        if name or declared:
+            spectrum = replace(spectrum, name=name, declared=declared)
+        if log.isEnabledFor(INFO):
+            low, high = spectrum.values.min(), spectrum.values.max()
+            first, last = spectrum.wavelength[[0, -1]]
+            text = "%s: %d rows used: %s from %g to %g nm, values from %.4g to %.4g"
+            log.info(text, spectrum.path, len(spectrum), spectrum.signal, first, last, low, high)
         return spectrum

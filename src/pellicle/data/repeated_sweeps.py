@@ -26,6 +26,8 @@ def sweep_numbers(
     wavelength: Float[np.ndarray, " rows"], angle: Float[np.ndarray, " rows"] | None = None
 ) -> Int[np.ndarray, " rows"]:
     """Number of the sweep of each row: how many earlier rows have the same wavelength and angle."""
+    if angle is None and one_way(wavelength):
+        return np.zeros(len(wavelength), dtype=np.int64)
     angles = np.zeros(len(wavelength)) if angle is None else angle
     order = np.lexsort((angles, wavelength))  # stable: equal points stay in the order of the rows
     points = np.stack([wavelength, angles], axis=1)[order]
@@ -46,14 +48,16 @@ def are_sweeps(
         return False
     groups = np.zeros(len(wavelength)) if angle is None else angle
     return all(
-        _one_way(wavelength[(number == k) & (groups == group)])
+        one_way(wavelength[(number == k) & (groups == group)])
         for k in range(len(counts))
         for group in np.unique(groups)
     )
 
 
-def _one_way(wavelength: np.ndarray) -> bool:
-    return len(np.unique(np.sign(np.diff(wavelength)))) <= 1
+def one_way(wavelength: np.ndarray) -> bool:
+    """True for values that rise or fall strictly."""
+    steps = np.diff(wavelength)
+    return bool((steps > 0).all() or (steps < 0).all())
 
 
 def of_rows(number: Int[np.ndarray, " rows"], arrays: dict[str, Any], **words: Any) -> Spectrum:
@@ -62,12 +66,14 @@ def of_rows(number: Int[np.ndarray, " rows"], arrays: dict[str, Any], **words: A
     `arrays` are arguments of `Spectrum` with one number per row, or None. Raises DataError as
     `mean_spectrum` does.
     """
+    if number.max(initial=0) == 0:
+        return Spectrum(**arrays, **words)
     sweeps = []
     for k in range(number.max(initial=0) + 1):
         rows = number == k
         own = {name: None if array is None else array[rows] for name, array in arrays.items()}
         sweeps.append(Spectrum(**own, **words))
-    return sweeps[0] if len(sweeps) == 1 else mean_spectrum(sweeps)
+    return mean_spectrum(sweeps)
 
 
 def mean_spectrum(sweeps: Sequence[Spectrum]) -> Spectrum:

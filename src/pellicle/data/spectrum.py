@@ -88,7 +88,10 @@ class Spectrum:
 
     def __post_init__(self) -> None:
         size = np.size(self.wavelength)
-        order = np.lexsort((np.zeros(size) if self.angle is None else self.angle, self.wavelength))
+        rising = self.angle is None and size > 0 and bool(np.all(np.diff(self.wavelength) > 0))
+        order = None
+        if not rising:
+            order = np.lexsort((np.zeros(size) if self.angle is None else self.angle, self.wavelength))
         for name in _ARRAYS:
             value = getattr(self, name)
             if value is None:
@@ -97,7 +100,8 @@ class Spectrum:
                 raise ValueError(
                     f"`{name}`: expected one number per wavelength ({size}), got {np.shape(value)}"
                 )
-            array = np.asarray(value, dtype=np.int64 if name == "lines" else np.float64)[order]
+            array = np.array(value, dtype=np.int64 if name == "lines" else np.float64)  # a copy
+            array = array if order is None else array[order]
             array.flags.writeable = False
             object.__setattr__(self, name, array)
         self._check_words()

@@ -11,6 +11,7 @@ import os
 from collections.abc import Callable, Sequence
 
 from pellicle.data.formats import accurion, film_sense, horiba, regress_pro, spectraray, woollam
+from pellicle.data.tabular.bulk import bulk_layout
 from pellicle.data.tabular.layout import Layout, find_layout
 from pellicle.data.tabular.table import Table
 from pellicle.data.tabular.text import TextFile, read_bytes, text_file
@@ -39,15 +40,26 @@ def read_tables(path: str | os.PathLike[str], spot: int | None = None) -> list[T
     for reader in BINARY_READERS:
         if layouts := reader(content, str(path)):
             return [Table(str(path), digest, layout) for layout in layouts]
+    if spot is None:
+        plain = bulk_layout(content, lambda head: text_file(head, digest, path), _plain_layout)
+        if plain is not None:
+            return [Table(str(path), digest, plain)]
     file = text_file(content, digest, path)
-    return [Table(file.path, digest, layout) for layout in _text_layouts(file, spot)]
+    layouts = _export_layouts(file, spot) or [find_layout(file)]
+    return [Table(file.path, digest, layout) for layout in layouts]
 
 
-def _text_layouts(file: TextFile, spot: int | None) -> Sequence[Layout]:
+def _plain_layout(head: TextFile) -> Layout | None:
+    """The layout of a file that is no instrument's export, from its first lines; None for an export."""
+    return None if _export_layouts(head, None) else find_layout(head)
+
+
+def _export_layouts(file: TextFile, spot: int | None) -> Sequence[Layout] | None:
+    """The layouts of an instrument's export, None for another file."""
     layout = accurion.layout(file, spot)
     if layout is not None:
         return [layout]
     if spot is not None:
         raise UsageError(f"{file.path}: `spot` selects a spot of an Accurion file, which this is not")
     found = (reader(file) for reader in TEXT_READERS)
-    return next((layouts for layouts in found if layouts), None) or [find_layout(file)]
+    return next((layouts for layouts in found if layouts), None)

@@ -93,10 +93,10 @@ class TextCells:
 
 @dataclass(frozen=True, eq=False)
 class ArrayCells:
-    """Columns of a binary file, float64, all of one length; its rows have no source lines."""
+    """Columns of numbers, float64, all of one length; rows of a binary file have no source lines."""
 
     columns: tuple[np.ndarray, ...]
-    lines: None = None
+    lines: np.ndarray | None = None
     notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pellicle.data.repeated_sweeps import are_sweeps, sweep_numbers
+from pellicle.data.repeated_sweeps import are_sweeps, one_way, sweep_numbers
 from pellicle.data.signal_checks import refuse_first
 from pellicle.data.tabular.column_selection import SpectrumColumns
 from pellicle.data.tabular.columns import Column
@@ -95,6 +95,8 @@ def read_axis(
             f"{table.path}: {table.label(wavelength.position)} runs from {values.min():g} to "
             f'{values.max():g}, which is unlike nm; state its unit: {likely} or `wavelength_unit="nm"`'
         )
+    if angles is None and one_way(values):
+        return to_nm(values, unit or "nm"), None, read
     if are_sweeps(values, angles, sweep_numbers(values, angles)):
         return to_nm(values, unit or "nm"), angles, read
     groups = np.zeros(values.size) if angles is None else angles
