@@ -230,7 +230,7 @@ def test_commands_parse_and_their_files_exist(page):
         written.add(out)
 
 
-IN_EVERY_RUN = ("README.md", "CONTRIBUTING.md", "docs/tour.md", "docs/howto/uncertainty.md")
+IN_EVERY_RUN = ("README.md", "docs/howto/files.md", "docs/howto/uncertainty.md")
 """Pages whose commands run in every run of the tests; the others take two minutes, in `make slow`."""
 
 

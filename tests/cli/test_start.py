@@ -65,7 +65,7 @@ sys.exit(code)"""
 """A command in a process that prints what JAX traced, lowered, compiled or took from its own cache."""
 
 
-@pytest.mark.parametrize("kind", ["reflectance", "psi-delta"])
+@pytest.mark.parametrize("kind", ["reflectance", pytest.param("psi-delta", marks=pytest.mark.slow)])
 def test_a_second_process_traces_nothing(kind, spectrum_file, scene, tmp_path):
     words = ["fit", spectrum_file(), *scene]
     if kind == "psi-delta":

@@ -164,6 +164,7 @@ def test_a_fit_finds_the_porosity(tmp_path):
     assert found["thickness"].value == pytest.approx(230.0, abs=4 * found["thickness"].stderr_noise)
 
 
+@pytest.mark.slow
 def test_a_fit_finds_a_tauc_lorentz_layer(tmp_path):
     """All six numbers at once, from the default bounds."""
     truth = {"eps_inf": 1.5, "A": 120.0, "E0": 4.1, "C": 2.3, "Eg": 2.2, "thickness": 120.0}

@@ -132,6 +132,7 @@ def test_a_lambertian_surface_has_no_layer():
     assert result["thickness"].stderr == np.inf
 
 
+@pytest.mark.slow
 def test_one_colour_in_all_directions_determines_nothing():
     """The layered diffuse part has three numbers for a thickness, three indices and a weight."""
     free = {"thickness": Free(0, 1000), "n": Free(1.05, 2.5)}

@@ -82,6 +82,7 @@ def test_where_the_data_do_not_want_it_a_bound_is_a_remark(film, measured):
     assert not all(found)
 
 
+@pytest.mark.slow
 def test_a_joint_fit_is_widened_as_one(film, measured):
     oblique = film(light=pl.Light(angle=50.0))
     data = [measured(film(), 430.0), measured(oblique, 430.0, seed=2)]

@@ -39,7 +39,7 @@ def test_no_clear_fringes(values):
     assert fringes(X, values) is None
 
 
-@pytest.mark.parametrize("signal", ["R", "T"])
+@pytest.mark.parametrize("signal", [pytest.param("R", marks=pytest.mark.slow), "T"])
 def test_a_fit_that_misses_the_fringes_says_what_they_suggest(film, measured, signal):
     """The bounds of the thickness exclude the truth."""
     light = pl.Light(signal=signal)
