@@ -12,6 +12,11 @@ from pellicle.dispersion.base import AbstractDispersion
 from pellicle.errors import DataError
 from pellicle.materials.page import NOISE_IN_K, table
 
+LONGEST_NM = 1e11
+LARGEST = 1e10
+"""Bounds of wavelengths and of n, k, ε₁ and ε₂, beyond all data: refractiveindex.info has water up to 10 m,
+and metals in the far infrared have |ε| of 1e6."""
+
 _ROW = "correct or delete that row"
 _SIGN = "absorption is n + ik with k ≥ 0 here, so turn its sign"
 
@@ -72,8 +77,11 @@ def material_file(found: OpticalConstants, kind: str, title: str = "", assumed: 
     _check_order(found)
     with np.errstate(over="ignore"):
         nm = np.round(to_nm(found.axis, found.unit), 9)
-    _refuse(found, axis, found.axis, ~((nm > 0) & np.isfinite(nm)), "of a finite wavelength", _ROW)
+    _refuse(found, axis, found.axis, ~((nm > 0) & (nm < LONGEST_NM)), "of a wavelength of light", _ROW)
     n, k = found.first, found.second
+    for name, values in ((first, n), (second, k)):
+        if values is not None:
+            _refuse(found, name, values, np.abs(values) > LARGEST, f"up to {LARGEST:g}", _ROW)
     if k is not None:
         _refuse(found, second, k, k < -NOISE_IN_K, "0 or above", _SIGN)
     if found.dielectric:

@@ -64,6 +64,15 @@ def read(text: MaterialText) -> MaterialFile:
     Raises DataError, one sentence with file, line, column and remedy.
     """
     found = read_table(text.path)
+    rows = set(map(int, found.text.lines))
+    first_row = min(rows, default=0)
+    strange = next(
+        (line for line in text.lines if line.number >= first_row and line.number not in rows), None
+    )
+    if strange is not None:
+        raise DataError(
+            f"{text.path}: line {strange.number} is no row of numbers: delete it, or put # before it"
+        )
     names = _header(text, found)
     columns = _by_position(text, found) if names is None else _by_name(text, found, names)
     order = list(columns)

@@ -35,7 +35,10 @@ def read_grid(text: MaterialText) -> MaterialFile | None:
             f"{text.path}: announces {intervals} intervals, which are {intervals + 1} rows, but has "
             f"{len(rows.lines)}; it is cut off, so fetch it again"
         )
-    axis = np.linspace(float(head[1]), float(head[2]), intervals + 1)
+    ends = float(head[1]), float(head[2])
+    if not np.isfinite(ends).all():
+        raise DataError(f"{text.path}: line {text.lines[0].number} gives no finite range of its axis")
+    axis = np.linspace(*ends, intervals + 1)
     names = ("axis", "n", "k")
     return material_file(
         OpticalConstants(
