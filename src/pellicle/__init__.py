@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from pellicle.scene.layers import Layer as Layer
     from pellicle.scene.layers import Plate as Plate
     from pellicle.scene.layers import Substrate as Substrate
+    from pellicle.scene.layers import medium as medium
     from pellicle.scene.surface import Surface as Surface
     from pellicle.scene.uncertainty import Uncertainty as Uncertainty
     from pellicle.simulation.functions import ellipsometry as ellipsometry
@@ -62,7 +63,7 @@ _NAMES = {
     "pellicle.scene.free": ("Free",),
     "pellicle.scene.instrument": ("Instrument",),
     "pellicle.scene.uncertainty": ("Uncertainty",),
-    "pellicle.scene.layers": ("Interface", "Layer", "Plate", "Substrate"),
+    "pellicle.scene.layers": ("Interface", "Layer", "Plate", "Substrate", "medium"),
     "pellicle.scene.surface": ("Surface",),
     "pellicle.simulation.functions": ("ellipsometry", "reflectance", "refractive_index", "transmittance"),
     "pellicle.synthetic.brdf": ("Directions",),

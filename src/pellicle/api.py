@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pellicle.data.brdf_samples import BrdfSamples
+from pellicle.data.measurement import Measurement, check_measurement
 from pellicle.data.spectrum import Spectrum
 from pellicle.effects.plan import Plan
+from pellicle.errors import UsageError
 from pellicle.fitting.brdf.fit import fit as fit_brdf
 from pellicle.fitting.comparison import Comparison
 from pellicle.fitting.comparison import compare as compare_fits
@@ -22,9 +24,10 @@ from pellicle.planning.film import plan as film_plan
 from pellicle.planning.surface import plan as surface_plan
 from pellicle.sampling.ensemble import STEPS
 from pellicle.sampling.result import Posterior
-from pellicle.sampling.sample import Measurement, measured
+from pellicle.sampling.sample import measured
 from pellicle.sampling.sample import sample as sample_posterior
 from pellicle.scene.film import Scene
+from pellicle.scene.kinds import check_scene
 from pellicle.scene.surface import Surface, SurfaceView, surface_view
 from pellicle.synthetic.brdf import Directions, default_directions, simulate_samples
 from pellicle.synthetic.spectra import default_wavelengths, simulate_spectrum
@@ -88,6 +91,9 @@ def simulate(
 
     ```
     """
+    check_scene(scene)
+    if not noise >= 0:
+        raise UsageError(f"`noise` must not be negative, got {noise:g}")
     if isinstance(scene, Surface):
         _refuse("a Surface", wavelength=wavelength, depolarisation_noise=depolarisation_noise)
         return simulate_samples(scene, directions, noise, seed).samples
@@ -128,6 +134,7 @@ def plan(
 
     ```
     """
+    check_scene(scene)
     if isinstance(scene, Surface):
         return surface_plan(_view(scene, directions), tolerance, keep)
     _refuse("a Scene", directions=directions)
@@ -192,6 +199,7 @@ def cost(
     from pellicle.accuracy.cost import cost as film_cost  # solvers, a fifth of the time of importing this
     from pellicle.accuracy.surface import cost as surface_cost
 
+    check_scene(scene)
     if isinstance(scene, Surface):
         _refuse("a Surface", wavelength=wavelength, noise=noise)
         view = _view(scene, directions)
@@ -251,6 +259,8 @@ def fit(
 
     ```
     """
+    check_measurement(data)
+    check_scene(scene, several=True)
     if isinstance(scene, Surface):
         samples = measured(BrdfSamples, data)
         return fit_brdf(samples, scene, residual=residual, tolerance=tolerance, loss=loss, progress=progress)
@@ -289,6 +299,8 @@ def sample(
     **Raises:** as `pellicle.fit` does; UsageError for too few walkers, or more than fit into memory;
     DataError for the chain of another problem.
     """
+    check_measurement(data)
+    check_scene(scene, several=True)
     if not isinstance(scene, Surface):
         _refuse("a Scene", residual=residual)
     return sample_posterior(
@@ -324,6 +336,8 @@ def compare(
 
     **Raises:** UsageError for fewer than two scenes, and as `pellicle.fit` does.
     """
+    if not isinstance(scenes, Mapping):
+        raise UsageError("`scenes` must have names, as in {'oxide': scene, 'nitride': other}")
     options = {"tolerance": tolerance, "residual": residual, "progress": progress}
     return compare_fits({name: fit(data, scene, **options) for name, scene in scenes.items()})
 

@@ -36,7 +36,7 @@ _ARRAYS = (
 _REMEDY = "correct or delete that point"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Spectrum:
     """One measured signal against wavelength.
 
@@ -87,6 +87,9 @@ class Spectrum:
     depolarisation_sigma: np.ndarray | None = None
 
     def __post_init__(self) -> None:
+        for name in _ARRAYS:
+            if isinstance(value := getattr(self, name), str):
+                raise UsageError(f"`{name}` must be an array, not {value!r}: pl.read_spectrum reads files")
         size = np.size(self.wavelength)
         rising = self.angle is None and size > 0 and bool(np.all(np.diff(self.wavelength) > 0))
         order = None
@@ -164,6 +167,8 @@ class Spectrum:
             low, high = self.wavelength[0], self.wavelength[-1]
             span = f"{low:g} to {high:g} nm" if low < high else f"{low:g} nm"
         return f"{self.source or 'spectrum'}: {len(self)} points of {self.signal}, {span}"
+
+    __repr__ = __str__
 
     def cut(self, low: float | int, high: float | int) -> Spectrum:
         """Return the points with low ≤ wavelength ≤ high (nm).

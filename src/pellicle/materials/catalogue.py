@@ -10,7 +10,7 @@ from pathlib import Path
 
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.empirical import Constant
-from pellicle.errors import DataError, install_command
+from pellicle.errors import DataError, UsageError, install_command
 from pellicle.materials import contents as index
 from pellicle.materials.files import SUFFIXES, read_material_file
 from pellicle.materials.named_dispersion import Material
@@ -32,6 +32,8 @@ def material(name: str) -> AbstractDispersion:
     >>> material("silica").page
     'main/SiO2/Malitson'
     """
+    if not isinstance(name, str):
+        raise UsageError(f"a material is a name, as in 'SiO2', not {name!r}: pl.medium takes numbers, too")
     name = name.strip()
     entry = index.find_name(name)
     if entry is not None:

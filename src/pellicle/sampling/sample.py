@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Sequence
-from typing import TypeAlias, TypeVar
+from typing import TypeVar
 
 import jax
 
 from pellicle.data.brdf_samples import BrdfSamples
+from pellicle.data.measurement import Measurement
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
 from pellicle.fitting.brdf import fit as brdf
@@ -30,7 +31,6 @@ from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface
 
 Kind = TypeVar("Kind", Spectrum, BrdfSamples)
-Measurement: TypeAlias = Spectrum | Sequence[Spectrum] | BrdfSamples | Sequence[BrdfSamples]
 
 
 def sample(

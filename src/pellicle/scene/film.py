@@ -14,6 +14,7 @@ import equinox as eqx
 import numpy as np
 
 from pellicle.dispersion.base import AbstractDispersion
+from pellicle.errors import UsageError
 from pellicle.scene.free import Free
 from pellicle.scene.instrument import Instrument
 from pellicle.scene.layers import Interface, Layer, Plate, Quantity, Substrate, absorbs, ambient_medium
@@ -45,6 +46,9 @@ class Light(eqx.Module):
         if self.signal not in SIGNALS:
             raise ValueError(f"`signal` must be one of {', '.join(SIGNALS)}, not {self.signal!r}")
         check_polarisation(self.polarisation)
+        for name in ("wavelength", "angle"):
+            if isinstance(getattr(self, name), str):
+                raise UsageError(f"`{name}` must be a number or an array, not {getattr(self, name)!r}")
         angle = [self.angle.lower, self.angle.upper] if isinstance(self.angle, Free) else self.angle
         if isinstance(angle, int | float | list | np.ndarray):
             wrong = [x for x in np.ravel(angle) if not 0 <= x <= 90]
@@ -61,6 +65,16 @@ def check_polarisation(polarisation: str) -> None:
     """Raise ValueError for an unknown polarisation."""
     if polarisation not in POLARISATIONS:
         raise ValueError(f"`polarisation` must be one of {', '.join(POLARISATIONS)}, not {polarisation!r}")
+
+
+def _layers(value: Any) -> tuple[Layer | Interface | Plate, ...]:
+    """One layer or several as a tuple. Raises UsageError for what is no layer."""
+    layers = tuple(value) if isinstance(value, list | tuple) else (value,)
+    for layer in layers:
+        if not isinstance(layer, Layer | Interface | Plate):
+            shown = repr(layer) if isinstance(layer, str) else type(layer).__name__
+            raise UsageError(f"a layer of a scene must be as pl.Layer('SiO2', 100.0), not {shown}")
+    return layers
 
 
 @final
@@ -83,9 +97,7 @@ class Scene(eqx.Module):
     'SiO2'
     """
 
-    layers: tuple[Layer | Interface | Plate, ...] = eqx.field(
-        converter=lambda layers: (layers,) if isinstance(layers, Layer) else tuple(layers)
-    )
+    layers: tuple[Layer | Interface | Plate, ...] = eqx.field(converter=_layers)
     substrate: Substrate = eqx.field(converter=lambda s: s if isinstance(s, Substrate) else Substrate(s))
     ambient: AbstractDispersion = eqx.field(converter=ambient_medium, default=1.0)
     light: Light = Light()

@@ -49,6 +49,10 @@ class Free(eqx.Module):
         prior: Prior | None = None,
         limits: tuple[float, float] | None = None,
     ):
+        given = {"lower": lower, "upper": upper, "start": start}
+        for name, value in given.items():
+            if value is not None and not isinstance(value, int | float | np.number):
+                raise UsageError(f"`{name}` of a free parameter must be a number, not {value!r}")
         if not lower < upper:
             raise ValueError(f"bounds are reversed or equal: lower {lower:g} is not below upper {upper:g}")
         if not (math.isfinite(lower) and math.isfinite(upper)):

@@ -15,10 +15,14 @@ import pellicle.dispersion
 from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.dispersion.effective_medium import MIXTURES
 from pellicle.dispersion.empirical import Constant
+from pellicle.errors import UsageError
 from pellicle.materials import Material, UnknownMaterial, material
 from pellicle.optics.pair import is_real
 from pellicle.scene.free import Free, insert, is_free, start_values
 from pellicle.scene.uncertainty import check_uncertainty
+
+METRE = 1e9
+"""Largest length in nm that a layer can have."""
 
 Quantity = float | Free | jax.Array
 """A number, a parameter to be fitted, or a traced number."""
@@ -28,9 +32,18 @@ MediumLike: TypeAlias = AbstractDispersion | str | complex | Free | Any
 
 
 def medium(value: MediumLike) -> AbstractDispersion:
-    """Return the dispersion for a material, a catalogue name or path, a number (n + ik), or a `Free` index.
+    """Return the dispersion of a medium: what layers, substrates and ambients are made of.
 
-    Raises ValueError for an index with k < 0 (gain), one that is not finite, and for an unknown name.
+    **Arguments:** `value`: a catalogue name (`"SiO2"`) or the path of an n,k table, an index n + ik, a `Free`
+    index, or a dispersion, which is returned.
+
+    **Returns:** a dispersion, whose `index(wavelength)` takes nm.
+
+    **Raises:** ValueError for an index with k < 0 (gain), one that is not finite, and for an unknown name;
+    UsageError for an object that is no medium.
+
+    >>> medium(1.5)
+    Constant(n=1.5)
     """
     if isinstance(value, AbstractDispersion):
         return value
@@ -49,6 +62,11 @@ def medium(value: MediumLike) -> AbstractDispersion:
             raise ValueError(f"index {value} has a negative real part")
     if isinstance(value, complex | np.complexfloating):
         return Constant(float(value.real), float(value.imag))
+    if value is None or isinstance(value, list | tuple | dict | eqx.Module):
+        raise UsageError(
+            "a medium is a name ('SiO2'), an index (1.46, 2.9 + 0.1j), pl.Free(1.3, 1.7) or a dispersion,"
+            f" not {type(value).__name__}"
+        )
     return Constant(value)
 
 
@@ -90,14 +108,22 @@ def ambient_medium(value: MediumLike) -> AbstractDispersion:
 
 
 def check_not_negative(name: str, number: Quantity | None, unit: str) -> None:
-    """Raise ValueError where a number, or the lower bound of a free one, is negative or not finite."""
+    """Raise ValueError where a number, or a bound of a free one, is negative, not finite or above a metre.
+
+    UsageError for what is no number.
+    """
+    if isinstance(number, str | list | tuple | dict):
+        raise UsageError(f"`{name}` must be a number or pl.Free(lower, upper), not {number!r}")
     lowest = number.lower if isinstance(number, Free) else number
+    largest = number.upper if isinstance(number, Free) else number
     if not isinstance(lowest, int | float):
         return
     if not math.isfinite(lowest):
         raise ValueError(f"`{name}` must be finite, got {lowest:g}")
     if lowest < 0:
         raise ValueError(f"`{name}` must not be negative, got {lowest:g} {unit}".rstrip())
+    if unit == "nm" and isinstance(largest, int | float) and largest > METRE:
+        raise UsageError(f"`{name}` must be at most {METRE:g} nm, a metre, got {largest:g} nm")
 
 
 def none_if_zero(number: Quantity | None) -> Quantity | None:
@@ -137,6 +163,8 @@ class Layer(eqx.Module):
 
     def __check_init__(self):
         check_uncertainty("index", self.index_uncertainty)
+        if self.thickness is None:
+            raise UsageError("`thickness` is missing: a number of nm, or pl.Free(10, 3000) to fit it")
         for key in ("thickness", "thickness_spread", "roughness"):
             check_not_negative(key, getattr(self, key), "nm")
 

@@ -16,6 +16,7 @@ from jax.core import Tracer
 from jaxtyping import Array, Complex, Float
 
 from pellicle.dispersion.base import AbstractDispersion
+from pellicle.errors import UsageError
 from pellicle.optics import coherent, interface, response
 from pellicle.optics.ellipsometry import normalised, psi_delta, stokes
 from pellicle.optics.pair import Number, is_real, to_complex, to_pair
@@ -151,6 +152,9 @@ def refractive_index(wavelength: Any, what: Medium) -> Complex[Array, "..."]:
 
 def _responses(wavelength, thickness, layer, substrate, ambient, angle, polarisation):
     check_polarisation(polarisation)
+    for name, value in {"wavelength": wavelength, "thickness": thickness, "angle": angle}.items():
+        if isinstance(value, str):
+            raise UsageError(f"`{name}` must be a number or an array, not {value!r}")
     _warn_of_lost_precision(wavelength, thickness, layer, substrate, ambient, angle)
     wavelength = _floating(wavelength)
     normal = isinstance(angle, int | float) and angle == 0
