@@ -327,7 +327,7 @@ def test_toml_parses_and_complete_recipes_are_valid(page):
 
 def test_every_flag_on_a_page_exists(monkeypatch, capsys):
     helps = []
-    for command in ("", "fit", "sample", "simulate", "plan", "compare", "cost", "chart", "materials"):
+    for command in ("", "fit", "sample", "simulate", "plan", "compare", "cost", "chart", "materials", "read"):
         monkeypatch.setattr(sys, "argv", ["pellicle", *command.split(), "--help"])
         main()
         helps.append(capsys.readouterr().out)
