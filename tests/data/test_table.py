@@ -10,7 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pellicle.data.formats.detect import read_tables
+from pellicle.data.read_spectrum import read_spectrum
 from pellicle.data.tabular.table import read_table
+from pellicle.errors import DataError
 
 ROOT = Path(__file__).resolve().parents[2]
 FILES = [*(ROOT / "measurements").rglob("*nm*.csv"), *(ROOT / "measurements").rglob("*.txt")]
@@ -65,3 +67,10 @@ def test_delimiters_decimals_and_quotes(tmp_path_factory, rows, delimiter, comma
     table = read_table(path)
     for own, other in zip(table.numbers([0, 1, 2]), by_pandas(table), strict=False):
         np.testing.assert_array_equal(own, other)
+
+
+def test_a_first_row_that_is_faulty_is_not_text_below_the_rows(tmp_path):
+    path = tmp_path / "faulty.dat"
+    path.write_text("SE # BETA\n\nAOI 71.5\nSE 241.5 +0.5 0.43\nSE 240.5 0 -.5\n")
+    with pytest.raises(DataError, match=r"line 4, column 1: expected a number.*'SE'"):
+        read_spectrum(path, signal="R")

@@ -103,6 +103,14 @@ def test_units_of_the_axis(write, unit, first, second):
     np.testing.assert_allclose(read_spectrum(write(text)).wavelength, [400, 400, 410])
 
 
+def test_a_file_for_wvase_whose_angle_has_no_name(write):
+    spectrum = read_spectrum(
+        write("brush\nnm\t\tPsi\tDelta\n658.0\t55.0\t27.7\t170.2\n658.0\t60.0\t23.25\t166.5\n")
+    )
+    np.testing.assert_array_equal(spectrum.angle, [55, 60])
+    np.testing.assert_array_equal(spectrum.delta, [170.2, 166.5])
+
+
 def test_an_axis_in_energies(write):
     spectrum = read_spectrum(write(COMPLETE_EASE))
     np.testing.assert_allclose(spectrum.wavelength, 1239.8419843320026 / np.array([3.0, 2.0]))

@@ -25,6 +25,9 @@ LABEL = "E"  # rows of Ψ and Δ
 DEPOLARISATION = "dpole"  # in lower case; programs write dpolE and dPolE
 TRIGONOMETRIC = "TRIG"  # behind the unit: tan Ψ and cos Δ in place of Ψ and Δ
 NOTE = "read as a Woollam (WVASE, CompleteEASE) text file"
+NAMES = ["PSI", "DELTA"]
+"""Behind the unit in files that programs for other instruments write for WVASE; the angle has no name."""
+_BEHIND_UNIT = ([], [TRIGONOMETRIC], NAMES)
 _POWERS = {f"{p}{q}": q if p == "u" else f"{q}{p}" for p in "psu" for q in "RT"}
 """Labels of reflectances and transmittances, and the column names of these."""
 _KNOWN = re.compile(r"(?i:dpole|AnE|Aps|Asp|mm[1-4][1-4])|E|[psu][RT][rb]?|R[ps][ps]|T[ps][ps]")
@@ -50,11 +53,11 @@ def layouts(file: TextFile) -> list[Layout] | None:
     at = _unit_line(lines)
     if at is None:
         return None
-    heading, unit = lines[:at], lines[at].text.split()
+    heading, unit = lines[:at], lines[at].text.upper().split()
     method = next((line.text for line in heading if line.text.startswith(METHOD)), "")
     rows = [(line, _cells(line)) for line in lines[at + 1 :] if line.bare.strip()]
-    trigonometric = TRIGONOMETRIC in [word.upper() for word in unit[1:]]
-    if not (method or trigonometric or any(_KNOWN.fullmatch(cells[0]) for _, cells in rows)):
+    trigonometric = TRIGONOMETRIC in unit
+    if not (method or unit[1:] or any(_KNOWN.fullmatch(cells[0]) for _, cells in rows)):
         return None
     dynamic = any(line.text.strip().lower() == "dynamic" for line in heading)
     transmitted = "TransmissionMeas=1" in method.replace(" ", "")
@@ -104,9 +107,13 @@ def _tables(
 def _unit_line(lines: Sequence[Line]) -> int | None:
     """Index of the line with nothing but the axis's unit, above rows of numbers."""
     for i, line in enumerate(lines[: min(_MOST_HEADING, len(lines) - 1)]):
-        words, below = line.text.split(), _cells(lines[i + 1])
-        alone = len(words) == 1 or (len(words) == 2 and words[1].upper() == TRIGONOMETRIC)
-        if alone and wavelength_unit(words[0]) and len(below) >= 4 and is_number(below[1]):
+        words, below = line.text.upper().split(), _cells(lines[i + 1])
+        if (
+            words[1:] in _BEHIND_UNIT
+            and wavelength_unit(words[0])
+            and len(below) >= 4
+            and is_number(below[1])
+        ):
             return i
     return None
 

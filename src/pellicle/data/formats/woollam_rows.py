@@ -62,6 +62,8 @@ def tan_cos(rows: Rows, path: str) -> Selected:
                 "cos(delta) are expected; correct that line"
             )
     rows, missing = _measured(rows, (2, 3))
+    if not rows:
+        raise DataError(f"{path}: has no point with tan(psi) and cos(delta); check the measurement")
     found = [(line, [*cells[:2], *cells_of(cells[2], cells[3], line, path)]) for line, cells in rows]
     return Selected(("angle_deg", *COLUMNS), found, [*notes, *missing])
 

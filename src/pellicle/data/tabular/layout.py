@@ -103,7 +103,7 @@ def find_layout(file: TextFile) -> Layout:
     skipped = start if header is None else header
     if skipped:
         notes.insert(0, f"{skipped} line{'s' * (skipped > 1)} of preamble skipped")
-    end = _rows_end(lines, delimiter, decimal)
+    end = max(_rows_end(lines, delimiter, decimal), first + 1)
     if end < len(lines):
         notes.append(f"text from line {lines[end].number} on, below the rows, skipped")
     rows = [line for line in lines[start:end] if not line.text.startswith(_MARKER)]
