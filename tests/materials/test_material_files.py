@@ -176,6 +176,15 @@ def test_a_page_without_k_and_a_formula(write):
     assert "no data for k" in source.warnings()[0]
 
 
+def test_a_download_of_n_alone_is_in_micrometres_and_a_table_of_ones_own_in_nm(write):
+    download = material(write("wl,n\n0.4,1.5\n0.6,1.4\n"))
+    assert download.wavelength_range == (400, 600)
+    assert download.warnings() == [w for w in download.warnings() if "no data for k" in w]
+    own = material(write("wl,n\n400,1.5\n600,1.4\n"))
+    assert own.wavelength_range == (400, 600)
+    assert "read as nm" in own.warnings()[0]
+
+
 def test_a_column_k_without_cells_is_none(write):
     source = material(write('"Wavelength, µm","n","k"\n0.4,1.5\n0.6,1.4\n'))
     assert not source.has_extinction
