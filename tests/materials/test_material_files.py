@@ -1,6 +1,7 @@
 """One material in every format of material files, whole and damaged."""
 
 import re
+from pathlib import Path
 
 import mpmath
 import numpy as np
@@ -14,6 +15,7 @@ from pellicle.materials.files import read_material_file
 from pellicle.materials.files.optical_constants import nk_from_dielectric
 from pellicle.optics.pair import imag, is_real, real
 from pellicle.recipes.media import medium as recipe_medium
+from pellicle.scene.layers import Layer
 
 # n + ik = 1.5 + 0.1i at 400 nm and 1.4 + 0.05i at 600 nm: ε = n² − k² + 2nki, E = 1239.8419844 eV nm / λ
 FORMATS = {
@@ -243,8 +245,9 @@ def test_what_is_missing_or_doubtful_is_one_sentence(write, suffix, text, words)
     assert words in refused(write(text, suffix))
 
 
-def test_a_recipe_finds_files_beside_it(write, tmp_path):
-    write(FORMATS["WVASE eV"][1], ".mat")
+def test_a_layer_and_a_recipe_take_a_file(write, tmp_path):
+    path = Path(write(FORMATS["WVASE eV"][1], ".mat"))
+    assert Layer(path, 100.0).material.wavelength_range == pytest.approx((400, 600), abs=1e-6)
     assert recipe_medium("resin.mat", tmp_path).wavelength_range == pytest.approx((400, 600), abs=1e-6)
 
 

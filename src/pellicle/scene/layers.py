@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import re
 from typing import Any, TypeAlias, final
 
@@ -28,7 +29,7 @@ Quantity = float | Free | jax.Array
 """A number, a parameter to be fitted, or a traced number."""
 
 MediumLike: TypeAlias = AbstractDispersion | str | complex | Free | Any
-"""A dispersion, a name of the catalogue or path of an n,k table, an index n + ik, or a `Free` index."""
+"""A dispersion, a name of the catalogue or path of a file of n and k, an index n + ik, or a `Free` index."""
 
 
 def medium(value: MediumLike) -> AbstractDispersion:
@@ -47,8 +48,8 @@ def medium(value: MediumLike) -> AbstractDispersion:
     """
     if isinstance(value, AbstractDispersion):
         return value
-    if isinstance(value, str):
-        return _named(value)
+    if isinstance(value, str | os.PathLike):
+        return _named(os.fspath(value))
     if is_free(value):
         return Constant(value)
     if isinstance(value, int | float | complex | np.number):
@@ -137,7 +138,7 @@ class Layer(eqx.Module):
 
     **Arguments:**
 
-    - `material`: a catalogue name or path of an n,k table, an index n + ik, a `Free` index or a dispersion.
+    - `material`: a catalogue name, path of a file of n and k, index n + ik, `Free` index or dispersion.
     - `thickness` in nm.
     - `name` of its parameters in results, where there are several layers.
     - `thickness_spread`: standard deviation of the thickness over the spot in nm.
