@@ -15,7 +15,7 @@ PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
 NOTEBOOKS := $(wildcard notebooks/*.ipynb)
 EXECUTED := executed/done
 
-.PHONY: schema fit fits notebooks test coverage docs lint bench verdicts peers properties tolerance measurements slow clean figures
+.PHONY: schema fit fits notebooks test coverage docs lint bench verdicts peers properties fuzz tolerance measurements slow clean figures
 
 # on Debian, pip for virtual environments is a separate package; without it, the system's pip is used
 $(VENV)/bin/python:
@@ -94,6 +94,10 @@ peers: $(VENV)/.dev
 # a thousand random scenes: is the error of every plan within its stated bound?
 tolerance: $(VENV)/.dev
 	$(BIN)/python benchmarks/tolerance.py
+
+# 10 000 damaged and random files for every reader
+fuzz: $(VENV)/.dev
+	$(BIN)/python benchmarks/fuzz_readers.py
 
 properties: $(VENV)/.dev
 	$(BIN)/python benchmarks/properties.py

@@ -107,6 +107,8 @@ def find_layout(file: TextFile) -> Layout:
     if end < len(lines):
         notes.append(f"text from line {lines[end].number} on, below the rows, skipped")
     rows = [line for line in lines[start:end] if not line.text.startswith(_MARKER)]
+    if not rows:
+        raise DataError(f"{path}: has no row of numbers below its header; expected rows as 550,0.21")
     trailing = len(lines[first].bare.split(delimiter)) if delimiter != " " else width
     above = [comment for comment in file.comments if comment.number < lines[start].number]
     declared = declarations([*above, *lines[:skipped], *lines[end:]])

@@ -1,0 +1,34 @@
+"""A short run of the damaged and random files that `make fuzz` gives to every reader."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+SCRIPT = Path(__file__).resolve().parents[2] / "benchmarks" / "fuzz_readers.py"
+
+
+@pytest.fixture(scope="module")
+def fuzz():
+    spec = importlib.util.spec_from_file_location("fuzz_readers", SCRIPT)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_every_file_is_read_or_refused_in_one_sentence(fuzz, tmp_path):
+    outcomes, failures = fuzz.run(150, tmp_path)
+    assert not failures
+    assert outcomes["inputs"] == 150
+    assert outcomes["read_spectra: read"] > 5
+
+
+def test_a_reader_that_fails_is_found(fuzz, tmp_path, monkeypatch):
+    monkeypatch.setattr(fuzz, "readers", lambda path, words: {"broken": lambda: {}["absent"]})
+    outcomes, failures = fuzz.run(3, tmp_path)
+    assert outcomes["broken: failed"] == 3
+    assert "KeyError" in failures[0]
