@@ -51,7 +51,7 @@ def test_an_argument_becomes_its_flag(argument, flag):
         "`thicknes`",
         "`weight=3`",
         '`angle=70, weight="slow"`',
-        "`folded=False`",
+        "`noise=False`",
         "`noise=None`",
         "`scene.thickness`",
         "`[data] angle = 70`",

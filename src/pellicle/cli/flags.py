@@ -102,7 +102,10 @@ class ReadingFlags(_Flags):
     dark: Annotated[str | None, flag(READING, "Raw counts without light.")] = None
     folded: Annotated[
         bool | None,
-        Parameter(group=READING, help="Δ is known in 0 to 180 degrees only: cos Δ.", negative=""),
+        Parameter(
+            group=READING,
+            help="Δ is known in 0 to 180 degrees only: cos Δ (by default where it has kinks there).",
+        ),
     ] = None
     analyser: Annotated[
         float | None, flag(READING, "Analyser angle in degrees (for alpha and beta columns).")

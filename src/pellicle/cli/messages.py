@@ -58,6 +58,7 @@ FLAGS = {
     "wavelength_unit": "--wavelength-unit",
 }
 """The flag of each argument that a message may name."""
+_NEGATIVES = {("folded", "False"): "--no-folded"}
 
 _QUOTED = re.compile(r"`([^`]+)`")
 
@@ -87,6 +88,9 @@ def _flags(code: str) -> str | None:
             return None
         words.append(FLAGS[name.id])
     for keyword in parsed.keywords:
+        if (keyword.arg, ast.unparse(keyword.value)) in _NEGATIVES:
+            words.append(_NEGATIVES[keyword.arg, "False"])
+            continue
         value = _word(keyword.value, call)
         if keyword.arg not in FLAGS or value is None:
             return None

@@ -94,7 +94,7 @@ def read(path: str, flags: ReadingFlags, *, free_scale: bool) -> list[Spectrum]:
         noise=flags.noise,
         polarisation=flags.polarisation,
         calibrated=False if free_scale else None,
-        folded=bool(flags.folded),
+        folded=flags.folded,
         analyser=flags.analyser,
         spot=flags.spot,
     )

@@ -23,8 +23,9 @@ from pellicle.data.ellipsometry_angles import (
     from_alpha_beta,
     from_ncs,
 )
+from pellicle.data.folded_delta import can_be_folded, folding_at, folding_note
 from pellicle.data.repeated_sweeps import of_rows, sweep_numbers
-from pellicle.data.signal_checks import check_psi_delta, refuse_first
+from pellicle.data.signal_checks import FOLDED_DELTA, check_psi_delta, refuse_first
 from pellicle.data.spectrum import Spectrum, inside_range
 from pellicle.data.tabular.column_selection import only, wavelength_and_angle
 from pellicle.data.tabular.columns import Column, listed
@@ -65,7 +66,7 @@ def read_ellipsometry(
     wavelength_unit: str | None,
     noise: float | None,
     range: tuple[float, float] | None,
-    folded: bool = False,
+    folded: bool | None = None,
     analyser: float | None = None,
 ) -> Spectrum:
     """Read Ψ and Δ of a table, Δ in 0 to 360; arguments as in `read_spectrum`.
@@ -89,29 +90,41 @@ def read_ellipsometry(
     if noise is not None:
         errors = [np.full(psi.size, float(noise))] * 2
         notes += ["the given noise replaces the columns of errors"] if chosen.errors else []
-    folded = folded or chosen.form == ALPHA_BETA
-    if folded:
-        notes.append("delta is known in 0 to 180 only: cos(delta) is fitted")
+    if chosen.form == ALPHA_BETA:
+        folded = True
+    elif chosen.form == NCS:
+        folded = False
     notes.append("psi and delta in degrees")
+    folding = None
+    if folded is None:
+        folding = _folding(wavelength, psi, delta, angle)
     rows = np.arange(psi.size)
     if range is not None:
         inside, note = inside_range(wavelength, range, table.path)
         rows, notes = rows[inside], [*notes, note]
     sigma = [error[rows] for error in errors]
     shares = [share[rows] for share in shares]
-    _check(table, chosen, rows, psi[rows], delta[rows], sigma, folded)
-    depolarisation.check(table, chosen.depolarisation, rows, shares)
     angle = None if angle is None else angle[rows]
+    number = sweep_numbers(wavelength[rows], angle)
+    _check(table, chosen, rows, psi[rows], delta[rows], sigma, bool(folded))
+    depolarisation.check(table, chosen.depolarisation, rows, shares)
+    if folded is None:
+        # outside of the range nothing is checked
+        folding = folding or _folding(wavelength[rows], psi[rows], delta[rows], angle)
+        folded = folding is not None and can_be_folded(delta[rows])
+        notes += [folding_note(folding)] if folded and folding else []
+    elif folded:
+        notes.append("delta is known in 0 to 180 only: cos(delta) is fitted")
     arrays = {
         "wavelength": wavelength[rows],
         "values": psi[rows],
-        "delta": delta[rows] % 360.0,
+        "delta": np.clip(delta[rows], *FOLDED_DELTA) if folded else delta[rows] % 360.0,
         "angle": angle,
     }
     errors = {"sigma": sigma[0] if sigma else None, "delta_sigma": sigma[-1] if sigma else None}
     errors |= dict(zip(("depolarisation", "depolarisation_sigma"), shares, strict=False))
     return of_rows(
-        sweep_numbers(arrays["wavelength"], angle),
+        number,
         arrays | errors | {"lines": table.source_lines(rows)},
         signal=SIGNAL,
         path=table.path,
@@ -121,7 +134,21 @@ def read_ellipsometry(
     )
 
 
-def _check_form(table: Table, columns: EllipsometryColumns, folded: bool, analyser: float | None) -> None:
+def _folding(
+    wavelength: np.ndarray, psi: np.ndarray, delta: np.ndarray, angle: np.ndarray | None
+) -> float | None:
+    """The wavelength at which Δ is folded, in any sweep at any angle; None where nothing shows it."""
+    if not can_be_folded(delta):
+        return None
+    number = sweep_numbers(wavelength, angle)
+    pairs = np.stack([number, number if angle is None else angle])
+    curve = np.unique(pairs, axis=1, return_inverse=True)[1]
+    return folding_at(wavelength, psi, delta, curve.ravel().astype(float))
+
+
+def _check_form(
+    table: Table, columns: EllipsometryColumns, folded: bool | None, analyser: float | None
+) -> None:
     """Refuse arguments that do not go with the columns. Raises UsageError."""
     if folded and columns.form == NCS:
         raise UsageError(f"{table.path}: N, C and S contain the sign of delta; leave `folded` out")

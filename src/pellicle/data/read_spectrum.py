@@ -33,7 +33,7 @@ def read_spectrum(
     noise: float | int | None = None,
     polarisation: str | None = None,
     calibrated: bool | None = None,
-    folded: bool = False,
+    folded: bool | None = None,
     analyser: float | int | None = None,
     spot: int | None = None,
 ) -> Spectrum:
@@ -52,7 +52,9 @@ def read_spectrum(
     - `noise`: standard deviation of every point as a fraction, or of Ψ and Δ in degrees; replaces the file's.
     - `polarisation`: "s", "p" or "unpolarised", where the column's name does not state it.
     - `calibrated`: False lifts the limits on the values; by default for an `intensity` column only.
-    - `folded`: Δ lies in 0 to 180, as from an instrument without a compensator; its sign is not fitted.
+    - `folded`: True where Δ lies in 0 to 180, as from an instrument without a compensator; its sign is not
+      fitted. None takes it as folded where it turns back at 0 or 180 with a kink, with a note; False as it
+      stands.
     - `analyser`: for columns α and β, the angle of the fixed polariser in degrees.
     - `spot`: number of the spot, from 1 in the order of the file, for an Accurion file of several spots.
 
@@ -112,7 +114,7 @@ class _Reading:
     noise: float | int | None = None
     polarisation: str | None = None
     calibrated: bool | None = None
-    folded: bool = False
+    folded: bool | None = None
     analyser: float | int | None = None
     spot: int | None = None
 

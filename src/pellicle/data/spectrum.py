@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool
 
+from pellicle.data.folded_delta import folding_at, folding_note
 from pellicle.data.signal_checks import (
     Where,
     check_depolarisation,
@@ -53,7 +54,8 @@ class Spectrum:
     - `path`, `sha256`, `lines`: file, its digest and the source line of each point.
     - `notes`: sentences on how the file was read.
     - `delta`, `delta_sigma`: Δ and its standard deviations in degrees, for "psi-delta".
-    - `folded`: the sign of sin Δ was not measured, and Δ lies in 0 to 180.
+    - `folded`: the sign of sin Δ was not measured, and Δ lies in 0 to 180. With None it is taken as folded
+      where it turns back at 0 or 180 with a kink.
     - `sweeps`: the repeated measurements of which this is the mean (`data.repeated_sweeps.mean_spectrum`).
     - `name` of the spectrum within its file, empty where the file has one spectrum.
     - `declared`: (key, value) pairs that the file states, such as its instrument and date.
@@ -79,7 +81,7 @@ class Spectrum:
     lines: np.ndarray | None = None
     delta: np.ndarray | None = None
     delta_sigma: np.ndarray | None = None
-    folded: bool = False
+    folded: bool | None = None
     sweeps: tuple[Spectrum, ...] = ()
     name: str = ""
     declared: tuple[tuple[str, str], ...] = ()
@@ -109,6 +111,18 @@ class Spectrum:
             object.__setattr__(self, name, array)
         self._check_words()
         self._check_arrays()
+        if self.folded is None:
+            self._find_folding()
+
+    def _find_folding(self) -> None:
+        """Set `folded`, with a note where it is true."""
+        at = None
+        if self.delta is not None:
+            angle = np.zeros(len(self)) if self.angle is None else self.angle
+            at = folding_at(self.wavelength, self.values, self.delta, angle)
+        object.__setattr__(self, "folded", at is not None)
+        if at is not None:
+            object.__setattr__(self, "notes", (*self.notes, folding_note(at)))
 
     def _check_words(self) -> None:
         for name, known in (("signal", SIGNALS), ("polarisation", POLARISATIONS)):
@@ -136,7 +150,9 @@ class Spectrum:
         refuse_first(self.wavelength[1:], repeated, lambda row: self.place("`wavelength`")(row + 1), reason)
         values = self.place("`values`")
         if self.delta is not None:
-            check_psi_delta(self.values, self.delta, self.folded, values, self.place("`delta`"), _REMEDY)
+            check_psi_delta(
+                self.values, self.delta, bool(self.folded), values, self.place("`delta`"), _REMEDY
+            )
             if self.depolarisation is not None:
                 check_depolarisation(self.depolarisation, self.place("`depolarisation`"), _REMEDY)
         elif self.signal != "counts" and self.calibrated and len(self):

@@ -75,6 +75,7 @@ def simulate_spectrum(
         polarisation=light.polarisation,
         angle=np.broadcast_to(angle, nm.shape),
         delta=delta,
+        folded=False,
         delta_sigma=sigma if ellipsometric else None,
         depolarisation=share,
         depolarisation_sigma=share_sigma,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import equinox as eqx
@@ -18,13 +19,14 @@ from pellicle.fitting.discrepancy import discrepancy
 from pellicle.fitting.minima import Minima
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.progress import Progress, quiet
-from pellicle.fitting.result import Fit
+from pellicle.fitting.result import Fit, Status
 from pellicle.fitting.reweighting import RankedMinima
 from pellicle.fitting.robust_losses import LEAST_SQUARES, check_loss
 from pellicle.fitting.spectra import (
     backface,
     default_bounds,
     depolarisation,
+    folded_reading,
     messages,
     parts,
     residual_structure,
@@ -83,7 +85,13 @@ def fitted(
     with jax.enable_x64(True):
         targets = measurements(data, scene)
         spectra = [data] if isinstance(data, Spectrum) else list(data)
-        return _fit(spectra, targets, tolerance, loss, progress)
+        fit, ranked = _fit(spectra, targets, tolerance, loss, progress)
+        folded = folded_reading.as_folded(spectra) if fit.status is Status.MISFIT else None
+        if folded is not None:
+            read = folded[0] if isinstance(data, Spectrum) else folded
+            other, _ = _fit(folded, measurements(read, scene), tolerance, loss, progress)
+            fit = replace(fit, warnings=(*folded_reading.remarks(other), *fit.warnings))
+        return fit, ranked
 
 
 def measurements(data: Spectrum | Sequence[Spectrum], scene: Scene | Sequence[Scene]) -> list[Measured]:

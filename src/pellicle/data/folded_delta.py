@@ -1,0 +1,97 @@
+"""Recognition of a folded Δ, whose sign was not measured: it turns back at 0 or 180 with a kink.
+
+S = sin 2Ψ sin Δ is a smooth function of the wavelength. Where it changes its sign, a folded Δ has |S|, which
+is no polynomial nearby; with the sign put back it is one. A smooth S that only touches zero is one as it
+stands.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+
+from pellicle.data.signal_checks import FOLDED_DELTA, ROUNDING
+
+_HALF_WIDTHS = (5, 6, 8, 11, 15, 20, 28, 40)
+"""Points on each side of a kink to which cubic polynomials are fitted."""
+_BETTER = 8.0
+"""Ratio of the variances of residuals, as measured and with the sign put back, from which there is a kink.
+
+Of simulated films (10 nm to 5 µm, on Si, glass and metals, steps of 1 to 10 nm, noise up to 0.3° of Ψ and
+0.6° of Δ) none of 1901 that were not folded was taken to be, and 29 % of the folded ones were missed:
+most of them films of several µm in steps of 10 nm, and films on glass, whose S is small."""
+_RISE = 0.03
+"""Least |S| on both sides of a kink."""
+_NEAR = 0.5
+"""Largest |S| at a kink, as a share of that."""
+_ROUNDED = 1e-5
+"""Standard deviation of rounded numbers."""
+
+
+def can_be_folded(delta: Float[np.ndarray, " points"]) -> bool:
+    """True where all Δ lie within 0 to 180 degrees."""
+    low, high = FOLDED_DELTA
+    return bool(np.all((delta >= low - ROUNDING) & (delta <= high + ROUNDING)))
+
+
+def folding_at(
+    wavelength: Float[np.ndarray, " points"],
+    psi: Float[np.ndarray, " points"],
+    delta: Float[np.ndarray, " points"],
+    group: Float[np.ndarray, " points"],
+) -> float | None:
+    """The wavelength at which Δ is folded, None where nothing shows it.
+
+    Ψ and Δ are in degrees; points of one `group` (an angle of incidence) form one curve.
+    """
+    if not can_be_folded(delta):
+        return None
+    found: list[tuple[float, float]] = []
+    for value in np.unique(group):
+        rows = np.flatnonzero(group == value)
+        rows = rows[np.argsort(wavelength[rows], kind="stable")]
+        if np.all(np.diff(wavelength[rows]) > 0):
+            found += kinks(wavelength[rows], psi[rows], delta[rows])
+    return max(found)[1] if found else None
+
+
+def folding_note(wavelength: float) -> str:
+    """A sentence on a Δ that is taken as folded."""
+    return (
+        f"delta lies within 0 to 180 and turns back there with a kink, most clearly at {wavelength:.4g} nm:"
+        " taken as folded, so that cos(delta) is fitted; if its sign was measured, give `folded=False`"
+    )
+
+
+def kinks(
+    wavelength: Float[np.ndarray, " points"],
+    psi: Float[np.ndarray, " points"],
+    delta: Float[np.ndarray, " points"],
+) -> list[tuple[float, float]]:
+    """Kinks of S: how much better it is with its sign put back, and the wavelength."""
+    s = np.abs(np.sin(2 * np.deg2rad(psi)) * np.sin(np.deg2rad(delta)))
+    if s.size < 4:
+        return []
+    rough = s[3:] - 3 * s[2:-1] + 3 * s[1:-2] - s[:-3]
+    noise = 1.4826 * float(np.median(np.abs(rough))) / np.sqrt(20) + _ROUNDED
+    lowest = np.flatnonzero((s[1:-1] <= s[:-2]) & (s[1:-1] <= s[2:])) + 1
+    result = []
+    for split in np.union1d(lowest, lowest + 1).tolist():
+        at = 0.5 * (wavelength[split - 1] + wavelength[split])
+        for half in _HALF_WIDTHS:
+            window = slice(split - half, split + half)
+            if window.start < 0 or window.stop > s.size:
+                break
+            near = s[window]
+            rise = min(near[:half].max(), near[half:].max())
+            if rise < _RISE or min(s[split - 1], s[split]) > _NEAR * rise:
+                continue
+            position = (wavelength[window] - at) / np.ptp(wavelength[window])
+            basis = np.linalg.qr(np.vander(position, 4))[0]
+            columns = np.stack([near, np.where(np.arange(2 * half) < half, -near, near)], axis=1)
+            rest = columns - basis @ (basis.T @ columns)
+            as_measured, restored = np.sum(rest**2, axis=0) / (2 * half - 4)
+            ratio = float(as_measured / max(restored, noise**2))
+            if ratio > _BETTER:
+                result.append((ratio, float(at)))
+    return result
