@@ -37,6 +37,7 @@ COMMANDS = ("fit", "sample", "simulate", "plan", "compare", "cost", "chart", "ma
         ("range=(400, inf)", "--range 400:inf"),
         ("thickness=Free(10, 3000)", "--thickness 10:3000"),
         ("folded=True", "--folded"),
+        ("folded=False", "--no-folded"),
         ("columns=...", "--columns ..."),
         ('layer="SiO2", substrate="Si"', "--layer SiO2 --substrate Si"),
     ],

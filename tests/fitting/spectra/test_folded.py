@@ -1,5 +1,6 @@
 """Ψ and a Δ without its sign, as an instrument without a compensator measures them."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -45,3 +46,26 @@ def test_errors_of_n_and_c_by_finite_differences():
     expected = np.sqrt(np.mean(np.sum(np.square(slopes), axis=0), axis=-1)) * spread
     np.testing.assert_allclose(at.sigma, expected, rtol=1e-2)
     assert seen(np.zeros(5), np.full(5, 90.0)).sigma.min() > 0  # where neither moves to first order
+
+
+def test_a_misfit_that_would_fit_as_folded():
+    """Δ of 205 to 283 degrees, folded: nothing shows it but that the scene explains it so only."""
+    nm = np.linspace(600.0, 900.0, 64)
+    psi, delta = (np.asarray(x) for x in pl.ellipsometry(nm, 260.0, "SiO2", "Si", angle=70.0))
+    assert 200 < delta.min() < delta.max() < 300
+    noise = np.random.default_rng(1).normal(0, 0.03, (2, 64))
+    angle = np.full(64, 70.0)
+    data = pl.Spectrum(
+        nm, psi + noise[0], "psi-delta", np.full(64, 0.03), delta=360 - delta + noise[1], angle=angle
+    )
+    assert not data.folded
+    scene = pl.Scene(pl.Layer("SiO2", pl.Free(10, 300)), "Si")
+    found = pl.fit(data, scene)
+    assert found.status == "misfit"
+    assert "read as folded it would fit, with thickness 260" in found.warnings[0]
+    assert found.warnings[0].endswith("give `folded=True`")
+    right = pl.fit(replace(data, folded=True), scene)
+    assert right.status == "converged"
+    assert abs(right["thickness"].value - 260.0) < 4 * right["thickness"].stderr_noise
+    assert not any("folded" in warning for warning in right.warnings)
+    assert not any("folded" in warning for warning in pl.fit(replace(data, delta=delta), scene).warnings)
