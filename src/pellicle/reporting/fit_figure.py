@@ -124,13 +124,16 @@ def _title(fit: Fit) -> str:
 
 def _file_names(fit: Fit) -> list[str]:
     """Each file without its folder, and the names of its spectra: `film.dat [psi-delta, Rp]`."""
-    spectra: dict[str, list[str]] = {}
+    files: list[tuple[str, list[str]]] = []
     for part in fit.parts:
-        names = spectra.setdefault(part.data.path, [])
-        names += [own] if (own := getattr(part.data, "name", "")) else []
+        path, name = part.data.path, getattr(part.data, "name", "")
+        if name and files and files[-1][0] == path:
+            files[-1][1].append(name)
+        else:
+            files.append((path, [name] if name else []))
     return [
         path.replace("\\", "/").rsplit("/", 1)[-1] + (f" [{', '.join(names)}]" if names else "")
-        for path, names in spectra.items()
+        for path, names in files
     ]
 
 
