@@ -1,0 +1,322 @@
+"""JCAMP-DX files (`.jdx`, `.dx`): spectra in blocks of labelled records, `##LABEL= value`.
+
+A block begins with `##TITLE=`; a LINK file holds several, an NTUPLES block several pages. Axis and quantity are
+`##XUNITS=` and `##YUNITS=`. The table is `(X++(Y..Y))`, at even steps from FIRSTX to LASTX, or `(XY..XY)`.
+Some programs write decimal commas. **Source**: JCAMP-DX 4.24 and 5.01, http://www.jcamp-dx.org.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pellicle.data.formats.jcamp_values import Point, ordinates, plain_numbers
+from pellicle.data.formats.quantities import Curve, axis_column, readable, signal_column
+from pellicle.data.tabular.layout import Layout, plain_columns
+from pellicle.data.tabular.text import Line, TextFile
+from pellicle.errors import DataError
+
+MOST_POINTS = 10_000_000
+"""Largest NPOINTS that is accepted; instruments write some 10⁴."""
+
+_RECORD = re.compile(r"(?P<label>[^=]{0,80})=(?P<value>.*)", re.DOTALL)
+_NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?")
+_COMMA = re.compile(r"[+-]?\d+,\d+")
+_LIMITS = ("FIRSTX", "LASTX", "DELTAX", "XFACTOR", "YFACTOR", "FIRSTY")
+_TABLES = ("XYDATA", "XYPOINTS", "DATATABLE")
+_HEAD = 60  # lines that are searched for ##JCAMP-DX=
+_FACTS = {
+    "instrument": ("SPECTROMETERDATASYSTEM", "INSTRUMENTALPARAMETERS", "ORIGIN"),
+    "date": ("LONGDATE", "DATE"),
+    "sample": ("SAMPLEDESCRIPTION", "NAMES", "TITLE"),
+}
+
+
+@dataclass(frozen=True)
+class _Table:
+    """A table: its form, as `(X++(Y..Y))`, the line that declares it, and its rows without comments."""
+
+    form: str
+    line: Line
+    rows: list[tuple[Line, str]] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class _Block:
+    """Records and tables between `##TITLE=` and `##END=`; each record keeps its line."""
+
+    records: dict[str, tuple[str, Line]] = field(default_factory=dict)
+    tables: list[_Table] = field(default_factory=list)
+
+    def text(self, label: str) -> str:
+        """Return the value of a record, empty where the block has none."""
+        return self.records[label][0] if label in self.records else ""
+
+    def parts(self, label: str) -> list[str]:
+        """Return the values of a record of NTUPLES, one for each variable."""
+        return [part.strip() for part in self.text(label).split(",")]
+
+
+@dataclass(frozen=True)
+class _Scales:
+    """Abscissa and factors of a table: None where the block does not state them."""
+
+    first: float | None
+    last: float | None
+    step: float | None
+    points: int | None
+    x_factor: float
+    y_factor: float
+    decimal: str
+
+
+def layouts(file: TextFile) -> list[Layout] | None:
+    """Return the spectra of a JCAMP-DX file, or None for another format.
+
+    Raises DataError for a table that contradicts the records above it, and for one without spectra.
+    """
+    heads = [_label(comment.text) for comment in file.comments if comment.number <= _HEAD]
+    if "JCAMPDX" not in heads and not {"TITLE", "XUNITS", "YUNITS"} <= set(heads):
+        return None
+    blocks = _blocks(file)
+    curves = [curve for block in blocks for curve in _curves(block, file.path)]
+    if not curves:
+        raise DataError(
+            f"{file.path}: is a JCAMP-DX file without a table of a spectrum (XYDATA or XYPOINTS); export it as CSV"
+        )
+    return readable(curves, file.path)
+
+
+def _label(text: str) -> str:
+    """The label of a record without blanks, `-`, `/` and `_`, which do not distinguish labels."""
+    match = _RECORD.match(text)
+    return re.sub(r"[\s/_-]", "", match["label"]).upper() if match else ""
+
+
+def _blocks(file: TextFile) -> list[_Block]:
+    blocks = [_Block()]
+    label, table = "", None
+    for line in file.all_lines:
+        text = line.text.partition("$$")[0]
+        match = _RECORD.match(text) if not line.bare else None
+        if match is None:
+            if not text.strip() or not line.bare:
+                continue
+            if table is not None:
+                table.rows.append((line, text))
+            elif label and label in blocks[-1].records:
+                value, start = blocks[-1].records[label]
+                blocks[-1].records[label] = (f"{value} {text.strip()}".strip(), start)
+            continue
+        label, value = _label(text), match["value"].strip()
+        table = None
+        if label == "TITLE":
+            blocks.append(_Block())
+        if label in _TABLES:
+            table = _Table(value, line)
+            blocks[-1].tables.append(table)
+        else:
+            blocks[-1].records.setdefault(label, (value, line))
+        if label == "PAGE":
+            blocks[-1].records["PAGE"] = (value, line)
+    return blocks
+
+
+def _curves(block: _Block, path: str) -> Iterator[Curve]:
+    """The curve of each table of a block."""
+    paged = "NTUPLES" in block.records
+    for table in block.tables:
+        if paged:
+            found = _paged(block, table, path)
+            if found is None:
+                continue
+            axis, quantity, scales = found
+        else:
+            axis, quantity = block.text("XUNITS"), block.text("YUNITS")
+            scales = _scales(block, path)
+        x, y = _points(table, scales, path)
+        names = (axis_column(axis) or axis, signal_column(quantity) or quantity or "ordinate")
+        rows = [
+            (line, (repr(float(at)), repr(value)))
+            for at, (value, line) in zip(x, y, strict=True)
+            if np.isfinite(value)
+        ]
+        unknown = len(y) - len(rows)
+        if not rows:
+            raise DataError(
+                f"{path}: line {table.line.number} begins a table without points; the file is cut short"
+            )
+        notes = ["read as a JCAMP-DX file"]
+        notes += [f"{unknown} points of unknown value (?) left out"] if unknown else []
+        title = block.text("TITLE")
+        layout = plain_columns(names, rows, notes, name=title or quantity, facts=_facts(block))
+        yield Curve(layout, axis, quantity, block.records.get("YUNITS", ("", table.line))[1].number)
+
+
+def _facts(block: _Block) -> list[tuple[str, str]]:
+    stated = {
+        fact: next((block.text(label) for label in labels if block.text(label)), "")
+        for fact, labels in _FACTS.items()
+    }
+    return [("format", "JCAMP-DX"), *((fact, value) for fact, value in stated.items() if value)]
+
+
+def _scales(block: _Block, path: str) -> _Scales:
+    comma = any(_COMMA.match(block.text(label)) for label in _LIMITS)
+    return _Scales(
+        _number(block, "FIRSTX", path),
+        _number(block, "LASTX", path),
+        _number(block, "DELTAX", path),
+        _count(_number(block, "NPOINTS", path), block, "NPOINTS", path),
+        _factor(_number(block, "XFACTOR", path), "XFACTOR", path),
+        _factor(_number(block, "YFACTOR", path), "YFACTOR", path),
+        "," if comma else ".",
+    )
+
+
+def _paged(block: _Block, table: _Table, path: str) -> tuple[str, str, _Scales] | None:
+    """Axis, quantity and scales of a page of NTUPLES; None where its variables are not X and one Y."""
+    form = re.match(r"\(\s*(\w)\s*\+\+\s*\(\s*(\w)\.\.\2\s*\)\s*\)", table.form)
+    symbols = [symbol.upper() for symbol in block.parts("SYMBOL")]
+    if form is None or not {form[1].upper(), form[2].upper()} <= set(symbols):
+        return None
+    x, y = symbols.index(form[1].upper()), symbols.index(form[2].upper())
+
+    def part(label: str, at: int) -> str:
+        parts = block.parts(label)
+        return parts[at] if at < len(parts) else ""
+
+    def number(label: str, at: int) -> float | None:
+        return _parsed(part(label, at), label, block, path) if part(label, at) else None
+
+    scales = _Scales(
+        number("FIRST", x),
+        number("LAST", x),
+        None,
+        _count(number("VARDIM", y), block, "VARDIM", path),
+        _factor(number("FACTOR", x), "FACTOR", path),
+        _factor(number("FACTOR", y), "FACTOR", path),
+        ".",
+    )
+    return part("UNITS", x), part("UNITS", y) or part("VARNAME", y), scales
+
+
+def _number(block: _Block, label: str, path: str) -> float | None:
+    return _parsed(block.text(label), label, block, path) if block.text(label) else None
+
+
+def _parsed(text: str, label: str, block: _Block, path: str) -> float:
+    line = block.records[label][1]
+    if not _NUMBER.fullmatch(text):
+        raise DataError(f"{path}: line {line.number}: {label} is {text[:40]!r}, not a number; correct it")
+    value = float(text.replace(",", "."))
+    if not np.isfinite(value):
+        raise DataError(f"{path}: line {line.number}: {label} is not a finite number; correct it")
+    return value
+
+
+def _factor(value: float | None, label: str, path: str) -> float:
+    if value == 0:
+        raise DataError(f"{path}: {label} is 0, which leaves no values; export it again")
+    return 1.0 if value is None else value
+
+
+def _count(value: float | None, block: _Block, label: str, path: str) -> int | None:
+    if value is None:
+        return None
+    if value != int(value) or not 1 <= value <= MOST_POINTS:
+        raise DataError(
+            f"{path}: line {block.records[label][1].number}: {label} is {value:g}, which is no number of points "
+            f"from 1 to {MOST_POINTS}; export it again"
+        )
+    return int(value)
+
+
+def _points(table: _Table, scales: _Scales, path: str) -> tuple[Sequence[float], Sequence[Point]]:
+    """Abscissae and ordinates of a table. Raises DataError where they contradict the records."""
+    form = re.sub(r"\s", "", table.form).upper()
+    if form.startswith("(XY..XY)"):
+        x, y = _pairs(table, scales, path)
+    elif re.match(r"\(\w\+\+\(\w\.\.\w\)\)", form):
+        x, y = _even(table, scales, path)
+    else:
+        raise DataError(
+            f"{path}: line {table.line.number}: a table {table.form!r} is not read, only (X++(Y..Y)) and (XY..XY); "
+            "export it as CSV"
+        )
+    return x, [(value * scales.y_factor, line) for value, line in y]
+
+
+def _pairs(table: _Table, scales: _Scales, path: str) -> tuple[list[float], list[Point]]:
+    x: list[float] = []
+    y: list[Point] = []
+    for line, text in table.rows:
+        numbers = plain_numbers(line, text, scales.decimal, path)
+        if len(numbers) % 2:
+            raise DataError(
+                f"{path}: line {line.number} has {len(numbers)} numbers where pairs of x and y are expected; "
+                "correct that line"
+            )
+        x += [value * scales.x_factor for value in numbers[::2]]
+        y += [(value, line) for value in numbers[1::2]]
+    _check_number(len(y), scales, table, path)
+    step = abs(x[-1] - x[0]) / max(len(x) - 1, 1) if x else 0.0
+    ends = ((scales.first, x[0], "FIRSTX"), (scales.last, x[-1], "LASTX")) if x else ()
+    for stated, found, label in ends:
+        if stated is not None and abs(stated - found) > step + 1e-3 * abs(found):
+            raise DataError(
+                f"{path}: {label} is {stated:g}, but the table has {found:g} there; check its decimal marks, or "
+                "export it as CSV"
+            )
+    return x, y
+
+
+def _even(table: _Table, scales: _Scales, path: str) -> tuple[Sequence[float], list[Point]]:
+    most = scales.points or MOST_POINTS
+    y, starts = ordinates(table.rows, most, scales.decimal, path)
+    _check_number(len(y), scales, table, path)
+    if not y:
+        return [], []
+    first, last = scales.first, scales.last
+    if first is None or (last is None and scales.step is None):
+        raise DataError(
+            f"{path}: line {table.line.number}: the table needs FIRSTX and LASTX above it, which give its axis; "
+            "export it as CSV"
+        )
+    if last is None:
+        last = first + (scales.step or 0.0) * (len(y) - 1)
+    step = (last - first) / max(len(y) - 1, 1)
+    if scales.step is not None and abs(abs(scales.step) - abs(step)) > 0.01 * abs(step):
+        raise DataError(
+            f"{path}: DELTAX is {scales.step:g}, but {len(y)} points from FIRSTX {first:g} to LASTX {last:g} are "
+            f"{step:g} apart; export it again"
+        )
+    _check_starts(table, starts, (first, step), scales.x_factor, path)
+    return np.linspace(first, last, len(y)).tolist(), y
+
+
+def _check_starts(
+    table: _Table, starts: Sequence[tuple[float, int]], axis: tuple[float, float], factor: float, path: str
+) -> None:
+    """Refuse a line whose abscissa is not where FIRSTX, LASTX and NPOINTS put it."""
+    first, step = axis
+    for (line, _), (abscissa, at) in zip(table.rows, starts, strict=True):
+        expected = first + step * at
+        room = 0.9 * abs(step) + abs(factor) + 1e-6 * abs(expected)
+        # some programs write the abscissae of a table without the factor
+        if min(abs(abscissa * factor - expected), abs(abscissa - expected)) > room:
+            raise DataError(
+                f"{path}: line {line.number} begins at {abscissa * factor:g}, where FIRSTX, LASTX and NPOINTS put "
+                f"{expected:g}; points are missing or the records are wrong, so export it again"
+            )
+
+
+def _check_number(found: int, scales: _Scales, table: _Table, path: str) -> None:
+    if scales.points is not None and found != scales.points:
+        raise DataError(
+            f"{path}: the table from line {table.line.number} has {found} points where NPOINTS states "
+            f"{scales.points}; the file is cut short or damaged, so export it again"
+        )
