@@ -10,7 +10,18 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 
-from pellicle.data.formats import accurion, film_sense, horiba, regress_pro, spectraray, woollam
+from pellicle.data.formats import (
+    accurion,
+    film_sense,
+    horiba,
+    jcamp,
+    nexus,
+    procspec,
+    regress_pro,
+    spectraray,
+    vendor_binary,
+    woollam,
+)
 from pellicle.data.tabular.bulk import bulk_layout
 from pellicle.data.tabular.layout import Layout, find_layout
 from pellicle.data.tabular.table import Table
@@ -21,13 +32,14 @@ TextReader = Callable[[TextFile], Sequence[Layout] | None]
 BinaryReader = Callable[[bytes, str], Sequence[Layout] | None]
 
 TEXT_READERS: tuple[TextReader, ...] = (
+    jcamp.layouts,
     woollam.layouts,
     spectraray.layouts,
     film_sense.layouts,
     regress_pro.layouts,
     horiba.layouts,
 )
-BINARY_READERS: tuple[BinaryReader, ...] = ()
+BINARY_READERS: tuple[BinaryReader, ...] = (procspec.layouts, nexus.layouts, vendor_binary.layouts)
 
 
 def read_tables(path: str | os.PathLike[str], spot: int | None = None) -> list[Table]:

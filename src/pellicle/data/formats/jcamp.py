@@ -1,8 +1,8 @@
 """JCAMP-DX files (`.jdx`, `.dx`): spectra in blocks of labelled records, `##LABEL= value`.
 
-A block begins with `##TITLE=`; a LINK file holds several, an NTUPLES block several pages. Axis and quantity are
-`##XUNITS=` and `##YUNITS=`. The table is `(X++(Y..Y))`, at even steps from FIRSTX to LASTX, or `(XY..XY)`.
-Some programs write decimal commas. **Source**: JCAMP-DX 4.24 and 5.01, http://www.jcamp-dx.org.
+A block begins with `##TITLE=`; a LINK file holds several, an NTUPLES block several pages. Axis and quantity
+are `##XUNITS=` and `##YUNITS=`. The table is `(X++(Y..Y))`, at even steps from FIRSTX to LASTX, or
+`(XY..XY)`. Some programs write decimal commas. **Source**: JCAMP-DX 4.24 and 5.01, http://www.jcamp-dx.org.
 """
 
 from __future__ import annotations
@@ -85,7 +85,8 @@ def layouts(file: TextFile) -> list[Layout] | None:
     curves = [curve for block in blocks for curve in _curves(block, file.path)]
     if not curves:
         raise DataError(
-            f"{file.path}: is a JCAMP-DX file without a table of a spectrum (XYDATA or XYPOINTS); export it as CSV"
+            f"{file.path}: is a JCAMP-DX file without a table of a spectrum (XYDATA or XYPOINTS); export "
+            "it as CSV"
         )
     return readable(curves, file.path)
 
@@ -229,8 +230,8 @@ def _count(value: float | None, block: _Block, label: str, path: str) -> int | N
         return None
     if value != int(value) or not 1 <= value <= MOST_POINTS:
         raise DataError(
-            f"{path}: line {block.records[label][1].number}: {label} is {value:g}, which is no number of points "
-            f"from 1 to {MOST_POINTS}; export it again"
+            f"{path}: line {block.records[label][1].number}: {label} is {value:g}, which is no number of "
+            f"points from 1 to {MOST_POINTS}; export it again"
         )
     return int(value)
 
@@ -244,8 +245,8 @@ def _points(table: _Table, scales: _Scales, path: str) -> tuple[Sequence[float],
         x, y = _even(table, scales, path)
     else:
         raise DataError(
-            f"{path}: line {table.line.number}: a table {table.form!r} is not read, only (X++(Y..Y)) and (XY..XY); "
-            "export it as CSV"
+            f"{path}: line {table.line.number}: a table {table.form!r} is not read, only (X++(Y..Y)) and "
+            "(XY..XY); export it as CSV"
         )
     return x, [(value * scales.y_factor, line) for value, line in y]
 
@@ -268,8 +269,8 @@ def _pairs(table: _Table, scales: _Scales, path: str) -> tuple[list[float], list
     for stated, found, label in ends:
         if stated is not None and abs(stated - found) > step + 1e-3 * abs(found):
             raise DataError(
-                f"{path}: {label} is {stated:g}, but the table has {found:g} there; check its decimal marks, or "
-                "export it as CSV"
+                f"{path}: {label} is {stated:g}, but the table has {found:g} there; check its decimal "
+                "marks, or export it as CSV"
             )
     return x, y
 
@@ -283,16 +284,16 @@ def _even(table: _Table, scales: _Scales, path: str) -> tuple[Sequence[float], l
     first, last = scales.first, scales.last
     if first is None or (last is None and scales.step is None):
         raise DataError(
-            f"{path}: line {table.line.number}: the table needs FIRSTX and LASTX above it, which give its axis; "
-            "export it as CSV"
+            f"{path}: line {table.line.number}: the table needs FIRSTX and LASTX above it, which give its "
+            "axis; export it as CSV"
         )
     if last is None:
         last = first + (scales.step or 0.0) * (len(y) - 1)
     step = (last - first) / max(len(y) - 1, 1)
     if scales.step is not None and abs(abs(scales.step) - abs(step)) > 0.01 * abs(step):
         raise DataError(
-            f"{path}: DELTAX is {scales.step:g}, but {len(y)} points from FIRSTX {first:g} to LASTX {last:g} are "
-            f"{step:g} apart; export it again"
+            f"{path}: DELTAX is {scales.step:g}, but {len(y)} points from FIRSTX {first:g} to LASTX "
+            f"{last:g} are {step:g} apart; export it again"
         )
     _check_starts(table, starts, (first, step), scales.x_factor, path)
     return np.linspace(first, last, len(y)).tolist(), y
@@ -309,8 +310,8 @@ def _check_starts(
         # some programs write the abscissae of a table without the factor
         if min(abs(abscissa * factor - expected), abs(abscissa - expected)) > room:
             raise DataError(
-                f"{path}: line {line.number} begins at {abscissa * factor:g}, where FIRSTX, LASTX and NPOINTS put "
-                f"{expected:g}; points are missing or the records are wrong, so export it again"
+                f"{path}: line {line.number} begins at {abscissa * factor:g}, where FIRSTX, LASTX and "
+                f"NPOINTS put {expected:g}; points are missing or the records are wrong, so export it again"
             )
 
 

@@ -1,10 +1,10 @@
 """Ordinates of JCAMP-DX tables in their ASCII forms: AFFN, PAC, SQZ, DIF and DUP.
 
-**Source**: McDonald and Wilks, JCAMP-DX: a standard form for exchange of infrared spectra in computer readable
-form, Appl. Spectrosc. 42, 151 (1988), tables VI and VII. The first number of a line is the abscissa. SQZ digits
-(`@A-Ia-i`) begin a value with its sign and first digit, DIF digits (`%J-Rj-r`) a difference from the value
-before, DUP digits (`S-Zs`) the number of times that the value or difference before is meant. After a line that
-ends in a difference, the next line repeats the last value as a check.
+**Source**: McDonald and Wilks, JCAMP-DX: a standard form for exchange of infrared spectra in computer
+readable form, Appl. Spectrosc. 42, 151 (1988), tables VI and VII. The first number of a line is the
+abscissa. SQZ digits (`@A-Ia-i`) begin a value with its sign and first digit, DIF digits (`%J-Rj-r`) a
+difference from the value before, DUP digits (`S-Zs`) the number of times that the value or difference before
+is meant. After a line that ends in a difference, the next line repeats the last value as a check.
 
 Public readers are not used: jcamp 1.3 and openreadout 0.4 read decimal commas as separators without a word,
 and neither refuses a table whose checks fail.
@@ -13,8 +13,8 @@ and neither refuses a table whose checks fail.
 from __future__ import annotations
 
 import re
-from math import isclose
 from collections.abc import Sequence
+from math import isclose
 
 from pellicle.data.tabular.text import Line
 from pellicle.errors import DataError
@@ -65,8 +65,8 @@ def ordinates(
         if differences and found:
             if not isclose(found[0], values[-1][0], rel_tol=1e-9, abs_tol=1e-9):
                 raise DataError(
-                    f"{path}: line {line.number} begins with {found[0]:g}, not with {values[-1][0]:g}, the last "
-                    "value of the line before; the file is damaged, so export it again"
+                    f"{path}: line {line.number} begins with {found[0]:g}, not with {values[-1][0]:g}, the "
+                    "last value of the line before; the file is damaged, so export it again"
                 )
             found = found[1:]
             starts.append((abscissa, len(values) - 1))
@@ -74,7 +74,8 @@ def ordinates(
             starts.append((abscissa, len(values)))
         if len(values) + len(found) > most:
             raise DataError(
-                f"{path}: line {line.number} goes beyond the {most} points that NPOINTS states; export it again"
+                f"{path}: line {line.number} goes beyond the {most} points that NPOINTS states; export it "
+                "again"
             )
         values += [(value, line) for value in found]
         differences = ends_in_difference
@@ -131,6 +132,6 @@ def _float(text: str, line: Line, path: str) -> float:
 
 def _unreadable(line: Line, text: str, path: str) -> DataError:
     return DataError(
-        f"{path}: line {line.number}: {text.strip()[:40]!r} is no JCAMP-DX ordinate here; the file is damaged, "
-        "so export it again"
+        f"{path}: line {line.number}: {text.strip()[:40]!r} is no JCAMP-DX ordinate here; the file is "
+        "damaged, so export it again"
     )

@@ -53,6 +53,9 @@ def axis_column(text: str) -> str | None:
 def signal_column(text: str) -> str | None:
     """Return the column name of a quantity such as `% TRANSMITTANCE`; None for one that is neither R nor T.
 
+    A percentage of an unnamed quantity keeps its name, and a relative intensity is "intensity": the user may
+    state what they are.
+
     >>> signal_column("Transmission (%)")
     'T (%)'
     """
@@ -60,8 +63,9 @@ def signal_column(text: str) -> str | None:
     plain = re.sub(r"\s+units?$", "", plain, flags=re.IGNORECASE)
     column = recognise(plain)
     if column.role not in _SPECTRAL:
-        arbitrary = column.role == "intensity" and "count" not in plain.lower()
-        return UNNAMED if arbitrary else None
+        if column.role == "other" and column.unit == "percent":
+            return text
+        return UNNAMED if column.role == "intensity" and "count" not in plain.lower() else None
     if column.unit == "absorbance":
         return "absorbance" if column.role == "T" else "log(1/R)"
     unit = {"percent": " (%)", "fraction": " (-)"}.get(column.unit or "", "")

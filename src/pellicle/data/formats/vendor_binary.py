@@ -1,7 +1,7 @@
 """Binary files of spectrometers: GRAMS SPC, Bruker OPUS, PerkinElmer `.sp` and JASCO `.jws`.
 
-They are recognised by their first bytes and decoded by the package openreadout (extra `formats`), from memory.
-It gives each trace with the quantity and the unit of both axes; what it does not name is not guessed.
+They are recognised by their first bytes and decoded by the package openreadout (extra `formats`), from
+memory. It gives each trace with the quantity and the unit of both axes; what it does not name is not guessed.
 """
 
 from __future__ import annotations
@@ -23,6 +23,8 @@ _SPC_VERSIONS = (0x4B, 0x4C, 0x4D)
 _SPC_HEADERS = {0x4B: "<4xIdd", 0x4C: ">4xIdd", 0x4D: "<4xfff"}
 _SPC_OLD = 0x4D
 _SPC_SHORTEST = {0x4B: 512, 0x4C: 512, 0x4D: 256}  # bytes of the header
+_SPC_SMALLEST, _SPC_LARGEST = 1e-6, 1e9
+"""Ends of a plausible axis; text read as numbers lies outside."""
 _FORMATS = {
     "spc": "GRAMS SPC",
     "0": "Bruker OPUS",
@@ -50,8 +52,8 @@ def layouts(content: bytes, path: str) -> list[Layout] | None:
         import openreadout
     except ImportError:
         raise DataError(
-            f"{path}: is a {name} file, which needs the package openreadout: {install_command('formats')}; or "
-            "export the spectrum as CSV"
+            f"{path}: is a {name} file, which needs the package openreadout: {install_command('formats')}; "
+            "or export the spectrum as CSV"
         ) from None
     try:
         with openreadout.File(content, name=f"file.{kind}") as file:
@@ -59,7 +61,7 @@ def layouts(content: bytes, path: str) -> list[Layout] | None:
     except DataError:
         raise
     except Exception as error:  # a foreign reader on a damaged file may raise anything
-        reason = str(error).partition(" (hint")[0].strip() or type(error).__name__
+        reason = " ".join(str(error).partition(" (hint")[0].split()) or type(error).__name__
         raise DataError(
             f"{path}: is a {name} file that cannot be read ({reason}); export it as CSV"
         ) from None
@@ -85,8 +87,11 @@ def _is_spc(content: bytes) -> bool:
     if version not in _SPC_VERSIONS or len(content) < _SPC_SHORTEST[version] or b"\0" not in content[:32]:
         return False
     points, first, last = struct.unpack_from(_SPC_HEADERS[version], content)
-    axis_code, signal_code = content[24:26] if version == _SPC_OLD else content[28:30]
-    plausible = (first, last) == (first, last) and max(abs(first), abs(last)) < 1e12 and points >= 1
+    axis_code, signal_code = content[16:18] if version == _SPC_OLD else content[28:30]
+    ends = (abs(first), abs(last))
+    plausible = (
+        first != last and all(x == 0 or _SPC_SMALLEST < x < _SPC_LARGEST for x in ends) and points >= 1
+    )
     return plausible and axis_code <= 31 and (signal_code <= 32 or signal_code >= 128)
 
 
@@ -96,13 +101,11 @@ def _curves(file: Any, name: str, size: int, path: str) -> Iterator[Curve]:
         channels, sweeps, points = trace["channels"], trace["sweep_count"], trace["sample_count"]
         if points * sweeps > size or sweeps > _MOST_SPECTRA:  # no value takes less than a byte
             raise DataError(
-                f"{path}: is a {name} file of {sweeps} spectra of {points} points, more than its {size} bytes "
-                "hold or pellicle reads; export the spectrum as CSV"
+                f"{path}: is a {name} file of {sweeps} spectra of {points} points, more than its {size} "
+                "bytes hold or pellicle reads; export the spectrum as CSV"
             )
         extra = trace["extra"]
         axis = _axis(extra)
-        if extra["axis"].get("quantity") in _SPECTRAL and "first" not in extra["axis"]:
-            raise DataError(f"{path}: is a {name} file without the limits of its axis; export it as CSV")
         for sweep in range(sweeps):
             values = np.asarray(file.read_trace(index, sweep))
             x = np.asarray(file.trace_axis(index))
@@ -136,6 +139,8 @@ def _axis(extra: dict[str, Any]) -> str:
 def _quantity(channel: dict[str, Any], extra: dict[str, Any]) -> str:
     """The quantity of a channel as a header would name it."""
     name, unit = channel["name"], channel.get("unit")
+    if name == "percent":
+        return "signal %"  # SPC states percent without the quantity
     if name in _OF_QUANTITY:
         return f"{_OF_QUANTITY[name]} (%)" if unit == "%" else _OF_QUANTITY[name]
     text = str(extra.get("y_units_text") or "")
@@ -144,9 +149,7 @@ def _quantity(channel: dict[str, Any], extra: dict[str, Any]) -> str:
     return "relative intensity" if name == "intensity" and not text else text or name.replace("_", " ")
 
 
-def _measured(
-    x: np.ndarray, y: np.ndarray, name: str, path: str
-) -> tuple[Sequence[np.ndarray], list[str]]:
+def _measured(x: np.ndarray, y: np.ndarray, name: str, path: str) -> tuple[Sequence[np.ndarray], list[str]]:
     """The columns without points that JASCO marks as not measured, and a note on these."""
     if x.shape != y.shape:
         raise DataError(

@@ -159,7 +159,7 @@ def recognise(name: str, position: int = 0) -> Column:
             column = _column(position, name, role, written, bracketed=bool(tail["open"]))
             if column.role != "other":
                 return column
-    return Column(position, name, "other")
+    return Column(position, name, "other", "percent" if percent else None)
 
 
 def _column(position: int, name: str, role: str, written: str | None, *, bracketed: bool) -> Column:

@@ -1,0 +1,203 @@
+"""NeXus files (HDF5): groups NXdata with units, the definition NXellipsometry, and NetCDF of xarray.
+
+A group NXdata, or the root of a NetCDF file, has a wavelength, energy or wavenumber and datasets along it.
+NXellipsometry of FAIRmat stores `measured_data[angle, observable, wavelength]` in `data_collection`, where
+`data_type` names the observables. **Source**: https://manual.nexusformat.org and the NXDL of NXellipsometry.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from pellicle.data.formats import hdf5_reading as hdf5
+from pellicle.data.tabular.columns import recognise
+from pellicle.data.tabular.layout import Layout, array_columns
+from pellicle.errors import DataError, install_command
+
+_MEASURED = "measured_data"
+_OBSERVABLES = {"psi/delta": ("psi", "delta"), "n/c/s": ("N", "C", "S")}
+"""Columns of `measured_data` by its `data_type`."""
+_ERRORS = {"psi": "sigma_psi", "delta": "sigma_delta", "depolarisation": "sigma_depolarisation"}
+_SIGNALS = {"R", "T", "psi", "N", "C", "S", "counts", "intensity"}
+_MOST_MEMBERS = 1000
+
+
+def layouts(content: bytes, path: str) -> list[Layout] | None:
+    """Return the spectra of a NeXus or NetCDF file, or None for another format.
+
+    Raises DataError where h5py is absent, and for a file without spectra, damaged, or with parts elsewhere.
+    """
+    if not content.startswith(hdf5.SIGNATURE):
+        return None
+    try:
+        import h5py
+    except ImportError:
+        raise DataError(
+            f"{path}: is an HDF5 (NeXus) file, which needs the package h5py: {install_command('formats')}; "
+            "or export the spectrum as CSV"
+        ) from None
+    try:
+        with h5py.File(io.BytesIO(content), "r") as file:
+            found = list(_layouts(file, path))
+    except DataError:
+        raise
+    except Exception as error:  # h5py raises OSError, KeyError, RuntimeError, ... on damaged files
+        raise DataError(
+            f"{path}: is an HDF5 (NeXus) file that cannot be read ({' '.join(str(error).split())[:200]}); "
+            "export it as CSV"
+        ) from None
+    if not found:
+        raise DataError(
+            f"{path}: is an HDF5 (NeXus) file without a wavelength, energy or wavenumber beside a "
+            "reflectance, a transmittance or psi and delta in a group NXdata; export the spectrum as CSV"
+        )
+    return found if len(found) > 1 else [_alone(found[0])]
+
+
+def _alone(layout: Layout) -> Layout:
+    return Layout(layout.names, layout.width, layout.cells, layout.notes, "", layout.declared)
+
+
+def _layouts(file: Any, path: str) -> Iterator[Layout]:
+    for name, group in hdf5.groups(file, path):
+        if len(group) > _MOST_MEMBERS:
+            continue
+        if _MEASURED in group:
+            columns, notes = _ellipsometry(group, name, path)
+        elif name == "/" or hdf5.attribute(group, "NX_class") == "NXdata":
+            columns, notes = _data(group, name, path)
+        else:
+            continue
+        if columns:
+            facts = [("format", "NeXus" if name != "/" else "NetCDF"), *_facts(file, path)]
+            found = [f"read as HDF5, group {name}", *notes]
+            yield array_columns(list(columns), list(columns.values()), found, name=name, facts=facts)
+
+
+def _facts(file: Any, path: str) -> Iterator[tuple[str, str]]:
+    """Date, instrument and sample of the entry."""
+    entries = (hdf5.member(file, name, path) for name in list(file)[:_MOST_MEMBERS])
+    entry = next((e for e in entries if e is not None and hdf5.attribute(e, "NX_class") == "NXentry"), None)
+    if entry is None:
+        return
+    for fact, where in (
+        ("date", "start_time"),
+        ("instrument", "instrument/device_information/model"),
+        ("instrument", "instrument/model"),
+        ("sample", "sample/sample_name"),
+    ):
+        if value := hdf5.text(hdf5.member(entry, where, path)):
+            yield fact, value
+
+
+def _named(name: str, units: str) -> str:
+    """The column name of a dataset, with the unit that its attribute states."""
+    plain = name.lower().removesuffix("_spectrum")
+    if plain.endswith("_errors"):
+        base = recognise(plain.removesuffix("_errors")).role
+        plain = _ERRORS.get(base, "sigma" if base in ("R", "T") else plain)
+    role = recognise(plain).role
+    if role == "angle":
+        plain = "angle"
+    if role == "wavelength" and not units:
+        units = recognise(plain).unit or "not stated"
+    return f"{plain} ({units})" if units and units != "1" else plain
+
+
+def _data(group: Any, name: str, path: str) -> tuple[dict[str, np.ndarray], list[str]]:
+    """The columns of a group along its wavelength, empty without a wavelength and a signal."""
+    names = {child: recognise(_named(child, "")).role for child in group}
+    axes = [child for child, role in names.items() if role == "wavelength"]
+    if not axes or not _SIGNALS & set(names.values()):
+        return {}, []
+    stated = hdf5.attribute(group, "axes")
+    axis = stated if stated in axes else axes[0]
+    if len(axes) > 1 and stated not in axes:
+        raise DataError(
+            f"{path}: {name} has the axes {', '.join(axes)} and names none of them; export it as CSV"
+        )
+    values, units = _dataset(group, axis, path)
+    if values is None or values.ndim != 1 or not values.size:
+        raise DataError(f"{path}: {name}/{axis} is no list of numbers; export the spectrum as CSV")
+    angle = next((child for child, role in names.items() if role == "angle"), None)
+    angles = _dataset(group, angle, path)[0] if angle else None
+    sweeps = angles.size if angles is not None and angles.shape != values.shape else 1
+    columns = {_named(axis, units): np.tile(values, sweeps)}
+    left_out = [other for other in axes if other != axis]
+    for child, role in names.items():
+        if child in axes:
+            continue
+        found, units = _dataset(group, child, path)
+        if found is not None and role == "angle" and found.size == sweeps and found.shape != values.shape:
+            found = np.repeat(found.reshape(-1), values.size)
+        if found is not None and found.size == sweeps * values.size and found.shape[-1:] == values.shape:
+            columns[_named(child, units)] = found.reshape(-1)
+        elif role in _SIGNALS or role == "angle":
+            raise DataError(
+                f"{path}: {name}/{child} has the shape {None if found is None else found.shape}, which "
+                f"does not match {values.size} points of {axis}; export the spectrum as CSV"
+            )
+        else:
+            left_out.append(child)
+    return columns, [f"left out: {', '.join(left_out)}"] if left_out else []
+
+
+def _dataset(group: Any, name: str, path: str) -> tuple[np.ndarray | None, str]:
+    """Numbers and unit of a dataset."""
+    dataset = hdf5.member(group, name, path)
+    found = hdf5.numbers(dataset, f"{group.name}/{name}", path)
+    return found, "" if found is None else hdf5.attribute(dataset, "units")
+
+
+def _ellipsometry(group: Any, name: str, path: str) -> tuple[dict[str, np.ndarray], list[str]]:
+    """The columns of `measured_data` of NXellipsometry, one row for each angle and wavelength."""
+    stated = hdf5.text(hdf5.member(group, "data_type", path))
+    slices = {child.lower().partition("_")[0] for child in group}
+    kind = stated or ("Psi/Delta" if {"psi", "delta"} <= slices else "not stated")
+    observables = _OBSERVABLES.get(kind.lower())
+    if observables is None:
+        raise DataError(
+            f"{path}: {name} measures {kind!r}; export psi and delta in degrees, or N, C and S, as CSV"
+        )
+    axis = next((child for child in group if recognise(_named(child, "")).role == "wavelength"), "")
+    values, units = _dataset(group, axis, path) if axis else (None, "")
+    measured, _ = _dataset(group, _MEASURED, path)
+    if values is None or measured is None or measured.shape[1:] != (len(observables), values.size):
+        raise DataError(
+            f"{path}: {name}/{_MEASURED} has the shape {None if measured is None else measured.shape}, where "
+            f"(angles, {len(observables)}, {'wavelengths' if values is None else values.size}) is expected "
+            f"for {kind}; export it as CSV"
+        )
+    count = measured.shape[0]
+    columns = {_named(axis, units): np.tile(values, count)}
+    columns |= _angles(group, count, values.size, path)
+    degrees = " (deg)" if "psi" in observables else ""
+    columns |= {f"{o}{degrees}": measured[:, i].reshape(-1) for i, o in enumerate(observables)}
+    for child in (f"{_MEASURED}_errors", "data_error"):
+        errors = _dataset(group, child, path)[0]
+        if errors is not None and errors.shape == measured.shape and degrees:
+            columns |= {f"{_ERRORS[o]} (deg)": errors[:, i].reshape(-1) for i, o in enumerate(observables)}
+            break
+    return columns, [f"{_MEASURED} read as {kind}" + ("" if stated else ", by the names beside it")]
+
+
+def _angles(group: Any, count: int, points: int, path: str) -> dict[str, np.ndarray]:
+    """A column of angles of incidence, empty where the entry states none for a single measurement."""
+    entry = group.parent
+    for place in ("angle_of_incidence", "instrument/angle_of_incidence"):
+        for holder in (group, entry):
+            dataset = hdf5.member(holder, place, path)
+            found = hdf5.numbers(dataset, place, path)
+            if found is not None and found.size == count:
+                units = hdf5.attribute(dataset, "units") or "not stated"
+                return {f"angle ({units})": np.repeat(found.reshape(-1), points)}
+    if count > 1:
+        raise DataError(
+            f"{path}: has {count} measurements in {group.name}, but not an angle of incidence for each; "
+            "export them as CSV"
+        )
+    return {}
