@@ -139,7 +139,7 @@ def _curves(block: _Block, path: str) -> Iterator[Curve]:
             axis, quantity = block.text("XUNITS"), block.text("YUNITS")
             scales = _scales(block, path)
         x, y = _points(table, scales, path)
-        names = (axis_column(axis) or axis, signal_column(quantity) or quantity or "ordinate")
+        names = (axis_column(axis) or axis, signal_column(quantity) or quantity)
         rows = [
             (line, (repr(float(at)), repr(value)))
             for at, (value, line) in zip(x, y, strict=True)
@@ -306,7 +306,7 @@ def _check_starts(
     first, step = axis
     for (line, _), (abscissa, at) in zip(table.rows, starts, strict=True):
         expected = first + step * at
-        room = 0.9 * abs(step) + abs(factor) + 1e-6 * abs(expected)
+        room = 0.3 * abs(step) + abs(factor) + 1e-6 * abs(expected)
         # some programs write the abscissae of a table without the factor
         if min(abs(abscissa * factor - expected), abs(abscissa - expected)) > room:
             raise DataError(

@@ -19,6 +19,7 @@ from pellicle.errors import DataError
 
 UNNAMED = "intensity"
 """Column name of a quantity that a file calls arbitrary: the user may state what it is."""
+_NO_NAME = "ordinate"
 _SPECTRAL = ("R", "T")
 _NOT_STATED = "not stated"
 
@@ -53,8 +54,8 @@ def axis_column(text: str) -> str | None:
 def signal_column(text: str) -> str | None:
     """Return the column name of a quantity such as `% TRANSMITTANCE`; None for one that is neither R nor T.
 
-    A percentage of an unnamed quantity keeps its name, and a relative intensity is "intensity": the user may
-    state what they are.
+    What the user may state keeps its place: a percentage of an unnamed quantity, a relative intensity
+    ("intensity"), and no name at all ("ordinate").
 
     >>> signal_column("Transmission (%)")
     'T (%)'
@@ -62,6 +63,8 @@ def signal_column(text: str) -> str | None:
     plain = re.sub(r"^percent\b|^per cent\b", "%", text.strip(), flags=re.IGNORECASE)
     plain = re.sub(r"\s+units?$", "", plain, flags=re.IGNORECASE)
     column = recognise(plain)
+    if not plain:
+        return _NO_NAME
     if column.role not in _SPECTRAL:
         if column.role == "other" and column.unit == "percent":
             return text
@@ -85,7 +88,9 @@ def readable(curves: Sequence[Curve], path: str) -> list[Layout]:
             "spectrum as CSV"
         )
     named = [(curve, signal_column(curve.quantity)) for curve in along]
-    kept = [curve for curve, name in named if name and name != UNNAMED] or [c for c, name in named if name]
+    kept = [curve for curve, name in named if name and name not in (UNNAMED, _NO_NAME)] or [
+        c for c, name in named if name
+    ]
     left_out = [curve.quantity for curve in curves if curve not in kept]
     if not kept:
         declared = Statement(Column(0, along[0].quantity, "foreign"), along[0].line)

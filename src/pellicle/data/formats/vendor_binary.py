@@ -57,6 +57,7 @@ def layouts(content: bytes, path: str) -> list[Layout] | None:
         ) from None
     try:
         with openreadout.File(content, name=f"file.{kind}") as file:
+            _check(file, name, path)
             curves = list(_curves(file, name, len(content), path))
     except DataError:
         raise
@@ -93,6 +94,16 @@ def _is_spc(content: bytes) -> bool:
         first != last and all(x == 0 or _SPC_SMALLEST < x < _SPC_LARGEST for x in ends) and points >= 1
     )
     return plausible and axis_code <= 31 and (signal_code <= 32 or signal_code >= 128)
+
+
+def _check(file: Any, name: str, path: str) -> None:
+    """Refuse a file in which openreadout finds damage, of which it reads what is left. Raises DataError."""
+    findings = file.check()["findings"]
+    error = next((finding["message"] for finding in findings if finding["severity"] == "error"), None)
+    if error is not None:
+        raise DataError(
+            f"{path}: is a damaged {name} file ({' '.join(error.split())}); copy or export it again"
+        )
 
 
 def _curves(file: Any, name: str, size: int, path: str) -> Iterator[Curve]:
