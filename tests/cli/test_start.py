@@ -6,6 +6,8 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
+from warnings import catch_warnings, simplefilter, warn
 
 import pytest
 
@@ -127,6 +129,21 @@ def test_where_programs_are_kept(monkeypatch, tmp_path):
     assert folder() == tmp_path / "pellicle"
     monkeypatch.delenv("XDG_CACHE_HOME")
     assert folder() == Path.home() / ".cache" / "pellicle"
+
+
+def test_a_full_disk_under_the_cache_is_one_sentence(tmp_path, monkeypatch):
+    monkeypatch.setattr("pellicle.cli.session.disk_usage", lambda folder: SimpleNamespace(free=10_000))
+    said = []
+    monkeypatch.setattr("pellicle.cli.session.say", said.append)
+    monkeypatch.setattr("jax.config.update", lambda name, value: None)
+    monkeypatch.setenv("PELLICLE_CACHE", str(tmp_path / "programs"))
+    with catch_warnings(record=True) as warned:
+        simplefilter("always")
+        session.start()
+        warn("Error writing persistent compilation cache entry for 'jit_f'", stacklevel=1)
+    assert len(said) == 1
+    assert "programs: the disk is full" in said[0]
+    assert not warned
 
 
 def test_a_closed_pipe_is_no_error(monkeypatch):

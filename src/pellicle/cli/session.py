@@ -6,12 +6,16 @@ import os
 import sys
 from math import inf
 from pathlib import Path
+from shutil import disk_usage
+from warnings import filterwarnings
 
 from pellicle.cli.messages import as_flags
 from pellicle.errors import UsageError
 
 CACHE_VARIABLE = "PELLICLE_CACHE"
 """A folder for compiled programs, or `off`."""
+ROOM = 2**22
+"""Bytes that the compiled programs of a command need at most, roughly."""
 
 
 def start(keep: bool = True) -> None:
@@ -39,6 +43,9 @@ def start(keep: bool = True) -> None:
             f" the right from them, or choose another folder with {CACHE_VARIABLE}"
         )
         return
+    if disk_usage(folder).free < ROOM:
+        say(f"{folder}: the disk is full, so new compiled programs are not kept and each run is slower")
+        filterwarnings("ignore", "Error writing persistent compilation cache")  # of JAX, one for each program
     jax.config.update("jax_compilation_cache_dir", str(folder))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)

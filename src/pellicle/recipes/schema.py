@@ -135,7 +135,7 @@ class _Reading(_Table):
 
 
 class FileTable(_Reading):
-    """One `[[data.file]]`: what is said here goes before `[data]` and `[instrument]`."""
+    """One `[[data.file]]`: its keys override those of `[data]` and `[instrument]`."""
 
     path: str
     instrument: InstrumentTable = InstrumentTable()
