@@ -133,9 +133,10 @@ def test_a_preamble_as_ocean_optics_writes_it(write):
         "Number of Pixels in Processed Spectrum: 2048\n"
         ">>>>>Begin Processed Spectral Data<<<<<\n"
     )
-    spectrum = read_spectrum(write(text + rows("\t") + ">>>>>End Processed Spectral Data<<<<<\n"), signal="R")
+    path = write(text + rows("\t") + ">>>>>End Processed Spectral Data<<<<<\n")
+    spectrum = read_spectrum(path, signal="R", signal_unit="fraction")
     assert_film(spectrum)
-    assert "7 lines of preamble skipped" in spectrum.notes
+    assert dict(spectrum.declared)["date"] == "Mon May 04 10:11:12 CEST 2015"
 
 
 def test_a_row_of_units_below_the_names(write):

@@ -29,12 +29,14 @@ from pellicle.data.signal_checks import FOLDED_DELTA, check_psi_delta, refuse_fi
 from pellicle.data.spectrum import Spectrum, inside_range
 from pellicle.data.tabular.column_selection import only, wavelength_and_angle
 from pellicle.data.tabular.columns import Column, listed
-from pellicle.data.tabular.named_columns import named_columns
+from pellicle.data.tabular.named_columns import first_column, named_columns
 from pellicle.data.tabular.table import Table
 from pellicle.data.tabular.wavelength_axis import axis_note, axis_unit, read_axis
 from pellicle.errors import DataError, UsageError
 
 SIGNAL = "psi-delta"
+_METAL_N, _METAL_K = 13, 80
+"""Largest n and k of common metals up to 12 µm (gold), in tables that look like psi and delta."""
 _REMEDY = "correct or delete that row"
 _EXAMPLE = '`columns=["wavelength", "angle", "psi", "delta"]`'
 
@@ -231,7 +233,8 @@ def _by_position(table: Table) -> EllipsometryColumns:
             f"{table.path}: has {table.layout.width} columns and no header; name them in order, as in "
             f"{_EXAMPLE}"
         )
-    wavelength, psi, delta = (Column(i, "", role) for i, role in enumerate(("wavelength", "psi", "delta")))
+    wavelength = first_column(table)
+    psi, delta = (Column(i, "", role) for i, role in ((1, "psi"), (2, "delta")))
     note = "no header: column 1 read as the wavelength, column 2 as psi, column 3 as delta"
     return EllipsometryColumns(wavelength, None, PSI_DELTA, (psi, delta), None, (), (), (note,))
 
@@ -266,6 +269,13 @@ def _check(
     for column, values in zip((columns.errors * 2)[:2], sigma, strict=False):
         where = table.places(column.position, rows)
         refuse_first(values, values <= 0, where, f"is a standard deviation not above zero; {_REMEDY}")
+    unnamed = not any(column.name for column in columns.values)
+    if unnamed and psi.max() < _METAL_N and delta.min() >= 0 and delta.max() < _METAL_K:
+        raise DataError(
+            f"{table.path}: has no header, and its values up to {psi.max():g} and {delta.max():g} may be n "
+            "and k; give optical constants as `layer` or `substrate`, or say that they are angles with "
+            '`columns=["wavelength", "psi_deg", "delta_deg"]`'
+        )
     stated = any(column.unit == "deg" for column in columns.values) or columns.form != PSI_DELTA
     if not stated and psi.max() < np.pi / 2 and np.abs(delta).max() < 2 * np.pi:
         raise DataError(

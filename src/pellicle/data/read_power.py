@@ -69,6 +69,11 @@ def _check(
 ) -> None:
     """Check σ and the values of these rows, naming line and column. Raises DataError."""
     if sigma is not None and columns.sigma is not None:
+        if not columns.sigma.name and np.median(sigma) > np.abs(values).max():
+            raise DataError(
+                f"{table.path}: has no header, and its third column, by custom the standard deviation, is "
+                "larger than the signal; name the columns, or give n and k as `layer` or `substrate`"
+            )
         at = table.places(columns.sigma.position, rows)
         refuse_first(sigma, sigma <= 0, at, "is not above zero; correct or delete that row")
     position = columns.signal.position

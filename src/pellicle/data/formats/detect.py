@@ -12,13 +12,21 @@ from collections.abc import Callable, Sequence
 
 from pellicle.data.formats import (
     accurion,
+    avantes,
+    bruker_dpt,
     film_sense,
     horiba,
+    jasco,
     jcamp,
     nexus,
+    ocean_optics,
+    perkin_elmer,
     procspec,
     regress_pro,
+    scans_side_by_side,
     spectraray,
+    stacked_tables,
+    stellarnet,
     vendor_binary,
     woollam,
 )
@@ -38,6 +46,14 @@ TEXT_READERS: tuple[TextReader, ...] = (
     film_sense.layouts,
     regress_pro.layouts,
     horiba.layouts,
+    ocean_optics.layouts,
+    avantes.layouts,
+    perkin_elmer.layouts,
+    jasco.layouts,
+    stellarnet.layouts,
+    bruker_dpt.layouts,
+    scans_side_by_side.layouts,
+    stacked_tables.layouts,
 )
 BINARY_READERS: tuple[BinaryReader, ...] = (procspec.layouts, nexus.layouts, vendor_binary.layouts)
 

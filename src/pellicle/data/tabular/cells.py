@@ -15,6 +15,8 @@ import numpy as np
 from pellicle.data.tabular.text import Line, is_number, split
 from pellicle.errors import DataError
 
+SELECTED = "\x1f"
+"""Delimiter of cells that a reader has selected: the unit separator of ASCII, which no text has."""
 DELIMITERS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}
 
 Place = Callable[[int, int], str]
@@ -37,8 +39,9 @@ class TextCells:
     @property
     def notes(self) -> tuple[str, ...]:
         """A sentence on how the cells are written."""
-        comma = ", decimal commas" if self.decimal == "," else ""
-        return (f"columns separated by {DELIMITERS[self.delimiter]}{comma}",)
+        found = [f"columns separated by {DELIMITERS[self.delimiter]}"] if self.delimiter in DELIMITERS else []
+        found += ["decimal commas"] if self.decimal == "," else []
+        return (", ".join(found),) if found else ()
 
     @cached_property
     def lines(self) -> np.ndarray:

@@ -7,10 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pellicle.data.tabular.columns import COUNTS, SIGNALS, Column, listed
-from pellicle.data.tabular.named_columns import named_columns
+from pellicle.data.tabular.named_columns import first_column, named_columns
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError, UsageError
 
+_COUNTERS = ("index", "no", "no.", "nr", "nr.", "number", "point", "pixel", "row", "time", "time (s)")
+"""Names of columns that count rows or give times, which are no signals."""
 _EITHER_SIGNAL = '`signal="R"` or `signal="T"`'
 
 
@@ -89,7 +91,7 @@ def _by_position(table: Table, role: str) -> SpectrumColumns:
         notes.append("column 3 read as sigma, the standard deviation of the signal")
     if width > 3:
         notes.append("column 4 (by custom the error of the wavelength) ignored")
-    return SpectrumColumns(Column(0, "", "wavelength"), Column(1, "", role), sigma, None, tuple(notes))
+    return SpectrumColumns(first_column(table), Column(1, "", role), sigma, None, tuple(notes))
 
 
 def _with_wavelength(table: Table, columns: Sequence[Column], signal: Column) -> SpectrumColumns:
@@ -200,9 +202,10 @@ def _unnamed_signals(table: Table, columns: Sequence[Column], signal: str | None
         raise UsageError(
             f'{table.path}: has psi and delta, which contradicts `signal="{signal}"`; leave that out'
         )
-    unnamed = [c for c in columns if c.role in ("processed", "other") and c.name not in ("_", "")]
-    processed = [c for c in unnamed if c.role == "processed"]
-    unnamed = processed or unnamed
+    named = [c for c in columns if c.name not in ("_", "")]
+    processed = [c for c in named if c.role == "processed"]
+    free = [c for c in named if c.role in ("other", "value")]
+    unnamed = processed or [c for c in free if c.name.strip().lower() not in _COUNTERS] or free
     if signal is not None and unnamed and "wavelength" in roles:
         return [dataclasses.replace(c, role=signal) for c in unnamed]
     sample = only(table, columns, "sample counts")
@@ -214,14 +217,16 @@ def _unnamed_signals(table: Table, columns: Sequence[Column], signal: str | None
             'reflectance needs the material of the reference as well, as in `reference_material="Si"`'
         )
     if unnamed and "wavelength" in roles:
+        percent = any(column.unit == "percent" for column in unnamed)
+        unit = "" if percent else ' (unit: `signal_unit="percent"`, ...)'
         raise UsageError(
-            f"{table.path}: {listed(unnamed)} state no quantity; say what they are with {_EITHER_SIGNAL}, or "
-            'name the columns in order, as in `columns=["wavelength", "R"]`'
+            f"{table.path}: {listed(unnamed)} state no quantity; state it with {_EITHER_SIGNAL}{unit}"
+            ', or name the columns, as in `columns=["wavelength", "R"]`'
         )
     foreign = [c for c in columns if c.role in ("foreign", "counts", *COUNTS)]
     if foreign:
         raise DataError(
-            f"{table.path}: {listed(foreign[:1]).replace('declared ', '')} is neither a reflectance nor a "
+            f"{table.path}: {listed(foreign).replace('declared ', '')} is neither a reflectance nor a "
             "transmittance; export one of these, give raw counts with `reference`, or if it is one, name it: "
             '`columns=["wavelength", "R"]`'
         )

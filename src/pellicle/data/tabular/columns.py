@@ -11,85 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pellicle.data.tabular import units
+from pellicle.data.tabular.column_names import FOREIGN, NAMES
 from pellicle.errors import UsageError
 
-# role → its names; a column of any other name is ignored, with a note
-_NAMES = {
-    "wavelength": (
-        *("wavelength", "wavelengths", "wave length", "wave", "wl", "lambda", "lam", "λ"),
-        *("wellenlänge", "wellenlaenge", "longueur d'onde", "longueur d’onde", "longitud de onda"),
-        *("lunghezza d'onda", "lunghezza d’onda", "comprimento de onda", "golflengte", "波長", "波长"),
-    ),
-    "energy": ("energy", "photon energy", "photon_energy", "energie", "photonenergie"),
-    "wavenumber": (
-        *("wavenumber", "wavenumbers", "wave number", "wellenzahl", "nombre d'onde", "nombre d’onde"),
-        *("número de onda", "波数"),
-    ),
-    "frequency": ("frequency", "frequenz"),
-    "R": (
-        *("r", "reflectance", "reflectivity", "reflection", "reflexion", "réflexion", "réflectance"),
-        *("reflexionsgrad", "reflektivität", "reflektanz", "reflectancia", "riflettanza", "反射率"),
-    ),
-    "Rs": ("rs", "r_s", "reflectance_s"),
-    "Rp": ("rp", "r_p", "reflectance_p"),
-    "T": (
-        *("t", "transmittance", "transmissivity", "transmission", "transmissionsgrad"),
-        *("transmitancia", "trasmittanza", "透過率", "透过率"),
-    ),
-    "Ts": ("ts", "t_s", "transmittance_s"),
-    "Tp": ("tp", "t_p", "transmittance_p"),
-    "absorbance": (
-        *("a", "abs", "abs.", "absorbance", "optical density", "optical_density", "od", "o.d."),
-        *("extinktion", "absorbanz", "absorbancia", "assorbanza", "吸光度"),
-    ),
-    "log(1/R)": ("log(1/r)", "log 1/r", "log_1_r", "apparent absorbance"),
-    "intensity": ("intensity", "relative intensity", "relative_intensity"),
-    "counts": ("counts", "raw"),
-    "processed": ("processed",),
-    "sample counts": ("sample counts",),
-    "reference counts": ("reference counts",),
-    "dark counts": ("dark counts",),
-    "sigma": ("sigma", "σ"),
-    "angle": ("angle", "aoi", "angle of incidence", "angle_of_incidence"),
-    "psi": ("psi", "ψ"),
-    "delta": ("delta", "δ"),
-    "sigma_psi": ("sigma_psi", "psi_sigma", "psi_err", "psi_error", "err_psi"),
-    "sigma_delta": ("sigma_delta", "delta_sigma", "delta_err", "delta_error", "err_delta"),
-    "depolarisation": ("depolarisation", "depolarization", "depol"),
-    "sigma_depolarisation": (
-        "sigma_depolarisation",
-        "sigma_depolarization",
-        "sigma_depol",
-        "depolarisation_sigma",
-        "depolarization_sigma",
-        "depol_sigma",
-        "depol_err",
-        "depol_error",
-        "err_depol",
-    ),
-    "N": ("n",),
-    "C": ("c",),
-    "S": ("s",),
-    "alpha": ("alpha", "α"),
-    "beta": ("beta", "β"),
-    "analyser": ("analyser", "analyzer", "analyser angle", "analyzer angle"),
-    "theta_i": ("theta_i", "θ_i"),
-    "phi_i": ("phi_i", "φ_i"),
-    "theta_o": ("theta_o", "θ_o"),
-    "phi_o": ("phi_o", "φ_o"),
-    "value": ("value", "brdf"),
-    "G": ("g",),
-    "B": ("b",),
-    "sigma_R": ("sigma_r",),
-    "sigma_G": ("sigma_g",),
-    "sigma_B": ("sigma_b",),
-}
-_FOREIGN = (
-    *("absorptance", "cd", "circular dichroism", "emission", "f(r)", "fluorescence", "irradiance", "k/s"),
-    *("kubelka-munk", "photoluminescence", "pl", "pl intensity", "power", "radiance", "raman"),
-    *("raman intensity", "scope", "single beam"),
-)
-"""Names of quantities that are neither a reflectance nor a transmittance."""
 SIGNALS = ("R", "T")
 """Roles of the signals of one column; psi-delta has two."""
 COUNTS = ("sample counts", "reference counts", "dark counts")
@@ -115,19 +39,21 @@ _UNIT_OF = {
     "intensity": lambda text: None,
 }
 _ALIASES = sorted(
-    ((name, role) for role, names in (*_NAMES.items(), ("foreign", _FOREIGN)) for name in names),
+    ((name, role) for role, names in (*NAMES.items(), ("foreign", FOREIGN)) for name in names),
     key=lambda alias: -len(alias[0]),
 )
 _TAIL = re.compile(r"\s*(?:(?P<open>[(\[])\s*(?P<inside>.*?)\s*[)\]]|[_\s/,:-]+(?:in\s+)?(?P<after>.+?))\s*")
 
 SKIP = "_"
+UNSTATED = "unit not stated"
+"""Unit in the name of a column whose unit must be asked for."""
 
 
 @dataclass(frozen=True)
 class Column:
     """One column: position, name, role and unit.
 
-    `role` is a key of `_NAMES`, "foreign" for a quantity that is not read, or "other"; energies, wavenumbers
+    `role` is a key of `NAMES`, "foreign" for a quantity that is not read, or "other"; energies, wavenumbers
     and frequencies have the role "wavelength", Rs, Rp, Ts, Tp the roles "R" and "T" with a polarisation, an
     absorbance the role "T" with that unit. `unit` is None where the name states none;
     `unknown_unit` keeps a unit that was not understood.
@@ -147,9 +73,9 @@ def recognise(name: str, position: int = 0) -> Column:
     unit_alone = units.wavelength_unit(plain)
     if unit_alone and plain != "a":
         return Column(position, name, "wavelength", unit_alone)
-    percent = plain.startswith("%") or plain.endswith("%")
+    percent = plain.startswith(("%", "percent ")) or plain.endswith("%")
     if percent:
-        plain = plain.strip("% _/,:-").removesuffix(" in")
+        plain = plain.strip("% _/,:-").removesuffix(" in").removeprefix("percent ")
     for alias, role in _ALIASES:
         if plain == alias:
             return _column(position, name, role, "%" if percent else None, bracketed=False)
@@ -233,10 +159,17 @@ def parse_columns(columns: str | Sequence[str], path: str, width: int) -> tuple[
     for column in parsed:
         if column.role == "other" and column.name not in (SKIP, ""):
             raise UsageError(
-                f"{path}: `columns` has the unknown name {column.name!r}; use {', '.join(_NAMES)}, or "
+                f"{path}: `columns` has the unknown name {column.name!r}; use {', '.join(NAMES)}, or "
                 f"{SKIP} to skip a column"
             )
     return parsed
+
+
+def unknown_unit(column: Column) -> str:
+    """Say of a column that its unit is unknown, for a message."""
+    if column.unknown_unit == UNSTATED:
+        return "states no unit"
+    return f"is in an unknown unit {column.unknown_unit!r}"
 
 
 def listed(columns: Sequence[Column]) -> str:

@@ -37,6 +37,13 @@ _FOREIGN = re.compile(
 """Quantities that are neither a reflectance nor a transmittance."""
 
 
+_NO_WAVELENGTH = re.compile(
+    r"(raman|pixel|channel|points?\b|index|time|temperature|position|angle|seconds?\b)",
+    re.IGNORECASE,
+)
+"""Axes that are no wavelength, energy or wavenumber."""
+
+
 @dataclass(frozen=True)
 class Statement:
     """A declared axis or quantity: the column that its words describe, and the line that declares it.
@@ -76,9 +83,11 @@ def declarations(lines: Sequence[Line]) -> Declared:
         column = recognise(value)
         if _AXIS.fullmatch(key) and column.role == "wavelength" and column.unit:
             axis = axis or Statement(column, line.number)
+        elif _AXIS.fullmatch(key) and _NO_WAVELENGTH.match(value):
+            axis = axis or Statement(Column(0, value, "wavelength", unknown_unit=value), line.number)
         elif _SIGNAL.fullmatch(key) and column.role in ("R", "T"):
             signal = signal or Statement(column, line.number)
-        elif _SIGNAL.fullmatch(key) and _FOREIGN.match(value):
+        elif _SIGNAL.fullmatch(key) and (column.role == "foreign" or _FOREIGN.match(value)):
             signal = signal or Statement(Column(0, value, "foreign"), line.number)
         else:
             fact = next((name for name, words in _FACTS.items() if re.fullmatch(words, key)), None)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pellicle.data.tabular.cells import DELIMITERS, ArrayCells, TextCells
+from pellicle.data.tabular.cells import DELIMITERS, SELECTED, ArrayCells, TextCells
 from pellicle.data.tabular.columns import is_header, is_unit_row, recognise_all
 from pellicle.data.tabular.declarations import NOTHING_DECLARED, Declared, declarations
 from pellicle.data.tabular.text import Line, TextFile, is_number, split
@@ -53,8 +53,8 @@ def plain_columns(
     `names` state quantity and unit as a header does; `facts` as in `Declared`.
     """
     width = len(names)
-    selected = [Line(line.number, line.text, "\t".join(cells)) for line, cells in rows]
-    cells = TextCells("\t", decimal, width, width, selected)
+    selected = [Line(line.number, line.text, SELECTED.join(cells)) for line, cells in rows]
+    cells = TextCells(SELECTED, decimal, width, width, selected)
     return Layout(tuple(names), width, cells, tuple(notes), name, Declared(facts=tuple(facts)))
 
 
@@ -79,7 +79,7 @@ def find_layout(file: TextFile) -> Layout:
     if first is None:
         raise DataError(
             f"{path}: line {lines[-1].number} ends the file without any row of two numbers; "
-            "expected rows of a wavelength and a value, as 550,0.21"
+            f"expected rows of a wavelength and a value, as 550,0.21{_hint(lines[-1].text)}"
         )
     width = len(split(lines[first].bare, delimiter))
     start, header = _rows_begin(lines, first, width, delimiter, decimal)
@@ -115,6 +115,15 @@ def find_layout(file: TextFile) -> Layout:
     width = max(width, len(names or ()))
     cells = TextCells(delimiter, decimal, width, max(width, trailing), rows)
     return Layout(tuple(names) if names else None, width, cells, tuple(notes), declared=declared)
+
+
+def _hint(text: str) -> str:
+    """Say what keeps a line from being a row of numbers, as far as that is common."""
+    if re.search(r"\d\s*%", text):
+        return "; leave the % signs out of the cells and put one into the header"
+    if re.search(r"\d{1,3}[.,' ]\d{3}(?!\d)", text):
+        return "; export numbers without thousands separators"
+    return ""
 
 
 def _numbers_in(line: Line, delimiter: str, decimal: str = ",") -> tuple[int, int]:

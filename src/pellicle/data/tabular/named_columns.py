@@ -35,6 +35,14 @@ def named_columns(table: Table, columns: str | Sequence[str] | None) -> tuple[Co
     return tuple(_with_declared(table, column, declared, column in unnamed) for column in found)
 
 
+def first_column(table: Table) -> Column:
+    """Return the wavelength of a table without a header, with the unit that the file declares."""
+    declared = table.layout.declared.axis
+    if declared is None:
+        return Column(0, "", "wavelength")
+    return dataclasses.replace(declared.column, position=0, name="")
+
+
 def _refuse_optical_constants(table: Table, columns: Sequence[Column]) -> None:
     """Raise DataError for a table of n and k, which is no measurement."""
     names = {column.name.strip().lower() for column in columns if column.name}
@@ -53,9 +61,11 @@ def _declared_columns(table: Table) -> tuple[Column, ...] | None:
     if declared.signal is None or table.layout.width not in (2, 3):
         return None
     signal = declared.signal.column
-    axis = declared.axis.column.unit if declared.axis else None
     label = f"declared {signal.name}"
-    columns = [Column(0, "column 1", "wavelength", axis), dataclasses.replace(signal, position=1, name=label)]
+    columns = [
+        dataclasses.replace(first_column(table), name="column 1"),
+        dataclasses.replace(signal, position=1, name=label),
+    ]
     return (*columns, *([Column(2, "column 3", "sigma")] if table.layout.width == 3 else []))
 
 
@@ -66,12 +76,12 @@ def _with_declared(table: Table, column: Column, declared: Declared, unnamed: bo
         return column
     stated = statement.column
     roles = (column.role, stated.role) if not unnamed else (stated.role,) * 2
-    units = {column.unit, stated.unit} - {None}
+    units = {column.unit, stated.unit or stated.unknown_unit} - {None}
     if roles[0] != roles[1] or len(units) > 1:
         raise DataError(
             f"{table.path}: line {statement.line} declares {stated.name!r}, which contradicts "
             f"{table.label(column.position)}; correct the file, or name its columns with `columns`"
         )
-    if column.unit is None and stated.unit:
-        column = dataclasses.replace(column, unit=stated.unit, unknown_unit=None)
+    if column.unit is None and (stated.unit or stated.unknown_unit):
+        column = dataclasses.replace(column, unit=stated.unit, unknown_unit=stated.unknown_unit)
     return dataclasses.replace(column, role=roles[1])

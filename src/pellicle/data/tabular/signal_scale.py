@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pellicle.data.tabular.column_selection import SpectrumColumns
+from pellicle.data.tabular.columns import unknown_unit
 from pellicle.data.tabular.table import Table
 from pellicle.data.tabular.units import SIGNAL_UNITS, signal_unit
 from pellicle.errors import DataError, UsageError
@@ -57,7 +58,7 @@ def signal_scale(table: Table, columns: SpectrumColumns, requested: str | None) 
     place = f"{table.path}: {table.label(column.position)}"
     if column.unknown_unit and asked is None:
         raise DataError(
-            f"{place} is in an unknown unit {column.unknown_unit!r}; state it with "
+            f"{place} {unknown_unit(column)}; state it with "
             '`signal_unit="fraction"`, `signal_unit="percent"` or `signal_unit="absorbance"`'
         )
     if asked and column.unit and asked != column.unit:

@@ -25,7 +25,7 @@ _WAVELENGTH_SPELLINGS = {
     "THz": ("thz", "terahertz"),
 }
 _SIGNAL_SPELLINGS = {
-    "percent": ("%", "percent", "pct", "perc"),
+    "percent": ("%", "percent", "pct", "perc", "%t", "%r"),
     "fraction": ("fraction", "frac", "1", "-", "", "0-1", "0..1", "unitless", "dimensionless"),
     "absorbance": ("absorbance", "od", "opticaldensity"),
 }

@@ -9,7 +9,7 @@ import numpy as np
 from pellicle.data.repeated_sweeps import are_sweeps, one_way, sweep_numbers
 from pellicle.data.signal_checks import refuse_first
 from pellicle.data.tabular.column_selection import SpectrumColumns
-from pellicle.data.tabular.columns import Column
+from pellicle.data.tabular.columns import Column, unknown_unit
 from pellicle.data.tabular.table import Table
 from pellicle.data.tabular.units import WAVELENGTH_UNITS, to_nm, wavelength_unit
 from pellicle.errors import DataError, UsageError
@@ -35,7 +35,7 @@ def axis_unit(table: Table, column: Column, requested: str | None) -> str | None
         raise UsageError(f"`wavelength_unit` must be one of {', '.join(WAVELENGTH_UNITS)}, not {requested!r}")
     if column.unknown_unit and asked is None:
         raise DataError(
-            f"{table.path}: {table.label(column.position)} is in an unknown unit {column.unknown_unit!r}; "
+            f"{table.path}: {table.label(column.position)} {unknown_unit(column)}; "
             f"convert it or state one of {', '.join(WAVELENGTH_UNITS)} with `wavelength_unit`"
         )
     if asked and column.unit and asked != column.unit:

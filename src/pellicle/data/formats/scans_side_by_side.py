@@ -1,0 +1,144 @@
+"""Tables with several scans side by side, each with its own wavelengths.
+
+Agilent (Varian) Cary and Shimadzu UVProbe write a line with the name of each scan over its first column, a
+line such as `Wavelength (nm),%T,Wavelength (nm),%T`, the rows, and Cary the method below a blank line. The
+layouts are those of public exports.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from pellicle.data.formats.instrument_rows import Rows, all_cells, decimal_mark, facts
+from pellicle.data.tabular.columns import Column, recognise
+from pellicle.data.tabular.declarations import declarations
+from pellicle.data.tabular.layout import Layout, plain_columns
+from pellicle.data.tabular.text import TextFile, is_number
+
+_MOST_HEADING = 40
+_BASELINE = re.compile(r"base ?line|(100|0) ?%? ?[TR]\b", re.IGNORECASE)
+_COLLECTED = re.compile(r"Collection Time:\s*(.+)")
+_INSTRUMENT = re.compile(r"Instrument(?: Name)?(?:\s{2,}|:\s*)(\S.*)")
+_IGNORED = ("foreign", "other", "sigma")
+
+
+class _Scan(NamedTuple):
+    name: str
+    columns: tuple[Column, ...]
+    rows: Rows
+
+    @property
+    def readable(self) -> bool:
+        return any(column.role not in _IGNORED for column in self.columns[1:])
+
+
+def layouts(file: TextFile) -> list[Layout] | None:
+    """Return one layout for each scan, without baselines, or None for another format."""
+    lines = file.lines
+    for at in range(min(_MOST_HEADING, len(lines))):
+        for delimiter in ("\t", ";", ","):
+            groups = _groups(all_cells(lines[at].text, delimiter))
+            names = all_cells(lines[at - 1].text, delimiter) if at else []
+            if groups and (len(groups) > 1 or _names_scan(names, lines[at - 1].text)):
+                return _layouts(file, at, delimiter, groups, names)
+    return None
+
+
+def _groups(header: Sequence[str]) -> list[tuple[Column, ...]]:
+    """Columns of each scan: an axis and what follows it; none for another line."""
+    columns = [recognise(name, position) for position, name in enumerate(header)]
+    if not columns or columns[0].role != "wavelength":
+        return []
+    begins = [i for i, column in enumerate(columns) if column.role == "wavelength"]
+    ends = [*begins, len(columns)][1:]
+    groups = [
+        tuple(column for column in columns[begin:end] if column.name)
+        for begin, end in zip(begins, ends, strict=True)
+    ]
+    return groups if all(len(group) > 1 for group in groups) else []
+
+
+def _names_scan(names: Sequence[str], text: str) -> bool:
+    """Return True for the line `sample 1,` or `"sample 1"` over a single scan."""
+    if len(names) == 1:
+        return len(text) > 2 and text[0] == text[-1] == '"'
+    return len(names) > 1 and bool(names[0]) and not any(names[1:]) and not is_number(names[0], ",")
+
+
+def _layouts(
+    file: TextFile, at: int, delimiter: str, groups: Sequence[tuple[Column, ...]], names: Sequence[str]
+) -> list[Layout] | None:
+    body = [(line, all_cells(line.bare, delimiter)) for line in file.lines[at + 1 :]]
+    end = _rows_end(body, groups)
+    if not end:
+        return None
+    below = [line for line, _ in body[end:]]
+    scans = [_Scan(_name(group, names), group, _rows(body[:end], group)) for group in groups]
+    scans = [scan for scan in scans if scan.rows]
+    collected = [match[1].strip() for line in below if (match := _COLLECTED.search(line.text))]
+    instrument = next((m[1].strip() for line in below if (m := _INSTRUMENT.match(line.text.strip()))), "")
+    kept = [scan for scan in scans if scan.readable and not _BASELINE.search(scan.name)] or scans
+    left_out = [repr(scan.name) for scan in scans if scan not in kept]
+    notes = [f"{len(scans)} scans side by side"] if len(scans) > 1 else []
+    notes += [f"left out as baselines or other quantities: {', '.join(left_out)}"] if left_out else []
+    notes += [f"text from line {below[0].number} on, below the rows, read as the method"] if below else []
+    declared = declarations([*file.lines[:at], *file.comments])
+    found = []
+    for scan, name in zip(kept, _different([scan.name for scan in kept]), strict=True):
+        index = scans.index(scan)
+        date = collected[index] if len(collected) == len(scans) else ""
+        title = scan.name if scan.name != scan.columns[1].name else ""
+        known = {"instrument": instrument, "date": date, "sample": title}
+        layout = plain_columns(
+            [column.name for column in scan.columns],
+            scan.rows,
+            notes,
+            name=name if len(kept) > 1 else "",
+            facts=facts("", [*file.lines[:at], *below], **known),
+            decimal="." if delimiter == "," else decimal_mark(scan.rows),
+        )
+        stated = dataclasses.replace(declared, facts=layout.declared.facts)
+        found.append(dataclasses.replace(layout, declared=stated))
+    return found
+
+
+def _rows_end(body: Rows, groups: Sequence[tuple[Column, ...]]) -> int:
+    """Number of lines up to the last row, or the faulty one that ends the file."""
+    axes = [group[0].position for group in groups]
+
+    def is_row(cells: Sequence[str], width: int) -> bool:
+        found = [cells[axis : axis + width] for axis in axes]
+        return any(len(part) == width and all(is_number(cell, ",") for cell in part) for part in found)
+
+    last = next((i for i in range(len(body) - 1, -1, -1) if is_row(body[i][1], 2)), -1)
+    while last >= 0 and last + 1 < len(body) and is_row(body[last + 1][1], 1):
+        last += 1
+    return last + 1
+
+
+def _rows(body: Rows, group: Sequence[Column]) -> Rows:
+    """The rows of one scan, which may end before those of the others."""
+    rows: Rows = []
+    for line, cells in body:
+        own = [cells[column.position] if column.position < len(cells) else "" for column in group]
+        if any(own):
+            rows.append((line, own))
+    return rows
+
+
+def _name(group: Sequence[Column], names: Sequence[str]) -> str:
+    """Name of a scan: the cell over its columns, or the name of its value."""
+    over = [names[column.position] for column in group if column.position < len(names)]
+    title = next((name for name in over if name and not is_number(name, ",")), "")
+    return re.sub(r"\s*-\s*RawData$", "", title) or group[1].name
+
+
+def _different(names: Sequence[str]) -> list[str]:
+    """The names, with a number behind those that are not the first of their kind."""
+    return [
+        name if name not in names[:i] else f"{name} ({names[:i].count(name) + 1})"
+        for i, name in enumerate(names)
+    ]
