@@ -58,16 +58,16 @@ def test_a_smooth_turn_is_none(least):
 @pytest.mark.parametrize("angle", [None, 70.0])
 def test_a_spectrum(angle):
     psi, delta = np.full(NM.size, 30.0), 180 - np.abs(NM - 601) / 3
-    arguments = {"delta": delta, "angle": None if angle is None else np.full(NM.size, angle)}
-    taken = pl.Spectrum(NM, psi, "psi-delta", **arguments)
+    angles = None if angle is None else np.full(NM.size, angle)
+    taken = pl.Spectrum(NM, psi, "psi-delta", delta=delta, angle=angles)
     assert taken.folded is True
     [note] = taken.notes
     assert "at 601 nm: taken as folded" in note
     assert "give `folded=False`" in note
-    stated = pl.Spectrum(NM, psi, "psi-delta", folded=False, **arguments)
+    stated = pl.Spectrum(NM, psi, "psi-delta", folded=False, delta=delta, angle=angles)
     assert stated.folded is False
     assert not stated.notes
-    whole = pl.Spectrum(NM, psi, "psi-delta", **arguments | {"delta": 180 + (NM - 601) / 3})
+    whole = pl.Spectrum(NM, psi, "psi-delta", delta=180 + (NM - 601) / 3, angle=angles)
     assert whole.folded is False
     assert taken.cut(700, 900).folded is True  # where nothing shows it any more
     assert pl.Spectrum(NM, np.full(NM.size, 0.3), "R").folded is False

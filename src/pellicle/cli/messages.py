@@ -58,7 +58,7 @@ FLAGS = {
     "wavelength_unit": "--wavelength-unit",
 }
 """The flag of each argument that a message may name."""
-_NEGATIVES = {("folded", "False"): "--no-folded"}
+_NEGATIVES = {"folded=False": "--no-folded"}
 
 _QUOTED = re.compile(r"`([^`]+)`")
 
@@ -88,8 +88,9 @@ def _flags(code: str) -> str | None:
             return None
         words.append(FLAGS[name.id])
     for keyword in parsed.keywords:
-        if (keyword.arg, ast.unparse(keyword.value)) in _NEGATIVES:
-            words.append(_NEGATIVES[keyword.arg, "False"])
+        negative = _NEGATIVES.get(f"{keyword.arg}={ast.unparse(keyword.value)}")
+        if negative:
+            words.append(negative)
             continue
         value = _word(keyword.value, call)
         if keyword.arg not in FLAGS or value is None:

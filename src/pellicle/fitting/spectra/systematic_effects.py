@@ -162,7 +162,10 @@ def _lamp_structure(
 
 
 def _of_angles(view: SpectrumView, at: Local, allowed: Uncertainty) -> list[Effect]:
-    """Offsets of Ψ and Δ, and depolarisation as a rotating analyser takes it: N and C lose a share."""
+    """Offsets of Ψ and Δ, and depolarisation as a rotating analyser takes it: N and C lose a share.
+
+    An instrument that measures the depolarisation divides it out; its offset counts instead.
+    """
     n, c, s = _sphere(view, at.signal).T
     sine = np.maximum(np.hypot(c, s), 1e-9)
     psi, delta, share = np.deg2rad(2 * allowed.psi), np.deg2rad(allowed.delta), 1 - allowed.depolarisation
@@ -171,7 +174,7 @@ def _of_angles(view: SpectrumView, at: Local, allowed: Uncertainty) -> list[Effe
     changes = (
         ("offset of psi", allowed.psi, "deg", psi * np.stack([-sine, n * c / sine, n * s / sine]), False),
         ("offset of delta", allowed.delta, "deg", delta * np.stack([0 * n, -s, c]), False),
-        ("depolarisation", allowed.depolarisation, "", less, True),
+        ("depolarisation", 0.0 if view.depolarisation else allowed.depolarisation, "", less, True),
     )
     result = []
     for name, size, unit, change, positive in changes:
