@@ -129,9 +129,11 @@ def _by_time(rows: Sequence[tuple[Line, list[str]]], dynamic: bool, path: str) -
     The time of static data is "".
     """
     times: dict[str, dict[str, Rows]] = defaultdict(lambda: defaultdict(list))
+    firsts = {cells[0] for _, cells in rows}
+    labels = {first for first in firsts if first[0].isalpha() and not is_number(first)}
     for line, cells in rows:
         label = LABEL
-        if cells[0][0].isalpha() and not is_number(cells[0]):
+        if cells[0] in labels:
             label, *cells = cells
         time = ""
         if dynamic:

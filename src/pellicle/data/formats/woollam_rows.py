@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
 from typing import NamedTuple, TypeAlias
 
 from pellicle.data.formats.tan_psi_cos_delta import COLUMNS, cells_of
@@ -16,6 +15,7 @@ from pellicle.data.tabular.text import Line, is_number
 from pellicle.errors import DataError
 
 Rows: TypeAlias = list[tuple[Line, list[str]]]
+_MISSING = frozenset(("nan", "NaN", "NAN"))
 
 
 class Selected(NamedTuple):
@@ -40,7 +40,7 @@ def psi_delta(rows: Rows, path: str) -> Selected:
     if width == 8:  # CompleteEASE and programs of other makers write 1 and 1 there
         rows = [(line, cells[:6]) for line, cells in rows]
         notes.append("2 columns behind the errors ignored")
-    rows, missing = _measured(rows, (2, 3))
+    rows, missing = _measured(rows, slice(2, 4))
     if not rows:
         raise DataError(f"{path}: has no point with psi and delta; check the measurement")
     names = ("angle_deg", "psi_deg", "delta_deg", "sigma_psi", "sigma_delta")[: len(rows[0][1]) - 1]
@@ -61,7 +61,7 @@ def tan_cos(rows: Rows, path: str) -> Selected:
                 f"{path}: line {line.number} has {len(cells)} values where wavelength, angle, tan(psi) and "
                 "cos(delta) are expected; correct that line"
             )
-    rows, missing = _measured(rows, (2, 3))
+    rows, missing = _measured(rows, slice(2, 4))
     if not rows:
         raise DataError(f"{path}: has no point with tan(psi) and cos(delta); check the measurement")
     found = [(line, [*cells[:2], *cells_of(cells[2], cells[3], line, path)]) for line, cells in rows]
@@ -120,13 +120,13 @@ def power(label: str, quantity: str, rows: Rows, path: str) -> Selected | None:
     if errors and all(_is(error, 0.0) for error in errors):
         names, rows = names[:2], [(line, cells[:3]) for line, cells in rows]
         notes.append("errors that are all zero ignored")
-    rows, missing = _measured(rows, (2,))
+    rows, missing = _measured(rows, slice(2, 3))
     return Selected(names, rows, [*notes, *missing]) if rows else None
 
 
-def _measured(rows: Rows, positions: Sequence[int]) -> tuple[Rows, list[str]]:
+def _measured(rows: Rows, positions: slice) -> tuple[Rows, list[str]]:
     """The rows whose values are not written NaN, and a sentence on the others."""
-    kept = [(line, cells) for line, cells in rows if not any(cells[i].lower() == "nan" for i in positions)]
+    kept = [(line, cells) for line, cells in rows if _MISSING.isdisjoint(cells[positions])]
     missing = len(rows) - len(kept)
     return kept, [f"{missing} of {len(rows)} points, written NaN, left out"] if missing else []
 
