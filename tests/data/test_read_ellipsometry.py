@@ -298,3 +298,19 @@ def test_n_c_s_of_polarised_light_have_no_depolarisation(write):
 )
 def test_what_is_no_depolarisation(write, refused, names, cells, said):
     refused(write(f"wl,psi,delta,{names}\n400,20,170,{cells}\n500,20,175,{cells}\n"), DataError, said)
+
+
+@pytest.mark.parametrize(
+    "header", ["wavelength_nm,tan_psi,cos_delta", "lambda (nm),tan(psi),cos(delta)", "nm,TanPsi,CosDelta"]
+)
+def test_tan_psi_and_cos_delta(tmp_path, header):
+    path = tmp_path / "tan_cos.csv"
+    path.write_text(f"{header}\n500,1,0.5\n600,0.5773502691896258,-0.5\n700,0.5,1.04\n")
+    spectrum = read_spectrum(path)
+    assert spectrum.folded
+    np.testing.assert_allclose(spectrum.values, [45, 30, np.rad2deg(np.arctan(0.5))])
+    np.testing.assert_allclose(spectrum.delta, [60, 120, 0], atol=1e-12)
+    assert any("delta is 0 or 180 at 1 points" in note for note in spectrum.notes)
+    path.write_text(f"{header}\n500,1,0.5\n600,0.5,-1.06\n")
+    with pytest.raises(DataError, match=r"line 3, .*-1\.06 is no cos\(delta\)"):
+        read_spectrum(path)

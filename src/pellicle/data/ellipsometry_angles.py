@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 
+from pellicle.data.signal_checks import refuse_first
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError
 
-PSI_DELTA, NCS, ALPHA_BETA = ("psi", "delta"), ("N", "C", "S"), ("alpha", "beta")
-FORMS = (PSI_DELTA, NCS, ALPHA_BETA)
+PSI_DELTA, NCS = ("psi", "delta"), ("N", "C", "S")
+ALPHA_BETA, TAN_COS = ("alpha", "beta"), ("tan_psi", "cos_delta")
+FORMS = (PSI_DELTA, NCS, ALPHA_BETA, TAN_COS)
 """The columns of each form; where a file has several, the first is read."""
+FOLDED_FORMS = (ALPHA_BETA, TAN_COS)
+"""Forms that contain cos Δ only."""
 POLARISED = (0.5, 1.05)
 """Accepted degrees of polarisation of N, C, S: below, noise dominates; above, the columns are not N, C, S."""
+HIGHEST_COSINE = 1.05
+"""Noise takes cos Δ this far beyond 1; further, the column is not cos Δ."""
+_REMEDY = "correct or delete that row"
 _ROUNDED = 3e-3
 """1 − N² − C² − S² below this is rounding: of three decimals in each it reaches 0.0017."""
 
@@ -90,3 +98,19 @@ def from_alpha_beta(
     over = int(np.sum(contrast > 1))
     limited = f"; delta is 0 or 180 at {over} points whose contrast is above 1" if over else ""
     return PsiDelta(psi, delta, f"alpha and beta converted to psi and delta{limited}")
+
+
+def from_tan_cos(table: Table, positions: Sequence[int], tan_cos: Float[np.ndarray, "2 points"]) -> PsiDelta:
+    """Convert tan Ψ and cos Δ; Δ is in 0 to 180. Where noise takes cos Δ beyond 1, Δ is 0 or 180.
+
+    `positions` are the columns that errors name. Raises DataError for a tangent below 0, or a cosine beyond
+    ±1.05.
+    """
+    tangent, cosine = tan_cos
+    refuse_first(tangent, tangent < 0, table.places(positions[0]), f"is no tan(psi), below zero; {_REMEDY}")
+    reason = f"is no cos(delta), beyond 1; {_REMEDY}, or name the columns psi_deg and delta_deg"
+    refuse_first(cosine, np.abs(cosine) > HIGHEST_COSINE, table.places(positions[1]), reason)
+    over = int(np.sum(np.abs(cosine) > 1))
+    limited = f"; delta is 0 or 180 at {over} points whose cosine is above 1" if over else ""
+    delta = np.rad2deg(np.arccos(np.clip(cosine, -1, 1)))
+    return PsiDelta(np.rad2deg(np.arctan(tangent)), delta, f"tan(psi) and cos(delta) converted{limited}")

@@ -2,8 +2,8 @@
 
 Both are in degrees, with tan Ψ exp(iΔ) = conj(r_p / r_s) for n + ik: Δ is near 180 for bare silicon
 at small angles, as instruments write it. N = cos 2Ψ, C = sin 2Ψ cos Δ, S = sin 2Ψ sin Δ are equivalent;
-α and β of a rotating analyser lack only the sign of S, as does a Δ that is folded into 0 to 180. A column of
-depolarisation, 1 − N² − C² − S², is read with them.
+α and β of a rotating analyser, tan Ψ and cos Δ lack only the sign of S, as does a Δ folded into 0 to 180.
+A column of depolarisation, 1 − N² − C² − S², is read with them.
 """
 
 from __future__ import annotations
@@ -16,12 +16,15 @@ import numpy as np
 from pellicle.data import depolarisation
 from pellicle.data.ellipsometry_angles import (
     ALPHA_BETA,
+    FOLDED_FORMS,
     FORMS,
     NCS,
     PSI_DELTA,
+    TAN_COS,
     PsiDelta,
     from_alpha_beta,
     from_ncs,
+    from_tan_cos,
 )
 from pellicle.data.folded_delta import can_be_folded, folding_at, folding_note
 from pellicle.data.repeated_sweeps import of_rows, sweep_numbers
@@ -92,7 +95,7 @@ def read_ellipsometry(
     if noise is not None:
         errors = [np.full(psi.size, float(noise))] * 2
         notes += ["the given noise replaces the columns of errors"] if chosen.errors else []
-    if chosen.form == ALPHA_BETA:
+    if chosen.form in FOLDED_FORMS:
         folded = True
     elif chosen.form == NCS:
         folded = False
@@ -180,6 +183,8 @@ def _psi_delta(
         return from_ncs(table, position, np.array(read[:3]))
     if columns.form == PSI_DELTA:
         return PsiDelta(read[0], read[1])
+    if columns.form == TAN_COS:
+        return from_tan_cos(table, [column.position for column in columns.values], np.array(read[:2]))
     if columns.analyser is None:
         angles = np.full(read[0].size, analyser, dtype=float)
         return from_alpha_beta(table, position, np.array(read[:2]), angles)
@@ -197,8 +202,8 @@ def ellipsometry_columns(table: Table, columns: Sequence[Column] | None) -> Elli
     values = tuple(column for role in form if (column := only(table, columns, role)) is not None)
     if len(values) != len(form):
         raise DataError(
-            f"{table.path}: psi and delta, or N, C and S, or alpha and beta, are not all among "
-            f"{listed(columns)}; name the columns in order, as in {_EXAMPLE}"
+            f"{table.path}: psi and delta, N, C and S, alpha and beta, or tan_psi and cos_delta are not all "
+            f"among {listed(columns)}; name the columns in order, as in {_EXAMPLE}"
         )
     for column in values:
         if column.unknown_unit or column.unit == "percent":
@@ -280,6 +285,6 @@ def _check(
     if not stated and psi.max() < np.pi / 2 and np.abs(delta).max() < 2 * np.pi:
         raise DataError(
             f"{table.path}: psi is at most {psi.max():g} and delta {np.abs(delta).max():g}, "
-            "which look like radians, or tan(psi) and cos(delta); write degrees, and name the columns "
-            "psi_deg and delta_deg"
+            "which look like radians, or tan(psi) and cos(delta); write degrees and name the columns psi_deg "
+            "and delta_deg, or name them tan_psi and cos_delta"
         )

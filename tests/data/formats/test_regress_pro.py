@@ -56,7 +56,7 @@ def test_refused(refused):
     refused("".join(AT_45.splitlines(keepends=True)[:3]), "no rows")
     refused(AT_45.replace("-0.5\t0.43", "-0.9\t0.83"), "line 4", "contrast")
     refused(AT_45.replace("-0.5\t", "x\t"), "line 4", "'x'")
-    refused(TAN_COS.replace("-0.5", "120.5"), "line 4", "'120.5' is no cos(delta)", "in degrees")
+    refused(TAN_COS.replace("-0.5", "120.5"), "line 4", "120.5 is no cos(delta)", "psi_deg")
 
 
 @pytest.mark.parametrize("text", [AT_45, AT_MINUS_30, TAN_COS])

@@ -223,10 +223,10 @@ def test_trigonometric_tables_leave_the_sign_of_delta_open(write, refused):
     np.testing.assert_allclose(spectrum.values, [45.0, np.rad2deg(np.arctan(0.5))])
     np.testing.assert_allclose(spectrum.delta, [60.0, 120.0])
     np.testing.assert_array_equal(spectrum.angle, [70, 70])
-    refused(TRIGONOMETRIC.replace("-.5", "-1.2"), "line 3", "'-1.2' is no cos(delta)")
-    refused(TRIGONOMETRIC.replace(".5 ", "-.5 "), "line 3", "no tan(psi)")
+    refused(TRIGONOMETRIC.replace("-.5", "-1.2"), "line 3, column 'cos_delta': -1.2 is no cos(delta)")
+    refused(TRIGONOMETRIC.replace(".5 ", "-.5 "), "line 3, column 'tan_psi': -0.5 is no tan(psi)")
     refused(TRIGONOMETRIC.replace("-.5", ""), "line 3 has 3 values")
-    refused(WVASE.replace("nm\n", "nm  TRIG\n"), "line 5", "'170.25' is no cos(delta)")
+    refused(WVASE.replace("nm\n", "nm  TRIG\n"), "line 5", "170.25 is no cos(delta)")
 
 
 def test_mueller_and_generalised_rows_are_named(write, refused):

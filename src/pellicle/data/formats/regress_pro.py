@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pellicle.data.formats import tan_psi_cos_delta
 from pellicle.data.tabular.layout import Layout, plain_columns
 from pellicle.data.tabular.text import Line, TextFile, is_number
 from pellicle.errors import DataError
@@ -46,8 +45,7 @@ def layouts(file: TextFile) -> list[Layout] | None:
         raise DataError(f"{path}: has the heading {' '.join(heading)} but no rows; export it again")
     notes = [NOTE]
     if heading == TAN_COS:
-        names = tan_psi_cos_delta.COLUMNS
-        rows = [(line, [x, *tan_psi_cos_delta.cells_of(t, c, line, path)]) for line, (x, t, c) in rows]
+        names = ("tan_psi", "cos_delta")
         notes.append("columns PSI and DELTA read as tan(psi) and cos(delta), which the program writes there")
     else:
         names = ("alpha", "beta")

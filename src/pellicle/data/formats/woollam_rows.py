@@ -10,7 +10,6 @@ import math
 from collections import Counter
 from typing import NamedTuple, TypeAlias
 
-from pellicle.data.formats.tan_psi_cos_delta import COLUMNS, cells_of
 from pellicle.data.tabular.text import Line, is_number
 from pellicle.errors import DataError
 
@@ -51,21 +50,18 @@ def psi_delta(rows: Rows, path: str) -> Selected:
 
 
 def tan_cos(rows: Rows, path: str) -> Selected:
-    """α and β of tan Ψ and cos Δ, which lack the sign of Δ as these do; errors are left out."""
-    notes = ["tan(psi) and cos(delta) read, which leave the sign of delta open"]
-    if any(len(cells) > 4 for _, cells in rows):
-        notes.append("errors of tan(psi) and cos(delta) ignored")
+    """tan Ψ and cos Δ; their errors are left out. Raises DataError for shorter rows."""
+    notes = ["errors of tan(psi) and cos(delta) ignored"] if len(rows[0][1]) > 4 else []
     for line, cells in rows:
         if len(cells) < 4:
             raise DataError(
                 f"{path}: line {line.number} has {len(cells)} values where wavelength, angle, tan(psi) and "
                 "cos(delta) are expected; correct that line"
             )
-    rows, missing = _measured(rows, slice(2, 4))
+    rows, missing = _measured([(line, cells[:4]) for line, cells in rows], slice(2, 4))
     if not rows:
         raise DataError(f"{path}: has no point with tan(psi) and cos(delta); check the measurement")
-    found = [(line, [*cells[:2], *cells_of(cells[2], cells[3], line, path)]) for line, cells in rows]
-    return Selected(("angle_deg", *COLUMNS), found, [*notes, *missing])
+    return Selected(("angle_deg", "tan_psi", "cos_delta"), rows, [*notes, *missing])
 
 
 def with_depolarisation(selected: Selected, label: str, shares: Rows) -> Selected:

@@ -58,6 +58,8 @@ NAMES = {
     "S": ("s",),
     "alpha": ("alpha", "α"),
     "beta": ("beta", "β"),
+    "tan_psi": ("tan_psi", "tan(psi)", "tan psi", "tanpsi", "tan(ψ)", "tan ψ", "tanψ"),
+    "cos_delta": ("cos_delta", "cos(delta)", "cos delta", "cosdelta", "cos(δ)", "cos δ", "cosδ"),
     "analyser": ("analyser", "analyzer", "analyser angle", "analyzer angle"),
     "theta_i": ("theta_i", "θ_i"),
     "phi_i": ("phi_i", "φ_i"),

@@ -131,6 +131,7 @@ def is_header(names: Sequence[str]) -> bool:
     roles = {column.role for column in recognise_all(names)}
     measured = bool(roles & {"R", "T", "intensity", "counts", "psi"})
     measured = measured or {"N", "C", "S"} <= roles or {"alpha", "beta"} <= roles
+    measured = measured or {"tan_psi", "cos_delta"} <= roles
     return ("wavelength" in roles and measured) or roles.issuperset(DIRECTIONS)
 
 
