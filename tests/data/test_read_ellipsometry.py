@@ -314,3 +314,13 @@ def test_tan_psi_and_cos_delta(tmp_path, header):
     path.write_text(f"{header}\n500,1,0.5\n600,0.5,-1.06\n")
     with pytest.raises(DataError, match=r"line 3, .*-1\.06 is no cos\(delta\)"):
         read_spectrum(path)
+
+
+@pytest.mark.parametrize("header", ["eV,Is,Ic", "nm,m12,m33", "nm,mm11,mm44"])
+@pytest.mark.parametrize("words", [{}, {"signal": "R"}])
+def test_other_quantities_of_ellipsometers_are_named(tmp_path, header, words):
+    path = tmp_path / "other.csv"
+    path.write_text(f"{header}\n2,0.1,0.2\n3,0.3,0.4\n")
+    first, second = header.split(",")[1:]
+    with pytest.raises(DataError, match=f"'{first}', '{second}' is neither .* psi and delta"):
+        read_spectrum(path, **words)

@@ -77,5 +77,7 @@ FOREIGN = (
     *("absorptance", "cd", "circular dichroism", "ellipticity", "emission", "f(r)", "fluorescence"),
     *("irradiance", "k/s", "kubelka-munk", "mdeg", "photoluminescence", "pl", "pl intensity", "power"),
     *("radiance", "raman", "raman intensity", "scope", "single beam"),
+    *("is", "ic", "ic'"),  # of a phase-modulated ellipsometer
+    *(f"{m}{i}{j}" for m in ("m", "mm") for i in range(1, 5) for j in range(1, 5)),  # Mueller matrix
 )
-"""Names of quantities that are neither a reflectance nor a transmittance."""
+"""Names of quantities that are neither a reflectance nor a transmittance, nor psi and delta."""

@@ -227,8 +227,8 @@ def _unnamed_signals(table: Table, columns: Sequence[Column], signal: str | None
     if foreign:
         raise DataError(
             f"{table.path}: {listed(foreign).replace('declared ', '')} is neither a reflectance nor a "
-            "transmittance; export one of these, give raw counts with `reference`, or if it is one, name it: "
-            '`columns=["wavelength", "R"]`'
+            "transmittance; export one of these or psi and delta, give raw counts with `reference`, or if it "
+            'is one, name it: `columns=["wavelength", "R"]`'
         )
     raise DataError(
         f"{table.path}: no column is a signal (R, T, Rs, Rp, Ts, Tp, absorbance or intensity) among "
