@@ -163,3 +163,22 @@ def test_ctrl_c_anywhere(monkeypatch, capsys):
     monkeypatch.setattr("pellicle.cli.command", pressed)
     assert main() == 130
     assert capsys.readouterr().err == "pellicle: interrupted\n"
+
+
+INTERRUPTED = """
+import atexit
+from pellicle import cli
+
+def pressed(*_):
+    print("a result")
+    raise KeyboardInterrupt
+
+cli.command = pressed
+atexit.register(print, "clean-up, in which XLA may crash")
+cli.process()
+"""
+
+
+def test_an_interrupted_process_ends_without_clean_up():
+    ran = subprocess.run([sys.executable, "-c", INTERRUPTED], capture_output=True, text=True, check=False)
+    assert (ran.returncode, ran.stdout, ran.stderr) == (130, "a result\n", "pellicle: interrupted\n")
