@@ -63,6 +63,7 @@ def test_refused(refused):
     refused("".join(lines[:5]), "has 1 lines of N, C, S for 2 LEDs", "cut short")
     refused("".join(lines[:4]), "has 0 lines of N, C, S")
     refused(lines[0], "line 2")
+    refused(STATIC.replace("Sense_Data", "Sense_Map_Data"), "the kind Film_Sense_Map_Data", "not read")
     refused(STATIC.replace("2\t1\t", "x\t1\t"), "line 2", "numbers of LEDs")
     refused(STATIC.replace("2\t1\t", "2\t4\t"), "has 4 measurements by its line 2")
     refused(STATIC.replace("0.99845\t16.5071", ""), "line 5 is not N, C, S")

@@ -16,6 +16,7 @@ from pellicle.data.tabular.layout import Layout, plain_columns
 from pellicle.data.tabular.text import Line, TextFile, is_number
 from pellicle.errors import DataError
 
+PREFIX = "Film_Sense_"
 STATIC, DYNAMIC = "Film_Sense_Data", "Film_Sense_Dyn_Data"
 NOTE = "read as a Film Sense text file"
 _NAMES = ("wavelength (nm)", "angle_deg", "N", "C", "S", "depolarisation")
@@ -30,8 +31,13 @@ def layouts(file: TextFile) -> list[Layout] | None:
     """
     lines, path = file.lines, file.path
     kind = lines[0].text.strip()
-    if kind not in (STATIC, DYNAMIC):
+    if not kind.startswith(PREFIX):
         return None
+    if kind not in (STATIC, DYNAMIC):
+        raise DataError(
+            f"{path}: is a Film Sense file of the kind {kind}, which is not read; export each measurement as "
+            f"{STATIC}, or those of one spot as {DYNAMIC}"
+        )
     counts = lines[1].text.split() if len(lines) > 1 else []
     if len(counts) < 3 or not counts[0].isdigit() or not counts[1].isdigit() or not is_number(counts[2]):
         raise DataError(
