@@ -75,7 +75,7 @@ def _column(name: str, unit: str, *, first: bool) -> str:
         if re.match(beginning, name.lower()):
             return counts
     if "counts" in plain or "scope" in name.lower():
-        return "scope"
+        return f"scope ({name})"
     if "watt" in plain or "irrad" in name.lower():
         return "irradiance"
     role = recognise(name).role

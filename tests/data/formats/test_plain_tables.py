@@ -1,0 +1,104 @@
+"""Plain tables as people and spreadsheets write them: read right, or refused with what to do."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pellicle.data.read_spectrum import read_spectrum
+
+PERCENT = "400{c}10{d}5{n}500{c}20{d}5{n}"
+
+
+def rows(delimiter, decimal=".", end="\n"):
+    return PERCENT.format(c=delimiter, d=decimal, n=end)
+
+
+@pytest.mark.parametrize(
+    ("text", "signal"),
+    [
+        ("Wellenlänge [nm];Transmission [%]\n" + rows(";", ","), "T"),
+        ("Wellenlänge in nm;Reflexion in %\n" + rows(";", ","), "R"),
+        ("longueur d'onde (nm);transmission (%)\n" + rows(";", ","), "T"),
+        ("Longueur d’onde\tRéflectance\nnm\t%\n" + rows("\t", ","), "R"),
+        ("Longitud de onda (nm);Transmitancia (%)\n" + rows(";"), "T"),
+        ("Lunghezza d'onda (nm);Riflettanza (%)\n" + rows(";"), "R"),
+        ("波長 (nm),反射率 (%)\n" + rows(","), "R"),
+        ('"Wavelength (nm)","R (%)"\n"400","10.5"\n"500","20.5"\n', "R"),
+        ("wavelength (nm),R (%),\n" + rows(",", end=",\n"), "R"),
+        ("wavelength (nm);R (%);;\n" + rows(";", end=";;\n"), "R"),
+        ("Sample 1\nmeasured by me, 2024\n\nwavelength (nm)\tR (%)\n" + rows("\t"), "R"),
+        ("Wavelength\tReflectance\n(nm)\t(%)\n" + rows("\t"), "R"),
+        ("Wavelength;Reflectance\n[nm];[%]\n" + rows(";"), "R"),
+        ("wavelength (nm),%R\n" + rows(",") + "\nMean,15\n", "R"),
+        ("wavelength (nm),%R\n" + rows(",") + "\nEnd of data\n", "R"),
+        ("wavelength (nm),%R\n" + rows(",") + "[END]\n", "R"),
+        ("wavelength (nm)  R (%)\n" + rows("   "), "R"),
+        ("No,Wavelength (nm),R (%)\n1,400,10.5\n2,500,20.5\n", "R"),
+        ("Nanometers,Percent Transmittance\n" + rows(","), "T"),
+        ("Wavelength (nm),Transmittance (%T)\n" + rows(","), "T"),
+        ("Angstrom;%R\n4000;10.5\n5000;20.5\n", "R"),
+        ("Wellenzahl (cm-1);Reflexion (%)\n25000;10,5\n20000;20,5\n", "R"),
+    ],
+)
+def test_read_without_flags(write, text, signal):
+    spectrum = read_spectrum(write(text))
+    assert spectrum.signal == signal
+    np.testing.assert_allclose(spectrum.wavelength, [400, 500], rtol=1e-14)
+    np.testing.assert_allclose(spectrum.values, [0.105, 0.205], rtol=1e-14)
+
+
+def test_absorbance_in_german(write):
+    spectrum = read_spectrum(write("Wellenlänge (nm);Extinktion\n400;1,0\n500;0,5\n"))
+    np.testing.assert_allclose(spectrum.values, [0.1, 10**-0.5])
+
+
+def test_a_counter_is_no_signal(write):
+    text = "Index;Wavelength;Value\n1;400;10,5\n2;500;20,5\n"
+    spectrum = read_spectrum(write(text), signal="R", signal_unit="percent")
+    np.testing.assert_allclose(spectrum.values, [0.105, 0.205])
+
+
+def test_counts_of_a_plain_table(write):
+    text = "Wavelength (nm),Sample,Dark,Reference\n400,110,10,210\n500,60,10,210\n"
+    np.testing.assert_allclose(read_spectrum(write(text), signal="T").values, [0.5, 0.25])
+
+
+@pytest.mark.parametrize(
+    ("text", "said", "reading"),
+    [
+        ("wavelength,T\n1,400.5;0.5\n1,500.5;0.6\n", ("thousands separators",), {}),
+        ("wavelength,R\n400,10%\n500,20%\n", ("% signs", "header"), {}),
+        ("wavelength,R\n400,0.1\n500,0.2\nMean,0.15\n", ("line 4", "'Mean'"), {}),
+        ("nm,n,k\n400,0.2,3.1\n500,0.3,4\n", ("optical constants", "`layer`"), {}),
+        ("nm,n,k\n400,0.2,3.1\n500,0.3,4\n", ("optical constants", "`layer`"), {"signal": "psi-delta"}),
+        ("eV,eps1,eps2\n2,-5,1\n3,-4,2\n", ("optical constants",), {"signal": "R"}),
+        ("400,0.2,3.1\n500,0.3,7\n", ("n and k", "psi_deg"), {"signal": "psi-delta"}),
+        ("400,0.2,3.1\n500,0.3,4\n", ("third column", "`layer`"), {"signal": "R"}),
+        ("X-axis: pixels\n400,0.1\n500,0.2\n", ("unknown unit 'pixels'",), {"signal": "R"}),
+        ("X-axis: Raman shift (cm-1)\nwavelength,R\n400,0.1\n", ("'Raman shift",), {}),
+        (
+            "Data mode: CD\nnm\tmdeg\n400\t0.1\n500\t0.2\n",
+            ("'mdeg'", "neither a reflectance"),
+            {"signal": "T"},
+        ),
+        ("nm,Kubelka-Munk\n400,0.1\n500,0.2\n", ("'Kubelka-Munk'",), {"signal": "R"}),
+        ("nm,Absorptance (%)\n400,1\n500,2\n", ("'Absorptance (%)'",), {"signal": "T"}),
+        ("nm,Irradiance (W/m2/nm)\n400,1\n500,2\n", ("'Irradiance",), {"signal": "T"}),
+        ("nm,Absorption\n400,1\n500,2\n", ("'Absorption' state no quantity",), {}),
+    ],
+)
+def test_refused(refused, text, said, reading):
+    refused(text, *said, **reading)
+
+
+@pytest.mark.parametrize(("unit", "first"), [("1/CM", 1e7 / 3000), ("micrometers", 2000e3)])
+def test_a_declared_axis_holds_where_only_the_quantity_is_a_flag(write, unit, first):
+    spectrum = read_spectrum(write(f"XUNITS={unit}\n3000,0.1\n2000,0.2\n"), signal="R")
+    np.testing.assert_allclose(spectrum.wavelength[0], first)
+
+
+def test_angles_that_look_like_optical_constants_are_read_by_name(write):
+    path = write("400,5,3\n500,6,7\n")
+    spectrum = read_spectrum(path, signal="psi-delta", columns="wavelength,psi_deg,delta_deg")
+    np.testing.assert_array_equal(spectrum.delta, [3, 7])
