@@ -60,4 +60,14 @@ def test_wrong_usage(pellicle, write):
     path = write(WIDE)
     assert pellicle("read").code == 2
     assert "csv, netcdf, nexus" in pellicle("read", path, "--to", "xlsx").err
-    assert "--dark is for a fit" in pellicle("read", path, "--dark", "dark.csv").err
+    assert "--loss is for a fit" in pellicle("read", path, "--loss", "huber").err
+    assert "--dark needs --reference" in pellicle("read", path, "--dark", "dark.csv").err
+
+
+def test_counts_of_a_sample_beside_those_of_a_reference(pellicle, write):
+    text = "Wavelength (nm),Sample,Dark,Reference\n400,110,10,210\n500,60,10,210\n600,60,10,110\n"
+    path = write(text)
+    assert "--reference-material Si" in pellicle("read", path, "--signal", "R").err
+    [record] = pellicle("read", path, "--reference-material", "Si", "--json").objects
+    # 0.25 and 0.5 of the reflectance of silicon at 500 and 400 nm, 0.387 and 0.486 (n, k of Green 2008)
+    np.testing.assert_allclose(record["values"]["values"], [0.25 * 0.387, 0.5 * 0.486], atol=0.002)

@@ -234,7 +234,7 @@ def _check_reading(reading: ReadingFlags, signals: tuple[str, ...]) -> None:
         from pellicle.fitting.robust_losses import check_loss
 
         check_loss(reading.loss, "--loss")
-    if reading.dark is not None and reading.reference is None:
+    if reading.dark is not None and reading.reference is None and reading.reference_material is None:
         raise UsageError("--dark needs --reference: the counts of a sample of known reflectance")
     from pellicle.data.tabular.units import SIGNAL_UNITS, WAVELENGTH_UNITS, signal_unit, wavelength_unit
 

@@ -83,6 +83,8 @@ def read(path: str, flags: ReadingFlags, *, free_scale: bool) -> list[Spectrum]:
 
     if flags.reference is not None or flags.reference_material is not None:
         return [_from_counts(path, flags)]
+    if flags.dark is not None:
+        raise UsageError("--dark needs --reference: the counts of a sample of known reflectance")
     return read_spectra(
         path,
         spectrum=flags.spectrum,

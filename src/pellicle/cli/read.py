@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from pellicle.cli.flags import OUTPUT, ReadingFlags, flag, switch
 from pellicle.cli.messages import as_flags
-from pellicle.cli.session import say
+from pellicle.cli.session import say, start
 from pellicle.errors import UsageError
 
 if TYPE_CHECKING:
@@ -37,13 +37,13 @@ def read(
     flags = reading or ReadingFlags()
     if not data:
         raise UsageError("no data: name the files, as in pellicle read oxide.csv")
-    if unused := [
-        name for name in ("reference", "reference_material", "dark", "loss") if getattr(flags, name)
-    ]:
-        raise UsageError(f"--{unused[0].replace('_', '-')} is for a fit; leave it out")
+    if flags.loss is not None:
+        raise UsageError("--loss is for a fit; leave it out")
     formats = [word.strip() for word in to.split(",")]
     if unknown := [word for word in formats if word not in SUFFIXES]:
         raise UsageError(f"--to must be of {', '.join(SUFFIXES)}, not {unknown[0]!r}")
+    if flags.reference or flags.reference_material:
+        start()  # the reflectance of the reference is computed
     worst, found = GOOD, []
     for path in data:
         try:

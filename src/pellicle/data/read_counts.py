@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -69,7 +70,7 @@ def _only_table(path: str | os.PathLike[str]) -> Table:
 def _read(table: Table, chosen: SpectrumColumns, wavelength_unit: str | None) -> Spectrum:
     axis = axis_unit(table, chosen.wavelength, wavelength_unit)
     wavelength, values, _, angle = read_columns(table, chosen, axis)
-    return of_rows(
+    counts = of_rows(
         sweep_numbers(wavelength, angle),
         {"wavelength": wavelength, "values": values, "angle": angle, "lines": table.lines},
         signal="counts",
@@ -78,6 +79,7 @@ def _read(table: Table, chosen: SpectrumColumns, wavelength_unit: str | None) ->
         sha256=table.sha256,
         notes=(*table.notes, *chosen.notes, axis_note(axis)),
     )
+    return replace(counts, declared=table.layout.declared.facts)
 
 
 def reflectance_from_counts(
@@ -135,6 +137,7 @@ def reflectance_from_counts(
         notes=(*sample.notes, f"counts divided by those of the reference {reference.path}"),
         lines=sample.lines,
         sweeps=tuple(each),
+        declared=sample.declared,
     )
 
 

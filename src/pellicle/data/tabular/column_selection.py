@@ -66,7 +66,7 @@ def counts_columns(table: Table, columns: str | Sequence[str] | None) -> Spectru
             f"{table.path}: expected one column of counts beside the wavelength, found "
             f'{listed(counts) or "none"}; choose one, as in `columns=["wavelength", "counts"]`'
         )
-    return _with_wavelength(table, named, counts[0])
+    return _with_wavelength(table, _without_other_counts(named, counts[0]), counts[0])
 
 
 def counts_columns_beside(
@@ -75,7 +75,11 @@ def counts_columns_beside(
     """Return the columns of one of `COUNTS`, None where the table has none."""
     named = named_columns(table, columns) or ()
     counts = only(table, named, part)
-    return _with_wavelength(table, named, counts) if counts else None
+    return _with_wavelength(table, _without_other_counts(named, counts), counts) if counts else None
+
+
+def _without_other_counts(columns: Sequence[Column], counts: Column) -> list[Column]:
+    return [c for c in columns if c.role not in COUNTS or c is counts]
 
 
 def _by_position(table: Table, role: str) -> SpectrumColumns:
@@ -111,7 +115,7 @@ def _with_wavelength(table: Table, columns: Sequence[Column], signal: Column) ->
 
 def _quotient(table: Table, columns: Sequence[Column], sample: Column) -> SpectrumColumns:
     """The transmittance that counts of a sample, a reference and possibly the dark make."""
-    chosen = _with_wavelength(table, [c for c in columns if c.role not in COUNTS or c is sample], sample)
+    chosen = _with_wavelength(table, _without_other_counts(columns, sample), sample)
     reference, dark = only(table, columns, "reference counts"), only(table, columns, "dark counts")
     formula = "(sample - dark) / (reference - dark)" if dark else "sample / reference"
     notes = (*chosen.notes, f"transmittance computed from counts: {formula}")
