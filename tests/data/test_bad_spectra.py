@@ -242,6 +242,11 @@ def test_two_columns_that_could_be_the_same(write, header, refused):
     refused(write(f"{header}\n400,0.1,0.2\n500,0.1,0.2\n"), DataError, "could each be", "`columns`")
 
 
+def test_samples_of_a_brdf(write, refused):
+    path = write("theta_i,phi_i,theta_o,phi_o,R\n30,0,30,180,0.4\n30,0,40,180,0.2\n")
+    refused(path, UsageError, "samples of a BRDF", "`recipe`")
+
+
 def test_two_signals_of_one_kind(write, refused):
     path = write("wl,R,Reflectance\n400,0.1,0.2\n500,0.1,0.2\n")
     refused(path, UsageError, "has 2 spectra", "'R', 'Reflectance'", "`spectrum=", '`spectrum="all"`')

@@ -81,7 +81,9 @@ def test_raw_counts_of_porous_silicon(shared_data, pair):
 
 def test_other_tables_are_refused(shared_data):
     for file in sorted((shared_data / "brdf").glob("*.csv")):
-        with pytest.raises((DataError, UsageError), match=r"(no column is|state no quantity).*`columns="):
+        with pytest.raises(
+            (DataError, UsageError), match=r"samples of a BRDF|(no column is|state no quantity).*`columns="
+        ):
             read_spectrum(file)
     teal = shared_data / "brdf" / "teal_spectra_300_700nm.csv"
     assert len(read_spectrum(teal, columns="wavelength,R_percent")) == 401

@@ -12,7 +12,7 @@ from pellicle.data.read_ellipsometry import (
     has_ellipsometry,
 )
 from pellicle.data.tabular.column_selection import SpectrumColumns, signal_columns
-from pellicle.data.tabular.columns import SIGNALS, listed
+from pellicle.data.tabular.columns import DIRECTIONS, SIGNALS, listed
 from pellicle.data.tabular.named_columns import named_columns
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError, UsageError
@@ -39,6 +39,11 @@ def candidates(
     Raises UsageError or DataError where there is none.
     """
     named = named_columns(table, columns)
+    if {column.role for column in named or ()}.issuperset(DIRECTIONS):
+        raise UsageError(
+            f"{table.path}: holds samples of a BRDF, not a spectrum; fit them with a `recipe` of the surface "
+            "(Python: pl.read_brdf_samples)"
+        )
     own = table.layout.name
     found = []
     if signal == SIGNAL or (signal is None and has_ellipsometry(named)):
