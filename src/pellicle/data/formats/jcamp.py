@@ -8,19 +8,16 @@ are `##XUNITS=` and `##YUNITS=`. The table is `(X++(Y..Y))`, at even steps from 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from pellicle.data.formats.jcamp_values import Point, ordinates, plain_numbers
+from pellicle.data.formats.jcamp_points import MOST_POINTS, Scales, Table, points_of
 from pellicle.data.formats.quantities import Curve, axis_column, readable, signal_column
 from pellicle.data.tabular.layout import Layout, plain_columns
 from pellicle.data.tabular.text import Line, TextFile
 from pellicle.errors import DataError
-
-MOST_POINTS = 10_000_000
-"""Largest NPOINTS that is accepted; instruments write some 10⁴."""
 
 _RECORD = re.compile(r"(?P<label>[^=]{0,80})=(?P<value>.*)", re.DOTALL)
 _NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?")
@@ -36,20 +33,11 @@ _FACTS = {
 
 
 @dataclass(frozen=True)
-class _Table:
-    """A table: its form, as `(X++(Y..Y))`, the line that declares it, and its rows without comments."""
-
-    form: str
-    line: Line
-    rows: list[tuple[Line, str]] = field(default_factory=list)
-
-
-@dataclass(frozen=True)
 class _Block:
     """Records and tables between `##TITLE=` and `##END=`; each record keeps its line."""
 
     records: dict[str, tuple[str, Line]] = field(default_factory=dict)
-    tables: list[_Table] = field(default_factory=list)
+    tables: list[Table] = field(default_factory=list)
 
     def text(self, label: str) -> str:
         """Return the value of a record, empty where the block has none."""
@@ -58,19 +46,6 @@ class _Block:
     def parts(self, label: str) -> list[str]:
         """Return the values of a record of NTUPLES, one for each variable."""
         return [part.strip() for part in self.text(label).split(",")]
-
-
-@dataclass(frozen=True)
-class _Scales:
-    """Abscissa and factors of a table: None where the block does not state them."""
-
-    first: float | None
-    last: float | None
-    step: float | None
-    points: int | None
-    x_factor: float
-    y_factor: float
-    decimal: str
 
 
 def layouts(file: TextFile) -> list[Layout] | None:
@@ -117,7 +92,7 @@ def _blocks(file: TextFile) -> list[_Block]:
         if label == "TITLE":
             blocks.append(_Block())
         if label in _TABLES:
-            table = _Table(value, line)
+            table = Table(value, line)
             blocks[-1].tables.append(table)
         else:
             blocks[-1].records.setdefault(label, (value, line))
@@ -138,7 +113,7 @@ def _curves(block: _Block, path: str) -> Iterator[Curve]:
         else:
             axis, quantity = block.text("XUNITS"), block.text("YUNITS")
             scales = _scales(block, path)
-        x, y = _points(table, scales, path)
+        x, y = points_of(table, scales, path)
         names = (axis_column(axis) or axis, signal_column(quantity) or quantity)
         rows = [
             (line, (repr(float(at)), repr(value)))
@@ -165,9 +140,9 @@ def _facts(block: _Block) -> list[tuple[str, str]]:
     return [("format", "JCAMP-DX"), *((fact, value) for fact, value in stated.items() if value)]
 
 
-def _scales(block: _Block, path: str) -> _Scales:
+def _scales(block: _Block, path: str) -> Scales:
     comma = any(_COMMA.match(block.text(label)) for label in _LIMITS)
-    return _Scales(
+    return Scales(
         _number(block, "FIRSTX", path),
         _number(block, "LASTX", path),
         _number(block, "DELTAX", path),
@@ -178,7 +153,7 @@ def _scales(block: _Block, path: str) -> _Scales:
     )
 
 
-def _paged(block: _Block, table: _Table, path: str) -> tuple[str, str, _Scales] | None:
+def _paged(block: _Block, table: Table, path: str) -> tuple[str, str, Scales] | None:
     """Axis, quantity and scales of a page of NTUPLES; None where its variables are not X and one Y."""
     form = re.match(r"\(\s*(\w)\s*\+\+\s*\(\s*(\w)\.\.\2\s*\)\s*\)", table.form)
     symbols = [symbol.upper() for symbol in block.parts("SYMBOL")]
@@ -193,7 +168,7 @@ def _paged(block: _Block, table: _Table, path: str) -> tuple[str, str, _Scales] 
     def number(label: str, at: int) -> float | None:
         return _parsed(part(label, at), label, block, path) if part(label, at) else None
 
-    scales = _Scales(
+    scales = Scales(
         number("FIRST", x),
         number("LAST", x),
         None,
@@ -234,90 +209,3 @@ def _count(value: float | None, block: _Block, label: str, path: str) -> int | N
             f"points from 1 to {MOST_POINTS}; export it again"
         )
     return int(value)
-
-
-def _points(table: _Table, scales: _Scales, path: str) -> tuple[Sequence[float], Sequence[Point]]:
-    """Abscissae and ordinates of a table. Raises DataError where they contradict the records."""
-    form = re.sub(r"\s", "", table.form).upper()
-    if form.startswith("(XY..XY)"):
-        x, y = _pairs(table, scales, path)
-    elif re.match(r"\(\w\+\+\(\w\.\.\w\)\)", form):
-        x, y = _even(table, scales, path)
-    else:
-        raise DataError(
-            f"{path}: line {table.line.number}: a table {table.form!r} is not read, only (X++(Y..Y)) and "
-            "(XY..XY); export it as CSV"
-        )
-    return x, [(value * scales.y_factor, line) for value, line in y]
-
-
-def _pairs(table: _Table, scales: _Scales, path: str) -> tuple[list[float], list[Point]]:
-    x: list[float] = []
-    y: list[Point] = []
-    for line, text in table.rows:
-        numbers = plain_numbers(line, text, scales.decimal, path)
-        if len(numbers) % 2:
-            raise DataError(
-                f"{path}: line {line.number} has {len(numbers)} numbers where pairs of x and y are expected; "
-                "correct that line"
-            )
-        x += [value * scales.x_factor for value in numbers[::2]]
-        y += [(value, line) for value in numbers[1::2]]
-    _check_number(len(y), scales, table, path)
-    step = abs(x[-1] - x[0]) / max(len(x) - 1, 1) if x else 0.0
-    ends = ((scales.first, x[0], "FIRSTX"), (scales.last, x[-1], "LASTX")) if x else ()
-    for stated, found, label in ends:
-        if stated is not None and abs(stated - found) > step + 1e-3 * abs(found):
-            raise DataError(
-                f"{path}: {label} is {stated:g}, but the table has {found:g} there; check its decimal "
-                "marks, or export it as CSV"
-            )
-    return x, y
-
-
-def _even(table: _Table, scales: _Scales, path: str) -> tuple[Sequence[float], list[Point]]:
-    most = scales.points or MOST_POINTS
-    y, starts = ordinates(table.rows, most, scales.decimal, path)
-    _check_number(len(y), scales, table, path)
-    if not y:
-        return [], []
-    first, last = scales.first, scales.last
-    if first is None or (last is None and scales.step is None):
-        raise DataError(
-            f"{path}: line {table.line.number}: the table needs FIRSTX and LASTX above it, which give its "
-            "axis; export it as CSV"
-        )
-    if last is None:
-        last = first + (scales.step or 0.0) * (len(y) - 1)
-    step = (last - first) / max(len(y) - 1, 1)
-    if scales.step is not None and abs(abs(scales.step) - abs(step)) > 0.01 * abs(step):
-        raise DataError(
-            f"{path}: DELTAX is {scales.step:g}, but {len(y)} points from FIRSTX {first:g} to LASTX "
-            f"{last:g} are {step:g} apart; export it again"
-        )
-    _check_starts(table, starts, (first, step), scales.x_factor, path)
-    return np.linspace(first, last, len(y)).tolist(), y
-
-
-def _check_starts(
-    table: _Table, starts: Sequence[tuple[float, int]], axis: tuple[float, float], factor: float, path: str
-) -> None:
-    """Refuse a line whose abscissa is not where FIRSTX, LASTX and NPOINTS put it."""
-    first, step = axis
-    for (line, _), (abscissa, at) in zip(table.rows, starts, strict=True):
-        expected = first + step * at
-        room = 0.3 * abs(step) + abs(factor) + 1e-6 * abs(expected)
-        # some programs write the abscissae of a table without the factor
-        if min(abs(abscissa * factor - expected), abs(abscissa - expected)) > room:
-            raise DataError(
-                f"{path}: line {line.number} begins at {abscissa * factor:g}, where FIRSTX, LASTX and "
-                f"NPOINTS put {expected:g}; points are missing or the records are wrong, so export it again"
-            )
-
-
-def _check_number(found: int, scales: _Scales, table: _Table, path: str) -> None:
-    if scales.points is not None and found != scales.points:
-        raise DataError(
-            f"{path}: the table from line {table.line.number} has {found} points where NPOINTS states "
-            f"{scales.points}; the file is cut short or damaged, so export it again"
-        )

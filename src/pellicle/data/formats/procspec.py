@@ -73,9 +73,11 @@ def layouts(content: bytes, path: str) -> list[Layout] | None:
 
 def _unpacked(archive: zipfile.ZipFile, info: zipfile.ZipInfo, path: str) -> bytes:
     """The content of a member. Raises DataError for one that is too large, before it is unpacked."""
+    document = b""
     too_large = info.file_size > LARGEST_XML or info.file_size > MOST_RATIO * max(info.compress_size, 1)
-    with archive.open(info) as member:
-        document = b"" if too_large else member.read(LARGEST_XML + 1)  # the size it states may be wrong
+    if not too_large:
+        with archive.open(info) as member:
+            document = member.read(LARGEST_XML + 1)  # the size that the directory states may be wrong
     if too_large or len(document) > LARGEST_XML:
         raise DataError(
             f"{path}: is an {_NAME} file whose {info.filename} unpacks to {info.file_size} bytes, which no "
