@@ -78,6 +78,11 @@ def test_sections_without_a_blank_line(write):
     assert "states 9 points but has 3: it may have been cut off" in spectrum.notes
 
 
+def test_a_section_without_a_title(write):
+    text = JASCO.partition("##### Ext")[0] + "Light source\tautomatic\nScans\t3\n5.0\t6.0\n"
+    assert len(read_spectrum(write(text))) == 3
+
+
 def test_what_cannot_be_read(refused):
     refused(JASCO.replace("ABSORBANCE", "CD[mdeg]"), "'CD[mdeg]'", "neither a reflectance", signal="T")
     refused(JASCO.replace("NANOMETERS", "PIXELS"), "'PIXELS'")

@@ -37,6 +37,7 @@ def rows(delimiter, decimal=".", end="\n"):
         ("No,Wavelength (nm),R (%)\n1,400,10.5\n2,500,20.5\n", "R"),
         ("Nanometers,Percent Transmittance\n" + rows(","), "T"),
         ("Wavelength (nm),Transmittance (%T)\n" + rows(","), "T"),
+        ("Energy (eV),nm,R (%)\n3.1,400,10.5\n2.48,500,20.5\n", "R"),
         ("Angstrom;%R\n4000;10.5\n5000;20.5\n", "R"),
         ("Wellenzahl (cm-1);Reflexion (%)\n25000;10,5\n20000;20,5\n", "R"),
     ],
@@ -68,6 +69,7 @@ def test_counts_of_a_plain_table(write):
     ("text", "said", "reading"),
     [
         ("wavelength,T\n1,400.5;0.5\n1,500.5;0.6\n", ("thousands separators",), {}),
+        ("wavelength;T\n1.400,5;0,5\n1.500,5;0,6\n", ("'1.400,5'", "thousands"), {"signal": "T"}),
         ("wavelength,R\n400,10%\n500,20%\n", ("% signs", "header"), {}),
         ("wavelength,R\n400,0.1\n500,0.2\nMean,0.15\n", ("line 4", "'Mean'"), {}),
         ("nm,n,k\n400,0.2,3.1\n500,0.3,4\n", ("optical constants", "`layer`"), {}),

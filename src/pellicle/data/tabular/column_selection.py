@@ -127,7 +127,10 @@ def wavelength_and_angle(
     table: Table, columns: Sequence[Column], example: str
 ) -> tuple[Column, Column | None]:
     """Return the columns of the wavelength and, if present, of the angle of incidence. Raises DataError."""
-    wavelength, angle = only(table, columns, "wavelength"), only(table, columns, "angle")
+    axes = [column for column in columns if column.role == "wavelength"]
+    if len({column.unit for column in axes} - {None}) == len(axes) > 1:  # one axis in several units
+        axes = [next((column for column in axes if column.unit == "nm"), axes[0])]
+    wavelength, angle = only(table, axes, "wavelength"), only(table, columns, "angle")
     if wavelength is None:
         raise DataError(
             f"{table.path}: no column is a wavelength, energy or wavenumber among {listed(columns)}; "

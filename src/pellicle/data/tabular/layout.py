@@ -20,6 +20,7 @@ from pellicle.errors import DataError
 
 _BLANK_NAMES = re.compile(r"[^\s(\[]+(?:\s*[(\[][^)\]]*[)\]])?|\S+")  # keeps `R (%)` one name
 _MARKER = ">>>>>"  # Ocean Optics puts such lines around the rows
+_GROUPED = re.compile(r"\b\d{1,3}(?:\.\d{3})+,\d+\b(?=\s*[;\t])")
 _SAMPLE = 60  # lines that vote on the dialect, spread over the file so that a preamble cannot outvote rows
 
 
@@ -144,6 +145,9 @@ def _dialect(lines: Sequence[Line], path: str) -> tuple[str, str]:
         return sum(n == cells >= 2 for n, cells in counted), sum(n >= 2 for n, cells in counted)
 
     delimiter = max(DELIMITERS, key=votes)
+    grouped = next((found[0] for line in sample if (found := _GROUPED.search(line.text))), None)
+    if grouped is not None:
+        raise DataError(f"{path}: writes {grouped!r}; export numbers without thousands separators")
     if delimiter == ",":
         return delimiter, "."
     cells = [
