@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pellicle.data.read_spectrum import read_spectrum
+from pellicle.data.read_spectrum import read_spectra, read_spectrum
 
 PERCENT = "400{c}10{d}5{n}500{c}20{d}5{n}"
 
@@ -52,6 +52,30 @@ def test_read_without_flags(write, text, signal):
 def test_absorbance_in_german(write):
     spectrum = read_spectrum(write("Wellenlänge (nm);Extinktion\n400;1,0\n500;0,5\n"))
     np.testing.assert_allclose(spectrum.values, [0.1, 10**-0.5])
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "Sample Name,film 1,film 2\nWavelength (nm),%R,%R\n",
+        "Wavelength (nm),film 1 %R,film 2 %R\n",
+        "Wavelength,film 1,film 2\nnm,%,%\n",
+        "Wavelength (nm),film 1,film 2\nnm,%,%\n",
+        "Wavelength (nm),film 1 (%),film 2 (%)\n",
+        "Wavelength (nm);Reflectance (SCI) [%];Reflectance (SCE) [%]\n",
+    ],
+)
+def test_percent_of_several_samples(write, header):
+    delimiter = ";" if ";" in header else ","
+    text = header + "400,0.5,1.0\n500,0.6,1.1\n".replace(",", delimiter)
+    one, other = read_spectra(write(text), signal="R", spectrum="all")
+    np.testing.assert_allclose([one.values, other.values], [[0.005, 0.006], [0.01, 0.011]])
+    assert one.name != other.name
+
+
+def test_a_specular_reflectance(write):
+    text = "Wavelength (nm),Specular Reflectance (%)\n400,10\n500,20\n"
+    np.testing.assert_allclose(read_spectrum(write(text)).values, [0.1, 0.2])
 
 
 def test_a_counter_is_no_signal(write):

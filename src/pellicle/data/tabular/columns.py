@@ -42,7 +42,12 @@ _ALIASES = sorted(
     ((name, role) for role, names in (*NAMES.items(), ("foreign", FOREIGN)) for name in names),
     key=lambda alias: -len(alias[0]),
 )
-_TAIL = re.compile(r"\s*(?:(?P<open>[(\[])\s*(?P<inside>.*?)\s*[)\]]|[_\s/,:-]+(?:in\s+)?(?P<after>.+?))\s*")
+_TAIL = re.compile(
+    r"\s*(?:(?P<open>[(\[])\s*(?P<inside>[^()\[\]]*?)\s*[)\]]|[_\s/,:-]+(?:in\s+)?(?P<after>.+?))\s*"
+)
+
+_QUALIFIER = re.compile(r"^(specular|regular|total|absolute|measured|mean|averaged?|corrected) +(?=\S)")
+_NAMED = re.compile(r".*\S\s*%\s*([rt])")  # `film 1 %R`
 
 SKIP = "_"
 UNSTATED = "unit not stated"
@@ -76,6 +81,7 @@ def recognise(name: str, position: int = 0) -> Column:
     percent = plain.startswith(("%", "percent ")) or plain.endswith("%")
     if percent:
         plain = plain.strip("% _/,:-").removesuffix(" in").removeprefix("percent ")
+    plain = _QUALIFIER.sub("", plain)
     for alias, role in _ALIASES:
         if plain == alias:
             return _column(position, name, role, "%" if percent else None, bracketed=False)
@@ -85,6 +91,9 @@ def recognise(name: str, position: int = 0) -> Column:
             column = _column(position, name, role, written, bracketed=bool(tail["open"]))
             if column.role != "other":
                 return column
+    percent = percent or plain.endswith(("(%)", "[%]"))
+    if named := _NAMED.fullmatch(plain):
+        return Column(position, name, named[1].upper(), "percent")
     return Column(position, name, "other", "percent" if percent else None)
 
 

@@ -91,7 +91,11 @@ def find_layout(file: TextFile) -> Layout:
             units = split(lines[header + 1].text, delimiter)
             units += [""] * (len(names) - len(units))
             units = [unit.strip("[]() ") for unit in units]
-            names = [f"{name} ({unit})" if unit else name for name, unit in zip(names, units, strict=False)]
+            names = [
+                f"{name} ({unit})" if unit and f"({unit})" not in name else name
+                for name, unit in zip(names, units, strict=False)
+            ]
+        names = _told_apart(names, split(lines[header - 1].text, delimiter) if header else [])
     else:
         names = _commented_header(lines[start], file.comments, delimiter, width)
         if names:
@@ -125,6 +129,16 @@ def _hint(text: str) -> str:
     if re.search(r"\d{1,3}[.,' ]\d{3}(?!\d)", text):
         return "; export numbers without thousands separators"
     return ""
+
+
+def _told_apart(names: list[str], above: Sequence[str]) -> list[str]:
+    """The names, with the samples that a line above them gives where names are repeated."""
+    if len(above) != len(names) or len(set(above)) < len(above) or len(set(names)) == len(names):
+        return names
+    return [
+        f"{sample} {name}" if names.count(name) > 1 else name
+        for sample, name in zip(above, names, strict=True)
+    ]
 
 
 def _numbers_in(line: Line, delimiter: str, decimal: str = ",") -> tuple[int, int]:
@@ -196,9 +210,12 @@ def _rows_begin(
     if start and not lines[start - 1].text.startswith(_MARKER):
         cells = split(lines[start - 1].text, delimiter)
         # two words of free text look like two names; only a known name tells them apart
-        words = delimiter == " " and not any(column.role != "other" for column in recognise_all(cells))
+        known = any(column.role != "other" for column in recognise_all(cells))
+        words = delimiter == " " and (not known or cells[0].endswith(":"))
         if len(cells) >= width and not words and not any(is_number(cell, decimal) for cell in cells):
-            return start, start - 1
+            above = split(lines[start - 2].text, delimiter) if start > 1 and is_unit_row(cells) else []
+            named = len(above) == len(cells) and recognise_all(above)[0].role == "wavelength"
+            return start, start - 2 if named else start - 1
     return start, None
 
 
