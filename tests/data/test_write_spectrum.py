@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -41,6 +43,7 @@ CASES = {
     "sweeps": mean_spectrum([reflectance(values=0.3 + 0.01 * np.cos(NM + k)) for k in range(3)]),
     "declared": reflectance(declared=(("instrument", "A # 1"), ("date", "2024-01-01"))),
     "ellipsometry": angles(),
+    "folded": dataclasses.replace(angles(), delta=np.linspace(5, 175, 14), folded=True),
 }
 
 

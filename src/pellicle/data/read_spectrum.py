@@ -16,6 +16,7 @@ from pellicle.data.signal_checks import check_noise
 from pellicle.data.spectrum import POLARISATIONS, Spectrum
 from pellicle.data.tabular.column_selection import SpectrumColumns
 from pellicle.data.tabular.columns import SIGNALS
+from pellicle.data.tabular.table import Table
 from pellicle.errors import UsageError
 
 log = getLogger(__name__)
@@ -164,7 +165,7 @@ class _Reading:
                 self.wavelength_unit,
                 self.noise,
                 self.range,
-                self.folded,
+                _folded(table) if self.folded is None else self.folded,
                 self.analyser,
             )
         name, declared = one.name if several else "", table.layout.declared.facts
@@ -176,3 +177,8 @@ class _Reading:
             text = "%s: %d rows used: %s from %g to %g nm, values from %.4g to %.4g"
             log.info(text, spectrum.path, len(spectrum), spectrum.signal, first, last, low, high)
         return spectrum
+
+
+def _folded(table: Table) -> bool | None:
+    """True where the file says that its Δ is folded, None where it says nothing."""
+    return True if dict(table.layout.declared.facts).get("delta", "").startswith("folded") else None

@@ -27,6 +27,7 @@ _FACTS = {
     r"|origin|spectrometer/data system",
     "date": r"date( (and|/) ?time)?|(acquired|measured|created)( (on|at))?|(measurement|acquisition) date"
     r"|time ?stamp|longdate|date of measurement",
+    "delta": r"delta",  # "folded into 0 to 180 degrees"
     "sample": r"sample( (name|id|description))?|title|spectrum name",
 }
 _FOREIGN = re.compile(
