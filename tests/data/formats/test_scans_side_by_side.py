@@ -132,6 +132,8 @@ def test_every_encoding(same_in_every_encoding, text):
 
 
 def test_what_cannot_be_read(refused):
+    header = "Wavelength (nm),Absorbance\n"
+    refused(STACKED.replace(header, header * 2, 1), "line 3 ends the file without any row")
     refused(ONE_SCAN.replace("799,0.5", "799,x"), "line 4", "'Abs'", "'x'")
     refused(ONE_SCAN.partition("0.5")[0], "line 4", "is empty")
     refused(CARY.replace("799,91", "799,x"), "line 4", "'x'", spectrum="film 1")

@@ -21,7 +21,7 @@ def layouts(file: TextFile) -> list[Layout] | None:
     headers = [i for i, line in enumerate(lines) if first is not None and line.text == first.text]
     if len(headers) < 2:
         return None
-    starts = [_title(lines, header) for header in headers]
+    starts = [_title(lines, header, after) for header, after in zip(headers, [-1, *headers], strict=False)]
     found = []
     for i, (start, header) in enumerate(zip(starts, headers, strict=True)):
         stop = starts[i + 1] if i + 1 < len(starts) else len(lines)
@@ -36,10 +36,10 @@ def _names(line: Line) -> bool:
     return is_header(all_cells(line.text, delimiter_of(line.text)))
 
 
-def _title(lines: Sequence[Line], header: int) -> int:
-    """Index of the first line above a header that is no row of the table before."""
+def _title(lines: Sequence[Line], header: int, after: int) -> int:
+    """Index of the first line above a header that is no row of the table before, whose header is `after`."""
     start = header
-    while start and not _is_row(lines[start - 1]):
+    while start > after + 1 and not _is_row(lines[start - 1]):
         start -= 1
     return start
 
