@@ -56,6 +56,7 @@ def test_a_byte_order_mark(write):
         ("a = " + "[" * 5000, "is not a recipe: its brackets are nested too deeply"),
         (SURFACE.replace("model", "modle"), r"scene\.surface\.model is missing"),
         (SURFACE.replace("noise", "noize"), r"unknown key 'data\.noize' \(did you mean 'noise'\?\)"),
+        (SURFACE.replace("[data]", "[Data]"), r"unknown key 'Data' \(did you mean 'data'\?\)"),
     ],
 )
 def test_refused_in_one_sentence(write, text, message):

@@ -31,6 +31,8 @@ def _first_error(error: ValidationError, tables: Mapping[str, type[BaseModel]]) 
     # unions put the name of the branch they tried into the location
     branches = ("str", "float", "list[float]")
     where = [str(part) for part in chosen["loc"] if not str(part)[:1].isupper() and part not in branches]
+    if chosen["type"] == "extra_forbidden" and where[-1:] != [str(chosen["loc"][-1])]:
+        where.append(str(chosen["loc"][-1]))  # a key of the user, as `Data`, is no branch
     key = ".".join(where)
     if chosen["type"] == "extra_forbidden":
         owner = next((part for part in reversed(where[:-1]) if not part.isdigit()), "")
