@@ -85,6 +85,7 @@ def test_the_report_and_the_code_of_an_earlier_run_are_repeated(pellicle, spectr
     assert (again.code, again.out, fitted()) == (4, first.out, [])
 
 
+@pytest.mark.slow
 def test_what_changed_is_fitted_again(batch, fitted, scene, tmp_path):
     assert batch().code == 0
     assert batch().code == 0
@@ -146,6 +147,7 @@ def test_a_full_disk_costs_no_result(batch, full, fitted, tmp_path):
     assert not list((tmp_path / "out").rglob(".*"))  # no temporary files
 
 
+@pytest.mark.slow
 def test_results_without_all_their_files_are_computed_again(batch, full, fitted, tmp_path, request):
     full()
     assert batch().code == 3

@@ -114,6 +114,7 @@ def test_the_spread_is_better_determined(together, without, measured):
     assert without.curve.depolarisation_data is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("unknown", ["all", "psi and delta", "depolarisation"])
 def test_a_noise_that_is_not_given_is_that_of_its_own_residuals(measured, together, unknown):
     angles = {} if unknown == "depolarisation" else {"sigma": None, "delta_sigma": None}
@@ -126,6 +127,7 @@ def test_a_noise_that_is_not_given_is_that_of_its_own_residuals(measured, togeth
     assert np.std(fit.curve.depolarisation_residual) == pytest.approx(SHARE, rel=0.2)
 
 
+@pytest.mark.slow
 def test_a_folded_delta(measured, together):
     delta = np.minimum(measured.delta, 360 - measured.delta)
     fit = pl.fit(replace(measured, delta=delta, folded=True), scene(WIDTH))
@@ -164,6 +166,7 @@ def test_noise_alone_is_no_depolarisation(measured):
     assert not any("depolarisation" in warning for warning in fit.warnings)
 
 
+@pytest.mark.slow
 def test_predictions(ranked):
     """Of a posterior at one point: the curves of the fit, and noise of σ."""
     fit, problem = ranked
