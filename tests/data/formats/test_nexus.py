@@ -6,9 +6,11 @@ import sys
 import numpy as np
 import pytest
 
-from pellicle.data.formats import hdf5_reading
+from pellicle.data.formats import hdf5_reading, isolated
+from pellicle.data.formats import nexus as nexus_reader
 from pellicle.data.read_spectrum import read_spectra, read_spectrum
 from pellicle.data.write_spectrum import write_spectrum
+from pellicle.errors import DataError
 
 h5py = pytest.importorskip("h5py")
 
@@ -17,6 +19,15 @@ R = np.array([0.1, 0.2, 0.4])
 ANGSTROM = np.array([4000.0, 5000.0, 6000.0])
 PSI = np.array([[20.0, 21.0, 22.0], [30.0, 31.0, 32.0]])
 DELTA = np.array([[170.0, 171.0, 172.0], [160.0, 161.0, 162.0]])
+
+
+@pytest.fixture(autouse=True)
+def in_this_process(request, monkeypatch):
+    """Read without a child process, whose start takes 0.25 s; tests named `in_a_child` do as users do."""
+    if "in_a_child" not in request.node.name:
+        monkeypatch.setattr(
+            isolated, "call", lambda reader, content, path: nexus_reader.read_hdf5(content, path)
+        )
 
 
 def nexus(fill):
@@ -147,7 +158,7 @@ def test_two_groups_are_chosen_by_name(write, refused):
     np.testing.assert_allclose(read_spectrum(write(content), spectrum="/entry/other").values, R / 2)
 
 
-def test_what_pellicle_writes_is_read_back(write, tmp_path):
+def test_what_pellicle_writes_is_read_back_in_a_child(write, tmp_path):
     pytest.importorskip("h5netcdf")
     pytest.importorskip("xarray")
     rows = (
@@ -249,3 +260,25 @@ def test_the_extra_is_named(refused, monkeypatch):
     content = nexus(nxdata)
     monkeypatch.setitem(sys.modules, "h5py", None)
     refused(content, "h5py", "pip install 'pellicle[formats]'")
+
+
+def test_files_are_refused_in_a_child(refused):
+    refused(nexus(lambda file: put(file, "image", np.ones((3, 3)))), "without a wavelength")
+
+
+READERS = """
+import ctypes, time
+def crash(content, path):
+    ctypes.string_at(0)
+def hang(content, path):
+    time.sleep(100)
+"""
+
+
+@pytest.mark.parametrize(("function", "words"), [("crash", "crashes"), ("hang", "does not end")])
+def test_a_reader_that_fails_in_a_child_is_stopped(function, words, tmp_path, monkeypatch):
+    (tmp_path / "fragile_readers.py").write_text(READERS)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(isolated, "TIMEOUT", 1.0 if function == "hang" else 60.0)
+    with pytest.raises(DataError, match=f"^file.nxs: is a damaged file, on which its reader {words}"):
+        isolated.call(f"fragile_readers:{function}", b"", "file.nxs")

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterator
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 
 from pellicle.data.formats import hdf5_reading as hdf5
+from pellicle.data.formats import isolated
 from pellicle.data.tabular.columns import recognise
 from pellicle.data.tabular.layout import Layout, array_columns
 from pellicle.errors import DataError, install_command
@@ -33,13 +35,18 @@ def layouts(content: bytes, path: str) -> list[Layout] | None:
     """
     if not content.startswith(hdf5.SIGNATURE):
         return None
-    try:
-        import h5py
-    except ImportError:
+    if find_spec("h5py") is None:
         raise DataError(
             f"{path}: is an HDF5 (NeXus) file, which needs the package h5py: {install_command('formats')}; "
             "or export the spectrum as CSV"
-        ) from None
+        )
+    return isolated.call(f"{__name__}:{read_hdf5.__name__}", content, path)
+
+
+def read_hdf5(content: bytes, path: str) -> list[Layout]:
+    """Return the spectra of an HDF5 file, in this process. Raises DataError as `layouts` does."""
+    import h5py
+
     try:
         with h5py.File(io.BytesIO(content), "r") as file:
             found = list(_layouts(file, path))
