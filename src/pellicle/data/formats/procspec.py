@@ -66,7 +66,9 @@ def layouts(content: bytes, path: str) -> list[Layout] | None:
             raise
         if not _ANYWHERE.search(content):
             return None
-        raise DataError(f"{path}: is an {_NAME} file that cannot be unpacked ({e}); copy it again") from None
+        raise DataError(
+            f"{path}: is an {_NAME} file that cannot be unpacked ({_plain(e)}); copy it again"
+        ) from None
     curves = [curve for document in documents for curve in _curves(_parsed(document, path), path)]
     return readable(curves, path)
 
@@ -99,8 +101,13 @@ def _parsed(document: bytes, path: str) -> Element:
     except Exception as error:  # syntax errors, and entities and document types that defusedxml refuses
         raise DataError(
             f"{path}: is an {_NAME} file whose XML cannot be read ({type(error).__name__}: "
-            f"{' '.join(str(error).split())[:200]}); export the spectrum as text"
+            f"{_plain(error)}); export the spectrum as text"
         ) from None
+
+
+def _plain(error: Exception) -> str:
+    """The text of an error in one line."""
+    return " ".join(str(error).split())[:200]
 
 
 def _curves(root: Element, path: str) -> Iterator[Curve]:
