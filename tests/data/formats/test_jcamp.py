@@ -41,6 +41,7 @@ FORMS = {
     "DIF and DUP": "400A00JL%U\n450A04nn4m0q\n490cJ5M88",
     "comments and blanks": "$$ first line\n400 100 101 104 104 104 $$ five\n\n450 104 99 45 5 -3\n500 12 500",
 }
+SAMPLES = {form: jcamp(table) for form, table in FORMS.items()}  # for `make fuzz`
 
 
 @pytest.mark.parametrize("form", FORMS)

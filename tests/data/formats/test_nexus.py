@@ -75,6 +75,9 @@ def nxellipsometry(file, kind="Psi/Delta", observables=(PSI, DELTA), angles=(50.
     return data
 
 
+SAMPLES = {fill.__name__: nexus(fill) for fill in (nxdata, nxellipsometry)}  # for `make fuzz`
+
+
 @pytest.mark.parametrize(
     ("axis", "signal", "wavelength", "kind", "factor"),
     [

@@ -226,6 +226,7 @@ READ = {
     ".jws, T against cm-1": (jws(WAVENUMBER, JWS_TRANSMITTANCE), "T", 1e7 / X[::-1], Y[::-1]),
     ".jws, absorbance": (jws(quantity=JWS_ABSORBANCE, y=Y), "T", X, 10**-Y),
 }  # fmt: skip
+SAMPLES = {name: case[0] for name, case in READ.items()}  # for `make fuzz`
 
 
 @pytest.mark.parametrize("name", READ)
@@ -325,3 +326,8 @@ def test_the_extra_is_named(content, refused, monkeypatch):
 def test_text_whose_second_letter_is_a_version_of_spc_is_text(write):
     text = "AKLM\0\0\0\0 padded\nwavelength_nm,R\n400,0.1\n500,0.2\n" + " " * 600
     np.testing.assert_allclose(read_spectrum(write(text)).values, [0.1, 0.2])
+
+
+def test_binary_files_that_are_not_read_are_named(refused):
+    refused(b"AVS84\x00\x01\x02" + bytes(400), "AvaSoft 8", "export it as text")
+    refused(b"Spectral Data File\x00" + bytes(400), "OMNIC", "JCAMP-DX")

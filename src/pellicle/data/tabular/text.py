@@ -146,6 +146,8 @@ _FOREIGN = {
     rb"%PDF": "a PDF; give the numbers in it as a CSV",
     rb"\xd0\xcf\x11\xe0|PK\x03\x04.*(\[Content_Types|spreadsheet)": "an office file; save its sheet as CSV",
     rb"PK\x03\x04|\x1f\x8b|BZh|7z\xbc\xaf|Rar!": "packed; unpack it and give the file inside",
+    rb"AVS8\d": "a binary file of Avantes AvaSoft 8; export it as text in AvaSoft",
+    rb"Spectral Data File": "a binary file of Thermo OMNIC; save it as JCAMP-DX or CSV in OMNIC",
     rb"\{\\rtf": "a word processor's file; save it as plain text",
     rb"\s*<(!doctype|html|\?xml|svg)": "a web page or XML; export the spectrum as a CSV",
     rb"\s*(\{|\[\s*[\{\[\"])": "JSON; give a CSV with columns as wavelength_nm,R",
