@@ -150,6 +150,12 @@ def test_decimal_commas_and_a_dark_spectrum(write):
     assert any("INTENSITY (COUNTS)" in note for note in found.notes)
 
 
+def test_a_relative_intensity_beside_a_transmittance_is_left_out(write):
+    found = read_spectrum(write(link(PROCESSED, DARK.replace("INTENSITY (COUNTS)", "RELATIVE INTENSITY"))))
+    assert found.signal == "T"
+    assert any("RELATIVE INTENSITY" in note for note in found.notes)
+
+
 def test_decimal_points_between_commas(write):
     text = link(PROCESSED).replace(", ", ";").replace(",", ".").replace(";", ", ")
     np.testing.assert_allclose(read_spectrum(write(text)).values, [0.32795, 0.335, 0.3425])
