@@ -86,11 +86,29 @@ def test_accurion_with_one_zone(write):
 
 def test_accurion_files_that_are_refused(refused):
     lines = ACCURION.splitlines(keepends=True)
-    refused("".join(lines[:6]), "zones 1, 2 without their mean", "one zone")
+    refused("".join(lines[:2] + lines[5:6]), "no point with psi and delta")
     refused(IMAGE.replace("#-\tdeg\tnm", "#-\tdeg\tum"), "Lambda in 'um', not in 'nm'")
     refused(IMAGE.replace("\t24.5", ""), "line 5 has fewer values")
     refused(IMAGE.replace("24.5", "94.5"), "line 5, column 'psi_deg': 94.5")
     refused("".join(lines[:2] + lines[5:6]), "no point with psi and delta")
+
+
+def test_zones_without_their_mean_are_averaged(write):
+    lines = ACCURION.splitlines(keepends=True)
+    spectrum = read_spectrum(write("".join(lines[:6]).replace("170.0", "359.0").replace("171.0", "3.0")))
+    assert_read(spectrum, angle=[50], values=[31.1], delta=[1.0])  # 60 degrees lack a balance in zone 2
+    assert "the mean of zones 1, 2 taken" in spectrum.notes
+
+
+@pytest.mark.parametrize("name", ["15-1-1", "19-1-1", "post_synthesis_spot_1"])
+def test_the_mean_of_the_zones_is_zone_0(write, name):
+    rows = (REAL / f"{name}.dat").read_text().splitlines(keepends=True)
+    expected = read_spectrum(REAL / f"{name}.dat")
+    without = write("".join(row for row in rows if row.startswith("#") or row.split("\t")[5] != "0"))
+    found = read_spectrum(without)
+    np.testing.assert_array_equal(found.angle, expected.angle)
+    np.testing.assert_allclose(found.values, expected.values, atol=0.002)  # zone 0 is written to 0.001
+    np.testing.assert_allclose(found.delta, expected.delta, atol=0.002)
 
 
 @pytest.mark.parametrize(("name", "points"), [("15-1-1", 8), ("19-1-1", 11), ("post_synthesis_spot_1", 5)])

@@ -81,7 +81,7 @@ def test_decimal_commas(write):
 
 @pytest.mark.parametrize("text", [OCEANVIEW, SPECTRASUITE, JAZ])
 def test_quantity_and_unit_are_asked_for(refused, text):
-    refused(text, "state no quantity", '`signal="R"`', '`signal_unit="percent"`')
+    refused(text, "states no quantity", '`signal="R"`', '`signal_unit="percent"`')
     refused(text, "states no unit", '`signal_unit="absorbance"`', signal="T")
 
 

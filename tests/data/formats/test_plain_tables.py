@@ -111,7 +111,7 @@ def test_counts_of_a_plain_table(write):
         ("nm,Kubelka-Munk\n400,0.1\n500,0.2\n", ("'Kubelka-Munk'",), {"signal": "R"}),
         ("nm,Absorptance (%)\n400,1\n500,2\n", ("'Absorptance (%)'",), {"signal": "T"}),
         ("nm,Irradiance (W/m2/nm)\n400,1\n500,2\n", ("'Irradiance",), {"signal": "T"}),
-        ("nm,Absorption\n400,1\n500,2\n", ("'Absorption' state no quantity",), {}),
+        ("nm,Absorption\n400,1\n500,2\n", ("'Absorption' states no quantity",), {}),
     ],
 )
 def test_refused(refused, text, said, reading):
@@ -128,3 +128,101 @@ def test_angles_that_look_like_optical_constants_are_read_by_name(write):
     path = write("400,5,3\n500,6,7\n")
     spectrum = read_spectrum(path, signal="psi-delta", columns="wavelength,psi_deg,delta_deg")
     np.testing.assert_array_equal(spectrum.delta, [3, 7])
+
+
+@pytest.mark.parametrize(
+    ("text", "columns", "wavelength", "values"),
+    [
+        ("Wavenumber (cm-1),spec (%)\n2000,50\n1000,60\n", "wavelength,R", [5000, 10000], [0.5, 0.6]),
+        ("Photon Energy (eV);%T\n40;0,5\n30;0,6\n", "wavelength,T", [30.996, 41.328], [0.005, 0.006]),
+        ("nm,Abs\n400,0.3\n500,0.5\n", "wavelength,T_fraction", [400, 500], [0.3, 0.5]),
+        ("nm,Abs\n400,1\n500,2\n", "wavelength,absorbance", [400, 500], [0.1, 0.01]),
+        ("XUNITS=1/CM\n2000,0.5\n1000,0.6\n", "wavelength,R", [5000, 10000], [0.5, 0.6]),
+    ],
+)
+def test_names_of_the_caller_without_a_unit_keep_that_of_the_file(write, text, columns, wavelength, values):
+    spectrum = read_spectrum(write(text), columns=columns)
+    np.testing.assert_allclose(spectrum.wavelength, wavelength, rtol=1e-4)
+    np.testing.assert_allclose(spectrum.values, values)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Wavelength (nm),Abs\n400,0.3\n500,0.5\n",
+        "Wellenlänge [nm];Extinktion\n400;0,3\n500;0,5\n",
+        "Y-axis mode: Abs\n400 0.3\n500 0.5\n",
+    ],
+)
+def test_an_absorbance_is_not_renamed_in_silence(refused, text):
+    refused(text, "an absorbance", "T_fraction", columns="wavelength,T")
+    refused(text, "an absorbance", "R_fraction", columns="wavelength,R")
+
+
+PROCESSED = """\
+Model,WP-UV-VIS
+Technique,{}
+Pixel Count,1024
+
+Pixel,Wavelength,Processed,Raw,Dark,Reference
+0,319.03,{},873,827,74
+1,319.51,{},867,829,87
+"""
+
+
+def test_a_technique_is_the_quantity_of_the_processed_column(write, refused):
+    spectrum = read_spectrum(write(PROCESSED.format("Absorbance", 1, 2)))
+    assert spectrum.signal == "T"
+    np.testing.assert_allclose(spectrum.values, [0.1, 0.01])
+    percent = read_spectrum(write(PROCESSED.format("Transmission", 60, 70)), signal_unit="percent")
+    np.testing.assert_allclose(percent.values, [0.6, 0.7])
+    refused(PROCESSED.format("Absorbance", 1, 2), "absorbance", signal="R")
+    refused(PROCESSED.format("Scope", 0.6, 0.7), "neither", columns=None)
+
+
+def test_declared_intensities_are_no_transmittance(refused):
+    text = "XAxisUnit,nm_air\nYAxisUnit,intensity\n[Data]\n500.1;0.5\n500.4;0.6\n"
+    refused(text, "'intensity'", signal="T")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        ";;;\n;Wavelength (nm);T (%);\n;400;81,5;\n;500;82,5;\n",
+        ",,Wavelength (nm),T (%)\n,,400,81.5\n,,500,82.5\n",
+        "sep=;\nWavelength (nm);T (%)\n400;81,5\n500;82,5\n",
+        '"Sample - RawData"\n"Wavelength nm." "T%"\n400.00 81.5\n500.00 82.5\n',
+    ],
+)
+def test_tables_as_sheets_and_programs_save_them(write, text):
+    spectrum = read_spectrum(write(text))
+    np.testing.assert_array_equal(spectrum.wavelength, [400, 500])
+    np.testing.assert_allclose(spectrum.values, [0.815, 0.825])
+    assert ("sample", "sep=") not in spectrum.declared
+
+
+def test_the_measured_column_is_read_beside_the_calculated_one(write):
+    text = "Wavelength(nm),Reflectance (Measured),Reflectance (Calculated)\n400,0.31,0.9\n500,0.32,0.9\n"
+    np.testing.assert_allclose(read_spectrum(write(text)).values, [0.31, 0.32])
+
+
+def test_an_energy_named_by_its_letter(write):
+    spectrum = read_spectrum(write("E(eV)\tPsi\tDelta\n2\t20\t120\n1\t21\t110\n"))
+    np.testing.assert_allclose(spectrum.wavelength, [619.92, 1239.84], rtol=1e-4)
+
+
+@pytest.mark.parametrize("columns", [3, 4, 7])
+def test_tables_without_a_header_are_asked_for_every_column(refused, columns):
+    row = " 0.5" * (columns - 1)
+    refused(f"400{row}\n500{row}\n", f"{columns} columns and no header", '"psi", "delta"]`')
+
+
+@pytest.mark.parametrize("header", ["Absorption (%)", "Re(rho),Im(rho)"])
+def test_shares_absorbed_and_ratios_of_amplitudes_are_no_reflectance(refused, header):
+    row = ",0.5" * len(header.split(","))
+    refused(f"nm,{header}\n400{row}\n500{row}\n", "neither", signal="R")
+
+
+def test_percent_in_the_names_of_samples(write):
+    spectra = read_spectra(write("nm,S1 (%),S2 (%)\n400,50,60\n500,52,62\n"), signal="R", spectrum="all")
+    np.testing.assert_allclose(spectra[1].values, [0.6, 0.62])

@@ -30,7 +30,7 @@ nm\t%R
 
 
 def test_spectrawiz(write, refused):
-    refused(SPECTRAWIZ, "state no quantity", '`signal="R"`')
+    refused(SPECTRAWIZ, "states no quantity", '`signal="R"`')
     spectrum = read_spectrum(write(SPECTRAWIZ), signal="R")
     np.testing.assert_allclose(spectrum.values, [0.255, 0.265, 0.275])
     assert dict(spectrum.declared)["sample"] == "film 3"

@@ -51,9 +51,12 @@ def layout(file: TextFile, spot: int | None = None) -> Layout | None:
         )
     notes = ["read as an Accurion data file"]
     if "Zone" in columns:
-        rows, note = _one_zone(rows, columns["Zone"], path)
-        notes.append(note)
-    rows, spot_notes = _select_spot(rows, columns, spot, path)
+        zones = _zones(rows, columns["Zone"])
+        notes.append(_zone_note(list(zones)))
+        of_zones = [_select_spot(zone, columns, spot, path) for zone in zones.values()]
+        rows, spot_notes = _mean([found for found, _ in of_zones], columns), of_zones[0][1]
+    else:
+        rows, spot_notes = _select_spot(rows, columns, spot, path)
     notes += spot_notes
     measured = [row for row in rows if not {row[1][columns["Psi"]], row[1][columns["Delta"]]} & _UNMEASURED]
     if len(measured) < len(rows):
@@ -74,17 +77,55 @@ def _check_units(columns: dict[str, int], units: Sequence[str], path: str) -> No
             )
 
 
-def _one_zone(rows: Rows, zone: int, path: str) -> tuple[Rows, str]:
-    """The mean of the zones, or the only zone."""
-    zones = sorted({cells[zone] for _, cells in rows} - {SPREAD_ZONE})
-    if MEAN_ZONE in zones:
-        return [row for row in rows if row[1][zone] == MEAN_ZONE], "zone 0, the mean of the zones, taken"
-    if len(zones) != 1:
-        raise DataError(
-            f"{path}: measured in zones {', '.join(zones)} without their mean, zone 0; "
-            "keep the rows of one zone"
-        )
-    return [row for row in rows if row[1][zone] == zones[0]], f"measured in zone {zones[0]} only"
+def _zones(rows: Rows, zone: int) -> dict[str, Rows]:
+    """The rows of each zone to use: of the mean if the file has it, else of every zone measured."""
+    found: dict[str, Rows] = {}
+    for row in rows:
+        found.setdefault(row[1][zone], []).append(row)
+    if MEAN_ZONE in found:
+        return {MEAN_ZONE: found[MEAN_ZONE]}
+    return {name: found[name] for name in sorted(found) if name != SPREAD_ZONE} or found
+
+
+def _zone_note(zones: Sequence[str]) -> str:
+    if list(zones) == [MEAN_ZONE]:
+        return "zone 0, the mean of the zones, taken"
+    if len(zones) == 1:
+        return f"measured in zone {zones[0]} only"
+    return f"the mean of zones {', '.join(zones)} taken"
+
+
+def _mean(zones: Sequence[Rows], columns: dict[str, int]) -> Rows:
+    """Rows of the first zone with the mean Ψ and Δ of all, NaN where a zone found no balance or has no row.
+
+    Zone 0 of files that have it is this mean.
+    """
+    if len(zones) == 1:
+        return zones[0]
+
+    def point(cells: Sequence[str]) -> tuple[str, str]:
+        return cells[columns["Lambda"]], cells[columns["AOI"]]
+
+    others = [{point(cells): cells for _, cells in rows} for rows in zones[1:]]
+    found: Rows = []
+    for line, cells in zones[0]:
+        same = [cells, *(zone[point(cells)] for zone in others if point(cells) in zone)]
+        mean = list(cells)
+        for name in ("Psi", "Delta"):
+            values = [one[columns[name]] for one in same]
+            whole = (
+                len(values) == len(zones) and not set(values) & _UNMEASURED and all(map(is_number, values))
+            )
+            mean[columns[name]] = f"{_mean_angle([float(value) for value in values]):.6g}" if whole else "NaN"
+        found.append((line, mean))
+    return found
+
+
+def _mean_angle(values: Sequence[float]) -> float:
+    """Mean of angles in degrees that may lie on both sides of 0 and 360."""
+    first = values[0]
+    apart = [(value - first + 180.0) % 360.0 - 180.0 for value in values]
+    return (first + sum(apart) / len(apart)) % 360.0
 
 
 def _spots(rows: Rows, columns: dict[str, int], path: str) -> list[Rows]:

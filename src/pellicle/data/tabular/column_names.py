@@ -6,7 +6,10 @@ NAMES = {
         *("wellenlänge", "wellenlaenge", "longueur d'onde", "longueur d’onde", "longitud de onda"),
         *("lunghezza d'onda", "lunghezza d’onda", "comprimento de onda", "golflengte", "波長", "波长"),
     ),
-    "energy": ("energy", "photon energy", "photon_energy", "energie", "photonenergie"),
+    "energy": (
+        *("energy", "photon energy", "photon_energy", "energie", "photonenergie"),
+        *("e(ev)", "e (ev)", "e[ev]", "e [ev]", "e/ev", "e / ev", "e_ev"),
+    ),
     "wavenumber": (
         *("wavenumber", "wavenumbers", "wave number", "wellenzahl", "nombre d'onde", "nombre d’onde"),
         *("número de onda", "波数"),
@@ -77,7 +80,12 @@ FOREIGN = (
     *("absorptance", "cd", "circular dichroism", "ellipticity", "emission", "f(r)", "fluorescence"),
     *("irradiance", "k/s", "kubelka-munk", "mdeg", "photoluminescence", "pl", "pl intensity", "power"),
     *("radiance", "raman", "raman intensity", "scope", "single beam"),
+    *("absorption (%)", "absorption [%]"),  # a share, as absorptance
+    *("re(rho)", "im(rho)", "re(ρ)", "im(ρ)", "re_rho", "im_rho"),
     *("is", "ic", "ic'"),  # of a phase-modulated ellipsometer
     *(f"{m}{i}{j}" for m in ("m", "mm") for i in range(1, 5) for j in range(1, 5)),  # Mueller matrix
 )
 """Names of quantities that are neither a reflectance nor a transmittance, nor psi and delta."""
+
+COUNTERS = ("index", "no", "no.", "nr", "nr.", "number", "point", "pixel", "row", "time", "time (s)")
+"""Names of columns that count rows or give times, which are no signals."""

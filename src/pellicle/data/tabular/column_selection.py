@@ -6,13 +6,12 @@ import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from pellicle.data.tabular.column_names import COUNTERS
 from pellicle.data.tabular.columns import COUNTS, SIGNALS, Column, listed
 from pellicle.data.tabular.named_columns import first_column, named_columns
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError, UsageError
 
-_COUNTERS = ("index", "no", "no.", "nr", "nr.", "number", "point", "pixel", "row", "time", "time (s)")
-"""Names of columns that count rows or give times, which are no signals."""
 _EITHER_SIGNAL = '`signal="R"` or `signal="T"`'
 
 
@@ -43,14 +42,28 @@ def signal_columns(
     named = named_columns(table, columns)
     if named is None:
         if signal is None:
-            raise UsageError(
-                f"{table.path}: has no header, so say what its second column is with {_EITHER_SIGNAL}"
-            )
+            raise UsageError(f"{table.path}: {_ask_without_header(table.layout.width)}")
         return [_by_position(table, signal)]
     chosen = _signals(table, named, signal, polarisation, by_caller=columns is not None)
     if [column.role for column in chosen] == ["sample counts"]:
         return [_quotient(table, named, chosen[0])]
     return [_with_wavelength(table, named, column) for column in chosen]
+
+
+def _ask_without_header(width: int) -> str:
+    """Ask what the columns of a table without a header are."""
+    names = '`columns=["wavelength", "angle", "psi", "delta"]`'
+    if width <= 2:
+        return f"has no header, so say what its second column is with {_EITHER_SIGNAL}"
+    if width == 3:
+        return (
+            f"has 3 columns and no header; say what the second is with {_EITHER_SIGNAL} (the third then is "
+            f'its error), or that they are psi and delta with `signal="psi-delta"`, or name them: {names}'
+        )
+    return (
+        f"has {width} columns and no header; name them in order, _ to skip one, as in "
+        f'`columns=["wavelength", "R_percent", "_"]` or {names}'
+    )
 
 
 def counts_columns(table: Table, columns: str | Sequence[str] | None) -> SpectrumColumns:
@@ -212,7 +225,9 @@ def _unnamed_signals(table: Table, columns: Sequence[Column], signal: str | None
     named = [c for c in columns if c.name not in ("_", "")]
     processed = [c for c in named if c.role == "processed"]
     free = [c for c in named if c.role in ("other", "value")]
-    unnamed = processed or [c for c in free if c.name.strip().lower() not in _COUNTERS] or free
+    foreign = [c for c in columns if c.role in ("foreign", "counts", *COUNTS)]
+    counters = [] if foreign else free
+    unnamed = processed or [c for c in free if c.name.strip().lower() not in COUNTERS] or counters
     if signal is not None and unnamed and "wavelength" in roles:
         return [dataclasses.replace(c, role=signal) for c in unnamed]
     sample = only(table, columns, "sample counts")
@@ -226,16 +241,17 @@ def _unnamed_signals(table: Table, columns: Sequence[Column], signal: str | None
     if unnamed and "wavelength" in roles:
         percent = any(column.unit == "percent" for column in unnamed)
         unit = "" if percent else ' (unit: `signal_unit="percent"`, ...)'
+        states = "states" if len(unnamed) == 1 else "state"
         raise UsageError(
-            f"{table.path}: {listed(unnamed)} state no quantity; state it with {_EITHER_SIGNAL}{unit}"
+            f"{table.path}: {listed(unnamed)} {states} no quantity; state it with {_EITHER_SIGNAL}{unit}"
             ', or name the columns, as in `columns=["wavelength", "R"]`'
         )
-    foreign = [c for c in columns if c.role in ("foreign", "counts", *COUNTS)]
     if foreign:
+        names, verb = listed(foreign).replace("declared ", ""), "is" if len(foreign) == 1 else "are"
         raise DataError(
-            f"{table.path}: {listed(foreign).replace('declared ', '')} is neither a reflectance nor a "
-            "transmittance; export one of these or psi and delta, give raw counts with `reference`, or if it "
-            'is one, name it: `columns=["wavelength", "R"]`'
+            f"{table.path}: {names} {verb} neither a reflectance nor a transmittance; export one of these or "
+            "psi and delta, give raw counts with `reference`, or if it is one, name it: "
+            '`columns=["wavelength", "R"]`'
         )
     raise DataError(
         f"{table.path}: no column is a signal (R, T, Rs, Rp, Ts, Tp, absorbance or intensity) among "

@@ -25,6 +25,9 @@ _AXES = ("energy", "wavenumber", "frequency")
 _ABSORBANCES = {"absorbance": "T", "log(1/R)": "R"}
 _OF_ABSORBANCE = {"a", "au", "a.u.", "abs", "abs.", "absorbance", "od", "o.d.", "-", "1", ""}
 """Units that programs write behind an absorbance."""
+_MEASURED = ("measured", "meas", "meas.", "exp", "exp.", "experimental")
+_MODELLED = ("calculated", "calc", "calc.", "modelled", "modeled", "simulated", "fit", "fitted", "model")
+"""What some programs write in the place of a unit: the measurement, and the result of their fit to it."""
 _OTHER_UNITS = ("a.u.", "abs", "abs.", "a", "counts", "deg", "°")
 _UNIT_OF = {
     "wavelength": units.wavelength_unit,
@@ -107,6 +110,10 @@ def _column(position: int, name: str, role: str, written: str | None, *, bracket
     polarisation = role[1] if role in ("Rs", "Rp", "Ts", "Tp") else None
     base = "wavelength" if role in _AXES else role[0] if polarisation else role
     unit = _IMPLIED_UNIT.get(role)
+    if written in _MODELLED:
+        return Column(position, name, "other")
+    if written in _MEASURED:
+        written = None
     if written is None and role == "frequency":
         return Column(position, name, base, unknown_unit="frequency")
     if written is None:

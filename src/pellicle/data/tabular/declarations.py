@@ -14,13 +14,13 @@ from pellicle.data.tabular.text import Line
 
 _ENTRY = re.compile(r"[#\s\"']*(?P<key>[^=:;,\t]{1,40}?)[\"']?\s*(?:[=:]|[\t;,])\s*(?P<value>.*?)[\s\"';,]*")
 _AXIS = re.compile(
-    r"(x[ _-]?(axis|unit|label|title)s?( (mode|unit|label|title|type)s?)?"
+    r"(x[ _-]?(axis|unit|label|title)s?([ _-]?(mode|unit|label|title|type)s?)?"
     r"|(wavelength|axis|abscissa|spectral)[ _-]?(unit|type|mode|scale)s?)"
 )
 _SIGNAL = re.compile(
-    r"(y[ _-]?(axis|unit|label|title)s?( (mode|unit|label|title|type)s?)?"
+    r"(y[ _-]?(axis|unit|label|title)s?([ _-]?(mode|unit|label|title|type)s?)?"
     r"|(data|measurement|measuring|photometric|ordinate|display|acquisition)[ _-]?(mode|type|unit|scale)s?"
-    r"|ordinate|quantity|signal([ _-](type|unit))?|(spectrum|spectral)[ _-]type|measured quantity)"
+    r"|ordinate|quantity|technique|signal([ _-](type|unit))?|(spectrum|spectral)[ _-]type|measured quantity)"
 )
 _FACTS = {
     "instrument": r"instrument( (name|model|type|serial.*))?|spectrometers?( (name|model|type))?|model"
@@ -32,7 +32,7 @@ _FACTS = {
 }
 _FOREIGN = re.compile(
     r"(kubelka|k/s\b|f\(r\)|irradiance|radiance|raman|fluorescence|emission|phosphorescence|power|"
-    r"counts?\b|scope|raw|single beam|interferogram)",
+    r"counts?\b|scope|raw|single beam|interferogram|intensity)",
     re.IGNORECASE,
 )
 """Quantities that are neither a reflectance nor a transmittance."""

@@ -18,7 +18,8 @@ from pellicle.data.tabular.declarations import NOTHING_DECLARED, Declared, decla
 from pellicle.data.tabular.text import Line, TextFile, is_number, split
 from pellicle.errors import DataError
 
-_BLANK_NAMES = re.compile(r"[^\s(\[]+(?:\s*[(\[][^)\]]*[)\]])?|\S+")  # keeps `R (%)` one name
+_BLANK_NAMES = re.compile(r'"[^"]*"|[^\s(\[]+(?:\s*[(\[][^)\]]*[)\]])?|\S+')
+"""Names separated by blanks; `R (%)` and `"Wavelength nm."` are one name each."""
 _MARKER = ">>>>>"  # Ocean Optics puts such lines around the rows
 _GROUPED = re.compile(r"\b\d{1,3}(?:\.\d{3})+,\d+\b(?=\s*[;\t])")
 _SAMPLE = 60  # lines that vote on the dialect, spread over the file so that a preamble cannot outvote rows
@@ -74,7 +75,7 @@ def array_columns(
 
 def find_layout(file: TextFile) -> Layout:
     """Find the layout of a file's lines. Raises DataError if no line has two numbers."""
-    lines, path = file.lines, file.path
+    lines, path = _without_empty_columns(file.lines), file.path
     delimiter, decimal = _dialect(lines, path)
     first = _first_numeric(lines, delimiter, decimal)
     if first is None:
@@ -120,6 +121,17 @@ def find_layout(file: TextFile) -> Layout:
     width = max(width, len(names or ()))
     cells = TextCells(delimiter, decimal, width, max(width, trailing), rows)
     return Layout(tuple(names) if names else None, width, cells, tuple(notes), declared=declared)
+
+
+def _without_empty_columns(lines: Sequence[Line]) -> Sequence[Line]:
+    """Lines without the empty columns that a sheet may have to the left of its table."""
+    while lines[0].text[0] in "\t;," and all(line.text.startswith(lines[0].text[0]) for line in lines):
+        mark = lines[0].text[0]
+        filled = [Line(line.number, line.text[1:], line.bare[1:]) for line in lines if line.text.strip(mark)]
+        if not filled:
+            return lines
+        lines = filled
+    return lines
 
 
 def _hint(text: str) -> str:
@@ -207,7 +219,8 @@ def _rows_begin(
     start = first
     while start and _is_faulty_row(lines[start - 1], width, delimiter, decimal):
         start -= 1
-    if start and not lines[start - 1].text.startswith(_MARKER):
+    declared = declarations(lines[start - 1 : start])
+    if start and not (lines[start - 1].text.startswith(_MARKER) or declared.axis or declared.signal):
         cells = split(lines[start - 1].text, delimiter)
         # two words of free text look like two names; only a known name tells them apart
         known = any(column.role != "other" for column in recognise_all(cells))
@@ -238,7 +251,8 @@ def _is_faulty_row(line: Line, width: int, delimiter: str, decimal: str) -> bool
 def _header_cells(text: str, delimiter: str, width: int) -> list[str]:
     """Column names of a header line, whose delimiter may differ from that of the rows."""
     candidates = [
-        _BLANK_NAMES.findall(text) if d == " " else split(text, d) for d in (delimiter, *DELIMITERS)
+        [name.strip('"') for name in _BLANK_NAMES.findall(text)] if d == " " else split(text, d)
+        for d in (delimiter, *DELIMITERS)
     ]
     return next((names for names in candidates if len(names) == width), candidates[0])
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 
-from pellicle.data.tabular.columns import SIGNALS, Column, listed, parse_columns, recognise_all
+from pellicle.data.tabular.column_names import COUNTERS
+from pellicle.data.tabular.columns import SIGNALS, Column, listed, parse_columns, recognise, recognise_all
 from pellicle.data.tabular.declarations import Declared
 from pellicle.data.tabular.table import Table
-from pellicle.errors import DataError
+from pellicle.errors import DataError, UsageError
 
 
 def named_columns(table: Table, columns: str | Sequence[str] | None) -> tuple[Column, ...] | None:
@@ -16,9 +17,10 @@ def named_columns(table: Table, columns: str | Sequence[str] | None) -> tuple[Co
 
     Raises DataError where the file contradicts itself.
     """
-    if columns is not None:
-        return parse_columns(columns, table.path, table.layout.width)
     names, declared = table.layout.names, table.layout.declared
+    if columns is not None:
+        parsed = parse_columns(columns, table.path, table.layout.width)
+        return tuple(_with_unit_of_file(table, column) for column in parsed)
     if names is None:
         return _declared_columns(table)
     lowered = [name.lower() for name in names]
@@ -31,7 +33,10 @@ def named_columns(table: Table, columns: str | Sequence[str] | None) -> tuple[Co
     signals = [column for column in found if column.role in SIGNALS]
     _refuse_optical_constants(table, found)
     open_roles = ("other", "intensity", "counts", "processed")
-    unnamed = () if signals else [c for c in found if c.role in open_roles and c.name]
+    free = [c for c in found if c.role in open_roles and c.name.strip().lower() not in ("", *COUNTERS)]
+    foreign = declared.signal is not None and declared.signal.column.role == "foreign"
+    processed = [] if foreign else [c for c in free if c.role == "processed"]
+    unnamed = () if signals else processed or free
     return tuple(_with_declared(table, column, declared, column in unnamed) for column in found)
 
 
@@ -53,6 +58,31 @@ def _refuse_optical_constants(table: Table, columns: Sequence[Column]) -> None:
             f"{table.path}: contains optical constants ({listed(columns)}), not a measured spectrum; give "
             "the file as `layer` or `substrate`"
         )
+
+
+def _with_unit_of_file(table: Table, column: Column) -> Column:
+    """A column of the caller's with the unit that the file states, where the caller's name states none.
+
+    Raises UsageError where the file calls an absorbance what the caller calls a reflectance or transmittance.
+    """
+    if column.role not in ("wavelength", *SIGNALS) or column.unit or column.unknown_unit:
+        return column
+    names, declared = table.layout.names or (), table.layout.declared
+    own = recognise(names[column.position]) if column.position < len(names) else None
+    power = column.role in SIGNALS
+    statement = declared.signal if power else declared.axis
+    known = (*SIGNALS, "processed", "other") if power else ("wavelength",)
+    stated = [own] if own and own.role in known else []
+    stated += [statement.column] if statement else []
+    found = next((one for one in stated if one.unit or one.unknown_unit), None)
+    if found is None:
+        return column
+    if power and found.unit == "absorbance":
+        raise UsageError(
+            f"{table.path}: calls {found.name!r}, an absorbance, what `columns` calls {column.name!r}; name "
+            f"it absorbance there, or {column.name}_fraction if it is none"
+        )
+    return dataclasses.replace(column, unit=found.unit, unknown_unit=found.unknown_unit)
 
 
 def _declared_columns(table: Table) -> tuple[Column, ...] | None:

@@ -19,6 +19,7 @@ _NUMBER = re.compile(
 )
 _COMMA_NUMBER = re.compile(r"[+-]?\d+,\d+(?:e[+-]?\d+)?", re.IGNORECASE | re.ASCII)
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x19\x1b-\x1f\x7f]")  # but the end-of-file mark of DOS, 0x1a
+_SEPARATOR = re.compile(r"\"?sep=\S?\"?\s*", re.IGNORECASE)  # Excel's first line, which names the delimiter
 _MOST_ZEROS = 0.1  # share of zero bytes in a text
 _HEAD = 4096  # bytes that tell the kind of a file
 
@@ -119,7 +120,7 @@ def content_lines(text: str) -> tuple[list[Line], list[Line]]:
         plain = raw.strip(" ")
         if plain.startswith("#"):
             comments.append(Line(number, plain.lstrip("# "), ""))
-        elif plain.strip():
+        elif plain.strip() and not (number == 1 and _SEPARATOR.fullmatch(plain)):
             lines.append(Line(number, plain, plain.partition("#")[0].rstrip(" ")))
     return lines, comments
 
