@@ -73,6 +73,7 @@ ELSEWHERE = {
         "speed is measured by benchmarks, never tested",
     ),
     "make properties": "tests/properties: the same on a hundred scenes",
+    "make fuzz": "tests/data/test_fuzz.py: a short run",
     "make verdicts": "tests/test_verdicts.py: its model, cases and scores",
     "make peers": "installs several GB; tests/test_peers.py needs no other package",
     "make schema": "tests/recipes/test_schema.py: the kept schema",

@@ -242,6 +242,12 @@ def test_two_columns_that_could_be_the_same(write, header, refused):
     refused(write(f"{header}\n400,0.1,0.2\n500,0.1,0.2\n"), DataError, "could each be", "`columns`")
 
 
+def test_numbers_that_overflow(write, refused):
+    refused(write("wavenumber,T\n1e-305,0.1\n1e-304,0.2\n"), DataError, "line 2", "far from any wavelength")
+    path = write("nm,A\n400,-400\n500,0.1\n")
+    refused(path, DataError, "line 2", "column 'A'")
+
+
 def test_samples_of_a_brdf(write, refused):
     path = write("theta_i,phi_i,theta_o,phi_o,R\n30,0,30,180,0.4\n30,0,40,180,0.2\n")
     refused(path, UsageError, "samples of a BRDF", "`recipe`")

@@ -59,6 +59,11 @@ def test_transmittance_in_percent(write):
     }
 
 
+@pytest.mark.parametrize(("old", "new"), [("1.0\n0.0", "0.01\n0.0"), ("1.0\n0.0", "1.0\n2.5")])
+def test_a_scaled_ordinate(refused, old, new):
+    refused(PEDS.replace(old, new), "scales the ordinate", "export it again")
+
+
 @pytest.mark.parametrize(
     ("ordinate", "signal", "first"),
     [("A", "T", 10**-0.855), ("%R", "R", 0.00855), ("R", "R", 0.855), ("T", "T", 0.855)],

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from pellicle.data.formats.instrument_rows import Rows, counted, decimal_mark
 from pellicle.data.tabular.layout import Layout, plain_columns
-from pellicle.data.tabular.text import Line, TextFile
+from pellicle.data.tabular.text import Line, TextFile, is_number
 from pellicle.data.tabular.units import wavelength_unit
 from pellicle.errors import DataError
 
@@ -20,6 +20,8 @@ _ORDINATES = {
     "%R": "R (%)",
     "R": "R (-)",
 }
+_UNSCALED = (1.0, 0.0)
+"""Factor and offset of the ordinate."""
 _POINTS = 6  # place of the number of points below #GR
 _FACTS = {4: "date", 9: "sample", 12: "instrument"}
 """Facts by the number of their line; lines may be blank."""
@@ -40,6 +42,12 @@ def layouts(file: TextFile) -> list[Layout] | None:
     rows: Rows = [(line, line.bare.split()) for line in file.lines if line.number > keywords["DATA"]]
     if len(scale) < 2 or not rows:
         raise DataError(f"{file.path}: has no rows below #DATA, or no units below #GR; export it again")
+    for line, usual in zip(scale[2:4], _UNSCALED, strict=False):
+        if not is_number(line.text) or float(line.text) != usual:
+            raise DataError(
+                f"{file.path}: line {line.number} scales the ordinate ({line.text!r}, where {usual:g} "
+                "is usual), which programs treat differently; export it again without"
+            )
     names = [_axis(scale[0], file.path), _ordinate(scale[1])]
     stated = [line.text.strip() for line in scale[_POINTS : _POINTS + 1]]
     found = [("format", "PerkinElmer PEDS text")]

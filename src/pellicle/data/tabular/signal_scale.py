@@ -12,6 +12,9 @@ from pellicle.data.tabular.table import Table
 from pellicle.data.tabular.units import SIGNAL_UNITS, signal_unit
 from pellicle.errors import DataError, UsageError
 
+_LEAST = -300.0
+"""Absorbances below it would overflow; the signal is refused anyhow, as far above 1."""
+
 
 @dataclass(frozen=True)
 class Scale:
@@ -27,7 +30,7 @@ class Scale:
         An absorbance A becomes 10⁻ᴬ with the error ln 10 · 10⁻ᴬ σ.
         """
         if self.signal == "absorbance":
-            values = 10.0**-values
+            values = 10.0 ** -np.maximum(values, _LEAST)
         elif self.signal == "percent":
             values = values / 100
         if sigma is not None and self.sigma == "absorbance":

@@ -20,6 +20,7 @@ LONGEST_ASSUMED = 3300.0
 """An axis that goes beyond this (nm) without a unit is more likely in cm⁻¹ or Å; spectrometers with gratings
 end at 3300 nm."""
 
+_LEAST = 1e-12
 _REMEDY = "correct or delete that row"
 _LONG = '`wavelength_unit="cm-1"`, `wavelength_unit="A"`'
 
@@ -88,6 +89,8 @@ def read_axis(
         refuse_first(angles, (angles < 0) | (angles >= 90), table.places(angle.position), reason)
     place = table.places(wavelength.position)
     refuse_first(values, values <= 0, place, f"is not above zero; {_REMEDY}")
+    beyond = (values < _LEAST) | (values > 1 / _LEAST)
+    refuse_first(values, beyond, place, f"is far from any wavelength, in whatever unit; {_REMEDY}")
     if unit is None and not SHORTEST_ASSUMED <= values.max() <= LONGEST_ASSUMED:
         small = values.max() < SHORTEST_ASSUMED
         likely = '`wavelength_unit="um"`, `wavelength_unit="eV"`' if small else _LONG
