@@ -56,6 +56,16 @@ def test_a_bad_file_does_not_stop_the_others(pellicle, write):
     assert "bad.csv" in ran.err
 
 
+def test_an_angle_goes_into_the_copy(pellicle, write, tmp_path):
+    path = write("nm,psi,delta\n400,20,170\n500,21,160\n600,22,150\n")
+    assert pellicle("read", path, "--angle", "70", "--out", tmp_path / "out").code == 0
+    copy = tmp_path / "out" / "film.csv"
+    assert read_spectrum(copy).angle.tolist() == [70, 70, 70]
+    again = pellicle("read", copy, "--angle", "65")
+    assert again.code == 3
+    assert "leave --angle out" in again.err
+
+
 def test_wrong_usage(pellicle, write):
     path = write(WIDE)
     assert pellicle("read").code == 2

@@ -60,14 +60,21 @@ def read(
 
 
 def _spectra(path: str, flags: ReadingFlags) -> list[Spectrum]:
-    """Every spectrum of a file, unless one is chosen."""
+    """Every spectrum of a file, unless one is chosen, with the angle of the flag where the file has none."""
     from dataclasses import replace
+
+    import numpy as np
 
     from pellicle.cli.options import read as read_file
     from pellicle.cli.options import wavelength_range
 
     every = replace(flags, spectrum=flags.spectrum or "all", range=wavelength_range(flags.range))
-    return read_file(path, every, free_scale=False)
+    found = read_file(path, every, free_scale=False)
+    if flags.angle is None:
+        return found
+    if stated := [one.source for one in found if one.angle is not None]:
+        raise UsageError(f"{stated[0]}: has a column of angles; leave --angle out")
+    return [replace(one, angle=np.full(len(one), float(flags.angle))) for one in found]
 
 
 def _report_error(path: str, message: str, as_json: bool) -> None:
