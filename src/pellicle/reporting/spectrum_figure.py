@@ -43,7 +43,7 @@ def draw(spectrum: Spectrum) -> Figure:
 
 
 def _against_angle(spectrum: Spectrum) -> bool:
-    return spectrum.angle is not None and spectrum.wavelength[0] == spectrum.wavelength[-1]
+    return spectrum.angle is not None and bool(spectrum.wavelength[0] == spectrum.wavelength[-1])
 
 
 def _panel(axes: Axes, spectrum: Spectrum, values: np.ndarray, errors: np.ndarray | None) -> None:
