@@ -52,6 +52,8 @@ FORMATS = {
     "table of ε": (".csv", "Energy (eV);ε1;ε2\n3.099604961;2.24;0.3\n2.066403307;1.9575;0.14\n"),
     "table with units below": (".txt", "wavelength  n  k\num - -\n0.4 1.5 0.1\n0.6 1.4 0.05\n"),
     "table of numpy": (".dat", "# wavelength_nm n k\n400 1.5 0.1\n600 1.4 0.05\n"),
+    "table of MATLAB": (".txt", "% Photon energy (eV)  n  k\n3.099604961 1.5 0.1\n2.066403307 1.4 0.05\n"),
+    "commented names": (".csv", "# of 1999\n# wavelength_A,eps1,eps2\n4000,2.24,0.3\n6000,1.9575,0.14\n"),
 }
 UNIT = {
     "WVASE nm": "nm",
@@ -146,6 +148,7 @@ LARGEST_K = {
     "SpectraRay nm": "0.3",
     "WVASE eV": "0.3",
     "table of ε": "0.3",
+    "commented names": "0.3",
     "refractiveindex.info text": "0.125",
 }
 

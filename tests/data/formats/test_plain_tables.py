@@ -191,6 +191,7 @@ def test_declared_intensities_are_no_transmittance(refused):
         ";;;\n;Wavelength (nm);T (%);\n;400;81,5;\n;500;82,5;\n",
         ",,Wavelength (nm),T (%)\n,,400,81.5\n,,500,82.5\n",
         "sep=;\nWavelength (nm);T (%)\n400;81,5\n500;82,5\n",
+        "% Wavelength (nm)  T (%)\n400 81.5\n500 82.5\n",
         '"Sample - RawData"\n"Wavelength nm." "T%"\n400.00 81.5\n500.00 82.5\n',
     ],
 )

@@ -20,6 +20,8 @@ from pellicle.errors import DataError
 
 _BLANK_NAMES = re.compile(r'"[^"]*"|[^\s(\[]+(?:\s*[(\[][^)\]]*[)\]])?|\S+')
 """Names separated by blanks; `R (%)` and `"Wavelength nm."` are one name each."""
+_COMMENT_MARKS = ("%", "!", "//", "*", ";")
+"""Marks with which other programs begin a comment; `#` has been taken off before."""
 _MARKER = ">>>>>"  # Ocean Optics puts such lines around the rows
 _GROUPED = re.compile(r"\b\d{1,3}(?:\.\d{3})+,\d+\b(?=\s*[;\t])")
 _SAMPLE = 60  # lines that vote on the dialect, spread over the file so that a preamble cannot outvote rows
@@ -87,7 +89,7 @@ def find_layout(file: TextFile) -> Layout:
     start, header = _rows_begin(lines, first, width, delimiter, decimal)
     notes = []
     if header is not None:
-        names = _header_cells(lines[header].text, delimiter, width)
+        names = header_cells(lines[header].text, delimiter, width)
         if header + 1 < start:  # a row of units below the names
             units = split(lines[header + 1].text, delimiter)
             units += [""] * (len(names) - len(units))
@@ -213,7 +215,7 @@ def _rows_begin(
     preamble.
     """
     for header in range(first - 1, -1, -1):
-        if is_header(_header_cells(lines[header].text, delimiter, width)):
+        if is_header(header_cells(lines[header].text, delimiter, width)):
             units_below = header + 1 < first and is_unit_row(split(lines[header + 1].text, delimiter))
             return header + (2 if units_below else 1), header
     start = first
@@ -248,12 +250,18 @@ def _is_faulty_row(line: Line, width: int, delimiter: str, decimal: str) -> bool
     return len(cells) == width and is_number(cells[0], decimal)
 
 
-def _header_cells(text: str, delimiter: str, width: int) -> list[str]:
+def header_cells(text: str, delimiter: str, width: int) -> list[str]:
     """Column names of a header line, whose delimiter may differ from that of the rows."""
     candidates = [
         [name.strip('"') for name in _BLANK_NAMES.findall(text)] if d == " " else split(text, d)
         for d in (delimiter, *DELIMITERS)
     ]
+    words = candidates[-1]
+    marked = bool(words) and words[0] in _COMMENT_MARKS
+    if marked:
+        candidates.append(words[1:])
+    # names of several words, two blanks apart
+    candidates.append(re.split(r"\s{2,}", text.removeprefix(words[0]).strip() if marked else text.strip()))
     return next((names for names in candidates if len(names) == width), candidates[0])
 
 
@@ -262,5 +270,5 @@ def _commented_header(
 ) -> list[str] | None:
     """Names in the last comment above the rows, as numpy.savetxt writes them, if they are a header."""
     above = [comment for comment in comments if comment.number < first_row.number]
-    names = _header_cells(above[-1].text, delimiter, width) if above else []
+    names = header_cells(above[-1].text, delimiter, width) if above else []
     return names if len(names) == width and is_header(names) else None

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from pellicle.data.tabular.columns import Column, is_unit_row, recognise_all
+from pellicle.data.tabular.layout import header_cells
 from pellicle.data.tabular.table import Table, read_table
 from pellicle.data.tabular.text import split
 from pellicle.data.tabular.units import wavelength_unit
@@ -128,8 +129,15 @@ def _header(text: MaterialText, found: Table) -> Sequence[str] | None:
         names = split(above[-2], delimiter)
         units += [""] * (len(names) - len(units))
         names = [f"{n} ({u})" if wavelength_unit(u) else n for n, u in zip(names, units, strict=False)]
-    fits = len(names) == _cells_per_row(text, found) or delimiter != " "
-    return names if fits and _is_header(names) else found.layout.names
+    width = _cells_per_row(text, found)
+    if (len(names) == width or delimiter != " ") and _is_header(names):
+        return names
+    if found.layout.names:
+        return found.layout.names
+    above = text.text.splitlines()[: int(found.text.lines[0]) - 1]
+    comments = [line.strip().lstrip("#% ") for line in above if line.strip()[:1] in ("#", "%")]
+    commented = [header_cells(comment, delimiter, width) for comment in comments]
+    return next((names for names in commented[::-1] if len(names) == width and _is_header(names)), None)
 
 
 def _is_header(names: Sequence[str]) -> bool:
