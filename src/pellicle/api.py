@@ -51,7 +51,7 @@ def simulate(
     scene: Surface,
     *,
     directions: Directions | BrdfSamples | None = None,
-    noise: float = 0.0,
+    noise: float | str | Sequence[float | str] = 0.0,
     seed: int = 0,
 ) -> BrdfSamples: ...
 def simulate(
@@ -59,7 +59,7 @@ def simulate(
     wavelength: ArrayLike | None = None,
     *,
     directions: Directions | BrdfSamples | None = None,
-    noise: float = 0.0,
+    noise: float | str | Sequence[float | str] = 0.0,
     seed: int = 0,
     depolarisation_noise: float | None = None,
 ) -> Spectrum | BrdfSamples:
@@ -74,7 +74,8 @@ def simulate(
     - `directions`: pairs of directions to light and eye, or the samples of which to take them. Of a
       `Surface` only; 1000 pairs by default, spread over the lobe and around it.
     - `noise`: standard deviation of the normal noise, in the unit of the signal: a fraction for R and T,
-      degrees for Ψ and Δ, 1/sr for a BRDF. It becomes the σ of the result.
+      degrees for Ψ and Δ, 1/sr for a BRDF. It becomes the σ of the result. Of a BRDF also a share of the
+      signal, as "2 %", or a list of one for each channel.
     - `seed` of the noise.
     - `depolarisation_noise`: standard deviation of a measured depolarisation, a fraction, which then becomes
       part of a spectrum of Ψ and Δ; 0 for one without noise.
@@ -92,12 +93,14 @@ def simulate(
     ```
     """
     check_scene(scene)
-    if not noise >= 0:
+    if isinstance(noise, float | int) and not noise >= 0:
         raise UsageError(f"`noise` must not be negative, got {noise:g}")
     if isinstance(scene, Surface):
         _refuse("a Surface", wavelength=wavelength, depolarisation_noise=depolarisation_noise)
         return simulate_samples(scene, directions, noise, seed).samples
     _refuse("a Scene", directions=directions)
+    if not isinstance(noise, float | int):
+        raise UsageError(f"`noise` of a Scene must be one number, a standard deviation, not {noise!r}")
     return simulate_spectrum(
         scene, wavelength, noise=noise, seed=seed, depolarisation_noise=depolarisation_noise
     )

@@ -73,6 +73,7 @@ def test_outside_a_materials_table(check_refused, spectrum_file):
         (("--signal", "X"), ("--signal", "'X'")),
         (("--scale", "loose"), ("--scale", "'loose'")),
         (("--noise", "-1"), ("--noise",)),
+        (("--noise", "2 %"), ("--noise", "share of the signal", "BRDF")),
         (("--free", "q"), ("free 'q'",)),
         (("--free", "k=-1:1"), ("free 'k'", "negative")),
         (("--plate-mm", "1"), ("--plate-mm", "--back")),

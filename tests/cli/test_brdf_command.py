@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pellicle import api
+from pellicle.data.read_brdf import read_brdf_samples
 from pellicle.effects.surface import exact
 from pellicle.fitting.result import (
     Baseline,
@@ -182,6 +183,31 @@ def test_flags_go_before_the_recipe_and_a_bad_file_does_not_stop_the_others(fold
     assert [each["status"] for each in ran.objects] == ["failed", "not-identifiable"]
     assert "no such file" in ran.err
     assert np.all(fits[-1]["samples"].sigma == 0.5)
+
+
+def test_noise_as_a_share_of_the_signal(folder, fits, pellicle):
+    pellicle("fit", "--recipe", folder / "paint.toml", "--noise", "2 %")
+    samples = fits[-1]["samples"]
+    np.testing.assert_allclose(samples.sigma, 0.02 * samples.values)
+    recipe = RECIPE.replace("noise = 0.01", 'noise = ["2 %", "1 %", 0.01]')
+    (folder / "paint.toml").write_text(recipe)
+    pellicle("fit", "--recipe", folder / "paint.toml")
+    np.testing.assert_allclose(fits[-1]["samples"].sigma[:, 1:], [[0.002, 0.01]] * 30)
+    (folder / "paint.toml").write_text(recipe.replace('"1 %"', '"one"'))
+    ran = pellicle("fit", "--recipe", folder / "paint.toml")
+    assert ran.code != 0
+    assert "a share of the signal, as in '2 %', not 'one'" in " ".join(ran.err.split())
+
+
+def test_simulated_noise_as_a_share_of_the_signal(folder, pellicle):
+    out = folder / "simulated.csv"
+    ran = pellicle("simulate", folder / "paint.toml", "--out", out, "--noise", "2 %")
+    assert ran.code == 0
+    written = read_brdf_samples(out)
+    sigma = np.asarray(written.sigma)
+    z = (written.values - sigma / 0.02) / sigma
+    assert 0.9 < np.std(z) < 1.1
+    assert "noise 2 %" in out.read_text()
 
 
 @pytest.mark.parametrize(

@@ -82,7 +82,13 @@ class ReadingFlags(_Flags):
         Parameter(group=READING, help="Wavelengths to use in nm.", metavar="LO:HI", negative="", n_tokens=1),
     ] = None
     noise: Annotated[
-        float | None, flag(READING, "Standard deviation of every point; degrees for psi-delta.")
+        float | str | None,
+        Parameter(
+            group=READING,
+            help='Standard deviation of every point (degrees for psi-delta), or "2 %" of the BRDF.',
+            metavar="SIGMA",
+            negative="",
+        ),
     ] = None
     loss: Annotated[
         str | None, flag(READING, "least-squares, or huber or student-t to give outliers little weight.")

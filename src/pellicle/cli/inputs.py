@@ -6,11 +6,10 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from logging import getLogger
-from math import inf
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pellicle.cli.flags import ReadingFlags, SceneFlags, given
-from pellicle.cli.options import light, merged, read, scene_from_flags, wavelength_range
+from pellicle.cli.options import light, merged, read, scene_from_flags, sigma, wavelength_range
 from pellicle.cli.session import say
 from pellicle.errors import DataError, UsageError
 
@@ -228,8 +227,13 @@ def _check_reading(reading: ReadingFlags, signals: tuple[str, ...]) -> None:
         raise UsageError(f"--angle must lie in 0 to 90 degrees, got {reading.angle:g}")
     if reading.polarisation not in (None, "s", "p", "unpolarised"):
         raise UsageError(f"--polarisation must be s, p or unpolarised, not {reading.polarisation!r}")
-    if reading.noise is not None and not 0 < reading.noise < inf:
-        raise UsageError(f"--noise must be a standard deviation above zero, got {reading.noise:g}")
+    if reading.noise is not None:
+        from pellicle.data.noise_level import noise_level
+
+        if signals == ("brdf",):
+            noise_level(reading.noise, "--noise")
+        else:
+            sigma(reading.noise)
     if reading.loss is not None:
         from pellicle.fitting.robust_losses import check_loss
 

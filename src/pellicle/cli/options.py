@@ -93,13 +93,28 @@ def read(path: str, flags: ReadingFlags, *, free_scale: bool) -> list[Spectrum]:
         wavelength_unit=flags.wavelength_unit,
         signal_unit=flags.signal_unit,
         range=wavelength_range(flags.range),
-        noise=flags.noise,
+        noise=sigma(flags.noise),
         polarisation=flags.polarisation,
         calibrated=False if free_scale else None,
         folded=flags.folded,
         analyser=flags.analyser,
         spot=flags.spot,
     )
+
+
+def sigma(noise: float | str | None) -> float | None:
+    """The standard deviation of a spectrum. Raises UsageError where the noise is a share of the signal."""
+    from pellicle.data.noise_level import noise_level
+
+    if noise is None:
+        return None
+    level = noise_level(noise)
+    if level.relative:
+        raise UsageError(
+            f"`noise` {level} is a share of the signal, which only BRDF samples can have: give the standard "
+            "deviation of a spectrum as a number, or a sigma column in its file"
+        )
+    return level.value
 
 
 def wavelength_range(value: str | tuple[float, float] | None) -> tuple[float, float] | None:
@@ -146,4 +161,4 @@ def _from_counts(path: str, flags: ReadingFlags) -> Spectrum:
         angle=flags.angle or 0.0,
         polarisation=flags.polarisation or "unpolarised",
     )
-    return reflectance_from_counts(sample, reference, np.asarray(known), dark, noise=flags.noise)
+    return reflectance_from_counts(sample, reference, np.asarray(known), dark, noise=sigma(flags.noise))

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
 from pellicle.cli.session import not_negative, say, start
 from pellicle.cli.wavelengths import directions, wavelengths
-from pellicle.errors import DataError
+from pellicle.errors import DataError, UsageError
 
 if TYPE_CHECKING:
     from pellicle.recipes.film import FilmRecipe
@@ -24,7 +24,10 @@ def simulate(
     *,
     out: Annotated[str, Parameter(help="CSV file to write; an existing file is not overwritten.")],
     noise: Annotated[
-        float | None, Parameter(help="Standard deviation of the noise (the recipe's, or 0).")
+        float | str | None,
+        Parameter(
+            help='Standard deviation of the noise, or "2 %" of a BRDF (the recipe\'s, or 0).', metavar="SIGMA"
+        ),
     ] = None,
     seed: Annotated[int, Parameter(help="Seed of the noise.")] = 0,
     tolerance: Annotated[
@@ -38,18 +41,35 @@ def simulate(
     from pellicle.recipes import read_recipe
     from pellicle.recipes.surface import SurfaceRecipe
 
-    not_negative("--noise", noise or 0.0)
+    spread = _spread(noise)
     not_negative("--tolerance", tolerance)
     described = read_recipe(recipe)
     start()
-    noise = (described.tables.data.noise or 0.0) if noise is None else noise
-    source = f"recipe {Path(recipe).name}, seed {seed}, noise {noise:g}, pellicle {version('pellicle')}"
+    source = f"recipe {Path(recipe).name}, seed {seed}, noise {{}}, pellicle {version('pellicle')}"
     comments = ["SYNTHETIC: simulated, not measured", source]
     if isinstance(described, SurfaceRecipe):
-        _write_samples(described, out, noise, seed, tolerance, comments)
-    else:
-        _write_spectrum(described, out, noise, seed, tolerance, comments)
+        given = (described.tables.data.noise or 0.0) if spread is None else spread
+        comments[1] = source.format(f"{given:g}" if isinstance(given, float) else given)
+        _write_samples(described, out, given, seed, tolerance, comments)
+        return 0
+    if isinstance(spread, str):
+        raise UsageError(
+            f"--noise {spread} is a share of the signal, which BRDF samples can have: give a number"
+        )
+    sigma = (described.tables.data.noise or 0.0) if spread is None else spread
+    comments[1] = source.format(f"{sigma:g}")
+    _write_spectrum(described, out, sigma, seed, tolerance, comments)
     return 0
+
+
+def _spread(noise: float | str | None) -> float | str | None:
+    """The flag's noise: a number from 0, or a share of the signal as text. Raises UsageError."""
+    from pellicle.data.noise_level import noise_level
+
+    if noise is None or noise == 0:
+        return noise
+    level = noise_level(noise, "--noise")
+    return str(level) if level.relative else level.value
 
 
 def _write_spectrum(
@@ -93,7 +113,7 @@ def _csv(scene: Scene, result: SimulatedSignal, noise: float, comments: list[str
 
 
 def _write_samples(
-    recipe: SurfaceRecipe, out: str, noise: float, seed: int, tolerance: float, comments: list[str]
+    recipe: SurfaceRecipe, out: str, noise: Any, seed: int, tolerance: float, comments: list[str]
 ) -> None:
     from pellicle.data.write_brdf import write_brdf_samples
     from pellicle.fitting.spectra.messages import log_plan

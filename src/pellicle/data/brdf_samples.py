@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Int
 
+from pellicle.data.noise_level import noise_level
 from pellicle.data.signal_checks import Where, refuse_first
 from pellicle.data.tabular.columns import DIRECTIONS
 from pellicle.errors import UsageError
@@ -16,6 +18,9 @@ from pellicle.errors import UsageError
 CHANNELS = (("value",), ("R", "G", "B"))
 ROUNDING = 1e-3
 """Degrees by which theta may exceed its limits: π/2 with four decimals is not below the horizon."""
+
+DARKEST = 1e-3
+"""Share of the median value below which values are alike: to the cube root, and to a relative noise."""
 
 _TABLES = ("values", "sigma")
 _GOLDEN = (math.sqrt(5) - 1) / 2
@@ -33,6 +38,8 @@ class BrdfSamples:
     - `values`: the BRDF in 1/sr, shape (samples, channels).
     - `channels`: ("value",) or ("R", "G", "B").
     - `sigma`: standard deviations of `values`, in their shape, or None.
+    - `relative`: the share of the signal that `sigma` is in each channel, 0 where it is not in proportion;
+      a fit then takes σ from the fitted values, which have no noise.
     - `path`, `sha256`, `lines`: file, its digest and the source line of each sample.
     - `notes`: sentences on how the file was read.
 
@@ -51,6 +58,7 @@ class BrdfSamples:
     sha256: str = ""
     notes: tuple[str, ...] = ()
     lines: np.ndarray | None = None
+    relative: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
         if self.channels not in CHANNELS:
@@ -107,6 +115,27 @@ class BrdfSamples:
             return self
         note = f"{kept.size} of {len(self)} samples kept, spread over the file"
         return dataclasses.replace(self.at(kept), notes=(*self.notes, note))
+
+    def with_noise(self, noise: float | str | Sequence[float | str]) -> BrdfSamples:
+        """Return the samples with standard deviations.
+
+        **Arguments:** `noise`, one for all channels or one for each: a number in 1/sr, or a share of the
+        signal as "2 %". Values below a thousandth of the median have the noise of that.
+
+        **Raises:** UsageError where a noise is not above zero, or there is not one for each channel.
+        """
+        given = [noise] if isinstance(noise, str | float | int) else list(noise)
+        if len(given) not in (1, len(self.channels)):
+            raise UsageError(
+                f"`noise` has {len(given)} numbers for {len(self.channels)} channels "
+                f"({', '.join(self.channels)}); give one or each"
+            )
+        levels = [noise_level(each) for each in given] * (len(self.channels) // len(given))
+        share = np.array([level.value * level.relative for level in levels])
+        same = np.array([level.value * (not level.relative) for level in levels])
+        floor = max(DARKEST * float(np.median(self.values)), 1e-12)
+        sigma = share * np.maximum(self.values, floor) + same
+        return dataclasses.replace(self, sigma=sigma, relative=tuple(share.tolist()) if share.any() else None)
 
     def at(self, rows: np.ndarray) -> BrdfSamples:
         """Return the samples of these rows, in their order."""

@@ -1,9 +1,15 @@
-"""Covariance of a fit from its Jacobian, also where the data do not see a direction."""
+"""Covariance of a fit from its Jacobian, also where the data do not see a direction.
+
+Where the noise of the points is unknown and uneven, their residuals stand for it: the sandwich estimator of
+H. White (1980, Econometrica 48, 817), with each residual divided by one less its leverage (HC3, J. MacKinnon
+and H. White, 1985, J. Econometrics 29, 305).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,14 +29,28 @@ def correlation(covariance: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Errors:
-    """Covariance of parameters, then of nuisances, in their own units; `names` in the same order."""
+    """Covariance of parameters, then of nuisances, in their own units; `names` in the same order.
+
+    `curvature` is the covariance that the weights alone would give, None where it is the same.
+    """
 
     names: tuple[str, ...]
     covariance: np.ndarray
+    curvature: np.ndarray | None = None
 
     @property
     def stderr(self) -> np.ndarray:
         return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def by_curvature(self) -> np.ndarray:
+        """Covariance by the curvature of the misfit, as its profile likelihood has it."""
+        return self.covariance if self.curvature is None else self.curvature
+
+    @property
+    def widening(self) -> np.ndarray:
+        """Standard errors over those by the curvature of the misfit (parameters and nuisances,)."""
+        return self.stderr / np.maximum(np.sqrt(np.diag(self.by_curvature)), 1e-300)
 
     @property
     def correlation(self) -> np.ndarray:
@@ -89,14 +109,33 @@ def scaled(problem: Problem, unit: np.ndarray, at: Sequence[Any], variance: Sequ
     return Scaled(np.vstack([*blocks, priors]), stretch, names, np.array(pull, float))
 
 
-def errors(scaled: Scaled) -> Errors:
+def errors(scaled: Scaled, uneven: Mapping[int, np.ndarray] = MappingProxyType({})) -> Errors:
     """Covariance by a singular value decomposition of the scaled Jacobian.
+
+    `uneven` are the weighted residuals (rows, channels) of views whose residuals stand for the noise of their
+    points, each by the first of the view's rows in the Jacobian; channels of one point may be correlated.
 
     Nothing is inverted that is not there: a direction that the data do not see keeps its huge variance (a
     pseudo-inverse would call it 0, and an opaque gold film known to ± 0.00 nm).
     """
-    _, values, rows = np.linalg.svd(scaled.jacobian, full_matrices=False)
+    left, values, rows = np.linalg.svd(scaled.jacobian, full_matrices=False)
     points = len(scaled.jacobian) - len(scaled.names)
     floor = np.finfo(float).eps * points * max(values.max(initial=0.0), 1e-100)
     spread = scaled.stretch @ (rows.T / np.maximum(values, floor))
-    return Errors(scaled.names, spread @ spread.T)
+    plain = spread @ spread.T
+    if not uneven:
+        return Errors(scaled.names, plain)
+    middle = np.eye(len(values))
+    for first, residuals in uneven.items():
+        block = left[first : first + residuals.size].reshape(*residuals.shape, -1)
+        middle += _sum_of_squares(block, residuals) - np.einsum("rci,rcj->ij", block, block)
+    return Errors(scaled.names, spread @ middle @ spread.T, plain)
+
+
+def _sum_of_squares(block: np.ndarray, residuals: np.ndarray) -> np.ndarray:
+    """Σ uᵀe eᵀu over the rows (rows, channels, columns), with e = (1 − uuᵀ)⁻¹ r: r without the row's own
+    influence on the fit."""
+    # a point that alone determines a parameter has no residual: nothing divided by nothing
+    own = (1 + 1e-9) * np.eye(residuals.shape[1]) - block @ np.swapaxes(block, 1, 2)
+    scores = np.einsum("rci,rc->ri", block, np.linalg.solve(own, residuals[..., None])[..., 0])
+    return scores.T @ scores

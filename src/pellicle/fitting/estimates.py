@@ -59,7 +59,20 @@ def by_profile(
     """
     close = [list(r.parameters.values()) for r in near[:_MOST_NEAR] if r.delta_chi2 < RIVAL]
     others = np.reshape(close, (-1, len(ranked.problem.parameters)))
-    return limits(neighbourhood(ranked, errors.covariance, others), scans)
+    found = limits(neighbourhood(ranked, errors.by_curvature, others), scans)
+    if errors.curvature is None:
+        return found
+    parameters, values = ranked.problem.parameters, ranked.values.tolist()
+    rows = zip(found, parameters, values, errors.widening.tolist(), strict=False)
+    return [_stretched(own, value, ratio, (p.lower, p.upper)) for own, p, value, ratio in rows]
+
+
+def _stretched(limits: Limits, value: float, ratio: float, bounds: tuple[float, float]) -> Limits:
+    """Limits `ratio` times as far from the value, within the bounds: to first order those at which the
+    misfit has risen by the square of it more (A. Rotnitzky and N. Jewell, 1990, Biometrika 77, 485)."""
+    lower = None if limits.lower is None else max(value + ratio * (limits.lower - value), bounds[0])
+    upper = None if limits.upper is None else min(value + ratio * (limits.upper - value), bounds[1])
+    return Limits(ratio * limits.stderr, lower, upper)
 
 
 def estimates(

@@ -20,12 +20,14 @@ from pellicle.fitting.parameter import Parameter
 class Noise(NamedTuple):
     """Source of the weights: `given` is an absolute σ; `drifting` is the error of a model whose lamp drifts.
 
-    `correlated`: the covariance counts correlated residuals as fewer points even where σ is given.
+    `correlated`: the covariance counts correlated residuals as fewer points even where σ is given. `uneven`:
+    σ is not given and may differ from point to point, so the covariance takes each point's from its residual.
     """
 
     given: bool = True
     drifting: bool = False
     correlated: bool = False
+    uneven: bool = False
 
     @property
     def known(self) -> bool:
@@ -136,6 +138,13 @@ class View(Protocol):
 
     def residuals(self, at: Any) -> np.ndarray:
         """Weighted residuals (rows, channels)."""
+        ...
+
+    def at_model(self, at: Any) -> Any:
+        """Weights by the noise of the model's values over those by the measured ones (rows, channels).
+
+        1 where the noise does not depend on the signal.
+        """
         ...
 
     def jacobian(self, at: Any) -> np.ndarray:

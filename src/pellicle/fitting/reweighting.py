@@ -29,7 +29,8 @@ class ViewFit:
 
     `at` is the local model there; `variance` multiplies the σ² of the weights in the covariance; `length` is
     the number of neighbouring points that count as one; `chi2` is the misfit over `freedom` degrees;
-    `outliers` is the number of points to which a robust loss gives less than half their weight.
+    `outliers` is the number of points to which a robust loss gives less than half their weight. `scores`
+    (rows, channels) are the weighted residuals where these stand for the noise of the points.
     """
 
     at: Any
@@ -38,6 +39,7 @@ class ViewFit:
     chi2: float
     freedom: float
     outliers: int = 0
+    scores: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,8 @@ class _Noise(NamedTuple):
 
     `scale` (channels,) multiplies the weights, so that a noise that is not known becomes the rms of the
     residuals of its channels; `chi2` is the misfit after that. Where a loss is robust, `factor` multiplies
-    the weight of each point, and `inflation` the variance.
+    the weight of each point, and `inflation` the variance. `at_model` multiplies the weights of noise that
+    depends on the signal.
     """
 
     chi2: float
@@ -82,6 +85,7 @@ class _Noise(NamedTuple):
     scale: np.ndarray
     factor: Any = 1.0
     inflation: float = 1.0
+    at_model: Any = 1.0
 
     @property
     def reduced(self) -> float:
@@ -92,8 +96,13 @@ class _Noise(NamedTuple):
         # the ranked weights carry the rms already, so only the correlation remains to be counted
         length = self.length if view.noise.correlated or not view.noise.given else 1.0
         variance = length * (self.reduced if view.noise.drifting else 1.0)
-        outliers = int(np.sum(np.square(self.factor) < 0.5))
-        return ViewFit(at, variance * self.inflation, self.length, self.chi2, self.freedom, outliers)
+        weight, scores = np.square(self.factor), None
+        if view.noise.uneven:
+            scores = view.residuals(at)
+            if np.ndim(weight):  # the inflation contains their mean already
+                scores = scores * math.sqrt(np.mean(weight) / np.mean(weight * scores**2))
+        outliers = int(np.sum(weight < 0.5))
+        return ViewFit(at, variance * self.inflation, self.length, self.chi2, self.freedom, outliers, scores)
 
 
 def rank(
@@ -157,7 +166,8 @@ def _noise(problem: Problem, unit: np.ndarray, loss: Loss | None) -> list[_Noise
     """Noise of every view. A parameter that several views share costs each a share of it, by their points."""
     result = []
     for view, at in zip(problem.views, _local(problem, unit), strict=True):
-        residuals, groups = view.residuals(at), view.noise_groups
+        at_model, groups = view.at_model(at), view.noise_groups
+        residuals = view.residuals(at) * at_model
         totals = [sum(v.independent for v in problem.views if i in v.takes) for i in view.takes]
         used = sum(view.independent / total for total in totals) + len(view.nuisances(at))
         freedom = max(view.independent - used, 1)
@@ -173,16 +183,17 @@ def _noise(problem: Problem, unit: np.ndarray, loss: Loss | None) -> list[_Noise
                 scale[channels] = 1 / math.sqrt(max(misfit / own, 1e-12))
             chi2 += misfit if group.known else own
         if loss is None:
-            result.append(_Noise(chi2, freedom, view.correlation_length(residuals), scale))
+            length = view.correlation_length(residuals)
+            result.append(_Noise(chi2, freedom, length, scale, at_model=at_model))
             continue
         weight = loss.weight(residuals if view.noise.given else residuals / size)
         length = view.correlation_length(np.sqrt(weight) * residuals)
         widening = inflation(loss, residuals / size)
-        result.append(_Noise(chi2, freedom, length, scale, np.sqrt(weight), widening))
+        result.append(_Noise(chi2, freedom, length, scale, np.sqrt(weight), widening, at_model))
     return result
 
 
 def _reweighted(problem: Problem, noise: Sequence[_Noise]) -> Problem:
     pairs = zip(problem.views, noise, strict=True)
-    views = tuple(v.reweighted(own.scale * own.factor, 1 / own.length) for v, own in pairs)
+    views = tuple(v.reweighted(own.scale * own.factor * own.at_model, 1 / own.length) for v, own in pairs)
     return problem._replace(views=views)

@@ -26,12 +26,13 @@ class _Table(BaseModel):
 
 
 class SurfaceDataTable(_Table):
-    """`[data]`: `residual` is the scale of the comparison, `samples` the most to keep of a file."""
+    """`[data]`: `noise` is a standard deviation (1/sr) or a share of the signal ("2 %"), for all channels or
+    for each; `residual` is the scale of the comparison, `samples` the most to keep of a file."""
 
     signal: Literal["brdf"] = "brdf"
     files: list[str] = []
     columns: str | list[str] | None = None
-    noise: float | None = Field(default=None, gt=0)
+    noise: float | str | list[float | str] | None = None
     residual: Literal["linear", "cosine", "log", "cube-root"] | None = None
     samples: int | None = Field(default=None, gt=0)
 
@@ -94,7 +95,10 @@ class SurfaceRecipe:
         samples = read_brdf_samples(file, columns=data.columns, samples=data.samples)
         if data.noise is None:
             return samples
-        return replace(samples, sigma=np.full_like(samples.values, data.noise))
+        try:
+            return samples.with_noise(data.noise)
+        except UsageError as error:
+            raise DataError(f"{self.path}: data.{error}".replace("`", "")) from None
 
     def with_data(self, **keys: Any) -> SurfaceRecipe:
         """The recipe with these keys of `[data]` replaced."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -60,11 +61,12 @@ class SimulatedSamples(NamedTuple):
 def simulate_samples(
     surface: Surface,
     directions: Directions | BrdfSamples | None = None,
-    noise: float = 0.0,
+    noise: float | str | Sequence[float | str] = 0.0,
     seed: int = 0,
     tolerance: float = 0.0,
 ) -> SimulatedSamples:
-    """Simulate samples of the BRDF of a surface with normal noise of standard deviation `noise` (1/sr).
+    """Simulate samples of the BRDF of a surface with normal noise of standard deviation `noise`, 1/sr or a
+    share of the signal ("2 %"), for all channels or for each.
 
     Free parameters take their start values. Without `directions` there are 1000 pairs, spread over the
     lobe and around it. The noise becomes the σ of the samples; values that it takes below zero are set to 0,
@@ -85,13 +87,13 @@ def simulate_samples(
     with jax.enable_x64(True):
         view = surface_view(fixed, pairs, len(pairs.theta_i))
         clean = np.asarray(jax.jit(build(plan.static_key))(view), dtype=float)
-    noisy = clean + np.random.default_rng(seed).normal(0.0, 1.0, clean.shape) * noise
-    below = int(np.sum(noisy < 0))
     samples = BrdfSamples(
-        **{name: getattr(pairs, name) for name in Directions._fields},
-        values=np.maximum(noisy, 0.0),
-        channels=channels,
-        sigma=np.full(clean.shape, noise) if noise > 0 else None,
-        notes=(f"{below} values below zero through noise were set to 0",) if below else (),
+        **{name: getattr(pairs, name) for name in Directions._fields}, values=clean, channels=channels
     )
-    return SimulatedSamples(samples, plan)
+    if noise == 0:
+        return SimulatedSamples(samples, plan)
+    sigma = np.asarray(samples.with_noise(noise).sigma)
+    noisy = clean + np.random.default_rng(seed).normal(0.0, 1.0, clean.shape) * sigma
+    below = int(np.sum(noisy < 0))
+    notes = (f"{below} values below zero through noise were set to 0",) if below else ()
+    return SimulatedSamples(replace(samples, values=np.maximum(noisy, 0.0), sigma=sigma, notes=notes), plan)

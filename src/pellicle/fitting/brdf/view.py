@@ -12,7 +12,7 @@ import numpy as np
 from pellicle.brdf.directions import direction
 from pellicle.brdf.models import Evaluate, model
 from pellicle.brdf.two_lobes import two_lobes
-from pellicle.data.brdf_samples import BrdfSamples
+from pellicle.data.brdf_samples import DARKEST, BrdfSamples
 from pellicle.effects.plan import Plan
 from pellicle.effects.surface import exact
 from pellicle.fitting.brdf.residuals import RESIDUALS, slope
@@ -25,8 +25,6 @@ from pellicle.simulation.surface import build
 
 _ROUND = 128
 """Samples are padded to a multiple of this, so that files of nearly one length share a program."""
-_DARKEST = 1e-3
-"""Share of the median value below which all values are alike to the cube root."""
 
 
 class Samples(NamedTuple):
@@ -126,6 +124,7 @@ class SamplesView:
     noise: Noise
     rows: int
     stated: np.ndarray
+    relative: tuple[float, ...] | None = None  # see `BrdfSamples`
 
     @property
     def arrays(self) -> Arrays:
@@ -158,6 +157,24 @@ class SamplesView:
     def residuals(self, at: Local) -> np.ndarray:
         """Weighted residuals (rows, channels)."""
         return np.asarray(at.residual)[: self.rows]
+
+    def at_model(self, at: Local) -> Any:
+        """Weights of a relative noise of the model's values over those of the measured ones (rows, channels).
+
+        With the noise of measured values the darker of two equal samples counts more: at 5 % a fit is 0.5 %
+        too dark.
+        """
+        if self.relative is None:
+            return 1.0
+        samples = self.samples
+        transform, cosine = RESIDUALS[self.form.residual], samples.i[:, 2:3]
+
+        def compared_noise(rho):
+            rho = jnp.maximum(rho, samples.floor)
+            return np.asarray(slope(transform, rho, cosine, samples.floor) * rho)
+
+        ratio = compared_noise(samples.values) / compared_noise(jnp.asarray(at.model))
+        return np.where(np.array(self.relative) > 0, ratio, 1.0)[: self.rows]
 
     def jacobian(self, at: Local) -> np.ndarray:
         """Weighted ∂ compared number / ∂ free number, (rows · channels, free numbers)."""
@@ -232,13 +249,15 @@ def samples_view(
     i = np.asarray(direction(samples.theta_i, samples.phi_i))
     o = np.asarray(direction(samples.theta_o, samples.phi_o))
     known = samples.values
-    floor = np.full((size + extra, 1), _DARKEST * max(float(np.median(known)), 1e-9))
+    floor = np.full((size + extra, 1), DARKEST * max(float(np.median(known)), 1e-9))
     weight = np.ones_like(known)
     if samples.sigma is not None:
         rise = slope(RESIDUALS[form.residual], jnp.asarray(known), jnp.asarray(i[:, 2:3]), floor[:size])
         weight = 1 / (np.asarray(rise) * samples.sigma)
     up, weight = np.array([0.0, 0.0, 1.0]), pad(weight, 0.0)
     numbers = Samples(pad(i, up), pad(o, up), pad(known, np.median(known)), weight, floor, np.float64(1.0))
-    noise = Noise(given=samples.sigma is not None, correlated=True)
+    # weights that suit the eye are not those of the noise, which grows with the signal
+    noise = Noise(given=samples.sigma is not None, correlated=True, uneven=samples.sigma is None)
     takes = tuple(range(len(form.keys)))
-    return SamplesView(name, plan, form, numbers, fixed, takes, noise, size, weight)
+    view = SamplesView(name, plan, form, numbers, fixed, takes, noise, size, weight)
+    return replace(view, relative=samples.relative)

@@ -194,6 +194,10 @@ class SpectrumView:
         own = f".{self.name}" if self.name else ""
         return nuisance.coefficients(self.data, self.scene.instrument, at.gain, at.offset, self.points, own)
 
+    def at_model(self, at: Any) -> float:
+        """1: the noise of a spectrum does not depend on the model."""
+        return 1.0
+
     def jacobian(self, at: Local) -> np.ndarray:
         """Weighted ∂ model / ∂ parameter, then by each coefficient of scale and offset in units of its prior,
         (points, parameters and coefficients)."""
