@@ -8,6 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from pellicle.optics.array_namespace import namespace
+
 TO_SRGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
 """XYZ to linear sRGB (IEC 61966-2-1)."""
 
@@ -38,10 +40,11 @@ def srgb(linear: Any) -> Float[Array, "..."]:
     return jnp.where(dark, 12.92 * linear, 1.055 * safe ** (1 / 2.4) - 0.055)
 
 
-def lab(xyz: Any, white: Any) -> Float[Array, "... 3"]:
-    """Convert XYZ (..., 3) to CIE 1976 L*, a*, b* relative to `white` (3,)."""
-    t = xyz / jnp.asarray(white, jnp.result_type(xyz))
+def lab(xyz: Any, white: Any) -> Float[Array | np.ndarray, "... 3"]:
+    """Convert XYZ (..., 3) to CIE 1976 L*, a*, b* relative to `white` (3,); arrays of NumPy stay so."""
+    xp = namespace(xyz)
+    t = xyz / xp.asarray(white, xp.result_type(xyz))
     dark = t <= (6 / 29) ** 3
-    f = jnp.where(dark, t * (29 / 6) ** 2 / 3 + 4 / 29, jnp.cbrt(jnp.where(dark, 1.0, t)))
+    f = xp.where(dark, t * (29 / 6) ** 2 / 3 + 4 / 29, xp.cbrt(xp.where(dark, 1.0, t)))
     x, y, z = f[..., 0], f[..., 1], f[..., 2]
-    return jnp.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=-1)
+    return xp.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=-1)

@@ -12,8 +12,10 @@ import numpy as np
 
 from pellicle.colour import integration_bands, sensor
 from pellicle.colour.film import Colour
+from pellicle.colour.table import REFERENCE, TOLERANCE, FilmColourTable
 from pellicle.effects.film import exact
 from pellicle.errors import UsageError
+from pellicle.optics.pair import real
 from pellicle.planning.differences import signals
 from pellicle.scene.film import Scene, with_wavelength
 from pellicle.scene.free import Free, insert, start_values
@@ -55,6 +57,44 @@ def interference_colours(
         weighted = signals(exact(varying), tabulated(varying), grid, build) @ bands.weights
         xyz = jnp.asarray(weighted.reshape(len(angle), len(thickness), 3))
     return Colour(xyz, (float(white[0]), float(white[1]), float(white[2])))
+
+
+def colour_table(
+    scene: Scene,
+    thickness: tuple[float, float],
+    angle: tuple[float, float] = (0.0, 80.0),
+    layer: str | None = None,
+    *,
+    observer: str = "1931",
+    illuminant: str = "D65",
+    tolerance: float = TOLERANCE,
+) -> FilmColourTable:
+    """Table of a film's colours over thickness and angle, for lookups and for the inverse from colours.
+
+    **Arguments:** `thickness` (nm) and `angle` (degrees) are ranges; `tolerance` is the largest ΔE*ab; the
+    rest as for `interference_colours`. The spectrum is integrated in steps of 1 nm.
+
+    **Raises:** as `interference_colours` and `FilmColourTable.from_colours` do.
+    """
+    if scene.light.signal == "psi-delta":
+        raise UsageError("ellipsometry has no colour: use a recipe with signal R or T")
+    eye, position = sensor(observer, illuminant), varied_layer(scene, layer)
+    at_eye = with_wavelength(scene, eye.wavelength)
+    varying = _over(at_eye, np.array(thickness), np.array(angle), position)
+    with jax.enable_x64(True):
+        plan, evaluated = exact(varying), tabulated(varying)
+        varied: Any = scene.layers[position]
+        media = (varied.material, scene.ambient)
+        n1, n0 = (float(real(insert(m, start_values(m)).index(REFERENCE))[0]) for m in media)
+
+    def colours(thickness: np.ndarray, cosine: np.ndarray) -> np.ndarray:
+        grid = np.stack([thickness, np.rad2deg(np.arccos(cosine))], axis=-1)
+        with jax.enable_x64(True):
+            return signals(plan, evaluated, grid, build) @ eye.weights
+
+    return FilmColourTable.from_colours(
+        colours, thickness, white=eye.white, angle=angle, index=n1 / n0, tolerance=tolerance
+    )
 
 
 def varied_layer(scene: Scene, layer: str | None = None) -> int:
