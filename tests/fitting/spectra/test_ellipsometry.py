@@ -93,6 +93,8 @@ def test_what_ellipsometry_cannot_have():
     )
     with pytest.raises(UsageError, match=r"oxide.csv: ellipsometry needs its angle of incidence"):
         pl.fit(bare, scene())
+    with pytest.raises(UsageError, match=r"own angles of incidence, 70 degrees, .*`angle=60`"):
+        pl.fit(spectrum, scene(light=pl.Light(angle=60.0, signal="psi-delta")))
 
 
 def test_hafnia(shared_data):

@@ -88,6 +88,12 @@ def seen_as(scene: Scene, data: Spectrum) -> Scene:
                 f"{data.path}: has several angles of incidence, and one free angle cannot stand for them"
             )
     elif data.angle is not None:
+        if np.ndim(angle) == 0 and angle and not np.isclose(data.angle, angle, atol=1e-3).any():
+            own = " to ".join(f"{end:g}" for end in np.unique([data.angle.min(), data.angle.max()]))
+            raise UsageError(
+                f"{data.path}: has its own angles of incidence, {own} degrees, which contradicts "
+                f"`angle={float(angle):g}`; leave that out"
+            )
         angle = float(data.angle[0]) if np.ptp(data.angle) == 0 else data.angle
     stated = data.polarisation != "unpolarised"
     polarisation = data.polarisation if stated else scene.light.polarisation
