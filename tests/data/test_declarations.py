@@ -131,3 +131,41 @@ def test_facts(write):
     text = "Spectrometer: SD2000\nDate; 2024-03-05 10:00\nSample name: wafer 7\nnm,R\n400,0.1\n500,0.2\n"
     declared = dict(read_spectrum(write(text)).declared)
     assert declared == {"instrument": "SD2000", "date": "2024-03-05 10:00", "sample": "wafer 7"}
+
+
+@pytest.mark.parametrize(
+    ("head", "angle", "polarisation"),
+    [
+        ("Polarization: s\nAngle of incidence: 45\n", 45, "s"),
+        ("Polarisation state;TM\nAOI (deg);8,5°\n", 8.5, "p"),
+        ("# Polarizer = P-polarized\n# Einfallswinkel: 60 deg\n", 60, "p"),
+        ("Polarizer: none\nIncident angle: 0\n", 0, "unpolarised"),
+    ],
+)
+def test_declared_angle_and_polarisation(tmp_path, head, angle, polarisation):
+    path = tmp_path / "oblique.csv"
+    path.write_text(f"{head}nm;R\n400;0,5\n500;0,6\n", encoding="utf-8")
+    spectrum = read_spectrum(path)
+    np.testing.assert_array_equal(spectrum.angle, [angle, angle])
+    assert spectrum.polarisation == polarisation
+    assert any("as the file declares" in note for note in spectrum.notes)
+    other = "s" if polarisation == "p" else "p"
+    with pytest.raises(UsageError, match=f"declares {polarisation} light"):
+        read_spectrum(path, polarisation=other)
+
+
+@pytest.mark.parametrize("line", ["Angle: front", "Polarizer angle: 45", "Polarization: 30", "AOI: 120-140"])
+def test_what_declares_neither_angle_nor_polarisation(tmp_path, line):
+    path = tmp_path / "plain.csv"
+    path.write_text(f"{line}\nnm;R\n400;0,5\n500;0,6\n")
+    spectrum = read_spectrum(path)
+    assert spectrum.angle is None
+    assert spectrum.polarisation == "unpolarised"
+
+
+def test_columns_of_angles_and_polarisation_hold_against_the_text_above(tmp_path):
+    path = tmp_path / "columns.csv"
+    path.write_text("Angle: 10\nPolarization: p\nnm;angle;Rs\n400;45;0,5\n500;45;0,6\n")
+    spectrum = read_spectrum(path)
+    np.testing.assert_array_equal(spectrum.angle, [45, 45])
+    assert spectrum.polarisation == "s"

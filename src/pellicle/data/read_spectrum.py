@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 from logging import INFO, getLogger
 from typing import Any
 
+import numpy as np
+
 from pellicle.data.file_spectra import ALL, Candidate, chosen, file_candidates
 from pellicle.data.formats.detect import read_tables
 from pellicle.data.read_ellipsometry import SIGNAL, read_ellipsometry
@@ -155,7 +157,7 @@ class _Reading:
                 self.signal,
                 self.range,
                 self.noise,
-                self.polarisation,
+                _polarisation(table, one.columns, self.polarisation),
                 calibrated,
             )
         else:
@@ -168,6 +170,10 @@ class _Reading:
                 _folded(table) if self.folded is None else self.folded,
                 self.analyser,
             )
+        angle = table.layout.declared.angle
+        if angle is not None and spectrum.angle is None:
+            notes = (*spectrum.notes, f"angle of incidence {angle:g} degrees, as the file declares")
+            spectrum = replace(spectrum, angle=np.full(len(spectrum), angle), notes=notes)
         name, declared = one.name if several else "", table.layout.declared.facts
         if name or declared:
             spectrum = replace(spectrum, name=name, declared=declared)
@@ -182,3 +188,16 @@ class _Reading:
 def _folded(table: Table) -> bool | None:
     """True where the file says that its Δ is folded, None where it says nothing."""
     return True if dict(table.layout.declared.facts).get("delta", "").startswith("folded") else None
+
+
+def _polarisation(table: Table, columns: SpectrumColumns, asked: str | None) -> str | None:
+    """The polarisation that the caller or the file states. Raises UsageError where they differ."""
+    declared = table.layout.declared.polarisation
+    if declared is None or columns.signal.polarisation:
+        return asked
+    if asked not in (None, declared):
+        raise UsageError(
+            f'{table.path}: declares {declared} light, which contradicts `polarisation="{asked}"`; leave '
+            "that out"
+        )
+    return declared

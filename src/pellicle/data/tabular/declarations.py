@@ -22,6 +22,17 @@ _SIGNAL = re.compile(
     r"|(data|measurement|measuring|photometric|ordinate|display|acquisition)[ _-]?(mode|type|unit|scale)s?"
     r"|ordinate|quantity|technique|signal([ _-](type|unit))?|(spectrum|spectral)[ _-]type|measured quantity)"
 )
+_ANGLE = re.compile(
+    r"(angle|(angle of|incidence|incident) (incidence|angle)|aoi|einfallswinkel)"
+    r"( ?[(\[]?(deg(rees?)?|°)[)\]]?)?"
+)
+_DEGREES = re.compile(r"(\d+(?:[.,]\d+)?)\s*(?:°|deg(?:rees?)?\.?)?")
+_POLARISATION = re.compile(r"polari[sz](ation|er)( (state|mode|position))?")
+_POLARISED = {
+    "s": re.compile(r"(s|te)([ -]?(pol.*|wave|light))?"),
+    "p": re.compile(r"(p|tm)([ -]?(pol.*|wave|light))?"),
+    "unpolarised": re.compile(r"none|random|un-?polari[sz]ed|non-?polari[sz]ed"),
+}
 _FACTS = {
     "instrument": r"instrument( (name|model|type|serial.*))?|spectrometers?( (name|model|type))?|model"
     r"|origin|spectrometer/data system",
@@ -58,11 +69,14 @@ class Statement:
 
 @dataclass(frozen=True)
 class Declared:
-    """Axis, signal and facts (pairs of a key and a value) that a file declares; None where it does not."""
+    """Axis, signal, angle of incidence (degrees), polarisation and facts (pairs of a key and a value) that a
+    file declares; None where it does not."""
 
     axis: Statement | None = None
     signal: Statement | None = None
     facts: tuple[tuple[str, str], ...] = ()
+    angle: float | None = None
+    polarisation: str | None = None
 
 
 NOTHING_DECLARED = Declared()
@@ -74,7 +88,7 @@ def declarations(lines: Sequence[Line]) -> Declared:
     >>> declarations([Line(1, "Y-axis mode: %T", "")]).signal.column.unit
     'percent'
     """
-    axis = signal = None
+    axis = signal = angle = polarisation = None
     facts: dict[str, str] = {}
     for line in lines:
         entry = _ENTRY.fullmatch(line.text)
@@ -90,8 +104,13 @@ def declarations(lines: Sequence[Line]) -> Declared:
             signal = signal or Statement(column, line.number)
         elif _SIGNAL.fullmatch(key) and (column.role == "foreign" or _FOREIGN.match(value)):
             signal = signal or Statement(Column(0, value, "foreign"), line.number)
+        elif _ANGLE.fullmatch(key) and (degrees := _DEGREES.fullmatch(value)):
+            angle = float(degrees[1].replace(",", ".")) if angle is None else angle
+        elif _POLARISATION.fullmatch(key):
+            found = (name for name, words in _POLARISED.items() if words.fullmatch(value.lower()))
+            polarisation = polarisation or next(found, None)
         else:
             fact = next((name for name, words in _FACTS.items() if re.fullmatch(words, key)), None)
             if fact:
                 facts.setdefault(fact, value)
-    return Declared(axis, signal, tuple(facts.items()))
+    return Declared(axis, signal, tuple(facts.items()), angle, polarisation)
