@@ -223,6 +223,11 @@ def test_no_signal_column(write, refused):
     refused(write("wavelength,psi_err\n400,1\n500,2\n"), DataError, "no column is a signal", "`columns=[")
 
 
+def test_names_that_differ_by_case_are_different_quantities(write):
+    spectrum = read_spectrum(write("wavelength,x,y,Y,R\n400,0.1,0.2,0.3,0.4\n500,0.1,0.2,0.3,0.5\n"))
+    assert spectrum.values.tolist() == [0.4, 0.5]
+
+
 def test_no_wavelength_column(write, refused):
     refused(write("x,R\n400,0.1\n500,0.2\n"), DataError, "'x', 'R'", "`columns=[")
 

@@ -234,6 +234,28 @@ def test_parametrisations_of_alta(write, name):
     assert read.notes[0] == f"read as an ALTA text file of {name} (radians) and INV_STERADIAN"
 
 
+@pytest.mark.parametrize(("values", "names"), [("0.5", "value"), ("0.5 0.6 0.7", "R, G, B")])
+def test_alta_without_its_meaning_is_known_by_its_columns(write, values, names):
+    count = len(values.split())
+    read = read_brdf_samples(
+        write(f"#DIM 4 {count}\n#PARAM_IN SPHERICAL_TL_PL_TV_PV\n0.5 0 1 3.1 {values}\n")
+    )
+    assert read.values.tolist() == [[float(each) for each in values.split()]]
+    assert f"{names} in 1/sr, since it has no #PARAM_OUT" in read.notes[0]
+
+
+def test_samples_near_grazing_are_left_out(write, refused):
+    path = write(
+        "theta_i,phi_i,theta_o,phi_o,value\n10,0,20,180,1\n80,0,20,180,2\n20,0,75,180,3\n60,0,5,0,4\n"
+    )
+    read = read_brdf_samples(path, max_theta=75)
+    assert read.values.ravel().tolist() == [1, 3, 4]
+    assert read.notes[-1] == "left out: 1 samples more than 75 degrees from the normal"
+    refused(path, DataError, "no sample within 5 degrees", max_theta=5)
+    with pytest.raises(UsageError, match="`max_theta` must lie above 0"):
+        read_brdf_samples(path, max_theta=0)
+
+
 def test_intervals_and_cosines_of_alta(write, refused):
     header = ALTA.replace("INV_STERADIAN", "INV_STERADIAN_COSINE_FACTOR")
     read = read_brdf_samples(write(header + f"#VS 2\n0.5 0 {np.pi / 3!r} 3.1 0.2 0.1 0.5\n"))

@@ -36,8 +36,16 @@ def test_missing_keys_keep_the_defaults_of_the_model():
         ("granier-heidrik", {}, "did you mean 'granier-heidrich'"),
         ("microfacet-film", {"roughnes": 0.1}, "did you mean 'roughness'"),
         ("granier-heidrich", {"n": [1.4, 1.5]}, "2 numbers for 3 wavelengths"),
+        ("microfacet-film", {"roughness": [0.1, 0.1, 0.1]}, "roughness: one number for all channels"),
+        ("granier-heidrich", {"thickness": [300, 300]}, "thickness: one number for all channels"),
     ],
 )
 def test_a_wrong_surface_is_refused(name, numbers, message):
     with pytest.raises(UsageError, match=message):
         Surface(name, numbers)
+
+
+def test_a_list_of_one_is_a_number():
+    fixed = Surface("microfacet-film", {"roughness": [0.1], "k": [0.1, 0.2, 0.3]}).fixed_numbers()
+    assert fixed["roughness"].shape == ()
+    assert fixed["k"].tolist() == [0.1, 0.2, 0.3]

@@ -6,7 +6,6 @@ paper. Where it is ambiguous, the reading that is consistent with the rest of it
 
 - i and o point away from the surface; t_i and t_o are **both** their refractions downward (with one
   of them upward eq. 3 would cancel the phase), so that eq. 10's lobe is ⟨r_ti, −t_o⟩.
-- Eq. 8 is squared: unsquared it is negative.
 - Eq. 10 is null where ⟨−t_i, n₁⟩, ⟨−t_o, n₁⟩ or ⟨r_ti, −t_o⟩ is not positive: light reaches the lower
   boundary from within the layer. The paper's "always true" for parallel boundaries is wrong: two rays on
   one side at 88° are null for an index below √2.
@@ -85,7 +84,7 @@ def paths(i: Any, o: Any, n: Any, normal: Any = None) -> Paths:
 
 
 def normal_reflectance(n: Any) -> Any:
-    """Return f of eq. 8, squared, from air."""
+    """Return f of eq. 8, from air."""
     return ((1 - n) / (1 + n)) ** 2
 
 

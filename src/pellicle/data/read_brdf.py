@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from collections.abc import Sequence
 
@@ -27,6 +28,7 @@ def read_brdf_samples(
     *,
     columns: str | Sequence[str] | None = None,
     samples: int | None = None,
+    max_theta: float | None = None,
 ) -> BrdfSamples:
     """Read samples of a BRDF from CSV, ALTA text or MERL binary files, recognised by their content.
 
@@ -39,20 +41,36 @@ def read_brdf_samples(
     - `columns`: names in the order of a CSV's columns, "_" to skip one; overrides the header.
     - `samples`: how many to keep, spread over the file, the same at every call. By default all of a text
       file and 10 000 of a MERL file.
+    - `max_theta`: samples with light or viewer further than this from the normal (degrees) are left out:
+      near grazing many instruments, MERL's among them, measure badly.
 
     **Returns:** `BrdfSamples`.
 
     **Raises:** DataError (unreadable or impossible data) or UsageError (an argument missing or wrong): one
     sentence with file, line and remedy.
     """
+    if max_theta is not None and not 0 < max_theta <= 90:
+        raise UsageError(f"`max_theta` must lie above 0 and at most at 90 degrees, got {max_theta:g}")
     if is_merl(path):
-        return read_merl(path, samples)
+        return read_merl(path, samples, 90.0 if max_theta is None else max_theta)
     file = text_file(*read_bytes(path), path)
     header = alta.find_header(file.comments, file.path)
     layout = alta.layout(file, header) if header else find_layout(file)
     table = Table(file.path, file.sha256, layout)
     every = alta.from_table(table, header) if header else _from_csv(table, columns)
+    every = every if max_theta is None else _within(every, max_theta)
     return every if samples is None else every.thinned(samples)
+
+
+def _within(samples: BrdfSamples, max_theta: float) -> BrdfSamples:
+    """Leave out samples beyond an angle from the normal. Raises DataError where none is left."""
+    kept = np.flatnonzero(np.maximum(samples.theta_i, samples.theta_o) <= max_theta)
+    if not kept.size:
+        raise DataError(
+            f"{samples.path}: has no sample within {max_theta:g} degrees of the normal; raise `max_theta`"
+        )
+    note = f"left out: {len(samples) - kept.size} samples more than {max_theta:g} degrees from the normal"
+    return dataclasses.replace(samples.at(kept), notes=(*samples.notes, note))
 
 
 def _from_csv(table: Table, requested: str | Sequence[str] | None) -> BrdfSamples:

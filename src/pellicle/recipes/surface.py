@@ -27,7 +27,8 @@ class _Table(BaseModel):
 
 class SurfaceDataTable(_Table):
     """`[data]`: `noise` is a standard deviation (1/sr) or a share of the signal ("2 %"), for all channels or
-    for each; `residual` is the scale of the comparison, `samples` the most to keep of a file."""
+    for each; `residual` is the scale of the comparison, `samples` the most to keep of a file, `max_theta` the
+    largest angle from the normal (degrees) of samples to keep."""
 
     signal: Literal["brdf"] = "brdf"
     files: list[str] = []
@@ -35,6 +36,7 @@ class SurfaceDataTable(_Table):
     noise: float | str | list[float | str] | None = None
     residual: Literal["linear", "cosine", "log", "cube-root"] | None = None
     samples: int | None = Field(default=None, gt=0)
+    max_theta: float | None = Field(default=None, gt=0, le=90)
 
 
 class SurfaceTable(_Table):
@@ -92,7 +94,9 @@ class SurfaceRecipe:
     def read(self, file: str) -> BrdfSamples:
         """Read samples as `[data]` says, with σ where it gives `noise`. Raises DataError or UsageError."""
         data = self.tables.data
-        samples = read_brdf_samples(file, columns=data.columns, samples=data.samples)
+        samples = read_brdf_samples(
+            file, columns=data.columns, samples=data.samples, max_theta=data.max_theta
+        )
         if data.noise is None:
             return samples
         try:

@@ -16,6 +16,8 @@ from pellicle.errors import UsageError, did_you_mean
 from pellicle.scene.free import Free
 
 LETTERS = ("r", "g", "b")
+INDICES = ("ambient_n", "n", "k", "base_n", "base_k")
+"""Keys that may have one number for each channel."""
 
 
 class FreeNumber(NamedTuple):
@@ -64,6 +66,8 @@ class Surface:
                     f"{self.model} has no {key!r}{did_you_mean(key, known)}; it has {', '.join(known)}"
                 )
             count = np.size(value) if not isinstance(value, Free) else 1
+            if key not in INDICES and count != 1:
+                raise UsageError(f"{key}: one number for all channels was expected, got {count}")
             if count not in (1, self.channels):
                 raise UsageError(f"{key}: {count} numbers for {self.channels} wavelengths; give one or each")
 
@@ -103,7 +107,8 @@ class Surface:
             if isinstance(value, Free):
                 continue
             default = parameter.key not in self.numbers and parameter.per_channel
-            fixed[parameter.key] = np.asarray(value[0] if default else value, dtype=float)
+            number = np.asarray(value[0] if default else value, dtype=float)
+            fixed[parameter.key] = number if parameter.key in INDICES else number.reshape(())
         return fixed
 
     def start_numbers(self) -> dict[str, np.ndarray]:

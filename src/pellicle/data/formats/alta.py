@@ -69,7 +69,11 @@ _KEYS = ("DIM", "PARAM_IN", "PARAM_OUT", "VS")
 
 @dataclass(frozen=True)
 class Header:
-    """Values of the lines `#KEY value`; `intervals` has 0, 1 or 2 for each channel."""
+    """Values of the lines `#KEY value`; `intervals` has 0, 1 or 2 for each channel.
+
+    `param_out` is empty where the file does not have it: the number of values then tells a BRDF in 1/sr from
+    one in R, G and B.
+    """
 
     param_in: str
     param_out: str
@@ -95,12 +99,13 @@ def find_header(comments: Sequence[Line], path: str) -> Header | None:
             keys[key] = comment, value.strip()
     if "PARAM_IN" not in keys:
         return None
-    for key in _KEYS[:3]:
-        if key not in keys:
-            raise DataError(f"{path}: has an ALTA header without #{key}; add that line")
+    if "DIM" not in keys:
+        raise DataError(f"{path}: has an ALTA header without #DIM; add that line")
 
     param_in = _known(keys["PARAM_IN"], INPUTS, path, "convert the file to SPHERICAL_TL_PL_TV_PV with ALTA")
-    param_out = _known(keys["PARAM_OUT"], OUTPUTS, path, "write INV_STERADIAN if it is a BRDF in 1/sr")
+    param_out = ""
+    if "PARAM_OUT" in keys:
+        param_out = _known(keys["PARAM_OUT"], OUTPUTS, path, "write INV_STERADIAN if it is a BRDF in 1/sr")
     line, dim = keys["DIM"]
     coordinates = len(INPUTS[param_in][0])
     channels = next((names for names in CHANNELS if dim.split() == [f"{coordinates}", f"{len(names)}"]), None)
@@ -142,7 +147,8 @@ def layout(file: TextFile, header: Header) -> Layout:
     rows = [line for line in file.lines if line.number > header.line]
     if not rows:
         raise DataError(f"{file.path}: has an ALTA header but no rows; export it again")
-    note = f"read as an ALTA text file of {header.param_in} (radians) and {header.param_out}"
+    meaning = header.param_out or f"{', '.join(header.channels)} in 1/sr, since it has no #PARAM_OUT"
+    note = f"read as an ALTA text file of {header.param_in} (radians) and {meaning}"
     width = len(header.names)
     return Layout(header.names, width, TextCells(" ", ".", width, width, rows), (note,))
 

@@ -39,11 +39,14 @@ def is_merl(path: str | os.PathLike[str]) -> bool:
     return dimensions.size == 3 and bool(((dimensions > 0) & (dimensions < _LARGEST)).all())
 
 
-def read_merl(path: str | os.PathLike[str], samples: int | None = None) -> BrdfSamples:
+def read_merl(
+    path: str | os.PathLike[str], samples: int | None = None, max_theta: float = 90.0
+) -> BrdfSamples:
     """Read at most `samples` (10 000 by default) valid cells of a MERL file, spread over its grid.
 
-    The file is read piece by piece, not into memory. Cells with a direction below the surface and invalid
-    ones are left out and counted in the notes. The surface is isotropic, so phi_i is 0.
+    The file is read piece by piece, not into memory. Cells with a direction below the surface or more than
+    `max_theta` degrees from its normal, and invalid ones, are left out and counted in the notes. The surface
+    is isotropic, so phi_i is 0.
 
     Raises DataError for other dimensions, a wrong size or no valid cell.
     """
@@ -51,9 +54,11 @@ def read_merl(path: str | os.PathLike[str], samples: int | None = None) -> BrdfS
     with open_binary(path) as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
     cells = np.memmap(path, dtype="<f8", mode="r", offset=_HEADER, shape=(3, *SHAPE))
-    valid, below, invalid = _valid(cells)
+    valid, below, invalid = _valid(cells, max_theta)
     if not valid.size:
-        raise DataError(f"{path}: has no valid cell of a BRDF; download it again")
+        within = "" if max_theta == 90 else f" within {max_theta:g} degrees of the normal"
+        raise DataError(f"{path}: has no valid cell of a BRDF{within}; download it again")
+    beyond = "below the surface" if max_theta == 90 else f"more than {max_theta:g} degrees from the normal"
     kept = valid[spread(valid.size, SAMPLES if samples is None else samples)]
     h, d, p = np.unravel_index(kept, SHAPE)
     (theta_i, phi_i), (theta_o, phi_o) = map(
@@ -71,7 +76,7 @@ def read_merl(path: str | os.PathLike[str], samples: int | None = None) -> BrdfS
         notes=(
             "read as a MERL file of an isotropic surface, phi_i set to 0",
             f"{kept.size} of {valid.size} valid cells kept, spread over the grid",
-            f"left out: {below} cells with a direction below the surface, {invalid} invalid (negative) ones",
+            f"left out: {below} cells with a direction {beyond}, {invalid} invalid (negative) ones",
         ),
     )
 
@@ -95,13 +100,14 @@ def _check_size(path: str | os.PathLike[str]) -> None:
         raise DataError(f"{path}: {fault}, {size} bytes where a MERL file has {_SIZE}; download it again")
 
 
-def _valid(cells: np.ndarray) -> tuple[np.ndarray, int, int]:
-    """Flat indices of the valid cells; counts of cells below the surface and of invalid ones."""
+def _valid(cells: np.ndarray, max_theta: float) -> tuple[np.ndarray, int, int]:
+    """Flat indices of the valid cells; counts of cells beyond `max_theta` degrees and of invalid ones."""
+    lowest = max(float(np.cos(np.deg2rad(max_theta))), 0.0) if max_theta < 90 else 0.0
     keep, below, invalid = np.empty(SHAPE, dtype=bool), 0, 0
     theta_d, phi_d = np.meshgrid(THETA_D, PHI_D, indexing="ij")
     for at, theta_h in enumerate(THETA_H):
         light, viewer = from_half_difference(theta_h, 0.0, theta_d, phi_d)
-        above = (light[2] > 0) & (viewer[2] > 0)
+        above = (light[2] > lowest) & (viewer[2] > lowest)
         piece = cells[:, at]
         measured = ((piece >= 0) & (piece < np.inf)).all(axis=0)
         keep[at] = above & measured

@@ -23,13 +23,16 @@ def named_columns(table: Table, columns: str | Sequence[str] | None) -> tuple[Co
         return tuple(_with_unit_of_file(table, column) for column in parsed)
     if names is None:
         return _declared_columns(table)
-    lowered = [name.lower() for name in names]
-    twice = next((name for i, name in enumerate(names) if name and name.lower() in lowered[:i]), None)
+    found = recognise_all(names)
+    # x, y and Y are three quantities, R and r one
+    alike = [
+        name if column.role == "other" else name.lower() for name, column in zip(names, found, strict=True)
+    ]
+    twice = next((name for i, name in enumerate(names) if name and alike[i] in alike[:i]), None)
     if twice is not None:
         raise DataError(
             f"{table.path}: the header names {twice!r} twice; rename one, or name the columns with `columns`"
         )
-    found = recognise_all(names)
     signals = [column for column in found if column.role in SIGNALS]
     _refuse_optical_constants(table, found)
     open_roles = ("other", "intensity", "counts", "processed")
