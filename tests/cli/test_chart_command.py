@@ -57,3 +57,28 @@ def test_the_command_draws_it(pellicle, tmp_path):
         (("--out", tmp_path / "a.png", "--illuminant", "F2"), "illuminant 'F2' is unknown"),
     ):
         pellicle("chart", recipe, *flags).refused(3 if "illuminant" in words else 2, words)
+
+
+def test_inverse_of_a_chart(pellicle, tmp_path):
+    """Every likely thickness has the colour of its row, by the film's own colours; probabilities add up."""
+    recipe, out, table = tmp_path / "oxide.toml", tmp_path / "oxide.png", tmp_path / "inverse.csv"
+    recipe.write_text('[scene]\nsubstrate = "Si"\n[[scene.layer]]\nmaterial = "SiO2"\nthickness = 300\n')
+    ran = pellicle("chart", recipe, "--out", out, "--thickness", "0:500", "--invert", table)
+    assert (ran.code, ran.out) == (0, "")
+    assert "% of the colours have more than one" in ran.err
+    rows = [line.split(",") for line in table.read_text().splitlines() if not line.startswith("#")]
+    assert rows[0][:5] == ["hex", "red", "green", "blue", "thickness_nm"]
+    assert rows[0][5:] == ["stderr_nm", "probability", "delta_e"]
+    rgb, nm, probability, delta_e = (
+        np.array([r[i] for r in rows[1:]], float) for i in (slice(1, 4), 4, 6, 7)
+    )
+    own = film_colour(nm, pl.material("SiO2"), pl.material("Si"), method="uniform-64")
+    sure = probability > 0.2
+    assert np.max(np.abs(255 * np.asarray(own.srgb) - rgb)[sure]) < 6  # four times the noise
+    assert np.max(delta_e[sure]) < 5
+    for colour in {row[0] for row in rows[1:]}:
+        assert sum(p for p, r in zip(probability, rows[1:], strict=True) if r[0] == colour) > 0.99
+    expected = film_colour(100.0, pl.material("SiO2"), pl.material("Si"), method="uniform-64").srgb
+    near = np.argmin(np.abs(rgb - 255 * np.asarray(expected)).sum(axis=1))
+    assert abs(nm[near] - 100) < 3
+    pellicle("chart", recipe, "--out", tmp_path / "b.png", "--invert", table).refused(2, "exists")

@@ -27,11 +27,18 @@ def chart(
     angle: Annotated[str, Parameter(help="LO:HI in degrees.")] = "0:80",
     illuminant: Annotated[str, Parameter(help="E, A, D50, D55, D65 or D75.")] = "D65",
     observer: Annotated[str, Parameter(help="1931 (2 degrees) or 1964 (10 degrees).")] = "1931",
+    invert: Annotated[
+        str | None,
+        Parameter(help="CSV file to write: every thickness of each colour at the lowest angle, with ΔE."),
+    ] = None,
     light: Annotated[
         float, Parameter(help="Surfaces: angle between the light and the line of sight in degrees.")
     ] = 35.0,
 ) -> int:
     """Draw the interference colours of a recipe's film, or a sphere and the BRDF of a recipe's surface.
+
+    With --invert, also write the inverse: each 8-bit colour of the film, all thicknesses that have it within
+    the noise of a camera (1.5 of 255), their probability and ΔE.
 
     Example: pellicle chart film.toml --out colours.png --thickness 0:1000
     """
@@ -40,8 +47,10 @@ def chart(
 
     described = read_recipe(recipe)
     if isinstance(described, SurfaceRecipe):
-        if layer is not None or thickness is not None:
-            raise UsageError("--layer and --thickness are for films: a surface has its own thickness")
+        if not (layer is thickness is invert is None):
+            raise UsageError(
+                "--layer, --thickness and --invert are for films; a surface has its own thickness"
+            )
         return _surface(described, out, light)
     scene = described.scene()
     angles = _range("--angle", angle, 90.0)
@@ -49,12 +58,24 @@ def chart(
     start()
     from pellicle.reporting import colour_figures
 
+    eye = {"observer": observer, "illuminant": illuminant}
+    inverse = None
+    if invert is not None:
+        from pellicle.reporting.colour_inverse import invert_chart
+
+        inverse = invert_chart(scene, invert, nm, angles[0], layer, **eye, source=Path(recipe).name)
     outside = colour_figures.chart(
-        scene, out, nm, angles, layer, observer=observer, illuminant=illuminant, title=Path(recipe).stem
+        scene, out, nm, angles, layer, **eye, title=Path(recipe).stem, inverse=inverse
     )
     say(f"{out}: {nm[0]:g} to {nm[1]:g} nm, {angles[0]:g} to {angles[1]:g} degrees")
     if outside > 0.005:
         say(f"{100 * outside:.0f} % of the colours are outside sRGB and are shown by the nearest ones")
+    if inverse is not None:
+        ambiguous = 100 * inverse.ambiguous
+        say(
+            f"{invert}: thicknesses of {len(inverse.source)} colours at {angles[0]:g} degrees;"
+            f" {ambiguous:.0f} % of the colours have more than one"
+        )
     return 0
 
 

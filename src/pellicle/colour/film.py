@@ -27,7 +27,7 @@ class Colour(eqx.Module):
     @property
     def lab(self) -> Float[Array, "... 3"]:
         """CIE 1976 L*, a*, b*."""
-        return spaces.lab(self.xyz, self.white)
+        return jnp.asarray(spaces.lab(self.xyz, self.white))
 
     @property
     def linear_srgb(self) -> Float[Array, "... 3"]:

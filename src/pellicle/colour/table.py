@@ -263,6 +263,7 @@ class _Probes(NamedTuple):
     cosine: np.ndarray
     xyz: np.ndarray
     slopes: list[np.ndarray]  # in thickness and in cosine
+    steps: tuple[float, float]  # of the differences that give the slopes
 
     def error(self, nodes: np.ndarray, grid: _Grid, white: np.ndarray) -> TableError:
         def table(thickness: np.ndarray, cosine: np.ndarray) -> np.ndarray:
@@ -270,7 +271,8 @@ class _Probes(NamedTuple):
 
         lab = [np.asarray(spaces.lab(x, white)) for x in (table(self.thickness, self.cosine), self.xyz)]
         missed = np.linalg.norm(lab[0] - lab[1], axis=-1)
-        slopes = zip(_slopes(table, self.thickness, self.cosine), self.slopes, strict=True)
+        found = _slopes(table, self.thickness, self.cosine, self.steps)
+        slopes = zip(found, self.slopes, strict=True)
         worst = max(np.max(np.abs(one - exact)) / np.max(np.abs(exact)) for one, exact in slopes)
         return TableError(missed.mean(), missed.max(), worst)
 
@@ -278,15 +280,18 @@ class _Probes(NamedTuple):
 def _probes(colours: Colours, thickness: tuple[float, float], cosine: tuple[float, float]) -> _Probes:
     draws = np.random.default_rng(0).uniform(0.001, 0.999, (2, _PROBES))
     nm, at = (low + draw * (high - low) for draw, (low, high) in zip(draws, (thickness, cosine), strict=True))
-    return _Probes(nm, at, colours(nm, at), _slopes(colours, nm, at))
+    steps = (1e-4 * (thickness[1] - thickness[0]), 1e-4 * (cosine[1] - cosine[0]))
+    return _Probes(nm, at, colours(nm, at), _slopes(colours, nm, at, steps), steps)
 
 
-def _slopes(colours: Colours, thickness: np.ndarray, cosine: np.ndarray) -> list[np.ndarray]:
+def _slopes(
+    colours: Colours, thickness: np.ndarray, cosine: np.ndarray, steps: tuple[float, float]
+) -> list[np.ndarray]:
     """Derivatives of XYZ in thickness and in cosine, by central differences."""
     found = []
-    for step in ((1e-3, 0.0), (0.0, 1e-5)):
-        above, below = (colours(thickness + s * step[0], cosine + s * step[1]) for s in (1, -1))
-        found.append((above - below) / (2 * sum(step)))
+    for nm, tilt in ((steps[0], 0.0), (0.0, steps[1])):
+        above, below = (colours(thickness + s * nm, cosine + s * tilt) for s in (1, -1))
+        found.append((above - below) / (2 * (nm + tilt)))
     return found
 
 

@@ -20,6 +20,8 @@ from pellicle.synthetic.sphere import in_plane, render
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from pellicle.reporting.colour_inverse import ChartInverse
+
 ACROSS, UP = 600, 61
 """Pixels of the chart: thicknesses, angles."""
 INCIDENCES = (15.0, 45.0, 70.0)
@@ -41,11 +43,13 @@ def chart(
     observer: str = "1931",
     illuminant: str = "D65",
     title: str = "",
+    inverse: ChartInverse | None = None,
 ) -> float:
     """Draw a film's colours against thickness and angle of incidence into `path` (.png, .pdf or .svg).
 
     **Arguments:** `thickness` (nm) and `angle` (degrees) are ranges; `layer`, `observer` and `illuminant` are
-    those of `pellicle.synthetic.colours.interference_colours`.
+    those of `pellicle.synthetic.colours.interference_colours`. `inverse` adds a panel with every thickness
+    that has the colour of another one.
 
     **Returns:** the share of the colours that sRGB cannot show.
 
@@ -56,21 +60,36 @@ def chart(
     colours = interference_colours(scene, nm, degrees, layer, observer=observer, illuminant=illuminant)
     linear = np.asarray(colours.linear_srgb)
     shown = np.clip(np.asarray(colours.srgb), 0, 1)
-    save_figure(_draw_chart(shown, thickness, angle, f"{title}   {illuminant}"), target)
+    save_figure(_draw_chart(shown, thickness, angle, f"{title}   {illuminant}", inverse), target)
     return float(np.mean(np.any((linear < -1e-3) | (linear > 1 + 1e-3), axis=-1)))
 
 
 def _draw_chart(
-    srgb: np.ndarray, thickness: tuple[float, float], angle: tuple[float, float], title: str
+    srgb: np.ndarray,
+    thickness: tuple[float, float],
+    angle: tuple[float, float],
+    title: str,
+    inverse: ChartInverse | None,
 ) -> Figure:
-    """The colours over all angles, and below them a strip of the first angle."""
-    figure = new_figure(8, 4)
-    swatch, strip = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [4, 1]})
+    """The colours over all angles, below them a strip of the first angle, and then the inverse."""
+    heights = [4, 1] if inverse is None else [4, 1, 6]
+    figure = new_figure(8, 0.8 * sum(heights))
+    swatch, strip, *others = figure.subplots(
+        len(heights), 1, sharex=True, gridspec_kw={"height_ratios": heights}
+    )
     swatch.imshow(srgb, origin="lower", aspect="auto", extent=(*thickness, *angle))
     swatch.set(ylabel="angle of incidence (°)")
     swatch.set_title(title.strip(), loc="left")
     strip.imshow(srgb[:1], origin="lower", aspect="auto", extent=(*thickness, 0, 1))
-    strip.set(xlabel="thickness (nm)", yticks=[], ylabel=f"{angle[0]:g}°")
+    strip.set(yticks=[], ylabel=f"{angle[0]:g}°")
+    for axes in others:
+        assert inverse is not None
+        row, order = np.nonzero(inverse.admissible)
+        found = inverse.found.thickness[row, order]
+        size = 12 + 24 * np.sqrt(inverse.found.probability[row, order])
+        axes.scatter(inverse.source[row], found, size, color=inverse.srgb[row], edgecolors="none")
+        axes.set(ylabel=f"thicknesses (nm) of the\ncolour at {angle[0]:g}°", ylim=thickness)
+    (others or [strip])[-1].set_xlabel("thickness (nm)")
     return figure
 
 
