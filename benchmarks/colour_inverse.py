@@ -1,11 +1,11 @@
 """Thickness from 8-bit sRGB colours: how often it is right, and how long it takes, as Markdown.
 
-Run `python benchmarks/colour_inverse.py`. The films have random thicknesses, seen at 0° or at 0°, 35° and 60°, with
-the exposure of a perfect reflector known, or free between 0.5 and 2. Their colours are computed in steps of
-1 nm, get normal noise of 1.5 of 255 in each channel, and are rounded to 8 bits. The table gives the share whose
-best order is within 5 nm, the share within 5 nm of any order that is listed, the mean probability of the best
-order, and, among the colours whose best order is a wrong one (off by more than 5 nm and four standard errors),
-the share that is called ambiguous.
+Run `python benchmarks/colour_inverse.py`. The films have random thicknesses, seen at 0°, or at 0°, 35° and
+60°, with the exposure of a perfect reflector known, or free between 0.5 and 2. Their colours are computed in
+steps of 1 nm, get normal noise of 1.5 of 255 in each channel, and are rounded to 8 bits. The table gives the
+share whose best order is within 5 nm, the share within 5 nm of any order that is listed, the mean probability
+of the best order, and, among the colours whose best order is a wrong one (off by more than 5 nm and by more
+than four standard errors), those that are called ambiguous.
 """
 
 from __future__ import annotations

@@ -135,13 +135,13 @@ class FilmColourTable(eqx.Module):
 
         **Raises:** ValueError for an empty range, and for colours that are not finite.
         """
-        low, high = (float(np.cos(np.deg2rad(x))) for x in (angle[1], angle[0]))
+        low, high = (np.cos(np.deg2rad(x)) for x in (angle[1], angle[0]))
         if not (0 <= thickness[0] < thickness[1] < np.inf and 0 <= low < high <= 1):
             raise ValueError(
                 "a table needs a rising `thickness` (nm) and a rising `angle` within 0 to 90 degrees, got"
                 f" {thickness} and {angle}"
             )
-        shear = 1 / index**2 if index > 1 else 0.0  # total reflection: no fringe rests on a path
+        shear = np.float64(1 / index**2 if index > 1 else 0.0)  # total reflection: no fringe rests on a path
         colours = _in_batches(colours)
         path = thickness[0] * _shortening(low, shear), thickness[1] * _shortening(high, shear)
         grid = _Grid(np.array(path), np.array([low, high]), np.array(shear))
@@ -201,7 +201,7 @@ class _Grid(NamedTuple):
 
 def _shortening(cosine: Any, shear: Any) -> Any:
     """cos θ₁: the optical path in the layer relative to that at normal incidence."""
-    return (1.0 - (1.0 - cosine * cosine) * shear) ** 0.5
+    return namespace(cosine).sqrt(1.0 - (1.0 - cosine * cosine) * shear)
 
 
 def _interpolated(nodes: Any, grid: _Grid, thickness: Any, cosine: Any) -> Any:
