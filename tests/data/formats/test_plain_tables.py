@@ -227,3 +227,10 @@ def test_shares_absorbed_and_ratios_of_amplitudes_are_no_reflectance(refused, he
 def test_percent_in_the_names_of_samples(write):
     spectra = read_spectra(write("nm,S1 (%),S2 (%)\n400,50,60\n500,52,62\n"), signal="R", spectrum="all")
     np.testing.assert_allclose(spectra[1].values, [0.6, 0.62])
+
+
+def test_ellipsometry_that_is_no_table_of_wavelengths(refused):
+    wide = "nm,Psi 65,Delta 65,Psi 70,Delta 70\n400,25,120,20,100\n500,26,119,21,99\n"
+    refused(wide, "'Psi 65'", "several angles", "angle_deg")
+    refused(wide, "several angles", signal="R", signal_unit="percent")
+    refused("70 168.2 10.5\n71 167.9 10.1\n", "wavelength_nm", columns="angle,delta,psi")

@@ -144,6 +144,11 @@ def wavelength_and_angle(
     if len({column.unit for column in axes} - {None}) == len(axes) > 1:  # one axis in several units
         axes = [next((column for column in axes if column.unit == "nm"), axes[0])]
     wavelength, angle = only(table, axes, "wavelength"), only(table, columns, "angle")
+    if wavelength is None and angle is not None:
+        raise DataError(
+            f"{table.path}: has angles of incidence but no wavelength among {listed(columns)}; add a column "
+            "wavelength_nm with that of the light"
+        )
     if wavelength is None:
         raise DataError(
             f"{table.path}: no column is a wavelength, energy or wavenumber among {listed(columns)}; "
@@ -228,6 +233,13 @@ def _unnamed_signals(table: Table, columns: Sequence[Column], signal: str | None
     foreign = [c for c in columns if c.role in ("foreign", "counts", *COUNTS)]
     counters = [] if foreign else free
     unnamed = processed or [c for c in free if c.name.strip().lower() not in COUNTERS] or counters
+    angles = [c for c in unnamed if c.name.strip().lower().startswith(("psi", "delta", "ψ", "δ"))]
+    if len(angles) > 1:
+        raise DataError(
+            f"{table.path}: {listed(angles)} may be psi and delta at several angles; choose a pair with "
+            '`columns=["wavelength", "psi", "delta", "_"]` and `angle=70`, or write them below each other with '
+            "a column angle_deg"
+        )
     if signal is not None and unnamed and "wavelength" in roles:
         return [dataclasses.replace(c, role=signal) for c in unnamed]
     sample = only(table, columns, "sample counts")
