@@ -111,7 +111,8 @@ def test_any_file_is_read_or_refused_in_one_sentence(path, content):
 ROLES = {
     *("wavelength", "R", "T", "intensity", "counts", "sigma", "angle"),
     *("psi", "delta", "sigma_psi", "sigma_delta", "N", "C", "S", "alpha", "beta", "analyser"),
-    *("depolarisation", "sigma_depolarisation"),
+    *("depolarisation", "sigma_depolarisation", "tan_psi", "cos_delta"),
+    *("processed", "sample counts", "reference counts", "dark counts", "foreign"),
     *("theta_i", "phi_i", "theta_o", "phi_o", "value", "G", "B", "sigma_R", "sigma_G", "sigma_B"),
     "other",
 }

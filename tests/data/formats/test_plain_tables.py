@@ -218,14 +218,14 @@ def test_tables_without_a_header_are_asked_for_every_column(refused, columns):
     refused(f"400{row}\n500{row}\n", f"{columns} columns and no header", '"psi", "delta"]`')
 
 
-@pytest.mark.parametrize("header", ["Absorption (%)", "Re(rho),Im(rho)"])
+@pytest.mark.parametrize("header", ["Absorption (%)", "Re(rho),Im(rho)", "1-R", "-ln(T)"])
 def test_shares_absorbed_and_ratios_of_amplitudes_are_no_reflectance(refused, header):
     row = ",0.5" * len(header.split(","))
     refused(f"nm,{header}\n400{row}\n500{row}\n", "neither", signal="R")
 
 
 def test_percent_in_the_names_of_samples(write):
-    spectra = read_spectra(write("nm,S1 (%),S2 (%)\n400,50,60\n500,52,62\n"), signal="R", spectrum="all")
+    spectra = read_spectra(write("nm,S1 (%),R(%) site 2\n400,50,60\n500,52,62\n"), signal="R", spectrum="all")
     np.testing.assert_allclose(spectra[1].values, [0.6, 0.62])
 
 
@@ -234,3 +234,8 @@ def test_ellipsometry_that_is_no_table_of_wavelengths(refused):
     refused(wide, "'Psi 65'", "several angles", "angle_deg")
     refused(wide, "several angles", signal="R", signal_unit="percent")
     refused("70 168.2 10.5\n71 167.9 10.1\n", "wavelength_nm", columns="angle,delta,psi")
+
+
+def test_logarithms_are_absorbances(write):
+    assert read_spectrum(write("nm,-log(R)\n400,1\n500,2\n")).signal == "R"
+    np.testing.assert_allclose(read_spectrum(write("nm,-log10(T)\n400,1\n500,2\n")).values, [0.1, 0.01])

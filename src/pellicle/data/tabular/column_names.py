@@ -28,10 +28,11 @@ NAMES = {
     "Ts": ("ts", "t_s", "transmittance_s"),
     "Tp": ("tp", "t_p", "transmittance_p"),
     "absorbance": (
+        *("-log(t)", "-log10(t)", "log(1/t)"),
         *("a", "abs", "abs.", "absorbance", "optical density", "optical_density", "od", "o.d."),
         *("extinktion", "absorbanz", "absorbancia", "assorbanza", "吸光度"),
     ),
-    "log(1/R)": ("log(1/r)", "log 1/r", "log_1_r", "apparent absorbance"),
+    "log(1/R)": ("log(1/r)", "-log(r)", "-log10(r)", "log 1/r", "log_1_r", "apparent absorbance"),
     "intensity": ("intensity", "relative intensity", "relative_intensity"),
     "counts": ("counts", "raw"),
     "processed": ("processed",),
@@ -80,6 +81,7 @@ FOREIGN = (
     *("absorptance", "cd", "circular dichroism", "ellipticity", "emission", "f(r)", "fluorescence"),
     *("irradiance", "k/s", "kubelka-munk", "mdeg", "photoluminescence", "pl", "pl intensity", "power"),
     *("radiance", "raman", "raman intensity", "scope", "single beam"),
+    *("absorption coefficient", "attenuation", "insertion loss", "1-r", "1-t", "1-r-t", "-ln(t)", "-ln(r)"),
     *("absorption (%)", "absorption [%]"),  # a share, as absorptance
     *("re(rho)", "im(rho)", "re(ρ)", "im(ρ)", "re_rho", "im_rho"),
     *("is", "ic", "ic'"),  # of a phase-modulated ellipsometer

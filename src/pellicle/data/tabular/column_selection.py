@@ -236,9 +236,9 @@ def _unnamed_signals(table: Table, columns: Sequence[Column], signal: str | None
     angles = [c for c in unnamed if c.name.strip().lower().startswith(("psi", "delta", "ψ", "δ"))]
     if len(angles) > 1:
         raise DataError(
-            f"{table.path}: {listed(angles)} may be psi and delta at several angles; choose a pair with "
-            '`columns=["wavelength", "psi", "delta", "_"]` and `angle=70`, or write them below each other with '
-            "a column angle_deg"
+            f"{table.path}: {listed(angles)} may be psi and delta at several angles; choose two with "
+            '`columns=["wavelength", "psi", "delta", "_"]` and `angle=70`, or write them below each other '
+            "with a column angle_deg"
         )
     if signal is not None and unnamed and "wavelength" in roles:
         return [dataclasses.replace(c, role=signal) for c in unnamed]

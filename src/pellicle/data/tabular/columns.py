@@ -52,6 +52,8 @@ _TAIL = re.compile(
 _QUALIFIER = re.compile(r"^(specular|regular|total|absolute|measured|mean|averaged?|corrected) +(?=\S)")
 _NAMED = re.compile(r".*\S\s*%\s*([rt])")  # `film 1 %R`
 
+_PERCENT_INSIDE = re.compile(r"[(\[]\s*%\s*[)\]]")
+
 SKIP = "_"
 UNSTATED = "unit not stated"
 """Unit in the name of a column whose unit must be asked for."""
@@ -94,7 +96,7 @@ def recognise(name: str, position: int = 0) -> Column:
             column = _column(position, name, role, written, bracketed=bool(tail["open"]))
             if column.role != "other":
                 return column
-    percent = percent or plain.endswith(("(%)", "[%]"))
+    percent = percent or bool(_PERCENT_INSIDE.search(plain))
     if named := _NAMED.fullmatch(plain):
         return Column(position, name, named[1].upper(), "percent")
     return Column(position, name, "other", "percent" if percent else None)
