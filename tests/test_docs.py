@@ -82,6 +82,7 @@ ELSEWHERE = {
     "pellicle demo": "tests/cli/test_demo_command.py",
     "pellicle --install-completion": "would change the user's shell; part of cyclopts",
     "python benchmarks/calibration.py": _LONG_STUDY,
+    "python benchmarks/colour_inverse.py": "tests/colour/test_inverse.py: 300 colours of one film",
     "python benchmarks/posterior.py": _LONG_STUDY,
     "python benchmarks/colour.py": _LONG_STUDY,
     "python benchmarks/brdf_recovery.py": _LONG_STUDY,
@@ -225,10 +226,10 @@ def test_commands_parse_and_their_files_exist(page):
         words = [word for word in shlex.split(command)[1:] if word != "--verbose"]
         _, _, ignored = app.parse_args(words, exit_on_error=False, print_error=False)
         assert not ignored
-        out = words[words.index("--out") + 1] if "--out" in words else None
-        read = {word for word in words if FILE.match(word) and word != out}
+        out = {words[words.index(flag) + 1] for flag in ("--out", "--invert") if flag in words}
+        read = {word for word in words if FILE.match(word) and word not in out}
         assert all(word in written or (ROOT / word).is_file() for word in read), command
-        written.add(out)
+        written |= out
 
 
 IN_EVERY_RUN = ("README.md", "docs/howto/files.md", "docs/howto/uncertainty.md")

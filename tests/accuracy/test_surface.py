@@ -47,7 +47,11 @@ def test_the_error_of_a_method_is_true(films):
     eye = sensor("1931", "D65")
     true = airy(eye.wavelength, films.numbers["thickness"], 2.9, 2.7 + 2.8j, films.angle) @ eye.weights
     with jax.enable_x64(True):
-        for name, least, most in (("points-645-525-445", 1.0, 10.0), ("uniform-16", 1e-3, 0.2)):
+        for name, least, most in (
+            ("points-645-525-445", 1.0, 10.0),
+            ("uniform-16", 1e-3, 0.2),
+            ("table of the film", 0.0, 0.02),
+        ):
             found = BY_NAME[name].program(films).run()
             off = np.mean(
                 delta_e2000(*(np.asarray(lab(np.asarray(x, float), eye.white)) for x in (found, true)))
@@ -70,6 +74,8 @@ def test_what_makes_no_sense_says_why(films):
     assert BY_NAME["belcour-barla"].program(absorbing) == "it has no absorbing layer"
     thick = films._replace(thickest=800.0)
     assert BY_NAME["nodes-6-500"].program(thick) == "its wavelengths are for films up to 500 nm"
+    free = films._replace(numbers={**films.numbers, "n": np.linspace(2.0, 2.9, 8)})
+    assert BY_NAME["table of the film"].program(free) == "its indices are free: a table is of one film"
     assert "too few angles" in BY_NAME["uniform-64 at 32 angles"].program(films)
     assert "defined at three wavelengths only" in films_of(PAINT, random_draws(PAINT))
     each = surface_view(Surface("blinn-phong-film", {}), default_directions(), 8)

@@ -6,8 +6,9 @@ They run in single precision, as colours do; the reference runs in double.
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -17,7 +18,7 @@ import numpy as np
 
 from pellicle.accuracy.compiled import Program, compiled_function
 from pellicle.brdf import film_colour
-from pellicle.colour import delta_e2000, integration_bands, lab, sensor
+from pellicle.colour import FilmColourTable, delta_e2000, integration_bands, lab, sensor
 from pellicle.colour.bands import Bands
 from pellicle.colour.film import reflectance
 from pellicle.colour.observers import Sensor
@@ -115,6 +116,27 @@ def _by_angles(count: int, films: Films) -> Program | str:
     return _compiled(at_angles, films)
 
 
+def _by_table(films: Films) -> Program | str:
+    """One lookup in a table, whose computation counts as compilation."""
+    numbers: dict[str, Any] = {
+        key: x if isinstance(x, Table) else np.unique(x) for key, x in films.numbers.items()
+    }
+    thickness = numbers.pop("thickness")
+    if any(np.size(x) > 1 for x in numbers.values() if not isinstance(x, Table)):
+        return "its indices are free: a table is of one film"
+    began = time.perf_counter()
+    one: dict[str, Any] = {key: x if isinstance(x, Table) else x[0] for key, x in numbers.items()}
+    index, base = (_index(one, *keys) for keys in (("n", "k"), ("base_n", "base_k")))
+    table = FilmColourTable.build(
+        *(index, base, (float(0.99 * thickness[0]), float(1.01 * thickness[-1]) + 1.0)),
+        ambient=one.get("ambient_n", 1.0),
+        angle=(0.0, float(np.rad2deg(films.angle.max()))),
+    )
+    built = time.perf_counter() - began
+    program = _compiled(lambda numbers, angle: table.xyz(numbers["thickness"], jnp.cos(angle)), films)
+    return replace(program, compile_seconds=program.compile_seconds + built)
+
+
 def _compiled(colour: Callable, films: Films, double: bool = False) -> Program:
     draws = max(np.size(x) for x in films.numbers.values() if not isinstance(x, Table))
     tables = {key: None if isinstance(x, Table) else 0 for key, x in films.numbers.items()}
@@ -164,5 +186,6 @@ COLOUR_METHODS = (
         ColourMethod(f"{FINE} at {n} angles", "the angles between them", partial(_by_angles, n))
         for n in (8, 16, 32)
     ),
+    ColourMethod("table of the film", "the colours between its nodes", _by_table),
 )
 """Every method of computing a colour, in the order of the table."""
