@@ -48,9 +48,11 @@ def _against_angle(spectrum: Spectrum) -> bool:
 
 def _panel(axes: Axes, spectrum: Spectrum, values: np.ndarray, errors: np.ndarray | None) -> None:
     """One panel, a colour for each angle of incidence."""
-    against_angle = _against_angle(spectrum)
-    x = spectrum.angle if against_angle else spectrum.wavelength
-    angles = [None] if spectrum.angle is None or against_angle else np.unique(spectrum.angle)
+    x, angles = spectrum.wavelength, [None]
+    if spectrum.angle is not None and _against_angle(spectrum):
+        x = spectrum.angle
+    elif spectrum.angle is not None:
+        angles = np.unique(spectrum.angle)
     colours = (BLACK, ORANGE, BLUE, GREEN)
     for i, angle in enumerate(angles):
         rows = np.arange(len(spectrum)) if angle is None else np.flatnonzero(spectrum.angle == angle)
