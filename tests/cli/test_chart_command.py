@@ -63,7 +63,7 @@ def test_inverse_of_a_chart(pellicle, tmp_path):
     """Every likely thickness has the colour of its row, by the film's own colours; probabilities add up."""
     recipe, out, table = tmp_path / "oxide.toml", tmp_path / "oxide.png", tmp_path / "inverse.csv"
     recipe.write_text('[scene]\nsubstrate = "Si"\n[[scene.layer]]\nmaterial = "SiO2"\nthickness = 300\n')
-    ran = pellicle("chart", recipe, "--out", out, "--thickness", "0:500", "--invert", table)
+    ran = pellicle("chart", recipe, "--out", out, "--thickness", "0:250", "--invert", table)
     assert (ran.code, ran.out) == (0, "")
     assert "% of the colours have more than one" in ran.err
     rows = [line.split(",") for line in table.read_text().splitlines() if not line.startswith("#")]
