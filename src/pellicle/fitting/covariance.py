@@ -2,7 +2,8 @@
 
 Where the noise of the points is unknown and uneven, their residuals stand for it: the sandwich estimator of
 H. White (1980, Econometrica 48, 817), with each residual divided by one less its leverage (HC3, J. MacKinnon
-and H. White, 1985, J. Econometrics 29, 305).
+and H. White, 1985, J. Econometrics 29, 305), and Student's t of the degrees of freedom of that variance (F.
+Satterthwaite, 1946, Biometrics Bull. 2, 110).
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pellicle.fitting.noise import student
 from pellicle.fitting.problem import Problem
 
 UNSEEN = 0.5
@@ -125,11 +127,14 @@ def errors(scaled: Scaled, uneven: Mapping[int, np.ndarray] = MappingProxyType({
     plain = spread @ spread.T
     if not uneven:
         return Errors(scaled.names, plain)
-    middle = np.eye(len(values))
+    middle, shares = np.eye(len(values)), np.zeros(len(spread))
     for first, residuals in uneven.items():
         block = left[first : first + residuals.size].reshape(*residuals.shape, -1)
         middle += _sum_of_squares(block, residuals) - np.einsum("rci,rcj->ij", block, block)
-    return Errors(scaled.names, spread @ middle @ spread.T, plain)
+        shares += np.sum(np.sum((block @ spread.T) ** 2, axis=1) ** 2, axis=0)
+    # a parameter that few points determine has an error of as few degrees of freedom
+    wider = [student(own, 1.0) for own in np.diag(plain) ** 2 / np.maximum(shares, 1e-300)]
+    return Errors(scaled.names, spread @ middle @ spread.T * np.outer(wider, wider), plain)
 
 
 def _sum_of_squares(block: np.ndarray, residuals: np.ndarray) -> np.ndarray:
