@@ -85,6 +85,7 @@ ELSEWHERE = {
     "python benchmarks/colour_inverse.py": "tests/colour/test_inverse.py: 300 colours of one film",
     "python benchmarks/posterior.py": _LONG_STUDY,
     "python benchmarks/colour.py": _LONG_STUDY,
+    "python benchmarks/brdf_errors.py": "tests/fitting/brdf/test_errors.py: fewer runs",
     "python benchmarks/brdf_recovery.py": _LONG_STUDY,
     "python -m pytest": "runs these tests",
     "python scripts/make_measurements.py": "tests/test_measurements.py: two of the files",

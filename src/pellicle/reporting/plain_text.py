@@ -22,6 +22,7 @@ def wrapped(text: str, first: str = "", rest: str = "") -> list[str]:
         initial_indent=INDENT + first,
         subsequent_indent=INDENT + rest,
         break_on_hyphens=False,
+        break_long_words=False,  # paths stay whole
     )
 
 
