@@ -59,6 +59,7 @@ def test_the_command_draws_it(pellicle, tmp_path):
         pellicle("chart", recipe, *flags).refused(3 if "illuminant" in words else 2, words)
 
 
+@pytest.mark.slow
 def test_inverse_of_a_chart(pellicle, tmp_path):
     """Every likely thickness has the colour of its row, by the film's own colours; probabilities add up."""
     recipe, out, table = tmp_path / "oxide.toml", tmp_path / "oxide.png", tmp_path / "inverse.csv"

@@ -21,6 +21,7 @@ def recipe(tmp_path):
     return write
 
 
+@pytest.mark.slow
 def test_repeats_of_one_thickness_agree(pellicle, spectrum_file, scene, tmp_path):
     files = [spectrum_file(f"{seed}.csv", seed=seed) for seed in range(4)]
     out = tmp_path / "out"

@@ -21,6 +21,7 @@ def properties():
     return module
 
 
+@pytest.mark.slow
 def test_stacks_are_finite_and_conserve_energy(properties):
     rows = properties.scenes(np.random.default_rng(3), 10_000, 3)
     for law, bad in properties.violations(rows, 3).items():

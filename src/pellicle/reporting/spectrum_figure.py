@@ -59,7 +59,9 @@ def _panel(axes: Axes, spectrum: Spectrum, values: np.ndarray, errors: np.ndarra
         at, own, colour = x[rows], values[rows], colours[i % len(colours)]
         size = marker_size(rows.size)
         name = None if angle is None else f"{angle:g}°"
-        axes.plot(at, own, ".-", color=colour, markersize=size, linewidth=0.6, label=name)
+        wraps = np.flatnonzero(np.abs(np.diff(own)) > 180) + 1 if values is spectrum.delta else []
+        line = (np.insert(numbers, wraps, np.nan) for numbers in (at, own))  # no line from 360 to 0
+        axes.plot(*line, ".-", color=colour, markersize=size, linewidth=0.6, label=name)
         if errors is not None:
             sigma = errors[rows]
             axes.fill_between(at, own - sigma, own + sigma, color=colour, alpha=0.2, linewidth=0)

@@ -42,6 +42,7 @@ def starts(problem):
     return np.array([[start[name] for name in problem.names] for start in STARTS])
 
 
+@pytest.mark.slow
 def test_vmapped_fits_agree_with_a_loop_of_fits(spectra, programs):
     with jax.enable_x64(True):
         problem = pl.fitting.prepare(spectra[0], FREE)

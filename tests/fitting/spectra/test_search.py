@@ -83,6 +83,7 @@ def test_orders_out_of_reach_cost_nothing(film, measured, polished):
     assert local_minima(scan.deviance[0, :, 0]).sum() > 2 * len(np.unique(np.concatenate(polished)))
 
 
+@pytest.mark.slow
 def test_wide_bounds_are_scanned_as_finely_or_the_fit_warns(film, measured):
     data = measured(film(), 430.0)
     wide, too_wide = (pl.fit(data, film(pl.Free(1, upper))) for upper in (1e6, 1e8))
