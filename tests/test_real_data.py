@@ -92,7 +92,7 @@ def test_thin_soap_films_are_not_decided_by_one_spectrum(fitted):
     assert [f["status"] in ("ambiguous", "not-identifiable") for f in found] == [True, True]
 
 
-@pytest.mark.parametrize("pair", ["SL1", "SL2"])
+@pytest.mark.parametrize("pair", [pytest.param("SL1", marks=pytest.mark.slow), "SL2"])
 def test_raw_counts_of_porous_silicon(shared_data, fitted, pair):
     """Counts divided by those of bare silicon: a reflectance, and a fit that runs and judges itself."""
     folder = shared_data / "thinfilmstools_oxides"

@@ -111,6 +111,7 @@ def _runs(process):
     return not (status.exists() and status.read_text().rpartition(")")[2].split()[0] == "Z")
 
 
+@pytest.mark.slow
 def test_two_processes_find_what_one_finds(pellicle, spectrum_file, scene, tmp_path):
     one, two, gone = spectrum_file("one.csv", 250.0), spectrum_file("two.csv", 420.0), tmp_path / "gone.csv"
     arguments = ("fit", one, gone, two, *scene, "--json", "--out")

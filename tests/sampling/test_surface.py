@@ -171,6 +171,7 @@ def turned():
     return pl.simulate(Surface("granier-heidrich", fixed), directions=directions, noise=0.4)
 
 
+@pytest.mark.slow
 def test_an_azimuth_is_drawn_within_half_a_turn_of_the_best(turned, monkeypatch):
     """Across the ends of its bounds, and all directions of the disc are as likely."""
     free = {"deviation": Free(0, 20), "azimuth": Free(-180, 180)}

@@ -42,7 +42,9 @@ def test_thickness_n_and_k(film, measured, signal):
     assert fit.plan.on("transmission") == (signal == "T")
 
 
-@pytest.mark.parametrize(("polarisation", "sees"), [("s", "p"), ("p", "s")])
+@pytest.mark.parametrize(
+    ("polarisation", "sees"), [pytest.param("s", "p", marks=pytest.mark.slow), ("p", "s")]
+)
 def test_at_an_angle_in_either_polarisation(film, measured, polarisation, sees):
     light = pl.Light(angle=60.0, polarisation=polarisation)
     data = measured(film(light=light), 480.0)

@@ -71,6 +71,7 @@ def together(spectra) -> pl.Fit:
     return pl.fit(spectra, pl.Scene(layer, GLASS, instrument=pl.Instrument(scale="free")))
 
 
+@pytest.mark.slow
 def test_reflectance_transmittance_and_ellipsometry_as_an_independent_fit(together, spectra):
     """The same minimum and errors as scipy's least squares of tmm's films, started at the truth."""
     angles = spectra[2]
@@ -96,6 +97,7 @@ def test_reflectance_transmittance_and_ellipsometry_as_an_independent_fit(togeth
     assert together.chi2_reduced == pytest.approx(2 * found.cost / (240 - 5), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_part_for_each_spectrum(together, spectra):
     assert [part.name for part in together.parts] == ["film_R", "film_T", "angles"]
     for part, spectrum in zip(together.parts, spectra, strict=True):
