@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib.util
 from pathlib import Path
 
 import hypothesis
@@ -40,6 +41,21 @@ def with_part():
 def _with_part(fit, **changes):
     [part] = fit.parts
     return dataclasses.replace(fit, parts=(dataclasses.replace(part, **changes),))
+
+
+@pytest.fixture(scope="session")
+def load_script():
+    """Return a function that imports a file of scripts/ or benchmarks/ as a module."""
+
+    def load_script(path: str):
+        spec = importlib.util.spec_from_file_location(Path(path).stem, ROOT / path)
+        assert spec is not None
+        assert spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        return module
+
+    return load_script
 
 
 @pytest.fixture(scope="session")

@@ -6,7 +6,6 @@ import hashlib
 import json
 import re
 import runpy
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
 import numpy as np
@@ -18,11 +17,8 @@ QUICK = "brush_19-1-1"
 
 
 @pytest.fixture(scope="module")
-def script():
-    spec = spec_from_file_location("rerun_fits", ROOT / "scripts" / "rerun_fits.py")
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+def script(load_script):
+    return load_script("scripts/rerun_fits.py")
 
 
 def rows_of_readme(folder: Path) -> dict[str, str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import tomllib
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
 import pytest
@@ -18,11 +17,8 @@ RECIPES = sorted((FOLDER / "recipes").glob("*.toml"))
 
 
 @pytest.fixture(scope="module")
-def script():
-    spec = spec_from_file_location("make_measurements", ROOT / "scripts" / "make_measurements.py")
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+def script(load_script):
+    return load_script("scripts/make_measurements.py")
 
 
 def test_there_are_hematite_cadmium_sulfide_and_gold():

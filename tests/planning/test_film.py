@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
 from dataclasses import replace
-from pathlib import Path
 
 import jax
 import numpy as np
@@ -166,14 +164,8 @@ def test_ellipsometry_counts_in_degrees():
 
 
 @pytest.fixture(scope="module")
-def drawing():
-    path = Path(__file__).parents[2] / "benchmarks" / "tolerance.py"
-    spec = importlib.util.spec_from_file_location("tolerance", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+def drawing(load_script):
+    return load_script("benchmarks/tolerance.py")
 
 
 @pytest.mark.parametrize("kind", ["fitted index"])

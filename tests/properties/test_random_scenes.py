@@ -2,23 +2,13 @@
 
 from __future__ import annotations
 
-import importlib.util
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-SCRIPT = Path(__file__).parents[2] / "benchmarks" / "properties.py"
-
 
 @pytest.fixture(scope="module")
-def properties():
-    spec = importlib.util.spec_from_file_location("properties", SCRIPT)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+def properties(load_script):
+    return load_script("benchmarks/properties.py")
 
 
 @pytest.mark.slow

@@ -192,7 +192,7 @@ class FilmColourTable(eqx.Module):
 
 
 class _Grid(NamedTuple):
-    """Where the nodes are: the first and the last path (nm) and cosine, and the shear of the paths."""
+    """Positions of the nodes: the first and the last path (nm) and cosine, and the shear of the paths."""
 
     path: Any
     cosine: Any

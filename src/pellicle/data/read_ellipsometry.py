@@ -32,7 +32,7 @@ from pellicle.data.signal_checks import FOLDED_DELTA, check_psi_delta, refuse_fi
 from pellicle.data.spectrum import Spectrum, inside_range
 from pellicle.data.tabular.column_selection import only, wavelength_and_angle
 from pellicle.data.tabular.columns import Column, listed
-from pellicle.data.tabular.named_columns import first_column, named_columns
+from pellicle.data.tabular.named_columns import first_column
 from pellicle.data.tabular.table import Table
 from pellicle.data.tabular.wavelength_axis import axis_note, axis_unit, read_axis
 from pellicle.errors import DataError, UsageError
@@ -67,18 +67,17 @@ def has_ellipsometry(columns: Sequence[Column] | None) -> bool:
 
 def read_ellipsometry(
     table: Table,
-    columns: str | Sequence[str] | None,
+    chosen: EllipsometryColumns,
     wavelength_unit: str | None,
     noise: float | None,
     range: tuple[float, float] | None,
     folded: bool | None = None,
     analyser: float | None = None,
 ) -> Spectrum:
-    """Read Ψ and Δ of a table, Δ in 0 to 360; arguments as in `read_spectrum`.
+    """Read Ψ and Δ of the chosen columns, Δ in 0 to 360; other arguments as in `read_spectrum`.
 
     Raises DataError or UsageError.
     """
-    chosen = ellipsometry_columns(table, named_columns(table, columns))
     _check_form(table, chosen, folded, analyser)
     unit = axis_unit(table, chosen.wavelength, wavelength_unit)
     cells = (*chosen.values, *([chosen.analyser] if chosen.analyser else []), *chosen.errors)

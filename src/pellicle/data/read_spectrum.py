@@ -107,7 +107,7 @@ def read_spectra(
 
 @dataclass(frozen=True, kw_only=True)
 class _Reading:
-    """How a file is read; the arguments of `read_spectrum`. Raises UsageError for an unknown word."""
+    """Arguments of `read_spectrum`, and reading with them. Raises UsageError for an unknown word."""
 
     signal: str | None = None
     columns: str | Sequence[str] | None = None
@@ -163,7 +163,7 @@ class _Reading:
         else:
             spectrum = read_ellipsometry(
                 table,
-                self.columns,
+                one.columns,
                 self.wavelength_unit,
                 self.noise,
                 self.range,

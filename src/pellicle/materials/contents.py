@@ -125,7 +125,7 @@ def covering(path: str, low: float, high: float) -> list[str]:
 
 
 def _form(path: str) -> tuple[str, str, bool]:
-    """What a page describes: its book, the form of the material, and whether the extraordinary ray.
+    """Book and form of the material that a page describes, and True for the extraordinary ray.
 
     A form has a name of its own beside that of the book, as amorphous silicon in the book of silicon.
     """

@@ -148,7 +148,7 @@ def _by_time(rows: Sequence[tuple[Line, list[str]]], dynamic: bool, path: str) -
 
 
 def _facts(heading: Sequence[Line], method: str) -> list[tuple[str, str]]:
-    """What the heading says of the program, the date and the sample."""
+    """Program, date and sample of the heading."""
     facts = [("format", "Woollam text")]
     for key, pattern in _FACTS.items():
         if match := re.search(pattern, method):

@@ -128,7 +128,7 @@ def _measured(rows: Rows, positions: slice) -> tuple[Rows, list[str]]:
 
 
 def _points(rows: Rows, one_angle: bool) -> list[tuple[float | str, float | str, int]]:
-    """What identifies each row: wavelength, angle, and its number among repeats of both."""
+    """Key of each row: wavelength, angle, and its number among repeats of both."""
     counts: Counter[tuple[float | str, float | str]] = Counter()
     points = []
     for _, cells in rows:

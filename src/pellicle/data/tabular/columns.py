@@ -27,7 +27,7 @@ _OF_ABSORBANCE = {"a", "au", "a.u.", "abs", "abs.", "absorbance", "od", "o.d.", 
 """Units that programs write behind an absorbance."""
 _MEASURED = ("measured", "meas", "meas.", "exp", "exp.", "experimental")
 _MODELLED = ("calculated", "calc", "calc.", "modelled", "modeled", "simulated", "fit", "fitted", "model")
-"""What some programs write in the place of a unit: the measurement, and the result of their fit to it."""
+"""Words that some programs write in the place of a unit, for the measurement and for their fit to it."""
 _OTHER_UNITS = ("a.u.", "abs", "abs.", "a", "counts", "deg", "°")
 _UNIT_OF = {
     "wavelength": units.wavelength_unit,
