@@ -1,0 +1,165 @@
+"""Measured colours of a film as arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from pellicle.data.signal_checks import Where, refuse_first
+from pellicle.errors import UsageError
+
+SPACES = ("rgb", "srgb", "xyz", "lab")
+_POLARISATIONS = ("s", "p", "unpolarised")
+USUAL_NOISE = {"srgb": 1.5 / 255, "rgb": 0.01, "xyz": 0.005, "lab": 0.5}
+"""Standard deviation of each channel where none is given: that of a good camera, or of a colorimeter."""
+_ARRAYS = ("angle", "lines")
+_REMEDY = "correct or delete that row"
+
+
+class CameraMatrix(NamedTuple):
+    """Colours as a camera records them: its linear R, G, B are `matrix` (3, 3) times the XYZ of the sensor.
+
+    `covariance` (9, 9) is that of the matrix by rows, as a fit to a chart leaves it.
+    """
+
+    matrix: np.ndarray
+    covariance: np.ndarray
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Colours:
+    """Colours of one film, at one angle of incidence each.
+
+    **Arguments:**
+
+    - `values`: shape (colours, 3). "srgb": display values from 0 to 1; "rgb": those of the sensor's three
+      channels, 1 for a perfect reflector, to the power 1/`gamma`; "xyz": Y = 1 for a perfect reflector;
+      "lab": CIE 1976 L*, a*, b* relative to that white.
+    - `sensor`: observer or camera under the lamp, as `pellicle.colour.sensor` returns it: wavelengths (N,) in
+      nm, and weights (N, 3), reflectance @ weights being the colour. All spaces but "rgb" need an observer of
+      the CIE, whose channels are X, Y and Z with Y = 1 for white; so do channels with a `camera`.
+    - `space`: "rgb", "srgb", "xyz" or "lab".
+    - `signal`: "R", or "T" for transmitted light.
+    - `sigma`: standard deviations of `values`, shape (colours, 3); None for the usual ones of the space.
+    - `angle` of incidence in degrees, (colours,); None leaves it to the scene.
+    - `polarisation`: "s", "p" or "unpolarised".
+    - `gamma` of "rgb".
+    - `white_balance`: "fixed", or "free" where each channel has an unknown factor.
+    - `camera`: matrix of a camera whose sensitivities are not known, by a chart.
+    - `path`, `sha256`, `lines`: file, its digest and the source line of each colour.
+    - `notes`: sentences on how the file was read.
+    - `name` of these colours within their file.
+
+    Values of 0 and 1 in "srgb" and "rgb" are limits: the film may be darker or brighter.
+
+    **Raises:** DataError for values that are not finite or, in "srgb", not from 0 to 1, for a σ that is not
+    positive and for angles beyond 0 to 90 degrees; UsageError for unknown words; ValueError for shapes.
+    """
+
+    values: np.ndarray
+    sensor: tuple[np.ndarray, np.ndarray]
+    space: str = "srgb"
+    signal: str = "R"
+    sigma: np.ndarray | None = None
+    angle: np.ndarray | None = None
+    polarisation: str = "unpolarised"
+    gamma: float = 1.0
+    white_balance: str = "fixed"
+    camera: CameraMatrix | None = None
+    path: str = ""
+    sha256: str = ""
+    lines: np.ndarray | None = None
+    notes: tuple[str, ...] = ()
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        values = np.array(self.values, dtype=np.float64)
+        if values.ndim != 2 or values.shape[1] != 3 or not len(values):
+            raise ValueError(f"`values`: expected the shape (colours, 3), got {values.shape}")
+        tables = {"values": values}
+        if self.sigma is not None:
+            tables["sigma"] = np.array(self.sigma, dtype=np.float64)
+            if tables["sigma"].shape != values.shape:
+                raise ValueError(f"`sigma`: expected the shape {values.shape}, got {tables['sigma'].shape}")
+        for name in _ARRAYS:
+            value = getattr(self, name)
+            if value is None:
+                continue
+            if np.shape(value) != (len(values),):
+                raise ValueError(
+                    f"`{name}`: expected one number per colour ({len(values)}), got {np.shape(value)}"
+                )
+            tables[name] = np.array(value, dtype=np.int64 if name == "lines" else np.float64)
+        for name, array in tables.items():
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+        nm, weights = (np.array(x, dtype=np.float64) for x in self.sensor)
+        if nm.ndim != 1 or weights.shape != (nm.size, 3):
+            raise ValueError(
+                f"`sensor`: expected the shapes (N,) and (N, 3), got {nm.shape}, {weights.shape}"
+            )
+        object.__setattr__(self, "sensor", (nm, weights))
+        self._check_words()
+        self._check_values()
+
+    def _check_words(self) -> None:
+        known = {"space": SPACES, "signal": ("R", "T"), "polarisation": _POLARISATIONS}
+        for name, words in (known | {"white_balance": ("fixed", "free")}).items():
+            if getattr(self, name) not in words:
+                raise UsageError(f"`{name}` must be one of {', '.join(words)}, not {getattr(self, name)!r}")
+        if self.gamma != 1.0 and self.space != "rgb":
+            raise UsageError(f'`gamma` goes with `space="rgb"`: {self.space} has its own coding')
+        if not 0.1 <= self.gamma <= 10:
+            raise UsageError(f"`gamma` must be a number such as 2.2, got {self.gamma:g}")
+        if self.space != "rgb" and (self.camera is not None or self.white_balance == "free"):
+            name = "camera" if self.camera is not None else "white_balance"
+            raise UsageError(f'`{name}` goes with `space="rgb"`, the channels of a camera, not {self.space}')
+
+    def _check_values(self) -> None:
+        sigma = np.ones((1, 3)) if self.sigma is None else self.sigma
+        angle = np.zeros(1) if self.angle is None else self.angle
+        for channel, values, errors in zip(self.channels, self.values.T, sigma.T, strict=True):
+            where = self.place(channel)
+            refuse_first(values, ~np.isfinite(values), where, f"is not finite; {_REMEDY}")
+            if self.space == "srgb":
+                outside = (values < 0) | (values > 1)
+                refuse_first(values, outside, where, "is not from 0 to 1; divide 8-bit values by 255")
+            spread = self.place(f"the standard deviation of {channel}")
+            refuse_first(
+                errors, ~(np.isfinite(errors) & (errors > 0)), spread, f"is not above zero; {_REMEDY}"
+            )
+        refuse_first(
+            angle, ~((angle >= 0) & (angle <= 90)), self.place("angle"), "is not from 0 to 90 degrees"
+        )
+
+    @property
+    def channels(self) -> tuple[str, str, str]:
+        """Names of the three channels."""
+        return {"xyz": ("X", "Y", "Z"), "lab": ("L*", "a*", "b*")}.get(self.space, ("R", "G", "B"))
+
+    @property
+    def noise(self) -> np.ndarray:
+        """Standard deviations (colours, 3): those given, or the usual ones of the space."""
+        return np.full(self.values.shape, USUAL_NOISE[self.space]) if self.sigma is None else self.sigma
+
+    @property
+    def source(self) -> str:
+        """Path of the file, and the name within it: `photo.png [patch 2]`."""
+        return " ".join(part for part in (self.path, f"[{self.name}]" if self.name else "") if part)
+
+    def place(self, name: str) -> Where:
+        """Return the place of a colour, as a function of its row, for a message about `name`."""
+        path = f"{self.source}: " if self.source else ""
+        lines = self.lines
+        return lambda row: f"{path}{f'colour {row}' if lines is None else f'line {lines[row]}'}: {name}"
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def __str__(self) -> str:
+        plural = "s" * (len(self) != 1)
+        return f"{self.source or 'colours'}: {len(self)} colour{plural} in {self.space}, {self.signal}"
+
+    __repr__ = __str__
