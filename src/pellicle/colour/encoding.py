@@ -60,14 +60,34 @@ class Encoding(NamedTuple):
 
     def decode(self, coded: np.ndarray) -> np.ndarray:
         """XYZ (..., 3) of coded colours."""
+        return self.decoded(coded) @ np.linalg.inv(self.linear).T
+
+    def decoded(self, coded: np.ndarray) -> np.ndarray:
+        """Linear channels (..., 3) of coded colours."""
         value = (np.asarray(coded, float) - self.shift) @ np.linalg.inv(self.mix).T
+        if self.power == 1:
+            return value
         bright = (np.clip(value + self.offset, 0.0, None) / self.gain) ** (1 / self.power)
         dark = (value - self.intercept) / self.slope
-        channels = np.where(dark <= self.cut, dark, bright) if self.power != 1 else value
-        return channels @ np.linalg.inv(self.linear).T
+        return np.where(dark <= self.cut, dark, bright)
 
+    def rise(self, channels: np.ndarray) -> np.ndarray:
+        """∂ coded / ∂ linear channel at linear channels (..., 3): (..., 3, 3), coded by linear."""
+        channels = np.asarray(channels, float)
+        above = np.maximum(channels, max(self.cut, _LEAST))
+        bright = self.gain * self.power * above ** (self.power - 1)
+        return self.mix * np.where(channels <= self.cut, self.slope, bright)[..., None, :]
+
+
+_LEAST = 1e-4
+"""Linear channel below which a power without a linear part is taken to rise no faster."""
 
 _PLAIN = Encoding._field_defaults["mix"]
+
+
+def camera_encoding(gamma: float = 1.0) -> Encoding:
+    """Return the encoding of a camera's own channels: to the power 1/`gamma`, from 0 to 1."""
+    return Encoding(np.eye(3), 1 / gamma, clips=True)
 
 
 def encoding(space: str, white: Any) -> Encoding:
