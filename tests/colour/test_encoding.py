@@ -8,7 +8,7 @@ from pellicle.colour.encoding import camera_encoding, encoding
 from pellicle.colour.spaces import lab, linear_srgb, srgb
 
 WHITE = sensor("1931", "D50").white
-COLOURS = np.array([[0.2, 0.3, 0.1], [0.002, 0.003, 0.004], [0.6, 0.55, 0.5]])
+COLOURS = WHITE * np.array([[0.2, 0.25, 0.15], [0.002, 0.002, 0.0022], [0.6, 0.55, 0.5]])
 
 
 def coded(space, code, xyz):
