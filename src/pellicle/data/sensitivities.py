@@ -1,0 +1,96 @@
+"""Reading of a camera's spectral sensitivities and of a lamp's spectrum from CSV."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+
+from pellicle.data.signal_checks import refuse_first
+from pellicle.data.tabular.columns import Column, listed, recognise_all
+from pellicle.data.tabular.named_columns import first_column
+from pellicle.data.tabular.table import Table, read_table
+from pellicle.data.tabular.wavelength_axis import axis_unit, read_axis
+from pellicle.errors import DataError
+
+_CHANNELS = {"r": 0, "red": 0, "x": 0, "g": 1, "green": 1, "y": 1, "b": 2, "blue": 2, "z": 2}
+_NEGATIVE = 0.02
+"""Share of its largest value by which a measured sensitivity or lamp may fall below zero."""
+_REMEDY = "correct or delete that row"
+
+
+def read_sensitivities(path: str | os.PathLike[str]) -> tuple[np.ndarray, np.ndarray]:
+    """Read the spectral sensitivities of a camera's three channels.
+
+    The file has a wavelength, whose unit its name gives (nm without one), and three columns: R, G, B, or red,
+    green, blue, in any order, or three of any other name in the order of the channels. The level of a
+    channel has no meaning. Other columns are refused.
+
+    **Returns:** wavelengths in nm, rising, (N,), and sensitivities (N, 3).
+
+    **Raises:** DataError: one sentence with file, line and remedy.
+    """
+    table = read_table(path)
+    wavelength, others = _columns(table)
+    if len(others) != 3:
+        raise DataError(
+            f"{table.path}: has {len(others)} columns beside the wavelength where the sensitivities of three "
+            f"channels are expected ({listed(others)}); keep those of R, G and B"
+        )
+    order = [_CHANNELS.get(_bare(column.name), -1) for column in others]
+    if sorted(order) == [0, 1, 2]:
+        others = [others[order.index(channel)] for channel in range(3)]
+    return _read(table, wavelength, others)
+
+
+def read_lamp(path: str | os.PathLike[str]) -> tuple[np.ndarray, np.ndarray]:
+    """Read the spectrum of a lamp: power per wavelength in any unit, against the wavelength.
+
+    **Returns:** wavelengths in nm, rising, (N,), and the power (N,).
+
+    **Raises:** DataError: one sentence with file, line and remedy.
+    """
+    table = read_table(path)
+    wavelength, others = _columns(table)
+    if len(others) != 1:
+        raise DataError(
+            f"{table.path}: has {len(others)} columns beside the wavelength where the power of one lamp is "
+            f"expected ({listed(others)}); keep one"
+        )
+    nm, power = _read(table, wavelength, others)
+    return nm, power[:, 0]
+
+
+def _columns(table: Table) -> tuple[Column, list[Column]]:
+    """The wavelength and the other columns that are not empty, in file order. Raises DataError."""
+    if table.layout.names is None:
+        return first_column(table), [
+            Column(i, f"column {i + 1}", "other") for i in range(1, table.layout.width)
+        ]
+    named = [column for column in recognise_all(table.layout.names) if column.name.strip()]
+    axes = [column for column in named if column.role == "wavelength"]
+    if len(axes) != 1:
+        raise DataError(
+            f"{table.path}: has {len(axes)} wavelength columns among {listed(named)} where one is expected; "
+            "name it wavelength_nm"
+        )
+    return axes[0], [column for column in named if column is not axes[0]]
+
+
+def _bare(name: str) -> str:
+    """A channel's name without a unit or brackets: `R (a.u.)` and `red_sensitivity` are R and red."""
+    return name.strip().lower().replace("_", " ").replace("(", " ").split(" ")[0]
+
+
+def _read(table: Table, wavelength: Column, others: list[Column]) -> tuple[np.ndarray, np.ndarray]:
+    nm, _, read = read_axis(table, wavelength, None, others, axis_unit(table, wavelength, None))
+    order = np.argsort(nm)
+    if len(nm) < 2 or not np.all(np.diff(nm[order]) > 0):
+        raise DataError(f"{table.path}: needs two or more wavelengths, each of them once")
+    for column, values in zip(others, read, strict=True):
+        largest = np.max(values)
+        if not largest > 0:
+            raise DataError(f"{table.path}: {table.label(column.position)} is nowhere above zero; correct it")
+        reason = f"is below zero; {_REMEDY}"
+        refuse_first(values, values < -_NEGATIVE * largest, table.places(column.position), reason)
+    return nm[order], np.stack(read, axis=1)[order]
