@@ -1,0 +1,161 @@
+"""Reading of pictures, PNG, TIFF and JPEG, as coded values of R, G and B."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+
+from pellicle.data.tabular.text import open_binary, read_bytes
+from pellicle.errors import DataError
+
+_SIGNATURES = {
+    "PNG": (b"\x89PNG",),
+    "TIFF": (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"),
+    "JPEG": (b"\xff\xd8\xff",),
+}
+_COLOUR_MODES = ("RGB", "RGBA", "RGBX")
+_INSTALL = "pip install 'pellicle[images]' (in a clone of the repository: pip install -e '.[images]')"
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """Pixels of a picture: coded values from 0 to 1, float32, (height, width, 3), row 0 at the top.
+
+    `step` is the step of the coding, 1/255 for 8 bits; `profile` the name of an embedded colour profile that
+    is not sRGB, or "".
+    """
+
+    pixels: np.ndarray
+    step: float
+    path: str
+    sha256: str
+    notes: tuple[str, ...]
+    profile: str = ""
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height in pixels."""
+        return self.pixels.shape[1], self.pixels.shape[0]
+
+
+def picture_format(path: str | os.PathLike[str]) -> str | None:
+    """Return "PNG", "TIFF" or "JPEG" by a file's first bytes, else None. Raises DataError if unreadable."""
+    with open_binary(path) as file:
+        head = file.read(8)
+    return next((name for name, marks in _SIGNATURES.items() if head.startswith(marks)), None)
+
+
+def read_picture(path: str | os.PathLike[str]) -> Picture:
+    """Read a picture in colour.
+
+    A picture that a camera has turned is turned upright. Palettes become R, G, B.
+
+    **Raises:** DataError, one sentence, for a file that is no such picture, damaged, without colours (grey),
+    with transparent pixels, or in another colour model; ImportError without the extra `images`.
+    """
+    kind = picture_format(path)
+    if kind is None:
+        raise DataError(f"{path}: is no PNG, TIFF or JPEG picture; save it as one of these")
+    content, sha256 = read_bytes(path)
+    try:
+        values, full, profile, notes = _tiff(content) if kind == "TIFF" else _by_pillow(content)
+    except ImportError as error:
+        raise ImportError(f"pictures need {error.name}: {_INSTALL}") from error
+    except DataError as error:
+        raise DataError(f"{path}: {error}") from None
+    except Exception as error:  # decoders raise errors of every kind on damaged files
+        reason = str(error).split("\n")[0].rstrip(".")
+        raise DataError(
+            f"{path}: the {kind} cannot be decoded ({reason}); save it again, uncompressed"
+        ) from None
+    coded, notes = _colours(values, full, notes, str(path))
+    name = _profile_name(profile)
+    foreign = "" if "srgb" in name.lower() or "61966-2" in name else name
+    if kind == "JPEG":
+        notes = [*notes, "JPEG: its compression shifts colours by a few of 255; PNG and TIFF do not"]
+    return Picture(coded, 1 / full, str(path), sha256, tuple(notes), foreign)
+
+
+def _by_pillow(content: bytes) -> tuple[np.ndarray, float, bytes | None, list[str]]:
+    from PIL import Image, ImageOps
+
+    opened = Image.open(BytesIO(content))
+    notes, profile = [], opened.info.get("icc_profile")
+    if content.startswith(b"\x89PNG") and content[24:25] == b"\x10":
+        notes.append("PNG of 16 bits, read to 8: save a TIFF to keep all")
+    image: Any = ImageOps.exif_transpose(opened)
+    if image.mode == "P":
+        notes.append("palette converted to R, G, B")
+        image = image.convert("RGBA" if "transparency" in image.info else "RGB")
+    if image.mode not in _COLOUR_MODES:
+        known = {
+            "L": "grey",
+            "LA": "grey",
+            "1": "black and white",
+            "I;16": "grey",
+            "I": "grey",
+            "CMYK": "in CMYK",
+        }
+        raise DataError(
+            f"is {known.get(image.mode, f'in the mode {image.mode}')}: a picture in R, G, B is needed"
+        )
+    return np.asarray(image), 255.0, profile, notes
+
+
+def _tiff(content: bytes) -> tuple[np.ndarray, float, bytes | None, list[str]]:
+    import tifffile
+
+    with tifffile.TiffFile(BytesIO(content)) as file:
+        page: Any = file.pages[0]
+        notes = [f"page 1 of {len(file.pages)}"] if len(file.pages) > 1 else []
+        name = page.photometric.name if page.photometric is not None else "unknown"
+        if name not in ("RGB", "PALETTE"):
+            shown = "grey" if name.startswith("MINIS") else f"in the colour model {name}"
+            raise DataError(f"is {shown}: a picture in R, G, B is needed")
+        values = page.asarray()
+        if name == "PALETTE":
+            values, notes = (
+                np.moveaxis(page.colormap[:, values], 0, -1),
+                [*notes, "palette converted to R, G, B"],
+            )
+        elif page.planarconfig.name == "SEPARATE":
+            values = np.moveaxis(values, 0, -1)
+        tag = page.tags.get(34675)  # ICC profile
+        profile = None if tag is None else tag.value
+    if values.dtype.kind == "f":
+        if not (np.isfinite(values).all() and values.min() >= 0 and values.max() <= 1):
+            raise DataError("has values beyond 0 to 1: divide them by that of white")
+        return values, 1.0, profile, notes
+    if values.dtype not in (np.uint8, np.uint16):
+        raise DataError(f"has values of the type {values.dtype}: save it with 8 or 16 bits")
+    return values, float(np.iinfo(values.dtype).max), profile, notes
+
+
+def _colours(values: np.ndarray, full: float, notes: list[str], path: str) -> tuple[np.ndarray, list[str]]:
+    """Coded R, G, B from 0 to 1 without the opaque alpha channel. Raises DataError."""
+    if values.ndim != 3 or values.shape[2] not in (3, 4):
+        raise DataError(f"{path}: has the shape {values.shape} and not three channels; save it in R, G, B")
+    if values.shape[2] == 4 and np.any(values[..., 3] < full):
+        clear = 100 * np.mean(values[..., 3] < full)
+        raise DataError(
+            f"{path}: {clear:.2g} % of its pixels are transparent, whose colours are unknown; save it without"
+            " alpha"
+        )
+    return values[..., :3].astype(np.float32) / np.float32(full), notes
+
+
+def _profile_name(profile: bytes | None) -> str:
+    """Name of an ICC profile; "sRGB" where there is none."""
+    if not profile:
+        return "sRGB"
+    from PIL import ImageCms
+
+    try:
+        described = ImageCms.getProfileDescription(ImageCms.ImageCmsProfile(BytesIO(profile))).strip()
+    except (OSError, ImageCms.PyCMSError):
+        return "unknown"
+    return described or "unknown"

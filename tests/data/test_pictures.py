@@ -1,0 +1,141 @@
+"""Pictures of any depth and layout give the pixels that were written; others are refused."""
+
+import numpy as np
+import pytest
+import tifffile
+from PIL import Image, ImageCms
+
+from pellicle.data.picture_regions import Region, parse_points, parse_regions, strip
+from pellicle.data.read_picture import picture_format, read_picture
+from pellicle.errors import DataError, UsageError
+
+PIXELS = np.random.default_rng(0).integers(0, 256, (12, 20, 3), dtype=np.uint8)
+
+
+def by_pillow(path, values=PIXELS, **options):
+    Image.fromarray(values).save(path, **options)
+    return path
+
+
+def by_tifffile(path, values, **options):
+    tifffile.imwrite(path, values, **options)
+    return path
+
+
+def palette(path):
+    picture = Image.fromarray(np.arange(240, dtype=np.uint8).reshape(12, 20) % 7, "P")
+    picture.putpalette([10, 20, 30, 40, 50, 60, 70, 80, 90] + [5, 6, 7] * 4)
+    picture.save(path)
+    return path
+
+
+LAYOUTS = {
+    "png": lambda p: by_pillow(p / "a.png"),
+    "opaque alpha": lambda p: by_pillow(p / "a.png", np.dstack([PIXELS, np.full((12, 20), 255, np.uint8)])),
+    "tiff": lambda p: by_pillow(p / "a.tif"),
+    "16 bits": lambda p: by_tifffile(p / "a.tif", PIXELS.astype(np.uint16) * 257, photometric="rgb"),
+    "planes": lambda p: by_tifffile(
+        p / "a.tif", np.moveaxis(PIXELS, -1, 0), photometric="rgb", planarconfig="separate"
+    ),
+    "float": lambda p: by_tifffile(p / "a.tif", (PIXELS / 255).astype(np.float32), photometric="rgb"),
+}
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_pixels_of_every_layout(tmp_path, layout):
+    path = LAYOUTS[layout](tmp_path)
+    picture = read_picture(path)
+    np.testing.assert_allclose(picture.pixels, PIXELS / 255, atol=1e-7)
+    assert picture.size == (20, 12)
+    assert picture.profile == ""
+    assert picture.step == pytest.approx({"16 bits": 1 / 65535, "float": 1.0}.get(layout, 1 / 255))
+
+
+def test_palette_and_jpeg_are_told(tmp_path):
+    coloured = read_picture(palette(tmp_path / "p.png"))
+    np.testing.assert_allclose(coloured.pixels[0, 1] * 255, [40, 50, 60], atol=1e-4)
+    assert "palette converted to R, G, B" in coloured.notes
+    photo = read_picture(by_pillow(tmp_path / "p.jpg"))
+    assert "compression" in " ".join(photo.notes)
+    assert picture_format(tmp_path / "p.jpg") == "JPEG"
+
+
+def test_a_turned_photo_is_upright(tmp_path):
+    exif = Image.Exif()
+    exif[0x0112] = 6  # the camera was turned by 90 degrees
+    path = by_pillow(tmp_path / "a.png", exif=exif)
+    np.testing.assert_allclose(read_picture(path).pixels, np.rot90(PIXELS, -1) / 255, atol=1e-7)
+
+
+def test_profiles_other_than_srgb_are_named(tmp_path):
+    srgb = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+    lab = ImageCms.ImageCmsProfile(ImageCms.createProfile("LAB")).tobytes()
+    assert read_picture(by_pillow(tmp_path / "a.png", icc_profile=srgb)).profile == ""
+    assert "Lab" in read_picture(by_pillow(tmp_path / "b.png", icc_profile=lab)).profile
+    tagged = by_tifffile(tmp_path / "c.tif", PIXELS, photometric="rgb", iccprofile=lab)
+    assert "Lab" in read_picture(tagged).profile
+
+
+def truncated(path):
+    by_pillow(path)
+    path.write_bytes(path.read_bytes()[:300])
+    return path
+
+
+REFUSED = {
+    "no picture": (lambda p: by_pillow(p / "a.bmp"), "is no PNG"),
+    "grey": (lambda p: by_pillow(p / "a.png", PIXELS[..., 0]), "is grey"),
+    "grey tiff": (lambda p: by_tifffile(p / "a.tif", PIXELS[..., 0], photometric="minisblack"), "is grey"),
+    "transparent": (
+        lambda p: by_pillow(p / "a.png", np.dstack([PIXELS, PIXELS[..., 0]])),
+        "transparent",
+    ),
+    "bright float": (
+        lambda p: by_tifffile(p / "a.tif", PIXELS.astype(np.float32), photometric="rgb"),
+        "beyond 0 to 1",
+    ),
+    "truncated png": (lambda p: truncated(p / "a.png"), "cannot be decoded"),
+    "truncated tiff": (lambda p: truncated(p / "a.tif"), "cannot be decoded"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_is_no_colour_picture_is_refused(tmp_path, refusal, case):
+    write, reason = REFUSED[case]
+    refusal(read_picture, write(tmp_path), DataError, reason)
+
+
+def test_regions_and_points(tmp_path):
+    picture = read_picture(by_pillow(tmp_path / "a.png"))
+    one, two = parse_regions("2,3,4,5; 0,0,1,1")
+    assert parse_regions([[2, 3, 4, 5], [0, 0, 1, 1]]) == [one, two]
+    assert parse_regions([2, 3, 4, 5]) == [one]
+    np.testing.assert_allclose(one.pixels(picture), PIXELS[3:8, 2:6].reshape(-1, 3) / 255, atol=1e-7)
+    assert parse_points("0,0;10,6", picture) == [Region(0, 0, 3, 3), Region(8, 4, 5, 5)]
+    for wrong in ("1,2,3", "1,2,a,4", "", "1.5,2,3,4"):
+        with pytest.raises(UsageError, match="region"):
+            parse_regions(wrong)
+    for region in (Region(18, 0, 3, 1), Region(-1, 0, 3, 1), Region(0, 0, 0, 1)):
+        with pytest.raises(UsageError, match="`region`"):
+            region.pixels(picture)
+    with pytest.raises(UsageError, match="20 by 12"):
+        parse_points("20,0", picture)
+
+
+def test_a_strip_follows_its_line(tmp_path):
+    row, column = np.mgrid[:30, :40]
+    gradient = np.stack([6 * column, 8 * row, 0 * row], axis=-1).astype(np.uint8)
+    picture = read_picture(by_pillow(tmp_path / "a.png", gradient))
+    along = strip(picture, "5,20,35,20")
+    np.testing.assert_allclose(along.position, np.arange(31.0))
+    np.testing.assert_allclose(along.pixels.mean(axis=1)[:, 0] * 255, 6 * np.arange(5, 36), atol=1e-3)
+    np.testing.assert_allclose(sorted(along.pixels[0, :, 1] * 255), 8 * np.arange(18, 23), atol=1e-3)
+    slanted = strip(picture, [0, 0, 30, 29])
+    mean = slanted.pixels.mean(axis=1) * 255
+    fraction = slanted.position / slanted.position[-1]
+    middle = slice(4, -4)  # the ends are cut by the edges of the picture
+    np.testing.assert_allclose(mean[middle, 0], 180 * fraction[middle], atol=6)
+    np.testing.assert_allclose(mean[middle, 1], 232 * fraction[middle], atol=8)
+    for wrong in ("5,5,5,5", "0,0,40,0", "1,2,3"):
+        with pytest.raises(UsageError, match="strip"):
+            strip(picture, wrong)
