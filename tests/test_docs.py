@@ -83,6 +83,7 @@ ELSEWHERE = {
     "pellicle --install-completion": "would change the user's shell; part of cyclopts",
     "python benchmarks/calibration.py": _LONG_STUDY,
     "python benchmarks/colour_inverse.py": "tests/colour/test_inverse.py: 300 colours of one film",
+    "python benchmarks/colour_series.py": "tests/colour/test_series.py: fewer colours",
     "python benchmarks/posterior.py": _LONG_STUDY,
     "python benchmarks/colour.py": _LONG_STUDY,
     "python benchmarks/brdf_errors.py": "tests/fitting/brdf/test_errors.py: fewer runs",
