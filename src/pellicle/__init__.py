@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from pellicle import fitting as fitting
     from pellicle.api import compare as compare
     from pellicle.api import cost as cost
+    from pellicle.api import export as export
     from pellicle.api import fit as fit
     from pellicle.api import plan as plan
     from pellicle.api import sample as sample
@@ -48,7 +49,7 @@ if TYPE_CHECKING:
     from pellicle.synthetic.brdf import Directions as Directions
 
 _NAMES = {
-    "pellicle.api": ("compare", "cost", "fit", "plan", "sample", "simulate"),
+    "pellicle.api": ("compare", "cost", "export", "fit", "plan", "sample", "simulate"),
     "pellicle.data.brdf_samples": ("BrdfSamples",),
     "pellicle.data.read_brdf": ("read_brdf_samples",),
     "pellicle.data.read_spectrum": ("read_spectra", "read_spectrum"),

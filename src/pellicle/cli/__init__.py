@@ -13,6 +13,7 @@ from pellicle.cli.chart import chart
 from pellicle.cli.compare import compare
 from pellicle.cli.cost import cost
 from pellicle.cli.demo import demo
+from pellicle.cli.export import export
 from pellicle.cli.fit import fit
 from pellicle.cli.interruption import interruptible
 from pellicle.cli.materials import materials
@@ -44,6 +45,7 @@ app.command(plan)
 app.command(compare)
 app.command(cost)
 app.command(chart)
+app.command(export)
 app.command(materials)
 app.command(demo)
 app.register_install_completion_command(help="Install completion of commands and flags for this shell.")

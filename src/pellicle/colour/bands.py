@@ -100,20 +100,25 @@ def _tabulated(kind: str, count: int, reach: float, target: Sensor) -> Bands:
     return Bands(wavelength, width if kind == "gaussians" else None, weights, orders=6)
 
 
-def belcour_barla(target: Sensor) -> Bands:
-    """Return the bands of Belcour and Barla 2017: four Gaussians, three orders, E, no absorption.
+@cache
+def published_gaussians() -> Bands:
+    """Return the bands of Belcour and Barla 2017 as published: four Gaussians, three orders, no absorption.
 
     The constants are those of their plugin and of glTF Sample Viewer, MaterialX and three.js: height,
-    centre (1/m) and variance of exp(−V(2πD)²); X has a second, blue lobe. For another illuminant their
-    colour is converted by Bradford's adaptation, as renderers do.
+    centre (1/m) and variance of exp(−V(2πD)²); X has a second, blue lobe. Their white is that of E.
     """
     height = np.array([5.4856e-13, 4.4201e-13, 5.2481e-13, 9.7470e-14])
     centre = np.array([1.6810e6, 1.7953e6, 2.2084e6, 2.2399e6])
     variance = np.array([4.3278e9, 9.3046e9, 6.6121e9, 4.5282e9])
     weights = np.zeros((4, 3))
     weights[range(4), (0, 1, 2, 0)] = height * np.sqrt(2 * np.pi * variance) / 1.0685e-7
-    to_target = adaptation(np.ones(3), target.white)
-    return Bands(1e9 / centre, np.sqrt(2 * variance) * 1e-9, weights @ to_target.T, orders=3, absorbs=False)
+    return Bands(1e9 / centre, np.sqrt(2 * variance) * 1e-9, weights, orders=3, absorbs=False)
+
+
+def belcour_barla(target: Sensor) -> Bands:
+    """Return the bands of Belcour and Barla 2017, converted from E by Bradford's adaptation."""
+    published, to_target = published_gaussians(), adaptation(np.ones(3), target.white)
+    return published._replace(weights=published.weights @ to_target.T)
 
 
 _WORD = re.compile(r"(points|uniform|frequency|nodes|gaussians)-(\d+(?:-\d+)*)")

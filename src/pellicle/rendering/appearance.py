@@ -1,0 +1,123 @@
+"""Exact colours of a film in reflection over the angle, and the numbers that renderers take of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import equinox as eqx
+import numpy as np
+from jaxtyping import Float
+
+from pellicle.colour import integration_bands, sensor
+from pellicle.colour.spaces import SRGB_WHITE, TO_SRGB, adaptation
+from pellicle.dispersion.base import AbstractDispersion, known_index
+from pellicle.optics.pair import parts
+from pellicle.scene.film import Light, Scene
+from pellicle.scene.free import insert, start_values
+from pellicle.scene.instrument import Instrument
+from pellicle.scene.layers import Interface, Layer, Plate
+from pellicle.synthetic.colours import BANDS, interference_colours, varied_layer
+
+ANGLES = np.linspace(0.0, 80.0, 81)
+"""Angles of incidence (degrees) at which colours are compared."""
+CHANNELS = np.array([650.0, 550.0, 450.0])
+"""Wavelengths (nm) of red, green and blue, at which a renderer's indices per channel are taken."""
+OPAQUE = 1e-4
+"""Extinction above which a substrate is opaque: visible light enters it by less than half a millimetre."""
+_FILM = "film"
+
+
+@dataclass(frozen=True)
+class Appearance:
+    """Exact colours of a film, and the numbers of its one layer and of its substrate.
+
+    `thickness` (thicknesses,) is in nm: one, or several where it varies over the object. `xyz`
+    (thicknesses, angles, 3) are the colours at `ANGLES` under D65 for the CIE 1931 observer, Y = 1 for a
+    perfect reflector. `layer` and `base` are n + ik at `CHANNELS`, `bare` the linear sRGB of the substrate
+    without a layer at normal incidence. `roughness` is the GGX α of its facets. `notes` are sentences on
+    what formats cannot say of this film.
+    """
+
+    thickness: Float[np.ndarray, " thicknesses"]
+    xyz: Float[np.ndarray, "thicknesses angles 3"]
+    layer: np.ndarray
+    base: np.ndarray
+    bare: Float[np.ndarray, "3"]
+    roughness: float = 0.0
+    notes: tuple[str, ...] = ()
+
+    @property
+    def metallic(self) -> bool:
+        """True where light does not leave the substrate again: a metal or a semiconductor."""
+        return bool(np.max(np.imag(self.base)) > OPAQUE)
+
+    @property
+    def index(self) -> float:
+        """Refractive index of the layer at 550 nm."""
+        return float(self.layer[1].real)
+
+
+def appearance(scene: Scene, thickness: Any = None, layer: str | None = None) -> Appearance:
+    """Compute the exact colours of a scene's film, and collect what renderers take of it.
+
+    **Arguments:** `scene`, whose free parameters take their start values; `thickness` in nm,
+    (thicknesses,), of the `layer` of that name (the free one or else the first if None), by default its own.
+
+    **Raises:** UsageError without a coherent layer or for an unknown name, ValueError where a material has
+    no data between 380 and 730 nm.
+    """
+    position = varied_layer(scene, layer)
+    scene = _in_reflection(insert(scene, start_values(scene)))
+    film: Any = scene.layers[position]
+    nm = np.unique(np.asarray(film.thickness if thickness is None else thickness, float))
+    # without the others' names, so that it is found by its own
+    named = tuple(replace(x, name=_FILM if i == position else None) for i, x in enumerate(scene.layers))
+    colour = interference_colours(replace(scene, layers=named), nm, ANGLES, _FILM)
+    return Appearance(
+        nm,
+        np.swapaxes(np.asarray(colour.xyz), 0, 1),
+        _index(film.material, CHANNELS),
+        _index(scene.substrate.material, CHANNELS),
+        _bare(scene),
+        notes=tuple(_notes(scene, film)),
+    )
+
+
+def _bare(scene: Scene) -> np.ndarray:
+    """Linear sRGB of the substrate in the scene's ambient at normal incidence, without a layer."""
+    bands, to_srgb = integration_bands(BANDS), TO_SRGB @ adaptation(sensor().white, SRGB_WHITE)
+    n0, n2 = (_index(medium, bands.wavelength) for medium in (scene.ambient, scene.substrate.material))
+    return np.clip(to_srgb @ (np.abs((n0 - n2) / (n0 + n2)) ** 2 @ bands.weights), 0.0, 1.0)
+
+
+def _index(medium: AbstractDispersion, wavelength: np.ndarray) -> np.ndarray:
+    """n + ik at wavelengths in nm."""
+    re, im = parts(known_index(medium, wavelength))
+    return np.broadcast_to(re + (0j if im is None else 1j * np.asarray(im)), wavelength.shape)
+
+
+def _in_reflection(scene: Scene) -> Scene:
+    """The scene without what belongs to the measurement, not to the sample."""
+    spread = scene.instrument.thickness_spread
+    return eqx.tree_at(
+        lambda s: (s.light, s.instrument), scene, (Light(), Instrument(thickness_spread=spread))
+    )
+
+
+def _notes(scene: Scene, film: Layer) -> list[str]:
+    coherent = [x for x in scene.layers if isinstance(x, Layer | Interface)]
+    found = []
+    if len(coherent) > 1:
+        found.append(f"the film has {len(coherent)} layers: formats have one")
+    if any(isinstance(x, Plate) for x in scene.layers) or scene.substrate.back is not None:
+        found.append("light that returns from the back face of a plate is part of its colours")
+    if film.roughness is not None or scene.substrate.roughness is not None:
+        found.append("interfaces with a roughness in nm are part of its colours")
+    if film.thickness_spread is not None or scene.instrument.thickness_spread is not None:
+        found.append("the spread of its thickness is part of its colours")
+    if np.max(np.imag(_index(film.material, CHANNELS))) > 0:
+        found.append("the layer absorbs: formats have none that does")
+    if np.max(np.abs(_index(scene.ambient, CHANNELS) - 1.0)) > 1e-3:
+        found.append("it is not in air, as formats assume")
+    return found
