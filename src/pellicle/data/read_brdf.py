@@ -1,4 +1,4 @@
-"""Reading of BRDF samples: CSV, ALTA text and MERL binary files."""
+"""Reading of BRDF samples: CSV, ALTA text, MERL and RGL binary files."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ import numpy as np
 from pellicle.data.brdf_samples import CHANNELS, ROUNDING, BrdfSamples, sigma_names
 from pellicle.data.formats import alta
 from pellicle.data.formats.merl import is_merl, read_merl
+from pellicle.data.formats.rgl import read_rgl
+from pellicle.data.formats.tensor_file import is_tensor_file
 from pellicle.data.tabular.column_selection import only
 from pellicle.data.tabular.columns import DIRECTIONS, Column, listed
 from pellicle.data.tabular.layout import find_layout
@@ -29,8 +31,9 @@ def read_brdf_samples(
     columns: str | Sequence[str] | None = None,
     samples: int | None = None,
     max_theta: float | None = None,
+    wavelengths: Sequence[float] | None = None,
 ) -> BrdfSamples:
-    """Read samples of a BRDF from CSV, ALTA text or MERL binary files, recognised by their content.
+    """Read samples of a BRDF from CSV, ALTA text, MERL or RGL (`.bsdf`) files, recognised by their content.
 
     A CSV has the columns theta_i, phi_i, theta_o, phi_o in degrees, then value or R, G, B in 1/sr, and
     may have their standard deviations: sigma for all, or sigma_R, sigma_G, sigma_B.
@@ -40,9 +43,10 @@ def read_brdf_samples(
     - `path` of the file.
     - `columns`: names in the order of a CSV's columns, "_" to skip one; overrides the header.
     - `samples`: how many to keep, spread over the file, the same at every call. By default all of a text
-      file and 10 000 of a MERL file.
+      file and 10 000 of a MERL or RGL file.
     - `max_theta`: samples with light or viewer further than this from the normal (degrees) are left out:
       near grazing many instruments, MERL's among them, measure badly.
+    - `wavelengths` (nm) at which spectra of an RGL file are taken, one or three: 645, 525, 445 by default.
 
     **Returns:** `BrdfSamples`.
 
@@ -51,8 +55,11 @@ def read_brdf_samples(
     """
     if max_theta is not None and not 0 < max_theta <= 90:
         raise UsageError(f"`max_theta` must lie above 0 and at most at 90 degrees, got {max_theta:g}")
+    widest = 90.0 if max_theta is None else max_theta
+    if is_tensor_file(path):
+        return read_rgl(path, samples, widest, wavelengths)
     if is_merl(path):
-        return read_merl(path, samples, 90.0 if max_theta is None else max_theta)
+        return read_merl(path, samples, widest)
     file = text_file(*read_bytes(path), path)
     header = alta.find_header(file.comments, file.path)
     layout = alta.layout(file, header) if header else find_layout(file)

@@ -92,10 +92,17 @@ class SurfaceRecipe:
             raise DataError(f"{self.path}: scene.surface: its base is nested too deeply") from None
 
     def read(self, file: str) -> BrdfSamples:
-        """Read samples as `[data]` says, with σ where it gives `noise`. Raises DataError or UsageError."""
+        """Read samples as `[data]` says, with σ where it gives `noise`. Raises DataError or UsageError.
+
+        Spectra are taken at the surface's wavelengths.
+        """
         data = self.tables.data
         samples = read_brdf_samples(
-            file, columns=data.columns, samples=data.samples, max_theta=data.max_theta
+            file,
+            columns=data.columns,
+            samples=data.samples,
+            max_theta=data.max_theta,
+            wavelengths=self.scene().channel_wavelengths,
         )
         if data.noise is None:
             return samples

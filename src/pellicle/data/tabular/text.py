@@ -149,6 +149,7 @@ _FOREIGN = {
     rb"PK\x03\x04|\x1f\x8b|BZh|7z\xbc\xaf|Rar!": "packed; unpack it and give the file inside",
     rb"AVS8\d": "a binary file of Avantes AvaSoft 8; export it as text in AvaSoft",
     rb"Spectral Data File": "a binary file of Thermo OMNIC; save it as JCAMP-DX or CSV in OMNIC",
+    rb"tensor_file\0": "a tensor file of a BRDF; fit it with a `recipe` of the surface",
     rb"\{\\rtf": "a word processor's file; save it as plain text",
     rb"\s*<(!doctype|html|\?xml|svg)": "a web page or XML; export the spectrum as a CSV",
     rb"\s*(\{|\[\s*[\{\[\"])": "JSON; give a CSV with columns as wavelength_nm,R",

@@ -1,0 +1,268 @@
+"""`.bsdf` files: values of simple tables by hand, of any table by Mitsuba's own `measured`."""
+
+import hashlib
+
+import numpy as np
+import pytest
+
+from pellicle.data.formats.rgl import load_rgl, read_rgl
+from pellicle.data.formats.tensor_file import write_tensors
+from pellicle.data.half_angles import angles, vectors
+from pellicle.data.read_brdf import read_brdf_samples
+from pellicle.data.read_spectrum import read_spectrum
+from pellicle.data.write_rgl import TableSize, tabulate, write_rgl
+from pellicle.errors import DataError
+
+THETA = [0.05, 0.4, 0.9, 1.4]
+WAVELENGTHS = np.linspace(400, 700, 5)
+
+
+def fields(phi=(0.0,), spectral=False, jacobian=1, side=6):
+    """A table of random numbers; that of an isotropic surface has its mirror symmetry.
+
+    Mitsuba 3.9 does not initialise its `m_reduction` for isotropic files, so that it mirrors or turns the
+    directions of some of them, by chance.
+    """
+    random = np.random.default_rng(0)
+    shape, channels = (len(phi), len(THETA)), 5 if spectral else 3
+    made = {
+        "phi_i": np.array(phi),
+        "theta_i": np.array(THETA),
+        "ndf": random.uniform(0.5, 2, (4, 5)),
+        "sigma": random.uniform(0.5, 2, (3, 6)),
+        "vndf": random.uniform(0.2, 2, (*shape, 7, 9)),
+        "luminance": random.uniform(0.2, 2, (*shape, side, side)),
+        "spectra" if spectral else "rgb": random.uniform(0.1, 1, (*shape, channels, side, side)),
+        **({"wavelengths": WAVELENGTHS} if spectral else {}),
+    }
+    if len(phi) == 1:
+        made["sigma"][:] = made["sigma"][:1]
+        for name in {"ndf", "vndf", "luminance", "rgb", "spectra"} & made.keys():
+            made[name] = made[name] + np.flip(made[name], axis=-2)
+    single = {name: array.astype(np.float32) for name, array in made.items()}
+    text = np.frombuffer(b"random", np.uint8)
+    return {"description": text, "jacobian": np.array([jacobian], np.uint8), **single}
+
+
+def write(path, **kind):
+    write_tensors(path, fields(**kind), overwrite=True)
+    return path
+
+
+def directions(count, seed=0):
+    """Uniform over the hemisphere."""
+    random = np.random.default_rng(seed)
+    z, phi = random.uniform(0.02, 1, count), random.uniform(-np.pi, np.pi, count)
+    return np.stack([np.sqrt(1 - z * z) * np.cos(phi), np.sqrt(1 - z * z) * np.sin(phi), z])
+
+
+def directions_of(samples):
+    light = vectors(np.deg2rad(samples.theta_i), np.deg2rad(samples.phi_i))
+    return light, vectors(np.deg2rad(samples.theta_o), np.deg2rad(samples.phi_o))
+
+
+def measured(path, i, o, variant, wavelengths=None):
+    """f cos θ_o by Mitsuba's `measured`, one pair of directions at a time."""
+    mitsuba = pytest.importorskip("mitsuba")
+    mitsuba.set_variant(variant)
+    bsdf = mitsuba.load_dict({"type": "measured", "filename": str(path)})
+    found = []
+    for light, viewer in zip(i.T.tolist(), o.T.tolist(), strict=True):
+        at = mitsuba.SurfaceInteraction3f()
+        at.wi = mitsuba.Vector3f(*light)
+        if wavelengths is not None:
+            at.wavelengths = wavelengths
+        found.append(np.array(bsdf.eval(mitsuba.BSDFContext(), at, mitsuba.Vector3f(*viewer))))
+    return np.array(found)
+
+
+@pytest.mark.parametrize("jacobian", [0, 1])
+@pytest.mark.parametrize(
+    "phi",
+    [(0.0,), np.linspace(-np.pi, np.pi, 5), np.linspace(-np.pi, 0, 4), np.linspace(-np.pi, -np.pi / 2, 3)],
+    ids=["isotropic", "anisotropic", "half", "quarter"],
+)
+def test_values_are_those_of_mitsuba(tmp_path, phi, jacobian):
+    path = write(tmp_path / "made.bsdf", phi=phi, jacobian=jacobian)
+    i, o = directions(150), directions(150, 1)
+    theirs = measured(path, i, o, "scalar_rgb")
+    # Mitsuba computes in float32
+    np.testing.assert_allclose(load_rgl(path).evaluate(i, o) * o[2][:, None], theirs, rtol=3e-5, atol=1e-6)
+
+
+def test_spectra_are_those_of_mitsuba(tmp_path):
+    path = write(tmp_path / "made.bsdf", spectral=True)
+    i, o = directions(60), directions(60, 1)
+    at = [450.0, 525.0, 612.0, 690.0]
+    theirs = measured(path, i, o, "scalar_spectral", at)
+    stored = load_rgl(path).evaluate(i, o) * o[2][:, None]
+    ours = [np.interp(at, WAVELENGTHS, row) for row in stored]
+    np.testing.assert_allclose(ours, theirs, rtol=3e-5, atol=1e-6)
+
+
+def test_a_uniform_density_leaves_the_grid_over_half_vectors(tmp_path):
+    """Without a warp the table is bilinear in √(2θ_m/π) and (φ_m − φ_i + π)/2π: values written as such."""
+    made = fields(jacobian=0, side=9)
+    made["vndf"][:] = 1
+    y, x = np.mgrid[:9, :9] / np.float32(8)
+    made["rgb"][:] = np.stack([1 + x, 2 + y, 3 + x * y])
+    path = tmp_path / "made.bsdf"
+    write_tensors(path, made)
+    i, o = directions(100), directions(100, 1)
+    half = i + o
+    u = np.sqrt(np.arccos(half[2] / np.linalg.norm(half, axis=0)) * 2 / np.pi)
+    turn = np.arctan2(half[1], half[0]) - np.arctan2(i[1], i[0])
+    v = (turn + np.pi) / (2 * np.pi) % 1
+    found = load_rgl(path).evaluate(i, o) * o[2][:, None]
+    np.testing.assert_allclose(found, np.stack([1 + u, 2 + v, 3 + u * v], 1), rtol=1e-6)
+    below = load_rgl(path).evaluate(i, o * [[1], [1], [-1]])
+    assert (below == 0).all()
+
+
+@pytest.mark.parametrize("phi", [(0.0,), np.linspace(-3, 3, 5)], ids=["isotropic", "anisotropic"])
+def test_samples_are_the_stored_values_at_their_directions(tmp_path, phi):
+    path = write(tmp_path / "made.bsdf", phi=phi)
+    samples = read_brdf_samples(path, samples=40)
+    assert len(samples) == 40
+    light, viewer = directions_of(samples)
+    np.testing.assert_allclose(load_rgl(path).evaluate(light, viewer), samples.values, rtol=1e-5)
+    # each is a stored number: divided by what depends on direction alone, ratios of channels are those stored
+    stored = np.asarray(fields(phi=phi)["rgb"], float)[..., 1:-1, 1:-1]
+    ratios = (stored[:, :, 1] / stored[:, :, 0]).ravel()
+    found = samples.values[:, 1] / samples.values[:, 0]
+    assert np.abs(ratios - found[:, None]).min(axis=1).max() < 1e-12
+    assert samples.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
+    assert (samples.phi_i == 0).all() == (len(phi) == 1)
+
+
+def test_what_is_left_out_is_counted(tmp_path):
+    made = fields()
+    made["rgb"][0, 1, 1, 2, 3] = -0.5
+    made["rgb"][0, 2, 0, 2, 3] = np.nan
+    write_tensors(tmp_path / "made.bsdf", made)
+    every, near = (read_brdf_samples(tmp_path / "made.bsdf", max_theta=t) for t in (None, 60))
+    inside = len(THETA) * 4 * 4
+    left_out = [int(word) for word in every.notes[2].split() if word.isdigit()]
+    assert left_out[1] == 2
+    assert len(every) + sum(left_out) == inside
+    assert 0 < len(near) < len(every)
+    assert max(near.theta_i.max(), near.theta_o.max()) <= 60
+    assert "nodes with a direction more than 60 degrees from the normal" in near.notes[2]
+
+
+def test_spectra_are_taken_at_wavelengths(tmp_path):
+    path = write(tmp_path / "made.bsdf", spectral=True)
+    red, all_three = (read_brdf_samples(path, wavelengths=w) for w in ([500.0], [625.0, 500.0, 437.5]))
+    assert red.channels == ("value",)
+    np.testing.assert_allclose(red.values[:, 0], all_three.values[:, 1], rtol=1e-14)
+    light, viewer = directions_of(all_three)
+    rows = load_rgl(path).evaluate(light, viewer)
+    expected = [np.interp([625.0, 500.0, 437.5], WAVELENGTHS, row) for row in rows]
+    np.testing.assert_allclose(all_three.values, expected, rtol=1e-5)
+    with pytest.raises(
+        DataError, match="go from 400 to 700 nm; choose one or three `wavelengths` there, not 900"
+    ):
+        read_brdf_samples(path, wavelengths=[900.0])
+
+
+def without(name):
+    return lambda made: made.pop(name)
+
+
+def put(name, value):
+    def change(made):
+        made[name] = np.asarray(value(made[name]), np.float32)
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (without("vndf"), "vndf is expected; choose a .bsdf file"),
+        (put("theta_i", lambda x: x[::-1]), "do not match in shape or order"),
+        (put("rgb", lambda x: x[:, :2]), "do not match in shape or order"),
+        (put("ndf", lambda x: -x), "ndf has values that are no densities"),
+        (put("vndf", lambda x: 0 * x), "vndf is zero everywhere"),
+        (put("vndf", lambda x: np.nan * x), "vndf has values that are no densities"),
+        (put("rgb", lambda x: -x), "has no valid value of a BRDF; download it again"),
+    ],
+)
+def test_tables_that_are_refused(tmp_path, change, said):
+    made = fields()
+    change(made)
+    write_tensors(tmp_path / "made.bsdf", made)
+    with pytest.raises(DataError, match=said) as caught:
+        read_rgl(tmp_path / "made.bsdf")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_bsdf_is_no_spectrum(tmp_path):
+    with pytest.raises(DataError, match="is a tensor file of a BRDF; fit it with a `recipe`"):
+        read_spectrum(write(tmp_path / "made.bsdf"))
+
+
+def facets(alpha, diffuse=0.0, across=0.0):
+    """GGX microfacets of some colour and a diffuse part; `across` tilts them, without isotropy."""
+
+    def brdf(i, o):
+        h = (i + o) / np.linalg.norm(i + o, axis=0)
+        cos_d = (i * h).sum(axis=0)
+        x = h[0] - across * h[2]
+        d = alpha**2 / np.pi / (h[2] ** 2 * alpha**2 + x**2 + h[1] ** 2) ** 2
+        mask = [c * np.sqrt(alpha**2 + (1 - alpha**2) * c2 * c2) for c, c2 in ((o[2], i[2]), (i[2], o[2]))]
+        colour = np.stack([0.5 + 0.5 * (1 - cos_d) ** 5, 0.2 + 0.1 * np.cos(6 * cos_d), 0.4 * cos_d], 1)
+        return (d * 0.5 / (mask[0] + mask[1]))[:, None] * colour + diffuse
+
+    return brdf
+
+
+def lobe(alpha, count, seed=0):
+    """Pairs of directions drawn from the lobe, at most 75° from the normal."""
+    random = np.random.default_rng(seed)
+    i = vectors(np.arccos(random.uniform(np.cos(1.3), 1, count)), random.uniform(0, 2 * np.pi, count))
+    u = random.uniform(0, 1, count)
+    m = vectors(np.arctan(alpha * np.sqrt(u / (1 - u))), random.uniform(0, 2 * np.pi, count))
+    o = 2 * (i * m).sum(axis=0) * m - i
+    near = (o[2] > np.cos(1.3)) & (i[2] > np.cos(1.3))
+    return i[:, near], o[:, near]
+
+
+@pytest.mark.parametrize(
+    ("alpha", "diffuse", "across", "size", "median"),
+    [
+        (0.1, 0.0, 0.0, TableSize(), 0.005),
+        (0.3, 0.05, 0.0, TableSize(thetas=24, side=32), 0.005),
+        (0.3, 0.02, 0.2, TableSize(17, 12, 24, (32, 64)), 0.02),  # 22° between azimuths
+    ],
+    ids=["facets", "with diffuse part", "anisotropic"],
+)
+def test_tables_of_a_brdf_are_near_it(tmp_path, alpha, diffuse, across, size, median):
+    """Exact at its nodes, near it between them, in Mitsuba too."""
+    brdf, path = facets(alpha, diffuse, across), tmp_path / "made.bsdf"
+    write_rgl(path, tabulate(brdf, size, description="a test"))
+    samples = read_brdf_samples(path, samples=500)
+    light, viewer = directions_of(samples)
+    exact = brdf(light, viewer)
+    # float32 keeps 7 digits of the half vector's coordinates
+    assert np.max(np.abs(samples.values - exact) / exact.max(axis=1, keepdims=True)) < 3e-4
+    i, o = lobe(alpha, 3000)
+    exact = brdf(i, o)
+    missed = np.abs(load_rgl(path).evaluate(i, o) - exact) / exact.max(axis=1, keepdims=True)
+    assert np.median(missed) < median
+    assert np.quantile(missed, 0.95) < 10 * median
+    theirs = measured(path, i[:, :50], o[:, :50], "scalar_rgb") / o[2, :50, None]
+    assert np.median(np.abs(theirs - exact[:50]) / exact[:50].max(axis=1, keepdims=True)) < median
+
+
+def test_half_vectors_of_a_table_are_sorted_by_the_warp(tmp_path):
+    """Sampling and inversion undo each other, also between two angles of the light."""
+    from pellicle.data.formats.bilinear_warp import corners
+
+    brdf = load_rgl(write(tmp_path / "made.bsdf"))
+    u, v, theta = np.random.default_rng(2).uniform(0.01, 0.99, (3, 400))
+    around = corners((brdf.phi_i, brdf.theta_i), (np.zeros(400), theta * 1.5))
+    back = brdf.warp.invert(around, *brdf.warp.sample(around, u, v))
+    np.testing.assert_allclose(back, [u, v], atol=1e-9)
+    theta_m, _ = angles(vectors(theta, 0.3))
+    np.testing.assert_allclose(theta_m, theta, atol=1e-12)
