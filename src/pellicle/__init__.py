@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from pellicle.api import sample as sample
     from pellicle.api import simulate as simulate
     from pellicle.data.brdf_samples import BrdfSamples as BrdfSamples
+    from pellicle.data.colours import CameraMatrix as CameraMatrix
+    from pellicle.data.colours import Colours as Colours
     from pellicle.data.read_brdf import read_brdf_samples as read_brdf_samples
     from pellicle.data.read_spectrum import read_spectra as read_spectra
     from pellicle.data.read_spectrum import read_spectrum as read_spectrum
@@ -27,6 +29,8 @@ if TYPE_CHECKING:
     from pellicle.fitting.result import Fit as Fit
     from pellicle.fitting.result import Status as Status
     from pellicle.materials import material as material
+    from pellicle.recipes.colours import read_colours as read_colours
+    from pellicle.recipes.colours import read_colours_by_film as read_colours_by_film
     from pellicle.recipes.read import read_recipe as read_recipe
     from pellicle.reporting.present import report as report
     from pellicle.sampling.result import Posterior as Posterior
@@ -51,12 +55,14 @@ if TYPE_CHECKING:
 _NAMES = {
     "pellicle.api": ("compare", "cost", "export", "fit", "plan", "sample", "simulate"),
     "pellicle.data.brdf_samples": ("BrdfSamples",),
+    "pellicle.data.colours": ("CameraMatrix", "Colours"),
     "pellicle.data.read_brdf": ("read_brdf_samples",),
     "pellicle.data.read_spectrum": ("read_spectra", "read_spectrum"),
     "pellicle.data.spectrum": ("Spectrum",),
     "pellicle.data.write_spectrum": ("write_spectrum",),
     "pellicle.fitting.result": ("Fit", "Status"),
     "pellicle.materials": ("material",),
+    "pellicle.recipes.colours": ("read_colours", "read_colours_by_film"),
     "pellicle.recipes.read": ("read_recipe",),
     "pellicle.reporting.present": ("report",),
     "pellicle.sampling.result": ("Posterior",),

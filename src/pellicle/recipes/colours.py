@@ -1,0 +1,145 @@
+"""Colours of films from files and pictures, with the sensor that saw them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+
+import numpy as np
+
+from pellicle.data.colours import Colours
+from pellicle.data.read_colours import ColourRows, read_colour_rows
+from pellicle.data.read_picture import picture_format, read_picture
+from pellicle.errors import UsageError
+from pellicle.recipes.cameras import Camera, Sight, sight
+from pellicle.recipes.picture_colours import Pixels, picture_colours
+
+
+def read_colours(path: str | os.PathLike[str], *, name: str | None = None, **options) -> Colours:
+    """Read the colours of one film from CSV, or from a PNG, TIFF or JPEG picture.
+
+    A CSV has R, G, B, or X, Y, Z, or x, y, Y, or L*, a*, b*, and may have angle_deg, sigma and name. Of a
+    picture the mean colour of a region, or of points, is taken in linear light.
+
+    **Arguments:** `name` of the film where a file has several, or the region as written; all others are
+    those of `read_colours_by_film`.
+
+    **Returns:** `Colours`, as `pellicle.fit` takes them.
+
+    **Raises:** as `read_colours_by_film`; UsageError for several films without a `name`, or an unknown one.
+    """
+    films = read_colours_by_film(path, **options)
+    chosen = [film for film in films if name is None or film.name == name]
+    if len(chosen) != 1:
+        known = ", ".join(repr(film.name) for film in films)
+        raise UsageError(f"{path}: has {len(films)} films, {known}: choose one with `name`")
+    return chosen[0]
+
+
+def read_colours_by_film(
+    path: str | os.PathLike[str],
+    *,
+    space: str | None = None,
+    observer: str = "1931",
+    illuminant: str = "D65",
+    lamp: str | os.PathLike[str] | None = None,
+    sensitivities: str | os.PathLike[str] | None = None,
+    chart: str | os.PathLike[str] | None = None,
+    gamma: float = 1.0,
+    white_balance: str = "fixed",
+    white: Pixels | None = None,
+    region: Pixels | None = None,
+    points: Pixels | None = None,
+    angle: float | Sequence[float] | None = None,
+    polarisation: str = "unpolarised",
+    signal: str = "R",
+    noise: float | Sequence[float] | None = None,
+    signal_unit: str | None = None,
+    columns: str | Sequence[str] | None = None,
+) -> list[Colours]:
+    """Read the colours of every film of a CSV file, or of every region of a picture.
+
+    **Arguments:**
+
+    - `path` of a CSV, or of a PNG, TIFF or JPEG picture (extra `images`).
+    - `space`: "srgb", "rgb" (a camera's channels), "xyz" or "lab", where the file does not say it; "srgb" of
+      R, G, B and of pictures.
+    - `observer`: "1931" or "1964"; `illuminant`: E, A, D50, D55, D65 or D75; `lamp`: CSV of a spectrum in
+      place of the illuminant.
+    - `sensitivities`: CSV of a camera's three channels; `chart`: CSV of a photographed chart in their place,
+      with R, G, B as measured and X, Y, Z of the reference. Without either, "rgb" is linear sRGB.
+    - `gamma` of "rgb": values are linear ones to the power 1/`gamma`.
+    - `white_balance`: "fixed", or "free" where each channel has an unknown factor.
+    - `white`: region of a picture that shows a perfect reflector, by which colours are divided.
+    - `region`: rectangles "x,y,width,height;..." of a picture in pixels from its upper left corner; `points`:
+      "x,y;...", each with the pixels around it, 5 by 5.
+    - `angle` of incidence in degrees, for all colours; or one for each region of a picture, which are then
+      colours of one film.
+    - `polarisation`: "unpolarised", "s" or "p"; `signal`: "R", or "T" for transmitted light.
+    - `noise`: standard deviation of the values, one or three; of a picture by default the scatter of the
+      region's pixels and the rounding.
+    - `signal_unit`: "fraction", "percent", "8-bit" or "16-bit", where values do not show it.
+    - `columns`: names in the order of a CSV's columns, "_" to skip one.
+
+    **Returns:** a list of `Colours`, one for each film.
+
+    **Raises:** DataError (unreadable or impossible data) or UsageError (an argument missing or wrong): one
+    sentence; ImportError for a picture without the extra `images`.
+    """
+    if signal not in ("R", "T"):
+        raise UsageError(f'`signal` must be R or T, and `space` the colour space, not `signal="{signal}"`')
+    lamp, sensitivities, chart = (None if x is None else os.fspath(x) for x in (lamp, sensitivities, chart))
+    camera = Camera(
+        observer, illuminant, lamp, sensitivities, chart, gamma, white_balance, transmitted=signal == "T"
+    )
+    if picture_format(path) is not None:
+        if columns is not None or signal_unit is not None:
+            raise UsageError(f"{path}: is a picture: leave `columns` and `signal_unit` out")
+        films, seen = picture_colours(read_picture(path), space, camera, region, points, white, angle)
+        angle = None
+    else:
+        if not region is points is white is None:
+            raise UsageError(f"{path}: is no picture: leave `region`, `points` and `white` out")
+        films = read_colour_rows(path, space, unit=signal_unit, columns=columns)
+        seen = sight(camera, films[0].space)
+        if angle is not None and np.ndim(angle):
+            raise UsageError("`angle` of a file is one number; several angles are a column angle_deg")
+    return [_assembled(film, seen, camera, angle, noise, polarisation) for film in films]
+
+
+def _assembled(
+    film: ColourRows,
+    seen: Sight,
+    camera: Camera,
+    angle: float | Sequence[float] | None,
+    noise: float | Sequence[float] | None,
+    polarisation: str,
+) -> Colours:
+    sigma, stated = film.sigma, film.angle
+    if noise is not None:
+        if not (np.all(np.isfinite(noise)) and np.all(np.asarray(noise) > 0) and np.size(noise) in (1, 3)):
+            raise UsageError(f"`noise` must be one standard deviation above zero, or three, got {noise}")
+        if film.space != "lab" and np.any(np.asarray(noise) > 0.5):
+            raise UsageError(f"`noise` {noise} is a fraction of white: divide 8-bit values by 255")
+        sigma = np.broadcast_to(noise, film.values.shape)
+    if angle is not None:
+        if stated is not None:
+            raise UsageError(f"{film.path}: states its own angles; leave `angle` out")
+        stated = np.full(len(film.values), angle, dtype=float)
+    return Colours(
+        film.values,
+        seen.sensor,
+        film.space,
+        "T" if camera.transmitted else "R",
+        sigma=sigma,
+        angle=stated,
+        polarisation=polarisation,
+        gamma=camera.gamma,
+        white_balance=camera.white_balance,
+        camera=seen.matrix,
+        path=film.path,
+        sha256=film.sha256,
+        lines=film.lines,
+        notes=(*film.notes, *seen.notes),
+        name=film.name,
+    )

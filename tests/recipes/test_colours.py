@@ -1,0 +1,176 @@
+"""Colours of films from files and pictures, against sums in NumPy and colour-science."""
+
+import colour
+import numpy as np
+import pytest
+from PIL import Image, ImageCms
+
+import pellicle as pl
+from pellicle.errors import DataError, UsageError
+from pellicle.recipes.colours import read_colours, read_colours_by_film
+
+RNG = np.random.default_rng(3)
+PIXELS = RNG.integers(20, 200, (20, 30, 3), dtype=np.uint8)
+PIXELS[:5, :5] = 0  # a dark corner
+WHITE = np.array([230, 220, 180], np.uint8)
+
+
+@pytest.fixture
+def photo(tmp_path):
+    def write(pixels=PIXELS, **options):
+        path = tmp_path / "photo.png"
+        Image.fromarray(pixels).save(path, **options)
+        return path
+
+    return write
+
+
+def linear(coded):
+    """sRGB decoded by colour-science, from 8 bits."""
+    return colour.models.eotf_sRGB(coded / 255.0)
+
+
+def coded(channels):
+    return colour.models.eotf_inverse_sRGB(channels)
+
+
+def test_the_mean_of_a_region_is_that_of_linear_light(photo):
+    film = read_colours(photo(), region="5,6,10,8", angle=45.0)
+    inside = PIXELS[6:14, 5:15].reshape(-1, 3)
+    np.testing.assert_allclose(film.values[0], coded(linear(inside).mean(axis=0)), atol=2e-4)
+    assert abs(film.values[0] - inside.mean(axis=0) / 255).max() > 0.02  # it is not the mean of the codes
+    rounding = 1 / 255 / np.sqrt(12)
+    np.testing.assert_allclose(film.sigma[0], np.hypot(inside.std(axis=0, ddof=1) / 255, rounding), rtol=1e-5)
+    assert film.angle.tolist() == [45.0]
+    assert film.space == "srgb"
+    assert "80 pixels in linear light" in " ".join(film.notes)
+    assert "observer 1931 under D65" in film.notes
+
+
+def test_division_by_a_white_in_linear_light(photo):
+    pixels = PIXELS.copy()
+    pixels[-4:, -4:] = WHITE
+    pixels[10, 10] = [90, 200, 180]
+    film = read_colours(photo(pixels), region=[10, 10, 1, 1], white="26,16,4,4")
+    expected = coded(np.minimum(linear(pixels[10, 10]) / linear(WHITE), 1))
+    np.testing.assert_allclose(film.values[0], expected, atol=2e-4)
+    assert film.sigma is None  # one pixel has no scatter
+    film = read_colours(
+        photo(pixels), region=[8, 8, 5, 5], white="26,16,4,4", space="rgb", gamma=2.2, noise=0.01
+    )
+    inside = (pixels[8:13, 8:13].reshape(-1, 3) / 255.0) ** 2.2
+    expected = (inside.mean(axis=0) / (WHITE / 255.0) ** 2.2) ** (1 / 2.2)
+    np.testing.assert_allclose(film.values[0], expected, atol=1e-5)
+    assert film.sigma.tolist() == [[0.01] * 3]
+    assert film.gamma == 2.2
+
+
+def test_regions_are_films_or_angles_of_one(photo):
+    path = photo()
+    one, two = read_colours_by_film(path, points="10,10;20,15")
+    assert (one.name, two.name) == ("8,8,5,5", "18,13,5,5")
+    both = read_colours(path, points="10,10;20,15", angle=[0, 60])
+    assert both.angle.tolist() == [0, 60]
+    np.testing.assert_allclose(both.values, np.concatenate([one.values, two.values]))
+    assert read_colours(path, points="10,10;20,15", name="18,13,5,5").values.tolist() == two.values.tolist()
+    with pytest.raises(UsageError, match="2 films"):
+        read_colours(path, points="10,10;20,15")
+
+
+def test_clipped_pixels_are_told_and_are_limits(photo):
+    film = read_colours(photo(), region="0,0,5,6")
+    assert film.values[0].tolist() == [0, 0, 0]
+    assert "83 % of the pixels are clipped (dark), taken as a limit in R, G, B" in " ".join(film.notes)
+    few = read_colours(photo(), region="0,0,30,20")
+    assert "4.2 % of the pixels are clipped" in " ".join(few.notes)
+    assert few.values.min() > 0.2
+
+
+def test_profiles_of_pictures(photo):
+    profile = ImageCms.ImageCmsProfile(ImageCms.createProfile("XYZ")).tobytes()
+    path = photo(icc_profile=profile)
+    with pytest.raises(DataError, match=r"colour profile 'XYZ.*convert the picture to sRGB"):
+        read_colours(path, region="1,1,3,3")
+    assert "ignored" in " ".join(read_colours(path, region="6,6,3,3", space="rgb").notes)
+
+
+@pytest.fixture
+def camera(tmp_path):
+    nm = np.arange(400, 721, 10.0)
+    bands = np.exp(-(((nm[:, None] - [600, 540, 460]) / 30) ** 2)) * [1, 2, 0.5]
+    lamp = 1 + (nm - 400) / 320
+    rows = zip(nm, *bands.T, lamp, strict=True)
+    table = [",".join(f"{x:.8g}" for x in row) for row in rows]
+    (tmp_path / "camera.csv").write_text(
+        "\n".join(["wavelength_nm,R,G,B", *(row.rpartition(",")[0] for row in table)])
+    )
+    (tmp_path / "lamp.csv").write_text("wavelength_nm,power\n380,0.9375\n780,2.1875\n")
+    (tmp_path / "c.csv").write_text("angle_deg,R,G,B\n0,.2,.3,.4\n")
+    return tmp_path, nm, bands, lamp
+
+
+def test_a_camera_and_its_lamp_from_files(camera):
+    folder, nm, bands, lamp = camera
+    film = pl.read_colours(
+        folder / "c.csv", space="rgb", sensitivities=folder / "camera.csv", lamp=folder / "lamp.csv"
+    )
+    at, weights = film.sensor
+    fine = np.linspace(400, 720, 32_001)
+    seen = np.stack([np.interp(fine, nm, band) for band in bands.T]) * np.interp(fine, nm, lamp)
+    expected = (seen * (0.5 + 0.3 * np.sin(fine / 40))).sum(1) / seen.sum(1)
+    np.testing.assert_allclose((0.5 + 0.3 * np.sin(at / 40)) @ weights, expected, atol=3e-4)
+    assert "camera.csv under" in " ".join(film.notes)
+
+
+def test_a_camera_by_its_chart(tmp_path):
+    truth = np.array([[2.0, -0.6, -0.3], [-0.4, 1.5, -0.1], [0.1, -0.3, 0.9]])
+    xyz = RNG.uniform(0.1, 0.5, (18, 3)) * [0.95, 1, 1.09]
+    xyz = xyz[np.all(xyz @ truth.T > 0.02, axis=1)]
+    rgb = (xyz @ truth.T) ** (1 / 2.2)
+    rows = "".join(",".join(f"{x:.9g}" for x in row) + "\n" for row in np.hstack([rgb, xyz]))
+    (tmp_path / "chart.csv").write_text("R,G,B,X,Y,Z\n" + rows)
+    (tmp_path / "c.csv").write_text("R,G,B\n.2,.3,.4\n")
+    film = pl.read_colours(tmp_path / "c.csv", space="rgb", gamma=2.2, chart=tmp_path / "chart.csv")
+    np.testing.assert_allclose(film.camera.matrix, truth, atol=1e-5)
+    assert "misfit ΔE2000" in " ".join(film.notes)
+    # its sensor is the observer
+    np.testing.assert_allclose(film.sensor[1].sum(axis=0), [0.9505, 1, 1.089], atol=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "reason"),
+    [
+        ({"space": "rgb", "sensitivities": "a.csv", "chart": "b.csv"}, UsageError, "exclude each other"),
+        ({"sensitivities": "a.csv"}, UsageError, "goes with"),
+        ({"lamp": "a.csv", "illuminant": "A"}, UsageError, "exclude each other"),
+        ({"lamp": "a.csv"}, DataError, "no such file"),
+        ({"observer": "1930"}, UsageError, "1930"),
+        ({"illuminant": "F2"}, UsageError, "F2"),
+        ({"gamma": 2.2}, UsageError, "gamma"),
+        ({"white_balance": "free"}, UsageError, "white_balance"),
+        ({"region": "1,1,2,2"}, UsageError, "no picture"),
+        ({"angle": 30.0}, UsageError, "own angles"),
+        ({"noise": 1.5}, UsageError, "divide 8-bit values"),
+        ({"noise": -1.0}, UsageError, "above zero"),
+        ({"signal": "srgb"}, UsageError, "R or T"),
+    ],
+)
+def test_what_does_not_go_together(camera, options, error, reason):
+    with pytest.raises(error, match=reason):
+        read_colours(camera[0] / "c.csv", **options)
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        ({}, "30 by 20 pixels: give `region"),
+        ({"region": "1,1,2,2", "points": "1,1"}, "give `region"),
+        ({"region": "1,1,2,2", "space": "lab"}, "a picture has"),
+        ({"region": "1,1,2,2", "white": "0,0,4,4"}, "is clipped in 100 %"),
+        ({"region": "1,1,2,2", "angle": [1, 2]}, "2 numbers for 1 regions"),
+        ({"region": "1,1,2,2", "columns": "R,G,B"}, "leave `columns`"),
+    ],
+)
+def test_what_a_picture_needs(photo, options, reason):
+    with pytest.raises(UsageError, match=reason):
+        read_colours(photo(), **options)
