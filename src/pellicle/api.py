@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pellicle.data.brdf_samples import BrdfSamples
+from pellicle.data.colours import Colours
 from pellicle.data.measurement import Measurement, check_measurement
 from pellicle.data.spectrum import Spectrum
 from pellicle.effects.plan import Plan
@@ -30,6 +31,7 @@ from pellicle.scene.film import Scene
 from pellicle.scene.kinds import check_scene
 from pellicle.scene.surface import Surface, SurfaceView, surface_view
 from pellicle.synthetic.brdf import Directions, default_directions, simulate_samples
+from pellicle.synthetic.measured_colours import simulate_colours
 from pellicle.synthetic.spectra import default_wavelengths, simulate_spectrum
 
 if TYPE_CHECKING:
@@ -46,7 +48,20 @@ def simulate(
     noise: float = 0.0,
     seed: int = 0,
     depolarisation_noise: float | None = None,
+    sensor: None = None,
+    space: None = None,
 ) -> Spectrum: ...
+@overload
+def simulate(
+    scene: Scene,
+    *,
+    sensor: tuple[np.ndarray, np.ndarray] | Colours | None = None,
+    space: str | None = None,
+    angle: ArrayLike | None = None,
+    gamma: float = 1.0,
+    noise: float = 0.0,
+    seed: int = 0,
+) -> Colours: ...
 @overload
 def simulate(
     scene: Surface,
@@ -63,8 +78,12 @@ def simulate(
     noise: float | str | Sequence[float | str] = 0.0,
     seed: int = 0,
     depolarisation_noise: float | None = None,
-) -> Spectrum | BrdfSamples:
-    """Simulate a measurement of `scene`: a spectrum of a film, or samples of the BRDF of a surface.
+    sensor: tuple[np.ndarray, np.ndarray] | Colours | None = None,
+    space: str | None = None,
+    angle: ArrayLike | None = None,
+    gamma: float = 1.0,
+) -> Spectrum | BrdfSamples | Colours:
+    """Simulate a measurement of `scene`: spectrum or colours of a film, or samples of a surface's BRDF.
 
     **Arguments:**
 
@@ -80,8 +99,13 @@ def simulate(
     - `seed` of the noise.
     - `depolarisation_noise`: standard deviation of a measured depolarisation, a fraction, which then becomes
       part of a spectrum of Ψ and Δ; 0 for one without noise.
+    - `sensor`, `space`: for colours, of a `Scene` only. `sensor` is wavelengths (N,), nm, and weights (N, 3)
+      as of `pellicle.colour.sensor`, the CIE observer 1931 under D65 by default, or `Colours` of which
+      sensor, space, gamma and angles are taken. `space` is "srgb" (the default), "rgb", "xyz" or "lab".
+    - `angle` of incidence of the colours in degrees, (colours,); that of the scene by default.
+    - `gamma` of "rgb".
 
-    **Returns:** `Spectrum` or `BrdfSamples`, as `pellicle.fit` takes them.
+    **Returns:** `Spectrum`, `BrdfSamples` or `Colours`, as `pellicle.fit` takes them.
 
     **Raises:** ValueError where a material has no data at a wavelength; UsageError for a surface that
     reflects nothing, or has neither one channel nor R, G and B.
@@ -90,6 +114,8 @@ def simulate(
     >>> scene = pl.Scene(pl.Layer("SiO2", 500.0), "Si")
     >>> pl.simulate(scene, [500.0, 600.0, 700.0]).values.round(4).tolist()
     [0.3769, 0.1065, 0.3259]
+    >>> pl.simulate(scene, space="srgb", angle=[0, 60]).values.round(2).tolist()
+    [[0.28, 0.52, 0.6], [0.65, 0.6, 0.52]]
 
     ```
     """
@@ -98,10 +124,21 @@ def simulate(
         raise UsageError(f"`noise` must not be negative, got {noise:g}")
     if isinstance(scene, Surface):
         _refuse("a Surface", wavelength=wavelength, depolarisation_noise=depolarisation_noise)
+        _refuse("a Surface", sensor=sensor, space=space, angle=angle)
         return simulate_samples(scene, directions, noise, seed).samples
     _refuse("a Scene", directions=directions)
     if not isinstance(noise, float | int):
         raise UsageError(f"`noise` of a Scene must be one number, a standard deviation, not {noise!r}")
+    if sensor is not None or space is not None:
+        _refuse("colours", wavelength=wavelength, depolarisation_noise=depolarisation_noise)
+        camera = None
+        if isinstance(sensor, Colours):
+            space, gamma, camera = sensor.space, sensor.gamma, sensor.camera
+            sensor, angle = sensor.sensor, sensor.angle if angle is None else angle
+        return simulate_colours(
+            scene, sensor, space or "srgb", angle, gamma=gamma, camera=camera, noise=noise, seed=seed
+        )[0]
+    _refuse("a spectrum, whose angle is that of the scene's light", angle=angle)
     return simulate_spectrum(
         scene, wavelength, noise=noise, seed=seed, depolarisation_noise=depolarisation_noise
     )
