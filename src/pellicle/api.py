@@ -25,7 +25,7 @@ from pellicle.planning.film import plan as film_plan
 from pellicle.planning.surface import plan as surface_plan
 from pellicle.sampling.ensemble import STEPS
 from pellicle.sampling.result import Posterior
-from pellicle.sampling.sample import measured
+from pellicle.sampling.sample import OF_A_FILM, measured
 from pellicle.sampling.sample import sample as sample_posterior
 from pellicle.scene.film import Scene
 from pellicle.scene.kinds import check_scene
@@ -273,7 +273,8 @@ def fit(
 
     **Arguments:**
 
-    - `data`: `Spectrum` or `BrdfSamples`, or a list of either, of one sample (a joint fit).
+    - `data`: `Spectrum` or `Colours`, or a list of these, of one sample (a joint fit); or `BrdfSamples`, or a
+      list.
     - `scene`: `Scene`, or a list with one for each spectrum; `Surface` for `BrdfSamples`. Signal, angle and
       polarisation come from the data.
     - `tolerance`: leave out effects that change the signal by less (see `pellicle.plan`); where the best fit
@@ -303,10 +304,11 @@ def fit(
     check_measurement(data)
     check_scene(scene, several=True)
     if isinstance(scene, Surface):
-        samples = measured(BrdfSamples, data)
+        samples = measured((BrdfSamples,), data)
         return fit_brdf(samples, scene, residual=residual, tolerance=tolerance, loss=loss, progress=progress)
     _refuse("a Scene", residual=residual)
-    return fit_spectra(measured(Spectrum, data), scene, tolerance=tolerance, loss=loss, progress=progress)
+    films = measured(OF_A_FILM, data)
+    return fit_spectra(films, scene, tolerance=tolerance, loss=loss, progress=progress)
 
 
 def sample(

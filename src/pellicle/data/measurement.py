@@ -1,4 +1,4 @@
-"""Measurements as a fit takes them: one spectrum or set of BRDF samples, or a list of either."""
+"""Measurements as a fit takes them: a spectrum, colours or BRDF samples, or a list."""
 
 from __future__ import annotations
 
@@ -9,10 +9,13 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from pellicle.data.brdf_samples import BrdfSamples
+from pellicle.data.colours import Colours
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import DataError, UsageError
 
-Measurement: TypeAlias = Spectrum | Sequence[Spectrum] | BrdfSamples | Sequence[BrdfSamples]
+Measurement: TypeAlias = (
+    Spectrum | Colours | Sequence[Spectrum | Colours] | BrdfSamples | Sequence[BrdfSamples]
+)
 
 
 SHORTEST = 10.0
@@ -30,7 +33,7 @@ def check_measurement(data: Any) -> None:
                 f"`wavelength` ends at {each.wavelength.max():g}, and is in nm: multiply µm by 1000, or"
                 " divide 1239.84 by eV"
             )
-        if isinstance(each, Spectrum | BrdfSamples):
+        if isinstance(each, Spectrum | Colours | BrdfSamples):
             continue
         if isinstance(each, str | os.PathLike):
             path = os.fspath(each)
@@ -41,4 +44,6 @@ def check_measurement(data: Any) -> None:
         name, remedy = type(each).__name__, 'arrays make one as in pl.Spectrum(wavelength, values, "R")'
         if name in ("Scene", "Surface"):
             remedy = "the scene comes second, as in pl.fit(data, scene)"
-        raise UsageError(f"`data` must be a Spectrum, BrdfSamples or a list of them, not {name}: {remedy}")
+        raise UsageError(
+            f"`data` must be a Spectrum, Colours, BrdfSamples or a list of them, not {name}: {remedy}"
+        )

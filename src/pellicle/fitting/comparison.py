@@ -15,12 +15,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pellicle.data.colours import Colours
 from pellicle.data.ellipsometry_angles import ncs
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
 from pellicle.fitting.noise import correlation_length
 from pellicle.fitting.presentation import ReportMixin
-from pellicle.fitting.result import BrdfCurve, Fit, Part, Status
+from pellicle.fitting.result import BrdfCurve, ColourCurve, Curve, Fit, Part, Status
 from pellicle.fitting.spectra.sweeps import correlation_in_sweeps, sweeps
 
 log = getLogger(__name__)
@@ -116,7 +117,7 @@ def _check_same(fits: Mapping[str, Fit]) -> None:
         names: list[object] = [fit.layer_test and fit.layer_test.residual]
         for data in (part.data for part in fit.parts):
             names += [type(data), (data.signal, data.folded) if isinstance(data, Spectrum) else ""]
-            light = "theta_i phi_i theta_o phi_o"
+            light = "angle" if isinstance(data, Colours) else "theta_i phi_i theta_o phi_o"
             if isinstance(data, Spectrum):
                 light = "wavelength delta delta_sigma depolarisation depolarisation_sigma"
             columns += [getattr(data, name) for name in ("values", "sigma", *light.split())]
@@ -145,13 +146,13 @@ class _Residuals(NamedTuple):
     def independent(self) -> int:
         """Independent numbers: three on the sphere of N, C and S are two."""
         points, channels = self.rows.shape
-        return points * (channels if isinstance(self.part.curve, BrdfCurve) else min(channels, 2))
+        return points * (min(channels, 2) if isinstance(self.part.curve, Curve) else channels)
 
 
 def _residuals(part: Part) -> list[_Residuals]:
     """Residuals of a part, and of its depolarisation, where that was measured."""
-    result = [_Residuals(part, _residual(part), part.data.sigma is not None)]
-    if not isinstance(part.curve, BrdfCurve) and part.curve.depolarisation_data is not None:
+    result = [_Residuals(part, _residual(part), part.sigma_from in ("given", "usual"))]
+    if isinstance(part.curve, Curve) and part.curve.depolarisation_data is not None:
         sigma = part.spectrum.depolarisation_sigma
         own = part.curve.depolarisation_residual / (1.0 if sigma is None else sigma)
         result.append(_Residuals(part, own[:, None], sigma is not None))
@@ -162,6 +163,8 @@ def _residual(part: Part) -> np.ndarray:
     """Residuals over a given σ, else as they are, (points, channels): of Ψ and Δ on the sphere."""
     if isinstance(part.curve, BrdfCurve):
         return part.curve.residual
+    if isinstance(part.curve, ColourCurve):
+        return part.curve.residual / part.curve.sigma
     c, spectrum = part.curve, part.spectrum
     sigma = spectrum.sigma
     if c.delta_data is None or c.delta_model is None:
@@ -179,6 +182,8 @@ def _correlation(residuals: _Residuals) -> float:
     part, rows, _ = residuals
     if isinstance(part.curve, BrdfCurve):
         return float(np.mean([correlation_length(column) for column in rows.T]))
+    if isinstance(part.curve, ColourCurve):
+        return 1.0
     wavelength, angle = part.curve.wavelength, part.spectrum.angle
     return correlation_in_sweeps(rows, sweeps(wavelength, 0.0 * wavelength if angle is None else angle))
 

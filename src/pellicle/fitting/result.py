@@ -9,6 +9,7 @@ from enum import StrEnum
 import numpy as np
 
 from pellicle.data.brdf_samples import BrdfSamples
+from pellicle.data.colours import Colours
 from pellicle.data.spectrum import Spectrum
 from pellicle.effects.plan import Plan
 from pellicle.fitting.noise import student
@@ -20,6 +21,11 @@ LEVEL = 0.95
 """Level of confidence of expanded uncertainties."""
 _NORMAL = 1.959964
 """Quantile of the normal distribution at that level."""
+_FITTED = {
+    Spectrum: "a spectrum was fitted",
+    Colours: "colours were fitted",
+    BrdfSamples: "BRDF samples were fitted",
+}
 
 
 class Status(StrEnum):
@@ -114,10 +120,14 @@ class SystematicEffect:
 
 @dataclass(frozen=True)
 class Rival:
-    """Another minimum: its parameters and how much worse it is, in χ² on the effective points."""
+    """Another minimum: its parameters and how much worse it is, in χ² on the effective points.
+
+    `probability` is its share of the posterior, where the fit has computed it: see `Fit.probability`.
+    """
 
     parameters: dict[str, float]
     delta_chi2: float
+    probability: float | None = None
 
 
 @dataclass(frozen=True)
@@ -168,6 +178,29 @@ class BrdfCurve:
 
 
 @dataclass(frozen=True)
+class ColourCurve:
+    """Colours of data and model, each (colours, 3) in the space of the data, with σ.
+
+    `difference` (colours,) is ΔE*ab (CIE 1976), None for the channels of a camera. The layer's index, with
+    standard errors, is that at the wavelengths (nm) of the sensor.
+    """
+
+    data: np.ndarray
+    sigma: np.ndarray
+    model: np.ndarray
+    difference: np.ndarray | None
+    wavelength: np.ndarray
+    n: np.ndarray
+    k: np.ndarray
+    n_stderr: np.ndarray
+    k_stderr: np.ndarray
+
+    @property
+    def residual(self) -> np.ndarray:
+        return self.data - self.model
+
+
+@dataclass(frozen=True)
 class Index:
     """The layer's n and k with standard errors at each wavelength (nm), rising."""
 
@@ -188,17 +221,17 @@ class Profile:
 
 @dataclass(frozen=True)
 class Part:
-    """One spectrum, or one set of BRDF samples, of a fit, and how the best scene explains it.
+    """One spectrum, one set of colours or of BRDF samples of a fit, and how the best scene explains it.
 
     `name` ends the names of its own parameters, empty where the fit is no joint one. `rms` is in the unit of
     the signal: a fraction, degrees of Ψ, or the unit in which BRDF samples are compared (standard deviations
-    where σ is known). `sigma_from` names the source of σ: "given", "residuals", or "model", the error of a
-    model whose lamp drifts.
+    where σ is known). `sigma_from` names the source of σ: "given", "residuals", "model", the error of a
+    model whose lamp drifts, or "usual", that of ordinary cameras.
     """
 
     name: str
-    data: Spectrum | BrdfSamples
-    curve: Curve | BrdfCurve
+    data: Spectrum | Colours | BrdfSamples
+    curve: Curve | ColourCurve | BrdfCurve
     plan: Plan
     rms: float
     chi2_reduced: float
@@ -209,29 +242,29 @@ class Part:
     def sigma(self) -> float:
         """The median σ of the points, in the unit of the signal; of BRDF samples in 1/sr, or their rms where
         no σ is given."""
-        if isinstance(self.curve, Curve):
+        if isinstance(self.curve, Curve | ColourCurve):
             return float(np.median(self.curve.sigma))
         return self.rms if self.data.sigma is None else float(np.median(self.data.sigma))
 
     @property
     def spectrum(self) -> Spectrum:
-        """The spectrum. Raises TypeError for BRDF samples."""
+        """The spectrum. Raises TypeError for colours and BRDF samples."""
         if not isinstance(self.data, Spectrum):
-            raise TypeError("BRDF samples were fitted, not a spectrum: see data")
+            raise TypeError(f"{_FITTED[type(self.data)]}, not a spectrum: see data")
         return self.data
 
     @property
     def samples(self) -> BrdfSamples:
-        """The BRDF samples. Raises TypeError for a spectrum."""
+        """The BRDF samples. Raises TypeError for other data."""
         if not isinstance(self.data, BrdfSamples):
-            raise TypeError("a spectrum was fitted, not BRDF samples: see data")
+            raise TypeError(f"{_FITTED[type(self.data)]}, not BRDF samples: see data")
         return self.data
 
     @property
     def spectral(self) -> Curve:
-        """Data and model of the spectrum. Raises TypeError for BRDF samples."""
+        """Data and model of the spectrum. Raises TypeError for colours and BRDF samples."""
         if not isinstance(self.curve, Curve):
-            raise TypeError("BRDF samples were fitted, not a spectrum: see curve")
+            raise TypeError(f"{_FITTED[type(self.data)]}, not a spectrum: see curve")
         return self.curve
 
 
@@ -263,7 +296,9 @@ class Fit(PlotMixin):
 
     `rms` is None where the spectra have no unit in common. `scene` is what was fitted, one for each spectrum
     where there are several, or a `Surface`. `budget` has the systematic effects that `stderr` includes, the
-    largest first. `profile` is the scan against thickness of a fit of spectra,
+    largest first. `probability` is the share of the posterior that the answer has beside its rivals, each by
+    its normal approximation: of fits of colours, which have several answers more often than not. `profile` is
+    the scan against thickness of a fit of spectra,
     `layer_test` the evidence for a layer of a fit of BRDF samples; None else.
     """
 
@@ -283,6 +318,7 @@ class Fit(PlotMixin):
     scene: Scene | tuple[Scene, ...] | Surface | None = None
     layer_test: LayerTest | None = None
     budget: tuple[SystematicEffect, ...] = ()
+    probability: float | None = None
 
     def __getitem__(self, name: str) -> Estimate:
         return self.parameters[name]
@@ -302,8 +338,8 @@ class Fit(PlotMixin):
         return bool(self.parts[0].name)
 
     @property
-    def data(self) -> Spectrum | BrdfSamples:
-        """The spectrum or samples that were fitted. Raises ValueError where there are several."""
+    def data(self) -> Spectrum | Colours | BrdfSamples:
+        """The spectrum, colours or samples that were fitted. Raises ValueError where there are several."""
         return self._only.data
 
     @property
@@ -340,8 +376,10 @@ class Fit(PlotMixin):
 
     @property
     def index(self) -> Index:
-        """The layer's n and k at every wavelength of any spectrum, each once."""
-        curves = [part.spectral for part in self.parts]
+        """The layer's n and k at every wavelength of any spectrum or sensor, each once."""
+        curves = [part.curve for part in self.parts]
+        if any(isinstance(curve, BrdfCurve) for curve in curves):
+            raise TypeError("BRDF samples were fitted: the index is among the parameters")
         columns = {f.name: np.concatenate([getattr(c, f.name) for c in curves]) for f in fields(Index)}
         _, first = np.unique(columns["wavelength"], return_index=True)
         return Index(**{name: column[first] for name, column in columns.items()})

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pellicle.data.tabular.columns import DIRECTIONS
+from pellicle.fitting.result import ColourCurve
+from pellicle.reporting import fitted_colours
 
 if TYPE_CHECKING:
     from pellicle.fitting.result import Fit, Part
@@ -30,7 +32,10 @@ def fit_csv(fit: Fit) -> str:
     if fit.joint:
         return _joint_csv(fit)
     [part] = fit.parts
-    if part.spectral.delta_data is not None:
+    if isinstance(part.curve, ColourCurve):
+        columns = fitted_colours.columns(part)
+        about = [f"fit of {fitted_colours.summary(part)}: data, model_, sigma_ = standard deviation assumed"]
+    elif part.spectral.delta_data is not None:
         about, columns = _psi_delta(part)
     else:
         about, columns = _spectrum(part)
@@ -117,7 +122,10 @@ def _joint_csv(fit: Fit) -> str:
 
 
 def _joint_rows(part: Part) -> Iterable[tuple[str | float, ...]]:
-    """A row for each value; Ψ, Δ and depolarisation are three."""
+    """A row for each value; Ψ, Δ and depolarisation are three, and so is a colour."""
+    if isinstance(part.curve, ColourCurve):
+        yield from fitted_colours.rows(part)
+        return
     curve, data = part.spectral, part.spectrum
     unknown = np.full(curve.wavelength.size, np.nan)
     angle = unknown if data.angle is None else data.angle

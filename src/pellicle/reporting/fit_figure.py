@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from pellicle.fitting.result import ColourCurve, Curve
 from pellicle.fitting.status import RIVAL
-from pellicle.reporting import brdf_figure, psi_delta
+from pellicle.reporting import brdf_figure, fitted_colours, psi_delta
 from pellicle.reporting.drawing import ABOVE, BLACK, BLUE, FITTED, GAP, GREY, ORANGE, marker_size, new_figure
 
 if TYPE_CHECKING:
@@ -106,7 +107,9 @@ def _arrange(figure: Figure, rows: list[Axes], panels: list[_Panel], title: str)
 
 
 def _panels_of_data(part: Part) -> list[_Panel]:
-    if part.spectral.delta_data is None:
+    if isinstance(part.curve, ColourCurve):
+        rows = [(fitted_colours.patches, 1.6, 0), (fitted_colours.residuals, 1.3, 1)]
+    elif part.spectral.delta_data is None:
         rows = [(_data, 3.0, 0), (_residuals, 1.3, 1)]
     else:
         rows = [(psi_delta.psi, 2.2, 0), (psi_delta.delta, 2.2, 0), (psi_delta.residuals, 1.5, 1)]
@@ -116,9 +119,9 @@ def _panels_of_data(part: Part) -> list[_Panel]:
 
 
 def _title(fit: Fit) -> str:
-    name = " and ".join(_file_names(fit))
+    name = " and ".join(name for name in _file_names(fit) if name)
     verdict = textwrap.wrap(fit.verdict.replace(" ± ", "\u00a0±\u00a0"), 108, break_on_hyphens=False)
-    text = "\n".join([f"{textwrap.shorten(name, 70) or 'spectrum'}: {fit.status}", *verdict])
+    text = "\n".join([f"{textwrap.shorten(name, 70) or 'fit'}: {fit.status}", *verdict])
     return text.replace("$", r"\$")  # no mathematics in a file's name
 
 
@@ -243,8 +246,12 @@ def _scale(axes: Axes, misfit: np.ndarray, minima: list[tuple[float, float]]) ->
 
 
 def _index_is_free(fit: Fit) -> bool:
-    several = any(part.spectral.delta_data is None for part in fit.parts) or fit.index.wavelength.size > 1
+    several = fit.index.wavelength.size > 1 or not all(_ellipsometric(part) for part in fit.parts)
     return several and bool(np.any(fit.index.n_stderr > 0) or np.any(fit.index.k_stderr > 0))
+
+
+def _ellipsometric(part: Part) -> bool:
+    return isinstance(part.curve, Curve) and part.curve.delta_data is not None
 
 
 def _index(axes: Axes, fit: Fit) -> None:

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pellicle.fitting.lack_of_fit import lack_of_fit
-from pellicle.fitting.result import Curve, Status
+from pellicle.fitting.result import BrdfCurve, ColourCurve, Curve, Status
 from pellicle.fitting.status import RIVAL
-from pellicle.reporting import budget_text, parameter_text
+from pellicle.reporting import budget_text, fitted_colours, parameter_text
 from pellicle.reporting.parameter_text import LEAST_CORRELATION
 from pellicle.reporting.plain_text import COLUMNS, INDENT, block, facts, wrapped
 
@@ -32,6 +32,7 @@ _SIGMA = {
     "given": "sigma {}, as given",
     "residuals": "sigma {}, estimated from the residuals: none was given",
     "model": "sigma {}, the error allowed for a drifting lamp: none was given",
+    "usual": "sigma {}, that of an ordinary camera: none was given",
 }
 """The noise and its source, by a part's `sigma_from`."""
 
@@ -75,7 +76,7 @@ def _verdict(fit: Fit) -> list[str]:
         room = COLUMNS - 2 * len(INDENT) - len("status")
         short = path if len(path) <= room else "…" + path[1 - room :]
         rows += [("file", short)] if path else []
-        rows.append((part.name or "data", _samples(part) if fit.layer_test else _spectrum(part)))
+        rows.append((part.name or "data", _data(part)))
     if fit.layer_test:
         rows.append(("model", fit.surface.model))
     return [*wrapped(fit.verdict), *facts(rows)]
@@ -91,6 +92,17 @@ def _spectrum(part: Part) -> str:
         if data.signal == "psi-delta" and data.angle is not None:
             text += "," + _range(data.angle, "degrees")
     return text + _independent(part, nm.size, "")
+
+
+def _data(part: Part) -> str:
+    """Kind, number and range of the data of a part."""
+    match part.curve:
+        case Curve():
+            return _spectrum(part)
+        case ColourCurve():
+            return fitted_colours.summary(part)
+        case _:
+            return _samples(part)
 
 
 def _samples(part: Part) -> str:
@@ -138,7 +150,7 @@ def _residuals(part: Part) -> list[tuple[str, str]]:
     """Rms and noise of one part; in a joint fit also its reduced χ², as each has its own noise."""
     curve = part.curve
     unit = " degrees" if isinstance(curve, Curve) and curve.delta_data is not None else ""
-    if not isinstance(curve, Curve) and part.sigma_from == "given":
+    if isinstance(curve, BrdfCurve) and part.sigma_from == "given":
         sigma = f"{part.sigma:.2g} 1/sr in the median"
     else:
         sigma = f"{part.sigma:.2g}{unit}"
@@ -147,6 +159,8 @@ def _residuals(part: Part) -> list[tuple[str, str]]:
     if part.name:
         rms += f", reduced chi-square {part.chi2_reduced:.4g}"
     rows = [(f"rms residual{of}", rms), (f"noise{of}", noise)]
+    if isinstance(curve, ColourCurve) and (apart := fitted_colours.differences(part)):
+        rows.append((f"colour difference{of}", apart))
     if isinstance(curve, Curve) and curve.delta_data is not None:
         psi, delta = (np.sqrt(np.mean(r**2)) for r in (curve.residual, curve.delta_residual))
         rows.append(("of psi and of delta", f"{psi:.4g} and {delta:.4g} degrees"))

@@ -42,6 +42,7 @@ def to_json(fit: Fit, posterior: Posterior | None = None) -> dict[str, Any]:
             {
                 "parameters": {name: number(value) for name, value in rival.parameters.items()},
                 "delta_chi2": number(rival.delta_chi2),
+                **_probability(rival.probability),
             }
             for rival in fit.rivals
         ],
@@ -58,9 +59,15 @@ def to_json(fit: Fit, posterior: Posterior | None = None) -> dict[str, Any]:
         "versions": versions(),
         "seconds": number(fit.seconds),
         "noise": noise if fit.joint else noise[0],
+        **_probability(fit.probability),
         **_layer_test(fit),
     }
     return record if posterior is None else record | {"posterior": posterior_to_json(posterior)}
+
+
+def _probability(share: float | None) -> dict[str, Any]:
+    """Share of the posterior of a minimum, where it was computed."""
+    return {} if share is None else {"probability": number(share)}
 
 
 def _data(part: Part, fit: Fit) -> dict[str, Any]:
@@ -68,7 +75,7 @@ def _data(part: Part, fit: Fit) -> dict[str, Any]:
     return {
         "path": data.path,
         "sha256": data.sha256,
-        "signal": getattr(data, "signal", "brdf"),
+        "signal": getattr(data, "space", getattr(data, "signal", "brdf")),
         "points": int(part.curve.model.size),
         **({"spectrum": name} if (name := getattr(data, "name", "")) else {}),
         **_depolarisation(part),

@@ -87,6 +87,7 @@ def rivals(fit: Fit) -> list[str]:
     rows = [
         (
             f"Δχ² {rival.delta_chi2:.3g}",
+            *([] if rival.probability is None else [f"probability {rival.probability:.2g}"]),
             *(
                 f"{name} {rival.parameters[name]:.5g}{_unit(p)}"
                 for name, p in fit.parameters.items()

@@ -8,12 +8,14 @@ import jax
 import numpy as np
 
 from pellicle.data.brdf_samples import BrdfSamples
+from pellicle.data.colours import Colours
 from pellicle.data.ellipsometry_angles import psi_delta
 from pellicle.fitting.brdf.residuals import INVERSES, RESIDUALS
 from pellicle.fitting.brdf.view import SamplesView
+from pellicle.fitting.colours.view import ColoursView
 from pellicle.fitting.evaluation import curves
 from pellicle.fitting.problem import Problem
-from pellicle.fitting.result import BrdfCurve, Part
+from pellicle.fitting.result import BrdfCurve, ColourCurve, Curve, Part
 from pellicle.fitting.spectra.view import SpectrumView
 
 DRAWS = 256
@@ -51,7 +53,7 @@ def chosen(units: np.ndarray, random: np.random.Generator) -> np.ndarray:
 def predictions(
     problem: Problem, parts: tuple[Part, ...], units: np.ndarray, seed: int
 ) -> tuple[Prediction, ...]:
-    """Predictions of each spectrum, of Ψ and Δ, or of each channel of BRDF samples.
+    """Predictions of each spectrum, of Ψ and Δ, or of each channel of colours and of BRDF samples.
 
     `units` are draws (steps, walkers, parameters) in the unit cube of an affine problem.
     """
@@ -63,8 +65,7 @@ def predictions(
         result: list[Prediction] = []
         for view, part in pairs:
             model = np.asarray(curves(view.form, view.arrays, problem.seen_by(view, values)).model)
-            of_part = _samples if isinstance(part.curve, BrdfCurve) else _spectrum
-            result += of_part(view, part, model, random)
+            result += _OF[type(part.curve)](view, part, model, random)
         return tuple(result)
 
 
@@ -119,3 +120,24 @@ def _samples(
         )
         for c, name in enumerate(channels)
     ]
+
+
+def _colours(
+    view: ColoursView, part: Part, model: np.ndarray, random: np.random.Generator
+) -> list[Prediction]:
+    """One for each channel, against the angle of incidence or the number of the colour."""
+    data = cast(Colours, part.data)
+    model = view.encoded(model)
+    noisy = model + data.noise * random.standard_normal(model.shape)
+    prefix, suffix = (f"{part.name}: ", f"_{part.name}") if part.name else ("", "")
+    at = Axis(f"colour{suffix}", "colour", np.arange(1.0, len(data) + 1))
+    if data.angle is not None:
+        at = Axis(f"angle_deg{suffix}", "angle of incidence (degrees)", data.angle)
+    return [
+        Prediction(name + suffix, prefix + name, at, data.values[:, c], model[..., c], noisy[..., c])
+        for c, name in enumerate(data.channels)
+    ]
+
+
+_OF = {Curve: _spectrum, ColourCurve: _colours, BrdfCurve: _samples}
+"""Predictions of a part, by the kind of its curve."""

@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Sequence
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import jax
 
 from pellicle.data.brdf_samples import BrdfSamples
+from pellicle.data.colours import Colours
 from pellicle.data.measurement import Measurement
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
@@ -30,7 +31,7 @@ from pellicle.sampling.systematics import systematics
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface
 
-Kind = TypeVar("Kind", Spectrum, BrdfSamples)
+Kind = TypeVar("Kind")
 
 
 def sample(
@@ -65,7 +66,7 @@ def sample(
     installed()
     assumption = ""
     if isinstance(scene, Surface):
-        measurements = measured(BrdfSamples, data)
+        measurements = measured((BrdfSamples,), data)
         fit, ranked = brdf.fitted(measurements, scene, tolerance, progress, residual=residual)
         jacobian, _ = linearised(ranked)
         residuals = sample_evidence(ranked, jacobian)
@@ -77,7 +78,7 @@ def sample(
         numbers = dict(scene.numbers), scene.channel_wavelengths
         identity = fingerprint([*columns, numbers], scene.model, compared, tolerance)
     else:
-        measurements = measured(Spectrum, data)
+        measurements = measured(OF_A_FILM, data)
         fit, ranked = spectra.fitted(measurements, scene, tolerance, progress)
         with jax.enable_x64(True):
             targets = spectra.measurements(measurements, scene)
@@ -103,11 +104,15 @@ def sample(
     return sampled(subject, walkers, steps, seed, chain, progress, began)
 
 
-def measured(kind: type[Kind], data: Measurement) -> Kind | list[Kind]:
-    """The data as one or a list of one kind. Raises UsageError for the other kind."""
-    if isinstance(data, kind):
+OF_A_FILM = (Spectrum, Colours)
+"""Kinds of data that a `Scene` explains."""
+
+
+def measured(kinds: tuple[type[Kind], ...], data: Measurement) -> Kind | list[Kind]:
+    """The data as one or a list of such kinds. Raises UsageError for another kind."""
+    if isinstance(data, kinds):
         return data
-    rows = [data] if isinstance(data, Spectrum | BrdfSamples) else list(data)
-    if not all(isinstance(row, kind) for row in rows):
-        raise UsageError("BRDF samples need a Surface, and spectra a Scene")
-    return [row for row in rows if isinstance(row, kind)]
+    rows: list[Any] = [data] if isinstance(data, Spectrum | Colours | BrdfSamples) else list(data)
+    if not all(isinstance(row, kinds) for row in rows):
+        raise UsageError("BRDF samples need a Surface, and spectra and colours a Scene")
+    return rows

@@ -8,10 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pellicle.fitting.colours.targets import MeasuredColours
 from pellicle.fitting.minima import minima
 from pellicle.fitting.reweighting import RankedMinima
 from pellicle.fitting.spectra.problem import make
-from pellicle.fitting.spectra.targets import Measured
+from pellicle.fitting.spectra.targets import Target
 from pellicle.fitting.spectra.view import Local, SpectrumView
 from pellicle.scene.free import free_leaves
 
@@ -24,14 +25,15 @@ class Comparison(NamedTuple):
     without: float
 
 
-def comparison(spectra: Sequence[Measured], ranked: RankedMinima) -> Comparison | None:
+def comparison(spectra: Sequence[Target], ranked: RankedMinima) -> Comparison | None:
     """Fit quality with substrates as half spaces, from the same minima.
 
     None where no plate has a back face, or where it has free parameters: without it they would have
     no meaning.
     """
     views = ranked.problem.views
-    dependent = [i for i, view in enumerate(views) if view.plan.on("back-face")]
+    spectral = [i for i, view in enumerate(views) if isinstance(view, SpectrumView)]
+    dependent = [i for i in spectral if views[i].plan.on("back-face")]
     dependent = [i for i in dependent if views[i].channels == 1] or dependent
     backs = [spectra[i].scene.substrate for i in dependent]
     if not dependent or any(free_leaves((plate.back, plate.plate_mm)) for plate in backs):
@@ -40,6 +42,9 @@ def comparison(spectra: Sequence[Measured], ranked: RankedMinima) -> Comparison 
     for spectrum, view in zip(spectra, views, strict=True):
         substrate = dataclasses.replace(spectrum.scene.substrate, back=None)
         scene = dataclasses.replace(spectrum.scene, substrate=substrate)
+        if isinstance(spectrum, MeasuredColours):
+            targets.append(spectrum._replace(scene=scene))
+            continue
         # with its final weights
         sigma = 1 / view.data.weight[: view.points].reshape(view.rows, view.channels)
         fraction = float(view.data.independent_fraction)

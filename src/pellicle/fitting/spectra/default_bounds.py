@@ -23,7 +23,7 @@ from pellicle.fitting.spectra import residual_structure
 from pellicle.fitting.spectra.parameters import bounds, with_bounds
 from pellicle.fitting.spectra.problem import make
 from pellicle.fitting.spectra.search import search
-from pellicle.fitting.spectra.targets import Measured
+from pellicle.fitting.spectra.targets import Target
 from pellicle.fitting.status import RIVAL
 
 log = getLogger(__name__)
@@ -50,7 +50,7 @@ class Wider(NamedTuple):
 
 
 def wider(
-    spectra: Sequence[Measured], ranked: RankedMinima, tolerance: float, loss: str, progress: Progress
+    spectra: Sequence[Target], ranked: RankedMinima, tolerance: float, loss: str, progress: Progress
 ) -> Wider:
     """Widen the default bounds on which the best fit rests, if χ² falls by more than a rival's distance."""
     old, now, gains = ranked.problem.parameters, ranked, 0.0
@@ -136,8 +136,8 @@ def _inside(problem: Problem, values: np.ndarray) -> np.ndarray:
 
 
 def measured_within(
-    spectra: Sequence[Measured], ranked: RankedMinima, parameters: tuple[Parameter, ...]
-) -> list[Measured]:
+    spectra: Sequence[Target], ranked: RankedMinima, parameters: tuple[Parameter, ...]
+) -> list[Target]:
     """The spectra with scenes whose bounds are those of the parameters."""
     pairs = zip(spectra, ranked.problem.views, strict=True)
     return [

@@ -4,26 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
+from pellicle.data.colours import Colours
 from pellicle.data.spectrum import Spectrum
 from pellicle.fitting.noise import local_noise
-from pellicle.fitting.spectra.targets import Measured
-from pellicle.fitting.spectra.view import SpectrumView
 
 _CHANCE = 5.0
 """Standard errors by which a mean square must exceed that of the noise."""
 
 
 def unexplained(
-    data: Sequence[Spectrum], spectra: Sequence[Measured], views: Sequence[SpectrumView]
+    data: Sequence[Spectrum | Colours], spectra: Sequence[Any], views: Sequence[Any]
 ) -> list[str]:
     """A sentence for each spectrum with a depolarisation beyond its noise and the scene's uncertainty, where
     the scene has none."""
     sentences = []
     for spectrum, measured, view in zip(data, spectra, views, strict=True):
-        if spectrum.depolarisation is None or view.depolarisation is not None:
+        if not isinstance(spectrum, Spectrum) or spectrum.depolarisation is None or view.depolarisation:
             continue
         if spectrum.depolarisation_sigma is None:
             parts = [local_noise(spectrum.depolarisation[rows]) for rows in view.sweeps()]

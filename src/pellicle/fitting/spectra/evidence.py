@@ -8,12 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from pellicle.fitting.colours.evidence import colours_evidence
+from pellicle.fitting.colours.view import ColoursView
 from pellicle.fitting.covariance import Scaled
 from pellicle.fitting.discrepancy import Evidence
 from pellicle.fitting.noise import DRIFT_CORRELATION, local_noise
 from pellicle.fitting.reweighting import RankedMinima
 from pellicle.fitting.spectra.systematic_effects import systematic_effects
-from pellicle.fitting.spectra.targets import Measured
+from pellicle.fitting.spectra.targets import Target
 from pellicle.fitting.spectra.view import SpectrumView
 
 _LEAST = 1e-9
@@ -23,11 +25,18 @@ _SCATTER = 2.9
 median absolute value of second differences of normal noise (simulated: 2.8 to 3.1 at 50 to 1000 points)."""
 
 
-def evidence(spectra: Sequence[Measured], ranked: RankedMinima, jacobian: Scaled) -> list[Evidence]:
-    """Evidence of each spectrum at the best of the ranked minima, of which `jacobian` is the scaled one."""
+def evidence(spectra: Sequence[Target], ranked: RankedMinima, jacobian: Scaled) -> list[Evidence]:
+    """Evidence of each spectrum, and of colours, at the best of the ranked minima.
+
+    `jacobian` is the scaled one there.
+    """
     views, fits, result = ranked.problem.views, ranked.fits, []
     blocks = jacobian.blocks([view.points for view in views], [fit.variance for fit in fits])
     for spectrum, view, fit, block in zip(spectra, views, fits, blocks, strict=True):
+        values = ranked.problem.seen_by(view, ranked.values)
+        if isinstance(view, ColoursView):
+            result.append(colours_evidence(view, values, fit.at, spectrum.scene, block))
+            continue
         keep, shape = view.measured_channels, (view.rows, view.channels, -1)
         weight = np.asarray(view.data.weight)[: view.points]
         columns = (block / weight[:, None]).reshape(shape)[:, :keep]
@@ -46,7 +55,6 @@ def evidence(spectra: Sequence[Measured], ranked: RankedMinima, jacobian: Scaled
             elif not view.noise.drifting:
                 noise = max(noise, float(np.median(sigma[:, own])))
             noises[own] = noise
-        values = ranked.problem.seen_by(view, ranked.values)
         effects = systematic_effects(view, values, fit.at, spectrum.scene)
         # all channels in units of the noise of the first
         unit = noises[0] / noises

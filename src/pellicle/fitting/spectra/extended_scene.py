@@ -11,8 +11,8 @@ import numpy as np
 from pellicle.dispersion.base import known_index
 from pellicle.dispersion.empirical import Constant, Scaled, Tabulated
 from pellicle.effects.film import exact
+from pellicle.fitting.colours.view import ColourForm, ColoursView
 from pellicle.fitting.program_cache import kept
-from pellicle.fitting.spectra.nuisance import Data
 from pellicle.fitting.spectra.parameters import anonymous
 from pellicle.fitting.spectra.view import SpectrumForm, SpectrumView
 from pellicle.optics.pair import Pair, imag, real
@@ -40,7 +40,7 @@ class Simulated(NamedTuple):
 
 
 @kept
-def simulated(form: SpectrumForm, scene: Scene, data: Data, values: Any) -> Simulated:
+def simulated(form: SpectrumForm | ColourForm, scene: Scene, data: Any, values: Any) -> Simulated:
     """Signals of a scene at candidates `values` (candidates, its free numbers)."""
     # one after the other: a cone of light through a stack may need gigabytes for all at once
     return Simulated(jax.lax.map(lambda each: form.simulate(insert(scene, each), data), values))
@@ -61,7 +61,7 @@ class ExtendedScene:
     given one; `shape`, one of a model with free numbers. `substrate_index` is a relative change.
     """
 
-    def __init__(self, view: SpectrumView, values: np.ndarray):
+    def __init__(self, view: SpectrumView | ColoursView, values: np.ndarray):
         self._view, self._free = view, []
         scene = insert(view.scene, np.asarray(values).tolist())
         nm = np.asarray(scene.light.wavelength)
@@ -132,7 +132,7 @@ class ExtendedScene:
         values = np.tile([own.start for own in self._free], (count, 1))
         for row, (number, change) in zip(values, changes, strict=False):
             row[number.position] += change
-        form = SpectrumForm(exact(self._scene).static_key, self._view.form.depolarisation)
+        form = self._view.form.with_plan(exact(self._scene).static_key)
         scene = jax.tree_util.tree_map(np.asarray, anonymous(self._scene))
         signals = simulated(form, scene, self._view.data, values[:, order]).signal
         return np.asarray(signals)[: len(changes)]

@@ -1,4 +1,4 @@
-"""Fit a scene to spectra of one sample: scan, polish, rank minima, estimate uncertainties."""
+"""Fit a scene to spectra and colours of one sample: scan, polish, rank minima, estimate uncertainties."""
 
 from __future__ import annotations
 
@@ -6,14 +6,19 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeAlias
 
 import equinox as eqx
 import jax
 
+from pellicle.data.colours import Colours
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
 from pellicle.fitting import identifiability
 from pellicle.fitting.budget import budget, likely_cause
+from pellicle.fitting.colours import orders
+from pellicle.fitting.colours.targets import measured_colours
+from pellicle.fitting.colours.view import ColoursView
 from pellicle.fitting.conclusion import conclude, linearised, ranked_minima
 from pellicle.fitting.discrepancy import discrepancy
 from pellicle.fitting.minima import Minima
@@ -36,25 +41,28 @@ from pellicle.fitting.spectra import (
 from pellicle.fitting.spectra.evidence import evidence
 from pellicle.fitting.spectra.problem import make
 from pellicle.fitting.spectra.search import search
-from pellicle.fitting.spectra.targets import Measured, measured, without_scale
+from pellicle.fitting.spectra.targets import Target, measured, without_scale
 from pellicle.fitting.status import verdict
 from pellicle.scene.film import Scene
 from pellicle.scene.free import free_leaves
 
+Film: TypeAlias = Spectrum | Colours | Sequence[Spectrum | Colours]
+"""Measurements of one film."""
+
 
 def fit(
-    data: Spectrum | Sequence[Spectrum],
+    data: Film,
     scene: Scene | Sequence[Scene],
     *,
     tolerance: float = 0.0,
     loss: str = LEAST_SQUARES,
     progress: Progress = quiet,
 ) -> Fit:
-    """Fit the free parameters of `scene` to a spectrum, in float64 whatever the caller's setting.
+    """Fit the free parameters of `scene` to a spectrum or colours, in float64 whatever the caller's setting.
 
-    The signal, and the polarisation and angle where the file has them, come from the spectrum. A list
-    of spectra of one sample is fitted jointly: layers and substrate are shared, what is free of the
-    light and the instrument is each spectrum's own (`instrument.scale.R`). `scene` may then be a list
+    The signal, and the polarisation and angle where the file has them, come from the data. A list
+    of spectra and colours of one sample is fitted jointly: layers and substrate are shared, what is free of
+    the light and the instrument is each one's own (`instrument.scale.R`). `scene` may then be a list
     too, of one scene for each, that differ in light, instrument and back face only; of a single scene,
     Ψ and Δ leave out scale and offset.
 
@@ -74,7 +82,7 @@ def fit(
 
 
 def fitted(
-    data: Spectrum | Sequence[Spectrum],
+    data: Film,
     scene: Scene | Sequence[Scene],
     tolerance: float,
     progress: Progress,
@@ -84,19 +92,23 @@ def fitted(
     check_loss(loss)
     with jax.enable_x64(True):
         targets = measurements(data, scene)
-        spectra = [data] if isinstance(data, Spectrum) else list(data)
+        spectra = _listed(data)
         fit, ranked = _fit(spectra, targets, tolerance, loss, progress)
         folded = folded_reading.as_folded(spectra) if fit.status is Status.MISFIT else None
         if folded is not None:
-            read = folded[0] if isinstance(data, Spectrum) else folded
+            read = folded[0] if isinstance(data, Spectrum | Colours) else folded
             other, _ = _fit(folded, measurements(read, scene), tolerance, loss, progress)
             fit = replace(fit, warnings=(*folded_reading.remarks(other), *fit.warnings))
         return fit, ranked
 
 
-def measurements(data: Spectrum | Sequence[Spectrum], scene: Scene | Sequence[Scene]) -> list[Measured]:
-    """The numbers and the scene of each spectrum. Raises UsageError as `fit` does."""
-    spectra = [data] if isinstance(data, Spectrum) else list(data)
+def _listed(data: Film) -> list[Spectrum | Colours]:
+    return [data] if isinstance(data, Spectrum | Colours) else list(data)
+
+
+def measurements(data: Film, scene: Scene | Sequence[Scene]) -> list[Target]:
+    """The numbers and the scene of each spectrum and of colours. Raises UsageError as `fit` does."""
+    spectra = _listed(data)
     if not spectra:
         raise UsageError("there is no spectrum to fit: give one, or a list of some")
     scenes = [scene] * len(spectra) if isinstance(scene, Scene) else list(scene)
@@ -112,8 +124,11 @@ def measurements(data: Spectrum | Sequence[Spectrum], scene: Scene | Sequence[Sc
         raise UsageError("the scenes of a joint fit must have the same layers, ambient and substrate")
     for each in scenes:
         check_free(each)
-    names = [""] if isinstance(data, Spectrum) else labels(spectra)
-    return [measured(*each) for each in zip(spectra, scenes, names, strict=True)]
+    names = [""] if isinstance(data, Spectrum | Colours) else labels(spectra)
+    return [
+        measured_colours(own, at, name) if isinstance(own, Colours) else measured(own, at, name)
+        for own, at, name in zip(spectra, scenes, names, strict=True)
+    ]
 
 
 def check_free(scene: Scene) -> None:
@@ -125,16 +140,17 @@ def check_free(scene: Scene) -> None:
         )
 
 
-def labels(spectra: Sequence[Spectrum]) -> list[str]:
+def labels(spectra: Sequence[Spectrum | Colours]) -> list[str]:
     """Unique names of spectra, without dots: files' stems, else with the names of spectra within a file (or
     with their signals), else numbered.
 
     Where a name would read as a parameter's it is numbered.
     """
-    stems = [Path(s.path).stem.replace(".", "_") or s.signal for s in spectra]
+    kinds = [s.space if isinstance(s, Colours) else s.signal for s in spectra]
+    stems = [Path(s.path).stem.replace(".", "_") or kind for s, kind in zip(spectra, kinds, strict=True)]
     pairs = list(zip(stems, spectra, strict=True))
     own = [f"{stem}-{s.name}".replace(".", "_") if s.name else stem for stem, s in pairs]
-    signals = [f"{stem}-{s.signal}" for stem, s in pairs]
+    signals = [f"{stem}-{kind}" for stem, kind in zip(stems, kinds, strict=True)]
     numbers = [f"{stem}-{i}" for i, stem in enumerate(stems, start=1)]
     for names in (stems, own, signals):
         if len(set(names)) == len(names) and "thickness" not in names:
@@ -143,7 +159,7 @@ def labels(spectra: Sequence[Spectrum]) -> list[str]:
 
 
 def _fit(
-    data: list[Spectrum], spectra: list[Measured], tolerance: float, loss: str, progress: Progress
+    data: list[Spectrum | Colours], spectra: list[Target], tolerance: float, loss: str, progress: Progress
 ) -> tuple[Fit, RankedMinima]:
     began = time.perf_counter()
 
@@ -195,10 +211,15 @@ def _fit(
         dark,
         identifiability.naming(next(iter(parameters)), conclusion.correlated),
     )
+    rivals, probability = conclusion.rivals, None
+    if any(isinstance(view, ColoursView) for view in ranked.problem.views):
+        share = orders.probabilities(ranked, found)
+        rivals, probability = orders.with_probabilities(rivals, share), float(share[0])
     unclear = [
         *drifts,
         *depolarisation.unexplained(data, spectra, ranked.problem.views),
-        *likely_cause(found, ranked.problem.parameters),
+        # the few residuals of colours have a cause in any case, where they are noise
+        *(likely_cause(found, ranked.problem.parameters) if probability is None or missed else []),
         *default_bounds.remarks(ranked, wider.binding),
         *identifiability.bounded(parameters, dark),
         *conclusion.correlated,
@@ -208,7 +229,8 @@ def _fit(
         status=conclusion.status,
         verdict=sentence + backface.sentence(backface.comparison(spectra, ranked)),
         parameters=parameters,
-        rivals=conclusion.rivals,
+        rivals=rivals,
+        probability=probability,
         chi2_reduced=ranked.chi2_reduced,
         rms=parts.together(each),
         effective_points=sum(part.effective_points for part in each),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from pellicle.data.colours import Colours
 from pellicle.data.folded_delta import can_be_folded
 from pellicle.data.spectrum import Spectrum
 from pellicle.fitting.result import Fit, Status
@@ -12,11 +13,11 @@ from pellicle.fitting.result import Fit, Status
 _NO_FIT = (Status.FAILED, Status.NOT_CONVERGED, Status.MISFIT)
 
 
-def as_folded(spectra: Sequence[Spectrum]) -> list[Spectrum] | None:
+def as_folded(spectra: Sequence[Spectrum | Colours]) -> list[Spectrum | Colours] | None:
     """The spectra with each Δ as folded that can be; None where none can."""
     found = [
         replace(s, folded=True, sweeps=tuple(replace(sweep, folded=True) for sweep in s.sweeps))
-        if s.delta is not None and not s.folded and can_be_folded(s.delta)
+        if isinstance(s, Spectrum) and s.delta is not None and not s.folded and can_be_folded(s.delta)
         else s
         for s in spectra
     ]

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pellicle.dispersion.base import known_index
+from pellicle.fitting.colours.view import ColoursView
 from pellicle.fitting.noise import local_noise
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.reweighting import ViewFit
@@ -54,10 +55,12 @@ class Fringes(NamedTuple):
     amplitude: complex
 
 
-def phase_per_thickness(view: SpectrumView, values: np.ndarray, thickness: float) -> np.ndarray | None:
+def phase_per_thickness(
+    view: SpectrumView | ColoursView, values: np.ndarray, thickness: float
+) -> np.ndarray | None:
     """x = 2 n cos θ / λ (points,) of the layer of this `thickness`, with the view's parameters at `values`.
 
-    None where another layer is not thin, where points are of several angles, and for Ψ and Δ.
+    None where another layer is not thin, where points are of several angles, and for Ψ and Δ and colours.
     """
     scene: Scene = insert(view.scene, list(values))
     wavelength, rows = np.asarray(scene.light.wavelength), slice(view.rows)

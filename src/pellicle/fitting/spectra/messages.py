@@ -13,8 +13,9 @@ import numpy as np
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.empirical import Constant
 from pellicle.effects.plan import Plan
+from pellicle.fitting.colours.targets import MeasuredColours
 from pellicle.fitting.problem import Problem
-from pellicle.fitting.spectra.targets import Measured
+from pellicle.fitting.spectra.targets import Target
 from pellicle.materials import Material
 from pellicle.scene.film import Scene
 from pellicle.scene.free import free_leaves, is_free
@@ -23,7 +24,7 @@ from pellicle.scene.layers import Interface, Plate
 log = getLogger(__name__)
 
 
-def log_problem(spectra: Sequence[Measured], problem: Problem) -> None:
+def log_problem(spectra: Sequence[Target], problem: Problem) -> None:
     """Log the scene, the free parameters, each spectrum with its noise, and its plan."""
     if not log.isEnabledFor(INFO):
         return
@@ -33,7 +34,8 @@ def log_problem(spectra: Sequence[Measured], problem: Problem) -> None:
     for spectrum, view in zip(spectra, problem.views, strict=True):
         light, nm = spectrum.scene.light, spectrum.wavelength
         at = "free angle" if is_free(light.angle) else f"{_span(np.atleast_1d(light.angle))} degrees"
-        points = f"{light.signal} at {len(nm)} points, {_span(nm)} nm, {at}, {light.polarisation}"
+        size = f"{view.rows} colours" if isinstance(spectrum, MeasuredColours) else f"{len(nm)} points"
+        points = f"{light.signal} at {size}, {_span(nm)} nm, {at}, {light.polarisation}"
         noise = "no noise is given: equal weights, and σ from the residuals of the best fit"
         if spectrum.noise.given:
             noise = "its noise is given, and errors are absolute"

@@ -1,4 +1,4 @@
-"""Fit quality, curves and misfit of each spectrum of a fit."""
+"""Fit quality, curves and misfit of each spectrum, and of colours, of a fit."""
 
 from __future__ import annotations
 
@@ -6,15 +6,20 @@ import math
 
 import numpy as np
 
+from pellicle.data.colours import Colours
 from pellicle.data.ellipsometry_angles import psi_delta
 from pellicle.data.spectrum import Spectrum
+from pellicle.fitting.colours.evidence import accuracy as colours_accuracy
+from pellicle.fitting.colours.parts import colours_part
+from pellicle.fitting.colours.view import ColoursView
 from pellicle.fitting.covariance import Errors
 from pellicle.fitting.discrepancy import Discrepancy
 from pellicle.fitting.misfit import Accuracy, misfit
 from pellicle.fitting.result import Curve, Part
 from pellicle.fitting.reweighting import RankedMinima, ViewFit
 from pellicle.fitting.spectra import fringes
-from pellicle.fitting.spectra.view import Local, SpectrumView
+from pellicle.fitting.spectra.layer_errors import layer_errors
+from pellicle.fitting.spectra.view import SpectrumView
 
 LARGEST_POWER, LARGEST_ANGLES = 0.02, 0.02
 """Structure in residuals of R and T, and of N, C and S (0.6° of Ψ), that no calibrated instrument makes."""
@@ -23,29 +28,37 @@ LARGEST_DRIFT = 1.0
 remains in a soap film of known thickness, 1.3 of titania on silicon that is fitted as a soap film."""
 
 
-def parts(data: list[Spectrum], ranked: RankedMinima, errors: Errors) -> tuple[Part, ...]:
-    """One part for each spectrum, in their order."""
-    return tuple(
-        Part(
+def parts(data: list[Spectrum | Colours], ranked: RankedMinima, errors: Errors) -> tuple[Part, ...]:
+    """One part for each spectrum and each set of colours, in their order."""
+
+    def part(own: Spectrum | Colours, view: SpectrumView | ColoursView, fit: ViewFit) -> Part:
+        covariance = errors.covariance[np.ix_(view.takes, view.takes)]
+        if isinstance(own, Colours):
+            assert isinstance(view, ColoursView)
+            return colours_part(own, view, fit, covariance)
+        assert isinstance(view, SpectrumView)
+        return Part(
             name=view.name,
-            data=spectrum,
-            curve=_curve(spectrum, view, fit, errors),
+            data=own,
+            curve=_curve(own, view, fit, covariance),
             plan=view.plan,
             rms=view.rms(fit.at.model),
             chi2_reduced=fit.chi2 / fit.freedom,
             effective_points=view.rows / fit.length,
             sigma_from="given" if view.noise.given else "model" if view.noise.drifting else "residuals",
         )
-        for spectrum, view, fit in zip(data, ranked.problem.views, ranked.fits, strict=True)
-    )
+
+    rows = zip(data, ranked.problem.views, ranked.fits, strict=True)
+    return tuple(part(own, view, fit) for own, view, fit in rows)
 
 
 def together(parts: tuple[Part, ...]) -> float | None:
     """rms over all spectra, None where they have no unit in common."""
     if len(parts) == 1:
         return parts[0].rms
-    units = {part.spectrum.signal == "psi-delta" for part in parts}
-    if len(units) > 1 or not all(part.spectrum.calibrated for part in parts):
+    spectra = [part.data for part in parts if isinstance(part.data, Spectrum)]
+    units = {spectrum.signal == "psi-delta" for spectrum in spectra}
+    if len(spectra) < len(parts) or len(units) > 1 or not all(spectrum.calibrated for spectrum in spectra):
         return None
     sizes = [part.spectral.wavelength.size for part in parts]
     return math.sqrt(np.average([part.rms**2 for part in parts], weights=sizes))
@@ -62,7 +75,9 @@ def missed(parts: tuple[Part, ...], ranked: RankedMinima, found: Discrepancy) ->
     )
 
 
-def _accuracy(part: Part, view: SpectrumView) -> Accuracy:
+def _accuracy(part: Part, view: SpectrumView | ColoursView) -> Accuracy:
+    if isinstance(view, ColoursView):
+        return colours_accuracy(view, part.sigma)
     if view.channels > 1:
         # of Ψ and Δ the range says nothing: on a thin oxide it is that of the substrate
         return Accuracy(largest=LARGEST_ANGLES)
@@ -72,10 +87,10 @@ def _accuracy(part: Part, view: SpectrumView) -> Accuracy:
     return Accuracy(LARGEST_POWER if part.spectrum.calibrated else math.inf, float(np.ptp(values)))
 
 
-def _curve(spectrum: Spectrum, view: SpectrumView, fit: ViewFit, errors: Errors) -> Curve:
+def _curve(spectrum: Spectrum, view: SpectrumView, fit: ViewFit, covariance: np.ndarray) -> Curve:
     """Data, model and the layer's index with errors, at the real points."""
-    at, rows, takes = fit.at, view.rows, list(view.takes)
-    n_stderr, k_stderr = layer_errors(at, errors.covariance[np.ix_(takes, takes)], rows)
+    at, rows = fit.at, view.rows
+    n_stderr, k_stderr = layer_errors(at, covariance, rows)
     n, k = np.asarray(at.layer)[:, :rows]
     data, model = view.in_columns(view.data.values), view.in_columns(at.model)
     sigma = 1 / np.asarray(view.data.weight)[: view.points : view.channels]
@@ -101,11 +116,3 @@ def _curve(spectrum: Spectrum, view: SpectrumView, fit: ViewFit, errors: Errors)
         k_stderr=k_stderr,
         **angles,
     )
-
-
-def layer_errors(at: Local, covariance: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray]:
-    """Standard errors of the layer's n and k at each wavelength, from the covariance of the parameters."""
-    slope = np.asarray(at.layer_slope)[:, :points]
-    variance = np.einsum("cip,pq,ciq->ci", slope, covariance, slope)
-    n, k = np.sqrt(np.maximum(variance, 0.0))
-    return n, k

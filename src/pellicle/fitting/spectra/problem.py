@@ -1,15 +1,16 @@
-"""Spectra of a sample and their scenes as a least-squares problem."""
+"""Spectra and colours of a sample and their scenes as a least-squares problem."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from pellicle.effects.bounds import largest_index
+from pellicle.fitting.colours.targets import MeasuredColours, colours_view
 from pellicle.fitting.coordinates import box
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.spectra.nuisance import Data
 from pellicle.fitting.spectra.parameters import anonymous, bounds, shared
-from pellicle.fitting.spectra.targets import Measured
+from pellicle.fitting.spectra.targets import Target
 from pellicle.fitting.spectra.view import ROUND, SpectrumView
 from pellicle.planning.film import plan
 from pellicle.scene.film import coherent_layers, with_wavelength
@@ -25,14 +26,18 @@ def shortest_wavelength(problem: Problem) -> float:
     return min(v.scene.light.wavelength.min() / v.largest_index for v in problem.views)
 
 
-def make(*spectra: Measured, tolerance: float = 0.0) -> Problem:
-    """The problem of explaining these spectra of one sample, with models that are off by up to `tolerance`.
+def make(*spectra: Target, tolerance: float = 0.0) -> Problem:
+    """The problem of explaining these spectra and colours of one sample.
 
-    Raises ValueError where a material has no data at a wavelength.
+    The models may be off by up to `tolerance`. Raises ValueError where a material has no data at a
+    wavelength.
     """
     free, positions = shared([m.scene for m in spectra], [m.name for m in spectra])
     views = []
     for spectrum, takes in zip(spectra, positions, strict=True):
+        if isinstance(spectrum, MeasuredColours):
+            views.append(colours_view(spectrum, takes, tolerance, _KEPT_EFFECTS))
+            continue
         scene, wavelength, values = spectrum.scene, spectrum.wavelength, spectrum.values
         points, channels = len(wavelength), values.size // len(wavelength)
         extra = -points % ROUND

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pellicle.fitting.colours.view import ColoursView
 from pellicle.fitting.noise import local_noise
 from pellicle.fitting.reweighting import ViewFit
 from pellicle.fitting.spectra.view import SpectrumView
@@ -83,8 +84,10 @@ class Missed(NamedTuple):
         return f"{self.place or 'over most of the spectrum'}{by}"
 
 
-def missed(view: SpectrumView, fit: ViewFit) -> Missed | None:
-    """Structure in the residuals of the best fit, None where they may be noise."""
+def missed(view: SpectrumView | ColoursView, fit: ViewFit) -> Missed | None:
+    """Structure in the residuals of the best fit, None where they may be noise, and for colours."""
+    if isinstance(view, ColoursView):
+        return None
     shape, columns = (view.rows, view.channels), slice(view.measured_channels)
     weight = np.asarray(view.data.weight)[: view.points].reshape(shape)[:, columns]
     residuals = (view.data.values - np.asarray(fit.at.model))[: view.points].reshape(shape)[:, columns]

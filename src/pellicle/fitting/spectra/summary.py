@@ -15,7 +15,7 @@ from pellicle.fitting.reweighting import RankedMinima, ViewFit
 from pellicle.fitting.spectra import fringes, residual_structure
 from pellicle.fitting.spectra.parameters import fixed_numbers, thickness_name
 from pellicle.fitting.spectra.problem import shortest_wavelength
-from pellicle.fitting.spectra.targets import Measured, drifts
+from pellicle.fitting.spectra.targets import Target, drifts
 from pellicle.fitting.spectra.view import SpectrumView
 from pellicle.fitting.status import RIVAL
 from pellicle.materials import materials_in
@@ -47,7 +47,7 @@ def scan_profile(ranked: RankedMinima) -> Profile | None:
     return Profile(scan.thickness, np.minimum(above - min(above.min(), 0.0), _RULED_OUT))
 
 
-def amended(spectra: Sequence[Measured], ranked: RankedMinima, limits: list[Limits]) -> list[Limits]:
+def amended(spectra: Sequence[Target], ranked: RankedMinima, limits: list[Limits]) -> list[Limits]:
     """Limits with a thickness that drift of scale and offset could imitate bounded from above only."""
     if not all(drifts(m.scene) and len(m.scene.layers) == 1 for m in spectra):
         return limits
@@ -69,7 +69,7 @@ def thinnest(view: SpectrumView, fit: ViewFit) -> float:
     return float(FEWEST_FRINGES / max(np.ptp(2 * n / wavelength), 1e-12))
 
 
-def fixed(spectra: Sequence[Measured]) -> list[Estimate]:
+def fixed(spectra: Sequence[Target]) -> list[Estimate]:
     """The fixed numbers of the layers and the instruments."""
     return [
         Estimate(name, value, 0.0, unit, value, value, False)
@@ -78,7 +78,7 @@ def fixed(spectra: Sequence[Measured]) -> list[Estimate]:
     ]
 
 
-def opaque(spectra: Sequence[Measured], ranked: RankedMinima) -> frozenset[str]:
+def opaque(spectra: Sequence[Target], ranked: RankedMinima) -> frozenset[str]:
     """Names of the thicknesses of layers that absorb at the best fit."""
     view = ranked.problem.views[0]
     scene = insert(view.scene, ranked.problem.seen_by(view, ranked.values))
@@ -90,7 +90,7 @@ def opaque(spectra: Sequence[Measured], ranked: RankedMinima) -> frozenset[str]:
     )
 
 
-def warnings(spectra: Sequence[Measured], ranked: RankedMinima, unclear: Sequence[str]) -> tuple[str, ...]:
+def warnings(spectra: Sequence[Target], ranked: RankedMinima, unclear: Sequence[str]) -> tuple[str, ...]:
     """Warnings that a reader needs before using the numbers; `unclear` is what the data do not determine."""
     messages = [w for m in spectra for material in materials_in(m.scene) for w in material.warnings()]
     scan, finest = ranked.minima.scan, shortest_wavelength(ranked.problem) / 8

@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pellicle.data.colours import Colours
 from pellicle.data.repeated_sweeps import deviations
 from pellicle.data.spectrum import Spectrum
 from pellicle.fitting.covariance import Scaled
@@ -23,14 +24,14 @@ from pellicle.fitting.reweighting import RankedMinima
 
 
 def with_sweeps(
-    data: Sequence[Spectrum],
+    data: Sequence[Spectrum | Colours],
     ranked: RankedMinima,
     jacobian: Scaled,
     parameters: Mapping[str, Estimate],
 ) -> tuple[dict[str, Estimate], list[str]]:
     """Estimates whose errors include the scatter between sweeps, and sentences on those that it enlarges."""
     result, sentences = dict(parameters), []
-    if not any(spectrum.sweeps for spectrum in data):
+    if not any(isinstance(each, Spectrum) and each.sweeps for each in data):
         return result, []
     for view, (shifts, stated) in zip(ranked.problem.views, _steps(data, ranked, jacobian), strict=True):
         for name, own, noise in zip(jacobian.names, shifts.T, stated, strict=True):
@@ -61,7 +62,7 @@ def with_sweeps(
 
 
 def _steps(
-    data: Sequence[Spectrum], ranked: RankedMinima, jacobian: Scaled
+    data: Sequence[Spectrum | Colours], ranked: RankedMinima, jacobian: Scaled
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """For each spectrum the steps (sweeps, columns) of all parameters and nuisances that its sweeps make, and
     the standard error (columns,) that its noise contributes, in their own units."""
@@ -72,7 +73,7 @@ def _steps(
     for spectrum, view, fit in zip(data, ranked.problem.views, ranked.fits, strict=True):
         gain = inverse @ jacobian.jacobian[first : first + view.points].T
         first += view.points
-        if not spectrum.sweeps:
+        if not isinstance(spectrum, Spectrum) or not spectrum.sweeps:
             result.append((np.zeros((0, len(gain))), np.zeros(len(gain))))
             continue
         apart = deviations(spectrum.sweeps)

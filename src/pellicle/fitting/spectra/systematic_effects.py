@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pellicle.fitting.colours.view import ColoursView
 from pellicle.fitting.discrepancy import HALF_NORMAL, Effect
 from pellicle.fitting.spectra.extended_scene import ExtendedScene, Number
 from pellicle.fitting.spectra.view import Local, SpectrumView
@@ -28,7 +29,7 @@ _ROUND_PUPIL = 0.5
 """Standard deviation of the angle in the plane of incidence over an evenly lit cone, by its half angle."""
 
 
-class _Simulation(NamedTuple):
+class SimulatedEffect(NamedTuple):
     """An effect that is simulated: weighted sum of signals with one number changed."""
 
     name: str
@@ -41,42 +42,62 @@ class _Simulation(NamedTuple):
     shared: bool = True
     material: bool = False
 
+    def effect(self, change: np.ndarray) -> Effect:
+        """The effect with its `change` of the data."""
+        about = self.name, self.size, self.unit, change
+        return Effect(*about, self.power, self.positive, self.shared, self.material)
+
 
 def systematic_effects(view: SpectrumView, values: np.ndarray, at: Local, scene: Scene) -> list[Effect]:
     """Every effect to which the `scene` gives an uncertainty, at `values` (the parameters of the view,).
 
     `at` is the local model there. What the scene describes itself, free or fixed, is no effect.
     """
+    gain, result = np.asarray(at.gain), []
+    for row, weights, own in simulated_effects(view, values, scene):
+        change = _on_sphere(view, at, _columns(view, gain * (weights @ own)))
+        if view.depolarisation is not None:
+            change[:, -1] = _depolarising(view, at, own, weights)
+        result.append(row.effect(change))
+    return named_for([*result, *_of_signal(view, at, scene)], view.name)
+
+
+def named_for(effects: list[Effect], name: str) -> list[Effect]:
+    """The effects, those of one measurement among several under its name."""
+    of = f" of {name}" if name else ""
+    return [e if e.shared else replace(e, name=f"{e.name}{of}") for e in effects]
+
+
+def simulated_effects(
+    view: SpectrumView | ColoursView, values: np.ndarray, scene: Scene
+) -> list[tuple[SimulatedEffect, np.ndarray, np.ndarray]]:
+    """Every effect that is simulated, with weights (signals,) and signals (signals, data values).
+
+    The weighted sum of the signals is the change by the effect.
+    """
     simulations = _simulations(view, values, scene)
-    result = []
-    if simulations:
-        extended, every = simulations
-        each = [(row.number, change) for row in every for change, _ in row.changes]
-        signals = extended.signals(each) if each else np.zeros((0, 0))
-        gain, first = np.asarray(at.gain), 0
-        for row in every:
-            weights = np.array([weight for _, weight in row.changes])
-            own = signals[first : first + len(weights)]
-            first += len(weights)
-            change = _on_sphere(view, at, _columns(view, gain * (weights @ own)))
-            if view.depolarisation is not None:
-                change[:, -1] = _depolarising(view, at, own, weights)
-            about = row.name, row.size, row.unit, change
-            result.append(Effect(*about, row.power, row.positive, row.shared, row.material))
-    every_effect = [*result, *_of_signal(view, at, scene)]
-    of = f" of {view.name}" if view.name else ""
-    return [e if e.shared else replace(e, name=f"{e.name}{of}") for e in every_effect]
+    if not simulations:
+        return []
+    extended, every = simulations
+    each = [(row.number, change) for row in every for change, _ in row.changes]
+    signals = extended.signals(each) if each else np.zeros((0, 0))
+    result, first = [], 0
+    for row in every:
+        weights = np.array([weight for _, weight in row.changes])
+        result.append((row, weights, signals[first : first + len(weights)]))
+        first += len(weights)
+    return result
 
 
 def _simulations(
-    view: SpectrumView, values: np.ndarray, scene: Scene
-) -> tuple[ExtendedScene, list[_Simulation]] | None:
+    view: SpectrumView | ColoursView, values: np.ndarray, scene: Scene
+) -> tuple[ExtendedScene, list[SimulatedEffect]] | None:
     allowed, instrument = scene.uncertainty, scene.instrument
     extended, rows = ExtendedScene(view, values), []
 
     def add(name: str, size: float, unit: str, number: Number | None, changes: Any, **kind: Any) -> None:
         if number is not None and size > 0:
-            rows.append(_Simulation(name, size, unit, number, tuple(changes), **kind))
+            rows.append(SimulatedEffect(name, size, unit, number, tuple(changes), **kind))
 
     def linear(name: str, size: float, unit: str, number: Number | None, **kind: Any) -> None:
         step, weight = _STEP * size, 0.5 / _STEP

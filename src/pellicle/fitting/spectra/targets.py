@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import equinox as eqx
 import numpy as np
 
+from pellicle.data.colours import Colours
 from pellicle.data.ellipsometry_angles import ncs
 from pellicle.data.spectrum import Spectrum
 from pellicle.effects.film import exact
 from pellicle.errors import DataError, UsageError
 from pellicle.fitting import noise
+from pellicle.fitting.colours.targets import MeasuredColours
 from pellicle.fitting.problem import Noise
 from pellicle.fitting.spectra.view import depolarises
 from pellicle.scene.film import Light, Scene
 from pellicle.scene.free import free_leaves, is_free
-from pellicle.scene.instrument import Drift, Instrument
+from pellicle.scene.instrument import ONE_NUMBER, Drift, Instrument
 
 _ROUGH = 0.01
 """First guess of the noise of N, C, S and of a depolarisation."""
@@ -42,6 +44,10 @@ class Measured(NamedTuple):
     name: str = ""  # that of one among several
     frame: np.ndarray | None = None
     depolarisation: Noise | None = None
+
+
+Target: TypeAlias = Measured | MeasuredColours
+"""What a fit of a scene explains: a spectrum or colours."""
 
 
 def measured(data: Spectrum, scene: Scene, name: str = "") -> Measured:
@@ -100,8 +106,14 @@ def seen_as(scene: Scene, data: Spectrum) -> Scene:
     return eqx.tree_at(lambda s: s.light, scene, Light(data.wavelength, angle, data.signal, polarisation))
 
 
-def without_scale(scene: Scene, data: Spectrum) -> Scene:
-    """A scene that several spectra share, for one of them: Ψ and Δ have neither scale nor offset."""
+def without_scale(scene: Scene, data: Spectrum | Colours) -> Scene:
+    """A scene that several data share, for one of them: Ψ and Δ have neither scale nor offset, and of a scale
+    that drifts colours have one number."""
+    if isinstance(data, Colours):
+        kept = {name: value for name, value in vars(scene.instrument).items() if name != "offset"}
+        if isinstance(scene.instrument.scale, Drift):
+            kept["scale"] = ONE_NUMBER
+        return eqx.tree_at(lambda s: s.instrument, scene, Instrument(**kept))
     if data.delta is None:
         return scene
     kept = {name: value for name, value in vars(scene.instrument).items() if name not in ("scale", "offset")}

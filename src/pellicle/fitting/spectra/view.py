@@ -14,6 +14,7 @@ from pellicle.fitting.coordinates import Array
 from pellicle.fitting.noise import DRIFT_CORRELATION
 from pellicle.fitting.problem import Explained, Noise, NoiseGroup
 from pellicle.fitting.program_cache import kept
+from pellicle.fitting.reported_layer import reported_layer
 from pellicle.fitting.spectra import nuisance
 from pellicle.fitting.spectra.nuisance import Coefficient, Data
 from pellicle.fitting.spectra.sweeps import correlation_in_sweeps, sweeps
@@ -22,8 +23,7 @@ from pellicle.optics.layout import stack_rows
 from pellicle.planning.differences import largest_difference, signals
 from pellicle.planning.film import full_plan
 from pellicle.scene.film import Scene
-from pellicle.scene.free import free_leaves, insert, is_free
-from pellicle.scene.layers import Interface
+from pellicle.scene.free import insert, is_free
 from pellicle.simulation.film import build
 
 ROUND = 64
@@ -64,6 +64,10 @@ class SpectrumForm:
             signal = jnp.einsum("pij,pj->pi", data.frame, signal)
         return signal[:, :channels].reshape(-1)
 
+    def with_plan(self, plan: Plan) -> SpectrumForm:
+        """The same with another plan."""
+        return replace(self, plan=plan)
+
     def explain(self, arrays: tuple[Scene, Data], values: Any, /) -> Explained:
         """The spectrum with the free parameters of its scene at `values`."""
         scene, data = arrays
@@ -88,14 +92,6 @@ class Local(NamedTuple):
     offset: Array
     layer: Array  # n and k of the layer at each wavelength
     layer_slope: Array  # their derivatives, (2, points, parameters)
-
-
-def reported_layer(scene: Scene) -> int | None:
-    """Position of the layer whose n and k are reported: the first with free parameters of its own, else the
-    uppermost; None, the substrate, where nothing but interfaces lies on it."""
-    known = [(i, x.material) for i, x in enumerate(scene.layers) if not isinstance(x, Interface)]
-    free = [i for i, material in known if free_leaves(material)]
-    return next(iter([*free, *(i for i, _ in known)]), None)
 
 
 @kept
