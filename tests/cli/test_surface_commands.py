@@ -91,7 +91,7 @@ def test_a_plan_names_the_effects_of_a_surface(pellicle, tmp_path):
     assert (record["schema"], record["tolerance"]) == ("pellicle.plan/1", 1e-3)
     found = {row["effect"]: row for row in record["effects"]}
     assert list(found) == [
-        *("spectral-sampling", "roughness", "deviation", "diffuse", "coherence", "precision")
+        *("spectral-sampling", "bands", "roughness", "deviation", "diffuse", "coherence", "precision")
     ]
     assert sum(row["error_bound"] for row in found.values()) == record["error_bound"] <= 1e-3
     assert not found["deviation"]["on"]

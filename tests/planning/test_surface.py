@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from pellicle.brdf.models import MODELS
+from pellicle.colour import sensor
 from pellicle.effects.surface import exact
 from pellicle.effects.surface_removal import REMOVABLE
 from pellicle.errors import UsageError
@@ -56,8 +57,8 @@ def rows(surface, looked=LOOKED):
 def test_effects_are_judged_from_bounds_and_not_from_values():
     found = rows(Surface("granier-heidrich", {"deviation": Free(0.0, 5.0, start=0.0), "diffuse": 0.0}))
     assert {name: row.on for name, row in found.items()} == {
-        **{"spectral-sampling": True, "roughness": True, "deviation": True, "diffuse": False},
-        **{"coherence": True, "precision": True},
+        **{"spectral-sampling": True, "bands": False, "roughness": True, "deviation": True},
+        **{"diffuse": False, "coherence": True, "precision": True},
     }
     film = rows(Surface("microfacet-film", {"k": Free(0.0, 1.0, start=0.0)}))
     assert film["absorption"].why == "the film's extinction is free"
@@ -67,6 +68,17 @@ def test_effects_are_judged_from_bounds_and_not_from_values():
     assert rows(Surface("microfacet-film", {"n": Free(0.9, 2.0)}))["tunnelling"].on
     assert not rows(Surface("granier-heidrich-diffuse", {}))["roughness"].on
     assert not rows(Surface("granier-heidrich-diffuse", {}, (550.0,)))["spectral-sampling"].on
+
+
+def test_bands_are_integrals_and_their_angles_nodes():
+    eye, film = sensor("1931", "D65"), {"thickness": Free(100.0, 500.0), "n": 1.5, "diffuse": 0.0}
+    plan = exact(surface_view(Surface("microfacet-film", film, sensor=eye), LOOKED))
+    assert plan.on("bands")
+    assert 0 < plan.row("bands").count < len(eye.wavelength) / 2
+    assert 0 < plan.row("oblique").count < len(LOOKED.theta_i)
+    assert rows(Surface("microfacet-film", film))["oblique"].count == 0
+    bent = Surface("microfacet-film", {**film, "n": Free(0.9, 1.5)}, sensor=eye)
+    assert rows(bent)["oblique"].count == 0  # a polynomial is no good at the edge of total reflection
 
 
 def test_light_that_returns_has_no_angle():

@@ -150,6 +150,7 @@ BRDF_METHODS = (
         BrdfMethod(f"{n} angles", "the film's colour between them", partial(_by_angles, n))
         for n in (8, 16, 32)
     ),
+    BrdfMethod("mean wavelengths", "the bands", partial(_without, "bands", "it has no sensor")),
     BrdfMethod("without interference", "interference", partial(_without, "coherence", "it has none")),
     BrdfMethod("normal incidence", "the film's angle", partial(_without, "oblique", "no oblique film")),
     BrdfMethod("s alone", "p", partial(_without, "polarisation", "s and p are equal")),

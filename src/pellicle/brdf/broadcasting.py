@@ -8,8 +8,9 @@ from typing import Any, TypeAlias
 import jax.numpy as jnp
 
 Parameters: TypeAlias = Mapping[str, Any]
-"""Key → a number, or a map (...) that broadcasts with the directions. `n` and `k` of any medium,
-`wavelengths` and `weights` have a last axis of channels, or are one number for all of them."""
+"""Key → a number, or a map (...) that broadcasts with the directions. `n` and `k` of any medium
+and `wavelengths` have a last axis of wavelengths, or are one number for all of them. `weights` (wavelengths,
+channels) are the bands of a sensor; without them each wavelength is a channel."""
 
 Evaluate: TypeAlias = Callable[[Parameters, Any, Any], Any]
 """(parameters, i, o) → (..., channels), without a test of the horizon."""
@@ -18,6 +19,12 @@ Evaluate: TypeAlias = Callable[[Parameters, Any, Any], Any]
 def column(samples: Any) -> Any:
     """Reshape a map (...) to (..., 1), so that it broadcasts with channels; return a number unchanged."""
     return samples if jnp.ndim(samples) == 0 else jnp.asarray(samples)[..., None]
+
+
+def in_channels(parameters: Parameters, spectrum: Any) -> Any:
+    """Weight a spectrum (..., wavelengths) by the bands of a sensor, `weights`, if there are any."""
+    weights = parameters.get("weights")
+    return spectrum if weights is None else spectrum @ weights
 
 
 def weighted_sum(

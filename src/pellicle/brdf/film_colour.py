@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.brdf.broadcasting import Parameters, column
+from pellicle.brdf.broadcasting import Parameters, column, in_channels
 from pellicle.brdf.directions import angle_to_half, cosine_to_half
 from pellicle.optics import coherent, orders, response
 from pellicle.optics.interface import allow_tunnelling
@@ -21,6 +21,10 @@ from pellicle.optics.pair import Number, Pair
 
 SHORTEST = 400.0
 """Wavelength (nm) for which `node_count` counts: eyes and cameras are nearly blind below."""
+
+
+_SMOOTH = 32
+"""Number of nodes of ⟨i, h⟩ without interference: `node_count` of no thickness, and eight more."""
 
 
 def node_count(thickest: float) -> int:
@@ -84,24 +88,17 @@ def without_interference(parameters: Parameters, angle: Any) -> Any:
     return 0.5 * sum(orders.reflectance(series, orders.monochromatic, count=0) for series in (s, p))
 
 
-def rgb(parameters: Parameters, spectrum: Any) -> Any:
-    """Weight a spectrum (..., wavelengths) by a sensor's `weights` (wavelengths, 3), if there are any."""
-    weights = parameters.get("weights")
-    return spectrum if weights is None else spectrum @ weights
-
-
 def per_sample(reflectance: Reflectance) -> Colour:
     """Return the RGB reflectance for light from i to o, computed for each sample."""
-    return lambda parameters, i, o: rgb(parameters, reflectance(parameters, angle_to_half(i, o)))
+    return lambda parameters, i, o: in_channels(parameters, reflectance(parameters, angle_to_half(i, o)))
 
 
 exact = per_sample(reflectance)
-incoherent = per_sample(without_interference)
 
 
 def at_normal_incidence(reflectance: Reflectance) -> Colour:
     """Return the RGB reflectance at normal incidence on the facets, for all directions."""
-    return lambda parameters, i, o: rgb(parameters, reflectance(parameters, None))
+    return lambda parameters, i, o: in_channels(parameters, reflectance(parameters, None))
 
 
 def coefficients(parameters: Parameters, dtype: Any, count: int, reflectance: Reflectance) -> Any:
@@ -110,13 +107,14 @@ def coefficients(parameters: Parameters, dtype: Any, count: int, reflectance: Re
     angle = jnp.asarray(np.arccos(0.5 + 0.5 * np.cos(phase)), dtype)
     transform = 2 / count * np.cos(np.outer(np.arange(count), phase))
     transform[0] *= 0.5
-    return jnp.asarray(transform, dtype) @ rgb(parameters, reflectance(parameters, angle))
+    return jnp.asarray(transform, dtype) @ in_channels(parameters, reflectance(parameters, angle))
 
 
 def interpolated(count: int, reflectance: Reflectance = reflectance) -> Colour:
     """Return the RGB reflectance by a polynomial through `count` nodes; `per_sample` for a thickness map.
 
-    For values only: a Jacobian through `exact` costs less than through a long polynomial.
+    At single wavelengths for values only: a Jacobian through `exact` costs less than through a long
+    polynomial. Over the bands of a sensor it saves most of the time of both.
     """
 
     def colour(parameters, i, o):
@@ -124,10 +122,22 @@ def interpolated(count: int, reflectance: Reflectance = reflectance) -> Colour:
             return per_sample(reflectance)(parameters, i, o)
         cosine = cosine_to_half(i, o)
         series = coefficients(parameters, cosine.dtype, count, reflectance)
+        if "weights" in parameters:
+            # a fit computes the polynomials once for all candidates, and compiles one product
+            angle = jnp.arccos(jnp.clip(2 * cosine - 1, -1.0, 1.0))
+            return jnp.cos(angle[..., None] * np.arange(count)) @ series
         # one channel after the other: a last axis of three would leave vector lanes empty
         return jnp.stack([_clenshaw(channel, 4 * cosine - 2) for channel in series.T], axis=-1)
 
     return colour
+
+
+def incoherent(parameters: Parameters, i: Any, o: Any) -> Any:
+    """Return the RGB reflectance without interference; over bands by a polynomial, for it has no fringes."""
+    over_bands = "weights" in parameters
+    return (interpolated(_SMOOTH, without_interference) if over_bands else per_sample(without_interference))(
+        parameters, i, o
+    )
 
 
 def chebyshev(thickest: float) -> Colour:

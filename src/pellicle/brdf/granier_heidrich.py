@@ -24,7 +24,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import jax.numpy as jnp
 
-from pellicle.brdf.broadcasting import Evaluate, Parameters, column, weighted_sum
+from pellicle.brdf.broadcasting import Evaluate, Parameters, column, in_channels, weighted_sum
 from pellicle.brdf.directions import cosine_inside, cosine_to_half, direction
 from pellicle.brdf.lobes import cosine_to_mirror, power
 from pellicle.optics.elementary import sincos
@@ -160,14 +160,19 @@ def layered_diffuse(parameters: Parameters, combine: Combine = interfering) -> A
     """Return ρ_d of eqs. 11 and 16 per channel; 1 without interference."""
     n = parameters["n"]
     phase = 2 * jnp.pi * n * column(parameters["thickness"]) / parameters["wavelengths"]
-    return combine(Amplitudes(sqrt(diffuse_reflectance(n)), sqrt(diffuse_transmittance(n)), phase))
+    amplitudes_at = Amplitudes(sqrt(diffuse_reflectance(n)), sqrt(diffuse_transmittance(n)), phase)
+    return in_channels(parameters, combine(amplitudes_at))
+
+
+def _lobes(parameters: Parameters, i: Any, o: Any, fresnel: Fresnel, combine: Combine) -> Any:
+    return in_channels(parameters, combine(amplitudes(parameters, i, o, fresnel)))
 
 
 def specular(fresnel: Fresnel = published, combine: Combine = interfering) -> Evaluate:
     """Return the Phong-like BRDF over a grey diffuse base: specular · (eq. 5) + diffuse."""
 
     def evaluate(parameters, i, o):
-        return weighted_sum(parameters, lambda: combine(amplitudes(parameters, i, o, fresnel)))
+        return weighted_sum(parameters, lambda: _lobes(parameters, i, o, fresnel, combine))
 
     return evaluate
 
@@ -188,7 +193,7 @@ def full(fresnel: Fresnel = published, combine: Combine = interfering) -> Evalua
     def evaluate(parameters, i, o):
         return weighted_sum(
             parameters,
-            lambda: combine(amplitudes(parameters, i, o, fresnel)),
+            lambda: _lobes(parameters, i, o, fresnel, combine),
             lambda: layered_diffuse(parameters, combine),
         )
 

@@ -74,8 +74,8 @@ class Model(NamedTuple):
 
         - `parameters` has every key of the model, each a number or a map (...) that broadcasts with the
           directions. Without `k`, `base_k`, `deviation`, `specular` or `diffuse` that effect is absent and
-          costs nothing. `wavelengths` (nm) are one for each channel, R, G and B by default. A film's model
-          also takes `weights` (wavelengths, 3), which weight its reflectance at any wavelengths to RGB.
+          costs nothing. `wavelengths` (nm) are one for each channel, R, G and B by default; with `weights`
+          (wavelengths, channels), the bands of a sensor, they are any.
         - `i`, `o`: unit vectors (..., 3) away from the surface, with the normal as third axis.
 
         **Returns:** (..., 3), or one value for each wavelength; 0 below the horizon.

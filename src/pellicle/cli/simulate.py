@@ -115,6 +115,8 @@ def _csv(scene: Scene, result: SimulatedSignal, noise: float, comments: list[str
 def _write_samples(
     recipe: SurfaceRecipe, out: str, noise: Any, seed: int, tolerance: float, comments: list[str]
 ) -> None:
+    import numpy as np
+
     from pellicle.data.write_brdf import write_brdf_samples
     from pellicle.fitting.spectra.messages import log_plan
     from pellicle.synthetic.brdf import simulate_samples
@@ -123,9 +125,15 @@ def _write_samples(
     samples, plan = simulate_samples(surface, directions(recipe), noise, seed, tolerance)
     log_plan(plan)
     units = {parameter.key: parameter.unit for parameter in surface.brdf.parameters}
-    truth = ", ".join(
-        f"{key} = {' '.join(f'{x:.10g}' for x in numbers.reshape(-1))} {units.get(key, 'nm')}".rstrip()
+    means = {
+        key: np.ravel(numbers @ surface.bands.weights if numbers.size > 1 else numbers)
         for key, numbers in surface.start_numbers().items()
+        if key != "weights"
+    }
+    truth = ", ".join(
+        f"{key} = {' '.join(f'{x:.10g}' for x in numbers)} {units.get(key, 'nm')}".rstrip()
+        for key, numbers in means.items()
     )
+    truth += ", means over the bands of a sensor" if surface.sensor is not None else ""
     write_brdf_samples(out, samples, comments=[*comments, f"truth: model {surface.model}, {truth}"])
     say(f"{out}: {len(samples)} samples of {', '.join(samples.channels)}", *samples.notes)

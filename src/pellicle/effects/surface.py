@@ -8,6 +8,8 @@ import jax
 import numpy as np
 
 from pellicle.brdf.directions import angle_to_half
+from pellicle.brdf.film_colour import node_count
+from pellicle.brdf.sensor_bands import ERROR
 from pellicle.effects.plan import Plan, Row
 from pellicle.scene.free import Free, is_free
 from pellicle.scene.surface import SurfaceView
@@ -22,11 +24,25 @@ def spectral_sampling(view: SurfaceView) -> Row:
     """On where channels differ."""
     if not view.layered:
         return Row("spectral-sampling", False, "the diffuse part alone is grey", count=1)
+    if "weights" in view.numbers:
+        count = view.channels
+        return Row("spectral-sampling", count > 1, f"bands of {count} channels", count=count)
     wavelengths = np.asarray(view.numbers["wavelengths"])
     listed = ", ".join(f"{nm:g}" for nm in wavelengths)
     if len(wavelengths) == 1:
         return Row("spectral-sampling", False, f"one channel: {listed} nm", count=1)
     return Row("spectral-sampling", True, f"one wavelength a channel: {listed} nm", count=len(wavelengths))
+
+
+def bands(view: SurfaceView) -> Row:
+    """On where a sensor sees each channel in a band of wavelengths."""
+    if not view.layered:
+        return Row("bands", False, "the diffuse part alone is grey")
+    if "weights" not in view.numbers:
+        return Row("bands", False, "no sensor: each channel is one wavelength")
+    count = np.shape(view.numbers["weights"])[0]
+    why = f"channels are integrals over bands, by {count} wavelengths (within {ERROR:g} in R)"
+    return Row("bands", True, why, count=count)
 
 
 def roughness(view: SurfaceView) -> Row:
@@ -83,10 +99,16 @@ def oblique(view: SurfaceView) -> Row | None:
         return None
     if not view.layered:
         return Row("oblique", False, NO_LAYER)
-    steepest = largest_angle(view)
-    if not view.oblique or steepest < SAME_DIRECTION:
+    if not _lit_aslant(view):
         return Row("oblique", False, "light and eye are in the same direction")
-    return Row("oblique", True, f"facets are lit at up to {np.rad2deg(steepest):.3g}°")
+    why = f"facets are lit at up to {np.rad2deg(largest_angle(view)):.3g}°"
+    if "weights" not in view.numbers or _totally_reflecting(view):
+        return Row("oblique", True, why)
+    # an integral over bands has flatter fringes than one wavelength: 4e-6 in R for 90 random films
+    count = node_count(_bound(view.numbers["thickness"], "upper"))
+    if count >= len(view.i):
+        return Row("oblique", True, why)
+    return Row("oblique", True, f"{why}: the film's colour at {count} angles", count=count)
 
 
 def polarisation(view: SurfaceView) -> Row | None:
@@ -102,20 +124,27 @@ def tunnelling(view: SurfaceView) -> Row | None:
     """Off where no index can fall below n₀ sin θ: the square root then needs no branch."""
     if view.brdf.from_film_colour is None:
         return None
-    row = oblique(view)
-    if row is not None and not row.on:
+    if not (view.layered and _lit_aslant(view)):
         why = "normal incidence: every wave propagates" if view.layered else NO_LAYER
         return Row("tunnelling", False, why)
+    if unsure := _totally_reflecting(view):
+        return Row("tunnelling", True, f"total reflection at the {' and '.join(unsure)} is possible")
+    return Row("tunnelling", False, "no real index can fall below n₀ sin θ")
+
+
+def _lit_aslant(view: SurfaceView) -> bool:
+    return view.oblique and largest_angle(view) >= SAME_DIRECTION
+
+
+def _totally_reflecting(view: SurfaceView) -> list[str]:
+    """The media whose real index may fall below n₀ sin θ."""
     ambient = _bound(view.numbers.get("ambient_n", 1.0), "upper")
     transverse = ambient * np.sin(largest_angle(view)) * (1 + 1e-6)
-    unsure = [
+    return [
         name
         for name, n, k in (("film", "n", "k"), ("base", "base_n", "base_k"))
         if k not in view.numbers and _bound(view.numbers[n], "lower") <= transverse
     ]
-    if unsure:
-        return Row("tunnelling", True, f"total reflection at the {' and '.join(unsure)} is possible")
-    return Row("tunnelling", False, "no real index can fall below n₀ sin θ")
 
 
 def precision(view: SurfaceView) -> Row:
@@ -124,7 +153,7 @@ def precision(view: SurfaceView) -> Row:
 
 
 JUDGES = (
-    *(spectral_sampling, roughness, deviation, diffuse, absorption),
+    *(spectral_sampling, bands, roughness, deviation, diffuse, absorption),
     *(coherence, tunnelling, oblique, polarisation, precision),
 )
 """One function for each effect of a surface, in the order of a plan; it returns None where the model cannot

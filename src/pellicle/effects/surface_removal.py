@@ -29,12 +29,15 @@ def _roughness(view: SurfaceView) -> SurfaceView:
     """Keep the diffuse part alone; where that is grey, nothing of the layer remains."""
     if view.model in LAYERED:
         return _drop(view, *_LOBES, *_NORMALS)
-    return _drop(view, *(view.numbers.keys() - {"wavelengths", "diffuse"}))
+    return _drop(view, *(view.numbers.keys() - {"wavelengths", "weights", "diffuse"}))
 
 
 def _spectral_sampling(view: SurfaceView) -> SurfaceView:
     """Take the middle channel for all of them."""
     middle = view.channels // 2
+    if "weights" in view.numbers:
+        one = view.numbers["weights"][:, middle : middle + 1]
+        return replace(view, numbers={**view.numbers, "weights": one})
 
     def one(number: Any) -> Any:
         if isinstance(number, list):
@@ -42,6 +45,13 @@ def _spectral_sampling(view: SurfaceView) -> SurfaceView:
         return number if np.ndim(number) == 0 else number[middle : middle + 1]
 
     return replace(view, numbers={key: one(number) for key, number in view.numbers.items()})
+
+
+def _bands(view: SurfaceView) -> SurfaceView:
+    """Take the mean wavelength of each band for all of it, with the mean indices."""
+    weights = view.numbers["weights"]
+    means = {key: x if np.ndim(x) != 1 else x @ weights for key, x in view.numbers.items()}
+    return _drop(replace(view, numbers=means), "weights")
 
 
 def _drop(view: SurfaceView, *keys: str) -> SurfaceView:
@@ -52,6 +62,7 @@ def _drop(view: SurfaceView, *keys: str) -> SurfaceView:
 _REMOVALS: dict[str, Callable[[SurfaceView], SurfaceView]] = {
     "roughness": _roughness,
     "spectral-sampling": _spectral_sampling,
+    "bands": _bands,
     "coherence": lambda view: replace(view, coherent=False),
     "oblique": lambda view: replace(view, oblique=False),
     "polarisation": lambda view: replace(view, polarisation="s"),

@@ -97,7 +97,7 @@ def _by_nodes(stage: Stage) -> Iterator[Step]:
     for count in NODES:
         if 4 * count > len(stage.scene.i):
             break
-        why = f"{rows['oblique'].why}: the film's colour at {count} angles"
+        why = f"{rows['oblique'].why.partition(':')[0]}: the film's colour at {count} angles"
         row = replace(rows["oblique"], count=count, why=why)
         nodes = tuple(row if r.effect == "oblique" else r for r in stage.plan.rows)
         yield Step(replace(stage.plan, rows=nodes), stage.scene, row)

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from pellicle.brdf.models import MODELS as BRDF_MODELS
@@ -15,7 +14,8 @@ from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.read_brdf import read_brdf_samples
 from pellicle.errors import DataError, UsageError
 from pellicle.recipes.media import Medium, Number, medium, number
-from pellicle.scene.free import check_free_count, free_leaves
+from pellicle.recipes.sensors import band_sensor
+from pellicle.scene.free import check_free_count
 from pellicle.scene.surface import Surface
 
 _NUMBERS: TypeAdapter[Any] = TypeAdapter(Number | list[float])
@@ -40,11 +40,20 @@ class SurfaceDataTable(_Table):
 
 
 class SurfaceTable(_Table):
-    """`[scene.surface]`: further keys are the model's own numbers."""
+    """`[scene.surface]`: further keys are the model's own numbers.
+
+    `sensor` gives each channel its band: an observer of the CIE, "srgb", or a file of a camera's
+    sensitivities; the light is an `illuminant` of the CIE or a `lamp`, a file of its spectrum. `film` and
+    `base` are media.
+    """
 
     model_config = ConfigDict(extra="allow", allow_inf_nan=False)
     model: str = Field(json_schema_extra={"enum": [*BRDF_MODELS]})
     wavelengths: list[float] | None = Field(default=None, min_length=1)
+    sensor: str | None = None
+    illuminant: Literal["E", "A", "D50", "D55", "D65", "D75"] | None = None
+    lamp: str | None = None
+    film: Medium | None = None
     base: Medium | None = None
 
 
@@ -118,18 +127,14 @@ class SurfaceRecipe:
 
 
 def _surface(table: SurfaceTable, folder: Path) -> Surface:
-    numbers = {key: _number(value, key) for key, value in (table.model_extra or {}).items()}
-    wavelengths = None if table.wavelengths is None else tuple(table.wavelengths)
-    bare = Surface(table.model, {}, wavelengths)
-    if table.base is not None:
-        if clash := {"base_n", "base_k"} & numbers.keys():
-            raise UsageError(f"base and {' and '.join(sorted(clash))} exclude each other")
-        base = medium(table.base, folder, "base")
-        if free_leaves(base):
-            raise UsageError("base cannot be free: give base_n and base_k as { lower = ..., upper = ... }")
-        index = np.asarray(base(np.array(bare.channel_wavelengths)))
-        numbers |= {"base_n": np.real(index).tolist(), "base_k": np.imag(index).tolist()}
-    surface = Surface(table.model, numbers, wavelengths)
+    surface = Surface(
+        table.model,
+        {key: _number(value, key) for key, value in (table.model_extra or {}).items()},
+        None if table.wavelengths is None else tuple(table.wavelengths),
+        band_sensor(table.sensor, table.illuminant, table.lamp, folder),
+        None if table.film is None else medium(table.film, folder, "film"),
+        None if table.base is None else medium(table.base, folder, "base"),
+    )
     check_free_count(len(surface.free_numbers()), least=0)
     return surface
 

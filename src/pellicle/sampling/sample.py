@@ -75,7 +75,7 @@ def sample(
         rows = [measurements] if isinstance(measurements, BrdfSamples) else measurements
         columns = [(s.theta_i, s.phi_i, s.theta_o, s.phi_o, s.values, s.sigma) for s in rows]
         compared = fit.layer_test.residual if fit.layer_test else ""
-        numbers = dict(scene.numbers), scene.channel_wavelengths
+        numbers = dict(scene.numbers), tuple(scene.bands), scene.media
         identity = fingerprint([*columns, numbers], scene.model, compared, tolerance)
     else:
         measurements = measured(OF_A_FILM, data)

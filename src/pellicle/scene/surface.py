@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, NamedTuple, Protocol, final, runtime_checkable
 
 import equinox as eqx
@@ -11,9 +12,13 @@ import numpy as np
 
 from pellicle.brdf.directions import direction
 from pellicle.brdf.models import Model, Parameter, model
+from pellicle.brdf.sensor_bands import Quadrature, quadrature
+from pellicle.colour.observers import Sensor
 from pellicle.data.brdf_samples import spread
 from pellicle.errors import UsageError, did_you_mean
 from pellicle.scene.free import Free
+from pellicle.scene.layers import MediumLike
+from pellicle.scene.surface_media import index_numbers
 
 LETTERS = ("r", "g", "b")
 INDICES = ("ambient_n", "n", "k", "base_n", "base_k")
@@ -39,14 +44,23 @@ class FreeNumber(NamedTuple):
 class Surface:
     """A surface: a BRDF model by name, with its numbers.
 
-    **Arguments:** `model`, a name such as "microfacet-film"; `numbers`, for each key of the model one number,
-    one number per channel or a `Free` (missing keys keep the model's defaults, fixed); `wavelengths` in nm,
-    one for each channel of the samples (the model's own if None). A `Free` of a key that differs between
-    channels becomes `n_r`, `n_g` and `n_b`.
+    **Arguments:**
 
-    **Raises:** UsageError for an unknown name or key, and where the count of numbers does not match.
+    - `model`: a name such as "microfacet-film".
+    - `numbers`: for each key of the model one number, one number per channel or a `Free`; missing keys keep
+      the model's defaults, fixed. A `Free` of a key that differs between channels becomes `n_r`, `n_g` and
+      `n_b`.
+    - `wavelengths` in nm, one for each channel of the samples; the model's own if None.
+    - `sensor`, in place of `wavelengths`: the bands of each channel, as `pellicle.colour.sensor` returns
+      those of an observer and `pellicle.colour.camera_sensor` those of a camera. Every channel of a white
+      surface is the same. An index is then one number for all wavelengths, or that of a medium.
+    - `film`, `base`: media of the film and of the base, in place of `n` and `k`, `base_n` and `base_k`: a
+      name of the catalogue, a file of n and k, or a dispersion without free parameters.
 
-    >>> surface = Surface("microfacet-film", {"thickness": Free(0, 500), "n": [1.5, 1.52, 1.54]})
+    **Raises:** UsageError for an unknown name or key, and where the count of numbers does not match;
+    ValueError for an unknown medium, or one without data at a wavelength.
+
+    >>> surface = Surface("microfacet-film", {"thickness": Free(0, 500), "n": [1.5, 1.52, 1.54]}, base="Si")
     >>> [number.name for number in surface.free_numbers()]
     ['thickness']
     """
@@ -54,12 +68,17 @@ class Surface:
     model: str
     numbers: Mapping[str, float | Sequence[float] | Free] = field(default_factory=dict)
     wavelengths: tuple[float, ...] | None = None
+    sensor: Sensor | None = None
+    film: MediumLike | None = None
+    base: MediumLike | None = None
 
     def __post_init__(self) -> None:
         try:
             known = [p.key for p in self.brdf.parameters]
         except ValueError as error:
             raise UsageError(str(error)) from None
+        if self.sensor is not None and self.wavelengths is not None:
+            raise UsageError("a surface has either wavelengths or a sensor, whose bands have their own")
         for key, value in self.numbers.items():
             if key not in known:
                 raise UsageError(
@@ -68,8 +87,11 @@ class Surface:
             count = np.size(value) if not isinstance(value, Free) else 1
             if key not in INDICES and count != 1:
                 raise UsageError(f"{key}: one number for all channels was expected, got {count}")
+            if count != 1 and self.sensor is not None:
+                raise UsageError(f"{key}: {count} numbers for bands of wavelengths; give one, or a medium")
             if count not in (1, self.channels):
                 raise UsageError(f"{key}: {count} numbers for {self.channels} wavelengths; give one or each")
+        _ = self.bands, self.media
 
     @property
     def brdf(self) -> Model:
@@ -77,14 +99,38 @@ class Surface:
         return model(self.model)
 
     @property
-    def channel_wavelengths(self) -> tuple[float, ...]:
-        """Wavelength of each channel in nm: `wavelengths`, or the model's own."""
-        return self.brdf.wavelengths if self.wavelengths is None else tuple(self.wavelengths)
-
-    @property
     def channels(self) -> int:
         """Number of channels."""
-        return len(self.channel_wavelengths)
+        if self.sensor is not None:
+            return self.sensor.weights.shape[1]
+        return len(self.brdf.wavelengths if self.wavelengths is None else self.wavelengths)
+
+    @cached_property
+    def bands(self) -> Quadrature:
+        """Wavelengths (N,) in nm and their weights (N, channels): few of a sensor, one of each channel
+        without one."""
+        if self.sensor is None:
+            nm = self.brdf.wavelengths if self.wavelengths is None else self.wavelengths
+            return Quadrature(np.array(nm, float), np.eye(len(nm)))
+        table = np.asarray(self.sensor.wavelength, float), np.asarray(self.sensor.weights, float)
+        thickest, index = self._largest("thickness"), self._largest("n")
+        if self.film is not None:
+            index = float(np.max(self._index("film", table[0])["n"]))
+        return quadrature(*table, thickest * index)
+
+    @cached_property
+    def media(self) -> dict[str, np.ndarray]:
+        """The numbers of `film` and `base`, (wavelengths,)."""
+        nm = self.bands.wavelength
+        return {key: x for part in ("film", "base") for key, x in self._index(part, nm).items()}
+
+    def _index(self, part: str, nm: np.ndarray) -> dict[str, np.ndarray]:
+        return index_numbers(part, getattr(self, part), nm, self.numbers, self.brdf)
+
+    def _largest(self, key: str) -> float:
+        default = next(p.value for p in self.brdf.parameters if p.key == key)
+        value: Any = self.numbers.get(key, default)
+        return float(value.upper if isinstance(value, Free) else np.max(value))
 
     def free_numbers(self) -> tuple[FreeNumber, ...]:
         """Return every free number, in the model's order."""
@@ -94,27 +140,35 @@ class Surface:
         key, value = parameter.key, self.numbers.get(parameter.key)
         if not isinstance(value, Free):
             return []
-        if not parameter.per_channel or self.channels == 1:
+        if not parameter.per_channel or self.channels == 1 or self.sensor is not None:
             return [FreeNumber(key, key, None, value, parameter)]
         names = LETTERS if self.channels == 3 else [str(c + 1) for c in range(self.channels)]
         return [FreeNumber(f"{key}_{name}", key, c, value, parameter) for c, name in enumerate(names)]
 
     def fixed_numbers(self) -> dict[str, np.ndarray]:
-        """Return every fixed number as an array () or (channels,), and the wavelengths."""
-        fixed = {"wavelengths": np.array(self.channel_wavelengths)}
+        """Return every fixed number as an array () or (wavelengths,), and the wavelengths; with a sensor also
+        their weights (wavelengths, channels)."""
+        fixed = {"wavelengths": self.bands.wavelength}
+        if self.sensor is not None:
+            fixed["weights"] = self.bands.weights
         for parameter in self.brdf.parameters:
             value: Any = self.numbers.get(parameter.key, parameter.value)
-            if isinstance(value, Free):
+            if isinstance(value, Free) or parameter.key in self.media:
                 continue
             default = parameter.key not in self.numbers and parameter.per_channel
             number = np.asarray(value[0] if default else value, dtype=float)
             fixed[parameter.key] = number if parameter.key in INDICES else number.reshape(())
-        return fixed
+        return fixed | self.media
 
     def start_numbers(self) -> dict[str, np.ndarray]:
         """Return every number as an array, free ones at their start values."""
         free = {key: np.asarray(x.start) for key, x in self.numbers.items() if isinstance(x, Free)}
         return self.fixed_numbers() | free
+
+    def at_start(self) -> Surface:
+        """Return the surface with its free numbers fixed at their start values."""
+        start = {key: x.start if isinstance(x, Free) else x for key, x in self.numbers.items()}
+        return replace(self, numbers=start)
 
 
 VIEW_DIRECTIONS = 256
@@ -148,9 +202,9 @@ class HasDirections(Protocol):
 class SurfaceView(eqx.Module):
     """A surface along given directions: numbers of its model and unit vectors to light and viewer.
 
-    `numbers` leaves out effects fixed at zero; some are `Free`. A number per channel is an array, or a list
-    where it is free. `i` and `o` have shape (samples, 3). The other fields are effects without a number of
-    their own that a plan may leave out.
+    `numbers` leaves out effects fixed at zero; some are `Free`. A number per wavelength is an array, or a
+    list where it is free. `i` and `o` have shape (samples, 3). The other fields are effects without a number
+    of their own that a plan may leave out.
     """
 
     model: str = eqx.field(static=True)
@@ -174,7 +228,8 @@ class SurfaceView(eqx.Module):
     @property
     def channels(self) -> int:
         """Number of channels."""
-        return np.shape(self.numbers["wavelengths"])[0]
+        weights = self.numbers.get("weights")
+        return np.shape(self.numbers["wavelengths"])[0] if weights is None else np.shape(weights)[1]
 
 
 def surface_view(surface: Surface, directions: HasDirections, count: int = VIEW_DIRECTIONS) -> SurfaceView:

@@ -81,8 +81,7 @@ def simulate_samples(
             f"samples have one channel or R, G and B: the surface has {surface.channels} wavelengths"
         )
     pairs = default_directions() if directions is None else directions
-    numbers = {key: x.tolist() for key, x in surface.start_numbers().items() if key != "wavelengths"}
-    fixed = replace(surface, numbers=numbers)
+    fixed = surface.at_start()
     plan = planning.plan(surface_view(fixed, pairs), tolerance)
     with jax.enable_x64(True):
         view = surface_view(fixed, pairs, len(pairs.theta_i))

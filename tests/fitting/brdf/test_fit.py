@@ -153,7 +153,7 @@ def test_impossible_fits_are_refused():
     one = dataclasses.replace(FREE, wavelengths=(550.0,), numbers={**FREE.numbers, "n": 1.5})
     for data, surface, options, message in (
         (flat, Surface("granier-heidrich", {}), {}, "nothing is free"),
-        (flat, one, {}, r"3 channels .* for 1 wavelengths"),
+        (flat, one, {}, r"3 channels .* for 1 of the surface"),
         (flat, FREE, {"residual": "cubic"}, "residual must be one of linear, cosine, log, cube-root"),
         (flat, FREE, {"loss": "L1"}, "loss must be one of least-squares, huber, student-t"),
         (flat.at(np.arange(5)), FREE, {}, "5 samples are too few"),

@@ -102,7 +102,7 @@ def _check(samples: list[BrdfSamples], surface: Surface) -> None:
         if surface.channels != len(each.channels):
             raise UsageError(
                 f"{where}{len(each.channels)} channels ({', '.join(each.channels)}) for"
-                f" {surface.channels} wavelengths: give wavelengths one for each"
+                f" {surface.channels} of the surface: give wavelengths one for each, or a sensor"
             )
     count = sum(len(each) for each in samples)
     if count < FEWEST:

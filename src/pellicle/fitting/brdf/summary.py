@@ -75,12 +75,13 @@ def amended(problem: Problem, limits: list[Limits]) -> list[Limits]:
 
 
 def fixed(surface: Surface) -> list[Estimate]:
-    """Every fixed number, one for each channel where they differ by channel."""
+    """Every fixed number, one for each channel where they differ: the mean over its band with a sensor."""
     numbers, result = surface.fixed_numbers(), []
     for about in surface.brdf.parameters:
         if about.key not in numbers:
             continue
         value = numbers[about.key]
+        value = value @ surface.bands.weights if value.size > 1 else value
         names = [about.key]
         if value.ndim:
             letters = ("r", "g", "b") if value.size == 3 else range(1, value.size + 1)

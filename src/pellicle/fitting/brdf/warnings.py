@@ -11,6 +11,8 @@ from pellicle.brdf.albedo import energy_warning
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.fitting.brdf.problem import in_plane
 from pellicle.fitting.result import Estimate
+from pellicle.materials import materials_in
+from pellicle.scene.layers import medium
 from pellicle.scene.surface import Surface
 
 _STEEP, _TOLERANCE = 15.0, 0.5
@@ -58,5 +60,9 @@ def numbers(surface: Surface, parameters: Mapping[str, Estimate], fitted: Mappin
             messages.append(f"{name} {p.value:.2f} is below 2: a second diffuse part rather than a lobe")
     if surface.model.startswith("granier-heidrich"):
         messages.append("the model's lobes are not normalised: specular is a weight and no albedo")
-    energy = energy_warning(surface.brdf, fitted)
+    media = [medium(value) for value in (surface.film, surface.base) if value is not None]
+    messages += [sentence for material in materials_in(media) for sentence in material.warnings()]
+    # over bands the colour of every direction of the quadrature would be an integral of its own
+    brdf = surface.brdf if surface.sensor is None else surface.brdf.for_thickness_up_to(fitted["thickness"])
+    energy = energy_warning(brdf, fitted)
     return [*messages, energy] if energy else messages
