@@ -17,7 +17,7 @@ from pellicle.scene.film import Light, Scene
 from pellicle.scene.free import insert, start_values
 from pellicle.scene.instrument import Instrument
 from pellicle.scene.layers import Interface, Layer, Plate
-from pellicle.synthetic.colours import BANDS, interference_colours, varied_layer
+from pellicle.synthetic.colours import BANDS, interference_colours, interference_spectra, varied_layer
 
 ANGLES = np.linspace(0.0, 80.0, 81)
 """Angles of incidence (degrees) at which colours are compared."""
@@ -25,7 +25,8 @@ CHANNELS = np.array([650.0, 550.0, 450.0])
 """Wavelengths (nm) of red, green and blue, at which a renderer's indices per channel are taken."""
 OPAQUE = 1e-4
 """Extinction above which a substrate is opaque: visible light enters it by less than half a millimetre."""
-_FILM = "film"
+FILM = "film"
+"""Name of the layer whose thickness may vary."""
 
 
 @dataclass(frozen=True)
@@ -35,8 +36,8 @@ class Appearance:
     `thickness` (thicknesses,) is in nm: one, or several where it varies over the object. `xyz`
     (thicknesses, angles, 3) are the colours at `ANGLES` under D65 for the CIE 1931 observer, Y = 1 for a
     perfect reflector. `layer` and `base` are n + ik at `CHANNELS`, `bare` the linear sRGB of the substrate
-    without a layer at normal incidence. `roughness` is the GGX α of its facets. `notes` are sentences on
-    what formats cannot say of this film.
+    without a layer at normal incidence. `scene` is the film in reflection, whose layer is named `FILM`.
+    `roughness` is the GGX α of its facets. `notes` are sentences on what formats cannot say of this film.
     """
 
     thickness: Float[np.ndarray, " thicknesses"]
@@ -44,6 +45,7 @@ class Appearance:
     layer: np.ndarray
     base: np.ndarray
     bare: Float[np.ndarray, "3"]
+    scene: Scene
     roughness: float = 0.0
     notes: tuple[str, ...] = ()
 
@@ -56,6 +58,10 @@ class Appearance:
     def index(self) -> float:
         """Refractive index of the layer at 550 nm."""
         return float(self.layer[1].real)
+
+    def spectra(self, wavelength: np.ndarray, thickness: np.ndarray, angle: np.ndarray) -> np.ndarray:
+        """Reflectance (angles, thicknesses, wavelengths); wavelengths and thicknesses in nm, degrees."""
+        return interference_spectra(self.scene, wavelength, thickness, angle, FILM)
 
 
 def appearance(scene: Scene, thickness: Any = None, layer: str | None = None) -> Appearance:
@@ -72,14 +78,16 @@ def appearance(scene: Scene, thickness: Any = None, layer: str | None = None) ->
     film: Any = scene.layers[position]
     nm = np.unique(np.asarray(film.thickness if thickness is None else thickness, float))
     # without the others' names, so that it is found by its own
-    named = tuple(replace(x, name=_FILM if i == position else None) for i, x in enumerate(scene.layers))
-    colour = interference_colours(replace(scene, layers=named), nm, ANGLES, _FILM)
+    named = tuple(replace(x, name=FILM if i == position else None) for i, x in enumerate(scene.layers))
+    scene = replace(scene, layers=named)
+    colour = interference_colours(scene, nm, ANGLES, FILM)
     return Appearance(
         nm,
         np.swapaxes(np.asarray(colour.xyz), 0, 1),
         _index(film.material, CHANNELS),
         _index(scene.substrate.material, CHANNELS),
         _bare(scene),
+        scene,
         notes=tuple(_notes(scene, film)),
     )
 

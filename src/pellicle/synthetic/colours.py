@@ -46,17 +46,32 @@ def interference_colours(
     **Raises:** UsageError for ellipsometry and for an unknown layer; ValueError where a material has
     no data between 380 and 730 nm.
     """
+    bands, white = integration_bands(BANDS, observer, illuminant), sensor(observer, illuminant).white
+    spectra = interference_spectra(scene, bands.wavelength, thickness, angle, layer)
+    with jax.enable_x64(True):
+        xyz = jnp.asarray(spectra @ bands.weights)
+    return Colour(xyz, (float(white[0]), float(white[1]), float(white[2])))
+
+
+def interference_spectra(
+    scene: Scene,
+    wavelength: np.ndarray,
+    thickness: np.ndarray,
+    angle: np.ndarray,
+    layer: str | None = None,
+) -> np.ndarray:
+    """Reflectance or transmittance of a film, (angles, thicknesses, wavelengths), wavelengths in nm.
+
+    The rest as for `interference_colours`.
+    """
     if scene.light.signal == "psi-delta":
         raise UsageError("ellipsometry has no colour: chart a recipe with signal R or T")
-    bands, white = integration_bands(BANDS, observer, illuminant), sensor(observer, illuminant).white
     with jax.enable_x64(True):
-        varying = _over(
-            with_wavelength(scene, bands.wavelength), thickness, angle, varied_layer(scene, layer)
-        )
+        position = varied_layer(scene, layer)
+        varying = _over(with_wavelength(scene, wavelength), thickness, angle, position)
         grid = np.stack(np.meshgrid(thickness, angle), axis=-1).reshape(-1, 2)
-        weighted = signals(exact(varying), tabulated(varying), grid, build) @ bands.weights
-        xyz = jnp.asarray(weighted.reshape(len(angle), len(thickness), 3))
-    return Colour(xyz, (float(white[0]), float(white[1]), float(white[2])))
+        found = signals(exact(varying), tabulated(varying), grid, build)
+    return found.reshape(len(angle), len(thickness), len(wavelength))
 
 
 def colour_table(
