@@ -136,8 +136,10 @@ def _profile(brdf: Brdf, x: np.ndarray) -> np.ndarray:
 def _projected_area(profile: np.ndarray, x: np.ndarray, theta: np.ndarray) -> np.ndarray:
     """Area of facets of this density seen from angles θ, ∫ D max(⟨i, m⟩, 0) dω, 1 for a flat surface."""
     angle = unit_to_theta(x)
-    m = vectors(angle, np.linspace(0, np.pi, 181)[:, None])
-    seen = np.stack([np.maximum(np.tensordot(vectors(t, 0.0), m, 1), 0.0).mean(axis=0) for t in theta])
+    upright = np.cos(theta)[:, None] * np.cos(angle)
+    tilted = np.maximum(np.sin(theta)[:, None] * np.sin(angle), 1e-30)
+    edge = np.arccos(np.clip(-upright / tilted, -1.0, 1.0))  # azimuth from which a facet is not seen
+    seen = (upright * edge + tilted * np.sin(edge)) / np.pi  # mean over the azimuth
     return np.trapezoid(seen * profile * np.sin(angle) * 2 * np.pi, angle, axis=1)
 
 

@@ -24,15 +24,18 @@ from __future__ import annotations
 
 from typing import Any
 
-import drjit as dr
-import mitsuba as mi
+import drjit
+import mitsuba
 import numpy as np
+
+dr: Any = drjit
+mi: Any = mitsuba  # its types change with the variant
 
 NAME = "pellicle_film"
 
 
 def table_texture(table: np.ndarray) -> Any:
-    """A Dr.Jit texture of a table whose last axis has the channels, linear between its nodes, edge outside."""
+    """Return a texture of a table whose last axis has the channels, linear between nodes."""
     kind = mi.Texture2f if table.ndim == 3 else mi.Texture3f
     return kind(
         mi.TensorXf(np.ascontiguousarray(table, np.float32)),

@@ -36,6 +36,7 @@ class Target(NamedTuple):
 
 MODULES = {
     "gltf": "pellicle.rendering.gltf",
+    "mitsuba": "pellicle.rendering.mitsuba",
 }
 """The module of each target."""
 
