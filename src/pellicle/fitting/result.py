@@ -122,12 +122,14 @@ class SystematicEffect:
 class Rival:
     """Another minimum: its parameters and how much worse it is, in χ² on the effective points.
 
-    `probability` is its share of the posterior, where the fit has computed it: see `Fit.probability`.
+    Where the fit has computed them, `probability` is its share of the posterior (see `Fit.probability`), and
+    `stderr` the standard errors of its parameters by the noise alone.
     """
 
     parameters: dict[str, float]
     delta_chi2: float
     probability: float | None = None
+    stderr: dict[str, float] | None = None
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pellicle.data.colours import Colours
 from pellicle.data.tabular.columns import DIRECTIONS
-from pellicle.fitting.result import ColourCurve
-from pellicle.reporting import fitted_colours
 
 if TYPE_CHECKING:
     from pellicle.fitting.result import Fit, Part
@@ -32,7 +31,9 @@ def fit_csv(fit: Fit) -> str:
     if fit.joint:
         return _joint_csv(fit)
     [part] = fit.parts
-    if isinstance(part.curve, ColourCurve):
+    if isinstance(part.data, Colours):
+        from pellicle.reporting import fitted_colours  # imports JAX
+
         columns = fitted_colours.columns(part)
         about = [f"fit of {fitted_colours.summary(part)}: data, model_, sigma_ = standard deviation assumed"]
     elif part.spectral.delta_data is not None:
@@ -123,7 +124,9 @@ def _joint_csv(fit: Fit) -> str:
 
 def _joint_rows(part: Part) -> Iterable[tuple[str | float, ...]]:
     """A row for each value; Ψ, Δ and depolarisation are three, and so is a colour."""
-    if isinstance(part.curve, ColourCurve):
+    if isinstance(part.data, Colours):
+        from pellicle.reporting import fitted_colours
+
         yield from fitted_colours.rows(part)
         return
     curve, data = part.spectral, part.spectrum

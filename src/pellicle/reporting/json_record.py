@@ -43,6 +43,7 @@ def to_json(fit: Fit, posterior: Posterior | None = None) -> dict[str, Any]:
                 "parameters": {name: number(value) for name, value in rival.parameters.items()},
                 "delta_chi2": number(rival.delta_chi2),
                 **_probability(rival.probability),
+                **_errors(rival.stderr),
             }
             for rival in fit.rivals
         ],
@@ -68,6 +69,11 @@ def to_json(fit: Fit, posterior: Posterior | None = None) -> dict[str, Any]:
 def _probability(share: float | None) -> dict[str, Any]:
     """Share of the posterior of a minimum, where it was computed."""
     return {} if share is None else {"probability": number(share)}
+
+
+def _errors(stderr: Mapping[str, float] | None) -> dict[str, Any]:
+    """Standard errors of a minimum by name, where they were computed."""
+    return {} if stderr is None else {"stderr": {name: number(value) for name, value in stderr.items()}}
 
 
 def _data(part: Part, fit: Fit) -> dict[str, Any]:

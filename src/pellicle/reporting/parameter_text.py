@@ -10,7 +10,7 @@ from pellicle.fitting.status import describe
 from pellicle.reporting.plain_text import INDENT, table
 
 if TYPE_CHECKING:
-    from pellicle.fitting.result import Estimate, Fit
+    from pellicle.fitting.result import Estimate, Fit, Rival
 
 LEAST_CORRELATION = 0.5
 MOST_CORRELATIONS = 10
@@ -89,7 +89,7 @@ def rivals(fit: Fit) -> list[str]:
             f"Δχ² {rival.delta_chi2:.3g}",
             *([] if rival.probability is None else [f"probability {rival.probability:.2g}"]),
             *(
-                f"{name} {rival.parameters[name]:.5g}{_unit(p)}"
+                f"{name} {rival.parameters[name]:.5g}{_error(rival, name)}{_unit(p)}"
                 for name, p in fit.parameters.items()
                 if name in rival.parameters
             ),
@@ -97,6 +97,10 @@ def rivals(fit: Fit) -> list[str]:
         for rival in shown
     ]
     return table(rows) + _omitted(len(fit.rivals) - len(shown))
+
+
+def _error(rival: Rival, name: str) -> str:
+    return "" if rival.stderr is None else f" ± {rival.stderr[name]:.2g}"
 
 
 def _omitted(count: int) -> list[str]:

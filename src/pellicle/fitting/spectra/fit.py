@@ -16,7 +16,7 @@ from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
 from pellicle.fitting import identifiability
 from pellicle.fitting.budget import budget, likely_cause
-from pellicle.fitting.colours import orders
+from pellicle.fitting.colours.orders import orders, with_orders
 from pellicle.fitting.colours.targets import measured_colours
 from pellicle.fitting.colours.view import ColoursView
 from pellicle.fitting.conclusion import conclude, linearised, ranked_minima
@@ -213,8 +213,8 @@ def _fit(
     )
     rivals, probability = conclusion.rivals, None
     if any(isinstance(view, ColoursView) for view in ranked.problem.views):
-        share = orders.probabilities(ranked, found)
-        rivals, probability = orders.with_probabilities(rivals, share), float(share[0])
+        every = orders(ranked, found)
+        rivals, probability = with_orders(rivals, every), float(every.probability[0])
     unclear = [
         *drifts,
         *depolarisation.unexplained(data, spectra, ranked.problem.views),
