@@ -35,6 +35,7 @@ class Target(NamedTuple):
 
 
 MODULES = {
+    "blender": "pellicle.rendering.blender",
     "gltf": "pellicle.rendering.gltf",
     "mitsuba": "pellicle.rendering.mitsuba",
 }
