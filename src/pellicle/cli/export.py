@@ -12,7 +12,7 @@ from pellicle.cli.session import say, start
 def export(
     recipe: Annotated[str, Parameter(help="TOML file that describes the scene.")],
     *,
-    to: Annotated[str, Parameter(help="Format or renderer: gltf.")],
+    to: Annotated[str, Parameter(help="Format or renderer: gltf, blender.")],
     out: Annotated[str, Parameter(help="File to write; no file is overwritten.")],
     numbers: Annotated[
         str,
