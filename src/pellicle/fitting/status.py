@@ -135,9 +135,11 @@ def _other(parameters: Mapping[str, Estimate], rivals: tuple[Rival, ...], lead: 
         name for name in rival.parameters if _outside(parameters, Rival({name: rival.parameters[name]}, 0.0))
     ]
     value = rival.parameters.get(lead.name, math.nan)
+    share = "" if rival.probability is None else f" (probability {100 * rival.probability:.2g} %)"
     if lead.name in apart or not apart:
-        return f"{value:.4g}{_unit(lead)}"
-    return " and ".join(f"{name} {rival.parameters[name]:.4g}{_unit(parameters[name])}" for name in apart[:2])
+        return f"{value:.4g}{_unit(lead)}{share}"
+    each = (f"{name} {rival.parameters[name]:.4g}{_unit(parameters[name])}" for name in apart[:2])
+    return " and ".join(each) + share
 
 
 def expanded(p: Estimate) -> str:

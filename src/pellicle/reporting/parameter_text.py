@@ -15,8 +15,10 @@ if TYPE_CHECKING:
 LEAST_CORRELATION = 0.5
 MOST_CORRELATIONS = 10
 MOST_RIVALS = 6
+_IMPOSSIBLE = 1e-6
+"""Share of a posterior below which nothing more is said of it."""
 
-_NUISANCE = re.compile(r"instrument\.(scale|offset)(_\d+)?(\..+)?")
+_NUISANCE = re.compile(r"instrument\.((scale|offset)(_\d+)?|white_balance_.+|camera_\d+)(\..+)?")
 
 
 def parameters(fit: Fit) -> list[str]:
@@ -87,7 +89,7 @@ def rivals(fit: Fit) -> list[str]:
     rows = [
         (
             f"Δχ² {rival.delta_chi2:.3g}",
-            *([] if rival.probability is None else [f"probability {rival.probability:.2g}"]),
+            *([] if rival.probability is None else [_probability(rival.probability)]),
             *(
                 f"{name} {rival.parameters[name]:.5g}{_error(rival, name)}{_unit(p)}"
                 for name, p in fit.parameters.items()
@@ -97,6 +99,10 @@ def rivals(fit: Fit) -> list[str]:
         for rival in shown
     ]
     return table(rows) + _omitted(len(fit.rivals) - len(shown))
+
+
+def _probability(share: float) -> str:
+    return f"probability {share:.2g}" if share > _IMPOSSIBLE else f"probability < {_IMPOSSIBLE:g}"
 
 
 def _error(rival: Rival, name: str) -> str:

@@ -201,20 +201,20 @@ def _fit(
     worst = (missed or each)[0]
     at = next(i for i, part in enumerate(each) if part is worst)
     structure = residual_structure.missed(ranked.problem.views[at], ranked.fits[at])
+    rivals, probability = conclusion.rivals, None
+    if any(isinstance(view, ColoursView) for view in ranked.problem.views):
+        every = orders(ranked, found)
+        rivals, probability = with_orders(rivals, every), float(every.probability[0])
     sentence = verdict(
         conclusion.status,
         parameters,
-        conclusion.rivals,
+        rivals,
         worst.rms,
         worst.name or "the data",
         structure.place if structure else "",
         dark,
         identifiability.naming(next(iter(parameters)), conclusion.correlated),
     )
-    rivals, probability = conclusion.rivals, None
-    if any(isinstance(view, ColoursView) for view in ranked.problem.views):
-        every = orders(ranked, found)
-        rivals, probability = with_orders(rivals, every), float(every.probability[0])
     unclear = [
         *drifts,
         *depolarisation.unexplained(data, spectra, ranked.problem.views),
