@@ -90,13 +90,13 @@ def test_films_by_name_with_angles_and_sigmas(written):
         ("0.1,0.2,0.3\n", {}, UsageError, ("no header",)),
         ("X,Y,Z\n0.1,0.2,0.3\n", {"space": "lab"}, UsageError, ("in xyz, not in lab",)),
         ("# signal srgb\nR,G,B\n0.1,0.2,0.3\n", {"space": "rgb"}, UsageError, ("in srgb, not in rgb",)),
-        ("R,G,B\n0.1,0.2,0.3\n", {"unit": "%"}, UsageError, ()),
+        ("R,G,B\n0.1,0.2,0.3\n", {"unit": "od"}, UsageError, ()),
         ("", {}, DataError, ("is empty",)),
     ],
 )
 def test_what_is_damaged_or_unclear_is_refused(written, refusal, text, options, error, parts):
     path = written(text)
-    if options.get("unit") == "%":
+    if options.get("unit") == "od":
         with pytest.raises(error, match="signal_unit"):
             read_colour_rows(path, **options)
         return

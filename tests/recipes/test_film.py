@@ -265,7 +265,7 @@ def test_how_files_are_read(tmp_path):
         ("wavelength_unit = 'mm'", "data.wavelength_unit: must be one of nm, um, A, eV, cm-1, THz, not 'mm'"),
         (
             "signal_unit = 'permille'",
-            "data.signal_unit: must be one of fraction, percent, absorbance, not 'permille'",
+            "data.signal_unit: must be one of fraction, percent, absorbance, 8-bit, 16-bit, not 'permille'",
         ),
         ("spot = 0", "data.spot: "),
         ("analyser = 90", "data.analyser: "),

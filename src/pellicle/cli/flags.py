@@ -13,6 +13,7 @@ INSTRUMENT = Group("Instrument", sort_key=2)
 READING = Group("Reading", sort_key=3)
 SAMPLER = Group("Sampler", sort_key=4)
 OUTPUT = Group("Output", sort_key=5)
+COLOURS = Group("Colours", sort_key=6)
 
 
 def flag(group: Group, help: str) -> Parameter:
@@ -70,11 +71,55 @@ class SceneFlags(_Flags):
 
 
 @dataclass(frozen=True)
-class ReadingFlags(_Flags):
-    """Flags for reading files; a recipe's [data] supplies what is None."""
+class CameraFlags(_Flags):
+    """Flags of what sees colours; a recipe's [camera] supplies what is None."""
 
-    spectrum: Annotated[str | None, flag(READING, "Name of one of several spectra in a file, or all.")] = None
-    signal: Annotated[str | None, flag(READING, "R, T or psi-delta, if the file does not name it.")] = None
+    observer: Annotated[str | None, flag(COLOURS, "1931 (2 degrees) or 1964 (10 degrees).")] = None
+    illuminant: Annotated[str | None, flag(COLOURS, "E, A, D50, D55, D65 or D75 (D65).")] = None
+    lamp: Annotated[str | None, flag(COLOURS, "CSV of the lamp's spectrum, for --illuminant.")] = None
+    sensitivities: Annotated[
+        str | None, flag(COLOURS, "CSV of a camera's three sensitivities (signal rgb).")
+    ] = None
+    chart: Annotated[
+        str | None, flag(COLOURS, "CSV of a photographed chart: R, G, B and reference X, Y, Z (signal rgb).")
+    ] = None
+    gamma: Annotated[float | None, flag(COLOURS, "Coding of the signal rgb: linear^(1/GAMMA) (1).")] = None
+    white_balance: Annotated[
+        str | None, flag(COLOURS, "fixed, or free for an unknown factor of each channel.")
+    ] = None
+    white: Annotated[str | None, flag(COLOURS, "X,Y,WIDTH,HEIGHT of a white in the picture, in pixels.")] = (
+        None
+    )
+    transmitted: Annotated[
+        bool | None, Parameter(group=COLOURS, help="The light has passed the film.", negative="")
+    ] = None
+
+
+@dataclass(frozen=True)
+class ReadingFlags(CameraFlags):
+    """Flags for reading files; a recipe's [data] and [camera] supply what is None."""
+
+    spectrum: Annotated[
+        str | None, flag(READING, "Name of one of several spectra or films in a file, or all.")
+    ] = None
+    signal: Annotated[
+        str | None,
+        flag(READING, "R, T or psi-delta, or srgb, rgb, xyz or lab, if the file does not name it."),
+    ] = None
+    region: Annotated[
+        str | None, flag(COLOURS, "X,Y,WIDTH,HEIGHT of a film in a picture, in pixels; ';' between several.")
+    ] = None
+    points: Annotated[str | None, flag(COLOURS, "X,Y of a film in a picture; ';' between several.")] = None
+    angles: Annotated[
+        str | list[float] | None,
+        Parameter(
+            group=COLOURS,
+            help="Angle of each region, which show one film.",
+            metavar="DEG,...",
+            negative="",
+            n_tokens=1,
+        ),
+    ] = None
     angle: Annotated[float | None, flag(READING, "Angle of incidence in degrees (0).")] = None
     polarisation: Annotated[str | None, flag(READING, "s, p or unpolarised.")] = None
     range: Annotated[
@@ -100,7 +145,9 @@ class ReadingFlags(_Flags):
         ),
     ] = None
     wavelength_unit: Annotated[str | None, flag(READING, "nm, um, A, eV, cm-1 or THz.")] = None
-    signal_unit: Annotated[str | None, flag(READING, "fraction, percent or absorbance.")] = None
+    signal_unit: Annotated[
+        str | None, flag(READING, "fraction, percent or absorbance; 8-bit or 16-bit of colours.")
+    ] = None
     reference: Annotated[
         str | None, flag(READING, "Raw counts of a bare reference; DATA are then raw counts too.")
     ] = None

@@ -15,6 +15,7 @@ from pellicle.errors import DataError, UsageError
 
 if TYPE_CHECKING:
     from pellicle.data.brdf_samples import BrdfSamples
+    from pellicle.data.colours import Colours
     from pellicle.data.spectrum import Spectrum
     from pellicle.recipes.film import FilmRecipe
     from pellicle.recipes.surface import SurfaceRecipe
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 log = getLogger(__name__)
 
 LEAST_SQUARES = "least-squares"
+_SIGNALS = ("R", "T", "psi-delta", "srgb", "rgb", "xyz", "lab")
 _FOR_SURFACES = ("columns", "noise", "signal", "loss")
 """Reading flags that BRDF samples can be given."""
 
@@ -31,12 +33,12 @@ _FOR_SURFACES = ("columns", "noise", "signal", "loss")
 class Input(NamedTuple):
     """A data file, the function that reads it, and the scene or surface that is fitted to it.
 
-    Several spectra of one film in one file are fitted together.
+    Several spectra of one film in one file are fitted together; films of a file of colours one by one.
     `own_scale` is true where the recipe gives this file a scale or an offset of its own.
     """
 
     path: str
-    read: Callable[[], list[Spectrum] | list[BrdfSamples]]
+    read: Callable[[], list[Spectrum] | list[Colours] | list[BrdfSamples]]
     scene: Scene | Surface
     own_scale: bool = False
 
@@ -122,7 +124,7 @@ def _sweep(read_file: Callable[[], Any], number: int) -> list[Spectrum]:
 def _by_flags(files: list[str], scene_flags: SceneFlags, reading: ReadingFlags) -> Inputs:
     if reading.signal == "brdf":
         raise UsageError("--signal brdf needs a --recipe that describes the surface under [scene.surface]")
-    _check_reading(reading, ("R", "T", "psi-delta"))
+    _check_reading(reading, _SIGNALS)
     if not files:
         raise UsageError(
             "no data: name the file, as in pellicle fit oxide.csv --layer SiO2 --substrate Si, or give a"
@@ -132,14 +134,14 @@ def _by_flags(files: list[str], scene_flags: SceneFlags, reading: ReadingFlags) 
     scene, assumed = scene_from_flags(scene_flags, reading)
     say(*assumed)
     _check_free(scene)
-    inputs = [one for file in files for one in _spectrum_inputs(file, scene, reading)]
+    inputs = [one for file in files for one in _film_inputs(file, scene, reading)]
     return Inputs(inputs, False, reading.loss or LEAST_SQUARES)
 
 
 def _by_recipe(files: list[str], recipe: FilmRecipe, reading: ReadingFlags) -> Inputs:
     import equinox as eqx
 
-    _check_reading(reading, ("R", "T", "psi-delta"))
+    _check_reading(reading, _SIGNALS)
     reading = replace(reading, range=wavelength_range(reading.range))
     if recipe.each and files:
         raise UsageError(f"{recipe.path}: [[data.file]] and files on the command line exclude each other")
@@ -151,7 +153,7 @@ def _by_recipe(files: list[str], recipe: FilmRecipe, reading: ReadingFlags) -> I
         scene = eqx.tree_at(lambda s: s.light, own.scene(), light(flags))
         _check_free(scene, recipe.path)
         own_scale = any(table.rescales for table in own.tables.data.file)
-        inputs += _spectrum_inputs(file, scene, flags, own_scale)
+        inputs += _film_inputs(file, scene, flags, own_scale)
     data = recipe.tables.data
     loss = reading.loss or data.loss or LEAST_SQUARES
     return Inputs(inputs, data.joint, loss, repeats=data.repeats)
@@ -180,11 +182,22 @@ def _files(files: list[str], recipe: FilmRecipe | SurfaceRecipe) -> list[str]:
     return files or recipe.files
 
 
-def _spectrum_inputs(path: str, scene: Scene, reading: ReadingFlags, own_scale: bool = False) -> list[Input]:
-    """One input for a file, or with --spectrum all one for each of its spectra."""
+def _film_inputs(path: str, scene: Scene, reading: ReadingFlags, own_scale: bool = False) -> list[Input]:
+    """One input for a file of a film; one for each film of a file of colours, and with --spectrum all for
+    each of several spectra."""
+    from pellicle.cli.colours import is_of_colours, read_films, refuse_camera
     from pellicle.data.file_spectra import ALL
     from pellicle.scene.instrument import Drift
 
+    if is_of_colours(path, reading):
+        try:
+            films = read_films(path, reading)
+        except ValueError:
+            return [Input(path, partial(read_films, path, reading), scene, own_scale)]
+        labels = [film.source if len(films) > 1 else path for film in films]
+        each = zip(labels, films, strict=True)
+        return [Input(label, partial(list, [film]), scene, own_scale) for label, film in each]
+    refuse_camera(path, reading)
     read_file = partial(read, path, reading, free_scale=isinstance(scene.instrument.scale, Drift))
     if reading.spectrum == ALL:
         try:
@@ -240,11 +253,12 @@ def _check_reading(reading: ReadingFlags, signals: tuple[str, ...]) -> None:
         check_loss(reading.loss, "--loss")
     if reading.dark is not None and reading.reference is None and reading.reference_material is None:
         raise UsageError("--dark needs --reference: the counts of a sample of known reflectance")
-    from pellicle.data.tabular.units import SIGNAL_UNITS, WAVELENGTH_UNITS, signal_unit, wavelength_unit
+    from pellicle.data.colour_scale import BITS, colour_unit
+    from pellicle.data.tabular.units import SIGNAL_UNITS, WAVELENGTH_UNITS, wavelength_unit
 
     for flag, value, known, find in (
         ("--wavelength-unit", reading.wavelength_unit, WAVELENGTH_UNITS, wavelength_unit),
-        ("--signal-unit", reading.signal_unit, SIGNAL_UNITS, signal_unit),
+        ("--signal-unit", reading.signal_unit, (*SIGNAL_UNITS, *BITS), colour_unit),
     ):
         if value is not None and find(value) is None:
             raise UsageError(f"{flag} must be one of {', '.join(known)}, not {value!r}")

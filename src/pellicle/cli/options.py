@@ -60,18 +60,19 @@ def scene_from_flags(flags: SceneFlags, reading: ReadingFlags) -> tuple[Scene, l
 
 def light(reading: ReadingFlags) -> Light:
     """Signal, angle and polarisation of a scene, where the file does not give them."""
-    from pellicle.recipes.film import optional
+    from pellicle.recipes.film import light_signal, optional
     from pellicle.scene.film import Light
 
     angle = optional(reading.angle, "angle") or 0.0
-    return Light(None, angle, reading.signal or "R", reading.polarisation or "unpolarised")
+    signal = light_signal(reading.signal, reading.transmitted)
+    return Light(None, angle, signal, reading.polarisation or "unpolarised")
 
 
 def merged(reading: ReadingFlags, recipe: FilmRecipe) -> ReadingFlags:
-    """The flags, supplemented by the recipe's [data]."""
-    data = recipe.tables.data
+    """The flags, supplemented by the recipe's [data] and [camera]."""
+    data, camera = recipe.tables.data, recipe.camera
     absent = [name for name, value in vars(reading).items() if value is None]
-    return replace(reading, **{name: getattr(data, name, None) for name in absent})
+    return replace(reading, **{name: camera.get(name, getattr(data, name, None)) for name in absent})
 
 
 def read(path: str, flags: ReadingFlags, *, free_scale: bool) -> list[Spectrum]:

@@ -1,9 +1,9 @@
-"""`pellicle read`: what a file of measurements holds, and its conversion to CSV, NetCDF or NeXus."""
+"""`pellicle read`: what a file of measurements or a picture holds, and its conversion."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
@@ -13,6 +13,7 @@ from pellicle.cli.session import say, start
 from pellicle.errors import UsageError
 
 if TYPE_CHECKING:
+    from pellicle.data.colours import Colours
     from pellicle.data.spectrum import Spectrum
 
 SUFFIXES = {"csv": ".csv", "netcdf": ".nc", "nexus": ".nxs"}
@@ -30,9 +31,11 @@ def read(
     ] = "csv",
     json: Annotated[bool, switch(OUTPUT, "Print one JSON object per spectrum.")] = False,
 ) -> int:
-    """Show what is understood of files, without fitting, and convert them.
+    """Show what is understood of files and pictures, without fitting, and convert them.
 
     Example: pellicle read wafer.txt --out converted --to csv,nexus
+
+    Example: pellicle read photo.png --region 120,80,40,40
     """
     flags = reading or ReadingFlags()
     if not data:
@@ -47,16 +50,26 @@ def read(
     worst, found = GOOD, []
     for path in data:
         try:
-            found += _spectra(path, flags)
+            found += _measurements(path, flags)
         except ValueError as error:
             worst = BAD_DATA
             _report_error(path, as_flags(str(error)), json)
             continue
-    for spectrum in found:
-        _show(spectrum, json)
+    for measurement in found:
+        _show(measurement, json)
     if out is not None:
         _write(Path(out), found, [SUFFIXES[word] for word in formats])
     return worst
+
+
+def _measurements(path: str, flags: ReadingFlags) -> list[Spectrum] | list[Colours]:
+    """Every spectrum of a file, or the colours of every film in it."""
+    from pellicle.cli.colours import is_of_colours, read_films, refuse_camera
+
+    if is_of_colours(path, flags):
+        return read_films(path, flags, angle=flags.angle)
+    refuse_camera(path, flags)
+    return _spectra(path, flags)
 
 
 def _spectra(path: str, flags: ReadingFlags) -> list[Spectrum]:
@@ -86,17 +99,22 @@ def _report_error(path: str, message: str, as_json: bool) -> None:
         print(one_line(error_record(message, BAD_DATA)), flush=True)
 
 
-def _show(spectrum: Spectrum, as_json: bool) -> None:
+def _show(measured: Spectrum | Colours, as_json: bool) -> None:
+    from pellicle.data.colours import Colours
     from pellicle.reporting.json_record import one_line
-    from pellicle.reporting.spectrum_text import describe, to_json
 
-    if as_json:
-        print(one_line(to_json(spectrum)), flush=True)
+    if isinstance(measured, Colours):
+        from pellicle.reporting.colours_text import describe, to_json
     else:
-        print(describe(spectrum, tuple(map(as_flags, spectrum.notes))), flush=True)
+        from pellicle.reporting.spectrum_text import describe, to_json
+    of: Any = measured
+    text = one_line(to_json(of)) if as_json else describe(of, tuple(map(as_flags, measured.notes)))
+    print(text, flush=True)
 
 
-def _write(folder: Path, spectra: list[Spectrum], suffixes: list[str]) -> None:
+def _write(folder: Path, found: list[Any], suffixes: list[str]) -> None:
+    from pellicle.data.colours import Colours
+    from pellicle.data.write_colours import write_colours
     from pellicle.data.write_spectrum import write_spectrum
     from pellicle.reporting.drawing import save_figure
     from pellicle.reporting.folders import distinct_stems
@@ -108,8 +126,11 @@ def _write(folder: Path, spectra: list[Spectrum], suffixes: list[str]) -> None:
         raise UsageError(
             f"--out {folder}: cannot be made ({error.strerror}); choose another folder"
         ) from None
-    labels = [f"{one.path} [{one.name}]" if one.name else one.path for one in spectra]
-    for spectrum, stem in zip(spectra, distinct_stems(labels), strict=True):
-        written = [write_spectrum(folder / f"{stem}{suffix}", spectrum) for suffix in suffixes]
-        written.append(save_figure(draw(spectrum), folder / f"{stem}.png"))
+    labels = [f"{one.path} [{one.name}]" if one.name else one.path for one in found]
+    for one, stem in zip(found, distinct_stems(labels), strict=True):
+        if isinstance(one, Colours):
+            written = [write_colours(folder / f"{stem}.csv", [one])]
+        else:
+            written = [write_spectrum(folder / f"{stem}{suffix}", one) for suffix in suffixes]
+            written.append(save_figure(draw(one), folder / f"{stem}.png"))
         say(f"{folder}: {', '.join(path.name for path in written)} written")

@@ -1,4 +1,4 @@
-"""`pellicle simulate`: a synthetic spectrum or BRDF samples, with the true values in the header."""
+"""`pellicle simulate`: a synthetic spectrum, colours or BRDF samples, with the true values in the header."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from pellicle.cli.colours import SPACES, recipe_angles
 from pellicle.cli.session import not_negative, say, start
 from pellicle.cli.wavelengths import directions, wavelengths
 from pellicle.errors import DataError, UsageError
@@ -34,7 +35,7 @@ def simulate(
         float, Parameter(help="Leave out effects that change the signal by less than this (0: none).")
     ] = 0.0,
 ) -> int:
-    """Simulate the spectrum of a recipe's film, or BRDF samples of its surface.
+    """Simulate the spectrum or the colours of a recipe's film, or BRDF samples of its surface.
 
     Example: pellicle simulate film.toml --out film.csv --noise 0.002 --seed 1
     """
@@ -58,7 +59,8 @@ def simulate(
         )
     sigma = (described.tables.data.noise or 0.0) if spread is None else spread
     comments[1] = source.format(f"{sigma:g}")
-    _write_spectrum(described, out, sigma, seed, tolerance, comments)
+    write = _write_colours if described.tables.data.signal in SPACES else _write_spectrum
+    write(described, out, sigma, seed, tolerance, comments)
     return 0
 
 
@@ -90,16 +92,45 @@ def _write_spectrum(
     say(f"{out}: {len(nm)} points, {nm[0]:g} to {nm[-1]:g} nm")
 
 
-def _csv(scene: Scene, result: SimulatedSignal, noise: float, comments: list[str]) -> str:
-    """The spectrum as CSV below its comments, which end with the true values of the parameters."""
+def _write_colours(
+    recipe: FilmRecipe, out: str, noise: float, seed: int, tolerance: float, comments: list[str]
+) -> None:
+    from pellicle.data.write_colours import write_colours
+    from pellicle.fitting.spectra.messages import log_plan, log_scene
+    from pellicle.synthetic.measured_colours import simulate_colours
+
+    scene, seen, table = recipe.scene(), recipe.sight(), recipe.tables
+    log_scene(scene)
+    colours, plan = simulate_colours(
+        scene,
+        seen.sensor,
+        table.data.signal or "srgb",
+        recipe_angles(recipe),
+        gamma=table.camera.gamma,
+        camera=seen.matrix,
+        noise=noise,
+        seed=seed,
+        tolerance=tolerance,
+    )
+    log_plan(plan)
+    write_colours(out, [colours], comments=[*comments, *seen.notes, _truth(scene)])
+    say(f"{out}: {len(colours)} colours in {colours.space}")
+
+
+def _truth(scene: Scene) -> str:
+    """The true values of the parameters, as a comment."""
     from pellicle.fitting.spectra.parameters import fixed_numbers, parameters
 
+    numbers = [(p.name, p.start, p.unit) for p in parameters(scene)] + fixed_numbers(scene)
+    return "truth: " + ", ".join(f"{name} = {value:.10g} {unit}".rstrip() for name, value, unit in numbers)
+
+
+def _csv(scene: Scene, result: SimulatedSignal, noise: float, comments: list[str]) -> str:
+    """The spectrum as CSV below its comments, which end with the true values of the parameters."""
     light = scene.light
     angle = f"{getattr(light.angle, 'start', light.angle):g}"
-    truth = [(p.name, p.start, p.unit) for p in parameters(scene)] + fixed_numbers(scene)
-    values = ", ".join(f"{name} = {value:.10g} {unit}".rstrip() for name, value, unit in truth)
     lines = [*comments, f"signal {light.signal}, angle {angle} degrees, {light.polarisation}"]
-    lines.append(f"truth: {values}")
+    lines.append(_truth(scene))
     columns, middle = f"wavelength_nm,{light.signal}", ""
     if light.signal == "psi-delta":
         columns, middle = "wavelength_nm,angle_deg,psi_deg,delta_deg", f"{angle},"

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from pellicle.cli.colours import SPACES, recipe_angles
 from pellicle.cli.session import say
 from pellicle.errors import DataError
 
@@ -23,6 +24,8 @@ MOST = 1_000_000
 def measured_scene(recipe: FilmRecipe) -> tuple[Scene, np.ndarray]:
     """The scene in the light of the recipe and its wavelengths: the recipe's, or those of its first file."""
     data = recipe.tables.data
+    if (recipe.each[0] if recipe.each else recipe).tables.data.signal in SPACES:
+        return _in_colours(recipe)
     if recipe.files and data.wavelengths is None:
         scene, nm = _as_measured(recipe)
     else:
@@ -31,6 +34,21 @@ def measured_scene(recipe: FilmRecipe) -> tuple[Scene, np.ndarray]:
     if scene.light.signal == "psi-delta" and scene.light.angle == 0.0:
         raise DataError(f"{recipe.path}: ellipsometry needs an angle of incidence: give [data] angle = 70")
     return scene, nm
+
+
+def _in_colours(recipe: FilmRecipe) -> tuple[Scene, np.ndarray]:
+    """The scene at each angle of its colours, and the wavelengths of the sensor for each."""
+    import equinox as eqx
+    import numpy as np
+
+    from pellicle.scene.film import Light
+
+    own = recipe.each[0] if recipe.each else recipe
+    scene, nm, angles = own.scene(), own.sight().sensor.wavelength, recipe_angles(recipe)
+    say(f"wavelengths: {nm[0]:g} to {nm[-1]:g} nm every 1 nm, those of the sensor")
+    angle: Any = scene.light.angle if len(angles) == 1 else np.repeat(angles, len(nm))
+    light = Light(None, angle, scene.light.signal, scene.light.polarisation)
+    return eqx.tree_at(lambda s: s.light, scene, light), np.tile(nm, len(angles))
 
 
 def _as_measured(recipe: FilmRecipe) -> tuple[Scene, np.ndarray]:

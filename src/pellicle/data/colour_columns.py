@@ -28,6 +28,13 @@ def is_colour_header(names: Sequence[str]) -> bool:
     return not foreign and bool(channel_sets(names))
 
 
+def first_cells(file: TextFile) -> tuple[list[str], str]:
+    """Return the cells of the first line and its delimiter, with which they name a colour if any does."""
+    first = file.lines[0].text
+    delimiter = max("\t;, ", key=lambda mark: (bool(channel_sets(split(first, mark))), first.count(mark)))
+    return split(first, delimiter), delimiter
+
+
 def named_cells(
     file: TextFile, columns: str | Sequence[str] | None = None
 ) -> tuple[list[str], list[Line], list[list[str]], str]:
@@ -37,11 +44,7 @@ def named_cells(
 
     **Raises:** UsageError without a header, DataError without rows and for a row of too many cells.
     """
-    first = file.lines[0]
-    delimiter = max(
-        "\t;, ", key=lambda mark: (bool(channel_sets(split(first.text, mark))), first.text.count(mark))
-    )
-    names = split(first.text, delimiter)
+    names, delimiter = first_cells(file)
     headed = not any(is_number(cell, ",") for cell in names)
     if columns is not None:
         given = columns.split(",") if isinstance(columns, str) else columns

@@ -7,12 +7,20 @@ from collections.abc import Sequence
 import numpy as np
 
 from pellicle.data.signal_checks import Where, refuse_first
+from pellicle.data.tabular.units import signal_unit
 from pellicle.errors import DataError, UsageError
 
+BITS = ("8-bit", "16-bit")
+"""Units of coded values."""
 UNITS = {"fraction": 1.0, "percent": 100.0, "8-bit": 255.0, "16-bit": 65535.0}
 _ASK = '`signal_unit="8-bit"`, `signal_unit="percent"` or `signal_unit="fraction"`'
 _HIGHEST = 1.5
 """Largest fraction: calibrations are off by half at most."""
+
+
+def colour_unit(text: str) -> str | None:
+    """Return the unit of a spectrum's signal or of colours that `text` spells, else None."""
+    return text if text in BITS else signal_unit(text)
 
 
 def scaled(
@@ -30,8 +38,9 @@ def scaled(
 
     **Raises:** UsageError where the unit is unclear or unknown, DataError for values beyond every unit.
     """
-    if unit is not None and unit not in UNITS:
+    if unit is not None and colour_unit(unit) not in UNITS:
         raise UsageError(f"`signal_unit` of colours must be one of {', '.join(UNITS)}, not {unit!r}")
+    unit = None if unit is None else colour_unit(unit)
     if space == "lab":
         lightness = values[:, 0]
         refuse_first(

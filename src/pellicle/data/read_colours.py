@@ -14,17 +14,20 @@ from pellicle.data.colour_columns import (
     bare_name,
     channel_sets,
     colour_table,
+    first_cells,
     is_colour_header,
     named_cells,
 )
 from pellicle.data.colour_scale import scaled
 from pellicle.data.colours import SPACES
 from pellicle.data.tabular.table import Table
-from pellicle.data.tabular.text import TextFile, read_bytes, text_file
+from pellicle.data.tabular.text import TextFile, open_binary, read_bytes, text_file
 from pellicle.errors import DataError, UsageError
 
 _ANGLES = ("angle", "aoi", "angle of incidence")
 _NAMES = ("name", "film", "sample", "patch", "label", "id")
+_HEAD = 65_536
+"""Bytes in which the header is looked for."""
 _STATED = re.compile(r"signal (rgb|srgb|xyz|lab)\b")
 
 
@@ -119,11 +122,9 @@ _MEANING = {
 
 def is_colour_table(path: str | os.PathLike[str]) -> bool:
     """Return True for a text file whose header names a colour. Raises DataError for an unreadable file."""
-    try:
-        names, *_ = named_cells(text_file(*read_bytes(path), path))
-    except UsageError:
-        return False
-    return is_colour_header(names)
+    with open_binary(path) as file:
+        head = file.read(_HEAD)
+    return is_colour_header(first_cells(text_file(head, "", path))[0])
 
 
 def _recognised(names: Sequence[str], path: str) -> _Columns:

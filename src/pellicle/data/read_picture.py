@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from pellicle.data.tabular.text import open_binary, read_bytes
-from pellicle.errors import DataError
+from pellicle.errors import DataError, UsageError, install_command
 
 _SIGNATURES = {
     "PNG": (b"\x89PNG",),
@@ -18,7 +18,6 @@ _SIGNATURES = {
     "JPEG": (b"\xff\xd8\xff",),
 }
 _COLOUR_MODES = ("RGB", "RGBA", "RGBX")
-_INSTALL = "pip install 'pellicle[images]' (in a clone of the repository: pip install -e '.[images]')"
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +54,7 @@ def read_picture(path: str | os.PathLike[str]) -> Picture:
     A picture that a camera has turned is turned upright. Palettes become R, G, B.
 
     **Raises:** DataError, one sentence, for a file that is no such picture, damaged, without colours (grey),
-    with transparent pixels, or in another colour model; ImportError without the extra `images`.
+    with transparent pixels, or in another colour model; UsageError without the extra `images`.
     """
     kind = picture_format(path)
     if kind is None:
@@ -64,7 +63,7 @@ def read_picture(path: str | os.PathLike[str]) -> Picture:
     try:
         values, full, profile, notes = _tiff(content) if kind == "TIFF" else _by_pillow(content)
     except ImportError as error:
-        raise ImportError(f"pictures need {error.name}: {_INSTALL}") from error
+        raise UsageError(f"{path}: pictures need {error.name}: {install_command('images')}") from None
     except DataError as error:
         raise DataError(f"{path}: {error}") from None
     except Exception as error:  # decoders raise errors of every kind on damaged files

@@ -73,8 +73,8 @@ def read_colours_by_film(
     - `white`: region of a picture that shows a perfect reflector, by which colours are divided.
     - `region`: rectangles "x,y,width,height;..." of a picture in pixels from its upper left corner; `points`:
       "x,y;...", each with the pixels around it, 5 by 5.
-    - `angle` of incidence in degrees, for all colours; or one for each region of a picture, which are then
-      colours of one film.
+    - `angle` of incidence in degrees, for all colours; or one for each, and for each region of a picture,
+      which are then colours of one film.
     - `polarisation`: "unpolarised", "s" or "p"; `signal`: "R", or "T" for transmitted light.
     - `noise`: standard deviation of the values, one or three; of a picture by default the scatter of the
       region's pixels and the rounding.
@@ -83,8 +83,8 @@ def read_colours_by_film(
 
     **Returns:** a list of `Colours`, one for each film.
 
-    **Raises:** DataError (unreadable or impossible data) or UsageError (an argument missing or wrong): one
-    sentence; ImportError for a picture without the extra `images`.
+    **Raises:** DataError (unreadable or impossible data) or UsageError (an argument missing or wrong, or a
+    picture without the extra `images`): one sentence.
     """
     if signal not in ("R", "T"):
         raise UsageError(f'`signal` must be R or T, and `space` the colour space, not `signal="{signal}"`')
@@ -102,8 +102,6 @@ def read_colours_by_film(
             raise UsageError(f"{path}: is no picture: leave `region`, `points` and `white` out")
         films = read_colour_rows(path, space, unit=signal_unit, columns=columns)
         seen = sight(camera, films[0].space)
-        if angle is not None and np.ndim(angle):
-            raise UsageError("`angle` of a file is one number; several angles are a column angle_deg")
     return [_assembled(film, seen, camera, angle, noise, polarisation) for film in films]
 
 
@@ -123,9 +121,12 @@ def _assembled(
             raise UsageError(f"`noise` {noise} is a fraction of white: divide 8-bit values by 255")
         sigma = np.broadcast_to(noise, film.values.shape)
     if angle is not None:
-        if stated is not None:
+        count = len(film.values)
+        if np.ndim(angle) and np.shape(angle) != (count,):
+            raise UsageError(f"{film.path}: has {count} colours and `angle` {np.size(angle)} numbers")
+        if stated is not None and not np.allclose(stated, angle, atol=1e-3):
             raise UsageError(f"{film.path}: states its own angles; leave `angle` out")
-        stated = np.full(len(film.values), angle, dtype=float)
+        stated = np.broadcast_to(np.asarray(angle, float), count)
     return Colours(
         film.values,
         seen.sensor,

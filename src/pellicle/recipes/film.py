@@ -9,10 +9,13 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from pellicle.errors import DataError
+from pellicle.data.colours import SPACES
+from pellicle.errors import DataError, UsageError
 from pellicle.recipes import media_words
+from pellicle.recipes.cameras import Camera, Sight, sight
 from pellicle.recipes.media import FreeTable, Medium, Number, PriorTable, medium, number
 from pellicle.recipes.schema import (
+    CameraTable,
     DataTable,
     FileTable,
     GridTable,
@@ -38,6 +41,7 @@ TABLES: dict[str, type[BaseModel]] = {
     "layer": LayerTable,
     "substrate": PlateTable,
     "instrument": InstrumentTable,
+    "camera": CameraTable,
     "thickness": FreeTable,
     "plate_mm": FreeTable,
     "bandwidth": FreeTable,
@@ -72,6 +76,24 @@ class FilmRecipe:
         """One recipe for each `[[data.file]]`, with the keys of that table; empty without such tables."""
         return [FilmRecipe(self.path, of_file(self.tables, file)) for file in self.tables.data.file]
 
+    @property
+    def camera(self) -> dict[str, Any]:
+        """The keys of `[camera]` that the recipe gives; files are relative to it."""
+        table = self.tables.camera
+        folder = Path(self.path).parent
+        found = {name: getattr(table, name) for name in table.model_fields_set}
+        files = {"lamp", "sensitivities", "chart"} & found.keys()
+        return found | {name: os.path.normpath(folder / found[name]) for name in files}
+
+    def sight(self) -> Sight:
+        """What sees the colours, as `[camera]` says. Raises DataError, the recipe's path in front."""
+        names = {field.name for field in fields(Camera)}
+        camera = Camera(**{name: value for name, value in self.camera.items() if name in names})
+        try:
+            return sight(camera, self.tables.data.signal or "srgb")
+        except UsageError as error:
+            raise DataError(f"{self.path}: camera: {error}".replace("`", "")) from None
+
     def scene(self) -> Scene:
         """Build the scene. Raises DataError, the recipe's path in front."""
         try:
@@ -83,6 +105,13 @@ class FilmRecipe:
             raise DataError(f"{self.path}: its materials are nested too deeply") from None
 
 
+def light_signal(signal: str | None, transmitted: bool | None) -> str:
+    """Return the signal of the light: "R" or "T" where colours are measured."""
+    if signal in SPACES:
+        return "T" if transmitted else "R"
+    return signal or "R"
+
+
 def _scene(tables: RecipeTable, folder: Path) -> Scene:
     scene, data, instrument = tables.scene, tables.data, tables.instrument
     built = Scene(
@@ -92,7 +121,7 @@ def _scene(tables: RecipeTable, folder: Path) -> Scene:
         light=Light(
             None,
             optional(data.angle, "angle") or 0.0,
-            data.signal or "R",
+            light_signal(data.signal, tables.camera.transmitted),
             data.polarisation or "unpolarised",
         ),
         instrument=Instrument(

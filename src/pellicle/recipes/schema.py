@@ -7,7 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
-from pellicle.data.tabular.units import SIGNAL_UNITS, WAVELENGTH_UNITS, signal_unit, wavelength_unit
+from pellicle.data.colour_scale import BITS, colour_unit
+from pellicle.data.tabular.units import SIGNAL_UNITS, WAVELENGTH_UNITS, wavelength_unit
 from pellicle.recipes.media import FreeTable, Medium, Number
 
 
@@ -23,7 +24,7 @@ def _unit(known: Sequence[str], find: Callable[[str], str | None]) -> AfterValid
 
 
 WavelengthUnit = Annotated[str, _unit(WAVELENGTH_UNITS, wavelength_unit)]
-SignalUnit = Annotated[str, _unit(SIGNAL_UNITS, signal_unit)]
+SignalUnit = Annotated[str, _unit((*SIGNAL_UNITS, *BITS), colour_unit)]
 
 
 class _Table(BaseModel):
@@ -121,7 +122,7 @@ class _Reading(_Table):
     """Reading options of data files, named as the flags of the command line."""
 
     spectrum: str | None = None
-    signal: Literal["R", "T", "psi-delta"] | None = None
+    signal: Literal["R", "T", "psi-delta", "srgb", "rgb", "xyz", "lab"] | None = None
     angle: Annotated[float, Field(ge=0, le=90)] | FreeTable | None = None
     polarisation: Literal["unpolarised", "s", "p"] | None = None
     noise: float | None = Field(default=None, gt=0)
@@ -132,13 +133,31 @@ class _Reading(_Table):
     folded: bool | None = None
     analyser: float | None = Field(default=None, gt=0, lt=90)
     spot: int | None = Field(default=None, ge=1)
+    region: str | list[int] | list[list[int]] | None = None
+    points: str | list[int] | list[list[int]] | None = None
+    angles: list[Annotated[float, Field(ge=0, le=90)]] | None = None
+
+
+class CameraTable(_Table):
+    """`[camera]`: what sees the colours of a film, and under which light; files are CSV."""
+
+    observer: Literal["1931", "1964"] = "1931"
+    illuminant: Literal["E", "A", "D50", "D55", "D65", "D75"] = "D65"
+    lamp: str | None = None
+    sensitivities: str | None = None
+    chart: str | None = None
+    gamma: float = Field(default=1.0, ge=0.1, le=10)
+    white_balance: Literal["fixed", "free"] = "fixed"
+    white: str | list[int] | None = None
+    transmitted: bool = False
 
 
 class FileTable(_Reading):
-    """One `[[data.file]]`: its keys override those of `[data]` and `[instrument]`."""
+    """One `[[data.file]]`: its keys override those of `[data]`, `[instrument]` and `[camera]`."""
 
     path: str
     instrument: InstrumentTable = InstrumentTable()
+    camera: CameraTable = CameraTable()
     back: Literal[False] | None = None
 
     @property
@@ -193,6 +212,7 @@ class RecipeTable(_Table):
     data: DataTable = DataTable()
     scene: SceneTable
     instrument: InstrumentTable = InstrumentTable()
+    camera: CameraTable = CameraTable()
 
 
 def of_file(tables: RecipeTable, file: FileTable) -> RecipeTable:
@@ -202,7 +222,12 @@ def of_file(tables: RecipeTable, file: FileTable) -> RecipeTable:
     data = tables.data.model_copy(update={**said, "file": [file]})
     own = {name: getattr(file.instrument, name) for name in file.instrument.model_fields_set}
     instrument = tables.instrument.model_copy(update=own)
+    camera = tables.camera.model_copy(
+        update={name: getattr(file.camera, name) for name in file.camera.model_fields_set}
+    )
     scene, plate = tables.scene, tables.scene.substrate
     if file.back is False and isinstance(plate, PlateTable):
         scene = scene.model_copy(update={"substrate": plate.model_copy(update={"back": None})})
-    return tables.model_copy(update={"data": data, "instrument": instrument, "scene": scene})
+    return tables.model_copy(
+        update={"data": data, "instrument": instrument, "camera": camera, "scene": scene}
+    )

@@ -60,13 +60,11 @@ def simulate_colours(
     simulated = simulate_signal(
         with_wavelength(scene, grid, np.repeat(angles, nm.size)), grid, tolerance=tolerance
     )
-    channels = simulated.clean.reshape(angles.size, nm.size) @ weights
+    white = weights.sum(axis=0)
+    coding = encoding(space, white) if space != "rgb" else camera_encoding(gamma)
     if space == "rgb":
-        coding = camera_encoding(gamma)
-        channels = channels if camera is None else channels @ camera.matrix.T
-    else:
-        coding = encoding(space, weights.sum(axis=0))
-        channels = coding.channels(channels)
+        coding = coding._replace(linear=np.diag(1 / white) if camera is None else np.asarray(camera.matrix))
+    channels = coding.channels(simulated.clean.reshape(angles.size, nm.size) @ weights)
     values = coding.encode(channels, coding.roots(channels))
     values = values + noise * np.random.default_rng(seed).normal(0.0, 1.0, values.shape)
     if coding.clips:

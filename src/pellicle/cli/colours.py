@@ -1,0 +1,116 @@
+"""Colours of films for the commands: which files have them, and their reading by the flags."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any
+
+from pellicle.cli.flags import CameraFlags, ReadingFlags, given
+from pellicle.cli.session import say
+from pellicle.errors import UsageError
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from pellicle.data.colours import Colours
+    from pellicle.recipes.film import FilmRecipe
+
+SPACES = ("srgb", "rgb", "xyz", "lab")
+_PIXELS = ("region", "points", "angles")
+_CAMERA = tuple(field.name for field in fields(CameraFlags))
+_OF_SPECTRA = (
+    "range",
+    "wavelength_unit",
+    "reference",
+    "reference_material",
+    "dark",
+    "folded",
+    "analyser",
+    "spot",
+)
+"""Reading flags without a meaning for colours."""
+
+
+def is_of_colours(path: str, reading: ReadingFlags) -> bool:
+    """True for a file of colours or a picture: by the signal, or by the file's content without one."""
+    from pellicle.data.read_colours import is_colour_table
+    from pellicle.data.read_picture import picture_format
+
+    if reading.signal is not None:
+        return reading.signal in SPACES
+    try:
+        return picture_format(path) is not None or is_colour_table(path)
+    except ValueError:
+        return False  # the reader of spectra reports it
+
+
+def refuse_camera(path: str, reading: ReadingFlags) -> None:
+    """Raise UsageError where flags of colours are given and the file has a spectrum."""
+    wrong = [name for name in _PIXELS if getattr(reading, name) is not None]
+    if wrong:
+        raise UsageError(f"{path}: {', '.join(given(wrong))}: only pictures have pixels, with --signal srgb")
+
+
+def read_films(path: str, reading: ReadingFlags, angle: float | None = None) -> list[Colours]:
+    """Read the colours of every film of a file, or of the one that --spectrum names.
+
+    `angle` is that of all colours; None leaves it to the file or the scene.
+
+    **Raises:** DataError or UsageError.
+    """
+    from pellicle.cli.options import sigma
+    from pellicle.data.file_spectra import ALL
+    from pellicle.recipes.colours import read_colours_by_film
+
+    if wrong := [name for name in _OF_SPECTRA if getattr(reading, name) is not None]:
+        raise UsageError(
+            f"{path}: {', '.join(given(wrong))}: of spectra, and these are colours; leave it out"
+        )
+    options: dict[str, Any] = {name: getattr(reading, name) for name in (*_CAMERA, "region", "points")}
+    transmitted = options.pop("transmitted")
+    films = read_colours_by_film(
+        path,
+        space=reading.signal,
+        signal="T" if transmitted else "R",
+        angle=angle if reading.angles is None else _angles(reading.angles),
+        polarisation=reading.polarisation or "unpolarised",
+        noise=sigma(reading.noise),
+        signal_unit=reading.signal_unit,
+        columns=reading.columns,
+        **{name: value for name, value in options.items() if value is not None},
+    )
+    if reading.spectrum in (None, ALL):
+        return films
+    chosen = [film for film in films if film.name == reading.spectrum]
+    if not chosen:
+        known = ", ".join(repr(film.name) for film in films)
+        raise UsageError(f"{path}: has no film {reading.spectrum!r}; its films are {known}")
+    return chosen
+
+
+def recipe_angles(recipe: FilmRecipe) -> np.ndarray:
+    """Angles of incidence (colours,) of a recipe: [data] angles, those of its first file, or [data] angle."""
+    import numpy as np
+
+    from pellicle.cli.options import light, merged
+
+    data = recipe.tables.data
+    own = recipe.each[0] if recipe.each else recipe
+    flags = merged(ReadingFlags(), own)
+    if recipe.files and data.angles is None:
+        stated = read_films(recipe.files[0], flags)[0].angle
+        if stated is not None:
+            say(f"angles: those of {recipe.files[0]} (the recipe gives none)")
+            return stated
+    angle: Any = light(flags).angle
+    return np.atleast_1d(np.asarray(own.tables.data.angles or getattr(angle, "start", angle), float))
+
+
+def _angles(value: str | list[float] | None) -> list[float] | None:
+    """Angles of a flag, `0,30,60`, or of a recipe. Raises UsageError."""
+    if not isinstance(value, str):
+        return value
+    try:
+        return [float(word) for word in value.split(",")]
+    except ValueError:
+        raise UsageError(f"--angles must be degrees such as 0,30,60, got {value!r}") from None

@@ -1,0 +1,115 @@
+"""Colours on the command line: read, simulate, plan and fit, by flags and by recipes."""
+
+import json
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import pellicle as pl
+from pellicle.data.write_colours import write_colours
+
+RECIPE = """
+[data]
+signal = "srgb"
+angles = [0, 45]
+noise = 0.006
+
+[camera]
+illuminant = "A"
+
+[scene]
+substrate = 3.9
+layer = [{ material = 1.46, thickness = { lower = 10, upper = 500, value = 310 } }]
+"""
+
+
+@pytest.fixture
+def recipe(tmp_path):
+    (tmp_path / "film.toml").write_text(RECIPE)
+    return tmp_path / "film.toml"
+
+
+def test_simulated_colours_are_read_and_fitted(pellicle, recipe, tmp_path):
+    out = tmp_path / "c.csv"
+    assert pellicle("simulate", recipe, "--out", out, "--seed", "3").code == 0
+    assert "truth: thickness = 310 nm" in out.read_text()
+    shown = pellicle("read", out, "--illuminant", "A", "--json")
+    record = json.loads(shown.out)
+    assert record["signal"] == "srgb"
+    assert record["angles_deg"] == [0, 45]
+    assert record["range_nm"] == [380, 730]
+    assert np.shape(record["colours"]) == (2, 3)
+    assert "observer 1931 under A" in record["notes"]
+    fitted = pellicle("fit", out, "--recipe", recipe, "--json")
+    fit = json.loads(fitted.out)
+    assert fit["data"]["signal"] == "srgb"
+    assert fit["parameters"]["thickness"]["value"] == pytest.approx(310, abs=5)
+
+
+def test_a_plan_of_colours_is_that_of_the_spectra_behind_them(pellicle, recipe):
+    found = pellicle("plan", recipe, "--json", "--tolerance", "1e-3")
+    assert found.code == 0
+    effects = {row["effect"]: row["on"] for row in json.loads(found.out)["effects"]}
+    assert effects["oblique"]
+    assert not effects["absorption"]
+    assert "380 to 730 nm every 1 nm" in found.err
+
+
+@pytest.fixture
+def photo(tmp_path):
+    """Two films at 0 degrees, in a picture of 8 bits."""
+    scenes = [pl.Scene(pl.Layer(1.46, d), 3.9) for d in (100.0, 200.0)]
+    colours = [pl.simulate(scene, space="srgb").values[0] for scene in scenes]
+    pixels = np.zeros((20, 40, 3), np.uint8)
+    pixels[:, :20], pixels[:, 20:] = (np.round(255 * c) for c in colours)
+    Image.fromarray(pixels).save(tmp_path / "photo.png")
+    return tmp_path / "photo.png", colours
+
+
+def test_regions_of_a_photo_are_read_as_films(pellicle, photo):
+    path, colours = photo
+    found = pellicle("read", path, "--region", "2,2,9,9;22,2,9,9", "--json")
+    assert found.code == 0
+    records = found.objects
+    assert [record["name"] for record in records] == ["2,2,9,9", "22,2,9,9"]
+    for record, colour in zip(records, colours, strict=True):
+        np.testing.assert_allclose(record["colours"][0], colour, atol=0.5 / 255 + 1e-6)
+    text = pellicle("read", path, "--points", "5,5", "--spectrum", "3,3,5,5")
+    assert "mean of 25 pixels in linear light" in text.out
+    assert "#" in text.out
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "message"),
+    [
+        (["read", "photo.png"], 3, "give --region x,y,width,height or --points x,y"),
+        (["read", "photo.png", "--region", "1,1,90,9"], 3, "leaves the picture"),
+        (["read", "photo.png", "--region", "1,1,9,9", "--range", "400:700"], 3, "--range: of spectra"),
+        (["read", "photo.png", "--region", "1,1,9,9", "--white", "0,0,2,2,2"], 3, "--white"),
+        (["read", "photo.png", "--region", "1,1,9,9", "--chart", "a.csv"], 3, "--chart goes with"),
+        (["read", "s.csv", "--region", "1,1,9,9"], 3, "only pictures have pixels"),
+        (["read", "c.csv", "--spectrum", "b"], 3, "its films are 'a'"),
+        (["read", "c.csv", "--signal-unit", "bit"], 3, "--signal-unit"),
+    ],
+)
+def test_errors_name_flags(pellicle, photo, tmp_path, monkeypatch, words, code, message):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "s.csv").write_text("wavelength_nm,R\n500,0.2\n600,0.3\n")
+    (tmp_path / "c.csv").write_text("name,R,G,B\na,0.1,0.2,0.3\n")
+    found = pellicle(*words)
+    assert found.code == code
+    assert message in found.err
+
+
+def test_colours_come_back_from_their_file(pellicle, tmp_path):
+    sensor = pl.simulate(pl.Scene(pl.Layer(1.4, 100.0), 1.5), space="lab", angle=[0.0, 30.0], noise=0.4)
+    write_colours(tmp_path / "a.csv", [sensor], comments=["a comment"])
+    found = pl.read_colours(tmp_path / "a.csv")
+    np.testing.assert_allclose(found.values, sensor.values, rtol=1e-6)
+    np.testing.assert_allclose(found.sigma, 0.4)
+    assert found.angle.tolist() == [0, 30]
+    assert found.space == "lab"
+    assert pellicle("read", tmp_path / "a.csv", "--out", tmp_path / "out").code == 0
+    again = pl.read_colours(tmp_path / "out" / "a.csv")
+    np.testing.assert_allclose(again.values, sensor.values, rtol=1e-6)
