@@ -24,8 +24,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import pellicle as pl
-from pellicle.reporting.colour_figures import shown
-from pellicle.synthetic.sphere import in_plane, render
+from pellicle.reporting.picture import display
+from pellicle.synthetic.environment import one_lamp
+from pellicle.synthetic.surface_sphere import in_plane, render
 
 jax.config.update("jax_enable_x64", True)  # double precision; JAX's default is single
 SHORT = os.environ.get("PELLICLE_SHORT") == "1"  # smaller pictures, for a quick run
@@ -63,15 +64,10 @@ changes += [{"deviation": x} for x in (0.0, 12.0, 20.0)]
 changes += [{"exponent_transmission": 60.0}]
 
 
-def picture(linear):
-    """Scale the image so that the highlight is white."""
-    return shown(linear / np.nanpercentile(linear, 99.9))
-
-
 figure, panels = plt.subplots(2, 4, figsize=(10, 5.4))
 for axes, change in zip(panels.flat, changes, strict=True):
-    sphere = render(pl.Surface("granier-heidrich", truth | change), size=SIZE)
-    axes.imshow(picture(sphere), origin="upper")
+    sphere = render(pl.Surface("granier-heidrich", truth | change), one_lamp(), size=SIZE)
+    axes.imshow(display(sphere), origin="upper")
     key, value = next(iter(change.items()))
     unit = {"thickness": " nm", "deviation": "°"}.get(key, "")
     axes.set_title(f"{key} {value:g}{unit}", fontsize="small")
@@ -79,10 +75,11 @@ for axes, change in zip(panels.flat, changes, strict=True):
 plt.show()
 
 # %% [markdown]
-# The pictures show a sphere under one lamp at the upper right. In the upper row only the thickness changes,
-# and with it the colour where the two lobes overlap. In the lower row the tilt increases and separates the
-# lobes: where only one face reflects, the light is white, because interference needs both. In the last
-# picture a smoother lower face has a narrower lobe.
+# The pictures show a sphere under one soft box at the upper right, in colours of the whole spectrum: the
+# model is evaluated at 32 wavelengths, with its index interpolated between the three. In the upper row only
+# the thickness changes, and with it the colour where the two lobes overlap. In the lower row the tilt
+# increases and separates the lobes: where only one face reflects, the light is white, because interference
+# needs both. In the last picture a smoother lower face has a narrower lobe.
 #
 # ## Simulated measurement
 #
@@ -174,11 +171,12 @@ plt.show()
 # Rendered images of the true surface and of the fit, and sixteen times their difference:
 
 # %%
-pictures = [render(each, size=SIZE) for each in (surface, fitted_surface)]
+pictures = [render(each, one_lamp(), size=SIZE) for each in (surface, fitted_surface)]
+difference = pictures[1].linear - pictures[0].linear
 figure, panels = plt.subplots(1, 3, figsize=(8, 3))
 for axes, image, title in zip(
     panels,
-    (*map(picture, pictures), np.clip(0.5 + 16 * (pictures[1] - pictures[0]), 0, 1)),
+    (*map(display, pictures), np.clip(0.5 + 16 * difference, 0, 1)),
     ("true surface", "fit", "difference × 16, around grey"),
     strict=True,
 ):
@@ -187,7 +185,7 @@ for axes, image, title in zip(
     axes.set_axis_off()
 plt.show()
 
-worst = np.nanmax(np.abs(pictures[1] - pictures[0])) / np.nanmax(pictures[0])
+worst = np.max(np.abs(difference)) / np.max(pictures[0].linear)
 print(f"largest difference: {worst:.2%} of the brightest pixel")
 
 # %% [markdown]

@@ -25,8 +25,8 @@ import numpy as np
 
 import pellicle as pl
 from pellicle.colour import delta_e2000, film_colour, lab
-from pellicle.reporting.colour_figures import shown
-from pellicle.synthetic.sphere import render
+from pellicle.reporting.picture import display
+from pellicle.synthetic.surface_sphere import render
 
 jax.config.update("jax_enable_x64", True)  # double precision; JAX's default is single
 SHORT = os.environ.get("PELLICLE_SHORT") == "1"  # fewer points, for a quick run
@@ -239,13 +239,13 @@ print("other minima:", ", ".join(f"{r.parameters['thickness']:.0f} nm" for r in 
 # The fit recovers both thickness and index, and no other order fits. The two are correlated, as the report
 # states, so each has a larger error than it would have with the other fixed.
 #
-# A rendered image of such a surface, with an uneven oxide of 10 to 70 nm:
+# A rendered image of such a surface in a studio, with an uneven oxide of 10 to 70 nm:
 
 # %%
 uneven = pl.Surface("microfacet-film", truth | {"thickness": pl.Free(10, 70)})
 image = render(uneven, size=100 if SHORT else 300)
 figure, axes = plt.subplots(figsize=(3.6, 3.6))
-axes.imshow(shown(image / np.nanpercentile(image, 99.5)), origin="upper")
+axes.imshow(display(image), origin="upper")
 axes.set_axis_off()
 plt.show()
 

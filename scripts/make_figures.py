@@ -16,6 +16,7 @@ import numpy as np
 
 import pellicle as pl
 from pellicle.colour import film_colour, srgb
+from pellicle.colour.gamut import into_srgb
 
 matplotlib.use("Agg")
 from matplotlib.figure import Figure
@@ -97,7 +98,7 @@ def swatch(axes, most: float, index: float, base: complex, title: str, exposure=
     """Draw the colours of a film under D65 against thickness and angle of incidence."""
     nm, degrees = np.linspace(0.0, most, 401), np.linspace(0.0, steepest, 81)
     colours = film_colour(nm, index, base, angle=degrees[:, None], method="uniform-64")
-    shown = srgb(exposure * np.asarray(colours.linear_srgb))
+    shown = srgb(into_srgb(exposure * np.asarray(colours.linear_srgb)))
     axes.imshow(shown, origin="lower", aspect="auto", extent=(0, most, 0, steepest), rasterized=True)
     axes.set(xlabel="thickness (nm)", ylabel="angle of incidence (°)", title=title)
 
@@ -113,6 +114,55 @@ def tempered_steel() -> Figure:
     return figure
 
 
+TEMPER_NAMES = {
+    "straw": (75.0, 100.0, 10.0),
+    "brown": (20.0, 75.0, 10.0),
+    "purple": (295.0, 345.0, 10.0),
+    "blue": (258.0, 295.0, 10.0),
+    "pale blue": (225.0, 258.0, 8.0),
+}
+"""Names of temper colours in the order in which a growing oxide has them: hue from and to (degrees of CIELAB)
+and least chroma. Yellow has a hue of about 90°, red 30°, purple 320°, blue 270°."""
+
+
+def temper_intervals(nm: np.ndarray, lab: np.ndarray) -> dict[str, tuple[float, float]]:
+    """First interval of thickness (nm) with each name, one after the other."""
+    hue = np.rad2deg(np.arctan2(lab[:, 2], lab[:, 1])) % 360
+    chroma = np.hypot(lab[:, 1], lab[:, 2])
+    found, start = {}, 0
+    for name, (low, high, least) in TEMPER_NAMES.items():
+        named = (hue >= low) & (hue < high) & (chroma >= least) & (np.arange(len(nm)) >= start)
+        first = int(np.argmax(named))
+        start = first + int(np.argmin(named[first:]))
+        found[name] = (nm[first], nm[start])
+    return found
+
+
+def temper_colours() -> Figure:
+    """Draw a gradient of oxide on steel with the names of its temper colours."""
+    films = {
+        "magnetite on iron: Fe3O4 (Querry 1985) on Fe (Johnson and Christy 1974)": ("Fe3O4", "Fe", 96.0),
+        "index 2.9 on 2.7 + 2.8i, constant": (2.9, STEEL, 72.0),
+    }
+    figure = Figure(figsize=(8.0, 3.4), layout="constrained")
+    panels = figure.subplots(len(films), 1)
+    for axes, (title, (layer, base, most)) in zip(panels, films.items(), strict=True):
+        nm = np.linspace(0.0, most, 961)
+        media = [pl.material(x) if isinstance(x, str) else x for x in (layer, base)]
+        colours = film_colour(nm, *media, method="uniform-64")
+        shown = srgb(into_srgb(np.asarray(colours.linear_srgb)))
+        axes.imshow(np.asarray(shown)[None], aspect="auto", extent=(0, most, 0, 1), rasterized=True)
+        for name, (low, high) in temper_intervals(nm, np.asarray(colours.lab)).items():
+            axes.plot([low, high], [1.12, 1.12], color="#444444", linewidth=1.5, clip_on=False)
+            axes.text(0.5 * (low + high), 1.2, name, ha="center", fontsize="small")
+        axes.set(yticks=[], xlim=(0, most), ylim=(0, 1))
+        axes.set_title(title, loc="left", fontsize="medium", pad=24)
+    panels[-1].set_xlabel(
+        "thickness of the oxide (nm); colours at normal incidence under D65, white as sRGB white"
+    )
+    return figure
+
+
 def main() -> None:
     FOLDER.mkdir(parents=True, exist_ok=True)
     drawn = {
@@ -120,6 +170,7 @@ def main() -> None:
         "gold_and_cds_on_glass": gold_and_cadmium_sulfide,
         "cuo_on_aluminium": copper_oxide_on_aluminium,
         "tempered_steel": tempered_steel,
+        "temper_colours": temper_colours,
     }
     with jax.enable_x64(True):
         for name, draw in drawn.items():

@@ -59,6 +59,20 @@ def test_the_command_draws_it(pellicle, tmp_path):
         pellicle("chart", recipe, *flags).refused(3 if "illuminant" in words else 2, words)
 
 
+def test_views_that_a_recipe_does_not_have(pellicle, tmp_path):
+    film, surface = tmp_path / "film.toml", tmp_path / "surface.toml"
+    film.write_text('[scene]\nsubstrate = "Si"\n[[scene.layer]]\nmaterial = "SiO2"\nthickness = 300\n')
+    surface.write_text('[scene.surface]\nmodel = "microfacet-film"\n[data]\nsignal = "brdf"\n')
+    for recipe, flags, words in (
+        (surface, ("--view", "balls"), "are for films"),
+        (film, ("--view", "bubble"), "must be above 0"),
+        (film, ("--view", "bubble", "--thickness", "50:500"), "same medium on both sides"),
+        (film, ("--view", "balls", "--invert", "a.csv"), "--invert belongs to a chart"),
+        (film, ("--view", "methods", "--illuminant", "A"), "under D65"),
+    ):
+        pellicle("chart", recipe, "--out", tmp_path / "a.png", *flags).refused(2, words)
+
+
 @pytest.mark.slow
 def test_inverse_of_a_chart(pellicle, tmp_path):
     """Every likely thickness has the colour of its row, by the film's own colours; probabilities add up."""

@@ -146,16 +146,24 @@ def _compiled(colour: Callable, films: Films, double: bool = False) -> Program:
 
 def error(eye: Sensor, reference: np.ndarray, colours: np.ndarray) -> float:
     """Mean ΔE2000 of colours (draws, angles, 3) from the reference; infinite where one is not finite."""
-    difference = delta_e2000(
-        *(np.asarray(lab(np.asarray(x, float), eye.white)) for x in (colours, reference))
-    )
+    difference = differences(eye, reference, colours)
     return float(np.mean(difference)) if np.all(np.isfinite(difference)) else math.inf
+
+
+def differences(eye: Sensor, reference: np.ndarray, colours: np.ndarray) -> np.ndarray:
+    """ΔE2000 (draws, angles) of colours from the reference."""
+    return delta_e2000(*(np.asarray(lab(np.asarray(x, float), eye.white)) for x in (colours, reference)))
+
+
+def reference_program(films: Films) -> Program:
+    """Integration in steps of 1 nm, in double precision."""
+    eye = sensor(*EYE)
+    return _compiled(partial(xyz, Bands(eye.wavelength, None, eye.weights)), films, double=True)
 
 
 def reference_colours(films: Films) -> np.ndarray:
     """Colours by integration in steps of 1 nm, in double precision."""
-    eye = sensor(*EYE)
-    return _compiled(partial(xyz, Bands(eye.wavelength, None, eye.weights)), films, double=True).run()
+    return reference_program(films).run()
 
 
 _SAMPLES = "the spectrum between them"

@@ -1,10 +1,10 @@
-"""`pellicle chart`: colours of a film against thickness and angle, or a picture of a surface."""
+"""`pellicle chart`: colours of a film against thickness and angle, or pictures of objects under it."""
 
 from __future__ import annotations
 
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
@@ -14,6 +14,10 @@ from pellicle.errors import UsageError
 if TYPE_CHECKING:
     from pellicle.recipes.surface import SurfaceRecipe
     from pellicle.scene.film import Scene
+
+View = Literal["chart", "balls", "bubble", "methods"]
+COUNT = 5
+"""Thicknesses of a row of objects."""
 
 
 def chart(
@@ -31,11 +35,19 @@ def chart(
         str | None,
         Parameter(help="CSV file to write: every thickness of each colour at the lowest angle, with ΔE."),
     ] = None,
+    view: Annotated[
+        View,
+        Parameter(
+            help="Films: chart of thickness and angle; balls of the substrate under five thicknesses, in"
+            " reflection and seen through; bubble that drains, by its thickness at the top; or methods of"
+            " computing the colour, side by side with ΔE2000 and time."
+        ),
+    ] = "chart",
     light: Annotated[
-        float, Parameter(help="Surfaces: angle between the light and the line of sight in degrees.")
+        float, Parameter(help="Surfaces: angle between the main lamp and the line of sight in degrees.")
     ] = 35.0,
 ) -> int:
-    """Draw the interference colours of a recipe's film, or a sphere and the BRDF of a recipe's surface.
+    """Draw the interference colours of a recipe's film, objects under it, or a sphere of a recipe's surface.
 
     With --invert, also write the inverse: each 8-bit colour of the film, all thicknesses that have it within
     the noise of a camera (1.5 of 255), their probability and ΔE.
@@ -47,18 +59,22 @@ def chart(
 
     described = read_recipe(recipe)
     if isinstance(described, SurfaceRecipe):
-        if not (layer is thickness is invert is None):
+        if not (layer is thickness is invert is None and view == "chart"):
             raise UsageError(
-                "--layer, --thickness and --invert are for films; a surface has its own thickness"
+                "--layer, --thickness, --invert and --view are for films; a surface has its own thickness"
             )
         return _surface(described, out, light)
     scene = described.scene()
     angles = _range("--angle", angle, 90.0)
     nm = _bounds(scene, layer) if thickness is None else _range("--thickness", thickness, inf)
+    eye: dict[str, Any] = {"observer": observer, "illuminant": illuminant}
+    if view != "chart":
+        if invert is not None:
+            raise UsageError("--invert belongs to a chart: leave out --view")
+        return _objects(scene, view, out, nm, layer, Path(recipe).stem, eye)
     start()
     from pellicle.reporting import colour_figures
 
-    eye = {"observer": observer, "illuminant": illuminant}
     inverse = None
     if invert is not None:
         from pellicle.reporting.colour_inverse import invert_chart
@@ -79,15 +95,53 @@ def chart(
     return 0
 
 
+def _objects(
+    scene: Scene,
+    view: View,
+    out: str,
+    nm: tuple[float, float],
+    layer: str | None,
+    title: str,
+    eye: dict[str, Any],
+) -> int:
+    import numpy as np
+
+    if view == "bubble" and nm[0] <= 0:
+        raise UsageError("--thickness of a bubble must be above 0 at its top: give --thickness LO:HI")
+    if view == "methods" and (layer is not None or eye != {"observer": "1931", "illuminant": "D65"}):
+        raise UsageError("methods are compared on one layer under D65: leave out the other flags")
+    start()
+    if view == "methods":
+        from pellicle.reporting.method_figure import draw_methods
+
+        for found in draw_methods(scene, out, nm, title):
+            say(
+                f"{found.name}: ΔE2000 {found.delta_e.mean():.2g} in the mean, {found.delta_e.max():.2g} at"
+                f" most, {found.seconds * 1e9:.0f} ns a colour"
+            )
+    elif view == "bubble":
+        from pellicle.reporting.sphere_figures import bubbles
+
+        bubbles(
+            scene, out, [float(f"{x:.3g}") for x in np.geomspace(nm[1], nm[0], COUNT)], layer, title, **eye
+        )
+    else:
+        from pellicle.reporting.sphere_figures import balls
+
+        balls(scene, out, [float(f"{x:.4g}") for x in np.linspace(*nm, COUNT)], layer, title, **eye)
+    say(f"{out}: {view}, {nm[0]:g} to {nm[1]:g} nm")
+    return 0
+
+
 def _surface(recipe: SurfaceRecipe, out: str, light: float) -> int:
     if not 0 <= light <= 180:
         raise UsageError(f"--light must lie in 0 to 180 degrees, got {light:g}")
     surface = recipe.scene()
     start()
-    from pellicle.reporting.colour_figures import sphere
+    from pellicle.reporting.sphere_figures import sphere
 
-    sphere(surface, out, (light, 60.0), title=Path(recipe.path).stem)
-    say(f"{out}: a sphere of {surface.model}, the light {light:g} degrees from the line of sight")
+    sphere(surface, out, light, title=Path(recipe.path).stem)
+    say(f"{out}: a sphere of {surface.model}, the main lamp {light:g} degrees from the line of sight")
     return 0
 
 

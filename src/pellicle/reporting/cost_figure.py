@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pellicle.reporting.cost_text import error_label, time_unit
-from pellicle.reporting.drawing import BLUE, GREY, ORANGE, new_figure
+from pellicle.reporting.drawing import ABOVE, BLUE, GREY, ORANGE, new_figure
+from pellicle.reporting.label_placement import Label, place_labels
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,50 +35,51 @@ def draw(cost: Cost | SurfaceCost, name: str = "scene") -> Figure:
     count = len(kinds) + (solvers is not None)
     figure = new_figure(8.0, 0.4 + 4.6 * count)
     panels = np.atleast_1d(figure.subplots(count, 1))
-    for axes, methods in zip(panels, kinds, strict=False):
-        _methods(axes, methods, name)
+    labels = [_methods(axes, methods, name) for axes, methods in zip(panels, kinds, strict=False)]
     if solvers is not None:
         axes = panels[-1]
-        _scatter(axes, solvers.results, solvers.recommended, 1e3)
-        axes.set(xlabel="time of one fit (ms)", ylabel="mean error of the parameters, share of the bounds")
+        labels.append(_scatter(axes, solvers.results, solvers.recommended, 1e3))
+        axes.set(xlabel="time of one fit (ms)", ylabel="mean error of the parameters,\nshare of the bounds")
+    figure.draw_without_rendering()  # gives the panels the size in which labels are placed
+    for axes, names in zip(panels, labels, strict=True):
+        place_labels(axes, names)
     return figure
 
 
-def _methods(axes: Axes, methods: MethodComparison, name: str) -> None:
+def _methods(axes: Axes, methods: MethodComparison, name: str) -> list[Label]:
+    """Draw methods of simulation, and return the labels of their points."""
     unit, scale = time_unit(methods)
-    _scatter(axes, methods.results, methods.recommended, scale)
-    axes.axhline(methods.tolerance, color=BLUE, linewidth=0.8, linestyle=":")
+    labels = _scatter(axes, methods.results, methods.recommended, scale)
+    label = f"{error_label(methods, f'{methods.tolerance:g}')} (tolerance)"
+    axes.axhline(methods.tolerance, color=BLUE, linewidth=0.8, linestyle=":", label=label)
+    axes.legend(**ABOVE, fontsize="x-small")
     which = "mean" if methods.sample == "colour" else "largest"
     axes.set(
         xlabel=f"time of one {methods.sample} ({unit})",
-        ylabel=f"{which} {error_label(methods)}, against {methods.reference}",
-        title=name.replace("$", r"\$"),
+        ylabel=f"{which} {error_label(methods)},\nagainst {methods.reference}",
     )
+    axes.set_title(name.replace("$", r"\$"), loc="left", fontsize="medium")
+    return labels
 
 
-def _scatter(axes: Axes, items: Sequence[Any], recommended: str | None, scale: float) -> None:
-    """Draw points with their names, join the Pareto front, and draw an error of zero at the bottom."""
+def _scatter(axes: Axes, items: Sequence[Any], recommended: str | None, scale: float) -> list[Label]:
+    """Draw points, join the Pareto front, and draw an error of zero at the bottom; return their labels."""
     from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
     points = [(item.seconds * scale, max(item.error, FLOOR)) for item in items]
     front = sorted(point for point, item in zip(points, items, strict=True) if item.pareto)
     axes.plot(*zip(*front, strict=True), color=ORANGE, linewidth=1.0, zorder=1)
-    for i, (point, item) in enumerate(zip(points, items, strict=True)):  # neighbours in time: they are sorted
+    labels = []
+    for point, item in zip(points, items, strict=True):
         if not np.isfinite(point[1]):
             continue
         colour = ORANGE if item.pareto else GREY
         axes.plot(*point, "D" if item.name == recommended else "o", color=colour, markersize=5)
-        axes.annotate(
-            item.name,
-            point,
-            xytext=(5, -8 if i % 2 else 3),
-            textcoords="offset points",
-            fontsize="x-small",
-            color=colour,
-        )
+        labels.append(Label(item.name, *point, colour))
     axes.set(xscale="log", yscale="log")
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
     axes.xaxis.set_minor_formatter(NullFormatter())
-    axes.margins(x=0.12, y=0.08)
+    axes.margins(x=0.14, y=0.1)
     axes.grid(alpha=0.2)
+    return labels

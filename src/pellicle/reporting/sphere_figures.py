@@ -1,0 +1,182 @@
+"""Figures of spheres: a surface with its BRDF, balls under a film, and a bubble that drains."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import jax
+import numpy as np
+
+from pellicle.reporting.drawing import figure_path, new_figure, save_figure
+from pellicle.reporting.picture import display, encode, exposure
+from pellicle.scene.film import Scene
+from pellicle.scene.surface import Surface
+from pellicle.synthetic.ball import ball
+from pellicle.synthetic.bubble import bubble
+from pellicle.synthetic.environment import Environment, light_tent, studio
+from pellicle.synthetic.film_spectra import stack
+from pellicle.synthetic.sphere import EYE
+from pellicle.synthetic.surface_sphere import in_plane, render
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+INCIDENCES = (15.0, 45.0, 70.0)
+LEAVING = np.linspace(-88.0, 88.0, 353)
+"""Angles (degrees) of the polar plots: of the light, and to the eye."""
+SIZE, SMALL = 420, 260
+"""Pixels across a single sphere, and across one of several."""
+LAMP_PERCENTILE = 97.0
+"""Percentile of the luminance that is white where a lamp is mirrored sharply: it covers 2 % of a ball."""
+DPI = 110
+"""Resolution at which a picture of several spheres has 200 to 400 kB."""
+DARK = 0.06
+"""sRGB value around balls in reflection alone."""
+_CHANNELS = ("#c03030", "#2f8f2f", "#3050c0")
+
+
+def sphere(
+    surface: Surface,
+    path: str | os.PathLike[str],
+    light: float = 35.0,
+    title: str = "",
+    *,
+    size: int = SIZE,
+) -> None:
+    """Draw a sphere of the surface in a studio, and polar plots of its BRDF, into `path`.
+
+    `light` is the angle of the brightest soft box from the line of sight in degrees.
+
+    **Raises:** UsageError for another file type, and where the file exists or cannot be written.
+    """
+    target = figure_path(path)
+    picture = render(surface, studio(light), size)
+    with jax.enable_x64(True):
+        lobes = {angle: in_plane(surface, angle, LEAVING) for angle in INCIDENCES}
+    factor = exposure(picture)
+    figure = new_figure(8.0, 5.0)
+    grid = figure.add_gridspec(len(lobes), 2, width_ratios=[2.2, 1])
+    axes = figure.add_subplot(grid[:, 0])
+    _show(axes, display(picture, factor))
+    axes.set_title(title.replace("$", r"\$"), loc="left", fontsize="medium")
+    axes.text(
+        0.0, -0.01, _lighting("D65, studio", factor), transform=axes.transAxes, va="top", fontsize="x-small"
+    )
+    for row, (angle, values) in enumerate(lobes.items()):
+        _draw_lobe(figure.add_subplot(grid[row, 1], projection="polar"), angle, values, surface)
+    save_figure(figure, target, dpi=DPI)
+
+
+def _draw_lobe(axes: Axes, angle: float, values: np.ndarray, surface: Surface) -> None:
+    """The BRDF at each channel's wavelength in the plane of incidence."""
+    from matplotlib.ticker import MaxNLocator
+
+    order = np.argsort(surface.channel_wavelengths)[::-1]
+    colours = _CHANNELS if len(order) == 3 else [f"C{k}" for k in range(len(order))]
+    for colour, channel in zip(colours, order, strict=True):
+        label = f"{surface.channel_wavelengths[channel]:g} nm"
+        axes.plot(np.deg2rad(LEAVING), values[:, channel], color=colour, linewidth=1.2, label=label)
+    axes.axvline(np.deg2rad(-angle), color="#777777", linestyle=":", linewidth=1.0)
+    axes.set(theta_zero_location="N", theta_direction=-1, thetamin=-90, thetamax=90)
+    axes.set_xticks(np.deg2rad([-90, -45, 0, 45, 90]))
+    axes.tick_params(labelsize="xx-small", pad=0)
+    axes.yaxis.set_major_locator(MaxNLocator(2))
+    axes.set_title(f"light at {angle:g}°, BRDF in 1/sr", fontsize="x-small")
+    if angle == INCIDENCES[-1]:
+        axes.legend(
+            fontsize="xx-small", frameon=False, loc="upper center", bbox_to_anchor=(0.5, 0.1), ncols=3
+        )
+
+
+def balls(
+    scene: Scene,
+    path: str | os.PathLike[str],
+    thickness: Sequence[float],
+    layer: str | None = None,
+    title: str = "",
+    *,
+    illuminant: str = "D65",
+    observer: str = "1931",
+    size: int = SMALL,
+) -> None:
+    """Draw balls of the substrate under films of several thicknesses (nm) into `path`.
+
+    A ball that does not absorb is shown in reflection, seen through, and as both together; others in
+    reflection. `layer`, `illuminant` and `observer` are those of `interference_colours`.
+
+    **Raises:** UsageError as `stack` does, for another file type, and where the file exists.
+    """
+    target, films = figure_path(path), stack(scene, layer, observer=observer, illuminant=illuminant)
+    surroundings = studio()
+    found = [ball(films, nm, surroundings, size) for nm in thickness]
+    factor = exposure(*(each.whole for each in found), percentile=LAMP_PERCENTILE)
+    behind = _background(surroundings, factor)
+    rows = {"in reflection": [display(each.reflected, factor, DARK) for each in found]}
+    through = [each.transmitted for each in found if each.transmitted is not None]
+    if through:
+        rows["seen through"] = [display(each, factor, behind) for each in through]
+        rows["together"] = [display(each.whole, factor, behind) for each in found]
+    names = [f"{nm:g} nm" for nm in thickness]
+    save_figure(_draw_grid(rows, names, title, _lighting(f"{illuminant}, studio", factor)), target, dpi=DPI)
+
+
+def bubbles(
+    scene: Scene,
+    path: str | os.PathLike[str],
+    thickness: Sequence[float],
+    layer: str | None = None,
+    title: str = "",
+    *,
+    illuminant: str = "D65",
+    observer: str = "1931",
+    size: int = SMALL,
+) -> None:
+    """Draw stages of a bubble that drains, by the thickness of the film at its top (nm), into `path`.
+
+    **Raises:** UsageError as `stack` and `bubble` do, for another file type, and where the file exists.
+    """
+    target, films = figure_path(path), stack(scene, layer, observer=observer, illuminant=illuminant)
+    tent = light_tent()
+    found = [bubble(films, top, tent, size) for top in thickness]
+    factor = exposure(*found)
+    shown = [display(each, factor, _background(tent, factor)) for each in found]
+    names = [f"{top:.3g} nm at the top" for top in thickness]
+    save_figure(
+        _draw_grid({"": shown}, names, title, _lighting(f"{illuminant}, light tent", factor)), target, dpi=DPI
+    )
+
+
+def _background(surroundings: Environment, factor: float) -> float:
+    """sRGB value of what lies behind the sphere: all lines of sight are parallel, so it is one grey."""
+    return float(encode(np.full(3, factor * surroundings.radiance(-EYE)))[0])
+
+
+def _lighting(lamps: str, factor: float) -> str:
+    return f"{lamps}; exposure × {factor:g}"
+
+
+def _draw_grid(rows: dict[str, list[np.ndarray]], names: list[str], title: str, note: str) -> Figure:
+    """Rows of pictures under the names of the columns."""
+    count = len(names)
+    figure = new_figure(0.3 + 1.9 * count, 0.6 + 1.95 * len(rows))
+    panels = figure.subplots(len(rows), count, squeeze=False)
+    for row, (word, images) in zip(panels, rows.items(), strict=True):
+        for axes, image in zip(row, images, strict=True):
+            _show(axes, image)
+        row[0].set_ylabel(word, fontsize="small")
+    for axes, name in zip(panels[0], names, strict=True):
+        axes.set_title(name, fontsize="small")
+    figure.suptitle(title.replace("$", r"\$"), x=0.01, ha="left", fontsize="medium")
+    figure.supxlabel(note, x=0.01, ha="left", fontsize="x-small")
+    return figure
+
+
+def _show(axes: Axes, image: np.ndarray) -> None:
+    """A picture without ticks and frame."""
+    axes.imshow(image, interpolation="antialiased")
+    axes.set(xticks=[], yticks=[])
+    for spine in axes.spines.values():
+        spine.set_visible(False)

@@ -1,0 +1,110 @@
+"""Surroundings of a rendered object: soft boxes, a horizon, and a sky and a ground that fade from it.
+
+Directions are unit vectors away from the object: x to the right, y up, z towards the eye. The light is of one
+spectrum, that of the illuminant, so radiances are numbers: a white diffuser in surroundings of radiance 1 has
+radiance 1.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pellicle.optics.array_namespace import namespace
+
+EDGE = 3.0
+"""Width (degrees) over which the edges of a soft box and the horizon fade: a step would be a staircase."""
+
+
+class SoftBox(NamedTuple):
+    """Rectangular lamp far away: its centre by polar angle from the line of sight and azimuth from the right,
+    its width and height, all in degrees, and its radiance."""
+
+    polar: float
+    azimuth: float
+    width: float
+    height: float
+    radiance: float
+
+    def coverage(self, direction: Any, edge: Any = EDGE) -> Any:
+        """Share (...) of the box's radiance in directions (..., 3): 1 inside, 0 outside."""
+        xp = namespace(direction)
+        polar, azimuth = xp.deg2rad(self.polar), xp.deg2rad(self.azimuth)
+        sine = xp.sin(polar)
+        centre = xp.stack([sine * xp.cos(azimuth), sine * xp.sin(azimuth), xp.cos(polar)])
+        right = xp.stack([centre[2], 0 * sine, -centre[0]]) / xp.hypot(centre[0], centre[2])
+        forward = direction @ centre
+        across = xp.rad2deg(xp.arctan2(direction @ right, forward))
+        up = xp.rad2deg(xp.arctan2(direction @ xp.cross(centre, right), forward))
+        inside = _fade(self.width / 2 - xp.abs(across), edge, xp) * _fade(
+            self.height / 2 - xp.abs(up), edge, xp
+        )
+        return xp.where(forward > 0, inside, 0.0)
+
+
+class Environment(NamedTuple):
+    """Soft boxes before a sky and a ground; radiances of the nadir, of both sides of the horizon and of the
+    zenith."""
+
+    boxes: tuple[SoftBox, ...]
+    nadir: float
+    below_horizon: float
+    above_horizon: float
+    zenith: float
+
+    def radiance(self, direction: Any, edge: Any = EDGE) -> Any:
+        """Radiance (...) from directions (..., 3), in NumPy or JAX as they are.
+
+        Edges fade over `edge` degrees, one number or one for each direction.
+        """
+        xp = namespace(direction)
+        elevation = xp.rad2deg(xp.arcsin(xp.clip(direction[..., 1], -1.0, 1.0)))
+        height = xp.abs(elevation) / 90
+        sky = self.above_horizon + (self.zenith - self.above_horizon) * height
+        ground = self.below_horizon + (self.nadir - self.below_horizon) * height
+        total = ground + (sky - ground) * _fade(elevation, edge, xp)
+        for box in self.boxes:
+            total = total + (box.radiance - total) * box.coverage(direction, edge)
+        return total
+
+
+def _fade(degrees: Any, edge: Any, xp: Any) -> Any:
+    """0 below −edge/2, 1 above edge/2, smooth between."""
+    t = xp.clip(degrees / edge + 0.5, 0.0, 1.0)
+    return t * t * (3 - 2 * t)
+
+
+def studio(light: float = 35.0) -> Environment:
+    """Bright studio over a grey ground and before a pale sky, with four soft boxes.
+
+    The brightest is at the upper right, `light` degrees from the line of sight; a large one is at the left,
+    one overhead and a narrow one behind at the right.
+    """
+    boxes = (
+        SoftBox(light, 60.0, 34.0, 34.0, 3.0),
+        SoftBox(75.0, 170.0, 40.0, 80.0, 1.6),
+        SoftBox(85.0, 91.0, 90.0, 28.0, 1.6),
+        SoftBox(112.0, 5.0, 16.0, 90.0, 1.6),
+    )
+    return Environment(boxes, 0.12, 0.35, 0.5, 0.9)
+
+
+def light_tent() -> Environment:
+    """Light tent with two windows, before a dark background: for what reflects little."""
+    boxes = (
+        SoftBox(180.0, 0.0, 100.0, 100.0, 0.02),
+        SoftBox(48.0, 150.0, 30.0, 44.0, 2.0),
+        SoftBox(70.0, 15.0, 18.0, 60.0, 1.4),
+    )
+    return Environment(boxes, 0.25, 0.4, 0.5, 0.8)
+
+
+def one_lamp(light: float = 35.0, width: float = 20.0) -> Environment:
+    """One square soft box at the upper right in the dark, `light` degrees from the line of sight.
+
+    A surface that faces it has the irradiance of surroundings of radiance 1 all round.
+    """
+    half = np.deg2rad(width / 2)
+    solid_angle = 4 * np.arcsin(np.sin(half) ** 2)
+    return Environment((SoftBox(light, 60.0, width, width, np.pi / solid_angle),), 0.0, 0.0, 0.0, 0.0)

@@ -1,0 +1,39 @@
+"""Figures of spheres: what they are made of, their exposure and their display."""
+
+import numpy as np
+import pytest
+
+import pellicle as pl
+from pellicle.errors import UsageError
+from pellicle.reporting.picture import display, exposure
+from pellicle.reporting.sphere_figures import balls, bubbles
+from pellicle.synthetic.sphere import Picture
+
+PNG = b"\x89PNG"
+
+
+def test_one_exposure_for_several_pictures():
+    coverage = np.ones((4, 4))
+    dark, bright = (Picture(np.full((4, 4, 3), value), coverage) for value in (0.1, 4.0))
+    assert exposure(dark) == pytest.approx(10.0)
+    assert exposure(dark, bright) == pytest.approx(0.25)
+    assert exposure(Picture(np.zeros((4, 4, 3)), coverage)) == 1.0
+    np.testing.assert_allclose(display(bright), 1.0, atol=1e-6)
+
+
+def test_the_background_shows_through_what_the_sphere_leaves():
+    picture = Picture(np.full((1, 2, 3), 0.5), np.array([[1.0, 0.25]]))
+    inside, limb = display(picture, 1.0, background=0.2)[0, :, 0]
+    assert inside == pytest.approx(0.7354, abs=1e-3)  # sRGB of 0.5, IEC 61966-2-1
+    assert limb == pytest.approx(0.25 * inside + 0.75 * 0.2)
+
+
+def test_figures_are_written(tmp_path):
+    film = pl.Scene(pl.Layer(1.33, 100.0), 1.0)
+    balls(pl.Scene(pl.Layer(2.0, 100.0), 1.5), tmp_path / "balls.png", (50.0, 100.0), size=9)
+    bubbles(film, tmp_path / "bubbles.png", (300.0, 100.0), size=9)
+    assert all((tmp_path / name).read_bytes().startswith(PNG) for name in ("balls.png", "bubbles.png"))
+    with pytest.raises(UsageError, match="exists"):
+        bubbles(film, tmp_path / "bubbles.png", (300.0,), size=9)
+    with pytest.raises(UsageError, match=r"\.png"):
+        balls(film, tmp_path / "balls.jpg", (300.0,), size=9)
