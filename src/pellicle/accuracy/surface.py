@@ -127,7 +127,7 @@ class BrdfMethod:
 def _without(effect: str, absent: str, view: SurfaceView, tolerance: float) -> Plan | str:
     if not any(row.effect == effect and row.on for row in exact(view).rows):
         return absent
-    other = {"roughness": "diffuse", "diffuse": "specular"}.get(effect)
+    other = {"roughness": "diffuse", "coat": "specular", "diffuse": "specular"}.get(effect)
     if other is not None and other not in view.numbers:
         return "nothing else is left of the BRDF"
     removal = SurfaceRemoval(effect)
@@ -156,6 +156,7 @@ BRDF_METHODS = (
     BrdfMethod("s alone", "p", partial(_without, "polarisation", "s and p are equal")),
     BrdfMethod("transparent film", "its absorption", partial(_without, "absorption", "no film absorbs")),
     BrdfMethod("parallel boundaries", "the deviation", partial(_without, "deviation", "they are parallel")),
+    BrdfMethod("no lobe of the coat", "the clear coat's lobe", partial(_without, "coat", "it has no coat")),
     BrdfMethod("no diffuse part", "the diffuse part", partial(_without, "diffuse", "it has none")),
     BrdfMethod("diffuse part alone", "the lobe", partial(_without, "roughness", "there is no lobe")),
     BrdfMethod(

@@ -23,6 +23,7 @@ from jaxtyping import Array, Float
 from pellicle.brdf import blinn_phong_film, film_colour, granier_heidrich
 from pellicle.brdf.broadcasting import Evaluate as Evaluate
 from pellicle.brdf.broadcasting import Parameters
+from pellicle.brdf.clear_coat import clear_coat
 from pellicle.brdf.microfacet import microfacet
 
 RGB = (645.0, 525.0, 445.0)
@@ -73,9 +74,9 @@ class Model(NamedTuple):
         **Arguments:**
 
         - `parameters` has every key of the model, each a number or a map (...) that broadcasts with the
-          directions. Without `k`, `base_k`, `deviation`, `specular` or `diffuse` that effect is absent and
-          costs nothing. `wavelengths` (nm) are one for each channel, R, G and B by default; with `weights`
-          (wavelengths, channels), the bands of a sensor, they are any.
+          directions. Without `k`, `base_k`, `deviation`, `specular`, `coat` or `diffuse` that effect is
+          absent and costs nothing. `wavelengths` (nm) are one for each channel, R, G and B by default; with
+          `weights` (wavelengths, channels), the bands of a sensor, they are any.
         - `i`, `o`: unit vectors (..., 3) away from the surface, with the normal as third axis.
 
         **Returns:** (..., 3), or one value for each wavelength; 0 below the horizon.
@@ -111,6 +112,13 @@ _FACETS = (
     Parameter("base_k", "", 0.0, 6.0, 2.8, "extinction of the base"),
     Parameter("roughness", "", 0.003, 1.0, 0.2, "GGX alpha", log=True),
     Parameter("specular", "", 0.0, 100.0, 1.0, "weight of the facets", linear=True),
+    _GREY,
+)
+_COATED = (
+    *_FACETS[:-1],
+    Parameter("coat_n", "", 1.1, 2.0, 1.5, "index of the clear coat"),
+    Parameter("coat_roughness", "", 0.003, 1.0, 0.05, "GGX alpha of the coat's face", log=True),
+    Parameter("coat", "", 0.0, 100.0, 1.0, "weight of the coat's lobe", linear=True),
     _GREY,
 )
 _SHADER = (
@@ -187,6 +195,14 @@ _ALL = (
         microfacet(),
         microfacet(film_colour.incoherent),
         from_film_colour=microfacet,
+    ),
+    Model(
+        "clear-coat-film",
+        "GGX microfacets under a film, under a clear coat with a lobe of its own",
+        _COATED,
+        clear_coat(),
+        clear_coat(film_colour.incoherent),
+        from_film_colour=clear_coat,
     ),
     _shader(
         "blinn-phong-film",

@@ -23,7 +23,7 @@ NO_LAYER = "the layer has no part in the BRDF"
 def spectral_sampling(view: SurfaceView) -> Row:
     """On where channels differ."""
     if not view.layered:
-        return Row("spectral-sampling", False, "the diffuse part alone is grey", count=1)
+        return Row("spectral-sampling", False, "what is left is grey", count=1)
     if "weights" in view.numbers:
         count = view.channels
         return Row("spectral-sampling", count > 1, f"bands of {count} channels", count=count)
@@ -37,7 +37,7 @@ def spectral_sampling(view: SurfaceView) -> Row:
 def bands(view: SurfaceView) -> Row:
     """On where a sensor sees each channel in a band of wavelengths."""
     if not view.layered:
-        return Row("bands", False, "the diffuse part alone is grey")
+        return Row("bands", False, "what is left is grey")
     if "weights" not in view.numbers:
         return Row("bands", False, "no sensor: each channel is one wavelength")
     count = np.shape(view.numbers["weights"])[0]
@@ -58,6 +58,11 @@ def roughness(view: SurfaceView) -> Row:
 def deviation(view: SurfaceView) -> Row | None:
     """On where the two normals may differ; only models with two boundaries have them."""
     return _of_number(view, "deviation", "the angle between the two normals", "the boundaries are parallel")
+
+
+def coat(view: SurfaceView) -> Row | None:
+    """On where a clear coat may have a lobe; only models with a coat have one."""
+    return _of_number(view, "coat", "the lobe of the clear coat", "the clear coat has no lobe")
 
 
 def diffuse(view: SurfaceView) -> Row | None:
@@ -102,6 +107,8 @@ def oblique(view: SurfaceView) -> Row | None:
     if not _lit_aslant(view):
         return Row("oblique", False, "light and eye are in the same direction")
     why = f"facets are lit at up to {np.rad2deg(largest_angle(view)):.3g}°"
+    if "coat_n" in view.numbers:
+        why = "facets under the coat are lit at an angle"
     if "weights" not in view.numbers or _totally_reflecting(view):
         return Row("oblique", True, why)
     # an integral over bands has flatter fringes than one wavelength: 4e-6 in R for 90 random films
@@ -137,7 +144,7 @@ def _lit_aslant(view: SurfaceView) -> bool:
 
 
 def _totally_reflecting(view: SurfaceView) -> list[str]:
-    """The media whose real index may fall below n₀ sin θ."""
+    """The media whose real index may fall below n₀ sin θ, which is no larger under a coat than above it."""
     ambient = _bound(view.numbers.get("ambient_n", 1.0), "upper")
     transverse = ambient * np.sin(largest_angle(view)) * (1 + 1e-6)
     return [
@@ -153,7 +160,7 @@ def precision(view: SurfaceView) -> Row:
 
 
 JUDGES = (
-    *(spectral_sampling, bands, roughness, deviation, diffuse, absorption),
+    *(spectral_sampling, bands, roughness, deviation, coat, diffuse, absorption),
     *(coherence, tunnelling, oblique, polarisation, precision),
 )
 """One function for each effect of a surface, in the order of a plan; it returns None where the model cannot

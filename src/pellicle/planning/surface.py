@@ -80,7 +80,7 @@ def _removal(effect: str, stage: Stage) -> Iterator[Step]:
     """Removal of one effect, where it is present and something else remains."""
     numbers = stage.scene.numbers
     present = any(row.effect == effect and row.on for row in stage.plan.rows)
-    other = {"roughness": "diffuse", "diffuse": "specular"}.get(effect)
+    other = {"roughness": "diffuse", "coat": "specular", "diffuse": "specular"}.get(effect)
     if effect == "coherence":
         removable = not is_free(numbers.get("thickness"))  # without interference it has no gradient
     else:

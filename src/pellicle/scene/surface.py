@@ -105,6 +105,11 @@ class Surface:
             return self.sensor.weights.shape[1]
         return len(self.brdf.wavelengths if self.wavelengths is None else self.wavelengths)
 
+    @property
+    def channel_wavelengths(self) -> tuple[float, ...]:
+        """Wavelength of each channel in nm, the mean of its band with a sensor."""
+        return tuple((self.bands.wavelength @ self.bands.weights).tolist())
+
     @cached_property
     def bands(self) -> Quadrature:
         """Wavelengths (N,) in nm and their weights (N, channels): few of a sensor, one of each channel
@@ -177,7 +182,7 @@ VIEW_DIRECTIONS = 256
 LAYERED = ("granier-heidrich-diffuse", "granier-heidrich-full")
 """Models whose diffuse part has passed through the layer."""
 
-ZERO_IS_ABSENT = ("k", "base_k", "deviation", "specular", "diffuse")
+ZERO_IS_ABSENT = ("k", "base_k", "deviation", "specular", "coat", "diffuse")
 """Keys whose effect is absent where they are fixed at zero."""
 
 
@@ -238,8 +243,10 @@ def surface_view(surface: Surface, directions: HasDirections, count: int = VIEW_
     Raises UsageError for a surface that reflects nothing.
     """
     numbers = nonzero_numbers(surface)
-    if not {"specular", "diffuse"} & numbers.keys():
-        raise UsageError("there is nothing to compute: the surface reflects nothing (specular, diffuse 0)")
+    weights = {p.key for p in surface.brdf.parameters if p.linear}
+    if not weights & numbers.keys():
+        zero = ", ".join(sorted(weights, reverse=True))
+        raise UsageError(f"there is nothing to compute: the surface reflects nothing ({zero} 0)")
     rows = spread(len(directions.theta_i), count)
     i, o = (
         np.asarray(direction(theta[rows], phi[rows]))

@@ -15,7 +15,7 @@ from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.problem import Problem
 from pellicle.scene.surface import FreeNumber, Surface, nonzero_numbers
 
-NATURAL = frozenset({"k", "base_k", "deviation", "specular", "diffuse", "thickness"})
+NATURAL = frozenset({"k", "base_k", "deviation", "specular", "coat", "diffuse", "thickness"})
 """Their lower bound, 0, is set by physics."""
 _MIRROR = frozenset({"exponent", "exponent_reflection", "exponent_transmission"})
 """Beyond their upper bound lies a mirror, which samples at some distance cannot tell from a narrow lobe."""
@@ -81,7 +81,7 @@ def _parameter(number: FreeNumber, tilted: bool, folded: bool) -> Parameter:
     free, key = number.free, number.key
     turns = key == "azimuth" and tilted
     lower, upper = (0.0, 180.0) if turns and folded else (free.lower, free.upper)
-    from_zero = (free.lower == 0 and key in NATURAL) or key == "roughness"
+    from_zero = (free.lower == 0 and key in NATURAL) or key in ("roughness", "coat_roughness")
     resolution = np.inf if number.parameter.linear else _RESOLUTION if key == "thickness" else None
     return Parameter(
         name=number.name,
