@@ -2,8 +2,8 @@
 
 Interference of Belcour and Barla with three orders, Fresnel's equations for s and p, and one index n + ik of
 the base per channel. The film is transparent and without dispersion. Light is white of equal energy, whose
-colour is taken for that of D65. Cycles 4.2 to 4.5 know films on dielectrics only, and use the Gaussians that
-glTF uses in place of the transforms.
+colour is taken for that of D65. Blender 4.2 has films on dielectrics only, with the Gaussians of glTF in
+place of the transforms.
 
 Source: Blender 5.0.1, `intern/cycles/kernel/closure/bsdf_util.h` (`fresnel_iridescence`) and
 `intern/cycles/doc/precompute/thin_film_table.py`; renders agree with this module to 1e-6.
