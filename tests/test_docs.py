@@ -86,6 +86,7 @@ ELSEWHERE = {
     "python benchmarks/colour_series.py": "tests/colour/test_series.py: fewer colours",
     "python benchmarks/posterior.py": _LONG_STUDY,
     "python benchmarks/colour.py": _LONG_STUDY,
+    "python benchmarks/brdf_bands.py": "takes minutes; tests/brdf/test_sensor_bands.py: its bands",
     "python benchmarks/brdf_errors.py": "tests/fitting/brdf/test_errors.py: fewer runs",
     "python benchmarks/brdf_recovery.py": _LONG_STUDY,
     "python -m pytest": "runs these tests",
