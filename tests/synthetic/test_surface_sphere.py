@@ -5,7 +5,7 @@ import pytest
 
 import pellicle as pl
 from pellicle.brdf.directions import direction, frame
-from pellicle.colour import sensor
+from pellicle.colour import film_colour, sensor
 from pellicle.colour.spaces import SRGB_WHITE, TO_SRGB, adaptation
 from pellicle.synthetic.environment import Environment, one_lamp, studio
 from pellicle.synthetic.relief import relief
@@ -122,9 +122,14 @@ def test_deviation_and_thickness_follow_the_noise_between_their_bounds():
     assert following(LAYERED, noise) == {}
 
 
-def test_a_surface_of_one_channel_has_a_colour():
-    grey = pl.Surface("microfacet-film", {"thickness": 40.0, "n": 2.9}, wavelengths=(550.0,))
-    assert in_colour(grey).numbers["table"].xyz(40.0, 1.0).shape == (3,)
+def test_media_have_their_own_index_at_each_wavelength():
+    """A table of a named film and base is that of `film_colour`, whatever the channels of the surface."""
+    oxide = pl.Surface(
+        "microfacet-film", {"thickness": 140.0}, wavelengths=(550.0,), film="Fe2O3", base="BK7"
+    )
+    found = in_colour(oxide).numbers["table"].xyz(140.0, 1.0)
+    expected = film_colour(140.0, pl.material("Fe2O3"), pl.material("BK7"), method="uniform-64").xyz
+    np.testing.assert_allclose(found, expected, atol=3e-4)
 
 
 def test_the_brdf_in_the_plane_of_incidence():
@@ -134,5 +139,5 @@ def test_the_brdf_in_the_plane_of_incidence():
     o = np.stack([-np.sin(at), 0 * at, np.cos(at)], axis=-1)
     i = np.broadcast_to([np.sqrt(0.5), 0.0, np.sqrt(0.5)], o.shape)
     facets, cosine = lobe(i, o)
-    expected = facets[:, None] * film(nm, cosine, np.array(UNEVEN.channel_wavelengths)) + STEEL["diffuse"]
+    expected = facets[:, None] * film(nm, cosine, UNEVEN.bands.wavelength) + STEEL["diffuse"]
     np.testing.assert_allclose(in_plane(UNEVEN, 45.0, leaving), expected, rtol=1e-5)

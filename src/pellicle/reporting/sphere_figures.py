@@ -71,13 +71,15 @@ def sphere(
 
 
 def _draw_lobe(axes: Axes, angle: float, values: np.ndarray, surface: Surface) -> None:
-    """The BRDF at each channel's wavelength in the plane of incidence."""
+    """The BRDF of each channel in the plane of incidence."""
     from matplotlib.ticker import MaxNLocator
 
-    order = np.argsort(surface.channel_wavelengths)[::-1]
-    colours = _CHANNELS if len(order) == 3 else [f"C{k}" for k in range(len(order))]
-    for colour, channel in zip(colours, order, strict=True):
-        label = f"{surface.channel_wavelengths[channel]:g} nm"
+    count = surface.channels
+    names = [f"channel {k + 1}" for k in range(count)] if count != 3 else ["R", "G", "B"]
+    if surface.sensor is None:
+        names = [f"{nm:g} nm" for nm in surface.bands.wavelength]
+    colours = _CHANNELS if count == 3 else [f"C{k}" for k in range(count)]
+    for channel, (colour, label) in enumerate(zip(colours, names, strict=True)):
         axes.plot(np.deg2rad(LEAVING), values[:, channel], color=colour, linewidth=1.2, label=label)
     axes.axvline(np.deg2rad(-angle), color="#777777", linestyle=":", linewidth=1.0)
     axes.set(theta_zero_location="N", theta_direction=-1, thetamin=-90, thetamax=90)

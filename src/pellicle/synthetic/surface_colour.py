@@ -14,11 +14,14 @@ from pellicle.colour.observers import Sensor
 from pellicle.dispersion.empirical import Table
 from pellicle.scene.free import Free
 from pellicle.scene.surface import INDICES, Surface
+from pellicle.scene.surface_media import index_numbers
 from pellicle.synthetic.colours import BANDS
 from pellicle.synthetic.film_spectra import to_srgb
 
 THIN = 1000.0
 """Optical thickness (nm) up to which 32 wavelengths suffice: ΔE2000 0.02 against steps of 1 nm."""
+_EVERYWHERE = sensor().wavelength
+"""Wavelengths (nm) of the table of a film, in steps of 1 nm."""
 STEEPEST = 85.0
 """Largest angle of incidence on a facet (degrees) in the table of a film; beyond it colours stay the same."""
 
@@ -36,18 +39,21 @@ def in_colour(surface: Surface) -> Shading:
 
     A model with the colour of a film takes it from a `FilmColourTable`, which is made in steps of 1 nm. The
     lobes of other models differ between wavelengths: they are evaluated at 32 wavelengths, or at 64 where
-    the layer is thick. An index given for each channel is interpolated linearly between the wavelengths of
-    the channels, and constant beyond them. Free parameters take their start values.
+    the layer is thick. Media have their own index at each wavelength; an index given for each channel is
+    interpolated linearly between the wavelengths of the channels, and constant beyond them. Free parameters
+    take their start values.
     """
     found: dict[str, Any] = dict(surface.start_numbers())
     low, high = thickness_range(surface)
     brdf = surface.brdf
+    found.pop("weights", None)  # of a sensor that is not the eye
     if brdf.from_film_colour is not None:
+        at = _at(surface, found, _EVERYWHERE)
         table = FilmColourTable.build(
-            _medium(surface, found, "n", "k"),
-            _medium(surface, found, "base_n", "base_k"),
+            _medium(at, "n", "k"),
+            _medium(at, "base_n", "base_k"),
             (0.99 * low, 1.01 * high + 1.0),
-            ambient=found.get("ambient_n", 1.0),
+            ambient=Table(_EVERYWHERE, at["ambient_n"]) if "ambient_n" in at else 1.0,
             angle=(0.0, STEEPEST),
         )
         matrix = to_srgb(sensor())
@@ -55,9 +61,7 @@ def in_colour(surface: Surface) -> Shading:
         return Shading(_by_table(brdf), found, np.eye(3))
     thick = high * float(np.max(found["n"])) > THIN
     bands = integration_bands(BANDS if thick else "uniform-32")
-    for key in {*INDICES} & found.keys():
-        found[key] = _interpolated(surface, found[key], bands.wavelength)
-    found["wavelengths"] = bands.wavelength
+    found |= _at(surface, found, bands.wavelength) | {"wavelengths": bands.wavelength}
     return Shading(brdf, found, to_srgb(Sensor(bands.wavelength, bands.weights)))
 
 
@@ -80,14 +84,20 @@ def _from_table(parameters: Any, i: Any, o: Any) -> Any:
     return parameters["table"].xyz(parameters["thickness"], cosine_to_half(i, o)) @ parameters["xyz_to_srgb"]
 
 
-def _medium(surface: Surface, numbers: dict[str, Any], n: str, k: str) -> Table:
-    """A medium whose index is given for each channel, as a table over all wavelengths."""
-    wavelength = np.array([1.0, *np.sort(surface.channel_wavelengths), 1e5])
-    index, extinction = (_interpolated(surface, numbers.get(key, 0.0), wavelength) for key in (n, k))
-    return Table(wavelength, index, extinction if np.any(extinction) else None)
-
-
-def _interpolated(surface: Surface, number: Any, wavelength: np.ndarray) -> np.ndarray:
-    channels = np.asarray(surface.channel_wavelengths)
+def _at(surface: Surface, numbers: dict[str, Any], nm: np.ndarray) -> dict[str, np.ndarray]:
+    """Indices (wavelengths,) of the surface: those of its media, and those of its channels interpolated."""
+    channels = surface.bands.wavelength
     order = np.argsort(channels)
-    return np.interp(wavelength, channels[order], np.broadcast_to(number, channels.shape)[order])
+    given = {
+        key: np.interp(nm, channels[order], np.broadcast_to(numbers[key], channels.shape)[order])
+        for key in INDICES
+        if key in numbers
+    }
+    for part, medium in (("film", surface.film), ("base", surface.base)):
+        given |= index_numbers(part, medium, nm, surface.numbers, surface.brdf)
+    return given
+
+
+def _medium(at: dict[str, np.ndarray], n: str, k: str) -> Table:
+    extinction = at.get(k)
+    return Table(_EVERYWHERE, at[n], extinction if extinction is not None and np.any(extinction) else None)
