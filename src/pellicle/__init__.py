@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from pellicle.api import cost as cost
     from pellicle.api import export as export
     from pellicle.api import fit as fit
+    from pellicle.api import map as map
     from pellicle.api import plan as plan
     from pellicle.api import sample as sample
     from pellicle.api import simulate as simulate
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from pellicle.data.spectrum import Spectrum as Spectrum
     from pellicle.data.write_spectrum import write_spectrum as write_spectrum
     from pellicle.dispersion import effective_medium as mixing  # noqa: F401
+    from pellicle.fitting.colours.thickness_map import ThicknessMap as ThicknessMap
     from pellicle.fitting.result import Fit as Fit
     from pellicle.fitting.result import Status as Status
     from pellicle.materials import material as material
@@ -53,13 +55,14 @@ if TYPE_CHECKING:
     from pellicle.synthetic.brdf import Directions as Directions
 
 _NAMES = {
-    "pellicle.api": ("compare", "cost", "export", "fit", "plan", "sample", "simulate"),
+    "pellicle.api": ("compare", "cost", "export", "fit", "map", "plan", "sample", "simulate"),
     "pellicle.data.brdf_samples": ("BrdfSamples",),
     "pellicle.data.colours": ("CameraMatrix", "Colours"),
     "pellicle.data.read_brdf": ("read_brdf_samples",),
     "pellicle.data.read_spectrum": ("read_spectra", "read_spectrum"),
     "pellicle.data.spectrum": ("Spectrum",),
     "pellicle.data.write_spectrum": ("write_spectrum",),
+    "pellicle.fitting.colours.thickness_map": ("ThicknessMap",),
     "pellicle.fitting.result": ("Fit", "Status"),
     "pellicle.materials": ("material",),
     "pellicle.recipes.colours": ("read_colours", "read_colours_by_film"),

@@ -12,10 +12,12 @@ from numpy.typing import ArrayLike
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.colours import Colours
 from pellicle.data.measurement import Measurement, check_measurement
+from pellicle.data.read_picture import read_picture
 from pellicle.data.spectrum import Spectrum
 from pellicle.effects.plan import Plan
 from pellicle.errors import UsageError
 from pellicle.fitting.brdf.fit import fit as fit_brdf
+from pellicle.fitting.colours.thickness_map import ThicknessMap, thickness_map
 from pellicle.fitting.comparison import Comparison
 from pellicle.fitting.comparison import compare as compare_fits
 from pellicle.fitting.progress import Progress, quiet
@@ -23,6 +25,8 @@ from pellicle.fitting.result import Fit
 from pellicle.fitting.spectra.fit import fit as fit_spectra
 from pellicle.planning.film import plan as film_plan
 from pellicle.planning.surface import plan as surface_plan
+from pellicle.recipes.cameras import Camera, sight
+from pellicle.recipes.picture_colours import check_picture
 from pellicle.sampling.ensemble import STEPS
 from pellicle.sampling.result import Posterior
 from pellicle.sampling.sample import OF_A_FILM, measured
@@ -359,6 +363,64 @@ def sample(
     )
 
 
+def map(
+    picture: str | os.PathLike[str],
+    scene: Scene,
+    *,
+    strip: str | Sequence[int] | None = None,
+    region: str | Sequence[int] | None = None,
+    space: str | None = None,
+    observer: str = "1931",
+    illuminant: str = "D65",
+    lamp: str | os.PathLike[str] | None = None,
+    sensitivities: str | os.PathLike[str] | None = None,
+    gamma: float = 1.0,
+    white: str | Sequence[int] | None = None,
+    layer: str | None = None,
+    noise: float | None = None,
+) -> ThicknessMap:
+    """Compute the thickness of a film at every pixel of a picture, or along a strip across a gradient.
+
+    Each position is inverted by itself (`pellicle.colour.ColourInverse`), between the bounds of the free
+    thickness; other free parameters take their start values. A free scale of the instrument is a free
+    exposure of each position.
+
+    **Arguments:**
+
+    - `picture`: path of a PNG, TIFF or JPEG file; `scene`: a film with a free thickness.
+    - `strip`: "x0,y0,x1,y1", the ends of a line, 5 pixels wide; or `region`: "x,y,width,height", by default
+      the whole picture. Pixels count from the upper left corner.
+    - `space`: "srgb" (the default), or "rgb" with its `gamma`.
+    - `observer`, `illuminant`, `lamp`, `sensitivities`, `white`: as in `pellicle.read_colours_by_film`.
+    - `layer`: name of the layer whose thickness is sought, the free one by default.
+    - `noise`: standard deviation of a coded channel, by default 1.5/255 of sRGB and 0.01 of "rgb".
+
+    **Returns:** `ThicknessMap`: `found` has thickness, standard error (of the noise alone), probability and
+    status of each position, the most probable thickness first.
+
+    **Raises:** DataError for a picture that cannot be read; UsageError for pixels outside it, and where no
+    thickness is free.
+    """
+    check_scene(scene)
+    paths = [None if path is None else os.fspath(path) for path in (lamp, sensitivities)]
+    transmitted = scene.light.signal == "T"
+    eye = Camera(observer, illuminant, *paths, gamma=gamma, transmitted=transmitted)
+    pixels = read_picture(picture)
+    space = check_picture(pixels, space)
+    return thickness_map(
+        pixels,
+        scene,
+        sight(eye, space),
+        space,
+        gamma=gamma,
+        along=strip,
+        region=region,
+        white=white,
+        layer=layer,
+        noise=noise,
+    )
+
+
 def compare(
     data: Measurement,
     scenes: Mapping[str, Scene | Sequence[Scene] | Surface],
@@ -402,9 +464,8 @@ def export(
 
     **Arguments:**
 
-    - `scene`: `Scene` or `Surface`, whose free parameters take their start values, or `Fit` with its best
-      values.
-    - `to`: "blender", "gltf", "materialx", "mitsuba", "openpbr" or "usd".
+    - `scene`: `Scene`, whose free parameters take their start values, or `Fit` with its best values.
+    - `to`: "gltf".
     - `path`: file to write, which must not exist; a record in JSON is written beside it.
     - `numbers`: the set that the renderer draws, "effective" or "physical".
     - `thickness_map`: thicknesses in nm over the object, (rows, columns) from the upper left, or the path of

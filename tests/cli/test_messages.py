@@ -14,7 +14,7 @@ from pellicle.cli.messages import FLAGS, as_flags
 from pellicle.cli.session import say
 from pellicle.cli.verbose import log_to_stderr
 
-COMMANDS = ("fit", "sample", "simulate", "plan", "compare", "cost", "export", "chart", "materials")
+COMMANDS = ("fit", "sample", "simulate", "plan", "compare", "cost", "export", "chart", "map", "materials")
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from pellicle.cli.demo import demo
 from pellicle.cli.export import export
 from pellicle.cli.fit import fit
 from pellicle.cli.interruption import interruptible
+from pellicle.cli.map import map
 from pellicle.cli.materials import materials
 from pellicle.cli.messages import as_flags
 from pellicle.cli.plan import plan
@@ -46,6 +47,7 @@ app.command(compare)
 app.command(cost)
 app.command(chart)
 app.command(export)
+app.command(map)
 app.command(materials)
 app.command(demo)
 app.register_install_completion_command(help="Install completion of commands and flags for this shell.")

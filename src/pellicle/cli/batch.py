@@ -205,11 +205,7 @@ class Batch:
         code = CONVERGED if fit.status == "converged" else UNCLEAR
         if posterior is not None and not posterior.trusted:
             code = TOO_SHORT
-        return (
-            code
-            if folder is None
-            else max(code, _write(folder, fit, posterior, identity, self.inputs.described))
-        )
+        return code if folder is None else max(code, _write(folder, fit, posterior, identity))
 
     def _repeat(self, found: Earlier, folder: Path) -> int:
         """Print the result of an earlier run, and return its exit code."""
@@ -237,14 +233,12 @@ class Batch:
         return posterior.fit, posterior
 
 
-def _write(
-    folder: Path, fit: Fit, posterior: Posterior | None, identity: str, described: dict[str, Any] | None
-) -> int:
+def _write(folder: Path, fit: Fit, posterior: Posterior | None, identity: str) -> int:
     """Write the folder of a result, and return FAILED where it cannot be written."""
     from pellicle.reporting.folders import write_fit
 
     try:
-        write_fit(folder, fit, posterior, identity, described)
+        write_fit(folder, fit, posterior, identity)
     except ValueError as error:  # the result is printed, and the other files go on
         say(f"pellicle: {error}; the result is printed, and the same command writes its files")
         return FAILED

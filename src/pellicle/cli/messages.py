@@ -58,6 +58,7 @@ FLAGS = {
     "spectrum": "--spectrum",
     "spot": "--spot",
     "steps": "--steps",
+    "strip": "--strip",
     "substrate": "--substrate",
     "thickness": "--thickness",
     "thickness_map": "--thickness-map",

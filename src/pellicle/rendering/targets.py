@@ -37,10 +37,7 @@ class Target(NamedTuple):
 MODULES = {
     "blender": "pellicle.rendering.blender",
     "gltf": "pellicle.rendering.gltf",
-    "materialx": "pellicle.rendering.materialx",
     "mitsuba": "pellicle.rendering.mitsuba",
-    "openpbr": "pellicle.rendering.openpbr",
-    "usd": "pellicle.rendering.usd",
 }
 """The module of each target."""
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from pellicle.colour import integration_bands, sensor
 from pellicle.colour.film import Colour
+from pellicle.colour.observers import Sensor
 from pellicle.colour.table import REFERENCE, TOLERANCE, FilmColourTable
 from pellicle.effects.film import exact
 from pellicle.errors import UsageError
@@ -82,18 +83,21 @@ def colour_table(
     *,
     observer: str = "1931",
     illuminant: str = "D65",
+    eye: Sensor | None = None,
     tolerance: float = TOLERANCE,
 ) -> FilmColourTable:
     """Table of a film's colours over thickness and angle, for lookups and for the inverse from colours.
 
-    **Arguments:** `thickness` (nm) and `angle` (degrees) are ranges; `tolerance` is the largest ΔE*ab; the
-    rest as for `interference_colours`. The spectrum is integrated in steps of 1 nm.
+    **Arguments:** `thickness` (nm) and `angle` (degrees) are ranges; `eye` is a sensor in place of `observer`
+    and `illuminant`, with whose channels the table then has "XYZ"; `tolerance` is the largest ΔE*ab; the rest
+    as for `interference_colours`. The spectrum is integrated in the steps of the sensor, 1 nm.
 
     **Raises:** as `interference_colours` and `FilmColourTable.from_colours` do.
     """
     if scene.light.signal == "psi-delta":
         raise UsageError("ellipsometry has no colour: use a recipe with signal R or T")
-    eye, position = sensor(observer, illuminant), varied_layer(scene, layer)
+    eye = sensor(observer, illuminant) if eye is None else eye
+    position = varied_layer(scene, layer)
     at_eye = with_wavelength(scene, eye.wavelength)
     varying = _over(at_eye, np.array(thickness), np.array(angle), position)
     with jax.enable_x64(True):

@@ -1,0 +1,165 @@
+"""Thickness of a film at every pixel of a picture, or along a strip, from its colours."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pellicle.colour import ColourInverse
+from pellicle.colour.inverse import ColourThickness
+from pellicle.colour.observers import Sensor
+from pellicle.data.colours import USUAL_NOISE
+from pellicle.data.picture_regions import Region, parse_regions, strip
+from pellicle.data.read_picture import Picture
+from pellicle.errors import UsageError
+from pellicle.recipes.cameras import Sight
+from pellicle.recipes.picture_colours import white_reference
+from pellicle.scene.film import Scene
+from pellicle.scene.free import Free
+from pellicle.scene.instrument import Drift
+from pellicle.synthetic.colours import colour_table, varied_layer
+
+EXPOSURE = (0.25, 4.0)
+"""Range of a free scale: two stops of a camera to either side."""
+ORDERS = 4
+"""Thicknesses of each pixel that are kept."""
+
+
+class ThicknessMap(NamedTuple):
+    """Thicknesses of a film along a strip, arrays (positions, ...), or of pixels, (height, width, ...).
+
+    `colours` (..., 3) are the measured ones, as coded, and `fitted` those of the most probable thickness;
+    `found` has the thicknesses, most probable first. `position` (positions,) is in pixels from the start of
+    the strip, None for a region.
+    """
+
+    colours: np.ndarray
+    fitted: np.ndarray
+    found: ColourThickness
+    position: np.ndarray | None
+    where: str  # the strip or the region, as numbers
+    space: str
+    notes: tuple[str, ...]
+    path: str
+    sha256: str
+
+    @property
+    def converged(self) -> float:
+        """Share of the positions with one thickness."""
+        return float(np.mean(self.found.status == "converged"))
+
+
+def thickness_map(
+    picture: Picture,
+    scene: Scene,
+    seen: Sight,
+    space: str = "srgb",
+    *,
+    gamma: float = 1.0,
+    along: Any = None,
+    region: Any = None,
+    white: Any = None,
+    layer: str | None = None,
+    noise: float | None = None,
+) -> ThicknessMap:
+    """Compute the thickness at each pixel of a region, of the whole picture, or along a strip.
+
+    Each position is inverted by itself (`pellicle.colour.ColourInverse`), between the bounds of the free
+    thickness. A free scale of the instrument is a free exposure of each position.
+
+    **Arguments:**
+
+    - `seen`: what sees the colours, without a chart; `space` "srgb" or "rgb" with its `gamma`.
+    - `along`: "x0,y0,x1,y1", the ends of a strip 5 pixels wide; `region`: "x,y,width,height".
+    - `white`: region of a perfect reflector.
+    - `layer` whose thickness is sought, the free one by default; other free parameters take their start
+      values.
+    - `noise`: standard deviation of the coded channels, 1.5/255 of sRGB and 0.01 of "rgb" by default.
+
+    **Raises:** UsageError for a chart, for a thickness that is not free and for pixels outside the picture.
+    """
+    if seen.matrix is not None:
+        raise UsageError("a map needs `sensitivities` or sRGB; a `chart` is for colours of regions")
+    if along is not None and region is not None:
+        raise UsageError("`strip` and `region` exclude each other")
+    bounds: Any = getattr(scene.layers[varied_layer(scene, layer)], "thickness", None)
+    if not isinstance(bounds, Free):
+        raise UsageError("the thickness of the map must be free, between two bounds")
+    reference, notes = white_reference(picture, seen.coding, white)
+    position = None
+    if along is not None:
+        taken = strip(picture, along)
+        position, where = taken.position, along if isinstance(along, str) else ",".join(map(str, along))
+        linear = seen.coding.decoded(taken.pixels).mean(axis=1, dtype=float)
+        step = f"strip {where}: {len(position)} positions, means of {taken.pixels.shape[1]} pixels"
+    else:
+        box = Region(0, 0, *picture.size) if region is None else _only(parse_regions(region))
+        pixels = box.pixels(picture).reshape(box.height, box.width, 3)
+        linear, where = seen.coding.decoded(pixels), str(box)
+        step = f"region {where}: {box.width * box.height} pixels"
+    exposed = linear / reference
+    coded = seen.coding.encode(exposed, seen.coding.roots(exposed))
+    clipped = np.mean(np.any((coded <= 0) | (coded >= 1), axis=-1))
+    sigma = USUAL_NOISE[space] if noise is None else noise
+    told = [*picture.notes, *seen.notes, *notes, step, f"noise {sigma:.2g} of each channel"]
+    if clipped > 0:
+        told.append(f"{100 * clipped:.2g} % of the positions are clipped in a channel")
+    inverse = _inverse(scene, seen.sensor, space, bounds, layer, sigma, gamma, linear)
+    found = inverse(coded if space == "srgb" else exposed, ORDERS)
+    return ThicknessMap(
+        coded,
+        _fitted(inverse, found, seen),
+        found,
+        position,
+        where,
+        space,
+        tuple(told),
+        picture.path,
+        picture.sha256,
+    )
+
+
+def _only(regions: list[Region]) -> Region:
+    if len(regions) > 1:
+        raise UsageError("`region` of a map must be one rectangle")
+    return regions[0]
+
+
+def _inverse(
+    scene: Scene,
+    eye: Sensor,
+    space: str,
+    bounds: Free,
+    layer: str | None,
+    sigma: float,
+    gamma: float,
+    linear: np.ndarray,
+) -> ColourInverse:
+    """The inverse of the film's colours; a camera's channels are linear, with the σ of their median."""
+    light: Any = scene.light.angle
+    angle = float(getattr(light, "start", light))
+    low = max(angle - 1.0, 0.0)  # a table needs a range of angles
+    table = colour_table(scene, (bounds.lower, bounds.upper), (low, low + 1.0), layer, eye=eye)
+    scale = scene.instrument.scale
+    known = None if isinstance(scale, Drift) else float(getattr(scale, "start", scale))
+    spread = np.full(3, sigma)
+    if space == "rgb":
+        middle = np.maximum(np.median(linear.reshape(-1, 3), axis=0), 1e-3)
+        spread = sigma * gamma * middle ** (1 - 1 / gamma)
+    return ColourInverse.build(
+        table,
+        angle,
+        space="srgb" if space == "srgb" else "xyz",
+        sigma=spread,
+        exposure=EXPOSURE if known is None else known,
+    )
+
+
+def _fitted(inverse: ColourInverse, found: ColourThickness, seen: Sight) -> np.ndarray:
+    """Coded colours of the most probable thicknesses, at their exposures."""
+    best, exposure = found.thickness[..., 0], found.exposure[..., 0]
+    columns = inverse.channels[:, 0].T
+    channels = np.stack([np.interp(best, inverse.thickness, column) for column in columns], axis=-1)
+    exposed = channels * exposure[..., None]
+    return seen.coding.encode(exposed, seen.coding.roots(exposed))
