@@ -331,7 +331,7 @@ def test_toml_parses_and_complete_recipes_are_valid(page):
 
 
 def test_every_flag_on_a_page_exists(monkeypatch, capsys):
-    helps, names = [], "fit sample simulate plan compare cost chart export materials read"
+    helps, names = [], "fit sample simulate plan compare cost chart export map materials read"
     for command in ("", *names.split()):
         monkeypatch.setattr(sys, "argv", ["pellicle", *command.split(), "--help"])
         main()
