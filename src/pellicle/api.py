@@ -20,6 +20,8 @@ from pellicle.fitting.brdf.fit import fit as fit_brdf
 from pellicle.fitting.colours.thickness_map import ThicknessMap, thickness_map
 from pellicle.fitting.comparison import Comparison
 from pellicle.fitting.comparison import compare as compare_fits
+from pellicle.fitting.joint import fit as fit_jointly
+from pellicle.fitting.joint import of_both_kinds
 from pellicle.fitting.progress import Progress, quiet
 from pellicle.fitting.result import Fit
 from pellicle.fitting.spectra.fit import fit as fit_spectra
@@ -266,7 +268,7 @@ def cost(
 
 def fit(
     data: Measurement,
-    scene: Scene | Sequence[Scene] | Surface,
+    scene: Scene | Sequence[Scene] | Surface | Sequence[Scene | Surface],
     *,
     tolerance: float = 0.0,
     loss: str = "least-squares",
@@ -278,9 +280,10 @@ def fit(
     **Arguments:**
 
     - `data`: `Spectrum` or `Colours`, or a list of these, of one sample (a joint fit); or `BrdfSamples`, or a
-      list.
+      list; or a list of both kinds.
     - `scene`: `Scene`, or a list with one for each spectrum; `Surface` for `BrdfSamples`. Signal, angle and
-      polarisation come from the data.
+      polarisation come from the data. For a list of both kinds it is a list too, of scenes and the surface:
+      free numbers of one name, such as `thickness`, are then one.
     - `tolerance`: leave out effects that change the signal by less (see `pellicle.plan`); where the best fit
       turns out to be off by more, the fit is done again with every effect.
     - `loss`: "least-squares", or "huber" or "student-t" against outliers.
@@ -307,6 +310,10 @@ def fit(
     """
     check_measurement(data)
     check_scene(scene, several=True)
+    if of_both_kinds(scene):
+        every: Any = data
+        options = {"residual": residual, "tolerance": tolerance, "loss": loss, "progress": progress}
+        return fit_jointly(every, scene, **options)
     if isinstance(scene, Surface):
         samples = measured((BrdfSamples,), data)
         return fit_brdf(samples, scene, residual=residual, tolerance=tolerance, loss=loss, progress=progress)

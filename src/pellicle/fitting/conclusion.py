@@ -54,8 +54,8 @@ def linearised(ranked: RankedMinima) -> tuple[Scaled, Errors]:
     """The scaled Jacobian at the best minimum, and the covariance from it."""
     at, variance = [fit.at for fit in ranked.fits], [fit.variance for fit in ranked.fits]
     jacobian = scaled(ranked.problem, ranked.minima.units[0], at, variance)
-    first = np.cumsum([0, *(view.independent for view in ranked.problem.views)]).tolist()
-    pairs = zip(first, ranked.fits, strict=False)
+    sizes = [view.residuals(own).size for view, own in zip(ranked.problem.views, at, strict=True)]
+    pairs = zip(np.cumsum([0, *sizes]).tolist(), ranked.fits, strict=False)
     return jacobian, errors(jacobian, {at: fit.scores for at, fit in pairs if fit.scores is not None})
 
 

@@ -317,7 +317,7 @@ class Fit(PlotMixin):
     warnings: tuple[str, ...]
     profile: Profile | None
     seconds: float
-    scene: Scene | tuple[Scene, ...] | Surface | None = None
+    scene: Scene | tuple[Scene | Surface, ...] | Surface | None = None
     layer_test: LayerTest | None = None
     budget: tuple[SystematicEffect, ...] = ()
     probability: float | None = None
@@ -379,8 +379,8 @@ class Fit(PlotMixin):
     @property
     def index(self) -> Index:
         """The layer's n and k at every wavelength of any spectrum or sensor, each once."""
-        curves = [part.curve for part in self.parts]
-        if any(isinstance(curve, BrdfCurve) for curve in curves):
+        curves = [part.curve for part in self.parts if not isinstance(part.curve, BrdfCurve)]
+        if not curves:
             raise TypeError("BRDF samples were fitted: the index is among the parameters")
         columns = {f.name: np.concatenate([getattr(c, f.name) for c in curves]) for f in fields(Index)}
         _, first = np.unique(columns["wavelength"], return_index=True)

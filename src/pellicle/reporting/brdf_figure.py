@@ -25,8 +25,8 @@ def draw(fit: Fit) -> Figure:
     figure = new_figure(8.0, 5.6 * count)
     panels = figure.subplots(2 * count, 1, sharex=True, height_ratios=(3, 1.3) * count)
     for part, above, below in zip(fit.parts, panels[::2], panels[1::2], strict=True):
-        _samples(above, part)
-        _residuals(below, part)
+        draw_samples(above, part)
+        draw_residuals(below, part)
         if fit.joint:
             above.set_title(part.name.replace("$", r"\$"), fontsize="small", loc="left")
     figure.suptitle(f"{fit.surface.model}: {fit.status}", fontsize="medium", x=0.01, ha="left")
@@ -42,7 +42,7 @@ def half_angle(samples: BrdfSamples) -> np.ndarray:
     return np.rad2deg(np.arctan2(np.hypot(half[0], half[1]), half[2]))
 
 
-def _samples(axes: Axes, part: Part) -> None:
+def draw_samples(axes: Axes, part: Part) -> None:
     """Draw samples and model, on a logarithmic axis if all are positive: a lobe spans decades."""
     samples, model = part.samples, part.curve.model
     angle, size = half_angle(samples), marker_size(len(samples))
@@ -56,7 +56,7 @@ def _samples(axes: Axes, part: Part) -> None:
     axes.legend(fontsize="small")
 
 
-def _residuals(axes: Axes, part: Part) -> None:
+def draw_residuals(axes: Axes, part: Part) -> None:
     """Draw samples − model, in σ where that is known."""
     samples, sigma = part.samples, part.samples.sigma
     residuals = (samples.values - part.curve.model) / (1.0 if sigma is None else sigma)

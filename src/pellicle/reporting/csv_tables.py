@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.colours import Colours
 from pellicle.data.tabular.columns import DIRECTIONS
 
@@ -123,7 +124,16 @@ def _joint_csv(fit: Fit) -> str:
 
 
 def _joint_rows(part: Part) -> Iterable[tuple[str | float, ...]]:
-    """A row for each value; Ψ, Δ and depolarisation are three, and so is a colour."""
+    """A row for each value; Ψ, Δ and depolarisation are three, and so is a colour.
+
+    The angle of a BRDF sample is that of the light.
+    """
+    if isinstance(part.data, BrdfSamples):
+        table = zip(part.data.theta_i, part.data.values, part.curve.model, strict=True)
+        for angle, values, model in table:
+            for name, value, own in zip(part.data.channels, values, model, strict=True):
+                yield part.name, name, math.nan, angle, value, own, value - own, math.nan
+        return
     if isinstance(part.data, Colours):
         from pellicle.reporting import fitted_colours
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from pellicle.fitting.result import ColourCurve, Curve
+from pellicle.fitting.result import BrdfCurve, ColourCurve, Curve
 from pellicle.fitting.status import RIVAL
 from pellicle.reporting import brdf_figure, fitted_colours, psi_delta
 from pellicle.reporting.drawing import ABOVE, BLACK, BLUE, FITTED, GAP, GREY, ORANGE, marker_size, new_figure
@@ -109,6 +109,8 @@ def _arrange(figure: Figure, rows: list[Axes], panels: list[_Panel], title: str)
 def _panels_of_data(part: Part) -> list[_Panel]:
     if isinstance(part.curve, ColourCurve):
         rows = [(fitted_colours.patches, 1.6, 0), (fitted_colours.residuals, 1.3, 1)]
+    elif isinstance(part.curve, BrdfCurve):
+        rows = [(brdf_figure.draw_samples, 3.0, 0), (brdf_figure.draw_residuals, 1.3, 0)]
     elif part.spectral.delta_data is None:
         rows = [(_data, 3.0, 0), (_residuals, 1.3, 1)]
     else:

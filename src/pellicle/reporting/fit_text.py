@@ -183,5 +183,6 @@ def _sweeps(part: Part, free: int) -> list[tuple[str, str]]:
 
 def _plan(part: Part) -> list[str]:
     """Every effect, on or off, and why; under the name of the spectrum in a joint fit."""
-    rows = facts((f"{row.effect:<13} {'on' if row.on else 'off':<3}", row.why) for row in part.plan.rows)
+    width = max(len(row.effect) for row in part.plan.rows)
+    rows = facts((f"{row.effect:<{width}} {'on' if row.on else 'off':<3}", row.why) for row in part.plan.rows)
     return [*(wrapped(f"{part.name}:") if part.name else []), *rows]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Sequence
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import jax
 
@@ -14,6 +14,7 @@ from pellicle.data.colours import Colours
 from pellicle.data.measurement import Measurement
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
+from pellicle.fitting import joint
 from pellicle.fitting.brdf import fit as brdf
 from pellicle.fitting.brdf.summary import evidence as sample_evidence
 from pellicle.fitting.conclusion import linearised
@@ -77,6 +78,16 @@ def sample(
         compared = fit.layer_test.residual if fit.layer_test else ""
         numbers = dict(scene.numbers), tuple(scene.bands), scene.media
         identity = fingerprint([*columns, numbers], scene.model, compared, tolerance)
+    elif joint.of_both_kinds(scene):
+        every: Any = data
+        fit, ranked, residuals = joint.fitted(every, cast(Any, scene), tolerance, progress, residual=residual)
+        with jax.enable_x64(True):
+            jacobian, _ = linearised(ranked)
+            own = joint.apart(every, cast(Any, scene))
+            columns = [(s.theta_i, s.phi_i, s.theta_o, s.phi_o, s.values, s.sigma) for s in own.samples]
+            numbers = own.surface.model, dict(own.surface.numbers), own.surface.channel_wavelengths
+            targets = spectra.measurements(own.films, own.scenes)
+            identity = fingerprint([targets, *columns, numbers], residual, tolerance)
     else:
         measurements = measured(OF_A_FILM, data)
         fit, ranked = spectra.fitted(measurements, scene, tolerance, progress)

@@ -1,0 +1,229 @@
+"""Joint fits of a film: its spectra and colours, and BRDF samples of a surface that has the same film.
+
+Both kinds of data are fitted apart first. The numbers that bear one name in the scene and in the surface
+(`thickness`, `n`) are then one parameter, and all data are fitted together from every pair of minima.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+
+from pellicle.data.brdf_samples import BrdfSamples
+from pellicle.data.colours import Colours
+from pellicle.data.spectrum import Spectrum
+from pellicle.errors import UsageError
+from pellicle.fitting.brdf import fit as of_samples
+from pellicle.fitting.brdf import summary as samples_summary
+from pellicle.fitting.budget import budget
+from pellicle.fitting.conclusion import conclude, linearised
+from pellicle.fitting.coordinates import Box, Coordinates
+from pellicle.fitting.covariance import Scaled
+from pellicle.fitting.discrepancy import Evidence, discrepancy
+from pellicle.fitting.minima import minima
+from pellicle.fitting.problem import Problem
+from pellicle.fitting.progress import Progress, quiet
+from pellicle.fitting.result import Fit
+from pellicle.fitting.reweighting import RankedMinima, rank
+from pellicle.fitting.robust_losses import LEAST_SQUARES
+from pellicle.fitting.spectra import fit as of_film
+from pellicle.fitting.spectra import parts, summary
+from pellicle.fitting.spectra.evidence import evidence
+from pellicle.fitting.spectra.targets import Target
+from pellicle.fitting.status import verdict
+from pellicle.scene.film import Scene
+from pellicle.scene.surface import Surface
+
+_MOST_FILMS, _MOST_SURFACES = 8, 6
+"""Minima of each kind of data that are combined."""
+
+Datum = Spectrum | Colours | BrdfSamples
+
+
+def of_both_kinds(scene: Any) -> bool:
+    """True for a list with a Scene and a Surface in it."""
+    kinds = {type(each) for each in scene} if isinstance(scene, list | tuple) else set()
+    return {Scene, Surface} <= kinds
+
+
+class Apart(NamedTuple):
+    """The data of a joint fit by kind, in their order: those of the film with their scenes, and BRDF samples
+    with their surface."""
+
+    films: list[Spectrum | Colours]
+    scenes: list[Scene]
+    samples: list[BrdfSamples]
+    surface: Surface
+
+
+def apart(data: Sequence[Datum], scene: Sequence[Scene | Surface]) -> Apart:
+    """Sort data and scenes by kind. Raises UsageError where they do not match or share no number."""
+    rows = list(zip(data, scene, strict=True)) if len(data) == len(scene) else []
+    films = [(d, s) for d, s in rows if isinstance(d, Spectrum | Colours) and isinstance(s, Scene)]
+    samples = [(d, s) for d, s in rows if isinstance(d, BrdfSamples) and isinstance(s, Surface)]
+    if not rows or len(films) + len(samples) < len(rows):
+        raise UsageError(
+            "a joint fit of BRDF samples and of spectra or colours needs a list of as many scenes: a Surface"
+            " for samples, a Scene for the others"
+        )
+    surfaces = [s for _, s in samples]
+    if any(s is not surfaces[0] for s in surfaces):
+        raise UsageError("the BRDF samples of a joint fit need one Surface, the same for all")
+    return Apart([d for d, _ in films], [s for _, s in films], [d for d, _ in samples], surfaces[0])
+
+
+def fit(
+    data: Sequence[Datum],
+    scene: Sequence[Scene | Surface],
+    *,
+    residual: str | None = None,
+    tolerance: float = 0.0,
+    loss: str = LEAST_SQUARES,
+    progress: Progress = quiet,
+) -> Fit:
+    """Fit spectra or colours and BRDF samples of one film; the arguments are those of `pellicle.fit`.
+
+    **Raises:** as `apart` does, and as fits of each kind do.
+    """
+    return fitted(data, scene, tolerance, progress, loss, residual)[0]
+
+
+def fitted(
+    data: Sequence[Datum],
+    scene: Sequence[Scene | Surface],
+    tolerance: float,
+    progress: Progress,
+    loss: str = LEAST_SQUARES,
+    residual: str | None = None,
+) -> tuple[Fit, RankedMinima, list[Evidence]]:
+    """The result of `fit`, the ranked minima that it rests on, and the evidence of each view."""
+    began, own = time.perf_counter(), apart(data, scene)
+    film, film_ranked = of_film.fitted(own.films, own.scenes, tolerance, progress, loss)
+    brdf, brdf_ranked = of_samples.fitted(own.samples, own.surface, tolerance, progress, loss, residual)
+    with jax.enable_x64(True):
+        targets = of_film.measurements(own.films, own.scenes)
+        problem, starts = _combined(film_ranked, brdf_ranked)
+        ranked = rank(problem, minima(problem, starts, progress), loss)
+        return _concluded(own, targets, ranked, film, brdf, began)
+
+
+def _combined(film: RankedMinima, brdf: RankedMinima) -> tuple[Problem, np.ndarray]:
+    """The problem of all data, and starts (starts, parameters) from pairs of minima."""
+    first, second = film.searched, brdf.searched
+    shared = {p.name: i for i, p in enumerate(first.parameters)}
+    both = {j: shared[p.name] for j, p in enumerate(second.parameters) if p.name in shared}
+    if not any(first.parameters[i].key == "thickness" for i in both.values()):
+        raise UsageError(
+            "the scene and the surface share no free thickness: free both under one name, as in"
+            " pl.Layer(material, pl.Free(10, 1000)) and {'thickness': pl.Free(10, 1000)}"
+        )
+    parameters, lower, upper = list(first.parameters), np.array(first.box.lower), np.array(first.box.upper)
+    for j, i in both.items():
+        p, q = parameters[i], second.parameters[j]
+        lower[i], upper[i] = max(p.lower, q.lower), min(p.upper, q.upper)
+        if not lower[i] < upper[i]:
+            raise UsageError(f"the bounds of {p.name} in the scene and in the surface do not overlap")
+        parameters[i] = replace(p, lower=float(lower[i]), upper=float(upper[i]))
+    rest = [j for j in range(len(second.parameters)) if j not in both]
+    where = both | {j: len(parameters) + at for at, j in enumerate(rest)}
+    parameters += [second.parameters[j] for j in rest]
+
+    def joined(one: Any, other: Any) -> np.ndarray:
+        return np.concatenate([one, np.asarray(other)[rest]])
+
+    priors = (joined(getattr(first.box, x), getattr(second.box, x)) for x in Box._fields[2:5])
+    box = Box(joined(lower, second.box.lower), joined(upper, second.box.upper), *priors, second.box.reach)
+    log, tilt = second.coordinates.log, second.coordinates.tilt
+    coordinates = Coordinates(
+        tuple(joined(np.zeros(len(lower), bool), log).tolist()) if log else (),
+        None if tilt is None else (where[tilt[0]], where[tilt[1]]),
+        second.coordinates.folded,
+    )
+    names = [view.name for view in second.views]
+    views = [replace(v, takes=tuple(where[i] for i in v.takes)) for v in second.views]
+    views = [
+        replace(v, name=name or f"brdf-{i}") for i, (v, name) in enumerate(zip(views, names, strict=True))
+    ]
+    values = np.asarray(first.values(film.minima.units))[:_MOST_FILMS]
+    others = brdf.minima.units[:_MOST_SURFACES]
+    their = np.asarray(second.values(others))
+    starts = []
+    for row in values:
+        for units, numbers in zip(others, their, strict=True):
+            shared_numbers = row.copy()
+            for j, i in both.items():
+                shared_numbers[i] = numbers[j]
+            for each in (row, shared_numbers):
+                own = np.clip((each - lower) / (upper - lower), 0.0, 1.0)
+                starts.append(np.concatenate([own, units[rest]]))
+    problem = Problem((*first.views, *views), tuple(parameters), box, coordinates)
+    return problem, np.array(starts)
+
+
+def _concluded(
+    own: Apart, targets: list[Target], ranked: RankedMinima, film: Fit, brdf: Fit, began: float
+) -> tuple[Fit, RankedMinima, list[Evidence]]:
+    """The joint fit at the best of the ranked minima."""
+    count = len(targets)
+    problem, fits = ranked.problem, ranked.fits
+    of_films = replace(ranked, problem=problem._replace(views=problem.views[:count]), fits=fits[:count])
+    of_surface = replace(ranked, problem=problem._replace(views=problem.views[count:]), fits=fits[count:])
+    jacobian, covariance = linearised(ranked)
+    before = sum(view.points for view in of_films.problem.views)
+    below: Scaled = jacobian._replace(jacobian=jacobian.jacobian[before:])
+    found_in = [*evidence(targets, of_films, jacobian), *samples_summary.evidence(of_surface, below)]
+    found = discrepancy(found_in, jacobian, ranked.minima.units[0])
+    film_parts = parts.parts(own.films, of_films, found.errors)
+    every = (*film_parts, *samples_summary.parts(own.samples, of_surface))
+    missed = parts.missed(film_parts, of_films, replace(found, remaining=found.remaining[:count]))
+    pairs = zip(of_surface.problem.views, of_surface.fits, every[count:], strict=True)
+    wrong = [*missed, *(part for view, fit, part in pairs if samples_summary.misses(view, fit))]
+    conclusion = conclude(
+        ranked,
+        jacobian,
+        covariance,
+        found,
+        misfit=bool(wrong),
+        fixed=[*summary.fixed(targets), *samples_summary.fixed(own.surface)],
+        scans={},
+        amend=lambda limits: samples_summary.amended(problem, summary.amended(targets, of_films, limits)),
+    )
+    worst = (wrong or every)[0]
+    result = Fit(
+        parts=every,
+        status=conclusion.status,
+        verdict=verdict(
+            conclusion.status, conclusion.parameters, conclusion.rivals, worst.rms, worst.name, trading=()
+        ),
+        parameters=conclusion.parameters,
+        rivals=conclusion.rivals,
+        chi2_reduced=ranked.chi2_reduced,
+        rms=None,
+        effective_points=sum(part.effective_points for part in every),
+        correlation_names=covariance.names,
+        correlation=found.errors.correlation,
+        warnings=tuple(dict.fromkeys([*_apart_warning(film, brdf), *film.warnings, *brdf.warnings])),
+        profile=None,
+        seconds=time.perf_counter() - began,
+        scene=(*own.scenes, own.surface),
+        budget=budget(found, problem.parameters),
+    )
+    return result, ranked, found_in
+
+
+def _apart_warning(film: Fit, brdf: Fit) -> list[str]:
+    """A sentence where the two kinds of data, each alone, do not agree on a number that they share."""
+    result = []
+    for name in [p.name for p in film.free if p.name in {q.name for q in brdf.free}]:
+        one, other = film[name], brdf[name]
+        if abs(one.value - other.value) > 3 * np.hypot(one.stderr, other.stderr):
+            apart_by = [f"{name} {p.value:.5g} ± {p.stderr:.2g} {p.unit}".rstrip() for p in (one, other)]
+            result.append("alone the spectra and colours give {}, the BRDF samples {}".format(*apart_by))
+    if brdf.layer_test is not None and not brdf.layer_test.layered:
+        result.append("the BRDF samples alone are no evidence of a layer")
+    return result
