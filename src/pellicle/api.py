@@ -268,7 +268,7 @@ def cost(
 
 def fit(
     data: Measurement,
-    scene: Scene | Sequence[Scene] | Surface | Sequence[Scene | Surface],
+    scene: Scene | Surface | Sequence[Scene | Surface],
     *,
     tolerance: float = 0.0,
     loss: str = "least-squares",
@@ -311,20 +311,19 @@ def fit(
     check_measurement(data)
     check_scene(scene, several=True)
     if of_both_kinds(scene):
-        every: Any = data
-        options = {"residual": residual, "tolerance": tolerance, "loss": loss, "progress": progress}
-        return fit_jointly(every, scene, **options)
+        both: Any = data, scene
+        return fit_jointly(*both, residual=residual, tolerance=tolerance, loss=loss, progress=progress)
     if isinstance(scene, Surface):
         samples = measured((BrdfSamples,), data)
         return fit_brdf(samples, scene, residual=residual, tolerance=tolerance, loss=loss, progress=progress)
     _refuse("a Scene", residual=residual)
-    films = measured(OF_A_FILM, data)
-    return fit_spectra(films, scene, tolerance=tolerance, loss=loss, progress=progress)
+    films: Any = measured(OF_A_FILM, data), scene
+    return fit_spectra(*films, tolerance=tolerance, loss=loss, progress=progress)
 
 
 def sample(
     data: Measurement,
-    scene: Scene | Sequence[Scene] | Surface,
+    scene: Scene | Surface | Sequence[Scene | Surface],
     *,
     walkers: int | None = None,
     steps: int = STEPS,
@@ -430,7 +429,7 @@ def map(
 
 def compare(
     data: Measurement,
-    scenes: Mapping[str, Scene | Sequence[Scene] | Surface],
+    scenes: Mapping[str, Scene | Surface | Sequence[Scene | Surface]],
     *,
     tolerance: float = 0.0,
     residual: str | None = None,

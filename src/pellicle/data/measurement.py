@@ -13,9 +13,8 @@ from pellicle.data.colours import Colours
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import DataError, UsageError
 
-Measurement: TypeAlias = (
-    Spectrum | Colours | Sequence[Spectrum | Colours] | BrdfSamples | Sequence[BrdfSamples]
-)
+Datum: TypeAlias = Spectrum | Colours | BrdfSamples
+Measurement: TypeAlias = Datum | Sequence[Datum]
 
 
 SHORTEST = 10.0

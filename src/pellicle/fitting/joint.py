@@ -16,6 +16,7 @@ import numpy as np
 
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.colours import Colours
+from pellicle.data.measurement import Datum
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
 from pellicle.fitting.brdf import fit as of_samples
@@ -41,8 +42,6 @@ from pellicle.scene.surface import Surface
 
 _MOST_FILMS, _MOST_SURFACES = 8, 6
 """Minima of each kind of data that are combined."""
-
-Datum = Spectrum | Colours | BrdfSamples
 
 
 def of_both_kinds(scene: Any) -> bool:
@@ -136,8 +135,14 @@ def _combined(film: RankedMinima, brdf: RankedMinima) -> tuple[Problem, np.ndarr
     def joined(one: Any, other: Any) -> np.ndarray:
         return np.concatenate([one, np.asarray(other)[rest]])
 
-    priors = (joined(getattr(first.box, x), getattr(second.box, x)) for x in Box._fields[2:5])
-    box = Box(joined(lower, second.box.lower), joined(upper, second.box.upper), *priors, second.box.reach)
+    box = Box(
+        lower=joined(lower, second.box.lower),
+        upper=joined(upper, second.box.upper),
+        prior_mean=joined(first.box.prior_mean, second.box.prior_mean),
+        prior_weight=joined(first.box.prior_weight, second.box.prior_weight),
+        logarithmic=joined(first.box.logarithmic, second.box.logarithmic),
+        reach=second.box.reach,
+    )
     log, tilt = second.coordinates.log, second.coordinates.tilt
     coordinates = Coordinates(
         tuple(joined(np.zeros(len(lower), bool), log).tolist()) if log else (),
@@ -146,9 +151,8 @@ def _combined(film: RankedMinima, brdf: RankedMinima) -> tuple[Problem, np.ndarr
     )
     names = [view.name for view in second.views]
     views = [replace(v, takes=tuple(where[i] for i in v.takes)) for v in second.views]
-    views = [
-        replace(v, name=name or f"brdf-{i}") for i, (v, name) in enumerate(zip(views, names, strict=True))
-    ]
+    named = enumerate(zip(views, names, strict=True), start=1)
+    views = [replace(view, name=name or f"brdf-{i}") for i, (view, name) in named]
     values = np.asarray(first.values(film.minima.units))[:_MOST_FILMS]
     others = brdf.minima.units[:_MOST_SURFACES]
     their = np.asarray(second.values(others))

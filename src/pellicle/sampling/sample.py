@@ -17,6 +17,7 @@ from pellicle.errors import UsageError
 from pellicle.fitting import joint
 from pellicle.fitting.brdf import fit as brdf
 from pellicle.fitting.brdf.summary import evidence as sample_evidence
+from pellicle.fitting.colours.targets import arrays
 from pellicle.fitting.conclusion import linearised
 from pellicle.fitting.discrepancy import discrepancy
 from pellicle.fitting.progress import Progress, quiet
@@ -37,7 +38,7 @@ Kind = TypeVar("Kind")
 
 def sample(
     data: Measurement,
-    scene: Scene | Sequence[Scene] | Surface,
+    scene: Scene | Surface | Sequence[Scene | Surface],
     *,
     walkers: int | None = None,
     steps: int = STEPS,
@@ -85,15 +86,16 @@ def sample(
             jacobian, _ = linearised(ranked)
             own = joint.apart(every, cast(Any, scene))
             columns = [(s.theta_i, s.phi_i, s.theta_o, s.phi_o, s.values, s.sigma) for s in own.samples]
-            numbers = own.surface.model, dict(own.surface.numbers), own.surface.channel_wavelengths
+            surface = dict(own.surface.numbers), tuple(own.surface.bands), own.surface.media
             targets = spectra.measurements(own.films, own.scenes)
-            identity = fingerprint([targets, *columns, numbers], residual, tolerance)
+            known = [*map(arrays, targets), *columns, surface]
+            identity = fingerprint(known, own.surface.model, residual, tolerance)
     else:
-        measurements = measured(OF_A_FILM, data)
-        fit, ranked = spectra.fitted(measurements, scene, tolerance, progress)
+        films: Any = measured(OF_A_FILM, data), scene
+        fit, ranked = spectra.fitted(*films, tolerance, progress)
         with jax.enable_x64(True):
-            targets = spectra.measurements(measurements, scene)
-            identity = fingerprint(targets, tolerance)
+            targets = spectra.measurements(*films)
+            identity = fingerprint([arrays(target) for target in targets], tolerance)
             jacobian, _ = linearised(ranked)
             residuals = spectrum_evidence(targets, ranked, jacobian)
     with jax.enable_x64(True):

@@ -37,6 +37,15 @@ class MeasuredColours(NamedTuple):
         return self.colours.sensor[0]
 
 
+def arrays(target: tuple[Any, ...]) -> tuple[Any, ...]:
+    """What a target depends on, as a pytree: of colours their arrays and words in place of the object."""
+    if not isinstance(target, MeasuredColours):
+        return target
+    own = target.colours
+    about = own.values, own.noise, own.sensor, own.camera, own.gamma
+    return target.scene, *about, own.space, own.white_balance, target.name
+
+
 def measured_colours(data: Colours, scene: Scene, name: str = "") -> MeasuredColours:
     """Colours with the scene in their light. Raises UsageError as `fit` does."""
     angle: Any = scene.light.angle
