@@ -91,10 +91,10 @@ def sample(
             known = [*map(arrays, targets), *columns, surface]
             identity = fingerprint(known, own.surface.model, residual, tolerance)
     else:
-        films: Any = measured(OF_A_FILM, data), scene
-        fit, ranked = spectra.fitted(*films, tolerance, progress)
+        measurements, own_scene = measured(OF_A_FILM, data), cast(Any, scene)
+        fit, ranked = spectra.fitted(measurements, own_scene, tolerance, progress)
         with jax.enable_x64(True):
-            targets = spectra.measurements(*films)
+            targets = spectra.measurements(measurements, own_scene)
             identity = fingerprint([arrays(target) for target in targets], tolerance)
             jacobian, _ = linearised(ranked)
             residuals = spectrum_evidence(targets, ranked, jacobian)
