@@ -3,6 +3,7 @@
 import importlib.util
 import json
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -10,6 +11,7 @@ import pellicle as pl
 from pellicle.colour import delta_e2000, lab, sensor
 from pellicle.errors import UsageError
 from pellicle.rendering.mitsuba import ALPHA
+from pellicle.rendering.mitsuba_tables import write_surface
 
 mi = pytest.importorskip("mitsuba")
 
@@ -181,6 +183,60 @@ def test_an_uneven_film_takes_its_thickness_from_a_picture(tmp_path):
     np.testing.assert_allclose(value / lobe(*np.array([[0, 0, 1.0]] * 2), ALPHA)[0][1], colour, atol=1e-3)
     with pytest.raises(UsageError, match=r"a \.bsdf has one thickness; export a map of thicknesses as \.xml"):
         pl.export(STEEL, to="mitsuba", path=tmp_path / "uneven.bsdf", thickness_map=nm)
+
+
+def spread_directions(count):
+    """Pairs of directions over the hemisphere, at most 75° from the normal."""
+    random = np.random.default_rng(0)
+    for light, viewer in random.uniform(size=(count, 2, 2)):
+        thetas = np.arccos(1 - (1 - np.cos(np.deg2rad(75))) * np.array([light[0], viewer[0]]))
+        phis = 2 * np.pi * np.array([light[1], viewer[1]])
+        yield [
+            np.array([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)])
+            for t, p in zip(thetas, phis, strict=True)
+        ]
+
+
+@pytest.mark.parametrize(
+    ("surface", "median"),
+    [
+        (pl.Surface("microfacet-film", {"thickness": 40.0, "roughness": 0.4, "diffuse": 0.05}), 0.003),
+        # azimuths of the table are 11° apart
+        pytest.param(
+            pl.Surface(
+                "granier-heidrich",
+                {
+                    "thickness": 300.0,
+                    "deviation": 8.0,
+                    "exponent_reflection": 12.0,
+                    "exponent_transmission": 20.0,
+                },
+            ),
+            0.03,
+            marks=pytest.mark.slow,
+        ),
+    ],
+    ids=lambda value: getattr(value, "model", ""),
+)
+def test_whole_surfaces_are_what_mitsuba_evaluates(tmp_path, surface, median):
+    write_surface(tmp_path / "surface.bsdf", surface)
+    mi.set_variant("scalar_rgb")
+    bsdf = mi.load_dict({"type": "measured", "filename": str(tmp_path / "surface.bsdf")})
+    pairs, found = list(spread_directions(300)), []
+    for light, viewer in pairs:
+        si = mi.SurfaceInteraction3f()
+        si.wi = mi.Vector3f(*light.tolist())
+        value = np.ravel(bsdf.eval(mi.BSDFContext(), si, mi.Vector3f(*viewer.tolist())))
+        found.append(value / viewer[2])
+    i, o = (jnp.asarray(each) for each in np.swapaxes(pairs, 0, 1))
+    numbers = {key: np.asarray(x) for key, x in surface.start_numbers().items()}
+    exact = np.asarray(surface.brdf(numbers, i, o))
+    assert np.median(np.abs(found - exact) / exact.max(axis=1, keepdims=True)) < median
+
+
+def test_surfaces_without_colour_are_refused(tmp_path):
+    with pytest.raises(UsageError, match="has R, G and B: the surface has 1 wavelengths"):
+        write_surface(tmp_path / "x.bsdf", pl.Surface("microfacet-film", wavelengths=(550.0,)))
 
 
 def test_nothing_is_overwritten(exported, tmp_path):

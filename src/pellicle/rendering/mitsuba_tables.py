@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 
 import jax
@@ -12,7 +13,8 @@ from pellicle.brdf.lobes import microfacets
 from pellicle.colour import integration_bands, sensor
 from pellicle.colour.spaces import SRGB_WHITE, TO_SRGB, adaptation
 from pellicle.data.half_angles import angles, vectors
-from pellicle.data.write_rgl import ISOTROPIC, Brdf, TableSize, tabulate
+from pellicle.data.write_rgl import ISOTROPIC, Brdf, TableSize, tabulate, write_rgl
+from pellicle.errors import UsageError
 from pellicle.rendering.appearance import Appearance
 from pellicle.scene.surface import Surface
 from pellicle.synthetic.brdf import Directions, simulate_samples
@@ -61,16 +63,16 @@ def lookup(look: Appearance) -> Lookup:
     span = (0.0, 1.25 * own if own > 0 else 1.0)
     nm = np.linspace(*span, int(np.clip(np.ceil(span[1] / _STEP), _FEWEST, _MOST)))
     cosine = np.linspace(0.0, 1.0, _COSINES)
-    return Lookup(_rgb(look, nm, cosine), _spectra(look, WAVELENGTHS, nm, cosine), span, own)
+    return Lookup(*_reflectances(look, nm, cosine), span, own)
 
 
 def film_tables(look: Appearance, alpha: float) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """Return the fields of two `.bsdf` files of an even film on GGX facets, in RGB and spectral."""
     own, text = look.thickness[-1:], f"film of {look.thickness[-1]:.6g} nm on GGX facets, alpha {alpha:g}"
-    rgb, spectra = _rgb(look, own, _FINE)[0], _spectra(look, WAVELENGTHS[::2], own, _FINE)[0]
+    rgb, spectra = (values[0] for values in _reflectances(look, own, _FINE))
     return (
         tabulate(facets(rgb, alpha), ISOTROPIC, description=text),
-        tabulate(facets(spectra, alpha), SPECTRAL, wavelengths=WAVELENGTHS[::2], description=text),
+        tabulate(facets(spectra[:, ::2], alpha), SPECTRAL, wavelengths=WAVELENGTHS[::2], description=text),
     )
 
 
@@ -88,18 +90,24 @@ def facets(reflectance: np.ndarray, alpha: float) -> Brdf:
     return brdf
 
 
-def surface_table(surface: Surface) -> dict[str, np.ndarray]:
-    """Return the fields of the `.bsdf` file of a surface of three channels, which become R, G and B.
+def write_surface(path: str | os.PathLike[str], surface: Surface, *, overwrite: bool = False) -> None:
+    """Write a whole surface, its diffuse part and all its lobes, as a `.bsdf` file for Mitsuba.
 
-    Free numbers take their start values. A surface that is not isotropic gets a table over the azimuth.
+    **Arguments:** `path` of the file; `surface`, whose three channels become R, G and B and whose free
+    numbers take their start values. A surface that is not isotropic gets a table over the azimuth.
+
+    **Raises:** UsageError for another number of channels, a surface that reflects nothing, and where `path`
+    exists without `overwrite` or cannot be written.
     """
+    if surface.channels != 3:
+        raise UsageError(f"a .bsdf has R, G and B: the surface has {surface.channels} wavelengths")
 
     def brdf(i: np.ndarray, o: np.ndarray) -> np.ndarray:
         ends = [np.rad2deg(each) for vector in (i, o) for each in angles(vector)]
         return simulate_samples(surface, Directions(*ends)).samples.values
 
     size = ISOTROPIC if _isotropic(brdf) else ANISOTROPIC
-    return tabulate(brdf, size, description=f"surface {surface.model}")
+    write_rgl(path, tabulate(brdf, size, description=f"surface {surface.model}"), overwrite=overwrite)
 
 
 def _isotropic(brdf: Brdf) -> bool:
@@ -112,13 +120,10 @@ def _isotropic(brdf: Brdf) -> bool:
     return bool(np.all(np.abs(straight - turned) <= 1e-6 * np.max(np.abs(straight))))
 
 
-def _rgb(look: Appearance, nm: np.ndarray, cosine: np.ndarray) -> np.ndarray:
-    """Linear sRGB (thicknesses, cosines, 3)."""
+def _reflectances(look: Appearance, nm: np.ndarray, cosine: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Linear sRGB and reflectance at `WAVELENGTHS`, (thicknesses, cosines, ...), at rising cosines."""
     bands, to_srgb = integration_bands(BANDS), TO_SRGB @ adaptation(sensor().white, SRGB_WHITE)
-    return _spectra(look, bands.wavelength, nm, cosine) @ bands.weights @ to_srgb.T
-
-
-def _spectra(look: Appearance, wavelength: np.ndarray, nm: np.ndarray, cosine: np.ndarray) -> np.ndarray:
-    """Reflectance (thicknesses, cosines, wavelengths) at rising cosines."""
-    degrees = np.rad2deg(np.arccos(cosine))[::-1]
-    return np.swapaxes(look.spectra(wavelength, nm, degrees)[::-1], 0, 1)
+    degrees, count = np.rad2deg(np.arccos(cosine))[::-1], len(bands.wavelength)
+    found = look.spectra(np.concatenate([bands.wavelength, WAVELENGTHS]), nm, degrees)
+    found = np.swapaxes(found[::-1], 0, 1)
+    return found[..., :count] @ bands.weights @ to_srgb.T, found[..., count:]
