@@ -23,7 +23,7 @@ from pellicle.synthetic.colours import BANDS
 WAVELENGTHS = np.arange(380.0, 731.0, 5.0)
 """Wavelengths (nm) of spectral tables; beyond them less than 0.01 % of the light is seen."""
 SPECTRAL = TableSize(thetas=32, side=32)
-"""Nodes of a spectral `.bsdf` file, which takes every second wavelength: 5 MB."""
+"""Nodes of a spectral `.bsdf` file: 11 MB."""
 ANISOTROPIC = TableSize(33, 24, 32)
 """Nodes of the `.bsdf` file of a surface that is not isotropic: 11 MB."""
 _STEP, _FEWEST, _MOST = 0.4, 64, 512
@@ -36,9 +36,10 @@ _FINE = np.linspace(0.0, 1.0, 1001)
 class Lookup:
     """Reflectance of a film over its thickness and the cosine of the angle of incidence, in even steps.
 
-    `rgb` (thicknesses, cosines, 3) is linear sRGB under D65, not clipped: interference colours exceed its
-    gamut. `spectra` (thicknesses, cosines, wavelengths) is the reflectance at `WAVELENGTHS`. `thickness` is
-    the range and `own` the film's own one, in nm; cosines run from 0 to 1.
+    `rgb` (thicknesses, cosines, 3) is linear sRGB under D65, clipped below at 0 where interference colours
+    exceed its gamut: Mitsuba drops negative samples. `spectra` (thicknesses, cosines, wavelengths) is the
+    reflectance at `WAVELENGTHS`. `thickness` is the range and `own` the film's own one, in nm; cosines run
+    from 0 to 1.
     """
 
     rgb: Float[np.ndarray, "thicknesses cosines 3"]
@@ -72,7 +73,7 @@ def film_tables(look: Appearance, alpha: float) -> tuple[dict[str, np.ndarray], 
     rgb, spectra = (values[0] for values in _reflectances(look, own, _FINE))
     return (
         tabulate(facets(rgb, alpha), ISOTROPIC, description=text),
-        tabulate(facets(spectra[:, ::2], alpha), SPECTRAL, wavelengths=WAVELENGTHS[::2], description=text),
+        tabulate(facets(spectra, alpha), SPECTRAL, wavelengths=WAVELENGTHS, description=text),
     )
 
 
@@ -121,9 +122,10 @@ def _isotropic(brdf: Brdf) -> bool:
 
 
 def _reflectances(look: Appearance, nm: np.ndarray, cosine: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Linear sRGB and reflectance at `WAVELENGTHS`, (thicknesses, cosines, ...), at rising cosines."""
+    """Linear sRGB, clipped at 0, and reflectance at `WAVELENGTHS`, (thicknesses, cosines, ...)."""
     bands, to_srgb = integration_bands(BANDS), TO_SRGB @ adaptation(sensor().white, SRGB_WHITE)
     degrees, count = np.rad2deg(np.arccos(cosine))[::-1], len(bands.wavelength)
     found = look.spectra(np.concatenate([bands.wavelength, WAVELENGTHS]), nm, degrees)
     found = np.swapaxes(found[::-1], 0, 1)
-    return found[..., :count] @ bands.weights @ to_srgb.T, found[..., count:]
+    rgb = found[..., :count] @ bands.weights @ to_srgb.T
+    return np.maximum(rgb, 0.0), found[..., count:]
