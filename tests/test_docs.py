@@ -56,6 +56,7 @@ SLOW = {
             *("examples/coated_window", "examples/microscope"),
         )
     },
+    "pellicle cost docs/examples/film_colours.toml": "compiles twenty programs",
     "pellicle cost docs/surfaces/tempered_steel.toml --out cost": "compiles forty programs in half a minute",
     "pellicle fit steel.csv --recipe docs/surfaces/tempered_steel.toml": "compiles for 10 s; "
     "tests/cli/test_brdf_command.py fits another surface",

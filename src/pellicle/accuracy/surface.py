@@ -67,7 +67,7 @@ def cost(view: SurfaceView, *, tolerance: float | None = None, progress: Progres
         films = films_of(view, draws)
         if isinstance(films, str):
             return SurfaceCost(None, _values(view, draws, tolerance or VALUE_TOLERANCE, progress), films)
-        colours = _colours(films, tolerance or COLOUR_TOLERANCE, progress)
+        colours = compare_colours(films, tolerance or COLOUR_TOLERANCE, progress)
         return SurfaceCost(colours, _values(view, draws, VALUE_TOLERANCE, progress))
 
 
@@ -101,7 +101,8 @@ def films_of(view: SurfaceView, draws: np.ndarray) -> Films | str:
     return Films(numbers, angle, float(np.max(numbers["thickness"])))
 
 
-def _colours(films: Films, tolerance: float, progress: Progress) -> MethodComparison:
+def compare_colours(films: Films, tolerance: float, progress: Progress) -> MethodComparison:
+    """Measure every method of computing the colours of films. Raises UsageError without colour-science."""
     try:
         reference = colour_methods.reference_colours(films)
         error = partial(colour_methods.error, sensor(*colour_methods.EYE), reference)

@@ -7,10 +7,14 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
+from pellicle.cli.colours import SPACES, recipe_angles
 from pellicle.cli.progress import Progress
 from pellicle.cli.session import check_folder, say, start
 from pellicle.cli.wavelengths import directions, measured_scene
 from pellicle.errors import UsageError
+
+USUAL_EYE = (("observer", "1931"), ("illuminant", "D65"))
+"""Keys of [camera] under which the methods for colours are compared."""
 
 
 def cost(
@@ -21,7 +25,7 @@ def cost(
     ] = "float64",
     tolerance: Annotated[
         float | None,
-        Parameter(help="Error that is small enough: in R, T, degrees or, for a surface, ΔE2000."),
+        Parameter(help="Error that is small enough: in R, T, degrees or, of colours, ΔE2000."),
     ] = None,
     datasets: Annotated[
         int, Parameter(help="Number of simulated spectra that every solver fits; 0 for no solvers.")
@@ -48,6 +52,15 @@ def cost(
                 "--reference is for films: a surface is measured against steps of 1 nm in float64"
             )
         scene, options = described.scene(), {"directions": directions(described)}
+    elif described.tables.data.signal in SPACES:
+        if reference != "float64":
+            raise UsageError(
+                "--reference is for spectra: colours are measured against steps of 1 nm in float64"
+            )
+        space, angle = described.tables.data.signal, recipe_angles(described)
+        scene, options = described.scene(), {"space": space, "angle": angle}
+        if any(item not in USUAL_EYE for item in described.camera.items()):
+            say("methods for colours are compared with the observer 1931 under D65, not the recipe's camera")
     else:
         scene, nm = measured_scene(described)
         noise = described.tables.data.noise

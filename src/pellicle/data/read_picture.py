@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from io import BytesIO
+from logging import CRITICAL, getLogger
 from typing import Any
 
 import numpy as np
@@ -17,6 +20,8 @@ _SIGNATURES = {
     "TIFF": (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"),
     "JPEG": (b"\xff\xd8\xff",),
 }
+LARGEST = 2**28
+"""Values of the largest TIFF, as many as Pillow reads of other pictures without a warning."""
 _COLOUR_MODES = ("RGB", "RGBA", "RGBX")
 
 
@@ -108,13 +113,15 @@ def _by_pillow(content: bytes) -> tuple[np.ndarray, float, bytes | None, list[st
 def _tiff(content: bytes) -> tuple[np.ndarray, float, bytes | None, list[str]]:
     import tifffile
 
-    with tifffile.TiffFile(BytesIO(content)) as file:
+    with _silent("tifffile"), tifffile.TiffFile(BytesIO(content)) as file:
         page: Any = file.pages[0]
         notes = [f"page 1 of {len(file.pages)}"] if len(file.pages) > 1 else []
         name = page.photometric.name if page.photometric is not None else "unknown"
         if name not in ("RGB", "PALETTE"):
             shown = "grey" if name.startswith("MINIS") else f"in the colour model {name}"
             raise DataError(f"is {shown}: a picture in R, G, B is needed")
+        if page.size > LARGEST:
+            raise DataError(f"has {page.size:,} values, more than {LARGEST:,}; cut it to the film")
         values = page.asarray()
         if name == "PALETTE":
             values, notes = (
@@ -132,6 +139,18 @@ def _tiff(content: bytes) -> tuple[np.ndarray, float, bytes | None, list[str]]:
     if values.dtype not in (np.uint8, np.uint16):
         raise DataError(f"has values of the type {values.dtype}: save it with 8 or 16 bits")
     return values, float(np.iinfo(values.dtype).max), profile, notes
+
+
+@contextmanager
+def _silent(name: str) -> Iterator[None]:
+    """A logger without its messages on damaged files, which one error reports."""
+    log = getLogger(name)
+    level = log.level
+    log.setLevel(CRITICAL + 1)
+    try:
+        yield
+    finally:
+        log.setLevel(level)
 
 
 def _colours(values: np.ndarray, full: float, notes: list[str], path: str) -> tuple[np.ndarray, list[str]]:

@@ -30,9 +30,9 @@ def to_json(cost: Cost | SurfaceCost, recipe: str) -> dict[str, Any]:
     """Convert to dictionaries: all methods in one list, `rungs`, each with its `kind`.
 
     Kinds of a film are "forward", "inverse" (a solver) and "interval" (its error is the distance of its
-    coverage from 95 %); of a surface "colour" (mean ΔE2000) and "brdf" (relative error). `recommended`
-    names a forward method, or one for colours; `within` says whether it meets the tolerance. `brdf` has the
-    same keys for a surface's values. Infinite errors are None.
+    coverage from 95 %), or of its colours "colour" (mean ΔE2000); of a surface "colour" and "brdf" (relative
+    error). `recommended` names a forward method, or one for colours; `within` says whether it meets the
+    tolerance. `brdf` has the same keys for a surface's values. Infinite errors are None.
     """
     from pellicle.accuracy.surface import SurfaceCost
 
@@ -43,7 +43,7 @@ def to_json(cost: Cost | SurfaceCost, recipe: str) -> dict[str, Any]:
 
 def _film(cost: Cost) -> dict[str, Any]:
     methods, solvers, intervals = cost.methods, cost.solvers, cost.intervals
-    rungs = _rungs("forward", methods.results)
+    rungs = _rungs("colour" if methods.sample == "colour" else "forward", methods.results)
     rungs += [] if solvers is None else _rungs("inverse", solvers.results)
     rungs += [] if intervals is None else _rungs("interval", intervals.results)
     omitted = [part.left_out for part in (methods, solvers, intervals) if part is not None]

@@ -79,7 +79,7 @@ def _compared(methods: MethodComparison) -> str:
     if methods.sample != "spectrum":
         each = f"{methods.wavelengths} {'angles' if methods.sample == 'colour' else 'pairs of directions'}"
         which = "mean" if methods.sample == "colour" else "largest"
-        return f"{methods.draws} surfaces between the bounds along {each}, the {which} error"
+        return f"{methods.draws} draws between the bounds along {each}, the {which} error"
     several = "s" * (methods.wavelengths > 1)
     draws = "draws between the bounds" if methods.draws > 1 else "spectrum"
     return f"{methods.wavelengths} wavelength{several}, the largest error of {methods.draws} {draws}"
