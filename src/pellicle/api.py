@@ -482,8 +482,9 @@ def export(
 
     **Arguments:**
 
-    - `scene`: `Scene`, whose free parameters take their start values, or `Fit` with its best values.
-    - `to`: "gltf".
+    - `scene`: `Scene` or `Surface`, whose free parameters take their start values, or `Fit` with its best
+      values.
+    - `to`: "blender", "gltf", "materialx", "mitsuba", "openpbr" or "usd".
     - `path`: file to write, which must not exist; a record in JSON is written beside it.
     - `numbers`: the set that the renderer draws, "effective" or "physical".
     - `thickness_map`: thicknesses in nm over the object, (rows, columns) from the upper left, or the path of

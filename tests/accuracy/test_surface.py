@@ -12,6 +12,7 @@ from pellicle.accuracy import colour_methods
 from pellicle.accuracy.measure import MethodComparison, MethodResult
 from pellicle.accuracy.surface import BRDF_METHODS, COLOUR_METHODS, SurfaceCost, films_of, random_draws
 from pellicle.colour import delta_e2000, lab, sensor
+from pellicle.dispersion.empirical import along_the_spectrum
 from pellicle.reporting.cost_files import to_json
 from pellicle.reporting.cost_text import text
 from pellicle.scene.free import Free
@@ -85,10 +86,10 @@ def test_what_makes_no_sense_says_why(films):
 
 def test_values_of_three_wavelengths_lie_on_a_line():
     """And are level beyond: what a metal given for R, G and B is taken for elsewhere."""
-    table = colour_methods.along_the_spectrum(np.array([2.9, 2.8, 2.6]), (645.0, 525.0, 445.0))
+    table = along_the_spectrum(np.array([2.9, 2.8, 2.6]), (645.0, 525.0, 445.0))
     found = np.asarray(table.index(np.array([380.0, 445.0, 485.0, 645.0, 730.0])))
     np.testing.assert_allclose(found, [2.6, 2.6, 2.7, 2.9, 2.9])
-    assert colour_methods.along_the_spectrum(2.0, (645.0, 525.0)) == 2.0
+    assert along_the_spectrum(2.0, (645.0, 525.0)) == 2.0
 
 
 def test_values_leave_out_what_is_there():

@@ -1,5 +1,7 @@
 """`pellicle export` writes the files and prints both errors."""
 
+import json
+
 import pytest
 
 pytest.importorskip("pygltflib")
@@ -21,3 +23,38 @@ def test_the_command_writes_and_reports(pellicle, tmp_path):
         (("--to", "gltf", "--out", tmp_path / "b.glb", "--numbers", "best"), "--numbers must be"),
     ):
         pellicle("export", recipe, *flags).refused(2, words)
+
+
+def test_a_fit_is_exported_with_its_values(pellicle, tmp_path):
+    """The record of a fit names its recipe, or has its flags."""
+    recipe, record = tmp_path / "steel.toml", tmp_path / "result.json"
+    free = "thickness = { lower = 10, upper = 100 }"
+    recipe.write_text(RECIPE.replace("thickness = 40", free))
+    flags = {"layer": "2.9", "substrate": "2.7+2.8j", "thickness": "10:100"}
+    for number, source in enumerate(({"recipe": str(recipe)}, {"flags": flags})):
+        record.write_text(json.dumps({"parameters": {"thickness": {"value": 40.0}}, "scene": source}))
+        ran = pellicle("export", record, "--to", "gltf", "--out", tmp_path / f"{number}.glb", "--json")
+        assert ran.code == 0, ran.err
+        assert ran.objects[0]["thickness_nm"] == [40, 40]
+    recipe.unlink()
+    record.write_text(
+        json.dumps({"parameters": {"thickness": {"value": 40.0}}, "scene": {"recipe": "no.toml"}})
+    )
+    out = ("--to", "gltf", "--out", tmp_path / "c.glb")
+    pellicle("export", record, *out).refused(2, "no.toml is not there", "--recipe")
+    record.write_text(json.dumps({"parameters": {}}))
+    pellicle("export", record, *out).refused(3, "no fitted parameters")
+    record.write_text("{")
+    pellicle("export", record, *out).refused(3, "is not JSON")
+
+
+def test_what_a_fit_leaves_is_enough(pellicle, spectrum_file, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    ran = pellicle(
+        *("fit", spectrum_file(), "--layer", "1.46", "--substrate", "3.9+0.02j"),
+        *("--thickness", "200:400", "--out", "fit"),
+    )
+    assert ran.code == 0, ran.err
+    ran = pellicle("export", "fit/result.json", "--to", "gltf", "--out", "film.glb", "--json")
+    assert ran.code == 0, ran.err
+    assert ran.objects[0]["thickness_nm"][0] == pytest.approx(300, abs=0.5)

@@ -46,16 +46,6 @@ class Films(NamedTuple):
         return "k" in self.numbers
 
 
-def along_the_spectrum(number: Any, wavelengths: tuple[float, ...]) -> Any:
-    """A number as it is; one for each channel as a table, linear between their wavelengths (nm) and constant
-    beyond."""
-    if np.ndim(number) == 0:
-        return number
-    order = np.argsort(wavelengths)
-    nm, values = np.asarray(wavelengths, float)[order], np.asarray(number, float)[order]
-    return Table(np.array([1.0, *nm, 1e5]), np.array([values[0], *values, values[-1]]))
-
-
 @dataclass(frozen=True)
 class ColourMethod:
     """A method of computing colours; `program` compiles it for films, or returns why it does not apply."""

@@ -17,6 +17,7 @@ from pellicle.accuracy.compiled import Program, compiled_function
 from pellicle.accuracy.measure import MethodComparison, measure
 from pellicle.brdf.directions import angle_to_half
 from pellicle.colour import sensor
+from pellicle.dispersion.empirical import along_the_spectrum
 from pellicle.effects.plan import Plan
 from pellicle.effects.surface import exact
 from pellicle.effects.surface_removal import SurfaceRemoval
@@ -96,7 +97,7 @@ def films_of(view: SurfaceView, draws: np.ndarray) -> Films | str:
         if key in view.numbers and np.ndim(each[0][key]) == 0:
             numbers[key] = np.array([float(one[key]) for one in each])
         elif key in view.numbers:
-            numbers[key] = colour_methods.along_the_spectrum(each[0][key], wavelengths)
+            numbers[key] = along_the_spectrum(each[0][key], wavelengths)
     angle = np.asarray(angle_to_half(view.i, view.o))
     return Films(numbers, angle, float(np.max(numbers["thickness"])))
 

@@ -205,7 +205,11 @@ class Batch:
         code = CONVERGED if fit.status == "converged" else UNCLEAR
         if posterior is not None and not posterior.trusted:
             code = TOO_SHORT
-        return code if folder is None else max(code, _write(folder, fit, posterior, identity))
+        return (
+            code
+            if folder is None
+            else max(code, _write(folder, fit, posterior, identity, self.inputs.described))
+        )
 
     def _repeat(self, found: Earlier, folder: Path) -> int:
         """Print the result of an earlier run, and return its exit code."""
@@ -233,12 +237,14 @@ class Batch:
         return posterior.fit, posterior
 
 
-def _write(folder: Path, fit: Fit, posterior: Posterior | None, identity: str) -> int:
+def _write(
+    folder: Path, fit: Fit, posterior: Posterior | None, identity: str, described: dict[str, Any] | None
+) -> int:
     """Write the folder of a result, and return FAILED where it cannot be written."""
     from pellicle.reporting.folders import write_fit
 
     try:
-        write_fit(folder, fit, posterior, identity)
+        write_fit(folder, fit, posterior, identity, described)
     except ValueError as error:  # the result is printed, and the other files go on
         say(f"pellicle: {error}; the result is printed, and the same command writes its files")
         return FAILED

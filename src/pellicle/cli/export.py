@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+import json
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from pellicle.cli.flags import ReadingFlags, SceneFlags
 from pellicle.cli.session import say, start
+from pellicle.errors import DataError, UsageError
+
+if TYPE_CHECKING:
+    from pellicle.scene.film import Scene
+    from pellicle.scene.surface import Surface
 
 
 def export(
-    recipe: Annotated[str, Parameter(help="TOML file that describes the scene.")],
+    film: Annotated[
+        str, Parameter(help="TOML file that describes the scene or surface, or the result.json of a fit.")
+    ],
     *,
-    to: Annotated[str, Parameter(help="Format or renderer: gltf, blender.")],
+    to: Annotated[str, Parameter(help="blender, gltf, materialx, mitsuba, openpbr or usd.")],
     out: Annotated[str, Parameter(help="File to write; no file is overwritten.")],
     numbers: Annotated[
         str,
@@ -24,25 +35,76 @@ def export(
     layer: Annotated[
         str | None, Parameter(help="Layer whose thickness it is (the one with a free thickness).")
     ] = None,
-    json: Annotated[bool, Parameter(help="Print one JSON object.", negative="")] = False,
+    recipe: Annotated[
+        str | None, Parameter(help="Recipe of a fit, where its result.json does not lead to it.")
+    ] = None,
+    as_json: Annotated[bool, Parameter(name="--json", help="Print one JSON object.", negative="")] = False,
 ) -> int:
     """Write a film as a material of a renderer, with the error of the renderer's formula.
 
     Example: pellicle export film.toml --to gltf --out film.glb
     """
-    from pellicle.recipes import read_recipe
-
-    described = read_recipe(recipe)
+    described = _described(film, recipe)
     start()
     from pellicle import api
     from pellicle.reporting.export_text import text
     from pellicle.reporting.json_record import one_line
 
     written = api.export(
-        described.scene(), to=to, path=out, numbers=numbers, thickness_map=thickness_map, layer=layer
+        described, to=to, path=out, numbers=numbers, thickness_map=thickness_map, layer=layer
     )
-    print(
-        one_line({"target": to} | written.material.record()) if json else text(written), end="\n", flush=True
-    )
+    print(one_line({"target": to} | written.material.record()) if as_json else text(written), flush=True)
     say(f"{', '.join(str(path) for path in written.files)} written")
     return 0
+
+
+def _described(film: str, recipe: str | None) -> Scene | Surface:
+    """The scene of a recipe, or of a fit with its values."""
+    from pellicle.recipes import read_recipe
+
+    if Path(film).suffix.lower() != ".json":
+        if recipe is not None:
+            raise UsageError("--recipe goes with the result.json of a fit; give the recipe alone")
+        return read_recipe(film).scene()
+    record = _record(film)
+    from pellicle.rendering.films import with_values
+
+    values = {name: each["value"] for name, each in record["parameters"].items()}
+    try:
+        return with_values(_scene_of(film, record.get("scene"), recipe), values)
+    except UsageError:
+        raise
+    except DataError as error:
+        raise DataError(f"{film}: {error}; give its recipe as --recipe") from None
+
+
+def _record(path: str) -> dict[str, Any]:
+    """The JSON record of a fit. Raises DataError."""
+    try:
+        record = json.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read ({error.strerror}); check its path") from None
+    except ValueError:
+        raise DataError(f"{path}: is not JSON; give the result.json of a fit") from None
+    if not isinstance(record, dict) or not record.get("parameters"):
+        raise DataError(f"{path}: has no fitted parameters; give the result.json of one fit")
+    return record
+
+
+def _scene_of(path: str, source: dict[str, Any] | None, recipe: str | None) -> Scene | Surface:
+    from pellicle.cli.options import scene_from_flags
+    from pellicle.recipes import read_recipe
+
+    source = source or {}
+    if recipe is None and "flags" in source:
+        known = {field.name for field in fields(SceneFlags)}
+        flags = {name: value for name, value in source["flags"].items() if name in known}
+        return scene_from_flags(SceneFlags(**flags), ReadingFlags())[0]
+    recipe = recipe or source.get("recipe")
+    if recipe is None:
+        raise UsageError(f"{path}: names no scene that was fitted: give its recipe as --recipe")
+    if not Path(recipe).exists():
+        raise UsageError(
+            f"{path}: its recipe {recipe} is not there: run from the folder of the fit, or give --recipe"
+        )
+    return read_recipe(recipe).scene()

@@ -46,7 +46,8 @@ class Input(NamedTuple):
 class Inputs(NamedTuple):
     """Data files, fitted together (`joint`) or one by one, and the options of their fits.
 
-    `repeats` is true where the files are repeated measurements of one spot.
+    `repeats` is true where the files are repeated measurements of one spot. `described` is what the scene was
+    built from, for the record: the recipe, or the flags.
     """
 
     files: list[Input]
@@ -54,6 +55,7 @@ class Inputs(NamedTuple):
     loss: str = LEAST_SQUARES
     residual: str | None = None
     repeats: bool = False
+    described: dict[str, Any] | None = None
 
     @property
     def groups(self) -> list[list[Input]]:
@@ -87,7 +89,9 @@ def inputs(
             result = _by_surface_recipe(files, described, reading)
         else:
             result = _by_recipe(files, described, reading)
-    result = result._replace(joint=joint or result.joint)
+    flags = {name: value for name, value in vars(scene_flags).items() if value is not None}
+    described_by = {"flags": flags} if recipe is None else {"recipe": recipe}
+    result = result._replace(joint=joint or result.joint, described=described_by)
     return result if repeats is None else _as_repeats(result, repeats or result.repeats)
 
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pellicle.files import MARKER
-from pellicle.reporting.folders import FINGERPRINT, REPORT
+from pellicle.reporting.folders import FINGERPRINT, REPORT, SCENE
 from pellicle.reporting.json_record import SCHEMA, versions
 
 
@@ -63,6 +63,7 @@ def earlier(folder: Path, identity: str) -> Earlier | None:
         return None
     if not isinstance(record, dict) or record.get("schema") != SCHEMA or "data" not in record:
         return None
+    record.pop(SCENE, None)  # printed by no fit
     if record.pop(FINGERPRINT, None) != identity or not record.get("posterior", {}).get("trusted", True):
         return None
     return Earlier(record, report)

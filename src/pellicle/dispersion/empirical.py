@@ -48,6 +48,18 @@ class Table(AbstractDispersion):
         return column(self.n) if self.k is None else Pair(column(self.n), column(self.k))
 
 
+def along_the_spectrum(number: Any, wavelengths: Any) -> Any:
+    """Return a number as it is, and one for each channel as a table.
+
+    It is linear between the wavelengths (nm) of the channels and constant beyond.
+    """
+    if np.ndim(number) == 0:
+        return number
+    order = np.argsort(wavelengths)
+    nm, values = np.asarray(wavelengths, float)[order], np.asarray(number, float)[order]
+    return Table(np.array([1.0, *nm, 1e5]), np.array([values[0], *values, values[-1]]))
+
+
 @final
 class Cauchy(AbstractDispersion):
     """n = A + B/λ² + C/λ⁴ with λ in nm, B in nm² and C in nm⁴ (A. Cauchy, 1836); no absorption."""

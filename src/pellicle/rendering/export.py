@@ -4,25 +4,20 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from pellicle.errors import UsageError
 from pellicle.files import write_text
 from pellicle.fitting.result import Fit
-from pellicle.fitting.spectra.parameters import shared
 from pellicle.rendering.appearance import Appearance, appearance
 from pellicle.rendering.effective import effective, physical
+from pellicle.rendering.films import film_of
 from pellicle.rendering.material import SETS, Material, Solved
 from pellicle.rendering.targets import Target, target
 from pellicle.rendering.thickness_map import checked, nodes, read_thickness_map
 from pellicle.scene.film import Scene
-from pellicle.scene.free import insert
-from pellicle.scene.kinds import check_scene
 from pellicle.scene.surface import Surface
 
 
@@ -70,7 +65,9 @@ def export(
         if not chosen.takes_map:
             raise UsageError(f"{chosen.title} takes no map of thicknesses; leave `thickness_map` out")
         thickness_map = checked(thickness_map)
-    look = appearance(film_of(scene), None if thickness_map is None else nodes(thickness_map), layer)
+    film = film_of(scene)
+    look = appearance(film.scene, None if thickness_map is None else nodes(thickness_map), layer)
+    look = replace(look, roughness=film.roughness, notes=(*look.notes, *film.notes))
     material = Material(out.stem, look, _solved(chosen, look, numbers), thickness_map)
     files = chosen.write(out, material)
     text = json.dumps({"target": to} | material.record(), ensure_ascii=False, indent=1, allow_nan=False)
@@ -86,18 +83,3 @@ def _solved(chosen: Target, look: Appearance, numbers: str) -> Solved | None:
         return Solved(formula, physical(formula, look), effective(formula, look), numbers)
     except ImportError as missing:  # colour-science
         raise UsageError(str(missing)) from None
-
-
-def film_of(scene: Scene | Surface | Fit) -> Scene:
-    """The film of a scene, or of a fit with its best values."""
-    if not isinstance(scene, Fit):
-        check_scene(scene)
-        if isinstance(scene, Surface):
-            raise UsageError("a surface cannot be exported yet: describe its film by a scene")
-        return scene
-    scenes: Sequence[Any] = scene.scene if isinstance(scene.scene, tuple) else [scene.scene]
-    if scene.scene is None:
-        raise UsageError("this fit has no scene: export the scene itself")
-    names, positions = shared(scenes, [part.name for part in scene.parts])
-    values = np.array([scene[parameter.name].value for parameter in names])
-    return insert(scenes[0], list(values[list(positions[0])]))

@@ -78,7 +78,7 @@ def physical(look: Appearance) -> Numbers:
 
 GLTF = Formula(
     "glTF's approximation of Belcour and Barla",
-    (Key("ior", 1.0, 4.0), Key("base", 1e-6, 1.0, 3), Key("factor", 0.0, 1.0)),
+    (Key("ior", 1.0, 4.0), Key("base", 1e-6, 1.0, 3), Key("factor", 0.25, 1.0)),
     colour,
     physical,
 )

@@ -37,7 +37,10 @@ class Target(NamedTuple):
 MODULES = {
     "blender": "pellicle.rendering.blender",
     "gltf": "pellicle.rendering.gltf",
+    "materialx": "pellicle.rendering.materialx",
     "mitsuba": "pellicle.rendering.mitsuba",
+    "openpbr": "pellicle.rendering.openpbr",
+    "usd": "pellicle.rendering.usd",
 }
 """The module of each target."""
 

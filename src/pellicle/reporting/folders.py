@@ -27,17 +27,23 @@ REPORT = "report.txt"
 SUMMARY = "summary.csv"
 FINGERPRINT = "fingerprint"
 """Key of result.json that only a folder with all its files has."""
+SCENE = "scene"
+"""Key of result.json of what the scene was built from: a recipe, or flags."""
 
 
 def write_fit(
-    folder: str | os.PathLike[str], fit: Fit, posterior: Posterior | None = None, fingerprint: str = ""
+    folder: str | os.PathLike[str],
+    fit: Fit,
+    posterior: Posterior | None = None,
+    fingerprint: str = "",
+    described: Mapping[str, Any] | None = None,
 ) -> Path:
     """Write a fit, and its posterior if there is one, into a folder.
 
     A fit has result.json, report.txt, fit.csv, figure.png and, of films, nk.csv; a posterior adds
     posterior.nc, corner.png and predictive.png. Each file appears complete or not at all; files of an earlier
     result are replaced. A `fingerprint` of what was fitted is added to result.json when all files are
-    written.
+    written. `described` is what the scene was built from, a recipe or flags.
 
     **Returns:** the folder.
 
@@ -50,6 +56,8 @@ def write_fit(
 
     target = new_folder(folder)
     record = to_json(fit, posterior)
+    if described is not None:
+        record[SCENE] = dict(described)
     write_text(target / MARKER, indented(record), overwrite=True)  # first: it marks the folder as ours
     write_text(target / REPORT, report(fit, posterior), overwrite=True)
     write_text(target / "fit.csv", fit_csv(fit), overwrite=True)
