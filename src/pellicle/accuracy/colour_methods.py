@@ -80,7 +80,7 @@ def _by_way(name: str, films: Films, double: bool = False) -> Program | str:
     bands = integration_bands(name, *EYE)
     if films.absorbs and not bands.absorbs:
         return "it has no absorbing layer"
-    return _compiled(partial(xyz, bands), films, double)
+    return compiled(partial(xyz, bands), films, double)
 
 
 def _by_nodes(count: int, thickest: float, films: Films) -> Program | str:
@@ -103,31 +103,49 @@ def _by_angles(count: int, films: Films) -> Program | str:
         given = {"wavelengths": bands.wavelength, "weights": bands.weights}
         return colour(numbers | {key: jnp.asarray(x, i.dtype) for key, x in given.items()}, i, o)
 
-    return _compiled(at_angles, films)
+    return compiled(at_angles, films)
 
 
-def _by_table(films: Films) -> Program | str:
-    """One lookup in a table, whose computation counts as compilation."""
+class OneFilm(NamedTuple):
+    """A film of known indices, and its thicknesses (draws,) in nm, rising."""
+
+    thickness: np.ndarray
+    layer: Any
+    base: Any
+    ambient: Any
+
+
+def one_film(films: Films) -> OneFilm | str:
+    """The film whose thickness alone differs between the draws, or why there is none."""
     numbers: dict[str, Any] = {
         key: x if isinstance(x, Table) else np.unique(x) for key, x in films.numbers.items()
     }
     thickness = numbers.pop("thickness")
     if any(np.size(x) > 1 for x in numbers.values() if not isinstance(x, Table)):
-        return "its indices are free: a table is of one film"
-    began = time.perf_counter()
+        return "its indices are free: it is for one film"
     one: dict[str, Any] = {key: x if isinstance(x, Table) else x[0] for key, x in numbers.items()}
-    index, base = (_index(one, *keys) for keys in (("n", "k"), ("base_n", "base_k")))
+    layer, base = (_index(one, *keys) for keys in (("n", "k"), ("base_n", "base_k")))
+    return OneFilm(thickness, layer, base, one.get("ambient_n", 1.0))
+
+
+def _by_table(films: Films) -> Program | str:
+    """One lookup in a table, whose computation counts as compilation."""
+    film = one_film(films)
+    if isinstance(film, str):
+        return film
+    began = time.perf_counter()
+    thickness = film.thickness
     table = FilmColourTable.build(
-        *(index, base, (float(0.99 * thickness[0]), float(1.01 * thickness[-1]) + 1.0)),
-        ambient=one.get("ambient_n", 1.0),
+        *(film.layer, film.base, (float(0.99 * thickness[0]), float(1.01 * thickness[-1]) + 1.0)),
+        ambient=film.ambient,
         angle=(0.0, float(np.rad2deg(films.angle.max()))),
     )
     built = time.perf_counter() - began
-    program = _compiled(lambda numbers, angle: table.xyz(numbers["thickness"], jnp.cos(angle)), films)
+    program = compiled(lambda numbers, angle: table.xyz(numbers["thickness"], jnp.cos(angle)), films)
     return replace(program, compile_seconds=program.compile_seconds + built)
 
 
-def _compiled(colour: Callable, films: Films, double: bool = False) -> Program:
+def compiled(colour: Callable, films: Films, double: bool = False) -> Program:
     draws = max(np.size(x) for x in films.numbers.values() if not isinstance(x, Table))
     tables = {key: None if isinstance(x, Table) else 0 for key, x in films.numbers.items()}
     call = jax.vmap(colour, in_axes=(tables, None))
@@ -148,7 +166,7 @@ def differences(eye: Sensor, reference: np.ndarray, colours: np.ndarray) -> np.n
 def reference_program(films: Films) -> Program:
     """Integration in steps of 1 nm, in double precision."""
     eye = sensor(*EYE)
-    return _compiled(partial(xyz, Bands(eye.wavelength, None, eye.weights)), films, double=True)
+    return compiled(partial(xyz, Bands(eye.wavelength, None, eye.weights)), films, double=True)
 
 
 def reference_colours(films: Films) -> np.ndarray:

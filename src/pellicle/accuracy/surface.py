@@ -15,6 +15,7 @@ from pellicle.accuracy import colour_methods
 from pellicle.accuracy.colour_methods import COLOUR_METHODS, Films
 from pellicle.accuracy.compiled import Program, compiled_function
 from pellicle.accuracy.measure import MethodComparison, measure
+from pellicle.accuracy.renderer_methods import RENDERER_METHODS
 from pellicle.brdf.directions import angle_to_half
 from pellicle.colour import sensor
 from pellicle.dispersion.empirical import along_the_spectrum
@@ -113,7 +114,13 @@ def compare_colours(films: Films, tolerance: float, progress: Progress) -> Metho
     comparison = MethodComparison(
         "steps of 1 nm", tolerance, "ΔE2000", films.angle.size, len(reference), "colour"
     )
-    return measure(comparison, COLOUR_METHODS, lambda method: method.program(films), error, progress)
+    return measure(
+        comparison,
+        (*COLOUR_METHODS, *RENDERER_METHODS),
+        lambda method: method.program(films),
+        error,
+        progress,
+    )
 
 
 @dataclass(frozen=True)

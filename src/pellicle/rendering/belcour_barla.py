@@ -21,8 +21,9 @@ def sensitivity(path: Any, shift: Any) -> Any:
     bands = published_gaussians()
     channel = np.array([0, 1, 2, 0])  # the second lobe of X has the shift of the first
     phase = 2 * jnp.pi * path[..., None]
-    waves = jnp.cos(phase / bands.wavelength + shift[..., channel])
-    return (waves * jnp.exp(-0.5 * (phase * np.asarray(bands.width)) ** 2)) @ jnp.asarray(bands.weights)
+    wavelength, width, weights = (jnp.asarray(x, phase.dtype) for x in bands[:3])
+    waves = jnp.cos(phase / wavelength + shift[..., channel])
+    return (waves * jnp.exp(-0.5 * (phase * width) ** 2)) @ weights
 
 
 def series(

@@ -89,7 +89,11 @@ def _of_surface(surface: Surface) -> Film:
             " blinn-phong-film"
         )
     numbers: dict[str, Any] = dict(surface.start_numbers())
-    layer, base = (_medium(numbers, *keys) for keys in (("n", "k"), ("base_n", "base_k")))
+    own = (("n", "k"), ("base_n", "base_k"))
+    layer, base = (
+        _medium(numbers, *keys) if given is None else given
+        for given, keys in zip((surface.film, surface.base), own, strict=True)
+    )
     scene = Scene(
         Layer(layer, float(numbers["thickness"])), base, ambient=_medium(numbers, "ambient_n", "ambient_k")
     )

@@ -43,8 +43,13 @@ class Formula:
 
     def xyz(self, numbers: Numbers, thickness: Any) -> Any:
         """XYZ (thicknesses, angles, 3) at `ANGLES` under D65, where linear sRGB (1, 1, 1) is white."""
-        rgb = self.colour(numbers, jnp.asarray(thickness)[:, None], np.cos(np.deg2rad(ANGLES)))
-        return rgb @ np.linalg.inv(TO_SRGB @ adaptation(sensor().white, SRGB_WHITE)).T
+        return self.xyz_at(numbers, jnp.asarray(thickness)[:, None], np.cos(np.deg2rad(ANGLES)))
+
+    def xyz_at(self, numbers: Numbers, thickness: Any, cosine: Any) -> Any:
+        """XYZ (..., 3) under D65 at thicknesses (nm) and cosines, which broadcast."""
+        rgb = self.colour(numbers, thickness, cosine)
+        matrix = np.linalg.inv(TO_SRGB @ adaptation(sensor().white, SRGB_WHITE))
+        return rgb @ jnp.asarray(matrix.T, rgb.dtype)
 
 
 def lab_of(xyz: Any, brightest: Any) -> Any:

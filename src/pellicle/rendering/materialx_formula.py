@@ -87,7 +87,7 @@ def film(index: Any, base: Any, thickness: Any, cosine: Any) -> Any:
     for upper, lower, turn, phase in zip(first, below, from_below, phases, strict=True):
         shift = jnp.broadcast_to(phase + jnp.asarray(turn)[..., None], (*path.shape, 3))
         total = total + series(upper[..., None], lower, path, shift, lambda xyz: xyz, _PRODUCT)
-    return jnp.clip((0.5 * total) @ XYZ_TO_RGB.T, 0.0, 1.0)
+    return jnp.clip((0.5 * total) @ jnp.asarray(XYZ_TO_RGB.T), 0.0, 1.0)
 
 
 def conductor(numbers: Numbers, thickness: Any, cosine: Any) -> Any:
