@@ -86,6 +86,7 @@ ELSEWHERE = {
     "python benchmarks/colour_inverse.py": "tests/colour/test_inverse.py: 300 colours of one film",
     "python benchmarks/colour_series.py": "tests/colour/test_series.py: fewer colours",
     "python benchmarks/posterior.py": _LONG_STUDY,
+    "python benchmarks/renderers.py": "takes minutes; tests/rendering: one film for each renderer",
     "python benchmarks/colour.py": _LONG_STUDY,
     "python benchmarks/brdf_bands.py": "takes minutes; tests/brdf/test_sensor_bands.py: its bands",
     "python benchmarks/brdf_errors.py": "tests/fitting/brdf/test_errors.py: fewer runs",
