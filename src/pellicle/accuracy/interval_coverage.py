@@ -86,7 +86,7 @@ def compare_intervals(data: Sequence[DataSet], progress: Progress) -> IntervalCo
     """Compute intervals for every data set by every method. Ctrl-C ends this and keeps the results so far."""
     comparison, runs = IntervalComparison(), []
     try:
-        fits = [rank(one.problem, search(one.problem, quiet)) for one in data]
+        fits = [rank(one.problem, search(one.problem, quiet)).counted for one in data]
         first = lambda method: method.intervals(fits[0])  # noqa: E731
         for method, seconds in first_runs(INTERVAL_METHODS, first, comparison.left_out, progress):
             runs.append(_Run(method, seconds))

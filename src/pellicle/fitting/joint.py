@@ -34,7 +34,7 @@ from pellicle.fitting.reweighting import RankedMinima, rank
 from pellicle.fitting.robust_losses import LEAST_SQUARES
 from pellicle.fitting.spectra import fit as of_film
 from pellicle.fitting.spectra import parts, summary
-from pellicle.fitting.spectra.evidence import evidence
+from pellicle.fitting.spectra.evidence import evidence as film_evidence
 from pellicle.fitting.spectra.targets import Target
 from pellicle.fitting.status import verdict
 from pellicle.scene.film import Scene
@@ -99,8 +99,8 @@ def fitted(
     progress: Progress,
     loss: str = LEAST_SQUARES,
     residual: str | None = None,
-) -> tuple[Fit, RankedMinima, list[Evidence]]:
-    """The result of `fit`, the ranked minima that it rests on, and the evidence of each view."""
+) -> tuple[Fit, RankedMinima]:
+    """The result of `fit`, and the ranked minima that it rests on."""
     began, own = time.perf_counter(), apart(data, scene)
     film, film_ranked = of_film.fitted(own.films, own.scenes, tolerance, progress, loss)
     brdf, brdf_ranked = of_samples.fitted(own.samples, own.surface, tolerance, progress, loss, residual)
@@ -169,19 +169,32 @@ def _combined(film: RankedMinima, brdf: RankedMinima) -> tuple[Problem, np.ndarr
     return problem, np.array(starts)
 
 
+def evidence(targets: Sequence[Target], ranked: RankedMinima, jacobian: Scaled) -> list[Evidence]:
+    """Evidence of all data at the best of the ranked minima; `targets` are those of the film."""
+    of_films, of_surface = _split(ranked, len(targets))
+    before = sum(view.points for view in of_films.problem.views)
+    below = jacobian._replace(jacobian=jacobian.jacobian[before:])
+    return [*film_evidence(targets, of_films, jacobian), *samples_summary.evidence(of_surface, below)]
+
+
+def _split(ranked: RankedMinima, count: int) -> tuple[RankedMinima, RankedMinima]:
+    """The minima as the first `count` views see them, and as the others do."""
+    views, fits = ranked.problem.views, ranked.fits
+    halves = [(views[:count], fits[:count]), (views[count:], fits[count:])]
+    one, other = (
+        replace(ranked, problem=ranked.problem._replace(views=own), fits=each) for own, each in halves
+    )
+    return one, other
+
+
 def _concluded(
     own: Apart, targets: list[Target], ranked: RankedMinima, film: Fit, brdf: Fit, began: float
-) -> tuple[Fit, RankedMinima, list[Evidence]]:
+) -> tuple[Fit, RankedMinima]:
     """The joint fit at the best of the ranked minima."""
-    count = len(targets)
-    problem, fits = ranked.problem, ranked.fits
-    of_films = replace(ranked, problem=problem._replace(views=problem.views[:count]), fits=fits[:count])
-    of_surface = replace(ranked, problem=problem._replace(views=problem.views[count:]), fits=fits[count:])
+    count, problem = len(targets), ranked.problem
+    of_films, of_surface = _split(ranked, count)
     jacobian, covariance = linearised(ranked)
-    before = sum(view.points for view in of_films.problem.views)
-    below: Scaled = jacobian._replace(jacobian=jacobian.jacobian[before:])
-    found_in = [*evidence(targets, of_films, jacobian), *samples_summary.evidence(of_surface, below)]
-    found = discrepancy(found_in, jacobian, ranked.minima.units[0])
+    found = discrepancy(evidence(targets, ranked, jacobian), jacobian, ranked.minima.units[0])
     film_parts = parts.parts(own.films, of_films, found.errors)
     every = (*film_parts, *samples_summary.parts(own.samples, of_surface))
     missed = parts.missed(film_parts, of_films, replace(found, remaining=found.remaining[:count]))
@@ -217,7 +230,7 @@ def _concluded(
         scene=(*own.scenes, own.surface),
         budget=budget(found, problem.parameters),
     )
-    return result, ranked, found_in
+    return result, ranked
 
 
 def _apart_warning(film: Fit, brdf: Fit) -> list[str]:

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pellicle.fitting.evaluation import total_deviance
 from pellicle.fitting.minima import MOST, Minima, minima
 from pellicle.fitting.problem import Problem, View
 from pellicle.fitting.robust_losses import LEAST_SQUARES, LOSSES, Loss, inflation, spread
@@ -63,6 +64,19 @@ class RankedMinima:
     @property
     def chi2_reduced(self) -> float:
         return sum(fit.chi2 for fit in self.fits) / sum(fit.freedom for fit in self.fits)
+
+    @property
+    def counted(self) -> RankedMinima:
+        """The same minima with points that count as in the covariance.
+
+        The ranking lets neighbours with correlated residuals count as fewer points; where σ is given, that is
+        chance or what the scene leaves out, which the discrepancy allows for.
+        """
+        pairs = zip(self.problem.views, self.fits, strict=True)
+        views = tuple(view.counting(1 / fit.variance) for view, fit in pairs)
+        problem = self.problem._replace(views=views)
+        deviance = total_deviance(problem, self.minima.units)
+        return replace(self, problem=problem, minima=replace(self.minima, deviance=deviance))
 
     @property
     def values(self) -> np.ndarray:

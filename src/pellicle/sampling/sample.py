@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, TypeVar, cast
 
 import jax
@@ -70,8 +71,7 @@ def sample(
     if isinstance(scene, Surface):
         measurements = measured((BrdfSamples,), data)
         fit, ranked = brdf.fitted(measurements, scene, tolerance, progress, residual=residual)
-        jacobian, _ = linearised(ranked)
-        residuals = sample_evidence(ranked, jacobian)
+        found_in = sample_evidence
         unsure = fit.layer_test and not fit.layer_test.layered and fit.status is not Status.AMBIGUOUS
         assumption = "there is a layer" if unsure else ""
         rows = [measurements] if isinstance(measurements, BrdfSamples) else measurements
@@ -81,25 +81,26 @@ def sample(
         identity = fingerprint([*columns, numbers], scene.model, compared, tolerance)
     elif joint.of_both_kinds(scene):
         every: Any = data
-        fit, ranked, residuals = joint.fitted(every, cast(Any, scene), tolerance, progress, residual=residual)
+        fit, ranked = joint.fitted(every, cast(Any, scene), tolerance, progress, residual=residual)
         with jax.enable_x64(True):
-            jacobian, _ = linearised(ranked)
             own = joint.apart(every, cast(Any, scene))
             columns = [(s.theta_i, s.phi_i, s.theta_o, s.phi_o, s.values, s.sigma) for s in own.samples]
             surface = dict(own.surface.numbers), tuple(own.surface.bands), own.surface.media
             targets = spectra.measurements(own.films, own.scenes)
             known = [*map(arrays, targets), *columns, surface]
             identity = fingerprint(known, own.surface.model, residual, tolerance)
+        found_in = partial(joint.evidence, targets)
     else:
         measurements, own_scene = measured(OF_A_FILM, data), cast(Any, scene)
         fit, ranked = spectra.fitted(measurements, own_scene, tolerance, progress)
         with jax.enable_x64(True):
             targets = spectra.measurements(measurements, own_scene)
             identity = fingerprint([arrays(target) for target in targets], tolerance)
-            jacobian, _ = linearised(ranked)
-            residuals = spectrum_evidence(targets, ranked, jacobian)
+        found_in = partial(spectrum_evidence, targets)
     with jax.enable_x64(True):
-        problem = ranked.problem.affine()
+        ranked = ranked.counted
+        jacobian, _ = linearised(ranked)
+        residuals, problem = found_in(ranked, jacobian), ranked.problem.affine()
         shares = discrepancy(residuals, jacobian, ranked.minima.units[0]).evidence_shares
         channels = [view.channels for view in problem.views]
         effects = systematics(residuals, shares, channels, len(problem.parameters))
