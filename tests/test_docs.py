@@ -40,12 +40,15 @@ EXIT_4 = (
 """Their fits do not converge to one answer (exit code 4), as their pages say."""
 SLOW = {
     **{
-        f"pellicle chart docs/surfaces/{name}.toml --out {name}.png": "one sphere of eight is drawn here"
+        f"pellicle chart docs/surfaces/{name}.toml": "one sphere of eight is drawn here"
         for name in (
             *("figure_2_coloured", "figure_2_clay", "figure_3_parallel", "figure_3_deviated"),
             *("figure_4", "figure_5_low", "figure_5_high"),
         )
     },
+    "pellicle chart measurements/recipes/gold_on_glass_12nm.toml": "the page draws balls of hematite",
+    "pellicle chart docs/cost/soap_film.toml --view": "tests/synthetic/test_bubble.py and"
+    " tests/accuracy/test_colour_maps.py: smaller ones",
     "pellicle compare film.csv": "compiles for 6 s; tests/cli/test_compare_command.py compares other scenes",
     "pellicle fit --recipe fits/cauchy_100nm/recipe.toml": "one of the studies of tests/test_fits.py",
     "pellicle cost docs/cost/soap_film.toml --out cost": "fits with many solvers: one to two minutes",

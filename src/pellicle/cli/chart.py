@@ -46,6 +46,10 @@ def chart(
     light: Annotated[
         float, Parameter(help="Surfaces: angle between the main lamp and the line of sight in degrees.")
     ] = 35.0,
+    environment: Annotated[
+        Literal["studio", "lamp"],
+        Parameter(help="Surfaces: studio of four soft boxes and a horizon, or one lamp in the dark."),
+    ] = "studio",
 ) -> int:
     """Draw the interference colours of a recipe's film, objects under it, or a sphere of a recipe's surface.
 
@@ -63,7 +67,7 @@ def chart(
             raise UsageError(
                 "--layer, --thickness, --invert and --view are for films; a surface has its own thickness"
             )
-        return _surface(described, out, light)
+        return _surface(described, out, light, environment)
     scene = described.scene()
     angles = _range("--angle", angle, 90.0)
     nm = _bounds(scene, layer) if thickness is None else _range("--thickness", thickness, inf)
@@ -133,14 +137,14 @@ def _objects(
     return 0
 
 
-def _surface(recipe: SurfaceRecipe, out: str, light: float) -> int:
+def _surface(recipe: SurfaceRecipe, out: str, light: float, environment: str) -> int:
     if not 0 <= light <= 180:
         raise UsageError(f"--light must lie in 0 to 180 degrees, got {light:g}")
     surface = recipe.scene()
     start()
     from pellicle.reporting.sphere_figures import sphere
 
-    sphere(surface, out, light, title=Path(recipe.path).stem)
+    sphere(surface, out, light, Path(recipe.path).stem, environment=environment)
     say(f"{out}: a sphere of {surface.model}, the main lamp {light:g} degrees from the line of sight")
     return 0
 

@@ -15,7 +15,7 @@ from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface
 from pellicle.synthetic.ball import ball
 from pellicle.synthetic.bubble import bubble
-from pellicle.synthetic.environment import Environment, light_tent, studio
+from pellicle.synthetic.environment import Environment, light_tent, one_lamp, studio
 from pellicle.synthetic.film_spectra import stack
 from pellicle.synthetic.sphere import EYE
 from pellicle.synthetic.surface_sphere import in_plane, render
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 INCIDENCES = (15.0, 45.0, 70.0)
 LEAVING = np.linspace(-88.0, 88.0, 353)
 """Angles (degrees) of the polar plots: of the light, and to the eye."""
+ENVIRONMENTS = {"studio": studio, "lamp": one_lamp}
+"""Surroundings of a sphere, by the angle of the brightest lamp from the line of sight."""
 SIZE, SMALL = 420, 260
 """Pixels across a single sphere, and across one of several."""
 LAMP_PERCENTILE = 97.0
@@ -44,16 +46,18 @@ def sphere(
     light: float = 35.0,
     title: str = "",
     *,
+    environment: str = "studio",
     size: int = SIZE,
 ) -> None:
-    """Draw a sphere of the surface in a studio, and polar plots of its BRDF, into `path`.
+    """Draw a sphere of the surface and polar plots of its BRDF into `path` (.png, .pdf or .svg).
 
-    `light` is the angle of the brightest soft box from the line of sight in degrees.
+    **Arguments:** `light`, the angle of the brightest soft box from the line of sight in degrees;
+    `environment`, "studio" or "lamp", one soft box in the dark.
 
     **Raises:** UsageError for another file type, and where the file exists or cannot be written.
     """
     target = figure_path(path)
-    picture = render(surface, studio(light), size)
+    picture = render(surface, ENVIRONMENTS[environment](light), size)
     with jax.enable_x64(True):
         lobes = {angle: in_plane(surface, angle, LEAVING) for angle in INCIDENCES}
     factor = exposure(picture)
@@ -63,7 +67,12 @@ def sphere(
     _show(axes, display(picture, factor))
     axes.set_title(title.replace("$", r"\$"), loc="left", fontsize="medium")
     axes.text(
-        0.0, -0.01, _lighting("D65, studio", factor), transform=axes.transAxes, va="top", fontsize="x-small"
+        0.0,
+        -0.01,
+        _lighting(f"D65, {environment}", factor),
+        transform=axes.transAxes,
+        va="top",
+        fontsize="x-small",
     )
     for row, (angle, values) in enumerate(lobes.items()):
         _draw_lobe(figure.add_subplot(grid[row, 1], projection="polar"), angle, values, surface)

@@ -27,25 +27,43 @@ class SoftBox(NamedTuple):
     height: float
     radiance: float
 
-    def coverage(self, direction: Any, edge: Any = EDGE) -> Any:
-        """Share (...) of the box's radiance in directions (..., 3): 1 inside, 0 outside."""
-        xp = namespace(direction)
+    def axes(self, xp: Any = np) -> tuple[Any, Any, Any]:
+        """Directions (3,) to the right of the box, up, and towards its centre."""
         polar, azimuth = xp.deg2rad(self.polar), xp.deg2rad(self.azimuth)
         sine = xp.sin(polar)
         centre = xp.stack([sine * xp.cos(azimuth), sine * xp.sin(azimuth), xp.cos(polar)])
         right = xp.stack([centre[2], 0 * sine, -centre[0]]) / xp.hypot(centre[0], centre[2])
+        return right, xp.cross(centre, right), centre
+
+    def coverage(self, direction: Any, edge: Any = EDGE) -> Any:
+        """Share (...) of the box's radiance in directions (..., 3): 1 inside, 0 outside."""
+        xp = namespace(direction)
+        right, above, centre = self.axes(xp)
         forward = direction @ centre
         across = xp.rad2deg(xp.arctan2(direction @ right, forward))
-        up = xp.rad2deg(xp.arctan2(direction @ xp.cross(centre, right), forward))
+        up = xp.rad2deg(xp.arctan2(direction @ above, forward))
         inside = _fade(self.width / 2 - xp.abs(across), edge, xp) * _fade(
             self.height / 2 - xp.abs(up), edge, xp
         )
         return xp.where(forward > 0, inside, 0.0)
 
+    def sample(self, u: Any, v: Any) -> tuple[Any, Any]:
+        """Directions (..., 3) to points of the unit square, spread over the plane of the box with its fading
+        edges, and the solid angle (...) that each would stand for alone."""
+        xp = namespace(u, v)
+        right, above, centre = self.axes(xp)
+        wide, high = (xp.tan(xp.deg2rad(side + EDGE) / 2) for side in (self.width, self.height))
+        x, y = wide * (2 * u - 1), high * (2 * v - 1)
+        distance = xp.sqrt(1 + x * x + y * y)
+        towards = centre + x[..., None] * right + y[..., None] * above
+        return towards / distance[..., None], 4 * wide * high / distance**3
+
 
 class Environment(NamedTuple):
-    """Soft boxes before a sky and a ground; radiances of the nadir, of both sides of the horizon and of the
-    zenith."""
+    """Soft boxes, the main lamp last and in front, before a sky and a ground.
+
+    The four numbers are the radiances of the nadir, of both sides of the horizon and of the zenith.
+    """
 
     boxes: tuple[SoftBox, ...]
     nadir: float
@@ -82,10 +100,10 @@ def studio(light: float = 35.0) -> Environment:
     one overhead and a narrow one behind at the right.
     """
     boxes = (
-        SoftBox(light, 60.0, 34.0, 34.0, 3.0),
         SoftBox(75.0, 170.0, 40.0, 80.0, 1.6),
         SoftBox(85.0, 91.0, 90.0, 28.0, 1.6),
         SoftBox(112.0, 5.0, 16.0, 90.0, 1.6),
+        SoftBox(light, 60.0, 34.0, 34.0, 3.0),
     )
     return Environment(boxes, 0.12, 0.35, 0.5, 0.9)
 
@@ -94,8 +112,8 @@ def light_tent() -> Environment:
     """Light tent with two windows, before a dark background: for what reflects little."""
     boxes = (
         SoftBox(180.0, 0.0, 100.0, 100.0, 0.02),
-        SoftBox(48.0, 150.0, 30.0, 44.0, 2.0),
         SoftBox(70.0, 15.0, 18.0, 60.0, 1.4),
+        SoftBox(48.0, 150.0, 30.0, 44.0, 2.0),
     )
     return Environment(boxes, 0.25, 0.4, 0.5, 0.8)
 

@@ -21,6 +21,9 @@ from pellicle.synthetic.surface_colour import in_colour
 
 DIRECTIONS = 192
 """Directions of the light at each pixel: half of them spread as a lobe, half as the light of a diffuser."""
+LAMP, NARROW = 100, 0.04
+"""Directions to the main lamp, and the roughness below which their spacing would show in its reflection:
+there it is integrated with the rest of the environment."""
 FOOTPRINT, WIDEST = 2.5, 60.0
 """Width over which edges of the environment fade: so many times the root of the solid angle that a direction
 stands for, up to so many degrees. Narrower edges would show as a pattern (filtered importance sampling,
@@ -52,18 +55,15 @@ def render(
         axes = np.asarray(frame(theta, phi))
         maps = following(surface, relief(pixels.normal, axes, np.random.default_rng(seed)))
         fixed = {key: x for key, x in shading.numbers.items() if key not in maps}
-        shared = (
-            fixed,
-            studio() if environment is None else environment,
-            _squares(count),
-            lobe_width(surface),
-        )
+        narrowest, width = lobe_widths(surface)
+        shared = (fixed, studio() if environment is None else environment, _squares(count), width)
         shared = jax.tree_util.tree_map(lambda x: jnp.asarray(x, jnp.float32), shared)
         found = []
         for start in range(0, len(theta), _BATCH):
             rows = np.minimum(np.arange(start, start + _BATCH), len(theta) - 1)
             batch = {key: jnp.asarray(x[rows, None], jnp.float32) for key, x in maps.items()}
-            found.append(np.asarray(_radiance(shading.brdf, batch, jnp.asarray(axes[rows]), *shared)))
+            lit = _radiance(shading.brdf, narrowest > NARROW, batch, jnp.asarray(axes[rows]), *shared)
+            found.append(np.asarray(lit))
     return pixels.picture(np.concatenate(found)[: len(theta)] @ shading.to_srgb)
 
 
@@ -78,15 +78,18 @@ def following(surface: Surface, noise: Relief) -> dict[str, np.ndarray]:
     return found
 
 
-def lobe_width(surface: Surface) -> float:
-    """GGX roughness that spreads directions at least as widely as the surface's lobes."""
+def lobe_widths(surface: Surface) -> tuple[float, float]:
+    """GGX roughness of the narrowest lobe, and one that spreads directions as widely as all lobes."""
     values = surface.start_numbers()
-    exponents = [float(value) for key, value in values.items() if key.startswith("exponent")]
-    phong = np.sqrt(2 / (4 * min(exponents) + 2)) if exponents else 0.0  # cos^e to the mirror ≈ cos^4e to h
+    rough = [float(value) for key, value in values.items() if key.endswith("roughness")]
+    # cos^e around the mirror direction is nearly cos^4e around the normal, GGX of α² = 2/(4e + 2)
+    phong = [
+        np.sqrt(2 / (4 * float(value) + 2)) for key, value in values.items() if key.startswith("exponent")
+    ]
+    lobes = [*rough, *phong] or [1.0]
     tilt: Any = surface.numbers.get("deviation", 0.0)
-    largest = tilt.upper if isinstance(tilt, Free) else float(tilt)
-    width = max(float(values.get("roughness", 0.0)), phong)
-    return float(np.clip(np.hypot(width, np.tan(np.deg2rad(largest))), 0.003, 1.0))
+    apart = np.tan(np.deg2rad(tilt.upper if isinstance(tilt, Free) else float(tilt)))
+    return min(lobes), float(np.clip(np.hypot(max(lobes), apart), 0.003, 1.0))
 
 
 def _squares(count: int) -> np.ndarray:
@@ -95,9 +98,10 @@ def _squares(count: int) -> np.ndarray:
     return (0.5 + np.arange(count)[:, None] * np.array([1 / plastic, 1 / plastic**2])) % 1.0
 
 
-@partial(jax.jit, static_argnums=0)
+@partial(jax.jit, static_argnums=(0, 1))
 def _radiance(
     brdf: Model,
+    by_lamp: bool,
     maps: dict[str, Any],
     axes: Any,
     fixed: dict[str, Any],
@@ -105,14 +109,31 @@ def _radiance(
     squares: Any,
     width: Any,
 ) -> Any:
-    """Radiance (pixels, channels): the mean of BRDF × radiance × cosine over the density of the directions.
+    """Radiance (pixels, channels) to the eye; with `by_lamp` the main lamp is integrated over itself."""
+    eye = (axes @ jnp.asarray(EYE, axes.dtype))[:, None]
+    rest, lamp = environment._replace(boxes=environment.boxes[:-1]), environment.boxes[-1]
+    total = 0.0
+    groups = [_by_lobe(rest if by_lamp else environment, axes, eye, squares, width)]
+    if by_lamp:
+        outside, solid_angle = lamp.sample(*jnp.asarray(_squares(LAMP), axes.dtype).T)
+        added = lamp.coverage(outside) * (lamp.radiance - rest.radiance(outside)) * solid_angle / LAMP
+        i = jnp.einsum("mk,plk->pml", outside, axes)
+        groups.append((i, added * jnp.maximum(i[..., 2], 0.0)))
+    for i, weight in groups:
+        values = brdf(fixed | maps, i, jnp.broadcast_to(eye, i.shape))
+        total = total + jnp.einsum("pmn,pm->pn", values, weight)
+    return total
 
-    Half of the directions are mirrored by facets of a GGX lobe (B. Walter et al., EGSR 2007, eq. 35), half
-    are spread as the cosine; all are weighted by the density of their mixture (the balance heuristic,
-    E. Veach and L. Guibas, SIGGRAPH 1995).
+
+def _by_lobe(environment: Environment, axes: Any, eye: Any, squares: Any, width: Any) -> tuple[Any, Any]:
+    """Directions (pixels, count, 3) of the light and radiance × cosine over their density.
+
+    Half of them are mirrored by facets of a GGX lobe (B. Walter et al., EGSR 2007, eq. 35), half are spread
+    as the cosine; all are weighted by the density of their mixture (the balance heuristic, E. Veach and
+    L. Guibas, SIGGRAPH 1995).
     """
-    count, eye = len(squares), axes @ jnp.asarray(EYE, axes.dtype)
-    o = jnp.broadcast_to(eye[:, None], (len(axes), count, 3))
+    count = len(squares)
+    o = jnp.broadcast_to(eye, (len(axes), count, 3))
     u, v = squares.T
     is_facet = jnp.arange(count) % 2 == 0
     tilt = jnp.where(is_facet, jnp.arctan(width * jnp.sqrt(u / (1 - u))), jnp.arcsin(jnp.sqrt(u)))
@@ -123,8 +144,7 @@ def _radiance(
     density = 0.5 * facets + 0.5 * jnp.maximum(i[..., 2], 0.0) / jnp.pi
     edge = jnp.rad2deg(FOOTPRINT / jnp.sqrt(count * density))
     seen = environment.radiance(jnp.einsum("pmk,pkl->pml", i, axes), jnp.clip(edge, EDGE, WIDEST))
-    weight = jnp.where(i[..., 2] > 0, seen * i[..., 2] / density, 0.0) / count
-    return jnp.einsum("pmn,pm->pn", brdf(fixed | maps, i, o), weight)
+    return i, jnp.where(i[..., 2] > 0, seen * i[..., 2] / density, 0.0) / count
 
 
 def in_plane(surface: Surface, incidence: float, leaving: np.ndarray) -> np.ndarray:
