@@ -12,6 +12,7 @@ import numpy as np
 
 from pellicle.accuracy.colour_methods import ColourMethod, Films, compiled, one_film
 from pellicle.accuracy.compiled import Program
+from pellicle.dispersion.base import AbstractDispersion
 from pellicle.rendering.appearance import appearance
 from pellicle.rendering.effective import effective, physical
 from pellicle.rendering.targets import target
@@ -30,7 +31,8 @@ def _by_formula(name: str, solve: Any, films: Films) -> Program | str:
     if isinstance(film, str):
         return film
     began = time.perf_counter()
-    scene = Scene(Layer(film.layer, float(film.thickness[0])), film.base, ambient=film.ambient)
+    layer, base, ambient = map(_medium, (film.layer, film.base, film.ambient))
+    scene = Scene(Layer(layer, float(film.thickness[0])), base, ambient=ambient)
     look = appearance(scene, np.quantile(film.thickness, _SHARES))
     formula = target(name, package_check=False).formula
     assert formula is not None
@@ -44,6 +46,14 @@ def _by_formula(name: str, solve: Any, films: Films) -> Program | str:
 
     program = compiled(xyz, films)
     return replace(program, compile_seconds=program.compile_seconds + solved)
+
+
+def _medium(index: Any) -> Any:
+    """A dispersion as it is, a number as what `Scene` takes."""
+    if isinstance(index, AbstractDispersion):
+        return index
+    number = complex(np.asarray(index))
+    return number if number.imag else number.real
 
 
 RENDERER_METHODS = tuple(
