@@ -4,9 +4,9 @@ The oxide is that of `docs/surfaces/tempered_steel.toml`, from 10 nm at the tip 
 upper picture is rendered spectrally, with the reflectance of the film at each wavelength; the lower one in
 RGB, with the formula that `KHR_materials_iridescence` publishes and the numbers of the film as they are.
 
-python scripts/render_blade.py [--spp 512] [--width 1200]
+python scripts/render_blade.py [--spp 256] [--width 1000]
 
-It writes docs/figures/heat_tinted_blade.png, and takes two minutes on two cores where Dr.Jit finds LLVM 16 or
+It writes docs/figures/heat_tinted_blade.png, and takes five minutes on two cores where Dr.Jit finds LLVM 16 or
 newer (`DRJIT_LIBLLVM_PATH`), ten times as long without. It needs `pip install 'pellicle[render]'`.
 """
 
@@ -249,7 +249,7 @@ def render(table: Path, variant: str, width: int, height: int, spp: int) -> np.n
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--spp", type=int, default=256, help="samples of a pixel")
-    parser.add_argument("--width", type=int, default=1200, help="pixels")
+    parser.add_argument("--width", type=int, default=1000, help="pixels")
     parser.add_argument("--out", type=Path, default=FIGURE)
     given = parser.parse_args()
     spectral, rgb = variants()

@@ -94,6 +94,8 @@ ELSEWHERE = {
     "python benchmarks/brdf_bands.py": "takes minutes; tests/brdf/test_sensor_bands.py: its bands",
     "python benchmarks/brdf_errors.py": "tests/fitting/brdf/test_errors.py: fewer runs",
     "python benchmarks/brdf_recovery.py": _LONG_STUDY,
+    "python benchmarks/mitsuba_films.py": "tests/rendering/test_mitsuba.py: one film",
+    "python scripts/render_blade.py": "renders for minutes; tests/rendering/test_mitsuba.py: its materials",
     "python -m pytest": "runs these tests",
     "python scripts/make_measurements.py": "tests/test_measurements.py: two of the files",
     "python scripts/index_materials.py": "tests/materials/test_catalogue.py: the kept index",
