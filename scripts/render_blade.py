@@ -6,8 +6,8 @@ RGB, with the formula that `KHR_materials_iridescence` publishes and the numbers
 
 python scripts/render_blade.py [--spp 256] [--width 1000]
 
-It writes docs/figures/heat_tinted_blade.png, and takes five minutes on two cores where Dr.Jit finds LLVM 16 or
-newer (`DRJIT_LIBLLVM_PATH`), ten times as long without. It needs `pip install 'pellicle[render]'`.
+It writes docs/figures/heat_tinted_blade.png. It takes some minutes on two cores where Dr.Jit finds LLVM 16 or
+newer (`DRJIT_LIBLLVM_PATH`), and ten times as long without. It needs `pip install 'pellicle[render]'`.
 """
 
 from __future__ import annotations
