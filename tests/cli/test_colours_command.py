@@ -113,3 +113,34 @@ def test_colours_come_back_from_their_file(pellicle, tmp_path):
     assert pellicle("read", tmp_path / "a.csv", "--out", tmp_path / "out").code == 0
     again = pl.read_colours(tmp_path / "out" / "a.csv")
     np.testing.assert_allclose(again.values, sensor.values, rtol=1e-6)
+
+
+@pytest.mark.parametrize("command", ["simulate", "plan"])
+def test_colours_have_no_wavelengths_of_their_own(pellicle, recipe, tmp_path, command):
+    recipe.write_text(RECIPE.replace("noise", "wavelengths = [400, 500]\nnoise"))
+    words = ("--out", tmp_path / "x.csv") if command == "simulate" else ()
+    pellicle(command, recipe, *words).refused(3, "colours take those of their sensor")
+
+
+def test_films_and_spectra_of_one_recipe(pellicle, recipe, tmp_path):
+    """Each file is read by its own signal, with a camera of its own."""
+    from pellicle.cli.flags import ReadingFlags, SceneFlags
+    from pellicle.cli.inputs import inputs
+
+    (tmp_path / "c.csv").write_text("R,G,B\n0.2,0.3,0.4\n")
+    (tmp_path / "s.csv").write_text("wavelength_nm,R\n500,0.2\n600,0.3\n")
+    files = """[[data.file]]
+path = "c.csv"
+signal = "srgb"
+camera = { illuminant = "D50" }
+
+[[data.file]]
+path = "s.csv"
+signal = "R"
+"""
+    recipe.write_text(files + RECIPE.partition("[data]")[2].partition("noise = 0.006")[2])
+    found = inputs([], str(recipe), SceneFlags(), ReadingFlags(), joint=True)
+    [colours], [spectrum] = (file.read() for file in found.files)
+    assert isinstance(colours, pl.Colours)
+    assert "observer 1931 under D50" in colours.notes
+    assert spectrum.signal == "R"

@@ -100,6 +100,10 @@ def _write_colours(
     from pellicle.synthetic.measured_colours import simulate_colours
 
     scene, seen, table = recipe.scene(), recipe.sight(), recipe.tables
+    if table.data.wavelengths is not None:
+        raise DataError(
+            f"{recipe.path}: [data] wavelengths: colours take those of their sensor; leave them out"
+        )
     log_scene(scene)
     colours, plan = simulate_colours(
         scene,

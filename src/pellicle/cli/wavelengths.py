@@ -43,6 +43,10 @@ def _in_colours(recipe: FilmRecipe) -> tuple[Scene, np.ndarray]:
 
     from pellicle.scene.film import Light
 
+    if recipe.tables.data.wavelengths is not None:
+        raise DataError(
+            f"{recipe.path}: [data] wavelengths: colours take those of their sensor; leave them out"
+        )
     own = recipe.each[0] if recipe.each else recipe
     scene, nm, angles = own.scene(), own.sight().sensor.wavelength, recipe_angles(recipe)
     say(f"wavelengths: {nm[0]:g} to {nm[-1]:g} nm every 1 nm, those of the sensor")

@@ -121,7 +121,8 @@ def distinct_stems(paths: Sequence[str | os.PathLike[str]], taken: Iterable[str]
 
 
 def write_summary(path: str | os.PathLike[str], records: Iterable[Mapping[str, Any]]) -> None:
-    """Write one row for each file: path, status, verdict, free parameters with errors, rms, reduced χ².
+    """Write one row for each file, spectrum or film: path and name within the file, status, verdict, free
+    parameters with errors, rms, reduced χ².
 
     `records` are JSON records of fits and failures. An earlier summary in a folder that pellicle wrote is
     replaced. Raises UsageError in a folder with files that pellicle did not write.
@@ -140,14 +141,16 @@ def write_summary(path: str | os.PathLike[str], records: Iterable[Mapping[str, A
 
 
 def _summary_row(record: Mapping[str, Any]) -> dict[str, Any]:
-    row = {"path": record["data"]["path"], "status": record["status"], "verdict": record["verdict"]}
+    data = record["data"]
+    row = {"path": data["path"], **({"spectrum": data["spectrum"]} if "spectrum" in data else {})}
+    row |= {"status": record["status"], "verdict": record["verdict"]}
     for name, p in record["parameters"].items():
         if p["free"]:
             row |= {name: _cell(p["value"]), f"{name}_stderr": _cell(p["stderr"])}
     return row | {
         "rms": _cell(record["rms"]),
         "chi2_reduced": _cell(record["chi2_reduced"]),
-        "sha256": record["data"]["sha256"] or "",
+        "sha256": data["sha256"] or "",
         "error": record.get("error", ""),
     }
 
