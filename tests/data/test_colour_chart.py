@@ -51,3 +51,6 @@ def test_charts_that_give_no_matrix(tmp_path, refusal):
     grey = np.outer(np.linspace(0.1, 0.9, 8), [0.95, 1.0, 1.09])
     with pytest.raises(DataError, match="one hue"):
         fit_matrix(grey, grey, None)
+    coloured = np.random.default_rng(2).uniform(0.1, 0.9, (8, 3))
+    with pytest.raises(DataError, match="one hue"):
+        fit_matrix(coloured @ np.ones((3, 3)) / 3, coloured, None)  # a grey photograph of the chart

@@ -48,7 +48,7 @@ def test_pixels_of_every_layout(tmp_path, layout):
     np.testing.assert_allclose(picture.pixels, PIXELS / 255, atol=1e-7)
     assert picture.size == (20, 12)
     assert picture.profile == ""
-    assert picture.step == pytest.approx({"16 bits": 1 / 65535, "float": 1.0}.get(layout, 1 / 255))
+    assert picture.step == pytest.approx({"16 bits": 1 / 65535, "float": 1 / 65535}.get(layout, 1 / 255))
 
 
 def test_palette_and_jpeg_are_told(tmp_path):
@@ -120,6 +120,15 @@ def test_regions_and_points(tmp_path):
             region.pixels(picture)
     with pytest.raises(UsageError, match="20 by 12"):
         parse_points("20,0", picture)
+
+
+def test_messages_on_damaged_and_transparent_pictures(tmp_path):
+    (tmp_path / "a.png").write_bytes(b"\x89PNG\r\n\x1a\nrubbish")
+    with pytest.raises(DataError, match=r"cannot identify image file\)"):
+        read_picture(tmp_path / "a.png")
+    clear = np.dstack([PIXELS, np.zeros((12, 20), np.uint8)])
+    with pytest.raises(DataError, match="100 % of its pixels are transparent"):
+        read_picture(by_pillow(tmp_path / "b.png", clear))
 
 
 def test_a_strip_follows_its_line(tmp_path):

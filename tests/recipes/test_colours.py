@@ -147,6 +147,7 @@ def test_a_camera_by_its_chart(tmp_path):
         ({"observer": "1930"}, UsageError, "1930"),
         ({"illuminant": "F2"}, UsageError, "F2"),
         ({"gamma": 2.2}, UsageError, "gamma"),
+        ({"space": "rgb", "gamma": 0.0}, UsageError, "`gamma` must be a number from"),
         ({"white_balance": "free"}, UsageError, "white_balance"),
         ({"region": "1,1,2,2"}, UsageError, "no picture"),
         ({"angle": 30.0}, UsageError, "own angles"),
@@ -164,10 +165,10 @@ def test_what_does_not_go_together(camera, options, error, reason):
     ("options", "reason"),
     [
         ({}, "30 by 20 pixels: give `region"),
-        ({"region": "1,1,2,2", "points": "1,1"}, "give `region"),
+        ({"region": "1,1,2,2", "points": "1,1"}, "`points` exclude each other"),
         ({"region": "1,1,2,2", "space": "lab"}, "a picture has"),
-        ({"region": "1,1,2,2", "white": "0,0,4,4"}, "is clipped in 100 %"),
-        ({"region": "1,1,2,2", "angle": [1, 2]}, "2 numbers for 1 regions"),
+        ({"region": "1,1,2,2", "white": "0,0,4,4"}, "is black in 100 %"),
+        ({"region": "1,1,2,2", "angle": [1, 2]}, "2 angles are given for 1 regions"),
         ({"region": "1,1,2,2", "columns": "R,G,B"}, "leave `columns`"),
     ],
 )

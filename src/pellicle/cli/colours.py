@@ -46,8 +46,11 @@ def is_of_colours(path: str, reading: ReadingFlags) -> bool:
 
 def refuse_camera(path: str, reading: ReadingFlags) -> None:
     """Raise UsageError where flags of colours are given and the file has a spectrum."""
+    from pellicle.data.read_picture import picture_format
+
     wrong = [name for name in _PIXELS if getattr(reading, name) is not None]
     if wrong:
+        picture_format(path)  # reports a file that does not exist
         raise UsageError(f"{path}: {', '.join(given(wrong))}: only pictures have pixels, with --signal srgb")
 
 

@@ -55,6 +55,7 @@ FLAGS = {
     "sensitivities": "--sensitivities",
     "signal": "--signal",
     "signal_unit": "--signal-unit",
+    "space": "--signal",
     "spectrum": "--spectrum",
     "spot": "--spot",
     "steps": "--steps",

@@ -58,6 +58,10 @@ def read(
     for measurement in found:
         _show(measurement, json)
     if out is not None:
+        from pellicle.data.colours import Colours
+
+        if formats != ["csv"] and any(isinstance(one, Colours) for one in found):
+            raise UsageError(f"--to {to}: colours are written as csv; leave it out")
         _write(Path(out), found, [SUFFIXES[word] for word in formats])
     return worst
 

@@ -69,7 +69,8 @@ def fit_matrix(linear: np.ndarray, xyz: np.ndarray, sigma: np.ndarray | None, pa
     Without `sigma` (patches, 3) all patches weigh the same. The covariance is scaled to the residuals where
     they exceed σ.
 
-    **Raises:** DataError for patches of fewer than three independent colours.
+    **Raises:** DataError for patches of fewer than three independent colours, in the reference or the
+    photograph.
     """
     rows, covariance = np.zeros((3, 3)), np.zeros((9, 9))
     for channel in range(3):
@@ -83,4 +84,6 @@ def fit_matrix(linear: np.ndarray, xyz: np.ndarray, sigma: np.ndarray | None, pa
         block = slice(3 * channel, 3 * channel + 3)
         scale = variance if sigma is None else max(variance, 1.0)
         covariance[block, block] = scale * np.linalg.inv(design.T @ design)
+    if np.linalg.cond(rows) > 1e6:
+        raise DataError(f"{path}: R, G, B of its patches are of one hue; give them as photographed")
     return CameraMatrix(rows, covariance)

@@ -74,9 +74,8 @@ def colour_table(
     decimal_comma: bool,
 ) -> Table:
     """Return the table of cells that `named_cells` has found."""
-    notes = ["decimal commas"] if decimal_comma else []
     decimal = "," if decimal_comma else "."
-    layout = plain_columns(names, list(zip(rows, cells, strict=True)), notes, decimal=decimal)
+    layout = plain_columns(names, list(zip(rows, cells, strict=True)), [], decimal=decimal)
     return Table(file.path, file.sha256, layout)
 
 

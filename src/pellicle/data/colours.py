@@ -112,7 +112,7 @@ class Colours:
         if self.gamma != 1.0 and self.space != "rgb":
             raise UsageError(f'`gamma` goes with `space="rgb"`: {self.space} has its own coding')
         if not 0.1 <= self.gamma <= 10:
-            raise UsageError(f"`gamma` must be a number such as 2.2, got {self.gamma:g}")
+            raise UsageError(f"`gamma` must be a number from 0.1 to 10, such as 2.2, got {self.gamma:g}")
         if self.space != "rgb" and (self.camera is not None or self.white_balance == "free"):
             name = "camera" if self.camera is not None else "white_balance"
             raise UsageError(f'`{name}` goes with `space="rgb"`, the channels of a camera, not {self.space}')

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -23,14 +24,16 @@ _SIGNATURES = {
 LARGEST = 2**28
 """Values of the largest TIFF, as many as Pillow reads of other pictures without a warning."""
 _COLOUR_MODES = ("RGB", "RGBA", "RGBX")
+_FLOAT_LEVELS = 65535.0
+"""Levels of a picture in floats: cameras have 16 bits at most."""
 
 
 @dataclass(frozen=True, eq=False)
 class Picture:
     """Pixels of a picture: coded values from 0 to 1, float32, (height, width, 3), row 0 at the top.
 
-    `step` is the step of the coding, 1/255 for 8 bits; `profile` the name of an embedded colour profile that
-    is not sRGB, or "".
+    `step` is the step of the coding, 1/255 for 8 bits, that of 16 bits for floats; `profile` the name of an
+    embedded colour profile that is not sRGB, or "".
     """
 
     pixels: np.ndarray
@@ -72,16 +75,15 @@ def read_picture(path: str | os.PathLike[str]) -> Picture:
     except DataError as error:
         raise DataError(f"{path}: {error}") from None
     except Exception as error:  # decoders raise errors of every kind on damaged files
-        reason = str(error).split("\n")[0].rstrip(".")
-        raise DataError(
-            f"{path}: the {kind} cannot be decoded ({reason}); save it again, uncompressed"
-        ) from None
+        reason = re.sub(r" <_io\.BytesIO.*?>", "", str(error).split("\n")[0].rstrip("."))
+        raise DataError(f"{path}: the {kind} cannot be decoded ({reason}); save it again") from None
     coded, notes = _colours(values, full, notes, str(path))
     name = _profile_name(profile)
     foreign = "" if "srgb" in name.lower() or "61966-2" in name else name
     if kind == "JPEG":
         notes = [*notes, "JPEG: its compression shifts colours by a few of 255; PNG and TIFF do not"]
-    return Picture(coded, 1 / full, str(path), sha256, tuple(notes), foreign)
+    step = 1 / (_FLOAT_LEVELS if values.dtype.kind == "f" else full)
+    return Picture(coded, step, str(path), sha256, tuple(notes), foreign)
 
 
 def _by_pillow(content: bytes) -> tuple[np.ndarray, float, bytes | None, list[str]]:
@@ -158,9 +160,9 @@ def _colours(values: np.ndarray, full: float, notes: list[str], path: str) -> tu
     if values.ndim != 3 or values.shape[2] not in (3, 4):
         raise DataError(f"{path}: has the shape {values.shape} and not three channels; save it in R, G, B")
     if values.shape[2] == 4 and np.any(values[..., 3] < full):
-        clear = 100 * np.mean(values[..., 3] < full)
+        clear = max(round(100 * np.mean(values[..., 3] < full)), 1)
         raise DataError(
-            f"{path}: {clear:.2g} % of its pixels are transparent, whose colours are unknown; save it without"
+            f"{path}: {clear} % of its pixels are transparent, whose colours are unknown; save it without"
             " alpha"
         )
     return values[..., :3].astype(np.float32) / np.float32(full), notes

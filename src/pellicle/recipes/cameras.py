@@ -82,6 +82,8 @@ def _check(camera: Camera, space: str) -> None:
     if camera.lamp is not None and camera.illuminant != "D65":
         raise UsageError("`illuminant` and `lamp` exclude each other: leave one out")
     if space == "rgb":
+        if not 0.1 <= camera.gamma <= 10:
+            raise UsageError(f"`gamma` must be a number from 0.1 to 10, such as 2.2, got {camera.gamma:g}")
         return
     for name in ("sensitivities", "chart"):
         if getattr(camera, name) is not None:

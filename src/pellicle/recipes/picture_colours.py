@@ -31,7 +31,9 @@ def picture_colours(
     """Return the colours of the regions of a picture, of a film each, or of one film at several angles."""
     space = check_picture(picture, space)
     seen = sight(camera, space)
-    if (region is None) == (points is None):
+    if region is not None and points is not None:
+        raise UsageError(f"{picture.path}: `region` and `points` exclude each other: leave one out")
+    if region is points is None:
         width, height = picture.size
         either = '`region="x,y,width,height"` or `points="x,y"`'
         raise UsageError(f"{picture.path}: is a picture of {width} by {height} pixels: give {either}")
@@ -39,7 +41,9 @@ def picture_colours(
     reference, notes = white_reference(picture, seen.coding, white)
     angles = None if angle is None else np.asarray(angle, float)
     if angles is not None and angles.ndim and len(angles) != len(regions):
-        raise UsageError(f"`angle` has {len(angles)} numbers for {len(regions)} regions: give one for each")
+        raise UsageError(
+            f"{len(angles)} angles are given for {len(regions)} regions of the picture: give one for each"
+        )
     told = [*picture.notes, *notes]
     told += [f"colour profile {picture.profile} ignored"] if picture.profile else []
     films = []
@@ -87,7 +91,14 @@ def white_reference(
     if others:
         raise UsageError("`white` must be one region")
     pixels = one.pixels(picture, "white")
-    limited = np.mean((pixels <= 0) | (pixels >= 1), axis=0)
+    dark = np.mean(pixels <= 0, axis=0)
+    if np.any(dark > 0.01):
+        name = "RGB"[int(np.argmax(dark))]
+        raise UsageError(
+            f"{picture.path}: `white` {one} is black in {100 * dark.max():.0f} % of its pixels in {name}:"
+            " choose the region of a white standard"
+        )
+    limited = np.mean(pixels >= 1, axis=0)
     if np.any(limited > 0.01):
         name, share = "RGB"[int(np.argmax(limited))], 100 * limited.max()
         raise UsageError(
