@@ -4,6 +4,8 @@ import json
 
 import pytest
 
+from pellicle.rendering.targets import MODULES
+
 pytest.importorskip("pygltflib")
 
 RECIPE = '[scene]\nsubstrate = "2.7+2.8j"\n[[scene.layer]]\nmaterial = 2.9\nthickness = 40\n'
@@ -58,3 +60,8 @@ def test_what_a_fit_leaves_is_enough(pellicle, spectrum_file, tmp_path, monkeypa
     ran = pellicle("export", "fit/result.json", "--to", "gltf", "--out", "film.glb", "--json")
     assert ran.code == 0, ran.err
     assert ran.objects[0]["thickness_nm"][0] == pytest.approx(300, abs=0.5)
+
+
+def test_the_help_names_every_renderer(pellicle):
+    words = pellicle("export", "--help").out.replace(",", " ").replace(".", " ").split()
+    assert set(MODULES) <= set(words)

@@ -1,0 +1,28 @@
+"""The registry of renderers: every target is named where users look, and says which package it lacks."""
+
+import pytest
+
+import pellicle as pl
+from pellicle.errors import UsageError
+from pellicle.rendering import targets
+from pellicle.rendering.targets import MODULES, target
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_a_target_bears_its_name(name):
+    found = target(name, package_check=False)
+    assert found.name == name
+    assert found.suffixes
+    assert all(suffix.startswith(".") for suffix in found.suffixes)
+
+
+def test_the_documentation_of_python_names_every_target():
+    assert [name for name in MODULES if f'"{name}"' not in (pl.export.__doc__ or "")] == []
+
+
+def test_an_absent_package_is_named_with_its_extra(monkeypatch):
+    monkeypatch.setattr(targets, "find_spec", lambda name: None)
+    with pytest.raises(
+        UsageError, match=r"glTF needs the package pygltflib: pip install 'pellicle\[render\]'"
+    ):
+        target("gltf")
