@@ -122,7 +122,7 @@ def test_values_leave_out_what_is_there():
     missing = {name for name, plan in plans.items() if isinstance(plan, str)}
     assert missing == {
         *("8 angles", "16 angles", "32 angles", "normal incidence", "s alone", "transparent film"),
-        *("parallel boundaries", "mean wavelengths", "no lobe of the coat"),
+        *("parallel boundaries", "mean wavelengths", "no lobe of the coat", "single scattering"),
     }
     assert not plans["without interference"].on("coherence")
 

@@ -164,6 +164,11 @@ BRDF_METHODS = (
     BrdfMethod("normal incidence", "the film's angle", partial(_without, "oblique", "no oblique film")),
     BrdfMethod("s alone", "p", partial(_without, "polarisation", "s and p are equal")),
     BrdfMethod("transparent film", "its absorption", partial(_without, "absorption", "no film absorbs")),
+    BrdfMethod(
+        "single scattering",
+        "light reflected more than once",
+        partial(_without, "multiple-scattering", "it is not asked for"),
+    ),
     BrdfMethod("parallel boundaries", "the deviation", partial(_without, "deviation", "they are parallel")),
     BrdfMethod("no lobe of the coat", "the clear coat's lobe", partial(_without, "coat", "it has no coat")),
     BrdfMethod("no diffuse part", "the diffuse part", partial(_without, "diffuse", "it has none")),

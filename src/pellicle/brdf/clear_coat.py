@@ -19,6 +19,7 @@ from pellicle.brdf import film_colour
 from pellicle.brdf.broadcasting import Evaluate, Parameters, column
 from pellicle.brdf.directions import cosine_inside, cosine_to_half
 from pellicle.brdf.lobes import microfacets
+from pellicle.brdf.microfacet import film_lobes
 
 
 def clear_coat(colour: film_colour.Colour = film_colour.exact) -> Evaluate:
@@ -50,8 +51,7 @@ def _below(parameters: Parameters, i: Any, o: Any, colour: film_colour.Colour) -
         jnp.concatenate([v[..., :2] / n, cosine_inside(v[..., 2:], n)], axis=-1) for v in (i, o)
     )
     passed = (1 - fresnel(i[..., 2], n)) * (1 - fresnel(o[..., 2], n)) / (n * n)
-    lobe = passed * microfacets(inner_i, inner_o, parameters["roughness"])
-    return column(lobe) * colour({**parameters, "ambient_n": n}, inner_i, inner_o)
+    return column(passed) * film_lobes({**parameters, "ambient_n": n}, inner_i, inner_o, colour)
 
 
 def fresnel(cosine: Any, n: Any) -> Any:

@@ -127,7 +127,7 @@ def interpolated(count: int, reflectance: Reflectance = reflectance) -> Colour:
             angle = jnp.arccos(jnp.clip(2 * cosine - 1, -1.0, 1.0))
             return jnp.cos(angle[..., None] * np.arange(count)) @ series
         # one channel after the other: a last axis of three would leave vector lanes empty
-        return jnp.stack([_clenshaw(channel, 4 * cosine - 2) for channel in series.T], axis=-1)
+        return jnp.stack([clenshaw(channel, 4 * cosine - 2) for channel in series.T], axis=-1)
 
     return colour
 
@@ -145,7 +145,7 @@ def chebyshev(thickest: float) -> Colour:
     return interpolated(node_count(thickest))
 
 
-def _clenshaw(series: Any, twice_x: Any) -> Any:
+def clenshaw(series: Any, twice_x: Any) -> Any:
     """Evaluate a Chebyshev series at x by Clenshaw's recurrence."""
     current, previous = 0.0, 0.0
     for term in range(len(series) - 1, 0, -1):

@@ -74,9 +74,9 @@ class Model(NamedTuple):
         **Arguments:**
 
         - `parameters` has every key of the model, each a number or a map (...) that broadcasts with the
-          directions. Without `k`, `base_k`, `deviation`, `specular`, `coat` or `diffuse` that effect is
-          absent and costs nothing. `wavelengths` (nm) are one for each channel, R, G and B by default; with
-          `weights` (wavelengths, channels), the bands of a sensor, they are any.
+          directions. Without `k`, `base_k`, `deviation`, `multiple_scattering`, `specular`, `coat` or
+          `diffuse` that effect is absent and costs nothing. `wavelengths` (nm) are one for each channel, R, G
+          and B by default; with `weights` (wavelengths, channels), the bands of a sensor, they are any.
         - `i`, `o`: unit vectors (..., 3) away from the surface, with the normal as third axis.
 
         **Returns:** (..., 3), or one value for each wavelength; 0 below the horizon.
@@ -111,6 +111,7 @@ _FACETS = (
     Parameter("base_n", "", 1.05, 4.0, 2.7, "index of the base"),
     Parameter("base_k", "", 0.0, 6.0, 2.8, "extinction of the base"),
     Parameter("roughness", "", 0.003, 1.0, 0.2, "GGX alpha", log=True),
+    Parameter("multiple_scattering", "", 0.0, 1.0, 0.0, "1 with light reflected more than once, 0 without"),
     Parameter("specular", "", 0.0, 100.0, 1.0, "weight of the facets", linear=True),
     _GREY,
 )

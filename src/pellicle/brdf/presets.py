@@ -32,6 +32,7 @@ PRESETS: dict[str, tuple[str, dict[str, Any]]] = {
             "base_n": 2.7,
             "base_k": 2.8,
             "roughness": 0.2,
+            "multiple_scattering": 0.0,
             "specular": 1.0,
             "diffuse": 0.0,
         },

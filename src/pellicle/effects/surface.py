@@ -60,6 +60,16 @@ def deviation(view: SurfaceView) -> Row | None:
     return _of_number(view, "deviation", "the angle between the two normals", "the boundaries are parallel")
 
 
+def multiple_scattering(view: SurfaceView) -> Row | None:
+    """On where a surface asks for it; only models with microfacets can."""
+    if "multiple_scattering" not in _keys(view):
+        return None
+    if "multiple_scattering" not in view.numbers:
+        return Row("multiple-scattering", False, "not asked for: light meets one facet")
+    why = "light reflected more than once between facets, by Kulla and Conty"
+    return Row("multiple-scattering", "specular" in view.numbers, why)
+
+
 def coat(view: SurfaceView) -> Row | None:
     """On where a clear coat may have a lobe; only models with a coat have one."""
     return _of_number(view, "coat", "the lobe of the clear coat", "the clear coat has no lobe")
@@ -160,7 +170,7 @@ def precision(view: SurfaceView) -> Row:
 
 
 JUDGES = (
-    *(spectral_sampling, bands, roughness, deviation, coat, diffuse, absorption),
+    *(spectral_sampling, bands, roughness, multiple_scattering, deviation, coat, diffuse, absorption),
     *(coherence, tunnelling, oblique, polarisation, precision),
 )
 """One function for each effect of a surface, in the order of a plan; it returns None where the model cannot

@@ -68,6 +68,7 @@ _REMOVALS: dict[str, Callable[[SurfaceView], SurfaceView]] = {
     "polarisation": lambda view: replace(view, polarisation="s"),
     "deviation": lambda view: _drop(view, *_NORMALS),
     "absorption": lambda view: _drop(view, "k"),
+    "multiple-scattering": lambda view: _drop(view, "multiple_scattering"),
     "coat": lambda view: _drop(view, "coat"),
     "diffuse": lambda view: _drop(view, "diffuse"),
     "precision": in_single_precision,

@@ -182,7 +182,7 @@ VIEW_DIRECTIONS = 256
 LAYERED = ("granier-heidrich-diffuse", "granier-heidrich-full")
 """Models whose diffuse part has passed through the layer."""
 
-ZERO_IS_ABSENT = ("k", "base_k", "deviation", "specular", "coat", "diffuse")
+ZERO_IS_ABSENT = ("k", "base_k", "deviation", "multiple_scattering", "specular", "coat", "diffuse")
 """Keys whose effect is absent where they are fixed at zero."""
 
 
