@@ -1,4 +1,4 @@
-"""`pellicle fit`: fits of measured spectra and BRDF samples."""
+"""`pellicle fit`: fits of measured spectra, colours and BRDF samples."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def fit(
         bool, switch(OUTPUT, "Fit all files, also those whose results an earlier run left in --out.")
     ] = False,
 ) -> int:
-    """Fit a layer to measured reflectance, transmittance, ellipsometry or BRDF samples.
+    """Fit a layer to measured reflectance, transmittance, ellipsometry, colours or BRDF samples.
 
     Example: pellicle fit oxide.csv --layer SiO2 --substrate Si --thickness 10:3000
     """
