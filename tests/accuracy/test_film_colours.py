@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.accuracy.colour_methods import reference_colours
+from pellicle.accuracy.colour_methods import COLOUR_METHODS, reference_colours
 from pellicle.accuracy.film_colours import colour_cost, films_of_scene
 
 
@@ -19,6 +19,12 @@ def test_the_reference_is_the_simulation_of_the_scene():
         one = pl.Scene(pl.Layer("Fe2O3", float(thickness[draw])), "Si", ambient=1.33)
         expected = pl.simulate(one, space="xyz", angle=[0.0, 50.0]).values
         np.testing.assert_allclose(made[draw], expected, atol=1e-9)
+
+
+def test_a_table_of_films_at_normal_incidence():
+    films = films_of_scene(pl.Scene(pl.Layer(1.4, pl.Free(50, 80)), 3.9), np.array([0.0]))
+    table = next(method for method in COLOUR_METHODS if method.name == "table of the film")
+    np.testing.assert_allclose(table.program(films).run(), reference_colours(films), atol=1e-3)
 
 
 @pytest.mark.parametrize(

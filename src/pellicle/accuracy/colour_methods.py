@@ -138,7 +138,7 @@ def _by_table(films: Films) -> Program | str:
     table = FilmColourTable.build(
         *(film.layer, film.base, (float(0.99 * thickness[0]), float(1.01 * thickness[-1]) + 1.0)),
         ambient=film.ambient,
-        angle=(0.0, float(np.rad2deg(films.angle.max()))),
+        angle=(0.0, max(float(np.rad2deg(films.angle.max())), 1.0)),  # a table needs two angles
     )
     built = time.perf_counter() - began
     program = compiled(lambda numbers, angle: table.xyz(numbers["thickness"], jnp.cos(angle)), films)

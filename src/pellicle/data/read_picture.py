@@ -160,7 +160,7 @@ def _colours(values: np.ndarray, full: float, notes: list[str], path: str) -> tu
     if values.ndim != 3 or values.shape[2] not in (3, 4):
         raise DataError(f"{path}: has the shape {values.shape} and not three channels; save it in R, G, B")
     if values.shape[2] == 4 and np.any(values[..., 3] < full):
-        clear = max(round(100 * np.mean(values[..., 3] < full)), 1)
+        clear = max(round(float(100 * np.mean(values[..., 3] < full))), 1)
         raise DataError(
             f"{path}: {clear} % of its pixels are transparent, whose colours are unknown; save it without"
             " alpha"
