@@ -125,6 +125,7 @@ def test_usd_has_the_nodes_and_a_preview(folder, looks):
     assert bsdf.GetIdAttr().Get() == "ND_dielectric_bsdf"
     assert bsdf.GetInput("thinfilm_thickness").Get() == 400
     np.testing.assert_allclose(bsdf.GetInput("ior").Get(), 1.33, rtol=1e-6)
+    assert material.GetPrim().GetAttribute("config:mtlx:version").Get() == "1.39"
     preview, _, _ = material.ComputeSurfaceSource()
     assert preview.GetIdAttr().Get() == "UsdPreviewSurface"
     record = json.loads(material.GetPrim().GetCustomDataByKey("pellicle"))

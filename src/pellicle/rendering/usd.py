@@ -51,6 +51,10 @@ def _connect_materialx(stage: Any, drawn: Any, material: Material) -> None:
         "color3": (Sdf.ValueTypeNames.Color3f, lambda x: Gf.Vec3f(*x)),
         "vector2": (Sdf.ValueTypeNames.Float2, lambda x: Gf.Vec2f(*x)),
     }
+    # without its version the document is taken for MaterialX 1.38, whose nodes have no film
+    prim = drawn.GetPrim()
+    prim.AddAppliedSchema("MaterialXConfigAPI")
+    prim.CreateAttribute("config:mtlx:version", Sdf.ValueTypeNames.String, False).Set("1.39")
     category, name, inputs = bsdf_of(material)
     bsdf = UsdShade.Shader.Define(stage, drawn.GetPath().AppendChild(name))
     bsdf.CreateIdAttr(f"ND_{category}")
