@@ -140,7 +140,7 @@ def thickness_map() -> np.ndarray:
         * np.sin(2 * np.pi * (k * u * 1.7 + random.uniform(-0.6, 0.6) * v + random.uniform()))
         for k in range(1, 7)
     )
-    return np.clip(u + 0.008 * uneven + 0.04 * (v - 0.5), 0, 1).astype(np.float32)
+    return np.clip(u + 0.005 * uneven + 0.04 * v, 0, 1).astype(np.float32)
 
 
 def environment() -> np.ndarray:

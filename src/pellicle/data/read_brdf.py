@@ -32,6 +32,7 @@ def read_brdf_samples(
     samples: int | None = None,
     max_theta: float | None = None,
     wavelengths: Sequence[float] | None = None,
+    bands: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> BrdfSamples:
     """Read samples of a BRDF from CSV, ALTA text, MERL or RGL (`.bsdf`) files, recognised by their content.
 
@@ -47,6 +48,8 @@ def read_brdf_samples(
     - `max_theta`: samples with light or viewer further than this from the normal (degrees) are left out:
       near grazing many instruments, MERL's among them, measure badly.
     - `wavelengths` (nm) at which spectra of an RGL file are taken, one or three: 645, 525, 445 by default.
+    - `bands`: in place of `wavelengths`, those over which they are integrated, in nm (N,), with their weights
+      in each channel (N, channels), as of `pellicle.colour.sensor`.
 
     **Returns:** `BrdfSamples`.
 
@@ -57,7 +60,7 @@ def read_brdf_samples(
         raise UsageError(f"`max_theta` must lie above 0 and at most at 90 degrees, got {max_theta:g}")
     widest = 90.0 if max_theta is None else max_theta
     if is_tensor_file(path):
-        return read_rgl(path, samples, widest, wavelengths)
+        return read_rgl(path, samples, widest, wavelengths, bands)
     if is_merl(path):
         return read_merl(path, samples, widest)
     file = text_file(*read_bytes(path), path)

@@ -103,15 +103,17 @@ class SurfaceRecipe:
     def read(self, file: str) -> BrdfSamples:
         """Read samples as `[data]` says, with σ where it gives `noise`. Raises DataError or UsageError.
 
-        Spectra are taken at the surface's wavelengths.
+        Spectra are taken at the surface's wavelengths, or integrated over the bands of its sensor.
         """
-        data = self.tables.data
+        data, surface = self.tables.data, self.scene()
+        sensor = surface.sensor
         samples = read_brdf_samples(
             file,
             columns=data.columns,
             samples=data.samples,
             max_theta=data.max_theta,
-            wavelengths=self.scene().channel_wavelengths,
+            wavelengths=surface.channel_wavelengths,
+            bands=None if sensor is None else (sensor.wavelength, sensor.weights),
         )
         if data.noise is None:
             return samples

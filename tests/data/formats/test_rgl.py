@@ -5,6 +5,7 @@ import hashlib
 import numpy as np
 import pytest
 
+import pellicle as pl
 from pellicle.data.formats.rgl import load_rgl, read_rgl
 from pellicle.data.formats.tensor_file import write_tensors
 from pellicle.data.half_angles import angles, vectors
@@ -163,6 +164,43 @@ def test_spectra_are_taken_at_wavelengths(tmp_path):
         DataError, match="go from 400 to 700 nm; choose one or three `wavelengths` there, not 900"
     ):
         read_brdf_samples(path, wavelengths=[900.0])
+
+
+def test_spectra_are_integrated_over_bands(tmp_path):
+    """By the trapezoidal rule over a triangular band, against the stored spectra at the same directions."""
+    path = write(tmp_path / "made.bsdf", spectral=True)
+    nm = np.linspace(450, 650, 401)
+    weights = np.maximum(0, 1 - np.abs(nm[:, None] - [600.0, 550.0, 500.0]) / 50)
+    read = read_brdf_samples(path, bands=(nm, weights))
+    rows = load_rgl(path).evaluate(*directions_of(read))
+    fine = np.array([np.interp(nm, WAVELENGTHS, row) for row in rows])
+    np.testing.assert_allclose(read.values, fine @ weights, rtol=1e-5)
+    assert "integrated over the bands" in read.notes[0]
+    with pytest.raises(DataError, match="400 to 700 nm, beyond which the sensor sees more than 1 %"):
+        read_brdf_samples(path, bands=(nm + 200, weights))
+
+
+@pytest.mark.parametrize(
+    ("keys", "expected"),
+    [
+        ("wavelengths = [625, 500, 437.5]", {"wavelengths": [625.0, 500.0, 437.5]}),
+        ('sensor = "camera.csv"', {"bands": True}),
+    ],
+)
+def test_recipes_of_surfaces_read_their_own_channels(tmp_path, keys, expected):
+    path = write(tmp_path / "made.bsdf", spectral=True)
+    recipe = '[data]\nsignal = "brdf"\n[scene.surface]\nmodel = "microfacet-film"\n' + keys
+    (tmp_path / "film.toml").write_text(recipe)
+    nm = np.arange(430.0, 671.0, 10.0)
+    bands = np.exp(-(((nm[:, None] - [600.0, 550.0, 500.0]) / 20) ** 2))
+    rows = "\n".join(",".join(map(repr, row)) for row in np.column_stack([nm, bands]).tolist())
+    (tmp_path / "camera.csv").write_text(f"wavelength_nm,R,G,B\n{rows}\n")
+    described = pl.read_recipe(tmp_path / "film.toml")
+    read = described.read(str(path))
+    if expected.pop("bands", False):
+        sensor = described.scene().sensor
+        expected["bands"] = (np.asarray(sensor.wavelength), np.asarray(sensor.weights))
+    np.testing.assert_array_equal(read.values, read_brdf_samples(path, **expected).values)
 
 
 def without(name):

@@ -31,6 +31,11 @@ SAMPLES = 10_000
 WAVELENGTHS = (645.0, 525.0, 445.0)
 """Wavelengths (nm) of R, G and B by default; those of BRDF models."""
 
+Bands = tuple[np.ndarray, np.ndarray]
+"""Wavelengths (N,) in nm and their weights (N, channels), 1 or 3: channels that are integrals."""
+_UNSEEN = 0.01
+"""Largest share of a band beyond the spectra, which keep their last value there."""
+
 _AXES = {"theta_i": 1, "phi_i": 1, "ndf": 2, "sigma": 2, "vndf": 4, "luminance": 4, "jacobian": 1}
 
 
@@ -178,18 +183,20 @@ def read_rgl(
     samples: int | None = None,
     max_theta: float = 90.0,
     wavelengths: Sequence[float] | None = None,
+    bands: Bands | None = None,
 ) -> BrdfSamples:
     """Read at most `samples` (10 000 by default) nodes of a `.bsdf` file, spread over its grid.
 
     Each is a stored value at its own direction, not interpolated. Nodes with a direction below the surface
     or more than `max_theta` degrees from its normal, and negative ones, are left out and counted.
-    Spectra are interpolated linearly at `wavelengths` (nm), one or three, by default 645, 525 and 445.
+    Spectra are interpolated linearly at `wavelengths` (nm), one or three, by default 645, 525 and 445, or
+    integrated over `bands`.
 
-    Raises DataError for another tensor file, a damaged one, one without a valid node, and wavelengths
-    outside those of the file.
+    Raises DataError for another tensor file, a damaged one, one without a valid node, and wavelengths or
+    bands outside the spectra.
     """
     brdf = load_rgl(path)
-    channels = _channels(path, brdf, wavelengths)
+    channels = _channels(path, brdf, wavelengths) if bands is None else _band_channels(path, brdf, bands)
     lowest = np.cos(np.deg2rad(max_theta)) if max_theta < 90 else 0.0
     pieces, beyond, invalid = [], 0, 0
     for azimuth, theta in np.ndindex(brdf.values.shape[:2]):
@@ -220,7 +227,7 @@ def read_rgl(
         path=str(path),
         sha256=digest,
         notes=(
-            f"read as an RGL tensor file of an {nature}, {_described(brdf, wavelengths)}",
+            f"read as an RGL tensor file of an {nature}, {_described(brdf, wavelengths, bands)}",
             f"{kept.size} of {every.shape[1]} valid nodes kept, spread over the grid",
             f"left out: {beyond} nodes with a direction {where}, {invalid} invalid (negative) ones",
         ),
@@ -242,8 +249,26 @@ def _channels(path: str | os.PathLike[str], brdf: RglBrdf, wavelengths: Sequence
     return np.stack([np.interp(wanted, brdf.wavelengths, row) for row in unit], axis=1)
 
 
-def _described(brdf: RglBrdf, wavelengths: Sequence[float] | None) -> str:
+def _band_channels(path: str | os.PathLike[str], brdf: RglBrdf, bands: Bands) -> np.ndarray:
+    """Weights (channels, stored) of the stored wavelengths in channels that are integrals."""
+    if brdf.wavelengths is None:
+        return np.eye(3)
+    wavelength, weights = (np.asarray(each, dtype=float) for each in bands)
+    first, last = brdf.wavelengths[[0, -1]]
+    beyond = (wavelength < first) | (wavelength > last)
+    if np.any(np.abs(weights[beyond]).sum(axis=0) > _UNSEEN * np.abs(weights).sum(axis=0)):
+        raise DataError(
+            f"{path}: its spectra go from {first:g} to {last:g} nm, beyond which the sensor sees more than"
+            " 1 % of the light; give the surface wavelengths in place of a sensor"
+        )
+    unit = np.eye(brdf.wavelengths.size)
+    return weights.T @ np.stack([np.interp(wavelength, brdf.wavelengths, row) for row in unit], axis=1)
+
+
+def _described(brdf: RglBrdf, wavelengths: Sequence[float] | None, bands: Bands | None) -> str:
     if brdf.wavelengths is None:
         return "R, G, B of linear sRGB"
+    if bands is not None:
+        return "spectra integrated over the bands of the sensor"
     names = ", ".join(f"{each:g}" for each in (WAVELENGTHS if wavelengths is None else wavelengths))
     return f"spectra taken at {names} nm"
