@@ -99,6 +99,19 @@ def test_a_posterior_is_as_wide_as_the_errors_say(fitted_before, known, tmp_path
         assert np.all(np.diff(np.median(band.model, axis=0)[np.argsort(band.axis.values)]) > -1e-3)
 
 
+def test_without_sigma_a_posterior_is_as_wide_as_the_errors_too(monkeypatch):
+    """Under a noise in proportion to the signal, which one σ for all samples would state wrongly."""
+    clean = pl.simulate(Surface("granier-heidrich", TRUTH), directions=arcs()).values
+    noise = 1 + 0.03 * np.random.default_rng(8).standard_normal(clean.shape)
+    monkeypatch.setattr(fitting, "search", search_from(UNITS))
+    posterior = pl.sample(dataclasses.replace(arcs(), values=clean * noise), FREE)
+    assert posterior.trusted
+    for name in BOUNDS:
+        assert posterior[name].sd == pytest.approx(posterior.fit[name].stderr, rel=0.15), name
+    [band, *_] = posterior.predictions()
+    assert np.all(np.isfinite(band.model))
+
+
 def test_a_chain_is_resumed_and_belongs_to_its_problem(fitted_before, known, tmp_path):
     path = tmp_path / "chain.h5"
     assert not pl.sample(known.samples, FREE, chain=path, steps=20).trusted

@@ -21,6 +21,7 @@ from pellicle.sampling.modes import Modes
 from pellicle.sampling.predict import Prediction
 from pellicle.sampling.result import Posterior
 from pellicle.sampling.run import run
+from pellicle.sampling.sandwich import Stretch, unchanged
 from pellicle.sampling.target import Target
 
 log = getLogger(__name__)
@@ -36,7 +37,8 @@ class Subject(NamedTuple):
     """A finished fit and the posterior of its parameters, in the unit cube of their bounds.
 
     `values` takes points of the cube to the parameters' own units; `fingerprint` identifies the problem;
-    `points` how many data one evaluation compares; `predict` makes predictions of draws, from a seed.
+    `points` how many data one evaluation compares; `predict` makes predictions of draws, from a seed;
+    `stretch` widens draws to the covariance of the fit.
     """
 
     fit: Fit
@@ -48,6 +50,7 @@ class Subject(NamedTuple):
     points: int
     predict: Callable[[np.ndarray, int], tuple[Prediction, ...]]
     assumption: str = ""
+    stretch: Stretch = unchanged
 
     def walkers(self, count: int | None, steps: int) -> int:
         """The number of walkers: `count` if it is possible, or four for each parameter and at least 32.
@@ -92,7 +95,7 @@ def sampled(
             file.write(grown)
         except DataError as error:  # of the disk: the chain in memory is complete
             log.warning("%s; this chain cannot be continued", error)
-    units = grown.draws[checks.discard :]
+    units = subject.stretch(grown.draws[checks.discard :])
     return Posterior(
         fit=subject.fit,
         names=subject.names,

@@ -30,6 +30,7 @@ from pellicle.sampling.ensemble import STEPS, Subject, installed, sampled
 from pellicle.sampling.modes import modes
 from pellicle.sampling.predict import predictions
 from pellicle.sampling.result import Posterior
+from pellicle.sampling.sandwich import sandwich_stretch
 from pellicle.sampling.systematics import systematics
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface
@@ -58,9 +59,11 @@ def sample(
     With a `chain` file it is kept there as it grows, and a run that was cut short goes on where it stopped.
 
     BRDF samples are taken to have normal errors in the unit of the `residual` (ρ, or its cube root): of the
-    given σ, or of the rms of the best fit's residuals. Where these are correlated in neighbouring samples the
-    samples count as fewer. A deviation and its azimuth are a direction, and all directions are as likely. The
-    posterior assumes that there is a layer, also where the fit finds no evidence of one.
+    given σ, or of the rms of the best fit's residuals. Without a σ the draws are then stretched around their
+    minimum to the covariance of the fit, in which each residual stands for its noise (HC3). Where residuals
+    are correlated in neighbouring samples the samples count as fewer. A deviation and its azimuth are a
+    direction, and all directions are as likely. The posterior assumes that there is a layer, also where the
+    fit finds no evidence of one.
 
     **Raises:** as `fit` does, and UsageError for too few walkers (two for each parameter at least) or
     more than the machine's memory holds; DataError for a chain of another problem.
@@ -99,21 +102,24 @@ def sample(
         found_in = partial(spectrum_evidence, targets)
     with jax.enable_x64(True):
         ranked = ranked.counted
-        jacobian, _ = linearised(ranked)
+        jacobian, covariance = linearised(ranked)
         residuals, problem = found_in(ranked, jacobian), ranked.problem.affine()
         shares = discrepancy(residuals, jacobian, ranked.minima.units[0]).evidence_shares
         channels = [view.channels for view in problem.views]
         effects = systematics(residuals, shares, channels, len(problem.parameters))
+        found_modes = modes(ranked, effects)
+        slope = problem.coordinates.slope(problem.box, found_modes.centre[0])
         subject = Subject(
             fit,
             tuple(p.name for p in problem.parameters),
             log_density(problem, effects),
-            modes(ranked, effects),
+            found_modes,
             lambda units: problem.values_near(units, ranked.values),
             identity,
             max(view.independent for view in problem.views),
             lambda units, seed: predictions(problem, fit.parts, units, seed),
             assumption,
+            sandwich_stretch(covariance, slope, found_modes),
         )
     return sampled(subject, walkers, steps, seed, chain, progress, began)
 
