@@ -3,7 +3,7 @@
 The density is given at the nodes of a grid for each node of further parameters, between which it is
 interpolated linearly. Its warp takes uniform points to points of that density, exactly and invertibly.
 
-Source: J. Dupuy and W. Jakob, ACM TOG 37(6), 274 (2018), sec. 4.2, and the class Marginal2D of Mitsuba 3,
+Source: J. Dupuy and W. Jakob, ACM TOG 37(6), 274 (2018), and the class Marginal2D of Mitsuba 3,
 whose results it reproduces.
 """
 
