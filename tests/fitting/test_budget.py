@@ -50,6 +50,13 @@ INDEX = row("index of the layer", 0.005, "", 0.97, -0.0376, material=True)
                 " of ordinary size does: check the material"
             ],
         ),
+        (
+            [OXIDE, row("scale of photo", 0.01, "", 0.99, -0.15), INDEX],
+            [
+                "a scale of photo that is 15 % lower would explain 99 % of the residuals: calibrate it"
+                ' against a white or a reference, or free it by `scale="free"`'
+            ],
+        ),
         ([row("slit", 2.0, "nm", 0.25, 2.0)], []),  # noise is the rest
         ([row("slit", 2.0, "nm", 0.9, 20.0)], []),  # no slit of ordinary size
         ([], []),

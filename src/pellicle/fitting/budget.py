@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pellicle.fitting.discrepancy import Discrepancy
+from pellicle.fitting.discrepancy import Contribution, Discrepancy
 from pellicle.fitting.misfit import other_material
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.result import SystematicEffect
@@ -15,6 +15,9 @@ _STRUCTURE = 0.3
 """Share of the residuals' sum of squares that a named cause explains at least; noise is the rest."""
 _USUAL = 3.0
 """Standard uncertainties up to which an effect is of ordinary size."""
+
+_EXPOSURE = 0.9
+"""Share of the residuals' sum of squares that a wrong exposure or calibration explains at least."""
 
 
 def budget(discrepancy: Discrepancy, parameters: Sequence[Parameter]) -> tuple[SystematicEffect, ...]:
@@ -52,8 +55,21 @@ def likely_cause(found: Discrepancy, parameters: Sequence[Parameter]) -> list[st
     usual = [c for c in rows if abs(c.alone) <= _USUAL * c.effect.size and c.explains > _STRUCTURE]
     best = max(usual, key=lambda c: c.explains, default=None)
     other = other_material(found)
+    level = max(
+        (c for c in rows if c.effect.name.startswith("scale")), key=lambda c: c.explains, default=None
+    )
+    if (
+        level is not None
+        and abs(level.alone) > _USUAL * level.effect.size
+        and level.explains > max(_EXPOSURE, other.explains if other else 0.0, best.explains if best else 0.0)
+    ):
+        return [
+            f"a {level.effect.name} that is {100 * abs(level.alone):.2g} % {_towards(level)} would explain"
+            f" {100 * level.explains:.0f} % of the residuals: calibrate it against a white or a reference, or"
+            ' free it by `scale="free"`'
+        ]
     if other is not None:
-        far = f"{100 * abs(other.alone):.2g} % {'higher' if other.alone > 0 else 'lower'}"
+        far = f"{100 * abs(other.alone):.2g} % {_towards(other)}"
         return [
             f"an {other.effect.name} that is {far} would explain {100 * other.explains:.0f} % of the"
             " residuals, and nothing of ordinary size does: check the material"
@@ -66,3 +82,7 @@ def likely_cause(found: Discrepancy, parameters: Sequence[Parameter]) -> list[st
         f" {lead.name} by {best.shift[at]:+.2g}{f' {lead.unit}' if lead.unit else ''}: describe it in the"
         " scene if it is real"
     ]
+
+
+def _towards(row: Contribution) -> str:
+    return "higher" if row.alone > 0 else "lower"
