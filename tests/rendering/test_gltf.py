@@ -92,6 +92,8 @@ def test_what_is_refused(tmp_path):
         ({"to": "gltf", "path": tmp_path / "there.glb"}, "exists"),
         ({"to": "gltf", "path": tmp_path / "a.glb", "numbers": "best"}, "effective or physical"),
         ({"to": "gltf", "path": tmp_path / "a.glb", "thickness_map": [[1.0, -1.0]]}, "none below 0"),
+        ({"to": "gltf", "path": tmp_path / "a.glb", "thickness_map": [[0.1, 0.3]]}, "in nm, not in µm"),
+        ({"to": "gltf", "path": tmp_path / "a.glb", "thickness_map": [["a"]]}, "must have numbers"),
     ):
         with pytest.raises(UsageError, match=words):
             pl.export(STEEL, **options)

@@ -5,7 +5,7 @@ import pytest
 import pellicle as pl
 from pellicle.errors import UsageError
 from pellicle.rendering import targets
-from pellicle.rendering.targets import MODULES, target
+from pellicle.rendering.targets import MODULES, Target, target
 
 
 @pytest.mark.parametrize("name", MODULES)
@@ -26,3 +26,21 @@ def test_an_absent_package_is_named_with_its_extra(monkeypatch):
         UsageError, match=r"glTF needs the package pygltflib: pip install 'pellicle\[render\]'"
     ):
         target("gltf")
+
+
+def test_tables_lack_nothing_that_formulas_lack(tmp_path, monkeypatch):
+    """Exact colours have the layers and the extinction of which formulas have none."""
+
+    def write(path, material):
+        path.write_text("")
+        return (path,)
+
+    made = Target("table", "Table", (".table",), (), None, write)
+    monkeypatch.setattr("pellicle.rendering.export.target", lambda name: made)
+    stack = pl.Scene([pl.Layer(1.46, 50.0), pl.Layer(2.9 + 0.1j, 20.0, name="low")], 3.9)
+    written = pl.export(stack, to="table", path=tmp_path / "a.table", layer="low")
+    assert written.material.look.notes == ()
+    assert [note.split(":")[0] for note in written.material.look.lacking] == [
+        "the film has 2 layers",
+        "the layer absorbs",
+    ]

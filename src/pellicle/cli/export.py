@@ -20,7 +20,10 @@ if TYPE_CHECKING:
 
 def export(
     film: Annotated[
-        str, Parameter(help="TOML file that describes the scene or surface, or the result.json of a fit.")
+        str,
+        Parameter(
+            help="TOML file that describes the scene or surface, or the result.json or folder of a fit."
+        ),
     ],
     *,
     to: Annotated[str, Parameter(help="blender, gltf, materialx, mitsuba, openpbr or usd.")],
@@ -62,6 +65,8 @@ def _described(film: str, recipe: str | None) -> Scene | Surface:
     """The scene of a recipe, or of a fit with its values."""
     from pellicle.recipes import read_recipe
 
+    if (Path(film) / "result.json").is_file():  # the folder of a fit
+        film = str(Path(film) / "result.json")
     if Path(film).suffix.lower() != ".json":
         if recipe is not None:
             raise UsageError("--recipe goes with the result.json of a fit; give the recipe alone")

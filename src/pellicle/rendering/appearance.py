@@ -37,7 +37,8 @@ class Appearance:
     (thicknesses, angles, 3) are the colours at `ANGLES` under D65 for the CIE 1931 observer, Y = 1 for a
     perfect reflector. `layer` and `base` are n + ik at `CHANNELS`, `bare` the linear sRGB of the substrate
     without a layer at normal incidence. `scene` is the film in reflection, whose layer is named `FILM`.
-    `roughness` is the GGX α of its facets. `notes` are sentences on what formats cannot say of this film.
+    `roughness` is the GGX α of its facets. `notes` are sentences on what else its colours
+    contain, `lacking` on what no format's formula has.
     """
 
     thickness: Float[np.ndarray, " thicknesses"]
@@ -48,6 +49,7 @@ class Appearance:
     scene: Scene
     roughness: float = 0.0
     notes: tuple[str, ...] = ()
+    lacking: tuple[str, ...] = ()
 
     @property
     def metallic(self) -> bool:
@@ -88,7 +90,8 @@ def appearance(scene: Scene, thickness: Any = None, layer: str | None = None) ->
         _index(scene.substrate.material, CHANNELS),
         _bare(scene),
         scene,
-        notes=tuple(_notes(scene, film)),
+        notes=_notes(scene, film),
+        lacking=_lacking(scene, film),
     )
 
 
@@ -113,19 +116,24 @@ def _in_reflection(scene: Scene) -> Scene:
     )
 
 
-def _notes(scene: Scene, film: Layer) -> list[str]:
-    coherent = [x for x in scene.layers if isinstance(x, Layer | Interface)]
+def _notes(scene: Scene, film: Layer) -> tuple[str, ...]:
     found = []
-    if len(coherent) > 1:
-        found.append(f"the film has {len(coherent)} layers: formats have one")
     if any(isinstance(x, Plate) for x in scene.layers) or scene.substrate.back is not None:
         found.append("light that returns from the back face of a plate is part of its colours")
     if film.roughness is not None or scene.substrate.roughness is not None:
         found.append("interfaces with a roughness in nm are part of its colours")
     if film.thickness_spread is not None or scene.instrument.thickness_spread is not None:
         found.append("the spread of its thickness is part of its colours")
+    return tuple(found)
+
+
+def _lacking(scene: Scene, film: Layer) -> tuple[str, ...]:
+    coherent = [x for x in scene.layers if isinstance(x, Layer | Interface)]
+    found = []
+    if len(coherent) > 1:
+        found.append(f"the film has {len(coherent)} layers: formats have one")
     if np.max(np.imag(_index(film.material, CHANNELS))) > 0:
         found.append("the layer absorbs: formats have none that does")
     if np.max(np.abs(_index(scene.ambient, CHANNELS) - 1.0)) > 1e-3:
         found.append("it is not in air, as formats assume")
-    return found
+    return tuple(found)

@@ -67,7 +67,8 @@ def export(
         thickness_map = checked(thickness_map)
     film = film_of(scene)
     look = appearance(film.scene, None if thickness_map is None else nodes(thickness_map), layer)
-    look = replace(look, roughness=film.roughness, notes=(*look.notes, *film.notes))
+    lacking = () if chosen.formula is None else look.lacking  # tables have the colours of any film
+    look = replace(look, roughness=film.roughness, notes=(*lacking, *look.notes, *film.notes))
     material = Material(out.stem, look, _solved(chosen, look, numbers), thickness_map)
     files = chosen.write(out, material)
     text = json.dumps({"target": to} | material.record(), ensure_ascii=False, indent=1, allow_nan=False)

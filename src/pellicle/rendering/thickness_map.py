@@ -13,6 +13,9 @@ from pellicle.errors import DataError, UsageError
 _NODES = 9
 """Thicknesses of a map at which colours are compared: its quantiles from the least to the largest."""
 
+_LEAST = 3.0
+"""Largest thickness (nm) of a map in nm at least: one of 3 µm is beyond all interference colours."""
+
 
 def read_thickness_map(path: str | os.PathLike[str]) -> np.ndarray:
     """Read a map of thicknesses in nm, (rows, columns): an array in `.npy`, or a grey image of 8 or 16 bits.
@@ -40,16 +43,23 @@ def read_thickness_map(path: str | os.PathLike[str]) -> np.ndarray:
     try:
         return checked(values)
     except UsageError as error:
-        raise DataError(f"{path}: {error}".replace("`", "")) from None
+        raise DataError(f"{path}: {error}") from None
 
 
 def checked(values: Any) -> np.ndarray:
     """Return a map of thicknesses as an array. Raises UsageError for another shape, and for wrong values."""
-    found = np.asarray(values, float)
+    try:
+        found = np.asarray(values, float)
+    except ValueError:
+        raise UsageError("`thickness_map` must have numbers, thicknesses in nm") from None
     if found.ndim != 2 or found.size == 0:
         raise UsageError(f"`thickness_map` must have the shape (rows, columns), not {found.shape}")
     if not np.all(np.isfinite(found)) or np.min(found) < 0:
         raise UsageError("`thickness_map` must have finite thicknesses in nm, none below 0")
+    if np.max(found) < _LEAST:
+        raise UsageError(
+            f"`thickness_map` is {np.max(found):.3g} nm thick at most: give thicknesses in nm, not in µm"
+        )
     return found
 
 
