@@ -78,7 +78,7 @@ class Colours:
         values = np.array(self.values, dtype=np.float64)
         if values.ndim != 2 or values.shape[1] != 3 or not len(values):
             raise ValueError(f"`values`: expected the shape (colours, 3), got {values.shape}")
-        tables = {"values": values}
+        tables: dict[str, np.ndarray] = {"values": values}
         if self.sigma is not None:
             tables["sigma"] = np.array(self.sigma, dtype=np.float64)
             if tables["sigma"].shape != values.shape:

@@ -86,6 +86,7 @@ def test_one_colour_of_unknown_exposure_has_several_thicknesses():
             assert own == pytest.approx(share, abs=0.1)
 
 
+@pytest.mark.slow  # compiles a scene of its own
 def test_a_camera_with_free_white_balance():
     gains = np.array([0.8, 1.0, 1.3])
     code = camera_encoding(2.2)._replace(linear=np.diag(1 / SENSOR[1].sum(axis=0)))
@@ -118,6 +119,7 @@ def test_clipped_channels_are_limits():
     assert fit["instrument.scale"].value == pytest.approx(3.0, rel=0.02)
 
 
+@pytest.mark.slow  # two kinds of data, and each alone
 def test_a_joint_fit_with_a_spectrum_narrows_both():
     nm = np.linspace(500.0, 700.0, 41)
     values = [tmm.coh_tmm("s", [1, 1.46, 3.9], [np.inf, 432.0, np.inf], 0.0, x)["R"] for x in nm]
