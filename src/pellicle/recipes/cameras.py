@@ -7,14 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pellicle.colour import delta_e76, delta_e2000, lab, sensor
-from pellicle.colour.cameras import camera_sensor, illuminant_spectrum, observer_sensor, srgb_sensor
+from pellicle.colour import delta_e76, delta_e2000, lab
+from pellicle.colour.cameras import srgb_sensor
 from pellicle.colour.encoding import Encoding, camera_encoding, encoding
 from pellicle.colour.observers import Sensor
 from pellicle.data.colour_chart import fit_matrix, read_chart
 from pellicle.data.colours import CameraMatrix
-from pellicle.data.sensitivities import read_lamp, read_sensitivities
-from pellicle.errors import DataError, UsageError
+from pellicle.errors import UsageError
+from pellicle.recipes.sensors import of_camera, of_observer
 
 
 @dataclass(frozen=True)
@@ -56,16 +56,11 @@ def sight(camera: Camera, space: str) -> Sight:
     """
     _check(camera, space)
     if camera.sensitivities is not None:
-        lamp_nm, lamp = _lamp(camera)
-        nm, seen = read_sensitivities(camera.sensitivities)
-        try:
-            made = camera_sensor(nm, seen, lamp_nm, lamp)
-        except ValueError as error:
-            raise DataError(f"{camera.sensitivities}: {error}") from None
+        made = of_camera(camera.sensitivities, camera.illuminant, camera.lamp)
         reach = f"{made.wavelength[0]:g} to {made.wavelength[-1]:g} nm"
         notes = (f"camera {camera.sensitivities} under {_light(camera)}, {reach}",)
         return Sight(made, None, camera_encoding(camera.gamma), notes)
-    eye = _observer(camera)
+    eye = of_observer(camera.observer, camera.illuminant, camera.lamp)
     notes = (f"observer {camera.observer} under {_light(camera)}",)
     if space != "rgb":
         return Sight(eye, None, encoding(space, eye.white), notes)
@@ -92,28 +87,6 @@ def _check(camera: Camera, space: str) -> None:
 
 def _light(camera: Camera) -> str:
     return camera.illuminant if camera.lamp is None else camera.lamp
-
-
-def _lamp(camera: Camera) -> tuple[np.ndarray, np.ndarray]:
-    if camera.lamp is not None:
-        return read_lamp(camera.lamp)
-    try:
-        return illuminant_spectrum(camera.illuminant)
-    except ValueError as error:
-        raise UsageError(f"`illuminant`: {error}") from None
-
-
-def _observer(camera: Camera) -> Sensor:
-    if camera.lamp is None:
-        try:
-            return sensor(camera.observer, camera.illuminant)
-        except ValueError as error:
-            raise UsageError(str(error)) from None
-    spectrum = read_lamp(camera.lamp)
-    try:
-        return observer_sensor(camera.observer, *spectrum)
-    except ValueError as error:
-        raise DataError(f"{camera.lamp}: {error}") from None
 
 
 def _by_chart(path: str, coding: Encoding, white: np.ndarray) -> tuple[CameraMatrix, tuple[str, ...]]:
