@@ -80,7 +80,7 @@ def errors(scene: pl.Scene, files: dict[str, Path]) -> list[np.ndarray]:
 
 
 def evaluated(bsdf: Any, i: np.ndarray, o: np.ndarray, wavelengths: Any = None) -> np.ndarray:
-    """What Mitsuba evaluates: the BRDF times cos θ_o."""
+    """Mitsuba's value of a BSDF: the BRDF times cos θ_o."""
     at = mi.SurfaceInteraction3f()
     at.wi = mi.Vector3f(*i.tolist())
     if wavelengths is not None:

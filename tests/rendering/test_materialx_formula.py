@@ -19,7 +19,7 @@ COSINES = np.cos(np.deg2rad(ANGLES))
     [(1.33, 1.0, 300.0), (1.5, 1.33, 400.0), (1.46, 4.0 + 0.1j, 300.0), (2.4, 2.7 + 2.8j, 40.0)],
 )
 def test_a_grey_base_is_exact(ior, base, thickness):
-    """Where n and k are those of all channels, nothing but two orders and four Gaussians is approximate.
+    """With the same n and k in all channels nothing but two orders and four Gaussians is approximate.
 
     The published Gaussians sum to 1.0011 in Z, and MaterialX takes 1 for the mean colour.
     """

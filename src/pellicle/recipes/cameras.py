@@ -1,4 +1,4 @@
-"""What sees the colours of a film: an observer or a camera, and the lamp, from words and files."""
+"""Observers and cameras of a film's colours, with their lamp and coding, from words and files."""
 
 from __future__ import annotations
 

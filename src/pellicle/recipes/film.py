@@ -86,7 +86,7 @@ class FilmRecipe:
         return found | {name: os.path.normpath(folder / found[name]) for name in files}
 
     def sight(self) -> Sight:
-        """What sees the colours, as `[camera]` says. Raises DataError, the recipe's path in front."""
+        """Sensor and coding of the colours by `[camera]`. Raises DataError, the recipe's path in front."""
         names = {field.name for field in fields(Camera)}
         camera = Camera(**{name: value for name, value in self.camera.items() if name in names})
         try:

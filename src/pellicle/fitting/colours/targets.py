@@ -38,7 +38,7 @@ class MeasuredColours(NamedTuple):
 
 
 def arrays(target: tuple[Any, ...]) -> tuple[Any, ...]:
-    """What a target depends on, as a pytree: of colours their arrays and words in place of the object."""
+    """A target as a pytree of all that it depends on: of colours their arrays and words."""
     if not isinstance(target, MeasuredColours):
         return target
     own = target.colours
