@@ -154,6 +154,10 @@ class View(Protocol):
 
     def nuisances(self, at: Any) -> Sequence[Nuisance]: ...
 
+    def nuisance_freedom(self, at: Any) -> float:
+        """Degrees of freedom that the nuisances take from the data."""
+        ...
+
     def correlation_length(self, residuals: np.ndarray) -> float:
         """Number of neighbouring points that count as one."""
         ...

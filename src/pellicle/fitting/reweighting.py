@@ -183,7 +183,7 @@ def _noise(problem: Problem, unit: np.ndarray, loss: Loss | None) -> list[_Noise
         at_model, groups = view.at_model(at), view.noise_groups
         residuals = view.residuals(at) * at_model
         totals = [sum(v.independent for v in problem.views if i in v.takes) for i in view.takes]
-        used = sum(view.independent / total for total in totals) + len(view.nuisances(at))
+        used = sum(view.independent / total for total in totals) + view.nuisance_freedom(at)
         freedom = max(view.independent - used, 1)
         scale, chi2, size = np.ones(residuals.shape[1]), 0.0, np.ones(residuals.shape[1])
         for group in groups:

@@ -154,7 +154,7 @@ def bubbles(
     found = [bubble(films, top, tent, size) for top in thickness]
     factor = exposure(*found)
     shown = [display(each, factor, _background(tent, factor)) for each in found]
-    names = [f"{top:.3g} nm at the top" for top in thickness]
+    names = [f"{float(f'{top:.3g}'):g} nm at the top" for top in thickness]
     save_figure(
         _draw_grid({"": shown}, names, title, _lighting(f"{illuminant}, light tent", factor)), target, dpi=DPI
     )

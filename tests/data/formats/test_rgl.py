@@ -126,6 +126,7 @@ def test_samples_are_the_stored_values_at_their_directions(tmp_path, phi):
     path = write(tmp_path / "made.bsdf", phi=phi)
     samples = read_brdf_samples(path, samples=40)
     assert len(samples) == 40
+    assert 'give the surface sensor = "srgb"' in samples.notes[0]
     light, viewer = directions_of(samples)
     np.testing.assert_allclose(load_rgl(path).evaluate(light, viewer), samples.values, rtol=1e-5)
     # each is a stored number: divided by what depends on direction alone, ratios of channels are those stored

@@ -114,7 +114,8 @@ def _band_channels(path: str | os.PathLike[str], brdf: RglBrdf, bands: Bands) ->
 
 def _described(brdf: RglBrdf, wavelengths: Sequence[float] | None, bands: Bands | None) -> str:
     if brdf.wavelengths is None:
-        return "R, G, B of linear sRGB"
+        told = "R, G, B of linear sRGB"
+        return told if bands is not None else f'{told}, at wavelengths: give the surface sensor = "srgb"'
     if bands is not None:
         return "spectra integrated over the bands of the sensor"
     names = ", ".join(f"{each:g}" for each in (WAVELENGTHS if wavelengths is None else wavelengths))

@@ -184,6 +184,10 @@ class SamplesView:
         """None: the weights of lobes are free numbers."""
         return []
 
+    def nuisance_freedom(self, at: Local) -> float:
+        """0: there are no nuisances."""
+        return 0.0
+
     def correlation_length(self, residuals: np.ndarray) -> float:
         """Number of neighbouring samples of the file, as on a goniometer's arc, that count as one."""
         return float(np.mean([correlation_length(column) for column in residuals.T]))

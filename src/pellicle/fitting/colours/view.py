@@ -197,6 +197,13 @@ class ColoursView:
         flat = np.einsum("kij,pj,k->pik", own.modes, at.colours, float(at.exposure) * np.asarray(own.sd))
         return self.weighted(at, np.concatenate([steep, flat], axis=2)).reshape(self.points, -1)
 
+    def nuisance_freedom(self, at: Local) -> float:
+        """Trace of the hat matrix of the modes: colours add little to a matrix that a chart gives."""
+        design = self.jacobian(at)
+        design = design[:, design.shape[1] - len(self.modes) :]
+        fisher = design.T @ design
+        return float(np.trace(np.linalg.solve(fisher + np.eye(len(self.modes)), fisher)))
+
     def correlation_length(self, residuals: np.ndarray) -> float:
         """1: colours at several angles have nothing in common but the film."""
         return 1.0

@@ -190,6 +190,10 @@ class SpectrumView:
         own = f".{self.name}" if self.name else ""
         return nuisance.coefficients(self.data, self.scene.instrument, at.gain, at.offset, self.points, own)
 
+    def nuisance_freedom(self, at: Local) -> float:
+        """Number of coefficients: a spectrum determines nearly all of them."""
+        return float(len(self.nuisances(at)))
+
     def at_model(self, at: Any) -> float:
         """1: the noise of a spectrum does not depend on the model."""
         return 1.0
