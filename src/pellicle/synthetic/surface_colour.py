@@ -47,13 +47,15 @@ def in_colour(surface: Surface) -> Shading:
     low, high = thickness_range(surface)
     brdf = surface.brdf
     found.pop("weights", None)  # of a sensor that is not the eye
+    if not found.get("multiple_scattering"):
+        found.pop("multiple_scattering", None)
     if brdf.from_film_colour is not None:
         at = _at(surface, found, _EVERYWHERE)
         table = FilmColourTable.build(
             _medium(at, "n", "k"),
             _medium(at, "base_n", "base_k"),
             (0.99 * low, 1.01 * high + 1.0),
-            ambient=Table(_EVERYWHERE, at["ambient_n"]) if "ambient_n" in at else 1.0,
+            ambient=Table(_EVERYWHERE, at["ambient_n"]) if "ambient_n" in at else found.get("coat_n", 1.0),
             angle=(0.0, STEEPEST),
         )
         matrix = to_srgb(sensor())
