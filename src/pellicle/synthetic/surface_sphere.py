@@ -89,7 +89,7 @@ def lobe_widths(surface: Surface) -> tuple[float, float]:
     lobes = [*rough, *phong] or [1.0]
     tilt: Any = surface.numbers.get("deviation", 0.0)
     apart = np.tan(np.deg2rad(tilt.upper if isinstance(tilt, Free) else float(tilt)))
-    return min(lobes), float(np.clip(np.hypot(max(lobes), apart), 0.003, 1.0))
+    return float(min(lobes)), float(np.clip(np.hypot(max(lobes), apart), 0.003, 1.0))
 
 
 def _squares(count: int) -> np.ndarray:
