@@ -105,6 +105,18 @@ def test_errors_name_flags(pellicle, photo, tmp_path, monkeypatch, words, code, 
     assert message in found.err
 
 
+def test_a_fit_states_what_its_colours_are(pellicle, tmp_path, monkeypatch):
+    """fit.csv is read back in its space, and not for another observer or illuminant."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "c.csv").write_text("angle_deg,R,G,B\n0,0.33,0.26,0.21\n50,0.22,0.32,0.31\n")
+    words = ("--layer", "1.46", "--substrate", "3.9", "--thickness", "10:500", "--out", "out")
+    light = ("--signal", "rgb", "--illuminant", "A")
+    assert pellicle("fit", "c.csv", *words, *light).code in (0, 4)
+    pellicle("read", "out/fit.csv").refused(3, "observer 1931 under A", "--illuminant A")
+    [record] = pellicle("read", "out/fit.csv", "--illuminant", "A", "--json").objects
+    assert record["signal"] == "rgb"
+
+
 def test_colours_come_back_from_their_file(pellicle, tmp_path):
     sensor = pl.simulate(pl.Scene(pl.Layer(1.4, 100.0), 1.5), space="lab", angle=[0.0, 30.0], noise=0.4)
     write_colours(tmp_path / "a.csv", [sensor], comments=["a comment"])

@@ -43,6 +43,7 @@ class ColourRows(NamedTuple):
     name: str = ""
     path: str = ""
     sha256: str = ""
+    sight: str = ""  # "observer 1964 under D65", where the file states it
 
 
 class _Columns(NamedTuple):
@@ -95,6 +96,7 @@ def read_colour_rows(
     notes += [f"ignored: {', '.join(found.ignored)}"] if found.ignored else []
     films = np.array(["" if found.name is None else row[found.name] for row in cells])
     lines = np.array([row.number for row in rows])
+    sight = next((c.text.strip() for c in file.comments if _SIGHT.fullmatch(c.text.strip())), "")
     return [
         ColourRows(
             space,
@@ -106,12 +108,15 @@ def read_colour_rows(
             film,
             file.path,
             file.sha256,
+            sight,
         )
         for film in dict.fromkeys(films.tolist())
         for own in [films == film]
     ]
 
 
+_SIGHT = re.compile(r"observer (1931|1964) under (E|A|D50|D55|D65|D75)")
+"""Comment of pellicle's own files on the observer and the illuminant."""
 _MEANING = {
     "srgb": "display values of sRGB",
     "rgb": "channels of a camera",

@@ -114,6 +114,14 @@ def _assembled(
     polarisation: str,
 ) -> Colours:
     sigma, stated = film.sigma, film.angle
+    if film.sight and camera.sensitivities is camera.chart is camera.lamp is None:
+        taken = f"observer {camera.observer} under {camera.illuminant}"
+        if taken != film.sight:
+            _, observer, _, illuminant = film.sight.split()
+            raise UsageError(
+                f"{film.path}: states the {film.sight}, and would be read for the {taken}: give"
+                f' `observer="{observer}"` and `illuminant="{illuminant}"`'
+            )
     if noise is not None:
         if not (np.all(np.isfinite(noise)) and np.all(np.asarray(noise) > 0) and np.size(noise) in (1, 3)):
             raise UsageError(f"`noise` must be one standard deviation above zero, or three, got {noise}")

@@ -36,7 +36,11 @@ def fit_csv(fit: Fit) -> str:
         from pellicle.reporting import fitted_colours  # imports JAX
 
         columns = fitted_colours.columns(part)
-        about = [f"fit of {fitted_colours.summary(part)}: data, model_, sigma_ = standard deviation assumed"]
+        data = part.data
+        light = "transmitted" if data.signal == "T" else "reflected"
+        about = [f"signal {data.space}, {light}, {data.polarisation}"]
+        about += [note for note in data.notes if note.startswith("observer ")]
+        about += [f"fit of {fitted_colours.summary(part)}: data, model_, sigma_ = standard deviation assumed"]
     elif part.spectral.delta_data is not None:
         about, columns = _psi_delta(part)
     else:
