@@ -66,6 +66,7 @@ def test_a_lamp_in_energies_rises_in_wavelength(written):
         (read_lamp, "wavelength_nm,power\n500,1\n500,2\n600,1\n", ("repeats",)),
         (read_lamp, "wavelength_nm,power\n500,1\n", ("two or more wavelengths",)),
         (read_lamp, "wavelength_nm,a lamp,another\n500,1,2\n600,1,2\n", ("one lamp",)),
+        (read_lamp, "wavelength,power\n0.5,1\n0.6,1\n", ("unlike nm; name the unit", "wavelength_um")),
         (read_lamp, "", ("is empty",)),
         (read_lamp, "\x89PNG\r\n", ("without any row",)),
     ],

@@ -83,7 +83,13 @@ def _bare(name: str) -> str:
 
 
 def _read(table: Table, wavelength: Column, others: list[Column]) -> tuple[np.ndarray, np.ndarray]:
-    nm, _, read = read_axis(table, wavelength, None, others, axis_unit(table, wavelength, None))
+    try:
+        nm, _, read = read_axis(table, wavelength, None, others, axis_unit(table, wavelength, None))
+    except DataError as error:
+        told, unclear, _ = str(error).partition("; state its unit")
+        if not unclear:
+            raise
+        raise DataError(f"{told}; name the unit in the header, as in wavelength_um") from None
     order = np.argsort(nm)
     if len(nm) < 2 or not np.all(np.diff(nm[order]) > 0):
         raise DataError(f"{table.path}: needs two or more wavelengths, each of them once")
