@@ -106,8 +106,9 @@ def test_rivals_nearest_first_at_most_six(fit):
 
 def test_plan_warnings_and_statistics(fit):
     text = report(fit)
-    assert block(text, "Plan")[1] == (
-        "back-face     on   the substrate is a plate; its back face adds incoherently"
+    # the column is as wide as the longest name of the plan
+    assert (
+        block(text, "Plan")[1] == "back-face  on   the substrate is a plate; its back face adds incoherently"
     )
     assert block(text, "Warnings")[0].startswith("- SiO2 has no data for k")
     assert block(text, "Fit statistics") == [
