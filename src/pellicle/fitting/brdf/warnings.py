@@ -63,6 +63,10 @@ def numbers(surface: Surface, parameters: Mapping[str, Estimate], fitted: Mappin
     media = [medium(value) for value in (surface.film, surface.base) if value is not None]
     messages += [sentence for material in materials_in(media) for sentence in material.warnings()]
     # over bands the colour of every direction of the quadrature would be an integral of its own
-    brdf = surface.brdf if surface.sensor is None else surface.brdf.for_thickness_up_to(fitted["thickness"])
+    brdf = (
+        surface.brdf
+        if surface.sensor is None
+        else surface.brdf.for_thickness_up_to(float(fitted["thickness"]))
+    )
     energy = energy_warning(brdf, fitted)
     return [*messages, energy] if energy else messages
