@@ -47,6 +47,7 @@ def test_simulated_colours_are_read_and_fitted(pellicle, recipe, tmp_path):
     assert fit["parameters"]["thickness"]["value"] == pytest.approx(310, abs=5)
 
 
+@pytest.mark.slow  # measures every effect
 def test_a_plan_of_colours_is_that_of_the_spectra_behind_them(pellicle, recipe):
     found = pellicle("plan", recipe, "--json", "--tolerance", "1e-3")
     assert found.code == 0

@@ -50,6 +50,7 @@ def test_a_fit_is_exported_with_its_values(pellicle, tmp_path):
     pellicle("export", record, *out).refused(3, "is not JSON")
 
 
+@pytest.mark.slow  # a fit and two exports
 def test_what_a_fit_leaves_is_enough(pellicle, spectrum_file, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     ran = pellicle(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.colour import delta_e2000, film_colour
+from pellicle.colour import film_colour
 from pellicle.rendering import gltf_formula
 from pellicle.rendering.appearance import ANGLES, appearance
 from pellicle.rendering.effective import effective, error, physical
@@ -87,12 +87,9 @@ def steel():
 def test_colours_are_exact(steel):
     """Against steps of 1 nm of the colour package."""
     look = steel[0]
-    exact = film_colour(40.0, 2.9, 2.7 + 2.8j, angle=ANGLES, method="uniform-351")
+    exact = film_colour(40.0, 2.9, 2.7 + 2.8j, angle=ANGLES[::20], method="uniform-351")
     assert look.xyz.shape == (1, 81, 3)
-    assert (
-        np.max(delta_e2000(np.asarray(film_colour(40.0, 2.9, 2.7 + 2.8j, angle=ANGLES).lab), exact.lab)) < 1
-    )
-    np.testing.assert_allclose(look.xyz[0], exact.xyz, atol=1e-4)
+    np.testing.assert_allclose(look.xyz[0, ::20], exact.xyz, atol=1e-4)
     bare = ((2.7 - 1) ** 2 + 2.8**2) / ((2.7 + 1) ** 2 + 2.8**2)
     np.testing.assert_allclose(look.bare, bare, atol=2e-4)  # sRGB's matrix has four digits
     assert look.metallic

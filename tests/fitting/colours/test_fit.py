@@ -73,10 +73,14 @@ def test_one_colour_of_unknown_exposure_has_several_thicknesses():
     assert sum(share for _, share in orders) == pytest.approx(1.0)
     # the posterior on a grid; the prior of the exposure is uniform in its logarithm
     grid, gains = np.arange(50.0, 700.0, 2.0), np.geomspace(0.5, 2.0, 801)
+    r01, r12 = (1 - 1.46) / (1 + 1.46), (1.46 - 3.9) / (1.46 + 3.9)
+    phase = np.exp(4j * np.pi * 1.46 * grid[:, None] / NM)
+    seen = np.abs((r01 + r12 * phase) / (1 + r01 * r12 * phase)) ** 2 @ SENSOR[1]
+    np.testing.assert_allclose(seen[125], xyz(300.0, ANGLES[:1])[0], rtol=1e-9)
     code = encoding("srgb", SENSOR[1].sum(axis=0))
     density = np.empty(len(grid))
-    for i, nm in enumerate(grid):
-        channels = gains[:, None] * code.channels(xyz(nm, ANGLES[:1]))
+    for i, colour in enumerate(seen):
+        channels = gains[:, None] * code.channels(colour)
         shown = code.encode(channels, code.roots(channels))
         chi2 = np.sum(((shown - data.values) / SIGMA) ** 2, axis=1)
         density[i] = np.trapezoid(np.exp(-chi2 / 2), np.log(gains))
