@@ -118,7 +118,7 @@ def _write_colours(
     )
     log_plan(plan)
     write_colours(out, [colours], comments=[*comments, *seen.notes, _truth(scene)])
-    say(f"{out}: {len(colours)} colours in {colours.space}")
+    say(f"{out}: {len(colours)} colour{'s' * (len(colours) != 1)} in {colours.space}")
 
 
 def _truth(scene: Scene) -> str:

@@ -32,7 +32,7 @@ _SIGMA = {
     "given": "sigma {}, as given",
     "residuals": "sigma {}, estimated from the residuals: none was given",
     "model": "sigma {}, the error allowed for a drifting lamp: none was given",
-    "usual": "sigma {}, that of an ordinary camera: none was given",
+    "usual": "sigma {}, the usual one of such colours: none was given",
 }
 """The noise and its source, by a part's `sigma_from`."""
 

@@ -9,7 +9,7 @@ import pellicle as pl
 from pellicle.colour import sensor
 from pellicle.colour.encoding import camera_encoding, encoding
 from pellicle.data.colours import CameraMatrix, Colours
-from pellicle.errors import UsageError
+from pellicle.errors import DataError, UsageError
 from pellicle.fitting.colours.targets import measured_colours
 from pellicle.fitting.spectra.problem import make
 
@@ -160,6 +160,12 @@ def test_the_jacobian_is_that_of_finite_differences():
     np.testing.assert_allclose(rows[:, 0], (weighted(above) - weighted(below)) / (2 * step), rtol=1e-5)
     (scale,) = view.nuisances(at)
     np.testing.assert_allclose(rows[:, 1] * scale.value / scale.prior_sd, weighted(at), rtol=1e-9)
+
+
+def test_different_colours_at_one_angle_are_refused():
+    values = np.array([[0.5, 0.4, 0.3], [0.3, 0.4, 0.5]])
+    with pytest.raises(DataError, match=r"2 colours of one film at one angle .* a column angle_deg"):
+        pl.fit(Colours(values, SENSOR), scene())
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import numpy as np
 from pellicle.colour.encoding import Encoding, camera_encoding, encoding
 from pellicle.data.colours import Colours
 from pellicle.effects.bounds import largest_index
-from pellicle.errors import UsageError
+from pellicle.errors import DataError, UsageError
 from pellicle.fitting.colours.response import ColourData, camera_response
 from pellicle.fitting.colours.view import ColoursView
 from pellicle.fitting.problem import Noise
@@ -20,6 +20,9 @@ from pellicle.scene.film import Light, Scene, coherent_layers, with_wavelength
 from pellicle.scene.free import is_free
 from pellicle.scene.instrument import Drift
 from pellicle.simulation.film import tabulated
+
+_APART = 8.0
+"""Standard deviations by which no two measurements of one colour differ."""
 
 
 class MeasuredColours(NamedTuple):
@@ -49,26 +52,33 @@ def arrays(target: tuple[Any, ...]) -> tuple[Any, ...]:
 def measured_colours(data: Colours, scene: Scene, name: str = "") -> MeasuredColours:
     """Colours with the scene in their light. Raises UsageError as `fit` does."""
     angle: Any = scene.light.angle
-    own, count = data.angle, len(data.sensor[0])
+    own, count, place = data.angle, len(data.sensor[0]), f"{data.source}: " if data.source else ""
     if own is not None and is_free(angle):
         if np.ptp(own) > 0:
             raise UsageError(
-                f"{data.source}: has several angles of incidence, and one free angle cannot stand for them"
+                f"{place}has several angles of incidence, and one free angle cannot stand for them"
             )
     elif own is not None:
         if np.ndim(angle) == 0 and angle and not np.isclose(own, angle, atol=1e-3).any():
             raise UsageError(
-                f"{data.source}: has its own angles of incidence, which contradict `angle={float(angle):g}`;"
+                f"{place}has its own angles of incidence, which contradict `angle={float(angle):g}`;"
                 " leave that out"
             )
         angle = float(own[0]) if np.ptp(own) == 0 else np.repeat(own, count)
+    apart = np.ptp(data.values, axis=0) / np.median(data.noise, axis=0)
+    if (own is None or np.ptp(own) == 0) and np.max(apart) > _APART:
+        raise DataError(
+            f"{place}{len(data)} colours of one film at one angle of incidence differ by up to"
+            f" {np.max(apart):.2g} standard deviations: give each its angle, in a column angle_deg, or tell"
+            " the films apart by a column name"
+        )
     instrument = scene.instrument
     if isinstance(instrument.scale, Drift) and instrument.scale.degree:
         raise UsageError(
             f'{data.source}: a colour has one scale, its exposure: give `scale="free"` or a number'
         )
     if isinstance(instrument.offset, Drift) or instrument.offset != 0.0:
-        raise UsageError(f"{data.source}: a colour has no offset: leave it out")
+        raise UsageError(f"{place}a colour has no offset: leave it out")
     stated = data.polarisation != "unpolarised"
     polarisation = data.polarisation if stated else scene.light.polarisation
     light = Light(np.tile(data.sensor[0], len(data)), angle, data.signal, polarisation)

@@ -44,6 +44,10 @@ class ThicknessMap(NamedTuple):
     path: str
     sha256: str
 
+    def __repr__(self) -> str:
+        shape = " x ".join(map(str, self.found.status.shape))
+        return f"{self.path}: thickness at {shape} positions, {100 * self.converged:.3g} % converged"
+
     @property
     def converged(self) -> float:
         """Share of the positions with one thickness."""
