@@ -95,7 +95,6 @@ def test_a_plan_names_the_effects_of_a_surface(pellicle, tmp_path):
     ]
     assert sum(row["error_bound"] for row in found.values()) == record["error_bound"] <= 1e-3
     assert not found["deviation"]["on"]
-    assert found["deviation"]["cost"] > 0
     assert 0 < found["deviation"]["error_without"] < 1e-3 < found["diffuse"]["error_without"]
     (tmp_path / "paint.toml").write_text(PAINT.replace("0.2", "0\nspecular = 0"))
     pellicle("plan", tmp_path / "paint.toml").refused(2, "nothing to compute")
