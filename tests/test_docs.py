@@ -49,6 +49,7 @@ SLOW = {
     "pellicle chart measurements/recipes/gold_on_glass_12nm.toml": "the page draws balls of hematite",
     "pellicle chart docs/cost/soap_film.toml --view": "tests/synthetic/test_bubble.py and"
     " tests/accuracy/test_colour_maps.py: smaller ones",
+    "pellicle chart docs/surfaces/tempered_steel.toml --out results/steel.png": "draws a sphere of full size",
     "pellicle compare film.csv": "compiles for 6 s; tests/cli/test_compare_command.py compares other scenes",
     "pellicle fit --recipe fits/cauchy_100nm/recipe.toml": "one of the studies of tests/test_fits.py",
     "pellicle cost docs/cost/soap_film.toml --out cost": "fits with many solvers: one to two minutes",
@@ -91,6 +92,8 @@ ELSEWHERE = {
     "python benchmarks/posterior.py": _LONG_STUDY,
     "python benchmarks/renderers.py": "takes minutes; tests/rendering: one film for each renderer",
     "python benchmarks/colour.py": _LONG_STUDY,
+    "python benchmarks/camera_colours.py": "takes minutes; tests/fitting/colours: a few films",
+    "python benchmarks/multiple_scattering.py": "tests/brdf/test_multiple_scattering.py: its limits",
     "python benchmarks/brdf_bands.py": "takes minutes; tests/brdf/test_sensor_bands.py: its bands",
     "python benchmarks/brdf_errors.py": "tests/fitting/brdf/test_errors.py: fewer runs",
     "python benchmarks/brdf_recovery.py": _LONG_STUDY,

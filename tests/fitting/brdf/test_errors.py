@@ -19,6 +19,7 @@ def _clean(grey_samples, grey, truth):
     return dataclasses.replace(data, values=pl.simulate(exact, directions=data).values, sigma=None)
 
 
+@pytest.mark.slow  # many fits; benchmarks/brdf_errors.py has the whole study
 def test_errors_without_sigma_cover_the_truth(grey_samples, grey, truth, no_search):
     """z of three parameters in 16 runs at 3 % noise: root mean square 1 ± 0.1.
 

@@ -111,6 +111,7 @@ def test_hafnia(shared_data):
     assert found["thickness"].value == pytest.approx(109.0, abs=2.0)
 
 
+@pytest.mark.slow  # compiles a scene of its own
 def test_a_free_angle_goes_before_the_one_that_the_file_tells():
     """The stage stood at 70.4 degrees where the file says 70."""
     nm = np.linspace(400.0, 900.0, 64)

@@ -94,6 +94,7 @@ def test_bandwidth(film, measured):
     assert not sharp.plan.on("coherence")
 
 
+@pytest.mark.slow  # compiles a scene of its own
 def test_uneven_thickness(film, measured):
     scene = film(instrument=pl.Instrument(thickness_spread=pl.Free(0.0, 60.0)))
     fit = pl.fit(measured(scene, 900.0, 30.0), scene)

@@ -13,6 +13,7 @@ COMPUTED = Path(__file__).parents[3] / "measurements" / "wvase" / "cauchy_100nm.
 """By another program (WVASE): n = 1.47 + 4950/λ², 100 nm on silicon, with Δ folded where it passes 180."""
 
 
+@pytest.mark.slow  # two fits of ellipsometry
 def test_a_film_whose_delta_was_folded():
     spectrum = pl.read_spectrum(COMPUTED, folded=True, noise=0.01)
     film = pl.dispersion.Cauchy(pl.Free(1.3, 1.7), pl.Free(0, 2e4))

@@ -257,6 +257,7 @@ def polarised() -> str:
     return "wavelength_nm,angle_deg,psi_deg,delta_deg,Rp,Rs\n" + "\n".join(rows) + "\n"
 
 
+@pytest.mark.slow  # a joint fit of a scene of its own
 def test_ellipsometry_with_both_polarised_reflectances(polarised, write):
     """One scene for all: each spectrum brings its signal and its polarisation."""
     spectra = pl.read_spectra(write(polarised))

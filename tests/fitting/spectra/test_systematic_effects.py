@@ -117,6 +117,7 @@ def test_offsets_of_psi_and_delta():
         np.testing.assert_allclose(found[name].change, expected, atol=1e-3 * np.abs(expected).max())
 
 
+@pytest.mark.slow  # compiles a scene for each effect
 def test_what_the_scene_describes_is_no_effect():
     scene = pl.Scene(
         pl.Layer(1.6, FREE, roughness=1.0),

@@ -27,6 +27,7 @@ def spectrum(thing):
     return pl.Spectrum(NM, values, "R", np.full(NM.shape, NOISE))
 
 
+@pytest.mark.slow  # two fits of a cone of light
 def test_a_fit_leaves_out_what_the_tolerance_allows():
     thing = scene(1e-6)
     data = spectrum(thing)
