@@ -30,7 +30,7 @@ from pellicle.synthetic.surface_sphere import in_plane, render
 
 jax.config.update("jax_enable_x64", True)  # double precision; JAX's default is single
 SHORT = os.environ.get("PELLICLE_SHORT") == "1"  # smaller pictures, for a quick run
-SIZE = 80 if SHORT else 220  # pixels
+SIZE = 40 if SHORT else 220  # pixels
 
 # %% [markdown]
 # ## The model

@@ -243,7 +243,7 @@ print("other minima:", ", ".join(f"{r.parameters['thickness']:.0f} nm" for r in 
 
 # %%
 uneven = pl.Surface("microfacet-film", truth | {"thickness": pl.Free(10, 70)})
-image = render(uneven, size=100 if SHORT else 300)
+image = render(uneven, size=50 if SHORT else 300)
 figure, axes = plt.subplots(figsize=(3.6, 3.6))
 axes.imshow(display(image), origin="upper")
 axes.set_axis_off()

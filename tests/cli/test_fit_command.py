@@ -223,6 +223,7 @@ def test_noise_is_absolute(pellicle, spectrum_file, scene, noise):
     assert found["chi2_reduced"] == pytest.approx((0.002 / noise) ** 2, rel=0.3)
 
 
+@pytest.mark.slow  # six fits; a scene of its own each
 def test_flags_reach_the_scene(pellicle, spectrum_file):
     """Angle, polarisation, range, ambient: each changes what is simulated, or it would be a decoration."""
     base = ("--layer", "1.46", "--substrate", "3.9+0.02j", "--thickness", "280:320", "--json")

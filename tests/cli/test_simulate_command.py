@@ -92,6 +92,7 @@ def test_negative_noise(pellicle, recipe, tmp_path):
     pellicle("simulate", recipe, "--out", tmp_path / "film.csv", "--noise", -1).refused(2, "--noise")
 
 
+@pytest.mark.slow  # a fit of ellipsometry
 def test_ellipsometry_comes_back_as_psi_and_delta(pellicle, recipe, tmp_path):
     """Columns as instruments write them, noise in degrees, and a fit that finds the truth."""
     ellipsometric = RECIPE.replace(

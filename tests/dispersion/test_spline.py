@@ -121,6 +121,7 @@ def test_impossible_splines(make, said):
         make()
 
 
+@pytest.mark.slow  # compiles a scene of its own
 def test_a_fit_scans_a_spline_as_a_whole(tmp_path):
     """The index of every knot moves together: 8 candidates a thickness, not 8 to the number of knots."""
     truth = Spline((400.0, 500.0, 600.0, 800.0), (2.9, 2.7, 2.6, 2.5))

@@ -96,6 +96,7 @@ def test_twice_the_noise_twice_the_error(scene, measured):
     assert two["thickness"].stderr_noise == pytest.approx(2 * one["thickness"].stderr_noise, rel=0.02)
 
 
+@pytest.mark.slow  # many fits
 def test_errors_cover_the_truth(film, measured):
     """95 % intervals over 40 noises: 38 expected, fewer than 33 would be a chance of 1 in 500."""
     scene = film()

@@ -90,6 +90,7 @@ def test_scale_and_offset_are_eliminated_and_named_apart():
     assert correlated(of_columns(0.001, n=column, **{"instrument.scale": NM / 900}), names) == []
 
 
+@pytest.mark.slow  # compiles a scene of its own
 def test_a_product_in_a_real_fit(film, measured):
     """Two weak reflections of unknown scale and offset: a + b cos(4π n d/λ) shows n·d and nothing else."""
     scene = film(

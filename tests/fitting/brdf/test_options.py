@@ -55,6 +55,7 @@ def widening(fit: pl.Fit) -> float:
     return float(np.sqrt(sum(part.samples.values.size for part in fit.parts) / fit.effective_points))
 
 
+@pytest.mark.slow  # compiles a surface of its own
 def test_a_normal_prior_pulls_as_bayes_says(grey, grey_samples):
     """A prior as narrow as the error, two errors off: the mean of both, against SciPy with one more row."""
     samples = grey_samples()

@@ -97,6 +97,7 @@ def test_what_ellipsometry_cannot_have():
         pl.fit(spectrum, scene(light=pl.Light(angle=60.0, signal="psi-delta")))
 
 
+@pytest.mark.slow  # compiles a scene of its own
 def test_hafnia(shared_data):
     """109 nm with its index free, as an independent fit found (../shared/data, SOURCE.md)."""
     path = shared_data / "thinfilmstools_oxides" / "hafnia_psi_delta.csv"

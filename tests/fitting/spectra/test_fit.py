@@ -60,6 +60,7 @@ def test_angles_of_the_spectrum_go_before_those_of_the_scene(film, measured):
     agrees(pl.fit(stated, film()), {"thickness": 480.0})
 
 
+@pytest.mark.slow  # compiles a scene of its own
 def test_two_angles_in_one_spectrum(film):
     both = [
         simulate_signal(film(480.0, light=pl.Light(angle=a)), NM[::2], 0.003, 1).values for a in (20.0, 60.0)
@@ -74,6 +75,7 @@ def test_a_free_angle(film, measured):
     agrees(pl.fit(measured(scene, 480.0, 35.0), scene), {"thickness": 480.0, "angle": 35.0})
 
 
+@pytest.mark.slow  # compiles a scene of its own
 def test_a_plate_with_its_back_face(film, measured):
     plate = pl.Substrate(Constant(1.5), "air", 1.0)
     scene = film(material=2.1, substrate=plate, light=pl.Light(signal="T"))

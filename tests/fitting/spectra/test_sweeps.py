@@ -46,6 +46,7 @@ def test_rows_in_no_order_are_one_sorted_sweep():
 
 
 @pytest.mark.parametrize("interleaved", [True, False])
+@pytest.mark.slow  # compiles a scene of its own
 def test_a_misfit_does_not_hide_between_angles(interleaved):
     """One measurement in two orders: structured residuals of thirteen angles are no noise."""
     angles = np.linspace(0.0, 60.0, 13)
