@@ -58,7 +58,10 @@ def plate(shared_data, name: str, back):
     return pl.fit(spectrum, scene)
 
 
-@pytest.mark.parametrize(("name", "truth", "tolerance"), [("hafnia_T.csv", 194, 3), ("scandia_T.csv", 92, 2)])
+@pytest.mark.parametrize(
+    ("name", "truth", "tolerance"),
+    [pytest.param("hafnia_T.csv", 194, 3, marks=pytest.mark.slow), ("scandia_T.csv", 92, 2)],
+)
 def test_oxides_on_a_plate_are_better_with_its_back_face(shared_data, name, truth, tolerance):
     found, without = plate(shared_data, name, "air"), plate(shared_data, name, None)
     assert found.status == "converged"

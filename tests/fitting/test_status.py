@@ -29,6 +29,7 @@ def test_at_a_bound_that_the_user_set(film, measured):
     assert "n (1.47)" in index.verdict
 
 
+@pytest.mark.slow  # compiles a scene of its own
 def test_a_natural_bound_gives_an_upper_limit_and_stays_converged(film, measured):
     scene = film(material=pl.dispersion.Constant(1.46, pl.Free(0.0, 1.0)))
     for seed in range(1, 9):

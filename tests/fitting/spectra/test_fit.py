@@ -70,6 +70,7 @@ def test_two_angles_in_one_spectrum(film):
     agrees(pl.fit(data, film()), {"thickness": 480.0})
 
 
+@pytest.mark.slow  # compiles a scene of its own
 def test_a_free_angle(film, measured):
     scene = film(light=pl.Light(angle=pl.Free(0.0, 60.0), polarisation="s"))
     agrees(pl.fit(measured(scene, 480.0, 35.0), scene), {"thickness": 480.0, "angle": 35.0})
@@ -87,6 +88,7 @@ def test_a_plate_with_its_back_face(film, measured):
     assert "The back face makes no difference here" in opaque.verdict
 
 
+@pytest.mark.slow  # compiles a scene of its own
 def test_bandwidth(film, measured):
     scene = film(instrument=pl.Instrument(bandwidth=pl.Free(0.0, 40.0)))
     fit = pl.fit(measured(scene, 900.0, 25.0), scene)
@@ -103,6 +105,7 @@ def test_uneven_thickness(film, measured):
     agrees(fit, {"thickness": 900.0, "instrument.thickness_spread": 30.0})
 
 
+@pytest.mark.slow  # compiles a scene of its own
 def test_free_scale_and_offset(film, measured):
     """Reported in physical units with errors."""
     data = measured(film(instrument=pl.Instrument(1.3, 0.05)), 480.0)
@@ -247,6 +250,7 @@ def test_rivals_cost_what_a_fit_there_costs(film, measured):
     assert rival.delta_chi2 == pytest.approx(expected * share, rel=1e-3)
 
 
+@pytest.mark.slow  # compiles a scene of its own
 def test_a_shift_of_the_wavelengths(film):
     """The instrument tells 3 nm too little: the film is seen at λ + 3, its tabled substrate too."""
     nm = np.linspace(400.0, 900.0, 128)
