@@ -146,6 +146,7 @@ def _by_table(films: Films) -> Program | str:
 
 
 def compiled(colour: Callable, films: Films, double: bool = False) -> Program:
+    """Compile a method of one film's colours, (numbers, angles in radians) → XYZ, for all films."""
     draws = max(np.size(x) for x in films.numbers.values() if not isinstance(x, Table))
     tables = {key: None if isinstance(x, Table) else 0 for key, x in films.numbers.items()}
     call = jax.vmap(colour, in_axes=(tables, None))

@@ -1,9 +1,15 @@
-"""The layer of a scene whose n and k a fit reports."""
+"""The layer of a scene whose n and k a fit reports, and its slopes beside those of the signal."""
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from pellicle.optics.layout import stack_rows
 from pellicle.scene.film import Scene
-from pellicle.scene.free import free_leaves
+from pellicle.scene.free import free_leaves, insert
 from pellicle.scene.layers import Interface
 
 
@@ -13,3 +19,26 @@ def reported_layer(scene: Scene) -> int | None:
     known = [(i, x.material) for i, x in enumerate(scene.layers) if not isinstance(x, Interface)]
     free = [i for i, material in known if free_leaves(material)]
     return next(iter([*free, *(i for i, _ in known)]), None)
+
+
+class Linearised(NamedTuple):
+    """A simulated signal and the n and k of the reported layer, with their derivatives."""
+
+    signal: Any  # as the form simulates it
+    layer: Any  # n and k, (2, wavelengths)
+    slope: Any  # ∂ signal / ∂ parameter in its own unit, (..., parameters)
+    layer_slope: Any  # (2, wavelengths, parameters)
+
+
+def linearised(form: Any, scene: Scene, data: Any, values: Any) -> Linearised:
+    """The signal that a form simulates of a scene, and the layer, around `values` (parameters,); traced."""
+    shown = reported_layer(scene)
+
+    def both(values):
+        numbers = insert(scene, list(values))
+        medium: Any = numbers.substrate if shown is None else numbers.layers[shown]
+        index = medium.material(numbers.light.wavelength)
+        return form.simulate(numbers, data), stack_rows([index.real, index.imag])
+
+    found, push = jax.linearize(both, values)
+    return Linearised(*found, *jax.vmap(push, out_axes=-1)(jnp.eye(len(values))))

@@ -67,7 +67,7 @@ class RankedMinima:
 
     @property
     def counted(self) -> RankedMinima:
-        """The same minima with points that count as in the covariance.
+        """Return the minima with points that count as in the covariance.
 
         The ranking lets neighbours with correlated residuals count as fewer points; where σ is given, that is
         chance or what the scene leaves out, which the discrepancy allows for.

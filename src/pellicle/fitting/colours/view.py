@@ -15,9 +15,8 @@ from pellicle.fitting.colours.response import ColourData, record
 from pellicle.fitting.coordinates import Array
 from pellicle.fitting.problem import Explained, Noise, NoiseGroup
 from pellicle.fitting.program_cache import kept
-from pellicle.fitting.reported_layer import reported_layer
+from pellicle.fitting.reported_layer import linearised
 from pellicle.optics.hoisting import compute_once
-from pellicle.optics.layout import stack_rows
 from pellicle.planning.differences import largest_difference, signals
 from pellicle.planning.film import full_plan
 from pellicle.scene.film import Scene
@@ -37,7 +36,7 @@ class ColourForm:
         return (spectra @ data.sensor).reshape(-1)
 
     def with_plan(self, plan: Plan) -> ColourForm:
-        """The same with another plan."""
+        """Return the form with another plan."""
         return replace(self, plan=plan)
 
     def explain(self, arrays: tuple[Scene, ColourData], values: Any, /) -> Explained:
@@ -65,27 +64,18 @@ class Local(NamedTuple):
 @kept
 def local(form: ColourForm, scene: Scene, data: ColourData, values: Any) -> Local:
     """Colours, their Jacobian, and the layer's index at `values` (parameters,)."""
-    shown = reported_layer(scene)
-
-    def both(values):
-        numbers = insert(scene, list(values))
-        medium: Any = numbers.substrate if shown is None else numbers.layers[shown]
-        index = medium.material(numbers.light.wavelength)
-        return form.simulate(numbers, data), stack_rows([index.real, index.imag])
-
-    (colours, layer), push = jax.linearize(both, values)
-    slope, layer_slope = jax.vmap(push, out_axes=-1)(jnp.eye(len(values)))
-    own = record(colours.reshape(-1, 3), data)
-    residual = own.residual / jnp.sqrt(data.independent_fraction)
+    found = linearised(form, scene, data, values)
+    colours = found.signal.reshape(-1, 3)
+    own = record(colours, data)
     return Local(
-        colours.reshape(-1, 3),
-        slope.reshape(-1, 3, len(values)),
+        colours,
+        found.slope.reshape(-1, 3, len(values)),
         own.model,
-        residual,
+        own.residual / jnp.sqrt(data.independent_fraction),
         own.coefficients,
         own.exposure,
-        layer,
-        layer_slope,
+        found.layer,
+        found.layer_slope,
     )
 
 

@@ -47,7 +47,7 @@ class Measured(NamedTuple):
 
 
 Target: TypeAlias = Measured | MeasuredColours
-"""What a fit of a scene explains: a spectrum or colours."""
+"""Data that a scene explains in a fit: a spectrum or colours."""
 
 
 def measured(data: Spectrum, scene: Scene, name: str = "") -> Measured:

@@ -14,7 +14,7 @@ from pellicle.fitting.coordinates import Array
 from pellicle.fitting.noise import DRIFT_CORRELATION
 from pellicle.fitting.problem import Explained, Noise, NoiseGroup
 from pellicle.fitting.program_cache import kept
-from pellicle.fitting.reported_layer import reported_layer
+from pellicle.fitting.reported_layer import linearised
 from pellicle.fitting.spectra import nuisance
 from pellicle.fitting.spectra.nuisance import Coefficient, Data
 from pellicle.fitting.spectra.sweeps import correlation_in_sweeps, sweeps
@@ -65,7 +65,7 @@ class SpectrumForm:
         return signal[:, :channels].reshape(-1)
 
     def with_plan(self, plan: Plan) -> SpectrumForm:
-        """The same with another plan."""
+        """Return the form with another plan."""
         return replace(self, plan=plan)
 
     def explain(self, arrays: tuple[Scene, Data], values: Any, /) -> Explained:
@@ -97,18 +97,10 @@ class Local(NamedTuple):
 @kept
 def local(form: SpectrumForm, scene: Scene, data: Data, values: Any) -> Local:
     """Signal, its Jacobian, and the layer's index at `values` (parameters,)."""
-    shown = reported_layer(scene)
-
-    def both(values):
-        numbers = insert(scene, list(values))
-        medium: Any = numbers.substrate if shown is None else numbers.layers[shown]
-        index = medium.material(numbers.light.wavelength)
-        return form.simulate(numbers, data), stack_rows([index.real, index.imag])
-
-    (signal, layer), push = jax.linearize(both, values)
-    slope, layer_slope = jax.vmap(push, out_axes=-1)(jnp.eye(len(values)))
-    solved = nuisance.solve(signal, data, scene.instrument)
-    return Local(signal, slope, solved.model, solved.gain, solved.offset, layer, layer_slope)
+    found = linearised(form, scene, data, values)
+    solved = nuisance.solve(found.signal, data, scene.instrument)
+    curves = solved.model, solved.gain, solved.offset
+    return Local(found.signal, found.slope, *curves, found.layer, found.layer_slope)
 
 
 @dataclass(frozen=True)
