@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from pellicle.data.spectrum import Spectrum as Spectrum
     from pellicle.data.write_spectrum import write_spectrum as write_spectrum
     from pellicle.dispersion import effective_medium as mixing  # noqa: F401
-    from pellicle.fitting.colours.thickness_map import ThicknessMap as ThicknessMap
     from pellicle.fitting.result import Fit as Fit
     from pellicle.fitting.result import Status as Status
+    from pellicle.mapping.picture import ThicknessMap as ThicknessMap
     from pellicle.materials import material as material
     from pellicle.recipes.colours import read_colours as read_colours
     from pellicle.recipes.colours import read_colours_by_film as read_colours_by_film
@@ -62,7 +62,7 @@ _NAMES = {
     "pellicle.data.read_spectrum": ("read_spectra", "read_spectrum"),
     "pellicle.data.spectrum": ("Spectrum",),
     "pellicle.data.write_spectrum": ("write_spectrum",),
-    "pellicle.fitting.colours.thickness_map": ("ThicknessMap",),
+    "pellicle.mapping.picture": ("ThicknessMap",),
     "pellicle.fitting.result": ("Fit", "Status"),
     "pellicle.materials": ("material",),
     "pellicle.recipes.colours": ("read_colours", "read_colours_by_film"),

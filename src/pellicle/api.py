@@ -17,7 +17,6 @@ from pellicle.data.spectrum import Spectrum
 from pellicle.effects.plan import Plan
 from pellicle.errors import UsageError
 from pellicle.fitting.brdf.fit import fit as fit_brdf
-from pellicle.fitting.colours.thickness_map import ThicknessMap, thickness_map
 from pellicle.fitting.comparison import Comparison
 from pellicle.fitting.comparison import compare as compare_fits
 from pellicle.fitting.joint import fit as fit_jointly
@@ -25,6 +24,7 @@ from pellicle.fitting.joint import of_both_kinds
 from pellicle.fitting.progress import Progress, quiet
 from pellicle.fitting.result import Fit
 from pellicle.fitting.spectra.fit import fit as fit_spectra
+from pellicle.mapping.picture import ThicknessMap, thickness_map
 from pellicle.planning.film import plan as film_plan
 from pellicle.planning.surface import plan as surface_plan
 from pellicle.recipes.cameras import Camera, sight

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pellicle.files import MARKER, new_folder, replacing, write_text
-from pellicle.fitting.colours.thickness_map import ThicknessMap
+from pellicle.mapping.picture import ThicknessMap
 from pellicle.reporting.drawing import BLUE, GREY, ORANGE, new_figure, save_figure
 from pellicle.reporting.json_record import indented, number, versions
 
