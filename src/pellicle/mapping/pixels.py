@@ -16,10 +16,8 @@ from pellicle.fitting.spectra.fit import fit as fit_spectra
 from pellicle.fitting.spectra.fit import measurements
 from pellicle.fitting.spectra.problem import make
 from pellicle.mapping.pixel_fits import CODES, NO_DATA, PixelFits
+from pellicle.mapping.pixel_minima import ORDERS
 from pellicle.scene.film import Scene
-
-ORDERS = 4
-"""Minima of each pixel that are kept."""
 
 
 @dataclass(frozen=True)
