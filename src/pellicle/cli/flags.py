@@ -31,14 +31,16 @@ def given(names: Iterable[str]) -> list[str]:
     return [f"--{name.replace('_', '-')}" for name in names]
 
 
-class _Flags:
+class Flags:
+    """Base of the groups of flags."""
+
     def given(self) -> list[str]:
         """The flags that the user gave."""
         return given(name for name, value in vars(self).items() if value is not None)
 
 
 @dataclass(frozen=True)
-class SceneFlags(_Flags):
+class SceneFlags(Flags):
     """Flags that describe a scene, None where not given."""
 
     layer: Annotated[
@@ -71,7 +73,7 @@ class SceneFlags(_Flags):
 
 
 @dataclass(frozen=True)
-class CameraFlags(_Flags):
+class CameraFlags(Flags):
     """Flags of what sees colours; a recipe's [camera] supplies what is None."""
 
     observer: Annotated[str | None, flag(COLOURS, "1931 (2 degrees) or 1964 (10 degrees).")] = None

@@ -1,0 +1,98 @@
+"""Flags that describe how a cube of spectra is read, and its reading by them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Group, Parameter
+
+from pellicle.cli.flags import READING, Flags, flag
+
+if TYPE_CHECKING:
+    from pellicle.data.cube import Cube
+    from pellicle.recipes.film import FilmRecipe
+
+FRAMES = Group("Camera frames", sort_key=6)
+
+OF_RECIPE = ("signal", "polarisation", "noise", "range", "wavelength_unit", "signal_unit")
+"""Keys of a recipe's [data] that supply flags which are not given."""
+
+
+@dataclass(frozen=True)
+class CubeFlags(Flags):
+    """Flags for reading a cube, None where not given; a recipe's [data] supplies some."""
+
+    variable: Annotated[
+        str | None, flag(READING, "Name of the variable to read, where a file has several.")
+    ] = None
+    wavelengths: Annotated[
+        str | None,
+        flag(
+            READING,
+            "Wavelengths of the bands, where the file has none: START:STOP:STEP, numbers between commas, "
+            "or a file with one a line.",
+        ),
+    ] = None
+    wavelength_unit: Annotated[str | None, flag(READING, "nm, um, A, eV, cm-1 or THz.")] = None
+    signal: Annotated[str | None, flag(READING, "R, T or psi-delta, if the file does not name it.")] = None
+    signal_unit: Annotated[str | None, flag(READING, "fraction, percent or absorbance.")] = None
+    angle: Annotated[float | None, flag(READING, "Angle of incidence in degrees (the recipe's).")] = None
+    polarisation: Annotated[str | None, flag(READING, "s, p or unpolarised.")] = None
+    range: Annotated[
+        str | tuple[float, float] | None,
+        Parameter(group=READING, help="Wavelengths to use in nm.", metavar="LO:HI", negative="", n_tokens=1),
+    ] = None
+    without_bands: Annotated[
+        str | None, flag(READING, "Dead bands to leave out in nm: LO:HI or single ones, as in 755:775,820.")
+    ] = None
+    noise: Annotated[
+        float | str | None,
+        Parameter(
+            group=READING,
+            help='Standard deviation of every point (degrees for psi-delta), "2 %" of the signal, or the '
+            "name of a variable.",
+            metavar="SIGMA",
+            negative="",
+        ),
+    ] = None
+    mask: Annotated[
+        str | None,
+        flag(READING, "Pixels to use: PNG, TIFF or .npy that is not zero there, or the name of a variable."),
+    ] = None
+    white_frame: Annotated[
+        str | None,
+        flag(FRAMES, "Counts of a white reference: a frame, a line or one spectrum; the cube is counts too."),
+    ] = None
+    dark_frame: Annotated[str | None, flag(FRAMES, "Counts without light, in the same forms.")] = None
+    white_reflectance: Annotated[
+        float | str | None,
+        Parameter(
+            group=FRAMES,
+            help="Reflectance of the white: a number, a CSV, or a material such as Si (1).",
+            negative="",
+        ),
+    ] = None
+    saturation: Annotated[
+        float | None, flag(FRAMES, "Counts from which a pixel is saturated (the largest of its type).")
+    ] = None
+
+
+def merged(flags: CubeFlags, recipe: FilmRecipe) -> CubeFlags:
+    """The flags, supplemented by the recipe's [data]."""
+    absent = [name for name in OF_RECIPE if getattr(flags, name) is None]
+    return replace(flags, **{name: getattr(recipe.tables.data, name, None) for name in absent})
+
+
+def read(path: str, flags: CubeFlags, *, free_scale: bool = False) -> Cube:
+    """Read the cube of a file or folder; with a `free_scale` any level is acceptable.
+
+    Raises DataError or UsageError.
+    """
+    from pellicle.cli.options import wavelength_range
+    from pellicle.data.read_cube import read_cube
+
+    options: dict[str, Any] = {name: value for name, value in vars(flags).items() if value is not None}
+    if flags.range is not None:
+        options["range"] = wavelength_range(flags.range)
+    return read_cube(path, calibrated=False if free_scale else None, **options)
