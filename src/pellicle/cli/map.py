@@ -72,7 +72,7 @@ def map(
 
     from pellicle import api
     from pellicle.reporting.json_record import one_line
-    from pellicle.reporting.map_files import report, to_json, write_map
+    from pellicle.reporting.picture_map import report, to_json, write_map
 
     if transmitted:
         scene = eqx.tree_at(lambda s: s.light, scene, replace(scene.light, signal="T"))

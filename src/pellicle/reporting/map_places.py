@@ -1,0 +1,163 @@
+"""Places of pixels of a map in words: along the edge, in a patch, in rows, scattered."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pellicle.reporting.map_axes import Axis, MapAxes
+
+MOST = 0.8
+"""Share of the pixels that a description must cover."""
+FEW = 3
+"""Most pixels, patches or runs that are listed one by one."""
+CLUSTERED = 0.15
+"""Least excess of neighbours with the same property over that of pixels at random, 0 to 1."""
+COVERED = 0.25
+"""Share of the band along the edge from which pixels lie along the edge rather than in a patch at it."""
+DEEP = 0.2
+"""Largest depth of that band, as a share of the distance from the edge to the middle."""
+
+
+def place(found: np.ndarray, known: np.ndarray, axes: MapAxes) -> str:
+    """Describe where pixels are.
+
+    **Arguments:**
+
+    - `found`: True for the pixels, at least one, in the shape of the map.
+    - `known`: True for pixels among which they are: those with data.
+
+    **Returns:** words such as "along the edge" or "in one patch of 84 pixels around x = 1.2, y = 3.4 mm".
+    """
+    found, known = axes.frames(found), axes.frames(known)
+    if axes.series is None or len(found) == 1:
+        return _in_frame(found[0], known[0], axes)
+    each = found.reshape(len(found), -1).sum(axis=1)
+    share = each / np.maximum(known.reshape(len(found), -1).sum(axis=1), 1)
+    whole = _runs(share > 0.5)
+    if sum(each[a:b].sum() for a, b in whole) >= MOST * each.sum():
+        return "in all pixels of " + _spans(whole, axes.series)
+    first, last = np.flatnonzero(each)[[0, -1]]
+    when = ""
+    if last - first + 1 <= 0.5 * len(found):
+        when = f"at {axes.series.span(*axes.series.values[[first, last]])}, "
+    often = found.sum(axis=0)
+    return when + _in_frame(often >= max(0.5 * often.max(), 1), np.any(known, axis=0), axes, counted=False)
+
+
+def _in_frame(found: np.ndarray, known: np.ndarray, axes: MapAxes, counted: bool = True) -> str:
+    """Describe where pixels of one image, one set of sites or one line are."""
+    count = int(found.sum())
+    if count <= FEW and axes.kind != "line":
+        return "at " + " and at ".join(axes.place(*index) for index in np.argwhere(found).tolist())
+    if axes.kind == "line":
+        return _on_line(found, axes.x)
+    if axes.kind == "sites":
+        return _at_sites(found, known, axes)
+    if count == known.sum():
+        return "everywhere"
+    return _rows(found, known, axes) or _edge(found, known) or _patches(found, known, axes, counted)
+
+
+def _on_line(found: np.ndarray, axis: Axis) -> str:
+    runs = sorted(_runs(found), key=lambda run: run[0] - run[1])[:FEW]
+    if sum(b - a for a, b in runs) < MOST * found.sum():
+        return "in scattered pixels"
+    return "at " + _spans(sorted(runs), axis)
+
+
+def _at_sites(found: np.ndarray, known: np.ndarray, axes: MapAxes) -> str:
+    """Sites far from the centre of all, near it, or neither."""
+    assert axes.y is not None
+    x, y = axes.x.values, axes.y.values
+    radius = np.hypot(x - (x.min() + x.max()) / 2, y - (y.min() + y.max()) / 2)
+    order = np.flatnonzero(known)[np.argsort(radius[known])]
+    size = min(int(np.ceil(1.25 * found.sum())), len(order) // 2)
+    for word, end in (("outer", order[::-1][:size]), ("inner", order[:size])):
+        if size and found[end].sum() >= MOST * found.sum():
+            return f"at the {word} sites"
+    return "at scattered sites"
+
+
+def _rows(found: np.ndarray, known: np.ndarray, axes: MapAxes) -> str:
+    """Whole rows or columns, or nothing; those at a border of the image are along an edge."""
+    assert axes.y is not None
+    top, bottom = ("top", "bottom") if axes.downward else ("bottom", "top")
+    for along, word, axis, ends in (
+        (1, "row", axes.y, (top, bottom)),
+        (0, "column", axes.x, ("left", "right")),
+    ):
+        each = found.sum(axis=along)
+        runs = _runs(each > 0.5 * np.maximum(known.sum(axis=along), 1))
+        if not runs or sum(each[a:b].sum() for a, b in runs) < MOST * found.sum():
+            continue
+        if len(runs) > FEW:
+            return f"in {sum(b - a for a, b in runs)} {word}s"
+        if len(runs) == 1:
+            edges = [
+                end for end, at in zip(ends, (runs[0][0] == 0, runs[0][1] == each.size), strict=True) if at
+            ]
+            if len(edges) == 1:
+                return f"along the {edges[0]} edge, {_spans(runs, axis)}"
+        number = sum(b - a for a, b in runs)
+        return f"in {'one' if number == 1 else number} {word}{'s' * (number > 1)}, {_spans(runs, axis)}"
+    return ""
+
+
+def _edge(found: np.ndarray, known: np.ndarray) -> str:
+    """Along the border of the pixels with data, or nothing."""
+    from scipy.ndimage import binary_fill_holes, distance_transform_edt  # slow to import
+
+    inside = np.asarray(binary_fill_holes(known))
+    depth = np.asarray(distance_transform_edt(np.pad(inside, 1)))[1:-1, 1:-1]
+    reach = np.quantile(depth[found], 0.9)
+    if reach > max(2.0, DEEP * depth.max()):
+        return ""
+    band = inside & (depth <= reach)
+    return "along the edge" if (found & band).sum() >= COVERED * band.sum() else ""
+
+
+def _patches(found: np.ndarray, known: np.ndarray, axes: MapAxes, counted: bool) -> str:
+    """One patch, a few, many, or pixels scattered at random."""
+    from scipy.ndimage import convolve, find_objects, label  # slow to import
+
+    x_axis, y_axis = axes.x, axes.y
+    assert y_axis is not None
+    ring = np.ones((3, 3), np.uint8)
+    ring[1, 1] = 0
+    around = convolve(found.astype(np.uint8), ring, mode="constant")[found].sum()
+    neighbours = convolve(known.astype(np.uint8), ring, mode="constant")[found].sum()
+    density = found.sum() / known.sum()
+    if around / max(neighbours, 1) - density < CLUSTERED * (1 - density):
+        return "in scattered pixels"
+    labelled: Any = label(found, np.ones((3, 3)))
+    labels, number = labelled
+    sizes = np.bincount(labels.ravel())[1:]
+    largest = np.argsort(-sizes)
+    boxes = find_objects(labels)
+    listed = next((n for n in range(1, FEW + 1) if sizes[largest[:n]].sum() >= MOST * found.sum()), 0)
+    if not listed:
+        return f"in {number} patches of up to {sizes.max()} pixels"
+
+    def described(which: int) -> str:
+        rows, columns = boxes[which]
+        size = f"of {sizes[which]} pixels " if counted else ""
+        if sizes[which] >= 0.4 * (rows.stop - rows.start) * (columns.stop - columns.start):
+            middle = [round(float(np.mean(i))) for i in np.nonzero(labels == which + 1)]
+            return f"{size}around {axes.place(*middle)}"
+        x = x_axis.span(*x_axis.values[[columns.start, columns.stop - 1]])
+        return f"{size}at {x}, {y_axis.span(*y_axis.values[[rows.start, rows.stop - 1]])}"
+
+    texts = [described(i) for i in largest[:listed].tolist()]
+    return f"in one patch {texts[0]}" if listed == 1 else f"in {listed} patches, " + " and ".join(texts)
+
+
+def _runs(flags: np.ndarray) -> list[tuple[int, int]]:
+    """Start and end of each run of True."""
+    steps = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
+    return [(int(a), int(b)) for a, b in zip(steps[::2], steps[1::2], strict=True)]
+
+
+def _spans(runs: list[tuple[int, int]], axis: Axis) -> str:
+    return " and ".join(axis.span(axis.values[a], axis.values[b - 1]) for a, b in runs)

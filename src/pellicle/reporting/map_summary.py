@@ -1,0 +1,199 @@
+"""Summary of the map of a cube: numbers and places of the statuses, values, errors, slopes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pellicle.fitting.result import Status
+from pellicle.mapping.pixel_fits import BY_NEIGHBOURS, CODES, NO_DATA, STATUSES
+from pellicle.reporting.map_axes import MapAxes, map_axes
+from pellicle.reporting.map_places import place
+
+if TYPE_CHECKING:
+    from xarray import Dataset
+
+DECIDED = (str(Status.CONVERGED), BY_NEIGHBOURS)
+"""Statuses of pixels whose numbers can be used within their errors."""
+MOST_PIXELS = 2_000_000
+"""Pixels beyond which percentiles are those of every second, third, ... pixel of each row and column."""
+LEAST_EXPLAINED = 0.5
+"""Share of the variance from which a plane is stated."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plane:
+    """Least-squares plane through values: slopes by axis, rms beside it, its share of the variance."""
+
+    slopes: Mapping[str, float]
+    unit: str
+    rms: float
+    explains: float
+
+
+@dataclass(frozen=True, eq=False)
+class ParameterSummary:
+    """A free parameter at the decided pixels.
+
+    `percentiles` are the 0th, 5th, 50th, 95th and 100th; the standard errors are medians.
+    """
+
+    name: str
+    variable: str
+    unit: str
+    percentiles: np.ndarray
+    stderr: float
+    stderr_noise: float
+    plane: Plane | None
+
+
+@dataclass(frozen=True, eq=False)
+class MapSummary:
+    """Summary of a map: pixels of each status and where they are, and the free parameters.
+
+    `counts` has the statuses that occur, the most frequent first; `places` those of fewer than half of the
+    pixels with data, and of pixels without data.
+    """
+
+    axes: MapAxes
+    counts: Mapping[str, int]
+    places: Mapping[str, str]
+    parameters: tuple[ParameterSummary, ...]
+    sampled: int  # percentiles are those of every n-th pixel
+    attributes: Mapping[str, Any]
+
+    @property
+    def pixels(self) -> int:
+        """Number of pixels, with and without data."""
+        return int(np.prod(self.axes.shape))
+
+    @property
+    def with_data(self) -> int:
+        """Number of pixels with data."""
+        return self.pixels - self.counts.get(NO_DATA, 0)
+
+    @property
+    def decided(self) -> int:
+        """Number of pixels whose numbers can be used."""
+        return sum(self.counts.get(word, 0) for word in DECIDED)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences on how the cube was read."""
+        notes = self.attributes.get("notes", ())
+        return tuple(notes.splitlines()) if isinstance(notes, str) else tuple(notes)
+
+    @property
+    def plan(self) -> list[dict[str, Any]]:
+        """Effects of the plan, as in the record of a fit."""
+        plan = self.attributes.get("plan", "[]")
+        return json.loads(plan) if isinstance(plan, str) else list(plan)
+
+
+def free_parameters(dataset: Dataset) -> list[str]:
+    """Variables of the free parameters of a map: those with a standard error."""
+    names = [str(name) for name in dataset.data_vars]
+    return [name for name in names if f"{name}_stderr" in names and not name.startswith("rival_")]
+
+
+def parameter_name(dataset: Dataset, variable: str) -> str:
+    """Name of a parameter in `pellicle.fit`."""
+    return str(dataset[variable].attrs.get("parameter", variable))
+
+
+def unit_of(dataset: Dataset, variable: str) -> str:
+    """Unit of a variable, empty where it has none."""
+    unit = str(dataset[variable].attrs.get("units", ""))
+    return "" if unit == "1" else unit
+
+
+def is_decided(codes: np.ndarray) -> np.ndarray:
+    """True for codes of statuses whose numbers can be used."""
+    return np.isin(codes, [CODES[word] for word in DECIDED])
+
+
+def summarise(dataset: Dataset) -> MapSummary:
+    """Summarise a map; large ones are read in parts, and every n-th pixel for percentiles."""
+    axes, codes = map_axes(dataset), np.asarray(dataset["status"])
+    number = np.bincount(codes.ravel(), minlength=len(STATUSES))
+    order = sorted(np.flatnonzero(number), key=lambda code: -number[code])
+    counts = {STATUSES[code]: int(number[code]) for code in order}
+    known = codes != CODES[NO_DATA]
+    places = {}
+    for word, count in counts.items():
+        if word == NO_DATA and known.any():
+            places[word] = place(~known, np.ones_like(known), axes)
+        elif word != NO_DATA and count < 0.5 * known.sum():
+            places[word] = place(codes == CODES[word], known, axes)
+    step = thinning(axes)
+    thin = dataset.isel({dim: slice(None, None, step) for dim in _thinned(dataset, axes)})
+    used = is_decided(np.asarray(thin["status"]))
+    parameters = tuple(_parameter(thin, name, used) for name in free_parameters(dataset))
+    return MapSummary(axes, counts, places, parameters, step, dict(dataset.attrs))
+
+
+def thinning(axes: MapAxes) -> int:
+    """Step between the pixels from which percentiles are computed."""
+    along = 2 if axes.kind == "image" else 1
+    return max(int(np.ceil((np.prod(axes.shape, dtype=float) / MOST_PIXELS) ** (1 / along))), 1)
+
+
+def _thinned(dataset: Dataset, axes: MapAxes) -> tuple[Any, ...]:
+    return dataset["status"].dims[-2 if axes.kind == "image" else -1 :]
+
+
+def _parameter(dataset: Dataset, variable: str, used: np.ndarray) -> ParameterSummary:
+    values = np.asarray(dataset[variable], dtype=float)
+    own = values[used]
+    empty = not np.isfinite(own).any()
+    return ParameterSummary(
+        parameter_name(dataset, variable),
+        variable,
+        unit_of(dataset, variable),
+        np.full(5, np.nan) if empty else np.nanpercentile(own, [0, 5, 50, 95, 100]),
+        _median(dataset, f"{variable}_stderr", used),
+        _median(dataset, f"{variable}_stderr_noise", used),
+        None if empty else _plane(values, used, map_axes(dataset), unit_of(dataset, variable)),
+    )
+
+
+def _median(dataset: Dataset, variable: str, used: np.ndarray) -> float:
+    """Median over pixels, NaN where nothing is known."""
+    if variable not in dataset:
+        return float("nan")
+    values = np.asarray(dataset[variable], dtype=float)[used]
+    values = values[~np.isnan(values)]
+    return float(np.median(values)) if values.size else float("nan")
+
+
+def _plane(values: np.ndarray, used: np.ndarray, axes: MapAxes, unit: str) -> Plane | None:
+    """The plane through the values of one image or of sites, the line through those of a line."""
+    if axes.series is not None:
+        return None
+    directions = [axes.x] if axes.y is None else [axes.x, axes.y]
+    if axes.kind == "image":
+        assert axes.y is not None
+        grid = np.meshgrid(axes.x.values, axes.y.values)
+    else:
+        grid = [axis.values for axis in directions]
+    used = used & np.isfinite(values)
+    own = values[used]
+    if own.size <= len(directions) + 1:
+        return None
+    columns = np.stack([np.ones(own.size), *(part[used] - part[used].mean() for part in grid)], axis=1)
+    solution, _, rank, _ = np.linalg.lstsq(columns, own, rcond=None)
+    variance, rest = np.var(own), own - columns @ solution
+    if rank < columns.shape[1] or variance == 0:
+        return None
+    explains = 1 - np.var(rest) / variance
+    length = directions[0].unit
+    units = {axis.unit for axis in directions}
+    if explains < LEAST_EXPLAINED or len(units) > 1:
+        return None
+    per = f"{unit or '1'}/{ {'pixels': 'pixel'}.get(length, length or 'step') }".replace(" ", "")
+    slopes = {axis.name: float(s) for axis, s in zip(directions, solution[1:], strict=True)}
+    return Plane(slopes, per, float(np.sqrt(np.mean(rest**2))), float(explains))

@@ -1,0 +1,221 @@
+"""Report and JSON record of the map of a cube: shares of the statuses and where they are, values, errors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from pellicle.fitting.result import Status
+from pellicle.mapping.pixel_fits import BY_NEIGHBOURS, NO_DATA
+from pellicle.reporting.fit_text import ADVICE
+from pellicle.reporting.json_record import number, versions
+from pellicle.reporting.map_summary import DECIDED, MapSummary, ParameterSummary, summarise
+from pellicle.reporting.plain_text import block, facts, wrapped
+
+if TYPE_CHECKING:
+    from xarray import Dataset
+
+SCHEMA = "pellicle.cube-map/1"
+ERRORS = (
+    "The standard error (`stderr`) contains systematic effects, which are common to all pixels: use it for"
+    " the value at a pixel. Differences between pixels have the error of the noise alone (`stderr_noise`)."
+)
+"""Which error to use for what."""
+_ADVICE = {str(status): text for status, text in ADVICE.items()} | {
+    BY_NEIGHBOURS: "Use the numbers where the thickness cannot jump: the order follows from the neighbours'.",
+}
+
+
+def cube_report(dataset: Dataset) -> str:
+    """Format a map as text of at most 100 columns: the statuses and where they are, then the numbers."""
+    made = summarise(dataset)
+    blocks = [
+        ("Map", [*wrapped(in_words(made)), *facts(_facts(made))]),
+        ("Status: what to do", facts((w, a) for w, a in _ADVICE.items() if w in made.counts)),
+        (
+            _title(made),
+            [line for p in made.parameters for line in facts(_parameter(p, len(made.parameters)))],
+        ),
+        ("Errors", wrapped(ERRORS)),
+        ("Plan: what was simulated", _plan(made)),
+    ]
+    return "".join(block(title, lines) for title, lines in blocks if lines)
+
+
+def in_words(made: MapSummary) -> str:
+    """The statuses of the pixels with data in one sentence, such as "97.2 % converged, 2.8 % ambiguous along
+    the edge."."""
+    if not made.with_data:
+        return "No pixel has data."
+    parts = [
+        " ".join([f"{share(count, made.with_data)} %", word, made.places.get(word, "")]).strip()
+        for word, count in made.counts.items()
+        if word != NO_DATA
+    ]
+    return ("; " if any("," in part for part in parts) else ", ").join(parts) + "."
+
+
+def share(count: int, total: int) -> str:
+    """Percentage with a digit where it is not 100 or 0, and never rounded to them."""
+    percent = 100 * count / total
+    if count in (0, total):
+        return f"{percent:.0f}"
+    return f"{percent:.1f}" if 0.05 <= percent < 99.95 else ("> 99.9" if percent > 50 else f"{percent:.2g}")
+
+
+def pixels_in_words(made: MapSummary) -> str:
+    """`40 frames of 120 x 80 pixels`, or `49 sites`."""
+    *before, last = [f"{n}" for n in made.axes.shape]
+    if made.axes.kind == "image":
+        *before, rows = before
+        last = f"{rows} x {last}"
+    unit = "sites" if made.axes.kind == "sites" else "pixels"
+    series = made.axes.series
+    return f"{' x '.join(before)} frames ({series.name}) of {last} {unit}" if series else f"{last} {unit}"
+
+
+def _facts(made: MapSummary) -> list[tuple[str, str]]:
+    about = made.attributes
+    rows = [("file", str(about["path"]))] if about.get("path") else []
+    bands = f", {about['bands']} bands" if "bands" in about else ""
+    lowest, highest = about.get("range_nm", (None, None))
+    between = f" from {lowest:g} to {highest:g} nm" if lowest is not None and highest is not None else ""
+    rows.append(("data", f"{about.get('signal', 'R')}{bands}{between}; {pixels_in_words(made)}"))
+    missing = made.counts.get(NO_DATA, 0)
+    if missing:
+        text = f"{missing} pixels ({share(missing, made.pixels)} %)"
+        rows.append(("no data", f"{text} {made.places.get(NO_DATA, '')}".strip()))
+    every = int(about.get("preview", 1))
+    if every > 1:
+        rows.append(("preview", f"of every {ordinal(every)} pixel in each direction"))
+    seconds = about.get("seconds")
+    if seconds:
+        rows.append(("time", f"{seconds:.3g} s, {_rounded(made.with_data / seconds)} pixels/s"))
+    return [*rows, *(("" if i else "read", note) for i, note in enumerate(made.notes))]
+
+
+def ordinal(every: int) -> str:
+    """`2nd`, `8th`."""
+    return f"{every}" + (
+        "th" if every % 100 in (11, 12, 13) else {1: "st", 2: "nd", 3: "rd"}.get(every % 10, "th")
+    )
+
+
+def _rounded(value: float) -> str:
+    """Three digits, thousands apart."""
+    digits = max(0, math.floor(math.log10(value)) - 2) if value > 0 else 0
+    return f"{round(value, -digits):,.0f}".replace(",", " ")
+
+
+def _title(made: MapSummary) -> str:
+    words = " or ".join(word for word in DECIDED if word in made.counts)
+    few = (
+        "" if made.sampled == 1 else f"; percentiles of every {ordinal(made.sampled)} pixel in each direction"
+    )
+    if not made.decided:
+        return "Parameters: no pixel has numbers that can be used"
+    count = f"{made.decided} pixel" + ("s that are" if made.decided > 1 else " that is")
+    return f"Parameters at the {count} {words}{few}"
+
+
+def _parameter(p: ParameterSummary, number_of_parameters: int) -> list[tuple[str, str]]:
+    least, low, middle, high, largest = (_number(value, p) for value in p.percentiles)
+    unit = f" {p.unit}" if p.unit else ""
+    if not math.isfinite(p.percentiles[2]):
+        return []
+    rows = [
+        (p.name, f"median {middle}{unit}, 5 to 95 %: {low} to {high}{unit}, all: {least} to {largest}{unit}"),
+        (
+            "",
+            f"standard error {_error(p.stderr, unit)} (median), of the noise {_error(p.stderr_noise, unit)}",
+        ),
+    ]
+    if p.plane is not None:
+        slopes = ", ".join(f"{name} {slope:+.3g}" for name, slope in p.plane.slopes.items())
+        shape = "plane" if len(p.plane.slopes) > 1 else "line"
+        rows.append(
+            (
+                "",
+                f"a {shape} explains {share_of_variance(p.plane.explains)} % of the variance: slope {slopes}"
+                f" {p.plane.unit}, rms beside it {_error(p.plane.rms, unit)}",
+            )
+        )
+    return rows
+
+
+def share_of_variance(explains: float) -> str:
+    """Percentage, cut rather than rounded so that it is never 100."""
+    return f"{math.floor(1000 * min(explains, 0.999)) / 10:.1f}"
+
+
+def _number(value: float, p: ParameterSummary) -> str:
+    """A value with a digit more than its standard error has."""
+    if not math.isfinite(p.stderr) or p.stderr <= 0:
+        return f"{value:.5g}"
+    decimals = min(max(0, 1 - math.floor(math.log10(p.stderr))), 9)
+    return f"{value:.{decimals}f}"
+
+
+def _error(value: float, unit: str) -> str:
+    if math.isnan(value):
+        return "unknown"
+    return f"{value:.2g}{unit}" if math.isfinite(value) else "infinite"
+
+
+def _plan(made: MapSummary) -> list[str]:
+    rows = [
+        (str(row["effect"]), f"{'on' if row['on'] else 'off'}: {row['why']}")
+        for row in made.plan
+        if row["on"] or row.get("error_bound")
+    ]
+    absent = [str(row["effect"]) for row in made.plan if not row["on"] and not row.get("error_bound")]
+    return facts([*rows, *([("left out", ", ".join(absent))] if absent else [])])
+
+
+def cube_json(dataset: Dataset) -> dict[str, Any]:
+    """Convert a map to the dictionary of its summary; infinite and undefined numbers are None."""
+    made = summarise(dataset)
+    about = made.attributes
+    seconds = about.get("seconds")
+    return {
+        "schema": SCHEMA,
+        "data": {
+            "path": about.get("path", ""),
+            "fingerprint": about.get("fingerprint", ""),
+            "signal": about.get("signal", "R"),
+            "shape": dict(zip(map(str, dataset["status"].dims), made.axes.shape, strict=True)),
+            "pixels": made.pixels,
+            "with_data": made.with_data,
+        },
+        "summary": in_words(made),
+        "status": dict(made.counts),
+        "places": dict(made.places),
+        "converged": made.counts.get(str(Status.CONVERGED), 0) / made.with_data if made.with_data else 0.0,
+        "parameters": {p.name: _parameter_json(p) for p in made.parameters},
+        "plan": made.plan,
+        "preview": int(about.get("preview", 1)),
+        "notes": list(made.notes),
+        "seconds": None if seconds is None else number(seconds),
+        "pixels_per_second": number(made.with_data / seconds) if seconds else None,
+        "versions": versions(),
+    }
+
+
+def _parameter_json(p: ParameterSummary) -> dict[str, Any]:
+    names: Sequence[str] = ("least", "q05", "median", "q95", "largest")
+    record: dict[str, Any] = {
+        "variable": p.variable,
+        "unit": p.unit,
+        **{name: number(value) for name, value in zip(names, p.percentiles, strict=True)},
+        "stderr": number(p.stderr),
+        "stderr_noise": number(p.stderr_noise),
+    }
+    if p.plane is not None:
+        record["plane"] = {
+            "slopes": dict(p.plane.slopes),
+            "unit": p.plane.unit,
+            "rms": number(p.plane.rms),
+            "explains": number(p.plane.explains),
+        }
+    return record

@@ -1,0 +1,223 @@
+"""Words and numbers on the map of a cube, against maps whose statuses and values are put in by hand."""
+
+import json
+
+import numpy as np
+import pytest
+
+from pellicle.mapping.pixel_fits import CODES, STATUSES
+from pellicle.reporting.map_axes import map_axes
+from pellicle.reporting.map_places import place
+from pellicle.reporting.map_text import cube_json, cube_report, share
+
+xr = pytest.importorskip("xarray")
+
+HEIGHT, WIDTH = 60, 80
+
+
+def made(status, thickness=None, dims=("y", "x"), coords=None, **attrs):
+    """A map of the thickness: 300 nm, with errors of 0.4 nm in all and 0.1 nm of noise."""
+    status = np.asarray(status, np.uint8)
+    values = np.full(status.shape, 300.0) if thickness is None else thickness
+    known = status != CODES["no-data"]
+    nm = {"units": "nm"}
+    return xr.Dataset(
+        {
+            "thickness": (dims, np.where(known, values, np.nan), nm),
+            "thickness_stderr": (dims, np.full(status.shape, 0.4, np.float32), nm),
+            "thickness_stderr_noise": (dims, np.full(status.shape, 0.1, np.float32), nm),
+            "status": (dims, status),
+        },
+        coords=coords,
+        attrs={"path": "wafer.nc", "signal": "R", **attrs},
+    )
+
+
+def image(fill="converged"):
+    return np.full((HEIGHT, WIDTH), CODES[fill], np.uint8)
+
+
+def words(text):
+    return " ".join(text.split())
+
+
+def where(found, **axes):
+    """The place of these pixels of an image, in words."""
+    found = np.asarray(found, bool)
+    return place(found, np.ones_like(found), map_axes(made(np.where(found, 0, 1), **axes)))
+
+
+def blank():
+    return np.zeros((HEIGHT, WIDTH), bool)
+
+
+def test_shares_are_those_of_pixels_with_data():
+    status = image()
+    status[:, :20] = CODES["no-data"]  # 1200 of 4800
+    status[0, 20:] = status[-1, 20:] = CODES["ambiguous"]  # 120 of 3600
+    status[1:-1, 20] = status[1:-1, -1] = CODES["ambiguous"]  # 116 more: 6.6 %
+    text = words(cube_report(made(status)))
+    assert "93.4 % converged, 6.6 % ambiguous along the edge." in text
+    assert "no data 1200 pixels (25.0 %) along the left edge, x = 0 to 19 pixels" in text
+    assert "Choose among the rivals" in text
+    assert "misfit" not in text
+
+
+@pytest.mark.parametrize(
+    ("count", "text"), [(0, "0"), (10**6, "100"), (999_999, "> 99.9"), (1, "0.0001"), (21_000, "2.1")]
+)
+def test_a_share_is_never_rounded_to_none_or_all(count, text):
+    assert share(count, 10**6) == text
+
+
+def test_a_patch_has_its_size_and_its_middle():
+    found = blank()
+    found[10:20, 30:43] = True
+    assert where(found) == "in one patch of 130 pixels around x = 36, y = 14 pixels"
+    millimetres = {"x": ("x", np.arange(WIDTH) * 0.05, {"units": "mm"}), "y": ("y", np.arange(HEIGHT) * 0.05)}
+    millimetres["y"] += ({"units": "mm"},)
+    assert where(found, coords=millimetres) == "in one patch of 130 pixels around x = 1.80, y = 0.70 mm"
+    found[40:50, 60:70] = True
+    assert where(found) == (
+        "in 2 patches, of 130 pixels around x = 36, y = 14 pixels"
+        " and of 100 pixels around x = 64, y = 44 pixels"
+    )
+
+
+def test_a_scratch_has_its_ends():
+    found = blank()
+    found[np.arange(10, 50), np.arange(20, 60)] = True
+    assert where(found) == "in one patch of 40 pixels at x = 20 to 59 pixels, y = 10 to 49 pixels"
+
+
+def test_rows_and_columns():
+    found = blank()
+    found[12:15] = True
+    assert where(found) == "in 3 rows, y = 12 to 14 pixels"
+    assert where(np.roll(found, -12, axis=0)) == "along the top edge, y = 0 to 2 pixels"
+    lengths = {"y": ("y", np.arange(HEIGHT) * 1.0, {"units": "mm"})}  # y increases upward: row 0 is below
+    assert where(np.roll(found, -12, axis=0), coords=lengths) == "along the bottom edge, y = 0 to 2 mm"
+    found = blank()
+    found[:, [7, 30, 31]] = True
+    assert where(found) == "in 3 columns, x = 7 pixels and x = 30 to 31 pixels"
+    found[:, ::4] = True
+    assert where(found) == "in 23 columns"  # 20 and the 3 above
+
+
+@pytest.mark.parametrize("density", [0.01, 0.1, 0.3, 0.45])
+def test_pixels_at_random_are_scattered(density):
+    assert where(np.random.default_rng(1).random((HEIGHT, WIDTH)) < density) == "in scattered pixels"
+
+
+def test_the_edge_of_a_round_wafer():
+    y, x = np.mgrid[:HEIGHT, :WIDTH]
+    radius = np.hypot(y - 30, x - 40)
+    wafer = radius < 29
+    axes = map_axes(made(np.where(wafer, 1, 0)))
+    assert place(wafer & (radius > 26.5), wafer, axes) == "along the edge"
+    patch = wafer & (np.hypot(y - 30, x - 66) < 3)  # at the edge, but on one side only
+    assert place(patch, wafer, axes).startswith("in one patch")
+    assert place(wafer & (radius < 5), wafer, axes).endswith("around x = 40, y = 30 pixels")
+
+
+def test_few_pixels_are_listed():
+    found = blank()
+    found[3, 5] = found[40, 70] = True
+    assert where(found) == "at x = 5, y = 3 pixels and at x = 70, y = 40 pixels"
+
+
+def test_frames_of_a_series():
+    found = np.zeros((20, 12, 16), bool)
+    dims, seconds = ("time", "y", "x"), {"time": ("time", np.arange(20) * 0.5, {"units": "s"})}
+    found[4:6] = True
+    assert where(found, dims=dims, coords=seconds) == "in all pixels of time = 2.0 to 2.5 s"
+    found[:] = False
+    found[4:6, 2:6, 8:14] = True
+    assert where(found, dims=dims, coords=seconds) == (
+        "at time = 2.0 to 2.5 s, in one patch around x = 10, y = 4 pixels"
+    )
+    found[:, 2:6, 8:14] = True
+    assert where(found, dims=dims, coords=seconds) == "in one patch around x = 10, y = 4 pixels"
+
+
+def test_sites_of_a_wafer():
+    angle = np.linspace(0, 2 * np.pi, 12, endpoint=False)
+    x = np.concatenate([[0.0], 20 * np.cos(angle), 40 * np.cos(angle)])
+    y = np.concatenate([[0.0], 20 * np.sin(angle), 40 * np.sin(angle)])
+    coords = {"x": ("site", x, {"units": "mm"}), "y": ("site", y, {"units": "mm"})}
+    radius = np.hypot(x, y)
+    assert where(radius > 30, dims=("site",), coords=coords) == "at the outer sites"
+    assert where(radius == 0, dims=("site",), coords=coords) == "at x = 0, y = 0 mm"
+    assert where(np.arange(25) % 4 == 1, dims=("site",), coords=coords) == "at scattered sites"
+    assert "25 sites" in cube_report(made(np.full(25, CODES["converged"]), dims=("site",), coords=coords))
+
+
+def test_values_errors_and_the_slope_of_a_wedge():
+    y, x = np.mgrid[:HEIGHT, :WIDTH]
+    coords = {"x": ("x", np.arange(WIDTH) * 0.1, {"units": "mm"}), "y": ("y", np.arange(HEIGHT) * 0.1)}
+    coords["y"] += ({"units": "mm"},)
+    thickness = 300 + 2.0 * x - 0.5 * y  # 20 and -5 nm/mm
+    status = image()
+    status[20:30, 20:30] = CODES["misfit"]
+    thickness[20:30, 20:30] = 5000.0  # must not count
+    record = cube_json(made(status, thickness, coords=coords))
+    own = record["parameters"]["thickness"]
+    assert own["plane"]["slopes"] == pytest.approx({"x": 20.0, "y": -5.0})
+    assert own["plane"]["unit"] == "nm/mm"
+    assert own["plane"]["explains"] == pytest.approx(1.0)
+    assert (own["least"], own["largest"]) == (300 - 0.5 * 59, 300 + 2.0 * 79)
+    assert own["stderr"] == pytest.approx(0.4)
+    assert own["stderr_noise"] == pytest.approx(0.1)
+    text = words(cube_report(made(status, thickness, coords=coords)))
+    assert "slope x +20, y -5 nm/mm" in text
+    assert "standard error 0.4 nm (median), of the noise 0.1 nm" in text
+    assert "4700 pixels that are converged" in text
+
+
+def test_no_plane_where_there_is_none():
+    random = np.random.default_rng(0).normal(300, 1, (HEIGHT, WIDTH))
+    assert "plane" not in cube_json(made(image(), random))["parameters"]["thickness"]
+
+
+def test_large_maps_are_thinned_for_percentiles_but_not_for_shares(monkeypatch):
+    monkeypatch.setattr("pellicle.reporting.map_summary.MOST_PIXELS", 600)  # every third of 60 x 80
+    x = np.arange(WIDTH) + np.zeros((HEIGHT, 1))
+    status = image()
+    status[1, 1] = CODES["misfit"]
+    dataset = made(status, 300 + 2.0 * x)
+    assert cube_json(dataset)["status"] == {"converged": 4799, "misfit": 1}
+    assert cube_json(dataset)["parameters"]["thickness"]["median"] == pytest.approx(379, abs=6)
+    assert "percentiles of every 3rd pixel" in words(cube_report(dataset))
+
+
+def test_the_record_is_strict_json_even_of_an_empty_map():
+    empty = made(image("no-data"))
+    record = json.loads(json.dumps(cube_json(empty), allow_nan=False))
+    assert record["schema"] == "pellicle.cube-map/1"
+    assert record["converged"] == 0.0
+    assert record["parameters"]["thickness"]["median"] is None
+    assert "No pixel has data." in cube_report(empty)
+
+
+def test_provenance_time_plan_and_preview():
+    effects = [
+        {"effect": "absorption", "on": False, "why": "no layer absorbs", "error_bound": 0.0},
+        {"effect": "back-face", "on": True, "why": "the substrate is a plate", "error_bound": 0.0},
+    ]
+    dataset = made(image(), notes="values are percent\nbands 3 and 17 are left out", seconds=2.4, preview=8)
+    dataset.attrs["plan"] = json.dumps(effects)
+    text = words(cube_report(dataset))
+    assert "time 2.4 s, 2 000 pixels/s" in text
+    assert "read values are percent bands 3 and 17 are left out" in text
+    assert "preview of every 8th pixel in each direction" in text
+    assert "back-face on: the substrate is a plate" in text
+    assert "left out absorption" in text
+    assert cube_json(dataset)["plan"] == effects
+    assert cube_json(dataset)["preview"] == 8
+
+
+def test_every_status_has_advice():
+    status = np.resize(np.arange(1, len(STATUSES)), (HEIGHT, WIDTH))
+    text = cube_report(made(status))
+    advice = text.split("[[Status: what to do]]\n")[1].split("[[")[0].splitlines()
+    assert [line.split()[0] for line in advice if line[4] != " "] == list(STATUSES[1:])
