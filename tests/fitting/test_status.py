@@ -85,6 +85,17 @@ def test_misfit_where_sigma_is_not_known(film, measured):
     assert fit.status is pl.Status.MISFIT
 
 
+def test_misfit_where_the_residuals_are_noise_a_hundred_times_as_large_as_sigma_says(film, measured):
+    """Random numbers have no structure that a film misses, and are no film."""
+    nm = np.linspace(400.0, 900.0, 128)
+    random = np.random.default_rng(1).uniform(0.0, 1.0, nm.size)
+    assert pl.fit(pl.Spectrum(nm, random, "R", np.full(128, 0.003)), film()).status is pl.Status.MISFIT
+    # a σ that is too small by five is everyday
+    noisy = measured(film(), 430.0, noise=0.025)
+    fit = pl.fit(pl.Spectrum(nm, noisy.values, "R", np.full(128, 0.005)), film())
+    assert fit.status is pl.Status.CONVERGED
+
+
 def test_not_identifiable(film, measured):
     scene = film(pl.Free(1, 1000), "Au")
     fit = pl.fit(measured(scene, 500.0), scene)
@@ -92,8 +103,17 @@ def test_not_identifiable(film, measured):
     assert f"opaque: thickness is at least {fit['thickness'].lower_limit:.4g} nm (95 %)." in fit.verdict
 
 
-def test_not_converged(film, measured, monkeypatch):
-    """A solver that reports no convergence anywhere."""
+def test_an_opaque_film_is_not_identifiable_where_the_solver_does_not_settle(film, measured, monkeypatch):
+    """A plateau has no point to settle at."""
+    stop_everywhere(monkeypatch)
+    scene = film(pl.Free(1, 1000), "Au")
+    fit = pl.fit(measured(scene, 500.0), scene)
+    assert fit.status is pl.Status.NOT_IDENTIFIABLE
+    assert fit["thickness"].lower_limit > 50
+
+
+def stop_everywhere(monkeypatch):
+    """Have a solver that reports no convergence anywhere."""
     real = minima.polish
 
     def stopped(*arguments):
@@ -101,6 +121,10 @@ def test_not_converged(film, measured, monkeypatch):
         return polished._replace(converged=np.zeros_like(np.asarray(polished.converged)))
 
     monkeypatch.setattr(minima, "polish", stopped)
+
+
+def test_not_converged(film, measured, monkeypatch):
+    stop_everywhere(monkeypatch)
     scene = film()
     fit = pl.fit(measured(scene, 430.0), scene)
     assert fit.status is pl.Status.NOT_CONVERGED

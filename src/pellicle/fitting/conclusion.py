@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from logging import getLogger
 from typing import NamedTuple
@@ -89,10 +90,14 @@ def conclude(
     user.
     """
     converged, others = bool(ranked.minima.converged[0]), rivals(ranked, discrepancy.evidence_share)
-    if converged and not misfit:
-        bounded = by_profile(ranked, covariance, scans, others if near else ())
-    else:
-        bounded = by_curvature(ranked, covariance)
+    bounded = by_curvature(ranked, covariance)
+    if not misfit:
+        profiled = by_profile(ranked, covariance, scans, others if near else ())
+        if not converged:
+            # on a plateau, as of an opaque film, a solver has no point to settle at
+            rows = zip(ranked.problem.parameters, profiled, strict=True)
+            converged = any(p.key == "thickness" and math.isinf(limit.stderr) for p, limit in rows)
+        bounded = profiled if converged else bounded
     parameters = estimates(ranked, covariance, discrepancy, list(amend(bounded)), fixed)
     # parameters at a zero that physics sets; a thickness of 0 is none of them: no layer
     natural = frozenset(

@@ -16,6 +16,9 @@ STRUCTURED = 2.5
 """Ratio of unexplained residuals to the noise of neighbouring points, above which they have structure."""
 SPAN = 0.015
 """Share of the signal's range above which unexplained structure is a large one."""
+_CONTRADICTED = 10.0
+"""Root mean square of unexplained residuals in units of a given σ, above which large ones are a misfit even
+without structure: that is no noise of which someone knew the size."""
 _BEYOND = 5.0
 """Standard uncertainties beyond which an index is that of another material."""
 _EXPLAINS = 0.6
@@ -44,6 +47,8 @@ def misfit(discrepancy: Discrepancy, remaining: Remaining, accuracy: Accuracy) -
         return True
     large = remaining.typical > min(accuracy.largest, SPAN * accuracy.span)
     if remaining.ratio > STRUCTURED and (large or remaining.weighted > accuracy.weighted):
+        return True
+    if large and remaining.weighted > _CONTRADICTED:
         return True
     return remaining.ratio > _DOUBTFUL and other_material(discrepancy) is not None
 
