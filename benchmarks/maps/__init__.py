@@ -1,0 +1,1 @@
+"""Simulated cubes of films, and other programs that fit their pixels."""
