@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import dataclasses
-import hashlib
 import json
-from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-
+from pellicle.data.fingerprint import fingerprint as content_fingerprint
 from pellicle.files import MARKER
 from pellicle.reporting.folders import FINGERPRINT, REPORT, SCENE
 from pellicle.reporting.json_record import SCHEMA, versions
@@ -24,31 +20,8 @@ class Earlier(NamedTuple):
 
 
 def fingerprint(*parts: Any) -> str:
-    """SHA-256 hash of pellicle's version and of `parts`: data, scenes and settings of a fit."""
-    digest = hashlib.sha256()
-    for part in _flat((versions()["pellicle"], *parts)):
-        digest.update(b"%d:" % len(part) + part)
-    return digest.hexdigest()
-
-
-def _flat(value: Any) -> Iterator[bytes]:
-    """Everything that a record, a mapping, a sequence, an array or a plain value contains."""
-    if dataclasses.is_dataclass(value):
-        yield type(value).__name__.encode()
-        for field in dataclasses.fields(value):
-            yield field.name.encode()
-            yield from _flat(getattr(value, field.name))
-    elif isinstance(value, Mapping | list | tuple):
-        items = [x for item in value.items() for x in item] if isinstance(value, Mapping) else value
-        yield b"%d items" % len(items)
-        for item in items:
-            yield from _flat(item)
-    elif hasattr(value, "__array__"):
-        array = np.asarray(value)
-        yield f"{array.dtype} {array.shape}".encode()
-        yield array.tobytes()
-    else:
-        yield repr(value).encode()
+    """Hash of pellicle's version and of `parts`: data, scenes and settings of a fit."""
+    return content_fingerprint(versions()["pellicle"], *parts)
 
 
 def earlier(folder: Path, identity: str) -> Earlier | None:

@@ -1,0 +1,209 @@
+"""Blocks of a map as tasks of a dask cluster: processes of this machine, or a scheduler's workers anywhere.
+
+Every worker gets the model and the cube once, by a plugin that the scheduler also sends to workers that come
+later. A worker reads its blocks from the cube's files and writes them into the store, which it reaches by
+its path. Blocks of a large cube in memory are sent to it one by one. Blocks of a worker that dies go to
+others.
+"""
+
+from __future__ import annotations
+
+import logging
+import pickle
+import signal
+import uuid
+from collections.abc import Iterator, Sequence
+from concurrent.futures import CancelledError
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from importlib.metadata import version
+from io import BytesIO
+from typing import Any
+
+import jax
+import numpy as np
+from dask import config
+from distributed import Client, LocalCluster, WorkerPlugin, as_completed, get_worker
+from distributed.scheduler import KilledWorker
+
+from pellicle.data.cube import Cube
+from pellicle.errors import DataError, UsageError
+from pellicle.mapping.blocks import Where
+from pellicle.mapping.run import Fitted, Job, fit_block
+
+log = logging.getLogger(__name__)
+
+_THREADS = ("NPROC", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+"""Numbers of threads. XLA takes its own from NPROC, which does not enter the key of a compiled program."""
+_SETTINGS = (
+    "jax_enable_x64",
+    "jax_compilation_cache_dir",
+    "jax_persistent_cache_min_compile_time_secs",
+    "jax_persistent_cache_min_entry_size_bytes",
+)
+"""JAX's settings that workers take over: a program that one of them compiles is found by all."""
+ANSWER = 10.0
+"""Seconds to wait for the answer of a scheduler."""
+_WAIT = 60.0
+"""Seconds to wait for the workers of a scheduler."""
+LARGEST = 2**24
+"""Bytes of an array in memory that is sent whole to every worker."""
+_WINDOW = 2
+"""Blocks of a large cube in memory that each worker has or waits for."""
+
+
+@contextmanager
+def local_cluster(workers: int) -> Iterator[Client]:
+    """Start worker processes on this machine, spawned, with one thread each; they end with the block."""
+    settings = {
+        "distributed.worker.multiprocessing-method": "spawn",  # a forked process inherits JAX's locks
+        **{f"distributed.nanny.pre-spawn-environ.{name}": 1 for name in _THREADS},
+    }
+    logger = logging.getLogger("distributed")
+    level = logger.level
+    with config.set(settings):
+        cluster = LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=True,
+            memory_limit=0,  # the size of the blocks bounds it; a limit would count the page cache of files
+            dashboard_address=None,  # pyright: ignore[reportArgumentType]
+            silence_logs=logging.CRITICAL,
+        )
+        try:
+            with Client(cluster) as client:
+                yield client
+        finally:
+            with suppress(TimeoutError):
+                cluster.close(timeout=5)
+            logger.setLevel(level)
+
+
+@contextmanager
+def connected(address: str) -> Iterator[Client]:
+    """Connect to a running scheduler and wait for its first worker.
+
+    **Raises:** UsageError where none answers; DataError where it has no workers.
+    """
+    try:
+        client = Client(address, timeout=ANSWER)
+    except (OSError, TimeoutError, ValueError) as error:
+        raise UsageError(
+            f"`scheduler`: no dask scheduler answers at {address} ({type(error).__name__}); start one, or"
+            " leave it out to use this machine"
+        ) from None
+    with client:
+        try:
+            client.wait_for_workers(1, timeout=_WAIT)
+        except TimeoutError:
+            raise DataError(
+                f"the scheduler at {address} has had no workers for {_WAIT:.0f} s; start some and repeat"
+            ) from None
+        yield client
+
+
+def on_cluster(client: Client, job: Job, todo: Sequence[tuple[int, ...]], *, local: bool) -> Iterator[Fitted]:
+    """Fit blocks on the workers of a client, and yield each when it is in the store.
+
+    **Raises:** DataError where a block is lost with every worker that fits it, ValueError of a fit as it is.
+    """
+    name = f"pellicle-{uuid.uuid4().hex}"
+    content = _pickled(job)
+    shipped = content is None
+    if content is None:
+        content = pickle.dumps(job._replace(cube=replace(job.cube, arrays={}, mask=None, coords={})))
+    client.register_plugin(_Model(name, content, local), name=name)
+    waiting = iter(todo)
+    queue: Any = as_completed()
+    most = _WINDOW * max(1, len(client.scheduler_info(n_workers=-1)["workers"])) if shipped else len(todo)
+
+    def submit() -> None:
+        for place in waiting:
+            block = part(job.cube, job.store.blocks.where(place)) if shipped else None
+            queue.add(client.submit(_task, name, place, block, key=f"{name}-{place}", pure=False))
+            if queue.count() >= most:
+                return
+
+    try:
+        submit()
+        for future in queue:
+            yield future.result()
+            submit()
+    except CancelledError:
+        raise DataError(
+            "the dask scheduler was lost; what is finished is kept, and the same map goes on from there"
+        ) from None
+    except KilledWorker:
+        raise DataError(
+            "worker processes ended again and again while they fitted the same pixels, often for lack of"
+            " memory; what is finished is kept: repeat with fewer `workers`"
+        ) from None
+    finally:
+        with suppress(Exception):  # of a cluster that is gone
+            client.cancel(list(queue.futures))
+            client.unregister_worker_plugin(name)
+
+
+def part(cube: Cube, where: Where) -> Cube:
+    """Read a block of a cube: a small cube in memory."""
+    arrays = {
+        name: np.asarray(array if np.ndim(array) == 1 else array[where])
+        for name, array in cube.arrays.items()
+    }
+    mask = None if cube.mask is None else cube.mask[where]
+    return replace(cube, arrays=arrays, mask=mask, coords={}, units={}, notes=())
+
+
+def _pickled(job: Job) -> bytes | None:
+    """The job as bytes, None where its cube is in memory, and large, or cannot be pickled."""
+    content = BytesIO()
+    try:
+        _Pickler(content).dump(job)
+    except Exception as error:  # pickle raises many kinds
+        log.info("blocks are sent to the workers, which cannot read the cube themselves: %s", error)
+        return None
+    return content.getvalue()
+
+
+class _Pickler(pickle.Pickler):
+    """A pickler that refuses large arrays before it copies them."""
+
+    def reducer_override(self, obj: Any) -> Any:
+        """Raise for a large array, leave anything else to pickle."""
+        if isinstance(obj, np.ndarray) and obj.nbytes > LARGEST:
+            raise ValueError(f"an array of {obj.nbytes} bytes is in memory")
+        return NotImplemented
+
+
+class _Model(WorkerPlugin):
+    """What all blocks need, as a plugin of each worker; it is unpickled by the worker's first task."""
+
+    def __init__(self, name: str, content: bytes, local: bool):
+        self.name, self.content, self.local = name, content, local
+        self.version = version("pellicle")
+        self.settings = {name: jax.config.values[name] for name in _SETTINGS}
+        self.job: Any = None
+
+    def setup(self, worker: Any) -> None:
+        if self.version != version("pellicle"):
+            raise DataError(
+                f"worker {worker.address} has pellicle {version('pellicle')}, and this process has"
+                f" {self.version}; install the same version on both"
+            )
+        if self.local:
+            signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that started this one
+
+    def loaded(self) -> Job:
+        if self.job is None:
+            for name, value in self.settings.items():
+                jax.config.update(name, value)
+            with jax.enable_x64(True):  # float64 arrays stay so
+                self.job = pickle.loads(self.content)
+        return self.job
+
+
+def _task(name: str, place: tuple[int, ...], block: Cube | None) -> Fitted:
+    plugin: Any = get_worker().plugins[name]
+    # arrays of dask are read here: the scheduler of this cluster would give their parts to busy workers
+    with config.set(scheduler="synchronous"):
+        return fit_block(plugin.loaded(), place, block)

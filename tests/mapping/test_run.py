@@ -1,0 +1,100 @@
+"""Maps by worker processes of a dask cluster: equal to maps of one process, whatever happens to them."""
+
+import dataclasses
+
+import dask.array
+import numpy as np
+import pytest
+import xarray
+
+import pellicle as pl
+from pellicle.data.cube import Cube
+from pellicle.errors import DataError, UsageError
+from pellicle.mapping.cluster import local_cluster
+from pellicle.mapping.pixel_fits import CODES
+from pellicle.mapping.run import run_map
+
+
+@pytest.fixture(scope="module")
+def workers():
+    """Address of a scheduler with two worker processes on this machine."""
+    with local_cluster(2) as client:
+        yield client.scheduler.address
+
+
+@pytest.mark.usefixtures("small_blocks")
+def test_a_worker_that_dies_loses_nothing(workers, cube, scene, fake_fits, tmp_path):
+    """The process that fits the brightest corner is killed; a cube in memory goes there by blocks."""
+    whole = run_map(cube, scene, tmp_path / "whole.zarr", fit=fake_fits.fit)
+    steps = []
+    marked = dataclasses.replace(cube, path=str(tmp_path / "died"))
+    made = run_map(
+        marked,
+        scene,
+        tmp_path / "map.zarr",
+        scheduler=workers,
+        fit=fake_fits.dying,
+        progress=lambda stage, done, total: steps.append(done),
+    )
+    assert (tmp_path / "died").exists()
+    assert steps == sorted(steps)
+    assert (steps[0], steps[-1]) == (0, 45 * 32)
+    xarray.testing.assert_equal(made.dataset.compute(), whole.dataset.compute())
+    assert made.dataset.attrs["path"] != whole.dataset.attrs["path"]
+
+
+@pytest.mark.usefixtures("small_blocks")
+def test_workers_read_a_cube_on_disk_themselves(workers, cube, scene, fake_fits, same_files, tmp_path):
+    values = tmp_path / "cube.npy"
+    np.save(values, cube.arrays["values"])
+    shape = (45, 32, 20)
+    on_disk = dataclasses.replace(cube, arrays={"values": fake_fits.OnDisk(values, shape)})
+    here = run_map(on_disk, scene, tmp_path / "here.zarr", fit=fake_fits.fit)
+    there = run_map(on_disk, scene, tmp_path / "there.zarr", scheduler=workers, fit=fake_fits.fit)
+    same_files(here.path, there.path)
+    mean = 1000 * np.where(cube.mask[..., None], cube.arrays["values"], np.nan).mean(axis=2)
+    np.testing.assert_allclose(there.thickness, mean)
+
+
+@pytest.mark.usefixtures("small_blocks")
+def test_a_large_cube_in_memory_is_sent_by_blocks(
+    workers, cube, scene, fake_fits, same_files, tmp_path, monkeypatch
+):
+    monkeypatch.setattr("pellicle.mapping.cluster.LARGEST", 1000)
+    lazy = dataclasses.replace(cube, arrays={"values": dask.array.from_array(cube.arrays["values"])})
+    for name, own in {"array": cube, "dask": lazy}.items():
+        here = run_map(own, scene, tmp_path / f"{name}-here.zarr", fit=fake_fits.fit)
+        there = run_map(own, scene, tmp_path / f"{name}-there.zarr", scheduler=workers, fit=fake_fits.fit)
+        same_files(here.path, there.path)
+
+
+def test_an_error_of_a_fit_comes_back_as_it_is(workers, cube, scene, fake_fits, tmp_path):
+    with pytest.raises(UsageError, match="no such pixel"):
+        run_map(cube, scene, tmp_path / "map.zarr", scheduler=workers, fit=fake_fits.refusing)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("small_blocks")
+def test_pixels_that_end_every_worker_are_an_error(cube, scene, fake_fits, tmp_path):
+    with pytest.raises(DataError, match="fewer `workers`"):
+        run_map(cube, scene, tmp_path / "map.zarr", workers=2, fit=fake_fits.deadly)
+
+
+def test_a_scheduler_that_is_not_there(cube, scene, tmp_path, monkeypatch):
+    monkeypatch.setattr("pellicle.mapping.cluster.ANSWER", 0.2)
+    with pytest.raises(UsageError, match="no dask scheduler answers at tcp://"):
+        run_map(cube, scene, tmp_path / "map.zarr", scheduler="tcp://127.0.0.1:1")
+
+
+def test_fits_are_those_of_fit(tmp_path):
+    """Two pixels, one of them without data, by the whole way."""
+    scene = pl.Scene(pl.Layer(1.46, pl.Free(10, 800)), 3.9)
+    nm = np.linspace(400.0, 796.0, 100)
+    clean = np.asarray(pl.reflectance(nm, 300.0, 1.46, 3.9))
+    spectrum = clean + np.random.default_rng(0).normal(0, 0.002, nm.size)
+    values = np.stack([np.full(100, np.nan), spectrum])[None]
+    made = run_map(Cube({"values": values}, nm), scene, tmp_path / "map.zarr")
+    fit = pl.fit(pl.Spectrum(nm, spectrum, "R"), scene)
+    assert made.dataset.status.values.tolist() == [[CODES["no-data"], CODES[str(fit.status)]]]
+    assert float(made.thickness[0, 1]) == pytest.approx(fit["thickness"].value, abs=0.05)
+    assert np.isnan(made.thickness[0, 0])

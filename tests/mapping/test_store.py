@@ -1,0 +1,198 @@
+"""The store of a map: its variables, killed runs, and what it refuses to continue."""
+
+import dataclasses
+import shutil
+
+import numpy as np
+import pytest
+import xarray
+import zarr
+
+import pellicle as pl
+from pellicle.errors import DataError, UsageError
+from pellicle.mapping.map_result import Map
+from pellicle.mapping.run import run_map
+
+pytestmark = pytest.mark.usefixtures("small_blocks")
+
+
+class Killed(BaseException):
+    pass
+
+
+@pytest.fixture
+def mapped(cube, scene, fake_fits, tmp_path):
+    """Maps the cube, with changed arguments, into a store of this name."""
+
+    def mapped(name="map.zarr", the_cube=cube, the_scene=scene, **options):
+        return run_map(the_cube, the_scene, tmp_path / name, **{"fit": fake_fits.fit, **options})
+
+    return mapped
+
+
+def counted(fit, die_at=None):
+    """A fit that counts its blocks, and dies at one of them."""
+
+    def call(model, cube, where):
+        call.blocks += 1
+        if call.blocks == die_at:
+            raise Killed
+        return fit(model, cube, where)
+
+    call.blocks = 0
+    return call
+
+
+def test_values_and_attributes_of_every_pixel(mapped, cube):
+    made = mapped()
+    data = xarray.open_zarr(made.path)
+    mean = 1000 * cube.arrays["values"].mean(axis=2)
+    mean[7, 7] = np.nan
+    np.testing.assert_allclose(data.thickness, mean)
+    np.testing.assert_allclose(data.thickness_stderr_noise, mean / 50, rtol=1e-6)
+    assert np.isposinf(data.thickness_stderr[0, 0])
+    np.testing.assert_allclose(data.rival_thickness, mean + 200, rtol=1e-6)
+    np.testing.assert_allclose(data.order_delta_chi2[0, 0], [0, 9, np.nan, np.nan])
+    np.testing.assert_allclose(data.order_thickness[..., 0], mean, rtol=1e-6)
+    words = data.status.attrs["flag_meanings"].split()
+    assert words[int(data.status[0, 0])] == "converged"
+    assert {words[int(data.status[at])] for at in ((3, 5), (7, 7))} == {"no-data"}
+    assert data.thickness.attrs["units"] == "nm"
+    assert (data.y.attrs["units"], float(data.y[2])) == ("mm", 1.0)
+    assert data.attrs["Conventions"].startswith("CF-1")
+    assert (data.attrs["path"], data.attrs["notes"]) == ("wafer.npy", ["percent"])
+
+
+def test_the_result_summarises_the_map(mapped):
+    made = mapped()
+    assert made.status == {"no-data": 2, "converged": 45 * 32 - 2}
+    assert (made.shape, made.dims, made.parameters) == ((45, 32), ("y", "x"), {"thickness": "nm"})
+    assert (made.converged, made.finished, made.thickness.dims) == (1.0, True, ("y", "x"))
+    assert repr(made) == "wafer.npy: map of 45 x 32 pixels, 100 % converged"
+    assert (made.run.pixels, made.run.earlier) == (45 * 32, 0)
+
+
+def test_netcdf_has_the_same_values_and_flags(mapped, tmp_path):
+    made = mapped()
+    made.to_netcdf(tmp_path / "map.nc")
+    with xarray.open_dataset(tmp_path / "map.nc", engine="h5netcdf") as copy:
+        xarray.testing.assert_equal(copy.load(), made.dataset.compute())
+        assert copy.status.attrs["flag_values"].dtype == np.uint8
+    with pytest.raises(UsageError, match="is not overwritten"):
+        made.to_netcdf(tmp_path / "map.nc")
+
+
+@pytest.mark.parametrize("die_at", [1, 7, 24])
+def test_a_killed_map_goes_on_and_is_equal(mapped, fake_fits, same_files, tmp_path, die_at):
+    whole = mapped("whole.zarr")
+    with pytest.raises(Killed):
+        mapped(fit=counted(fake_fits.fit, die_at))
+    begun = Map(tmp_path / "map.zarr")
+    assert not begun.finished
+    assert repr(begun).endswith("unfinished")
+    rest = counted(fake_fits.fit)
+    made = mapped(fit=rest)
+    assert rest.blocks == 24 - die_at + 1
+    assert made.run.pixels + made.run.earlier == 45 * 32
+    same_files(whole.path, made.path)
+
+
+def test_a_block_that_was_being_written_is_written_again(mapped, same_files, monkeypatch):
+    whole = mapped("whole.zarr")
+    write = zarr.Array.__setitem__
+
+    def die(array, where, values):
+        if array.name == "/rms":
+            raise Killed
+        write(array, where, values)
+
+    monkeypatch.setattr(zarr.Array, "__setitem__", die)
+    with pytest.raises(Killed):
+        mapped()
+    monkeypatch.undo()
+    stray = whole.path.parent / "map.zarr/thickness/c/0/0.00ff.partial"
+    stray.write_bytes(b"half")  # as zarr leaves it where the process is killed while it writes
+    monkeypatch.setattr("pellicle.mapping.blocks.PIXELS", 64)
+    same_files(whole.path, mapped().path)
+
+
+def test_a_finished_map_is_not_fitted_again(mapped, fake_fits):
+    mapped()
+    again = counted(fake_fits.fit)
+    made = mapped(fit=again)
+    assert again.blocks == 0
+    assert (made.run.pixels, made.run.earlier) == (0, 45 * 32)
+
+
+def test_blocks_of_an_earlier_run_keep_their_size(mapped, fake_fits, same_files, monkeypatch):
+    whole = mapped("whole.zarr")
+    with pytest.raises(Killed):
+        mapped(fit=counted(fake_fits.fit, 5))
+    monkeypatch.setattr("pellicle.mapping.blocks.PIXELS", 256)
+    same_files(whole.path, mapped().path)
+
+
+def test_another_input_scene_or_option_is_not_mixed_in(mapped, cube):
+    mapped()
+    other = dataclasses.replace(cube, arrays={"values": cube.arrays["values"] + 1e-9})
+    masked = dataclasses.replace(cube, mask=None)
+    scene = pl.Scene(pl.Layer(1.46, pl.Free(10, 801)), 3.9)
+    for word, changes in {
+        "is of another input": {"the_cube": other},
+        "is of another scene": {"the_scene": scene},
+        "was made with other options": {"options": {"neighbours": True}},
+    }.items():
+        with pytest.raises(UsageError, match=rf"{word}.*`overwrite=True`"):
+            mapped(**changes)
+    with pytest.raises(UsageError, match="another input"):
+        mapped(the_cube=masked)
+    assert mapped(the_cube=other, overwrite=True).run.pixels == 45 * 32
+
+
+def test_a_map_is_not_continued_unasked(mapped):
+    mapped()
+    with pytest.raises(UsageError, match="exists; leave `resume=False` out"):
+        mapped(resume=False)
+
+
+def test_files_of_a_user_stay(mapped, tmp_path):
+    (tmp_path / "map.zarr").mkdir()
+    (tmp_path / "map.zarr/notes.txt").write_text("mine")
+    with pytest.raises(UsageError, match="is no map of pellicle"):
+        mapped(overwrite=True)
+    shutil.rmtree(tmp_path / "map.zarr")
+    zarr.create_group(tmp_path / "map.zarr", attributes={"title": "mine"})
+    with pytest.raises(UsageError, match="is no map of pellicle"):
+        mapped(overwrite=True)
+    with pytest.raises(DataError, match="holds no map"):
+        Map(tmp_path / "map.zarr")
+
+
+def test_a_cube_with_a_fingerprint_is_not_read_for_it(mapped, cube):
+    class Counting:
+        shape, dtype = cube.arrays["values"].shape, np.dtype(float)
+        reads = 0
+
+        def __getitem__(self, where):
+            self.reads += 1
+            return cube.arrays["values"][where]
+
+    counting = Counting()
+    named = dataclasses.replace(cube, arrays={"values": counting}, fingerprint="sha256:1")
+    mapped(the_cube=named)
+    assert counting.reads == 1 + 24  # an example, and each block
+
+
+def test_sites_of_a_table_have_their_coordinates(mapped, cube):
+    sites = dataclasses.replace(
+        cube,
+        arrays={"values": cube.arrays["values"][:, 0]},
+        dims=("site",),
+        coords={"site": np.array([f"die {i}" for i in range(45)]), "x": np.arange(45.0), "y": np.zeros(45)},
+        mask=None,
+    )
+    made = mapped(the_cube=sites)
+    assert set(made.dataset.coords) == {"site", "x", "y"}
+    assert made.dataset.x.dims == ("site",)
+    assert str(made.dataset.site.values[3]) == "die 3"
+    made.to_netcdf(made.path.with_name("sites.nc"))
