@@ -95,4 +95,29 @@ def read(path: str, flags: CubeFlags, *, free_scale: bool = False) -> Cube:
     options: dict[str, Any] = {name: value for name, value in vars(flags).items() if value is not None}
     if flags.range is not None:
         options["range"] = wavelength_range(flags.range)
+    if isinstance(flags.white_reflectance, str):
+        options["white_reflectance"] = _reflectance(flags.white_reflectance, flags)
     return read_cube(path, calibrated=False if free_scale else None, **options)
+
+
+def _reflectance(white: str, flags: CubeFlags) -> Any:
+    """The reflectance of a white reference: a number, the path of a CSV, or a function of the wavelength."""
+    from pathlib import Path
+
+    import numpy as np
+
+    try:
+        return float(white)
+    except ValueError:
+        if Path(white).is_file():
+            return white
+
+    from pellicle.recipes.media_words import medium
+    from pellicle.simulation.functions import reflectance
+
+    material = medium(white, name="`white_reflectance`")
+    light: dict[str, Any] = {
+        "angle": flags.angle or 0.0,
+        "polarisation": flags.polarisation or "unpolarised",
+    }
+    return lambda nm: np.asarray(reflectance(nm, 0.0, 1.0, material, **light))

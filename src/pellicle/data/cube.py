@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+
+from pellicle.data.cubes.pixel_array import PartOfArray
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -83,3 +85,20 @@ class Cube:
         if self.mask is not None:
             block["values"] = np.where(self.mask[where].reshape(-1, 1), block["values"], np.nan)
         return block
+
+    def part(self, where: tuple[slice, ...]) -> Cube:
+        """The cube of some of the pixels, a slice along each of the `dims`; values stay in their file."""
+        arrays = {n: a if np.ndim(a) == 1 else PartOfArray(a, where) for n, a in self.arrays.items()}
+        along = dict(zip(self.dims, where, strict=True))
+        if len(self.dims) == 1:  # coordinates of sites have names of their own
+            along = dict.fromkeys(self.coords, where[0])
+        coords = {name: values[along[name]] for name, values in self.coords.items() if name in along}
+        mask = None if self.mask is None else self.mask[where]
+        return replace(
+            self, arrays=arrays, coords=coords, mask=mask, fingerprint=f"{self.fingerprint}{where}"
+        )
+
+    def coarse(self, factor: int) -> Cube:
+        """The cube of every `factor`-th pixel along each axis but that of time."""
+        steps = [1 if dim == "time" else min(factor, n) for dim, n in zip(self.dims, self.shape, strict=True)]
+        return self.part(tuple(slice(step // 2, None, step) for step in steps))

@@ -1,0 +1,43 @@
+"""Detection of the format of a cube, by content and not by suffix."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pellicle.data.cubes import envi, numpy_files, spectra_folder, tiff_stacks, xarray_cubes
+from pellicle.data.cubes.raw_cube import Asked, RawCube
+from pellicle.data.read_picture import picture_format
+from pellicle.errors import DataError
+
+READ = "zarr, NetCDF, ENVI (.hdr), TIFF stacks, .npy, .npz, and folders of spectra with a table of file, x, y"
+
+
+def read_raw(path: Path, asked: Asked) -> RawCube:
+    """Read the cube of a file or folder. Raises DataError or UsageError, one sentence."""
+    if not path.exists():
+        raise DataError(f"{path}: no such file or folder; check its name")
+    if path.is_dir():
+        if xarray_cubes.is_zarr(path):
+            return xarray_cubes.read_zarr(path, asked)
+        return spectra_folder.read_folder(path, asked)
+    if xarray_cubes.is_netcdf(path):
+        return xarray_cubes.read_netcdf(path, asked)
+    if numpy_files.is_numpy(path):
+        return numpy_files.read_numpy(path, asked)
+    if tiff_stacks.is_tiff(path):
+        return tiff_stacks.read_tiff(path, asked)
+    if envi.header_of(path) is not None:
+        return envi.read_envi(path, asked)
+    if picture_format(path) is None and spectra_folder.table_of(path) is not None:
+        return spectra_folder.read_folder(path, asked)
+    raise DataError(f"{path}: is no cube that pellicle reads ({READ}): convert it to one of these")
+
+
+def is_picture(path: Path) -> bool:
+    """True for a picture in colours: PNG, JPEG, or a TIFF of one page in R, G, B or with a palette."""
+    if not path.is_file():
+        return False
+    kind = picture_format(path)
+    if kind != "TIFF":
+        return kind is not None
+    return tiff_stacks.is_colour_picture(path)

@@ -1,0 +1,170 @@
+"""ENVI cubes: a text header `.hdr` and a file of numbers beside it, read block by block.
+
+**Source**: NV5 Geospatial, ENVI Header Files, https://www.nv5geospatialsoftware.com/docs/enviheaderfiles.html
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from pellicle.data.cubes.array_axes import need_wavelengths
+from pellicle.data.cubes.raw_cube import COUNTS, Asked, RawCube
+from pellicle.data.cubes.stored_arrays import MappedFile, Stored
+from pellicle.data.tabular.text import open_binary
+from pellicle.errors import DataError
+
+_TYPES = {
+    **{1: "u1", 2: "i2", 3: "i4", 4: "f4", 5: "f8", 6: "c8", 9: "c16"},
+    **{12: "u2", 13: "u4", 14: "i8", 15: "u8"},
+}
+_AXES = {
+    "bsq": ("wavelength", "y", "x"),
+    "bil": ("y", "wavelength", "x"),
+    "bip": ("y", "x", "wavelength"),
+}
+_SUFFIXES = ("", ".img", ".dat", ".raw", ".bin", ".bsq", ".bil", ".bip", ".cube", ".cub", ".hyspex", ".sli")
+_FIELD = re.compile(r"^[ \t]*([^=;{}\n]+?)[ \t]*=[ \t]*(\{[^}]*\}|[^\n]*)", re.MULTILINE)
+_MOST_HEADER = 2**24
+
+
+def header_of(path: Path) -> Path | None:
+    """The ENVI header of a file: itself, or the one beside it; None for a file of another format."""
+    for header in (path, path.with_name(path.name + ".hdr"), path.with_suffix(".hdr")):
+        if header.is_file():
+            with open_binary(header) as file:
+                if file.read(16).lstrip(b"\xef\xbb\xbf").startswith(b"ENVI"):
+                    return header
+    return None
+
+
+def read_envi(path: Path, asked: Asked) -> RawCube:
+    """Read the cube of an ENVI header, or of the data file beside one. Raises DataError or UsageError."""
+    header = header_of(path)
+    assert header is not None, "the file was recognised by it"
+    fields = _fields(header)
+    lines, samples, bands = (_integer(fields, name, header) for name in ("lines", "samples", "bands"))
+    interleave = fields.get("interleave", "bsq").lower()
+    if interleave not in _AXES:
+        raise DataError(f"{header}: `interleave` is {interleave!r}, not bsq, bil or bip: correct the header")
+    code = _integer(fields, "data type", header)
+    if code not in _TYPES:
+        raise DataError(f"{header}: `data type` is {code}, which ENVI does not define: correct the header")
+    if fields.get("file compression", "0") not in ("", "0"):
+        raise DataError(f"{header}: its data are compressed: save the cube without compression")
+    if "spectral library" in fields.get("file type", "").lower():
+        raise DataError(
+            f"{header}: is a spectral library and no image: export its spectra as CSV and fit them"
+        )
+    byte_order = ">" if fields.get("byte order", "0") == "1" else "<"
+    dtype = np.dtype(byte_order + _TYPES[code])
+    axes = _AXES[interleave]
+    sizes = {"y": lines, "x": samples, "wavelength": bands}
+    shape = tuple(sizes[axis] for axis in axes)
+    offset = _integer(fields, "header offset", header, 0)
+    data = path if path != header else _data_file(header)
+    needed = offset + int(np.prod(shape)) * dtype.itemsize
+    if data.stat().st_size < needed:
+        raise DataError(
+            f"{data}: has {data.stat().st_size:,} bytes and its header {header.name} describes {needed:,}: "
+            "the copy is incomplete, or `lines`, `bands` or `data type` of the header are wrong"
+        )
+    wavelength, unit = asked.wavelength, asked.unit
+    if wavelength is None and "wavelength" in fields:
+        wavelength, unit = _numbers(fields, "wavelength", header), fields.get("wavelength units")
+    if wavelength is None:
+        raise need_wavelengths(shape, str(header))
+    if wavelength.size != bands:
+        raise DataError(
+            f"{header}: has {wavelength.size} wavelengths for {bands} bands: give one for each with "
+            "`wavelengths`"
+        )
+    good, notes = None, [f"ENVI, {interleave}, {dtype.name}, {data.name}"]
+    if "bbl" in fields:
+        good = _numbers(fields, "bbl", header) != 0
+        if good.size != bands:
+            raise DataError(
+                f"{header}: `bbl` has {good.size} numbers for {bands} bands: correct or delete it"
+            )
+    if "fwhm" in fields:
+        widths = _numbers(fields, "fwhm", header)
+        notes.append(
+            f"bands are {np.median(widths):g} {unit or 'nm'} wide (fwhm of the header), which the "
+            "instrument's bandwidth of a recipe takes into account"
+        )
+    divisor = _number(fields, "reflectance scale factor", header, 1.0) or 1.0
+    if divisor != 1.0:
+        notes.append(f"values divided by {divisor:g}, the reflectance scale factor")
+    stated = "fraction" if "reflectance scale factor" in fields else None
+    if stated is None and dtype.kind in "iu":
+        stated = COUNTS
+    return RawCube(
+        str(path),
+        {"values": Stored(MappedFile(str(data), dtype, shape, offset), axes)},
+        ("y", "x"),
+        wavelength,
+        unit,
+        files=(header, data),
+        signal="R" if "reflectance scale factor" in fields else None,
+        signal_unit=stated,
+        divisor=divisor,
+        missing=_number(fields, "data ignore value", header, None),
+        good=good,
+        notes=tuple(notes),
+    )
+
+
+def _fields(header: Path) -> dict[str, str]:
+    """Fields of a header by name in lower case with single blanks, values without braces."""
+    with open_binary(header) as file:
+        text = (
+            file.read(_MOST_HEADER).decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\r", "\n")
+        )
+    found = {}
+    for name, value in _FIELD.findall(text):
+        plain = " ".join(name.lower().replace("_", " ").split())
+        found[plain] = " ".join(value.strip("{} \t\n").split())
+    return found
+
+
+def _data_file(header: Path) -> Path:
+    """The file of numbers beside a header: `cube`, `cube.img` or the like beside `cube.hdr`."""
+    stem = header.name[: -len(header.suffix)]
+    beside = {
+        file.name.lower(): file for file in header.parent.iterdir() if file.is_file() and file != header
+    }
+    for suffix in _SUFFIXES:
+        if found := beside.get((stem + suffix).lower()):
+            return found
+    raise DataError(
+        f"{header}: the file with its numbers is not beside it: looked for {stem} and "
+        f"{', '.join(stem + suffix for suffix in _SUFFIXES[1:5])} and others; put it there"
+    )
+
+
+def _integer(fields: dict[str, str], name: str, header: Path, default: int | None = None) -> int:
+    value = _number(fields, name, header, None if default is None else float(default))
+    if value is None or value != int(value) or value < 0 or (default is None and value == 0):
+        raise DataError(
+            f"{header}: `{name}` is {fields.get(name, 'missing')!r}, no whole number: correct the header"
+        )
+    return int(value)
+
+
+def _number(fields: dict[str, str], name: str, header: Path, default: float | None) -> float | None:
+    text = fields.get(name, "")
+    if not text:
+        return default
+    try:
+        return float(text)
+    except ValueError:
+        raise DataError(f"{header}: `{name}` is {text!r}, no number: correct the header") from None
+
+
+def _numbers(fields: dict[str, str], name: str, header: Path) -> np.ndarray:
+    try:
+        return np.array([float(word) for word in re.split(r"[,\s]+", fields[name]) if word])
+    except ValueError:
+        raise DataError(f"{header}: `{name}` is no list of numbers: correct the header") from None

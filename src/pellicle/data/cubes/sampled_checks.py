@@ -1,0 +1,130 @@
+"""Checks of a cube on a sample of its pixels: dead bands, counts, percent, radians, zeros.
+
+The sample has some blocks in a grid, so that memory and time do not grow with the cube.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from pellicle.data.signal_checks import DELTA, HIGHEST, LOWEST, PSI
+from pellicle.errors import DataError
+
+WHOLE = 1_000_000
+"""Values up to which a cube is checked whole."""
+_BLOCKS = {1: (16,), 2: (5, 5), 3: (3, 4, 4)}
+_WIDTHS = {1: (64,), 2: (8, 8), 3: (1, 8, 8)}
+_SHARE = 0.95
+"""Quantile of the values that must be possible: some pixels may be dead, hot or glare."""
+_PERCENT = 200.0
+"""Values with a larger quantile are counts rather than percent."""
+
+
+def sample_blocks(sizes: tuple[int, ...], points: int) -> Iterator[tuple[slice, ...]]:
+    """Blocks of pixels across a cube: all of a small one."""
+    rank = len(sizes)
+    if int(np.prod(sizes)) * points <= WHOLE:
+        yield (slice(None),) * rank
+        return
+    axes = []
+    for size, count, width in zip(sizes, _BLOCKS[rank], _WIDTHS[rank], strict=True):
+        starts = np.unique(np.linspace(0, max(size - width, 0), count).astype(int))
+        axes.append([slice(int(start), int(start) + width) for start in starts])
+    yield from itertools.product(*axes)
+
+
+def sample(arrays: Mapping[str, Any], rank: int) -> dict[str, np.ndarray]:
+    """Sampled values (pixels, bands, ...) by name; `rank` is the number of axes of pixels."""
+    found = {}
+    for name, array in arrays.items():
+        shape = tuple(array.shape)
+        blocks = sample_blocks(shape[:rank], int(np.prod(shape[rank:])))
+        read = [np.asarray(array[where], dtype=float) for where in blocks]
+        found[name] = np.concatenate([block.reshape(-1, *shape[rank:]) for block in read])
+    return found
+
+
+def check_type(dtype: Any, path: str) -> None:
+    """Raise DataError unless values are real numbers."""
+    kind = np.dtype(dtype).kind
+    if kind == "c":
+        raise DataError(
+            f"{path}: has complex values, and a measured signal is real: store the power |r|², or psi and "
+            "delta"
+        )
+    if kind not in "fiu":
+        raise DataError(f"{path}: has values of the type {dtype}, which are no numbers: store them as floats")
+
+
+def live_bands(values: np.ndarray, path: str) -> tuple[np.ndarray, list[str]]:
+    """Return which bands have values in any sampled pixel, and a note on the others; bands are the axis 1.
+
+    Raises DataError where no band has.
+    """
+    finite = np.isfinite(values)
+    if not finite.any():
+        raise DataError(f"{path}: has no values, only NaN, in all pixels looked at: check how it was written")
+    if not np.any(values[finite]):
+        raise DataError(f"{path}: is zero in all pixels looked at: check how it was written")
+    others = (0, *range(2, values.ndim))
+    measured = finite.any(others) & np.any(finite & (values != 0), others)
+    notes = []
+    if not measured.all():
+        dead = int(np.sum(~measured))
+        notes.append(f"{dead} bands left out, NaN or zero in each of the {len(values)} pixels looked at")
+    return measured, notes
+
+
+def check_level(values: np.ndarray, signal: str, path: str) -> None:
+    """Raise DataError for a reflectance or transmittance that is in percent or in counts, or negative."""
+    known = values[np.isfinite(values)]
+    high, middle = (float(q) for q in np.quantile(known, [_SHARE, 0.5]))
+    word = {"R": "reflectance", "T": "transmittance"}[signal]
+    if high > HIGHEST:
+        reach = (
+            f"{path}: its {word} reaches {known.max():.4g}, with {100 - 100 * _SHARE:.0f} % above {high:.4g}"
+        )
+        if high <= _PERCENT:
+            raise DataError(
+                f'{reach}, which looks like percent: give `signal_unit="percent"`, or for counts '
+                "`white_frame` "
+                "and `dark_frame`"
+            )
+        raise DataError(
+            f"{reach}, which looks like counts of a camera: give `white_frame` and `dark_frame`, or as "
+            "`signal_unit` the number that stands for 1"
+        )
+    if middle < LOWEST:
+        raise DataError(
+            f"{path}: its {word} is below zero in half of the values looked at ({middle:.3g} in the "
+            "median): check the subtraction of the dark"
+        )
+
+
+def check_angles(psi: np.ndarray, delta: np.ndarray, path: str) -> None:
+    """Raise DataError for Ψ and Δ beyond their limits in degrees, or in radians."""
+    for name, values, limits in (("psi", psi, PSI), ("delta", delta, DELTA)):
+        known = values[np.isfinite(values)]
+        if not known.size:
+            raise DataError(f"{path}: {name} has no values, only NaN, in all pixels looked at")
+        low, high = np.quantile(known, [1 - _SHARE, _SHARE])
+        if low < limits[0] or high > limits[1]:
+            raise DataError(
+                f"{path}: {name} runs from {known.min():.4g} to {known.max():.4g}, beyond {limits[0]:g} to "
+                f"{limits[1]:g} degrees: correct it, or choose another `variable`"
+            )
+    if np.nanmax(psi) <= np.pi / 2 and np.nanmax(np.abs(delta)) <= 2 * np.pi:
+        raise DataError(f"{path}: psi and delta are within those of radians: convert them to degrees")
+
+
+def refuse_counts(path: str, dtype: Any) -> DataError:
+    """The error for whole numbers without a scale."""
+    return DataError(
+        f"{path}: has whole numbers ({np.dtype(dtype).name}) without a scale, which are counts of a "
+        "camera: give `white_frame` and `dark_frame`, or as `signal_unit` percent or the number that "
+        "stands for 1"
+    )

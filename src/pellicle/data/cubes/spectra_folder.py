@@ -1,0 +1,160 @@
+"""Folders of spectra with a table of their positions, as wafer maps are exported."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from pellicle.data.cubes.raw_cube import Asked, RawCube
+from pellicle.data.cubes.stored_arrays import ANGLE, WAVELENGTH, Stored
+from pellicle.data.read_spectrum import read_spectrum
+from pellicle.data.spectrum import Spectrum
+from pellicle.data.tabular.text import decoded, open_binary
+from pellicle.errors import DataError, UsageError
+
+_FILES = ("file", "filename", "file name", "spectrum", "path")
+_HEADER = re.compile(r"([^\s(\[_/]+)[\s_/]*[(\[]?\s*([^)\]]*)")
+_TABLES = ("*.csv", "*.txt", "*.tsv")
+_MOST_HEADER = 2**16
+_TOLERANCE = 1e-6
+"""Relative difference of wavelengths that are taken as equal: rounding of exported numbers."""
+
+
+def table_of(path: Path) -> Path | None:
+    """The table of positions: `path` itself, or the only one in a folder; None where there is none."""
+    if path.is_file():
+        return path if _columns(path) else None
+    found = [file for pattern in _TABLES for file in sorted(path.glob(pattern)) if _columns(file)]
+    if len(found) > 1:
+        raise UsageError(
+            f"{path}: has several tables of positions, {', '.join(file.name for file in found)}: name one "
+            "of them instead of the folder"
+        )
+    return found[0] if found else None
+
+
+def read_folder(path: Path, asked: Asked) -> RawCube:
+    """Read the spectra of a table of positions. Raises DataError, or UsageError of a spectrum's reader."""
+    table = table_of(path)
+    if table is None:
+        raise DataError(
+            f"{path}: is a folder without a table of positions: put a CSV with the columns file, x and y "
+            "in it"
+        )
+    columns = _columns(table)
+    names, where, units, notes = _rows(table, columns)
+    spectra = [_read(table.parent / name, asked) for name in names]
+    first = spectra[0]
+    for name, one in zip(names, spectra, strict=True):
+        _compare(one, first, names[0], table.parent / name)
+    arrays, angle = _arrays(spectra, table)
+    coords = {key: np.array(values) for key, values in where.items()}
+    return RawCube(
+        str(path),
+        arrays,
+        ("site",),
+        np.unique(first.wavelength),
+        "nm",
+        files=(table, *(table.parent / name for name in names)),
+        signal=first.signal,
+        polarisation=first.polarisation,
+        signal_unit=None if first.signal == "psi-delta" else "fraction",
+        calibrated=first.calibrated,
+        angle=angle,
+        coords={"file": np.array(names), **coords},
+        units=units,
+        notes=(f"{len(names)} spectra at the positions of {table.name}", *notes, *first.notes),
+    )
+
+
+def _columns(file: Path) -> dict[str, tuple[int, str]]:
+    """Column and unit of file, x, y and name of a table; empty for a file that is no table of positions."""
+    with open_binary(file) as opened:
+        head = opened.read(_MOST_HEADER)
+    line = next((x for x in decoded(head).splitlines() if x.strip() and not x.startswith("#")), "")
+    found: dict[str, tuple[int, str]] = {}
+    for i, cell in enumerate(_cells(line)):
+        plain = cell.strip().strip('"').lower()
+        if plain in _FILES:
+            found.setdefault("file", (i, ""))
+        elif (match := _HEADER.fullmatch(plain)) and match[1] in ("x", "y", "name", "site"):
+            found.setdefault(match[1], (i, match[2].strip()))
+    return found if {"file", "x", "y"} <= set(found) else {}
+
+
+def _cells(line: str) -> Sequence[str]:
+    delimiter = next((c for c in ("\t", ";", ",") if c in line), ",")
+    return next(csv.reader(io.StringIO(line), delimiter=delimiter), [])
+
+
+def _rows(
+    table: Path, columns: dict[str, tuple[int, str]]
+) -> tuple[list[str], dict[str, list[float | str]], dict[str, str], list[str]]:
+    """Files and positions of a table, units of the positions, and notes."""
+    with open_binary(table) as file:
+        lines = decoded(file.read()).splitlines()
+    kept = [(i, x) for i, x in enumerate(lines, 1) if x.strip() and not x.startswith("#")][1:]
+    names: list[str] = []
+    where: dict[str, list[float | str]] = {key: [] for key in columns if key != "file"}
+    for number, line in kept:
+        cells = _cells(line)
+        if len(cells) <= max(i for i, _ in columns.values()):
+            raise DataError(f"{table}: line {number} has {len(cells)} cells, too few: complete or delete it")
+        names.append(cells[columns["file"][0]].strip())
+        for key in where:
+            text = cells[columns[key][0]].strip()
+            try:
+                where[key].append(text if key in ("name", "site") else float(text))
+            except ValueError:
+                raise DataError(f"{table}: line {number}: {key} is {text!r}, no number: correct it") from None
+    if not names:
+        raise DataError(f"{table}: has no rows below its header: add one for each spectrum")
+    units = {key: columns[key][1] or "mm" for key in ("x", "y")}
+    assumed = not (columns["x"][1] and columns["y"][1])
+    return names, where, units, ["positions in mm, assumed"] if assumed else []
+
+
+def _read(file: Path, asked: Asked) -> Spectrum:
+    return read_spectrum(file, signal=asked.signal, spectrum=asked.variable, wavelength_unit=asked.unit)
+
+
+def _compare(one: Spectrum, first: Spectrum, first_name: str, file: Path) -> None:
+    """Refuse a spectrum of another kind or grid than the first. Raises DataError."""
+    if one.signal != first.signal or one.polarisation != first.polarisation:
+        raise DataError(
+            f"{file}: has {one.signal} in {one.polarisation} light and {first_name} has {first.signal} in "
+            f"{first.polarisation}: map files of one quantity"
+        )
+    same = len(one) == len(first) and np.allclose(one.wavelength, first.wavelength, _TOLERANCE, 0)
+    if not same:
+        raise DataError(
+            f"{file}: its {len(one)} wavelengths from {one.wavelength[0]:g} to {one.wavelength[-1]:g} nm "
+            f"differ from those of {first_name}, {len(first)} from {first.wavelength[0]:g} to "
+            f"{first.wavelength[-1]:g} nm: export all on one grid"
+        )
+    mine, others = (np.zeros(0) if s.angle is None else s.angle for s in (one, first))
+    if not np.array_equal(mine, others):
+        raise DataError(f"{file}: its angles differ from those of {first_name}: map files of one geometry")
+
+
+def _arrays(spectra: Sequence[Spectrum], table: Path) -> tuple[dict[str, Stored], np.ndarray | None]:
+    """Arrays (sites, bands[, angles]), and the angles."""
+    first = spectra[0]
+    angle = None if first.angle is None else np.unique(first.angle)
+    axes: tuple[str, ...] = ("site", WAVELENGTH)
+    shape: tuple[int, ...] = (len(first),)
+    if first.angle is not None and angle is not None and angle.size > 1:
+        axes, shape = (*axes, ANGLE), (len(first) // angle.size, angle.size)
+        if not np.array_equal(first.angle, np.tile(angle, shape[0])):
+            raise DataError(f"{table}: its spectra have other wavelengths at each angle: export one grid")
+    found = {}
+    for name in ("values", "delta", "sigma", "delta_sigma"):
+        read = [getattr(one, name) for one in spectra]
+        if all(values is not None for values in read):
+            found[name] = Stored(np.reshape(read, (len(spectra), *shape)), axes)
+    return found, angle
