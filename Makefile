@@ -15,7 +15,7 @@ PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
 NOTEBOOKS := $(wildcard notebooks/*.ipynb)
 EXECUTED := executed/done
 
-.PHONY: schema fit fits notebooks test coverage docs lint bench verdicts peers properties fuzz tolerance measurements slow clean figures
+.PHONY: schema fit fits notebooks test exact coverage docs lint bench verdicts peers properties fuzz tolerance measurements slow clean figures
 
 # on Debian, pip for virtual environments is a separate package; without it, the system's pip is used
 $(VENV)/bin/python:
@@ -26,16 +26,13 @@ $(VENV)/bin/python:
 	    $(PYTHON) -m pip --python $(VENV)/bin/python install --quiet pip; } || \
 	  { rm -rf $(VENV); echo "no virtual environment could be created: install python3-venv"; exit 1; }
 
+# --no-compile: Python compiles modules when they are first imported, a small part of those installed
 $(VENV)/.fit: pyproject.toml | $(VENV)/bin/python
-	$(BIN)/python -m pip install --quiet --editable .
+	$(BIN)/python -m pip install --quiet --no-compile --editable .
 	@touch $@
 
 $(VENV)/.dev: pyproject.toml | $(VENV)/bin/python
-	$(BIN)/python -m pip install --quiet --editable ".[dev]"
-	@touch $@ $(VENV)/.fit
-
-$(VENV)/.docs: pyproject.toml | $(VENV)/bin/python
-	$(BIN)/python -m pip install --quiet --editable ".[docs]"
+	$(BIN)/python -m pip install --quiet --no-compile --editable ".[dev]"
 	@touch $@ $(VENV)/.fit
 
 fit: $(VENV)/.fit
@@ -45,9 +42,13 @@ fit: $(VENV)/.fit
 fits: $(VENV)/.fit
 	$(BIN)/python scripts/rerun_fits.py
 
-test: $(VENV)/.dev lint
-	$(PYTEST) $(EXACT)
+# pyright takes one core for a minute, and shares the two with the first tests
+test: $(VENV)/.dev
+	$(MAKE) --jobs 2 lint exact
 	$(QUICK_COMPILE) $(PYTEST) $(addprefix --ignore=,$(EXACT))
+
+exact: $(VENV)/.dev
+	$(PYTEST) $(EXACT)
 
 coverage: $(VENV)/.dev
 	$(PYTEST) --cov --cov-report=term
@@ -65,7 +66,7 @@ $(EXECUTED): $(NOTEBOOKS)
 	$(MAKE) notebooks
 
 # into site/, with the executed notebooks; warnings are errors (--quiet would hide them from --strict)
-docs: $(VENV)/.docs $(EXECUTED)
+docs: $(VENV)/.dev $(EXECUTED)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 slow: $(VENV)/.dev

@@ -245,8 +245,10 @@ def test_commands_parse_and_their_files_exist(page):
         written |= out
 
 
-IN_EVERY_RUN = ("README.md", "docs/howto/files.md", "docs/howto/uncertainty.md")
+IN_EVERY_RUN = ("README.md", "docs/howto/uncertainty.md")
 """Pages whose commands run in every run of the tests; the others take two minutes, in `make slow`."""
+LONG_BLOCKS = ("docs/howto/loops.md", "docs/howto/repeats.md", "docs/reference/colour.md")
+"""Pages whose Python blocks compile for 3 to 5 s each: run in `make slow`."""
 
 
 @pytest.mark.parametrize(
@@ -284,7 +286,14 @@ def test_slow_commands_run(page, clone, run_command):
         run_command(command)
 
 
-@pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "python")])
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(page, marks=pytest.mark.slow) if page in LONG_BLOCKS else page
+        for page in PAGES
+        if blocks(page, "python")
+    ],
+)
 def test_python_runs(page, clone):
     """The blocks of a page run in order, in one namespace."""
     clone()

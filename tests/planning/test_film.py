@@ -168,6 +168,7 @@ def drawing(load_script):
     return load_script("benchmarks/tolerance.py")
 
 
+@pytest.mark.slow  # test_the_bound_holds_and_no_gradient_is_lost: the same for five scenes
 @pytest.mark.parametrize("kind", ["fitted index"])
 def test_random_scenes_keep_their_bounds(drawing, kind):
     """One of the thousand that `make tolerance` draws."""

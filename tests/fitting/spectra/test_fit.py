@@ -28,7 +28,7 @@ def agrees(fit, truth, sigmas=4.0):
         assert estimate.stderr < 0.1 * (estimate.upper - estimate.lower), (name, estimate)
 
 
-@pytest.mark.parametrize("signal", ["R", "T"])
+@pytest.mark.parametrize("signal", [pytest.param("R", marks=pytest.mark.slow), "T"])  # R: other tests here
 def test_thickness_n_and_k(film, measured, signal):
     scene = film(
         material=Constant(N, K),
@@ -42,9 +42,8 @@ def test_thickness_n_and_k(film, measured, signal):
     assert fit.plan.on("transmission") == (signal == "T")
 
 
-@pytest.mark.parametrize(
-    ("polarisation", "sees"), [pytest.param("s", "p", marks=pytest.mark.slow), ("p", "s")]
-)
+@pytest.mark.slow  # compiles two scenes; the next test has s at the same angle
+@pytest.mark.parametrize(("polarisation", "sees"), [("s", "p"), ("p", "s")])
 def test_at_an_angle_in_either_polarisation(film, measured, polarisation, sees):
     light = pl.Light(angle=60.0, polarisation=polarisation)
     data = measured(film(light=light), 480.0)
