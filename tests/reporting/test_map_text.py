@@ -130,7 +130,7 @@ def test_frames_of_a_series():
     found = np.zeros((20, 12, 16), bool)
     dims, seconds = ("time", "y", "x"), {"time": ("time", np.arange(20) * 0.5, {"units": "s"})}
     found[4:6] = True
-    assert where(found, dims=dims, coords=seconds) == "in all pixels of time = 2.0 to 2.5 s"
+    assert where(found, dims=dims, coords=seconds) == "in all pixels at time = 2.0 to 2.5 s"
     found[:] = False
     found[4:6, 2:6, 8:14] = True
     assert where(found, dims=dims, coords=seconds) == (
@@ -187,7 +187,7 @@ def test_large_maps_are_thinned_for_percentiles_but_not_for_shares(monkeypatch):
     dataset = made(status, 300 + 2.0 * x)
     assert cube_json(dataset)["status"] == {"converged": 4799, "misfit": 1}
     assert cube_json(dataset)["parameters"]["thickness"]["median"] == pytest.approx(379, abs=6)
-    assert "percentiles of every 3rd pixel" in words(cube_report(dataset))
+    assert "Percentiles are those of every 3rd pixel" in words(cube_report(dataset))
 
 
 def test_the_record_is_strict_json_even_of_an_empty_map():

@@ -32,7 +32,9 @@ class Axis:
     @property
     def step(self) -> float:
         """Median distance of neighbours."""
-        return float(np.median(np.abs(np.diff(self.values)))) if self.values.size > 1 else 1.0
+        steps = np.diff(np.sort(self.values))
+        steps = steps[steps > 1e-6 * np.ptp(self.values)]  # sites share coordinates
+        return float(np.median(steps)) if steps.size else 1.0
 
     @property
     def is_even(self) -> bool:
@@ -42,7 +44,10 @@ class Axis:
 
     def number(self, value: float) -> str:
         """Format a coordinate with the digits that tell neighbours apart."""
-        decimals = 0 if self.step >= 1 else min(int(np.ceil(-np.log10(self.step))), 9)
+        off = 0.02 * self.step
+        decimals = next(
+            (d for d in range(9) if np.all(abs(np.round(self.values, d) - self.values) <= off)), 9
+        )
         return f"{value:.{decimals}f}"
 
     def span(self, first: float, last: float) -> str:
@@ -102,7 +107,7 @@ def map_axes(dataset: Dataset) -> MapAxes:
     def axis(dim: str, coordinate: str | None = None) -> Axis:
         name = coordinate or dim
         if name not in dataset.coords:
-            unit = "" if dim in TIMES else PIXELS
+            unit = PIXELS if dim in ("x", "y") else ""
             return Axis(dim, unit, np.arange(dataset.sizes[dim], dtype=float) * every)
         values, unit = np.asarray(dataset.coords[name]), str(dataset.coords[name].attrs.get("units", ""))
         if values.dtype.kind == "M":  # seconds since the first
@@ -110,7 +115,7 @@ def map_axes(dataset: Dataset) -> MapAxes:
         elif values.dtype.kind not in "iuf":  # names
             values, unit = np.arange(values.size), ""
         elif not unit and values.dtype.kind in "iu":
-            unit = "" if dim in TIMES else PIXELS
+            unit = PIXELS if name in ("x", "y") else ""
         return Axis(name, unit, np.asarray(values, dtype=float))
 
     last, on_line = dims[-1], len(dims) == 1 or (len(dims) == 2 and dims[0] in TIMES)

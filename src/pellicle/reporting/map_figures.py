@@ -2,14 +2,278 @@
 
 from __future__ import annotations
 
+import re
+import textwrap
 from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from pellicle.mapping.pixel_fits import CODES, NO_DATA
+from pellicle.reporting import map_blocks
+from pellicle.reporting.drawing import ABOVE, BLUE, ORANGE, marker_size, new_figure
+from pellicle.reporting.map_axes import MapAxes
+from pellicle.reporting.map_panels import (
+    COLOURS,
+    VALUES,
+    Sheet,
+    colour_bar,
+    errors_panel,
+    hatched,
+    histogram_panel,
+    paint,
+    ratio,
+    read,
+    status_panel,
+    unusable,
+    values_panel,
+)
+from pellicle.reporting.map_summary import MapSummary, free_parameters, is_decided, summarise, thinned
+from pellicle.reporting.map_text import in_words, ordinal
+
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from xarray import Dataset
 
+RIVALS = "magma"
+PANEL, TALLEST, LEAST, WIDE = 3.5, 5.0, 1.2, 2.0
+"""Inches: width of a panel, its largest and least height, height of a panel as wide as the page."""
+_LEFT, _RIGHT, _ABOVE, _BELOW, _LINE = 0.75, 1.45, 0.32, 0.55, 0.19
+"""Inches beside a panel: labels, colour bar or legend, its title, its axis; a line of text."""
 
-def figures(dataset: Dataset) -> Iterator[tuple[str, Figure]]:
-    """Draw a map: yield the name of each figure's file, without suffix, and the figure."""
-    yield from ()
+
+def figures(dataset: Dataset, made: MapSummary | None = None) -> Iterator[tuple[str, Figure]]:
+    """Draw a map: yield the name of each figure's file, without suffix, and the figure.
+
+    "map" has the first parameter, its standard error, the statuses and a histogram. Each other free parameter
+    has a figure of its name, and "rival" shows how close the second best answers are. Large images are drawn
+    by means over blocks of pixels.
+    """
+    made = summarise(dataset) if made is None else made
+    sheet = Sheet(*_as_image(dataset, made.axes), made)
+    first, *others = free_parameters(dataset)
+    yield "map", draw_map(sheet, first)
+    for variable in others:
+        yield variable, draw_parameter(sheet, variable)
+    if "rival_delta_chi2" in dataset and sheet.axes.series is None and sheet.axes.kind != "line":
+        yield "rival", draw_rival(sheet)
+
+
+def _as_image(dataset: Dataset, axes: MapAxes) -> tuple[Dataset, MapAxes]:
+    """A series of lines as an image of position and time."""
+    if axes.kind == "line" and axes.series is not None:
+        return dataset, replace(axes, kind="image", y=axes.series, series=None)
+    return dataset, axes
+
+
+def draw_map(sheet: Sheet, variable: str) -> Figure:
+    """Draw a parameter, its standard error, the statuses and a histogram; of a series, some frames of it."""
+    if sheet.axes.series is not None:
+        return _series(sheet, variable)
+    if sheet.axes.kind == "line":
+        return _line(sheet, variable)
+    figure, ((values, errors), (status, histogram)), _ = _page(sheet, 2, 2)
+    values_panel(sheet, values, variable)
+    errors_panel(sheet, errors, variable)
+    status_panel(sheet, status, sheet.codes(0), legend=True)
+    histogram_panel(sheet, histogram, variable)
+    return figure
+
+
+def draw_parameter(sheet: Sheet, variable: str) -> Figure:
+    """Draw a parameter, its standard error and a histogram; of a series or a line as of the first."""
+    if sheet.axes.series is not None:
+        return _series(sheet, variable)
+    if sheet.axes.kind == "line":
+        return _line(sheet, variable)
+    figure, ((values, errors, histogram),), _ = _page(sheet, 1, 3)
+    values_panel(sheet, values, variable)
+    errors_panel(sheet, errors, variable)
+    histogram_panel(sheet, histogram, variable)
+    return figure
+
+
+def draw_rival(sheet: Sheet) -> Figure:
+    """Draw how much worse the best other answer of each pixel fits."""
+    from matplotlib.colors import LogNorm
+
+    from pellicle.fitting.status import RIVAL
+
+    figure, ((panel,),), _ = _page(
+        sheet,
+        1,
+        1,
+        hatching=False,
+        remark=f"White: no other answer. Below the line on the scale, Δχ² {RIVAL:g}, an answer is ambiguous.",
+    )
+    values = read(sheet, "rival_delta_chi2", 0, sheet.codes(0) != CODES[NO_DATA])
+    known = values[np.isfinite(values) & (values > 0)]
+    low, high = np.percentile(known, [1, 99]) if known.size else (RIVAL, RIVAL)
+    norm = LogNorm(min(max(low, RIVAL / 100), RIVAL / 3), max(high, 3 * RIVAL))
+    drawn = paint(sheet, panel, np.where(values <= 0, norm.vmin, values), None, RIVALS, norm=norm)
+    bar = colour_bar(panel, drawn, "Δχ² of the best other answer", "both")
+    bar.ax.axhline(RIVAL, color="white", linewidth=2)
+    return figure
+
+
+def _page(
+    sheet: Sheet,
+    rows: int,
+    columns: int,
+    wide: int = 0,
+    *,
+    hatching: bool = True,
+    between: float = _RIGHT,
+    tallest: float = TALLEST,
+    remark: str = "",
+) -> tuple[Figure, np.ndarray, list[Axes]]:
+    """An empty page with its title and the legend of the hatching: panels, and wide ones below them.
+
+    Panels have the shape of the map, so that their scales are equal without empty space; there are `between`
+    inches right of all but the last one. `remark` is added to the title.
+    """
+    height = min(PANEL * ratio(sheet.axes), tallest)
+    across = float(np.clip(height / ratio(sheet.axes), 1.0, PANEL))
+    height = max(height, LEAST)
+    width = (_LEFT + across) * columns + between * (columns - 1) + _RIGHT
+    width = max(width, 7.5 if wide else 5.5)
+    title = _title(sheet, int(width * 12.5), remark)
+    words = unusable(np.asarray(sheet.data["status"])) if hatching else []
+    below = _LINE * 2.6 if words else 0.0
+    top = _LINE * (title.count("\n") + 1) + 0.15
+    heights = [height] * rows + [WIDE] * wide
+    total = top + sum(heights) + (_ABOVE + _BELOW) * len(heights) + below
+    figure = new_figure(width, total, constrained=False)
+    figure.suptitle(title, fontsize="medium", x=0.1 / width, y=1 - 0.08 / total, ha="left", va="top")
+    panels, wides = np.empty((rows, columns), object), []
+    for i, own in enumerate(heights):
+        top += _ABOVE + own
+        bottom, share = 1 - top / total, own / total
+        top += _BELOW
+        if i >= rows:
+            room = (width - _LEFT - 0.7) / width
+            wides.append(figure.add_axes((_LEFT / width, bottom, room, share)))
+            continue
+        for j in range(columns):
+            left = (_LEFT + (_LEFT + across + between) * j) / width
+            panels[i, j] = figure.add_axes((left, bottom, across / width, share))
+    if words:
+        figure.legend(
+            handles=hatched(words),
+            title="numbers that should not be used:",
+            title_fontsize="small",
+            fontsize="small",
+            loc="lower left",
+            bbox_to_anchor=(0.0, 0.0),
+            ncols=min(len(words), int(width / 1.5)),
+            frameon=False,
+            alignment="left",
+        )
+    return figure, panels, wides
+
+
+def _title(sheet: Sheet, columns: int, remark: str) -> str:
+    """File, statuses, and what a point of the picture is."""
+    about = sheet.made.attributes
+    lines = [Path(str(about.get("path", ""))).name, in_words(sheet.made)]
+    every = int(about.get("preview", 1))
+    if every > 1:
+        lines.append(f"Preview of every {ordinal(every)} pixel in each direction.")
+    if sheet.side > 1:
+        lines.append(
+            f"A point is a block of {sheet.side} x {sheet.side} pixels: the mean of those that can be used,"
+            " the most frequent status."
+        )
+    lines.append(remark)
+    lines = [re.sub(r" (?==|%|[a-z]*m\b)|(?<==) ", "\u00a0", line) for line in lines]  # numbers stay whole
+    text = "\n".join(
+        part for line in lines if line for part in textwrap.wrap(line, columns, break_on_hyphens=False)
+    )
+    return text.replace("$", r"\$")
+
+
+def _series(sheet: Sheet, variable: str) -> Figure:
+    """First, middle and last frame, their statuses, and the values against time."""
+    axes, frames = sheet.axes, sheet.frames
+    assert axes.series is not None
+    figure, panels, (curve,) = _page(sheet, 2, len(frames), wide=1, between=0.1, tallest=3.5)
+    codes = [sheet.codes(i) for i in frames]
+    values = [read(sheet, variable, i, is_decided(own)) for i, own in zip(frames, codes, strict=True)]
+    low, high, extend = map_blocks.limits(np.concatenate([own.ravel() for own in values]))
+    for i, frame in enumerate(frames):
+        drawn = paint(sheet, panels[0, i], values[i], codes[i], VALUES, vmin=low, vmax=high)
+        status_panel(sheet, panels[1, i], codes[i], legend=i == len(frames) - 1)
+        if i == len(frames) - 1:
+            colour_bar(panels[0, i], drawn, "", extend)
+        when = axes.series.span(*2 * (axes.series.values[frame],))
+        for row, what in enumerate((sheet.label(variable), "status")):
+            panels[row, i].set_title(what + f", {when}" if i == 0 else when, fontsize="medium", loc="left")
+            if i:
+                panels[row, i].set_ylabel("")
+    _against_series(sheet, curve, variable)
+    return figure
+
+
+def _against_series(sheet: Sheet, panel: Axes, variable: str) -> None:
+    """Mean and 5 to 95 % of the decided pixels of each frame, and the share of these pixels."""
+    thin = thinned(sheet.data, sheet.made.axes)
+    axis = sheet.axes.series
+    assert axis is not None
+    codes = np.asarray(thin["status"]).reshape(axis.values.size, -1)
+    used = is_decided(codes)
+    values = np.where(used, np.asarray(thin[variable], dtype=float).reshape(codes.shape), np.nan)
+    some = np.isfinite(values).any(axis=1)
+    mean, low, high = np.full((3, axis.values.size), np.nan)
+    mean[some] = np.nanmean(values[some], axis=1)
+    low[some], high[some] = np.nanpercentile(values[some], [5, 95], axis=1)
+    panel.fill_between(
+        axis.values, low, high, color=BLUE, alpha=0.25, linewidth=0, label="5 to 95 % of the pixels"
+    )
+    panel.plot(axis.values, mean, ".-", color=BLUE, markersize=4, label="mean")
+    panel.set(xlabel=axis.label, ylabel=sheet.label(variable))
+    panel.spines[["top"]].set_visible(False)
+    beside = panel.twinx()
+    beside.plot(
+        axis.values,
+        100 * used.sum(axis=1) / np.maximum((codes != CODES[NO_DATA]).sum(axis=1), 1),
+        color=ORANGE,
+        linewidth=1.0,
+        label="pixels that can be used (right)",
+    )
+    beside.set(ylabel="share (%)", ylim=(0, 105))
+    beside.spines[["top"]].set_visible(False)
+    handles, labels = (
+        a + b for a, b in zip(*(own.get_legend_handles_labels() for own in (panel, beside)), strict=True)
+    )
+    panel.legend(handles, labels, ncols=3, fontsize="small", **ABOVE)
+
+
+def _line(sheet: Sheet, variable: str) -> Figure:
+    """Values with their standard errors along a line, or against time, and a histogram."""
+    figure, _, (panel,) = _page(sheet, 0, 1, wide=1, hatching=False)
+    codes, x = sheet.codes(0), sheet.axes.x.values
+    values = np.asarray(sheet.frame(variable, 0), dtype=float)
+    stderr = np.asarray(sheet.frame(f"{variable}_stderr", 0), dtype=float)
+    used = is_decided(codes)
+    panel.errorbar(
+        x[used],
+        values[used],
+        np.where(np.isfinite(stderr[used]), stderr[used], 0.0),
+        fmt=".",
+        color=BLUE,
+        markersize=marker_size(x.size),
+        elinewidth=0.8,
+        label="value and standard error",
+    )
+    if used.any():  # bad values must not set the limits
+        panel.set_ylim(panel.get_ylim())
+    for word in unusable(codes):
+        own = codes == CODES[word]
+        panel.plot(x[own], values[own], "x", color=COLOURS[word], markersize=5, label=word)
+    panel.set(xlabel=sheet.axes.x.label, ylabel=sheet.label(variable))
+    panel.spines[["top", "right"]].set_visible(False)
+    panel.legend(ncols=4, fontsize="small", **ABOVE)
+    return figure

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from pellicle.files import MARKER, new_folder, write_text
 from pellicle.reporting.drawing import save_figure
 from pellicle.reporting.json_record import indented
+from pellicle.reporting.map_summary import summarise
 from pellicle.reporting.map_text import cube_json, cube_report
 
 if TYPE_CHECKING:
@@ -22,9 +23,11 @@ def write_cube_map(folder: str | os.PathLike[str], dataset: Dataset) -> Path:
     """
     from pellicle.reporting.map_figures import figures
 
-    target = new_folder(folder)
-    write_text(target / MARKER, indented(cube_json(dataset)), overwrite=True)  # first: it marks the folder
-    write_text(target / "report.txt", cube_report(dataset), overwrite=True)
-    for name, figure in figures(dataset):
+    target, made = new_folder(folder), summarise(dataset)
+    write_text(
+        target / MARKER, indented(cube_json(dataset, made)), overwrite=True
+    )  # first: it marks the folder
+    write_text(target / "report.txt", cube_report(dataset, made), overwrite=True)
+    for name, figure in figures(dataset, made):
         save_figure(figure, target / f"{name}.png", overwrite=True)
     return target

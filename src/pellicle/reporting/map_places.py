@@ -37,7 +37,7 @@ def place(found: np.ndarray, known: np.ndarray, axes: MapAxes) -> str:
     share = each / np.maximum(known.reshape(len(found), -1).sum(axis=1), 1)
     whole = _runs(share > 0.5)
     if sum(each[a:b].sum() for a, b in whole) >= MOST * each.sum():
-        return "in all pixels of " + _spans(whole, axes.series)
+        return "in all pixels at " + _spans(whole, axes.series)
     first, last = np.flatnonzero(each)[[0, -1]]
     when = ""
     if last - first + 1 <= 0.5 * len(found):

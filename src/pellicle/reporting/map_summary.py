@@ -129,21 +129,22 @@ def summarise(dataset: Dataset) -> MapSummary:
             places[word] = place(~known, np.ones_like(known), axes)
         elif word != NO_DATA and count < 0.5 * known.sum():
             places[word] = place(codes == CODES[word], known, axes)
-    step = thinning(axes)
-    thin = dataset.isel({dim: slice(None, None, step) for dim in _thinned(dataset, axes)})
+    thin = thinned(dataset, axes)
     used = is_decided(np.asarray(thin["status"]))
     parameters = tuple(_parameter(thin, name, used) for name in free_parameters(dataset))
-    return MapSummary(axes, counts, places, parameters, step, dict(dataset.attrs))
+    return MapSummary(axes, counts, places, parameters, _step(axes), dict(dataset.attrs))
 
 
-def thinning(axes: MapAxes) -> int:
+def thinned(dataset: Dataset, axes: MapAxes) -> Dataset:
+    """Every n-th pixel of a large map, in each direction; all frames of a series."""
+    along = dataset["status"].dims[-2 if axes.kind == "image" else -1 :]
+    return dataset.isel({dim: slice(None, None, _step(axes)) for dim in along})
+
+
+def _step(axes: MapAxes) -> int:
     """Step between the pixels from which percentiles are computed."""
     along = 2 if axes.kind == "image" else 1
     return max(int(np.ceil((np.prod(axes.shape, dtype=float) / MOST_PIXELS) ** (1 / along))), 1)
-
-
-def _thinned(dataset: Dataset, axes: MapAxes) -> tuple[Any, ...]:
-    return dataset["status"].dims[-2 if axes.kind == "image" else -1 :]
 
 
 def _parameter(dataset: Dataset, variable: str, used: np.ndarray) -> ParameterSummary:

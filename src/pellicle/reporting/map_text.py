@@ -27,16 +27,16 @@ _ADVICE = {str(status): text for status, text in ADVICE.items()} | {
 }
 
 
-def cube_report(dataset: Dataset) -> str:
-    """Format a map as text of at most 100 columns: the statuses and where they are, then the numbers."""
-    made = summarise(dataset)
+def cube_report(dataset: Dataset, made: MapSummary | None = None) -> str:
+    """Format a map as text of at most 100 columns: the statuses and where they are, then the numbers.
+
+    `made` is the summary, if it has been computed.
+    """
+    made = summarise(dataset) if made is None else made
     blocks = [
         ("Map", [*wrapped(in_words(made)), *facts(_facts(made))]),
         ("Status: what to do", facts((w, a) for w, a in _ADVICE.items() if w in made.counts)),
-        (
-            _title(made),
-            [line for p in made.parameters for line in facts(_parameter(p, len(made.parameters)))],
-        ),
+        (_title(made), _parameters(made)),
         ("Errors", wrapped(ERRORS)),
         ("Plan: what was simulated", _plan(made)),
     ]
@@ -109,17 +109,23 @@ def _rounded(value: float) -> str:
 
 
 def _title(made: MapSummary) -> str:
-    words = " or ".join(word for word in DECIDED if word in made.counts)
-    few = (
-        "" if made.sampled == 1 else f"; percentiles of every {ordinal(made.sampled)} pixel in each direction"
-    )
     if not made.decided:
         return "Parameters: no pixel has numbers that can be used"
-    count = f"{made.decided} pixel" + ("s that are" if made.decided > 1 else " that is")
-    return f"Parameters at the {count} {words}{few}"
+    words = " or ".join(word for word in DECIDED if word in made.counts)
+    return f"Parameters at the {made.decided} pixel{'s that are' if made.decided > 1 else ' that is'} {words}"
 
 
-def _parameter(p: ParameterSummary, number_of_parameters: int) -> list[tuple[str, str]]:
+def _parameters(made: MapSummary) -> list[str]:
+    lines = [line for p in made.parameters for line in facts(_parameter(p))]
+    if made.sampled == 1 or not lines:
+        return lines
+    return [
+        *lines,
+        *wrapped(f"Percentiles are those of every {ordinal(made.sampled)} pixel in each direction."),
+    ]
+
+
+def _parameter(p: ParameterSummary) -> list[tuple[str, str]]:
     least, low, middle, high, largest = (_number(value, p) for value in p.percentiles)
     unit = f" {p.unit}" if p.unit else ""
     if not math.isfinite(p.percentiles[2]):
@@ -173,9 +179,9 @@ def _plan(made: MapSummary) -> list[str]:
     return facts([*rows, *([("left out", ", ".join(absent))] if absent else [])])
 
 
-def cube_json(dataset: Dataset) -> dict[str, Any]:
+def cube_json(dataset: Dataset, made: MapSummary | None = None) -> dict[str, Any]:
     """Convert a map to the dictionary of its summary; infinite and undefined numbers are None."""
-    made = summarise(dataset)
+    made = summarise(dataset) if made is None else made
     about = made.attributes
     seconds = about.get("seconds")
     return {

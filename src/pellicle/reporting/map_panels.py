@@ -1,0 +1,308 @@
+"""Panels of the figures of a map: values in colours, hatching by status, statuses, histograms."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pellicle.mapping.pixel_fits import CODES, NO_DATA, STATUSES
+from pellicle.reporting import map_blocks
+from pellicle.reporting.drawing import BLACK, BLUE, GREY
+from pellicle.reporting.map_axes import MapAxes
+from pellicle.reporting.map_summary import DECIDED, MapSummary, is_decided, parameter_name, thinned, unit_of
+from pellicle.reporting.map_text import share
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.patches import Patch
+    from xarray import DataArray, Dataset
+
+VALUES, ERRORS = "viridis", "cividis"
+"""Perceptually uniform colour maps, which the colour-blind can read."""
+WIDE = 20.0
+"""Ratio of the 98th and 2nd percentiles of standard errors from which their colours are logarithmic."""
+SPOT = 60.0
+"""Area of the circle of a site, in square points, where there are few."""
+FLAT = 0.12
+"""Ratio of height and width below which a picture is stretched."""
+COLOURS = {
+    NO_DATA: "#FFFFFF",
+    "failed": "#000000",
+    "not-converged": "#777777",
+    "misfit": "#D55E00",
+    "not-identifiable": "#CC79A7",
+    "ambiguous": "#E69F00",
+    "at-bound": "#F0E442",
+    "converged": "#C6DCEC",
+    "by-neighbours": "#56B4E9",
+}
+"""Colours of the statuses: Okabe and Ito's, pale where all is well."""
+HATCHES = {
+    "failed": "++++",
+    "not-converged": "||||",
+    "misfit": "xxxx",
+    "not-identifiable": "....",
+    "ambiguous": "////",
+    "at-bound": "----",
+}
+"""Hatching of pixels whose numbers should not be used."""
+PALE, DARK = 0.88, 0.55
+"""Greys of the hatching."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """A map that is drawn: its data, axes and summary."""
+
+    data: Dataset
+    axes: MapAxes
+    made: MapSummary
+
+    @property
+    def side(self) -> int:
+        """Side of the blocks of pixels that are one point of a picture."""
+        return map_blocks.block(self.axes)
+
+    @property
+    def frames(self) -> list[int]:
+        """The first, the middle and the last one of a series, or the only one."""
+        number = 1 if self.axes.series is None else self.axes.series.values.size
+        return sorted({0, number // 2, number - 1})
+
+    def codes(self, frame: int) -> np.ndarray:
+        """Statuses of all pixels of a frame."""
+        return np.asarray(self.frame("status", frame))
+
+    def frame(self, variable: str, frame: int) -> DataArray:
+        """A variable at the pixels of one frame, unread."""
+        array = self.data[variable]
+        before = array.dims[: len(array.dims) - (2 if self.axes.kind == "image" else 1)]
+        index = np.unravel_index(frame, [self.data.sizes[dim] for dim in before])
+        return array.isel(dict(zip(before, map(int, index), strict=True)))
+
+    def label(self, variable: str, of: str = "") -> str:
+        """`thickness (nm)`, or `standard error of thickness (nm)`."""
+        unit = unit_of(self.data, variable)
+        name = str(self.data[variable].attrs.get("long_name", parameter_name(self.data, variable)))
+        return of + name + (f" ({unit})" if unit else "")
+
+
+def extent(axes: MapAxes) -> tuple[float, float, float, float]:
+    """Left, right, bottom and top of an image whose first row is drawn first."""
+    assert axes.y is not None
+    x, y = axes.x.edges(), axes.y.edges()
+    return float(x[0]), float(x[-1]), float(y[-1]), float(y[0])
+
+
+def ratio(axes: MapAxes) -> float:
+    """Height of a picture divided by its width: at equal scales, or 0.6 where these would not be readable."""
+    return _to_scale(axes) or 0.6
+
+
+def _to_scale(axes: MapAxes) -> float | None:
+    """That ratio at equal scales, None where directions have different units or the picture would be flat."""
+    if axes.y is None or axes.y.unit != axes.x.unit:
+        return None
+    ends = [axis.edges() if axes.kind == "image" else axis.values for axis in (axes.y, axes.x)]
+    height, width = (float(np.ptp(values)) for values in ends)
+    return height / width if FLAT * width <= height <= width / FLAT and width > 0 else None
+
+
+def overlay(codes: np.ndarray) -> np.ndarray:
+    """Hatching (height, width, 4) of points that should not be used, transparent elsewhere."""
+    scale = max(round(map_blocks.MOST_POINTS / max(codes.shape)), 1)
+    fine = codes.repeat(scale, axis=0).repeat(scale, axis=1)
+    rows, columns = np.ogrid[: fine.shape[0], : fine.shape[1]]
+    period, width = 14, 3
+    near = {
+        "/": (rows + columns) % period < width,
+        "\\": (rows - columns) % period < width,
+        "-": (rows + 0 * columns) % period < width,
+        "|": (columns + 0 * rows) % period < width,
+    }
+    marks = {
+        "////": near["/"],
+        "xxxx": near["/"] | near["\\"],
+        "----": near["-"],
+        "||||": near["|"],
+        "++++": near["-"] | near["|"],
+        "....": (rows % period < width + 1) & (columns % period < width + 1),
+    }
+    picture = np.zeros((*fine.shape, 4), np.float32)
+    for word, hatch in HATCHES.items():
+        own = fine == CODES[word]
+        if own.any():
+            picture[own, :3], picture[own, 3] = PALE, 1.0
+            picture[own & marks[hatch], :3] = DARK
+    return picture
+
+
+def hatched(words: Sequence[str]) -> list[Patch]:
+    """Entries of a legend for the hatching of these statuses."""
+    from matplotlib.patches import Patch
+
+    style: Any = {"facecolor": f"{PALE}", "edgecolor": f"{DARK}", "linewidth": 0}
+    return [Patch(hatch=HATCHES[word], label=word, **style) for word in words if word in HATCHES]
+
+
+def label_axes(panel: Axes, axes: MapAxes) -> None:
+    """Name the axes of a picture, with equal scales where both have one unit."""
+    panel.set_xlabel(axes.x.label.replace("$", r"\$"))
+    assert axes.y is not None
+    panel.set_ylabel(axes.y.label.replace("$", r"\$"))
+    if _to_scale(axes):
+        panel.set_aspect("equal")
+    if axes.kind == "image":
+        panel.set_xlim(*sorted(axes.x.edges()[[0, -1]]))
+        panel.set_ylim(*sorted(axes.y.edges()[[0, -1]]))
+    if axes.downward:
+        panel.set_ylim(panel.get_ylim()[::-1])
+
+
+def unusable(codes: np.ndarray) -> list[str]:
+    """Statuses that occur and whose numbers should not be used."""
+    return [STATUSES[code] for code in np.unique(codes) if STATUSES[code] not in (*DECIDED, NO_DATA)]
+
+
+def read(sheet: Sheet, variable: str, frame: int, used: np.ndarray) -> np.ndarray:
+    """A variable at the used pixels of a frame, reduced to the points of a picture; NaN elsewhere."""
+    array = sheet.frame(variable, frame)
+    if sheet.axes.kind == "image":
+        return map_blocks.block_means(array, used, sheet.side)
+    return np.where(used, np.asarray(array, dtype=float), np.nan)
+
+
+def values_panel(sheet: Sheet, panel: Axes, variable: str) -> None:
+    codes = sheet.codes(0)
+    values = read(sheet, variable, 0, is_decided(codes))
+    low, high, extend = map_blocks.limits(values)
+    drawn = paint(sheet, panel, values, codes, VALUES, vmin=low, vmax=high)
+    colour_bar(panel, drawn, sheet.label(variable), extend)
+
+
+def errors_panel(sheet: Sheet, panel: Axes, variable: str) -> None:
+    from matplotlib.colors import LogNorm
+
+    codes = sheet.codes(0)
+    values = read(sheet, f"{variable}_stderr", 0, is_decided(codes))
+    low, high, extend = map_blocks.limits(values)
+    known = values[values > 0]
+    style: dict[str, Any] = {"vmin": low, "vmax": high}
+    if known.size and np.percentile(known, 98) > WIDE * np.percentile(known, 2):
+        low, high = np.percentile(known, [1, 99])
+        style, extend = {"norm": LogNorm(low, high)}, "both"
+    drawn = paint(sheet, panel, values, codes, ERRORS, **style)
+    colour_bar(panel, drawn, sheet.label(variable, "standard error of "), extend)
+
+
+def paint(
+    sheet: Sheet, panel: Axes, values: np.ndarray, codes: np.ndarray | None, cmap: Any, **style: Any
+) -> Any:
+    """Draw values in colours and hatch what should not be used; return what a colour bar needs."""
+    axes = sheet.axes
+    if axes.kind == "sites":
+        drawn = _circles(sheet, panel, values, codes, cmap, style)
+    else:
+        place: dict[str, Any] = {
+            "extent": extent(axes),
+            "aspect": "auto",
+            "interpolation": "nearest",
+            "origin": "upper",
+        }
+        drawn = panel.imshow(map_blocks.evenly(values, axes, sheet.side), cmap=cmap, **place, **style)
+        if codes is not None:
+            reduced = map_blocks.block_codes(codes, sheet.side)
+            layer = overlay(map_blocks.evenly(reduced, axes, sheet.side))
+            panel.imshow(layer, **{**place, "interpolation": "antialiased"})
+    label_axes(panel, axes)
+    return drawn
+
+
+def _circles(
+    sheet: Sheet, panel: Axes, values: np.ndarray, codes: np.ndarray | None, cmap: Any, style: dict[str, Any]
+) -> Any:
+    """Filled circles at the sites, nothing between them."""
+    assert sheet.axes.y is not None
+    x, y = sheet.axes.x.values, sheet.axes.y.values
+    area = SPOT * float(np.clip(60 / x.size, 0.05, 1.5))
+    known = np.isfinite(values)
+    if codes is not None:
+        for word in unusable(codes):
+            own = codes == CODES[word]
+            panel.scatter(x[own], y[own], area, facecolor="0.88", edgecolor="0.55", hatch=2 * HATCHES[word])
+    edge: dict[str, Any] = {"edgecolor": GREY, "linewidth": 0.3}
+    panel.margins(0.08)
+    return panel.scatter(x[known], y[known], area, c=values[known], cmap=cmap, **edge, **style)
+
+
+def colour_bar(panel: Axes, drawn: Any, label: str, extend: str) -> Any:
+    """Draw a colour bar as high as its panel, with its label above the panel."""
+    panel.set_title(label.replace("$", r"\$"), fontsize="medium", loc="left")
+    root: Any = panel.figure
+    width = panel.get_position().width * root.get_size_inches()[0]
+    bar = root.colorbar(drawn, cax=panel.inset_axes((1 + 0.1 / width, 0.0, 0.16 / width, 1.0)), extend=extend)
+    if hasattr(bar.formatter, "set_useOffset"):
+        bar.formatter.set_useOffset(False)
+    return bar
+
+
+def status_panel(sheet: Sheet, panel: Axes, codes: np.ndarray, legend: bool) -> None:
+    """Statuses in colours, with their shares among the pixels with data as a legend."""
+    from matplotlib.colors import ListedColormap
+    from matplotlib.patches import Patch
+
+    colours = ListedColormap([COLOURS[word] for word in STATUSES])
+    style = {"vmin": -0.5, "vmax": len(STATUSES) - 0.5}
+    shown = map_blocks.block_codes(codes, sheet.side) if sheet.axes.kind == "image" else codes
+    paint(sheet, panel, shown.astype(float), None, colours, **style)
+    if not legend:
+        return
+    made = sheet.made
+    entries = []
+    for word, count in made.counts.items():
+        total, among = (made.pixels, " of all") if word == NO_DATA else (made.with_data, "")
+        text = f"{word}\n{share(count, total)} %{among}"
+        entries.append(Patch(facecolor=COLOURS[word], edgecolor=GREY, linewidth=0.5, label=text))
+    panel.legend(
+        handles=entries,
+        fontsize="small",
+        frameon=False,
+        loc="upper left",
+        bbox_to_anchor=(1.0, 1.02),
+        borderaxespad=0.2,
+    )
+
+
+def histogram_panel(sheet: Sheet, panel: Axes, variable: str) -> None:
+    """Values of the decided pixels."""
+    thin = thinned(sheet.data, sheet.made.axes)
+    values = np.asarray(thin[variable], dtype=float)[is_decided(np.asarray(thin["status"]))]
+    values = values[np.isfinite(values)]
+    panel.set(xlabel=sheet.label(variable), ylabel="sites" if sheet.axes.kind == "sites" else "pixels")
+    panel.spines[["top", "right"]].set_visible(False)
+    if not values.size:
+        panel.text(
+            0.5,
+            0.5,
+            "no pixel has numbers\nthat can be used",
+            ha="center",
+            va="center",
+            transform=panel.transAxes,
+        )
+        return
+    low, high, _ = map_blocks.limits(values)
+    bins = int(np.clip(2 * values.size ** (1 / 3), 10, 80))
+    weights = np.full(values.size, float(sheet.made.sampled ** (2 if sheet.axes.kind == "image" else 1)))
+    panel.hist(np.clip(values, low, high), bins=bins, range=(low, high), weights=weights, color=BLUE)
+    q05, middle, q95 = np.percentile(values, [5, 50, 95])
+    panel.axvline(middle, color=BLACK, linewidth=1.2, label="median")
+    panel.axvspan(q05, q95, color=GREY, alpha=0.18, linewidth=0, zorder=0, label="5 to 95 %")
+    panel.legend(
+        frameon=False, fontsize="small", loc="lower right", bbox_to_anchor=(1, 1), ncols=2, borderaxespad=0.1
+    )
+    outside = int(np.sum((values < low) | (values > high)))
+    if outside:
+        panel.set_xlabel(f"{sheet.label(variable)}\n(the outermost bars contain all beyond them)")
