@@ -147,7 +147,7 @@ def test_sites_of_a_wafer():
     coords = {"x": ("site", x, {"units": "mm"}), "y": ("site", y, {"units": "mm"})}
     radius = np.hypot(x, y)
     assert where(radius > 30, dims=("site",), coords=coords) == "at the outer sites"
-    assert where(radius == 0, dims=("site",), coords=coords) == "at x = 0, y = 0 mm"
+    assert where(radius == 0, dims=("site",), coords=coords) == "at x = 0.0, y = 0.0 mm"  # others at 17.3
     assert where(np.arange(25) % 4 == 1, dims=("site",), coords=coords) == "at scattered sites"
     assert "25 sites" in cube_report(made(np.full(25, CODES["converged"]), dims=("site",), coords=coords))
 

@@ -112,8 +112,8 @@ def draw_rival(sheet: Sheet) -> Figure:
     values = read(sheet, "rival_delta_chi2", 0, sheet.codes(0) != CODES[NO_DATA])
     known = values[np.isfinite(values) & (values > 0)]
     low, high = np.percentile(known, [1, 99]) if known.size else (RIVAL, RIVAL)
-    norm = LogNorm(min(max(low, RIVAL / 100), RIVAL / 3), max(high, 3 * RIVAL))
-    drawn = paint(sheet, panel, np.where(values <= 0, norm.vmin, values), None, RIVALS, norm=norm)
+    low, high = min(max(low, RIVAL / 100), RIVAL / 3), max(high, 3 * RIVAL)
+    drawn = paint(sheet, panel, np.where(values <= 0, low, values), None, RIVALS, norm=LogNorm(low, high))
     bar = colour_bar(panel, drawn, "Δχ² of the best other answer", "both")
     bar.ax.axhline(RIVAL, color="white", linewidth=2)
     return figure

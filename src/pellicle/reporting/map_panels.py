@@ -159,7 +159,7 @@ def label_axes(panel: Axes, axes: MapAxes) -> None:
         panel.set_xlim(*sorted(axes.x.edges()[[0, -1]]))
         panel.set_ylim(*sorted(axes.y.edges()[[0, -1]]))
     if axes.downward:
-        panel.set_ylim(panel.get_ylim()[::-1])
+        panel.invert_yaxis()
 
 
 def unusable(codes: np.ndarray) -> list[str]:
