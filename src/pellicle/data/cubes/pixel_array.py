@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from pellicle.data.cubes.stored_arrays import ANGLE, WAVELENGTH, Stored
 
 
-class Conversion(Protocol):
-    """Conversion of a block (*pixels, bands[, angles]) of stored numbers; `where` are its pixels."""
-
-    def __call__(self, block: np.ndarray, where: tuple[slice, ...], dims: tuple[str, ...]) -> np.ndarray:
-        """Return the converted block."""
-        ...
+Conversion = Callable[[np.ndarray, tuple[slice, ...], tuple[str, ...]], np.ndarray]
+"""Conversion of a block (*pixels, bands[, angles]) of stored numbers, given its pixels and their axes."""
 
 
 @dataclass(frozen=True)
