@@ -16,6 +16,7 @@ from pellicle.errors import DataError, UsageError
 
 _SHORTEST, _LONGEST = 10.0, 1e6
 """Bands in nm outside these limits (soft X-rays, 1 mm) come from a mistaken unit."""
+_METRES = ("m", "meter", "meters", "metre", "metres")
 _NO_UNIT = ("", "unknown", "index", "none", "-")
 _MOST = 100_000
 _EXAMPLE = "as in 400:900:5, 450,550,650 or a file with one number a line"
@@ -90,7 +91,9 @@ def in_nm(
     if requested and unit is None:
         raise UsageError(f"`wavelength_unit` must be one of {', '.join(WAVELENGTH_UNITS)}, not {requested!r}")
     notes = []
-    if unit is None and written is not None and written.strip().lower() not in _NO_UNIT:
+    if unit is None and written is not None and written.strip().lower() in _METRES:
+        values, unit, written = values * 1e9, "nm", "m"
+    elif unit is None and written is not None and written.strip().lower() not in _NO_UNIT:
         unit = wavelength_unit(written)
         if unit is None:
             raise DataError(
@@ -110,7 +113,8 @@ def in_nm(
     if assumed:
         notes.append("wavelength unit: nm, assumed")
     else:
-        notes.append(f"wavelength unit: {unit}" + ("" if unit == "nm" else ", converted to nm"))
+        shown = "m" if written == "m" and not requested else unit
+        notes.append(f"wavelength unit: {shown}" + ("" if shown == "nm" else ", converted to nm"))
     if np.any(np.diff(nm) < 0):
         notes.append("bands sorted by wavelength")
     return nm, notes

@@ -38,9 +38,10 @@ def fingerprint(
         return digest.hexdigest(), _note(members)
     total = sum(int(np.prod(s.data.shape)) * np.dtype(s.data.dtype).itemsize for s in raw.arrays.values())
     for _, stored in sorted(raw.arrays.items()):
-        name = getattr(getattr(getattr(stored.data, "variable", None), "data", None), "name", "")
-        digest.update(str(name).encode())  # that of a dask array is a digest of its graph
-        for where in _blocks(raw, stored.data.shape, stored.axes, total):
+        # the name of a dask array is a digest of its graph, which may be long to compute
+        graph = getattr(stored.data, "graph", "")
+        digest.update(graph.encode())
+        for where in _blocks(raw, stored.data.shape, stored.axes, bool(graph) or total > WHOLE):
             digest.update(np.ascontiguousarray(stored.read(where)).tobytes())
     return digest.hexdigest(), "" if total <= WHOLE else _sampled(total, "some blocks of pixels")
 
@@ -53,10 +54,10 @@ def _text(value: Any) -> str:
 
 
 def _blocks(
-    raw: RawCube, shape: tuple[int, ...], axes: tuple[str, ...], total: int
+    raw: RawCube, shape: tuple[int, ...], axes: tuple[str, ...], part: bool
 ) -> list[dict[str, slice]]:
-    """Blocks of an array to read: all of a small one."""
-    if total <= WHOLE:
+    """Blocks of an array to read: some of them, or all at once."""
+    if not part:
         return [{}]
     dims = [axis for axis in axes if axis in raw.dims]
     sizes = tuple(shape[axes.index(axis)] for axis in dims)

@@ -10,7 +10,6 @@ import numpy as np
 
 from pellicle.data.cubes.stored_arrays import ANGLE, WAVELENGTH, Stored
 
-
 Conversion = Callable[[np.ndarray, tuple[slice, ...], tuple[str, ...]], np.ndarray]
 """Conversion of a block (*pixels, bands[, angles]) of stored numbers, given its pixels and their axes."""
 

@@ -73,6 +73,11 @@ class XarrayVariable:
         object.__setattr__(self, "dtype", self.variable.dtype)
         object.__setattr__(self, "shape", tuple(self.variable.shape))
 
+    @property
+    def graph(self) -> str:
+        """The name of a dask array, which depends on how it is computed; empty for others."""
+        return "" if self.variable.chunks is None else str(self.variable.data.name)
+
     def __getitem__(self, where: Any) -> Any:
         part = self.variable[where]
         return part.data if part.chunks is not None else part.values
