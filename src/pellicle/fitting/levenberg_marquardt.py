@@ -53,8 +53,8 @@ class State(eqx.Module):
     aux: Any
 
 
-class _Model(NamedTuple):
-    """JᵀJ, its correction, and the box, as seen from one point."""
+class QuadraticModel(NamedTuple):
+    """A sum of squares around one point: Jᵀr, JᵀJ and its correction, and the box."""
 
     y: Any
     gradient: Any
@@ -108,7 +108,7 @@ class _Model(NamedTuple):
         return jnp.clip(self.y + step, self.lower, self.upper), predicted, jnp.maximum(promise, 0)
 
 
-def _normal_equations(fn, y, args):
+def normal_equations(fn, y, args):
     """Residuals' square ‖r‖², Jᵀr and JᵀJ, and the auxiliary output of `fn`."""
     residual, push, aux = jax.linearize(lambda y: fn(y, args), y, has_aux=True)
     # else XLA computes what the columns share once for each of them
@@ -160,7 +160,7 @@ class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
 
     def step(self, fn, y, args, options, state, tags):
         del tags
-        cost, gradient, hessian, aux = _normal_equations(fn, state.y_eval, args)
+        cost, gradient, hessian, aux = normal_equations(fn, state.y_eval, args)
         cost = jnp.where(jnp.isfinite(cost), cost, jnp.inf)
         accept = state.first | (cost < state.cost)
         step, curvature = state.y_eval - y, state.curvature
@@ -187,7 +187,7 @@ class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
         y = chosen(state.y_eval, y)
         gradient = chosen(gradient, state.gradient)
         damping = jnp.where(state.first, jnp.asarray(_START, y.dtype), damping)
-        model = _Model(y, gradient, hessian, curvature, top, *_bounds(options, y))
+        model = QuadraticModel(y, gradient, hessian, curvature, top, *_bounds(options, y))
         trial, predicted, promise = model.propose(damping, corrected)
         aux = jax.tree.map(chosen, aux, state.aux)
         state = State(

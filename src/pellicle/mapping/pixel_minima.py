@@ -28,6 +28,11 @@ class PixelData(NamedTuple):
     level: np.ndarray
     frame: np.ndarray | None = None
 
+    def of(self, which: np.ndarray) -> PixelData:
+        """The data of some pixels, by their positions."""
+        frame = None if self.frame is None else self.frame[which]
+        return PixelData(self.values[which], self.weight[which], self.level[which], frame)
+
 
 class PixelMinima(NamedTuple):
     """The best distinct local minima of each pixel, best first, as arrays (pixels, orders, ...).
@@ -44,6 +49,9 @@ class PixelMinima(NamedTuple):
     - `model` (pixels, points): the best model as measured, with its nuisances.
     - `profile` (pixels, nodes): least predicted deviance near each node of the scanned `thickness` (nodes,)
       in nm, above that of the best minimum; (pixels, 0) where no thickness is free.
+    - `signal`, `gain` and `offset` (pixels, points): the simulated signal at the best minimum, and the scale
+      and offset that make the model of it, gain · signal + offset.
+    - `slope` (pixels, points, parameters): ∂ signal / ∂ parameter there, in its own unit.
     """
 
     values: np.ndarray
@@ -54,3 +62,7 @@ class PixelMinima(NamedTuple):
     model: np.ndarray
     profile: np.ndarray
     thickness: np.ndarray
+    signal: np.ndarray
+    gain: np.ndarray
+    offset: np.ndarray
+    slope: np.ndarray

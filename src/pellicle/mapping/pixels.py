@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,19 +11,26 @@ import numpy as np
 
 from pellicle.data.cube import Cube
 from pellicle.data.spectrum import Spectrum
+from pellicle.errors import DataError
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.problem import Problem
-from pellicle.fitting.spectra.fit import fit as fit_spectra
+from pellicle.fitting.result import Status
 from pellicle.fitting.spectra.fit import measurements
 from pellicle.fitting.spectra.problem import make
+from pellicle.fitting.status import RIVAL
+from pellicle.mapping.pixel_data import pixel_data
 from pellicle.mapping.pixel_fits import CODES, NO_DATA, PixelFits
-from pellicle.mapping.pixel_minima import ORDERS
+from pellicle.mapping.pixel_minima import PixelData, PixelMinima
+from pellicle.mapping.pixel_search import PixelSearch, minima, prepared
 from pellicle.scene.film import Scene
+
+_SAMPLE = 9
+"""Pixels that show how large the values and their errors are."""
 
 
 @dataclass(frozen=True)
 class PixelModel:
-    """What the pixels of a cube have in common: the scene and its problem.
+    """What the pixels of a cube have in common: the scene, its problem and the search of minima.
 
     `example` is a spectrum as of one pixel, whose numbers do not matter but for their size.
     """
@@ -30,6 +38,7 @@ class PixelModel:
     scene: Scene
     problem: Problem
     example: Spectrum
+    search: PixelSearch
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -38,20 +47,38 @@ class PixelModel:
 
 
 def prepare(cube: Cube, scene: Scene) -> PixelModel:
-    """Prepare the fits of the pixels of a cube: media, effects and bounds.
+    """Prepare the fits of the pixels of a cube: media, effects, bounds and the table of the search.
 
     **Raises:** as `pellicle.fit` does; DataError where no pixel has data.
     """
-    example = spectrum(cube, _example(cube))
+    sample = _sample(cube)
+    example = spectrum(cube, {name: _complete(rows[0]) for name, rows in sample.items()})
     with jax.enable_x64(True):
         problem = make(*measurements(example, scene))
-    return PixelModel(scene, problem, example)
+        search = prepared(problem, pixel_data(sample, problem.views[0].noise))
+    return PixelModel(scene, problem, example, search)
 
 
-def _example(cube: Cube) -> dict[str, np.ndarray]:
-    """A pixel in the middle of a cube."""
-    where = tuple(slice(n // 2, n // 2 + 1) for n in cube.shape)
-    return {name: values[0] for name, values in cube.pixels(where).items()}
+def _sample(cube: Cube) -> dict[str, np.ndarray]:
+    """A few pixels all over a cube, the one with most values first, as arrays (pixels, points) by name."""
+    each = [np.unique([n // 2, n // 5, n - 1 - n // 5]) for n in cube.shape]
+    where = [tuple(slice(i, i + 1) for i in at) for at in itertools.product(*each)]
+    # where none of them has data, row by row
+    rows = ((slice(i, i + 1), *(slice(None) for _ in cube.shape[1:])) for i in range(cube.shape[0]))
+    for chosen in itertools.chain([where[:_SAMPLE]], ([row] for row in rows)):
+        blocks = [cube.pixels(own) for own in chosen]
+        sample = {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
+        known = np.sum(np.all([np.isfinite(x) for x in sample.values()], axis=0), axis=1)
+        order = np.argsort(-known, kind="stable")[: np.sum(known > 1)][:_SAMPLE]
+        if len(order):
+            return {name: values[order] for name, values in sample.items()}
+    raise DataError(f"{cube.path or 'cube'}: no pixel has data")
+
+
+def _complete(values: np.ndarray) -> np.ndarray:
+    """The values of a pixel with those that are missing by linear interpolation."""
+    known, at = np.isfinite(values), np.arange(values.size)
+    return np.interp(at, at[known], values[known])
 
 
 def spectrum(cube: Cube, pixel: dict[str, np.ndarray]) -> Spectrum:
@@ -76,23 +103,31 @@ def spectrum(cube: Cube, pixel: dict[str, np.ndarray]) -> Spectrum:
 def fit_pixels(model: PixelModel, cube: Cube, where: tuple[slice, ...]) -> PixelFits:
     """Fit a block of pixels of a cube."""
     block = cube.pixels(where)
-    count, names = len(block["values"]), [p.name for p in model.parameters]
-    numbers = np.full((count, 3, len(names)), np.nan)
-    minima, delta = np.full((count, ORDERS, len(names)), np.nan), np.full((count, ORDERS), np.inf)
-    quality, status = np.full((count, 2), np.nan), np.full(count, CODES[NO_DATA], np.uint8)
-    for i in range(count):
-        pixel = {name: values[i] for name, values in block.items()}
-        if not np.isfinite(pixel["values"]).any():
-            continue
-        fit = fit_spectra(spectrum(cube, pixel), model.scene)
-        for j, name in enumerate(names):
-            own = fit[name]
-            numbers[i, :, j] = own.value, own.stderr, own.stderr_noise
-        rivals = fit.rivals[: ORDERS - 1]
-        minima[i, 0], delta[i, 0] = numbers[i, 0], 0.0
-        for j, rival in enumerate(rivals, start=1):
-            minima[i, j], delta[i, j] = [rival.parameters[name] for name in names], rival.delta_chi2
-        quality[i] = fit.chi2_reduced, fit.rms
-        status[i] = CODES[str(fit.status)]
-    values, stderr, stderr_noise = np.moveaxis(numbers, 1, 0)
-    return PixelFits(values, stderr, stderr_noise, status, minima, delta, quality[:, 0], quality[:, 1])
+    with jax.enable_x64(True):
+        data = pixel_data(block, model.problem.views[0].noise)
+        return _by_noise(model, data, minima(model.search, data))
+
+
+def _by_noise(model: PixelModel, data: PixelData, found: PixelMinima) -> PixelFits:
+    """Fits with standard errors by the noise alone."""
+    view = model.problem.views[0]
+    points, nuisances = (data.weight > 0).sum(axis=1), len(view.nuisances(view.local(found.values[0, 0])))
+    freedom = np.maximum(points - found.values.shape[2] - nuisances, 1)
+    reduced = found.misfit[:, 0] / freedom
+    variance = np.ones_like(reduced) if view.noise.known else np.maximum(reduced, 1e-12)
+    delta = (found.deviance - found.deviance[:, :1]) / variance[:, None]
+    steep = data.weight[..., None] * found.gain[..., None] * found.slope
+    information = np.nan_to_num(np.einsum("pri,prj->pij", steep, steep))
+    stderr = np.sqrt(np.diagonal(np.linalg.pinv(information), axis1=1, axis2=2) * variance[:, None])
+    known = points > 1
+    status = np.full(len(points), CODES[NO_DATA], np.uint8)
+    status[known] = CODES[str(Status.NOT_CONVERGED)]
+    settled = known & found.converged[:, 0]
+    status[settled] = CODES[str(Status.CONVERGED)]
+    status[settled & (delta[:, 1] < RIVAL)] = CODES[str(Status.AMBIGUOUS)]
+    measured = np.where(data.weight > 0, data.values - found.model, np.nan)
+    rms = np.sqrt(np.nanmean(measured**2, axis=1, where=known[:, None]))
+    stderr = np.where(known[:, None], stderr, np.nan)
+    quality = np.where(known, reduced if view.noise.known else 1.0, np.nan)
+    delta = np.where(known[:, None], delta, np.inf)
+    return PixelFits(found.values[:, 0], stderr, stderr, status, found.values, delta, quality, rms)

@@ -49,8 +49,8 @@ _MOST_POLISHED = 2048
 def search(problem: Problem, progress: Progress) -> Minima:
     """Scan the box, polish the best distinct local minima, sort them."""
     thinned, depth = problem.thinned(), problem.thickness_axis
-    design = _design(problem)
-    grid = _thickness_grid(problem, len(design))
+    design = design_points(problem)
+    grid = thickness_grid(problem, len(design))
     units = np.repeat(design, max(len(grid), 1), axis=0)
     if depth is not None:
         units[:, depth] = np.tile(grid, len(design))
@@ -137,7 +137,7 @@ def _root(deviance: Any) -> Any:
     return np.sqrt(np.maximum(deviance, 0.0))
 
 
-def _thickness_grid(problem: Problem, choices: int) -> np.ndarray:
+def thickness_grid(problem: Problem, choices: int) -> np.ndarray:
     """Positions in 0..1 no further apart than λ_min/(8 n_max): an eighth of the shortest fringe's period
     in optical thickness, as n_max is the largest that the bounds allow. Logs the size of the scan, with as
     many `choices` of the other parameters."""
@@ -156,8 +156,9 @@ def _thickness_grid(problem: Problem, choices: int) -> np.ndarray:
     return np.linspace(0.0, 1.0, count)
 
 
-def _design(problem: Problem) -> np.ndarray:
-    """A few values of every parameter but the scanned thickness, as points of the unit cube."""
+def design_points(problem: Problem, most: int = _MOST_DESIGNS) -> np.ndarray:
+    """A few values of every parameter but the scanned thickness, as points of the unit cube: `most` at most,
+    about."""
     levels = [_levels(p, problem) for p in problem.parameters]
     if problem.thickness_axis is not None:
         levels[problem.thickness_axis] = np.zeros(1)
@@ -165,7 +166,7 @@ def _design(problem: Problem) -> np.ndarray:
     for i, p in enumerate(problem.parameters):
         groups.setdefault(p.group, []).append(i)
     free = [levels[members[0]] for members in groups.values()]
-    while np.prod([len(level) for level in free]) > _MOST_DESIGNS:
+    while np.prod([len(level) for level in free]) > max(most, 1):
         longest = max(range(len(free)), key=lambda i: len(free[i]))
         free[longest] = _even(len(free[longest]) - 1)
     design = np.array(list(itertools.product(*free))).reshape(-1, len(free))

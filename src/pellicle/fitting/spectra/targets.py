@@ -20,7 +20,7 @@ from pellicle.scene.film import Light, Scene
 from pellicle.scene.free import free_leaves, is_free
 from pellicle.scene.instrument import ONE_NUMBER, Drift, Instrument
 
-_ROUGH = 0.01
+ROUGH = 0.01
 """First guess of the noise of N, C, S and of a depolarisation."""
 
 
@@ -63,18 +63,12 @@ def measured(data: Spectrum, scene: Scene, name: str = "") -> Measured:
     if data.depolarisation is not None and depolarises(exact(scene)):
         depolarisation = Noise(data.depolarisation_sigma is not None)
     if data.delta is not None and data.sigma is not None and not data.folded:
-        # along Ψ, along Δ and outwards: there the measured point is (0, 0, 1), and errors of Ψ and of Δ are
-        # errors of one component each
-        psi, delta = 2 * np.deg2rad(data.values), np.deg2rad(data.delta)
-        zero, outwards = np.zeros_like(psi), values
-        along = np.stack([-np.sin(psi), np.cos(psi) * np.cos(delta), np.cos(psi) * np.sin(delta)], axis=1)
-        across = np.stack([zero, -np.sin(delta), np.cos(delta)], axis=1)
-        frame = np.stack([along, across, outwards], axis=1)
+        frame = sphere_frame(data.values, data.delta)
         values = np.einsum("pij,pj->pi", frame, values)
     if depolarisation is not None and data.depolarisation is not None:
         # the last of what is measured: before the direction outwards
         at = values.shape[1] if frame is None else values.shape[1] - 1
-        own = _ROUGH if data.depolarisation_sigma is None else data.depolarisation_sigma
+        own = ROUGH if data.depolarisation_sigma is None else data.depolarisation_sigma
         sigma = np.broadcast_to(np.reshape(sigma, (len(data), -1)), values.shape)
         values = np.insert(values, at, data.depolarisation, axis=1)
         sigma = np.insert(sigma, at, own, axis=1)
@@ -83,6 +77,38 @@ def measured(data: Spectrum, scene: Scene, name: str = "") -> Measured:
             frame[:, at, 3] = 1.0
     known = scene, data.wavelength, values, sigma, independent_fraction, source, name, frame
     return Measured(*known, depolarisation)
+
+
+def sphere_frame(psi: np.ndarray, delta: np.ndarray) -> np.ndarray:
+    """Directions of N, C, S along Ψ, along Δ and outwards, (..., 3, 3), at Ψ and Δ in degrees (...).
+
+    In them the measured point is (0, 0, 1), and errors of Ψ and of Δ are errors of one component each.
+    """
+    outwards = ncs(psi, delta)
+    psi, delta = 2 * np.deg2rad(psi), np.deg2rad(delta)
+    zero = np.zeros_like(psi)
+    along = np.stack([-np.sin(psi), np.cos(psi) * np.cos(delta), np.cos(psi) * np.sin(delta)], axis=-1)
+    across = np.stack([zero, -np.sin(delta), np.cos(delta)], axis=-1)
+    return np.stack([along, across, outwards], axis=-2)
+
+
+def sphere_sigma(
+    psi: np.ndarray, delta: np.ndarray, psi_sigma: np.ndarray, delta_sigma: np.ndarray, folded: bool = False
+) -> np.ndarray:
+    """σ of N, C, S in their `sphere_frame`, (..., 3), of Ψ and Δ and their σ in degrees (...).
+
+    On the sphere of N, C, S an error of Ψ moves a point by 2σ_Ψ along its meridian, one of Δ by sin(2Ψ) σ_Δ
+    across it, of which Ψ's own error leaves something at the poles. Outwards there is no first order: the
+    mean serves. A folded Δ leaves N and C, which share one σ (...): the mean square of what both errors move.
+    An error of Δ at 0 or 180° moves neither to first order; the second order of σ_Ψ keeps σ above zero.
+    """
+    psi, delta, psi_sigma, delta_sigma = (np.deg2rad(x) for x in (psi, delta, psi_sigma, delta_sigma))
+    along, sine = 2 * psi_sigma, np.sin(2 * psi)
+    if folded:
+        visible = sine**2 + (np.cos(2 * psi) * np.cos(delta)) ** 2
+        return np.sqrt(0.5 * (visible * along**2 + (sine * delta_sigma * np.sin(delta)) ** 2 + along**4))
+    across = np.hypot(sine, along) * delta_sigma
+    return np.stack([along, across, np.sqrt(0.5 * (along**2 + across**2))], axis=-1)
 
 
 def seen_as(scene: Scene, data: Spectrum) -> Scene:
@@ -145,15 +171,9 @@ def _check(data: Spectrum, scene: Scene) -> None:
 
 
 def _sigma(data: Spectrum, source: Noise) -> np.ndarray:
-    """σ of each point: the data's, the model's own error, or a guess that the residuals will replace.
-
-    On the sphere of N, C, S an error of Ψ moves a point by 2σ_Ψ along its meridian, one of Δ by sin(2Ψ) σ_Δ
-    across it, of which Ψ's own error leaves something at the poles. Outwards there is no first order: the
-    mean serves. A folded Δ leaves N and C, which share one σ: the mean square of what both errors move. An
-    error of Δ at 0 or 180° moves neither to first order; the second order of σ_Ψ keeps σ above zero.
-    """
+    """σ of each point: the data's, the model's own error, or a guess that the residuals will replace."""
     if data.sigma is None and data.delta is not None:
-        return np.full(len(data), _ROUGH)
+        return np.full(len(data), ROUGH)
     if data.sigma is None and source.drifting:
         return noise.drifting_sigma(data.values)
     if data.sigma is None:
@@ -162,10 +182,4 @@ def _sigma(data: Spectrum, source: Noise) -> np.ndarray:
     if data.delta is None:
         return data.sigma
     delta_sigma = data.sigma if data.delta_sigma is None else data.delta_sigma
-    psi, delta, psi_sigma, delta_sigma = np.deg2rad([data.values, data.delta, data.sigma, delta_sigma])
-    along, sine = 2 * psi_sigma, np.sin(2 * psi)
-    if data.folded:
-        visible = sine**2 + (np.cos(2 * psi) * np.cos(delta)) ** 2
-        return np.sqrt(0.5 * (visible * along**2 + (sine * delta_sigma * np.sin(delta)) ** 2 + along**4))
-    across = np.hypot(sine, along) * delta_sigma
-    return np.stack([along, across, np.sqrt(0.5 * (along**2 + across**2))], axis=1)
+    return sphere_sigma(data.values, data.delta, data.sigma, delta_sigma, data.folded)

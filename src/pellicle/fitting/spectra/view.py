@@ -234,7 +234,21 @@ class SpectrumView:
         size, channels = len(self.scene.light.wavelength), self.channels
         chosen = np.arange(0, self.rows, stride)
         padding = -len(chosen) % ROUND
-        take = np.concatenate([chosen, np.full(padding, size - 1)])
+        scene, data = self._taken(np.concatenate([chosen, np.full(padding, size - 1)]))
+        real = np.repeat(np.concatenate([np.ones(len(chosen)), np.zeros(padding)]), channels)
+        data = data._replace(
+            weight=data.weight * real, independent_fraction=data.independent_fraction * stride
+        )
+        return replace(self, scene=scene, data=data, points=len(chosen) * channels)
+
+    def unpadded(self) -> SpectrumView:
+        """The view without the points that make its length round."""
+        scene, data = self._taken(np.arange(self.rows))
+        return replace(self, scene=scene, data=data)
+
+    def _taken(self, take: np.ndarray) -> tuple[Scene, Data]:
+        """The arrays at the wavelengths of positions `take`."""
+        size, channels = len(self.scene.light.wavelength), self.channels
 
         def pick(x):
             if np.ndim(x) not in (1, 3) or len(x) not in (size, size * channels):
@@ -242,12 +256,7 @@ class SpectrumView:
             taken = x.reshape(size, -1)[take]
             return taken.reshape(-1) if np.ndim(x) == 1 else taken.reshape(-1, *x.shape[1:])
 
-        scene, data = jax.tree_util.tree_map(pick, (self.scene, self.data))
-        real = np.repeat(np.concatenate([np.ones(len(chosen)), np.zeros(padding)]), channels)
-        data = data._replace(
-            weight=data.weight * real, independent_fraction=data.independent_fraction * stride
-        )
-        return replace(self, scene=scene, data=data, points=len(chosen) * channels)
+        return jax.tree_util.tree_map(pick, (self.scene, self.data))
 
     def off_tolerance(self, values: np.ndarray) -> float:
         """Error of the view's plan at `values`, in the unit of its signal."""

@@ -1,0 +1,81 @@
+"""Measured values of many pixels as a fit sees them: those of `fitting.spectra.targets`, pixel by pixel."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from pellicle.data.ellipsometry_angles import ncs
+from pellicle.fitting import noise
+from pellicle.fitting.problem import Noise
+from pellicle.fitting.spectra.targets import ROUGH, sphere_frame, sphere_sigma
+from pellicle.mapping.pixel_minima import PixelData
+
+_TO_NORMAL = 1.4826 / np.sqrt(6.0)
+"""Standard deviation of normal noise over the median size of its second differences."""
+
+
+def pixel_data(block: Mapping[str, np.ndarray], source: Noise) -> PixelData:
+    """The data of a block of pixels (`Cube.pixels`), with weights as `pellicle.fit` first gives them.
+
+    `source` is the noise of the view that explains them.
+    """
+    known = np.isfinite(block["values"])
+    for values in block.values():
+        known &= np.isfinite(values)
+    whole = bool(known.all())
+    arrays = block if whole else {name: _filled(array, known) for name, array in block.items()}
+    values = arrays["values"]
+    if "delta" in arrays:
+        return _on_sphere(arrays, known)
+    if "sigma" in arrays:
+        weight = known / arrays["sigma"]
+    else:
+        weight = known / (_drifting(values) if source.drifting else _guess(values))
+    size = np.abs(values)
+    level = np.median(size, axis=1) if whole else _median_of(size, known)
+    return PixelData(np.where(known, values, 0.0), weight, np.maximum(level, 1e-12))
+
+
+def _on_sphere(arrays: Mapping[str, np.ndarray], known: np.ndarray) -> PixelData:
+    """Ψ and Δ as N, C, S, in a frame where their errors are given."""
+    psi, delta, points = arrays["values"], arrays["delta"], (len(known), -1)
+    values, sigma, frame = ncs(psi, delta), np.full((*psi.shape, 3), ROUGH), None
+    if "sigma" in arrays:
+        sigma = sphere_sigma(psi, delta, arrays["sigma"], arrays.get("delta_sigma", arrays["sigma"]))
+        frame = sphere_frame(psi, delta)
+        values = np.einsum("...ij,...j->...i", frame, values)
+    weight = known[..., None] / sigma
+    return PixelData(
+        (values * known[..., None]).reshape(points), weight.reshape(points), np.ones(len(psi)), frame
+    )
+
+
+def _filled(array: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Rows with the values between the `known` ones by linear interpolation; 1 where a row has none."""
+    result, at = np.where(known, array, 1.0), np.arange(array.shape[1])
+    for i in np.flatnonzero(known.any(axis=1) & ~known.all(axis=1)):
+        result[i] = np.interp(at, at[known[i]], array[i, known[i]])
+    return result
+
+
+def _median_of(size: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Median of the `known` values of each row; 1 where there are none."""
+    ordered = np.sort(np.where(known, size, np.inf), axis=1)
+    count = np.maximum(known.sum(axis=1), 1)[:, None]
+    middle = [np.take_along_axis(ordered, (count - down) // 2, axis=1)[:, 0] for down in (1, 0)]
+    middle[1] = np.take_along_axis(ordered, count // 2, axis=1)[:, 0]
+    return np.where(known.any(axis=1), 0.5 * (middle[0] + middle[1]), 1.0)
+
+
+def _guess(values: np.ndarray) -> np.ndarray:
+    """First guess of an unknown noise, (pixels, 1), which the residuals replace."""
+    rough = np.median(np.abs(values[:, :-2] - 2 * values[:, 1:-1] + values[:, 2:]), axis=1)
+    guess = np.maximum(0.01 * np.ptp(values, axis=1), _TO_NORMAL * rough)
+    return np.maximum(guess, 1e-12)[:, None]
+
+
+def _drifting(values: np.ndarray) -> np.ndarray:
+    """Error of a model whose lamp drifts, in place of σ: it stays, so it is that of `pellicle.fit`."""
+    return np.stack([noise.drifting_sigma(row) for row in values]) if len(values) else values

@@ -1,0 +1,188 @@
+"""Gauss-Newton steps of many pixels side by side, with the exact model of their scene."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from pellicle.fitting.coordinates import Box, Coordinates
+from pellicle.fitting.levenberg_marquardt import QuadraticModel, normal_equations
+from pellicle.fitting.program_cache import kept
+from pellicle.fitting.spectra import nuisance
+from pellicle.fitting.spectra.nuisance import Data
+from pellicle.fitting.spectra.view import SpectrumForm
+from pellicle.mapping.pixel_minima import PixelData
+from pellicle.scene.film import Scene
+from pellicle.scene.free import insert
+
+ROWS = 256
+"""Starts, or pixels, of one call: all calls share a program."""
+EVALUATIONS = 3
+"""Evaluations of one call."""
+
+Static = tuple[SpectrumForm, Coordinates]
+"""The static part of a program."""
+
+
+class Common(NamedTuple):
+    """What all pixels have in common: the scene, data whose values are of no matter, and the box."""
+
+    scene: Scene
+    data: Data
+    box: Box
+
+
+class Explained(NamedTuple):
+    """Deviances of points (pixels, points)."""
+
+    deviance: Any
+
+
+class Stepped(NamedTuple):
+    """Points (starts, parameters) after the steps, with what a last one predicts there: the deviance, and
+    its part that goes with the weights. `promise` is the fall that is still to come, about."""
+
+    units: Any
+    deviance: Any
+    misfit: Any
+    promise: Any
+
+
+class Best(NamedTuple):
+    """The model at the best minimum of each pixel, (pixels, points, ...), in the parameters' own units."""
+
+    deviance: Any
+    misfit: Any
+    model: Any
+    gain: Any
+    offset: Any
+    signal: Any
+    slope: Any
+
+
+def _of(common: Common, row: PixelData) -> Data:
+    own = common.data._replace(values=row.values, weight=row.weight, level=row.level)
+    return own._replace(frame=row.frame)
+
+
+def _residual(static: Static, common: Common, row: PixelData, unit: Any) -> tuple[Any, Any]:
+    """Weighted residuals at a point of the unit cube; deviance and misfit."""
+    form, coordinates = static
+    data = _of(common, row)
+    values = coordinates.values(common.box, unit)
+    found = form.explain((common.scene, data), list(values))
+    prior = common.box.prior_rows(values)
+    misfit = jnp.sum(found.residual[: data.values.size] ** 2)
+    return (found.residual, prior), (found.deviance + jnp.sum(prior**2), misfit)
+
+
+@kept
+def explained(static: Static, common: Common, rows: PixelData, units: Any) -> Explained:
+    """Deviance of points `units` (pixels, points, parameters)."""
+
+    def one(row, unit):
+        return _residual(static, common, row, unit)[1][0]
+
+    return Explained(jax.vmap(jax.vmap(one, (None, 0)))(rows, units))
+
+
+@kept
+def stepped(static: Static, common: Common, rows: PixelData, units: Any) -> Stepped:
+    """`EVALUATIONS` bounded Gauss-Newton steps from points `units` (starts, parameters).
+
+    A step that does not lower the misfit is taken back and repeated with more damping.
+    """
+
+    def one(row, unit):
+        def fn(unit, _):
+            return _residual(static, common, row, unit)
+
+        def quadratic(state):
+            y, gradient, hessian, *_ = state
+            top = jnp.diagonal(hessian)
+            return QuadraticModel(y, gradient, hessian, 0 * hessian, top, jnp.zeros_like(y), jnp.ones_like(y))
+
+        def advance(carry, _):
+            state, trial, damping, promise = carry
+            cost, gradient, hessian, aux = normal_equations(fn, trial, None)
+            cost = jnp.where(jnp.isfinite(cost), cost, jnp.inf)
+            accept = cost <= state[3]
+            new = trial, gradient, hessian, cost, aux
+            state = jax.tree.map(lambda a, b: jnp.where(accept, a, b), new, state)
+            damping = jnp.where(accept, damping / 10, jnp.maximum(10 * damping, 1e-2))
+            trial, predicted, left = quadratic(state).propose(damping, jnp.array(False))
+            return (state, trial, damping, jnp.stack([promise[1], left])), predicted[0]
+
+        size = unit.size
+        nothing = unit, 0 * unit, jnp.zeros((size, size)), jnp.inf, (jnp.inf, jnp.inf)
+        start = nothing, unit, jnp.zeros(()), jnp.full(2, jnp.inf)
+        (state, trial, _, promise), predicted = jax.lax.scan(advance, start, None, EVALUATIONS)
+        fall, (before, last) = jnp.maximum(predicted[-1], 0.0), promise
+        # Gauss-Newton's promises fall by a constant factor from step to step
+        ratio = jnp.where(before > 0, last / before, 0.0)
+        deviance, misfit = state[4]
+        return Stepped(trial, deviance - fall, misfit - fall, last * jnp.minimum(ratio, 1.0))
+
+    return jax.vmap(one)(rows, units)
+
+
+@kept
+def at_best(static: Static, common: Common, rows: PixelData, units: Any) -> Best:
+    """Model and slopes of pixels at points `units` (pixels, parameters)."""
+    form, coordinates = static
+
+    def one(row, unit):
+        data = _of(common, row)
+        values = coordinates.values(common.box, unit)
+        prior = jnp.sum(common.box.prior_rows(values) ** 2)
+        signal, push = jax.linearize(lambda x: form.simulate(insert(common.scene, list(x)), data), values)
+        signal, push = jax.lax.optimization_barrier((signal, push))
+        slope = jax.vmap(push)(jnp.eye(values.size))
+        found = nuisance.solve(signal, data, common.scene.instrument)
+        misfit = jnp.sum(found.residual[: data.values.size] ** 2)
+        curves = found.model, found.gain, found.offset
+        return Best(found.deviance + prior, misfit, *curves, signal, slope.T)
+
+    return jax.vmap(one)(rows, units)
+
+
+def in_rows(program: Any, static: Static, common: Common, rows: PixelData, units: np.ndarray) -> list[Any]:
+    """Outputs of a `program` of starts, `ROWS` of them at a time; `rows` are the data of each."""
+    pieces = []
+    for first in range(0, max(len(units), 1), ROWS):
+        take = np.minimum(np.arange(first, first + ROWS), len(units) - 1)
+        found = program(static, common, rows.of(take), units[take])
+        pieces.append([np.asarray(x)[: len(units) - first] for x in found])
+    return [np.concatenate(x) for x in zip(*pieces, strict=True)]
+
+
+def settle(
+    static: Static,
+    common: Common,
+    data: PixelData,
+    pixels: np.ndarray,
+    units: np.ndarray,
+    *,
+    rounds: int,
+    tolerance: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Local minima below starts (starts, parameters) of `pixels` (starts,): points, deviance, misfit, and
+    the fall of the deviance that is still to come, about.
+
+    **Arguments:** `rounds` of `EVALUATIONS` at most; `tolerance` (starts,) of the deviance.
+    """
+    units, count = np.array(units), len(units)
+    deviance, misfit = np.full(count, np.inf), np.full(count, np.inf)
+    promise = np.full(count, np.inf)
+    left = np.arange(count)
+    for _ in range(rounds):
+        if not len(left):
+            break
+        found = Stepped(*in_rows(stepped, static, common, data.of(pixels[left]), units[left]))
+        units[left], deviance[left], misfit[left] = found.units, found.deviance, found.misfit
+        promise[left] = found.promise
+        left = left[promise[left] > tolerance[left]]
+    return units, deviance, misfit, promise
