@@ -10,7 +10,7 @@ import numpy as np
 
 from pellicle.errors import UsageError
 from pellicle.mapping.pixel_fits import CODES, NO_DATA, PixelFits
-from pellicle.mapping.pixels import ORDERS
+from pellicle.mapping.pixel_minima import ORDERS
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,8 @@ from pellicle.mapping.blocks import Where
 from pellicle.mapping.map_identity import identity
 from pellicle.mapping.map_result import Map, Run
 from pellicle.mapping.pixel_fits import PixelFits
-from pellicle.mapping.pixels import ORDERS, PixelModel
+from pellicle.mapping.pixel_minima import ORDERS
+from pellicle.mapping.pixels import PixelModel
 from pellicle.mapping.store import MapStore, begin
 from pellicle.scene.film import Scene
 
