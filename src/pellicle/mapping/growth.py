@@ -1,0 +1,229 @@
+"""Growth and drainage: the rate of change of a thickness at each pixel of a map with an axis of time.
+
+A straight line by weighted least squares through the whole series of a pixel, or through a window around each
+time. Weights are those of the noise. Where a line does not fit, that is stated, and the error of the rate
+contains what it misses. Errors that all times have in common (of an index, of the angle) are propagated as
+one: their share of the rate is the slope of the systematic standard error itself.
+
+**Source:** Barlow 1989, Statistics, ch. 6 (straight line, correlated errors); Birge 1932, Phys. Rev. 40, 207
+(enlargement of errors by the square root of the reduced chi-square).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pellicle.errors import UsageError
+from pellicle.mapping.pixel_fits import BY_NEIGHBOURS, CODES
+
+TIME = "time"
+RATES = ("no-data", "constant", "not-constant")
+"""Words of `<parameter>_rate_status`: too few times; a straight line fits; it does not."""
+_CODE = {word: code for code, word in enumerate(RATES)}
+_ONE_IN_A_THOUSAND = 3.09
+"""Quantile of the normal distribution above which χ² is too large for a line."""
+_SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
+_PIXELS = 100_000
+"""Pixels that are computed at a time."""
+
+
+class Line(NamedTuple):
+    """Straight lines through the values of pixels, arrays (pixels,).
+
+    `rate` with its errors by the noise and by what all times have in common; `chi2` of the line, `points` on
+    it, and `curvature` in standard errors: how much χ² falls by a parabola, with the sign of its bend.
+    """
+
+    rate: np.ndarray
+    noise: np.ndarray
+    systematic: np.ndarray
+    chi2: np.ndarray
+    points: np.ndarray
+    curvature: np.ndarray
+
+
+def growth(
+    dataset: Any,
+    *,
+    parameters: Sequence[str] | None = None,
+    window: int | None = None,
+    unit: str | None = None,
+) -> Any:
+    """Compute rates of change of a map's parameters, with errors and the χ² of a constant rate.
+
+    Times are used where a pixel has converged or its neighbours decide. Orders that jump from one time to the
+    next are best decided before (`pellicle.mapping.continuity`, for which time is a direction as any other).
+
+    **Arguments:**
+
+    - `dataset`: of a map with the axis `time`: dates, or numbers with the attribute `units`.
+    - `parameters`: by default every thickness.
+    - `window`: number of times, at least 3, for a rate at each time from those around it; None for one rate
+      of the whole series.
+    - `unit` of time of the rates: "s", "min", "h" or "d"; by default the one in which the series is longer
+      than one and shorter than the next, for dates and for numbers in such a unit.
+
+    **Returns:** a new dataset with, for each parameter, `<parameter>_rate`, `_rate_stderr` (noise, systematic
+    part, and scatter beyond noise), `_rate_stderr_noise`, `_rate_chi2_reduced`, `_rate_points`, and
+    `_rate_status`: "no-data" for fewer than three times, "constant", or "not-constant" where χ² of the line,
+    or a parabola's gain on it, occurs by chance in one case of a thousand. One rate for each pixel, or with
+    `window` one for each time, too.
+
+    **Raises:** UsageError for a map without times, fewer than three of them, or times without a unit.
+
+    **Source:** of the module.
+    """
+    if TIME not in dataset["status"].dims or dataset.sizes[TIME] < 3:
+        raise UsageError("a rate needs a map with an axis `time` of at least three times")
+    if window is not None and window < 3:
+        raise UsageError(f"`window` must be at least 3 times, got {window}")
+    names = list(parameters or _thicknesses(dataset))
+    if not names or any(f"{name}_stderr_noise" not in dataset for name in names):
+        raise UsageError("a rate needs a free thickness with its standard error, and this map has none")
+    time, unit = _times(dataset[TIME], unit)
+    axis = dataset["status"].dims.index(TIME)
+    rest = tuple(dim for dim in dataset["status"].dims if dim != TIME)
+    dims = rest if window is None else (TIME, *rest)
+    made = dataset.copy()
+    for name in names:
+        keys = ("status", name, f"{name}_stderr", f"{name}_stderr_noise")
+        arrays = [np.moveaxis(np.asarray(dataset[key]), axis, 0) for key in keys]
+        shape = arrays[0].shape[1:]
+        state, value, stderr, noise = (array.reshape(len(time), -1) for array in arrays)
+        parts = [slice(i, i + _PIXELS) for i in range(0, max(state.shape[1], 1), _PIXELS)]
+        columns = [_rates(time, state[:, p], value[:, p], stderr[:, p], noise[:, p], window) for p in parts]
+        whole = {key: np.concatenate([column[key] for column in columns], axis=-1) for key in columns[0]}
+        of = f"{dataset[name].attrs.get('units', 'nm')}/{unit}"
+        for key, (words, units) in {
+            "rate": ("rate of change", of),
+            "rate_stderr": ("standard error of the rate, of noise, model and scatter", of),
+            "rate_stderr_noise": ("standard error of the rate, of the noise alone", of),
+            "rate_chi2_reduced": ("reduced chi-square of a constant rate", "1"),
+            "rate_points": ("number of times of the rate", "1"),
+        }.items():
+            array = whole[key].reshape(*([] if window is None else [len(time)]), *shape)
+            made[f"{name}_{key}"] = (dims, array, {"long_name": f"{words} of {name}", "units": units})
+        array = whole["rate_status"].reshape(made[f"{name}_rate"].shape)
+        flags = {"flag_values": np.arange(len(RATES), dtype=np.uint8), "flag_meanings": " ".join(RATES)}
+        made[f"{name}_rate_status"] = (dims, array, flags)
+    return made
+
+
+def straight_line(
+    time: np.ndarray, value: np.ndarray, noise: np.ndarray, systematic: np.ndarray, used: np.ndarray
+) -> Line:
+    """Fit a straight line to each column of `value` (times, pixels) by weighted least squares.
+
+    **Arguments:** `time` (times,), errors by the noise and in common (times, pixels), and where values are
+    `used`.
+    """
+    weight = np.where(used, np.where(used, noise, 1.0) ** -2.0, 0.0)
+    total = weight.sum(axis=0)
+    points = used.sum(axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        x = np.where(used, time[:, None] - (weight * time[:, None]).sum(axis=0) / total, 0.0)
+        lever = weight * x / (weight * x**2).sum(axis=0)  # ∂ rate / ∂ value
+        y = np.where(used, value - (weight * np.where(used, value, 0.0)).sum(axis=0) / total, 0.0)
+        rate = (lever * y).sum(axis=0)
+        residual = np.where(used, y - rate * x, 0.0)
+        chi2 = (weight * residual**2).sum(axis=0)
+        # the part of a parabola that a line does not have
+        bend = x**2 - (weight * x**2).sum(axis=0) / total
+        bend = np.where(used, bend - (lever * bend).sum(axis=0) * x, 0.0)
+        curvature = (weight * bend * residual).sum(axis=0) / np.sqrt((weight * bend**2).sum(axis=0))
+        enough = (points >= 3) & np.isfinite(rate)
+        columns = (
+            np.where(enough, rate, np.nan),
+            np.where(enough, np.sqrt(((lever * np.where(used, noise, 0.0)) ** 2).sum(axis=0)), np.nan),
+            np.where(enough, np.abs((lever * np.where(used, systematic, 0.0)).sum(axis=0)), np.nan),
+            np.where(enough, chi2, np.nan),
+        )
+    return Line(*columns, points, np.where(points > 3, np.nan_to_num(curvature), 0.0))
+
+
+def _rates(
+    time: np.ndarray,
+    state: np.ndarray,
+    value: np.ndarray,
+    stderr: np.ndarray,
+    noise: np.ndarray,
+    window: int | None,
+) -> dict[str, np.ndarray]:
+    """Variables of some pixels: arrays (pixels,), or with a window (times, pixels)."""
+    value, stderr, noise = (array.astype(float) for array in (value, stderr, noise))
+    used = np.isin(state, [CODES["converged"], CODES[BY_NEIGHBOURS]])
+    used &= np.isfinite(value) & np.isfinite(stderr) & (noise > 0) & np.isfinite(noise)
+    systematic = np.sqrt(np.maximum(stderr**2 - noise**2, 0.0))
+    if window is None:
+        return _variables(straight_line(time, value, noise, systematic, used))
+    count = len(time)
+    lines = []
+    for at in range(count):
+        first = min(max(at - window // 2, 0), max(count - window, 0))
+        part = slice(first, first + window)
+        lines.append(
+            _variables(straight_line(time[part], *(a[part] for a in (value, noise, systematic, used))))
+        )
+    return {key: np.stack([line[key] for line in lines]) for key in lines[0]}
+
+
+def _variables(line: Line) -> dict[str, np.ndarray]:
+    free = np.maximum(line.points - 2, 1)
+    reduced = line.chi2 / free
+    # χ² to a normal variable: Wilson and Hilferty 1931, PNAS 17, 684
+    part = 2 / (9 * free)
+    excess = (np.cbrt(reduced) - (1 - part)) / np.sqrt(part)
+    bent = (excess > _ONE_IN_A_THOUSAND) | (np.abs(line.curvature) > _ONE_IN_A_THOUSAND)
+    status = np.where(np.isfinite(line.rate), np.where(bent, _CODE["not-constant"], _CODE["constant"]), 0)
+    enlarged = line.noise * np.sqrt(np.maximum(reduced, 1.0))
+    return {
+        "rate": line.rate,
+        "rate_stderr": np.hypot(enlarged, line.systematic).astype(np.float32),
+        "rate_stderr_noise": line.noise.astype(np.float32),
+        "rate_chi2_reduced": reduced.astype(np.float32),
+        "rate_points": line.points.astype(np.uint16),
+        "rate_status": status.astype(np.uint8),
+    }
+
+
+def _thicknesses(dataset: Any) -> list[str]:
+    names = (str(name).removesuffix("_stderr_noise") for name in dataset.data_vars)
+    return [n for n in names if n.split("_")[-1] == "thickness" and f"{n}_stderr_noise" in dataset]
+
+
+def _times(array: Any, unit: str | None) -> tuple[np.ndarray, str]:
+    """Times since the first one, and their unit."""
+    if unit is not None and unit not in _SECONDS:
+        raise UsageError(f"`unit` must be one of {', '.join(_SECONDS)}, got {unit!r}")
+    stamps = np.asarray(array.values)
+    if stamps.dtype.kind in "mM":
+        seconds = (stamps - stamps[0]) / np.timedelta64(1, "s")
+    else:
+        given = str(array.attrs.get("units", "")).split(" since ")[0].strip()
+        own = {"seconds": "s", "second": "s", "sec": "s", "minutes": "min", "minute": "min", "hours": "h"}
+        own |= {"hour": "h", "days": "d", "day": "d"}
+        given = own.get(given, given)
+        if not given:
+            raise UsageError(
+                "times are numbers without a unit: give the coordinate `time` `units`, such as s"
+            )
+        if given not in _SECONDS:
+            if unit is not None:
+                raise UsageError(f"`unit` is {unit!r}, but the times are in {given!r}: leave it out")
+            return _checked(stamps - stamps[0]), given
+        seconds = (stamps - stamps[0]) * _SECONDS[given]
+    seconds = _checked(seconds)
+    chosen = unit or max(
+        (u for u in _SECONDS if np.ptp(seconds) >= _SECONDS[u]), key=_SECONDS.__getitem__, default="s"
+    )
+    return seconds / _SECONDS[chosen], chosen
+
+
+def _checked(time: np.ndarray) -> np.ndarray:
+    time = np.asarray(time, float)
+    if not np.isfinite(time).all() or len(np.unique(time)) < 3:
+        raise UsageError("a rate needs at least three different times, each of them known")
+    return time
