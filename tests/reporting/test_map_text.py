@@ -1,13 +1,16 @@
 """Words and numbers on the map of a cube, against maps whose statuses and values are put in by hand."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from pellicle.mapping.map_result import Run
 from pellicle.mapping.pixel_fits import CODES, STATUSES
 from pellicle.reporting.map_axes import map_axes
 from pellicle.reporting.map_places import place
+from pellicle.reporting.map_summary import summarise
 from pellicle.reporting.map_text import cube_json, cube_report, share
 
 xr = pytest.importorskip("xarray")
@@ -204,16 +207,37 @@ def test_provenance_time_plan_and_preview():
         {"effect": "absorption", "on": False, "why": "no layer absorbs", "error_bound": 0.0},
         {"effect": "back-face", "on": True, "why": "the substrate is a plate", "error_bound": 0.0},
     ]
-    dataset = made(image(), notes="values are percent\nbands 3 and 17 are left out", seconds=2.4, preview=8)
+    dataset = made(image(), notes="values are percent\nbands 3 and 17 are left out", preview=8)
     dataset.attrs["plan"] = json.dumps(effects)
     text = words(cube_report(dataset))
-    assert "time 2.4 s, 2 000 pixels/s" in text
     assert "read values are percent bands 3 and 17 are left out" in text
     assert "preview of every 8th pixel in each direction" in text
     assert "back-face on: the substrate is a plate" in text
     assert "left out absorption" in text
     assert cube_json(dataset)["plan"] == effects
+    assert cube_json(dataset)["seconds"] is None
     assert cube_json(dataset)["preview"] == 8
+
+
+def test_time_of_the_run():
+    timed = replace(summarise(made(image())), run=Run(4000, 800, 2, 2.5, 1.25))
+    text = words(cube_report(made(image()), timed))
+    assert (
+        "time 2.5 s, 1 600 pixels/s, 2 processes, 1.2 s of it compilation,"
+        " without 800 pixels of an earlier run" in text
+    )
+    assert cube_json(made(image()), timed)["pixels_per_second"] == 1600
+
+
+def test_parameters_in_the_order_of_the_fit():
+    dataset = made(image(), parameters={"thickness": "nm", "A": "", "instrument.scale": ""})
+    for name in ("A", "instrument_scale", "thickness_rate"):
+        dataset[name] = (("y", "x"), np.ones((HEIGHT, WIDTH)), {"parameter": name.replace("_", ".")})
+        dataset[f"{name}_stderr"] = (("y", "x"), np.ones((HEIGHT, WIDTH)))
+    dataset = dataset[sorted(dataset.data_vars)]
+    assert list(cube_json(dataset)["parameters"]) == ["thickness", "A", "instrument.scale"]
+    dataset.attrs["parameters"] = ["thickness (nm)", "A ()", "instrument.scale ()"]  # as in NetCDF
+    assert list(cube_json(dataset)["parameters"]) == ["thickness", "A", "instrument.scale"]
 
 
 def test_every_status_has_advice():

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import asdict
 from importlib.metadata import version
 from typing import Any, NamedTuple
 
@@ -88,6 +90,7 @@ def run_map(
         "bands": cube.wavelength.size,
         "range_nm": [float(cube.wavelength[0]), float(cube.wavelength[-1])],
         "recipe": recipe or str(scene),
+        "plan": json.dumps([asdict(row) for row in model.problem.views[0].plan.rows]),
         "notes": list(cube.notes),
         "parameters": {parameter.name: parameter.unit for parameter in model.parameters},
     }

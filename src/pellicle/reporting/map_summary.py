@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pellicle.fitting.result import Status
+from pellicle.mapping.continuity import evidence, row
+from pellicle.mapping.map_result import Map, Run
+from pellicle.mapping.map_variables import variable_name
 from pellicle.mapping.pixel_fits import BY_NEIGHBOURS, CODES, NO_DATA, STATUSES
 from pellicle.reporting.map_axes import MapAxes, map_axes
 from pellicle.reporting.map_places import place
@@ -65,6 +68,8 @@ class MapSummary:
     parameters: tuple[ParameterSummary, ...]
     sampled: int  # percentiles are those of every n-th pixel
     attributes: Mapping[str, Any]
+    plan: tuple[Mapping[str, Any], ...]  # rows of effects, as in the record of a fit
+    run: Run | None  # None for a map that was computed earlier
 
     @property
     def pixels(self) -> int:
@@ -87,17 +92,13 @@ class MapSummary:
         notes = self.attributes.get("notes", ())
         return tuple(notes.splitlines()) if isinstance(notes, str) else tuple(notes)
 
-    @property
-    def plan(self) -> list[dict[str, Any]]:
-        """Effects of the plan, as in the record of a fit."""
-        plan = self.attributes.get("plan", "[]")
-        return json.loads(plan) if isinstance(plan, str) else list(plan)
-
 
 def free_parameters(dataset: Dataset) -> list[str]:
-    """Variables of the free parameters of a map: those with a standard error."""
-    names = [str(name) for name in dataset.data_vars]
-    return [name for name in names if f"{name}_stderr" in names and not name.startswith("rival_")]
+    """Variables of the free parameters of a map, in the order of the fits: those with a standard error."""
+    order = [variable_name(str(text).split(" ")[0]) for text in dataset.attrs.get("parameters", ())]
+    names = [str(name) for name in dataset.data_vars if not str(name).endswith("_rate")]
+    found = [name for name in names if f"{name}_stderr" in dataset.data_vars]
+    return sorted(found, key=lambda name: order.index(name) if name in order else len(order))
 
 
 def parameter_name(dataset: Dataset, variable: str) -> str:
@@ -116,8 +117,14 @@ def is_decided(codes: np.ndarray) -> np.ndarray:
     return np.isin(codes, [CODES[word] for word in DECIDED])
 
 
-def summarise(dataset: Dataset) -> MapSummary:
+def dataset_of(made: Dataset | Map) -> Dataset:
+    """The dataset of a map."""
+    return made.dataset if isinstance(made, Map) else made
+
+
+def summarise(made: Dataset | Map) -> MapSummary:
     """Summarise a map; large ones are read in parts, and every n-th pixel for percentiles."""
+    dataset, run = dataset_of(made), made.run if isinstance(made, Map) else None
     axes, codes = map_axes(dataset), np.asarray(dataset["status"])
     number = np.bincount(codes.ravel(), minlength=len(STATUSES))
     order = sorted(np.flatnonzero(number), key=lambda code: -number[code])
@@ -132,7 +139,14 @@ def summarise(dataset: Dataset) -> MapSummary:
     thin = thinned(dataset, axes)
     used = is_decided(np.asarray(thin["status"]))
     parameters = tuple(_parameter(thin, name, used) for name in free_parameters(dataset))
-    return MapSummary(axes, counts, places, parameters, _step(axes), dict(dataset.attrs))
+    return MapSummary(axes, counts, places, parameters, _step(axes), dict(dataset.attrs), _plan(dataset), run)
+
+
+def _plan(dataset: Dataset) -> tuple[Mapping[str, Any], ...]:
+    """Rows of the plan, with that of the neighbours."""
+    stored, found = dataset.attrs.get("plan"), evidence(dataset)
+    rows = [] if stored is None else json.loads(stored)
+    return (*rows, *([asdict(row(found))] if found is not None else []))
 
 
 def thinned(dataset: Dataset, axes: MapAxes) -> Dataset:
