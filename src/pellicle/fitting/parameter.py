@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from pellicle.scene.priors import Prior
 
 _SHARE, _RELATIVE = 0.02, 0.002
@@ -41,7 +43,11 @@ class Parameter:
 
     def resolution_at(self, unit: float) -> float:
         """Distance from a point of the unit interval within which minima are one."""
+        return float(self.resolutions_at(np.array(unit)))
+
+    def resolutions_at(self, units: np.ndarray) -> np.ndarray:
+        """Distances from points of the unit interval within which minima are one."""
         if self.resolution is None:
-            return _SHARE
+            return np.full(np.shape(units), _SHARE)
         span = self.upper - self.lower
-        return max(self.resolution, _RELATIVE * abs(self.lower + unit * span)) / span
+        return np.maximum(self.resolution, _RELATIVE * np.abs(self.lower + units * span)) / span

@@ -36,8 +36,6 @@ _ROUNDING = 1e-5
 """Error of a predicted deviance as a share of the data's square: the table is in single precision."""
 _SETTLED = 1e-10
 """Fall of the deviance, in units of the noise, that may be left in a minimum: a 1e-5 of a standard error."""
-_COARSE = 1e-3
-"""The same for rivals, as a share of their distance to the best."""
 _ROUNDS, _MORE_ROUNDS = 4, 30
 """Rounds of steps for each candidate, and of more for the best of a pixel."""
 
@@ -121,6 +119,7 @@ def _block(search: PixelSearch, data: PixelData) -> PixelMinima:
     problem, pixels = search.problem, np.arange(len(data.values))
     units, predicted, profile, rounding = _candidates(search, data)
     exact = polish.in_rows(polish.explained, search.static, search.common, data, units)[0]
+    exact = np.where(np.isfinite(exact), exact, np.inf)
     optimistic = np.minimum(predicted, exact)
     size, candidates = optimistic.shape
     deviance, misfit = np.where(np.isfinite(exact), optimistic, np.inf), np.array(exact)
@@ -132,10 +131,12 @@ def _block(search: PixelSearch, data: PixelData) -> PixelMinima:
     def polished(where: np.ndarray, rounds: int, fine: bool) -> None:
         at, which = np.nonzero(where)
         tolerance = _SETTLED * np.maximum(best[at] / independent, 1.0)
-        if not fine:
-            tolerance = np.maximum(tolerance, _COARSE * np.maximum(optimistic[at, which] - best[at], 0.0))
+        coarse = None if fine else best[at]
         found = polish.settle(
-            search.static, search.common, data, at, units[at, which], rounds=rounds, tolerance=tolerance
+            *(search.static, search.common, data, at, units[at, which]),
+            rounds=rounds,
+            tolerance=tolerance,
+            coarse=coarse,
         )
         units[at, which], deviance[at, which], misfit[at, which], promise[at, which] = found
 
@@ -160,9 +161,11 @@ def _block(search: PixelSearch, data: PixelData) -> PixelMinima:
     lowest = np.argmin(np.where(tried, deviance, np.inf), axis=1)
     first = (np.arange(candidates) == lowest[:, None]) & (promise > fine)
     polished(first, _MORE_ROUNDS, True)
-    settled = promise <= np.maximum(fine, _COARSE * (deviance - best[:, None]))
+    settled = promise <= np.maximum(fine, polish.COARSE * (deviance - best[:, None]))
     settled[pixels, lowest] = promise[pixels, lowest] <= fine[:, 0]
-    order = _distinct(problem.parameters, units, deviance, tried)
+    # along a valley of several parameters, points that have not settled are no minima
+    listed = settled if len(problem.parameters) > 1 else np.isfinite(deviance)
+    order = _distinct(problem.parameters, units, deviance, lowest, listed)
     rows, here = pixels[:, None], np.maximum(order, 0)
     absent = order < 0
     ordered = np.where(absent[..., None], np.nan, units[rows, here])
@@ -230,26 +233,22 @@ def _root(deviance: np.ndarray) -> np.ndarray:
 
 
 def _distinct(
-    parameters: Sequence[Parameter], units: np.ndarray, deviance: np.ndarray, tried: np.ndarray
+    parameters: Sequence[Parameter],
+    units: np.ndarray,
+    deviance: np.ndarray,
+    lowest: np.ndarray,
+    listed: np.ndarray,
 ) -> np.ndarray:
-    """Positions of the best distinct minima of each pixel (pixels, `ORDERS`), −1 where there are no more.
-
-    Only what was polished can be the best.
-    """
-    size, count, _ = units.shape
-    rows = np.arange(size)
-    low, span = (
-        np.array([x(p) for p in parameters]) for x in (lambda p: p.lower, lambda p: p.upper - p.lower)
-    )
-    share = np.array([0.02 if p.resolution is None else 0.0 for p in parameters])
-    least = np.array([0.0 if p.resolution is None else p.resolution for p in parameters])
-    relative = np.where(share > 0, 0.0, 0.002)
-    resolution = share + np.maximum(least, relative * np.abs(low + units * span)) / span
-    left = np.where(np.isfinite(deviance), deviance, np.inf)
-    chosen = np.full((size, ORDERS), -1)
-    for k in range(min(ORDERS, count)):
-        at = np.argmin(np.where(tried, left, np.inf) if k == 0 else left, axis=1)
-        chosen[:, k] = np.where(np.isfinite(left[rows, at]), at, -1)
+    """Positions of the best distinct minima of each pixel (pixels, `ORDERS`), −1 where there are no more: the
+    `lowest` (pixels,), and the best of the others that are `listed` (pixels, candidates)."""
+    rows, count = np.arange(len(units)), units.shape[1]
+    resolution = np.stack([p.resolutions_at(x) for p, x in zip(parameters, units.T, strict=True)]).T
+    left = np.where(listed, deviance, np.inf)
+    chosen, at = np.full((len(units), ORDERS), -1), lowest
+    chosen[:, 0] = at
+    for k in range(1, min(ORDERS, count)):
         apart = np.any(np.abs(units - units[rows, at][:, None]) > resolution[rows, at][:, None], axis=2)
         left = np.where(apart, left, np.inf)
+        at = np.argmin(left, axis=1)
+        chosen[:, k] = np.where(np.isfinite(left[rows, at]), at, -1)
     return chosen

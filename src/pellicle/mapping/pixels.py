@@ -113,13 +113,14 @@ def _by_noise(model: PixelModel, data: PixelData, found: PixelMinima) -> PixelFi
     view = model.problem.views[0]
     points, nuisances = (data.weight > 0).sum(axis=1), len(view.nuisances(view.local(found.values[0, 0])))
     freedom = np.maximum(points - found.values.shape[2] - nuisances, 1)
-    reduced = found.misfit[:, 0] / freedom
+    reduced = np.where(points > 1, found.misfit[:, 0], 1.0) / freedom
     variance = np.ones_like(reduced) if view.noise.known else np.maximum(reduced, 1e-12)
-    delta = (found.deviance - found.deviance[:, :1]) / variance[:, None]
+    known = points > 1
+    lowest = np.where(known, found.deviance[:, 0], 0.0)
+    delta = (found.deviance - lowest[:, None]) / variance[:, None]
     steep = data.weight[..., None] * found.gain[..., None] * found.slope
     information = np.nan_to_num(np.einsum("pri,prj->pij", steep, steep))
     stderr = np.sqrt(np.diagonal(np.linalg.pinv(information), axis1=1, axis2=2) * variance[:, None])
-    known = points > 1
     status = np.full(len(points), CODES[NO_DATA], np.uint8)
     status[known] = CODES[str(Status.NOT_CONVERGED)]
     settled = known & found.converged[:, 0]
@@ -129,5 +130,4 @@ def _by_noise(model: PixelModel, data: PixelData, found: PixelMinima) -> PixelFi
     rms = np.sqrt(np.nanmean(measured**2, axis=1, where=known[:, None]))
     stderr = np.where(known[:, None], stderr, np.nan)
     quality = np.where(known, reduced if view.noise.known else 1.0, np.nan)
-    delta = np.where(known[:, None], delta, np.inf)
     return PixelFits(found.values[:, 0], stderr, stderr, status, found.values, delta, quality, rms)

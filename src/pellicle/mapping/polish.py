@@ -22,6 +22,8 @@ ROWS = 256
 """Starts, or pixels, of one call: all calls share a program."""
 EVALUATIONS = 3
 """Evaluations of one call."""
+COARSE = 1e-3
+"""Fall of the deviance that may be left in a rival, as a share of its distance to the best."""
 
 Static = tuple[SpectrumForm, Coordinates]
 """The static part of a program."""
@@ -43,12 +45,14 @@ class Explained(NamedTuple):
 
 class Stepped(NamedTuple):
     """Points (starts, parameters) after the steps, with what a last one predicts there: the deviance, and
-    its part that goes with the weights. `promise` is the fall that is still to come, about."""
+    its part that goes with the weights. `promise` is the fall that is still to come, about, `damping` that of
+    the next step."""
 
     units: Any
     deviance: Any
     misfit: Any
     promise: Any
+    damping: Any
 
 
 class Best(NamedTuple):
@@ -90,13 +94,13 @@ def explained(static: Static, common: Common, rows: PixelData, units: Any) -> Ex
 
 
 @kept
-def stepped(static: Static, common: Common, rows: PixelData, units: Any) -> Stepped:
+def stepped(static: Static, common: Common, rows: PixelData, units: Any, damping: Any) -> Stepped:
     """`EVALUATIONS` bounded Gauss-Newton steps from points `units` (starts, parameters).
 
     A step that does not lower the misfit is taken back and repeated with more damping.
     """
 
-    def one(row, unit):
+    def one(row, unit, damping):
         def fn(unit, _):
             return _residual(static, common, row, unit)
 
@@ -112,21 +116,21 @@ def stepped(static: Static, common: Common, rows: PixelData, units: Any) -> Step
             accept = cost <= state[3]
             new = trial, gradient, hessian, cost, aux
             state = jax.tree.map(lambda a, b: jnp.where(accept, a, b), new, state)
-            damping = jnp.where(accept, damping / 10, jnp.maximum(10 * damping, 1e-2))
+            damping = jnp.where(accept, damping / 10, jnp.maximum(10 * damping, 1e-3))
             trial, predicted, left = quadratic(state).propose(damping, jnp.array(False))
             return (state, trial, damping, jnp.stack([promise[1], left])), predicted[0]
 
         size = unit.size
         nothing = unit, 0 * unit, jnp.zeros((size, size)), jnp.inf, (jnp.inf, jnp.inf)
-        start = nothing, unit, jnp.zeros(()), jnp.full(2, jnp.inf)
-        (state, trial, _, promise), predicted = jax.lax.scan(advance, start, None, EVALUATIONS)
+        start = nothing, unit, damping, jnp.full(2, jnp.inf)
+        (state, trial, damping, promise), predicted = jax.lax.scan(advance, start, None, EVALUATIONS)
         fall, (before, last) = jnp.maximum(predicted[-1], 0.0), promise
         # Gauss-Newton's promises fall by a constant factor from step to step
         ratio = jnp.where(before > 0, last / before, 0.0)
         deviance, misfit = state[4]
-        return Stepped(trial, deviance - fall, misfit - fall, last * jnp.minimum(ratio, 1.0))
+        return Stepped(trial, deviance - fall, misfit - fall, last * jnp.minimum(ratio, 1.0), damping)
 
-    return jax.vmap(one)(rows, units)
+    return jax.vmap(one)(rows, units, damping)
 
 
 @kept
@@ -149,13 +153,13 @@ def at_best(static: Static, common: Common, rows: PixelData, units: Any) -> Best
     return jax.vmap(one)(rows, units)
 
 
-def in_rows(program: Any, static: Static, common: Common, rows: PixelData, units: np.ndarray) -> list[Any]:
+def in_rows(program: Any, static: Static, common: Common, rows: PixelData, *points: np.ndarray) -> list[Any]:
     """Outputs of a `program` of starts, `ROWS` of them at a time; `rows` are the data of each."""
-    pieces = []
-    for first in range(0, max(len(units), 1), ROWS):
-        take = np.minimum(np.arange(first, first + ROWS), len(units) - 1)
-        found = program(static, common, rows.of(take), units[take])
-        pieces.append([np.asarray(x)[: len(units) - first] for x in found])
+    pieces, count = [], len(points[0])
+    for first in range(0, count, ROWS):
+        take = np.minimum(np.arange(first, first + ROWS), count - 1)
+        found = program(static, common, rows.of(take), *(x[take] for x in points))
+        pieces.append([np.asarray(x)[: count - first] for x in found])
     return [np.concatenate(x) for x in zip(*pieces, strict=True)]
 
 
@@ -168,21 +172,27 @@ def settle(
     *,
     rounds: int,
     tolerance: np.ndarray,
+    coarse: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Local minima below starts (starts, parameters) of `pixels` (starts,): points, deviance, misfit, and
     the fall of the deviance that is still to come, about.
 
-    **Arguments:** `rounds` of `EVALUATIONS` at most; `tolerance` (starts,) of the deviance.
+    **Arguments:** `rounds` of `EVALUATIONS` at most; `tolerance` (starts,) of the deviance. With `coarse`
+    (starts,) a start also ends where the fall to come is less than `COARSE` of its distance to that deviance.
     """
     units, count = np.array(units), len(units)
     deviance, misfit = np.full(count, np.inf), np.full(count, np.inf)
-    promise = np.full(count, np.inf)
+    promise, damping = np.full(count, np.inf), np.zeros(count)
     left = np.arange(count)
     for _ in range(rounds):
         if not len(left):
             break
-        found = Stepped(*in_rows(stepped, static, common, data.of(pixels[left]), units[left]))
+        own = data.of(pixels[left])
+        found = Stepped(*in_rows(stepped, static, common, own, units[left], damping[left]))
         units[left], deviance[left], misfit[left] = found.units, found.deviance, found.misfit
-        promise[left] = found.promise
-        left = left[promise[left] > tolerance[left]]
+        promise[left], damping[left] = found.promise, found.damping
+        enough = tolerance[left]
+        if coarse is not None:
+            enough = np.maximum(enough, COARSE * (found.deviance - coarse[left]))
+        left = left[promise[left] > enough]
     return units, deviance, misfit, promise
