@@ -126,8 +126,8 @@ def _by_noise(model: PixelModel, data: PixelData, found: PixelMinima) -> PixelFi
     settled = known & found.converged[:, 0]
     status[settled] = CODES[str(Status.CONVERGED)]
     status[settled & (delta[:, 1] < RIVAL)] = CODES[str(Status.AMBIGUOUS)]
-    measured = np.where(data.weight > 0, data.values - found.model, np.nan)
-    rms = np.sqrt(np.nanmean(measured**2, axis=1, where=known[:, None]))
+    square = np.where(data.weight > 0, data.values - found.model, 0.0) ** 2
+    rms = np.where(known, np.sqrt(square.sum(axis=1) / np.maximum(points, 1)), np.nan)
     stderr = np.where(known[:, None], stderr, np.nan)
     quality = np.where(known, reduced if view.noise.known else 1.0, np.nan)
     return PixelFits(found.values[:, 0], stderr, stderr, status, found.values, delta, quality, rms)
