@@ -50,4 +50,4 @@ class Parameter:
         if self.resolution is None:
             return np.full(np.shape(units), _SHARE)
         span = self.upper - self.lower
-        return np.maximum(self.resolution, _RELATIVE * np.abs(self.lower + units * span)) / span
+        return np.asarray(np.maximum(self.resolution, _RELATIVE * np.abs(self.lower + units * span)) / span)
