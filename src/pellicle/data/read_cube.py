@@ -96,7 +96,8 @@ def read_cube(
         raise UsageError(f"`signal` of a cube must be one of {', '.join(SIGNALS)}, not {signal!r}")
     if polarisation is not None and polarisation not in POLARISATIONS:
         raise UsageError(f"`polarisation` must be one of {', '.join(POLARISATIONS)}, not {polarisation!r}")
-    if white_frame is None and (dark_frame, white_reflectance, saturation) != (None, None, None):
+    of_frames = (dark_frame, white_reflectance, saturation)
+    if white_frame is None and any(one is not None for one in of_frames):
         raise UsageError(
             "`dark_frame`, `white_reflectance` and `saturation` need `white_frame`: the counts of white"
         )

@@ -36,8 +36,8 @@ class Frame:
         read = self.stored.read(dict(zip(dims, where, strict=True)))
         order = [self.stored.axes.index(axis) for axis in (*dims, WAVELENGTH) if axis in self.stored.axes]
         read = np.transpose(read, order)[..., bands]
-        sizes = iter(read.shape)
-        return read.reshape([next(sizes) if axis in self.axes else 1 for axis in (*dims, WAVELENGTH)])
+        sizes = iter(read.shape[:-1])
+        return read.reshape([*(next(sizes) if axis in self.axes else 1 for axis in dims), bands.size])
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ from pellicle.data.tabular.text import decoded, open_binary
 from pellicle.errors import DataError, UsageError
 
 _FILES = ("file", "filename", "file name", "spectrum", "path")
-_HEADER = re.compile(r"([^\s(\[_/]+)[\s_/]*[(\[]?\s*([^)\]]*)")
+_HEADER = re.compile(r"([^\s(\[_/]+)[\s_/]*[(\[]?\s*([^)\]]*)[)\]]?")
 _TABLES = ("*.csv", "*.txt", "*.tsv")
 _MOST_HEADER = 2**16
 _TOLERANCE = 1e-6

@@ -101,8 +101,14 @@ class TiffPages:
 
         front, rest = where[: self.leading], where[self.leading :]
         numbers = np.reshape(self.pages, self.shape[: self.leading])[front]
-        with tifffile.TiffFile(self.path) as file:
-            read = [_page(file.pages[int(i)], rest) for i in numbers.reshape(-1)]
+        try:
+            with tifffile.TiffFile(self.path) as file:
+                read = [_page(file.pages[int(i)], rest) for i in numbers.reshape(-1)]
+        except Exception as error:  # decoders raise errors of every kind on damaged files
+            reason = str(error.args[0] if error.args else error).split("\n")[0]
+            raise DataError(
+                f"{self.path}: cannot be decoded ({reason}); save it without compression"
+            ) from None
         return np.stack(read).reshape(*numbers.shape, *read[0].shape)
 
 

@@ -1,0 +1,69 @@
+"""NumPy files, and lists of wavelengths."""
+
+import numpy as np
+import pytest
+
+from pellicle.data.read_cube import read_cube
+from pellicle.errors import DataError, UsageError
+
+NM = np.linspace(400.0, 800.0, 9)
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+@pytest.mark.parametrize("axes", [(0, 1, 2), (2, 0, 1), (0, 2, 1)])
+def test_npy(values, same, tmp_path, order, axes):
+    np.save(tmp_path / "a.npy", np.array(values.transpose(axes), order=order))
+    assert same(tmp_path / "a.npy", wavelengths=NM).dims == ("y", "x")
+
+
+def test_array_in_memory(values, same):
+    same(values, wavelengths=NM)
+
+
+@pytest.mark.parametrize("save", [np.savez, np.savez_compressed])
+def test_npz_with_wavelengths_and_errors(values, same, tmp_path, save):
+    save(tmp_path / "a.npz", R=values, sigma=values * 0 + 0.01, wavelength_um=NM / 1000)
+    cube = same(tmp_path / "a.npz")
+    np.testing.assert_allclose(np.asarray(cube.arrays["sigma"]), 0.01, rtol=1e-6)
+
+
+def test_sites_and_time(values, tmp_path):
+    np.save(tmp_path / "sites.npy", values.reshape(35, 9))
+    assert read_cube(tmp_path / "sites.npy", wavelengths=NM).dims == ("site",)
+    np.save(tmp_path / "time.npy", np.stack([values, values]))
+    assert read_cube(tmp_path / "time.npy", wavelengths=NM).dims == ("time", "y", "x")
+
+
+@pytest.mark.parametrize(
+    "written",
+    [
+        "400\n450\n500\n550\n600\n650\n700\n750\n800\n",
+        "wavelength_um\n0.4\n0.45\n0.5\n0.55\n0.6\n0.65\n0.7\n0.75\n0.8",
+        "400, 450, 500, 550, 600, 650, 700, 750, 800",
+    ],
+)
+def test_file_of_wavelengths(values, same, tmp_path, written):
+    (tmp_path / "bands.txt").write_text(written)
+    same(values, wavelengths=tmp_path / "bands.txt")
+
+
+@pytest.mark.parametrize("wrong", ["400:800", "400:800:45", "800:400:50", "blue", "400:800:0", ""])
+def test_wrong_lists_of_wavelengths(values, refused, wrong):
+    refused(values, "`wavelengths`", error=UsageError, wavelengths=wrong)
+
+
+def test_refusals(values, refused, tmp_path):
+    np.save(tmp_path / "a.npy", values)
+    refused(tmp_path / "a.npy", "no wavelengths", "7 x 5 x 9", error=UsageError)
+    refused(tmp_path / "a.npy", "4 wavelengths", error=DataError, wavelengths="400,500,600,700")
+    np.save(tmp_path / "flat.npy", values[0, 0])
+    refused(tmp_path / "flat.npy", "no array of pixels", error=DataError, wavelengths=NM)
+    np.save(tmp_path / "objects.npy", np.array([{}]), allow_pickle=True)
+    refused(tmp_path / "objects.npy", "damaged", error=DataError, wavelengths=NM)
+    (tmp_path / "short.npy").write_bytes((tmp_path / "a.npy").read_bytes()[:-4])
+    refused(tmp_path / "short.npy", "ends before", error=DataError, wavelengths=NM)
+    (tmp_path / "text.md").write_text("# notes\n")
+    refused(tmp_path / "text.md", "is no cube", "zarr, NetCDF, ENVI", error=DataError)
+    refused(tmp_path / "absent.npy", "no such file", error=DataError)
+    refused(tmp_path, "without a table of positions", error=DataError)
+    refused(42, "must be a path", error=UsageError)
