@@ -245,3 +245,12 @@ def test_every_status_has_advice():
     text = cube_report(made(status))
     advice = text.split("[[Status: what to do]]\n")[1].split("[[")[0].splitlines()
     assert [line.split()[0] for line in advice if line[4] != " "] == list(STATUSES[1:])
+
+
+def test_a_place_of_most_pixels_says_so():
+    found = blank()
+    found[10:20, 30:43] = True  # 130
+    found[[40, 45, 50, 55, 59], [3, 60, 20, 70, 5]] = True
+    assert where(found).startswith("in one patch of 130")  # 96 %
+    found[35:38, 70:74] = True  # 12 more: 88 %
+    assert where(found).startswith("mostly in one patch of 130")

@@ -16,6 +16,8 @@ CLUSTERED = 0.15
 """Least excess of neighbours with the same property over that of pixels at random, 0 to 1."""
 COVERED = 0.25
 """Share of the band along the edge from which pixels lie along the edge rather than in a patch at it."""
+WHOLE = 0.95
+"""Share from which a description is not called mostly true."""
 DEEP = 0.2
 """Largest depth of that band, as a share of the distance from the edge to the middle."""
 
@@ -90,18 +92,22 @@ def _rows(found: np.ndarray, known: np.ndarray, axes: MapAxes) -> str:
     ):
         each = found.sum(axis=along)
         runs = _runs(each > 0.5 * np.maximum(known.sum(axis=along), 1))
-        if not runs or sum(each[a:b].sum() for a, b in runs) < MOST * found.sum():
+        covered = sum(each[a:b].sum() for a, b in runs) / found.sum()
+        if covered < MOST:
             continue
+        mostly = _mostly(covered)
         if len(runs) > FEW:
-            return f"in {sum(b - a for a, b in runs)} {word}s"
+            return f"{mostly}in {sum(b - a for a, b in runs)} {word}s"
         if len(runs) == 1:
             edges = [
                 end for end, at in zip(ends, (runs[0][0] == 0, runs[0][1] == each.size), strict=True) if at
             ]
             if len(edges) == 1:
-                return f"along the {edges[0]} edge, {_spans(runs, axis)}"
+                return f"{mostly}along the {edges[0]} edge, {_spans(runs, axis)}"
         number = sum(b - a for a, b in runs)
-        return f"in {'one' if number == 1 else number} {word}{'s' * (number > 1)}, {_spans(runs, axis)}"
+        return (
+            f"{mostly}in {'one' if number == 1 else number} {word}{'s' * (number > 1)}, {_spans(runs, axis)}"
+        )
     return ""
 
 
@@ -111,11 +117,12 @@ def _edge(found: np.ndarray, known: np.ndarray) -> str:
 
     inside = np.asarray(binary_fill_holes(known))
     depth = np.asarray(distance_transform_edt(np.pad(inside, 1)))[1:-1, 1:-1]
-    reach = np.quantile(depth[found], 0.9)
-    if reach > max(2.0, DEEP * depth.max()):
-        return ""
-    band = inside & (depth <= reach)
-    return "along the edge" if (found & band).sum() >= COVERED * band.sum() else ""
+    for covered in (0.97, 0.85):
+        reach = np.quantile(depth[found], covered)
+        band = inside & (depth <= reach)
+        if reach <= max(2.0, DEEP * depth.max()) and (found & band).sum() >= COVERED * band.sum():
+            return _mostly(covered) + "along the edge"
+    return ""
 
 
 def _patches(found: np.ndarray, known: np.ndarray, axes: MapAxes, counted: bool) -> str:
@@ -150,7 +157,14 @@ def _patches(found: np.ndarray, known: np.ndarray, axes: MapAxes, counted: bool)
         return f"{size}at {x}, {y_axis.span(*y_axis.values[[rows.start, rows.stop - 1]])}"
 
     texts = [described(i) for i in largest[:listed].tolist()]
-    return f"in one patch {texts[0]}" if listed == 1 else f"in {listed} patches, " + " and ".join(texts)
+    mostly = _mostly(sizes[largest[:listed]].sum() / found.sum())
+    return mostly + (
+        f"in one patch {texts[0]}" if listed == 1 else f"in {listed} patches, {' and '.join(texts)}"
+    )
+
+
+def _mostly(covered: float) -> str:
+    return "" if covered >= WHOLE else "mostly "
 
 
 def _runs(flags: np.ndarray) -> list[tuple[int, int]]:

@@ -73,7 +73,8 @@ def pixels_in_words(made: MapSummary) -> str:
         last = f"{rows} x {last}"
     unit = "sites" if made.axes.kind == "sites" else "pixels"
     series = made.axes.series
-    return f"{' x '.join(before)} frames ({series.name}) of {last} {unit}" if series else f"{last} {unit}"
+    last += f" {unit} (y, x)" if made.axes.kind == "image" else f" {unit}"
+    return f"{' x '.join(before)} frames ({series.name}) of {last}" if series else last
 
 
 def _facts(made: MapSummary) -> list[tuple[str, str]]:
