@@ -105,14 +105,21 @@ def ordinal(every: int) -> str:
 
 def _time(run: Run) -> str:
     """`3.2 s, 81 000 pixels/s`, with the time of compilation and the pixels of an earlier run."""
-    parts = [f"{run.seconds:.3g} s", f"{_rounded(run.pixels / run.seconds)} pixels/s"]
+    if not run.pixels:
+        return "all pixels are of an earlier run"
+    parts = [f"{run.seconds:.3g} s", f"{_rounded(_rate(run))} pixels/s"]
+    if run.compiling > 0.1 * run.seconds:
+        parts.insert(1, f"{run.compiling:.2g} s of it compilation")
     if run.workers > 1:
         parts.append(f"{run.workers} processes")
-    if run.compiling > 0.1 * run.seconds:
-        parts.append(f"{run.compiling:.2g} s of it compilation")
     if run.earlier:
         parts.append(f"without {run.earlier} pixels of an earlier run")
     return ", ".join(parts)
+
+
+def _rate(run: Run) -> float:
+    """Pixels per second, without the time of compilation."""
+    return run.pixels / max(run.seconds - run.compiling, 1e-3)
 
 
 def _rounded(value: float) -> str:
@@ -215,7 +222,7 @@ def cube_json(made: Dataset | Map, summary: MapSummary | None = None) -> dict[st
         "preview": int(about.get("preview", 1)),
         "notes": list(found.notes),
         "seconds": None if run is None else number(run.seconds),
-        "pixels_per_second": None if run is None else number(run.pixels / run.seconds),
+        "pixels_per_second": number(_rate(run)) if run is not None and run.pixels else None,
         "versions": versions(),
     }
 
