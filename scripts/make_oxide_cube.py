@@ -2,8 +2,8 @@
 
 Run `python scripts/make_oxide_cube.py`. 40 x 30 pixels of 0.1 mm and 50 bands from 420 to 910 nm, with noise
 of 0.005. The oxide is 250 nm thick at the left edge and grows by 40 nm/mm; above y = 1.5 mm it is 60 nm
-thicker. A grain of dust reflects half of the light, two pixels are dead, and so is one row. The reflectance is
-computed here, by Airy's formula.
+thicker. A grain of dust reflects half of the light, two pixels are dead, and so is one row. The reflectance
+is computed here, by Airy's formula.
 """
 
 from pathlib import Path
