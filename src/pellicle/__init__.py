@@ -21,7 +21,9 @@ if TYPE_CHECKING:
     from pellicle.data.brdf_samples import BrdfSamples as BrdfSamples
     from pellicle.data.colours import CameraMatrix as CameraMatrix
     from pellicle.data.colours import Colours as Colours
+    from pellicle.data.cube import Cube as Cube
     from pellicle.data.read_brdf import read_brdf_samples as read_brdf_samples
+    from pellicle.data.read_cube import read_cube as read_cube
     from pellicle.data.read_spectrum import read_spectra as read_spectra
     from pellicle.data.read_spectrum import read_spectrum as read_spectrum
     from pellicle.data.spectrum import Spectrum as Spectrum
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
     from pellicle.dispersion import effective_medium as mixing  # noqa: F401
     from pellicle.fitting.result import Fit as Fit
     from pellicle.fitting.result import Status as Status
+    from pellicle.mapping.map_result import Map as Map
     from pellicle.mapping.picture import ThicknessMap as ThicknessMap
     from pellicle.materials import material as material
     from pellicle.recipes.colours import read_colours as read_colours
@@ -58,10 +61,13 @@ _NAMES = {
     "pellicle.api": ("compare", "cost", "export", "fit", "map", "plan", "sample", "simulate"),
     "pellicle.data.brdf_samples": ("BrdfSamples",),
     "pellicle.data.colours": ("CameraMatrix", "Colours"),
+    "pellicle.data.cube": ("Cube",),
     "pellicle.data.read_brdf": ("read_brdf_samples",),
+    "pellicle.data.read_cube": ("read_cube",),
     "pellicle.data.read_spectrum": ("read_spectra", "read_spectrum"),
     "pellicle.data.spectrum": ("Spectrum",),
     "pellicle.data.write_spectrum": ("write_spectrum",),
+    "pellicle.mapping.map_result": ("Map",),
     "pellicle.mapping.picture": ("ThicknessMap",),
     "pellicle.fitting.result": ("Fit", "Status"),
     "pellicle.materials": ("material",),

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
+from inspect import signature
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
@@ -11,11 +13,12 @@ from numpy.typing import ArrayLike
 
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.colours import Colours
+from pellicle.data.cubes.detect import is_picture
 from pellicle.data.measurement import Measurement, check_measurement
-from pellicle.data.read_picture import read_picture
+from pellicle.data.read_cube import read_cube
 from pellicle.data.spectrum import Spectrum
 from pellicle.effects.plan import Plan
-from pellicle.errors import UsageError
+from pellicle.errors import UsageError, install_command
 from pellicle.fitting.brdf.fit import fit as fit_brdf
 from pellicle.fitting.comparison import Comparison
 from pellicle.fitting.comparison import compare as compare_fits
@@ -24,11 +27,9 @@ from pellicle.fitting.joint import of_both_kinds
 from pellicle.fitting.progress import Progress, quiet
 from pellicle.fitting.result import Fit
 from pellicle.fitting.spectra.fit import fit as fit_spectra
-from pellicle.mapping.picture import ThicknessMap, thickness_map
+from pellicle.mapping.picture import ThicknessMap, map_picture
 from pellicle.planning.film import plan as film_plan
 from pellicle.planning.surface import plan as surface_plan
-from pellicle.recipes.cameras import Camera, sight
-from pellicle.recipes.picture_colours import check_picture
 from pellicle.sampling.ensemble import STEPS
 from pellicle.sampling.result import Posterior
 from pellicle.sampling.sample import OF_A_FILM, measured
@@ -43,7 +44,22 @@ from pellicle.synthetic.spectra import default_wavelengths, simulate_spectrum
 if TYPE_CHECKING:
     from pellicle.accuracy.cost import Cost
     from pellicle.accuracy.surface import SurfaceCost
+    from pellicle.mapping.map_result import Map
     from pellicle.rendering.export import Export
+
+
+_OF_A_CUBE = (
+    "out",
+    "workers",
+    "scheduler",
+    "resume",
+    "overwrite",
+    "preview",
+    "neighbours",
+    "recipe",
+    "progress",
+)
+"""Arguments of `map` for a cube, besides those of reading it."""
 
 
 @overload
@@ -381,8 +397,9 @@ def sample(
     )
 
 
-def map(
-    picture: str | os.PathLike[str],
+@overload
+def map(  # pyright: ignore[reportOverlappingOverload]  # a path is of either kind
+    data: str | os.PathLike[str],
     scene: Scene,
     *,
     strip: str | Sequence[int] | None = None,
@@ -396,16 +413,55 @@ def map(
     white: str | Sequence[int] | None = None,
     layer: str | None = None,
     noise: float | None = None,
-) -> ThicknessMap:
-    """Compute the thickness of a film at every pixel of a picture, or along a strip across a gradient.
+) -> ThicknessMap: ...
+@overload
+def map(
+    data: Any,
+    scene: Scene,
+    *,
+    out: str | os.PathLike[str] | None = None,
+    workers: int | None = 1,
+    scheduler: str | None = None,
+    resume: bool = True,
+    overwrite: bool = False,
+    preview: bool = False,
+    neighbours: bool = False,
+    recipe: str = "",
+    progress: Progress = quiet,
+    **reading: Any,
+) -> Map: ...
+def map(data: Any, scene: Scene, **options: Any) -> Any:
+    """Fit the free parameters of `scene` at every pixel of a cube of spectra, or the thickness of a picture.
 
-    Each position is inverted by itself (`pellicle.colour.ColourInverse`), between the bounds of the free
-    thickness; other free parameters take their start values. A free scale of the instrument is a free
+    Every pixel of a cube is fitted as `pellicle.fit` fits a spectrum, with the same statuses. Each position
+    of a picture is inverted by itself (`pellicle.colour.ColourInverse`), between the bounds of the free
+    thickness; other free parameters take their start values, and a free scale of the instrument is a free
     exposure of each position.
 
     **Arguments:**
 
-    - `picture`: path of a PNG, TIFF or JPEG file; `scene`: a film with a free thickness.
+    - `data`: a cube: an xarray DataArray or Dataset, a `Cube`, or the path of one (zarr, NetCDF, ENVI, TIFF
+      stack, `.npy`, folder of spectra); or the path of a picture in colours (PNG, TIFF or JPEG).
+    - `scene`: a film; of a picture with a free thickness.
+
+    Of a cube:
+
+    - `out`: path of the zarr store of the map, a temporary one by default. A store of the same input and
+      scene that an earlier run left unfinished is continued; not with `resume=False`. `overwrite` replaces
+      any other map there.
+    - `workers`: processes on this machine, of one thread each. A script that asks for several needs
+      `if __name__ == "__main__":`. None: as many as there are cores, if that saves time.
+    - `scheduler`: address of a dask scheduler, "tcp://host:8786", whose workers reach the files by the same
+      paths.
+    - `preview`: fit only so many pixels, evenly spread, that it takes seconds; `out` must be another one.
+    - `neighbours`: decide ambiguous pixels by the order of interference of their neighbours. The result is
+      stored beside `out`, with "-neighbours" in its name.
+    - `recipe`: text of the scene's recipe, kept in the map.
+    - `progress`: called with the name of a stage, the number of pixels done and their total.
+    - `reading`: arguments of `pellicle.read_cube`, such as `wavelengths`, `signal_unit`, `noise`, `mask`.
+
+    Of a picture:
+
     - `strip`: "x0,y0,x1,y1", the ends of a line, 5 pixels wide; or `region`: "x,y,width,height", by default
       the whole picture. Pixels count from the upper left corner.
     - `space`: "srgb" (the default), or "rgb" with its `gamma`.
@@ -413,30 +469,40 @@ def map(
     - `layer`: name of the layer whose thickness is sought, the free one by default.
     - `noise`: standard deviation of a coded channel, by default 1.5/255 of sRGB and 0.01 of "rgb".
 
-    **Returns:** `ThicknessMap`: `found` has thickness, standard error (of the noise alone), probability and
+    **Returns:** of a cube a `Map`: `dataset` has values, standard errors, status and rivals of each pixel. Of
+    a picture a `ThicknessMap`: `found` has thickness, standard error (of the noise alone), probability and
     status of each position, the most probable thickness first.
 
-    **Raises:** DataError for a picture that cannot be read; UsageError for pixels outside it, and where no
-    thickness is free.
+    **Raises:** DataError for data that cannot be read; UsageError for arguments of the other kind of data,
+    for a store that is of another map, for pixels outside a picture, and where nothing is free.
     """
     check_scene(scene)
-    paths = [None if path is None else os.fspath(path) for path in (lamp, sensitivities)]
-    transmitted = scene.light.signal == "T"
-    eye = Camera(observer, illuminant, *paths, gamma=gamma, transmitted=transmitted)
-    pixels = read_picture(picture)
-    space = check_picture(pixels, space)
-    return thickness_map(
-        pixels,
-        scene,
-        sight(eye, space),
-        space,
-        gamma=gamma,
-        along=strip,
-        region=region,
-        white=white,
-        layer=layer,
-        noise=noise,
-    )
+    if isinstance(scene, Surface):
+        raise UsageError("`scene` of a map must be a Scene, a film, not a Surface")
+    picture = isinstance(data, str | os.PathLike) and is_picture(Path(data))
+    _refuse_others(options, ("picture", "cube") if picture else ("cube", "picture"))
+    if picture:
+        return map_picture(data, scene, **options)
+    try:
+        from pellicle.mapping.maps import map_cube
+    except ImportError as error:
+        raise UsageError(f"maps of cubes need {error.name}: {install_command('maps')}") from None
+    return map_cube(data, scene, **options)
+
+
+def _refuse_others(options: Iterable[str], kinds: tuple[str, str]) -> None:
+    """Raise UsageError for an argument of `map` that is not for the first of the kinds of data."""
+    names = {
+        "picture": {*signature(map_picture).parameters},
+        "cube": {*_OF_A_CUBE, *signature(read_cube).parameters},
+    }
+    own, other = kinds
+    for name in options:
+        if name not in names[own]:
+            known = (
+                f"is for a {other}, and the data are a {own}" if name in names[other] else "is no argument"
+            )
+            raise UsageError(f"`{name}` {known}; leave it out")
 
 
 def compare(

@@ -8,7 +8,7 @@ import jax
 import pytest
 
 from pellicle.cli import progress
-from pellicle.cli.progress import COMPILING, Progress, TimeLeft, duration
+from pellicle.cli.progress import COMPILING, PixelProgress, Progress, TimeLeft, duration
 
 
 class _Terminal(io.StringIO):
@@ -104,3 +104,21 @@ def test_nothing_is_shown_without_a_terminal(capsys):
 )
 def test_durations(seconds, words):
     assert duration(seconds) == words
+
+
+def test_pixels_per_second_count_from_the_first_block(terminal, clock):
+    with PixelProgress("wafer.nc") as line:
+        line("pixels", 500, 100_500)  # of an earlier run
+        line("starting workers", 0, 2)
+        clock[0] = 60.0  # the first block compiles
+        line("pixels", 1_500, 100_500)
+        clock[0] = 62.0
+        line("pixels", 11_500, 100_500)
+        assert (line.done, line.total) == (11_500, 100_500)
+    assert terminal() == [
+        "wafer.nc: pixels 500/100500",
+        "wafer.nc: starting workers, pixels 500/100500",
+        "wafer.nc: pixels 1500/100500",
+        "wafer.nc: pixels 11500/100500, 5e+03 pixels/s, 18 s left",
+        "",
+    ]

@@ -171,16 +171,18 @@ def test_files_of_a_user_stay(mapped, tmp_path):
 def test_a_cube_with_a_fingerprint_is_not_read_for_it(mapped, cube):
     class Counting:
         shape, dtype = cube.arrays["values"].shape, np.dtype(float)
-        reads = 0
+        values = 0
 
         def __getitem__(self, where):
-            self.reads += 1
-            return cube.arrays["values"][where]
+            found = cube.arrays["values"][where]
+            self.values += found.size
+            return found
 
     counting = Counting()
     named = dataclasses.replace(cube, arrays={"values": counting}, fingerprint="sha256:1")
     mapped(the_cube=named)
-    assert counting.reads == 9 + 24  # a few single pixels, and each block
+    whole = cube.arrays["values"].size
+    assert whole <= counting.values < 1.1 * whole  # each block once, and a few examples
 
 
 def test_sites_of_a_table_have_their_coordinates(mapped, cube):

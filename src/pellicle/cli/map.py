@@ -1,57 +1,98 @@
-"""`pellicle map`: thickness at every pixel of a picture, or along a strip of it."""
+"""`pellicle map`: thickness at every pixel of a cube of spectra or of a picture."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
-from cyclopts import Parameter
+from cyclopts import Group, Parameter
 
 from pellicle.cli.batch import CONVERGED, UNCLEAR
 from pellicle.cli.colours import SPACES
-from pellicle.cli.flags import OUTPUT, CameraFlags, flag, switch
+from pellicle.cli.cube_flags import CubeFlags
+from pellicle.cli.flags import OUTPUT, CameraFlags, flag, given, switch
+from pellicle.cli.map_cube import RunFlags, map_cube
 from pellicle.cli.session import check_folder, say, start
 from pellicle.errors import UsageError
 
+if TYPE_CHECKING:
+    from pellicle.recipes.film import FilmRecipe
+
+PICTURES = Group("Pictures", sort_key=5)
 MOST_CONVERGED = 0.5
 """Share of the positions that must have one thickness for the exit code 0."""
+_OF_BOTH = ("--signal", "--noise")
 
 
 def map(
-    picture: Annotated[str, Parameter(help="PNG, TIFF or JPEG picture.")],
+    data: Annotated[
+        str, Parameter(help="Cube: zarr, NetCDF, ENVI, TIFF stack, .npy, folder of spectra; or a picture.")
+    ],
     *,
     recipe: Annotated[str, Parameter(help="TOML file that describes the film, with a free thickness.")],
+    run: Annotated[RunFlags | None, Parameter(name="*")] = None,
+    cube: Annotated[CubeFlags | None, Parameter(name="*")] = None,
     strip: Annotated[
-        str | None, Parameter(help="X0,Y0,X1,Y1: ends of a line across the film, in pixels.")
+        str | None, flag(PICTURES, "X0,Y0,X1,Y1: ends of a line across the film, in pixels.")
     ] = None,
-    region: Annotated[str | None, Parameter(help="X,Y,WIDTH,HEIGHT in pixels (the whole picture).")] = None,
-    camera: Annotated[CameraFlags | None, Parameter(name="*")] = None,
-    signal: Annotated[str | None, Parameter(help="srgb or rgb (the recipe's, or srgb).")] = None,
+    region: Annotated[str | None, flag(PICTURES, "X,Y,WIDTH,HEIGHT in pixels (the whole picture).")] = None,
     layer: Annotated[
-        str | None, Parameter(help="Layer whose thickness is sought (the one with a free thickness).")
+        str | None, flag(PICTURES, "Layer whose thickness is sought (the one with a free thickness).")
     ] = None,
-    noise: Annotated[
-        float | None, Parameter(help="Standard deviation of a channel (the recipe's, or 1.5/255).")
-    ] = None,
-    out: Annotated[str | None, flag(OUTPUT, "Folder for report, figure, table or arrays.")] = None,
+    camera: Annotated[CameraFlags | None, Parameter(name="*")] = None,
+    out: Annotated[str | None, flag(OUTPUT, "Folder for the map, report and figures.")] = None,
     json: Annotated[bool, switch(OUTPUT, "Print one JSON object.")] = False,
 ) -> int:
-    """Compute the thickness of a film at every pixel of a picture, or along a strip across a gradient.
+    """Fit a film at every pixel of a cube of spectra, or compute its thickness from the colours of a picture.
 
-    Each position has its most probable thickness and its probability: one colour rarely decides. The exit
-    code is 4 where fewer than half of the positions have one thickness.
+    A cube is fitted pixel by pixel, as pellicle fit does. Results are written to --out while they are
+    computed, and the same command goes on where a killed one was. Each position of a picture has its most
+    probable thickness and its probability: one colour rarely decides. The exit code is 4 where fewer than
+    half of the pixels have one thickness.
+
+    Example: pellicle map wafer.nc --recipe oxide.toml --out wafer
 
     Example: pellicle map blade.png --recipe oxide.toml --strip 20,60,420,60 --out blade
     """
+    from pellicle.data.cubes.detect import is_picture
     from pellicle.recipes import read_recipe
     from pellicle.recipes.surface import SurfaceRecipe
 
     described = read_recipe(recipe)
     if isinstance(described, SurfaceRecipe):
         raise UsageError("a map needs the recipe of a film, and this one describes a surface")
-    stated: dict[str, Any] = {
-        name: value for name, value in vars(camera or CameraFlags()).items() if value is not None
-    }
+    run, cube, camera = run or RunFlags(), cube or CubeFlags(), camera or CameraFlags()
+    picture = {"strip": strip, "region": region, "layer": layer}
+    of_picture = [*given(n for n, value in picture.items() if value is not None), *camera.given()]
+    of_cube = [*run.given(), *(name for name in cube.given() if name not in _OF_BOTH)]
+    if is_picture(Path(data)):
+        _refuse(data, "picture", "cubes", of_cube)
+        seen = picture | {"signal": cube.signal, "noise": cube.noise}
+        return _map_picture(data, described, camera, seen, out, json)
+    if Path(data).exists():
+        _refuse(data, "cube", "pictures", of_picture)
+    return map_cube(data, described, run, cube, out, json)
+
+
+def _refuse(data: str, kind: str, others: str, flags: list[str]) -> None:
+    if flags:
+        verb = "is" if len(flags) == 1 else "are"
+        raise UsageError(
+            f"{data}: is a {kind}, and {', '.join(flags)} {verb} for {others}; leave out what does not apply"
+        )
+
+
+def _map_picture(
+    picture: str,
+    described: FilmRecipe,
+    camera: CameraFlags,
+    flags: dict[str, Any],
+    out: str | None,
+    json: bool,
+) -> int:
+    """Map a picture by `flags` strip, region, layer, signal and noise; print and write the result."""
+    stated: dict[str, Any] = {name: value for name, value in vars(camera).items() if value is not None}
     seen = described.camera | stated
     if seen.pop("white_balance", "fixed") == "free" or seen.pop("chart", None) is not None:
         raise UsageError(
@@ -60,10 +101,13 @@ def map(
     transmitted = seen.pop("transmitted", False)
     data = described.tables.data
     of_colours = data.signal in SPACES
-    space = signal or (data.signal if of_colours else "srgb")
+    space = flags.pop("signal") or (data.signal if of_colours else "srgb")
     if space not in ("srgb", "rgb"):
         raise UsageError(f"a picture has the signal srgb or rgb, not {space}")
+    noise = flags.pop("noise")
     noise = data.noise if noise is None and of_colours else noise
+    if isinstance(noise, str):
+        raise UsageError(f"--noise of a picture must be a number, not {noise}")
     if out is not None:
         check_folder(out)
     scene = described.scene()
@@ -76,7 +120,7 @@ def map(
 
     if transmitted:
         scene = eqx.tree_at(lambda s: s.light, scene, replace(scene.light, signal="T"))
-    made = api.map(picture, scene, strip=strip, region=region, space=space, layer=layer, noise=noise, **seen)
+    made: Any = api.map(picture, scene, space=space, noise=noise, **flags, **seen)
     print(one_line(to_json(made)) if json else report(made), flush=True)
     if out is not None:
         say(f"{write_map(out, made)}: report, figure and tables written")

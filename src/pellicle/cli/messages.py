@@ -38,22 +38,27 @@ FLAGS = {
     "light": "--light",
     "loss": "--loss",
     "mask": "--mask",
+    "neighbours": "--neighbours",
     "noise": "--noise",
     "numbers": "--numbers",
     "observer": "--observer",
     "offset": "--offset",
     "out": "--out",
+    "overwrite": "--overwrite",
     "path": "--out",
     "plate_mm": "--plate-mm",
     "points": "--points",
     "polarisation": "--polarisation",
+    "preview": "--preview",
     "range": "--range",
     "recipe": "--recipe",
     "reference": "--reference",
     "reference_material": "--reference-material",
     "region": "--region",
+    "resume": "--resume",
     "saturation": "--saturation",
     "scale": "--scale",
+    "scheduler": "--scheduler",
     "seed": "--seed",
     "sensitivities": "--sensitivities",
     "signal": "--signal",
@@ -78,9 +83,10 @@ FLAGS = {
     "white_frame": "--white-frame",
     "white_reflectance": "--white-reflectance",
     "without_bands": "--without-bands",
+    "workers": "--workers",
 }
 """The flag of each argument that a message may name."""
-_NEGATIVES = {"folded=False": "--no-folded"}
+_NEGATIVES = {"folded=False": "--no-folded", "resume=False": "--no-resume"}
 
 _QUOTED = re.compile(r"`([^`]+)`")
 

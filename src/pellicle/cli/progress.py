@@ -90,6 +90,36 @@ class Progress:
             self.shown = True
 
 
+class PixelProgress(Progress):
+    """Progress line of a map: pixels, pixels per second and time left, counted from the first finished block,
+    which includes the compilation."""
+
+    def __init__(self, label: str):
+        super().__init__(label)
+        self.first: tuple[int, float] | None = None
+        self.begun, self.done, self.total = -1, 0, 0
+
+    def __call__(self, stage: str, done: int, total: int) -> None:
+        """Show a step."""
+        if stage != "pixels":
+            self.steps = f"{stage}, {self._pixels()}" if self.total else stage
+            return self._show()
+        now, self.done, self.total = time.monotonic(), done, total
+        if self.begun < 0:
+            self.begun = done
+        elif self.first is None:
+            self.first = done, now
+        self.steps = self._pixels()
+        if self.first is not None and done > self.first[0]:
+            rate = (done - self.first[0]) / max(now - self.first[1], 1e-3)
+            left = duration((total - done) / rate)
+            self.steps += f", {rate:.3g} pixels/s" + f", {left} left" * bool(left)
+        return self._show()
+
+    def _pixels(self) -> str:
+        return f"pixels {self.done}/{self.total}"
+
+
 def duration(seconds: float) -> str:
     """A time for a reader: `12 s`, `3 min`, `2.5 h`; empty where it is not worth a word."""
     if seconds < _SHORTEST:

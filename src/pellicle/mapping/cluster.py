@@ -108,11 +108,9 @@ def on_cluster(client: Client, job: Job, todo: Sequence[tuple[int, ...]], *, loc
     **Raises:** DataError where a block is lost with every worker that fits it, ValueError of a fit as it is.
     """
     name = f"pellicle-{uuid.uuid4().hex}"
-    content = _pickled(job)
-    shipped = content is None
-    if content is None:
-        content = pickle.dumps(job._replace(cube=replace(job.cube, arrays={}, mask=None, coords={})))
-    client.register_plugin(_Model(name, content, local), name=name)
+    shipped = not _can_be_read_there(job.cube)
+    sent = replace(job.cube, arrays={}, mask=None, coords={}) if shipped else job.cube
+    client.register_plugin(_Model(name, pickle.dumps(job._replace(cube=sent)), local), name=name)
     waiting = iter(todo)
     queue: Any = as_completed()
     most = _WINDOW * max(1, len(client.scheduler_info(n_workers=-1)["workers"])) if shipped else len(todo)
@@ -154,15 +152,14 @@ def part(cube: Cube, where: Where) -> Cube:
     return replace(cube, arrays=arrays, mask=mask, coords={}, units={}, notes=())
 
 
-def _pickled(job: Job) -> bytes | None:
-    """The job as bytes, None where its cube is in memory, and large, or cannot be pickled."""
-    content = BytesIO()
+def _can_be_read_there(cube: Cube) -> bool:
+    """False for a cube whose values are in memory, and large, or which cannot be pickled."""
     try:
-        _Pickler(content).dump(job)
+        _Pickler(BytesIO()).dump(cube)
     except Exception as error:  # pickle raises many kinds
         log.info("blocks are sent to the workers, which cannot read the cube themselves: %s", error)
-        return None
-    return content.getvalue()
+        return False
+    return True
 
 
 class _Pickler(pickle.Pickler):

@@ -21,7 +21,7 @@ FORMAT = "pellicle.map-store/1"
 _OTHERWISE = {
     "format": "has the layout of another version of pellicle",
     "version": "was made by another version of pellicle",
-    "input": "is of another input",
+    "input": "is of another input, or of one that was read otherwise",
     "scene": "is of another scene",
     "options": "was made with other options",
 }

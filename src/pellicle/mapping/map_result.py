@@ -16,7 +16,7 @@ from pellicle.errors import DataError
 from pellicle.files import replacing
 from pellicle.mapping.map_variables import STATUS, variable_name
 from pellicle.mapping.pixel_fits import BY_NEIGHBOURS, CODES, NO_DATA, STATUSES
-from pellicle.mapping.store import DONE, IDENTITY
+from pellicle.mapping.store import DONE, IDENTITY, write_dataset
 
 if TYPE_CHECKING:
     import xarray
@@ -69,7 +69,10 @@ class Map:
         """All variables as an xarray Dataset of dask arrays, which are read when they are computed."""
         import xarray
 
-        return xarray.open_zarr(self.path, chunks={})
+        data = xarray.open_zarr(self.path, chunks={})
+        if self.run is not None and self.run.pixels and not self.run.earlier:
+            data.attrs["seconds"] = self.run.seconds
+        return data
 
     def __getitem__(self, name: str) -> xarray.DataArray:
         """A variable by its name, or the best values of a parameter by the parameter's name."""
@@ -103,7 +106,7 @@ class Map:
     @property
     def finished(self) -> bool:
         """True where every block of pixels has been fitted."""
-        return bool(np.all(self._group[DONE][...]))
+        return DONE not in self._group or bool(np.all(self._group[DONE][...]))
 
     @cached_property
     def status(self) -> dict[str, int]:
@@ -135,6 +138,21 @@ class Map:
             if name.rpartition(".")[2] == "thickness":
                 return self[name]
         raise KeyError("the map has no free thickness")
+
+    def by_neighbours(self) -> Map:
+        """Decide ambiguous pixels by the order of interference of their neighbours.
+
+        The store of the result lies beside this one, with "-neighbours" in its name, and replaces an earlier
+        one. Raises UsageError for a map without a free thickness.
+        """
+        from pellicle.mapping.continuity import decided_by_neighbours
+        from pellicle.mapping.map_attributes import with_evidence
+
+        target = self.path.with_name(f"{self.path.stem}-neighbours{self.path.suffix}")
+        decided = decided_by_neighbours(self.dataset)
+        with_evidence(decided)
+        write_dataset(target, decided)
+        return Map(target, self.run)
 
     def to_netcdf(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
         """Write all variables to a NetCDF 4 file, block by block, complete or not at all.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,10 +12,10 @@ from pellicle.colour.inverse import ColourThickness
 from pellicle.colour.observers import Sensor
 from pellicle.data.colours import USUAL_NOISE
 from pellicle.data.picture_regions import Region, parse_regions, strip
-from pellicle.data.read_picture import Picture
+from pellicle.data.read_picture import Picture, read_picture
 from pellicle.errors import UsageError
-from pellicle.recipes.cameras import Sight
-from pellicle.recipes.picture_colours import white_reference
+from pellicle.recipes.cameras import Camera, Sight, sight
+from pellicle.recipes.picture_colours import check_picture, white_reference
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free
 from pellicle.scene.instrument import Drift
@@ -52,6 +53,42 @@ class ThicknessMap(NamedTuple):
     def converged(self) -> float:
         """Share of the positions with one thickness."""
         return float(np.mean(self.found.status == "converged"))
+
+
+def map_picture(
+    data: str | os.PathLike[str],
+    scene: Scene,
+    *,
+    strip: Any = None,
+    region: Any = None,
+    space: str | None = None,
+    observer: str = "1931",
+    illuminant: str = "D65",
+    lamp: str | os.PathLike[str] | None = None,
+    sensitivities: str | os.PathLike[str] | None = None,
+    gamma: float = 1.0,
+    white: Any = None,
+    layer: str | None = None,
+    noise: float | None = None,
+) -> ThicknessMap:
+    """Compute the thickness at each pixel of a picture; arguments as of `pellicle.map`."""
+    paths = [None if path is None else os.fspath(path) for path in (lamp, sensitivities)]
+    transmitted = scene.light.signal == "T"
+    eye = Camera(observer, illuminant, *paths, gamma=gamma, transmitted=transmitted)
+    pixels = read_picture(data)
+    space = check_picture(pixels, space)
+    return thickness_map(
+        pixels,
+        scene,
+        sight(eye, space),
+        space,
+        gamma=gamma,
+        along=strip,
+        region=region,
+        white=white,
+        layer=layer,
+        noise=noise,
+    )
 
 
 def thickness_map(

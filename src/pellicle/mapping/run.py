@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict
-from importlib.metadata import version
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,6 +16,7 @@ from pellicle.errors import UsageError
 from pellicle.fitting.progress import Progress, quiet
 from pellicle.mapping import pixels
 from pellicle.mapping.blocks import Where
+from pellicle.mapping.map_attributes import attributes
 from pellicle.mapping.map_identity import identity
 from pellicle.mapping.map_result import Map, Run
 from pellicle.mapping.pixel_fits import PixelFits
@@ -28,6 +26,9 @@ from pellicle.mapping.store import MapStore, begin
 from pellicle.scene.film import Scene
 
 log = logging.getLogger(__name__)
+
+START = 30.0
+"""Seconds of fits for which worker processes are worth their start: each imports JAX, for 5 to 10 s."""
 
 Fitter = Callable[[PixelModel, Cube, Where], PixelFits]
 
@@ -42,9 +43,10 @@ class Job(NamedTuple):
 
 
 class Fitted(NamedTuple):
-    """A block that is in the store: its number of pixels, and seconds of compilation."""
+    """A block that is in the store: its number of pixels, seconds of its fits, and of compilation."""
 
     pixels: int
+    seconds: float
     compiling: float
 
 
@@ -53,10 +55,11 @@ def run_map(
     scene: Scene,
     path: str | os.PathLike[str],
     *,
-    workers: int = 1,
+    workers: int | None = 1,
     scheduler: str | None = None,
     resume: bool = True,
     overwrite: bool = False,
+    preview: int = 1,
     options: Mapping[str, Any] | None = None,
     recipe: str = "",
     progress: Progress = quiet,
@@ -68,8 +71,10 @@ def run_map(
 
     - `path` of the store. A store that an earlier run of the same map began is continued, with `resume`, and
       any other map is replaced, with `overwrite`.
-    - `workers`: processes on this machine, of one thread each; with 1 the blocks are fitted in this process.
+    - `workers`: processes on this machine, of one thread each; with 1 the blocks are fitted in this process,
+      and with None as soon as one block has shown that the others take longer than processes to start.
     - `scheduler`: address of a running dask scheduler, "tcp://host:8786", whose workers share the files.
+    - `preview`: the cube has every so many of the pixels in each direction.
     - `options` that change the result, `recipe`: the text of it; both are kept in the store.
     - `progress`: called with "pixels", the number that is done and their total.
     - `fit`: the function that fits a block, `pixels.fit_pixels` by default.
@@ -77,43 +82,45 @@ def run_map(
     **Raises:** as `pixels.prepare` and `store.begin` do; DataError where a block is lost with every worker
     that fits it. After KeyboardInterrupt the finished blocks are in the store.
     """
-    if workers < 1:
+    if workers is not None and workers < 1:
         raise UsageError(f"`workers` must be at least 1, got {workers}")
     began = time.monotonic()
     model = pixels.prepare(cube, scene)
-    about = {
-        "title": "map of thin-film parameters",
-        "source": f"pellicle {version('pellicle')}",
-        "path": cube.path,
-        "fingerprint": cube.fingerprint,
-        "signal": cube.signal,
-        "bands": cube.wavelength.size,
-        "range_nm": [float(cube.wavelength[0]), float(cube.wavelength[-1])],
-        "recipe": recipe or str(scene),
-        "plan": json.dumps([asdict(row) for row in model.problem.views[0].plan.rows]),
-        "notes": list(cube.notes),
-        "parameters": {parameter.name: parameter.unit for parameter in model.parameters},
-    }
+    about = attributes(cube, model, recipe, preview)
     who = identity(cube, scene, options or {})
     store = begin(path, cube, model.parameters, who, about, orders=ORDERS, resume=resume, overwrite=overwrite)
     todo, total = store.unfinished(), int(np.prod(cube.shape))
     earlier = done = total - sum(map(store.blocks.count, todo))
     log.info("%s: %d of %d blocks of %s pixels are left", path, len(todo), *_sizes(store))
     progress("pixels", done, total)
-    job, compiling = Job(model, cube, store, fit or pixels.fit_pixels), 0.0
-    count = 1 if scheduler is None and len(todo) < 2 else workers
-    for fitted in _fitted(job, todo, count, scheduler):
+    job, compiling, used = Job(model, cube, store, fit or pixels.fit_pixels), 0.0, 1
+    if scheduler is None and workers is None and todo:
+        first = fit_block(job, todo.pop(0))
+        done, compiling = done + first.pixels, first.compiling
+        progress("pixels", done, total)
+        workers = _worthwhile(len(todo), first.seconds)
+    if scheduler is not None or (workers or 1) > 1:
+        used = min(workers or len(todo), len(todo))
+    for fitted in _fitted(job, todo, used, scheduler, progress):
         done += fitted.pixels
         compiling = max(compiling, fitted.compiling)
         progress("pixels", done, total)
-    return Map(path, Run(done - earlier, earlier, count, time.monotonic() - began, compiling))
+    return Map(path, Run(done - earlier, earlier, used, time.monotonic() - began, compiling))
+
+
+def _worthwhile(blocks: int, seconds: float) -> int:
+    """Number of processes for blocks that take so many seconds each: 1, or as many as there are cores."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return cores if blocks * seconds > START else 1
 
 
 def _sizes(store: MapStore) -> tuple[int, str]:
     return int(np.prod(store.blocks.grid)), " x ".join(map(str, store.blocks.size))
 
 
-def _fitted(job: Job, todo: list[tuple[int, ...]], workers: int, scheduler: str | None) -> Iterator[Fitted]:
+def _fitted(
+    job: Job, todo: list[tuple[int, ...]], workers: int, scheduler: str | None, progress: Progress
+) -> Iterator[Fitted]:
     if not todo:
         return
     if scheduler is None and workers == 1:
@@ -122,6 +129,7 @@ def _fitted(job: Job, todo: list[tuple[int, ...]], workers: int, scheduler: str 
         return
     from pellicle.mapping.cluster import connected, local_cluster, on_cluster
 
+    progress("starting workers", 0, workers)
     with local_cluster(workers) if scheduler is None else connected(scheduler) as client:
         yield from on_cluster(client, job, todo, local=scheduler is None)
 
@@ -131,14 +139,15 @@ def fit_block(job: Job, place: tuple[int, ...], block: Cube | None = None) -> Fi
 
     `block` is the part of the cube, read by another process; None where this one reads it.
     """
-    where = job.store.blocks.where(place)
+    where, began = job.store.blocks.where(place), time.monotonic()
     with _compilation() as seconds:
         if block is None:
             fits = job.fit(job.model, job.cube, where)
         else:
             fits = job.fit(job.model, block, tuple(slice(0, n) for n in block.shape))
     job.store.write(place, fits)
-    return Fitted(job.store.blocks.count(place), sum(seconds))
+    compiling = sum(seconds)
+    return Fitted(job.store.blocks.count(place), time.monotonic() - began - compiling, compiling)
 
 
 @contextmanager

@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import zarr
@@ -28,6 +28,9 @@ from pellicle.mapping.blocks import Blocks, blocks_of
 from pellicle.mapping.map_identity import difference
 from pellicle.mapping.map_variables import ORDER, Variable, variables
 from pellicle.mapping.pixel_fits import PixelFits
+
+if TYPE_CHECKING:
+    from xarray import Dataset
 
 IDENTITY, DONE = "pellicle_identity", "progress/done"
 
@@ -118,6 +121,22 @@ def begin(
     except OSError as error:
         raise UsageError(f"{target}: cannot be written ({error.strerror}); choose another `out`") from None
     return store
+
+
+def write_dataset(path: str | os.PathLike[str], dataset: Dataset) -> None:
+    """Write a changed dataset of a map as a store of its own, whole or not at all.
+
+    **Raises:** UsageError where something else than a map is at `path`.
+    """
+    target = Path(path).resolve()
+    if target.exists() and _identity_at(target) is None:
+        raise UsageError(f"{target}: exists and is no map of pellicle; choose another `out`")
+    draft = _draft(target)
+    with _quietly():
+        dataset.to_zarr(draft)
+    if target.exists():
+        shutil.rmtree(target)
+    draft.rename(target)
 
 
 def _draft(target: Path) -> Path:

@@ -1,0 +1,143 @@
+"""`pellicle map` of a cube: the run with its progress, output folder and exit code."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Group, Parameter
+
+from pellicle.cli.batch import CONVERGED, INTERRUPTED, UNCLEAR
+from pellicle.cli.cube_flags import CubeFlags, merged
+from pellicle.cli.flags import OUTPUT, Flags, flag
+from pellicle.cli.options import wavelength_range
+from pellicle.cli.progress import PixelProgress
+from pellicle.cli.session import check_folder, say, start
+from pellicle.errors import UsageError
+
+if TYPE_CHECKING:
+    from pellicle.mapping.map_result import Map
+    from pellicle.recipes.film import FilmRecipe
+
+RUN = Group("Run", sort_key=2)
+MOST_DECIDED = 0.5
+"""Share of the pixels with data that must have one answer for the exit code 0."""
+STORE, NETCDF = "map.zarr", "map.nc"
+
+
+@dataclass(frozen=True)
+class RunFlags(Flags):
+    """Flags of the computation of a map, None where not given."""
+
+    workers: Annotated[
+        int | None, flag(RUN, "Processes on this machine, one thread each (its cores, if that saves time).")
+    ] = None
+    scheduler: Annotated[
+        str | None, flag(RUN, "Address of a dask scheduler, tcp://HOST:8786, whose workers fit the pixels.")
+    ] = None
+    neighbours: Annotated[
+        bool | None,
+        Parameter(group=RUN, help="Decide ambiguous pixels by the order of their neighbours.", negative=""),
+    ] = None
+    preview: Annotated[
+        bool | None,
+        Parameter(
+            group=RUN, help="Fit a few thousand pixels only, into the folder OUT-preview.", negative=""
+        ),
+    ] = None
+    resume: Annotated[
+        bool | None,
+        Parameter(group=OUTPUT, help="Go on with the map that an earlier run left in --out (the default)."),
+    ] = None
+    overwrite: Annotated[
+        bool | None, Parameter(group=OUTPUT, help="Replace a map that is in --out.", negative="")
+    ] = None
+
+
+def map_cube(
+    path: str, described: FilmRecipe, run: RunFlags, cube: CubeFlags, out: str | None, json: bool
+) -> int:
+    """Map a cube, print the report, write the folder, and return the exit code."""
+    if run.workers is not None and run.workers < 1:
+        raise UsageError(f"--workers must be at least 1, got {run.workers}")
+    if run.workers is not None and run.scheduler is not None:
+        raise UsageError("--workers are processes of this machine, and --scheduler has its own: give one")
+    if out is None and (idle := [name for name in run.given() if name in ("--resume", "--overwrite")]):
+        raise UsageError(f"{idle[0]} needs --out, the folder of the map")
+    folder = None if out is None else Path(f"{out.rstrip('/')}-preview" if run.preview else out)
+    if folder is not None:
+        check_folder(str(folder))
+    scene = described.scene()
+    start()
+    from pellicle import api
+    from pellicle.reporting.json_record import one_line
+    from pellicle.reporting.map_text import cube_json, cube_report
+
+    flags = merged(cube, described)
+    reading = {name: value for name, value in vars(flags).items() if value is not None}
+    if flags.range is not None:
+        reading["range"] = wavelength_range(flags.range)
+    if folder is not None:
+        _mark(folder)
+    progress = PixelProgress(path)
+    try:
+        with progress:
+            made = api.map(
+                path,
+                scene,
+                out=None if folder is None else folder / STORE,
+                workers=1 if run.preview and run.workers is None else run.workers,
+                scheduler=run.scheduler,
+                resume=run.resume is not False,
+                overwrite=bool(run.overwrite),
+                preview=bool(run.preview),
+                neighbours=bool(run.neighbours),
+                recipe=Path(described.path).read_text(encoding="utf-8"),
+                progress=progress,
+                **reading,
+            )
+    except KeyboardInterrupt:
+        kept = (
+            "" if folder is None else f"; they are kept in {folder}, and the same command goes on from there"
+        )
+        say(f"interrupted after {progress.done} of {progress.total} pixels{kept}")
+        return INTERRUPTED
+    _say_speed(made, folder)
+    print(one_line(cube_json(made.dataset)) if json else cube_report(made.dataset), flush=True)
+    if folder is not None:
+        _write(folder, made)
+    return CONVERGED if made.decided >= MOST_DECIDED else UNCLEAR
+
+
+def _mark(folder: Path) -> None:
+    """Make the folder and mark it as ours, so that a killed run can go on in it."""
+    from pellicle.files import MARKER, new_folder, write_text
+    from pellicle.reporting.json_record import indented, versions
+    from pellicle.reporting.map_text import SCHEMA
+
+    target = new_folder(folder)
+    if not (target / MARKER).exists():
+        begun = {"schema": SCHEMA, "status": "running", "versions": versions()}
+        write_text(target / MARKER, indented(begun))
+
+
+def _say_speed(made: Map, folder: Path | None) -> None:
+    run = made.run
+    if run is None:
+        return
+    if run.earlier:
+        say(f"{run.earlier} pixels are from an earlier run in {folder}; --overwrite fits them again")
+    if run.pixels:
+        rate = run.pixels / max(run.seconds - run.compiling, 1e-3)
+        compiled = f"; {run.compiling:.1f} s more to compile, in the first run of a kind of scene"
+        where = f"{run.workers} processes" if run.workers > 1 else "one process"
+        say(f"{run.pixels} pixels in {where}, {rate:.3g} pixels/s" + compiled * (run.compiling > 0.1))
+
+
+def _write(folder: Path, made: Map) -> None:
+    from pellicle.reporting.map_files import write_cube_map
+
+    made.to_netcdf(folder / NETCDF, overwrite=True)
+    write_cube_map(folder, made.dataset)
+    say(f"{folder}: map.zarr, map.nc, report and figures written")

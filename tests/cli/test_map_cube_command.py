@@ -1,0 +1,154 @@
+"""`pellicle map` of a cube: output folder, interruption, exit codes, flags of the wrong kind."""
+
+import json
+import os
+import signal
+
+import numpy as np
+import pytest
+import xarray
+from PIL import Image
+
+from pellicle.mapping.pixel_fits import CODES, NO_DATA, PixelFits
+from pellicle.mapping.pixel_minima import ORDERS
+
+RECIPE = """
+[scene]
+substrate = { model = "constant", n = 3.9, k = 0.02 }
+layer = [{ material = 1.46, thickness = { lower = 10, upper = 800 } }]
+"""
+
+
+def fitted(model, cube, where):
+    """A made-up fit: 100 nm for each unit of the first band."""
+    values = cube.pixels(where)["values"][:, :1]
+    status = np.where(np.isfinite(values[:, 0]), CODES["converged"], CODES[NO_DATA]).astype(np.uint8)
+    minima = np.full((len(values), ORDERS, 1), np.nan)
+    minima[:, 0] = 100 * values
+    delta = np.full((len(values), ORDERS), np.inf)
+    delta[:, 0] = 0
+    one = np.ones(len(values))
+    return PixelFits(100 * values, values, values, status, minima, delta, one, one)
+
+
+@pytest.fixture
+def fits(monkeypatch):
+    """Replaces the fit of a block."""
+
+    def fits(fit=fitted):
+        monkeypatch.setattr("pellicle.mapping.pixels.fit_pixels", fit)
+
+    fits()
+    return fits
+
+
+@pytest.fixture
+def words(tmp_path, monkeypatch):
+    """The arguments that map a cube of 24 x 20 pixels in 9 blocks into the folder `out`."""
+    monkeypatch.setattr("pellicle.mapping.blocks.PIXELS", 100)
+    nm = np.linspace(400.0, 700.0, 30)
+    values = np.random.default_rng(0).uniform(0.2, 0.8, (24, 20, 30))
+    values[0, 0] = np.nan
+    cube = xarray.DataArray(
+        values, {"wavelength": ("wavelength", nm, {"units": "nm"})}, ("y", "x", "wavelength")
+    )
+    cube.to_dataset(name="R").to_netcdf(tmp_path / "wafer.nc")
+    (tmp_path / "film.toml").write_text(RECIPE)
+    return "map", tmp_path / "wafer.nc", "--recipe", tmp_path / "film.toml", "--out", tmp_path / "out"
+
+
+@pytest.fixture
+def picture(tmp_path):
+    Image.fromarray(np.full((8, 8, 3), 99, np.uint8)).save(tmp_path / "film.png")
+    return "map", tmp_path / "film.png", "--recipe", tmp_path / "film.toml"
+
+
+def test_the_folder_of_a_map(pellicle, words, fits, tmp_path):
+    ran = pellicle(*words, "--json")
+    assert ran.code == 0, ran.err
+    [record] = ran.objects
+    assert record["status"] == {"converged": 479, "no-data": 1}
+    assert record == json.loads((tmp_path / "out/result.json").read_text())
+    assert "converged" in (tmp_path / "out/report.txt").read_text()
+    with (
+        xarray.open_dataset(tmp_path / "wafer.nc") as cube,
+        xarray.open_dataset(tmp_path / "out/map.nc") as map,
+    ):
+        np.testing.assert_allclose(map.thickness, 100 * cube.R[..., 0])
+        assert map.attrs["recipe"] == RECIPE
+    assert xarray.open_zarr(tmp_path / "out/map.zarr").status.shape == (24, 20)
+
+
+def test_the_same_command_goes_on_after_ctrl_c(pellicle, words, fits, tmp_path):
+    blocks = []
+
+    def interrupted(model, cube, where):
+        blocks.append(where)
+        if len(blocks) == 3:
+            os.kill(os.getpid(), signal.SIGINT)
+        return fitted(model, cube, where)
+
+    fits(interrupted)
+    ran = pellicle(*words)
+    assert (ran.code, ran.out) == (130, "")
+    assert "interrupted after" in ran.err
+    assert f"they are kept in {tmp_path / 'out'}, and the same command goes on" in ran.err
+    ran = pellicle(*words)
+    assert ran.code == 0
+    assert "pixels are from an earlier run" in ran.err
+    assert len(blocks) in (9, 10)  # 2 or 3 were in the store
+    assert pellicle(*words).code == 0
+    assert len(blocks) in (9, 10)
+
+
+def test_undecided_pixels_have_their_exit_code(pellicle, words, fits):
+    def ambiguous(model, cube, where):
+        found = fitted(model, cube, where)
+        return found._replace(status=np.full_like(found.status, CODES["ambiguous"]))
+
+    fits(ambiguous)
+    assert pellicle(*words).code == 4
+
+
+def test_another_map_is_kept_unless_it_is_to_be_replaced(pellicle, words, fits):
+    assert pellicle(*words).code == 0
+    pellicle(*words, "--signal-unit", "percent").refused(2, "another input", "--overwrite")
+    pellicle(*words, "--no-resume").refused(2, "--no-resume", "--overwrite")
+    assert pellicle(*words, "--signal-unit", "percent", "--overwrite").code == 0
+
+
+def test_a_preview_has_its_own_folder(pellicle, words, fits, tmp_path, monkeypatch):
+    monkeypatch.setattr("pellicle.mapping.maps.PREVIEW", 30)
+    [record] = pellicle(*words, "--preview", "--json").objects
+    assert record["data"]["shape"] == {"y": 6, "x": 5}
+    assert record["preview"] == 4
+    assert not (tmp_path / "out").exists()
+    assert (tmp_path / "out-preview/map.nc").is_file()
+
+
+def test_a_folder_of_the_user_stays(pellicle, words, fits, tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out/notes.txt").write_text("mine")
+    pellicle(*words).refused(2, "did not write")
+    assert [file.name for file in (tmp_path / "out").iterdir()] == ["notes.txt"]
+
+
+def test_without_a_folder_nothing_is_written(pellicle, words, fits, tmp_path):
+    before = {*tmp_path.iterdir()}
+    assert pellicle(*words[:-2], "--json").code == 0
+    assert {*tmp_path.iterdir()} == before
+
+
+def test_flags_of_the_other_kind_are_refused(pellicle, words, picture):
+    pellicle(*words, "--strip", "0,0,5,5").refused(2, "is a cube", "--strip")
+    pellicle(*words, "--sensitivities", "a.csv").refused(2, "is a cube", "--sensitivities")
+    pellicle(*picture, "--workers", 2).refused(2, "is a picture", "--workers")
+    pellicle(*picture, "--mask", "a.png", "--preview").refused(2, "is a picture", "--preview", "--mask")
+    pellicle(*picture, "--noise", "2 %").refused(2, "--noise")
+
+
+def test_wrong_use(pellicle, words):
+    pellicle(*words, "--workers", 0).refused(2, "--workers")
+    pellicle(*words, "--workers", 2, "--scheduler", "tcp://host:1").refused(2, "--scheduler")
+    pellicle(*words[:-2], "--overwrite").refused(2, "--out")
+    pellicle("map", "absent.nc", *words[2:]).refused(3, "absent.nc")
