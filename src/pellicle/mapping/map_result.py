@@ -14,6 +14,7 @@ import zarr
 
 from pellicle.errors import DataError
 from pellicle.files import replacing
+from pellicle.fitting.presentation import PlotMixin
 from pellicle.mapping.map_variables import STATUS, variable_name
 from pellicle.mapping.pixel_fits import BY_NEIGHBOURS, CODES, NO_DATA, STATUSES
 from pellicle.mapping.store import DONE, IDENTITY, write_dataset
@@ -35,7 +36,7 @@ class Run(NamedTuple):
     compiling: float
 
 
-class Map:
+class Map(PlotMixin):
     """Thickness map of a cube.
 
     **Arguments:**

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pellicle.mapping.map_result import Map
 from pellicle.mapping.pixel_fits import CODES, NO_DATA
 from pellicle.reporting import map_blocks
 from pellicle.reporting.drawing import ABOVE, BLUE, ORANGE, marker_size, new_figure
@@ -30,7 +31,14 @@ from pellicle.reporting.map_panels import (
     unusable,
     values_panel,
 )
-from pellicle.reporting.map_summary import MapSummary, free_parameters, is_decided, summarise, thinned
+from pellicle.reporting.map_summary import (
+    MapSummary,
+    dataset_of,
+    free_parameters,
+    is_decided,
+    summarise,
+    thinned,
+)
 from pellicle.reporting.map_text import in_words, ordinal
 
 if TYPE_CHECKING:
@@ -45,15 +53,16 @@ _LEFT, _RIGHT, _ABOVE, _BELOW, _LINE = 0.75, 1.45, 0.32, 0.55, 0.19
 """Inches beside a panel: labels, colour bar or legend, its title, its axis; a line of text."""
 
 
-def figures(dataset: Dataset, made: MapSummary | None = None) -> Iterator[tuple[str, Figure]]:
+def figures(made: Dataset | Map, summary: MapSummary | None = None) -> Iterator[tuple[str, Figure]]:
     """Draw a map: yield the name of each figure's file, without suffix, and the figure.
 
     "map" has the first parameter, its standard error, the statuses and a histogram. Each other free parameter
     has a figure of its name, and "rival" shows how close the second best answers are. Large images are drawn
     by means over blocks of pixels.
     """
-    made = summarise(dataset) if made is None else made
-    sheet = Sheet(*_as_image(dataset, made.axes), made)
+    summary = summarise(made) if summary is None else summary
+    dataset = dataset_of(made)
+    sheet = Sheet(*_as_image(dataset, summary.axes), summary)
     first, *others = free_parameters(dataset)
     yield "map", draw_map(sheet, first)
     for variable in others:

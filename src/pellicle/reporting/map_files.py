@@ -10,7 +10,7 @@ from pellicle.files import MARKER, new_folder, write_text
 from pellicle.mapping.map_result import Map
 from pellicle.reporting.drawing import save_figure
 from pellicle.reporting.json_record import indented
-from pellicle.reporting.map_summary import dataset_of, summarise
+from pellicle.reporting.map_summary import summarise
 from pellicle.reporting.map_text import cube_json, cube_report
 
 if TYPE_CHECKING:
@@ -29,6 +29,6 @@ def write_cube_map(folder: str | os.PathLike[str], made: Dataset | Map) -> Path:
         target / MARKER, indented(cube_json(made, summary)), overwrite=True
     )  # first: it marks the folder
     write_text(target / "report.txt", cube_report(made, summary), overwrite=True)
-    for name, figure in figures(dataset_of(made), summary):
+    for name, figure in figures(made, summary):
         save_figure(figure, target / f"{name}.png", overwrite=True)
     return target

@@ -1,11 +1,12 @@
-"""Report, figure and folder of any result: a fit, a posterior, a comparison, repeats, a plan, or a cost."""
+"""Report, figure and folder of any result: a fit, a posterior, a comparison, a map, a plan, or a cost."""
 
 from __future__ import annotations
 
 import os
+import sys
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeGuard
 
 from pellicle.accuracy.cost import Cost
 from pellicle.accuracy.surface import SurfaceCost
@@ -13,6 +14,7 @@ from pellicle.effects.plan import Plan
 from pellicle.fitting.comparison import Comparison
 from pellicle.fitting.repeated_measurements import Repeats
 from pellicle.fitting.result import Fit
+from pellicle.mapping.picture import ThicknessMap
 from pellicle.reporting import (
     comparison,
     cost_figure,
@@ -21,6 +23,7 @@ from pellicle.reporting import (
     fit_figure,
     fit_text,
     folders,
+    picture_map,
     plans,
     posterior,
     repeats,
@@ -30,14 +33,22 @@ from pellicle.sampling.result import Posterior, verdict
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from pellicle.mapping.map_result import Map
+
 AnyCost = Cost | SurfaceCost
 
 
-def report(result: Fit | Posterior | Comparison | Repeats | Plan | AnyCost) -> str:
+def _is_map(result: object) -> TypeGuard[Map]:
+    """True for the map of a cube, whose module needs an optional package: no import, no such object."""
+    module = sys.modules.get("pellicle.mapping.map_result")
+    return module is not None and isinstance(result, module.Map)
+
+
+def report(result: Fit | Posterior | Comparison | Repeats | Plan | AnyCost | Map | ThicknessMap) -> str:
     """Format a result as plain text.
 
-    **Arguments:** `result` of `pl.fit`, `pl.sample`, `pl.compare`, `pl.fitting.repeats`, `pl.plan` or
-    `pl.cost`.
+    **Arguments:** `result` of `pl.fit`, `pl.sample`, `pl.compare`, `pl.fitting.repeats`, `pl.plan`, `pl.cost`
+    or `pl.map`.
 
     **Returns:** the text that the command line prints: the verdict first, then the numbers behind it.
 
@@ -63,14 +74,21 @@ def report(result: Fit | Posterior | Comparison | Repeats | Plan | AnyCost) -> s
             return plans.report(result)
         case Cost() | SurfaceCost():
             return cost_text.text(result)
+        case ThicknessMap():
+            return picture_map.report(result)
+    if _is_map(result):
+        from pellicle.reporting.map_text import cube_report
+
+        return cube_report(result)
     raise TypeError(f"a {type(result).__name__} has no report; fits, posteriors and plans have")
 
 
-def plot(result: Fit | Posterior | AnyCost) -> Figure:
+def plot(result: Fit | Posterior | AnyCost | Map | ThicknessMap) -> Figure:
     """Draw a result.
 
     **Arguments:** `result` of `pl.fit` (data, fit, residuals; of films also misfit against thickness, n and
-    k), `pl.sample` (corner plot) or `pl.cost` (error against time).
+    k), `pl.sample` (corner plot), `pl.cost` (error against time) or `pl.map` (of a cube: the first
+    parameter, its standard error, status and histogram).
 
     **Returns:** a Matplotlib figure, which a notebook shows and `figure.savefig(path)` writes.
 
@@ -83,14 +101,23 @@ def plot(result: Fit | Posterior | AnyCost) -> Figure:
             return posterior.corner_figure(result)
         case Cost() | SurfaceCost():
             return cost_figure.draw(result)
+        case ThicknessMap():
+            return picture_map.draw(result)
+    if _is_map(result):
+        from pellicle.reporting.map_figures import figures
+
+        return next(figures(result))[1]
     raise TypeError(f"a {type(result).__name__} has no figure; fits, posteriors and costs have")
 
 
-def save(result: Fit | Posterior | Comparison | Repeats | AnyCost, folder: str | os.PathLike[str]) -> Path:
+def save(
+    result: Fit | Posterior | Comparison | Repeats | AnyCost | Map | ThicknessMap,
+    folder: str | os.PathLike[str],
+) -> Path:
     """Write a result into a folder, as the command line does: report, JSON record, tables and figures.
 
-    **Arguments:** `result` of `pl.fit`, `pl.sample`, `pl.compare`, `pl.fitting.repeats` or `pl.cost`;
-    `folder`, which is made if it is absent. Files of an earlier result in it are replaced.
+    **Arguments:** `result` of `pl.fit`, `pl.sample`, `pl.compare`, `pl.fitting.repeats`, `pl.cost` or
+    `pl.map`; `folder`, which is made if it is absent. Files of an earlier result in it are replaced.
 
     **Returns:** the folder.
 
@@ -108,10 +135,16 @@ def save(result: Fit | Posterior | Comparison | Repeats | AnyCost, folder: str |
             return repeats.write_repeats(folder, result)
         case Cost() | SurfaceCost():
             return cost_files.write_cost(folder, result)
+        case ThicknessMap():
+            return picture_map.write_map(folder, result)
+    if _is_map(result):
+        from pellicle.reporting.map_files import write_cube_map
+
+        return write_cube_map(folder, result)
     raise TypeError(f"a {type(result).__name__} has no files; fits, posteriors and costs have")
 
 
-def html(result: Fit | Posterior | Comparison | Repeats | AnyCost) -> str:
+def html(result: Fit | Posterior | Comparison | Repeats | AnyCost | Map) -> str:
     """Format a result for a notebook: verdict, a table of free parameters, and the report to unfold."""
     match result:
         case Fit():
