@@ -213,8 +213,9 @@ class _Step(NamedTuple):
 
 def _joint(cube: Cube, scene: Scene, pixels: int) -> LampCurve:
     """Lamp curve fitted together with the films of a sample of pixels."""
-    own_scale = isinstance(scene.instrument.scale, Drift)
-    if not own_scale or scene.instrument.scale.degree == 0:
+    scale: Any = scene.instrument.scale
+    own_scale = isinstance(scale, Drift)
+    if not own_scale or scale.degree == 0:
         scene = eqx.tree_at(lambda s: s.instrument, scene, replace(scene.instrument, scale=SLOW_SCALE))
     sample = _sample(cube, pixels)
     bands = cube.wavelength.size
