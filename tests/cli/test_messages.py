@@ -9,12 +9,13 @@ from dataclasses import fields
 import pytest
 
 from pellicle.cli import main
+from pellicle.cli.cube_flags import CubeFlags
 from pellicle.cli.flags import ReadingFlags, SceneFlags
 from pellicle.cli.messages import FLAGS, as_flags
 from pellicle.cli.session import say
 from pellicle.cli.verbose import log_to_stderr
 
-COMMANDS = ("fit", "sample", "simulate", "plan", "compare", "cost", "export", "chart", "map", "materials")
+COMMANDS = ("fit", "sample", "simulate", "plan", "compare", "cost", "export", "chart", "map", "read")
 
 
 @pytest.mark.parametrize(
@@ -75,7 +76,9 @@ def test_several_arguments_in_one_sentence():
 def test_every_flag_of_the_table_exists_and_no_flag_of_a_scene_or_a_file_is_missing(pellicle):
     helps = "".join(pellicle(command, "--help").out for command in COMMANDS).replace("--", " --").split()
     assert {flag for flag in FLAGS.values() if flag not in helps} == set()
-    assert {field.name for kind in (SceneFlags, ReadingFlags) for field in fields(kind)} <= FLAGS.keys()
+    assert {
+        field.name for kind in (SceneFlags, ReadingFlags, CubeFlags) for field in fields(kind)
+    } <= FLAGS.keys()
 
 
 def test_messages_on_stderr(monkeypatch, capsys):

@@ -20,41 +20,22 @@ OF_RECIPE = ("signal", "polarisation", "noise", "range", "wavelength_unit", "sig
 
 
 @dataclass(frozen=True)
-class CubeFlags(Flags):
-    """Flags for reading a cube, None where not given; a recipe's [data] supplies some."""
+class CubeOnlyFlags(Flags):
+    """Flags that only a cube has, None where not given."""
 
     variable: Annotated[
-        str | None, flag(READING, "Name of the variable to read, where a file has several.")
+        str | None, flag(READING, "Name of the variable to read, where a cube has several.")
     ] = None
     wavelengths: Annotated[
         str | None,
         flag(
             READING,
-            "Wavelengths of the bands, where the file has none: START:STOP:STEP, numbers between commas, "
+            "Wavelengths of a cube's bands, where its file has none: START:STOP:STEP, numbers with commas, "
             "or a file with one a line.",
         ),
     ] = None
-    wavelength_unit: Annotated[str | None, flag(READING, "nm, um, A, eV, cm-1 or THz.")] = None
-    signal: Annotated[str | None, flag(READING, "R, T or psi-delta, if the file does not name it.")] = None
-    signal_unit: Annotated[str | None, flag(READING, "fraction, percent or absorbance.")] = None
-    angle: Annotated[float | None, flag(READING, "Angle of incidence in degrees (the recipe's).")] = None
-    polarisation: Annotated[str | None, flag(READING, "s, p or unpolarised.")] = None
-    range: Annotated[
-        str | tuple[float, float] | None,
-        Parameter(group=READING, help="Wavelengths to use in nm.", metavar="LO:HI", negative="", n_tokens=1),
-    ] = None
     without_bands: Annotated[
         str | None, flag(READING, "Dead bands to leave out in nm: LO:HI or single ones, as in 755:775,820.")
-    ] = None
-    noise: Annotated[
-        float | str | None,
-        Parameter(
-            group=READING,
-            help='Standard deviation of every point (degrees for psi-delta), "2 %" of the signal, or the '
-            "name of a variable.",
-            metavar="SIGMA",
-            negative="",
-        ),
     ] = None
     mask: Annotated[
         str | None,
@@ -62,7 +43,7 @@ class CubeFlags(Flags):
     ] = None
     white_frame: Annotated[
         str | None,
-        flag(FRAMES, "Counts of a white reference: a frame, a line or one spectrum; the cube is counts too."),
+        flag(FRAMES, "Counts of a white reference: an image, a line or a spectrum; the cube is counts too."),
     ] = None
     dark_frame: Annotated[str | None, flag(FRAMES, "Counts without light, in the same forms.")] = None
     white_reflectance: Annotated[
@@ -75,6 +56,33 @@ class CubeFlags(Flags):
     ] = None
     saturation: Annotated[
         float | None, flag(FRAMES, "Counts from which a pixel is saturated (the largest of its type).")
+    ] = None
+
+
+@dataclass(frozen=True)
+class CubeFlags(CubeOnlyFlags):
+    """Flags for reading a cube, None where not given; a recipe's [data] supplies some."""
+
+    wavelength_unit: Annotated[str | None, flag(READING, "nm, um, A, eV, cm-1 or THz.")] = None
+    signal: Annotated[str | None, flag(READING, "R, T or psi-delta, if the file does not name it.")] = None
+    signal_unit: Annotated[
+        str | None, flag(READING, "fraction, percent, absorbance, or the stored number that stands for 1.")
+    ] = None
+    angle: Annotated[float | None, flag(READING, "Angle of incidence in degrees (the recipe's).")] = None
+    polarisation: Annotated[str | None, flag(READING, "s, p or unpolarised.")] = None
+    range: Annotated[
+        str | tuple[float, float] | None,
+        Parameter(group=READING, help="Wavelengths to use in nm.", metavar="LO:HI", negative="", n_tokens=1),
+    ] = None
+    noise: Annotated[
+        float | str | None,
+        Parameter(
+            group=READING,
+            help='Standard deviation of every point (degrees for psi-delta), "2 %" of the signal, or the '
+            "name of a variable.",
+            metavar="SIGMA",
+            negative="",
+        ),
     ] = None
 
 

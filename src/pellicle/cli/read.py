@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from pellicle.cli.flags import OUTPUT, ReadingFlags, flag, switch
+from pellicle.cli.cube_flags import CubeOnlyFlags
+from pellicle.cli.flags import OUTPUT, ReadingFlags, flag, given, switch
 from pellicle.cli.messages import as_flags
 from pellicle.cli.session import say, start
-from pellicle.errors import UsageError
+from pellicle.errors import DataError, UsageError
 
 if TYPE_CHECKING:
     from pellicle.data.colours import Colours
+    from pellicle.data.cube import Cube
     from pellicle.data.spectrum import Spectrum
 
 SUFFIXES = {"csv": ".csv", "netcdf": ".nc", "nexus": ".nxs"}
@@ -21,8 +24,9 @@ GOOD, BAD_DATA = 0, 3
 
 
 def read(
-    *data: Annotated[str, Parameter(help="Files of measurements.")],
+    *data: Annotated[str, Parameter(help="Files of measurements, or cubes of spectra.")],
     reading: Annotated[ReadingFlags | None, Parameter(name="*")] = None,
+    cubes: Annotated[CubeOnlyFlags | None, Parameter(name="*")] = None,
     out: Annotated[
         str | None, flag(OUTPUT, "Folder for the spectra and their figures; existing files stay.")
     ] = None,
@@ -31,11 +35,13 @@ def read(
     ] = "csv",
     json: Annotated[bool, switch(OUTPUT, "Print one JSON object per spectrum.")] = False,
 ) -> int:
-    """Show what is understood of files and pictures, without fitting, and convert them.
+    """Show what is understood of files, pictures and cubes, without fitting, and convert spectra.
 
     Example: pellicle read wafer.txt --out converted --to csv,nexus
 
     Example: pellicle read photo.png --region 120,80,40,40
+
+    Example: pellicle read stack.tif --wavelengths 400:900:5 --white-frame white.tif
     """
     flags = reading or ReadingFlags()
     if not data:
@@ -50,11 +56,16 @@ def read(
     worst, found = GOOD, []
     for path in data:
         try:
-            found += _measurements(path, flags)
+            found += _measurements(path, flags, cubes or CubeOnlyFlags())
         except ValueError as error:
             worst = BAD_DATA
             _report_error(path, as_flags(str(error)), json)
             continue
+    if out is not None:
+        from pellicle.data.cube import Cube
+
+        if any(isinstance(one, Cube) for one in found):
+            raise UsageError("--out writes spectra, and a cube stays in its file: leave it out")
     for measurement in found:
         _show(measurement, json)
     if out is not None:
@@ -66,14 +77,49 @@ def read(
     return worst
 
 
-def _measurements(path: str, flags: ReadingFlags) -> list[Spectrum] | list[Colours]:
-    """Every spectrum of a file, or the colours of every film in it."""
+def _measurements(
+    path: str, flags: ReadingFlags, of_cube: CubeOnlyFlags
+) -> list[Spectrum] | list[Colours] | list[Cube]:
+    """Every spectrum of a file, the colours of every film in it, or its cube."""
     from pellicle.cli.colours import is_of_colours, read_films, refuse_camera
+    from pellicle.data.cubes.detect import is_cube
 
+    if of_cube.given() or is_cube(Path(path)):
+        return [_cube(path, flags, of_cube)]
     if is_of_colours(path, flags):
         return read_films(path, flags, angle=flags.angle)
     refuse_camera(path, flags)
-    return _spectra(path, flags)
+    try:
+        return _spectra(path, flags)
+    except DataError:
+        if not _is_hdf5(path):
+            raise
+        try:  # a NetCDF file that is no spectrum may be a cube
+            return [_cube(path, flags, of_cube)]
+        except ValueError as error:
+            reason = error
+        if "no axis" in str(reason):
+            raise
+        raise reason from None
+
+
+def _is_hdf5(path: str) -> bool:
+    from pellicle.data.cubes.xarray_cubes import is_netcdf
+
+    return is_netcdf(Path(path))
+
+
+def _cube(path: str, flags: ReadingFlags, of_cube: CubeOnlyFlags) -> Cube:
+    """The cube of a file; flags of other files are refused."""
+    from pellicle.cli.cube_flags import CubeFlags, read
+
+    shared = {name: value for name, value in vars(flags).items() if value is not None}
+    known = {field.name for field in fields(CubeFlags)}
+    if wrong := sorted(set(shared) - known):
+        raise UsageError(
+            f"{path}: is a cube of spectra, which {given(wrong[:1])[0]} does not apply to: leave it out"
+        )
+    return read(path, CubeFlags(**{**vars(of_cube), **shared}))
 
 
 def _spectra(path: str, flags: ReadingFlags) -> list[Spectrum]:
@@ -103,12 +149,15 @@ def _report_error(path: str, message: str, as_json: bool) -> None:
         print(one_line(error_record(message, BAD_DATA)), flush=True)
 
 
-def _show(measured: Spectrum | Colours, as_json: bool) -> None:
+def _show(measured: Spectrum | Colours | Cube, as_json: bool) -> None:
     from pellicle.data.colours import Colours
+    from pellicle.data.cube import Cube
     from pellicle.reporting.json_record import one_line
 
     if isinstance(measured, Colours):
         from pellicle.reporting.colours_text import describe, to_json
+    elif isinstance(measured, Cube):
+        from pellicle.reporting.cube_text import describe, to_json
     else:
         from pellicle.reporting.spectrum_text import describe, to_json
     of: Any = measured

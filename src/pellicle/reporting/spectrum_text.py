@@ -11,7 +11,7 @@ from pellicle.reporting.json_record import number, versions
 from pellicle.reporting.plain_text import facts
 
 SCHEMA = "pellicle.spectrum/1"
-_QUANTITIES = {
+QUANTITIES = {
     "R": "reflectance R",
     "T": "transmittance T",
     "psi-delta": "ellipsometry, psi and delta",
@@ -28,7 +28,7 @@ def describe(spectrum: Spectrum, notes: tuple[str, ...] | None = None) -> str:
     nm, angles = spectrum.wavelength, _angles(spectrum)
     steps = np.diff(np.unique(nm))
     reach = f"{nm[0]:g} to {nm[-1]:g} nm, every {np.median(steps):.3g} nm" if steps.size else f"{nm[0]:g} nm"
-    quantity = _QUANTITIES[spectrum.signal] + ("" if spectrum.calibrated else ", scale unknown")
+    quantity = QUANTITIES[spectrum.signal] + ("" if spectrum.calibrated else ", scale unknown")
     if spectrum.delta is None and spectrum.signal != "counts":
         quantity += f", {spectrum.polarisation} light"
     rows = [

@@ -9,6 +9,8 @@ from pellicle.data.cubes.raw_cube import Asked, RawCube
 from pellicle.data.read_picture import picture_format
 from pellicle.errors import DataError
 
+LARGEST_SPECTRUM = 2**27
+"""Bytes of a larger HDF5 file are no spectrum's."""
 READ = "zarr, NetCDF, ENVI (.hdr), TIFF stacks, .npy, .npz, and folders of spectra with a table of file, x, y"
 
 
@@ -31,6 +33,21 @@ def read_raw(path: Path, asked: Asked) -> RawCube:
     if picture_format(path) is None and spectra_folder.table_of(path) is not None:
         return spectra_folder.read_folder(path, asked)
     raise DataError(f"{path}: is no cube that pellicle reads ({READ}): convert it to one of these")
+
+
+def is_cube(path: Path) -> bool:
+    """True for a file or folder that only a reader of cubes understands; HDF5 may also be a spectrum."""
+    if not path.exists():
+        return False
+    if path.is_dir():
+        return xarray_cubes.is_zarr(path) or spectra_folder.table_of(path) is not None
+    if numpy_files.is_numpy(path) or envi.header_of(path) is not None:
+        return True
+    if tiff_stacks.is_tiff(path):
+        return not tiff_stacks.is_colour_picture(path)
+    if xarray_cubes.is_netcdf(path):
+        return xarray_cubes.is_classic(path) or path.stat().st_size > LARGEST_SPECTRUM
+    return picture_format(path) is None and spectra_folder.table_of(path) is not None
 
 
 def is_picture(path: Path) -> bool:

@@ -38,6 +38,12 @@ def is_netcdf(path: Path) -> bool:
     return head == _HDF5 or head.startswith(_CLASSIC)
 
 
+def is_classic(path: Path) -> bool:
+    """True for NetCDF 3, which has its own format."""
+    with open_binary(path) as file:
+        return file.read(3) == _CLASSIC
+
+
 def is_zarr(path: Path) -> bool:
     """True for the folder of a zarr store."""
     return any((path / name).exists() for name in _STORES)
@@ -45,8 +51,7 @@ def is_zarr(path: Path) -> bool:
 
 def read_netcdf(path: Path, asked: Asked) -> RawCube:
     """Read a NetCDF file. Raises DataError for a damaged one, UsageError without the packages."""
-    with open_binary(path) as file:
-        engine = "scipy" if file.read(3) == _CLASSIC else "h5netcdf"
+    engine = "scipy" if is_classic(path) else "h5netcdf"
     dataset = _opened(path, lambda xarray: xarray.open_dataset(path, engine=engine, chunks=None, cache=False))
     return xarray_to_raw(dataset, str(path), asked, (path,))
 
