@@ -1,6 +1,7 @@
 """Fits of pixels without JAX, for tests of what is around them; worker processes import this module."""
 
 import os
+import pickle
 import signal
 import time
 from dataclasses import dataclass
@@ -23,6 +24,16 @@ class OnDisk:
 
     def __getitem__(self, where):
         return np.load(self.path, mmap_mode="r")[where]
+
+
+def save(path, arguments):
+    """Write arguments for another process."""
+    path.write_bytes(pickle.dumps(arguments))
+
+
+def load(path):
+    """Read arguments that another process wrote."""
+    return pickle.loads(Path(path).read_bytes())
 
 
 def fit(model, cube, where):

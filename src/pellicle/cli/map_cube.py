@@ -103,8 +103,9 @@ def map_cube(
         )
         say(f"interrupted after {progress.done} of {progress.total} pixels{kept}")
         return INTERRUPTED
-    _say_speed(made, folder)
-    print(one_line(cube_json(made.dataset)) if json else cube_report(made.dataset), flush=True)
+    if made.run is not None and made.run.earlier:
+        say(f"{made.run.earlier} pixels are from an earlier run in {folder}; --overwrite fits them again")
+    print(one_line(cube_json(made)) if json else cube_report(made), flush=True)
     if folder is not None:
         _write(folder, made)
     return CONVERGED if made.decided >= MOST_DECIDED else UNCLEAR
@@ -122,22 +123,9 @@ def _mark(folder: Path) -> None:
         write_text(target / MARKER, indented(begun))
 
 
-def _say_speed(made: Map, folder: Path | None) -> None:
-    run = made.run
-    if run is None:
-        return
-    if run.earlier:
-        say(f"{run.earlier} pixels are from an earlier run in {folder}; --overwrite fits them again")
-    if run.pixels:
-        rate = run.pixels / max(run.seconds - run.compiling, 1e-3)
-        compiled = f"; {run.compiling:.1f} s more to compile, in the first run of a kind of scene"
-        where = f"{run.workers} processes" if run.workers > 1 else "one process"
-        say(f"{run.pixels} pixels in {where}, {rate:.3g} pixels/s" + compiled * (run.compiling > 0.1))
-
-
 def _write(folder: Path, made: Map) -> None:
     from pellicle.reporting.map_files import write_cube_map
 
     made.to_netcdf(folder / NETCDF, overwrite=True)
-    write_cube_map(folder, made.dataset)
+    write_cube_map(folder, made)
     say(f"{folder}: map.zarr, map.nc, report and figures written")

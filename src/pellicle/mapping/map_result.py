@@ -70,10 +70,7 @@ class Map(PlotMixin):
         """All variables as an xarray Dataset of dask arrays, which are read when they are computed."""
         import xarray
 
-        data = xarray.open_zarr(self.path, chunks={})
-        if self.run is not None and self.run.pixels and not self.run.earlier:
-            data.attrs["seconds"] = self.run.seconds
-        return data
+        return xarray.open_zarr(self.path, chunks={})
 
     def __getitem__(self, name: str) -> xarray.DataArray:
         """A variable by its name, or the best values of a parameter by the parameter's name."""
