@@ -8,7 +8,7 @@ scan predicts.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from logging import getLogger
 from typing import NamedTuple
 
@@ -34,10 +34,11 @@ _SCALE = 0.02
 because differences of χ² count less by what a scene may leave out."""
 _ROUNDING = 1e-5
 """Error of a predicted deviance as a share of the data's square: the table is in single precision."""
-_SETTLED = 1e-10
-"""Fall of the deviance, in units of the noise, that may be left in a minimum: a 1e-5 of a standard error."""
-_ROUNDS, _MORE_ROUNDS = 4, 30
-"""Rounds of steps for each candidate, and of more for the best of a pixel."""
+_NEAR, _SETTLED = 1e-5, 1e-10
+"""Fall of the deviance, in units of the noise, that may be left in a minimum before and after its last step:
+the second is 1e-5 of a standard error."""
+_ROUNDS, _MORE_ROUNDS, _LAST = 4, 40, 4
+"""Rounds of steps for each candidate, of more for the best of a pixel, and most repetitions of its last."""
 
 
 class PixelSearch(NamedTuple):
@@ -54,6 +55,11 @@ class PixelSearch(NamedTuple):
     @property
     def static(self) -> polish.Static:
         return self.view.form, self.problem.coordinates
+
+    def noise(self, deviance: np.ndarray) -> np.ndarray:
+        """Size of the noise in the unit of a deviance: where the weights are right, 1."""
+        independent = self.view.independent * float(self.view.data.independent_fraction)
+        return np.maximum(deviance / independent, 1.0)
 
     @property
     def block(self) -> int:
@@ -87,91 +93,107 @@ def _even_weight(data: PixelData, channels: int) -> np.ndarray:
 
 def minima(search: PixelSearch, data: PixelData) -> PixelMinima:
     """The best distinct minima of each pixel; to be called with JAX in float64."""
-    pixels, count = len(data.values), len(search.problem.parameters)
-    pieces = []
+    pixels, points = data.values.shape
+    count, nodes = len(search.problem.parameters), len(search.thickness)
     valid = np.flatnonzero(np.sum(data.weight > 0, axis=1) >= 2)
-    for first in range(0, len(valid), search.block):
-        own = valid[first : first + search.block]
-        pieces.append(_block(search, data.of(own)))
+    found = _minima(search, data.of(valid) if len(valid) < pixels else data) if len(valid) else None
+    if found is not None and len(valid) == pixels:
+        return found
+    orders, curve = (pixels, ORDERS), (pixels, points)
     result = PixelMinima(
-        values=np.full((pixels, ORDERS, count), np.nan),
-        units=np.full((pixels, ORDERS, count), np.nan),
-        deviance=np.full((pixels, ORDERS), np.inf),
-        misfit=np.full((pixels, ORDERS), np.inf),
-        converged=np.zeros((pixels, ORDERS), bool),
-        model=np.full(data.values.shape, np.nan),
-        profile=np.full((pixels, len(search.thickness)), np.nan),
+        values=np.full((*orders, count), np.nan),
+        units=np.full((*orders, count), np.nan),
+        deviance=np.full(orders, np.inf),
+        misfit=np.full(orders, np.inf),
+        converged=np.zeros(orders, bool),
+        model=np.full(curve, np.nan),
+        profile=np.full((pixels, nodes), np.nan),
         thickness=search.thickness,
-        slope=np.full((*data.values.shape, count), np.nan),
-        signal=np.full(data.values.shape, np.nan),
-        gain=np.full(data.values.shape, np.nan),
-        offset=np.full(data.values.shape, np.nan),
+        signal=np.full(curve, np.nan),
+        gain=np.full(curve, np.nan),
+        offset=np.full(curve, np.nan),
+        slope=np.full((*curve, count), np.nan),
     )
-    if pieces:
-        for name, column in zip(PixelMinima._fields, zip(*pieces, strict=True), strict=True):
-            if name != "thickness":
-                getattr(result, name)[valid] = np.concatenate(column)
+    for name, rows in zip(PixelMinima._fields, found or (), strict=False):
+        if name != "thickness":
+            getattr(result, name)[valid] = rows
     return result
 
 
-def _block(search: PixelSearch, data: PixelData) -> PixelMinima:
-    """Minima of at most `search.block` pixels, all with data."""
-    problem, pixels = search.problem, np.arange(len(data.values))
-    units, predicted, profile, rounding = _candidates(search, data)
-    exact = polish.in_rows(polish.explained, search.static, search.common, data, units)[0]
-    exact = np.where(np.isfinite(exact), exact, np.inf)
-    optimistic = np.minimum(predicted, exact)
-    size, candidates = optimistic.shape
-    deviance, misfit = np.where(np.isfinite(exact), optimistic, np.inf), np.array(exact)
-    promise, tried = np.full((size, candidates), np.inf), np.zeros((size, candidates), bool)
-    independent = search.view.independent * float(search.view.data.independent_fraction)
-    best, fall = np.full(size, np.inf), np.zeros(size)
-    systematic = np.sum((_SCALE * data.weight * data.values) ** 2, axis=1)
+@dataclass
+class _Points:
+    """Points of pixels on their way to minima: `units` (pixels, candidates, parameters), with the deviance,
+    its part that goes with the weights, and the fall to come (pixels, candidates)."""
 
-    def polished(where: np.ndarray, rounds: int, fine: bool) -> None:
+    search: PixelSearch
+    data: PixelData
+    units: np.ndarray
+    deviance: np.ndarray
+    misfit: np.ndarray
+    promise: np.ndarray
+
+    def polish(self, where: np.ndarray, rounds: int, best: np.ndarray, *, coarse: bool = True) -> None:
+        """Polish the points `where`, as far as their distance to the `best` (pixels,) asks if `coarse`."""
         at, which = np.nonzero(where)
-        tolerance = _SETTLED * np.maximum(best[at] / independent, 1.0)
-        coarse = None if fine else best[at]
         found = polish.settle(
-            *(search.static, search.common, data, at, units[at, which]),
+            *(self.search.static, self.search.common, self.data, at, self.units[at, which]),
             rounds=rounds,
-            tolerance=tolerance,
-            coarse=coarse,
+            tolerance=_NEAR * self.search.noise(best[at]),
+            coarse=best[at] if coarse else None,
         )
-        units[at, which], deviance[at, which], misfit[at, which], promise[at, which] = found
+        for mine, own in zip((self.units, self.deviance, self.misfit, self.promise), found, strict=True):
+            mine[at, which] = own
 
-    best = exact.min(axis=1)
-    if len(problem.parameters) > 1:
+    def end(self, lowest: np.ndarray) -> polish.Best:
+        """The last steps of the `lowest` points (pixels,), and the model there."""
+        static, common, pixels = self.search.static, self.search.common, np.arange(len(lowest))
+        best = polish.Best(
+            *polish.in_rows(polish.at_best, static, common, self.data, self.units[pixels, lowest])
+        )
+        for _ in range(_LAST):
+            left = np.flatnonzero(best.promise > _SETTLED * self.search.noise(best.deviance))
+            if not len(left):
+                break
+            again = polish.in_rows(polish.at_best, static, common, self.data.of(left), best.units[left])
+            for mine, own in zip(best, again, strict=True):
+                mine[left] = own
+        self.units[pixels, lowest], self.deviance[pixels, lowest] = best.units, best.deviance
+        self.misfit[pixels, lowest], self.promise[pixels, lowest] = best.misfit, best.promise
+        return best
+
+
+def _minima(search: PixelSearch, data: PixelData) -> PixelMinima:
+    """Minima of pixels that all have data."""
+    problem, pixels = search.problem, np.arange(len(data.values))
+    units, predicted, profile, rounding, alike = _candidates(search, data)
+    several = len(problem.parameters) > 1
+    optimistic = exact = predicted
+    if not alike:
+        exact = polish.in_rows(polish.explained, search.static, search.common, data, units)[0]
+        exact = np.where(np.isfinite(exact), exact, np.inf)
+        optimistic = np.minimum(predicted, exact)
+    points = _Points(
+        search, data, units, np.array(optimistic), np.array(exact), np.full(predicted.shape, np.inf)
+    )
+    if several:
         # along a valley of several parameters a linear step says little
-        polished(np.isfinite(optimistic), 1, False)
-        optimistic = np.where(np.isfinite(deviance), deviance, optimistic)
-    now = np.zeros((size, candidates), bool)
-    now[pixels, np.argmin(optimistic, axis=1)] = True
-    now[pixels, np.argmin(exact, axis=1)] = True
-    while now.any():
-        polished(now, _ROUNDS, False)
-        tried |= now
-        below = np.where(now, _root(optimistic) - _root(deviance), 0.0)
-        fall = np.maximum(fall, np.where(np.isfinite(below), below, 0.0).max(axis=1))
-        best = np.where(tried, deviance, np.inf).min(axis=1)
-        level = best + _CHANCE * np.maximum(best / independent, 1.0) + systematic + rounding
-        near = _root(optimistic) - _REACH * fall[:, None] < _root(level)[:, None]
-        now = near & ~tried & np.isfinite(optimistic)
-    fine = _SETTLED * np.maximum(best / independent, 1.0)[:, None]
-    lowest = np.argmin(np.where(tried, deviance, np.inf), axis=1)
-    first = (np.arange(candidates) == lowest[:, None]) & (promise > fine)
-    polished(first, _MORE_ROUNDS, True)
-    settled = promise <= np.maximum(fine, polish.COARSE * (deviance - best[:, None]))
-    settled[pixels, lowest] = promise[pixels, lowest] <= fine[:, 0]
+        points.polish(np.isfinite(optimistic), 1, exact.min(axis=1))
+        optimistic = np.where(np.isfinite(points.deviance), points.deviance, optimistic)
+    tried = _polish_all_near(points, optimistic, exact, rounding)
+    best = np.where(tried, points.deviance, np.inf)
+    lowest, best = np.argmin(best, axis=1), best.min(axis=1)
+    first = np.arange(tried.shape[1]) == lowest[:, None]
+    left = points.promise > _NEAR * search.noise(best)[:, None]
+    points.polish(first & left, _MORE_ROUNDS, best, coarse=False)
+    at_best = points.end(lowest)
+    near = _NEAR * search.noise(best)[:, None]
+    settled = points.promise <= np.maximum(near, polish.COARSE * (points.deviance - best[:, None]) * ~first)
     # along a valley of several parameters, points that have not settled are no minima
-    listed = settled if len(problem.parameters) > 1 else np.isfinite(deviance)
-    order = _distinct(problem.parameters, units, deviance, lowest, listed)
-    rows, here = pixels[:, None], np.maximum(order, 0)
-    absent = order < 0
-    ordered = np.where(absent[..., None], np.nan, units[rows, here])
-    at_best = polish.Best(*polish.in_rows(polish.at_best, search.static, search.common, data, ordered[:, 0]))
-    deviance, misfit = (np.where(absent, np.inf, x[rows, here]) for x in (deviance, misfit))
-    deviance[:, 0], misfit[:, 0] = at_best.deviance, at_best.misfit
+    listed = settled if several else np.isfinite(points.deviance)
+    order = _distinct(problem.parameters, points.units, points.deviance, lowest, listed)
+    rows, here, absent = pixels[:, None], np.maximum(order, 0), order < 0
+    ordered = np.where(absent[..., None], np.nan, points.units[rows, here])
+    deviance, misfit = (np.where(absent, np.inf, x[rows, here]) for x in (points.deviance, points.misfit))
     return PixelMinima(
         values=np.asarray(problem.values(ordered)),
         units=ordered,
@@ -181,35 +203,72 @@ def _block(search: PixelSearch, data: PixelData) -> PixelMinima:
         model=at_best.model,
         profile=profile - deviance[:, :1],
         thickness=search.thickness,
-        slope=at_best.slope,
         signal=at_best.signal,
         gain=at_best.gain,
         offset=at_best.offset,
+        slope=at_best.slope,
     )
+
+
+def _polish_all_near(
+    points: _Points, optimistic: np.ndarray, exact: np.ndarray, rounding: np.ndarray
+) -> np.ndarray:
+    """Polish all candidates that could be the best of their pixel or its rival; returns which they are.
+
+    As in `fitting.spectra.search`, residuals obey the triangle inequality: a candidate is left out where the
+    best is further away than `_REACH` times what polishing has brought in that pixel.
+    """
+    pixels, search, data = np.arange(len(exact)), points.search, points.data
+    systematic = np.sum((_SCALE * data.weight * data.values) ** 2, axis=1)
+    tried, now = np.zeros(exact.shape, bool), np.zeros(exact.shape, bool)
+    now[pixels, np.argmin(optimistic, axis=1)] = True
+    now[pixels, np.argmin(exact, axis=1)] = True
+    best, fall = exact.min(axis=1), np.zeros(len(exact))
+    while now.any():
+        points.polish(now, _ROUNDS, best)
+        tried |= now
+        below = np.where(now, _root(optimistic) - _root(points.deviance), 0.0)
+        fall = np.maximum(fall, np.where(np.isfinite(below), below, 0.0).max(axis=1))
+        best = np.where(tried, points.deviance, np.inf).min(axis=1)
+        level = best + _CHANCE * search.noise(best) + systematic + rounding
+        near = _root(optimistic) - _REACH * fall[:, None] < _root(level)[:, None]
+        now = near & ~tried & np.isfinite(optimistic)
+    return tried
 
 
 def _candidates(
     search: PixelSearch, data: PixelData
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, bool]:
     """Candidates (pixels, candidates, parameters), their predicted deviance, the profile along the thickness,
-    and the rounding error of the predictions."""
+    the rounding error of the predictions, and whether the predictions are of the pixels' own weights."""
     lookup, channels, count = search.lookup, search.view.channels, len(data.values)
     values, weight = data.values, _even_weight(data, channels)
     values = _filled(values, data.weight, lookup.weight, channels)
     if data.frame is not None:
         columns = values.reshape(count, -1, channels)
         values = np.einsum("...ij,...i->...j", data.frame, columns).reshape(count, -1)
-    values = values - search.dark
+    if search.dark:
+        values = values - search.dark
     seen = np.sqrt(float(search.view.data.independent_fraction)) * weight
     if search.layout.relative:
         values, seen = values / data.level[:, None], seen * data.level[:, None]
-    known = (lookup.weight > 0) & (weight > 0)
-    scale = np.sqrt(np.sum((seen * known) ** 2, axis=1) / np.maximum(known @ lookup.weight**2, 1e-300))
-    take = np.minimum(np.arange(search.block), count - 1)
-    found = scan(search.layout, lookup, values[take], scale[take])
-    units, deviance, profile = (np.array(x[:count], dtype=float) for x in found)
+    common = lookup.weight * (weight > 0)
+    scale = np.sqrt(
+        np.sum((seen * (common > 0)) ** 2, axis=1) / np.maximum(np.sum(common**2, axis=1), 1e-300)
+    )
+    pieces = []
+    for first in range(0, count, search.block):
+        take = np.minimum(np.arange(first, first + search.block), count - 1)
+        found = scan(search.layout, lookup, values[take], scale[take])
+        pieces.append([np.asarray(x)[: count - first] for x in found])
+    units, deviance, profile = (np.concatenate(x) for x in zip(*pieces, strict=True))
     square = np.sum((values * lookup.weight - lookup.known) ** 2, axis=1)
-    return units, deviance, profile, _ROUNDING * square * scale**2
+    alike = (
+        len(search.problem.parameters) == 1
+        and not (search.layout.relative or lookup.rotation.shape[1] or data.frame is not None)
+        and np.allclose(seen, scale[:, None] * lookup.weight, rtol=1e-3, atol=0.0)
+    )
+    return units, deviance.astype(float), profile, _ROUNDING * square * scale**2, bool(alike)
 
 
 def _filled(values: np.ndarray, weight: np.ndarray, common: np.ndarray, channels: int) -> np.ndarray:

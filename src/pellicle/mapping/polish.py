@@ -15,13 +15,15 @@ from pellicle.fitting.spectra import nuisance
 from pellicle.fitting.spectra.nuisance import Data
 from pellicle.fitting.spectra.view import SpectrumForm
 from pellicle.mapping.pixel_minima import PixelData
+from pellicle.optics.hoisting import compute_once
 from pellicle.scene.film import Scene
 from pellicle.scene.free import insert
 
 ROWS = 256
 """Starts, or pixels, of one call: all calls share a program."""
-EVALUATIONS = 3
-"""Evaluations of one call."""
+EVALUATIONS = 2
+"""Evaluations of one call: for most starts of a scan, two bring the solver so near that the next, which is
+done in any case for the model and its slopes, ends it."""
 COARSE = 1e-3
 """Fall of the deviance that may be left in a rival, as a share of its distance to the best."""
 
@@ -56,10 +58,13 @@ class Stepped(NamedTuple):
 
 
 class Best(NamedTuple):
-    """The model at the best minimum of each pixel, (pixels, points, ...), in the parameters' own units."""
+    """The best minimum of each pixel after one more step, as in `Stepped`, and the model with its slopes there,
+    in the parameters' own units, (pixels, points, ...)."""
 
+    units: Any
     deviance: Any
     misfit: Any
+    promise: Any
     model: Any
     gain: Any
     offset: Any
@@ -81,6 +86,12 @@ def _residual(static: Static, common: Common, row: PixelData, unit: Any) -> tupl
     prior = common.box.prior_rows(values)
     misfit = jnp.sum(found.residual[: data.values.size] ** 2)
     return (found.residual, prior), (found.deviance + jnp.sum(prior**2), misfit)
+
+
+def _quadratic(unit: Any, gradient: Any, hessian: Any) -> QuadraticModel:
+    """The Gauss-Newton model around a point of the unit cube."""
+    top, ends = jnp.diagonal(hessian), (jnp.zeros_like(unit), jnp.ones_like(unit))
+    return QuadraticModel(unit, gradient, hessian, 0 * hessian, top, *ends)
 
 
 @kept
@@ -117,7 +128,7 @@ def stepped(static: Static, common: Common, rows: PixelData, units: Any, damping
             new = trial, gradient, hessian, cost, aux
             state = jax.tree.map(lambda a, b: jnp.where(accept, a, b), new, state)
             damping = jnp.where(accept, damping / 10, jnp.maximum(10 * damping, 1e-3))
-            trial, predicted, left = quadratic(state).propose(damping, jnp.array(False))
+            trial, predicted, left = _quadratic(*state[:3]).propose(damping, jnp.array(False))
             return (state, trial, damping, jnp.stack([promise[1], left])), predicted[0]
 
         size = unit.size
@@ -135,20 +146,34 @@ def stepped(static: Static, common: Common, rows: PixelData, units: Any, damping
 
 @kept
 def at_best(static: Static, common: Common, rows: PixelData, units: Any) -> Best:
-    """Model and slopes of pixels at points `units` (pixels, parameters)."""
+    """One step of pixels from points `units` (pixels, parameters) next to their minima, and the model there.
+
+    The step is so small that the curves are those of the points before it.
+    """
     form, coordinates = static
 
     def one(row, unit):
         data = _of(common, row)
-        values = coordinates.values(common.box, unit)
-        prior = jnp.sum(common.box.prior_rows(values) ** 2)
-        signal, push = jax.linearize(lambda x: form.simulate(insert(common.scene, list(x)), data), values)
-        signal, push = jax.lax.optimization_barrier((signal, push))
-        slope = jax.vmap(push)(jnp.eye(values.size))
-        found = nuisance.solve(signal, data, common.scene.instrument)
-        misfit = jnp.sum(found.residual[: data.values.size] ** 2)
+
+        def fn(unit):
+            values = coordinates.values(common.box, unit)
+            signal = compute_once(form.simulate(insert(common.scene, list(values)), data))
+            found = nuisance.solve(signal, data, common.scene.instrument)
+            prior = common.box.prior_rows(values)
+            return (signal, found.residual, prior), (found, prior)
+
+        (signal, *residuals), push, (found, prior) = jax.linearize(fn, unit, has_aux=True)
+        signal, residuals, push, found = jax.lax.optimization_barrier((signal, residuals, push, found))
+        slope, *steep = jax.vmap(push)(jnp.eye(unit.size))
+        residual, steep = jnp.concatenate(residuals), jnp.concatenate(steep, axis=1)
+        model = _quadratic(unit, steep @ residual, steep @ steep.T)
+        moved, (fall, _), promise = model.propose(jnp.zeros(()), jnp.array(False))
+        fall = jnp.maximum(fall, 0.0)
+        misfit = jnp.sum(found.residual[: data.values.size] ** 2) - fall
+        span = common.box.upper - common.box.lower
+        deviance = found.deviance + jnp.sum(prior**2) - fall
         curves = found.model, found.gain, found.offset
-        return Best(found.deviance + prior, misfit, *curves, signal, slope.T)
+        return Best(moved, deviance, misfit, promise, *curves, signal, slope.T / span)
 
     return jax.vmap(one)(rows, units)
 
