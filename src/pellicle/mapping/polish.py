@@ -58,8 +58,8 @@ class Stepped(NamedTuple):
 
 
 class Best(NamedTuple):
-    """The best minimum of each pixel after one more step, as in `Stepped`, and the model with its slopes there,
-    in the parameters' own units, (pixels, points, ...)."""
+    """The best minimum of each pixel after one more step, as in `Stepped`; the model (pixels, points) there
+    and its slopes by the parameters in their own units."""
 
     units: Any
     deviance: Any
