@@ -1,8 +1,10 @@
-"""Maps show themselves as other results do: report, figure and folder."""
+"""Maps show themselves as other results do: report, figure and folder; their arrays outlive them."""
 
+import gc
 import json
 
 import pellicle as pl
+from pellicle.mapping.pixel_fits import CODES
 from pellicle.mapping.run import run_map
 from pellicle.reporting.map_text import cube_report
 
@@ -25,3 +27,11 @@ def test_a_map_is_reported_drawn_and_saved(cube, scene, fake_fits, tmp_path):
     assert record["schema"] == "pellicle.cube-map/1"
     assert record["status"] == {"converged": 45 * 32 - 2, "no-data": 2}
     assert {row["effect"] for row in record["plan"]} > {"absorption", "dispersion"}
+
+
+def test_arrays_of_a_map_in_a_temporary_folder_outlive_it(cube, scene, fake_fits, monkeypatch):
+    """Zarr takes a chunk whose file is absent as one without values, and says nothing."""
+    monkeypatch.setattr("pellicle.mapping.pixels.fit_pixels", fake_fits.fit)
+    dataset = pl.map(cube, scene).dataset
+    gc.collect()
+    assert int((dataset["status"] == CODES["converged"]).sum()) == 45 * 32 - 2

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 import shutil
-import weakref
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -174,7 +174,10 @@ class Map(PlotMixin):
         with replacing(path, overwrite=overwrite) as draft, config.set(scheduler="synchronous"):
             data.to_netcdf(draft, engine="h5netcdf")
 
-    def keep_until_deleted(self, folder: str) -> Map:
-        """Remove a temporary `folder` when this object is no longer used, and return the object."""
-        weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
+    def remove_at_exit(self, folder: str) -> Map:
+        """Remove a temporary `folder` when Python ends, and return the map.
+
+        Not earlier: arrays of `dataset` read it when they are computed, and outlive this object.
+        """
+        atexit.register(shutil.rmtree, folder, ignore_errors=True)
         return self

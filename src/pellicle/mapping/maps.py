@@ -52,7 +52,7 @@ def map_cube(
     made = run_map(cube, scene, out, **options)
     if neighbours:
         made = made.by_neighbours()
-    return made if folder is None else made.keep_until_deleted(folder)
+    return made if folder is None else made.remove_at_exit(folder)
 
 
 def cube_of(data: Any, scene: Scene, **reading: Any) -> Cube:
