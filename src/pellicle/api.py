@@ -44,6 +44,7 @@ from pellicle.synthetic.spectra import default_wavelengths, simulate_spectrum
 if TYPE_CHECKING:
     from pellicle.accuracy.cost import Cost
     from pellicle.accuracy.surface import SurfaceCost
+    from pellicle.mapping.lamp import LampCurve
     from pellicle.mapping.map_result import Map
     from pellicle.rendering.export import Export
 
@@ -55,6 +56,8 @@ _OF_A_CUBE = (
     "resume",
     "overwrite",
     "preview",
+    "lamp_curve",
+    "lamp_reference",
     "neighbours",
     "recipe",
     "progress",
@@ -426,6 +429,8 @@ def map(
     overwrite: bool = False,
     preview: bool = False,
     neighbours: bool = False,
+    lamp_curve: str | Sequence[int] | LampCurve | None = None,
+    lamp_reference: Scene | None = None,
     recipe: str = "",
     progress: Progress = quiet,
     **reading: Any,
@@ -456,6 +461,9 @@ def map(data: Any, scene: Scene, **options: Any) -> Any:
     - `preview`: fit only so many pixels, evenly spread, that it takes seconds; `out` must be another one.
     - `neighbours`: decide ambiguous pixels by the order of interference of their neighbours. The result is
       stored beside `out`, with "-neighbours" in its name.
+    - `lamp_curve`: a gain against wavelength that all pixels have in common, by which the cube is divided:
+      "joint", fitted together with the films of some pixels; "x,y,width,height", from a region whose scene is
+      `lamp_reference`, by default the bare substrate; or a `LampCurve`.
     - `recipe`: text of the scene's recipe, kept in the map.
     - `progress`: called with the name of a stage, the number of pixels done and their total.
     - `reading`: arguments of `pellicle.read_cube`, such as `wavelengths`, `signal_unit`, `noise`, `mask`.

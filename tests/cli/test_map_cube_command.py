@@ -152,3 +152,33 @@ def test_wrong_use(pellicle, words):
     pellicle(*words, "--workers", 2, "--scheduler", "tcp://host:1").refused(2, "--scheduler")
     pellicle(*words[:-2], "--overwrite").refused(2, "--out")
     pellicle("map", "absent.nc", *words[2:]).refused(3, "absent.nc")
+
+
+def test_a_lamp_curve_of_a_region_divides_the_cube(pellicle, words, fits, tmp_path):
+    with xarray.open_dataset(tmp_path / "wafer.nc") as cube:
+        lit = cube.R.values[2:8, 4:9]
+    ran = pellicle(*words, "--lamp-curve", "4,2,5,6", "--json")
+    assert ran.code == 0, ran.err
+    bare = (2.9**2 + 0.02**2) / (4.9**2 + 0.02**2)  # Fresnel, air on 3.9 + 0.02i
+    with (
+        xarray.open_dataset(tmp_path / "out/map.nc") as map,
+        xarray.open_dataset(tmp_path / "wafer.nc") as cube,
+    ):
+        gain = lit[..., 0].mean() / bare
+        np.testing.assert_allclose(map.thickness, 100 * cube.R[..., 0] / gain, rtol=1e-6)
+        assert "lamp curve of region 4,2,5,6" in " ".join(map.attrs["notes"])
+    again = pellicle(*words)
+    assert again.code == 2
+    assert "another input" in again.err
+
+
+def test_lamp_curves_that_contradict(pellicle, words, fits, tmp_path):
+    film = tmp_path / "film.toml"
+    for flags, text in (
+        (("--lamp-curve", "0,0,99,1"), "--lamp-curve 0,0,99,1 leaves the image"),
+        (("--lamp-curve", "0,0,4,4", "--lamp-reference", film), "--lamp-reference must be known"),
+        (("--lamp-reference", film), "--lamp-curve, x,y,width,height"),
+    ):
+        ran = pellicle(*words, *flags)
+        assert ran.code == 2
+        assert text in ran.err

@@ -19,6 +19,7 @@ from pellicle.errors import UsageError
 if TYPE_CHECKING:
     from pellicle.mapping.map_result import Map
     from pellicle.recipes.film import FilmRecipe
+    from pellicle.scene.film import Scene
 
 RUN = Group("Run", sort_key=2)
 MOST_DECIDED = 0.5
@@ -39,6 +40,17 @@ class RunFlags(Flags):
     neighbours: Annotated[
         bool | None,
         Parameter(group=RUN, help="Decide ambiguous pixels by the order of their neighbours.", negative=""),
+    ] = None
+    lamp_curve: Annotated[
+        str | None,
+        flag(
+            RUN,
+            "Divide all spectra by one lamp curve: joint, fitted with the films, or X,Y,WIDTH,HEIGHT, from a"
+            " region of known reflectance.",
+        ),
+    ] = None
+    lamp_reference: Annotated[
+        str | None, flag(RUN, "Recipe of the region of --lamp-curve (the bare substrate).")
     ] = None
     preview: Annotated[
         bool | None,
@@ -69,6 +81,7 @@ def map_cube(
     if folder is not None:
         check_folder(str(folder))
     scene = described.scene()
+    reference = None if run.lamp_reference is None else _known(run.lamp_reference)
     start()
     from pellicle import api
     from pellicle.reporting.json_record import one_line
@@ -93,6 +106,8 @@ def map_cube(
                 overwrite=bool(run.overwrite),
                 preview=bool(run.preview),
                 neighbours=bool(run.neighbours),
+                lamp_curve=run.lamp_curve,
+                lamp_reference=reference,
                 recipe=Path(described.path).read_text(encoding="utf-8"),
                 progress=progress,
                 **reading,
@@ -109,6 +124,17 @@ def map_cube(
     if folder is not None:
         _write(folder, made)
     return CONVERGED if made.decided >= MOST_DECIDED else UNCLEAR
+
+
+def _known(path: str) -> Scene:
+    """The scene of the recipe of a reference."""
+    from pellicle.recipes import read_recipe
+    from pellicle.recipes.film import FilmRecipe
+
+    described = read_recipe(path)
+    if not isinstance(described, FilmRecipe):
+        raise UsageError(f"{path}: --lamp-reference needs the recipe of a film, and this one is of a surface")
+    return described.scene()
 
 
 def _mark(folder: Path) -> None:

@@ -34,6 +34,8 @@ FLAGS = {
     "illuminant": "--illuminant",
     "joint": "--joint",
     "lamp": "--lamp",
+    "lamp_curve": "--lamp-curve",
+    "lamp_reference": "--lamp-reference",
     "layer": "--layer",
     "light": "--light",
     "loss": "--loss",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from pellicle.data.cube import Cube
 from pellicle.data.read_cube import read_cube
 from pellicle.errors import UsageError
 from pellicle.fitting.progress import Progress, quiet
+from pellicle.mapping.lamp import LampCurve, lamp_curve_of
 from pellicle.mapping.map_result import Map
 from pellicle.mapping.run import run_map
 from pellicle.scene.film import Scene
@@ -32,12 +34,18 @@ def map_cube(
     overwrite: bool = False,
     preview: bool = False,
     neighbours: bool = False,
+    lamp_curve: str | Sequence[int] | LampCurve | None = None,
+    lamp_reference: Scene | None = None,
     recipe: str = "",
     progress: Progress = quiet,
     **reading: Any,
 ) -> Map:
     """Fit every pixel of a cube; arguments as of `pellicle.map`."""
     cube = cube_of(data, scene, **reading)
+    if lamp_curve is not None:
+        cube = lamp_curve_of(lamp_curve, cube, scene, lamp_reference).correct(cube)
+    elif lamp_reference is not None:
+        raise UsageError("`lamp_reference` is of a region: give it as `lamp_curve`, x,y,width,height")
     factor = preview_factor(cube) if preview else 1
     options: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "recipe": recipe}
     options |= {"resume": resume, "overwrite": overwrite, "preview": factor, "progress": progress}
