@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -94,9 +95,8 @@ class Cube:
             along = dict.fromkeys(self.coords, where[0])
         coords = {name: values[along[name]] for name, values in self.coords.items() if name in along}
         mask = None if self.mask is None else self.mask[where]
-        return replace(
-            self, arrays=arrays, coords=coords, mask=mask, fingerprint=f"{self.fingerprint}{where}"
-        )
+        digest = hashlib.sha256(f"{self.fingerprint}{where}".encode()).hexdigest()
+        return replace(self, arrays=arrays, coords=coords, mask=mask, fingerprint=digest)
 
     def coarse(self, factor: int) -> Cube:
         """The cube of every `factor`-th pixel along each axis but that of time."""

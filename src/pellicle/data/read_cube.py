@@ -12,26 +12,17 @@ from typing import Any
 import numpy as np
 
 from pellicle.data.cube import Cube
-from pellicle.data.cubes import camera_frames as camera
 from pellicle.data.cubes.bands import chosen_bands, in_nm, parse_wavelengths
+from pellicle.data.cubes.calibration import Frames, camera_frames
 from pellicle.data.cubes.fingerprint import fingerprint
-from pellicle.data.cubes.frame_files import read_frame
 from pellicle.data.cubes.masks import read_mask
 from pellicle.data.cubes.pixel_array import Conversion, PixelArray, Scale, ShareOfSignal
-from pellicle.data.cubes.raw_cube import COUNTS, Asked, RawCube
-from pellicle.data.cubes.sampled_checks import (
-    check_angles,
-    check_level,
-    check_type,
-    live_bands,
-    refuse_counts,
-    sample,
-)
+from pellicle.data.cubes.raw_cube import Asked, RawCube
+from pellicle.data.cubes.sampled_checks import check_angles, check_level, check_type, live_bands, sample
 from pellicle.data.cubes.stored_arrays import ANGLE, Stored
+from pellicle.data.cubes.value_scale import value_scale
 from pellicle.data.noise_level import noise_level
-from pellicle.data.read_spectrum import read_spectrum
 from pellicle.data.spectrum import POLARISATIONS
-from pellicle.data.tabular.units import SIGNAL_UNITS, signal_unit
 from pellicle.errors import DataError, UsageError
 
 log = getLogger(__name__)
@@ -115,35 +106,34 @@ def read_cube(
         notes.append('signal: R, assumed; give `signal="T"` for transmittance')
     if (kind == "psi-delta") != ("delta" in raw.arrays):
         raise UsageError(f"{path}: psi-delta needs variables named psi and delta: name both in the file")
-    frames: _Frames | None = None
+    frames = None
     if white_frame is not None:
-        frames, told = _frames(raw, white_frame, dark_frame, saturation)
+        given_frames = (white_frame, dark_frame, white_reflectance, saturation)
+        frames, told = camera_frames(raw, nm, *given_frames)
         notes += told
     calibrated = raw.calibrated if calibrated is None else calibrated
-    scale, told = _scale(raw, kind, signal_unit, calibrated, frames is not None)
-    white = None if frames is None else _white(white_reflectance, nm, path)
-    unlike = _Values(raw, scale, frames, white)
-    values = {name: unlike.array(name, bands) for name in raw.arrays if name in ("values", "delta")}
-    seen = sample(values, len(raw.dims))
-    live, dead = live_bands(seen["values"], path)
-    if not live.all():
-        bands, seen = bands[live], {name: array[:, live] for name, array in seen.items()}
-    notes += [*told, *dead]
+    scale, told = value_scale(raw, kind, signal_unit, calibrated=calibrated, framed=frames is not None)
+    notes += [told] if told else []
+    used = None if mask is None else read_mask(mask, raw, raw.sizes)
+    converted = _Converted(raw, scale, frames)
+    names = [name for name in ("values", "delta") if name in raw.arrays]
+    seen = sample({name: converted.array(name, bands) for name in names}, len(raw.dims), used)
+    live, told = live_bands(seen["values"], int(np.prod(raw.sizes)), path)
+    notes += told
+    bands, seen = bands[live], {name: values[:, live] for name, values in seen.items()}
     if kind == "psi-delta":
         check_angles(seen["values"], seen["delta"], path)
     elif calibrated:
         check_level(seen["values"], kind, path)
-    arrays: dict[str, Any] = {name: unlike.array(name, bands) for name in values}
-    arrays |= _errors(unlike, arrays, bands, noise)
-    sizes = tuple(raw.arrays["values"].size(axis) for axis in raw.dims)
-    used = None if mask is None else read_mask(mask, raw, sizes)
+    arrays: dict[str, Any] = {name: converted.array(name, bands) for name in names}
+    arrays |= converted.errors(arrays, bands, noise)
     angles = raw.angle if angle is None else _stated_angle(raw, float(angle))
     facts = {
         "scale": scale,
         "signal": kind,
         "noise": noise,
         "mask": used,
-        "white": white,
+        "white": None if frames is None else frames.reflectance,
         "saturation": None if frames is None else frames.saturation,
         "variable": variable,
         "polarisation": polarisation,
@@ -151,7 +141,7 @@ def read_cube(
     beside = [Path(f) for f in (white_frame, dark_frame) if isinstance(f, str | os.PathLike)]
     facts |= {f"frame {i}": f for i, f in enumerate((white_frame, dark_frame)) if isinstance(f, np.ndarray)}
     axes = [nm[bands], bands, np.zeros(0) if angles is None else angles]
-    digest, told = fingerprint(raw, [*raw.files, *beside] if raw.files else [], facts, axes)
+    digest, told = fingerprint(raw, beside, facts, axes)
     cube = Cube(
         arrays,
         nm[bands],
@@ -172,39 +162,47 @@ def read_cube(
 
 
 @dataclass(frozen=True, eq=False)
-class _Frames:
-    """Frames of a camera and the counts of saturation."""
-
-    white: camera.Frame
-    dark: camera.Frame | None
-    saturation: float | None
-
-
-@dataclass(frozen=True, eq=False)
-class _Values:
-    """The arrays of a cube as they are converted."""
+class _Converted:
+    """The arrays of a cube as they are converted when a block is read."""
 
     raw: RawCube
     scale: Scale
-    frames: _Frames | None
-    white: np.ndarray | None
+    frames: Frames | None
 
     def array(self, name: str, bands: np.ndarray) -> PixelArray:
-        """Values of the bands, converted block by block."""
-        return self.of(self.raw.arrays[name], bands, measured=not name.endswith("sigma"))
+        """Measured values at some bands."""
+        steps: list[Conversion] = [self.scale]
+        if self.frames is not None:
+            steps.append(self.frames.at(bands))
+        return self._pixels(self.raw.arrays[name], bands, steps)
 
-    def of(self, stored: Stored, bands: np.ndarray, *, measured: bool) -> PixelArray:
-        """The same for any variable; errors are scaled only."""
-        raw = self.raw
-        sizes = tuple(raw.arrays["values"].size(axis) for axis in raw.dims)
-        steps: list[Conversion] = [self.scale if measured else replace(self.scale, absorbance=False)]
-        if self.frames is not None and self.white is not None:
-            frames, white = self.frames, self.white[bands]
-            steps.append(camera.Calibration(frames.white, frames.dark, white, bands, frames.saturation))
-        angles = None
-        if ANGLE in raw.arrays["values"].axes:
-            angles = np.arange(raw.arrays["values"].size(ANGLE))
-        return PixelArray(stored, raw.dims, sizes, bands, angles, steps)
+    def errors(
+        self, arrays: Mapping[str, PixelArray], bands: np.ndarray, noise: float | str | None
+    ) -> dict[str, Any]:
+        """Standard deviations by name: those given, or those of the file. Raises UsageError."""
+        raw, names = self.raw, {"values": "sigma", "delta": "delta_sigma"}
+        named = isinstance(noise, str) and noise in raw.others
+        if named or noise is None:
+            stored = {n: raw.arrays[n] for n in names.values() if n in raw.arrays}
+            if named:
+                stored = {"sigma": raw.others[str(noise)]}
+            elif self.frames is not None or self.scale.absorbance:
+                return {}  # of counts or absorbances, which are not converted
+            scale = replace(self.scale, absorbance=False)
+            return {name: self._pixels(one, bands, [scale]) for name, one in stored.items()}
+        level = noise_level(noise)
+        if level.relative and "delta" in arrays:
+            raise UsageError(
+                f"`noise` {level} is a share of the signal: give that of psi and delta in degrees"
+            )
+        if level.relative:
+            return {"sigma": ShareOfSignal(arrays["values"], level.value)}
+        return {names[name]: np.full(bands.size, level.value) for name in arrays}
+
+    def _pixels(self, stored: Stored, bands: np.ndarray, steps: list[Conversion]) -> PixelArray:
+        values = self.raw.arrays["values"]
+        angles = np.arange(values.size(ANGLE)) if ANGLE in values.axes else None
+        return PixelArray(stored, self.raw.dims, self.raw.sizes, bands, angles, steps)
 
 
 def _raw(source: Any, asked: Asked) -> RawCube:
@@ -220,101 +218,6 @@ def _raw(source: Any, asked: Asked) -> RawCube:
     if not isinstance(source, str | os.PathLike):
         raise UsageError(f"a cube must be a path, an xarray object or an array, not {type(source).__name__}")
     return detect.read_raw(Path(source), asked)
-
-
-def _frames(raw: RawCube, white: Any, dark: Any, saturation: float | None) -> tuple[_Frames, list[str]]:
-    if ANGLE in raw.arrays["values"].axes or "delta" in raw.arrays:
-        raise UsageError(
-            f"{raw.path}: `white_frame` is for a cube of counts against wavelength only: leave it out"
-        )
-    bright, note = camera.frame_of(read_frame(white, raw), raw, "white")
-    notes, black = [note], None
-    if dark is None:
-        notes.append("no dark frame: the counts without light are taken as zero")
-    else:
-        black, note = camera.frame_of(read_frame(dark, raw), raw, "dark")
-        notes.append(note)
-    level, note = camera.saturation_level(raw, bright, saturation)
-    return _Frames(bright, black, level), [*notes, *([note] if note else [])]
-
-
-def _white(reflectance: Any, nm: np.ndarray, path: str) -> np.ndarray:
-    """Reflectance of the white reference at all bands, as a fraction."""
-    if callable(reflectance):
-        values = np.asarray(reflectance(nm), dtype=float)
-    else:
-        reflectance = 1.0 if reflectance is None else reflectance
-        try:
-            values = np.full(nm.size, float(reflectance))
-        except ValueError:
-            known = read_spectrum(reflectance)
-            values = np.interp(nm, known.wavelength, known.values, left=np.nan, right=np.nan)
-    values = np.broadcast_to(values, nm.shape)
-    if np.any(values <= 0) or np.any(values > 1.5) or not np.any(np.isfinite(values)):
-        raise UsageError(
-            f"{path}: `white_reflectance` must be above 0 and a fraction at the wavelengths of the bands, "
-            "as in 0.99"
-        )
-    return values
-
-
-def _scale(
-    raw: RawCube, kind: str, asked: str | float | None, calibrated: bool, framed: bool
-) -> tuple[Scale, list[str]]:
-    """Conversion of the stored numbers, and notes. Raises DataError for counts without a scale."""
-    unit, factor = raw.signal_unit, 1.0 / raw.divisor
-    if framed or kind == "psi-delta":
-        if asked is not None:
-            reason = "frames of a camera give the scale" if framed else "psi and delta are in degrees"
-            raise UsageError(f"{raw.path}: {reason}; leave `signal_unit` out")
-        return Scale(factor, raw.missing), []
-    if asked is not None:
-        unit = signal_unit(str(asked))
-        try:
-            full = float(asked)
-        except ValueError:
-            full = 0.0
-        if full > 0 and str(asked) != "1":
-            return Scale(factor / full, raw.missing), [f"values divided by {full:g}, as given"]
-        if unit is None:
-            raise UsageError(
-                f"`signal_unit` must be one of {', '.join(SIGNAL_UNITS)}, or the number that stands for 1, "
-                f"not {asked!r}"
-            )
-    stored = raw.arrays["values"].data.dtype
-    whole = np.dtype(stored).kind in "iu" and raw.divisor == 1.0 and unit is None
-    if calibrated and (unit == COUNTS or whole):
-        raise refuse_counts(raw.path, stored)
-    if unit == "percent":
-        return Scale(factor / 100, raw.missing), ["signal unit: percent"]
-    if unit == "absorbance":
-        return Scale(factor, raw.missing, True), [f"signal unit: absorbance A, converted to {kind} = 10^-A"]
-    assumed = "" if unit == "fraction" else ", assumed"
-    return Scale(factor, raw.missing), [
-        f"signal unit: fraction{assumed}" if calibrated else "signal unit: arbitrary"
-    ]
-
-
-def _errors(
-    unlike: _Values, arrays: Mapping[str, PixelArray], bands: np.ndarray, noise: float | str | None
-) -> dict[str, Any]:
-    """Standard deviations: those given, or those of the file."""
-    raw = unlike.raw
-    names = {"values": "sigma", "delta": "delta_sigma"}
-    if isinstance(noise, str) and noise in raw.others:
-        return {"sigma": unlike.of(raw.others[noise], bands, measured=False)}
-    if noise is None:
-        if unlike.frames is not None or unlike.scale.absorbance:
-            return {}
-        return {name: unlike.array(name, bands) for name in names.values() if name in raw.arrays}
-    level = noise_level(noise)
-    if level.relative:
-        if "delta" in arrays:
-            raise UsageError(
-                f"`noise` {level} is a share of the signal: give that of psi and delta in degrees"
-            )
-        return {"sigma": ShareOfSignal(arrays["values"], level.value)}
-    return {names[name]: np.full(bands.size, level.value) for name in arrays}
 
 
 def _stated_angle(raw: RawCube, angle: float) -> np.ndarray:

@@ -1,5 +1,7 @@
 """Reflectance from counts with frames of white and dark, masks, errors, and dead bands."""
 
+import pickle
+
 import numpy as np
 import pytest
 import tifffile
@@ -177,3 +179,34 @@ def test_noise(values, refused):
         share.coarse(2).pixels((slice(0, 1), slice(0, 1)))["sigma"][0], 0.02 * values[1, 1], rtol=1e-6
     )
     refused(values, "`noise`", error=UsageError, wavelengths=NM, noise=-1)
+
+
+def test_a_small_film_on_an_empty_background():
+    """No block of the sample meets it: the cube is read up to the first line with values."""
+    large = np.full((300, 300, 20), np.nan, "f4")  # 1.8 million values
+    large[40:43, 40:43] = 0.3
+    nm = np.linspace(400, 800, 20)
+    assert read_cube(large, wavelengths=nm).wavelength.size == 20
+    mask = np.zeros((300, 300), bool)
+    mask[40:43, 40:43] = True
+    large[0] = 1000.0  # glare outside the mask
+    assert read_cube(large, wavelengths=nm, mask=mask).wavelength.size == 20
+
+
+def test_few_pixels_leave_all_bands():
+    large = np.full((300, 300, 20), np.nan, "f4")
+    large[40, 40] = 0.3
+    large[40, 40, 7] = np.nan  # one pixel shows no band to be dead
+    assert read_cube(large, wavelengths=np.linspace(400, 800, 20)).wavelength.size == 20
+
+
+def test_frames_stay_in_their_file(camera, tmp_path):
+    """A copy for another process is small, and the fingerprint covers the frame."""
+    counts, white, _ = camera
+    np.save(tmp_path / "raw.npy", np.tile(counts, (40, 1, 1)))
+    np.save(tmp_path / "white.npy", np.tile(white, (280, 1, 1)))
+    cube = read_cube(tmp_path / "raw.npy", wavelengths=NM, white_frame=tmp_path / "white.npy")
+    assert len(pickle.dumps(cube)) < 10_000  # the frame has 100 kB
+    np.save(tmp_path / "white.npy", np.tile(white, (280, 1, 1)) + 1)
+    again = read_cube(tmp_path / "raw.npy", wavelengths=NM, white_frame=tmp_path / "white.npy")
+    assert again.fingerprint != cube.fingerprint

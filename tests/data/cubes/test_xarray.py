@@ -202,7 +202,7 @@ def test_dask_blocks_are_computed_only_when_read(array):
         (lambda a: a.astype(str), ("no numbers",)),
         (lambda a: 100 * a, ("looks like percent", '`signal_unit="percent"`')),
         (lambda a: 4000 * a, ("looks like counts", "`white_frame`")),
-        (lambda a: (4000 * a).astype("u2"), ("whole numbers", "counts", "`white_frame`")),
+        (lambda a: (4000 * a).astype("u2"), ("counts of a camera (uint16)", "`white_frame`")),
         (lambda a: a.assign_attrs(units="counts"), ("counts of a camera",)),
         (lambda a: -a, ("below zero",)),
     ],

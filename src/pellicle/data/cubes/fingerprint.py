@@ -18,12 +18,13 @@ _SAMPLES, _SAMPLE = 64, 2**16
 
 
 def fingerprint(
-    raw: RawCube, files: Iterable[Path], facts: Mapping[str, Any], axes: Iterable[np.ndarray]
+    raw: RawCube, beside: Iterable[Path], facts: Mapping[str, Any], axes: Iterable[np.ndarray]
 ) -> tuple[str, str]:
     """Return the SHA-256 of a cube, and a note where it covers a sample of the content only.
 
-    It covers shape, type and axes, `facts` (how it is read) and the content: of `files`, or else of the
-    arrays. Of more than 64 MB, it covers size, date and 64 samples of each file, or some blocks of pixels.
+    It covers shape, type and axes, `facts` (how it is read) and the content of the cube's files, or else of
+    its arrays, and of the files `beside` it. Of more than 64 MB, it covers size, date and 64 samples of each
+    file, or some blocks of pixels.
     """
     digest = hashlib.sha256()
     for name, value in sorted(facts.items()):
@@ -32,9 +33,9 @@ def fingerprint(
         digest.update(f"{name} {stored.axes} {stored.data.shape} {stored.data.dtype};".encode())
     for axis in axes:
         digest.update(np.ascontiguousarray(axis, dtype=float).tobytes())
-    members = [member for file in files for member in _members(file)]
-    if members:
-        _add_files(digest, members)
+    members = [member for file in (*raw.files, *beside) for member in _members(file)]
+    _add_files(digest, members)
+    if raw.files:
         return digest.hexdigest(), _note(members)
     total = sum(int(np.prod(s.data.shape)) * np.dtype(s.data.dtype).itemsize for s in raw.arrays.values())
     for _, stored in sorted(raw.arrays.items()):

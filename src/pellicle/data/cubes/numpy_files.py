@@ -37,7 +37,7 @@ def read_numpy(path: Path, asked: Asked) -> RawCube:
             arrays: Mapping[str, Any] = _members(path)
         else:
             with path.open("rb") as file:
-                arrays = {"": _mapped(path, file, 0)}
+                arrays = {"": mapped_array(path, file)}
     except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
         raise DataError(f"{path}: is a damaged NumPy file ({error}); save it again") from None
     return arrays_to_raw(arrays, str(path), asked, (path,))
@@ -145,12 +145,12 @@ def _members(path: Path) -> dict[str, Any]:
             whole.seek(info.header_offset + 26)  # lengths of the name and of the extra field
             lengths = np.frombuffer(whole.read(4), "<u2")
             start = info.header_offset + 30 + int(lengths.sum())
-            found[name] = _mapped(path, whole, start)
+            found[name] = mapped_array(path, whole, start)
     return found
 
 
-def _mapped(path: Path, file: Any, start: int) -> MappedFile:
-    """The array whose header begins at a place of an open file."""
+def mapped_array(path: Path, file: Any, start: int = 0) -> MappedFile:
+    """The array whose header begins at a place of an open file. Raises ValueError for a damaged one."""
     file.seek(start)
     version = np.lib.format.read_magic(file)
     read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0

@@ -55,6 +55,11 @@ class RawCube:
     others: Mapping[str, Stored] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """Number of pixels along each of the `dims`."""
+        return tuple(self.arrays["values"].size(axis) for axis in self.dims)
+
 
 @dataclass(frozen=True)
 class Asked:

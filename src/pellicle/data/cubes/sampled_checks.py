@@ -20,6 +20,8 @@ _BLOCKS = {1: (16,), 2: (5, 5), 3: (3, 4, 4)}
 _WIDTHS = {1: (64,), 2: (8, 8), 3: (1, 8, 8)}
 _SHARE = 0.95
 """Quantile of the values that must be possible: some pixels may be dead, hot or glare."""
+_FEWEST = 30
+"""Pixels with values that show a band to be dead; a few may be saturated there."""
 _PERCENT = 200.0
 """Values with a larger quantile are counts rather than percent."""
 
@@ -37,14 +39,44 @@ def sample_blocks(sizes: tuple[int, ...], points: int) -> Iterator[tuple[slice, 
     yield from itertools.product(*axes)
 
 
-def sample(arrays: Mapping[str, Any], rank: int) -> dict[str, np.ndarray]:
-    """Sampled values (pixels, bands, ...) by name; `rank` is the number of axes of pixels."""
+def sample(arrays: Mapping[str, Any], rank: int, mask: np.ndarray | None = None) -> dict[str, np.ndarray]:
+    """Sampled values (pixels, bands, ...) by name, NaN outside the mask.
+
+    `rank` is the number of axes of pixels. Where the sample has no values, as of a small film on a large
+    background, the cube is read line by line up to the first that has some.
+    """
+    shape = tuple(next(iter(arrays.values())).shape)
+    sizes, points = shape[:rank], int(np.prod(shape[rank:]))
+    found = _read(arrays, mask, list(sample_blocks(sizes, points)), shape[rank:])
+    if _measured(next(iter(found.values()))) or int(np.prod(sizes)) * points <= WHOLE:
+        return found
+    lines = itertools.product(*(range(n) for n in sizes[:-1]))
+    for line in lines:
+        where = (*(slice(i, i + 1) for i in line), slice(None))
+        found = _read(arrays, mask, [where], shape[rank:])
+        if _measured(next(iter(found.values()))):
+            break
+    return found
+
+
+def _measured(values: np.ndarray) -> bool:
+    return bool(np.any(np.isfinite(values) & (values != 0)))
+
+
+def _read(
+    arrays: Mapping[str, Any],
+    mask: np.ndarray | None,
+    blocks: list[tuple[slice, ...]],
+    points: tuple[int, ...],
+) -> dict[str, np.ndarray]:
+    """Values of some blocks."""
     found = {}
     for name, array in arrays.items():
-        shape = tuple(array.shape)
-        blocks = sample_blocks(shape[:rank], int(np.prod(shape[rank:])))
-        read = [np.asarray(array[where], dtype=float) for where in blocks]
-        found[name] = np.concatenate([block.reshape(-1, *shape[rank:]) for block in read])
+        read = [np.asarray(array[where], dtype=float).reshape(-1, *points) for where in blocks]
+        found[name] = np.concatenate(read)
+    if mask is not None:
+        used = np.concatenate([mask[where].reshape(-1) for where in blocks])
+        found = {name: np.where(used.reshape(-1, *[1] * len(points)), v, np.nan) for name, v in found.items()}
     return found
 
 
@@ -60,22 +92,27 @@ def check_type(dtype: Any, path: str) -> None:
         raise DataError(f"{path}: has values of the type {dtype}, which are no numbers: store them as floats")
 
 
-def live_bands(values: np.ndarray, path: str) -> tuple[np.ndarray, list[str]]:
+def live_bands(values: np.ndarray, pixels: int, path: str) -> tuple[np.ndarray, list[str]]:
     """Return which bands have values in any sampled pixel, and a note on the others; bands are the axis 1.
 
-    Raises DataError where no band has.
+    `pixels` are those of the cube: a sample in which few have values leaves all bands. Raises DataError where
+    no band has any.
     """
     finite = np.isfinite(values)
     if not finite.any():
         raise DataError(f"{path}: has no values, only NaN, in all pixels looked at: check how it was written")
     if not np.any(values[finite]):
         raise DataError(f"{path}: is zero in all pixels looked at: check how it was written")
+    known = finite & (values != 0)
     others = (0, *range(2, values.ndim))
-    measured = finite.any(others) & np.any(finite & (values != 0), others)
+    measured = known.any(others)
+    seen = int(np.sum(known.reshape(len(values), -1).any(1)))
+    if seen < _FEWEST and len(values) < pixels:
+        measured = np.ones_like(measured)
     notes = []
     if not measured.all():
         dead = int(np.sum(~measured))
-        notes.append(f"{dead} bands left out, NaN or zero in each of the {len(values)} pixels looked at")
+        notes.append(f"{dead} bands left out, NaN or zero in each of the {seen} pixels looked at")
     return measured, notes
 
 
@@ -119,12 +156,3 @@ def check_angles(psi: np.ndarray, delta: np.ndarray, path: str) -> None:
             )
     if np.nanmax(psi) <= np.pi / 2 and np.nanmax(np.abs(delta)) <= 2 * np.pi:
         raise DataError(f"{path}: psi and delta are within those of radians: convert them to degrees")
-
-
-def refuse_counts(path: str, dtype: Any) -> DataError:
-    """The error for whole numbers without a scale."""
-    return DataError(
-        f"{path}: has whole numbers ({np.dtype(dtype).name}) without a scale, which are counts of a "
-        "camera: give `white_frame` and `dark_frame`, or as `signal_unit` percent or the number that "
-        "stands for 1"
-    )
