@@ -80,7 +80,7 @@ WATER = "--layer cauchy(1.324188,3102.06)"
 
 @pytest.mark.parametrize(
     ("name", "layer", "truth"),
-    [("003582", "--layer 1.33", 3521), ("000005253", WATER, 777)],
+    [("003582", "--layer 1.33", 3521), pytest.param("000005253", WATER, 777, marks=pytest.mark.slow)],
 )
 def test_soap_films(fitted, name, layer, truth):
     code, (found,) = fitted(f"soap_films/{name}.csv", flags=f"{layer} {SOAP}")
@@ -95,7 +95,8 @@ def test_thin_soap_films_are_not_decided_by_one_spectrum(fitted):
     assert [f["status"] in ("ambiguous", "not-identifiable") for f in found] == [True, True]
 
 
-@pytest.mark.parametrize("pair", [pytest.param("SL1", marks=pytest.mark.slow), "SL2"])
+@pytest.mark.slow  # tests/data/test_read_counts.py: the same counts, not fitted
+@pytest.mark.parametrize("pair", ["SL1", "SL2"])
 def test_raw_counts_of_porous_silicon(shared_data, fitted, pair):
     """Counts divided by those of bare silicon: a reflectance, and a fit that runs and judges itself."""
     folder = shared_data / "thinfilmstools_oxides"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import jax
 import numpy as np
 import pytest
 
@@ -12,6 +13,7 @@ from pellicle.scene.instrument import Instrument
 
 from .conftest import NM, few
 
+reflectance = jax.jit(lambda d, n, substrate, angle: pl.reflectance(NM, d, n, substrate, angle=angle))
 BY_NAME = {method.name: method for method in METHODS}
 
 
@@ -35,7 +37,7 @@ def by_library(case, thickness=None, **changes):
         "substrate": 1.5 + 0.4j,
     } | changes
     layer = given["n"] + 1j * given["k"]
-    return np.asarray(pl.reflectance(NM, case.draws[:, 1:], layer, given["substrate"], angle=given["angle"]))
+    return np.asarray(reflectance(case.draws[:, 1:], layer, given["substrate"], given["angle"]))
 
 
 def test_what_is_left_out_is_left_out(oblique):

@@ -231,6 +231,18 @@ def test_a_layer_that_becomes_evanescent_is_smooth():
     assert np.max(np.abs(np.diff(real[0]))) < 0.05
 
 
+@partial(jax.jit, static_argnames="whole")
+def grid_and_slope(n, k, below, depth, angle, whole):
+    """R and T of every depth and n, and their slopes in n; `whole` gives each point an index of its own."""
+
+    def signals(n):
+        layer = Pair(*(jnp.broadcast_to(x, (9, 3)) if whole else x for x in (n, k)))
+        responses = film.film(jnp.ones((), n.dtype), layer, below, depth, angle)
+        return jnp.stack([f(x) for x in responses for f in (response.reflectance, response.transmittance)])
+
+    return jax.jvp(signals, (n,), (jnp.ones_like(n),))
+
+
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 @pytest.mark.parametrize(
     ("layer", "substrate", "angle"),
@@ -250,17 +262,9 @@ def test_a_grid_equals_its_points(layer, substrate, angle, dtype):
     spread = np.array([1.0, 1.0 + 1e-6, 1.1]).astype(dtype)
     below = to_pair(np.broadcast_to(kind(substrate), 3))
 
-    def signals(n, whole):
-        n, k = (jnp.broadcast_to(x, (9, 3)) if whole else x for x in (n, 0 * n + kind(layer).imag))
-        responses = film.film(dtype(1), Pair(n, k), below, depth, dtype(angle))
-        return jnp.stack([f(x) for x in responses for f in (response.reflectance, response.transmittance)])
-
-    @partial(jax.jit, static_argnums=1)
-    def both(n, whole):
-        return jax.jvp(lambda n: signals(n, whole), (n,), (jnp.ones_like(n),))
-
-    n = kind(layer).real * spread
+    n, k = kind(layer).real * spread, kind(layer).imag + 0 * spread
     tolerance = 100 * float(np.finfo(dtype).eps)
-    for grid, points in zip(both(n, False), both(n, True), strict=True):
+    both = (grid_and_slope(n, k, below, depth, dtype(angle), whole) for whole in (False, True))
+    for grid, points in zip(*both, strict=True):
         size = 1 + np.abs(points)
         np.testing.assert_allclose(grid / size, points / size, atol=tolerance)

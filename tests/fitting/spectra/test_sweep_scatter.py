@@ -25,7 +25,10 @@ def ellipsometry(shift: float, seed: int) -> pl.Spectrum:
     return pl.Spectrum(NM, values, "psi-delta", sigma, delta=delta, delta_sigma=sigma, angle=angle)
 
 
-@pytest.mark.parametrize("measure", [reflectance, ellipsometry])
+MEASURES = [reflectance, pytest.param(ellipsometry, marks=pytest.mark.slow)]  # in the joint fit below too
+
+
+@pytest.mark.parametrize("measure", MEASURES)
 def test_the_scatter_between_sweeps_is_that_of_their_own_fits(measure):
     """To first order: within 5 %, where residuals alone state a third of it or less."""
     sweeps = [measure(shift, seed) for seed, shift in enumerate(SHIFTS)]
@@ -40,7 +43,7 @@ def test_the_scatter_between_sweeps_is_that_of_their_own_fits(measure):
     assert warning.startswith("the sweeps drift: thickness differs by ")
 
 
-@pytest.mark.parametrize("measure", [reflectance, ellipsometry])
+@pytest.mark.parametrize("measure", MEASURES)
 def test_noise_between_sweeps_changes_nothing(measure):
     mean = mean_spectrum([measure(0.0, seed) for seed in range(4)])
     found = pl.fit(mean, FILM)
