@@ -9,6 +9,7 @@ from PIL import Image
 import pellicle as pl
 from pellicle.data.write_colours import write_colours
 
+FILM = ("--layer", "1.46", "--substrate", "3.9", "--thickness", "10:500")
 RECIPE = """
 [data]
 signal = "srgb"
@@ -87,7 +88,6 @@ def test_regions_of_a_photo_are_read_as_films(pellicle, photo):
         (["read", "photo.png"], 3, "give --region x,y,width,height or --points x,y"),
         (["read", "photo.png", "--region", "1,1,90,9"], 3, "leaves the picture"),
         (["read", "photo.png", "--region", "1,1,9,9", "--range", "400:700"], 3, "--range: of spectra"),
-        (["read", "photo.png", "--region", "1,1,9,9", "--white", "0,0,2,2,2"], 3, "--white"),
         (["read", "photo.png", "--region", "1,1,9,9", "--chart", "a.csv"], 3, "--chart goes with"),
         (["read", "s.csv", "--region", "1,1,9,9"], 3, "only pictures have pixels"),
         (["read", "absent.png", "--region", "1,1,9,9"], 3, "no such file"),
@@ -95,6 +95,13 @@ def test_regions_of_a_photo_are_read_as_films(pellicle, photo):
         (["read", "c.csv", "--out", "o", "--to", "netcdf"], 2, "colours are written as csv"),
         (["read", "c.csv", "--spectrum", "b"], 3, "its films are 'a'"),
         (["read", "c.csv", "--signal-unit", "bit"], 3, "--signal-unit"),
+        (
+            ["read", "s.csv", "--illuminant", "A", "--gamma", "2"],
+            2,
+            "s.csv: --illuminant, --gamma: of colours",
+        ),
+        (["fit", "s.csv", *FILM, "--transmitted"], 2, "s.csv: --transmitted: of colours"),
+        (["read", "absent.csv", "--illuminant", "A"], 3, "no such file"),
     ],
 )
 def test_errors_name_flags(pellicle, photo, tmp_path, monkeypatch, words, code, message):
@@ -104,6 +111,34 @@ def test_errors_name_flags(pellicle, photo, tmp_path, monkeypatch, words, code, 
     found = pellicle(*words)
     assert found.code == code
     assert message in found.err
+
+
+@pytest.mark.parametrize("command", [("read", "photo.png"), ("fit", "photo.png", *FILM)])
+@pytest.mark.parametrize(
+    ("flag", "value", "said"),
+    [
+        ("--observer", "1930", "1931, 1964"),
+        ("--illuminant", "D66", "D65"),
+        ("--white-balance", "auto", "fixed, free"),
+        ("--gamma", "20", "0.1 to 10"),
+        ("--region", "1,1,9", "x,y,width,height"),
+        ("--region", "1,1,0,9", "x,y,width,height"),
+        ("--white", "0,0,2,2,2", "x,y,width,height"),
+        ("--points", "1", "x,y"),
+        ("--angles", "0,x", "degrees"),
+    ],
+)
+def test_wrong_words_are_wrong_usage(pellicle, photo, tmp_path, monkeypatch, command, flag, value, said):
+    """Whatever the file: the code is 2, as for every flag."""
+    monkeypatch.chdir(tmp_path)
+    pellicle(*command, flag, value).refused(2, flag, said)
+
+
+def test_a_flag_of_colours_goes_to_the_files_that_have_them(pellicle, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "s.csv").write_text("wavelength_nm,R\n500,0.2\n600,0.3\n")
+    (tmp_path / "c.csv").write_text("R,G,B\n0.1,0.2,0.3\n")
+    assert pellicle("read", "s.csv", "c.csv", "--illuminant", "A").code == 0
 
 
 def test_a_fit_states_what_its_colours_are(pellicle, tmp_path, monkeypatch):

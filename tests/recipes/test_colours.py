@@ -3,6 +3,7 @@
 import colour
 import numpy as np
 import pytest
+import tifffile
 from PIL import Image, ImageCms
 
 import pellicle as pl
@@ -92,6 +93,21 @@ def test_profiles_of_pictures(photo):
     with pytest.raises(DataError, match=r"colour profile 'XYZ.*convert the picture to sRGB"):
         read_colours(path, region="1,1,3,3")
     assert "ignored" in " ".join(read_colours(path, region="6,6,3,3", space="rgb").notes)
+
+
+def test_floating_point_values_are_taken_as_coded_and_the_note_says_so(tmp_path):
+    tifffile.imwrite(tmp_path / "a.tif", (PIXELS / 255).astype(np.float32), photometric="rgb")
+    region = "6,6,3,3"
+    assumed, stated, linear = (
+        read_colours(tmp_path / "a.tif", region=region, space=space) for space in (None, "srgb", "rgb")
+    )
+    np.testing.assert_array_equal(assumed.values, stated.values)
+    [note] = [note for note in assumed.notes if "floating-point" in note]
+    assert 'coded in sRGB: give `space="rgb"`' in note
+    assert not any("floating-point" in note for note in (*stated.notes, *linear.notes))
+    np.testing.assert_allclose(
+        linear.values[0], PIXELS[6:9, 6:9].reshape(-1, 3).mean(axis=0) / 255, atol=1e-6
+    )
 
 
 @pytest.fixture

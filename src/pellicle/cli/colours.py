@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
@@ -42,6 +43,48 @@ def is_of_colours(path: str, reading: ReadingFlags) -> bool:
         return picture_format(path) is not None or is_colour_table(path)
     except ValueError:
         return False  # the reader of spectra reports it
+
+
+def check_words(reading: ReadingFlags) -> None:
+    """Raise UsageError for a value of a colour flag that is wrong for every file."""
+    from pellicle.data.picture_regions import parse_regions, whole_numbers
+
+    words = {"--white-balance": (reading.white_balance, ("fixed", "free"))}
+    if reading.observer is not None or reading.illuminant is not None:
+        from pellicle.colour.observers import ILLUMINANTS, OBSERVERS
+
+        words["--observer"] = reading.observer, OBSERVERS
+        words["--illuminant"] = reading.illuminant, ILLUMINANTS
+    for name, (value, known) in words.items():
+        if value is not None and value not in known:
+            raise UsageError(f"{name} must be one of {', '.join(known)}, not {value!r}")
+    if reading.gamma is not None and not 0.1 <= reading.gamma <= 10:
+        raise UsageError(f"--gamma must be a number from 0.1 to 10, such as 2.2, got {reading.gamma:g}")
+    for name in ("region", "white"):
+        if (value := getattr(reading, name)) is not None:
+            parse_regions(value, name)
+    if reading.points is not None:
+        whole_numbers(reading.points, 2, "points", "x,y")
+    _angles(reading.angles)
+
+
+def check_camera(given_flags: ReadingFlags, files: Iterable[tuple[str, ReadingFlags]]) -> None:
+    """Raise UsageError where flags of a camera are given, and none of the files has colours.
+
+    `files` are paths, each with all flags of its reading; one that cannot be read is left to its reader.
+    """
+    from pellicle.data.read_picture import picture_format
+
+    wrong = [name for name in _CAMERA if getattr(given_flags, name) is not None]
+    each = list(files)
+    if not wrong or not each or any(is_of_colours(path, reading) for path, reading in each):
+        return
+    try:
+        for path, _ in each:
+            picture_format(path)
+    except ValueError:
+        return
+    raise UsageError(f"{each[0][0]}: {', '.join(given(wrong))}: of colours, and it has none; leave it out")
 
 
 def refuse_camera(path: str, reading: ReadingFlags) -> None:

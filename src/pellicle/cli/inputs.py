@@ -8,6 +8,7 @@ from functools import partial
 from logging import getLogger
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from pellicle.cli.colours import check_camera, check_words, is_of_colours, read_films, refuse_camera
 from pellicle.cli.flags import ReadingFlags, SceneFlags, given
 from pellicle.cli.options import light, merged, read, scene_from_flags, sigma, wavelength_range
 from pellicle.cli.session import say
@@ -138,6 +139,7 @@ def _by_flags(files: list[str], scene_flags: SceneFlags, reading: ReadingFlags) 
     scene, assumed = scene_from_flags(scene_flags, reading)
     say(*assumed)
     _check_free(scene)
+    check_camera(reading, [(file, reading) for file in files])
     inputs = [one for file in files for one in _film_inputs(file, scene, reading)]
     return Inputs(inputs, False, reading.loss or LEAST_SQUARES)
 
@@ -151,9 +153,10 @@ def _by_recipe(files: list[str], recipe: FilmRecipe, reading: ReadingFlags) -> I
         raise UsageError(f"{recipe.path}: [[data.file]] and files on the command line exclude each other")
     files = _files(files, recipe)
     recipes = recipe.each or [recipe] * len(files)
+    each = [(file, merged(reading, own)) for file, own in zip(files, recipes, strict=True)]
+    check_camera(reading, each)
     inputs = []
-    for file, own in zip(files, recipes, strict=True):
-        flags = merged(reading, own)
+    for (file, flags), own in zip(each, recipes, strict=True):
         scene = eqx.tree_at(lambda s: s.light, own.scene(), light(flags))
         _check_free(scene, recipe.path)
         own_scale = any(table.rescales for table in own.tables.data.file)
@@ -189,7 +192,6 @@ def _files(files: list[str], recipe: FilmRecipe | SurfaceRecipe) -> list[str]:
 def _film_inputs(path: str, scene: Scene, reading: ReadingFlags, own_scale: bool = False) -> list[Input]:
     """One input for a file of a film; one for each film of a file of colours, and with --spectrum all for
     each of several spectra."""
-    from pellicle.cli.colours import is_of_colours, read_films, refuse_camera
     from pellicle.data.file_spectra import ALL
     from pellicle.scene.instrument import Drift
 
@@ -244,6 +246,7 @@ def _check_reading(reading: ReadingFlags, signals: tuple[str, ...]) -> None:
         raise UsageError(f"--angle must lie in 0 to 90 degrees, got {reading.angle:g}")
     if reading.polarisation not in (None, "s", "p", "unpolarised"):
         raise UsageError(f"--polarisation must be s, p or unpolarised, not {reading.polarisation!r}")
+    check_words(reading)
     if reading.noise is not None:
         from pellicle.data.noise_level import noise_level
 

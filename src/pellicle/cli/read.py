@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from pellicle.cli.colours import check_camera, check_words, is_of_colours, read_films, refuse_camera
 from pellicle.cli.cube_flags import CubeOnlyFlags
 from pellicle.cli.flags import OUTPUT, ReadingFlags, flag, given, switch
 from pellicle.cli.messages import as_flags
@@ -48,6 +49,8 @@ def read(
         raise UsageError("no data: name the files, as in pellicle read oxide.csv")
     if flags.loss is not None:
         raise UsageError("--loss is for a fit; leave it out")
+    check_words(flags)
+    check_camera(flags, [(path, flags) for path in data])
     formats = [word.strip() for word in to.split(",")]
     if unknown := [word for word in formats if word not in SUFFIXES]:
         raise UsageError(f"--to must be of {', '.join(SUFFIXES)}, not {unknown[0]!r}")
@@ -81,7 +84,6 @@ def _measurements(
     path: str, flags: ReadingFlags, of_cube: CubeOnlyFlags
 ) -> list[Spectrum] | list[Colours] | list[Cube]:
     """Every spectrum of a file, the colours of every film in it, or its cube."""
-    from pellicle.cli.colours import is_of_colours, read_films, refuse_camera
     from pellicle.data.cubes.detect import is_cube
 
     if of_cube.given() or is_cube(Path(path)):

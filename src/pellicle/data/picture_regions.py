@@ -27,11 +27,16 @@ class Region(NamedTuple):
     width: int
     height: int
 
-    def pixels(self, picture: Picture, name: str = "region") -> np.ndarray:
-        """Coded pixels (N, 3). Raises UsageError where the rectangle leaves the picture."""
-        width, height = picture.size
+    def checked(self, name: str) -> Region:
+        """Return the region. Raises UsageError for a negative corner, or without a pixel."""
         if min(self.x, self.y) < 0 or min(self.width, self.height) < 1:
             raise UsageError(f"`{name}` must be x,y,width,height in pixels, from 0, got {self}")
+        return self
+
+    def pixels(self, picture: Picture, name: str = "region") -> np.ndarray:
+        """Coded pixels (N, 3). Raises UsageError where the rectangle leaves the picture."""
+        self.checked(name)
+        width, height = picture.size
         if self.x + self.width > width or self.y + self.height > height:
             raise UsageError(
                 f"{picture.path}: `{name}` {self} leaves the picture of {width} by {height} pixels;"
@@ -46,14 +51,14 @@ class Region(NamedTuple):
 
 def parse_regions(value: str | Sequence[int] | Sequence[Sequence[int]], name: str = "region") -> list[Region]:
     """Return the rectangles of `x,y,w,h;x,y,w,h`, of four numbers or of a list of them. Raises UsageError."""
-    return [Region(*four) for four in _tuples(value, 4, name, "x,y,width,height")]
+    return [Region(*four).checked(name) for four in whole_numbers(value, 4, name, "x,y,width,height")]
 
 
 def parse_points(value: str | Sequence[int] | Sequence[Sequence[int]], picture: Picture) -> list[Region]:
     """Return the squares of 5 by 5 pixels around points `x,y;x,y`, cut at the edges. Raises UsageError."""
     width, height = picture.size
     found = []
-    for x, y in _tuples(value, 2, "points", "x,y"):
+    for x, y in whole_numbers(value, 2, "points", "x,y"):
         if not (0 <= x < width and 0 <= y < height):
             raise UsageError(
                 f"{picture.path}: the point {x},{y} is not in the picture of {width} by {height} pixels"
@@ -78,7 +83,7 @@ def strip(picture: Picture, value: str | Sequence[int]) -> Strip:
 
     **Raises:** UsageError for ends outside the picture or on the same pixel.
     """
-    x0, y0, x1, y1 = _tuples(value, 4, "strip", "x0,y0,x1,y1")[0]
+    x0, y0, x1, y1 = whole_numbers(value, 4, "strip", "x0,y0,x1,y1")[0]
     width, height = picture.size
     for x, y in ((x0, y0), (x1, y1)):
         if not (0 <= x < width and 0 <= y < height):
@@ -96,8 +101,8 @@ def strip(picture: Picture, value: str | Sequence[int]) -> Strip:
     return Strip(along * length, picture.pixels[row, column])
 
 
-def _tuples(value: str | Sequence, count: int, name: str, form: str) -> list[tuple[int, ...]]:
-    """Whole numbers in groups of `count`, from text or from lists. Raises UsageError."""
+def whole_numbers(value: str | Sequence, count: int, name: str, form: str) -> list[tuple[int, ...]]:
+    """Return whole numbers in groups of `count`, from text or from lists. Raises UsageError."""
     if isinstance(value, str):
         groups: list = [re.split(r"\s*,\s*", part.strip()) for part in value.split(";") if part.strip()]
     else:

@@ -33,7 +33,8 @@ class Picture:
     """Pixels of a picture: coded values from 0 to 1, float32, (height, width, 3), row 0 at the top.
 
     `step` is the step of the coding, 1/255 for 8 bits, that of 16 bits for floats; `profile` the name of an
-    embedded colour profile that is not sRGB, or "".
+    embedded colour profile that is not sRGB, or ""; `floats` is true of floating-point
+    values.
     """
 
     pixels: np.ndarray
@@ -42,6 +43,7 @@ class Picture:
     sha256: str
     notes: tuple[str, ...]
     profile: str = ""
+    floats: bool = False
 
     @property
     def size(self) -> tuple[int, int]:
@@ -82,8 +84,9 @@ def read_picture(path: str | os.PathLike[str]) -> Picture:
     foreign = "" if "srgb" in name.lower() or "61966-2" in name else name
     if kind == "JPEG":
         notes = [*notes, "JPEG: its compression shifts colours by a few of 255; PNG and TIFF do not"]
-    step = 1 / (_FLOAT_LEVELS if values.dtype.kind == "f" else full)
-    return Picture(coded, step, str(path), sha256, tuple(notes), foreign)
+    floats = values.dtype.kind == "f"
+    step = 1 / (_FLOAT_LEVELS if floats else full)
+    return Picture(coded, step, str(path), sha256, tuple(notes), foreign, floats)
 
 
 def _by_pillow(content: bytes) -> tuple[np.ndarray, float, bytes | None, list[str]]:

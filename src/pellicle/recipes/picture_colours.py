@@ -29,6 +29,7 @@ def picture_colours(
     angle: float | Sequence[float] | None,
 ) -> tuple[list[ColourRows], Sight]:
     """Return the colours of the regions of a picture, of a film each, or of one film at several angles."""
+    assumed = space is None
     space = check_picture(picture, space)
     seen = sight(camera, space)
     if region is not None and points is not None:
@@ -45,6 +46,8 @@ def picture_colours(
             f"{len(angles)} angles are given for {len(regions)} regions of the picture: give one for each"
         )
     told = [*picture.notes, *notes]
+    if assumed and picture.floats:
+        told.append('floating-point values taken as coded in sRGB: give `space="rgb"` if they are linear')
     told += [f"colour profile {picture.profile} ignored"] if picture.profile else []
     films = []
     for number, each in enumerate(regions):

@@ -67,10 +67,12 @@ def measured_colours(data: Colours, scene: Scene, name: str = "") -> MeasuredCol
         angle = float(own[0]) if np.ptp(own) == 0 else np.repeat(own, count)
     apart = np.ptp(data.values, axis=0) / np.median(data.noise, axis=0)
     if (own is None or np.ptp(own) == 0) and np.max(apart) > _APART:
+        ignored = next((note for note in data.notes if note.startswith("ignored: ")), "")
+        unknown = f" ({ignored})" if ignored else ""
         raise DataError(
             f"{place}{len(data)} colours of one film at one angle of incidence differ by up to"
-            f" {np.max(apart):.2g} standard deviations: give each its angle, in a column angle_deg, or tell"
-            " the films apart by a column name"
+            f" {np.max(apart):.2g} standard deviations{unknown}: give each its angle, in a column angle_deg,"
+            " or tell the films apart by a column name"
         )
     instrument = scene.instrument
     if isinstance(instrument.scale, Drift) and instrument.scale.degree:
