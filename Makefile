@@ -57,7 +57,7 @@ coverage: $(VENV)/.dev
 notebooks: $(VENV)/.dev
 	rm -rf executed && mkdir executed && cp notebooks/*.ipynb notebooks/matplotlibrc executed
 	$(if $(PELLICLE_SHORT),$(QUICK_COMPILE)) PYTHONWARNINGS="ignore:Error reading persistent compilation cache entry" \
-	  JAX_COMPILATION_CACHE_DIR=$(CURDIR)/executed/compiled \
+	  JAX_COMPILATION_CACHE_DIR=$(CURDIR)/.pytest_cache/jax \
 	  JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS=0 PELLICLE_CACHE=$(CURDIR)/executed/compiled \
 	  $(BIN)/python -m pytest -n 2 --nbmake --nbmake-timeout 300 --overwrite --durations 8 executed
 	@touch $(EXECUTED)

@@ -225,8 +225,8 @@ def test_every_command_is_run_by_a_test():
         assert any(command.startswith(line) for line in ELSEWHERE), f"no test runs {command}"
         assert program != "make" or target in targets, command
         assert program != "python" or target == "-m" or (ROOT / target).is_file(), command
-    ci_lines = (ROOT / ".ci" / "run").read_text("utf-8").splitlines()
-    assert all(any(line.startswith(command) for line in ci_lines) for command in CI)
+    ci = re.findall(r"^make (.*)", (ROOT / ".ci" / "run").read_text("utf-8"), re.MULTILINE)
+    assert {command.split()[1] for command in CI} <= set(" ".join(ci).split())
     stale = [line for line in (*ELSEWHERE, *SLOW, *EXIT_4) if not any(c.startswith(line) for c in shown)]
     assert not stale
 

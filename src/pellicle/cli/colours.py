@@ -49,7 +49,9 @@ def check_words(reading: ReadingFlags) -> None:
     """Raise UsageError for a value of a colour flag that is wrong for every file."""
     from pellicle.data.picture_regions import parse_regions, whole_numbers
 
-    words = {"--white-balance": (reading.white_balance, ("fixed", "free"))}
+    words: dict[str, tuple[str | None, tuple[str, ...]]] = {
+        "--white-balance": (reading.white_balance, ("fixed", "free"))
+    }
     if reading.observer is not None or reading.illuminant is not None:
         from pellicle.colour.observers import ILLUMINANTS, OBSERVERS
 
