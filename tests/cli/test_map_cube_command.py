@@ -182,3 +182,19 @@ def test_lamp_curves_that_contradict(pellicle, words, fits, tmp_path):
         ran = pellicle(*words, *flags)
         assert ran.code == 2
         assert text in ran.err
+
+
+def test_a_series_has_rates(pellicle, words, fits, tmp_path):
+    values = 0.5 - 0.01 * np.arange(6.0)[:, None, None, None] + np.zeros((1, 4, 5, 30))
+    coords = {
+        "wavelength": ("wavelength", np.linspace(400.0, 700.0, 30), {"units": "nm"}),
+        "time": np.datetime64("2024-01-01", "ns") + np.arange(6) * np.timedelta64(2, "s"),
+    }
+    series = xarray.DataArray(values, coords, ("time", "y", "x", "wavelength")).to_dataset(name="R")
+    series.to_netcdf(tmp_path / "series.nc")
+    ran = pellicle("map", tmp_path / "series.nc", *words[2:])
+    assert ran.code == 0, ran.err
+    assert "rate.nc" in ran.err
+    with xarray.open_dataset(tmp_path / "out/rate.nc") as rate:
+        np.testing.assert_allclose(rate.thickness_rate, np.full((4, 5), -0.5))  # of 1 nm in 2 s
+        assert rate.thickness_rate.attrs["units"] == "nm/s"

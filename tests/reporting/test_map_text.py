@@ -254,3 +254,31 @@ def test_a_place_of_most_pixels_says_so():
     assert where(found).startswith("in one patch of 130")  # 96 %
     found[35:38, 70:74] = True  # 12 more: 88 %
     assert where(found).startswith("mostly in one patch of 130")
+
+
+def test_rates_of_a_series():
+    time = np.arange(8.0)
+    status = np.full((8, 5), CODES["converged"], np.uint8)
+    status[2:, 4] = CODES["misfit"]  # two times are left
+    thickness = 300.0 - 2.5 * time[:, None] + np.zeros((8, 5))
+    thickness[:, 3] += 0.5 * (time - 3.5) ** 2
+    coords = {"time": ("time", time, {"units": "s"})}
+    series = made(status, thickness, dims=("time", "x"), coords=coords)
+    text = words(cube_report(series))
+    assert "thickness median -2.5 nm/s" in text
+    assert "constant at 3 of 4 pixels; a straight line does not fit the others" in text
+    [rate] = cube_json(series)["rates"].values()
+    assert (rate["unit"], rate["constant"], rate["not_constant"]) == ("nm/s", 3, 1)
+    assert rate["stderr_noise"] == pytest.approx(0.1 / np.sqrt(np.sum((time - 3.5) ** 2)))
+    assert cube_json(made(image()))["rates"] == {}
+
+
+def test_the_plan_has_one_row_of_the_neighbours():
+    rows = [{"effect": "neighbours", "on": False, "why": "off", "error_bound": 0.0}]
+    decided = {
+        "undecided": 4, "decided": 3, "changed": 2, "overruled": 1.0, "median_overruled": 1.0,
+        "neighbours": 9, "hidden": 99, "found": 90, "wrong": 0, "continuous": 1.0, "roughness": 0.1,
+        "weight": 9.0, "margin": 12.0, "limit": 25.0,
+    }  # fmt: skip
+    found = made(image(), plan=json.dumps(rows), neighbours=json.dumps(decided))
+    assert len([row for row in cube_json(found)["plan"] if row["effect"] == "neighbours"]) == 1

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 RUN = Group("Run", sort_key=2)
 MOST_DECIDED = 0.5
 """Share of the pixels with data that must have one answer for the exit code 0."""
-STORE, NETCDF = "map.zarr", "map.nc"
+STORE, NETCDF, RATES = "map.zarr", "map.nc", "rate.nc"
 
 
 @dataclass(frozen=True)
@@ -154,4 +154,22 @@ def _write(folder: Path, made: Map) -> None:
 
     made.to_netcdf(folder / NETCDF, overwrite=True)
     write_cube_map(folder, made)
-    say(f"{folder}: map.zarr, map.nc, report and figures written")
+    rates = _write_rates(folder, made)
+    say(f"{folder}: map.zarr, map.nc, {rates}report and figures written")
+
+
+def _write_rates(folder: Path, made: Map) -> str:
+    """Write the rates of a series, and return the name of the file with a comma, empty without one."""
+    from pellicle.files import replacing
+    from pellicle.mapping.growth import TIME
+
+    if TIME not in made.dims:
+        return ""
+    try:
+        rates = made.growth()
+    except UsageError as error:
+        say(f"no rates of change: {error}")
+        return ""
+    with replacing(folder / RATES, overwrite=True) as draft:
+        rates.to_netcdf(draft, engine="h5netcdf")
+    return f"{RATES}, "

@@ -152,6 +152,18 @@ class Map(PlotMixin):
         write_dataset(target, decided)
         return Map(target, self.run)
 
+    def growth(self, *, window: int | None = None, unit: str | None = None) -> xarray.Dataset:
+        """Rates of change of the thicknesses of a map with an axis of time, as of `pellicle.mapping.growth`.
+
+        Only the new variables are returned.
+        """
+        from pellicle.mapping.growth import growth
+
+        made = growth(self.dataset, window=window, unit=unit)
+        rates = made[[name for name in made.data_vars if name not in self.dataset.data_vars]]
+        rates.attrs = {name: made.attrs[name] for name in ("Conventions", "source", "path", "recipe")}
+        return rates
+
     def to_netcdf(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
         """Write all variables to a NetCDF 4 file, block by block, complete or not at all.
 

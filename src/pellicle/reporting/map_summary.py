@@ -16,6 +16,7 @@ from pellicle.mapping.map_variables import variable_name
 from pellicle.mapping.pixel_fits import BY_NEIGHBOURS, CODES, NO_DATA, STATUSES
 from pellicle.reporting.map_axes import MapAxes, map_axes
 from pellicle.reporting.map_places import place
+from pellicle.reporting.map_rates import RateSummary, summarise_rates
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -70,6 +71,7 @@ class MapSummary:
     attributes: Mapping[str, Any]
     plan: tuple[Mapping[str, Any], ...]  # rows of effects, as in the record of a fit
     run: Run | None  # None for a map that was computed earlier
+    rates: tuple[RateSummary, ...] = ()  # of a series in time
 
     @property
     def pixels(self) -> int:
@@ -139,14 +141,17 @@ def summarise(made: Dataset | Map) -> MapSummary:
     thin = thinned(dataset, axes)
     used = is_decided(np.asarray(thin["status"]))
     parameters = tuple(_parameter(thin, name, used) for name in free_parameters(dataset))
-    return MapSummary(axes, counts, places, parameters, _step(axes), dict(dataset.attrs), _plan(dataset), run)
+    rates = summarise_rates(thin)
+    about = dict(dataset.attrs)
+    return MapSummary(axes, counts, places, parameters, _step(axes), about, _plan(dataset), run, rates)
 
 
 def _plan(dataset: Dataset) -> tuple[Mapping[str, Any], ...]:
     """Rows of the plan, with that of the neighbours."""
     stored, found = dataset.attrs.get("plan"), evidence(dataset)
     rows = [] if stored is None else json.loads(stored)
-    return (*rows, *([asdict(row(found))] if found is not None else []))
+    named = any(each["effect"] == "neighbours" for each in rows)
+    return (*rows, *([asdict(row(found))] if found is not None and not named else []))
 
 
 def thinned(dataset: Dataset, axes: MapAxes) -> Dataset:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from pellicle.fitting.result import Status
@@ -38,10 +39,15 @@ def cube_report(made: Dataset | Map, summary: MapSummary | None = None) -> str:
         ("Map", [*wrapped(in_words(summary)), *facts(_facts(summary))]),
         ("Status: what to do", facts((w, a) for w, a in _ADVICE.items() if w in summary.counts)),
         (_title(summary), _parameters(summary)),
+        ("Rate of change: a straight line through the times", facts(_rates(summary))),
         ("Errors", wrapped(ERRORS)),
         ("Plan: what was simulated", _plan(summary)),
     ]
     return "".join(block(title, lines) for title, lines in blocks if lines)
+
+
+def _rates(made: MapSummary) -> list[tuple[str, str]]:
+    return [(rate.variable, str(rate)) for rate in made.rates]
 
 
 def in_words(made: MapSummary) -> str:
@@ -218,6 +224,7 @@ def cube_json(made: Dataset | Map, summary: MapSummary | None = None) -> dict[st
         "places": dict(found.places),
         "converged": found.counts.get(str(Status.CONVERGED), 0) / found.with_data if found.with_data else 0.0,
         "parameters": {p.name: _parameter_json(p) for p in found.parameters},
+        "rates": {rate.variable: asdict(rate) for rate in found.rates},
         "plan": [dict(row) for row in found.plan],
         "preview": int(about.get("preview", 1)),
         "notes": list(found.notes),
