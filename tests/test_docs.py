@@ -247,7 +247,12 @@ def test_commands_parse_and_their_files_exist(page):
 
 IN_EVERY_RUN = ("README.md", "docs/howto/uncertainty.md")
 """Pages whose commands run in every run of the tests; the others take two minutes, in `make slow`."""
-LONG_BLOCKS = ("docs/howto/loops.md", "docs/howto/repeats.md", "docs/reference/colour.md")
+LONG_BLOCKS = (
+    "docs/howto/loops.md",
+    "docs/howto/maps.md",
+    "docs/howto/repeats.md",
+    "docs/reference/colour.md",
+)
 """Pages whose Python blocks compile for 3 to 5 s each: run in `make slow`."""
 
 

@@ -34,7 +34,7 @@ def new_figure(width: float, height: float, constrained: bool = True) -> Figure:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width, height), layout="constrained" if constrained else None)
+    figure = Figure(figsize=(width, height), layout="constrained" if constrained else "none")
     FigureCanvasAgg(figure)
     return figure
 
