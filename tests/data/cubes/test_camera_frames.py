@@ -113,7 +113,7 @@ def test_dead_bands(values, refused):
     dead = values.copy()
     dead[..., 0] = np.nan
     dead[..., 8] = 0
-    dead[2, 3, 4] = np.nan
+    dead[2, 3, 4] = np.inf
     cube = read_cube(dead, wavelengths=NM)
     np.testing.assert_array_equal(cube.wavelength, NM[1:8])
     assert any("2 bands left out" in note for note in cube.notes)

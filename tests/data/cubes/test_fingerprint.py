@@ -54,6 +54,18 @@ def test_arrays_in_memory_and_of_dask(values):
     assert read_cube(lazy).fingerprint != read_cube(lazy + 1e-3).fingerprint
 
 
+def test_a_pixel_of_dask_outside_the_sample():
+    """The blocks that are read are the same; the name of the array is a digest of its graph."""
+    nm = np.linspace(400, 800, 20)
+    large = xr.DataArray(
+        np.full((300, 300, 20), 0.3, "f4"), dims=("y", "x", "wavelength"), coords={"wavelength": nm}, name="R"
+    )
+    other = large.copy()
+    other[30, 30] = 0.4
+    one, two = (read_cube(array.chunk({"y": 50})).fingerprint for array in (large, other))
+    assert one != two
+
+
 def test_a_large_file_by_size_date_and_samples(path, monkeypatch):
     monkeypatch.setattr(module, "WHOLE", 100)
     cube = read_cube(path, wavelengths=NM)
