@@ -174,7 +174,7 @@ def test_values_errors_and_the_slope_of_a_wedge():
     text = words(cube_report(made(status, thickness, coords=coords)))
     assert "slope x +20, y -5 nm/mm" in text
     assert "standard error 0.4 nm (median), of the noise 0.1 nm" in text
-    assert "4700 pixels that are converged" in text
+    assert "4700 pixels with status converged" in text
 
 
 def test_no_plane_where_there_is_none():

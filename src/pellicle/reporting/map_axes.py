@@ -80,6 +80,11 @@ class MapAxes:
     shape: tuple[int, ...]
 
     @property
+    def points(self) -> str:
+        """What the map has numbers for: pixels or sites."""
+        return "sites" if self.kind == "sites" else "pixels"
+
+    @property
     def downward(self) -> bool:
         """True where y increases downward, as in pictures; lengths increase upward."""
         return self.y is not None and self.y.unit == PIXELS

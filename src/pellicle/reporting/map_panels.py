@@ -281,7 +281,7 @@ def histogram_panel(sheet: Sheet, panel: Axes, variable: str) -> None:
     thin = thinned(sheet.data, sheet.made.axes)
     values = np.asarray(thin[variable], dtype=float)[is_decided(np.asarray(thin["status"]))]
     values = values[np.isfinite(values)]
-    panel.set(xlabel=sheet.label(variable), ylabel="sites" if sheet.axes.kind == "sites" else "pixels")
+    panel.set(xlabel=sheet.label(variable), ylabel=sheet.axes.points)
     panel.spines[["top", "right"]].set_visible(False)
     if not values.size:
         panel.text(

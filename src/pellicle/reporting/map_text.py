@@ -77,9 +77,8 @@ def pixels_in_words(made: MapSummary) -> str:
     if made.axes.kind == "image":
         *before, rows = before
         last = f"{rows} x {last}"
-    unit = "sites" if made.axes.kind == "sites" else "pixels"
     series = made.axes.series
-    last += f" {unit} (y, x)" if made.axes.kind == "image" else f" {unit}"
+    last += f" {made.axes.points}" + " (y, x)" * (made.axes.kind == "image")
     return f"{' x '.join(before)} frames ({series.name}) of {last}" if series else last
 
 
@@ -92,7 +91,7 @@ def _facts(made: MapSummary) -> list[tuple[str, str]]:
     rows.append(("data", f"{about.get('signal', 'R')}{bands}{between}; {pixels_in_words(made)}"))
     missing = made.counts.get(NO_DATA, 0)
     if missing:
-        text = f"{missing} pixels ({share(missing, made.pixels)} %)"
+        text = f"{missing} {made.axes.points} ({share(missing, made.pixels)} %)"
         rows.append(("no data", f"{text} {made.places.get(NO_DATA, '')}".strip()))
     every = int(about.get("preview", 1))
     if every > 1:
@@ -138,7 +137,7 @@ def _title(made: MapSummary) -> str:
     if not made.decided:
         return "Parameters: no pixel has numbers that can be used"
     words = " or ".join(word for word in DECIDED if word in made.counts)
-    return f"Parameters at the {made.decided} pixel{'s that are' if made.decided > 1 else ' that is'} {words}"
+    return f"Parameters at the {made.decided} {made.axes.points} with status {words}"
 
 
 def _parameters(made: MapSummary) -> list[str]:
