@@ -5,6 +5,9 @@ time. Weights are those of the noise. Where a line does not fit, that is stated,
 contains what it misses. Errors that all times have in common (of an index, of the angle) are propagated as
 one: their share of the rate is the slope of the systematic standard error itself.
 
+The fits of a series do not start at the thickness of the time before: the scan that this would save takes 1
+to 8 % of the processor time of a fit (4096 pixels of 100 bands), and finds the rivals that decide the status.
+
 **Source:** Barlow 1989, Statistics, ch. 6 (straight line, correlated errors); Birge 1932, Phys. Rev. 40, 207
 (enlargement of errors by the square root of the reduced chi-square).
 """
