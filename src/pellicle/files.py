@@ -54,7 +54,7 @@ def replacing(path: str | os.PathLike[str], *, overwrite: bool = False) -> Itera
             " `path`"
         ) from None
     except OSError as error:
-        raise _not_written(target, error) from None
+        raise not_written(target, error) from None
     os.close(handle)
     temporary = Path(name)
     try:
@@ -65,7 +65,7 @@ def replacing(path: str | os.PathLike[str], *, overwrite: bool = False) -> Itera
         _refuse_existing(target, overwrite)
         os.replace(temporary, target)
     except OSError as error:
-        raise _not_written(target, error) from None
+        raise not_written(target, error) from None
     finally:
         temporary.unlink(missing_ok=True)
 
@@ -109,12 +109,12 @@ def new_folder(path: str | os.PathLike[str]) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         if error.errno in _DISK:
-            raise _not_written(folder, error) from None
+            raise not_written(folder, error) from None
         raise UsageError(f"{folder}: cannot be made ({error.strerror}); choose another `folder`") from None
     return folder
 
 
-def _not_written(target: Path, error: OSError) -> DataError | UsageError:
+def not_written(target: Path, error: OSError) -> DataError | UsageError:
     """The error of a file that cannot be written."""
     # h5py raises errors of the disk without a number
     reason = error.strerror or next(iter(str(error).splitlines()), type(error).__name__)

@@ -1,6 +1,8 @@
 """The store of a map: its variables, killed runs, and what it refuses to continue."""
 
 import dataclasses
+import errno
+import os
 import shutil
 
 import numpy as np
@@ -153,6 +155,26 @@ def test_a_map_is_not_continued_unasked(mapped):
     mapped()
     with pytest.raises(UsageError, match="exists; leave `resume=False` out"):
         mapped(resume=False)
+
+
+def test_a_full_disk_is_one_sentence_and_loses_nothing(mapped, fake_fits, same_files, monkeypatch):
+    whole, write = mapped("whole.zarr"), zarr.Array.__setitem__
+    monkeypatch.setattr(zarr.Array, "__setitem__", _disk_full_after(5, write))
+    with pytest.raises(DataError, match=r"map.zarr: cannot be written \(No space left.*make room"):
+        mapped()
+    monkeypatch.setattr(zarr.Array, "__setitem__", write)
+    same_files(whole.path, mapped().path)
+
+
+def _disk_full_after(blocks, write):
+    def full(array, where, values):
+        if array.name == "/rms" and full.blocks == blocks:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "c/0/0")
+        full.blocks += array.name == "/rms"
+        write(array, where, values)
+
+    full.blocks = 0
+    return full
 
 
 def test_files_of_a_user_stay(mapped, tmp_path):

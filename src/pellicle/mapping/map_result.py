@@ -93,7 +93,7 @@ class Map(PlotMixin):
 
     @property
     def parameters(self) -> dict[str, str]:
-        """Free parameters by name, with their units, the thickness of the reported layer first."""
+        """Free parameters by name, with their units, in the order of the fit."""
         return dict(self._group.attrs["parameters"])
 
     @property

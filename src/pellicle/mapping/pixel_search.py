@@ -227,7 +227,8 @@ def _polish_all_near(
     while now.any():
         points.polish(now, _ROUNDS, best)
         tried |= now
-        below = np.where(now, _root(optimistic) - _root(points.deviance), 0.0)
+        with np.errstate(invalid="ignore"):  # of candidates that are not there
+            below = np.where(now, _root(optimistic) - _root(points.deviance), 0.0)
         fall = np.maximum(fall, np.where(np.isfinite(below), below, 0.0).max(axis=1))
         best = np.where(tried, points.deviance, np.inf).min(axis=1)
         level = best + _CHANCE * search.noise(best) + systematic + rounding

@@ -23,6 +23,7 @@ import zarr
 
 from pellicle.data.cube import Cube
 from pellicle.errors import UsageError
+from pellicle.files import not_written
 from pellicle.fitting.parameter import Parameter
 from pellicle.mapping.blocks import Blocks, blocks_of
 from pellicle.mapping.map_identity import difference
@@ -44,13 +45,19 @@ class MapStore:
     parameters: tuple[Parameter, ...]
 
     def write(self, place: tuple[int, ...], fits: PixelFits) -> None:
-        """Write the fits of the block at a place of the grid, and mark it as finished."""
+        """Write the fits of the block at a place of the grid, and mark it as finished.
+
+        **Raises:** DataError for a full disk, UsageError where the store cannot be written.
+        """
         where = self.blocks.where(place)
         shape = tuple(part.stop - part.start for part in where)
-        for variable in self._variables:
-            values = np.asarray(variable.of(fits), variable.dtype)
-            self._group[variable.name][where] = values.reshape(*shape, *values.shape[1:])
-        self._group[DONE][place] = 1
+        try:
+            for variable in self._variables:
+                values = np.asarray(variable.of(fits), variable.dtype)
+                self._group[variable.name][where] = values.reshape(*shape, *values.shape[1:])
+            self._group[DONE][place] = 1
+        except OSError as error:
+            raise not_written(self.path, error) from None
 
     def unfinished(self) -> list[tuple[int, ...]]:
         """Places of the blocks that are not finished, row by row."""
@@ -119,7 +126,7 @@ def begin(
         _make(draft, store, cube, {**attributes, IDENTITY: dict(identity)}, orders)
         draft.rename(target)
     except OSError as error:
-        raise UsageError(f"{target}: cannot be written ({error.strerror}); choose another `out`") from None
+        raise not_written(target, error) from None
     return store
 
 
