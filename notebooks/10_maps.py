@@ -24,7 +24,6 @@ import xarray as xr
 import pellicle as pl
 from pellicle.colour import film_colour, srgb
 from pellicle.colour.gamut import into_srgb
-from pellicle.mapping.growth import growth
 from pellicle.mapping.pixel_fits import CODES
 
 jax.config.update("jax_enable_x64", True)  # double precision; JAX's default is single
@@ -119,7 +118,7 @@ deviation = compared(maps, soap)
 # times, a line does not fit, and `thickness_rate_status` says so.
 
 # %%
-rates = growth(maps, window=3, unit="s")
+rates = drained.growth(window=3, unit="s")
 middle = len(TIME) // 2
 figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.4))
 for i in frames:
