@@ -62,6 +62,13 @@ class PixelSearch(NamedTuple):
         return np.maximum(deviance / independent, 1.0)
 
     @property
+    def has_priors(self) -> bool:
+        """True where priors of parameters or of a scale or an offset that drifts weigh beside the data."""
+        drifts = (self.view.scene.instrument.scale, self.view.scene.instrument.offset)
+        drifting = any(isinstance(x, Drift) and x.degree > 0 for x in drifts)
+        return drifting or bool(np.any(np.asarray(self.problem.box.prior_weight) > 0))
+
+    @property
     def block(self) -> int:
         """Pixels that are scanned together."""
         width = self.lookup.columns.shape[1]
@@ -180,6 +187,16 @@ def _minima(search: PixelSearch, data: PixelData) -> PixelMinima:
         points.polish(np.isfinite(optimistic), 1, exact.min(axis=1))
         optimistic = np.where(np.isfinite(points.deviance), points.deviance, optimistic)
     tried = _polish_all_near(points, optimistic, exact, rounding)
+    factor = np.ones(len(pixels))
+    if search.has_priors:
+        factor = _weight_factor(points, tried)
+        data = data._replace(weight=data.weight * factor[:, None])
+        again = polish.in_rows(polish.explained, search.static, search.common, data, points.units)[0]
+        exact = np.where(np.isfinite(again), again, np.inf)
+        points = _Points(
+            search, data, points.units, np.array(exact), np.array(exact), np.full(exact.shape, np.inf)
+        )
+        tried = _polish_all_near(points, exact, exact, np.zeros(len(pixels)))
     best = np.where(tried, points.deviance, np.inf)
     lowest, best = np.argmin(best, axis=1), best.min(axis=1)
     first = np.arange(tried.shape[1]) == lowest[:, None]
@@ -193,7 +210,8 @@ def _minima(search: PixelSearch, data: PixelData) -> PixelMinima:
     order = _distinct(problem.parameters, points.units, points.deviance, lowest, listed)
     rows, here, absent = pixels[:, None], np.maximum(order, 0), order < 0
     ordered = np.where(absent[..., None], np.nan, points.units[rows, here])
-    deviance, misfit = (np.where(absent, np.inf, x[rows, here]) for x in (points.deviance, points.misfit))
+    rest, misfit = points.deviance - points.misfit, points.misfit / factor[:, None] ** 2
+    deviance, misfit = (np.where(absent, np.inf, x[rows, here]) for x in (misfit + rest, misfit))
     return PixelMinima(
         values=np.asarray(problem.values(ordered)),
         units=ordered,
@@ -208,6 +226,35 @@ def _minima(search: PixelSearch, data: PixelData) -> PixelMinima:
         offset=at_best.offset,
         slope=at_best.slope,
     )
+
+
+def _weight_factor(points: _Points, tried: np.ndarray) -> np.ndarray:
+    """What the weights of each pixel are multiplied by, (pixels,), by the residuals of its best point.
+
+    As in `fitting.reweighting`: σ that is not given is their rms, and correlated neighbours count as one
+    point. Without priors that moves no minimum.
+    """
+    search, view = points.search, points.search.view
+    lowest = np.argmin(np.where(tried, points.deviance, np.inf), axis=1)
+    best = polish.Best(
+        *polish.in_rows(
+            *(polish.at_best, search.static, search.common, points.data),
+            points.units[np.arange(len(lowest)), lowest],
+        )
+    )
+    residual = points.data.weight * (points.data.values - best.model)
+    known = np.sum(points.data.weight > 0, axis=1) * view.independent / view.points
+    nuisances = [
+        x for x in (view.scene.instrument.scale, view.scene.instrument.offset) if isinstance(x, Drift)
+    ]
+    used = len(search.problem.parameters) + sum(x.degree + 1 for x in nuisances)
+    square = np.sum(residual**2, axis=1) / np.maximum(known - used, 1.0)
+    scale = np.ones(len(square)) if view.noise.known else 1 / np.sqrt(np.maximum(square, 1e-12))
+    length = np.array(
+        [view.correlation_length(x) for x in residual.reshape(len(residual), -1, view.channels)]
+    )
+    fraction = float(view.data.independent_fraction)
+    return scale * np.sqrt(np.minimum(1 / length, fraction) / fraction)
 
 
 def _polish_all_near(
