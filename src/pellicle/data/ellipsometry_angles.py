@@ -36,8 +36,8 @@ class PsiDelta(NamedTuple):
     depolarisation: Float[np.ndarray, " points"] | None = None
 
 
-def ncs(psi: Float[np.ndarray, " points"], delta: Float[np.ndarray, " points"]) -> np.ndarray:
-    """N, C, S (points, 3) of Ψ and Δ in degrees: a point on the unit sphere."""
+def ncs(psi: Float[np.ndarray, "*points"], delta: Float[np.ndarray, "*points"]) -> np.ndarray:
+    """N, C, S (..., 3) of Ψ and Δ in degrees: a point on the unit sphere."""
     psi, delta = 2 * np.deg2rad(psi), np.deg2rad(delta)
     return np.stack([np.cos(psi), np.sin(psi) * np.cos(delta), np.sin(psi) * np.sin(delta)], axis=-1)
 

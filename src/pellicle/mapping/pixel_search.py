@@ -40,6 +40,9 @@ the second is 1e-5 of a standard error."""
 _ROUNDS, _MORE_ROUNDS, _LAST = 4, 40, 4
 """Rounds of steps for each candidate, of more for the best of a pixel, and most repetitions of its last."""
 
+_REWEIGHTED = 3
+"""Times that weights are adapted to the residuals, where priors weigh beside the data."""
+
 
 class PixelSearch(NamedTuple):
     """A problem's one spectrum as of any pixel, and the table that finds its minima."""
@@ -178,25 +181,32 @@ def _minima(search: PixelSearch, data: PixelData) -> PixelMinima:
     if not alike:
         exact = polish.in_rows(polish.explained, search.static, search.common, data, units)[0]
         exact = np.where(np.isfinite(exact), exact, np.inf)
+        if not several:
+            # the determinant of the nuisances, which predictions leave out, is much the same everywhere
+            at = pixels, np.argmin(exact, axis=1)
+            predicted = predicted + (exact[at] - predicted[at])[:, None]
         optimistic = np.minimum(predicted, exact)
-    points = _Points(
-        search, data, units, np.array(optimistic), np.array(exact), np.full(predicted.shape, np.inf)
-    )
+    points = _Points(search, data, units, np.array(exact), np.array(exact), np.full(predicted.shape, np.inf))
     if several:
         # along a valley of several parameters a linear step says little
         points.polish(np.isfinite(optimistic), 1, exact.min(axis=1))
         optimistic = np.where(np.isfinite(points.deviance), points.deviance, optimistic)
     tried = _polish_all_near(points, optimistic, exact, rounding)
     factor = np.ones(len(pixels))
-    if search.has_priors:
-        factor = _weight_factor(points, tried)
-        data = data._replace(weight=data.weight * factor[:, None])
-        again = polish.in_rows(polish.explained, search.static, search.common, data, points.units)[0]
-        exact = np.where(np.isfinite(again), again, np.inf)
+    for _ in range(_REWEIGHTED if search.has_priors else 0):
+        lowest = np.argmin(np.where(tried, points.deviance, np.inf), axis=1)
+        before = points.units[pixels, lowest]
+        factor = _weight_factor(points, lowest, data)
+        weighted = data._replace(weight=data.weight * factor[:, None])
+        exact = polish.in_rows(polish.explained, search.static, search.common, weighted, points.units)[0]
+        exact = np.where(np.isfinite(exact), exact, np.inf)
         points = _Points(
-            search, data, points.units, np.array(exact), np.array(exact), np.full(exact.shape, np.inf)
+            search, weighted, points.units, np.array(exact), np.array(exact), np.full(exact.shape, np.inf)
         )
         tried = _polish_all_near(points, exact, exact, np.zeros(len(pixels)))
+        lowest = np.argmin(np.where(tried, points.deviance, np.inf), axis=1)
+        if np.allclose(points.units[pixels, lowest], before, rtol=0.0, atol=1e-3):
+            break
     best = np.where(tried, points.deviance, np.inf)
     lowest, best = np.argmin(best, axis=1), best.min(axis=1)
     first = np.arange(tried.shape[1]) == lowest[:, None]
@@ -228,22 +238,17 @@ def _minima(search: PixelSearch, data: PixelData) -> PixelMinima:
     )
 
 
-def _weight_factor(points: _Points, tried: np.ndarray) -> np.ndarray:
-    """What the weights of each pixel are multiplied by, (pixels,), by the residuals of its best point.
+def _weight_factor(points: _Points, lowest: np.ndarray, data: PixelData) -> np.ndarray:
+    """What the weights of the `data` are multiplied by, (pixels,), by the residuals of the `lowest` points.
 
     As in `fitting.reweighting`: σ that is not given is their rms, and correlated neighbours count as one
     point. Without priors that moves no minimum.
     """
     search, view = points.search, points.search.view
-    lowest = np.argmin(np.where(tried, points.deviance, np.inf), axis=1)
-    best = polish.Best(
-        *polish.in_rows(
-            *(polish.at_best, search.static, search.common, points.data),
-            points.units[np.arange(len(lowest)), lowest],
-        )
-    )
-    residual = points.data.weight * (points.data.values - best.model)
-    known = np.sum(points.data.weight > 0, axis=1) * view.independent / view.points
+    units = points.units[np.arange(len(lowest)), lowest]
+    best = polish.Best(*polish.in_rows(polish.at_best, search.static, search.common, points.data, units))
+    residual = data.weight * (data.values - best.model)
+    known = np.sum(data.weight > 0, axis=1) * view.independent / view.points
     nuisances = [
         x for x in (view.scene.instrument.scale, view.scene.instrument.offset) if isinstance(x, Drift)
     ]
