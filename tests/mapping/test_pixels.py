@@ -120,7 +120,7 @@ def test_rivals_are_those_of_fit():
         assert listed.sum() > 1
         for value, own in zip(best.values[pixel, listed, 0], best.deviance[pixel, listed], strict=True):
             nearest = np.argmin(np.abs(values - value))
-            # polished until the deviance falls by 1e-3 of the distance to the best: σ is 0.06, minima are flat
+            # polished to 1e-3 of the distance to the best; with a σ of 0.06 minima are flat
             assert value == pytest.approx(values[nearest], abs=3.0)
             assert own == pytest.approx(deviance[nearest], rel=1e-3, abs=0.05)
         assert best.deviance[pixel, 0] == pytest.approx(deviance.min(), abs=1e-6)
