@@ -111,6 +111,14 @@ def test_all_numbers_of_a_pixel_are_those_of_its_minimum(wedge):
     np.testing.assert_array_equal(again["thickness"], made["thickness"])
 
 
+def test_maps_in_chunks_are_changed_chunk_by_chunk(wedge):
+    before = constructed(*wedge)
+    made, lazy = decided_by_neighbours(before), decided_by_neighbours(before.chunk({"y": 10, "x": 17}))
+    assert lazy["order_n"].chunks is not None
+    assert lazy["thickness"].chunks is not None
+    xr.testing.assert_equal(lazy.compute(), made)
+
+
 def test_a_step_of_one_order_stays():
     y, x = np.mgrid[:40, :40]
     truth = 500 + 0.5 * x + np.where((x > 10) & (x < 30) & (y > 10) & (y < 32), PERIOD, 0.0)

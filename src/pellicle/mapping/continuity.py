@@ -20,6 +20,7 @@ from pellicle.effects.plan import Row
 from pellicle.errors import UsageError
 from pellicle.mapping.neighbours import Neighbourhood, grid, scattered
 from pellicle.mapping.pixel_fits import BY_NEIGHBOURS, CODES
+from pellicle.mapping.stored_minima import exchanged, minima_at
 from pellicle.mapping.unwrapping import Field, field_of, grow
 
 log = getLogger(__name__)
@@ -31,8 +32,6 @@ LIMIT = 25.0
 """Largest Δχ² of a minimum that neighbours may choose."""
 _HIDDEN, _SHARE, _PATCH = 20_000, 0.1, 4
 """Decided pixels that are hidden to test the neighbours: number in all, share at a time, width of a patch."""
-_READ = 2_000_000
-"""Numbers of a variable that are read at a time."""
 
 
 @dataclass(frozen=True)
@@ -143,7 +142,7 @@ def decided_by_neighbours(
     # odds of a right order (Jeffreys' rule): neighbours outweigh no more Δχ² than they are seen to be worth
     weight = max(2 * math.log((found - wrong + 0.5) / (wrong + 0.5)), 0.0)
 
-    minima, delta = _minima(dataset, name, pixels)
+    minima, delta = minima_at(dataset, name, pixels)
     least = delta.min(axis=1, keepdims=True, initial=np.inf)  # not the answer's, where neighbours chose it
     delta = delta - np.where(np.isfinite(least), least, 0.0)
     best = np.argmin(delta, axis=1) if len(pixels) else np.empty(0, int)
@@ -169,7 +168,7 @@ def decided_by_neighbours(
         limit=limit,
     )
     log.info("neighbours: %s", result)
-    made = _swapped(dataset, names, chosen, order)
+    made = exchanged(dataset, names, chosen, order)
     state = state.copy()
     state[chosen] = CODES[BY_NEIGHBOURS]
     made["status"] = made["status"].copy(data=state.reshape(shape))
@@ -220,25 +219,6 @@ def _widest(dataset: Any, names: list[str]) -> str | None:
     return max(thicknesses, key=spread) if len(thicknesses) > 1 else next(iter(thicknesses), None)
 
 
-def _minima(dataset: Any, name: str, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Thickness and Δχ² (pixels, orders) of the minima of some pixels, in increasing flat order."""
-    thickness, delta = (_read(dataset[key], pixels) for key in (f"order_{name}", "order_delta_chi2"))
-    return thickness, np.where(np.isfinite(thickness) & ~np.isnan(delta), delta, np.inf)
-
-
-def _read(array: Any, pixels: np.ndarray) -> np.ndarray:
-    """Rows (pixels, orders) of an array (*map, orders), a slab at a time: it may be larger than memory."""
-    rows = int(np.prod(array.shape[1:-1], dtype=int))
-    slab = max(1, _READ // max(rows * array.shape[-1], 1))
-    read = np.empty((len(pixels), array.shape[-1]))
-    for first in range(0, array.shape[0], slab):
-        low, high = np.searchsorted(pixels, [first * rows, (first + slab) * rows])
-        if high > low:
-            part = np.asarray(array[first : first + slab], float).reshape(-1, array.shape[-1])
-            read[low:high] = part[pixels[low:high] - first * rows]
-    return read
-
-
 def _tested(dataset: Any, name: str, field: Field, near: Neighbourhood) -> tuple[int, int, int]:
     """Hide decided pixels and seek their orders by their neighbours alone, a tenth of the map at a time.
 
@@ -258,7 +238,7 @@ def _tested(dataset: Any, name: str, field: Field, near: Neighbourhood) -> tuple
         hidden = pixels[np.isin(patch, part)]
         decided = field.decided.copy()
         decided[hidden] = False
-        minima, delta = _minima(dataset, name, hidden)
+        minima, delta = minima_at(dataset, name, hidden)
         known = np.isfinite(delta)
         choice = grow(
             field._replace(decided=decided), near, hidden, minima, np.where(known, 0.0, np.inf), np.inf
@@ -269,39 +249,3 @@ def _tested(dataset: Any, name: str, field: Field, near: Neighbourhood) -> tuple
             break
     hidden, found, wrong = map(int, counts)
     return hidden, found, wrong
-
-
-def _swapped(dataset: Any, names: list[str], pixels: np.ndarray, order: np.ndarray) -> Any:
-    """The dataset with the chosen minimum of each pixel as its answer, and the former answer as its rival."""
-    made = dataset.copy()
-    kept = dataset["order_delta_chi2"]
-    orders = kept.shape[-1]
-    rank = np.tile(np.arange(orders), (len(pixels), 1))
-    rank = np.concatenate([order[:, None], rank[rank != order[:, None]].reshape(-1, orders - 1)], axis=1)
-    swap, line = order > 0, np.arange(len(pixels))[:, None]
-
-    def put(key: str, rows: Any) -> None:
-        """Replace the rows of the pixels whose minimum changes."""
-        whole = np.array(dataset[key])
-        flat = whole.reshape(-1, orders) if dataset[key].ndim == kept.ndim else whole.reshape(-1)
-        flat[pixels[swap]] = np.asarray(rows)[swap]
-        made[key] = dataset[key].copy(data=whole)
-
-    delta = _read(kept, pixels)[line, rank]
-    put("order_delta_chi2", delta - delta[:, :1])
-    if "rival_delta_chi2" in dataset:
-        put("rival_delta_chi2", delta[:, 1] - delta[:, 0])
-    for key in dataset.data_vars:
-        name = str(key)
-        if f"{name}_stderr_noise" not in dataset:
-            continue
-        if name in names:
-            minima = _read(dataset[f"order_{name}"], pixels)[line, rank]
-            put(f"order_{name}", minima)
-            put(name, minima[:, 0])
-            if f"rival_{name}" in dataset:
-                put(f"rival_{name}", minima[:, 1])
-        else:
-            for other in (name, f"{name}_stderr", f"{name}_stderr_noise"):
-                put(other, np.full(len(pixels), np.nan))
-    return made
