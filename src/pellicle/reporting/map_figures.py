@@ -47,9 +47,9 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 RIVALS = "magma"
-PANEL, TALLEST, LEAST, WIDE = 3.5, 5.0, 1.2, 2.0
+PANEL, TALLEST, LEAST, WIDE = 3.5, 5.0, 1.3, 2.0
 """Inches: width of a panel, its largest and least height, height of a panel as wide as the page."""
-_LEFT, _RIGHT, _ABOVE, _BELOW, _LINE = 0.75, 1.45, 0.32, 0.55, 0.19
+_LEFT, _RIGHT, _ABOVE, _BELOW, _LINE = 0.75, 1.85, 0.32, 0.62, 0.175
 """Inches beside a panel: labels, colour bar or legend, its title, its axis; a line of text."""
 
 
@@ -151,7 +151,8 @@ def _page(
     width = max(width, 7.5 if wide else 5.5)
     title = _title(sheet, int(width * 12.5), remark)
     words = unusable(np.asarray(sheet.data["status"])) if hatching else []
-    below = _LINE * 2.6 if words else 0.0
+    each_line = max(int(width / 1.5), 1)
+    below = _LINE * (1.6 + 1.2 * np.ceil(len(words) / each_line)) if words else 0.0
     top = _LINE * (title.count("\n") + 1) + 0.15
     heights = [height] * rows + [WIDE] * wide
     total = top + sum(heights) + (_ABOVE + _BELOW) * len(heights) + below
@@ -177,7 +178,7 @@ def _page(
             fontsize="small",
             loc="lower left",
             bbox_to_anchor=(0.0, 0.0),
-            ncols=min(len(words), int(width / 1.5)),
+            ncols=min(len(words), each_line),
             frameon=False,
             alignment="left",
         )

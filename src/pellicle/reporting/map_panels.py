@@ -154,7 +154,7 @@ def label_axes(panel: Axes, axes: MapAxes) -> None:
     assert axes.y is not None
     panel.set_ylabel(axes.y.label.replace("$", r"\$"))
     if _to_scale(axes):
-        panel.set_aspect("equal")
+        panel.set_aspect("equal", anchor="NW")
     if axes.kind == "image":
         panel.set_xlim(*sorted(axes.x.edges()[[0, -1]]))
         panel.set_ylim(*sorted(axes.y.edges()[[0, -1]]))
@@ -264,7 +264,7 @@ def status_panel(sheet: Sheet, panel: Axes, codes: np.ndarray, legend: bool) -> 
     entries = []
     for word, count in made.counts.items():
         total, among = (made.pixels, " of all") if word == NO_DATA else (made.with_data, "")
-        text = f"{word}\n{share(count, total)} %{among}"
+        text = f"{word} {share(count, total)} %{among}"
         entries.append(Patch(facecolor=COLOURS[word], edgecolor=GREY, linewidth=0.5, label=text))
     panel.legend(
         handles=entries,
