@@ -282,3 +282,10 @@ def test_the_plan_has_one_row_of_the_neighbours():
     }  # fmt: skip
     found = made(image(), plan=json.dumps(rows), neighbours=json.dumps(decided))
     assert len([row for row in cube_json(found)["plan"] if row["effect"] == "neighbours"]) == 1
+
+
+def test_the_edge_of_a_large_map_is_sought_on_fewer_pixels(monkeypatch):
+    monkeypatch.setattr("pellicle.reporting.map_places.MOST_PIXELS", 1200)  # every second
+    found = ~blank()
+    found[4:-4, 4:-4] = False
+    assert where(found) == "along the edge"
