@@ -51,6 +51,8 @@ if TYPE_CHECKING:
     from pellicle.scene.layers import medium as medium
     from pellicle.scene.surface import Surface as Surface
     from pellicle.scene.uncertainty import Uncertainty as Uncertainty
+    from pellicle.simulation.depth import absorptance as absorptance
+    from pellicle.simulation.depth import field as field
     from pellicle.simulation.functions import ellipsometry as ellipsometry
     from pellicle.simulation.functions import reflectance as reflectance
     from pellicle.simulation.functions import refractive_index as refractive_index
@@ -81,6 +83,7 @@ _NAMES = {
     "pellicle.scene.uncertainty": ("Uncertainty",),
     "pellicle.scene.layers": ("Interface", "Layer", "Plate", "Substrate", "medium"),
     "pellicle.scene.surface": ("Surface",),
+    "pellicle.simulation.depth": ("absorptance", "field"),
     "pellicle.simulation.functions": ("ellipsometry", "reflectance", "refractive_index", "transmittance"),
     "pellicle.synthetic.brdf": ("Directions",),
 }

@@ -124,6 +124,22 @@ def element_slopes(
     return values, slopes
 
 
+@jax.custom_jvp
+def scale_exponent(Q: Number, k: Any) -> Number:
+    """Return ikq, the logarithm of the scale of `matrix_elements`, whose derivative is that of the scale.
+
+    For fields at different depths of a layer, whose scales differ. Of a complex array or a `Pair`.
+    """
+    return times_i(k * sqrt(Q))
+
+
+@scale_exponent.defjvp
+def _scale_exponent_slope(primal: Any, tangent: Any) -> tuple[Number, Number]:
+    (Q, k), (dQ, dk) = primal, tangent
+    slope = _i_over_root(Q) * (Q * dk + 0.5 * k * dQ)
+    return scale_exponent(Q, k), where(_near_zero(Q, k), 0.0 * slope, slope)
+
+
 def _i_over_root(Q: Number) -> Number:
     """Return i/√Q, finite at 0; of a real Q 1/√−Q, which is used for evanescent layers only."""
     q = jnp.sqrt(jnp.abs(Q)) if is_real_array(Q) else sqrt(Q)

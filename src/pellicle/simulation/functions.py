@@ -6,25 +6,15 @@ them. The precision follows the input, float32 or float64.
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
-import jax
 import jax.numpy as jnp
-import numpy as np
-from jax.core import Tracer
 from jaxtyping import Array, Complex, Float
 
-from pellicle.dispersion.base import AbstractDispersion
-from pellicle.errors import UsageError
-from pellicle.optics import coherent, interface, response
+from pellicle.optics import coherent, response
 from pellicle.optics.ellipsometry import normalised, psi_delta, stokes
-from pellicle.optics.pair import Number, is_real, to_complex, to_pair
-from pellicle.scene.film import check_polarisation
-from pellicle.scene.layers import ambient_medium, medium
-
-Medium = Any
-"""A number (n + ik), an array of them, a material, or a material's name."""
+from pellicle.optics.pair import to_complex
+from pellicle.simulation.film_arguments import Medium, film_arguments, floating, index_at
 
 
 def reflectance(
@@ -125,7 +115,7 @@ def ellipsometry(
 
     ```
     """
-    angle = _floating(angle)  # also at 0 both polarisations are needed
+    angle = floating(angle)  # also at 0 both polarisations are needed
     s, p = _responses(wavelength, thickness, layer, substrate, ambient, angle, "unpolarised")
     return psi_delta(*normalised(stokes(s, p)))
 
@@ -145,65 +135,13 @@ def refractive_index(wavelength: Any, what: Medium) -> Complex[Array, "..."]:
 
     ```
     """
-    wavelength = _floating(wavelength)
-    value = to_complex(_index(what, wavelength))
+    wavelength = floating(wavelength)
+    value = to_complex(index_at(what, wavelength))
     return jnp.broadcast_to(value, jnp.broadcast_shapes(value.shape, wavelength.shape))
 
 
 def _responses(wavelength, thickness, layer, substrate, ambient, angle, polarisation):
-    check_polarisation(polarisation)
-    for name, value in {"wavelength": wavelength, "thickness": thickness, "angle": angle}.items():
-        if isinstance(value, str):
-            raise UsageError(f"`{name}` must be a number or an array, not {value!r}")
-    _warn_of_lost_precision(wavelength, thickness, layer, substrate, ambient, angle)
-    wavelength = _floating(wavelength)
-    normal = isinstance(angle, int | float) and angle == 0
-    several = isinstance(layer, list | tuple)
-    propagating = normal or all(
-        interface.propagates(n, ambient, angle) for n in (layer if several else [layer])
-    )
-    into_below = normal or interface.propagates(substrate, ambient, angle)
-    named = isinstance(ambient, str | AbstractDispersion)
-    ambient = _index(ambient_medium(ambient) if named else ambient, wavelength)
-    substrate = _index(substrate, wavelength)
-    if not is_real(ambient):
-        raise ValueError("the ambient must not absorb: give it a real index")
-    if not into_below:
-        substrate = interface.allow_tunnelling(substrate)
-    theta = None if normal else jnp.deg2rad(_floating(angle))
-    letters = "sp" if polarisation == "unpolarised" else polarisation
-    layers, thicknesses = [layer], [thickness]
-    if several:
-        layers, thicknesses = layer, thickness
-        count = len(thickness) if isinstance(thickness, list | tuple) else np.shape(thickness)[:1]
-        if count not in (len(layers), (len(layers),)):
-            raise ValueError(f"thickness: expected one for each of {len(layers)} layers, got {count}")
-    indices = [_index(n, wavelength) for n in layers]
-    phases = [2 * jnp.pi / wavelength * thicknesses[i] for i in range(len(layers))]
-    return coherent.responses(ambient, indices, substrate, phases, theta, letters, propagating=propagating)
-
-
-def _floating(x: Any):
-    return jnp.asarray(x) * 1.0
-
-
-def _index(what: Medium, wavelength) -> Number:
-    """The index at the wavelengths: arrays and numbers as they are, materials evaluated."""
-    if isinstance(what, str | AbstractDispersion):
-        material = medium(what)
-        check = getattr(material, "check_range", None)
-        if check is not None and not isinstance(wavelength, Tracer):
-            check(np.asarray(wavelength))
-        return material.index(wavelength)
-    return to_pair(_floating(what))
-
-
-def _warn_of_lost_precision(*arguments: Any) -> None:
-    if jax.config.jax_enable_x64:  # pyright: ignore[reportAttributeAccessIssue]
-        return
-    double = (np.float64, np.complex128)
-    if any(isinstance(a, np.ndarray | np.generic) and a.dtype in double for a in arguments):
-        warnings.warn(
-            "float64 input is computed in float32: jax.config.update('jax_enable_x64', True) keeps it",
-            stacklevel=4,
-        )
+    film = film_arguments(wavelength, thickness, layer, substrate, ambient, angle, polarisation)
+    phases = [2 * jnp.pi / film.wavelength * d for d in film.thicknesses]
+    media = (film.ambient, film.layers, film.substrate)
+    return coherent.responses(*media, phases, film.angle, film.polarisations, propagating=film.propagating)

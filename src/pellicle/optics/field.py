@@ -1,0 +1,157 @@
+"""Electric and magnetic field at any depth of a coherent stack, in its ambient and in its substrate.
+
+Within a layer the field is followed upwards from its lower face, and multiplied by e^{iqx} over the distance
+x to its upper face: no exponential grows, and under a millimetre of metal the field is 0.
+
+Source: Macleod, Thin-Film Optical Filters, chapter 2; Byrnes, arXiv:1603.02720, section 4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from pellicle.optics.characteristic import matrix_elements, scale_exponent
+from pellicle.optics.interface import incident_factor
+from pellicle.optics.interface_fields import Media, interface_fields, media
+from pellicle.optics.pair import Number, Pair, abs2, imag, real, times_i, where
+
+
+class PolarisedField(NamedTuple):
+    """Field of one polarisation at a depth, for an incident wave of unit power along the normal.
+
+    x lies in the plane of incidence, along the interfaces; z points from the ambient into the substrate.
+    `magnetic` is in the unit in which a plane wave has |H| = |n E|.
+    """
+
+    electric: tuple[Number, Number, Number]
+    magnetic: tuple[Number, Number, Number]
+    loss: Any  # Im ε at that depth
+
+    def energy(self) -> Any:
+        """Return |E|²; Im ε times it is the power absorbed over a depth of 1/k₀."""
+        return sum(abs2(component) for component in self.electric)
+
+
+class _Place(NamedTuple):
+    """Fields along the interfaces, and the permittivity, at a depth."""
+
+    U: Pair
+    V: Pair
+    permittivity: Pair
+
+
+class _Layer(NamedTuple):
+    """A layer's fields at its lower face, the logarithm of their scale, and what they are followed by."""
+
+    U: Pair
+    V: Pair
+    exponent: Pair
+    square: Pair
+    weight: Pair
+    permittivity: Pair
+    upper: Any  # depth of its faces, nm
+    lower: Any
+
+
+def fields(
+    ambient: Number,
+    layers: Sequence[Number],
+    substrate: Number,
+    wavenumber: Any,
+    thicknesses: Sequence[Any],
+    depth: Any,
+    angle: Any,
+    polarisations: str = "sp",
+) -> tuple[PolarisedField, ...]:
+    """Return the field at a depth, for each letter of `polarisations`.
+
+    **Arguments:** as for `coherent.responses`, with `wavenumber` k₀ in 1/nm, `thicknesses` in nm, and `depth`
+    in nm from the first interface downwards, negative in the ambient. At an interface the field is that just
+    below it. `angle` has no None.
+    """
+    stack = media(ambient, layers, substrate, [wavenumber * d for d in thicknesses], angle)
+    shape, dtype = stack.substrate.re.shape, stack.substrate.re.dtype
+    rows = [jnp.broadcast_to(jnp.asarray(d, dtype), shape) for d in thicknesses]
+    lower = jnp.cumsum(jnp.stack(rows), axis=0) if rows else jnp.zeros((0, *shape), dtype)
+    return tuple(_field(stack, wavenumber, lower, depth, letter) for letter in polarisations)
+
+
+def _field(stack: Media, wavenumber: Any, lower: Any, depth: Any, polarisation: str) -> PolarisedField:
+    found = interface_fields(stack, polarisation)
+    s = polarisation == "s"
+    zero = jnp.zeros_like(stack.substrate.re)
+    # logarithms of the scales: from the first interface to the upper face of each layer, and within it
+    within = scale_exponent(stack.squares, stack.phases) - 0.5 * jnp.log(found.size)
+    sums = jax.tree.map(lambda x: jnp.cumsum(x, axis=0), within)
+    layers = _Layer(
+        found.U,
+        found.V,
+        sums,
+        stack.squares,
+        found.weight,
+        stack.permittivity,
+        jnp.concatenate([zero[None], lower[:-1]]) if lower.shape[0] else lower,
+        lower,
+    )
+    e0 = stack.ambient * stack.ambient
+    top = _Layer(
+        *found.top,
+        Pair(zero, zero),
+        _pair(stack.q_top * stack.q_top, zero),
+        _pair(1.0 if s else e0, zero),
+        _pair(e0, zero),
+        jnp.full_like(zero, -jnp.inf),
+        zero,
+    )
+    passed, foot = Pair(zero, zero), zero
+    if lower.shape[0]:
+        passed, foot = jax.tree.map(lambda x: x[-1], (sums, lower))
+    below = jnp.where(depth >= foot, wavenumber * (depth - foot), 0.0)
+    wave = _exp(passed + times_i(stack.q_bottom * below))
+    admittance = stack.q_bottom if s else stack.q_bottom / stack.substrate
+    place = _Place(wave, admittance * wave, stack.substrate + 0.0 * below)
+
+    def choose(place: _Place, layer: _Layer) -> tuple[_Place, None]:
+        inside = (depth >= layer.upper) & (depth < layer.lower)
+        # of other layers any distance will do, if its slope is finite
+        here = _within(layer, jnp.where(inside, wavenumber * (layer.lower - depth), 0.0))
+        return _Place(*(where(inside, new, old) for new, old in zip(here, place, strict=True))), None
+
+    place, _ = jax.lax.scan(choose, choose(place, top)[0], layers)
+    return _components(stack, found.denominator, place, polarisation)
+
+
+def _within(layer: _Layer, height: Any) -> _Place:
+    """Fields of a layer at a height k₀t above its lower face."""
+    c, f, _, _ = matrix_elements(layer.square + 0.0 * height, height)
+    scale = _exp(layer.exponent - scale_exponent(layer.square + 0.0 * height, height))
+    g = times_i(-f)
+    U = (layer.U * c + layer.weight * layer.V * g) * scale
+    V = (layer.V * c + layer.square / layer.weight * layer.U * g) * scale
+    return _Place(U, V, layer.permittivity + 0.0 * height)
+
+
+def _components(stack: Media, denominator: Number, place: _Place, polarisation: str) -> PolarisedField:
+    factor = incident_factor(stack.ambient, stack.q_top, polarisation)
+    if polarisation == "p":
+        factor = factor / abs2(stack.ambient * stack.ambient)
+    amplitude = jnp.sqrt(factor) / denominator
+    U, V = place.U * amplitude, place.V * amplitude
+    nothing = 0.0 * U
+    loss = imag(place.permittivity)
+    if polarisation == "s":
+        return PolarisedField((nothing, U, nothing), (-V, nothing, stack.a * U), loss)
+    return PolarisedField((V, nothing, -stack.a * U / place.permittivity), (nothing, U, nothing), loss)
+
+
+def _pair(number: Number, zero: Any) -> Pair:
+    return Pair(real(number) + zero, imag(number) + zero)
+
+
+def _exp(x: Pair) -> Pair:
+    size = jnp.exp(x.re)
+    return Pair(size * jnp.cos(x.im), size * jnp.sin(x.im))

@@ -1,0 +1,101 @@
+"""Integrals of |cos(qt)|², |sin(qt)/q|² and their product over a layer, as functions of Q = q².
+
+The energy in a layer is a sum of them, without a difference between powers: the absorption in a layer of
+k = 1e-30 has all its digits. With q = p + ib they are built from sinh(2bt)/2b and sin(2pt)/2p, which are
+g(b²) and g(−p²) for one entire function g. So the integral of |sin(qt)/q|² is a divided difference of g,
+symmetric in b² and −p², and smooth in Re Q and Im Q where q is 0.
+
+Source: Byrnes, arXiv:1603.02720, section 4 (absorption), integrated over the layer.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+
+from pellicle.optics.characteristic import Characteristic
+from pellicle.optics.pair import Number, Pair, abs2, imag, real, sqrt, where
+
+_TERMS = 14
+"""Terms of the series at |k²Q| < 1: the next ones are below 1e-18 of the sum."""
+_DECAY_TERMS = 18
+
+
+class LayerIntegrals(NamedTuple):
+    """Integrals over k₀t from 0 to k, times |scale|² of the layer's matrix elements."""
+
+    cc: Any  # of |cos(qt)|²
+    ff: Any  # of |sin(qt)/q|²
+    cf: Number  # of conj(cos(qt)) sin(qt)/q
+
+
+def layer_integrals(Q: Number, k: Any, elements: Characteristic) -> LayerIntegrals:
+    """Return the integrals over a layer, finite in opaque layers and smooth where Q or k is 0.
+
+    **Arguments:** `Q` = q² as a `Pair`; `k` = k₀d, real; `elements` = matrix_elements(Q, k), whose scale is
+    taken, with its derivative.
+    """
+    w = k * k * Q
+    near = abs2(w) < 1
+    cc, ff, across = _series(jnp.where(near, real(w), 0.0), jnp.where(near, imag(w), 0.0))
+    cc_far, ff_far, across_far = _by_functions(
+        where(near, 1.0, Q), jnp.where(near, 1.0, k), elements.scale_square
+    )
+
+    def scaled(power: int, series: Any, far: Any) -> Any:
+        return jnp.where(near, k**power * series * elements.scale_square, far)
+
+    cf = Pair(0.5 * abs2(elements.f), scaled(2, across, across_far))  # d|f|²/dt = 2 Re(conj(c) f)
+    return LayerIntegrals(scaled(1, cc, cc_far), scaled(3, ff, ff_far), cf)
+
+
+def _series(x: Any, y: Any) -> tuple[Any, Any, Any]:
+    """Integrals for k = 1 without scale: of cc, of ff and the imaginary part of cf, from w = x + iy.
+
+    Power sums P_n and complete homogeneous polynomials H_n of the two numbers 4b² and −4p², whose sum is −4x
+    and whose product is −4y².
+    """
+    total, product = -4 * x, -4 * y * y
+    powers, before = total, 2.0 + 0.0 * x
+    complete, complete_before = 1.0 + 0.0 * x, 0.0 * x
+    cc, ff, across = 0.5 * before, 0.0 * x, 0.0 * x
+    for n in range(_TERMS):
+        cc = cc + powers * (0.5 / math.factorial(2 * n + 3))
+        ff = ff + complete * (2 / math.factorial(2 * n + 3))
+        across = across + complete * (2 / math.factorial(2 * n + 4))
+        powers, before = total * powers - product * before, powers
+        complete, complete_before = total * complete - product * complete_before, complete
+    return cc, ff, across * y
+
+
+def _by_functions(Q: Number, k: Any, scale_square: Any) -> tuple[Any, Any, Any]:
+    """The same for any k with the scale, where |k²Q| is not small."""
+    q = sqrt(Q)
+    p, b = real(q), imag(q)
+    square = abs2(q)
+    grown, swung = _decay(4 * b * k), scale_square * _sinc(2 * p * k)
+    half = 0.5 * k
+    across = _decay(2 * b * k) ** 2 - scale_square * _sinc(p * k) ** 2
+    return half * (grown + swung), half * (grown - swung) / square, half * half * imag(Q) * across / square
+
+
+def _decay(x: Any) -> Any:
+    """Return (1 − e^−x)/x for x ≥ 0, the mean of a decay over the layer."""
+    small = x < 1
+    near, far = jnp.where(small, x, 0.0), jnp.where(small, 1.0, x)
+    series = 0.0 * near
+    for n in range(_DECAY_TERMS, -1, -1):
+        series = series * -near + 1 / math.factorial(n + 1)
+    return jnp.where(small, series, -jnp.expm1(-far) / far)
+
+
+def _sinc(x: Any) -> Any:
+    """Return sin(x)/x."""
+    small = jnp.abs(x) < 1
+    near, far = jnp.where(small, x, 0.0), jnp.where(small, 1.0, x)
+    square, series = near * near, 0.0 * near
+    for n in range(9, -1, -1):
+        series = series * -square + 1 / math.factorial(2 * n + 1)
+    return jnp.where(small, series, jnp.sin(far) / far)

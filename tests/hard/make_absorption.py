@@ -1,0 +1,123 @@
+"""Writes absorption.json: absorptances and fields of hard stacks with their derivatives, to 50 digits.
+
+Absorptances are differences between the net powers through the faces of a layer, at 160 digits, where no
+cancellation matters; |E|² at a depth is made of the same characteristic matrices (H. A. Macleod, Thin-Film
+Optical Filters, chapter 2). Beside each number stands its condition: by how much it changes, to first order,
+where every input changes by its own size. Run as `python tests/hard/make_absorption.py`.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+from make_stacks import STACKS, case, natural, unpack
+from make_table import STEP
+from mpmath import mp, mpf
+
+LAYERS = 3
+SHARES = (0.4, 0.3, 0.7)
+"""Depth within each layer at which |E|² is computed, as a share of its thickness."""
+OUTSIDE = 40.0
+"""Its distance from the stack in the ambient and in the substrate, nm."""
+
+MORE = {
+    "0.1 mm of k = 0.01": case((1e5, 1.5 + 1e-2j), (50.0, 2.1), (30.0, 1.38)),
+    "metal of kd = 1e4": case((100.0, 1.46), (3e5, 0.5 + 4j), (80.0, 2.1 + 0.1j)),
+    "k = 1e-12 under metal": case((30.0, 0.2 + 3.4j), (120.0, 1.9 + 1e-12j), (30.0, 0.2 + 3.4j)),
+    "k = 1e-12 beyond total reflection": case(
+        (100.0, 1.3 + 1e-12j), (200.0, 1.0), (30.0, 1.38 + 1e-12j), ambient=1.52, angle=70.0, substrate=1.0
+    ),
+    "absorbing gap of 2 µm": case((50.0, 1.8), (2000.0, 1.0 + 1e-3j), (50.0, 1.8), ambient=1.5, substrate=1.5),
+    "thin absorber at a node": case((275.0, 1.0), (1.0, 3.0 + 2j), (1e-3, 1.0), substrate=0.01 + 20j, angle=0.0),
+}
+CASES = STACKS | MORE
+
+
+def outputs(p, near=None):
+    """A of each layer and |E|² in each layer, the ambient and the substrate, for s and p in turn."""
+    depth, eps, q, k0 = unpack(p, near)
+    a = p[-3] * mp.sin(p[-2] * mp.pi / 180)
+    found = []
+    for letter in "sp":
+        weights = [mpf(1)] * len(eps) if letter == "s" else eps
+        Y0, Ys = q[0] / weights[0], q[-1] / weights[-1]
+        fields = [(mpf(1), Ys)]
+
+        def above(U, V, i, t):
+            phase = k0 * t * q[i]
+            c, f = mp.cos(phase), mp.sin(phase) / q[i]
+            return c * U - 1j * f * weights[i] * V, c * V - 1j * f * q[i] ** 2 / weights[i] * U
+
+        for i in range(LAYERS, 0, -1):
+            fields.insert(0, above(*fields[0], i, depth[i - 1]))
+        U, V = fields[0]
+        scale = abs(2 * Y0 / (Y0 * U + V)) ** 2
+        powers = [scale * mp.re(U * mp.conj(V)) / Y0 for U, V in fields]
+        absorbed = [above - below for above, below in zip(powers[:-1], powers[1:], strict=True)]
+
+        def intensity(U, V, i):
+            electric = abs(U) ** 2 if letter == "s" else abs(V) ** 2 + abs(a * U / eps[i]) ** 2
+            return scale * electric * (1 if letter == "s" else p[-3] ** 2)
+
+        at = [
+            intensity(*above(*fields[i + 1], i + 1, (1 - share) * depth[i]), i + 1)
+            for i, share in enumerate(map(mpf, SHARES))
+        ]
+        wave = mp.exp(1j * k0 * mpf(OUTSIDE) * q[-1])
+        at = [intensity(*above(*fields[0], 0, mpf(OUTSIDE)), 0), *at, intensity(wave, Ys * wave, LAYERS + 1)]
+        found += [*absorbed, *at]
+    return found
+
+
+def slopes(p, near):
+    table = []
+    for i in range(len(p)):
+        up, down = list(p), list(p)
+        up[i], down[i] = p[i] + STEP, p[i] - STEP
+        table.append([(x - y) / (2 * STEP) for x, y in zip(outputs(up, near), outputs(down, near), strict=True)])
+    return table
+
+
+def sizes(p):
+    """What a rounding of each input is proportional to: itself, also where it is an extinction of 1e-30."""
+    return [abs(x) for x in p]
+
+
+def row(given):
+    p = [mpf(x) for x in given["at"]]
+    size = sizes(p)
+    value = outputs(p)
+    out = {"at": given["at"], "smooth": given["smooth"], "value": [float(x) for x in value]}
+    if not given["smooth"]:
+        return out
+    near = unpack(p, None)[2][-1]
+    first = slopes(p, near)
+    out["slope"] = [[float(x) for x in column] for column in first]
+    spread = [abs(v) + sum(s * abs(c[i]) for s, c in zip(size, first, strict=True)) for i, v in enumerate(value)]
+    # an absorptance cannot be better known than the fields at its faces, from which it follows in proportion
+    floor = natural(p)
+    bends = [[f * abs(v) + abs(x) for v, x in zip(value, column, strict=True)] for f, column in zip(floor, first, strict=True)]
+    for j, s in enumerate(size):
+        if s == 0:
+            continue
+        up, down = list(p), list(p)
+        up[j], down[j] = p[j] + STEP, p[j] - STEP
+        above, below = slopes(up, near), slopes(down, near)
+        for column, x, y in zip(bends, above, below, strict=True):
+            for i in range(len(value)):
+                column[i] += s * abs(x[i] - y[i]) / (2 * STEP)
+    out["slope_condition"] = [[float(f"{float(x):.3g}") for x in column] for column in bends]
+    out["condition"] = [float(f"{float(x):.3g}") for x in spread]
+    return out
+
+
+def main():
+    found = {name: row(given) for name, given in CASES.items()}
+    text = json.dumps({"shares": SHARES, "outside": OUTSIDE, "cases": found}).replace('}, "', '},\n"')
+    Path(__file__).with_name("absorption.json").write_text(text + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
