@@ -9,12 +9,12 @@ where every input changes by its own size. Run as `python tests/hard/make_absorp
 from __future__ import annotations
 
 import json
+from itertools import pairwise
 from pathlib import Path
 
-import numpy as np
 from make_stacks import STACKS, case, natural, unpack
 from make_table import STEP
-from mpmath import mp, mpf
+from mpmath import mp, mpc, mpf
 
 LAYERS = 3
 SHARES = (0.4, 0.3, 0.7)
@@ -29,45 +29,46 @@ MORE = {
     "k = 1e-12 beyond total reflection": case(
         (100.0, 1.3 + 1e-12j), (200.0, 1.0), (30.0, 1.38 + 1e-12j), ambient=1.52, angle=70.0, substrate=1.0
     ),
-    "absorbing gap of 2 µm": case((50.0, 1.8), (2000.0, 1.0 + 1e-3j), (50.0, 1.8), ambient=1.5, substrate=1.5),
-    "thin absorber at a node": case((275.0, 1.0), (1.0, 3.0 + 2j), (1e-3, 1.0), substrate=0.01 + 20j, angle=0.0),
+    "absorbing gap of 2 µm": case(
+        (50.0, 1.8), (2000.0, 1.0 + 1e-3j), (50.0, 1.8), ambient=1.5, substrate=1.5
+    ),
+    "thin absorber at a node": case(
+        (275.0, 1.0), (1.0, 3.0 + 2j), (1e-3, 1.0), substrate=0.01 + 20j, angle=0.0
+    ),
 }
 CASES = STACKS | MORE
 
 
 def outputs(p, near=None):
-    """A of each layer and |E|² in each layer, the ambient and the substrate, for s and p in turn."""
+    """A of each layer and |E|² in the ambient, each layer and the substrate, for s and p in turn."""
     depth, eps, q, k0 = unpack(p, near)
-    a = p[-3] * mp.sin(p[-2] * mp.pi / 180)
-    found = []
-    for letter in "sp":
-        weights = [mpf(1)] * len(eps) if letter == "s" else eps
-        Y0, Ys = q[0] / weights[0], q[-1] / weights[-1]
-        fields = [(mpf(1), Ys)]
+    return _of_one("s", p, depth, eps, q, k0) + _of_one("p", p, depth, eps, q, k0)
 
-        def above(U, V, i, t):
-            phase = k0 * t * q[i]
-            c, f = mp.cos(phase), mp.sin(phase) / q[i]
-            return c * U - 1j * f * weights[i] * V, c * V - 1j * f * q[i] ** 2 / weights[i] * U
 
-        for i in range(LAYERS, 0, -1):
-            fields.insert(0, above(*fields[0], i, depth[i - 1]))
-        U, V = fields[0]
-        scale = abs(2 * Y0 / (Y0 * U + V)) ** 2
-        powers = [scale * mp.re(U * mp.conj(V)) / Y0 for U, V in fields]
-        absorbed = [above - below for above, below in zip(powers[:-1], powers[1:], strict=True)]
+def _of_one(letter, p, depth, eps, q, k0):
+    s, a = letter == "s", p[-3] * mp.sin(p[-2] * mp.pi / 180)
+    weights = [mpf(1)] * len(eps) if s else eps
+    top, bottom = q[0] / weights[0], q[-1] / weights[-1]
 
-        def intensity(U, V, i):
-            electric = abs(U) ** 2 if letter == "s" else abs(V) ** 2 + abs(a * U / eps[i]) ** 2
-            return scale * electric * (1 if letter == "s" else p[-3] ** 2)
+    def above(fields, i, t):
+        """Fields (E, H) of s or (H, E) of p at a height t over those of medium i."""
+        (U, V), phase = fields, k0 * t * q[i]
+        c, f = mp.cos(phase), mp.sin(phase) / q[i]
+        return c * U - 1j * f * weights[i] * V, c * V - 1j * f * q[i] ** 2 / weights[i] * U
 
-        at = [
-            intensity(*above(*fields[i + 1], i + 1, (1 - share) * depth[i]), i + 1)
-            for i, share in enumerate(map(mpf, SHARES))
-        ]
-        wave = mp.exp(1j * k0 * mpf(OUTSIDE) * q[-1])
-        at = [intensity(*above(*fields[0], 0, mpf(OUTSIDE)), 0), *at, intensity(wave, Ys * wave, LAYERS + 1)]
-        found += [*absorbed, *at]
+    faces = [(mpf(1), bottom)]
+    for i in range(LAYERS, 0, -1):
+        faces.insert(0, above(faces[0], i, depth[i - 1]))
+    scale = abs(2 * top / (top * faces[0][0] + faces[0][1])) ** 2
+    powers = [scale * mp.re(U * mp.conj(V)) / top for U, V in faces]
+    wave = mp.exp(1j * k0 * mpf(OUTSIDE) * q[-1])
+    places = [above(faces[0], 0, mpf(OUTSIDE))]
+    places += [above(faces[i + 1], i + 1, (1 - mpf(x)) * depth[i]) for i, x in enumerate(SHARES)]
+    places += [(wave, bottom * wave)]
+    found = [one - other for one, other in pairwise(powers)]
+    for (U, V), permittivity in zip(places, eps, strict=True):
+        electric = abs(U) ** 2 if s else p[-3] ** 2 * (abs(V) ** 2 + abs(a * U / permittivity) ** 2)
+        found.append(scale * electric)
     return found
 
 
@@ -76,18 +77,27 @@ def slopes(p, near):
     for i in range(len(p)):
         up, down = list(p), list(p)
         up[i], down[i] = p[i] + STEP, p[i] - STEP
-        table.append([(x - y) / (2 * STEP) for x, y in zip(outputs(up, near), outputs(down, near), strict=True)])
+        table.append(
+            [(x - y) / (2 * STEP) for x, y in zip(outputs(up, near), outputs(down, near), strict=True)]
+        )
     return table
 
 
-def sizes(p):
-    """What a rounding of each input is proportional to: itself, also where it is an extinction of 1e-30."""
-    return [abs(x) for x in p]
+def rounding(p):
+    """What the error of each input is proportional to in a derivative.
+
+    An index is rounded as n + ik, but of an extinction below 1e-6 nothing may be lost.
+    """
+    sizes = [abs(x) for x in p]
+    pairs = [(LAYERS + i, 2 * LAYERS + i) for i in range(LAYERS)] + [(3 * LAYERS, 3 * LAYERS + 1)]
+    for n, k in pairs:
+        if p[k] > mpf(10) ** -6:
+            sizes[n] = sizes[k] = abs(mpc(p[n], p[k]))
+    return sizes
 
 
 def row(given):
     p = [mpf(x) for x in given["at"]]
-    size = sizes(p)
     value = outputs(p)
     out = {"at": given["at"], "smooth": given["smooth"], "value": [float(x) for x in value]}
     if not given["smooth"]:
@@ -95,19 +105,23 @@ def row(given):
     near = unpack(p, None)[2][-1]
     first = slopes(p, near)
     out["slope"] = [[float(x) for x in column] for column in first]
-    spread = [abs(v) + sum(s * abs(c[i]) for s, c in zip(size, first, strict=True)) for i, v in enumerate(value)]
-    # an absorptance cannot be better known than the fields at its faces, from which it follows in proportion
-    floor = natural(p)
-    bends = [[f * abs(v) + abs(x) for v, x in zip(value, column, strict=True)] for f, column in zip(floor, first, strict=True)]
-    for j, s in enumerate(size):
-        if s == 0:
+    spread = [
+        abs(v) + sum(abs(x) * abs(column[i]) for x, column in zip(p, first, strict=True))
+        for i, v in enumerate(value)
+    ]
+    bends = [
+        [floor * abs(v) + abs(x) for v, x in zip(value, column, strict=True)]
+        for floor, column in zip(natural(p), first, strict=True)
+    ]
+    for j, size in enumerate(rounding(p)):
+        if size == 0:
             continue
         up, down = list(p), list(p)
         up[j], down[j] = p[j] + STEP, p[j] - STEP
         above, below = slopes(up, near), slopes(down, near)
         for column, x, y in zip(bends, above, below, strict=True):
             for i in range(len(value)):
-                column[i] += s * abs(x[i] - y[i]) / (2 * STEP)
+                column[i] += size * abs(x[i] - y[i]) / (2 * STEP)
     out["slope_condition"] = [[float(f"{float(x):.3g}") for x in column] for column in bends]
     out["condition"] = [float(f"{float(x):.3g}") for x in spread]
     return out

@@ -17,7 +17,7 @@ import jax.numpy as jnp
 from pellicle.optics.interface import incident_factor
 from pellicle.optics.interface_fields import InterfaceFields, Media, interface_fields, media
 from pellicle.optics.layer_integrals import LayerIntegrals, layer_integrals
-from pellicle.optics.pair import Number, abs2, conj, imag, real, times_i
+from pellicle.optics.pair import Number, abs2, conj, real, times_i
 
 
 def absorptances(
@@ -56,12 +56,15 @@ def _absorptance(stack: Media, integrals: LayerIntegrals, polarisation: str) -> 
     # the fields at the upper face of each layer relative to those at the first interface
     ratios = stack.elements.scale_square / fields.size
     above = jnp.concatenate([jnp.ones_like(ratios[:1]), jnp.cumprod(ratios, axis=0)[:-1]])
-    energy = _energy(stack, fields, integrals, polarisation)
-    return imag(stack.permittivity) * energy * (above / fields.size) * (factor / abs2(fields.denominator))
+    absorbed = _absorbed(stack, fields, integrals, polarisation)
+    return absorbed * (above / fields.size) * (factor / abs2(fields.denominator))
 
 
-def _energy(stack: Media, fields: InterfaceFields, integrals: LayerIntegrals, polarisation: str) -> Any:
-    """Return the integral of |E|² over each layer, in the scale of the field at its upper face."""
+def _absorbed(stack: Media, fields: InterfaceFields, integrals: LayerIntegrals, polarisation: str) -> Any:
+    """Return Im ε times the integral of |E|² over each layer, in the scale of the field at its upper face.
+
+    Im Q is Im ε, because the transverse index is real.
+    """
     if polarisation == "s":
         return _integral(fields.U, fields.weight * fields.V, integrals)
     along = _integral(fields.V, stack.squares / fields.weight * fields.U, integrals)
@@ -70,6 +73,6 @@ def _energy(stack: Media, fields: InterfaceFields, integrals: LayerIntegrals, po
 
 
 def _integral(value: Number, slope: Number, integrals: LayerIntegrals) -> Any:
-    """Return the integral of |value cos(qt) − i slope sin(qt)/q|²."""
+    """Return Im ε times the integral of |value cos(qt) − i slope sin(qt)/q|²."""
     mixed = conj(value) * times_i(-slope) * integrals.cf
     return abs2(value) * integrals.cc + abs2(slope) * integrals.ff + 2 * real(mixed)

@@ -27,8 +27,9 @@ class PolarisedField(NamedTuple):
     `magnetic` is in the unit in which a plane wave has |H| = |n E|.
     """
 
-    electric: tuple[Number, Number, Number]
+    electric: tuple[Number, Number, Number]  # without the common factor e^{i phase}
     magnetic: tuple[Number, Number, Number]
+    phase: Any
     loss: Any  # Im ε at that depth
 
     def energy(self) -> Any:
@@ -37,10 +38,14 @@ class PolarisedField(NamedTuple):
 
 
 class _Place(NamedTuple):
-    """Fields along the interfaces, and the permittivity, at a depth."""
+    """Fields along the interfaces, their common phase, and the permittivity, at a depth.
+
+    The phase is apart because its slopes, as large as k₀d, would cancel in |E|² but for their rounding.
+    """
 
     U: Pair
     V: Pair
+    phase: Any
     permittivity: Pair
 
 
@@ -111,9 +116,10 @@ def _field(stack: Media, wavenumber: Any, lower: Any, depth: Any, polarisation: 
     if lower.shape[0]:
         passed, foot = jax.tree.map(lambda x: x[-1], (sums, lower))
     below = jnp.where(depth >= foot, wavenumber * (depth - foot), 0.0)
-    wave = _exp(passed + times_i(stack.q_bottom * below))
+    exponent = passed + times_i(stack.q_bottom * below)
+    wave = jnp.exp(exponent.re)
     admittance = stack.q_bottom if s else stack.q_bottom / stack.substrate
-    place = _Place(wave, admittance * wave, stack.substrate + 0.0 * below)
+    place = _Place(Pair(wave, 0.0 * wave), admittance * wave, exponent.im, stack.substrate + 0.0 * below)
 
     def choose(place: _Place, layer: _Layer) -> tuple[_Place, None]:
         inside = (depth >= layer.upper) & (depth < layer.lower)
@@ -128,11 +134,11 @@ def _field(stack: Media, wavenumber: Any, lower: Any, depth: Any, polarisation: 
 def _within(layer: _Layer, height: Any) -> _Place:
     """Fields of a layer at a height k₀t above its lower face."""
     c, f, _, _ = matrix_elements(layer.square + 0.0 * height, height)
-    scale = _exp(layer.exponent - scale_exponent(layer.square + 0.0 * height, height))
-    g = times_i(-f)
+    exponent = layer.exponent - scale_exponent(layer.square + 0.0 * height, height)
+    scale, g = jnp.exp(exponent.re), times_i(-f)
     U = (layer.U * c + layer.weight * layer.V * g) * scale
     V = (layer.V * c + layer.square / layer.weight * layer.U * g) * scale
-    return _Place(U, V, layer.permittivity + 0.0 * height)
+    return _Place(U, V, exponent.im, layer.permittivity + 0.0 * height)
 
 
 def _components(stack: Media, denominator: Number, place: _Place, polarisation: str) -> PolarisedField:
@@ -144,14 +150,10 @@ def _components(stack: Media, denominator: Number, place: _Place, polarisation: 
     nothing = 0.0 * U
     loss = imag(place.permittivity)
     if polarisation == "s":
-        return PolarisedField((nothing, U, nothing), (-V, nothing, stack.a * U), loss)
-    return PolarisedField((V, nothing, -stack.a * U / place.permittivity), (nothing, U, nothing), loss)
+        return PolarisedField((nothing, U, nothing), (-V, nothing, stack.a * U), place.phase, loss)
+    upright = -stack.a * U / place.permittivity
+    return PolarisedField((V, nothing, upright), (nothing, U, nothing), place.phase, loss)
 
 
 def _pair(number: Number, zero: Any) -> Pair:
     return Pair(real(number) + zero, imag(number) + zero)
-
-
-def _exp(x: Pair) -> Pair:
-    size = jnp.exp(x.re)
-    return Pair(size * jnp.cos(x.im), size * jnp.sin(x.im))

@@ -1,8 +1,8 @@
-"""Integrals of |cos(qt)|², |sin(qt)/q|² and their product over a layer, as functions of Q = q².
+"""Power absorbed in a layer by the parts of its field: Im Q times integrals of |cos(qt)|² and |sin(qt)/q|².
 
-The energy in a layer is a sum of them, without a difference between powers: the absorption in a layer of
-k = 1e-30 has all its digits. With q = p + ib they are built from sinh(2bt)/2b and sin(2pt)/2p, which are
-g(b²) and g(−p²) for one entire function g. So the integral of |sin(qt)/q|² is a divided difference of g,
+Absorbed powers are sums of these, without a difference between the powers through the faces: a layer of
+k = 1e-30 has all its digits. With q = p + ib the integrals are built from sinh(2bt)/2b and sin(2pt)/2p, which
+are g(b²) and g(−p²) for one entire function g. So the integral of |sin(qt)/q|² is a divided difference of g,
 symmetric in b² and −p², and smooth in Re Q and Im Q where q is 0.
 
 Source: Byrnes, arXiv:1603.02720, section 4 (absorption), integrated over the layer.
@@ -16,15 +16,15 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 
 from pellicle.optics.characteristic import Characteristic
+from pellicle.optics.elementary import exp_and_expm1
 from pellicle.optics.pair import Number, Pair, abs2, imag, real, sqrt, where
 
 _TERMS = 14
 """Terms of the series at |k²Q| < 1: the next ones are below 1e-18 of the sum."""
-_DECAY_TERMS = 18
 
 
 class LayerIntegrals(NamedTuple):
-    """Integrals over k₀t from 0 to k, times |scale|² of the layer's matrix elements."""
+    """Im Q times integrals over k₀t from 0 to k, times |scale|² of the layer's matrix elements."""
 
     cc: Any  # of |cos(qt)|²
     ff: Any  # of |sin(qt)/q|²
@@ -32,7 +32,7 @@ class LayerIntegrals(NamedTuple):
 
 
 def layer_integrals(Q: Number, k: Any, elements: Characteristic) -> LayerIntegrals:
-    """Return the integrals over a layer, finite in opaque layers and smooth where Q or k is 0.
+    """Return Im Q times the integrals, finite in opaque layers and smooth where Q or k is 0.
 
     **Arguments:** `Q` = q² as a `Pair`; `k` = k₀d, real; `elements` = matrix_elements(Q, k), whose scale is
     taken, with its derivative.
@@ -45,9 +45,10 @@ def layer_integrals(Q: Number, k: Any, elements: Characteristic) -> LayerIntegra
     )
 
     def scaled(power: int, series: Any, far: Any) -> Any:
-        return jnp.where(near, k**power * series * elements.scale_square, far)
+        return jnp.where(near, k**power * imag(Q) * series * elements.scale_square, far)
 
-    cf = Pair(0.5 * abs2(elements.f), scaled(2, across, across_far))  # d|f|²/dt = 2 Re(conj(c) f)
+    # d|f|²/dt = 2 Re(conj(c) f)
+    cf = Pair(0.5 * imag(Q) * abs2(elements.f), scaled(2, across, across_far))
     return LayerIntegrals(scaled(1, cc, cc_far), scaled(3, ff, ff_far), cf)
 
 
@@ -71,31 +72,16 @@ def _series(x: Any, y: Any) -> tuple[Any, Any, Any]:
 
 
 def _by_functions(Q: Number, k: Any, scale_square: Any) -> tuple[Any, Any, Any]:
-    """The same for any k with the scale, where |k²Q| is not small."""
+    """Im Q times the same for any k with the scale, where |k²Q| is not small.
+
+    Im Q = 2pb is multiplied out, so that neither p nor b divides, and an opaque layer has no terms in 1/b.
+    """
     q = sqrt(Q)
     p, b = real(q), imag(q)
-    square = abs2(q)
-    grown, swung = _decay(4 * b * k), scale_square * _sinc(2 * p * k)
-    half = 0.5 * k
-    across = _decay(2 * b * k) ** 2 - scale_square * _sinc(p * k) ** 2
-    return half * (grown + swung), half * (grown - swung) / square, half * half * imag(Q) * across / square
-
-
-def _decay(x: Any) -> Any:
-    """Return (1 − e^−x)/x for x ≥ 0, the mean of a decay over the layer."""
-    small = x < 1
-    near, far = jnp.where(small, x, 0.0), jnp.where(small, 1.0, x)
-    series = 0.0 * near
-    for n in range(_DECAY_TERMS, -1, -1):
-        series = series * -near + 1 / math.factorial(n + 1)
-    return jnp.where(small, series, -jnp.expm1(-far) / far)
-
-
-def _sinc(x: Any) -> Any:
-    """Return sin(x)/x."""
-    small = jnp.abs(x) < 1
-    near, far = jnp.where(small, x, 0.0), jnp.where(small, 1.0, x)
-    square, series = near * near, 0.0 * near
-    for n in range(9, -1, -1):
-        series = series * -square + 1 / math.factorial(2 * n + 1)
-    return jnp.where(small, series, jnp.sin(far) / far)
+    square = p * p + b * b
+    # not jnp.expm1, whose slope is rounded to 1 + expm1: in an opaque layer k times nothing
+    grown = -0.25 * p * exp_and_expm1(-4 * b * k)[1]
+    swung = 0.5 * b * scale_square * jnp.sin(2 * p * k)
+    up, turned = 0.5 * p * exp_and_expm1(-2 * b * k)[1], b * jnp.sin(p * k)
+    across = up * up - scale_square * turned * turned
+    return grown + swung, (grown - swung) / square, across / square

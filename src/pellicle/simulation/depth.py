@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Complex, Float
 
@@ -105,7 +106,7 @@ def field(
     ```python
     >>> field = pl.field(550.0, 30.0, 0.4 + 2.5j, 1.52, [0.0, 15.0, 30.0])
     >>> field.intensity.round(3).tolist()
-    [0.402, 0.25, 0.219]
+    [0.459, 0.248, 0.195]
 
     ```
     """
@@ -124,8 +125,11 @@ def _field(*arguments_and_depth: Any) -> Field:
     energy = sum(each.energy() * (1 / len(found)) for each in found)
     _, q0 = transverse(film.ambient, angle)
     incident = jnp.sqrt(q0)  # |E| of the incident wave is 1, of each of these 1/√q₀
-    electric, magnetic = (
-        jnp.stack([incident * to_complex(sum(parts)) for parts in zip(*components, strict=True)])
-        for components in ([x.electric for x in found], [x.magnetic for x in found])
-    )
+    turns = [jax.lax.complex(incident * jnp.cos(x.phase), incident * jnp.sin(x.phase)) for x in found]
+
+    def turned(components: Any) -> Any:
+        axes = zip(*components, strict=True)
+        return jnp.stack([sum(t * to_complex(x) for t, x in zip(turns, axis, strict=True)) for axis in axes])
+
+    electric, magnetic = turned([x.electric for x in found]), turned([x.magnetic for x in found])
     return Field(q0 * energy, wavenumber * found[0].loss * energy, electric, magnetic)

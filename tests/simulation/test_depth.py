@@ -1,0 +1,160 @@
+"""Absorptance of layers and field in depth, against the `tmm` package and by conservation of energy."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+import tmm
+
+import pellicle as pl
+
+RNG = np.random.default_rng(18)
+COUNT, LAYERS = 60, 3
+INDEX = RNG.uniform(1.2, 4, (LAYERS, COUNT)) + 1j * RNG.choice([0.0, 1e-6, 1e-3, 0.3, 3.0], (LAYERS, COUNT))
+THICKNESS = RNG.uniform(0, 500, (LAYERS, COUNT))
+SUBSTRATE = RNG.uniform(0.2, 4, COUNT) + 1j * RNG.choice([0.0, 0.02, 4.0], COUNT)
+AMBIENT = RNG.choice([1.0, 1.33, 1.52], COUNT)
+ANGLE = RNG.uniform(0, 89, COUNT)
+WAVELENGTH = RNG.uniform(300, 1100, COUNT)
+DEPTH = RNG.uniform(-300, np.sum(THICKNESS, axis=0) + 300, (4, COUNT))
+
+
+def media(i=slice(None)):
+    """Arguments of one random stack, or of all of them, without polarisation."""
+    film = (WAVELENGTH[i], THICKNESS[:, i], list(INDEX[:, i]), SUBSTRATE[i])
+    return film, {"ambient": AMBIENT[i], "angle": ANGLE[i]}
+
+
+@pytest.fixture(scope="module")
+def computed():
+    """Absorptance, field, R and T of all stacks for s, p and unpolarised light."""
+
+    def all_of(polarisation):
+        film, light = media()
+        light = light | {"polarisation": polarisation}
+        powers = (f(*film, **light) for f in (pl.absorptance, pl.reflectance, pl.transmittance))
+        return (*powers, pl.field(*film, DEPTH, **light))
+
+    return {x: jax.jit(all_of, static_argnums=0)(x) for x in ("s", "p", "unpolarised")}
+
+
+def reference(i, letter):
+    film, light = media(i)
+    return tmm.coh_tmm(
+        letter,
+        [light["ambient"], *film[2], film[3]],
+        [np.inf, *film[1], np.inf],
+        np.deg2rad(light["angle"]),
+        film[0],
+    )
+
+
+@pytest.mark.parametrize("letter", "sp")
+def test_random_stacks_as_tmm(computed, letter):
+    absorbed, R, _, field = computed[letter]
+    assert absorbed.shape == (LAYERS, COUNT)
+    assert field.electric.shape == field.magnetic.shape == (3, 4, COUNT)
+    for i in range(COUNT):
+        exact = reference(i, letter)
+        assert R[i] == pytest.approx(exact["R"], abs=1e-12)
+        np.testing.assert_allclose(absorbed[:, i], tmm.absorp_in_each_layer(exact)[1:-1], rtol=0, atol=1e-12)
+        for j, depth in enumerate(DEPTH[:, i]):
+            at = tmm.position_resolved(*tmm.find_in_structure_with_inf(exact["d_list"], depth), exact)
+            E = np.array([at["Ex"], at["Ey"], at["Ez"]])
+            np.testing.assert_allclose(field.electric[:, j, i], E, rtol=1e-10, atol=1e-12)
+            assert field.intensity[j, i] == pytest.approx(np.sum(abs(E) ** 2), rel=1e-10, abs=1e-12)
+            assert field.absorbed[j, i] == pytest.approx(at["absor"], rel=1e-10, abs=1e-14)
+
+
+def test_the_magnetic_field_has_the_poynting_vector_of_tmm(computed):
+    """Its part along z, E_x H_y* − E_y H_x*, over the incident n₀ cos θ₀."""
+    incident = AMBIENT * np.cos(np.deg2rad(ANGLE))
+    for letter in "sp":
+        (Ex, Ey, _), (Hx, Hy, _) = (np.asarray(x) for x in computed[letter][-1][2:])
+        power = np.real(Ex * np.conj(Hy) - Ey * np.conj(Hx)) / incident
+        for i in range(0, COUNT, 5):
+            exact = reference(i, letter)
+            for j, depth in enumerate(DEPTH[:, i]):
+                at = tmm.position_resolved(*tmm.find_in_structure_with_inf(exact["d_list"], depth), exact)
+                assert power[j, i] == pytest.approx(at["poyn"], rel=1e-10, abs=1e-12)
+
+
+def test_energy_is_conserved(computed):
+    for absorbed, R, T, _ in computed.values():
+        np.testing.assert_allclose(R + T + jnp.sum(absorbed, axis=0), 1, rtol=0, atol=1e-12)
+        assert np.all(np.asarray(absorbed) >= 0)
+
+
+def test_unpolarised_is_the_mean_with_the_components_of_both(computed):
+    (A_s, *_, s), (A_p, *_, p), (A, *_, both) = (computed[x] for x in ("s", "p", "unpolarised"))
+    np.testing.assert_allclose(A, 0.5 * (A_s + A_p), rtol=1e-14)
+    np.testing.assert_allclose(both.intensity, 0.5 * (s.intensity + p.intensity), rtol=1e-13)
+    np.testing.assert_allclose(both.absorbed, 0.5 * (s.absorbed + p.absorbed), rtol=1e-13)
+    np.testing.assert_allclose(both.electric, s.electric + p.electric, rtol=1e-13)
+    np.testing.assert_allclose(both.magnetic, s.magnetic + p.magnetic, rtol=1e-13)
+
+
+def test_the_density_integrates_to_the_absorptance_and_in_the_substrate_to_t():
+    nodes, weights = np.polynomial.legendre.leggauss(40)
+    film, light = (550.0, [80.0, 40.0], [2.0 + 0.3j, 0.4 + 2.5j], 3.0 + 0.5j), {"angle": 50.0}
+    ends = [0.0, 80.0, 120.0, 2000.0]  # 2000 nm are 20 skin depths of the substrate
+
+    @jax.jit
+    def at(depth):
+        return pl.field(*film, depth, **light).absorbed
+
+    found = []
+    for low, high in pairwise(ends):
+        half = 0.5 * (high - low)
+        found.append(half * weights @ np.asarray(at(low + half * (nodes + 1))))
+    A, T = pl.absorptance(*film, **light), pl.transmittance(*film, **light)
+    np.testing.assert_allclose(found, [*A, T], rtol=1e-9)
+
+
+def test_fifty_layers_with_an_opaque_one_conserve_energy():
+    """A mirror of quarter waves on 1 mm of metal on another mirror, which no light reaches."""
+    depth, index = np.tile([60.0, 95.0], 25), np.tile([2.3 + 1e-4j, 1.46 + 1e-3j], 25)
+    depth[25], index[25] = 1e6, 0.5 + 4j
+
+    def all_of(depth):
+        film = (550.0, depth, list(index), 1.52)
+        light = {"angle": 30.0, "polarisation": "p"}
+        A = pl.absorptance(*film, **light)
+        return A, pl.reflectance(*film, **light) + jnp.sum(A), pl.field(*film, 5e5, **light).intensity
+
+    A, total, inside = jax.jit(all_of)(depth)
+    assert float(total) == pytest.approx(1, abs=1e-12)
+    assert np.all(A[:26] > 0)
+    assert np.all(A[26:] == 0)
+    assert inside == 0
+    slope = jax.jit(jax.grad(lambda d: all_of(d)[0][0]))(depth)
+    assert np.all(np.isfinite(slope))
+
+
+def test_one_layer_has_an_axis_of_layers_too():
+    nm = np.linspace(400, 800, 5)
+    assert pl.absorptance(nm, 100.0, 2.0 + 0.1j, 1.5).shape == (1, 5)
+    assert pl.absorptance(nm, 100.0, "Au", "Si", angle=np.array([[0.0], [60.0]])).shape == (1, 2, 5)
+    assert not np.any(pl.absorptance(nm, [100.0], [2.0], 1.5))
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_precision_follows_the_input(dtype):
+    nm = np.array([500.0, 600.0], dtype)
+    A = pl.absorptance(nm, 30.0, 0.4 + 2.5j, 1.5, angle=30.0)
+    found = pl.field(nm, 30.0, 0.4 + 2.5j, 1.5, 10.0, angle=30.0)
+    assert A.dtype == found.intensity.dtype == found.absorbed.dtype == dtype
+    assert found.electric.dtype == found.magnetic.dtype == np.result_type(dtype, np.complex64)
+
+
+def test_what_is_refused():
+    with pytest.raises(ValueError, match="ambient must not absorb"):
+        pl.absorptance(500.0, 10.0, 2.0, 1.5, ambient=1.3 + 0.1j)
+    with pytest.raises(ValueError, match="one for each of 2 layers"):
+        pl.field(500.0, [10.0], [2.0, 1.5], 1.5, 0.0)
+    with pytest.raises(ValueError, match="`depth` must be a number"):
+        pl.field(500.0, 10.0, 2.0, 1.5, "0:100")
