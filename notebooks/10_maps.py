@@ -181,7 +181,10 @@ figure, (top, axes) = plt.subplots(2, 1, figsize=(7, 4.2), sharex=True, height_r
 colours = into_srgb(np.asarray(film_colour(oxide.ravel(), OXIDE, STEEL).linear_srgb))
 top.imshow(np.asarray(srgb(colours)).reshape(*oxide.shape, 3), extent=(0, 80, 0, 20))
 top.set(ylabel="y (mm)", title="colours of the bar, without grease")
-axes.errorbar(along, tints["thickness"][row], tints["thickness_stderr"][row], fmt=".", label="map")
+profile, doubtful = tints.isel(y=row), tints["status"][row].values == CODES["misfit"]
+sure = profile.isel(x=~doubtful)
+axes.errorbar(sure["x"], sure["thickness"], sure["thickness_stderr"], fmt=".", label="map")
+axes.plot(along[doubtful], profile["thickness"][doubtful], "x", label="misfit: not to be used")
 axes.plot(along, oxide[row], color="black", linewidth=0.8, label="truth")
 axes.set(xlabel="x (mm)", ylabel=f"thickness at y = {across[row]:.0f} mm (nm)")
 axes.legend()
