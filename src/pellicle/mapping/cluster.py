@@ -24,6 +24,7 @@ import jax
 import numpy as np
 from dask import config
 from distributed import Client, LocalCluster, WorkerPlugin, as_completed, get_worker
+from distributed.comm.core import CommClosedError
 from distributed.scheduler import KilledWorker
 
 from pellicle.data.cube import Cube
@@ -67,7 +68,7 @@ def local_cluster(workers: int) -> Iterator[Client]:
             threads_per_worker=1,
             processes=True,
             memory_limit=0,  # the size of the blocks bounds it; a limit would count the page cache of files
-            dashboard_address=None,  # pyright: ignore[reportArgumentType]
+            dashboard_address=":0",
             silence_logs=logging.CRITICAL,
         )
         try:
@@ -110,7 +111,7 @@ def on_cluster(client: Client, job: Job, todo: Sequence[tuple[int, ...]], *, loc
     name = f"pellicle-{uuid.uuid4().hex}"
     shipped = not _can_be_read_there(job.cube)
     sent = replace(job.cube, arrays={}, mask=None, coords={}) if shipped else job.cube
-    client.register_plugin(_Model(name, pickle.dumps(job._replace(cube=sent)), local), name=name)
+    plugin = _Model(name, pickle.dumps(job._replace(cube=sent)), local)
     waiting = iter(todo)
     queue: Any = as_completed()
     most = _WINDOW * max(1, len(client.scheduler_info(n_workers=-1)["workers"])) if shipped else len(todo)
@@ -123,11 +124,12 @@ def on_cluster(client: Client, job: Job, todo: Sequence[tuple[int, ...]], *, loc
                 return
 
     try:
+        client.register_plugin(plugin, name=name)
         submit()
         for future in queue:
             yield future.result()
             submit()
-    except CancelledError:
+    except (CancelledError, CommClosedError):
         raise DataError(
             "the dask scheduler was lost; what is finished is kept, and the same map goes on from there"
         ) from None
