@@ -2,8 +2,9 @@
 
 Each round fits the pixels, linearises each around its answer, and solves for log g with the parameters of all
 pixels eliminated (Schur complement). Pixels of different thickness have their fringes at different
-wavelengths, and g is what stays. Each pixel has a slow scale of its own in these fits, so a gradient of the
-light over the image (vignetting) does no harm; the map follows it by a free scale.
+wavelengths, and g is what stays. The first rounds give each pixel a slow scale of its own, which follows
+most of the lamp; the others have the scale of the scene. A gradient of the light over the image (vignetting)
+needs a free one.
 
 **Source:** Golub and Pereyra 2003, Inverse Problems 19, R1 (separable least squares); Triggs et al. 2000,
 Bundle adjustment: a modern synthesis, LNCS 1883, section 6 (Schur complement of the parameters of each view).
@@ -39,8 +40,9 @@ _FEWEST = 30
 _SEPARATE = 0.01
 """Least share of the information on any shape of g that the films of the pixels may leave: with 0.01 its
 error is ten times that of known films. Fringes whose phases spread by 0.1 radian leave about this."""
-_ROUNDS, _SETTLED = 12, 0.2
-"""Rounds at most, and the change of log g, in its standard errors, below which it has settled."""
+_FIRST, _ROUNDS, _SETTLED = 3, 12, 0.2
+"""Rounds with a slow scale, rounds at most after them, and the change of log g, in its standard errors, below
+which it has settled."""
 
 
 class JointGain(NamedTuple):
@@ -69,23 +71,24 @@ def joint_gain(cube: Cube, scene: Scene, pixels: int) -> JointGain:
     """
     scale: Any = scene.instrument.scale
     own_scale = isinstance(scale, Drift)
-    if not own_scale or scale.degree == 0:
-        scene = eqx.tree_at(lambda s: s.instrument, scene, replace(scene.instrument, scale=SLOW_SCALE))
+    slow = own_scale and scale.degree > 0
+    first = eqx.tree_at(lambda s: s.instrument, scene, replace(scene.instrument, scale=SLOW_SCALE))
+    rounds = [*([] if slow else [first] * _FIRST), *[scene] * _ROUNDS]
     sample = _sample(cube, pixels)
     bands = cube.wavelength.size
     angles = 1 if cube.angle is None else cube.angle.size
     log_gain, step, used = np.zeros(bands), None, 0
     if not cube.calibrated:  # counts follow the lamp first of all, and a slow scale follows only what is slow
         log_gain = _smooth(np.log(np.maximum(np.nanmean(sample["values"], axis=0), 1e-12)), angles)
-    table = None
+    search, last = None, None
     with jax.enable_x64(True):
-        for _ in range(_ROUNDS):
+        for own in rounds:
             gain = np.repeat(np.exp(log_gain), angles)
             block = {name: values / gain for name, values in sample.items()}
-            if table is None:
-                table = prepare(_in_memory(cube, block), scene)
-            data = pixel_data(block, table.problem.views[0].noise)
-            found = minima(table.search, data)
+            if search is None or own is not last:
+                search, last = prepare(_in_memory(cube, block), own).search, own
+            data = pixel_data(block, search.problem.views[0].noise)
+            found = minima(search, data)
             weight = data.weight if "sigma" in block else (data.weight > 0).astype(float)
             good = _usable(found, weight, data.values)
             used = int(good.sum())
@@ -94,19 +97,17 @@ def joint_gain(cube: Cube, scene: Scene, pixels: int) -> JointGain:
                     f"{cube.path or 'cube'}: {used} of {len(good)} pixels of the sample have a fit that can"
                     f" be used, and {_FEWEST} are needed: give a region of known reflectance"
                 )
-            step = _step(found, weight, data.values, good, table.search.view.data.position, angles, scene)
-            if step.separation < _SEPARATE:
+            step = _step(found, weight, data.values, good, search.view.data.position, angles, own)
+            if own is scene and step.separation < _SEPARATE:
                 raise UsageError(
                     "the films of the pixels are too much alike to be told from the lamp curve: the free"
                     f" parameters take all but {100 * step.separation:.2g} % of what the pixels say on some"
                     " shape of it; give a region of known reflectance"
                 )
-            log_gain = log_gain + step.change
-            if own_scale:
-                log_gain = log_gain - log_gain.mean()
-            moved = step.change - (step.change.mean() if own_scale else 0.0)
-            log.info("lamp curve: %d pixels, largest change %.2g", used, np.abs(moved).max())
-            if np.all(np.abs(moved) < _SETTLED * np.sqrt(step.variance)):
+            change = step.change - (step.change.mean() if own_scale else 0.0)
+            log_gain = log_gain + change
+            log.info("lamp curve: %d pixels, largest change %.2g", used, np.abs(change).max())
+            if own is scene and np.all(np.abs(change) < _SETTLED * np.sqrt(step.variance)):
                 break
     assert step is not None
     gain = np.exp(log_gain).astype(np.float32).astype(float)  # the same in a later run, up to rounding
@@ -115,8 +116,11 @@ def joint_gain(cube: Cube, scene: Scene, pixels: int) -> JointGain:
 
 def _sample(cube: Cube, pixels: int) -> dict[str, np.ndarray]:
     """Pixels all over a cube, about so many, as arrays (pixels, points) by name."""
-    every = max((math.prod(cube.shape) / pixels) ** (1 / len(cube.shape)), 1.0)
-    steps = [min(math.ceil(every), max(n // 2, 1)) for n in cube.shape]
+    steps = [1] * len(cube.shape)
+    while (
+        math.prod(counts := [math.ceil(n / step) for n, step in zip(cube.shape, steps, strict=True)]) > pixels
+    ):
+        steps[int(np.argmax(counts))] += 1
     block = cube.pixels(tuple(slice(step // 2, None, step) for step in steps))
     known = np.isfinite(block["values"]).all(axis=1)
     if np.count_nonzero(known) < _FEWEST:
@@ -167,15 +171,17 @@ def _step(
     signal, gain = found.signal[good], found.gain[good]
     count, points, _ = found.slope[good].shape
     scale: Any = scene.instrument.scale
-    terms = np.polynomial.chebyshev.chebvander(np.asarray(position)[:points], scale.degree)
-    columns = [gain[..., None] * found.slope[good], signal[..., None] * terms]
+    own = scale.degree + 1 if isinstance(scale, Drift) else 0  # terms of the scale
+    terms = np.polynomial.chebyshev.chebvander(np.asarray(position)[:points], max(own - 1, 0))[:, :own]
+    columns = [signal[..., None] * terms, gain[..., None] * found.slope[good]]
     drift = scene.instrument.offset
     if isinstance(drift, Drift):
         shifts = np.polynomial.chebyshev.chebvander(np.asarray(position)[:points], drift.degree)
         columns.append(np.broadcast_to(shifts, (count, *shifts.shape)))
     matrix = weight[..., None] * np.concatenate(columns, axis=-1)
     length = np.sqrt((matrix**2).sum(axis=1, keepdims=True))
-    basis, _ = np.linalg.qr(matrix / np.where(length > 0, length, 1.0))
+    length = np.where(length > 0, length, 1.0)
+    basis, triangle = np.linalg.qr(matrix / length)
     left = weight * residual
     left = left - np.einsum("npk,nk->np", basis, np.einsum("npk,np->nk", basis, left))
     # weights by what is left, as the noise of a pixel is not always known
@@ -183,15 +189,26 @@ def _step(
     steep = weight * (model - offset) / noise
     left = left / noise
     bands = points // angles
-    own = (steep**2).reshape(count, bands, angles).sum(axis=(0, 2))
+    known = (steep**2).reshape(count, bands, angles).sum(axis=(0, 2))
     shared = (steep[..., None] * basis).reshape(count, bands, angles, -1).sum(axis=2)
     shared = shared.transpose(1, 0, 2).reshape(bands, -1)
-    unit = 1 / np.sqrt(own)
-    share, shapes = np.linalg.eigh((np.diag(own) - shared @ shared.T) * unit * unit[:, None])
-    slow = terms.shape[1]  # the scales of the pixels themselves, of which the mean is taken below
-    share, shapes = share[slow:], unit[:, None] * shapes[:, slow:]
+    unit = 1 / np.sqrt(known)
+    share, shapes = np.linalg.eigh((np.diag(known) - shared @ shared.T) * unit * unit[:, None])
+    share, shapes = share[own:], unit[:, None] * shapes[:, own:]  # the others are the pixels' own scales
+    separation = float(share[0])
+    share = np.where(share < _SEPARATE, np.inf, share)  # refused in the end; no large steps before
     change = shapes @ ((shapes.T @ (steep * left).reshape(count, bands, angles).sum(axis=(0, 2))) / share)
-    curve = np.log(np.maximum(gain, 1e-12)).reshape(count, bands, angles).mean(axis=2)
-    level = curve.mean(axis=1, keepdims=True)
-    variance = (shapes**2 / share).sum(axis=1) + (curve - level).var(axis=0, ddof=1) / count
-    return _Step(change + curve.mean(axis=0), variance, float(share[0]))
+    variance = (shapes**2 / share).sum(axis=1)
+    if own > 1:
+        # of the pixels' own slow scales, the mean is the lamp's: weights by their errors
+        inverse = np.linalg.pinv(triangle)[:, :own] / length[:, 0, :own, None]
+        error = np.einsum("pt,ntk->npk", terms, inverse)
+        relative = (error**2).sum(axis=2) * noise**2 / gain**2
+        curve = np.log(np.maximum(gain, 1e-12)).reshape(count, bands, angles).mean(axis=2)
+        heavy = 1 / relative.mean(axis=1)
+        heavy = heavy[:, None] / heavy.sum()
+        mean = (heavy * curve).sum(axis=0)
+        away = curve - mean
+        away = away - away.mean(axis=1, keepdims=True)
+        change, variance = change + mean, variance + (heavy**2 * away**2).sum(axis=0)
+    return _Step(change, variance, separation)
