@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import chi2
 
 from pellicle.fitting.covariance import Scaled
-from pellicle.fitting.discrepancy import HALF_NORMAL, Effect, Evidence, _improbable, discrepancy
+from pellicle.fitting.discrepancy import HALF_NORMAL, Effect, Evidence, discrepancy, improbable
 
 X = np.linspace(-1, 1, 200)
 SIGMA = 0.01
@@ -161,7 +161,7 @@ def test_the_amount_of_a_width():
 
 @pytest.mark.parametrize("count", [1, 5, 12, 30])
 def test_the_threshold_of_the_implausible(count):
-    assert _improbable(count) == pytest.approx(chi2.isf(1e-3, count), rel=0.04)
+    assert improbable(count) == pytest.approx(chi2.isf(1e-3, count), rel=0.04)
 
 
 @pytest.mark.parametrize(("least", "expected"), [(1.0, 1.0), (10.0, 10.0)])

@@ -89,10 +89,10 @@ class Remaining(NamedTuple):
     the factor on σ² that stands for them and for their correlation.
     """
 
-    ratio: float
-    typical: float
-    weighted: float
-    variance: float
+    ratio: Any
+    typical: Any
+    weighted: Any
+    variance: Any
 
 
 class Contribution(NamedTuple):
@@ -168,7 +168,7 @@ def discrepancy(evidence: Sequence[Evidence], scaled: Scaled, unit: np.ndarray) 
             row(i, effect, size)
             for i, (effect, size) in enumerate(zip(system.effects, sizes.tolist(), strict=True))
         ),
-        implausible=bool(len(sizes) and np.sum(sizes**2) > _improbable(len(sizes))),
+        implausible=bool(len(sizes) and np.sum(sizes**2) > improbable(len(sizes))),
         evidence_shares=shares,
         evidence_share=float(np.average(shares, weights=[view.residual.size for view in evidence])),
     )
@@ -211,22 +211,34 @@ def _evidence_shares(evidence: Sequence[Evidence], variance: Sequence[float]) ->
     return tuple(float(min(1.0, one / own)) for one, own in zip(counted, now, strict=True))
 
 
-def _weights(residual: np.ndarray) -> np.ndarray:
-    """Square roots of Huber's weights."""
-    far = _OUTLIER * max(spread(residual), 1.0)
+def huber_roots(residual: np.ndarray, size: Any) -> np.ndarray:
+    """Square roots of Huber's weights of residuals (..., rows, channels), of a bulk of this `size` (...)."""
+    far = (_OUTLIER * np.maximum(size, 1.0))[..., None, None]
     return np.sqrt(np.minimum(1.0, far / np.maximum(np.abs(residual), 1e-300)))
 
 
+def _weights(residual: np.ndarray) -> np.ndarray:
+    """Square roots of Huber's weights."""
+    return huber_roots(residual, np.float64(spread(residual)))
+
+
 def _variance(view: Evidence, residual: np.ndarray, weight: np.ndarray, used: float) -> float:
-    """Factor on σ² for the size and correlation of what remains, where that is no noise by chance."""
-    rest = weight * residual
-    freedom = max(rest.size - used, 1.0)
-    reduced = float(np.sum(rest**2)) / freedom
+    """Factor on σ² of one view for what remains."""
+    return float(reduced_variance(weight * residual, used, view.correlation, view.least, view.uncertain))
+
+
+def reduced_variance(
+    rest: np.ndarray, used: Any, correlation: Callable[[np.ndarray], Any], least: float, uncertain: float
+) -> Any:
+    """Factor on σ² (...) for the size and correlation of what remains (..., rows, channels), where that is no
+    noise by chance; `used` degrees of freedom are those of the fit."""
+    freedom = np.maximum(rest.shape[-2] * rest.shape[-1] - used, 1.0)
+    reduced = np.sum(rest**2, axis=(-2, -1)) / freedom
     # only what remains is correlated: of a σ that allows for a lamp it may be a tenth
-    factor = max(reduced * view.correlation(rest), max(1.0, reduced) * view.least)
-    of_length = math.sqrt(2 * (2 * _WINDOW + 1) / freedom)  # standard error of the correlation length: ibid.
-    by_chance = 1 + _SCATTER * math.hypot(math.sqrt(2 / freedom), of_length, view.uncertain)
-    return factor if factor > by_chance else 1.0
+    factor = np.maximum(reduced * correlation(rest), np.maximum(1.0, reduced) * least)
+    of_length = np.sqrt(2 * (2 * _WINDOW + 1) / freedom)  # standard error of the correlation length: ibid.
+    by_chance = 1 + _SCATTER * np.sqrt(2 / freedom + of_length**2 + uncertain**2)
+    return np.where(factor > by_chance, factor, 1.0)
 
 
 class _System:
@@ -349,7 +361,7 @@ def _least_squares(
     return solution
 
 
-def _improbable(count: int) -> float:
+def improbable(count: int) -> float:
     """χ² of `count` degrees of freedom that is exceeded with a probability of 1e-3 (E. Wilson and M.
     Hilferty, 1931, Proc. Natl. Acad. Sci. 17, 684)."""
     spread_of_cube_root = 2 / (9 * max(count, 1))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -57,17 +58,18 @@ def correlation_length(residual: np.ndarray) -> float:
     return integrated_time(residual[:, None])
 
 
-def integrated_time(series: np.ndarray) -> float:
-    """The integrated autocorrelation time of series (steps, series) around zero, at least 1.
+def integrated_time(series: np.ndarray) -> Any:
+    """The integrated autocorrelation time of series (..., steps, series) around zero, (...), at least 1.
 
     The window closes at five times the estimate (A. Sokal, 1997, Monte Carlo methods in statistical
     mechanics); where it does not close, the time is a fifth of the steps.
     """
-    size = len(series)
-    spectrum = np.abs(np.fft.rfft(series, 2 * size, axis=0)) ** 2
-    covariance = np.fft.irfft(spectrum.sum(axis=1))[:size]
-    if not covariance[0] > 0:
-        return 1.0
-    times = 2 * np.cumsum(covariance / covariance[0]) - 1
-    closed = np.flatnonzero(np.arange(size) >= 5 * times)
-    return float(max(times[closed[0]] if len(closed) else size / 5, 1.0))
+    size = series.shape[-2]
+    spectrum = np.abs(np.fft.rfft(series, 2 * size, axis=-2)) ** 2
+    covariance = np.fft.irfft(spectrum.sum(axis=-1))[..., :size]
+    some = covariance[..., :1] > 0
+    times = 2 * np.cumsum(covariance / np.where(some, covariance[..., :1], 1.0), axis=-1) - 1
+    closed = np.arange(size) >= 5 * times
+    first = np.take_along_axis(times, np.argmax(closed, axis=-1)[..., None], axis=-1)[..., 0]
+    time = np.where(closed.any(axis=-1), first, size / 5)
+    return np.where(some[..., 0], np.maximum(time, 1.0), 1.0)[()]

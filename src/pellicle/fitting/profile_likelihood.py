@@ -20,21 +20,21 @@ from pellicle.fitting.status import RIVAL
 
 ONE_SIDED, TWO_SIDED = 2.71, 3.84
 """χ² above the best at a 95 % limit, where one side is bounded and where both are."""
-_OPEN = RIVAL
+OPEN = RIVAL
 """A side is open where the misfit never rises by this, which would rule out a rival."""
-_PLATEAU, _LEVEL = 10.0, 1.0
-"""A side is open, too, where the outer half of the misfit is below `_PLATEAU` and level within `_LEVEL`. An
+PLATEAU, LEVEL = 10.0, 1.0
+"""A side is open, too, where the outer half of the misfit is below `PLATEAU` and level within `LEVEL`. An
 absorbing film looks the same at any large thickness, and noise favours one of many by that much."""
-_REACH = 2.0
+REACH = 2.0
 """Standard errors at which the parabola is compared with the misfit, and within which a bound matters."""
-_FLAT, _CURVED = 0.5, 4.0
+FLAT, CURVED = 0.5, 4.0
 """The misfit at that reach as a share of the parabola's: outside of these a profile is made."""
-_NEAR = 1e-3
+NEAR = 1e-3
 """A best thickness this close (nm) to a bound rests on it; the side is open if the misfit is flat there."""
-_STEEP = 3.3
+STEEP = 3.3
 """A limit nearer than this many standard errors to a bound on which the best value rests: the misfit rises
 from there, as it would not for a parameter that the data do not see."""
-_STEPS = 7
+STEPS = 7
 """Values on each side of the best one at which a profile is computed, unless it has risen enough before."""
 _EXACT = 2e-3
 """Share of the interval in which a limit lies that its error may be."""
@@ -51,15 +51,15 @@ class Limits(NamedTuple):
 
 def limits(around: Neighbourhood, scans: Mapping[int, Profile] | None = None) -> list[Limits]:
     """Limits of each parameter; `scans` are scans of the misfit against some of them."""
-    moved, share = around.along_axes(_REACH)
-    wrong = (moved > 0.5) & ((share < _FLAT) | (share > _CURVED))
+    moved, share = around.along_axes(REACH)
+    wrong = (moved > 0.5) & ((share < FLAT) | (share > CURVED))
     doubted = (around.stderr > UNSEEN * (around.upper - around.lower)) | wrong.any(axis=0)
     scans, result = scans or {}, []
     for i, natural in enumerate(around.natural):
         one = _OneParameter(around, i)
         flat = one.flat_sides(scans[i]) if i in scans else (False, False)
         ends = [end for end, closed in zip((one.lower, one.upper), natural, strict=True) if closed]
-        beside = next((end for end in ends if abs(one.value - end) < _REACH * one.sd), None)
+        beside = next((end for end in ends if abs(one.value - end) < REACH * one.sd), None)
         if beside is not None:
             result.append(one.beside(beside))
         elif doubted[i] or any(flat):
@@ -162,7 +162,7 @@ class _OneParameter:
     def profiled(self, flat: tuple[bool, bool], natural: tuple[bool, bool]) -> Limits:
         """Limits where the misfit is no parabola; `flat` are sides known to be open, and an open side with a
         `natural` bound is closed by physics."""
-        sides = self.sides([self.lower, self.upper], _OPEN)
+        sides = self.sides([self.lower, self.upper], OPEN)
         below, above = (None if known else side for known, side in zip(flat, sides, strict=True))
         if below is not None and above is not None:
             low, high = self.crossing(below, TWO_SIDED), self.crossing(above, TWO_SIDED)
@@ -173,7 +173,7 @@ class _OneParameter:
         if all(closed) and limit is not None:
             return Limits(self.error, lower, upper)
         rests = min(self.value - self.lower, self.upper - self.value) <= 1e-6 * (self.upper - self.lower)
-        if rests and limit is not None and abs(limit - self.value) < _STEEP * self.error and not any(flat):
+        if rests and limit is not None and abs(limit - self.value) < STEEP * self.error and not any(flat):
             return Limits(self.error)  # the data push against that bound: they see the parameter well enough
         return Limits(np.inf, lower, upper)
 
@@ -186,9 +186,9 @@ class _OneParameter:
         for bound in bounds:
             room = bound - self.value
             first = min(ONE_SIDED**0.5 * self.sd / max(abs(room), 1e-300), 0.3)
-            ways[bound] = (self.value + room * np.geomspace(max(first, 1e-6), 1.0, _STEPS)).tolist()
+            ways[bound] = (self.value + room * np.geomspace(max(first, 1e-6), 1.0, STEPS)).tolist()
         inside, result = dict.fromkeys(bounds, self.value), dict.fromkeys(bounds)
-        for step in range(_STEPS):
+        for step in range(STEPS):
             going = [bound for bound in bounds if result[bound] is None]
             values = [ways[bound][step] for bound in going]
             for bound, value, rise in zip(going, values, self.rise(values), strict=True):
@@ -212,7 +212,7 @@ class _OneParameter:
     def flat_sides(self, scan: Profile) -> tuple[bool, bool]:
         """On which sides of the best thickness the misfit of the search's scan never rises."""
         close = scan.delta_chi2 < ONE_SIDED
-        thinner, thicker = scan.thickness < self.value - _NEAR, scan.thickness > self.value + _NEAR
+        thinner, thicker = scan.thickness < self.value - NEAR, scan.thickness > self.value + NEAR
         outwards = scan.delta_chi2[thinner][::-1], scan.delta_chi2[thicker]
         below = _open(outwards[0]) if thinner.any() else close[thicker][:1].all()
         above = _open(outwards[1]) if thicker.any() else close[thinner][-1:].all()
@@ -222,5 +222,5 @@ class _OneParameter:
 def _open(rise: np.ndarray) -> bool:
     """True where the misfit along a way to a bound never rises, or only to a plateau."""
     far = rise[len(rise) // 2 :]
-    plateau = len(far) > 1 and far.max() < _PLATEAU and np.ptp(far) < _LEVEL
-    return bool(rise.max() < _OPEN or plateau)
+    plateau = len(far) > 1 and far.max() < PLATEAU and np.ptp(far) < LEVEL
+    return bool(rise.max() < OPEN or plateau)

@@ -13,7 +13,7 @@ log = getLogger(__name__)
 
 RIVAL = 6.0
 """A distinct rival within this Δχ² on the effective points makes a fit ambiguous."""
-_WELL_KNOWN = 0.1
+WELL_KNOWN = 0.1
 """Largest relative error of a thickness beside which a default bound is a remark."""
 
 
@@ -63,7 +63,7 @@ def _well_known(resting: Estimate, depths: Sequence[Estimate], lead: Estimate) -
     if not depths or resting in depths:
         return resting is not lead and not depths
     own = [d for d in depths if resting.name.startswith(d.name.removesuffix("thickness"))]
-    return all(d.stderr <= _WELL_KNOWN * d.value for d in own or depths)
+    return all(d.stderr <= WELL_KNOWN * d.value for d in own or depths)
 
 
 def distinct_rivals(parameters: Mapping[str, Estimate], rivals: tuple[Rival, ...]) -> list[Rival]:

@@ -18,9 +18,9 @@ from pellicle.fitting.spectra.systematic_effects import systematic_effects
 from pellicle.fitting.spectra.targets import Target
 from pellicle.fitting.spectra.view import SpectrumView
 
-_LEAST = 1e-9
+LEAST_NOISE = 1e-9
 """Least noise, as a share of the signal's level: rounding in simulated data."""
-_SCATTER = 2.9
+SCATTER_OF_NOISE = 2.9
 """Relative standard error of σ² from the differences of neighbours, times the root of the points: that of the
 median absolute value of second differences of normal noise (simulated: 2.8 to 3.1 at 50 to 1000 points)."""
 
@@ -68,7 +68,7 @@ def evidence(spectra: Sequence[Target], ranked: RankedMinima, jacobian: Scaled) 
                 [replace(effect, change=effect.change * unit) for effect in effects],
                 view.correlation_length,
                 DRIFT_CORRELATION if view.noise.drifting else 1.0,
-                0.0 if view.noise.known else _SCATTER / math.sqrt(view.rows),
+                0.0 if view.noise.known else SCATTER_OF_NOISE / math.sqrt(view.rows),
             )
         )
     return result
@@ -77,4 +77,4 @@ def evidence(spectra: Sequence[Target], ranked: RankedMinima, jacobian: Scaled) 
 def short_range_noise(view: SpectrumView, residual: np.ndarray) -> float:
     """Noise (of one point) from differences of neighbouring residuals (rows, channels) in each sweep."""
     squares = [np.median(local_noise(column)) ** 2 for sweep in view.sweeps() for column in residual[sweep].T]
-    return max(math.sqrt(np.mean(squares)), _LEAST * float(view.data.level))
+    return max(math.sqrt(np.mean(squares)), LEAST_NOISE * float(view.data.level))

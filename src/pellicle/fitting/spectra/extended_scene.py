@@ -17,7 +17,7 @@ from pellicle.fitting.spectra.parameters import anonymous
 from pellicle.fitting.spectra.view import SpectrumForm, SpectrumView
 from pellicle.optics.pair import Pair, imag, real
 from pellicle.scene.film import Scene
-from pellicle.scene.free import Free, free_leaves, insert
+from pellicle.scene.free import Free, free_leaves, insert, is_free
 from pellicle.scene.layers import Interface, Layer
 
 OXIDE_INDEX = 1.46
@@ -53,9 +53,33 @@ class Number(NamedTuple):
     value: float
 
 
+class SideBySide(NamedTuple):
+    """Signals of many candidates, (pixels, candidates, data values)."""
+
+    signal: Any
+
+
+@kept
+def simulated_side_by_side(
+    form: SpectrumForm | ColourForm, scene: Scene, data: Any, frame: Any, values: Any
+) -> SideBySide:
+    """Signals of a scene at candidates `values` (pixels, candidates, its free numbers), all at once.
+
+    `frame` (pixels, ...) are the frames of N, C, S of pixels that have their own; None else.
+    """
+
+    def of_pixel(frame: Any, rows: Any) -> Any:
+        own = data if frame is None else data._replace(frame=frame)
+        return jax.vmap(lambda each: form.simulate(insert(scene, each), own))(rows)
+
+    axes = None if frame is None else 0
+    return SideBySide(jax.vmap(of_pixel, in_axes=(axes, 0))(frame, values))
+
+
 class ExtendedScene:
     """The scene of a view at the best fit, with further numbers; None stands for those that it cannot have.
 
+    The first numbers are the parameters of the view.
     `wavelength` and `angle` are shifts, `roughness` that of the upper face, `oxide` and `mixture` thicknesses
     on the substrate. Of each coherent layer, by its position: `thickness`; `index`, a relative change of a
     given one; `shape`, one of a model with free numbers. `substrate_index` is a relative change.
@@ -64,8 +88,10 @@ class ExtendedScene:
     def __init__(self, view: SpectrumView | ColoursView, values: np.ndarray):
         self._view, self._free = view, []
         scene = insert(view.scene, np.asarray(values).tolist())
+        # as the scene, with its parameters still free: another best fit is no other program
+        opened = insert(view.scene, [self._number(value)[1] for value in np.asarray(values).tolist()])
         nm = np.asarray(scene.light.wavelength)
-        instrument = scene.instrument
+        instrument = opened.instrument
         self.wavelength = self.angle = self.roughness = self.oxide = self.mixture = None
         self.substrate_index: Number | None = None
         self.thickness: dict[int, Number] = {}
@@ -79,18 +105,19 @@ class ExtendedScene:
             instrument = replace(instrument, angle_shift=turn)
         # a spread of the only layer, which will not be the only one
         spread, instrument = instrument.thickness_spread, replace(instrument, thickness_spread=None)
-        layers: list[Any] = list(scene.layers)
-        for i, layer in enumerate(scene.layers):
+        layers: list[Any] = list(opened.layers)
+        for i, layer in enumerate(opened.layers):
             if isinstance(layer, Layer):
                 own = layer if spread is None else replace(layer, thickness_spread=spread)
-                layers[i] = self._layer(i, own, nm)
-        top, foot, below = layers[0], scene.layers[-1], _with_slope(scene.substrate.material, nm)
-        if _solid(below, nm):
+                layers[i] = self._layer(i, own, scene.layers[i], nm)
+        top, foot, bulk = layers[0], scene.layers[-1], scene.substrate.material
+        below = _with_slope(opened.substrate.material, nm)
+        if _solid(bulk, nm):
             self.substrate_index, change = self._number(0.0, -0.5)
             if isinstance(top, Layer) and top.roughness is None:
                 self.roughness, rough = self._number(0.0)
                 layers[0] = replace(top, roughness=rough)
-            if isinstance(foot, Layer) and _oxidises(below, nm):
+            if isinstance(foot, Layer) and _oxidises(bulk, nm):
                 fixed = not free_leaves(getattr(view.scene.layers[-1], "material", None))
                 if not (fixed and abs(_median(foot.material, nm) - OXIDE_INDEX) < _LIKE_OXIDE):
                     self.oxide, thin = self._number(0.0)
@@ -99,10 +126,10 @@ class ExtendedScene:
                 layers.append(Interface(thin))
             below = Scaled(below, change)
         self._scene = replace(
-            scene,
+            opened,
             layers=tuple(layers),
-            substrate=replace(scene.substrate, material=below),
-            ambient=_with_slope(scene.ambient, nm),
+            substrate=replace(opened.substrate, material=below),
+            ambient=_with_slope(opened.ambient, nm),
             instrument=instrument,
         )
 
@@ -111,31 +138,45 @@ class ExtendedScene:
         self._free.append(free)
         return Number(len(self._free) - 1, value), free
 
-    def _layer(self, i: int, layer: Layer, nm: np.ndarray) -> Layer:
+    def _layer(self, i: int, layer: Layer, fitted: Layer, nm: np.ndarray) -> Layer:
         material = _with_slope(layer.material, nm)
-        if _solid(material, nm):
+        if _solid(fitted.material, nm):
             position = 2 * (nm - nm.min()) / max(np.ptp(nm), 1e-9) - 1
             given = not free_leaves(getattr(self._view.scene.layers[i], "material", None))
             number, change = self._number(0.0, -0.5)
             (self.index if given else self.shape)[i] = number
             # level and slope of a model are its own: what it may lack is a curvature
             material = Scaled(material, change, 1.0 if given else 2 * position**2 - 1)
-        self.thickness[i], thickness = self._number(float(np.asarray(layer.thickness)))
+        thickness: Any = layer.thickness
+        if is_free(thickness):
+            position = next(j for j, own in enumerate(self._free) if own is thickness)
+            self.thickness[i] = Number(position, thickness.start)
+        else:
+            self.thickness[i], thickness = self._number(float(np.asarray(thickness)))
         return replace(layer, material=material, thickness=thickness)
+
+    @property
+    def start(self) -> np.ndarray:
+        """All numbers (numbers,) as the fit has them."""
+        return np.array([own.start for own in self._free])
 
     def signals(self, changes: list[tuple[Number, float]]) -> np.ndarray:
         """Signals (changes, data values) with one number changed in each, without scale and offset."""
-        # the order of a pytree is that of its fields
-        order = [next(i for i, own in enumerate(self._free) if own is x) for _, x in free_leaves(self._scene)]
         # padded: scenes with other uncertainties share a program
         count = -(-len(changes) // _ROUND) * _ROUND
-        values = np.tile([own.start for own in self._free], (count, 1))
+        values = np.tile(self.start, (count, 1))
         for row, (number, change) in zip(values, changes, strict=False):
             row[number.position] += change
-        form = self._view.form.with_plan(exact(self._scene).static_key)
-        scene = jax.tree_util.tree_map(np.asarray, anonymous(self._scene))
+        form, scene, order = self.program()
         signals = simulated(form, scene, self._view.data, values[:, order]).signal
         return np.asarray(signals)[: len(changes)]
+
+    def program(self) -> tuple[Any, Scene, list[int]]:
+        """The form and the scene of the program that simulates, and which numbers it takes, in its order."""
+        # the order of a pytree is that of its fields
+        order = [next(i for i, own in enumerate(self._free) if own is x) for _, x in free_leaves(self._scene)]
+        form = self._view.form.with_plan(exact(self._scene).static_key)
+        return form, jax.tree_util.tree_map(np.asarray, anonymous(self._scene)), order
 
 
 def _with_slope(medium: Any, nm: np.ndarray) -> Any:

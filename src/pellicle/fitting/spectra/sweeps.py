@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -40,19 +41,20 @@ def sweeps(
 
 
 def correlation_in_sweeps(
-    residuals: Float[np.ndarray, "rows channels"], parts: Sequence[Int[np.ndarray, " points"]]
-) -> float:
+    residuals: Float[np.ndarray, "*pixels rows channels"], parts: Sequence[Int[np.ndarray, " points"]]
+) -> Any:
     """Number of points of one channel whose residuals count as one: neighbours in a sweep, times the sweeps
     that have the same residuals, as angles have of one model's error. `parts` are the rows of each sweep."""
     total = 0.0
     for size in {len(part) for part in parts}:
         # those of one length have one estimate: each alone may be too short for it
-        alike = np.stack([residuals[part] for part in parts if len(part) == size], axis=1)
-        among = alike.shape[1] * np.mean(np.mean(alike, axis=1) ** 2, axis=0)
-        among = np.clip(among / np.maximum(np.mean(alike**2, axis=(0, 1)), 1e-300), 1.0, alike.shape[1])
-        along = [integrated_time(channel) for channel in np.moveaxis(alike, -1, 0)]
-        total += float(np.mean(along * among)) * alike.shape[0] * alike.shape[1]
-    return total / len(residuals)
+        alike = np.stack([residuals[..., part, :] for part in parts if len(part) == size], axis=-2)
+        count = alike.shape[-2]
+        among = count * np.mean(np.mean(alike, axis=-2) ** 2, axis=-2)
+        among = np.clip(among / np.maximum(np.mean(alike**2, axis=(-3, -2)), 1e-300), 1.0, count)
+        along = integrated_time(np.moveaxis(alike, -1, -3))
+        total = total + np.mean(along * among, axis=-1) * alike.shape[-3] * count
+    return total / residuals.shape[-2]
 
 
 def _count(values: np.ndarray) -> int:

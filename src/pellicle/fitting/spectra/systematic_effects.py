@@ -41,6 +41,13 @@ class SimulatedEffect(NamedTuple):
     positive: bool = False
     shared: bool = True
     material: bool = False
+    relative: float = 0.0  # size by the number itself, at most `_WIDEST_SPREAD`; 0 for a size of its own
+
+    def sizes(self, values: np.ndarray) -> np.ndarray:
+        """The size where all numbers of the scene are `values` (..., numbers)."""
+        if not self.relative:
+            return np.full(values.shape[:-1], self.size)
+        return np.minimum(self.relative * values[..., self.number.position], _WIDEST_SPREAD)
 
     def effect(self, change: np.ndarray) -> Effect:
         """The effect with its `change` of the data."""
@@ -53,13 +60,18 @@ def systematic_effects(view: SpectrumView, values: np.ndarray, at: Local, scene:
 
     `at` is the local model there. What the scene describes itself, free or fixed, is no effect.
     """
-    gain, result = np.asarray(at.gain), []
+    result = []
     for row, weights, own in simulated_effects(view, values, scene):
-        change = _on_sphere(view, at, _columns(view, gain * (weights @ own)))
+        change = change_of_data(view, at, weights @ own)
         if view.depolarisation is not None:
             change[:, -1] = _depolarising(view, at, own, weights)
         result.append(row.effect(change))
-    return named_for([*result, *_of_signal(view, at, scene)], view.name)
+    return named_for([*result, *effects_on_signal(view, at, scene)], view.name)
+
+
+def change_of_data(view: SpectrumView, at: Local, change: np.ndarray) -> np.ndarray:
+    """Change of the data (..., rows, measured channels) by a change of the signal (..., data values)."""
+    return _on_sphere(view, at, _columns(view, np.asarray(at.gain) * change))
 
 
 def named_for(effects: list[Effect], name: str) -> list[Effect]:
@@ -75,7 +87,7 @@ def simulated_effects(
 
     The weighted sum of the signals is the change by the effect.
     """
-    simulations = _simulations(view, values, scene)
+    simulations = simulations_of(view, values, scene)
     if not simulations:
         return []
     extended, every = simulations
@@ -89,9 +101,10 @@ def simulated_effects(
     return result
 
 
-def _simulations(
+def simulations_of(
     view: SpectrumView | ColoursView, values: np.ndarray, scene: Scene
 ) -> tuple[ExtendedScene, list[SimulatedEffect]] | None:
+    """The extended scene, and every effect that it simulates; None where there are none."""
     allowed, instrument = scene.uncertainty, scene.instrument
     extended, rows = ExtendedScene(view, values), []
 
@@ -133,7 +146,8 @@ def _simulations(
             linear(f"dispersion{of}", allowed.dispersion, "", extended.shape[i])
         if instrument.thickness_spread is None and layer.thickness_spread is None:
             size = min(allowed.thickness_spread * extended.thickness[i].value, _WIDEST_SPREAD)
-            width(f"thickness spread{of}", size, "nm", extended.thickness[i], size)
+            relative = allowed.thickness_spread
+            width(f"thickness spread{of}", size, "nm", extended.thickness[i], size, relative=relative)
     substrate = scene.substrate
     own = allowed.index if substrate.index_uncertainty is None else substrate.index_uncertainty
     linear("index of the substrate", own, "", extended.substrate_index, material=True)
@@ -148,8 +162,8 @@ def _simulations(
     return (extended, rows) if rows else None
 
 
-def _of_signal(view: SpectrumView, at: Local, scene: Scene) -> list[Effect]:
-    """Effects that act on the signal alone."""
+def effects_on_signal(view: SpectrumView, at: Local, scene: Scene) -> list[Effect]:
+    """Effects that act on the signal alone; leading axes of `at` are those of the changes too."""
     allowed, signal = scene.uncertainty, np.asarray(at.signal)
     if view.channels > 1:
         return _of_angles(view, at, allowed)
@@ -164,7 +178,7 @@ def _of_signal(view: SpectrumView, at: Local, scene: Scene) -> list[Effect]:
     elif scene.instrument.scale.degree:
         curves += _lamp_structure(view, np.asarray(at.gain) * signal, scene.instrument.scale.degree)
     if not isinstance(scene.instrument.offset, Drift):
-        curves.append(("offset", allowed.offset, np.full(len(signal), allowed.offset)))
+        curves.append(("offset", allowed.offset, np.full(signal.shape, allowed.offset)))
     return [
         Effect(name, size, "", _columns(view, change), shared=False) for name, size, change in curves if size
     ]
@@ -175,11 +189,13 @@ def _lamp_structure(
 ) -> list[tuple[str, float, np.ndarray]]:
     """Structure of a lamp that a scale of this degree does not follow: terms of the scale up to half the
     frequency of the fringes, which they must not imitate."""
-    position, real = np.asarray(view.data.position), signal[: view.points]
-    extrema = int(np.sum(np.diff(np.sign(np.diff(real))) != 0))
-    terms = range(degree + 1, min(extrema // 2, _LAMP_TERMS) + 1)
+    position, real = np.asarray(view.data.position), signal[..., : view.points]
+    extrema = np.sum(np.diff(np.sign(np.diff(real))) != 0, axis=-1)
+    last = np.minimum(extrema // 2, _LAMP_TERMS)
+    terms = range(degree + 1, int(np.max(last)) + 1)
     wave = {k: np.cos(k * np.arccos(np.clip(position, -1, 1))) for k in terms}
-    return [(f"term {k} of the scale", _LAMP, _LAMP * signal * wave[k]) for k in terms]
+    has = {k: (k <= last)[..., None] for k in terms}
+    return [(f"term {k} of the scale", _LAMP, _LAMP * signal * wave[k] * has[k]) for k in terms]
 
 
 def _of_angles(view: SpectrumView, at: Local, allowed: Uncertainty) -> list[Effect]:
@@ -187,20 +203,22 @@ def _of_angles(view: SpectrumView, at: Local, allowed: Uncertainty) -> list[Effe
 
     An instrument that measures the depolarisation divides it out; its offset counts instead.
     """
-    n, c, s = _sphere(view, at.signal).T
+    n, c, s = np.moveaxis(_sphere(view, at.signal), -1, 0)
     sine = np.maximum(np.hypot(c, s), 1e-9)
     psi, delta, share = np.deg2rad(2 * allowed.psi), np.deg2rad(allowed.delta), 1 - allowed.depolarisation
     third = np.where(s < 0, -1, 1) * np.sqrt(np.maximum(1 - (share * n) ** 2 - (share * c) ** 2, 0.0))
-    less = np.stack([share * n - n, share * c - c, third - s])
+    less = np.stack([share * n - n, share * c - c, third - s], axis=-1)
+    of_psi = psi * np.stack([-sine, n * c / sine, n * s / sine], axis=-1)
+    of_delta = delta * np.stack([0 * n, -s, c], axis=-1)
     changes = (
-        ("offset of psi", allowed.psi, "deg", psi * np.stack([-sine, n * c / sine, n * s / sine]), False),
-        ("offset of delta", allowed.delta, "deg", delta * np.stack([0 * n, -s, c]), False),
+        ("offset of psi", allowed.psi, "deg", of_psi, False),
+        ("offset of delta", allowed.delta, "deg", of_delta, False),
         ("depolarisation", 0.0 if view.depolarisation else allowed.depolarisation, "", less, True),
     )
     result = []
     for name, size, unit, change, positive in changes:
         if size:
-            data = _in_frame(view, change.T[: view.rows])
+            data = _in_frame(view, change[..., : view.rows, :])
             result.append(Effect(name, size, unit, data, positive=positive, shared=False))
     size = allowed.depolarisation
     if size and view.depolarisation is not None:
@@ -211,18 +229,21 @@ def _of_angles(view: SpectrumView, at: Local, allowed: Uncertainty) -> list[Effe
 
 
 def _in_frame(view: SpectrumView, change: np.ndarray) -> np.ndarray:
-    """A change of N, C and S (rows, 3), which leaves the depolarisation, as (rows, measured channels)."""
+    """A change of N, C and S (..., rows, 3), which leaves the depolarisation, as (..., rows, measured
+    channels)."""
     keep = view.measured_channels
     if view.depolarisation is not None:
-        change = np.insert(change, 3 if view.channels == 4 else 2, 0.0, axis=1)
+        change = np.insert(change, 3 if view.channels == 4 else 2, 0.0, axis=-1)
     if view.data.frame is not None:
-        change = np.einsum("pij,pj->pi", np.asarray(view.data.frame)[: view.rows], change)
-    return change[:, :keep]
+        frame = np.asarray(view.data.frame)[..., : view.rows, :, :]
+        change = np.einsum("...pij,...pj->...pi", frame, change)
+    return change[..., :keep]
 
 
 def _columns(view: SpectrumView, values: np.ndarray) -> np.ndarray:
-    """Data values, or a change of them, as (rows, measured channels)."""
-    return values[: view.points].reshape(view.rows, view.channels)[:, : view.measured_channels]
+    """Data values, or a change of them, (..., data values) as (..., rows, measured channels)."""
+    columns = values[..., : view.points].reshape(*values.shape[:-1], view.rows, view.channels)
+    return columns[..., : view.measured_channels]
 
 
 def _on_sphere(view: SpectrumView, at: Local, change: np.ndarray) -> np.ndarray:
@@ -230,8 +251,8 @@ def _on_sphere(view: SpectrumView, at: Local, change: np.ndarray) -> np.ndarray:
     sphere = view.channels if view.depolarisation is None else view.channels - 1
     if sphere < 3 or view.data.frame is not None:
         return change
-    outwards = _sphere(view, at.signal)[: view.rows]
-    change[:, :3] -= outwards * np.sum(change[:, :3] * outwards, axis=1, keepdims=True)
+    outwards = _sphere(view, at.signal)[..., : view.rows, :]
+    change[..., :3] -= outwards * np.sum(change[..., :3] * outwards, axis=-1, keepdims=True)
     return change
 
 
@@ -250,13 +271,14 @@ def _depolarising(view: SpectrumView, at: Local, signals: np.ndarray, weights: n
 
 
 def _sphere(view: SpectrumView, signal: Any) -> np.ndarray:
-    """N, C, S of a signal, (wavelengths with padding, 3)."""
-    columns = np.asarray(signal).reshape(len(view.scene.light.wavelength), -1)
+    """N, C, S of a signal (..., data values), (..., wavelengths with padding, 3)."""
+    signal = np.asarray(signal)
+    columns = signal.reshape(*signal.shape[:-1], -1, view.channels)
     if view.data.frame is not None:
-        columns = np.einsum("pij,pi->pj", np.asarray(view.data.frame), columns)
+        columns = np.einsum("...pij,...pi->...pj", np.asarray(view.data.frame), columns)
     if view.depolarisation is not None:
-        columns = columns[:, :-1]
-    if columns.shape[1] == 3:
+        columns = columns[..., :-1]
+    if columns.shape[-1] == 3:
         return columns
-    third = np.sqrt(np.maximum(1 - np.sum(columns**2, axis=1), 0.0))
-    return np.column_stack([columns, third])
+    third = np.sqrt(np.maximum(1 - np.sum(columns**2, axis=-1, keepdims=True), 0.0))
+    return np.concatenate([columns, third], axis=-1)

@@ -1,0 +1,202 @@
+"""Discrepancy of many pixels: what systematic effects and correlated residuals add to their errors.
+
+`fitting.discrepancy` for many spectra of one kind at once, by normal equations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from pellicle.fitting.discrepancy import HALF_NORMAL, Effect, huber_roots, improbable, reduced_variance
+from pellicle.fitting.misfit import BETTER, BEYOND, EXPLAINS
+from pellicle.mapping.pixel_covariance import Normal, inverse, solve, solve_within
+
+_ROUNDS = 4
+_SETTLED = 1e-6
+_WHATEVER = 1e-6
+"""Prior of an effect that is looked for whatever its size: see `fitting.discrepancy`."""
+
+
+@dataclass(frozen=True, eq=False)
+class PixelEvidence:
+    """Residuals of pixels and what may explain them: see `fitting.discrepancy.Evidence`.
+
+    `residual` (pixels, rows, channels) and `columns` (pixels, points, columns), of parameters and nuisances
+    in the steps of their covariance and then of effects, are in the unit of the data. `sigma` (pixels, rows,
+    channels), `noise` (pixels,); `counted` (pixels,) is the median variance by which the fit counts points.
+    `prior` (pixels, columns) are the weights of priors, `pull` (pixels, columns) distances from their means,
+    `lower` and `upper` (pixels, columns) bounds. `known` is the number of parameters and nuisances, `count`
+    (pixels,) that of effects.
+    """
+
+    residual: np.ndarray
+    columns: np.ndarray
+    sigma: np.ndarray
+    noise: np.ndarray
+    counted: np.ndarray
+    prior: np.ndarray
+    pull: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    known: int
+    count: np.ndarray
+    correlation: Callable[[np.ndarray], np.ndarray]
+    least: float
+    uncertain: float
+
+    def of(self, pixels: np.ndarray) -> PixelEvidence:
+        """The evidence of some of the pixels."""
+        arrays = {name: x[pixels] for name, x in vars(self).items() if isinstance(x, np.ndarray)}
+        return replace(self, **arrays)
+
+
+class PixelDiscrepancy(NamedTuple):
+    """Errors of pixels with the effects allowed for: see `fitting.discrepancy.Discrepancy`.
+
+    `covariance` (pixels, known, known) and `shift` (pixels, known) are in the steps of the columns; the
+    numbers of `remaining` are arrays (pixels,).
+    """
+
+    covariance: np.ndarray
+    shift: np.ndarray
+    remaining: Remaining
+    implausible: np.ndarray
+    evidence_share: np.ndarray
+
+
+class _Balance(NamedTuple):
+    """Systems with factors on σ² and weights that stand for the residuals which they leave."""
+
+    rows: np.ndarray
+    data: np.ndarray
+    variance: np.ndarray
+    roots: np.ndarray
+    normal: Normal
+    covariance: np.ndarray
+    solution: np.ndarray
+    rest: np.ndarray
+
+
+def discrepancy(evidence: PixelEvidence) -> PixelDiscrepancy:
+    """The discrepancy of each pixel."""
+    state = _balanced(evidence)
+    known, rest = evidence.known, state.rest.reshape(evidence.residual.shape)
+    typical = _spread(rest * evidence.sigma)
+    weighted = np.sqrt(np.mean((huber_roots(rest, _spread(rest)) * rest) ** 2, axis=(1, 2)))
+    sizes = state.solution[:, known:]
+    limit = np.array([improbable(int(n)) for n in range(int(evidence.count.max(initial=0)) + 1)])
+    now = state.variance * np.median(evidence.sigma, axis=(1, 2)) ** 2
+    return PixelDiscrepancy(
+        covariance=state.covariance[:, :known, :known],
+        shift=state.solution[:, :known],
+        remaining=Remaining(typical / evidence.noise, typical, weighted, state.variance),
+        implausible=(evidence.count > 0) & (np.sum(sizes**2, axis=1) > limit[evidence.count]),
+        evidence_share=np.minimum(1.0, evidence.counted / now),
+    )
+
+
+def other_material(evidence: PixelEvidence, effects: Sequence[Effect]) -> np.ndarray:
+    """Whether (pixels,) an index far from the given one explains the residuals as no effect of ordinary size
+    does: see `fitting.misfit.other_material`."""
+    one = np.broadcast_to(evidence.noise[:, None, None], evidence.sigma.shape)
+    state = _balanced(replace(evidence, sigma=one, least=1.0))
+    known, pixels = evidence.known, len(evidence.residual)
+    data = (state.data * state.roots) / np.sqrt(state.variance)[:, None]
+    power = np.sum(data**2, axis=1)
+    priors = evidence.prior**2
+    # without the priors of the sums of squares themselves
+    gram = state.normal.matrix - priors[:, :, None] * np.eye(priors.shape[1])
+    right = state.normal.right + evidence.prior * evidence.pull
+    own = np.arange(known)
+    best = solve(state.normal.matrix[:, :known, :known], state.normal.right[:, :known])
+    before = power - 2 * np.sum(best * right[:, own], axis=1)
+    before += np.einsum("pi,pij,pj->p", best, gram[:, :known, :known], best)
+    explains, alone = np.zeros((2, pixels, len(effects)))
+    for i in range(len(effects)):
+        both = np.append(own, known + i)
+        matrix = state.normal.matrix[:, both][:, :, both].copy()
+        matrix[:, -1, -1] += _WHATEVER**2 - priors[:, known + i]
+        normal = Normal(matrix, state.normal.right[:, both])
+        bounds = evidence.lower[:, both], evidence.upper[:, both]
+        x = solve_within(normal, *bounds, solve(*normal))
+        after = power - 2 * np.sum(x * right[:, both], axis=1)
+        after += np.einsum("pi,pij,pj->p", x, gram[:, both][:, :, both], x)
+        explains[:, i] = 1 - after / np.maximum(before, 1e-300)
+        alone[:, i] = x[:, -1]
+    size = np.abs(_over_own_size(effects, alone))
+    material = np.array([effect.material for effect in effects])
+    usual = np.max(np.where(size <= BEYOND, explains, 0.0), axis=1, initial=0.0)
+    best = np.max(np.where((size > BEYOND) & material, explains, -np.inf), axis=1, initial=-np.inf)
+    return best > np.maximum(EXPLAINS, usual + BETTER)
+
+
+def _spread(values: np.ndarray) -> np.ndarray:
+    """`fitting.robust_losses.spread` of each pixel."""
+    return np.maximum(1.4826 * np.median(np.abs(values), axis=(1, 2)), 1e-300)
+
+
+def _balanced(evidence: PixelEvidence) -> _Balance:
+    """Factors and weights of each pixel: those whose factors have settled are not computed again."""
+    shape = evidence.residual.shape
+    pixels, columns = shape[0], evidence.columns.shape[2]
+    inverse_sigma = (1 / evidence.sigma).reshape(pixels, -1)
+    rows = evidence.columns * inverse_sigma[..., None]
+    data = evidence.residual.reshape(pixels, -1) * inverse_sigma
+    variance = np.full(pixels, max(1.0, evidence.least))
+    roots = np.ones(data.shape)
+    gram, against = np.swapaxes(rows, 1, 2) @ rows, np.einsum("pnc,pn->pc", rows, data)
+    at, pulled = np.arange(columns), evidence.prior * evidence.pull
+    every = slice(None)
+
+    def system(which: np.ndarray | slice) -> Normal:
+        matrix = gram[which] / variance[which][:, None, None]
+        matrix[:, at, at] += evidence.prior[which] ** 2
+        return Normal(matrix, against[which] / variance[which][:, None] - pulled[which])
+
+    def solved(normal: Normal, covariance: np.ndarray, which: np.ndarray | slice) -> np.ndarray:
+        free = np.einsum("pij,pj->pi", covariance, normal.right)
+        return solve_within(normal, evidence.lower[which], evidence.upper[which], free)
+
+    normal = system(every)
+    covariance = inverse(normal.matrix)
+    solution = solved(normal, covariance, every)
+    rest = data - np.einsum("pnc,pc->pn", rows, solution)
+    todo = np.arange(pixels)
+    for _ in range(_ROUNDS):
+        left = rest[todo].reshape(-1, *shape[1:])
+        now = huber_roots(left, _spread(left)).reshape(len(todo), -1)
+        robust = (now < 1).any(axis=1) | (roots[todo] < 1).any(axis=1)
+        some = todo[robust]
+        changed = np.zeros(len(todo), bool)
+        changed[robust] = np.abs(now[robust] - roots[some]).max(axis=1, initial=0.0) > _SETTLED
+        roots[todo] = now
+        if len(some):
+            weighted = rows[some] * (roots[some] ** 2)[..., None]
+            gram[some] = np.swapaxes(weighted, 1, 2) @ rows[some]
+            against[some] = np.einsum("pnc,pn->pc", weighted, data[some])
+        used = np.einsum("pij,pij->p", covariance[todo], gram[todo]) / variance[todo]
+        factor = reduced_variance(
+            now.reshape(left.shape) * left, used, evidence.correlation, evidence.least, evidence.uncertain
+        )
+        changed |= np.abs(factor / variance[todo] - 1) > _SETTLED
+        variance[todo] = factor
+        todo = todo[changed]
+        if not len(todo):
+            break
+        fresh = system(todo)
+        normal.matrix[todo], normal.right[todo] = fresh
+        covariance[todo] = inverse(fresh.matrix)
+        solution[todo] = solved(fresh, covariance[todo], todo)
+        rest[todo] = data[todo] - np.einsum("pnc,pc->pn", rows[todo], solution[todo])
+    return _Balance(rows, data, variance, roots, normal, covariance, solution, rest)
+
+
+def _over_own_size(effects: Sequence[Effect], coefficients: np.ndarray) -> np.ndarray:
+    """Sizes over their standard uncertainty at coefficients (pixels, effects): see `Effect.amount`."""
+    square = np.array([effect.power == 2 for effect in effects])
+    root = np.copysign(np.sqrt(HALF_NORMAL * np.abs(coefficients)), coefficients)
+    return np.where(square, root, coefficients)

@@ -1,0 +1,111 @@
+"""Models of many pixels around their minima: signals, slopes, nuisances and deviances, compiled once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+
+from pellicle.fitting.program_cache import kept
+from pellicle.fitting.reported_layer import linearised
+from pellicle.fitting.spectra import nuisance
+from pellicle.fitting.spectra.nuisance import Data
+from pellicle.fitting.spectra.view import Local, SpectrumForm, SpectrumView
+from pellicle.scene.film import Scene
+
+LANES = 256
+"""Pixels that one call of a compiled program takes."""
+
+
+class PixelArrays(NamedTuple):
+    """What differs between the data of pixels, each (pixels, ...), padded as the data of the view."""
+
+    values: Any
+    weight: Any
+    independent_fraction: Any
+    level: Any
+    frame: Any
+
+    def of(self, data: Data) -> Data:
+        """The data of one pixel, where these are its arrays."""
+        frame = data.frame if self.frame is None else self.frame
+        return Data(self.values, self.weight, data.position, self.independent_fraction, self.level, frame)
+
+
+class PixelLocals(NamedTuple):
+    """Models around one point of each pixel: see `fitting.spectra.view.Local`."""
+
+    signal: Any
+    slope: Any
+    model: Any
+    gain: Any
+    offset: Any
+    layer: Any
+    deviance: Any
+
+
+@kept
+def local_models(form: SpectrumForm, scene: Scene, data: Data, pixels: PixelArrays, at: Any) -> PixelLocals:
+    """The model of each pixel around `at` (pixels, parameters)."""
+
+    def one(pixel: PixelArrays, values: Any) -> PixelLocals:
+        own = pixel.of(data)
+        found = linearised(form, scene, own, values)
+        solved = nuisance.solve(found.signal, own, scene.instrument)
+        curves = solved.model, solved.gain, solved.offset
+        return PixelLocals(found.signal, found.slope, *curves, found.layer, solved.deviance)
+
+    return jax.vmap(one)(pixels, at)
+
+
+class PixelDeviances(NamedTuple):
+    """Deviances of candidates of each pixel, (pixels, candidates)."""
+
+    value: Any
+
+
+@kept
+def deviances(form: SpectrumForm, scene: Scene, data: Data, pixels: PixelArrays, at: Any) -> PixelDeviances:
+    """Deviance of each pixel at `at` (pixels, candidates, parameters), priors of parameters left out."""
+
+    def one(pixel: PixelArrays, candidates: Any) -> Any:
+        own = pixel.of(data)
+        return jax.vmap(lambda values: form.explain((scene, own), values).deviance)(candidates)
+
+    return PixelDeviances(jax.vmap(one)(pixels, at))
+
+
+def padded(view: SpectrumView, arrays: PixelArrays) -> PixelArrays:
+    """The arrays (pixels, points) with the padding of the view, which weighs nothing."""
+    extra = len(view.data.values) - view.points
+    values, weight = (np.pad(x, [(0, 0), (0, extra)]) for x in (arrays.values, arrays.weight))
+    frame = arrays.frame
+    if frame is not None:
+        frame = np.concatenate([frame, np.repeat(frame[:, -1:], extra // view.channels, axis=1)], axis=1)
+    return arrays._replace(values=values, weight=weight, frame=frame)
+
+
+def in_lanes(program: Callable[..., Any], view: SpectrumView, arrays: PixelArrays, at: np.ndarray) -> Any:
+    """Call a program for pixels, `LANES` at a time, and return NumPy arrays of all of them."""
+    pieces, kind = [], tuple
+    for first in range(0, len(at), LANES):
+        count = min(LANES, len(at) - first)
+
+        def lanes(x: np.ndarray, first: int = first, count: int = count) -> np.ndarray:
+            own = np.ascontiguousarray(x[first : first + count])
+            return np.concatenate([own, np.repeat(own[-1:], LANES - count, axis=0)])
+
+        own = jax.tree_util.tree_map(lanes, arrays)
+        found = jax.device_get(program(view.form, view.scene, view.data, own, lanes(at)))
+        kind = type(found)
+        pieces.append([np.asarray(x)[:count] for x in found])
+    return kind(*(np.concatenate(column) for column in zip(*pieces, strict=True)))
+
+
+def locals_of(view: SpectrumView, arrays: PixelArrays, at: np.ndarray) -> tuple[Local, np.ndarray]:
+    """The model of each pixel around `at` (pixels, parameters), without layer slopes, and its deviance."""
+    found: PixelLocals = in_lanes(local_models, view, arrays, at)
+    local = Local(found.signal, found.slope, found.model, found.gain, found.offset, found.layer, np.zeros(0))
+    return local, found.deviance
