@@ -11,7 +11,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pellicle.fitting.discrepancy import HALF_NORMAL, Effect, huber_roots, improbable, reduced_variance
+from pellicle.fitting.discrepancy import (
+    HALF_NORMAL,
+    Effect,
+    Remaining,
+    huber_roots,
+    improbable,
+    reduced_variance,
+)
 from pellicle.fitting.misfit import BETTER, BEYOND, EXPLAINS
 from pellicle.mapping.pixel_covariance import Normal, inverse, solve, solve_within
 

@@ -60,13 +60,16 @@ class PixelEffects:
         for i, (key, row) in enumerate(self._terms.items()):
             candidates[:, i, row.number.position] += key[1] * row.sizes(numbers)
         candidates = candidates[:, :, order]
-        frame, pieces = view.data.frame, []
+        frame, pieces = None if view.data.frame is None else np.asarray(view.data.frame), []
+        if frame is not None:  # with the padding of the scene
+            extra = len(self._view.scene.light.wavelength) - frame.shape[1]
+            frame = np.concatenate([frame, np.repeat(frame[:, -1:], extra, axis=1)], axis=1)
         for first in range(0, pixels, _LANES):
             of = slice(first, first + _LANES)
-            own = None if frame is None else _lanes(np.asarray(frame)[of]), _lanes(candidates[of])
+            own = None if frame is None else _lanes(frame[of]), _lanes(candidates[of])
             signal = simulated_side_by_side(form, scene, self._view.data, *own).signal
             pieces.append(np.asarray(jax.device_get(signal))[: pixels - first])
-        signals = np.concatenate(pieces)
+        signals = np.concatenate(pieces)[..., : view.points]
         result = []
         for row in self._rows:
             change = np.zeros((pixels, signals.shape[2]))
@@ -83,8 +86,9 @@ def _lanes(x: np.ndarray) -> np.ndarray:
 
 
 def of_pixels(view: SpectrumView, frame: np.ndarray | None) -> SpectrumView:
-    """The view with the frames of pixels (pixels, wavelengths with padding, channels, channels)."""
-    return view if frame is None else replace(view, data=view.data._replace(frame=frame))
+    """The view without padding, and with the frames of pixels (pixels, wavelengths, channels, channels)."""
+    position = np.asarray(view.data.position)[: view.points]
+    return replace(view, data=view.data._replace(position=position, frame=frame))
 
 
 def columns(changes: Sequence[np.ndarray], pixels: int, points: int) -> np.ndarray:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import jax
 import numpy as np
 
 from pellicle.fitting.misfit import DOUBTFUL, Accuracy, beyond_accuracy
 from pellicle.fitting.noise import DRIFT_CORRELATION
+from pellicle.fitting.problem import Problem
 from pellicle.fitting.spectra.evidence import LEAST_NOISE, SCATTER_OF_NOISE
-from pellicle.fitting.spectra.fit import measurements
 from pellicle.fitting.spectra.nuisance import offset_prior, scale_prior
 from pellicle.fitting.spectra.parts import LARGEST_ANGLES, LARGEST_DRIFT, LARGEST_POWER
 from pellicle.fitting.spectra.search import thickness_grid
@@ -26,7 +25,6 @@ from pellicle.mapping.pixel_local import PixelArrays, deviances, in_lanes, local
 from pellicle.mapping.pixel_minima import PixelData, PixelMinima
 from pellicle.mapping.pixel_noise import PixelNoise, correlation, noise_of, short_range_noise, students
 from pellicle.mapping.pixel_status import judge
-from pellicle.mapping.pixels import PixelModel
 from pellicle.scene.instrument import Drift
 
 _REFITS = 4
@@ -40,17 +38,14 @@ class PixelErrors:
     a bound that physics sets are those of the covariance.
     """
 
-    def __init__(self, model: PixelModel):
-        with jax.enable_x64(True):
-            target = measurements(model.example, model.scene)[0]
-        assert isinstance(target, Measured)
-        self.model, self.target = model, target
-        [self.view] = model.problem.views
-        self.parameters = model.parameters
+    def __init__(self, problem: Problem, target: Measured, calibrated: bool):
+        self.target, self.calibrated = target, calibrated
+        [self.view] = problem.views
+        self.parameters = problem.parameters
         self.lower = np.array([p.lower for p in self.parameters])
         self.upper = np.array([p.upper for p in self.parameters])
-        self.prior_mean = np.asarray(model.problem.box.prior_mean)
-        self.prior_weight = np.asarray(model.problem.box.prior_weight)
+        self.prior_mean = np.asarray(problem.box.prior_mean)
+        self.prior_weight = np.asarray(problem.box.prior_weight)
         self.natural = pixel_profiles.natural_bounds([p.natural for p in self.parameters])
         self.position = np.asarray(self.view.data.position)[: self.view.points]
         self.nuisances: list[tuple[np.ndarray, np.ndarray, bool]] = []
@@ -62,13 +57,12 @@ class PixelErrors:
                 basis = np.polynomial.chebyshev.chebvander(self.position, number.degree)
                 self.nuisances.append((basis, prior(number)[1], on_signal))
         self.linear = sum(len(sd) for _, sd, _ in self.nuisances)
-        self.depth = model.problem.thickness_axis
+        self.depth = problem.thickness_axis
         if self.depth is not None:
             p = self.parameters[self.depth]
-            self.grid = p.lower + thickness_grid(model.problem, 1) * (p.upper - p.lower)
+            self.grid = p.lower + thickness_grid(problem, 1) * (p.upper - p.lower)
         middle = 0.5 * (self.lower + self.upper)
-        with jax.enable_x64(True):
-            self.effects = PixelEffects(self.view, middle, target.scene)
+        self.effects = PixelEffects(self.view, middle, target.scene)
 
     def fits(self, data: PixelData, minima: PixelMinima) -> PixelFits:
         """Errors and status of pixels by their data and minima."""
@@ -85,11 +79,10 @@ class PixelErrors:
             rms=quality.copy(),
         )
         known = np.isfinite(minima.deviance[:, 0])
-        with jax.enable_x64(True):
-            for group in groups(self.view, data.weight, known):
-                for chunk in group.chunks():
-                    for column, own in zip(result, self._chunk(data, minima, chunk), strict=True):
-                        column[chunk.pixels] = own
+        for group in groups(self.view, data.weight, known):
+            for chunk in group.chunks():
+                for column, own in zip(result, self._chunk(data, minima, chunk), strict=True):
+                    column[chunk.pixels] = own
         return result
 
     def _chunk(self, data: PixelData, minima: PixelMinima, group: Group) -> PixelFits:
@@ -106,8 +99,10 @@ class PixelErrors:
         weight = weight * noise.scale[:, None]
         frame = None if data.frame is None else data.frame[who]
         arrays = padded(view, PixelArrays(data.values[who], weight, noise.fraction, data.level[who], frame))
-        at, _ = locals_of(view, arrays, values)
-        residual = (arrays.values - at.model)[:, : view.points]
+        empty = np.zeros(0)
+        signal, slope, model = minima.signal[who], minima.slope[who], minima.model[who]
+        at = Local(signal, slope, model, minima.gain[who], minima.offset[who], empty, empty)
+        residual = data.values[who] - at.model
         # the scaled Jacobian
         flat, prior_sd = self._nuisance_columns(at, data.level[who])
         steep = at.gain[:, : view.points, None] * at.slope[:, : view.points] * (self.upper - self.lower)
@@ -119,7 +114,7 @@ class PixelErrors:
         own = own * stretch[:, :, None] * stretch[:, None, :]
         # systematic effects
         evidence, effects = self._evidence(
-            group, taken, at, arrays, residual, jacobian, weight, noise, prior, values, units
+            group, taken, at, arrays, frame, residual, jacobian, weight, noise, prior, values, units
         )
         found = discrepancy(evidence)
         misfit = self._misfit(evidence, effects, found, taken(data.values[who])[..., 0], kind.drifting)
@@ -164,7 +159,9 @@ class PixelErrors:
             return np.zeros((len(level), points, 0)), np.zeros((len(level), 0))
         return np.concatenate(flat, axis=2), np.concatenate(steps, axis=1)
 
-    def _evidence(self, group, taken, at, arrays, residual, jacobian, weight, noise, prior, values, units):
+    def _evidence(
+        self, group, taken, at, arrays, frame, residual, jacobian, weight, noise, prior, values, units
+    ):
         view, kind, keep = self.view, self.view.noise, self.view.measured_channels
         pixels, known = len(values), jacobian.shape[2]
         left = taken(residual)[..., :keep]
@@ -177,7 +174,7 @@ class PixelErrors:
             sigma = np.broadcast_to(short[:, None, None], sigma.shape)
         elif not kind.drifting:
             short = np.maximum(short, median)
-        effects = self.effects.changes(of_pixels(view, arrays.frame), at, values)
+        effects = self.effects.changes(of_pixels(view, frame), at, values)
         parts = [
             taken(jacobian)[:, :, :keep].reshape(pixels, -1, known),
             columns([taken(e.change.reshape(pixels, -1)) for e in effects], pixels, left[0].size),
@@ -218,7 +215,7 @@ class PixelErrors:
         elif drifting:
             accuracy = Accuracy(weighted=LARGEST_DRIFT)
         else:
-            largest = LARGEST_POWER if self.model.example.calibrated else np.inf
+            largest = LARGEST_POWER if self.calibrated else np.inf
             accuracy = Accuracy(largest, np.ptp(values, axis=1))
         misfit = found.implausible | beyond_accuracy(found.remaining, accuracy)
         doubtful = np.flatnonzero((found.remaining.ratio > DOUBTFUL) & ~misfit)
@@ -255,7 +252,8 @@ class PixelErrors:
         scene = self.target.scene
         if drifts(scene) and len(scene.layers) == 1 and self.depth is not None:
             rows = slice(self.view.rows)
-            index = at.layer[:, 0, rows] / np.asarray(self.view.scene.light.wavelength)[rows]
+            layer = locals_of(self.view, arrays, values)[0].layer
+            index = layer[:, 0, rows] / np.asarray(self.view.scene.light.wavelength)[rows]
             thinnest = FEWEST_FRINGES / np.maximum(np.ptp(2 * index, axis=1), 1e-12)
             result[values[:, self.depth] < thinnest, self.depth] = np.inf
         return result, converged

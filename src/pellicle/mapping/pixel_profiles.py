@@ -48,7 +48,6 @@ class Around(NamedTuple):
     misfit: Callable[[np.ndarray, np.ndarray], np.ndarray]
     refitted: Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
-
     @property
     def sd(self) -> np.ndarray:
         """Standard errors (pixels, parameters) by the curvature."""

@@ -14,13 +14,12 @@ from pellicle.data.spectrum import Spectrum
 from pellicle.errors import DataError
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.problem import Problem
-from pellicle.fitting.result import Status
 from pellicle.fitting.spectra.fit import measurements
 from pellicle.fitting.spectra.problem import make
-from pellicle.fitting.status import RIVAL
+from pellicle.fitting.spectra.targets import Measured
 from pellicle.mapping.pixel_data import pixel_data
-from pellicle.mapping.pixel_fits import CODES, NO_DATA, PixelFits
-from pellicle.mapping.pixel_minima import PixelData, PixelMinima
+from pellicle.mapping.pixel_errors import PixelErrors
+from pellicle.mapping.pixel_fits import PixelFits
 from pellicle.mapping.pixel_search import PixelSearch, minima, prepared
 from pellicle.scene.film import Scene
 
@@ -30,7 +29,7 @@ _SAMPLE = 9
 
 @dataclass(frozen=True)
 class PixelModel:
-    """What the pixels of a cube have in common: the scene, its problem and the search of minima.
+    """What the pixels of a cube have in common: scene, problem, search of minima and their errors.
 
     `example` is a spectrum as of one pixel, whose numbers do not matter but for their size.
     """
@@ -39,6 +38,7 @@ class PixelModel:
     problem: Problem
     example: Spectrum
     search: PixelSearch
+    errors: PixelErrors
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -54,9 +54,12 @@ def prepare(cube: Cube, scene: Scene) -> PixelModel:
     sample = _sample(cube)
     example = spectrum(cube, {name: _complete(rows[0]) for name, rows in sample.items()})
     with jax.enable_x64(True):
-        problem = make(*measurements(example, scene))
+        [target] = measurements(example, scene)
+        problem = make(target)
         search = prepared(problem, pixel_data(sample, problem.views[0].noise))
-    return PixelModel(scene, problem, example, search)
+        assert isinstance(target, Measured)
+        errors = PixelErrors(problem, target, cube.calibrated)
+    return PixelModel(scene, problem, example, search, errors)
 
 
 def _sample(cube: Cube) -> dict[str, np.ndarray]:
@@ -105,29 +108,4 @@ def fit_pixels(model: PixelModel, cube: Cube, where: tuple[slice, ...]) -> Pixel
     block = cube.pixels(where)
     with jax.enable_x64(True):
         data = pixel_data(block, model.problem.views[0].noise)
-        return _by_noise(model, data, minima(model.search, data))
-
-
-def _by_noise(model: PixelModel, data: PixelData, found: PixelMinima) -> PixelFits:
-    """Fits with standard errors by the noise alone."""
-    view = model.problem.views[0]
-    points, nuisances = (data.weight > 0).sum(axis=1), len(view.nuisances(view.local(found.values[0, 0])))
-    freedom = np.maximum(points - found.values.shape[2] - nuisances, 1)
-    reduced = np.where(points > 1, found.misfit[:, 0], 1.0) / freedom
-    variance = np.ones_like(reduced) if view.noise.known else np.maximum(reduced, 1e-12)
-    known = points > 1
-    lowest = np.where(known, found.deviance[:, 0], 0.0)
-    delta = (found.deviance - lowest[:, None]) / variance[:, None]
-    steep = data.weight[..., None] * found.gain[..., None] * found.slope
-    information = np.nan_to_num(np.einsum("pri,prj->pij", steep, steep))
-    stderr = np.sqrt(np.diagonal(np.linalg.pinv(information), axis1=1, axis2=2) * variance[:, None])
-    status = np.full(len(points), CODES[NO_DATA], np.uint8)
-    status[known] = CODES[str(Status.NOT_CONVERGED)]
-    settled = known & found.converged[:, 0]
-    status[settled] = CODES[str(Status.CONVERGED)]
-    status[settled & (delta[:, 1] < RIVAL)] = CODES[str(Status.AMBIGUOUS)]
-    square = np.where(data.weight > 0, data.values - found.model, 0.0) ** 2
-    rms = np.where(known, np.sqrt(square.sum(axis=1) / np.maximum(points, 1)), np.nan)
-    stderr = np.where(known[:, None], stderr, np.nan)
-    quality = np.where(known, reduced if view.noise.known else 1.0, np.nan)
-    return PixelFits(found.values[:, 0], stderr, stderr, status, found.values, delta, quality, rms)
+        return model.errors.fits(data, minima(model.search, data))
