@@ -11,6 +11,7 @@ from cyclopts import Group, Parameter
 from pellicle.cli.batch import CONVERGED, INTERRUPTED, UNCLEAR
 from pellicle.cli.cube_flags import CubeFlags, merged
 from pellicle.cli.flags import OUTPUT, Flags, flag
+from pellicle.cli.messages import as_flags
 from pellicle.cli.options import wavelength_range
 from pellicle.cli.progress import PixelProgress
 from pellicle.cli.session import check_folder, say, start
@@ -120,7 +121,7 @@ def map_cube(
         return INTERRUPTED
     if made.run is not None and made.run.earlier:
         say(f"{made.run.earlier} pixels are from an earlier run in {folder}; --overwrite fits them again")
-    print(one_line(cube_json(made)) if json else cube_report(made), flush=True)
+    print(one_line(cube_json(made)) if json else as_flags(cube_report(made)), flush=True)
     if folder is not None:
         _write(folder, made)
     return CONVERGED if made.decided >= MOST_DECIDED else UNCLEAR

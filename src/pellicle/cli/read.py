@@ -86,7 +86,7 @@ def _measurements(
     """Every spectrum of a file, the colours of every film in it, or its cube."""
     from pellicle.data.cubes.detect import is_cube
 
-    if of_cube.given() or is_cube(Path(path)):
+    if of_cube.given() or is_cube(Path(path)) or Path(path).is_dir():
         return [_cube(path, flags, of_cube)]
     if is_of_colours(path, flags):
         return read_films(path, flags, angle=flags.angle)

@@ -155,7 +155,7 @@ def read_cube(
         calibrated=calibrated,
         path=path,
         fingerprint=digest,
-        notes=(*notes, *([told] if told else [])),
+        notes=_once([*notes, *([told] if told else [])]),
     )
     log.info("%s", cube)
     return cube
@@ -218,6 +218,13 @@ def _raw(source: Any, asked: Asked) -> RawCube:
     if not isinstance(source, str | os.PathLike):
         raise UsageError(f"a cube must be a path, an xarray object or an array, not {type(source).__name__}")
     return detect.read_raw(Path(source), asked)
+
+
+def _once(notes: Sequence[str]) -> tuple[str, ...]:
+    """Notes without later ones on a unit: those of a folder's spectra are already in nm and fractions."""
+    units = ("wavelength unit: ", "signal unit: ")
+    first = [next((i for i, n in enumerate(notes) if n.startswith(unit)), -1) for unit in units]
+    return tuple(n for i, n in enumerate(notes) if i in first or not n.startswith(units))
 
 
 def _stated_angle(raw: RawCube, angle: float) -> np.ndarray:

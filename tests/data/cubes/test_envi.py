@@ -101,7 +101,7 @@ def test_bad_bands_and_missing_values(envi, values):
     assert np.isnan(read[3, 2, 3])
     assert np.isnan(read).sum() == 1
     np.testing.assert_allclose(read[6], values[6][:, good])
-    assert any("5 Nanometers wide" in note for note in cube.notes)
+    assert any("5 nm wide" in note for note in cube.notes)
     assert any("2 bands left out" in note for note in cube.notes)
 
 
@@ -113,6 +113,9 @@ def test_micrometres_and_no_unit(envi, same, refused):
         small = small.replace(f"{nm:.1f}", f"{nm / 1000:.5f}")
     header.write_text(small)
     same(header)
+    wide = small.rstrip() + "\nfwhm = {0.005, 0.005, 0.005, 0.005, 0.005, 0.005, 0.005, 0.005, 0.005}\n"
+    header.write_text(wide)
+    assert any("5 nm wide" in note for note in same(header).notes)
     header.write_text(small.replace("Micrometers", "Unknown"))
     refused(header, "0.4 to 0.8", "µm", "`wavelength_unit`")
     same(header, wavelength_unit="um")

@@ -40,11 +40,20 @@ def test_sites_and_time(values, tmp_path):
         "400\n450\n500\n550\n600\n650\n700\n750\n800\n",
         "wavelength_um\n0.4\n0.45\n0.5\n0.55\n0.6\n0.65\n0.7\n0.75\n0.8",
         "400, 450, 500, 550, 600, 650, 700, 750, 800",
+        "band,wavelength_nm,fwhm\n" + "".join(f"{i},{nm:g},3\n" for i, nm in enumerate(NM)),
+        "Band;Wavelength (nm)\n" + "".join(f"{i};{nm:g}\n" for i, nm in enumerate(NM)),
+        "band;wl (um)\n" + "".join(f"{i};{nm / 1000:.4f}\n".replace(".", ",") for i, nm in enumerate(NM)),
+        "Wavelength (nm)\n" + "".join(f"{nm:.1f}\n".replace(".", ",") for nm in NM),
     ],
 )
 def test_file_of_wavelengths(values, same, tmp_path, written):
     (tmp_path / "bands.txt").write_text(written)
     same(values, wavelengths=tmp_path / "bands.txt")
+
+
+def test_file_of_other_columns(values, refused, tmp_path):
+    (tmp_path / "bands.csv").write_text("band,gain\n1,2\n2,2\n")
+    refused(values, "band, gain", error=UsageError, wavelengths=tmp_path / "bands.csv")
 
 
 @pytest.mark.parametrize("wrong", ["400:800", "400:800:45", "800:400:50", "blue", "400:800:0", ""])

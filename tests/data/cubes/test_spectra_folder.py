@@ -55,6 +55,33 @@ def test_other_quantity_names_the_file(wafer, refused):
     refused(wafer, str(path), "has T", error=DataError)
 
 
+def test_sites_whose_files_do_not_exist(wafer, values, refused):
+    (wafer / "site_0.csv").unlink()
+    cube = read_cube(wafer)
+    assert cube.coords["name"].tolist() == ["centre", "left", "edge"]
+    read = np.asarray(cube.arrays["values"])
+    assert np.isnan(read[0]).all()
+    np.testing.assert_allclose(read[1:], values[1:3, 0], atol=1e-6)
+    assert "1 sites without data, whose files do not exist: site_0.csv" in cube.notes
+    (wafer / "site_1.csv").unlink()
+    refused(wafer, "2 of its 3 files", "site_0.csv", error=DataError)
+
+
+def test_units_are_noted_once(wafer):
+    assert [note.split(":")[0] for note in read_cube(wafer).notes].count("wavelength unit") == 1
+
+
+def test_folders_that_are_no_wafer(tmp_path, refused):
+    refused(tmp_path, "empty folder", error=DataError)
+    for name in ("dark.hdr", "white.hdr"):
+        (tmp_path / name).write_text("ENVI\n")
+        refused(tmp_path, "ENVI", name, error=DataError)
+        (tmp_path / name).unlink()
+    for name in ("450nm.tif", "460nm.tif"):
+        (tmp_path / name).write_bytes(b"II*")
+    refused(tmp_path, "2 images", "one TIFF stack", error=DataError)
+
+
 def test_bad_tables(wafer, refused):
     table = wafer / "positions.csv"
     good = table.read_text()
@@ -62,8 +89,6 @@ def test_bad_tables(wafer, refused):
     refused(wafer, "line 3", "'ten'", error=DataError)
     table.write_text(good.replace("site_2.csv,20,-10,edge", "site_2.csv,20"))
     refused(wafer, "line 4", "too few", error=DataError)
-    table.write_text(good.replace("site_2.csv", "absent.csv"))
-    refused(wafer, "absent.csv", "no such file", error=DataError)
     table.write_text(good.splitlines()[0] + "\n")
     refused(wafer, "no rows", error=DataError)
     table.write_text(good)

@@ -77,6 +77,16 @@ def test_scalar_and_axis_of_angles(array, values):
     np.testing.assert_allclose(pixel, expected, rtol=1e-6)
 
 
+def test_polarisation_of_the_variable(array):
+    assert read_cube(array.assign_attrs(polarization="P")).polarisation == "p"
+    assert read_cube(array.to_dataset().assign_attrs(polarisation="s")).polarisation == "s"
+    assert read_cube(array.assign_attrs(polarization="unpolarized")).polarisation == "unpolarised"
+
+
+def test_psi_without_delta(array, refused):
+    refused(xr.Dataset({"psi": 20 + 10 * array}), "'psi' alone", "delta", error=DataError)
+
+
 def test_time_comes_first_and_dates_become_seconds(array, values):
     dates = np.array(["2026-01-01T00:00:00", "2026-01-01T00:00:30"], "M8[ns]")
     series = xr.concat([array, array / 2], xr.IndexVariable("time", dates)).transpose("y", "x", "time", ...)
@@ -140,10 +150,17 @@ def test_netcdf(array, same, tmp_path, engine):
     assert same(tmp_path / "a.nc").signal == "R"
 
 
+@pytest.mark.filterwarnings("ignore:Consolidated metadata")  # zarr 3 has no specification of it yet
+@pytest.mark.parametrize("consolidated", [False, True])
 @pytest.mark.parametrize("version", [2, 3])
-def test_zarr(array, same, tmp_path, version):
-    array.to_dataset().to_zarr(tmp_path / "a.zarr", zarr_format=version, consolidated=False)
+def test_zarr(array, same, tmp_path, version, consolidated):
+    array.to_dataset().to_zarr(tmp_path / "a.zarr", zarr_format=version, consolidated=consolidated)
     same(tmp_path / "a.zarr")
+
+
+def test_damaged_zarr(tmp_path, refused):
+    (tmp_path / "zarr.json").write_text("{}")
+    refused(tmp_path, "zarr.json", "damaged", error=DataError)
 
 
 def test_zarr_array_with_and_without_names(values, same, tmp_path):

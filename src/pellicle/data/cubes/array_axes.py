@@ -24,8 +24,8 @@ def array_axes(shape: tuple[int, ...], bands: int, path: str) -> tuple[tuple[str
         )
     if bands not in shape:
         raise DataError(
-            f"{path}: has {bands} wavelengths, and none of its axes ({text}) has that length: give one "
-            "wavelength for each band with `wavelengths`"
+            f"{path}: {bands} wavelengths are given, and none of its axes ({text}) has that length: give one "
+            "for each band with `wavelengths`"
         )
     at = len(shape) - 1
     if shape[at] != bands:

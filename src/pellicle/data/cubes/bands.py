@@ -37,10 +37,7 @@ def parse_wavelengths(value: str | os.PathLike[str] | Sequence[float] | np.ndarr
     if Path(text).is_file():
         if text.endswith(".npy"):
             return np.load(text).astype(float).reshape(-1), ""
-        lines = [line for line in Path(text).read_text("utf-8-sig").splitlines() if line.strip()]
-        if lines and not re.search(r"^[\s\d.]", lines[0]):
-            unit = recognise(lines.pop(0).strip("# ")).unit or ""
-        words = [word for line in lines for word in re.split(r"[\s,;]+", line.strip()) if word]
+        words, unit = _words_of_file(Path(text))
     elif ":" in text:
         return _evenly(text), ""
     else:
@@ -54,6 +51,32 @@ def parse_wavelengths(value: str | os.PathLike[str] | Sequence[float] | np.ndarr
             f"`wavelengths` {text!r} is no list of numbers and no file of them: give them {_EXAMPLE}"
         )
     return numbers, unit
+
+
+def _words_of_file(path: Path) -> tuple[list[str], str]:
+    """Numbers of a file, or of the column of wavelengths that its header names, and their unit.
+
+    Raises UsageError for a header of several columns without wavelengths.
+    """
+    lines = [line.strip() for line in path.read_text("utf-8-sig").splitlines() if line.strip()]
+    if not lines or re.match(r"[\d.]", lines[0]):
+        return [word for line in lines for word in re.split(r"[\s,;]+", line) if word], ""
+    header = lines.pop(0).strip("# ")
+    delimiter = next((mark for mark in "\t;," if mark in header), None)
+    names = [name.strip().strip('"') for name in header.split(delimiter)] if delimiter else [header]
+    if delimiter != ",":  # a comma is a decimal point
+        lines = [re.sub(r"(\d),(\d)", r"\1.\2", line) for line in lines]
+    columns = [recognise(name) for name in names]
+    at = next((i for i, column in enumerate(columns) if column.role == "wavelength"), 0)
+    rows = [line.split(delimiter) for line in lines]
+    if len(columns) == 1:
+        return [word for line in lines for word in re.split(r"[\s,;]+", line) if word], columns[0].unit or ""
+    if columns[at].role != "wavelength" or any(len(row) != len(columns) for row in rows):
+        raise UsageError(
+            f"`wavelengths` {str(path)!r} has several columns, {', '.join(names)}: keep that of the "
+            "wavelengths only"
+        )
+    return [row[at] for row in rows], columns[at].unit or ""
 
 
 def _evenly(text: str) -> np.ndarray:

@@ -14,6 +14,7 @@ from pellicle.data.cubes.array_axes import need_wavelengths
 from pellicle.data.cubes.raw_cube import COUNTS, Asked, RawCube
 from pellicle.data.cubes.stored_arrays import MappedFile, Stored
 from pellicle.data.tabular.text import open_binary
+from pellicle.data.tabular.units import to_nm, wavelength_unit
 from pellicle.errors import DataError
 
 _TYPES = {
@@ -89,10 +90,12 @@ def read_envi(path: Path, asked: Asked) -> RawCube:
                 f"{header}: `bbl` has {good.size} numbers for {bands} bands: correct or delete it"
             )
     if "fwhm" in fields:
-        widths = _numbers(fields, "fwhm", header)
+        width, of = float(np.median(_numbers(fields, "fwhm", header))), wavelength_unit(unit or "nm")
+        if of in ("um", "A"):
+            width, of = float(to_nm(np.array([width]), of)[0]), "nm"
         notes.append(
-            f"bands are {np.median(widths):g} {unit or 'nm'} wide (fwhm of the header), which the "
-            "instrument's bandwidth of a recipe takes into account"
+            f"bands are {width:g} {of or unit} wide (fwhm of the header), which is not used: state it as "
+            "bandwidth in the recipe's [instrument] where fringes are narrow"
         )
     divisor = _number(fields, "reflectance scale factor", header, 1.0) or 1.0
     if divisor != 1.0:

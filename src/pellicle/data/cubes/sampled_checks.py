@@ -132,8 +132,8 @@ def check_level(values: np.ndarray, signal: str, path: str) -> None:
                 "and `dark_frame`"
             )
         raise DataError(
-            f"{reach}, which looks like counts of a camera: give `white_frame` and `dark_frame`, or as "
-            "`signal_unit` the number that stands for 1"
+            f"{reach}, which looks like counts of a camera: give `white_frame` and `dark_frame`, or the "
+            "number that stands for 1 as `signal_unit`"
         )
     if middle < LOWEST:
         raise DataError(
@@ -155,4 +155,7 @@ def check_angles(psi: np.ndarray, delta: np.ndarray, path: str) -> None:
                 f"{limits[1]:g} degrees: correct it, or choose another `variable`"
             )
     if np.nanmax(psi) <= np.pi / 2 and np.nanmax(np.abs(delta)) <= 2 * np.pi:
-        raise DataError(f"{path}: psi and delta are within those of radians: convert them to degrees")
+        raise DataError(
+            f"{path}: psi up to {np.nanmax(psi):.3g} and delta up to {np.nanmax(np.abs(delta)):.3g} look "
+            "like radians: convert them to degrees"
+        )

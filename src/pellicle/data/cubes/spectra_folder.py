@@ -42,17 +42,24 @@ def read_folder(path: Path, asked: Asked) -> RawCube:
     """Read the spectra of a table of positions. Raises DataError, or UsageError of a spectrum's reader."""
     table = table_of(path)
     if table is None:
-        raise DataError(
-            f"{path}: is a folder without a table of positions: put a CSV with the columns file, x and y "
-            "in it"
-        )
+        raise _no_table(path)
     columns = _columns(table)
     names, where, units, notes = _rows(table, columns)
-    spectra = [_read(table.parent / name, asked) for name in names]
+    there = [i for i, name in enumerate(names) if (table.parent / name).is_file()]
+    absent = [name for name in names if not (table.parent / name).is_file()]
+    if len(there) < len(absent):
+        raise DataError(
+            f"{table}: {len(absent)} of its {len(names)} files do not exist, the first is "
+            f"{table.parent / absent[0]}: check their names, which are relative to the table"
+        )
+    if absent:
+        notes.append(f"{len(absent)} sites without data, whose files do not exist: {_shortened(absent)}")
+    present = [names[i] for i in there]
+    spectra = [_read(table.parent / name, asked) for name in present]
     first = spectra[0]
-    for name, one in zip(names, spectra, strict=True):
-        _compare(one, first, names[0], table.parent / name)
-    arrays, angle = _arrays(spectra, table)
+    for name, one in zip(present, spectra, strict=True):
+        _compare(one, first, present[0], table.parent / name)
+    arrays, angle = _arrays(spectra, table, np.array(there), len(names))
     coords = {key: np.array(values) for key, values in where.items()}
     return RawCube(
         str(path),
@@ -60,7 +67,7 @@ def read_folder(path: Path, asked: Asked) -> RawCube:
         ("site",),
         np.unique(first.wavelength),
         "nm",
-        files=(table, *(table.parent / name for name in names)),
+        files=(table, *(table.parent / name for name in present)),
         signal=first.signal,
         polarisation=first.polarisation,
         signal_unit=None if first.signal == "psi-delta" else "fraction",
@@ -68,8 +75,31 @@ def read_folder(path: Path, asked: Asked) -> RawCube:
         angle=angle,
         coords={"file": np.array(names), **coords},
         units=units,
-        notes=(f"{len(names)} spectra at the positions of {table.name}", *notes, *first.notes),
+        notes=(f"{len(present)} spectra at the positions of {table.name}", *notes, *first.notes),
     )
+
+
+def _no_table(path: Path) -> DataError:
+    """The error for a folder that is neither a store nor a wafer map."""
+    files = sorted(file.name for file in path.iterdir())
+    headers = [name for name in files if name.lower().endswith(".hdr")]
+    images = [name for name in files if name.lower().endswith((".tif", ".tiff"))]
+    if headers:
+        return DataError(f"{path}: is a folder of ENVI files: name one of them, {_shortened(headers)}")
+    if len(images) > 1:
+        return DataError(
+            f"{path}: is a folder of {len(images)} images: write them into one TIFF stack, a page for each "
+            "wavelength"
+        )
+    return DataError(
+        f"{path}: is {'a' if files else 'an empty'} folder without a table of positions: name a file in it, "
+        "or put a CSV with the columns file, x and y beside spectra"
+    )
+
+
+def _shortened(names: Sequence[str]) -> str:
+    """Names in a row, the first three of many."""
+    return ", ".join(names) if len(names) <= 4 else f"{', '.join(names[:3])} and {len(names) - 3} others"
 
 
 def _columns(file: Path) -> dict[str, tuple[int, str]]:
@@ -142,8 +172,10 @@ def _compare(one: Spectrum, first: Spectrum, first_name: str, file: Path) -> Non
         raise DataError(f"{file}: its angles differ from those of {first_name}: map files of one geometry")
 
 
-def _arrays(spectra: Sequence[Spectrum], table: Path) -> tuple[dict[str, Stored], np.ndarray | None]:
-    """Arrays (sites, bands[, angles]), and the angles."""
+def _arrays(
+    spectra: Sequence[Spectrum], table: Path, at: np.ndarray, sites: int
+) -> tuple[dict[str, Stored], np.ndarray | None]:
+    """Arrays (sites, bands[, angles]) with the spectra `at` these sites and NaN at others, and the angles."""
     first = spectra[0]
     angle = None if first.angle is None else np.unique(first.angle)
     axes: tuple[str, ...] = ("site", WAVELENGTH)
@@ -156,5 +188,6 @@ def _arrays(spectra: Sequence[Spectrum], table: Path) -> tuple[dict[str, Stored]
     for name in ("values", "delta", "sigma", "delta_sigma"):
         read = [getattr(one, name) for one in spectra]
         if all(values is not None for values in read):
-            found[name] = Stored(np.reshape(read, (len(spectra), *shape)), axes)
+            found[name] = Stored(np.full((sites, *shape), np.nan), axes)
+            found[name].data[at] = np.reshape(read, (len(spectra), *shape))
     return found, angle

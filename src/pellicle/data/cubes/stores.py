@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import warnings
 from pathlib import Path
 from typing import Any
@@ -49,13 +50,17 @@ def read_zarr(path: Path, asked: Asked) -> RawCube:
             warnings.simplefilter("ignore")  # metadata that are not consolidated take longer to read
             return xarray.open_zarr(path, chunks=None, decode_timedelta=True)
 
-    if (path / ".zarray").exists() or '"node_type": "array"' in _text(path / "zarr.json"):
+    if (path / ".zarray").exists() or _node_type(path / "zarr.json") == "array":
         return _zarr_array(path, asked)
     return xarray_to_raw(_opened(path, group), str(path), asked, (path,))
 
 
-def _text(path: Path) -> str:
-    return path.read_text("utf-8") if path.is_file() else ""
+def _node_type(path: Path) -> str:
+    """Type of a store of zarr 3, array or group; its text may also contain the types of its arrays."""
+    try:
+        return str(json.loads(path.read_bytes())["node_type"]) if path.is_file() else ""
+    except (ValueError, KeyError, TypeError):
+        raise DataError(f"{path}: is damaged: it states no node_type; write the store again") from None
 
 
 def _opened(path: Path, opening: Any) -> Any:

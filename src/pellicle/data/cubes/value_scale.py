@@ -39,8 +39,8 @@ def value_scale(
     whole = stored.kind in "iu" and raw.divisor == 1.0 and unit is None
     if calibrated and (unit == COUNTS or whole):
         raise DataError(
-            f"{raw.path}: has counts of a camera ({stored.name}): give `white_frame` and `dark_frame`, or as "
-            "`signal_unit` percent or the number that stands for 1"
+            f"{raw.path}: has counts of a camera ({stored.name}): give `white_frame` and `dark_frame`, or, "
+            "for scaled reflectances, percent or the number that stands for 1 as `signal_unit`"
         )
     if unit == "percent":
         return Scale(factor / 100, raw.missing), "signal unit: percent"

@@ -48,6 +48,10 @@ def choose_variables(
         if len(pair) == 2 and (signal or not any(c.role in ("R", "T") for c in values.values())):
             return _psi_delta(pair, errors, written, path)
     names = [variable] if variable else _measured(values, signal)
+    if not names and (half := [name for name, column in roles.items() if column.role in ("psi", "delta")]):
+        raise DataError(
+            f"{path}: has {half[0]!r} alone, and ellipsometry needs psi and delta: write both into the file"
+        )
     if len(names) != 1:
         raise UsageError(
             f"{path}: has several variables of pixels and bands, {', '.join(map(repr, names or written))}: "

@@ -66,7 +66,7 @@ def xarray_to_raw(source: Any, path: str, asked: Asked, files: tuple[Path, ...] 
         for name, variable in dataset.data_vars.items()
     }
     wavelength, unit = _band_axis(dataset, band, asked, path)
-    angle, polarisation = _light(dataset, roles)
+    angle, polarisation = _light(dataset, main, roles, path)
     coords, units, told = _coordinates(dataset, renamed, dims)
     return RawCube(
         path,
@@ -83,7 +83,17 @@ def xarray_to_raw(source: Any, path: str, asked: Asked, files: tuple[Path, ...] 
         coords=coords,
         units=units,
         others={name: one for name, one in stored.items() if name not in chosen.arrays.values()},
-        notes=(f"variable {chosen.arrays['values']!r} ({_listed(lengths)})", *notes, *told),
+        notes=(
+            f"variable {chosen.arrays['values']!r} ({_listed(lengths)})"
+            + "".join(f", {name!r}" for role, name in chosen.arrays.items() if role == "delta"),
+            *(
+                f"standard deviations: {name!r}"
+                for role, name in chosen.arrays.items()
+                if role in ("sigma", "delta_sigma")
+            ),
+            *notes,
+            *told,
+        ),
     )
 
 
@@ -156,8 +166,13 @@ def _band_axis(dataset: Any, band: str, asked: Asked, path: str) -> tuple[np.nda
     )
 
 
-def _light(dataset: Any, roles: Mapping[str, str | None]) -> tuple[np.ndarray | None, str | None]:
-    """Angles of incidence in degrees, along an axis or one for all, and the polarisation."""
+def _light(
+    dataset: Any, main: Any, roles: Mapping[str, str | None], path: str
+) -> tuple[np.ndarray | None, str | None]:
+    """Angles of incidence in degrees, along an axis or one for all, and the polarisation.
+
+    The polarisation is an attribute of the `main` variable or of the dataset.
+    """
     angle = None
     for name, coordinate in dataset.coords.items():
         if recognise(str(name)).role == "angle" and coordinate.ndim <= 1 and coordinate.dtype.kind in "iuf":
@@ -166,8 +181,11 @@ def _light(dataset: Any, roles: Mapping[str, str | None]) -> tuple[np.ndarray | 
                 angle = np.degrees(angle)
     if angle is None and ANGLE in roles.values():
         dim = next(dim for dim, role in roles.items() if role == ANGLE)
-        raise DataError(f"its axis {dim!r} has no angles as a coordinate: assign them in degrees in xarray")
-    stated = str(dataset.attrs.get("polarisation", dataset.attrs.get("polarization", "")))
+        raise DataError(
+            f"{path}: its axis {dim!r} has no angles as a coordinate: assign them in degrees in xarray"
+        )
+    stated = dataset.attrs | main.attrs
+    stated = str(stated.get("polarisation", stated.get("polarization", ""))).lower().replace("zed", "sed")
     return angle, stated if stated in POLARISATIONS else None
 
 
