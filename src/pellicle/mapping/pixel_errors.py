@@ -10,6 +10,7 @@ from pellicle.fitting.problem import Problem
 from pellicle.fitting.spectra.evidence import LEAST_NOISE, SCATTER_OF_NOISE
 from pellicle.fitting.spectra.nuisance import offset_prior, scale_prior
 from pellicle.fitting.spectra.parts import LARGEST_ANGLES, LARGEST_DRIFT, LARGEST_POWER
+from pellicle.fitting.spectra.problem import shortest_wavelength
 from pellicle.fitting.spectra.search import thickness_grid
 from pellicle.fitting.spectra.summary import FEWEST_FRINGES
 from pellicle.fitting.spectra.targets import Measured, drifts
@@ -18,7 +19,7 @@ from pellicle.fitting.status import RIVAL
 from pellicle.mapping import pixel_profiles
 from pellicle.mapping.pixel_covariance import noise_covariance, solve
 from pellicle.mapping.pixel_discrepancy import PixelEvidence, discrepancy, other_material
-from pellicle.mapping.pixel_effects import PixelEffects, columns, of_pixels
+from pellicle.mapping.pixel_effects import PixelEffects, columns, nodes, of_pixels
 from pellicle.mapping.pixel_fits import CODES, NO_DATA, PixelFits
 from pellicle.mapping.pixel_groups import Group, Taken, groups
 from pellicle.mapping.pixel_local import PixelArrays, deviances, in_lanes, locals_of, padded
@@ -62,7 +63,10 @@ class PixelErrors:
             p = self.parameters[self.depth]
             self.grid = p.lower + thickness_grid(problem, 1) * (p.upper - p.lower)
         middle = 0.5 * (self.lower + self.upper)
-        self.effects = PixelEffects(self.view, middle, target.scene)
+        table = None
+        if len(self.parameters) == 1 and self.depth is not None:
+            table = nodes(self.lower[0], self.upper[0], shortest_wavelength(problem))
+        self.effects = PixelEffects(self.view, middle, target.scene, table)
 
     def fits(self, data: PixelData, minima: PixelMinima) -> PixelFits:
         """Errors and status of pixels by their data and minima."""
@@ -242,7 +246,16 @@ class PixelErrors:
             rise = pixel_profiles.resampled(self.grid, minima.thickness, minima.profile[who])
             rise = rise * (square / students(noise.student_freedom, RIVAL) ** 2)[:, None]
             rise = rise - np.minimum(rise.min(axis=1), 0.0)[:, None]
-            flat[self.depth] = pixel_profiles.flat_sides(self.grid, rise, values[:, self.depth])
+            sides = pixel_profiles.flat_sides(self.grid, rise, values[:, self.depth])
+            doubtful = np.flatnonzero(sides.any(axis=1) & usable)
+            if count == 1 and len(doubtful):
+                # what the scan predicts near a node is not exact: the nodes themselves
+                points = np.concatenate([np.tile(self.grid, (len(doubtful), 1)), values[doubtful]], axis=1)
+                exact = self._deviance(arrays, doubtful, points[..., None])
+                rise = (exact - exact.min(axis=1)[:, None])[:, :-1]
+                rise = rise / students(noise.student_freedom[doubtful], RIVAL)[:, None] ** 2
+                sides[doubtful] = pixel_profiles.flat_sides(self.grid, rise, values[doubtful, 0])
+            flat[self.depth] = sides
         result = pixel_profiles.errors(around, flat, usable)
         # on a plateau, as of an opaque film, a solver has no point to settle at
         depths = [i for i, p in enumerate(self.parameters) if p.key == "thickness"]
