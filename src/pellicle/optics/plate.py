@@ -26,6 +26,11 @@ def internal_transmittance(normal_extinction: Any, thickness_mm: Any, wavelength
     return jnp.exp(-4e6 * jnp.pi * normal_extinction * thickness_mm / wavelength)
 
 
+def internal_absorptance(normal_extinction: Any, thickness_mm: Any, wavelength: Any) -> Any:
+    """Return what one passage absorbs, 1 − `internal_transmittance`, to full precision where it is small."""
+    return -jnp.expm1(-4e6 * jnp.pi * normal_extinction * thickness_mm / wavelength)
+
+
 def plate_reflectance(front: Face, back_reflectance: Any, internal: Any) -> Any:
     """Return R = R_f + T_f² R_b τ²/(1 − R_f′ R_b τ²), all reflections between the faces added.
 
