@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from pellicle import fitting as fitting
     from pellicle.api import compare as compare
     from pellicle.api import cost as cost
+    from pellicle.api import depth_profile as depth_profile
     from pellicle.api import export as export
     from pellicle.api import fit as fit
     from pellicle.api import map as map
@@ -60,7 +61,17 @@ if TYPE_CHECKING:
     from pellicle.synthetic.brdf import Directions as Directions
 
 _NAMES = {
-    "pellicle.api": ("compare", "cost", "export", "fit", "map", "plan", "sample", "simulate"),
+    "pellicle.api": (
+        "compare",
+        "cost",
+        "depth_profile",
+        "export",
+        "fit",
+        "map",
+        "plan",
+        "sample",
+        "simulate",
+    ),
     "pellicle.data.brdf_samples": ("BrdfSamples",),
     "pellicle.data.colours": ("CameraMatrix", "Colours"),
     "pellicle.data.cube": ("Cube",),

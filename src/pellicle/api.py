@@ -38,6 +38,8 @@ from pellicle.scene.film import Scene
 from pellicle.scene.kinds import check_scene
 from pellicle.scene.surface import Surface, SurfaceView, surface_view
 from pellicle.synthetic.brdf import Directions, default_directions, simulate_samples
+from pellicle.synthetic.depth_profile import DepthProfile
+from pellicle.synthetic.depth_profile import depth_profile as film_depth_profile
 from pellicle.synthetic.measured_colours import simulate_colours
 from pellicle.synthetic.spectra import default_wavelengths, simulate_spectrum
 
@@ -295,6 +297,40 @@ def cost(
         datasets=datasets,
         progress=progress,
     )
+
+
+def depth_profile(scene: Scene, at: ArrayLike, wavelength: ArrayLike | None = None) -> DepthProfile:
+    """Compute where a film absorbs light: absorptance of each layer and plate, and the field against depth.
+
+    Plane monochromatic waves: the instrument's bandwidth, cone and spreads are left out.
+
+    **Arguments:**
+
+    - `scene`: `Scene`, whose free parameters take their start values.
+    - `at`: wavelengths in nm of the field, a number or (chosen,).
+    - `wavelength`: nm, (wavelengths,), of the absorptances; by default as in `pellicle.simulate`.
+
+    **Returns:** `DepthProfile`: R, T and the `absorptance` of each layer and plate, which add up to 1, and
+    |E|² and absorbed power per nm in the `sections` between thick media. T enters the substrate, which
+    absorbs it unless it is transparent.
+
+    **Raises:** UsageError for rough faces and for a light of several angles; ValueError where a material has
+    no data at a wavelength.
+
+    ```python
+    >>> scene = pl.Scene(pl.Layer("Au", 40.0), pl.Substrate("BK7", back="air"))
+    >>> profile = pl.depth_profile(scene, 550.0, [500.0, 550.0])
+    >>> profile.media
+    ('Au', 'substrate')
+    >>> (profile.R + profile.T + profile.absorptance.sum(axis=0)).round(12).tolist()
+    [1.0, 1.0]
+
+    ```
+    """
+    check_scene(scene)
+    if isinstance(scene, Surface):
+        raise UsageError("a depth profile is one of a film: give a pl.Scene, not a Surface")
+    return film_depth_profile(scene, at, default_wavelengths(scene) if wavelength is None else wavelength)
 
 
 def fit(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from pellicle.cli.colours import SPACES, recipe_angles
-from pellicle.cli.session import not_negative, say, start
+from pellicle.cli.session import check_folder, not_negative, say, start
 from pellicle.cli.wavelengths import directions, wavelengths
 from pellicle.errors import DataError, UsageError
 
@@ -23,7 +23,10 @@ if TYPE_CHECKING:
 def simulate(
     recipe: Annotated[str, Parameter(help="TOML file that describes the scene or surface.")],
     *,
-    out: Annotated[str, Parameter(help="CSV file to write; an existing file is not overwritten.")],
+    out: Annotated[
+        str,
+        Parameter(help="CSV file to write; an existing file is not overwritten. A folder with --depth."),
+    ],
     noise: Annotated[
         float | str | None,
         Parameter(
@@ -34,17 +37,37 @@ def simulate(
     tolerance: Annotated[
         float, Parameter(help="Leave out effects that change the signal by less than this (0: none).")
     ] = 0.0,
+    depth: Annotated[
+        str | None,
+        Parameter(
+            help="Wavelengths in nm: |E|² and absorbed power against depth there, and the absorptance of"
+            " each layer against wavelength.",
+            metavar="NM[,NM]",
+        ),
+    ] = None,
+    json: Annotated[bool, Parameter(help="Print one JSON object (with --depth).", negative="")] = False,
 ) -> int:
     """Simulate the spectrum or the colours of a recipe's film, or BRDF samples of its surface.
+
+    With --depth, compute instead where a film absorbs light.
 
     Example: pellicle simulate film.toml --out film.csv --noise 0.002 --seed 1
     """
     from pellicle.recipes import read_recipe
     from pellicle.recipes.surface import SurfaceRecipe
 
+    if json and depth is None:
+        raise UsageError("--json is for --depth: spectra, colours and BRDF samples are written to --out")
     spread = _spread(noise)
     not_negative("--tolerance", tolerance)
     described = read_recipe(recipe)
+    if depth is not None:
+        if isinstance(described, SurfaceRecipe) or described.tables.data.signal in SPACES:
+            raise DataError(f"{recipe}: --depth is for a film and its spectrum")
+        if spread or tolerance:
+            raise UsageError("--depth is exact: leave out --noise and --tolerance")
+        _write_depth_profile(described, out, _wavelengths_of(depth), json)
+        return 0
     start()
     source = f"recipe {Path(recipe).name}, seed {seed}, noise {{}}, pellicle {version('pellicle')}"
     comments = ["SYNTHETIC: simulated, not measured", source]
@@ -72,6 +95,44 @@ def _spread(noise: float | str | None) -> float | str | None:
         return noise
     level = noise_level(noise, "--noise")
     return str(level) if level.relative else level.value
+
+
+def _wavelengths_of(text: str) -> list[float]:
+    """The wavelengths of --depth. Raises UsageError."""
+    try:
+        numbers = [float(word) for word in text.split(",")]
+    except ValueError:
+        numbers = [0.0]
+    if not all(0 < nm < float("inf") for nm in numbers):
+        raise UsageError(f"--depth {text}: expected wavelengths in nm, as in --depth 450,600")
+    return numbers
+
+
+def _write_depth_profile(recipe: FilmRecipe, out: str, at: list[float], json: bool) -> None:
+    check_folder(out)
+    start()
+    from pellicle import api
+    from pellicle.fitting.spectra.messages import log_scene
+    from pellicle.reporting.depth_profile import report, to_json, write_depth_profile
+    from pellicle.reporting.json_record import one_line
+
+    scene = recipe.scene()
+    log_scene(scene)
+    profile = api.depth_profile(scene, at, wavelengths(recipe, scene))
+    source = f"recipe {Path(recipe.path).name}, pellicle {version('pellicle')}"
+    angle, light = getattr(scene.light.angle, "start", scene.light.angle), scene.light.polarisation
+    comments = [
+        "SYNTHETIC: simulated, not measured",
+        source,
+        f"angle {angle:g} degrees, {light}",
+        _truth(scene),
+    ]
+    folder = write_depth_profile(out, profile, str(recipe.path), comments)
+    print(
+        one_line(to_json(profile, str(recipe.path))) if json else report(profile, str(recipe.path)),
+        flush=True,
+    )
+    say(f"{folder}: figure and tables written")
 
 
 def _write_spectrum(

@@ -54,7 +54,8 @@ class DepthProfile:
 
     `absorptance` (media, wavelengths) is that of each layer and plate in `media`, from the ambient down. With
     `R` and `T` (wavelengths,) it adds up to 1; T enters the substrate, or the medium behind its back face.
-    `sections` have the field at the wavelengths `at`, one for each group of layers between thick media.
+    `sections` have the field at the wavelengths `at`, one for each group of layers between thick media;
+    `shares` (chosen wavelengths,) are R, T and the absorptances there, by name.
     """
 
     wavelength: np.ndarray
@@ -63,6 +64,7 @@ class DepthProfile:
     media: tuple[str, ...]
     absorptance: np.ndarray
     at: np.ndarray
+    shares: dict[str, np.ndarray]
     sections: tuple[Section, ...]
 
 
@@ -86,8 +88,9 @@ def depth_profile(scene: Scene, at: ArrayLike, wavelength: ArrayLike) -> DepthPr
         plane = [replace(x, thickness_spread=None) if isinstance(x, Layer) else x for x in fixed.layers]
         fixed = eqx.tree_at(lambda s: (s.layers, s.instrument), fixed, (tuple(plane), Instrument()))
         names, runs = _names(scene)
-        plan = exact(with_wavelength(fixed, nm))
-        R, T, layers, plates = _mean(plan, with_wavelength(fixed, nm))
+        every = with_wavelength(fixed, np.concatenate([nm, chosen]))
+        plan = exact(every)
+        R, T, layers, plates = _mean(plan, every)
         media, rows = [], []
         for i, run in enumerate(runs):
             start = 0
@@ -99,7 +102,10 @@ def depth_profile(scene: Scene, at: ArrayLike, wavelength: ArrayLike) -> DepthPr
                 media.append(names[i])
                 rows.append(plates[i])
         sections = _sections(plan, fixed, chosen, names, runs)
-    return DepthProfile(nm, R, T, tuple(media), np.array(rows), chosen, sections)
+    own, there = slice(nm.size), slice(nm.size, None)
+    absorptance = np.array(rows)
+    shares = {"R": R[there], "T": T[there], **dict(zip(media, absorptance[:, there], strict=True))}
+    return DepthProfile(nm, R[own], T[own], tuple(media), absorptance[:, own], chosen, shares, sections)
 
 
 def _names(scene: Scene) -> tuple[list[str], list[list[tuple[str, int]]]]:
