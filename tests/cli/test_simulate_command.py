@@ -116,3 +116,44 @@ def test_ellipsometry_comes_back_as_psi_and_delta(pellicle, recipe, tmp_path):
     recipe.write_text(ellipsometric.replace("angle = 65\n", ""))
     pellicle("simulate", recipe, "--out", tmp_path / "none.csv").refused(3, "needs an angle of incidence")
     assert not (tmp_path / "none.csv").exists()
+
+
+def test_depth_profile(pellicle, recipe, tmp_path):
+    """Figure, tables and JSON of where the light goes; the film is transparent, and the substrate takes T."""
+    recipe.write_text(
+        RECIPE.replace("noise = 0.002\n", "").replace("material = 1.46", 'material = "1.46+0.1j"')
+    )
+    out = tmp_path / "depth"
+    ran = pellicle("simulate", recipe, "--depth", "450,600", "--out", out, "--json")
+    (found,) = ran.objects
+    assert ran.code == 0
+    assert found["schema"] == "pellicle.depth/1"
+    assert found["at_nm"] == [450, 600]
+    assert sum(row[0] for row in found["shares"].values()) == pytest.approx(1, abs=1e-12)
+    assert {path.name for path in out.iterdir()} == {
+        "result.json",
+        "absorptance.csv",
+        "depth.csv",
+        "depth.png",
+    }
+    table = np.loadtxt(out / "absorptance.csv", delimiter=",", skiprows=5)
+    np.testing.assert_allclose(np.sum(table[:, 1:], axis=1), 1, atol=1e-9)
+    exact = pl.field(450.0, 321.5, 1.46 + 0.1j, 3.9 + 0.02j, np.array(found["sections"][0]["depth_nm"]))
+    np.testing.assert_allclose(found["sections"][0]["intensity"][0], exact.intensity, rtol=1e-9)
+    np.testing.assert_allclose(
+        found["sections"][0]["absorbed_per_nm"][0], exact.absorbed, rtol=1e-9, atol=1e-15
+    )
+
+
+@pytest.mark.parametrize(
+    ("flags", "said"),
+    [
+        (["--depth", "green"], "--depth green: expected wavelengths in nm"),
+        (["--depth", "-5"], "expected wavelengths"),
+        (["--depth", "500", "--noise", 0.01], "leave out --noise"),
+    ],
+)
+def test_bad_depth_flags(pellicle, recipe, tmp_path, flags, said):
+    pellicle("simulate", recipe, "--out", tmp_path / "x", *flags).refused(2, said)
+    assert "--depth" in pellicle("simulate", recipe, "--out", tmp_path / "x", "--json").err
+    assert not (tmp_path / "x").exists()

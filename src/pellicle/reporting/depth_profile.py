@@ -124,7 +124,8 @@ def draw(profile: DepthProfile) -> Figure:
             axes.set_ylim(bottom=0)
             if row == 0:
                 _name_layers(axes, section)
-        axes.set_xlabel("depth (nm)")
+            else:
+                axes.set_xlabel("depth (nm)")
     _against_wavelength(figure.add_subplot(grid[:, -1]), profile)
     return figure
 

@@ -165,7 +165,8 @@ def _sections(
     for i, group in enumerate(groups(scene)[0]):
         if not group.layers:
             continue
-        faces = np.concatenate([[0.0], np.cumsum([float(layer.thickness) for layer in group.layers])])
+        depths: list[Any] = [layer.thickness for layer in group.layers]
+        faces = np.concatenate([[0.0], np.cumsum([float(d) for d in depths])])
         slices = np.cumsum([0, *(count for _, count in runs[i])])
         layers = tuple(
             (name, float(faces[a]), float(faces[b]))
@@ -174,12 +175,10 @@ def _sections(
         depth, medium = _depths(layers, faces, slices, edges[i], edges[i + 1])
 
         @jax.jit
-        def compute(scene: Scene, depth: Any, i: int = i) -> tuple[Any, Any]:
+        def compute(scene: Scene, depth: Any, i: int = i, depths: list[Any] = depths) -> tuple[Any, Any]:
             found, wavelength = coherent_groups(plan, scene), jnp.asarray(scene.light.wavelength)
-            thicknesses = [
-                layer.thickness * jnp.ones_like(wavelength) for layer in groups(scene)[0][i].layers
-            ]
-            per_power, density = 0.0, 0.0
+            thicknesses = [d * jnp.ones_like(wavelength) for d in depths]
+            per_power = density = jnp.zeros_like(depth)
             for letter in letters:
                 powers = absorbed_power(plan, found, groups(scene)[1], wavelength, letter)
                 E, loss = energy(found, i, wavelength, thicknesses, depth, powers, letter)
