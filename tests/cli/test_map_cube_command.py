@@ -152,6 +152,21 @@ def test_wrong_use(pellicle, words):
     pellicle(*words, "--workers", 2, "--scheduler", "tcp://host:1").refused(2, "--scheduler")
     pellicle(*words[:-2], "--overwrite").refused(2, "--out")
     pellicle("map", "absent.nc", *words[2:]).refused(3, "absent.nc")
+    words[3].write_text(RECIPE.replace("{ lower = 10, upper = 800 }", "300"))
+    pellicle(*words).refused(3, "film.toml", "nothing is free")
+    assert not words[-1].exists()
+
+
+def test_a_cube_that_cannot_be_read_leaves_no_folder(pellicle, words, fits, tmp_path):
+    pellicle(*words, "--mask", "absent.png").refused(2, "absent.png")
+    assert not words[-1].exists()
+    words[-1].mkdir()
+    pellicle(*words, "--scheduler", "nonsense").refused(2, "nonsense")
+    assert list(words[-1].iterdir()) == []
+    assert pellicle(*words).code == 0
+    before = {*words[-1].iterdir()}
+    pellicle(*words, "--mask", "absent.png").refused(2, "absent.png")
+    assert {*words[-1].iterdir()} == before
 
 
 def test_a_lamp_curve_of_a_region_divides_the_cube(pellicle, words, fits, tmp_path):

@@ -150,6 +150,19 @@ def test_other_parameters_rivals_and_a_preview():
     assert "Preview of every 8th pixel" in heading(drawn["map"])
 
 
+def test_the_first_thickness_comes_first_and_labels_have_room():
+    dataset = made(image(12, 10))
+    index = 1.45 + 0.0171 * np.linspace(0, 1, 120).reshape(12, 10)
+    dataset["A"] = (("y", "x"), index, {"parameter": "n"})
+    dataset["A_stderr"] = (("y", "x"), np.full((12, 10), 0.001))
+    drawn = dict(figures(dataset))
+    assert set(drawn) == {"map", "A"}
+    map = panel(drawn["map"], "thickness (nm)")
+    assert all(tick == round(tick) for tick in (*map.get_xticks(), *map.get_yticks()))
+    [histogram] = [axes for axes in drawn["A"].axes if axes.get_ylabel() == "pixels" and axes.patches]
+    assert len(histogram.get_xticks()) <= 6  # of seven characters, in 3.5 inches
+
+
 def test_the_histogram_counts_the_pixels_that_can_be_used():
     status = image()
     status[:10] = CODES["not-identifiable"]

@@ -123,6 +123,14 @@ def test_the_edge_of_a_round_wafer():
     assert place(wafer & (radius < 5), wafer, axes).endswith("around x = 40, y = 30 pixels")
 
 
+def test_pixels_outside_a_mask_are_around_it():
+    y, x = np.mgrid[:HEIGHT, :WIDTH]
+    for radius in (20, 28):
+        expected = f"all around x = {40 - radius} to {40 + radius} pixels, y = {30 - radius} to"
+        assert where(np.hypot(y - 30, x - 40) > radius).startswith(expected)
+    assert where((y < 2) | (y >= HEIGHT - 2) | (x < 2) | (x >= WIDTH - 2)) == "along the edge"
+
+
 def test_few_pixels_are_listed():
     found = blank()
     found[3, 5] = found[40, 70] = True

@@ -61,7 +61,7 @@ def map(
 
     described = read_recipe(recipe)
     if isinstance(described, SurfaceRecipe):
-        raise UsageError("a map needs the recipe of a film, and this one describes a surface")
+        raise UsageError(f"{recipe}: describes a surface, and a map needs the recipe of a film")
     run, cube, camera = run or RunFlags(), cube or CubeFlags(), camera or CameraFlags()
     picture = {"strip": strip, "region": region, "layer": layer}
     of_picture = [*given(n for n, value in picture.items() if value is not None), *camera.given()]

@@ -15,7 +15,7 @@ from pellicle.cli.messages import as_flags
 from pellicle.cli.options import wavelength_range
 from pellicle.cli.progress import PixelProgress
 from pellicle.cli.session import check_folder, say, start
-from pellicle.errors import UsageError
+from pellicle.errors import DataError, UsageError
 
 if TYPE_CHECKING:
     from pellicle.mapping.map_result import Map
@@ -84,6 +84,13 @@ def map_cube(
     scene = described.scene()
     reference = None if run.lamp_reference is None else _known(run.lamp_reference)
     start()
+    from pellicle.scene.free import free_leaves
+
+    if not free_leaves(scene):
+        raise DataError(
+            f"{described.path}: nothing is free to fit: give the thickness bounds, as in"
+            " thickness = { lower = 10, upper = 3000 }"
+        )
     from pellicle import api
     from pellicle.reporting.json_record import one_line
     from pellicle.reporting.map_text import cube_json, cube_report
@@ -92,6 +99,7 @@ def map_cube(
     reading = {name: value for name, value in vars(flags).items() if value is not None}
     if flags.range is not None:
         reading["range"] = wavelength_range(flags.range)
+    remains = set() if folder is None or not folder.exists() else {folder, *folder.iterdir()}
     if folder is not None:
         _mark(folder)
     progress = PixelProgress(path)
@@ -119,6 +127,10 @@ def map_cube(
         )
         say(f"interrupted after {progress.done} of {progress.total} pixels{kept}")
         return INTERRUPTED
+    except ValueError:  # a cube that cannot be read leaves no folder
+        if folder is not None and not progress.done:
+            _remove(folder, remains)
+        raise
     if made.run is not None and made.run.earlier:
         say(f"{made.run.earlier} pixels are from an earlier run in {folder}; --overwrite fits them again")
     print(one_line(cube_json(made)) if json else as_flags(cube_report(made)), flush=True)
@@ -148,6 +160,20 @@ def _mark(folder: Path) -> None:
     if not (target / MARKER).exists():
         begun = {"schema": SCHEMA, "status": "running", "versions": versions()}
         write_text(target / MARKER, indented(begun))
+
+
+def _remove(folder: Path, remains: set[Path]) -> None:
+    """Remove the store and the mark of a run that has no pixel, unless they were there before it."""
+    import shutil
+
+    from pellicle.files import MARKER
+
+    if folder / STORE not in remains:
+        shutil.rmtree(folder / STORE, ignore_errors=True)
+    if folder / MARKER not in remains:
+        (folder / MARKER).unlink(missing_ok=True)
+    if folder not in remains and not any(folder.iterdir()):
+        folder.rmdir()
 
 
 def _write(folder: Path, made: Map) -> None:

@@ -23,7 +23,7 @@ from pellicle.data.cubes.stored_arrays import ANGLE, Stored
 from pellicle.data.cubes.value_scale import value_scale
 from pellicle.data.noise_level import noise_level
 from pellicle.data.spectrum import POLARISATIONS
-from pellicle.errors import DataError, UsageError
+from pellicle.errors import UsageError
 
 log = getLogger(__name__)
 SIGNALS = ("R", "T", "psi-delta")
@@ -231,5 +231,5 @@ def _stated_angle(raw: RawCube, angle: float) -> np.ndarray:
     if raw.angle is not None and np.any(raw.angle != angle):
         raise UsageError(f"{raw.path}: states its own angles; leave `angle` out")
     if not 0 <= angle < 90:
-        raise DataError(f"`angle` must be from 0 to below 90 degrees, not {angle:g}")
+        raise UsageError(f"`angle` must be from 0 to below 90 degrees, not {angle:g}")
     return np.array([angle])

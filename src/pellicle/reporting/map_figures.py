@@ -56,14 +56,14 @@ _LEFT, _RIGHT, _ABOVE, _BELOW, _LINE = 0.75, 1.85, 0.32, 0.62, 0.175
 def figures(made: Dataset | Map, summary: MapSummary | None = None) -> Iterator[tuple[str, Figure]]:
     """Draw a map: yield the name of each figure's file, without suffix, and the figure.
 
-    "map" has the first parameter, its standard error, the statuses and a histogram. Each other free parameter
+    "map" has the first thickness, its standard error, the statuses and a histogram. Each other free parameter
     has a figure of its name, and "rival" shows how close the second best answers are. Large images are drawn
     by means over blocks of pixels.
     """
     summary = summarise(made) if summary is None else summary
     dataset = dataset_of(made)
     sheet = Sheet(*_as_image(dataset, summary.axes), summary)
-    first, *others = free_parameters(dataset)
+    first, *others = sorted(free_parameters(dataset), key=lambda name: not name.endswith("thickness"))
     yield "map", draw_map(sheet, first)
     for variable in others:
         yield variable, draw_parameter(sheet, variable)

@@ -158,6 +158,7 @@ def label_axes(panel: Axes, axes: MapAxes) -> None:
     if axes.kind == "image":
         panel.set_xlim(*sorted(axes.x.edges()[[0, -1]]))
         panel.set_ylim(*sorted(axes.y.edges()[[0, -1]]))
+        panel.locator_params(integer=axes.downward)  # pixels are counted
     if axes.downward:
         panel.invert_yaxis()
 
@@ -296,6 +297,7 @@ def histogram_panel(sheet: Sheet, panel: Axes, variable: str) -> None:
     low, high, _ = map_blocks.limits(values)
     bins = int(np.clip(2 * values.size ** (1 / 3), 10, 80))
     weights = np.full(values.size, float(sheet.made.sampled ** (2 if sheet.axes.kind == "image" else 1)))
+    panel.locator_params(axis="x", nbins=5)  # labels of an index have six digits
     panel.hist(np.clip(values, low, high), bins=bins, range=(low, high), weights=weights, color=BLUE)
     q05, middle, q95 = np.percentile(values, [5, 50, 95])
     panel.axvline(middle, color=BLACK, linewidth=1.2, label="median")

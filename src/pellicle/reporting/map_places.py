@@ -16,6 +16,8 @@ FEW = 3
 """Most pixels, patches or runs that are listed one by one."""
 CLUSTERED = 0.15
 """Least excess of neighbours with the same property over that of pixels at random, 0 to 1."""
+FILLED = 0.4
+"""Least share of others within the rectangle that encloses them, for pixels all around it."""
 COVERED = 0.25
 """Share of the band along the edge from which pixels lie along the edge rather than in a patch at it."""
 WHOLE = 0.95
@@ -61,7 +63,23 @@ def _in_frame(found: np.ndarray, known: np.ndarray, axes: MapAxes, counted: bool
         return _at_sites(found, known, axes)
     if count == known.sum():
         return "everywhere"
+    if around := _around(found, axes):
+        return _edge(found, known) or around
     return _rows(found, known, axes) or _edge(found, known) or _patches(found, known, axes, counted)
+
+
+def _around(found: np.ndarray, axes: MapAxes) -> str:
+    """All around one region, as outside a mask, or nothing."""
+    border = np.concatenate([found[0], found[-1], found[:, 0], found[:, -1]])
+    rows, columns = (np.flatnonzero(~np.all(found, axis=i)) for i in (1, 0))
+    if border.mean() < WHOLE or not rows.size:
+        return ""
+    box = found[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    if box.mean() > 1 - FILLED or box.size > MOST * found.size:
+        return ""
+    assert axes.y is not None
+    x, y = (axis.span(*axis.values[at[[0, -1]]]) for axis, at in ((axes.x, columns), (axes.y, rows)))
+    return f"all around {x}, {y}"
 
 
 def _on_line(found: np.ndarray, axis: Axis) -> str:
