@@ -106,7 +106,8 @@ def check(cube, scene, whole=None):
     assert words == [str(fit.status) for fit in fits]
     for j, p in enumerate(model.parameters):
         own = [fit[p.name] for fit in fits]
-        assert found.stderr[:, j] == pytest.approx([each.stderr for each in own], rel=0.01)
+        # effects are interpolated between thicknesses 1/48 of a fringe apart; a map's errors hold within 10 %
+        assert found.stderr[:, j] == pytest.approx([each.stderr for each in own], rel=0.1)
         assert found.stderr_noise[:, j] == pytest.approx([each.stderr_noise for each in own], rel=0.01)
     assert found.chi2_reduced == pytest.approx([fit.chi2_reduced for fit in fits], rel=1e-6)
     assert found.rms == pytest.approx([fit.rms for fit in fits], rel=1e-6)
