@@ -151,6 +151,23 @@ def test_precision_follows_the_input(dtype):
     assert found.electric.dtype == found.magnetic.dtype == np.result_type(dtype, np.complex64)
 
 
+def test_weak_absorption_is_proportional_to_k_and_has_its_slope():
+    """At k = 0 the absorptance is 0 and its derivative is not; at 1e-12 all digits are there."""
+
+    @jax.jit
+    def at(k):
+        def absorptance(k):
+            return pl.absorptance(550.0, [200.0], [1.46 + 1j * k], 3.9, angle=40.0)[0]
+
+        return absorptance(k), jax.grad(absorptance)(k)
+
+    none, slope = at(0.0)
+    little, _ = at(1e-12)
+    assert none == 0
+    assert float(little / 1e-12) == pytest.approx(float(slope), rel=1e-11)  # the next order is k
+    assert slope > 1
+
+
 def test_what_is_refused():
     with pytest.raises(ValueError, match="ambient must not absorb"):
         pl.absorptance(500.0, 10.0, 2.0, 1.5, ambient=1.3 + 0.1j)

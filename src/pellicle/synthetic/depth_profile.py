@@ -75,8 +75,8 @@ def depth_profile(scene: Scene, at: ArrayLike, wavelength: ArrayLike) -> DepthPr
     """
     if any(face is not None for group in groups(scene)[0] for face in group.roughness):
         raise UsageError(
-            "a rough face scatters light, and the field at it has no value: describe it as a layer of its"
-            " own, a mixed interface"
+            "a rough face scatters light, and the field at it has no value: describe it as a mixed interface,"
+            ' pl.Interface(thickness), or in a recipe a layer with between = "bruggeman"'
         )
     if np.size(scene.light.angle) != 1:
         raise UsageError("a depth profile has one angle of incidence: give the light one `angle`")
