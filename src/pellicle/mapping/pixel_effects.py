@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
 
 from pellicle.fitting.discrepancy import Effect
-from pellicle.fitting.spectra.extended_scene import simulated_side_by_side
+from pellicle.fitting.spectra.extended_scene import Program, simulated_side_by_side
 from pellicle.fitting.spectra.systematic_effects import (
     SimulatedEffect,
     change_of_data,
@@ -45,15 +45,18 @@ class PixelEffects:
         self, view: SpectrumView, example: np.ndarray, scene: Scene, nodes: np.ndarray | None = None
     ):
         self._view, self._scene, self._nodes = view, scene, nodes
-        self._program, self._start, self._rows = None, np.zeros(0), list[SimulatedEffect]()
+        self._simulations, self._start, self._rows = list[_Simulation](), np.zeros(0), list[SimulatedEffect]()
         simulations = simulations_of(view, example, scene)
         if simulations is None:
             return
         extended, self._rows = simulations
-        self._program, self._start = extended.program(), extended.start
-        # each by what it changes, in units of its size; the unchanged signal is shared
-        terms = [(row, change / row.size) for row in self._rows for change, _ in row.changes]
-        self._terms = {(row.number.position if c else -1, c): row for row, c in terms}
+        self._start = extended.start
+        programs = extended.programs()
+        by = [r.number.position if r.number.position in programs else None for r in self._rows]
+        for position, program in programs.items():
+            own = [i for i, at in enumerate(by) if at == position]
+            if own:
+                self._simulations.append(_simulation(program, self._rows, own))
         if nodes is not None:
             self._table = np.zeros((len(nodes), len(self._rows), view.points))
             self._simulated_at = np.zeros(len(nodes), bool)
@@ -64,7 +67,7 @@ class PixelEffects:
 
         `view` is that of the pixels: its frame may have an axis of pixels.
         """
-        found = [] if self._program is None else self._simulated(view, at, values)
+        found = self._simulated(view, at, values) if self._simulations else []
         return [*found, *effects_on_signal(view, at, self._scene)]
 
     def _simulated(self, view: SpectrumView, at: Local, values: np.ndarray) -> list[Effect]:
@@ -90,31 +93,52 @@ class PixelEffects:
 
     def _of_signal(self, values: np.ndarray, frames: Any) -> np.ndarray:
         """Changes of the signal (pixels, effects, points) at `values` (pixels, parameters)."""
-        assert self._program is not None
-        form, scene, order = self._program
         numbers = np.tile(self._start, (len(values), 1))
         numbers[:, : values.shape[1]] = values
-        keys = list(self._terms)
-        candidates = np.repeat(numbers[:, None], len(keys), axis=1)
-        for i, (key, row) in enumerate(self._terms.items()):
-            candidates[:, i, row.number.position] += key[1] * row.sizes(numbers)
-        candidates = candidates[:, :, order]
         frame = None if frames is None else np.asarray(frames)
         if frame is not None:  # with the padding of the scene
             extra = len(self._view.scene.light.wavelength) - frame.shape[1]
             frame = np.concatenate([frame, np.repeat(frame[:, -1:], extra, axis=1)], axis=1)
-        weights, pieces = np.zeros((len(self._rows), len(keys))), []
-        for row, own in zip(self._rows, weights, strict=True):
-            for change, weight in row.changes:
-                relative = change / row.size
-                own[keys.index((row.number.position if relative else -1, relative))] += weight
-        for first in range(0, len(values), _LANES):
-            of = slice(first, first + _LANES)
-            lanes = None if frame is None else _lanes(frame[of]), _lanes(candidates[of])
-            found = simulated_side_by_side(form, scene, self._view.data, *lanes).signal
-            signal = np.asarray(jax.device_get(found))[: len(values) - first, :, : self._view.points]
-            pieces.append(weights @ signal)
-        return np.concatenate(pieces)
+        changes = np.empty((len(values), len(self._rows), self._view.points))
+        for (form, scene, order), rows, terms, weights in self._simulations:
+            candidates = np.repeat(numbers[:, None], len(terms), axis=1)
+            for i, (row, relative) in enumerate(terms):
+                candidates[:, i, row.number.position] += relative * row.sizes(numbers)
+            candidates = candidates[:, :, order]
+            for first in range(0, len(values), _LANES):
+                of = slice(first, first + _LANES)
+                lanes = None if frame is None else _lanes(frame[of]), _lanes(candidates[of])
+                found = simulated_side_by_side(form, scene, self._view.data, *lanes).signal
+                signal = np.asarray(jax.device_get(found))[: len(values) - first, :, : self._view.points]
+                changes[of, rows] = weights @ signal
+        return changes
+
+
+class _Simulation(NamedTuple):
+    """A program that simulates some of the effects, those at positions `rows`.
+
+    Each is `weights` (effects, terms) times the signals at the `terms`: an effect whose number changes, and
+    by how much in units of its size. The unchanged signal is shared.
+    """
+
+    program: Program
+    rows: list[int]
+    terms: list[tuple[SimulatedEffect, float]]
+    weights: np.ndarray
+
+
+def _simulation(program: Program, every: Sequence[SimulatedEffect], rows: list[int]) -> _Simulation:
+    keyed = {
+        (every[i].number.position if change else -1, change / every[i].size): every[i]
+        for i in rows
+        for change, _ in every[i].changes
+    }
+    weights, keys = np.zeros((len(rows), len(keyed))), list(keyed)
+    for i, own in zip(rows, weights, strict=True):
+        for change, weight in every[i].changes:
+            own[keys.index((every[i].number.position if change else -1, change / every[i].size))] += weight
+    terms = [(row, relative) for (_, relative), row in keyed.items()]
+    return _Simulation(program, rows, terms, weights)
 
 
 def _lanes(x: np.ndarray) -> np.ndarray:

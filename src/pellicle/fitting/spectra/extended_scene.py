@@ -110,6 +110,8 @@ class ExtendedScene:
             if isinstance(layer, Layer):
                 own = layer if spread is None else replace(layer, thickness_spread=spread)
                 layers[i] = self._layer(i, own, scene.layers[i], nm)
+        plain = tuple(layers)
+        self._with_face: dict[int, tuple[Any, ...]] = {}
         top, foot, bulk = layers[0], scene.layers[-1], scene.substrate.material
         below = _with_slope(opened.substrate.material, nm)
         if _solid(bulk, nm):
@@ -117,13 +119,16 @@ class ExtendedScene:
             if isinstance(top, Layer) and top.roughness is None:
                 self.roughness, rough = self._number(0.0)
                 layers[0] = replace(top, roughness=rough)
+                self._with_face[self.roughness.position] = (layers[0], *plain[1:])
             if isinstance(foot, Layer) and _oxidises(bulk, nm):
                 fixed = not free_leaves(getattr(view.scene.layers[-1], "material", None))
                 if not (fixed and abs(_median(foot.material, nm) - OXIDE_INDEX) < _LIKE_OXIDE):
                     self.oxide, thin = self._number(0.0)
                     layers.append(Layer(Constant(OXIDE_INDEX), thin))
+                    self._with_face[self.oxide.position] = (*plain, layers[-1])
                 self.mixture, thin = self._number(0.0)
                 layers.append(Interface(thin))
+                self._with_face[self.mixture.position] = (*plain, layers[-1])
             below = Scaled(below, change)
         self._scene = replace(
             opened,
@@ -132,6 +137,7 @@ class ExtendedScene:
             ambient=_with_slope(opened.ambient, nm),
             instrument=instrument,
         )
+        self._plain = replace(self._scene, layers=plain)
 
     def _number(self, value: float, lower: float = 0.0) -> tuple[Number, Free]:
         free = Free(min(lower, value), value + _WIDEST, start=value)
@@ -167,16 +173,34 @@ class ExtendedScene:
         values = np.tile(self.start, (count, 1))
         for row, (number, change) in zip(values, changes, strict=False):
             row[number.position] += change
-        form, scene, order = self.program()
+        form, scene, order = _program(self._view, self._free, self._scene)
         signals = simulated(form, scene, self._view.data, values[:, order]).signal
         return np.asarray(signals)[: len(changes)]
 
-    def program(self) -> tuple[Any, Scene, list[int]]:
-        """The form and the scene of the program that simulates, and which numbers it takes, in its order."""
-        # the order of a pytree is that of its fields
-        order = [next(i for i, own in enumerate(self._free) if own is x) for _, x in free_leaves(self._scene)]
-        form = self._view.form.with_plan(exact(self._scene).static_key)
-        return form, jax.tree_util.tree_map(np.asarray, anonymous(self._scene)), order
+    def programs(self) -> dict[int | None, Program]:
+        """Programs of scenes with one number of a face alone, by its position, and of the scene without any.
+
+        A scene with all of them is a deep stack, which takes a hundred times as long.
+        """
+        scenes: dict[int | None, Scene] = {None: self._plain}
+        for position, layers in self._with_face.items():
+            scenes[position] = replace(self._scene, layers=layers)
+        return {at: _program(self._view, self._free, scene) for at, scene in scenes.items()}
+
+
+class Program(NamedTuple):
+    """The form and the scene of a program that simulates, and which numbers it takes, in its order."""
+
+    form: Any
+    scene: Scene
+    order: list[int]
+
+
+def _program(view: SpectrumView | ColoursView, numbers: list[Free], scene: Scene) -> Program:
+    # the order of a pytree is that of its fields
+    order = [next(i for i, own in enumerate(numbers) if own is x) for _, x in free_leaves(scene)]
+    form = view.form.with_plan(exact(scene).static_key)
+    return Program(form, jax.tree_util.tree_map(np.asarray, anonymous(scene)), order)
 
 
 def _with_slope(medium: Any, nm: np.ndarray) -> Any:
