@@ -62,11 +62,12 @@ class Continuity:
     limit: float
 
     def __str__(self) -> str:
+        unclear = f"pixels with a rival within Δχ² {self.margin:g}"
         if not self.found:
-            return f"neighbours show no continuity: none of {self.undecided} undecided pixels decided by them"
+            return f"neighbours show no continuity: none of {self.undecided} {unclear} decided by them"
         recovered = 100 * (1 - self.wrong / self.found)
         return (
-            f"{self.decided} of {self.undecided} undecided pixels take the order of their neighbours,"
+            f"{self.decided} of {self.undecided} {unclear} take the order of their neighbours,"
             f" {self.changed} of them against a Δχ² of up to {self.overruled:.2g}; of {self.hidden} decided"
             f" pixels, hidden as a test, they decided {self.found} and {recovered:.4g} % of these rightly;"
             f" {100 * self.continuous:.3g} % of the decided pixels lie on the plane of their neighbours,"

@@ -220,7 +220,9 @@ def _minima(search: PixelSearch, data: PixelData) -> PixelMinima:
     order = _distinct(problem.parameters, points.units, points.deviance, lowest, listed)
     rows, here, absent = pixels[:, None], np.maximum(order, 0), order < 0
     ordered = np.where(absent[..., None], np.nan, points.units[rows, here])
-    rest, misfit = points.deviance - points.misfit, points.misfit / factor[:, None] ** 2
+    with np.errstate(invalid="ignore"):  # of points that were not tried, which are infinite
+        rest = points.deviance - points.misfit
+    misfit = points.misfit / factor[:, None] ** 2
     deviance, misfit = (np.where(absent, np.inf, x[rows, here]) for x in (misfit + rest, misfit))
     return PixelMinima(
         values=np.asarray(problem.values(ordered)),

@@ -72,7 +72,7 @@ def test_units_are_noted_once(wafer):
 
 
 def test_folders_that_are_no_wafer(tmp_path, refused):
-    refused(tmp_path, "empty folder", error=DataError)
+    refused(tmp_path, "is an empty folder", error=DataError)
     for name in ("dark.hdr", "white.hdr"):
         (tmp_path / name).write_text("ENVI\n")
         refused(tmp_path, "ENVI", name, error=DataError)

@@ -91,9 +91,11 @@ def _no_table(path: Path) -> DataError:
             f"{path}: is a folder of {len(images)} images: write them into one TIFF stack, a page for each "
             "wavelength"
         )
+    if not files:
+        return DataError(f"{path}: is an empty folder: name that of a zarr store or of spectra, or a file")
     return DataError(
-        f"{path}: is {'a' if files else 'an empty'} folder without a table of positions: name a file in it, "
-        "or put a CSV with the columns file, x and y beside spectra"
+        f"{path}: is a folder without a table of positions: name a file in it, or put a CSV with the columns "
+        "file, x and y beside spectra"
     )
 
 
