@@ -265,7 +265,9 @@ class PixelErrors:
         scene = self.target.scene
         if drifts(scene) and len(scene.layers) == 1 and self.depth is not None:
             rows = slice(self.view.rows)
-            layer = locals_of(self.view, arrays, values)[0].layer
+            # a layer without numbers of its own has one index at all pixels
+            some = slice(1) if count == 1 else slice(None)
+            layer = locals_of(self.view, _of(arrays, np.arange(len(values))[some]), values[some])[0].layer
             index = layer[:, 0, rows] / np.asarray(self.view.scene.light.wavelength)[rows]
             thinnest = FEWEST_FRINGES / np.maximum(np.ptp(2 * index, axis=1), 1e-12)
             result[values[:, self.depth] < thinnest, self.depth] = np.inf

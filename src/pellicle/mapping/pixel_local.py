@@ -15,8 +15,8 @@ from pellicle.fitting.spectra.nuisance import Data
 from pellicle.fitting.spectra.view import Local, SpectrumForm, SpectrumView
 from pellicle.scene.film import Scene
 
-LANES = 256
-"""Pixels that one call of a compiled program takes."""
+LANES, FEW = 256, 16
+"""Pixels that one call of a compiled program takes, and that of the last ones where they are few."""
 
 
 class PixelArrays(NamedTuple):
@@ -92,10 +92,11 @@ def in_lanes(program: Callable[..., Any], view: SpectrumView, arrays: PixelArray
     pieces, kind = [], tuple
     for first in range(0, len(at), LANES):
         count = min(LANES, len(at) - first)
+        size = LANES if count > FEW else FEW
 
-        def lanes(x: np.ndarray, first: int = first, count: int = count) -> np.ndarray:
+        def lanes(x: np.ndarray, first: int = first, count: int = count, size: int = size) -> np.ndarray:
             own = np.ascontiguousarray(x[first : first + count])
-            return np.concatenate([own, np.repeat(own[-1:], LANES - count, axis=0)])
+            return np.concatenate([own, np.repeat(own[-1:], size - count, axis=0)])
 
         own = jax.tree_util.tree_map(lanes, arrays)
         found = jax.device_get(program(view.form, view.scene, view.data, own, lanes(at)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -127,10 +128,14 @@ def short_range_noise(residual: np.ndarray, parts: Sequence[np.ndarray], least: 
 _FREEDOMS = np.geomspace(1.0, 1000.0, 200)
 
 
+@lru_cache(maxsize=8)
+def _students(chi2: float) -> np.ndarray:
+    return np.array([student(each, chi2) for each in _FREEDOMS.tolist()])
+
+
 def students(freedom: np.ndarray, chi2: float) -> np.ndarray:
     """`fitting.noise.student` of each of the degrees of freedom."""
     if not np.isfinite(freedom).any():
         return np.ones(len(freedom))
-    table = np.array([student(each, chi2) for each in _FREEDOMS.tolist()])
-    inside = np.interp(np.log(np.clip(freedom, 1.0, 1000.0)), np.log(_FREEDOMS), table)
+    inside = np.interp(np.log(np.clip(freedom, 1.0, 1000.0)), np.log(_FREEDOMS), _students(chi2))
     return np.where(freedom > 1000.0, 1 + (chi2 + 1) / (4 * freedom), inside)
