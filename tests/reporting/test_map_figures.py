@@ -186,6 +186,16 @@ def test_sites_are_points_without_interpolation():
     assert unsure.get_hatch()
 
 
+def test_panels_of_sites_have_one_range_where_some_are_without_data():
+    x, y = np.arange(9.0), np.arange(9.0) ** 2
+    status = np.full(9, CODES["converged"])
+    status[-2:] = CODES["no-data"]
+    figure = dict(figures(made(status, ("site",), {"x": ("site", x), "y": ("site", y)})))["map"]
+    ranges = {(axes.get_xlim(), axes.get_ylim()) for axes in figure.axes if axes.get_xlabel().startswith("x")}
+    assert len(ranges) == 1
+    assert all(low < 0 and high > 64 for _, (low, high) in ranges)
+
+
 def test_a_series_has_its_first_middle_and_last_frame_and_its_mean():
     status = np.full((5, 6, 8), CODES["converged"], np.uint8)
     status[4, :3] = CODES["misfit"]

@@ -159,6 +159,10 @@ def label_axes(panel: Axes, axes: MapAxes) -> None:
         panel.set_xlim(*sorted(axes.x.edges()[[0, -1]]))
         panel.set_ylim(*sorted(axes.y.edges()[[0, -1]]))
         panel.locator_params(integer=axes.downward)  # pixels are counted
+    else:  # also where some sites are without data
+        for limits, axis in ((panel.set_xlim, axes.x), (panel.set_ylim, axes.y)):
+            margin = 0.08 * np.ptp(axis.values) or axis.step
+            limits(axis.values.min() - margin, axis.values.max() + margin)
     if axes.downward:
         panel.invert_yaxis()
 
