@@ -19,8 +19,8 @@ from maps.films import index, reflectance
 
 import pellicle as pl
 from pellicle.data.cube import Cube
-from pellicle.mapping.pixel_fits import STATUSES, PixelFits
-from pellicle.mapping.pixels import fit_pixels, prepare, spectrum
+from pellicle.mapping.pixels.fit import fit_pixels, prepare, spectrum
+from pellicle.mapping.pixels.results import STATUSES, PixelFits
 
 NM = np.linspace(420.0, 900.0, 100)
 SIGMA = 0.003

@@ -9,8 +9,8 @@ import pytest
 import xarray
 from PIL import Image
 
-from pellicle.mapping.pixel_fits import CODES, NO_DATA, PixelFits
-from pellicle.mapping.pixel_minima import ORDERS
+from pellicle.mapping.pixels.minima import ORDERS
+from pellicle.mapping.pixels.results import CODES, NO_DATA, PixelFits
 
 RECIPE = """
 [scene]
@@ -36,7 +36,7 @@ def fits(monkeypatch):
     """Replaces the fit of a block."""
 
     def fits(fit=fitted):
-        monkeypatch.setattr("pellicle.mapping.pixels.fit_pixels", fit)
+        monkeypatch.setattr("pellicle.mapping.pixels.fit.fit_pixels", fit)
 
     fits()
     return fits

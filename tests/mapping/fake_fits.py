@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from pellicle.errors import UsageError
-from pellicle.mapping.pixel_fits import CODES, NO_DATA, PixelFits
-from pellicle.mapping.pixel_minima import ORDERS
+from pellicle.mapping.pixels.minima import ORDERS
+from pellicle.mapping.pixels.results import CODES, NO_DATA, PixelFits
 
 
 @dataclass(frozen=True)

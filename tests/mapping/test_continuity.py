@@ -8,7 +8,7 @@ import xarray as xr
 
 from pellicle.errors import UsageError
 from pellicle.mapping.continuity import decided_by_neighbours, evidence, row
-from pellicle.mapping.pixel_fits import CODES
+from pellicle.mapping.pixels.results import CODES
 
 PERIOD = 190.0
 """Distance of the minima in nm: 550 nm light in an index of 1.45."""

@@ -10,7 +10,7 @@ import xarray as xr
 
 from pellicle.errors import UsageError
 from pellicle.mapping.growth import RATES, growth
-from pellicle.mapping.pixel_fits import CODES
+from pellicle.mapping.pixels.results import CODES
 
 NO_DATA, CONSTANT, NOT_CONSTANT = range(len(RATES))
 NOISE = 0.4

@@ -14,11 +14,11 @@ from pellicle.fitting.result import Fit
 from pellicle.fitting.spectra.fit import fitted, measurements
 from pellicle.fitting.spectra.problem import make
 from pellicle.fitting.spectra.search import search
-from pellicle.mapping.pixel_covariance import Normal, solve, solve_within
-from pellicle.mapping.pixel_fits import STATUSES
-from pellicle.mapping.pixel_minima import ORDERS, PixelData, PixelMinima
-from pellicle.mapping.pixel_noise import correlation, students, typical_noise
-from pellicle.mapping.pixels import PixelModel, prepare, spectrum
+from pellicle.mapping.pixels.covariance import Normal, solve, solve_within
+from pellicle.mapping.pixels.fit import PixelModel, prepare, spectrum
+from pellicle.mapping.pixels.minima import ORDERS, PixelData, PixelMinima
+from pellicle.mapping.pixels.noise import correlation, students, typical_noise
+from pellicle.mapping.pixels.results import STATUSES
 
 NM, SIGMA = np.linspace(400, 900, 100), 0.003
 OXIDE = pl.Scene(pl.Layer(1.46, pl.Free(0, 1600)), "Si")

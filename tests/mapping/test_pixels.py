@@ -7,10 +7,10 @@ import pytest
 import pellicle as pl
 from pellicle.data.cube import Cube
 from pellicle.errors import DataError
-from pellicle.mapping.pixel_data import pixel_data
-from pellicle.mapping.pixel_fits import CODES
-from pellicle.mapping.pixel_search import minima
-from pellicle.mapping.pixels import fit_pixels, prepare, spectrum
+from pellicle.mapping.pixels.data import pixel_data
+from pellicle.mapping.pixels.fit import fit_pixels, prepare, spectrum
+from pellicle.mapping.pixels.results import CODES
+from pellicle.mapping.pixels.search import minima
 from pellicle.scene.priors import Normal
 
 NM, SIGMA = np.linspace(420.0, 780.0, 48), 0.002

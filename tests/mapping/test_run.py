@@ -11,7 +11,7 @@ import pellicle as pl
 from pellicle.data.cube import Cube
 from pellicle.errors import DataError, UsageError
 from pellicle.mapping.cluster import local_cluster
-from pellicle.mapping.pixel_fits import CODES
+from pellicle.mapping.pixels.results import CODES
 from pellicle.mapping.run import run_map
 
 

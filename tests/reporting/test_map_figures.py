@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pellicle.mapping.pixel_fits import CODES, STATUSES
+from pellicle.mapping.pixels.results import CODES, STATUSES
 from pellicle.reporting import map_blocks
 from pellicle.reporting.map_axes import Axis, MapAxes
 from pellicle.reporting.map_figures import figures

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pellicle.mapping.map_result import Run
-from pellicle.mapping.pixel_fits import CODES, STATUSES
+from pellicle.mapping.pixels.results import CODES, STATUSES
 from pellicle.reporting.map_axes import map_axes
 from pellicle.reporting.map_places import place
 from pellicle.reporting.map_summary import summarise

@@ -19,7 +19,7 @@ import numpy as np
 from pellicle.effects.plan import Row
 from pellicle.errors import UsageError
 from pellicle.mapping.neighbours import Neighbourhood, grid, scattered
-from pellicle.mapping.pixel_fits import BY_NEIGHBOURS, CODES
+from pellicle.mapping.pixels.results import BY_NEIGHBOURS, CODES
 from pellicle.mapping.stored_minima import exchanged, minima_at
 from pellicle.mapping.unwrapping import Field, field_of, grow
 

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pellicle.errors import UsageError
-from pellicle.mapping.pixel_fits import BY_NEIGHBOURS, CODES
+from pellicle.mapping.pixels.results import BY_NEIGHBOURS, CODES
 
 TIME = "time"
 RATES = ("no-data", "constant", "not-constant")

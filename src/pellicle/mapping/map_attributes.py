@@ -10,7 +10,7 @@ from typing import Any
 from pellicle.data.cube import Cube
 from pellicle.effects.plan import Row
 from pellicle.mapping.continuity import evidence, row
-from pellicle.mapping.pixels import PixelModel
+from pellicle.mapping.pixels.fit import PixelModel
 
 
 def attributes(cube: Cube, model: PixelModel, recipe: str, preview: int) -> dict[str, Any]:

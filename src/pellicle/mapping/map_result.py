@@ -16,7 +16,7 @@ from pellicle.errors import DataError
 from pellicle.files import replacing
 from pellicle.fitting.presentation import PlotMixin
 from pellicle.mapping.map_variables import STATUS, variable_name
-from pellicle.mapping.pixel_fits import BY_NEIGHBOURS, CODES, NO_DATA, STATUSES
+from pellicle.mapping.pixels.results import BY_NEIGHBOURS, CODES, NO_DATA, STATUSES
 from pellicle.mapping.store import DONE, IDENTITY, write_dataset
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pellicle.fitting.parameter import Parameter
-from pellicle.mapping.pixel_fits import CODES, NO_DATA, STATUSES, PixelFits
+from pellicle.mapping.pixels.results import CODES, NO_DATA, STATUSES, PixelFits
 
 STATUS = "status"
 ORDER = "order"

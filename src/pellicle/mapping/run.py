@@ -14,14 +14,14 @@ import numpy as np
 from pellicle.data.cube import Cube
 from pellicle.errors import UsageError
 from pellicle.fitting.progress import Progress, quiet
-from pellicle.mapping import pixels
 from pellicle.mapping.blocks import Where
 from pellicle.mapping.map_attributes import attributes
 from pellicle.mapping.map_identity import identity
 from pellicle.mapping.map_result import Map, Run
-from pellicle.mapping.pixel_fits import PixelFits
-from pellicle.mapping.pixel_minima import ORDERS
-from pellicle.mapping.pixels import PixelModel
+from pellicle.mapping.pixels import fit as pixel_fit
+from pellicle.mapping.pixels.fit import PixelModel
+from pellicle.mapping.pixels.minima import ORDERS
+from pellicle.mapping.pixels.results import PixelFits
 from pellicle.mapping.store import MapStore, begin
 from pellicle.scene.film import Scene
 
@@ -77,15 +77,15 @@ def run_map(
     - `preview`: the cube has every so many of the pixels in each direction.
     - `options` that change the result, `recipe`: the text of it; both are kept in the store.
     - `progress`: called with "pixels", the number that is done and their total.
-    - `fit`: the function that fits a block, `pixels.fit_pixels` by default.
+    - `fit`: the function that fits a block, `pixels.fit.fit_pixels` by default.
 
-    **Raises:** as `pixels.prepare` and `store.begin` do; DataError where a block is lost with every worker
-    that fits it. After KeyboardInterrupt the finished blocks are in the store.
+    **Raises:** as `pixels.fit.prepare` and `store.begin` do; DataError where a block is lost with every
+    worker that fits it. After KeyboardInterrupt the finished blocks are in the store.
     """
     if workers is not None and workers < 1:
         raise UsageError(f"`workers` must be at least 1, got {workers}")
     began = time.monotonic()
-    model = pixels.prepare(cube, scene)
+    model = pixel_fit.prepare(cube, scene)
     about = attributes(cube, model, recipe, preview)
     who = identity(cube, scene, options or {})
     store = begin(path, cube, model.parameters, who, about, orders=ORDERS, resume=resume, overwrite=overwrite)
@@ -93,7 +93,7 @@ def run_map(
     earlier = done = total - sum(map(store.blocks.count, todo))
     log.info("%s: %d of %d blocks of %s pixels are left", path, len(todo), *_sizes(store))
     progress("pixels", done, total)
-    job, compiling, used = Job(model, cube, store, fit or pixels.fit_pixels), 0.0, 1
+    job, compiling, used = Job(model, cube, store, fit or pixel_fit.fit_pixels), 0.0, 1
     if scheduler is None and workers is None and todo:
         first = fit_block(job, todo.pop(0))
         done, compiling = done + first.pixels, first.compiling

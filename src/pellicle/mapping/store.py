@@ -28,7 +28,7 @@ from pellicle.fitting.parameter import Parameter
 from pellicle.mapping.blocks import Blocks, blocks_of
 from pellicle.mapping.map_identity import difference
 from pellicle.mapping.map_variables import ORDER, Variable, variables
-from pellicle.mapping.pixel_fits import PixelFits
+from pellicle.mapping.pixels.results import PixelFits
 
 if TYPE_CHECKING:
     from xarray import Dataset

@@ -34,7 +34,8 @@ def new_figure(width: float, height: float, constrained: bool = True) -> Figure:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width, height), layout="constrained" if constrained else "none")
+    layout: Any = "constrained" if constrained else "none"  # "none" is missing in Matplotlib's types
+    figure = Figure(figsize=(width, height), layout=layout)
     FigureCanvasAgg(figure)
     return figure
 

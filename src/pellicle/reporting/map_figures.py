@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pellicle.mapping.map_result import Map
-from pellicle.mapping.pixel_fits import CODES, NO_DATA
+from pellicle.mapping.pixels.results import CODES, NO_DATA
 from pellicle.reporting import map_blocks
 from pellicle.reporting.drawing import ABOVE, BLUE, ORANGE, marker_size, new_figure
 from pellicle.reporting.map_axes import MapAxes

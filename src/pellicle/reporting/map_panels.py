@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pellicle.mapping.pixel_fits import CODES, NO_DATA, STATUSES
+from pellicle.mapping.pixels.results import CODES, NO_DATA, STATUSES
 from pellicle.reporting import map_blocks
 from pellicle.reporting.drawing import BLACK, BLUE, GREY
 from pellicle.reporting.map_axes import MapAxes

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from pellicle.fitting.result import Status
 from pellicle.mapping.map_result import Map, Run
-from pellicle.mapping.pixel_fits import BY_NEIGHBOURS, NO_DATA
+from pellicle.mapping.pixels.results import BY_NEIGHBOURS, NO_DATA
 from pellicle.reporting.fit_text import ADVICE
 from pellicle.reporting.json_record import number, versions
 from pellicle.reporting.map_summary import DECIDED, MapSummary, ParameterSummary, dataset_of, summarise

@@ -182,4 +182,4 @@ def _sigma(data: Spectrum, source: Noise) -> np.ndarray:
     if data.delta is None:
         return data.sigma
     delta_sigma = data.sigma if data.delta_sigma is None else data.delta_sigma
-    return sphere_sigma(data.values, data.delta, data.sigma, delta_sigma, data.folded)
+    return sphere_sigma(data.values, data.delta, data.sigma, delta_sigma, bool(data.folded))

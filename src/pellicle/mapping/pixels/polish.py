@@ -14,7 +14,7 @@ from pellicle.fitting.program_cache import kept
 from pellicle.fitting.spectra import nuisance
 from pellicle.fitting.spectra.nuisance import Data
 from pellicle.fitting.spectra.view import SpectrumForm
-from pellicle.mapping.pixel_minima import PixelData
+from pellicle.mapping.pixels.minima import PixelData
 from pellicle.optics.hoisting import compute_once
 from pellicle.scene.film import Scene
 from pellicle.scene.free import insert

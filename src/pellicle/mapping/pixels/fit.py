@@ -17,10 +17,10 @@ from pellicle.fitting.problem import Problem
 from pellicle.fitting.spectra.fit import measurements
 from pellicle.fitting.spectra.problem import make
 from pellicle.fitting.spectra.targets import Measured
-from pellicle.mapping.pixel_data import pixel_data
-from pellicle.mapping.pixel_errors import PixelErrors
-from pellicle.mapping.pixel_fits import PixelFits
-from pellicle.mapping.pixel_search import PixelSearch, minima, prepared
+from pellicle.mapping.pixels.data import pixel_data
+from pellicle.mapping.pixels.errors import PixelErrors
+from pellicle.mapping.pixels.results import PixelFits
+from pellicle.mapping.pixels.search import PixelSearch, minima, prepared
 from pellicle.scene.film import Scene
 
 _SAMPLE = 9

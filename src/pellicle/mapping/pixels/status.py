@@ -9,7 +9,7 @@ import numpy as np
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.result import Status
 from pellicle.fitting.status import RIVAL, WELL_KNOWN
-from pellicle.mapping.pixel_fits import CODES
+from pellicle.mapping.pixels.results import CODES
 
 _ON_BOUND = 1e-6
 

@@ -16,16 +16,16 @@ from pellicle.fitting.spectra.summary import FEWEST_FRINGES
 from pellicle.fitting.spectra.targets import Measured, drifts
 from pellicle.fitting.spectra.view import Local
 from pellicle.fitting.status import RIVAL
-from pellicle.mapping import pixel_profiles
-from pellicle.mapping.pixel_covariance import noise_covariance, solve
-from pellicle.mapping.pixel_discrepancy import PixelEvidence, discrepancy, other_material
-from pellicle.mapping.pixel_effects import PixelEffects, columns, nodes, of_pixels
-from pellicle.mapping.pixel_fits import CODES, NO_DATA, PixelFits
-from pellicle.mapping.pixel_groups import Group, Taken, groups
-from pellicle.mapping.pixel_local import PixelArrays, deviances, in_lanes, locals_of, padded
-from pellicle.mapping.pixel_minima import PixelData, PixelMinima
-from pellicle.mapping.pixel_noise import PixelNoise, correlation, noise_of, short_range_noise, students
-from pellicle.mapping.pixel_status import judge
+from pellicle.mapping.pixels import profiles
+from pellicle.mapping.pixels.covariance import noise_covariance, solve
+from pellicle.mapping.pixels.discrepancy import PixelEvidence, discrepancy, other_material
+from pellicle.mapping.pixels.effects import PixelEffects, columns, nodes, of_pixels
+from pellicle.mapping.pixels.groups import Group, Taken, groups
+from pellicle.mapping.pixels.local_models import PixelArrays, deviances, in_lanes, locals_of, padded
+from pellicle.mapping.pixels.minima import PixelData, PixelMinima
+from pellicle.mapping.pixels.noise import PixelNoise, correlation, noise_of, short_range_noise, students
+from pellicle.mapping.pixels.results import CODES, NO_DATA, PixelFits
+from pellicle.mapping.pixels.status import judge
 from pellicle.scene.instrument import Drift
 
 _REFITS = 4
@@ -47,7 +47,7 @@ class PixelErrors:
         self.upper = np.array([p.upper for p in self.parameters])
         self.prior_mean = np.asarray(problem.box.prior_mean)
         self.prior_weight = np.asarray(problem.box.prior_weight)
-        self.natural = pixel_profiles.natural_bounds([p.natural for p in self.parameters])
+        self.natural = profiles.natural_bounds([p.natural for p in self.parameters])
         self.position = np.asarray(self.view.data.position)[: self.view.points]
         self.nuisances: list[tuple[np.ndarray, np.ndarray, bool]] = []
         for number, prior, on_signal in (
@@ -231,7 +231,7 @@ class PixelErrors:
         """Standard errors (pixels, parameters) of the noise alone."""
         count = values.shape[1]
         counted = arrays._replace(independent_fraction=1 / noise.variance)
-        around = pixel_profiles.Around(
+        around = profiles.Around(
             values,
             self.lower,
             self.upper,
@@ -243,10 +243,10 @@ class PixelErrors:
         flat = {}
         if self.depth is not None and minima.profile.shape[1] > 1:
             square = noise.scale**2 * noise.fraction / float(self.target.independent_fraction)
-            rise = pixel_profiles.resampled(self.grid, minima.thickness, minima.profile[who])
+            rise = profiles.resampled(self.grid, minima.thickness, minima.profile[who])
             rise = rise * (square / students(noise.student_freedom, RIVAL) ** 2)[:, None]
             rise = rise - np.minimum(rise.min(axis=1), 0.0)[:, None]
-            sides = pixel_profiles.flat_sides(self.grid, rise, values[:, self.depth])
+            sides = profiles.flat_sides(self.grid, rise, values[:, self.depth])
             doubtful = np.flatnonzero(sides.any(axis=1) & usable)
             if count == 1 and len(doubtful):
                 # what the scan predicts near a node is not exact: the nodes themselves
@@ -254,14 +254,14 @@ class PixelErrors:
                 exact = self._deviance(arrays, doubtful, points[..., None])
                 rise = (exact - exact.min(axis=1)[:, None])[:, :-1]
                 rise = rise / students(noise.student_freedom[doubtful], RIVAL)[:, None] ** 2
-                sides[doubtful] = pixel_profiles.flat_sides(self.grid, rise, values[doubtful, 0])
+                sides[doubtful] = profiles.flat_sides(self.grid, rise, values[doubtful, 0])
             flat[self.depth] = sides
-        result = pixel_profiles.errors(around, flat, usable)
+        result = profiles.errors(around, flat, usable)
         # on a plateau, as of an opaque film, a solver has no point to settle at
         depths = [i for i, p in enumerate(self.parameters) if p.key == "thickness"]
         converged = converged | (usable & np.isinf(result[:, depths]).any(axis=1))
         lost = ~converged & usable
-        result[lost] = pixel_profiles.by_curvature(around)[lost]
+        result[lost] = profiles.by_curvature(around)[lost]
         scene = self.target.scene
         if drifts(scene) and len(scene.layers) == 1 and self.depth is not None:
             rows = slice(self.view.rows)

@@ -20,7 +20,7 @@ from pellicle.fitting.discrepancy import (
     reduced_variance,
 )
 from pellicle.fitting.misfit import BETTER, BEYOND, EXPLAINS
-from pellicle.mapping.pixel_covariance import Normal, inverse, solve, solve_within
+from pellicle.mapping.pixels.covariance import Normal, inverse, solve, solve_within
 
 _ROUNDS = 4
 _SETTLED = 1e-6

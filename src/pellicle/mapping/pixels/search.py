@@ -17,9 +17,9 @@ import numpy as np
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.spectra.view import SpectrumView
-from pellicle.mapping import polish
-from pellicle.mapping.lookup import Layout, Lookup, scan, table
-from pellicle.mapping.pixel_minima import ORDERS, PixelData, PixelMinima
+from pellicle.mapping.pixels import polish
+from pellicle.mapping.pixels.lookup import Layout, Lookup, scan, table
+from pellicle.mapping.pixels.minima import ORDERS, PixelData, PixelMinima
 from pellicle.scene.instrument import Drift
 
 log = getLogger(__name__)

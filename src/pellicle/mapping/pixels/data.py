@@ -10,7 +10,7 @@ from pellicle.data.ellipsometry_angles import ncs
 from pellicle.fitting import noise
 from pellicle.fitting.problem import Noise
 from pellicle.fitting.spectra.targets import ROUGH, sphere_frame, sphere_sigma
-from pellicle.mapping.pixel_minima import PixelData
+from pellicle.mapping.pixels.minima import PixelData
 
 _TO_NORMAL = 1.4826 / np.sqrt(6.0)
 """Standard deviation of normal noise over the median size of its second differences."""
