@@ -23,7 +23,7 @@ from pellicle.fitting.robust_losses import spread
 HALF_NORMAL = math.sqrt(3)
 """Root mean square of σ² where σ has a half-normal prior, in units of the square of its scale: 3^½."""
 _ROUNDS = 4
-_OUTLIER = 4.0
+OUTLIER = 4.0
 """Residuals beyond this many standard deviations of their bulk count less (Huber's loss)."""
 _SCATTER = 2.0
 """Standard deviations within which the size and correlation of residuals are those of noise."""
@@ -213,7 +213,7 @@ def _evidence_shares(evidence: Sequence[Evidence], variance: Sequence[float]) ->
 
 def huber_roots(residual: np.ndarray, size: Any) -> np.ndarray:
     """Square roots of Huber's weights of residuals (..., rows, channels), of a bulk of this `size` (...)."""
-    far = (_OUTLIER * np.maximum(size, 1.0))[..., None, None]
+    far = (OUTLIER * np.maximum(size, 1.0))[..., None, None]
     return np.sqrt(np.minimum(1.0, far / np.maximum(np.abs(residual), 1e-300)))
 
 

@@ -13,13 +13,14 @@ import numpy as np
 
 from pellicle.fitting.discrepancy import (
     HALF_NORMAL,
+    OUTLIER,
     Effect,
     Remaining,
     huber_roots,
     improbable,
     reduced_variance,
 )
-from pellicle.fitting.misfit import BETTER, BEYOND, EXPLAINS
+from pellicle.fitting.misfit import BETTER, BEYOND, DOUBTFUL, EXPLAINS
 from pellicle.mapping.pixels.covariance import Normal, inverse, solve, solve_within
 
 _ROUNDS = 4
@@ -37,7 +38,8 @@ class PixelEvidence:
     channels), `noise` (pixels,); `counted` (pixels,) is the median variance by which the fit counts points.
     `prior` (pixels, columns) are the weights of priors, `pull` (pixels, columns) distances from their means,
     `lower` and `upper` (pixels, columns) bounds. `known` is the number of parameters and nuisances, `count`
-    (pixels,) that of effects.
+    (pixels,) that of effects. `middle` (pixels,) is the median σ. With `short` the noise is at least `noise`,
+    and `short(which)` is that which neighbouring points of some pixels show.
     """
 
     residual: np.ndarray
@@ -54,6 +56,8 @@ class PixelEvidence:
     correlation: Callable[[np.ndarray], np.ndarray]
     least: float
     uncertain: float
+    middle: np.ndarray
+    short: Callable[[np.ndarray], np.ndarray] | None = None
 
     def of(self, pixels: np.ndarray) -> PixelEvidence:
         """The evidence of some of the pixels."""
@@ -65,7 +69,8 @@ class PixelDiscrepancy(NamedTuple):
     """Errors of pixels with the effects allowed for: see `fitting.discrepancy.Discrepancy`.
 
     `covariance` (pixels, known, known) and `shift` (pixels, known) are in the steps of the columns; the
-    numbers of `remaining` are arrays (pixels,).
+    numbers of `remaining` are arrays (pixels,). `noise` (pixels,) is that of the evidence, exact where it may
+    matter.
     """
 
     covariance: np.ndarray
@@ -73,6 +78,7 @@ class PixelDiscrepancy(NamedTuple):
     remaining: Remaining
     implausible: np.ndarray
     evidence_share: np.ndarray
+    noise: np.ndarray
 
 
 class _Balance(NamedTuple):
@@ -92,17 +98,21 @@ def discrepancy(evidence: PixelEvidence) -> PixelDiscrepancy:
     """The discrepancy of each pixel."""
     state = _balanced(evidence)
     known, rest = evidence.known, state.rest.reshape(evidence.residual.shape)
-    typical = _spread(rest * evidence.sigma)
-    weighted = np.sqrt(np.mean((huber_roots(rest, _spread(rest)) * rest) ** 2, axis=(1, 2)))
+    typical, noise = _spread(rest * evidence.sigma), evidence.noise.copy()
+    large = np.flatnonzero(typical > DOUBTFUL * noise)
+    if evidence.short is not None and len(large):
+        noise[large] = np.maximum(noise[large], evidence.short(large))
+    weighted = np.sqrt(np.mean((_roots(rest) * rest) ** 2, axis=(1, 2)))
     sizes = state.solution[:, known:]
     limit = np.array([improbable(int(n)) for n in range(int(evidence.count.max(initial=0)) + 1)])
-    now = state.variance * np.median(evidence.sigma, axis=(1, 2)) ** 2
+    now = state.variance * evidence.middle**2
     return PixelDiscrepancy(
         covariance=state.covariance[:, :known, :known],
         shift=state.solution[:, :known],
-        remaining=Remaining(typical / evidence.noise, typical, weighted, state.variance),
+        remaining=Remaining(typical / noise, typical, weighted, state.variance),
         implausible=(evidence.count > 0) & (np.sum(sizes**2, axis=1) > limit[evidence.count]),
         evidence_share=np.minimum(1.0, evidence.counted / now),
+        noise=noise,
     )
 
 
@@ -146,6 +156,15 @@ def _spread(values: np.ndarray) -> np.ndarray:
     return np.maximum(1.4826 * np.median(np.abs(values), axis=(1, 2)), 1e-300)
 
 
+def _roots(residual: np.ndarray) -> np.ndarray:
+    """Square roots of Huber's weights; most pixels have no residual that counts less."""
+    roots = np.ones(residual.shape)
+    far = np.flatnonzero(np.max(np.abs(residual), axis=(1, 2)) > OUTLIER)
+    if len(far):
+        roots[far] = huber_roots(residual[far], _spread(residual[far]))
+    return roots
+
+
 def _balanced(evidence: PixelEvidence) -> _Balance:
     """Factors and weights of each pixel: those whose factors have settled are not computed again."""
     shape = evidence.residual.shape
@@ -175,7 +194,7 @@ def _balanced(evidence: PixelEvidence) -> _Balance:
     todo = np.arange(pixels)
     for _ in range(_ROUNDS):
         left = rest[todo].reshape(-1, *shape[1:])
-        now = huber_roots(left, _spread(left)).reshape(len(todo), -1)
+        now = _roots(left).reshape(len(todo), -1)
         robust = (now < 1).any(axis=1) | (roots[todo] < 1).any(axis=1)
         some = todo[robust]
         changed = np.zeros(len(todo), bool)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from pellicle.fitting.misfit import DOUBTFUL, Accuracy, beyond_accuracy
@@ -170,14 +172,18 @@ class PixelErrors:
         pixels, known = len(values), jacobian.shape[2]
         left = taken(residual)[..., :keep]
         sigma = 1 / taken(weight)[..., :keep]
-        counted = np.median(sigma, axis=(1, 2)) ** 2 / noise.fraction
-        short = short_range_noise(left, group.parts, LEAST_NOISE * arrays.level)
         median = np.median(sigma, axis=(1, 2))
+        counted, middle = median**2 / noise.fraction, median
+        least = LEAST_NOISE * arrays.level
+
+        def short(which: np.ndarray) -> np.ndarray:
+            return short_range_noise(left[which], group.parts, least[which])
+
+        given = kind.known and not kind.drifting
+        own = median if given else short(np.arange(pixels))
         if not kind.known:
-            short = np.minimum(short, median)
-            sigma = np.broadcast_to(short[:, None, None], sigma.shape)
-        elif not kind.drifting:
-            short = np.maximum(short, median)
+            own = middle = np.minimum(own, median)
+            sigma = np.broadcast_to(own[:, None, None], sigma.shape)
         effects = self.effects.changes(of_pixels(view, frame), at, values)
         parts = [
             taken(jacobian)[:, :, :keep].reshape(pixels, -1, known),
@@ -198,7 +204,7 @@ class PixelErrors:
             residual=left,
             columns=both,
             sigma=sigma,
-            noise=short,
+            noise=own,
             counted=counted,
             prior=np.concatenate([prior, np.ones((pixels, extra))], axis=1),
             pull=pull,
@@ -209,6 +215,8 @@ class PixelErrors:
             correlation=lambda rest: correlation(rest, group.parts),
             least=DRIFT_CORRELATION if kind.drifting else 1.0,
             uncertain=0.0 if kind.known else SCATTER_OF_NOISE / left.shape[1] ** 0.5,
+            middle=middle,
+            short=short if given else None,
         )
         return evidence, effects
 
@@ -224,7 +232,7 @@ class PixelErrors:
         misfit = found.implausible | beyond_accuracy(found.remaining, accuracy)
         doubtful = np.flatnonzero((found.remaining.ratio > DOUBTFUL) & ~misfit)
         if len(doubtful) and effects:
-            misfit[doubtful] = other_material(evidence.of(doubtful), effects)
+            misfit[doubtful] = other_material(replace(evidence, noise=found.noise).of(doubtful), effects)
         return misfit
 
     def _limits(self, minima, who, arrays, noise, covariance, values, at, converged, usable):
