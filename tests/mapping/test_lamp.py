@@ -47,6 +47,7 @@ def joint(wedge):
     return lamp_curve(lit(wedge), SCENE)
 
 
+@pytest.mark.slow  # fits a thousand pixels in several rounds
 def test_a_joint_curve_is_the_lamp_within_its_errors(joint):
     away = np.log(joint.gain / LAMP)
     pull = (away - away.mean()) / (joint.stderr / joint.gain)
@@ -59,6 +60,7 @@ def test_a_joint_curve_is_the_lamp_within_its_errors(joint):
     assert "up to a constant factor" in str(joint)
 
 
+@pytest.mark.slow  # fits a thousand pixels in several rounds
 def test_thicknesses_lose_their_bias(joint, wedge):
     cube = lit(wedge)
     model = prepare(cube, SCENE)

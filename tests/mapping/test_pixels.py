@@ -99,6 +99,7 @@ def test_slope_is_that_of_the_signal(wedge):
     assert best.slope[20, :, 0] == pytest.approx((moved[1] - moved[0]) / (2 * step), abs=1e-7)
 
 
+@pytest.mark.slow  # compiles a scene of its own; test_pixel_errors.py has one in every run
 def test_rivals_are_those_of_fit():
     """Thin layers of unknown scale: several thicknesses explain them nearly as well."""
     few = slice(None, None, 4)
@@ -126,6 +127,7 @@ def test_rivals_are_those_of_fit():
         assert best.deviance[pixel, 0] == pytest.approx(deviance.min(), abs=1e-6)
 
 
+@pytest.mark.slow  # compiles a scene of its own; test_pixel_errors.py has one in every run
 def test_thickness_and_index_are_those_of_fit():
     scene = pl.Scene(pl.Layer(pl.Free(1.3, 2.0), FREE), 3.9)
     cube = cube_of(np.linspace(60, 850, 20), 1.62)  # σ is not given
@@ -139,6 +141,7 @@ def test_priors_weigh_against_the_noise_of_the_residuals():
     check(cube_of([350.0, 420.0], 1.62), scene, (1,), share=0.05)
 
 
+@pytest.mark.slow  # compiles a scene of its own; test_pixel_errors.py has one in every run
 def test_ellipsometry_is_that_of_fit():
     """Ψ and Δ at two angles, with errors of their own."""
     nm, angle = np.linspace(420.0, 780.0, 20), np.array([65.0, 72.0])

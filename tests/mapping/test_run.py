@@ -56,6 +56,7 @@ def test_workers_read_a_cube_on_disk_themselves(workers, cube, scene, fake_fits,
     np.testing.assert_allclose(there.thickness, mean)
 
 
+@pytest.mark.slow  # starts worker processes
 @pytest.mark.usefixtures("small_blocks")
 def test_a_large_cube_in_memory_is_sent_by_blocks(
     workers, cube, scene, fake_fits, same_files, tmp_path, monkeypatch

@@ -115,6 +115,7 @@ def test_the_density_integrates_to_the_absorptance_and_in_the_substrate_to_t():
     np.testing.assert_allclose(found, [*A, T], rtol=1e-9)
 
 
+@pytest.mark.slow  # compiles fifty layers
 def test_fifty_layers_with_an_opaque_one_conserve_energy():
     """A mirror of quarter waves on 1 mm of metal on another mirror, which no light reaches."""
     depth, index = np.tile([60.0, 95.0], 25), np.tile([2.3 + 1e-4j, 1.46 + 1e-3j], 25)
@@ -135,6 +136,7 @@ def test_fifty_layers_with_an_opaque_one_conserve_energy():
     assert np.all(np.isfinite(slope))
 
 
+@pytest.mark.slow  # compiles a stack of its own
 def test_one_layer_has_an_axis_of_layers_too():
     nm = np.linspace(400, 800, 5)
     assert pl.absorptance(nm, 100.0, 2.0 + 0.1j, 1.5).shape == (1, 5)
