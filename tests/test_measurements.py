@@ -63,7 +63,12 @@ def fitted(recipe: Path):
 
 
 @pytest.mark.parametrize(
-    "recipe", [r for r in RECIPES if r.stem != "gold_on_glass_300nm"], ids=lambda r: r.stem
+    "recipe",
+    [
+        pytest.param(r, marks=[pytest.mark.slow] if "gold" in r.stem else [], id=r.stem)  # compiles alone
+        for r in RECIPES
+        if r.stem != "gold_on_glass_300nm"
+    ],
 )
 def test_the_fit_finds_the_truth(recipe):
     found, truth = fitted(recipe)

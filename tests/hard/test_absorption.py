@@ -70,7 +70,8 @@ def ratios(case, value, slope, dtype):
     return np.where(chosen, values, 0.0), np.where(chosen, slopes, 0.0)
 
 
-@pytest.mark.parametrize("dtype", [np.float64, pytest.param(np.float32, marks=pytest.mark.slow)])
+@pytest.mark.slow  # compiles for half a minute; tests/simulation/test_depth.py: random stacks
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
 def test_values_and_derivatives(dtype):
     for name, (case, value, slope) in computed(dtype).items():
         assert value.dtype == dtype

@@ -21,7 +21,7 @@ LAYERS = [
 SUBSTRATE = 3.0 + 0.1j
 
 
-@pytest.fixture(scope="module", params=["s", "p"])
+@pytest.fixture(scope="module", params=[pytest.param("s", marks=pytest.mark.slow), "p"])
 def both(request):
     scene = pl.Scene(LAYERS, SUBSTRATE, light=pl.Light(angle=ANGLE, polarisation=request.param))
     return request.param, pl.depth_profile(scene, 550.0, NM)
@@ -60,6 +60,7 @@ def test_the_density_integrates_to_each_layer(both):
             assert total == pytest.approx(profile.shares[name][0], rel=1e-4, abs=1e-12)
 
 
+@pytest.mark.slow  # compiles two stacks
 def test_without_plates_it_is_the_function_of_numbers():
     """An interface of two slices is one layer."""
     layers = [pl.Layer(2.0 + 0.1j, 60.0), pl.Interface(10.0, steps=2, name="graded")]

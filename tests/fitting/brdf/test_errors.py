@@ -34,6 +34,7 @@ def test_errors_without_sigma_cover_the_truth(grey_samples, grey, truth, no_sear
     assert 0.8 < np.sqrt(np.mean(np.square(z))) < 1.25
 
 
+@pytest.mark.slow  # compiles a model of its own
 def test_a_share_of_the_signal_is_one_of_the_model(grey_samples, grey, truth, no_search):
     """Of two samples 20 % above and below the truth a noise in proportion favours neither.
 

@@ -60,6 +60,7 @@ def test_noise_between_sweeps_changes_nothing(measure):
     assert not any("drift" in text for text in found.warnings)
 
 
+@pytest.mark.slow  # a joint fit of its own
 def test_one_of_two_spectra_drifts():
     """In a joint fit the error grows by what the drifting sweeps contribute to it."""
     steady = mean_spectrum([ellipsometry(0.0, seed) for seed in range(4)])

@@ -100,6 +100,7 @@ def test_a_native_oxide_is_one_more_layer(reflectance):
     np.testing.assert_allclose(reflectance["native oxide"].change[:, 0], expected, atol=1e-9)
 
 
+@pytest.mark.slow  # compiles a scene of its own
 def test_offsets_of_psi_and_delta():
     data = spectrum("psi-delta", 70.0)
     scene = pl.Scene(pl.Layer(1.6, FREE), 3.9, light=pl.Light(angle=70.0, signal="psi-delta"))
