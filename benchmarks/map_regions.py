@@ -53,7 +53,8 @@ def oxide(size: int) -> Sample:
     scratch = np.abs(x - 0.6 - 0.2 * y) < 1.5 / size
     values[scratch] = random.uniform(0, 1, (int(scratch.sum()), NM.size))
     dead, stuck = random.uniform(size=(2, size, size)) < 0.001
-    values[dead], values[stuck] = np.nan, SIGMA * random.standard_normal((int(stuck.sum()), NM.size))
+    values[stuck] = SIGMA * random.standard_normal((int(stuck.sum()), NM.size))
+    values[dead] = np.nan
     for name, where in (("opaque", gold), ("scratch", scratch), ("stuck", stuck), ("dead", dead)):
         region = np.where(where, name, region)
     scene = pl.Scene(pl.Layer("SiO2", pl.Free(20, 1500)), "Si", instrument=pl.Instrument(scale="free"))

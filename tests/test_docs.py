@@ -89,6 +89,8 @@ ELSEWHERE = {
     "python benchmarks/calibration.py": _LONG_STUDY,
     "python benchmarks/colour_inverse.py": "tests/colour/test_inverse.py: 300 colours of one film",
     "python benchmarks/colour_series.py": "tests/colour/test_series.py: fewer colours",
+    "python benchmarks/map.py": "speed is measured by benchmarks; tests/mapping: a few pixels",
+    "python benchmarks/map_regions.py": "takes minutes; tests/mapping/test_pixel_errors.py: a few pixels",
     "python benchmarks/posterior.py": _LONG_STUDY,
     "python benchmarks/renderers.py": "takes minutes; tests/rendering: one film for each renderer",
     "python benchmarks/colour.py": _LONG_STUDY,
