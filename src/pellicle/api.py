@@ -18,7 +18,7 @@ from pellicle.data.measurement import Measurement, check_measurement
 from pellicle.data.read_cube import read_cube
 from pellicle.data.spectrum import Spectrum
 from pellicle.effects.plan import Plan
-from pellicle.errors import UsageError, install_command
+from pellicle.errors import UsageError
 from pellicle.fitting.brdf.fit import fit as fit_brdf
 from pellicle.fitting.comparison import Comparison
 from pellicle.fitting.comparison import compare as compare_fits
@@ -527,10 +527,8 @@ def map(data: Any, scene: Scene, **options: Any) -> Any:
     _refuse_others(options, ("picture", "cube") if picture else ("cube", "picture"))
     if picture:
         return map_picture(data, scene, **options)
-    try:
-        from pellicle.mapping.maps import map_cube
-    except ImportError as error:
-        raise UsageError(f"maps of cubes need {error.name}: {install_command('maps')}") from None
+    from pellicle.mapping.maps import map_cube
+
     return map_cube(data, scene, **options)
 
 

@@ -4,6 +4,7 @@ import dataclasses
 import errno
 import os
 import shutil
+import sys
 
 import numpy as np
 import pytest
@@ -220,3 +221,10 @@ def test_sites_of_a_table_have_their_coordinates(mapped, cube):
     assert made.dataset.x.dims == ("site",)
     assert str(made.dataset.site.values[3]) == "die 3"
     made.to_netcdf(made.path.with_name("sites.nc"))
+
+
+def test_without_zarr_the_message_names_the_extra(monkeypatch, tmp_path):
+    """`pl.Map` loads without the packages of the extra `maps`, as every public name does."""
+    monkeypatch.setitem(sys.modules, "zarr", None)
+    with pytest.raises(UsageError, match=r"need zarr: pip install 'pellicle\[maps\]'"):
+        Map(tmp_path / "map.zarr")

@@ -34,6 +34,7 @@ def test_a_description_gives_page_reason_citation_and_the_other_pages():
     assert "model, not measured" in describe("HgS")
     assert "taken as transparent" in describe("SiO2")
     assert "all wavelengths" in describe("air")
+    assert "Malitson" in describe("main/SiO2/Malitson")  # the full name of a page is no file
     with pytest.raises(UnknownMaterial):
         describe("unobtainium")
 

@@ -10,14 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import zarr
 
 from pellicle.errors import DataError
 from pellicle.files import replacing
 from pellicle.fitting.presentation import PlotMixin
 from pellicle.mapping.map_variables import STATUS, variable_name
 from pellicle.mapping.pixels.results import BY_NEIGHBOURS, CODES, NO_DATA, STATUSES
-from pellicle.mapping.store import DONE, IDENTITY, write_dataset
+from pellicle.mapping.store import DONE, IDENTITY, write_dataset, zarr_package
 
 if TYPE_CHECKING:
     import xarray
@@ -44,7 +43,7 @@ class Map(PlotMixin):
     - `path`: zarr store of a map, finished or not, of `pellicle.map` or `pellicle map`.
     - `run`: how it was computed, None for a map of an earlier run.
 
-    **Raises:** DataError where there is no map at `path`.
+    **Raises:** DataError where there is no map at `path`; UsageError where zarr is not installed.
 
     ```python
     made = pl.Map("wafer/map.zarr")
@@ -54,6 +53,7 @@ class Map(PlotMixin):
 
     def __init__(self, path: str | os.PathLike[str], run: Run | None = None):
         self.path, self.run = Path(path), run
+        zarr = zarr_package()
         try:
             self._group: Any = zarr.open_group(self.path, mode="r", use_consolidated=False)
             self._group.attrs[IDENTITY]

@@ -15,14 +15,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import zarr
 
 from pellicle.data.cube import Cube
-from pellicle.errors import UsageError
+from pellicle.errors import UsageError, install_command
 from pellicle.files import not_written
 from pellicle.fitting.parameter import Parameter
 from pellicle.mapping.blocks import Blocks, blocks_of
@@ -34,6 +34,17 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 IDENTITY, DONE = "pellicle_identity", "progress/done"
+
+
+def zarr_package() -> Any:
+    """Import zarr, which not every installation has: it belongs to the extra `maps`.
+
+    **Raises:** UsageError where it is absent.
+    """
+    try:
+        return import_module("zarr")
+    except ImportError:
+        raise UsageError(f"maps of cubes need zarr: {install_command('maps')}") from None
 
 
 @dataclass(frozen=True)
@@ -66,7 +77,7 @@ class MapStore:
 
     @cached_property
     def _group(self) -> Any:
-        return zarr.open_group(self.path, mode="r+", use_consolidated=False)
+        return zarr_package().open_group(self.path, mode="r+", use_consolidated=False)
 
     @cached_property
     def _variables(self) -> list[Variable]:
@@ -118,7 +129,7 @@ def begin(
         else:
             for stray in target.rglob("*.partial"):  # of a process that was killed while it wrote
                 stray.unlink(missing_ok=True)
-            size = tuple(zarr.open_group(target, mode="r", use_consolidated=False)["status"].chunks)  # pyright: ignore
+            size = tuple(zarr_package().open_group(target, mode="r", use_consolidated=False)["status"].chunks)  # pyright: ignore
             return MapStore(target, Blocks(cube.shape, size), tuple(parameters))
     store = MapStore(target, blocks_of(cube), tuple(parameters))
     draft = _draft(target)
@@ -162,6 +173,7 @@ def _remove(target: Path) -> None:
 
 def _identity_at(path: Path) -> dict[str, str] | None:
     """The identity of the map stored at `path`, None where there is none."""
+    zarr = zarr_package()
     try:
         found: Any = zarr.open_group(path, mode="r", use_consolidated=False).attrs.get(IDENTITY)
     except (OSError, ValueError, KeyError):
@@ -171,7 +183,7 @@ def _identity_at(path: Path) -> dict[str, str] | None:
 
 def _make(path: Path, store: MapStore, cube: Cube, attributes: Mapping[str, Any], orders: int) -> None:
     """Make all arrays of a store, without the values of pixels."""
-    group = zarr.create_group(path, attributes=_attributes(cube, attributes))
+    group = zarr_package().create_group(path, attributes=_attributes(cube, attributes))
     blocks = store.blocks
     for variable in store._variables:
         axes = (orders,) * variable.orders
@@ -195,7 +207,7 @@ def _make(path: Path, store: MapStore, cube: Cube, attributes: Mapping[str, Any]
         )
     group.create_array(DONE, shape=blocks.grid, chunks=(1,) * len(blocks.grid), dtype="uint8", fill_value=0)
     with _quietly():
-        zarr.consolidate_metadata(path)
+        zarr_package().consolidate_metadata(path)
 
 
 def coordinate_dims(cube: Cube, name: str) -> tuple[str, ...]:

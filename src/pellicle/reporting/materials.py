@@ -66,7 +66,7 @@ def describe(name: str) -> str:
     if not isinstance(source, Material):
         return f"{name}\n"
     low, high = source.wavelength_range
-    is_file = entry is None and source.page == name.strip()
+    is_file = entry is None and source.page == name.strip() and Path(source.page).is_file()
     facts = [
         *(_facts_of_file(source.page) if is_file else [("page", source.page)]),
         ("range", "all wavelengths" if high == np.inf else f"{_range(low, high)} nm"),
