@@ -15,7 +15,7 @@ PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
 NOTEBOOKS := $(wildcard notebooks/*.ipynb)
 EXECUTED := executed/done
 
-.PHONY: schema fit fits notebooks test exact coverage docs lint bench verdicts peers properties fuzz tolerance measurements slow clean figures
+.PHONY: schema fit fits notebooks test exact coverage docs dist dist-check lint bench verdicts peers properties fuzz tolerance measurements slow clean figures
 
 # on Debian, pip for virtual environments is a separate package; without it, the system's pip is used
 $(VENV)/bin/python:
@@ -69,6 +69,15 @@ $(EXECUTED): $(NOTEBOOKS)
 docs: $(VENV)/.dev $(EXECUTED)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
+# sdist and wheel into dist/, with their metadata and lists of files checked
+dist: $(VENV)/.dev
+	$(BIN)/python scripts/check_distribution.py
+
+# and an installation of the wheel for each Python that is found: make dist-check PYTHONS="python3.11 /path/to/python3.13"
+PYTHONS ?= python3.11 python3.12 python3.13
+dist-check: $(VENV)/.dev
+	$(BIN)/python scripts/check_distribution.py $(PYTHONS)
+
 slow: $(VENV)/.dev
 	$(BIN)/python -m pytest -m slow
 
@@ -113,4 +122,4 @@ measurements: $(VENV)/.fit
 	$(BIN)/python scripts/make_measurements.py
 
 clean:
-	rm -rf $(VENV) .venv-peers results executed site .pytest_cache .ruff_cache .hypothesis .coverage
+	rm -rf $(VENV) .venv-peers results executed site dist .pytest_cache .ruff_cache .hypothesis .coverage

@@ -67,10 +67,11 @@ SLOW = {
     "pellicle sample --recipe fits/brdf/tempered_steel/recipe.toml --out results/steel": "compiles for 20 s; "
     "tests/sampling samples another surface",
 }
-CI = ("make fit", "make test", "make notebooks", "make docs")
+CI = ("make fit", "make test", "make notebooks", "make docs", "make dist")
 _LONG_STUDY = "takes hours; its tables are kept, and the modules that it uses have their own tests"
 ELSEWHERE = {
     **dict.fromkeys(CI, "run by CI: .ci/run"),
+    "make dist-check": "installs the wheel for every Python found; .ci/run: make dist",
     "make fits": "tests/test_fits.py: one study in every run, all of them in make slow",
     **dict.fromkeys(("make slow", "make coverage"), "run these tests"),
     **dict.fromkeys(
@@ -218,11 +219,12 @@ def test_every_command_is_run_by_a_test():
     shown = {command for text in PAGES.values() for command in commands(text)}
     others = {c for c in shown if not c.startswith("pellicle ") or c in ELSEWHERE}
     extras = PROJECT["optional-dependencies"].keys()
-    targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE))
+    targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE))
     for command in others:
         program, target = command.split()[:2]
         if program == "pip":
-            assert set(re.findall(r"'\.\[(\w+)\]'", command)) <= extras, command
+            named = re.findall(r"'(?:\.|pellicle)\[([\w,]+)\]'", command)
+            assert {extra for names in named for extra in names.split(",")} <= extras, command
             continue
         assert any(command.startswith(line) for line in ELSEWHERE), f"no test runs {command}"
         assert program != "make" or target in targets, command
@@ -314,7 +316,8 @@ def test_the_citation_file_is_complete():
     cited = yaml.safe_load((ROOT / "CITATION.cff").read_text("utf-8"))
     assert cited["cff-version"] == "1.2.0"
     assert {"message", "title", "authors"} <= cited.keys()
-    assert cited["version"] == PROJECT["version"]
+    newest = re.findall(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.MULTILINE)[0]
+    assert cited["version"] == newest
     for reference in cited["references"]:
         assert {"type", "title", "authors", "year"} <= reference.keys(), reference
         assert not reference.get("doi", "10.1/x").startswith("http"), reference
@@ -341,7 +344,8 @@ def test_the_house_is_drawn_in_the_order_of_the_import_contract():
 def test_modules_named_in_contributing_exist():
     """By their path in the repository or in the package, or by the end of it."""
     named = set(re.findall(r"`([\w./]+\.(?:py|toml|csv|md))`", PAGES["CONTRIBUTING.md"])) - {"NN_name.py"}
-    kept = ["/" + path.relative_to(ROOT).as_posix() for path in ROOT.glob("[a-z]*/**/*") if path.is_file()]
+    paths = [*ROOT.glob("*"), *ROOT.glob("[a-z]*/**/*")]
+    kept = ["/" + path.relative_to(ROOT).as_posix() for path in paths if path.is_file()]
     assert not [name for name in named if not any(path.endswith("/" + name) for path in kept)]
 
 
