@@ -22,6 +22,7 @@ def workers():
         yield client.scheduler.address
 
 
+@pytest.mark.slow  # starts workers and kills one; test_killed_runs.py kills a run without workers
 @pytest.mark.usefixtures("small_blocks")
 def test_a_worker_that_dies_loses_nothing(workers, cube, scene, fake_fits, tmp_path):
     """The process that fits the brightest corner is killed; a cube in memory goes there by blocks."""

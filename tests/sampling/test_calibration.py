@@ -7,6 +7,8 @@ import pytest
 
 import pellicle as pl
 
+pytestmark = pytest.mark.slow  # 30 posteriors; test_sample.py compares posteriors with a grid
+
 SETS = 30
 TRUTHS = np.random.default_rng(0).uniform(50.0, 1500.0, SETS)
 
