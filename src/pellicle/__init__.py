@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from pellicle.data.spectrum import Spectrum as Spectrum
     from pellicle.data.write_spectrum import write_spectrum as write_spectrum
     from pellicle.dispersion import effective_medium as mixing  # noqa: F401
+    from pellicle.dispersion.anisotropic import Anisotropic as Anisotropic
     from pellicle.fitting.result import Fit as Fit
     from pellicle.fitting.result import Status as Status
     from pellicle.mapping.map_result import Map as Map
@@ -82,6 +83,7 @@ _NAMES = {
     "pellicle.data.write_spectrum": ("write_spectrum",),
     "pellicle.mapping.map_result": ("Map",),
     "pellicle.mapping.picture": ("ThicknessMap",),
+    "pellicle.dispersion.anisotropic": ("Anisotropic",),
     "pellicle.fitting.result": ("Fit", "Status"),
     "pellicle.materials": ("material",),
     "pellicle.recipes.colours": ("read_colours", "read_colours_by_film"),

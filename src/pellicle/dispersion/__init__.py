@@ -4,6 +4,7 @@
 `pellicle.dispersion.effective_medium`.
 """
 
+from pellicle.dispersion.anisotropic import Anisotropic as Anisotropic
 from pellicle.dispersion.base import HC as HC
 from pellicle.dispersion.base import AbstractDispersion as AbstractDispersion
 from pellicle.dispersion.cody_lorentz import CodyLorentz as CodyLorentz

@@ -13,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 
 import pellicle.dispersion
+from pellicle.dispersion.anisotropic import Anisotropic
 from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.dispersion.effective_medium import MIXTURES
 from pellicle.dispersion.empirical import Constant
@@ -46,6 +47,8 @@ def medium(value: MediumLike) -> AbstractDispersion:
     >>> medium(1.5)
     Constant(n=1.5)
     """
+    if isinstance(value, Anisotropic):
+        return value.with_media(medium)
     if isinstance(value, AbstractDispersion):
         return value
     if isinstance(value, str | os.PathLike):

@@ -1,0 +1,109 @@
+"""Birefringent media: dispersions of the principal indices, and the orientation of the axes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, final
+
+import equinox as eqx
+
+from pellicle.dispersion.base import AbstractDispersion
+from pellicle.optics.anisotropy import Principal, permittivity, uniaxial
+from pellicle.optics.array_namespace import namespace
+
+
+@final
+class Anisotropic(AbstractDispersion):
+    """Uniaxial or biaxial medium.
+
+    **Arguments:**
+
+    - `ordinary`, `extraordinary`: the media of a uniaxial crystal, each anything that a medium may be.
+    - `x`, `y`, `z`: in place of these, the principal media of a biaxial crystal.
+    - `axis`: angles in degrees. (θ, φ) of the optic axis: θ to the surface normal, φ from the plane of
+      incidence. Biaxial: (θ, φ, ψ) of the third axis and of the rotation about it, Euler angles z-y-z
+      (`pellicle.optics.anisotropy`). By default the third axis is the surface normal.
+
+    Angles that are literally multiples of 90° keep the axes along those of the laboratory.
+    """
+
+    x: Any  # the ordinary medium of a uniaxial crystal
+    y: Any  # None for a uniaxial crystal
+    z: Any  # the extraordinary medium of a uniaxial crystal
+    theta: Any
+    phi: Any
+    psi: Any
+    order: tuple[int, int, int] | None = eqx.field(static=True)
+    """Which principal axis lies along each laboratory axis; None if any orientation is possible."""
+
+    def __init__(
+        self,
+        ordinary: Any = None,
+        extraordinary: Any = None,
+        *,
+        x: Any = None,
+        y: Any = None,
+        z: Any = None,
+        axis: Any = (0.0, 0.0),
+    ):
+        uniaxial = ordinary is not None and extraordinary is not None and x is y is z is None
+        biaxial = ordinary is extraordinary is None and None not in (x, y, z)
+        if not (uniaxial or biaxial):
+            raise ValueError("give `ordinary` and `extraordinary`, or all of `x`, `y` and `z`")
+        if len(axis) not in ((2,) if uniaxial else (2, 3)):
+            raise ValueError(f"`axis`: expected (theta, phi){'' if uniaxial else ' or (theta, phi, psi)'}")
+        self.x, self.y, self.z = (ordinary, None, extraordinary) if uniaxial else (x, y, z)
+        self.theta, self.phi, self.psi = (*axis, 0.0)[:3]
+        self.order = _axis_order(self.theta, self.phi, None if uniaxial else self.psi)
+
+    def with_media(self, convert: Callable[[Any], AbstractDispersion]) -> Anisotropic:
+        """Return a copy whose principal media are `convert(medium)`."""
+        x, z = convert(self.x), convert(self.z)
+        axis = (self.theta, self.phi)
+        if self.y is None:
+            return Anisotropic(x, z, axis=axis)
+        return Anisotropic(x=x, y=convert(self.y), z=z, axis=(*axis, self.psi))
+
+    @property
+    def is_uniaxial(self) -> bool:
+        """True for a medium of two indices."""
+        return self.y is None
+
+    def index(self, wavelength):
+        """Return a `Principal` where the axes are those of the laboratory, else a `Uniaxial` or `Tensor`."""
+        x, z = self.x.index(wavelength), self.z.index(wavelength)
+        y = x if self.y is None else self.y.index(wavelength)
+        if self.order is not None:
+            return Principal(*((x, y, z)[i] for i in self.order))
+        xp = namespace(self.theta, self.phi, self.psi, wavelength)
+        theta, phi, psi = (xp.deg2rad(angle * 1.0) for angle in (self.theta, self.phi, self.psi))
+        return (
+            uniaxial(x, z, theta, phi)
+            if self.y is None
+            else permittivity(Principal(x, y, z), theta, phi, psi)
+        )
+
+
+def _axis_order(theta: Any, phi: Any, psi: Any) -> tuple[int, int, int] | None:
+    """Return the principal axis along each laboratory axis; None unless the angles are literal right angles.
+
+    `psi` is None for a uniaxial medium. With the optic axis along the normal φ is of no consequence.
+    """
+
+    def quarter_turns(angle: Any) -> int | None:
+        literal = isinstance(angle, int | float) and math.isfinite(angle) and angle % 90 == 0
+        return int(angle // 90) % 2 if literal else None
+
+    tilt, azimuth, twist = (quarter_turns(angle) for angle in (theta, phi, psi))
+    if psi is None:
+        twist = 0
+        if tilt == 0:
+            azimuth = 0
+    if None in (tilt, azimuth, twist):
+        return None
+    axes = [0, 1, 2]
+    for odd, (i, j) in ((twist, (0, 1)), (tilt, (0, 2)), (azimuth, (0, 1))):
+        if odd:
+            axes[i], axes[j] = axes[j], axes[i]
+    return axes[0], axes[1], axes[2]
