@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
 
 import numpy as np
@@ -119,20 +119,6 @@ class SystematicEffect:
 
 
 @dataclass(frozen=True)
-class Rival:
-    """Another minimum: its parameters and how much worse it is, in χ² on the effective points.
-
-    Where the fit has computed them, `probability` is its share of the posterior (see `Fit.probability`), and
-    `stderr` the standard errors of its parameters by the noise alone.
-    """
-
-    parameters: dict[str, float]
-    delta_chi2: float
-    probability: float | None = None
-    stderr: dict[str, float] | None = None
-
-
-@dataclass(frozen=True)
 class Curve:
     """Data and model at each wavelength (nm), and the layer's index with standard errors.
 
@@ -200,6 +186,22 @@ class ColourCurve:
     @property
     def residual(self) -> np.ndarray:
         return self.data - self.model
+
+
+@dataclass(frozen=True)
+class Rival:
+    """Another minimum: its parameters and how much worse it is, in χ² on the effective points.
+
+    Where the fit has computed them, `probability` is its share of the posterior (see `Fit.probability`),
+    `stderr` the standard errors of its parameters by the noise alone, and `curves` the curve of each part of
+    the fit there, whose errors of n and k are undefined.
+    """
+
+    parameters: dict[str, float]
+    delta_chi2: float
+    probability: float | None = None
+    stderr: dict[str, float] | None = None
+    curves: tuple[Curve | ColourCurve | BrdfCurve, ...] = field(default=(), compare=False, repr=False)
 
 
 @dataclass(frozen=True)

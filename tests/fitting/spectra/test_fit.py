@@ -237,7 +237,7 @@ def test_the_record(film, measured):
 
 
 def test_rivals_cost_what_a_fit_there_costs(film, measured):
-    """Δχ² of a rival against a fit that is allowed nothing else."""
+    """Δχ² of a rival against a fit that is allowed nothing else; curves against the closed formula."""
     scene = film()
     data = measured(scene, 480.0, sigma=True)
     fit = pl.fit(data, scene)
@@ -247,6 +247,12 @@ def test_rivals_cost_what_a_fit_there_costs(film, measured):
     expected = (there.chi2_reduced - fit.chi2_reduced) * (128 - 1)
     share = fit.effective_points / 128
     assert rival.delta_chi2 == pytest.approx(expected * share, rel=1e-3)
+    assert len(fit.rivals) > 1
+    for rival in fit.rivals:
+        [curve] = rival.curves
+        exact = pl.reflectance(data.wavelength, rival.parameters["thickness"], 1.46, 3.9 + 0.02j)
+        np.testing.assert_allclose(curve.model, exact, atol=1e-9)
+        np.testing.assert_array_equal(curve.data, data.values)
 
 
 @pytest.mark.slow  # compiles a scene of its own

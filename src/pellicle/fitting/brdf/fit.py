@@ -200,7 +200,7 @@ def _fit(
         status=status,
         verdict=sentence,
         parameters=parameters,
-        rivals=conclusion.rivals,
+        rivals=summary.with_curves(conclusion.rivals, ranked.problem),
         chi2_reduced=ranked.chi2_reduced,
         rms=rms,
         effective_points=sum(part.effective_points for part in parts),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from pellicle.fitting.covariance import Scaled
 from pellicle.fitting.discrepancy import Evidence
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.profile_likelihood import Limits
-from pellicle.fitting.result import BrdfCurve, Estimate, Part
+from pellicle.fitting.result import BrdfCurve, Estimate, Part, Rival
 from pellicle.fitting.reweighting import RankedMinima, ViewFit
 from pellicle.scene.surface import Surface
 
@@ -32,7 +33,7 @@ def parts(samples: list[BrdfSamples], ranked: RankedMinima) -> tuple[Part, ...]:
         Part(
             name=view.name,
             data=each,
-            curve=BrdfCurve(np.asarray(fit.at.model)[: view.rows], view.compared(fit.at)),
+            curve=_curve(view, fit.at),
             plan=view.plan,
             rms=view.rms(fit.at),
             chi2_reduced=fit.chi2 / fit.freedom,
@@ -40,6 +41,22 @@ def parts(samples: list[BrdfSamples], ranked: RankedMinima) -> tuple[Part, ...]:
             sigma_from="given" if view.noise.given else "residuals",
         )
         for each, view, fit in views
+    )
+
+
+def _curve(view: SamplesView, at: Any) -> BrdfCurve:
+    return BrdfCurve(np.asarray(at.model)[: view.rows], view.compared(at))
+
+
+def with_curves(rivals: tuple[Rival, ...], problem: Problem) -> tuple[Rival, ...]:
+    """The rivals with the curve of each set of samples there."""
+    each = [(rival, np.array(list(rival.parameters.values()))) for rival in rivals]
+    return tuple(
+        dataclasses.replace(
+            rival,
+            curves=tuple(_curve(view, view.local(problem.seen_by(view, values))) for view in problem.views),
+        )
+        for rival, values in each
     )
 
 

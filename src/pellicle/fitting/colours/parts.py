@@ -18,7 +18,7 @@ def colours_part(colours: Colours, view: ColoursView, fit: ViewFit, covariance: 
     return Part(
         name=view.name,
         data=colours,
-        curve=_curve(colours, view, fit.at, covariance),
+        curve=colour_curve(colours, view, fit.at, covariance),
         plan=view.plan,
         rms=view.rms(fit.at),
         chi2_reduced=fit.chi2 / fit.freedom,
@@ -27,7 +27,7 @@ def colours_part(colours: Colours, view: ColoursView, fit: ViewFit, covariance: 
     )
 
 
-def _curve(colours: Colours, view: ColoursView, at: Local, covariance: np.ndarray) -> ColourCurve:
+def colour_curve(colours: Colours, view: ColoursView, at: Local, covariance: np.ndarray) -> ColourCurve:
     """Data and model in the space of the data, and the layer's index at the wavelengths of the sensor."""
     bands = slice(len(colours.sensor[0]))
     n_stderr, k_stderr = layer_errors(at, covariance, bands.stop)

@@ -229,7 +229,7 @@ def _fit(
         status=conclusion.status,
         verdict=sentence + backface.sentence(backface.comparison(spectra, ranked)),
         parameters=parameters,
-        rivals=rivals,
+        rivals=parts.with_curves(rivals, each, ranked),
         probability=probability,
         chi2_reduced=ranked.chi2_reduced,
         rms=parts.together(each),

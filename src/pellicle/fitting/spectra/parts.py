@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -10,16 +12,16 @@ from pellicle.data.colours import Colours
 from pellicle.data.ellipsometry_angles import psi_delta
 from pellicle.data.spectrum import Spectrum
 from pellicle.fitting.colours.evidence import accuracy as colours_accuracy
-from pellicle.fitting.colours.parts import colours_part
+from pellicle.fitting.colours.parts import colour_curve, colours_part
 from pellicle.fitting.colours.view import ColoursView
 from pellicle.fitting.covariance import Errors
 from pellicle.fitting.discrepancy import Discrepancy
 from pellicle.fitting.misfit import Accuracy, misfit
-from pellicle.fitting.result import Curve, Part
+from pellicle.fitting.result import ColourCurve, Curve, Part, Rival
 from pellicle.fitting.reweighting import RankedMinima, ViewFit
 from pellicle.fitting.spectra import fringes
 from pellicle.fitting.spectra.layer_errors import layer_errors
-from pellicle.fitting.spectra.view import SpectrumView
+from pellicle.fitting.spectra.view import Local, SpectrumView
 
 LARGEST_POWER, LARGEST_ANGLES = 0.02, 0.02
 """Structure in residuals of R and T, and of N, C and S (0.6° of Ψ), that no calibrated instrument makes."""
@@ -40,7 +42,7 @@ def parts(data: list[Spectrum | Colours], ranked: RankedMinima, errors: Errors) 
         return Part(
             name=view.name,
             data=own,
-            curve=_curve(own, view, fit, covariance),
+            curve=_curve(own, view, fit.at, covariance),
             plan=view.plan,
             rms=view.rms(fit.at.model),
             chi2_reduced=fit.chi2 / fit.freedom,
@@ -75,6 +77,29 @@ def missed(parts: tuple[Part, ...], ranked: RankedMinima, found: Discrepancy) ->
     )
 
 
+def with_curves(
+    rivals: tuple[Rival, ...], parts: tuple[Part, ...], ranked: RankedMinima
+) -> tuple[Rival, ...]:
+    """The rivals with the curve of each part there. The program that computed the parts computes them."""
+
+    def curve(part: Part, view: Any, values: np.ndarray) -> Curve | ColourCurve:
+        at = view.local(ranked.problem.seen_by(view, values))
+        unknown = np.full((len(view.takes), len(view.takes)), np.nan)
+        if isinstance(part.data, Colours):
+            return colour_curve(part.data, view, at, unknown)
+        return _curve(part.spectrum, view, at, unknown)
+
+    views = ranked.problem.views
+    each = [(rival, np.array(list(rival.parameters.values()))) for rival in rivals]
+    return tuple(
+        replace(
+            rival,
+            curves=tuple(curve(part, view, values) for part, view in zip(parts, views, strict=True)),
+        )
+        for rival, values in each
+    )
+
+
 def _accuracy(part: Part, view: SpectrumView | ColoursView) -> Accuracy:
     if isinstance(view, ColoursView):
         return colours_accuracy(view, part.sigma)
@@ -87,9 +112,9 @@ def _accuracy(part: Part, view: SpectrumView | ColoursView) -> Accuracy:
     return Accuracy(LARGEST_POWER if part.spectrum.calibrated else math.inf, float(np.ptp(values)))
 
 
-def _curve(spectrum: Spectrum, view: SpectrumView, fit: ViewFit, covariance: np.ndarray) -> Curve:
+def _curve(spectrum: Spectrum, view: SpectrumView, at: Local, covariance: np.ndarray) -> Curve:
     """Data, model and the layer's index with errors, at the real points."""
-    at, rows = fit.at, view.rows
+    rows = view.rows
     n_stderr, k_stderr = layer_errors(at, covariance, rows)
     n, k = np.asarray(at.layer)[:, :rows]
     data, model = view.in_columns(view.data.values), view.in_columns(at.model)
