@@ -21,7 +21,7 @@ from pellicle.reporting.csv_tables import fit_csv, nk_csv
 from pellicle.reporting.folders import folder_per_file, write_fit, write_summary
 from pellicle.reporting.json_record import failure, one_line, to_json
 
-FILES = ["figure.png", "fit.csv", "nk.csv", "report.txt", "result.json"]
+FILES = ["figure.png", "fit.csv", "nk.csv", "report.html", "report.txt", "result.json"]
 KEYS = (
     "schema data status verdict parameters rivals chi2_reduced rms effective_points correlation"
     " budget plan warnings versions seconds"

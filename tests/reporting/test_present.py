@@ -21,8 +21,8 @@ from pellicle.sampling.predict import Axis, Prediction
 from pellicle.sampling.result import Posterior
 
 FILES = {
-    "fit": {"report.txt", "result.json", "fit.csv", "nk.csv", "figure.png"},
-    "brdf_fit": {"report.txt", "result.json", "fit.csv", "figure.png"},
+    "fit": {"report.html", "report.txt", "result.json", "fit.csv", "nk.csv", "figure.png"},
+    "brdf_fit": {"report.html", "report.txt", "result.json", "fit.csv", "figure.png"},
 }
 
 

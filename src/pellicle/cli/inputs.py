@@ -90,8 +90,12 @@ def inputs(
             result = _by_surface_recipe(files, described, reading)
         else:
             result = _by_recipe(files, described, reading)
-    flags = {name: value for name, value in vars(scene_flags).items() if value is not None}
+    flags, how = (
+        {name: value for name, value in vars(given).items() if value is not None}
+        for given in (scene_flags, reading)
+    )
     described_by = {"flags": flags} if recipe is None else {"recipe": recipe}
+    described_by |= {"reading": how} if how else {}
     result = result._replace(joint=joint or result.joint, described=described_by)
     return result if repeats is None else _as_repeats(result, repeats or result.repeats)
 

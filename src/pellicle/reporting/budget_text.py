@@ -18,19 +18,31 @@ _SMALL = 0.01
 
 def budget(fit: Fit) -> list[str]:
     """Budget of the leading parameter: what each systematic effect, at its standard uncertainty, changes."""
-    lead = next(iter(fit.free), None)
-    if lead is None or not fit.budget or not math.isfinite(lead.stderr):
+    lead, lines = next(iter(fit.free), None), rows(fit)
+    if lead is None or not lines:
         return []
-    rows = [row for row in fit.budget if abs(row.changes[lead.name]) > _SMALL * lead.stderr]
-    unit = f" {lead.unit}" if lead.unit else ""
-    lines = [("noise and residuals (type A)", "", f"{lead.stderr_noise:.2g}{unit}")]
-    lines += [(row.name, _size(row), f"{abs(row.changes[lead.name]):.2g}{unit}") for row in rows[:_SHOWN]]
-    smaller = len(fit.budget) - len(rows[:_SHOWN])
+    smaller = len(fit.budget) + 1 - len(lines)
     return [
         *wrapped(f"{lead.name}: standard uncertainties, and what each alone would change"),
         *table(lines),
         *([f"{INDENT}... and {smaller} smaller in the JSON"] if smaller else []),
-        *wrapped(_together(lead, unit)),
+        *wrapped(together(lead)),
+    ]
+
+
+def rows(fit: Fit) -> list[tuple[str, str, str]]:
+    """Name, standard uncertainty and change of the leading parameter, of noise and of each larger effect.
+
+    Empty where the leading parameter has no finite error.
+    """
+    lead = next(iter(fit.free), None)
+    if lead is None or not fit.budget or not math.isfinite(lead.stderr):
+        return []
+    unit = f" {lead.unit}" if lead.unit else ""
+    larger = [row for row in fit.budget if abs(row.changes[lead.name]) > _SMALL * lead.stderr]
+    return [
+        ("noise and residuals (type A)", "", f"{lead.stderr_noise:.2g}{unit}"),
+        *((row.name, _size(row), f"{abs(row.changes[lead.name]):.2g}{unit}") for row in larger[:_SHOWN]),
     ]
 
 
@@ -38,7 +50,9 @@ def _size(row: SystematicEffect) -> str:
     return f"{row.uncertainty:.3g} {row.unit}" if row.unit else f"{100 * row.uncertainty:.3g} %"
 
 
-def _together(lead: Estimate, unit: str) -> str:
+def together(lead: Estimate) -> str:
+    """The combined and the expanded uncertainty of the leading parameter."""
+    unit = f" {lead.unit}" if lead.unit else ""
     freedom = lead.effective_degrees_of_freedom
     of = f", {freedom:.3g} degrees of freedom" if freedom < 100 else ""
     return (

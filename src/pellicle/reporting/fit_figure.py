@@ -58,7 +58,7 @@ def draw(fit: Fit) -> Figure:
     panels = [panel for part in fit.parts for panel in _panels_of_data(part)]
     if fit.profile is not None and fit.profile.thickness.size > 1:
         panels.append(_Panel(partial(_misfit, fit=fit), 1.9, lines_above=1))
-    if _index_is_free(fit):
+    if index_is_free(fit):
         panels.append(_Panel(partial(_index, fit=fit), 1.5))
     figure = new_figure(WIDTH_INCHES, 1.0, constrained=False)
     rows = figure.subplots(len(panels), 1, squeeze=False)[:, 0]
@@ -121,13 +121,13 @@ def _panels_of_data(part: Part) -> list[_Panel]:
 
 
 def _title(fit: Fit) -> str:
-    name = " and ".join(name for name in _file_names(fit) if name)
+    name = " and ".join(name for name in file_names(fit) if name)
     verdict = textwrap.wrap(fit.verdict.replace(" ± ", "\u00a0±\u00a0"), 108, break_on_hyphens=False)
     text = "\n".join([f"{textwrap.shorten(name, 70) or 'fit'}: {fit.status}", *verdict])
     return text.replace("$", r"\$")  # no mathematics in a file's name
 
 
-def _file_names(fit: Fit) -> list[str]:
+def file_names(fit: Fit) -> list[str]:
     """Each file without its folder, and the names of its spectra: `film.dat [psi-delta, Rp]`."""
     files: list[tuple[str, list[str]]] = []
     for part in fit.parts:
@@ -142,7 +142,7 @@ def _file_names(fit: Fit) -> list[str]:
     ]
 
 
-def _series(part: Part) -> list[np.ndarray]:
+def series(part: Part) -> list[np.ndarray]:
     """Indices of the points that one line joins: of one angle of incidence, without a wide gap."""
     nm, angle = part.spectral.wavelength, part.spectrum.angle
     series = []
@@ -158,7 +158,7 @@ def _data(axes: Axes, part: Part) -> None:
     curve, data = part.spectral, part.spectrum
     size = marker_size(curve.wavelength.size)
     axes.plot(curve.wavelength, curve.data, ".", color=GREY, markersize=size, label="data")
-    for i, line in enumerate(_series(part)):
+    for i, line in enumerate(series(part)):
         axes.plot(curve.wavelength[line], curve.model[line], **FITTED, label="_" if i else "fit")
     kind = _SIGNALS.get(data.signal) or str(data.signal)
     axes.set_ylabel(kind if data.calibrated else f"{kind} × unknown scale")
@@ -169,7 +169,7 @@ def _data(axes: Axes, part: Part) -> None:
 
 def _residuals(axes: Axes, part: Part) -> None:
     curve = part.spectral
-    for i, line in enumerate(_series(part)):
+    for i, line in enumerate(series(part)):
         nm, sigma = curve.wavelength[line], curve.sigma[line]
         axes.fill_between(nm, -sigma, sigma, color=BLUE, alpha=0.2, lw=0, label="_" if i else "±σ")
         axes.plot(nm, curve.residual[line], color=BLACK, linewidth=0.8)
@@ -181,9 +181,9 @@ def _residuals(axes: Axes, part: Part) -> None:
 def _misfit(axes: Axes, fit: Fit) -> None:
     """Δχ² against thickness, logarithmic above the threshold that calls a fit ambiguous."""
     assert fit.profile is not None
-    minima = _minima(fit)
-    thickness, misfit = _completed(fit.profile, minima)
-    left, right = _span(thickness, misfit)
+    minima = minima_of(fit)
+    thickness, misfit = completed(fit.profile, minima)
+    left, right = span(thickness, misfit)
     axes.plot(thickness, misfit, color=GREY, linewidth=0.9)
     axes.axhline(RIVAL, color=BLUE, linewidth=0.8, linestyle=":", label=f"ambiguous below {RIVAL:g}")
     if minima:
@@ -198,7 +198,7 @@ def _misfit(axes: Axes, fit: Fit) -> None:
     axes.legend(**ABOVE, ncols=3)
 
 
-def _minima(fit: Fit) -> list[tuple[float, float]]:
+def minima_of(fit: Fit) -> list[tuple[float, float]]:
     """(thickness, Δχ²) of the best fit and its rivals, the best first."""
     name = next((p.name for p in fit.free if p.name.split(".")[-1] == "thickness"), None)
     if name is None:
@@ -207,7 +207,7 @@ def _minima(fit: Fit) -> list[tuple[float, float]]:
     return [(fit[name].value, 0.0), *sorted(rivals, key=lambda rival: rival[1])]
 
 
-def _completed(profile: Profile, minima: list[tuple[float, float]]) -> tuple[np.ndarray, np.ndarray]:
+def completed(profile: Profile, minima: list[tuple[float, float]]) -> tuple[np.ndarray, np.ndarray]:
     """The scan with the minima added that lie below it: its grid seldom includes the very minimum."""
     thickness, misfit = profile.thickness, np.maximum(profile.delta_chi2, 0.0)
     below = [(t, delta) for t, delta in minima if delta < np.interp(t, thickness, misfit)]
@@ -216,7 +216,7 @@ def _completed(profile: Profile, minima: list[tuple[float, float]]) -> tuple[np.
     return thickness[order], np.concatenate([misfit, [delta for _, delta in below]])[order]
 
 
-def _span(thickness: np.ndarray, misfit: np.ndarray) -> tuple[float, float]:
+def span(thickness: np.ndarray, misfit: np.ndarray) -> tuple[float, float]:
     """Range of thickness to show: ends whose misfit is hopeless are cut."""
     shown = thickness[misfit < HOPELESS] if np.any(misfit < HOPELESS) else thickness
     margin = 0.03 * float(np.ptp(shown)) or 1.0
@@ -247,7 +247,7 @@ def _scale(axes: Axes, misfit: np.ndarray, minima: list[tuple[float, float]]) ->
     axes.set_ylim(-2, ceiling)
 
 
-def _index_is_free(fit: Fit) -> bool:
+def index_is_free(fit: Fit) -> bool:
     several = fit.index.wavelength.size > 1 or not all(_ellipsometric(part) for part in fit.parts)
     return several and bool(np.any(fit.index.n_stderr > 0) or np.any(fit.index.k_stderr > 0))
 

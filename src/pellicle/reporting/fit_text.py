@@ -49,8 +49,8 @@ def report(fit: Fit, posterior: Posterior | None = None) -> str:
     """Format a fit, and its posterior if there is one, as text of at most 100 columns."""
     blocks = [
         ("Verdict", _verdict(fit)),
-        ("With and without a layer", _layer_test(fit)),
-        ("Fit statistics", _statistics(fit)),
+        ("With and without a layer", facts(layer_test_rows(fit))),
+        ("Fit statistics", facts(statistic_rows(fit))),
         ("Parameters", parameter_text.parameters(fit)),
         ("Uncertainty budget", budget_text.budget(fit)),
         (f"Correlations above {LEAST_CORRELATION:g}", parameter_text.correlations(fit)),
@@ -76,7 +76,7 @@ def _verdict(fit: Fit) -> list[str]:
         room = COLUMNS - 2 * len(INDENT) - len("status")
         short = path if len(path) <= room else "…" + path[1 - room :]
         rows += [("file", short)] if path else []
-        rows.append((part.name or "data", _data(part)))
+        rows.append((part.name or "data", data_in_words(part)))
     if fit.layer_test:
         rows.append(("model", fit.surface.model))
     return [*wrapped(fit.verdict), *facts(rows)]
@@ -94,7 +94,7 @@ def _spectrum(part: Part) -> str:
     return text + _independent(part, nm.size, "")
 
 
-def _data(part: Part) -> str:
+def data_in_words(part: Part) -> str:
     """Kind, number and range of the data of a part."""
     match part.curve:
         case Curve():
@@ -125,17 +125,18 @@ def _range(values: np.ndarray, unit: str) -> str:
     return f" from {lo:g} to {hi:g} {unit}" if lo < hi else f" at {lo:g} {unit}"
 
 
-def _layer_test(fit: Fit) -> list[str]:
+def layer_test_rows(fit: Fit) -> list[tuple[str, str]]:
     """Errors on held-out BRDF samples: of the surface, and of models without a layer."""
     test = fit.layer_test
     if test is None:
         return []
     errors = [(b.name, f"{b.held_out:.4g}") for b in test.baselines]
     head = ("held-out error", "of a fit to four fifths of the samples")
-    return facts([head, ("this surface", f"{test.held_out:.4g}"), *errors])
+    return [head, ("this surface", f"{test.held_out:.4g}"), *errors]
 
 
-def _statistics(fit: Fit) -> list[str]:
+def statistic_rows(fit: Fit) -> list[tuple[str, str]]:
+    """Labels and texts of residuals, noise, reduced χ² and time."""
     rows = []
     if fit.layer_test:
         over = "" if fit.parts[0].data.sigma is None else " over sigma"
@@ -143,7 +144,7 @@ def _statistics(fit: Fit) -> list[str]:
     for part in fit.parts:
         rows += [*_residuals(part), *_sweeps(part, len(fit.free))]
     chi2 = ("reduced chi-square", f"{fit.chi2_reduced:.4g}")
-    return facts([*rows, chi2, ("seconds", f"{fit.seconds:.2f}")])
+    return [*rows, chi2, ("seconds", f"{fit.seconds:.2f}")]
 
 
 def _residuals(part: Part) -> list[tuple[str, str]]:

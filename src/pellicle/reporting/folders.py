@@ -24,6 +24,7 @@ INDEX_SCHEMA = "pellicle.fits/1"
 CHAIN_SCHEMA = "pellicle.chain/1"
 CHAIN = "chain.h5"
 REPORT = "report.txt"
+PAGE = "report.html"
 SUMMARY = "summary.csv"
 FINGERPRINT = "fingerprint"
 """Key of result.json that only a folder with all its files has."""
@@ -40,9 +41,9 @@ def write_fit(
 ) -> Path:
     """Write a fit, and its posterior if there is one, into a folder.
 
-    A fit has result.json, report.txt, fit.csv, figure.png and, of films, nk.csv; a posterior adds
-    posterior.nc, corner.png and predictive.png. Each file appears complete or not at all; files of an earlier
-    result are replaced. A `fingerprint` of what was fitted is added to result.json when all files are
+    A fit has result.json, report.txt, report.html, fit.csv, figure.png and, of films, nk.csv; a posterior
+    adds posterior.nc, corner.png and predictive.png. Each file appears complete or not at all; files of an
+    earlier result are replaced. A `fingerprint` of what was fitted is added to result.json when all files are
     written. `described` is what the scene was built from, a recipe or flags.
 
     **Returns:** the folder.
@@ -53,6 +54,8 @@ def write_fit(
     from pellicle.reporting.drawing import save_figure
     from pellicle.reporting.fit_figure import draw
     from pellicle.reporting.fit_text import report
+    from pellicle.reporting.page.fit_page import fit_page
+    from pellicle.reporting.page.repetition import repetition
 
     target = new_folder(folder)
     record = to_json(fit, posterior)
@@ -64,6 +67,7 @@ def write_fit(
     if fit.layer_test is None:
         write_text(target / "nk.csv", nk_csv(fit), overwrite=True)
     save_figure(draw(fit), target / "figure.png", overwrite=True)
+    pictures = {}
     if posterior is not None:
         from pellicle.reporting.netcdf import write_netcdf
         from pellicle.reporting.posterior import corner_figure, predictive_figure
@@ -72,6 +76,10 @@ def write_fit(
         write_netcdf(target / "posterior.nc", posterior, predictions, overwrite=True)
         save_figure(corner_figure(posterior), target / "corner.png", overwrite=True, bbox_inches="tight")
         save_figure(predictive_figure(predictions), target / "predictive.png", overwrite=True)
+        pictures = {name: (target / f"{name}.png").read_bytes() for name in ("corner", "predictive")}
+    image = (target / "figure.png").read_bytes()
+    text = fit_page(fit, image, posterior, pictures, repetition(fit, described))
+    write_text(target / PAGE, text, overwrite=True)
     if fingerprint:
         write_text(target / MARKER, indented(record | {FINGERPRINT: fingerprint}), overwrite=True)
     return target

@@ -25,14 +25,18 @@ def parameters(fit: Fit) -> list[str]:
     """One line for each, the free ones first: name, value ± error or limit, unit and bounds."""
     width = max((len(name) for name in fit.parameters), default=0) + 1
     rows = [
-        (f"{p.name + ':':<{width}}", _free(p) if p.free else f"{p.value:.6g}{_unit(p)} (fixed)", _bounds(p))
+        (
+            f"{p.name + ':':<{width}}",
+            value_in_words(p) if p.free else f"{p.value:.6g}{_unit(p)} (fixed)",
+            bounds_in_words(p),
+        )
         for p in sorted(fit.parameters.values(), key=lambda p: not p.free)
     ]
     middle = max((len(value) for _, value, bounds in rows if bounds), default=0)
     return [f"{INDENT}{name}  {value:<{middle}}  {bounds}".rstrip() for name, value, bounds in rows]
 
 
-def _free(p: Estimate) -> str:
+def value_in_words(p: Estimate) -> str:
     """`751.66 ± 0.12 nm (0.016 %)`, with its standard error, or the best value and its limits where that is
     infinite."""
     sides = (("at least", p.lower_limit), ("at most", p.upper_limit))
@@ -49,7 +53,8 @@ def _unit(p: Estimate) -> str:
     return f" {p.unit}" if p.unit else ""
 
 
-def _bounds(p: Estimate) -> str:
+def bounds_in_words(p: Estimate) -> str:
+    """`[10, 3000]`, and the bound on which the value rests."""
     if not p.free or not (math.isfinite(p.lower) and math.isfinite(p.upper)):
         return ""
     bounds = f"[{p.lower:g}, {p.upper:g}]"

@@ -49,8 +49,8 @@ def residuals(axes: Axes, part: Part) -> None:
     x, label = abscissa(part)
     of_psi: dict[str, Any] = {"color": BLACK, "linewidth": 0.9, "marker": ".", "markersize": 2}
     of_delta: dict[str, Any] = of_psi | {"color": BLUE, "linestyle": "--"}
-    for i, (line, _) in enumerate(_lines(part)):
-        for points in _unbroken(x, part.spectral.residual, line, turns=False):
+    for i, (line, _) in enumerate(lines_of(part)):
+        for points in unbroken(x, part.spectral.residual, line, turns=False):
             hidden = "_" if i or points[0] != line[0] else ""
             axes.plot(x[points], part.spectral.residual[points], **of_psi, label=hidden or "Ψ")
             axes.plot(x[points], part.spectral.delta_residual[points], **of_delta, label=hidden or "Δ")
@@ -71,7 +71,7 @@ def _sweeps_angle(part: Part) -> bool:
     return np.unique(part.spectral.wavelength).size == 1 and angle is not None and np.unique(angle).size > 1
 
 
-def _lines(part: Part) -> list[tuple[np.ndarray, float | None]]:
+def lines_of(part: Part) -> list[tuple[np.ndarray, float | None]]:
     """Indices of the points of each line in rising order, and its angle, None if there is one line."""
     x, _ = abscissa(part)
     angle = part.spectrum.angle
@@ -84,18 +84,18 @@ def _lines(part: Part) -> list[tuple[np.ndarray, float | None]]:
 def _pair(axes: Axes, part: Part, data: np.ndarray, model: np.ndarray, turns: bool = False) -> None:
     x, _ = abscissa(part)
     axes.plot(x, data, ".", color=GREY, markersize=marker_size(x.size), label="data")
-    lines = _lines(part)
+    lines = lines_of(part)
     for i, (points, angle) in enumerate(lines):
         color, style = _COLOURS[i % len(_COLOURS)], _DASHES[i // len(_COLOURS) % len(_DASHES)]
         name = "fit" if angle is None else f"fit, {angle:g}°"
-        for j, stroke in enumerate(_unbroken(x, model, points, turns)):
+        for j, stroke in enumerate(unbroken(x, model, points, turns)):
             label = "_" if j or len(lines) > MOST_NAMED else name
             axes.plot(x[stroke], model[stroke], **{**FITTED, "color": color}, linestyle=style, label=label)
     axes.tick_params(labelbottom=False)
     axes.margins(x=0.01)
 
 
-def _unbroken(x: np.ndarray, y: np.ndarray, points: np.ndarray, turns: bool) -> list[np.ndarray]:
+def unbroken(x: np.ndarray, y: np.ndarray, points: np.ndarray, turns: bool) -> list[np.ndarray]:
     """Indices of the points of each stroke, split at wide gaps and, in Δ, where it passes 360 degrees."""
     steps = np.diff(x[points])
     broken = steps > GAP * np.median(steps) if steps.size else np.zeros(0, dtype=bool)

@@ -1,0 +1,345 @@
+"""Interactive figures of a fit: data, model and residuals of each part; misfit against thickness; n and k."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pellicle.fitting.result import BrdfCurve, ColourCurve, Curve
+from pellicle.fitting.status import RIVAL
+from pellicle.reporting import brdf_figure, fit_figure, fitted_colours, psi_delta
+from pellicle.reporting.page.figure import (
+    Column,
+    Panel,
+    Trace,
+    band,
+    figure,
+    line,
+    markers,
+    numbers,
+    thinning,
+)
+
+if TYPE_CHECKING:
+    from pellicle.fitting.result import Fit, Part, Rival
+
+_CHANNELS = "var(--red)", "var(--green)", "var(--blue)", "var(--fourth)"
+_LINES = "var(--fit)", "var(--index-n)", "var(--green)", "var(--fourth)"
+_SIGNALS = {"R": "reflectance", "T": "transmittance"}
+_PROFILE_POINTS = 1500
+"""Ranges of thickness of which the least and the largest misfit are drawn: a scan may have 400 000 points."""
+_LINEAR = 0.8
+"""Height of the linear part of the axis of misfits, in decades."""
+
+
+def label(rival: Rival, fit: Fit) -> str:
+    """`thickness 242.87 nm`: the first free parameter of a rival."""
+    name, value = next(iter(rival.parameters.items()))
+    unit = fit.parameters[name].unit if name in fit.parameters else ""
+    return f"{name} {value:.5g} {unit}".rstrip()
+
+
+def of_part(fit: Fit, number: int) -> dict[str, Any]:
+    """Data, model and residuals of one part, with those of rivals."""
+    part = fit.parts[number]
+    kind = type(part.curve)
+    abscissa, panels, columns, axis = _KINDS[kind](part)
+    rivals = []
+    for rival in fit.rivals:
+        if number < len(rival.curves):
+            own = replace(part, curve=rival.curves[number])
+            rivals.append((f"rival: {escape(label(rival, fit))}", _KINDS[kind](own)[1]))
+    caption = _caption(part)
+    return figure(f"data-{number}", caption, abscissa, panels, columns, rivals, axis)
+
+
+def _caption(part: Part) -> str:
+    name = f"{part.name}: " if part.name else ""
+    size = part.samples.values.size if isinstance(part.curve, BrdfCurve) else 0
+    step = thinning(size) if size else thinning(len(getattr(part.curve, "wavelength", ())))
+    thinned = f" One point of {step} is drawn; the CSV file has them all." if step > 1 else ""
+    unit = " degrees" if isinstance(part.curve, Curve) and part.curve.delta_data is not None else ""
+    return f"{name}data, fit and residuals (data − fit). The rms residual is {part.rms:.3g}{unit}.{thinned}"
+
+
+_Drawn = tuple[str, list[Panel], list[Column], dict[str, Any]]
+
+
+def _spectrum(part: Part) -> _Drawn:
+    curve = part.spectral
+    if curve.delta_data is not None:
+        return _psi_delta(part)
+    nm, strokes, data = curve.wavelength, fit_figure.series(part), part.spectrum
+    kind = _SIGNALS.get(data.signal) or str(data.signal)
+    every = np.argsort(nm, kind="stable")[:: thinning(nm.size)]
+    panels = [
+        Panel(
+            kind if data.calibrated else f"{kind} × unknown scale",
+            300,
+            [markers(nm[every], curve.data[every], "data", "var(--data)")],
+            [line(nm, curve.model, strokes, "fit", "var(--fit)")],
+        ),
+        Panel(
+            "data − fit",
+            130,
+            [
+                {
+                    **band(nm[own], -curve.sigma[own], curve.sigma[own], "±σ", "var(--band)"),
+                    "showlegend": not i,
+                }
+                for i, own in enumerate(strokes)
+            ],
+            [line(nm, curve.residual, strokes, "residual", "var(--data)") | {"showlegend": False}],
+        ),
+    ]
+    columns = [
+        Column("wavelength (nm)", nm[every]),
+        *([] if data.angle is None else [Column("angle (degrees)", data.angle[every])]),
+        Column("data", curve.data[every]),
+        Column("fit", curve.model[every]),
+        Column("residual", curve.residual[every]),
+        Column("sigma", curve.sigma[every]),
+    ]
+    return "wavelength (nm)", panels, columns, {}
+
+
+def _psi_delta(part: Part) -> _Drawn:
+    curve = part.spectral
+    assert curve.delta_data is not None
+    assert curve.delta_model is not None
+    x, abscissa = psi_delta.abscissa(part)
+    quantities = [
+        ("Ψ (degrees)", curve.data, curve.model, False),
+        ("Δ (degrees)", curve.delta_data, curve.delta_model, True),
+    ]
+    if curve.depolarisation_data is not None and curve.depolarisation_model is not None:
+        quantities.append(("depolarisation", curve.depolarisation_data, curve.depolarisation_model, False))
+    lines = psi_delta.lines_of(part)
+    panels = []
+    for number, (title, data, model, turns) in enumerate(quantities):
+        of_model = []
+        for i, (points, angle) in enumerate(lines):
+            name = "fit" if angle is None else f"fit, {angle:g}°"
+            strokes = psi_delta.unbroken(x, model, points, turns)
+            trace = line(x, model, strokes, name, _LINES[i % len(_LINES)])
+            of_model.append(trace | {"showlegend": not number})
+        of_data = markers(x, data, "data", "var(--data)") | {"showlegend": not number}
+        panels.append(Panel(title, 190, [of_data], of_model))
+    residuals: list[Trace] = []
+    for points, _ in lines:
+        for name, values, colour in (
+            ("residual of Ψ", curve.residual, "var(--data)"),
+            ("residual of Δ", curve.delta_residual, "var(--fourth)"),
+        ):
+            strokes = psi_delta.unbroken(x, values, points, False)
+            residuals.append(line(x, values, strokes, name, colour) | {"showlegend": False})
+    panels.append(Panel("data − fit (degrees)", 130, [], residuals))
+    order = np.argsort(x, kind="stable")[:: thinning(x.size)]
+    columns = [Column(abscissa, x[order])]
+    if part.spectrum.angle is not None and abscissa.startswith("wavelength"):
+        columns.append(Column("angle (degrees)", part.spectrum.angle[order]))
+    for title, data, model, _ in quantities:
+        columns += [Column(title, data[order]), Column(f"fit of {title}", model[order])]
+    return abscissa, panels, columns, {}
+
+
+def _samples(part: Part) -> _Drawn:
+    samples, model = part.samples, part.curve.model
+    angle = brdf_figure.half_angle(samples)
+    order = np.argsort(angle, kind="stable")[:: thinning(samples.values.size)]
+    one = 1.0 if samples.sigma is None else samples.sigma
+    residual = (samples.values - model) / one
+    data, fitted, missed = [], [], []
+    for c, name in enumerate(samples.channels):
+        colour = _CHANNELS[c % len(_CHANNELS)]
+        own = f" {escape(name)}"
+        data.append(markers(angle[order], samples.values[order, c], f"data{own}", colour, "circle-open"))
+        fitted.append(markers(angle[order], model[order, c], f"fit{own}", colour, "x-thin-open"))
+        missed.append(markers(angle[order], residual[order, c], own, colour) | {"showlegend": False})
+    positive = min(samples.values.min(), model.min()) > 0
+    panels = [
+        Panel("BRDF (1/sr)", 320, data, fitted, {"type": "log"} if positive else {}),
+        Panel("residual (1/sr)" if samples.sigma is None else "residual / σ", 140, [], missed),
+    ]
+    columns = [Column("half angle (degrees)", angle[order])]
+    for c, name in enumerate(samples.channels):
+        columns += [Column(name, samples.values[order, c]), Column(f"fit of {name}", model[order, c])]
+    return "half angle (degrees)", panels, columns, {}
+
+
+def _colours(part: Part) -> _Drawn:
+    data, curve = fitted_colours.colours_of(part)
+    at = np.arange(1.0, len(data) + 1) if data.angle is None else data.angle
+    abscissa = "number of the colour" if data.angle is None else "angle of incidence (degrees)"
+    measured, fitted, missed = [], [], []
+    for c, name in enumerate(data.channels):
+        colour = _CHANNELS[c]
+        measured.append(markers(at, curve.data[:, c], f"data {name}", colour))
+        fitted.append(markers(at, curve.model[:, c], f"fit {name}", colour, "x-thin-open"))
+        scaled = curve.residual[:, c] / curve.sigma[:, c]
+        missed.append(markers(at, scaled, name, colour) | {"showlegend": False})
+    panels = [
+        Panel(f"{data.space}", 240, measured, fitted),
+        Panel("(data − fit) / σ", 130, [], missed),
+    ]
+    columns = [Column(abscissa, at)]
+    for c, name in enumerate(data.channels):
+        columns += [Column(name, curve.data[:, c]), Column(f"fit of {name}", curve.model[:, c])]
+    return abscissa, panels, columns, {}
+
+
+_KINDS = {Curve: _spectrum, BrdfCurve: _samples, ColourCurve: _colours}
+"""Panels of a part, by the kind of its curve."""
+
+
+def of_misfit(fit: Fit) -> dict[str, Any] | None:
+    """Δχ² against thickness with the minima; None where no thickness was scanned."""
+    if fit.profile is None or fit.profile.thickness.size < 2:
+        return None
+    minima = fit_figure.minima_of(fit)
+    thickness, misfit = fit_figure.completed(fit.profile, minima)
+    left, right = fit_figure.span(thickness, misfit)
+    shown = (thickness >= left) & (thickness <= right)
+    x, y = _envelope(thickness[shown], misfit[shown])
+    scan = {
+        **line(x, _height(y), [np.arange(len(x))], "misfit", "var(--data)"),
+        "text": [f"{value:.4g}" for value in y],
+        "hovertemplate": "%{x:.5g} nm: Δχ² %{text}<extra></extra>",
+    }
+    limit = {
+        "type": "scatter",
+        "mode": "lines",
+        "name": f"ambiguous below {RIVAL:g}",
+        "x": [left, right],
+        "y": numbers(_height(np.array([RIVAL, RIVAL]))),
+        "line": {"color": "var(--fourth)", "width": 1, "dash": "dot"},
+        "hoverinfo": "skip",
+    }
+    traces = [scan, limit]
+    if minima:
+        traces.append(
+            _points([minima[0]], "best", "circle", "var(--fit)", ["best fit: show it alone"], [None])
+        )
+    found = [(i, rival) for i, rival in enumerate(fit.rivals) if minima and _depth(fit) in rival.parameters]
+    if found:
+        places = [(rival.parameters[_depth(fit)], rival.delta_chi2) for _, rival in found]
+        numbered = [i if rival.curves else None for i, rival in found]
+        traces.append(
+            _points(
+                places, "rivals", "diamond", "var(--rival)", ["click to see its curve"] * len(found), numbered
+            )
+        )
+    decades = np.arange(2, 9)
+    axis = {
+        "tickvals": numbers(_height(np.array([0.0, RIVAL, *10.0**decades]))),
+        "ticktext": [
+            "0",
+            f"{RIVAL:g}",
+            *(f"{10 ** int(i)}" if i < 5 else f"10<sup>{i}</sup>" for i in decades),
+        ],
+        "zeroline": False,
+    }
+    rivals = [(f"rival: {escape(label(rival, fit))}", [_highlight(rival, fit)]) for rival in fit.rivals]
+    columns = [
+        Column("thickness (nm)", [place for place, _ in minima]),
+        Column("misfit", [delta for _, delta in minima]),
+    ]
+    caption = (
+        f"Misfit Δχ² against thickness, searched from {thickness.min():.5g} to {thickness.max():.5g} nm,"
+        f" linear below {RIVAL:g} and logarithmic above. Its minima are the best fit and {len(found)} rivals."
+    )
+    panel = Panel("misfit Δχ²", 260, traces, [], axis)
+    drawn = figure("misfit", caption, "thickness (nm)", [panel], columns, rivals, {"range": [left, right]})
+    drawn["layout"]["hovermode"] = "closest"
+    return drawn
+
+
+def _depth(fit: Fit) -> str:
+    """Name of the thickness of `fit_figure.minima_of`."""
+    return next(p.name for p in fit.free if p.name.split(".")[-1] == "thickness")
+
+
+def _highlight(rival: Rival, fit: Fit) -> Panel:
+    """A ring around a rival's minimum."""
+    name = next((p.name for p in fit.free if p.name.split(".")[-1] == "thickness"), None)
+    if name not in rival.parameters:
+        return Panel("", 1, [], [])
+    at, height = np.array([rival.parameters[name]]), _height(np.array([rival.delta_chi2]))
+    ring = markers(at, height, "", "var(--rival)")
+    return Panel("", 1, [], [ring | {"marker": {"size": 18, "line": {"width": 3}}, "hoverinfo": "skip"}])
+
+
+def _points(
+    places: list[tuple[float, float]],
+    name: str,
+    symbol: str,
+    colour: str,
+    hints: list[str],
+    rivals: list[int | None],
+) -> Trace:
+    x, y = np.transpose(places)
+    texts = [
+        f"{at:.5g} nm: Δχ² {delta:.3g}<br>{hint}" for (at, delta), hint in zip(places, hints, strict=True)
+    ]
+    return {
+        **markers(x, _height(y), name, colour, symbol),
+        "marker": {"color": colour, "symbol": symbol, "size": 11},
+        "text": texts,
+        "hovertemplate": "%{text}<extra></extra>",
+        "customdata": [{"rival": rival} for rival in rivals],
+    }
+
+
+def _height(misfit: np.ndarray) -> np.ndarray:
+    """Place of a misfit on an axis that is linear below the threshold of rivals and logarithmic above."""
+    above = np.maximum(misfit, RIVAL)
+    return np.where(misfit > RIVAL, _LINEAR + np.log10(above / RIVAL), _LINEAR * misfit / RIVAL)
+
+
+def _envelope(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The least and the largest value of each range of positions, where there are many points."""
+    if len(x) <= 2 * _PROFILE_POINTS:
+        return x, y
+    groups = np.array_split(np.arange(len(x)), _PROFILE_POINTS)
+    kept = sorted({int(group[pick(y[group])]) for group in groups for pick in (np.argmin, np.argmax)})
+    return x[kept], y[kept]
+
+
+def of_index(fit: Fit) -> dict[str, Any] | None:
+    """n and k of the layer with the bands of their standard errors; None where both are known."""
+    if fit.layer_test is not None or not fit_figure.index_is_free(fit):
+        return None
+    curve = fit.index
+    panels = _index_panels(curve, errors=True)
+    size = len(curve.wavelength)
+    rivals = []
+    for rival in fit.rivals:
+        own = replace(
+            fit, parts=tuple(replace(p, curve=c) for p, c in zip(fit.parts, rival.curves, strict=False))
+        )
+        panel = _index_panels(own.index, errors=False)[: len(panels)] if rival.curves else []
+        rivals.append((f"rival: {escape(label(rival, fit))}", panel))
+    columns = [Column("wavelength (nm)", curve.wavelength)]
+    for name in ("n", "k"):
+        columns += [
+            Column(name, getattr(curve, name)),
+            Column(f"error of {name}", getattr(curve, f"{name}_stderr")),
+        ]
+    caption = f"n and k of the layer at {size} wavelengths, with bands of ± one standard error."
+    return figure("index", caption, "wavelength (nm)", panels, columns, rivals)
+
+
+def _index_panels(curve: Any, errors: bool) -> list[Panel]:
+    panels, nm = [], curve.wavelength
+    absorbs = bool(np.any(curve.k) or np.any(curve.k_stderr > 0))
+    for name, height in (("n", 180), ("k", 180))[: 1 + absorbs]:
+        value, stderr = getattr(curve, name), getattr(curve, f"{name}_stderr")
+        bands = []
+        if errors:
+            bands = [band(nm, value - stderr, value + stderr, f"± error of {name}", f"var(--band-{name})")]
+        whole = [np.arange(len(nm))]
+        panels.append(Panel(name, height, bands, [line(nm, value, whole, name, f"var(--index-{name})")]))
+    return panels
