@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from pellicle.data import mueller
 from pellicle.data.read_ellipsometry import (
     SIGNAL,
     EllipsometryColumns,
     ellipsometry_columns,
     has_ellipsometry,
 )
+from pellicle.data.read_mueller import MuellerColumns, has_mueller, mueller_columns
 from pellicle.data.tabular.column_selection import SpectrumColumns, signal_columns
 from pellicle.data.tabular.columns import DIRECTIONS, SIGNALS, listed
 from pellicle.data.tabular.named_columns import named_columns
@@ -19,20 +21,25 @@ from pellicle.errors import DataError, UsageError
 
 ALL = "all"
 _MOST_LISTED = 40
+_ELLIPSOMETRY = {SIGNAL: "psi and delta", mueller.SIGNAL: "Mueller elements"}
 
 
 class Candidate(NamedTuple):
     """A spectrum of a file: its table and columns, and its name, signal and polarisation."""
 
     table: Table
-    columns: SpectrumColumns | EllipsometryColumns
+    columns: SpectrumColumns | EllipsometryColumns | MuellerColumns
     name: str
     signal: str
     polarisation: str | None
 
 
 def candidates(
-    table: Table, columns: str | Sequence[str] | None, signal: str | None, polarisation: str | None
+    table: Table,
+    columns: str | Sequence[str] | None,
+    signal: str | None,
+    polarisation: str | None,
+    elements: Sequence[str] | None = None,
 ) -> list[Candidate]:
     """Find the spectra of a table; arguments as in `read_spectrum`.
 
@@ -46,7 +53,13 @@ def candidates(
         )
     own = table.layout.name
     found = []
-    if signal == SIGNAL or (signal is None and has_ellipsometry(named)):
+    wanted = signal == mueller.SIGNAL or (signal is None and elements is not None)
+    if wanted or (signal is None and has_mueller(named) and not has_ellipsometry(named)):
+        chosen = mueller_columns(table, named, elements)
+        found.append(Candidate(table, chosen, own or mueller.SIGNAL, mueller.SIGNAL, None))
+        if wanted or not any(column.role in SIGNALS for column in named or ()):
+            return found
+    elif signal == SIGNAL or (signal is None and has_ellipsometry(named)):
         angles = ellipsometry_columns(table, named)
         found.append(Candidate(table, angles, own or SIGNAL, SIGNAL, None))
         if signal == SIGNAL or not any(column.role in SIGNALS for column in named or ()):
@@ -65,6 +78,7 @@ def file_candidates(
     columns: str | Sequence[str] | None,
     signal: str | None,
     polarisation: str | None,
+    elements: Sequence[str] | None = None,
 ) -> list[Candidate]:
     """Find the spectra of all tables of a file that have the wanted signal and polarisation.
 
@@ -74,9 +88,9 @@ def file_candidates(
     refusals: list[DataError | UsageError] = []
     for table in tables:
         try:
-            found += candidates(table, columns, signal, polarisation)
+            found += candidates(table, columns, signal, polarisation, elements)
         except (DataError, UsageError) as refusal:
-            if len(tables) == 1 or (signal is None and polarisation is None):
+            if len(tables) == 1 or (signal is None and polarisation is None and elements is None):
                 raise
             refusals.append(refusal)
     if not found:
@@ -103,13 +117,14 @@ def chosen(found: Sequence[Candidate], spectrum: str | None, *, together: bool) 
     if len(found) == 1:
         return list(found)
     signals = {one.signal for one in found}
-    if SIGNAL in signals and [one.signal for one in found].count(SIGNAL) == 1:
+    kinds = [one.signal for one in found if one.signal in _ELLIPSOMETRY]
+    if len(kinds) == 1:
         if together:
             return list(found)
-        powers = sorted(signals - {SIGNAL})
+        powers = sorted(signals - set(kinds))
         raise UsageError(
-            f"{path}: has psi and delta as well as {', '.join(powers)}; choose one with `signal`, or read "
-            "all with pl.read_spectra"
+            f"{path}: has {_ELLIPSOMETRY[kinds[0]]} as well as {', '.join(powers)}; choose one with `signal`,"
+            " or read all with pl.read_spectra"
         )
     every = '`spectrum="all"`'
     if signals == set(SIGNALS):

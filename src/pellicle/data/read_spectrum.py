@@ -10,9 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from pellicle.data import mueller
 from pellicle.data.file_spectra import ALL, Candidate, chosen, file_candidates
 from pellicle.data.formats.detect import read_tables
 from pellicle.data.read_ellipsometry import SIGNAL, read_ellipsometry
+from pellicle.data.read_mueller import MuellerColumns, read_mueller
 from pellicle.data.read_power import read_power
 from pellicle.data.signal_checks import check_noise
 from pellicle.data.spectrum import POLARISATIONS, Spectrum
@@ -39,6 +41,7 @@ def read_spectrum(
     folded: bool | None = None,
     analyser: float | int | None = None,
     spot: int | None = None,
+    elements: Sequence[str] | None = None,
 ) -> Spectrum:
     """Read reflectance, transmittance or ellipsometry from a file: CSV, or an instrument's export.
 
@@ -46,7 +49,7 @@ def read_spectrum(
 
     - `path` of the file.
     - `spectrum`: the name of one of several spectra in the file.
-    - `signal`: "R", "T" or "psi-delta"; needed where the file does not state it, or has several.
+    - `signal`: "R", "T", "psi-delta" or "mueller"; needed where the file does not state it, or has several.
     - `columns`: names in the order of the file's columns, "_" to skip one; overrides the header.
     - `wavelength_unit`: "nm", "um", "A", "eV", "cm-1" or "THz", where the file does not state it (else nm).
     - `signal_unit`: "fraction", "percent" or "absorbance" (−log₁₀ of the signal), where the file does not
@@ -60,6 +63,7 @@ def read_spectrum(
       stands.
     - `analyser`: for columns α and β, the angle of the fixed polariser in degrees.
     - `spot`: number of the spot, from 1 in the order of the file, for an Accurion file of several spots.
+    - `elements`: names of the elements of a Mueller matrix to read, such as ["m12", "m33"]; None for all.
 
     **Returns:** a `Spectrum`; of several complete sweeps over the same wavelengths, their mean.
 
@@ -78,6 +82,7 @@ def read_spectrum(
         folded=folded,
         analyser=analyser,
         spot=spot,
+        elements=elements,
     )
     if spectrum == ALL:
         raise UsageError(f"{path}: one spectrum is wanted; read all of a file with pl.read_spectra")
@@ -120,9 +125,10 @@ class _Reading:
     folded: bool | None = None
     analyser: float | int | None = None
     spot: int | None = None
+    elements: Sequence[str] | None = None
 
     def __post_init__(self) -> None:
-        for name, known in (("signal", (*SIGNALS, SIGNAL)), ("polarisation", POLARISATIONS)):
+        for name, known in (("signal", (*SIGNALS, SIGNAL, mueller.SIGNAL)), ("polarisation", POLARISATIONS)):
             value = getattr(self, name)
             if value is not None and value not in known:
                 raise UsageError(f"`{name}` must be one of {', '.join(known)}, not {value!r}")
@@ -131,15 +137,18 @@ class _Reading:
     def find(self, path: str | os.PathLike[str]) -> list[Candidate]:
         """Find the spectra of a file that these arguments may mean."""
         tables = read_tables(path, self.spot)
-        found = file_candidates(tables, self.columns, self.signal, self.polarisation)
+        found = file_candidates(
+            tables, self.columns, self.signal, self.polarisation, self.elements
+        )
         if (self.folded or self.analyser is not None) and all(one.signal != SIGNAL for one in found):
             name = "folded" if self.folded else "analyser"
             raise UsageError(f"{path}: `{name}` is for ellipsometry, and the file has none; leave it out")
-        if all(one.signal == SIGNAL for one in found):
+        kinds = {SIGNAL: "psi and delta are in degrees", mueller.SIGNAL: "Mueller elements have no unit"}
+        if all(one.signal in kinds for one in found):
             if self.signal_unit is not None:
-                raise UsageError(f"{path}: psi and delta are in degrees; leave `signal_unit` out")
+                raise UsageError(f"{path}: {kinds[found[0].signal]}; leave `signal_unit` out")
             if self.polarisation in ("s", "p"):
-                raise UsageError(f"{path}: psi and delta compare p with s light; leave `polarisation` out")
+                raise UsageError(f"{path}: ellipsometry compares p with s light; leave `polarisation` out")
         return found
 
     def read(self, one: Candidate, several: bool) -> Spectrum:
@@ -160,6 +169,8 @@ class _Reading:
                 _polarisation(table, one.columns, self.polarisation),
                 calibrated,
             )
+        elif isinstance(one.columns, MuellerColumns):
+            spectrum = read_mueller(table, one.columns, self.wavelength_unit, self.noise, self.range)
         else:
             spectrum = read_ellipsometry(
                 table,

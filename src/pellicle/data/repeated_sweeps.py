@@ -101,7 +101,7 @@ def mean_spectrum(sweeps: Sequence[Spectrum]) -> Spectrum:
     first, count = sweeps[0], len(sweeps)
     if count < 2:
         raise UsageError("a mean needs two sweeps or more")
-    for name in ("signal", "polarisation", "folded", "wavelength", "angle"):
+    for name in ("signal", "elements", "polarisation", "folded", "wavelength", "angle"):
         if any(not np.array_equal(getattr(first, name), getattr(sweep, name)) for sweep in sweeps):
             raise UsageError(f"sweeps that are averaged must have the same {name}")
     copies = [i for i in range(1, count) if any(_same(sweeps[i], earlier) for earlier in sweeps[:i])]
@@ -132,19 +132,20 @@ def mean_spectrum(sweeps: Sequence[Spectrum]) -> Spectrum:
 def repeatability(sweeps: Sequence[Spectrum]) -> float:
     """Standard deviation of a point of one sweep, from the differences between sweeps, in any scene.
 
-    It is pooled over all points, on (sweeps − 1) · points degrees of freedom, twice as many for Ψ and Δ. For
-    these it is in degrees of Ψ: half the distance on the sphere of N, C, S, in each of its two directions.
+    It is pooled over all points, on (sweeps − 1) · points degrees of freedom, twice as many for Ψ and Δ, as
+    many for each Mueller element. For Ψ and Δ it is in degrees of Ψ: half the distance on the sphere of N, C, S, in each of its two directions.
     """
     apart = deviations(sweeps)
     count, points, channels = apart.shape
-    size = math.sqrt(float(np.sum(apart**2)) / ((count - 1) * points * min(channels, 2)))
+    independent = channels if sweeps[0].elements else min(channels, 2)
+    size = math.sqrt(float(np.sum(apart**2)) / ((count - 1) * points * independent))
     return size if sweeps[0].delta is None else math.degrees(size) / 2
 
 
 def coordinates(spectrum: Spectrum) -> Float[np.ndarray, "points channels"]:
     """The values as differences of them are compared: as they are, or N, C and S, of a folded Δ N and C."""
     if spectrum.delta is None:
-        return spectrum.values[:, None]
+        return spectrum.values.reshape(len(spectrum), -1)
     return ncs(spectrum.values, spectrum.delta)[:, : 2 if spectrum.folded else 3]
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool
 
+from pellicle.data import mueller
 from pellicle.data.folded_delta import folding_at, folding_note
 from pellicle.data.signal_checks import (
     Where,
@@ -18,7 +19,9 @@ from pellicle.data.signal_checks import (
 )
 from pellicle.errors import DataError, UsageError
 
-SIGNALS = ("R", "T", "psi-delta", "counts")
+SIGNALS = ("R", "T", "psi-delta", mueller.SIGNAL, "counts")
+ELLIPSOMETRY = ("psi-delta", mueller.SIGNAL)
+"""Signals that compare polarisations, without a scale or an offset."""
 POLARISATIONS = ("s", "p", "unpolarised")
 FEWEST_POINTS = 5
 """A range that keeps fewer points is a mistake in the range."""
@@ -45,8 +48,8 @@ class Spectrum:
 
     - `wavelength` in nm.
     - `values`: reflectance or transmittance as fractions (on any scale if `calibrated` is False), or Ψ in
-      degrees.
-    - `signal`: "R", "T", "psi-delta", or "counts" for raw detector counts.
+      degrees, or elements of the normalised Mueller matrix (points, elements).
+    - `signal`: "R", "T", "psi-delta", "mueller", or "counts" for raw detector counts.
     - `sigma`: standard deviations of `values`, in the same unit.
     - `polarisation`: "s", "p" or "unpolarised".
     - `angle` of incidence in degrees; None leaves it to the scene.
@@ -61,6 +64,7 @@ class Spectrum:
     - `declared`: (key, value) pairs that the file states, such as its instrument and date.
     - `depolarisation`, `depolarisation_sigma`: 1 − N² − C² − S² and its standard deviations, as fractions,
       for "psi-delta".
+    - `elements`: names of the columns of `values`, such as ("m12", "m33", "m34"), for "mueller".
 
     **Raises:** DataError for values that no sample has, UsageError for unknown words, ValueError for shapes.
 
@@ -87,6 +91,7 @@ class Spectrum:
     declared: tuple[tuple[str, str], ...] = ()
     depolarisation: np.ndarray | None = None
     depolarisation_sigma: np.ndarray | None = None
+    elements: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name in _ARRAYS:
@@ -101,9 +106,11 @@ class Spectrum:
             value = getattr(self, name)
             if value is None:
                 continue
-            if np.shape(value) != (size,):
+            matrix = self.elements and name in ("values", "sigma")
+            if np.shape(value) != ((size, len(self.elements)) if matrix else (size,)):
+                expected = f"{len(self.elements)} numbers" if matrix else "one number"
                 raise ValueError(
-                    f"`{name}`: expected one number per wavelength ({size}), got {np.shape(value)}"
+                    f"`{name}`: expected {expected} per wavelength ({size}), got {np.shape(value)}"
                 )
             array = np.array(value, dtype=np.int64 if name == "lines" else np.float64)  # a copy
             array = array if order is None else array[order]
@@ -130,6 +137,9 @@ class Spectrum:
                 raise UsageError(f"`{name}` must be one of {', '.join(known)}, not {getattr(self, name)!r}")
         if (self.signal == "psi-delta") != (self.delta is not None):
             raise UsageError('`delta` goes with `signal="psi-delta"`: give both, or neither')
+        if (self.signal == mueller.SIGNAL) != bool(self.elements):
+            raise UsageError('`elements` go with `signal="mueller"`: give both, or neither')
+        mueller.check_elements(self.elements)
         if self.depolarisation is not None and self.delta is None:
             raise UsageError('`depolarisation` goes with `signal="psi-delta"`: leave it out')
         if self.depolarisation_sigma is not None and self.depolarisation is None:
@@ -138,6 +148,10 @@ class Spectrum:
     def _check_arrays(self) -> None:
         """Refuse what a file may not contain either. Raises DataError."""
         present = {name: array for name in _ARRAYS if (array := getattr(self, name)) is not None}
+        for name in ("values", "sigma") if self.elements else ():
+            if name in present:
+                columns = zip(self.elements, present.pop(name).T, strict=True)
+                present |= {f"{element} {name}": column for element, column in columns}
         for name, array in present.items():
             refuse_first(array, ~np.isfinite(array), self.place(f"`{name}`"), f"is not finite; {_REMEDY}")
             if name == "wavelength" or name.endswith("sigma"):
@@ -155,9 +169,18 @@ class Spectrum:
             )
             if self.depolarisation is not None:
                 check_depolarisation(self.depolarisation, self.place("`depolarisation`"), _REMEDY)
+        elif self.elements:
+            for i, element in enumerate(self.elements):
+                sigma = None if self.sigma is None else self.sigma[:, i]
+                mueller.check_mueller(self.values[:, i], sigma, element, self.place(f"`{element}`"), _REMEDY)
         elif self.signal != "counts" and self.calibrated and len(self):
             too_high = "divide percent by 100, or give `calibrated=False` for an arbitrary scale"
             check_power(self.signal, self.values, self.sigma, values, too_high=too_high, remedy=_REMEDY)
+
+    @property
+    def ellipsometric(self) -> bool:
+        """True for Ψ and Δ and for Mueller elements, which have no scale and no offset."""
+        return self.signal in ELLIPSOMETRY
 
     @property
     def source(self) -> str:

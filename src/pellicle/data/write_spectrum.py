@@ -31,7 +31,7 @@ def write_spectrum(path: str | os.PathLike[str], spectrum: Spectrum, *, overwrit
 
     A CSV is read back unchanged by `read_spectrum`, repeated sweeps included. NetCDF is for xarray
     (`xarray.open_dataset(path, engine="h5netcdf")`). NeXus has an NXdata group under the definition
-    NXellipsometry for Ψ and Δ, NXoptical_spectroscopy for reflectance and transmittance. NetCDF and NeXus
+    NXellipsometry for Ψ and Δ and for Mueller elements, NXoptical_spectroscopy for reflectance and transmittance. NetCDF and NeXus
     hold the mean of repeated sweeps and need the extra `formats`.
 
     **Arguments:** `path` of the file; `spectrum`; `overwrite` an existing file.
@@ -68,6 +68,12 @@ def _columns(spectrum: Spectrum) -> list[_Column]:
                 name = header if header == "depolarisation" else "depolarisation_errors"
                 found.append(_Column(header, values, "", name))
         return found
+    if spectrum.elements:
+        pairs = list(zip(spectrum.elements, spectrum.values.T, strict=True))
+        found += [_Column(element, values, "", element) for element, values in pairs]
+        errors = () if spectrum.sigma is None else spectrum.sigma.T
+        named = zip(spectrum.elements, errors, strict=True) if len(errors) else ()
+        return found + [_Column(f"sigma_{e}", values, "", f"{e}_errors") for e, values in named]
     header = f"{spectrum.signal}{_POLARISED[spectrum.polarisation]}"
     if spectrum.signal == "counts" or not spectrum.calibrated:
         header = "counts" if spectrum.signal == "counts" else "intensity"
@@ -86,7 +92,7 @@ def _facts(spectrum: Spectrum) -> list[tuple[str, str]]:
         ("name", spectrum.name),
         *spectrum.declared,
         ("signal" if spectrum.calibrated else "uncalibrated", spectrum.signal),
-        ("polarisation", spectrum.polarisation if spectrum.delta is None else ""),
+        ("polarisation", "" if spectrum.ellipsometric else spectrum.polarisation),
         ("delta", "folded into 0 to 180 degrees" if spectrum.folded else ""),
         ("written_by", f"pellicle {version('pellicle')}"),
     ]
@@ -116,7 +122,7 @@ def _write_netcdf(path: Path, spectrum: Spectrum) -> None:
 
 def _write_nexus(path: Path, spectrum: Spectrum) -> None:
     h5py = _imported("h5py")
-    of_angles = spectrum.delta is not None
+    of_angles = spectrum.ellipsometric
     with h5py.File(path, "w") as file:
         entry = _group(file, "entry", "NXentry", default="data")
         entry["definition"] = "NXellipsometry" if of_angles else "NXoptical_spectroscopy"
@@ -127,6 +133,8 @@ def _write_nexus(path: Path, spectrum: Spectrum) -> None:
         columns = _columns(spectrum)
         signals = [c.name for c in columns if c.name in ("psi", "reflectance", "transmittance", "counts")]
         others = [c.name for c in columns if c.name in ("delta", "depolarisation")]
+        if spectrum.elements:
+            signals, others = [spectrum.elements[0]], list(spectrum.elements[1:])
         data = _group(entry, "data", "NXdata", signal=signals[0], axes=["wavelength"])
         if others:
             data.attrs["auxiliary_signals"] = others

@@ -16,6 +16,7 @@ import numpy as np
 
 from pellicle.data.formats import hdf5_reading as hdf5
 from pellicle.data.formats import isolated
+from pellicle.data.mueller import ELEMENTS
 from pellicle.data.tabular.columns import recognise
 from pellicle.data.tabular.layout import Layout, array_columns
 from pellicle.errors import DataError, install_command
@@ -23,8 +24,8 @@ from pellicle.errors import DataError, install_command
 _MEASURED = "measured_data"
 _OBSERVABLES = {"psi/delta": ("psi", "delta"), "n/c/s": ("N", "C", "S")}
 """Columns of `measured_data` by its `data_type`."""
-_ERRORS = {"psi": "sigma_psi", "delta": "sigma_delta", "depolarisation": "sigma_depolarisation"}
-_SIGNALS = {"R", "T", "psi", "N", "C", "S", "counts", "intensity"}
+_ERRORS = {name: f"sigma_{name}" for name in ("psi", "delta", "depolarisation", *ELEMENTS)}
+_SIGNALS = {"R", "T", "psi", "N", "C", "S", "counts", "intensity", *ELEMENTS}
 _MOST_MEMBERS = 1000
 
 

@@ -1,6 +1,6 @@
 """Names of columns, in lower case, in the languages that instruments write."""
 
-NAMES = {
+NAMES: dict[str, tuple[str, ...]] = {
     "wavelength": (
         *("wavelength", "wavelengths", "wave length", "wave", "wl", "lambda", "lam", "λ"),
         *("wellenlänge", "wellenlaenge", "longueur d'onde", "longueur d’onde", "longitud de onda"),
@@ -77,6 +77,15 @@ NAMES = {
     "sigma_B": ("sigma_b",),
 }
 """Names of each role; a column of any other name is ignored, with a note."""
+_SIGMA_OF = ("sigma_{}", "{}_sigma", "{}_err", "{}_error", "err_{}")
+_PLACES = tuple(f"{i}{j}" for i in range(1, 5) for j in range(1, 5))
+MUELLER = tuple(f"m{place}" for place in _PLACES)
+"""Roles of the elements of a Mueller matrix, m11 to m44."""
+NAMES |= {f"m{place}": (f"m{place}", f"mm{place}", f"m_{place}", f"m_{{{place}}}") for place in _PLACES}
+NAMES |= {
+    f"sigma_{element}": tuple(form.format(f"{m}{element[1:]}") for m in ("m", "mm") for form in _SIGMA_OF)
+    for element in MUELLER
+}
 FOREIGN = (
     *("absorptance", "cd", "circular dichroism", "ellipticity", "emission", "f(r)", "fluorescence"),
     *("irradiance", "k/s", "kubelka-munk", "mdeg", "photoluminescence", "pl", "pl intensity", "power"),
@@ -85,9 +94,8 @@ FOREIGN = (
     *("absorption (%)", "absorption [%]"),  # a share, as absorptance
     *("re(rho)", "im(rho)", "re(ρ)", "im(ρ)", "re_rho", "im_rho"),
     *("is", "ic", "ic'"),  # of a phase-modulated ellipsometer
-    *(f"{m}{i}{j}" for m in ("m", "mm") for i in range(1, 5) for j in range(1, 5)),  # Mueller matrix
 )
-"""Names of quantities that are neither a reflectance nor a transmittance, nor psi and delta."""
+"""Names of quantities that are not read: neither R nor T, psi and delta, nor elements of a Mueller matrix."""
 
 COUNTERS = ("index", "no", "no.", "nr", "nr.", "number", "point", "pixel", "row", "time", "time (s)")
 """Names of columns that count rows or give times, which are no signals."""
