@@ -75,6 +75,7 @@ def simulate(
     noise: float = 0.0,
     seed: int = 0,
     depolarisation_noise: float | None = None,
+    elements: Sequence[str] | None = None,
     sensor: None = None,
     space: None = None,
 ) -> Spectrum: ...
@@ -105,6 +106,7 @@ def simulate(
     noise: float | str | Sequence[float | str] = 0.0,
     seed: int = 0,
     depolarisation_noise: float | None = None,
+    elements: Sequence[str] | None = None,
     sensor: tuple[np.ndarray, np.ndarray] | Colours | None = None,
     space: str | None = None,
     angle: ArrayLike | None = None,
@@ -121,11 +123,13 @@ def simulate(
     - `directions`: pairs of directions to light and eye, or the samples of which to take them. Of a
       `Surface` only; 1000 pairs by default, spread over the lobe and around it.
     - `noise`: standard deviation of the normal noise, in the unit of the signal: a fraction for R and T,
-      degrees for Ψ and Δ, 1/sr for a BRDF. It becomes the σ of the result. Of a BRDF also a share of the
-      signal, as "2 %", or a list of one for each channel.
+      degrees for Ψ and Δ, that of each normalised Mueller element, 1/sr for a BRDF. It becomes the σ of the
+      result. Of a BRDF also a share of the signal, as "2 %", or a list of one for each channel.
     - `seed` of the noise.
     - `depolarisation_noise`: standard deviation of a measured depolarisation, a fraction, which then becomes
       part of a spectrum of Ψ and Δ; 0 for one without noise.
+    - `elements`: names of the elements of a Mueller matrix, such as ["m12", "m33", "m34"]; all 15 beside m11
+      by default.
     - `sensor`, `space`: for colours, of a `Scene` only. `sensor` is wavelengths (N,), nm, and weights (N, 3)
       as of `pellicle.colour.sensor`, the CIE observer 1931 under D65 by default, or `Colours` of which
       sensor, space, gamma and angles are taken. `space` is "srgb" (the default), "rgb", "xyz" or "lab".
@@ -151,13 +155,14 @@ def simulate(
         raise UsageError(f"`noise` must not be negative, got {noise:g}")
     if isinstance(scene, Surface):
         _refuse("a Surface", wavelength=wavelength, depolarisation_noise=depolarisation_noise)
-        _refuse("a Surface", sensor=sensor, space=space, angle=angle)
+        _refuse("a Surface", sensor=sensor, space=space, angle=angle, elements=elements)
         return simulate_samples(scene, directions, noise, seed).samples
     _refuse("a Scene", directions=directions)
     if not isinstance(noise, float | int):
         raise UsageError(f"`noise` of a Scene must be one number, a standard deviation, not {noise!r}")
     if sensor is not None or space is not None:
         _refuse("colours", wavelength=wavelength, depolarisation_noise=depolarisation_noise)
+        _refuse("colours", elements=elements)
         camera = None
         if isinstance(sensor, Colours):
             space, gamma, camera = sensor.space, sensor.gamma, sensor.camera
@@ -167,7 +172,12 @@ def simulate(
         )[0]
     _refuse("a spectrum, whose angle is that of the scene's light", angle=angle)
     return simulate_spectrum(
-        scene, wavelength, noise=noise, seed=seed, depolarisation_noise=depolarisation_noise
+        scene,
+        wavelength,
+        noise=noise,
+        seed=seed,
+        depolarisation_noise=depolarisation_noise,
+        elements=elements,
     )
 
 

@@ -316,7 +316,7 @@ def test_tan_psi_and_cos_delta(tmp_path, header):
         read_spectrum(path)
 
 
-@pytest.mark.parametrize("header", ["eV,Is,Ic", "nm,m12,m33", "nm,mm11,mm44"])
+@pytest.mark.parametrize("header", ["eV,Is,Ic", "nm,re(rho),im(rho)"])
 @pytest.mark.parametrize("words", [{}, {"signal": "R"}])
 def test_other_quantities_of_ellipsometers_are_named(tmp_path, header, words):
     path = tmp_path / "other.csv"

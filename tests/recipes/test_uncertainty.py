@@ -17,6 +17,7 @@ INSTRUMENT = [
     "psi",
     "delta",
     "depolarisation",
+    "mueller",
 ]
 SAMPLE = ["index", "dispersion", "roughness", "thickness_spread", "interlayer"]
 

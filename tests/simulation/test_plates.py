@@ -92,6 +92,21 @@ def test_films_on_both_faces():
     np.testing.assert_allclose(found, exact, rtol=0, atol=5e-8)
 
 
+def test_the_whole_matrix():
+    """All 16 elements; tmm's conjugate amplitudes have the opposite sign of the fourth Stokes parameter."""
+    light = pl.Light(signal="mueller", angle=ANGLE)
+    scene = with_wavelength(pl.Scene(pl.Layer(2.2 + 0.05j, 120.0), PLATE, light=light), NM, ANGLE)
+    found = np.asarray(build(pl.plan(scene))(scene)).reshape(-1, 15)
+    for nm, elements in zip(NM, found, strict=True):
+        inside = tmm.snell(1.0, GLASS, np.deg2rad(ANGLE))
+        passed = np.exp(-4e6 * np.pi * K * MM / np.real(np.cos(inside)) / nm)
+        upper = sheet([1.0, 2.2 + 0.05j, GLASS], [120.0], np.deg2rad(ANGLE), nm)
+        matrix = on_a_plate(upper, sheet([GLASS, 1.0], [], inside, nm)[0], passed)
+        signs = np.diag([1, 1, 1, -1])
+        exact = (signs @ matrix @ signs / matrix[0, 0]).ravel()[1:]
+        np.testing.assert_allclose(elements, exact, rtol=0, atol=5e-8)
+
+
 def test_its_slope_is_that_of_differences():
     scene = with_wavelength(
         pl.Scene(pl.Layer(2.2 + 0.05j, pl.Free(1, 500, start=120.0)), PLATE, light=LIGHT), NM, ANGLE

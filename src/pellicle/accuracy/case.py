@@ -38,6 +38,11 @@ class Case(NamedTuple):
 
     @property
     def ellipsometric(self) -> bool:
+        return self.plan.ellipsometric
+
+    @property
+    def in_degrees(self) -> bool:
+        """True where errors are degrees on the sphere of N, C, S."""
         return self.plan.signal == "psi-delta"
 
 

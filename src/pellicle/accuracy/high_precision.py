@@ -41,7 +41,8 @@ def unsuitable(case: Case) -> str | None:
 
 
 def signal(case: Case, values: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """R or T (wavelengths, 1), or N, C, S (wavelengths, 3), at some of a case's wavelengths."""
+    """R or T (wavelengths, 1), N, C, S (wavelengths, 3) or Mueller elements (wavelengths, 15), at some of a
+    case's wavelengths."""
     scene = insert(case.scene, [float(x) for x in values])
     angle = np.broadcast_to(scene.light.angle, case.wavelength.shape)[at]
     scene = with_wavelength(scene, case.wavelength[at], angle)
@@ -99,14 +100,15 @@ def _indices(medium: Any, wavelength: np.ndarray) -> list[Any]:
 
 def _signal(scene: Scene, point: _Point) -> list[Any]:
     light = scene.light
-    if light.signal == "psi-delta":
+    if light.ellipsometric:
         s, p, cross = (
             mp.re(_product(point, 0, "ss")),
             mp.re(_product(point, 0, "pp")),
             _product(point, 0, "ps"),
         )
         # tan Ψ e^{iΔ} = conj(r_p/r_s): N = cos 2Ψ, C = sin 2Ψ cos Δ, S = sin 2Ψ sin Δ
-        return [(s - p) / (s + p), 2 * mp.re(cross) / (s + p), -2 * mp.im(cross) / (s + p)]
+        N, C, S = (s - p) / (s + p), 2 * mp.re(cross) / (s + p), -2 * mp.im(cross) / (s + p)
+        return [N, C, S] if light.signal == "psi-delta" else [-N, 0, 0, -N, 1, *[0] * 4, C, S, 0, 0, -S, C]
     letters = "sp" if light.polarisation == "unpolarised" else light.polarisation
     which = 0 if light.signal == "R" else 1
     return [sum(_powers(point, 0, letter)[which] for letter in letters) / len(letters)]

@@ -86,7 +86,7 @@ def compare_methods(
         raise UsageError(
             f"there is nothing to compute: {case.plan.signal} is 0 everywhere between the bounds"
         )
-    unit = "degrees" if case.ellipsometric else case.plan.signal
+    unit = "degrees" if case.in_degrees else case.plan.signal
     comparison = MethodComparison(truth.name, case.tolerance, unit, len(truth.wavelengths), len(truth.draws))
 
     def prepare(method: Method) -> Program | str:

@@ -27,14 +27,15 @@ class Reference(NamedTuple):
     def error(self, case: Case, signal: np.ndarray) -> float:
         """The largest error of a signal (draws, points), in its unit.
 
-        For ellipsometry it is the arc between two points (N, C, S) in degrees: an error of Ψ counts twice,
+        For Ψ and Δ it is the arc between two points (N, C, S) in degrees: an error of Ψ counts twice,
         one of Δ sin 2Ψ times. Infinite where the signal is not finite and the reference is.
         """
         rows = signal.reshape(len(signal), len(case.wavelength), -1)[self.draws][:, self.wavelengths]
         known = np.all(np.isfinite(self.values), axis=-1)
-        off = np.linalg.norm(np.asarray(rows, dtype=float) - self.values, axis=-1)[known]
+        apart = np.abs(np.asarray(rows, dtype=float) - self.values)[known]
+        off = np.linalg.norm(apart, axis=-1) if case.in_degrees else apart
         worst = float(np.max(off, initial=0.0)) if np.all(np.isfinite(off)) else np.inf
-        return float(np.rad2deg(worst)) if case.ellipsometric else worst
+        return float(np.rad2deg(worst)) if case.in_degrees else worst
 
 
 def reference_signal(name: str, case: Case) -> Reference:

@@ -46,13 +46,14 @@ def data_sets(case: Case, scene: Scene, noise: float, count: int, seed: int = 0)
     random = np.random.default_rng(seed)
     units = random.uniform(size=(count, len(free)))
     clean = compiled(case._replace(draws=low + units * (high - low)), Variant(case.plan, case.scene)).run()
-    sigma = float(np.deg2rad(2 * noise)) if case.ellipsometric else noise
+    sigma = float(np.deg2rad(2 * noise)) if case.in_degrees else noise
     noisy = clean + random.normal(0.0, sigma, clean.shape)
-    if case.ellipsometric:
-        noisy = noisy.reshape(count, -1, 3)
+    channels = clean.shape[1] // len(case.wavelength)
+    noisy = noisy.reshape(count, -1, channels) if channels > 1 else noisy
+    elements = tuple(range(channels)) if scene.light.signal == "mueller" else ()
     nm, sigmas = case.wavelength, np.full(len(case.wavelength), sigma)
     return [
-        DataSet(make(Measured(scene, nm, values, sigmas)), unit, start)
+        DataSet(make(Measured(scene, nm, values, sigmas, elements=elements)), unit, start)
         for values, unit in zip(noisy, units, strict=True)
     ]
 

@@ -106,7 +106,7 @@ class ReadingFlags(CameraFlags):
     ] = None
     signal: Annotated[
         str | None,
-        flag(READING, "R, T or psi-delta, or srgb, rgb, xyz or lab, if the file does not name it."),
+        flag(READING, "R, T, psi-delta or mueller, or srgb, rgb, xyz or lab, if the file does not name it."),
     ] = None
     region: Annotated[
         str | None, flag(COLOURS, "X,Y,WIDTH,HEIGHT of a film in a picture, in pixels; ';' between several.")
@@ -166,3 +166,13 @@ class ReadingFlags(CameraFlags):
         float | None, flag(READING, "Analyser angle in degrees (for alpha and beta columns).")
     ] = None
     spot: Annotated[int | None, flag(READING, "Spot of an Accurion file, counted from 1.")] = None
+    elements: Annotated[
+        str | list[str] | None,
+        Parameter(
+            group=READING,
+            help="Elements of a Mueller matrix to use (all).",
+            metavar="m12,...",
+            negative="",
+            n_tokens=1,
+        ),
+    ] = None

@@ -27,6 +27,7 @@ FLAGS = {
     "dark": "--dark",
     "dark_frame": "--dark-frame",
     "datasets": "--datasets",
+    "elements": "--elements",
     "folded": "--folded",
     "folder": "--out",
     "free": "--free",

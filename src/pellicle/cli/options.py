@@ -100,7 +100,13 @@ def read(path: str, flags: ReadingFlags, *, free_scale: bool) -> list[Spectrum]:
         folded=flags.folded,
         analyser=flags.analyser,
         spot=flags.spot,
+        elements=_names(flags.elements),
     )
+
+
+def _names(value: str | list[str] | None) -> list[str] | None:
+    """Names of a flag, separated by commas, or of a recipe."""
+    return [name.strip() for name in value.split(",")] if isinstance(value, str) else value
 
 
 def sigma(noise: float | str | None) -> float | None:

@@ -14,6 +14,8 @@ from pellicle.cli.wavelengths import directions, wavelengths
 from pellicle.errors import DataError, UsageError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from pellicle.recipes.film import FilmRecipe
     from pellicle.recipes.surface import SurfaceRecipe
     from pellicle.scene.film import Scene
@@ -144,12 +146,12 @@ def _write_spectrum(
 
     scene = recipe.scene()
     log_scene(scene)
-    if scene.light.signal == "psi-delta" and recipe.tables.data.angle is None:
+    if scene.light.ellipsometric and recipe.tables.data.angle is None:
         raise DataError(f"{recipe.path}: ellipsometry needs an angle of incidence: give [data] angle = 70")
     nm = wavelengths(recipe, scene)
     result = simulate_signal(scene, nm, noise, seed, tolerance)
     log_plan(result.plan)
-    write_text(out, _csv(scene, result, noise, comments))
+    write_text(out, _csv(scene, result, noise, comments, recipe.tables.data.elements))
     say(f"{out}: {len(nm)} points, {nm[0]:g} to {nm[-1]:g} nm")
 
 
@@ -190,17 +192,31 @@ def _truth(scene: Scene) -> str:
     return "truth: " + ", ".join(f"{name} = {value:.10g} {unit}".rstrip() for name, value, unit in numbers)
 
 
-def _csv(scene: Scene, result: SimulatedSignal, noise: float, comments: list[str]) -> str:
+def _csv(
+    scene: Scene,
+    result: SimulatedSignal,
+    noise: float,
+    comments: list[str],
+    elements: Sequence[str] | None,
+) -> str:
     """The spectrum as CSV below its comments, which end with the true values of the parameters."""
+    from pellicle.data.mueller import ELEMENTS, SIGNAL, check_elements
+
     light = scene.light
     angle = f"{getattr(light.angle, 'start', light.angle):g}"
-    lines = [*comments, f"signal {light.signal}, angle {angle} degrees, {light.polarisation}"]
+    about = "" if light.ellipsometric else f", {light.polarisation}"
+    lines = [*comments, f"signal {light.signal}, angle {angle} degrees{about}"]
     lines.append(_truth(scene))
     columns, middle = f"wavelength_nm,{light.signal}", ""
     if light.signal == "psi-delta":
         columns, middle = "wavelength_nm,angle_deg,psi_deg,delta_deg", f"{angle},"
-    columns, end = (f"{columns},sigma", f",{noise:g}") if noise else (columns, "")
     table = result.values.reshape(len(result.wavelength), -1)
+    if light.signal == SIGNAL:
+        chosen = ELEMENTS if elements is None else tuple(elements)
+        check_elements(chosen)
+        columns, middle = f"wavelength_nm,angle_deg,{','.join(chosen)}", f"{angle},"
+        table = table[:, [ELEMENTS.index(name) for name in chosen]]
+    columns, end = (f"{columns},sigma", f",{noise:g}") if noise else (columns, "")
     rows = [
         f"{nm:.10g},{middle}{','.join(f'{value:.8f}' for value in row)}{end}"
         for nm, row in zip(result.wavelength, table, strict=True)

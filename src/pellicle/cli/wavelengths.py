@@ -31,7 +31,7 @@ def measured_scene(recipe: FilmRecipe) -> tuple[Scene, np.ndarray]:
     else:
         scene = recipe.scene()
         nm = wavelengths(recipe, scene)
-    if scene.light.signal == "psi-delta" and scene.light.angle == 0.0:
+    if scene.light.ellipsometric and scene.light.angle == 0.0:
         raise DataError(f"{recipe.path}: ellipsometry needs an angle of incidence: give [data] angle = 70")
     return scene, nm
 

@@ -137,9 +137,7 @@ class _Reading:
     def find(self, path: str | os.PathLike[str]) -> list[Candidate]:
         """Find the spectra of a file that these arguments may mean."""
         tables = read_tables(path, self.spot)
-        found = file_candidates(
-            tables, self.columns, self.signal, self.polarisation, self.elements
-        )
+        found = file_candidates(tables, self.columns, self.signal, self.polarisation, self.elements)
         if (self.folded or self.analyser is not None) and all(one.signal != SIGNAL for one in found):
             name = "folded" if self.folded else "analyser"
             raise UsageError(f"{path}: `{name}` is for ellipsometry, and the file has none; leave it out")

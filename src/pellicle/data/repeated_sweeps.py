@@ -133,7 +133,8 @@ def repeatability(sweeps: Sequence[Spectrum]) -> float:
     """Standard deviation of a point of one sweep, from the differences between sweeps, in any scene.
 
     It is pooled over all points, on (sweeps − 1) · points degrees of freedom, twice as many for Ψ and Δ, as
-    many for each Mueller element. For Ψ and Δ it is in degrees of Ψ: half the distance on the sphere of N, C, S, in each of its two directions.
+    many for each Mueller element. For Ψ and Δ it is in degrees of Ψ: half the distance on the sphere of N, C,
+    S, in each of its two directions.
     """
     apart = deviations(sweeps)
     count, points, channels = apart.shape

@@ -31,8 +31,8 @@ def write_spectrum(path: str | os.PathLike[str], spectrum: Spectrum, *, overwrit
 
     A CSV is read back unchanged by `read_spectrum`, repeated sweeps included. NetCDF is for xarray
     (`xarray.open_dataset(path, engine="h5netcdf")`). NeXus has an NXdata group under the definition
-    NXellipsometry for Ψ and Δ and for Mueller elements, NXoptical_spectroscopy for reflectance and transmittance. NetCDF and NeXus
-    hold the mean of repeated sweeps and need the extra `formats`.
+    NXellipsometry for Ψ and Δ and for Mueller elements, NXoptical_spectroscopy for reflectance and
+    transmittance. NetCDF and NeXus hold the mean of repeated sweeps and need the extra `formats`.
 
     **Arguments:** `path` of the file; `spectrum`; `overwrite` an existing file.
 

@@ -80,7 +80,7 @@ def _unresolved(scene: Scene) -> str | None:
 def _has_series(scene: Scene) -> bool:
     """True for one smooth coherent layer whose signal is an intensity."""
     one = len(coherent_layers(scene)) == 1
-    return one and scene.light.signal != "psi-delta" and not roughness(scene).on
+    return one and not scene.light.ellipsometric and not roughness(scene).on
 
 
 def _by_orders(scene: Scene) -> bool:

@@ -62,6 +62,11 @@ class Plan:
         return self.row(effect).on
 
     @property
+    def ellipsometric(self) -> bool:
+        """True for the signals of ellipsometry."""
+        return self.signal in ("psi-delta", "mueller")
+
+    @property
     def error_bound(self) -> float:
         """Bound on the error of the signal by everything that the plan leaves out or averages."""
         return sum(row.error_bound for row in self.rows)

@@ -97,7 +97,7 @@ def _propagates(material, scene: Scene) -> bool:
 
 def polarisation(scene: Scene) -> Row:
     """On where s and p differ and both are needed."""
-    if scene.light.signal == "psi-delta":
+    if scene.light.ellipsometric:
         return Row("polarisation", True, "ellipsometry compares p with s")
     if scene.instrument.has_cone:
         return Row("polarisation", True, "the light's cone has s and p")

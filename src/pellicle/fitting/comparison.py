@@ -116,7 +116,8 @@ def _check_same(fits: Mapping[str, Fit]) -> None:
         columns: list[np.ndarray | None] = []
         names: list[object] = [fit.layer_test and fit.layer_test.residual]
         for data in (part.data for part in fit.parts):
-            names += [type(data), (data.signal, data.folded) if isinstance(data, Spectrum) else ""]
+            names += [type(data)]
+            names += [(data.signal, data.folded, data.elements) if isinstance(data, Spectrum) else ""]
             light = "angle" if isinstance(data, Colours) else "theta_i phi_i theta_o phi_o"
             if isinstance(data, Spectrum):
                 light = "wavelength delta delta_sigma depolarisation depolarisation_sigma"
@@ -146,12 +147,16 @@ class _Residuals(NamedTuple):
     def independent(self) -> int:
         """Independent numbers: three on the sphere of N, C and S are two."""
         points, channels = self.rows.shape
-        return points * (min(channels, 2) if isinstance(self.part.curve, Curve) else channels)
+        on_sphere = isinstance(self.part.curve, Curve) and self.part.curve.delta_data is not None
+        return points * (min(channels, 2) if on_sphere else channels)
 
 
 def _residuals(part: Part) -> list[_Residuals]:
     """Residuals of a part, and of its depolarisation, where that was measured."""
-    result = [_Residuals(part, _residual(part), part.sigma_from in ("given", "usual"))]
+    known, of_part = part.sigma_from in ("given", "usual"), _residual(part)
+    if isinstance(part.curve, Curve) and part.spectrum.elements:
+        return [_Residuals(part, column[:, None], known) for column in of_part.T]  # each of its own noise
+    result = [_Residuals(part, of_part, known)]
     if isinstance(part.curve, Curve) and part.curve.depolarisation_data is not None:
         sigma = part.spectrum.depolarisation_sigma
         own = part.curve.depolarisation_residual / (1.0 if sigma is None else sigma)
@@ -168,7 +173,8 @@ def _residual(part: Part) -> np.ndarray:
     c, spectrum = part.curve, part.spectrum
     sigma = spectrum.sigma
     if c.delta_data is None or c.delta_model is None:
-        return (c.residual if sigma is None else c.residual / sigma)[:, None]
+        residual = c.residual if sigma is None else c.residual / sigma
+        return residual if spectrum.elements else residual[:, None]
     if sigma is None:
         return ncs(c.data, c.delta_data) - ncs(c.model, c.delta_model)
     across = sigma if spectrum.delta_sigma is None else spectrum.delta_sigma

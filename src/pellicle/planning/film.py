@@ -93,9 +93,9 @@ def _removals(effect: str, stage: Stage) -> Iterator[Step]:
     """Removal of one effect; of opaque layers the uppermost first."""
     scene, light = stage.scene, stage.scene.light
     meaningless = {
-        "oblique": light.signal == "psi-delta",
+        "oblique": light.ellipsometric,
         "back-face": light.signal == "T",
-        "polarisation": light.signal == "psi-delta"
+        "polarisation": light.ellipsometric
         or is_free(light.angle)
         or is_free(scene.instrument.angle_shift)  # with the angle s and p change in opposite directions
         or scene.instrument.has_cone,

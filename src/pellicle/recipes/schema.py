@@ -116,13 +116,14 @@ class InstrumentTable(_Table):
     psi_uncertainty: Uncertain = None
     delta_uncertainty: Uncertain = None
     depolarisation_uncertainty: Uncertain = None
+    mueller_uncertainty: Uncertain = None
 
 
 class _Reading(_Table):
     """Reading options of data files, named as the flags of the command line."""
 
     spectrum: str | None = None
-    signal: Literal["R", "T", "psi-delta", "srgb", "rgb", "xyz", "lab"] | None = None
+    signal: Literal["R", "T", "psi-delta", "mueller", "srgb", "rgb", "xyz", "lab"] | None = None
     angle: Annotated[float, Field(ge=0, le=90)] | FreeTable | None = None
     polarisation: Literal["unpolarised", "s", "p"] | None = None
     noise: float | None = Field(default=None, gt=0)
@@ -133,6 +134,7 @@ class _Reading(_Table):
     folded: bool | None = None
     analyser: float | None = Field(default=None, gt=0, lt=90)
     spot: int | None = Field(default=None, ge=1)
+    elements: list[str] | None = None
     region: str | list[int] | list[list[int]] | None = None
     points: str | list[int] | list[list[int]] | None = None
     angles: list[Annotated[float, Field(ge=0, le=90)]] | None = None

@@ -41,6 +41,8 @@ def fit_csv(fit: Fit) -> str:
         about = [f"signal {data.space}, {light}, {data.polarisation}"]
         about += [note for note in data.notes if note.startswith("observer ")]
         about += [f"fit of {fitted_colours.summary(part)}: data, model_, sigma_ = standard deviation assumed"]
+    elif part.spectrum.elements:
+        about, columns = _mueller(part)
     elif part.spectral.delta_data is not None:
         about, columns = _psi_delta(part)
     else:
@@ -107,6 +109,19 @@ def _psi_delta(part: Part) -> tuple[list[str], Columns]:
     return about, columns
 
 
+def _mueller(part: Part) -> tuple[list[str], Columns]:
+    curve, data = part.spectral, part.spectrum
+    columns = {"wavelength_nm": curve.wavelength}
+    if data.angle is not None:
+        columns["angle_deg"] = data.angle
+    for i, name in enumerate(data.elements):
+        columns[name] = curve.data[:, i]
+        columns[f"{name}_model"] = curve.model[:, i]
+        columns[f"sigma_{name}"] = curve.sigma[:, i]
+    about = ["fit of normalised Mueller elements: data, model, sigma = standard deviation assumed"]
+    return about, columns
+
+
 def _samples_csv(fit: Fit) -> str:
     channels = fit.parts[0].samples.channels
     about = [
@@ -128,7 +143,7 @@ def _joint_csv(fit: Fit) -> str:
 
 
 def _joint_rows(part: Part) -> Iterable[tuple[str | float, ...]]:
-    """A row for each value; Ψ, Δ and depolarisation are three, and so is a colour.
+    """A row for each value; Ψ, Δ and depolarisation are three, and so is a colour; Mueller elements one each.
 
     The angle of a BRDF sample is that of the light.
     """
@@ -146,6 +161,12 @@ def _joint_rows(part: Part) -> Iterable[tuple[str | float, ...]]:
     curve, data = part.spectral, part.spectrum
     unknown = np.full(curve.wavelength.size, np.nan)
     angle = unknown if data.angle is None else data.angle
+    if data.elements:
+        for i, name in enumerate(data.elements):
+            numbers = (curve.data[:, i], curve.model[:, i], curve.residual[:, i], curve.sigma[:, i])
+            for row in zip(curve.wavelength, angle, *numbers, strict=True):
+                yield part.name, name, *row
+        return
     kind = data.signal if curve.delta_data is None else "psi"
     columns = {kind: (curve.data, curve.model, curve.residual, curve.sigma)}
     if curve.delta_data is not None and curve.delta_model is not None:

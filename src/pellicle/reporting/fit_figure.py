@@ -11,7 +11,7 @@ import numpy as np
 
 from pellicle.fitting.result import BrdfCurve, ColourCurve, Curve
 from pellicle.fitting.status import RIVAL
-from pellicle.reporting import brdf_figure, fitted_colours, psi_delta
+from pellicle.reporting import brdf_figure, fitted_colours, mueller_figure, psi_delta
 from pellicle.reporting.drawing import ABOVE, BLACK, BLUE, FITTED, GAP, GREY, ORANGE, marker_size, new_figure
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def draw(fit: Fit) -> Figure:
     rows = figure.subplots(len(panels), 1, squeeze=False)[:, 0]
     for part in fit.parts:
         first, *rest = [axes for axes, panel in zip(rows, panels, strict=True) if panel.part is part]
-        for axes in rest:
+        for axes in rest if not getattr(part.data, "elements", ()) else ():
             axes.sharex(first)
         if len(fit.parts) > 1:
             first.set_title(part.name.replace("$", r"\$"), fontsize="small", loc="left")
@@ -111,6 +111,8 @@ def _panels_of_data(part: Part) -> list[_Panel]:
         rows = [(fitted_colours.patches, 1.6, 0), (fitted_colours.residuals, 1.3, 1)]
     elif isinstance(part.curve, BrdfCurve):
         rows = [(brdf_figure.draw_samples, 3.0, 0), (brdf_figure.draw_residuals, 1.3, 0)]
+    elif part.spectrum.elements:
+        rows = [(mueller_figure.matrix, 5.4, 0), (mueller_figure.residuals, 1.5, 3)]
     elif part.spectral.delta_data is None:
         rows = [(_data, 3.0, 0), (_residuals, 1.3, 1)]
     else:
@@ -253,7 +255,7 @@ def index_is_free(fit: Fit) -> bool:
 
 
 def _ellipsometric(part: Part) -> bool:
-    return isinstance(part.curve, Curve) and part.curve.delta_data is not None
+    return isinstance(part.curve, Curve) and part.spectrum.ellipsometric
 
 
 def _index(axes: Axes, fit: Fit) -> None:

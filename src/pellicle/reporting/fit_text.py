@@ -86,10 +86,11 @@ def _spectrum(part: Part) -> str:
     """`R, 41 points from 400 to 800 nm`."""
     data, nm = part.spectrum, part.spectral.wavelength
     light = "" if data.polarisation == "unpolarised" else f" of {data.polarisation}-polarised light"
-    text = f"{data.signal}{light}, {nm.size} points"
+    own = f" ({', '.join(data.elements)})" if data.elements else ""
+    text = f"{data.signal}{own}{light}, {nm.size} points"
     if nm.size:
         text += _range(nm, "nm")
-        if data.signal == "psi-delta" and data.angle is not None:
+        if data.ellipsometric and data.angle is not None:
             text += "," + _range(data.angle, "degrees")
     return text + _independent(part, nm.size, "")
 

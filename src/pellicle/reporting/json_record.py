@@ -82,7 +82,7 @@ def _data(part: Part, fit: Fit) -> dict[str, Any]:
         "path": data.path,
         "sha256": data.sha256,
         "signal": getattr(data, "space", getattr(data, "signal", "brdf")),
-        "points": int(part.curve.model.size),
+        "points": len(part.curve.model) if getattr(data, "elements", ()) else int(part.curve.model.size),
         **({"spectrum": name} if (name := getattr(data, "name", "")) else {}),
         **_depolarisation(part),
         **_sweeps(part, fit),

@@ -17,10 +17,13 @@ _LABELS = {"R": "reflectance", "T": "transmittance", "counts": "counts", "psi-de
 
 
 def draw(spectrum: Spectrum) -> Figure:
-    """Draw the values against wavelength, with their errors; Ψ, Δ and the depolarisation in panels.
+    """Draw the values against wavelength, with their errors; Ψ, Δ and the depolarisation in panels, Mueller
+    elements at their places of the matrix.
 
     Values at one wavelength are drawn against the angle of incidence.
     """
+    if spectrum.elements:
+        return _matrix(spectrum)
     label = _LABELS[spectrum.signal] + ("" if spectrum.calibrated else " × unknown scale")
     panels = [(label, spectrum.values, spectrum.sigma)]
     if spectrum.delta is not None:
@@ -37,9 +40,29 @@ def draw(spectrum: Spectrum) -> Figure:
     rows[-1].set_xlabel("angle of incidence (degrees)" if against_angle else "wavelength (nm)")
     if spectrum.angle is not None and not against_angle:
         rows[0].legend(frameon=False, markerscale=3, fontsize="small")
-    title = f"{spectrum.path} [{spectrum.name}]" if spectrum.name else spectrum.path
-    figure.suptitle(title.replace("$", r"\$"), fontsize="medium")
+    figure.suptitle(_title(spectrum), fontsize="medium")
     return figure
+
+
+def _matrix(spectrum: Spectrum) -> Figure:
+    """Elements of a Mueller matrix at their places."""
+    from pellicle.reporting import mueller_figure
+
+    figure = new_figure(8.0, 6.0)
+    axes = figure.subplots()
+    x, label = mueller_figure.abscissa(spectrum.wavelength, spectrum.angle)
+    lines = mueller_figure.series(spectrum.wavelength, spectrum.angle)
+    about = spectrum.elements, x, lines, spectrum.values, spectrum.sigma
+    mueller_figure.draw_measured(axes, *about)
+    axes.set_xlabel(label, labelpad=16)
+    axes.set_ylabel("normalised element", labelpad=30)
+    figure.suptitle(_title(spectrum), fontsize="medium")
+    return figure
+
+
+def _title(spectrum: Spectrum) -> str:
+    title = f"{spectrum.path} [{spectrum.name}]" if spectrum.name else spectrum.path
+    return title.replace("$", r"\$")  # no mathematics in a file's name
 
 
 def _against_angle(spectrum: Spectrum) -> bool:

@@ -15,6 +15,7 @@ QUANTITIES = {
     "R": "reflectance R",
     "T": "transmittance T",
     "psi-delta": "ellipsometry, psi and delta",
+    "mueller": "normalised elements of a Mueller matrix",
     "counts": "raw counts",
 }
 _MAD = 1.4826  # standard deviation over median absolute deviation, for normal noise
@@ -29,7 +30,7 @@ def describe(spectrum: Spectrum, notes: tuple[str, ...] | None = None) -> str:
     steps = np.diff(np.unique(nm))
     reach = f"{nm[0]:g} to {nm[-1]:g} nm, every {np.median(steps):.3g} nm" if steps.size else f"{nm[0]:g} nm"
     quantity = QUANTITIES[spectrum.signal] + ("" if spectrum.calibrated else ", scale unknown")
-    if spectrum.delta is None and spectrum.signal != "counts":
+    if not spectrum.ellipsometric and spectrum.signal != "counts":
         quantity += f", {spectrum.polarisation} light"
     rows = [
         ("spectrum", spectrum.name),
@@ -89,6 +90,8 @@ def _values(spectrum: Spectrum) -> dict[str, np.ndarray]:
     order = slice(None)
     if spectrum.angle is not None:
         order = np.lexsort((spectrum.wavelength, spectrum.angle))  # neighbours are of one angle
+    if spectrum.elements:
+        return dict(zip(spectrum.elements, spectrum.values[order].T, strict=True))
     if spectrum.delta is None:
         return {"values": spectrum.values[order]}
     found = {"psi": spectrum.values[order], "delta": spectrum.delta[order]}

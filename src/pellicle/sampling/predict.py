@@ -53,7 +53,8 @@ def chosen(units: np.ndarray, random: np.random.Generator) -> np.ndarray:
 def predictions(
     problem: Problem, parts: tuple[Part, ...], units: np.ndarray, seed: int
 ) -> tuple[Prediction, ...]:
-    """Predictions of each spectrum, of Ψ and Δ, or of each channel of colours and of BRDF samples.
+    """Predictions of each spectrum, of Ψ and Δ, of each Mueller element, or of each channel of colours and of
+    BRDF samples.
 
     `units` are draws (steps, walkers, parameters) in the unit cube of an affine problem.
     """
@@ -77,6 +78,12 @@ def _spectrum(
     noisy = model + sigma * random.standard_normal(model.shape)
     curve, (prefix, suffix) = part.spectral, (f"{part.name}: ", f"_{part.name}") if part.name else ("", "")
     axis = Axis(f"wavelength_nm{suffix}", "wavelength (nm)", curve.wavelength)
+    if part.spectrum.elements:
+        of_model, of_noisy = view.in_columns(model), view.in_columns(noisy)
+        return [
+            Prediction(e + suffix, prefix + e, axis, curve.data[:, i], of_model[..., i], of_noisy[..., i])
+            for i, e in enumerate(part.spectrum.elements)
+        ]
     if curve.delta_data is None:
         signal = part.spectrum.signal
         return [Prediction(signal + suffix, prefix + _SIGNALS[signal], axis, curve.data, model, noisy)]

@@ -20,7 +20,8 @@ from pellicle.scene.instrument import Instrument
 from pellicle.scene.layers import Interface, Layer, Plate, Quantity, Substrate, absorbs, ambient_medium
 from pellicle.scene.uncertainty import Uncertainty
 
-SIGNALS = ("R", "T", "psi-delta")
+SIGNALS = ("R", "T", "psi-delta", "mueller")
+ELLIPSOMETRY = ("psi-delta", "mueller")
 POLARISATIONS = ("unpolarised", "s", "p")
 
 
@@ -29,7 +30,8 @@ class Light(eqx.Module):
     """Light and signal of a measurement.
 
     **Arguments:** `wavelength` in nm (None leaves it to the data); `angle` of incidence in degrees, one or
-    one per wavelength; `signal`, "R", "T" or "psi-delta"; `polarisation`, "unpolarised", "s" or "p".
+    one per wavelength; `signal`, "R", "T", "psi-delta" or "mueller"; `polarisation`, "unpolarised", "s" or
+    "p".
 
     **Raises:** ValueError for an unknown word, and for angles outside 0 to 90 degrees.
 
@@ -54,6 +56,11 @@ class Light(eqx.Module):
             wrong = [x for x in np.ravel(angle) if not 0 <= x <= 90]
             if wrong:
                 raise ValueError(f"`angle` of incidence must lie in 0 to 90 degrees, got {wrong[0]:g}")
+
+    @property
+    def ellipsometric(self) -> bool:
+        """True for signals that compare polarisations: Ψ and Δ, or Mueller elements."""
+        return self.signal in ELLIPSOMETRY
 
     @property
     def largest_angle(self) -> float:

@@ -22,6 +22,7 @@ class Uncertainty:
     - `scale`: relative, of R and T, and of a slope over the spectrum; a curvature has half of it.
     - `offset`: of R and T, as a fraction.
     - `psi`, `delta`: of offsets of Ψ and Δ, in degrees; `depolarisation`: lost share of polarised light.
+    - `mueller`: of an offset of each normalised element of a Mueller matrix.
     - `index`: relative, of every given index but that of a gas; a layer and the substrate may have their own.
     - `dispersion`: relative, of the shape of a dispersion model whose numbers are free.
     - `roughness`: root mean square height of the upper face, in nm.
@@ -44,6 +45,7 @@ class Uncertainty:
     psi: float = 0.05
     delta: float = 0.15
     depolarisation: float = 0.005
+    mueller: float = 0.002
     index: float = 0.005
     dispersion: float = 0.003
     roughness: float = 1.5

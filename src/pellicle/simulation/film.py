@@ -18,7 +18,7 @@ from pellicle.materials import materials_in
 from pellicle.optics import ellipsometry, plate
 from pellicle.optics.layout import stack_rows
 from pellicle.optics.pointwise import pointwise
-from pellicle.scene.film import Scene, thickness_spread
+from pellicle.scene.film import ELLIPSOMETRY, Scene, thickness_spread
 from pellicle.scene.free import free_leaves
 from pellicle.scene.layers import Interface, Layer
 from pellicle.simulation import instrument
@@ -72,10 +72,10 @@ def build(plan: Plan) -> Simulate:
     """The forward model of a plan: simulate(scene) → signal at `scene.light.wavelength`.
 
     The signal is a fraction, without scale or offset; for ellipsometry it is one array with N, C, S of the
-    first wavelength, then of the next. `scene` contains numbers only (see `scene.free.insert`). The function
-    is pure and can be traced.
+    first wavelength, then of the next, or the 15 elements of a Mueller matrix beside m11. `scene` contains
+    numbers only (see `scene.free.insert`). The function is pure and can be traced.
     """
-    ellipsometric = plan.signal == "psi-delta"
+    ellipsometric = plan.signal in ELLIPSOMETRY
     powers = partial(_stokes_rows if ellipsometric else _power_rows, plan)
     finish = _normalised_rows if ellipsometric else _mean
     averaged = plan.row("coherence").count or plan.on("angle-spread")
@@ -99,6 +99,8 @@ def build(plan: Plan) -> Simulate:
         for remove in plan.left_out:
             scene = remove(scene)
         rows = finish(intensities(scene)) if averaged else intensities(scene)
+        # behind the averages, whose slopes then have three rows
+        rows = _mueller_rows(*rows) if plan.signal == "mueller" else rows
         return stack_rows(rows).T.reshape(-1) if ellipsometric else rows[0]
 
     return simulate
@@ -140,6 +142,12 @@ def _mean(rows: Sequence[Any]) -> Sequence[Any]:
 def _normalised_rows(rows: Sequence[Any]) -> Sequence[Any]:
     """N, C and S."""
     return ellipsometry.normalised(ellipsometry.Stokes(*rows))
+
+
+def _mueller_rows(n: Any, c: Any, s: Any) -> Sequence[Any]:
+    """The elements m12, m13, ..., m44 of the normalised Mueller matrix of an isotropic sample."""
+    one, none = jnp.ones_like(n), jnp.zeros_like(n)
+    return [-n, none, none, -n, one, *[none] * 4, c, s, none, none, -s, c]
 
 
 def _power_rows(plan: Plan, groups: list[CoherentGroup]) -> list[Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -10,6 +11,7 @@ import jax
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pellicle.data import mueller
 from pellicle.data.spectrum import Spectrum
 from pellicle.effects.plan import Plan
 from pellicle.errors import UsageError
@@ -25,9 +27,10 @@ VISIBLE = (380.0, 780.0, 2.0)
 
 
 class SimulatedSignal(NamedTuple):
-    """A simulated signal with and without noise, (wavelengths,) or Ψ and Δ (wavelengths, 2), and its plan.
+    """A simulated signal with and without noise, and its plan: (wavelengths,), Ψ and Δ (wavelengths, 2), or
+    Mueller elements m12 to m44 (wavelengths, 15).
 
-    `depolarisation` (wavelengths,) is without noise; None for R and T.
+    `depolarisation` (wavelengths,) is without noise; None for other signals than Ψ and Δ.
     """
 
     wavelength: np.ndarray
@@ -44,21 +47,32 @@ def simulate_spectrum(
     noise: float = 0.0,
     seed: int = 0,
     depolarisation_noise: float | None = None,
+    elements: Sequence[str] | None = None,
 ) -> Spectrum:
     """Simulate a spectrum of a film, as `pellicle.simulate` does.
 
     **Arguments:** `wavelength` in nm (`default_wavelengths` if None); `noise` the standard deviation of the
     normal noise, in the unit of the signal, which becomes the σ of the spectrum; `seed` of the noise;
-    `depolarisation_noise` that of the depolarisation, a fraction; None leaves the depolarisation out.
+    `depolarisation_noise` that of the depolarisation, a fraction; None leaves the depolarisation out;
+    `elements` of a Mueller matrix, all 15 if None.
 
-    **Raises:** ValueError where a material has no data at a wavelength; UsageError for a depolarisation of R
-    or T.
+    **Raises:** ValueError where a material has no data at a wavelength; UsageError for a depolarisation
+    or elements of another signal.
     """
     nm = default_wavelengths(scene) if wavelength is None else np.asarray(wavelength, dtype=float)
     light, ellipsometric = scene.light, scene.light.signal == "psi-delta"
     if depolarisation_noise is not None and not ellipsometric:
         raise UsageError('`depolarisation_noise` goes with `signal="psi-delta"`: leave it out')
+    if elements is not None and light.signal != mueller.SIGNAL:
+        raise UsageError('`elements` go with `signal="mueller"`: leave them out')
     simulated = simulate_signal(scene, nm, noise, seed)
+    angle = np.broadcast_to(getattr(light.angle, "start", light.angle), nm.shape)
+    if light.signal == mueller.SIGNAL:
+        chosen = mueller.ELEMENTS if elements is None else tuple(elements)
+        mueller.check_elements(chosen)
+        values = simulated.values[:, [mueller.ELEMENTS.index(name) for name in chosen]]
+        sigma = np.full(values.shape, noise) if noise > 0 else None
+        return Spectrum(nm, values, light.signal, sigma=sigma, angle=angle, elements=chosen)
     values, share, share_sigma = simulated.values, None, None
     if depolarisation_noise is not None and simulated.depolarisation is not None:
         own = np.random.default_rng((seed, 1)).normal(0.0, 1.0, nm.shape)
@@ -66,14 +80,13 @@ def simulate_spectrum(
         share_sigma = np.full(nm.shape, depolarisation_noise) if depolarisation_noise > 0 else None
     psi_or_power, delta = values.T if ellipsometric else (values, None)
     sigma = np.full(nm.shape, noise) if noise > 0 else None
-    angle = getattr(light.angle, "start", light.angle)
     return Spectrum(
         nm,
         psi_or_power,
         light.signal,
         sigma=sigma,
         polarisation=light.polarisation,
-        angle=np.broadcast_to(angle, nm.shape),
+        angle=angle,
         delta=delta,
         folded=False,
         delta_sigma=sigma if ellipsometric else None,
@@ -89,7 +102,7 @@ def simulate_signal(
 
     Free parameters take their start values; a free scale is 1 and a free offset 0. Effects that change
     the signal by less than the `tolerance` are left out (see `pellicle.plan`). The signal of ellipsometry is
-    Ψ and Δ in degrees.
+    Ψ and Δ in degrees, or the elements m12 to m44 of the normalised Mueller matrix.
 
     **Raises:** ValueError where a material has no data at a wavelength.
     """
@@ -106,6 +119,8 @@ def simulate_signal(
     if scene.light.signal == "psi-delta":
         depolarisation = 1 - np.sum(clean.reshape(-1, 3) ** 2, axis=1)
         clean = np.stack(np.broadcast_arrays(*psi_delta(*clean.reshape(-1, 3).T)), axis=1)
+    elif scene.light.signal == mueller.SIGNAL:
+        clean = clean.reshape(len(wavelength), -1)
     values = clean + noise * np.random.default_rng(seed).normal(0.0, 1.0, clean.shape)
     if scene.light.signal == "psi-delta":
         values = np.stack([np.clip(values[:, 0], 0.0, 90.0), np.mod(values[:, 1], 360.0)], axis=1)

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from pellicle.data.tabular.column_names import COUNTERS
+from pellicle.data.tabular.column_names import COUNTERS, MUELLER
 from pellicle.data.tabular.columns import COUNTS, SIGNALS, Column, listed
 from pellicle.data.tabular.named_columns import first_column, named_columns
 from pellicle.data.tabular.table import Table
@@ -226,6 +226,11 @@ def _unnamed_signals(table: Table, columns: Sequence[Column], signal: str | None
     if {"psi", "delta"} & roles:
         raise UsageError(
             f'{table.path}: has psi and delta, which contradicts `signal="{signal}"`; leave that out'
+        )
+    if roles & set(MUELLER):
+        raise UsageError(
+            f"{table.path}: has elements of a Mueller matrix, which contradicts "
+            f'`signal="{signal}"`; leave that out'
         )
     named = [c for c in columns if c.name not in ("_", "")]
     processed = [c for c in named if c.role == "processed"]

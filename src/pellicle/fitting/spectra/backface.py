@@ -34,7 +34,7 @@ def comparison(spectra: Sequence[Target], ranked: RankedMinima) -> Comparison | 
     views = ranked.problem.views
     spectral = [i for i, view in enumerate(views) if isinstance(view, SpectrumView)]
     dependent = [i for i in spectral if views[i].plan.on("back-face")]
-    dependent = [i for i in dependent if views[i].channels == 1] or dependent
+    dependent = [i for i in dependent if views[i].of_power] or dependent
     backs = [spectra[i].scene.substrate for i in dependent]
     if not dependent or any(free_leaves((plate.back, plate.plate_mm)) for plate in backs):
         return None

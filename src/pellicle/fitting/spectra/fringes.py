@@ -66,7 +66,13 @@ def phase_per_thickness(
     wavelength, rows = np.asarray(scene.light.wavelength), slice(view.rows)
     angle = np.broadcast_to(np.asarray(scene.light.angle, dtype=float), wavelength.shape)
     layers = [x for x in scene.layers if isinstance(x, Layer)]
-    if view.channels > 1 or len(layers) < len(scene.layers) or np.ptp(angle[rows]) > 0 or view.rows < 16:
+    if (
+        isinstance(view, ColoursView)
+        or not view.of_power
+        or len(layers) < len(scene.layers)
+        or np.ptp(angle[rows]) > 0
+        or view.rows < 16
+    ):
         return None
     indices = [np.broadcast_to(real(known_index(x.material, wavelength)), wavelength.shape) for x in layers]
     own = [i for i, layer in enumerate(layers) if layer.thickness == thickness]

@@ -57,12 +57,14 @@ class Prepared(eqx.Module):
         - `sigma`: standard deviations, (points,) or one number; those of the prepared spectrum if None.
         - `spectrum`: position of the spectrum in a joint problem.
 
-        **Raises:** UsageError for Ψ and Δ, which `prepare` takes; ValueError for another number of points.
+        **Raises:** UsageError for ellipsometry, which `prepare` takes; ValueError for other numbers.
         """
         scene, data = self._arrays[spectrum]
-        points, numbers = self._shapes[spectrum]
-        if numbers != points:
-            raise UsageError("`values` of Ψ and Δ cannot be replaced: prepare and stack a problem of each")
+        points, _ = self._shapes[spectrum]
+        if scene.light.ellipsometric:
+            raise UsageError(
+                "`values` of ellipsometry cannot be replaced: prepare and stack a problem of each"
+            )
         values = jnp.asarray(values)
         if values.shape != (points,):
             raise ValueError(f"`values`: expected one number per wavelength ({points},), got {values.shape}")

@@ -59,7 +59,7 @@ def together(parts: tuple[Part, ...]) -> float | None:
     if len(parts) == 1:
         return parts[0].rms
     spectra = [part.data for part in parts if isinstance(part.data, Spectrum)]
-    units = {spectrum.signal == "psi-delta" for spectrum in spectra}
+    units = {spectrum.signal if spectrum.ellipsometric else "power" for spectrum in spectra}
     if len(spectra) < len(parts) or len(units) > 1 or not all(spectrum.calibrated for spectrum in spectra):
         return None
     sizes = [part.spectral.wavelength.size for part in parts]
@@ -103,7 +103,7 @@ def with_curves(
 def _accuracy(part: Part, view: SpectrumView | ColoursView) -> Accuracy:
     if isinstance(view, ColoursView):
         return colours_accuracy(view, part.sigma)
-    if view.channels > 1:
+    if not view.of_power:
         # of Ψ and Δ the range says nothing: on a thin oxide it is that of the substrate
         return Accuracy(largest=LARGEST_ANGLES)
     if view.noise.drifting:
@@ -118,23 +118,23 @@ def _curve(spectrum: Spectrum, view: SpectrumView, at: Local, covariance: np.nda
     n_stderr, k_stderr = layer_errors(at, covariance, rows)
     n, k = np.asarray(at.layer)[:, :rows]
     data, model = view.in_columns(view.data.values), view.in_columns(at.model)
-    sigma = 1 / np.asarray(view.data.weight)[: view.points : view.channels]
-    angles = {}
+    weight = np.asarray(view.data.weight)[: view.points].reshape(rows, view.channels)
+    sigma, angles = 1 / (weight if view.elements else weight[:, 0]), {}
     if spectrum.depolarisation is not None:
         # a scene without depolarisation has none at any wavelength
         share = np.zeros(rows) if view.depolarisation is None else model[:, -1]
         angles = {"depolarisation_data": spectrum.depolarisation, "depolarisation_model": share}
     if view.depolarisation is not None:
         data, model = data[:, :-1], model[:, :-1]
-    if view.channels > 1:
+    if spectrum.delta is not None:
         (data, delta_data), (model, delta_model) = psi_delta(data), psi_delta(model)
         sigma = np.rad2deg(sigma) / 2
         angles |= {"delta_data": delta_data, "delta_model": delta_model}
     return Curve(
         wavelength=np.asarray(view.scene.light.wavelength)[:rows],
-        data=np.ravel(data),
+        data=data if view.elements else np.ravel(data),
         sigma=sigma,
-        model=np.ravel(model),
+        model=model if view.elements else np.ravel(model),
         n=n,
         k=k,
         n_stderr=n_stderr,

@@ -68,6 +68,7 @@ def make(*spectra: Target, tolerance: float = 0.0) -> Problem:
                 spectrum.noise,
                 *numbers,
                 spectrum.depolarisation,
+                spectrum.elements,
             )
         )
     return Problem(tuple(views), free, box(*bounds(free), [p.prior for p in free]))

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pellicle.data.mueller import ELEMENTS
 from pellicle.fitting.colours.view import ColoursView
 from pellicle.fitting.discrepancy import HALF_NORMAL, Effect
 from pellicle.fitting.spectra.extended_scene import ExtendedScene, Number
@@ -165,7 +166,9 @@ def simulations_of(
 def effects_on_signal(view: SpectrumView, at: Local, scene: Scene) -> list[Effect]:
     """Effects that act on the signal alone; leading axes of `at` are those of the changes too."""
     allowed, signal = scene.uncertainty, np.asarray(at.signal)
-    if view.channels > 1:
+    if view.elements:
+        return _of_elements(view, signal, allowed)
+    if not view.of_power:
         return _of_angles(view, at, allowed)
     position, curves = np.asarray(view.data.position), []
     if not isinstance(scene.instrument.scale, Drift):
@@ -228,6 +231,23 @@ def _of_angles(view: SpectrumView, at: Local, allowed: Uncertainty) -> list[Effe
     return result
 
 
+def _of_elements(view: SpectrumView, signal: np.ndarray, allowed: Uncertainty) -> list[Effect]:
+    """An offset of each element, and a depolarisation that mixes the phases of s and p: elements of the third
+    and fourth rows and columns lose a share."""
+    columns = signal[: view.points].reshape(view.rows, view.channels)
+    names = [ELEMENTS[i] for i in view.elements]
+    result = []
+    for channel, name in enumerate(names) if allowed.mueller else ():
+        change = np.zeros(columns.shape)
+        change[:, channel] = allowed.mueller
+        result.append(Effect(f"offset of {name}", allowed.mueller, "", change, shared=False))
+    mixed = [allowed.depolarisation * bool({"3", "4"} & set(name[1:])) for name in names]
+    if any(mixed):
+        size = allowed.depolarisation
+        result.append(Effect("depolarisation", size, "", -columns * mixed, positive=True, shared=False))
+    return result
+
+
 def _in_frame(view: SpectrumView, change: np.ndarray) -> np.ndarray:
     """A change of N, C and S (..., rows, 3), which leaves the depolarisation, as (..., rows, measured
     channels)."""
@@ -248,6 +268,8 @@ def _columns(view: SpectrumView, values: np.ndarray) -> np.ndarray:
 
 def _on_sphere(view: SpectrumView, at: Local, change: np.ndarray) -> np.ndarray:
     """Change of N, C, S without its part outwards: Ψ and Δ do not depend on the degree of polarisation."""
+    if view.elements:
+        return change
     sphere = view.channels if view.depolarisation is None else view.channels - 1
     if sphere < 3 or view.data.frame is not None:
         return change

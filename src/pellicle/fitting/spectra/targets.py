@@ -9,6 +9,7 @@ import numpy as np
 
 from pellicle.data.colours import Colours
 from pellicle.data.ellipsometry_angles import ncs
+from pellicle.data.mueller import ELEMENTS
 from pellicle.data.spectrum import Spectrum
 from pellicle.effects.film import exact
 from pellicle.errors import DataError, UsageError
@@ -21,18 +22,19 @@ from pellicle.scene.free import free_leaves, is_free
 from pellicle.scene.instrument import ONE_NUMBER, Drift, Instrument
 
 ROUGH = 0.01
-"""First guess of the noise of N, C, S and of a depolarisation."""
+"""First guess of the noise of N, C, S, of a depolarisation and of Mueller elements."""
 
 
 class Measured(NamedTuple):
     """Values of one spectrum, and the scene that is to explain them.
 
-    `values` are fractions (points,), or N, C, S (points, 3) for ellipsometry, which have no wrap-around,
-    or N and C alone (points, 2) where Δ is folded;
-    `wavelength` (nm) is (points,), `sigma` too or the shape of `values`; `independent_fraction` is
-    how many independent points each counts for. Where some light is unpolarised and its depolarisation was
-    measured, that follows N, C, S (or N, C), and `depolarisation` is its noise. With a `frame` (points,
-    channels, channels) the values are those of N, C, S and depolarisation in it.
+    `values` are fractions (points,), or N, C, S (points, 3) for ellipsometry, which have no wrap-around, or N
+    and C alone (points, 2) where Δ is folded; `wavelength` (nm) is (points,), `sigma` too or the shape of
+    `values`; `independent_fraction` is how many independent points each counts for. Where some light is
+    unpolarised and its depolarisation was measured, that follows N, C, S (or N, C), and `depolarisation` is
+    its noise. With a `frame` (points, channels, channels) the values are those of N, C, S and depolarisation
+    in it. Of a Mueller matrix the values are (points, elements), and `elements` their positions among m12,
+    m13, ..., m44.
     """
 
     scene: Scene
@@ -44,6 +46,7 @@ class Measured(NamedTuple):
     name: str = ""  # that of one among several
     frame: np.ndarray | None = None
     depolarisation: Noise | None = None
+    elements: tuple[int, ...] = ()
 
 
 Target: TypeAlias = Measured | MeasuredColours
@@ -76,7 +79,7 @@ def measured(data: Spectrum, scene: Scene, name: str = "") -> Measured:
             frame = np.insert(np.insert(frame, at, 0.0, axis=1), 3, 0.0, axis=2)
             frame[:, at, 3] = 1.0
     known = scene, data.wavelength, values, sigma, independent_fraction, source, name, frame
-    return Measured(*known, depolarisation)
+    return Measured(*known, depolarisation, tuple(ELEMENTS.index(name) for name in data.elements))
 
 
 def sphere_frame(psi: np.ndarray, delta: np.ndarray) -> np.ndarray:
@@ -133,14 +136,14 @@ def seen_as(scene: Scene, data: Spectrum) -> Scene:
 
 
 def without_scale(scene: Scene, data: Spectrum | Colours) -> Scene:
-    """A scene that several data share, for one of them: Ψ and Δ have neither scale nor offset, and of a scale
-    that drifts colours have one number."""
+    """A scene that several data share, for one of them: ellipsometry has neither scale nor offset, and of a
+    scale that drifts colours have one number."""
     if isinstance(data, Colours):
         kept = {name: value for name, value in vars(scene.instrument).items() if name != "offset"}
         if isinstance(scene.instrument.scale, Drift):
             kept["scale"] = ONE_NUMBER
         return eqx.tree_at(lambda s: s.instrument, scene, Instrument(**kept))
-    if data.delta is None:
+    if not data.ellipsometric:
         return scene
     kept = {name: value for name, value in vars(scene.instrument).items() if name not in ("scale", "offset")}
     return eqx.tree_at(lambda s: s.instrument, scene, Instrument(**kept))
@@ -152,17 +155,17 @@ def drifts(scene: Scene) -> bool:
 
 
 def _check(data: Spectrum, scene: Scene) -> None:
-    if data.delta is None and len(data) < 2:
+    if not data.ellipsometric and len(data) < 2:
         raise DataError(f"{data.path}: holds one point of {data.signal}; a fit needs a spectrum")
     drifting = [x for x in (scene.instrument.scale, scene.instrument.offset) if isinstance(x, Drift)]
-    if data.delta is None and not data.calibrated and scene.instrument.scale not in drifting:
+    if not data.ellipsometric and not data.calibrated and scene.instrument.scale not in drifting:
         raise UsageError(
             f'{data.path}: an uncalibrated intensity needs a free scale: `scale="slow"` or `scale="free"`'
         )
-    if data.delta is None:
+    if not data.ellipsometric:
         return
     if drifting or scene.instrument.scale != 1.0 or scene.instrument.offset != 0.0:
-        raise UsageError(f"{data.path}: Ψ and Δ have no scale and no offset: leave both out")
+        raise UsageError(f"{data.path}: ellipsometry has no scale and no offset: leave both out")
     if data.angle is None and not free_leaves(scene.light) and not np.any(scene.light.angle):
         raise UsageError(
             f"{data.path}: ellipsometry needs its angle of incidence: give `angle=70`, for instance, "
@@ -172,7 +175,7 @@ def _check(data: Spectrum, scene: Scene) -> None:
 
 def _sigma(data: Spectrum, source: Noise) -> np.ndarray:
     """σ of each point: the data's, the model's own error, or a guess that the residuals will replace."""
-    if data.sigma is None and data.delta is not None:
+    if data.sigma is None and data.ellipsometric:
         return np.full(len(data), ROUGH)
     if data.sigma is None and source.drifting:
         return noise.drifting_sigma(data.values)

@@ -37,20 +37,25 @@ SCAN_POINTS = 448
 class SpectrumForm:
     """The simulation of a spectrum by a plan without words, compared with data by variable projection.
 
-    With `depolarisation` a channel of it follows N, C, S.
+    With `depolarisation` a channel of it follows N, C, S. `elements` are the positions of measured elements
+    of a Mueller matrix among m12, m13, ..., m44, empty for other signals.
     """
 
     plan: Plan
     depolarisation: bool = False
+    elements: tuple[int, ...] = ()
 
     def simulate(self, scene: Scene, data: Data) -> Any:
-        """The signal as measured: all of it, or of N, C, S the N and C that a folded Δ leaves.
+        """The signal as measured: all of it, or of N, C, S the N and C that a folded Δ leaves, or those
+        elements of a Mueller matrix that were measured.
 
         Ψ and Δ do not depend on the degree of polarisation, so where some light is unpolarised, N, C, S are
         brought to their sphere; a rotating analyser measures N and C as they are. 1 − N² − C² − S² is the
         depolarisation.
         """
         signal = build(self.plan)(scene).reshape(scene.light.wavelength.size, -1)
+        if self.elements:
+            return stack_rows([signal[:, i] for i in self.elements]).T.reshape(-1)
         channels = data.values.size // len(signal)
         if self.depolarisation:
             square = jnp.sum(signal**2, axis=1)
@@ -109,7 +114,7 @@ class SpectrumView:
 
     `scene` has anonymous free parameters and sampled media; `takes` are the positions of its parameters in
     the problem. `data` is padded to a round length. `depolarisation` is the noise of a measured one, where
-    that is a channel.
+    that is a channel, `elements` the positions of elements of a Mueller matrix, as in `SpectrumForm`.
     """
 
     name: str  # empty where there is no other
@@ -118,13 +123,19 @@ class SpectrumView:
     data: Data
     takes: tuple[int, ...]
     noise: Noise
-    points: int  # data values: N, C, S, or N and C, and depolarisation for each wavelength in ellipsometry
+    points: int  # data values: N, C, S, or N and C, and depolarisation, or elements, for each wavelength
     largest_index: float
     depolarisation: Noise | None = None
+    elements: tuple[int, ...] = ()
 
     @property
     def form(self) -> SpectrumForm:
-        return SpectrumForm(self.plan.static_key, self.depolarisation is not None)
+        return SpectrumForm(self.plan.static_key, self.depolarisation is not None, self.elements)
+
+    @property
+    def of_power(self) -> bool:
+        """True for R and T, which have a scale, an offset and fringes; False for ellipsometry."""
+        return not self.plan.ellipsometric
 
     @property
     def arrays(self) -> tuple[Scene, Data]:
@@ -147,13 +158,15 @@ class SpectrumView:
 
     @property
     def independent(self) -> int:
-        """Independent data values: N, C and S lie on a sphere, so two of the three."""
+        """Independent data values: N, C and S lie on a sphere, so two of the three; elements count each."""
         return sum(group.independent for group in self.noise_groups)
 
     @property
     def noise_groups(self) -> tuple[NoiseGroup, ...]:
-        """The channels of the signal, and that of the depolarisation."""
+        """The channels of the signal, and that of the depolarisation; elements of a matrix one by one."""
         every = tuple(range(self.channels))
+        if self.elements:
+            return tuple(NoiseGroup((channel,), self.noise.known, self.rows) for channel in every)
         if self.depolarisation is None:
             return (NoiseGroup(every, self.noise.known, min(self.channels, 2) * self.rows),)
         own = self.measured_channels - 1
@@ -276,9 +289,9 @@ class SpectrumView:
         return np.einsum("pij,...pi->...pj", np.asarray(self.data.frame)[: self.rows], columns)
 
     def rms(self, model: Any) -> float:
-        """rms of the residuals. For ellipsometry it is in degrees of Ψ: half the distance on the sphere, in
-        each of its two directions."""
-        if self.channels == 1:
+        """rms of the residuals. For Ψ and Δ it is in degrees of Ψ: half the distance on the sphere, in each
+        of its two directions."""
+        if self.channels == 1 or self.elements:
             return float(np.sqrt(np.mean((self.data.values - np.asarray(model))[: self.points] ** 2)))
         residual = self.in_columns(self.data.values - np.asarray(model))
         residual = residual if self.depolarisation is None else residual[:, :-1]

@@ -1,0 +1,158 @@
+"""Panels of a Mueller matrix, 4 × 4: elements of a fit or of a measurement against wavelength or angle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pellicle.reporting.drawing import ABOVE, BLACK, BLUE, FITTED, GAP, GREEN, GREY, ORANGE, marker_size
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from pellicle.fitting.result import Part
+
+_COLOURS = (ORANGE, BLUE, GREEN, BLACK)
+MOST_NAMED = 6
+"""Most angles that the first panel lists."""
+_MARGIN = 0.08
+SMALLEST = 0.02
+"""Least height of a panel: an element of 0 shows its noise, without magnifying it."""
+
+
+def matrix(axes: Axes, part: Part) -> None:
+    """Draw data and model of each measured element at its place of the matrix, those in a row side by side.
+
+    The first panel lists the angles; residuals have panels of their own below (`residuals`).
+    """
+    curve = part.spectral
+    x, label = abscissa(curve.wavelength, part.spectrum.angle)
+    lines = series(curve.wavelength, part.spectrum.angle)
+    cells = _grid(axes)
+    _list_angles(cells[0], [angle for _, angle in lines])
+    for place, cell in cells.items():
+        name = f"m{place // 4 + 1}{place % 4 + 1}"
+        if name not in part.spectrum.elements:
+            if place:
+                _unmeasured(cell, name)
+            continue
+        column = part.spectrum.elements.index(name)
+        data, model = curve.data[:, column], curve.model[:, column]
+        cell.plot(x, data, ".", color=GREY, markersize=0.6 * marker_size(x.size))
+        for i, (points, _) in enumerate(lines):
+            for stroke in unbroken(x, points):
+                color = _COLOURS[i % len(_COLOURS)]
+                cell.plot(x[stroke], model[stroke], **{**FITTED, "color": color, "linewidth": 0.9})
+        _finish(cell, name, place, np.concatenate([data, model]))
+    axes.set_xlabel(label, labelpad=16)
+    axes.set_ylabel("normalised element", labelpad=30)
+
+
+def residuals(axes: Axes, part: Part) -> None:
+    """Draw data − model of all elements in one panel, the first ten solid and the others dashed."""
+    curve = part.spectral
+    x, label = abscissa(curve.wavelength, part.spectrum.angle)
+    lines = series(curve.wavelength, part.spectrum.angle)
+    for column, name in enumerate(part.spectrum.elements):
+        style: dict[str, Any] = {"linewidth": 0.7, "color": f"C{column % 10}"}
+        style["linestyle"] = "-" if column < 10 else "--"
+        for i, (points, _) in enumerate(lines):
+            for j, stroke in enumerate(unbroken(x, points)):
+                residual = curve.residual[stroke, column]
+                axes.plot(x[stroke], residual, **style, label="_" if i or j else name)
+    axes.axhline(0, color=GREY, linewidth=0.6)
+    axes.set(xlabel=label, ylabel="data − fit")
+    axes.legend(**{**ABOVE, "ncols": 8}, fontsize="x-small")
+    axes.margins(x=0.01)
+
+
+def draw_measured(
+    axes: Axes, elements: Sequence[str], x: np.ndarray, lines: Sequence[tuple[np.ndarray, float | None]],
+    values: np.ndarray, sigma: np.ndarray | None,
+) -> None:  # fmt: skip
+    """Draw measured elements at their places of the matrix, with ± σ."""
+    cells = _grid(axes)
+    _list_angles(cells[0], [angle for _, angle in lines])
+    for place, cell in cells.items():
+        name = f"m{place // 4 + 1}{place % 4 + 1}"
+        if name not in elements:
+            if place:
+                _unmeasured(cell, name)
+            continue
+        own = values[:, elements.index(name)]
+        for i, (points, _) in enumerate(lines):
+            color = _COLOURS[i % len(_COLOURS)]
+            cell.plot(x[points], own[points], ".-", color=color, markersize=1.5, linewidth=0.6)
+            if sigma is not None:
+                error = sigma[points, elements.index(name)]
+                band = own[points] - error, own[points] + error
+                cell.fill_between(x[points], *band, color=color, alpha=0.2, linewidth=0)
+        _finish(cell, name, place, own)
+
+
+def abscissa(wavelength: np.ndarray, angle: np.ndarray | None) -> tuple[np.ndarray, str]:
+    """The x axis and its label: wavelength, or the angle of incidence if there is one wavelength only."""
+    if angle is not None and np.unique(wavelength).size == 1 and np.unique(angle).size > 1:
+        return angle, "angle of incidence (degrees)"
+    return wavelength, "wavelength (nm)"
+
+
+def series(wavelength: np.ndarray, angle: np.ndarray | None) -> list[tuple[np.ndarray, float | None]]:
+    """Indices of the points of each line in rising order, and its angle, None if there is one line."""
+    x, _ = abscissa(wavelength, angle)
+    if angle is None or x is angle or np.unique(angle).size == 1:
+        return [(np.argsort(x, kind="stable"), None)]
+    groups = [(np.flatnonzero(angle == value), float(value)) for value in np.unique(angle)]
+    return [(points[np.argsort(x[points], kind="stable")], value) for points, value in groups]
+
+
+def unbroken(x: np.ndarray, points: np.ndarray) -> list[np.ndarray]:
+    """Indices of the points of each stroke, split at wide gaps."""
+    steps = np.diff(x[points])
+    broken = steps > GAP * np.median(steps) if steps.size else np.zeros(0, dtype=bool)
+    return np.split(points, np.flatnonzero(broken) + 1)
+
+
+def _grid(axes: Axes) -> dict[int, Axes]:
+    """Sixteen axes within one, row by row; that one keeps its labels only."""
+    axes.set(xticks=[], yticks=[])
+    axes.spines[:].set_visible(False)
+    cells, gap = {}, 0.055
+    size = (1 - 3 * gap) / 4
+    for place in range(16):
+        row, column = divmod(place, 4)
+        low = (column * (size + gap), (3 - row) * (size + gap * 0.6) + 0.02)
+        cells[place] = axes.inset_axes((*low, size, size))
+    return cells
+
+
+def _list_angles(cell: Axes, angles: Sequence[float | None]) -> None:
+    """Write m11 and the colour of each angle into the first panel."""
+    cell.set_axis_off()
+    cell.text(0.5, 0.9, "m11 = 1", ha="center", va="top", fontsize="small", transform=cell.transAxes)
+    named = [(i, angle) for i, angle in enumerate(angles) if angle is not None][:MOST_NAMED]
+    for line, (i, angle) in enumerate(named):
+        where = (0.5, 0.68 - 0.13 * line)
+        style: dict[str, Any] = {"color": _COLOURS[i % len(_COLOURS)], "fontsize": "x-small"}
+        cell.text(*where, f"{angle:g}°", ha="center", va="top", transform=cell.transAxes, **style)
+
+
+def _unmeasured(cell: Axes, name: str) -> None:
+    cell.set(xticks=[], yticks=[])
+    cell.spines[:].set_color("0.85")
+    cell.text(0.5, 0.5, name, ha="center", va="center", color="0.7", transform=cell.transAxes)
+
+
+def _finish(cell: Axes, name: str, place: int, shown: np.ndarray) -> None:
+    low, high = float(np.min(shown)), float(np.max(shown))
+    room = max(high - low, SMALLEST) * (1 + 2 * _MARGIN) / 2
+    cell.set_ylim((low + high) / 2 - room, (low + high) / 2 + room)
+    cell.tick_params(labelsize="x-small", labelbottom=place >= 12, pad=1, length=2)
+    cell.locator_params(nbins=3)
+    cell.margins(x=0.02)
+    cell.text(
+        0.04, 0.94, name, va="top", fontsize="small", transform=cell.transAxes,
+        bbox={"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 0.5},
+    )  # fmt: skip

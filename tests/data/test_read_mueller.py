@@ -1,0 +1,168 @@
+"""Reading and writing of normalised Mueller elements."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pellicle.data.read_spectrum import read_spectra, read_spectrum
+from pellicle.data.spectrum import Spectrum
+from pellicle.data.write_spectrum import write_spectrum
+from pellicle.errors import DataError, UsageError
+
+NM = np.linspace(400.0, 800.0, 6)
+M12, M33, M34 = np.linspace(-0.9, 0.8, 6), np.linspace(0.3, -0.4, 6), np.linspace(0.1, 0.5, 6)
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write(header: str, *columns: np.ndarray | float):
+        path = tmp_path / "matrix.csv"
+        table = np.column_stack([np.broadcast_to(column, NM.shape) for column in (NM, *columns)])
+        rows = [",".join(f"{x:.9g}" for x in row) for row in table]
+        path.write_text("\n".join([header, *rows, ""]))
+        return path
+
+    return write
+
+
+@pytest.mark.parametrize("names", ["m12,m33,m34", "M12,M33,M34", "mm12,mm33,mm34", "m_12,M_33,m_{34}"])
+def test_names_of_elements(write, names):
+    spectrum = read_spectrum(write(f"wavelength_nm,{names},angle", M12, M33, M34, 65.0))
+    assert spectrum.signal == "mueller"
+    assert spectrum.elements == ("m12", "m33", "m34")
+    np.testing.assert_allclose(spectrum.values, np.stack([M12, M33, M34], axis=1), rtol=1e-8)
+    assert np.all(spectrum.angle == 65)
+
+
+def test_elements_are_chosen_in_the_order_of_the_matrix(write):
+    path = write("nm,m34,m33,m12", M34, M33, M12)
+    assert read_spectrum(path, elements=["m34", "m12"]).elements == ("m12", "m34")
+    with pytest.raises(UsageError, match="has no column m44; it has m12, m33, m34"):
+        read_spectrum(path, elements=["m44"])
+    with pytest.raises(UsageError, match="not 'm11'"):
+        read_spectrum(path, elements=["m11"])
+
+
+def test_elements_are_divided_by_m11(write):
+    raw = np.linspace(2000.0, 3000.0, 6)
+    path = write("nm,m11,m12,m33,sigma_m12,sigma_m33", raw, raw * M12, raw * M33, 10.0, 20.0)
+    spectrum = read_spectrum(path)
+    np.testing.assert_allclose(spectrum.values, np.stack([M12, M33], axis=1), rtol=1e-7)
+    np.testing.assert_allclose(spectrum.sigma, np.outer(1 / raw, [10, 20]), rtol=1e-8)
+    assert "elements divided by m11" in spectrum.notes
+
+
+def test_an_intensity_in_the_place_of_m11_is_no_divisor(write):
+    spectrum = read_spectrum(write("nm,m11,m12", np.linspace(0.2, 0.4, 6), M12))
+    np.testing.assert_allclose(spectrum.values[:, 0], M12, rtol=1e-8)
+    assert "m11 is an intensity beside normalised elements: ignored" in spectrum.notes
+
+
+def test_elements_that_were_not_measured_are_left_out(write):
+    spectrum = read_spectrum(write("nm,m12,m13,m22,m33", M12, 0.0, 1.0, M33))
+    assert spectrum.elements == ("m12", "m33")
+    assert "left out as not measured, exactly 0 or 1 at every point: m13, m22" in spectrum.notes
+    with pytest.raises(DataError, match="m13, m22 are constant: nothing was measured"):
+        read_spectrum(write("nm,m13,m22", 0.0, 1.0))
+
+
+def test_standard_deviations(write):
+    both = read_spectrum(write("nm,m12,m33,sigma", M12, M33, 0.01))
+    assert both.sigma.shape == (6, 2)
+    assert np.all(both.sigma == 0.01)
+    replaced = read_spectrum(write("nm,m12,m33,sigma", M12, M33, 0.01), noise=0.002)
+    assert np.all(replaced.sigma == 0.002)
+    with pytest.raises(DataError, match=r"some of the elements only \('m12_err'\)"):
+        read_spectrum(write("nm,m12,m33,m12_err", M12, M33, 0.01))
+    with pytest.raises(DataError, match="is a standard deviation not above zero"):
+        read_spectrum(write("nm,m12,sigma", M12, 0.0))
+
+
+def test_impossible_elements_are_refused(write):
+    with pytest.raises(DataError, match=r"line 7, column 'm12': 1\.2 is beyond 1\.1 for m12"):
+        read_spectrum(write("nm,m12,m33", np.where(NM == 800, 1.2, M12), M33))
+    # noise reaches as far
+    assert len(read_spectrum(write("nm,m12,sigma", np.where(NM == 800, 1.2, M12), 0.05))) == 6
+    with pytest.raises(DataError, match="is in 'percent'; write elements as fractions"):
+        read_spectrum(write("nm,m12 (%)", 100 * M12))
+
+
+@pytest.mark.parametrize(
+    ("pair", "values", "words"),
+    [
+        (
+            "m34,m43",
+            (M34, M34),
+            "m34 and m43 have the same sign, and of an isotropic sample they are opposite",
+        ),
+        (
+            "m12,m21",
+            (M12, -M12),
+            "m12 and m21 have opposite signs, and of an isotropic sample they are equal",
+        ),
+        ("m33,m44", (M33, -M33), "m33 and m44 have opposite signs"),
+    ],
+)
+def test_signs_of_another_convention_are_named(write, pair, values, words):
+    assert any(words in note for note in read_spectrum(write(f"nm,{pair}", *values)).notes)
+    usual = values[0], -values[1]
+    assert not any("convention" in note for note in read_spectrum(write(f"nm,{pair}", *usual)).notes)
+
+
+def test_psi_and_delta_come_first(write):
+    path = write("nm,psi_deg,delta_deg,m12", 45.0, np.linspace(100, 170, 6), M12)
+    assert read_spectrum(path).signal == "psi-delta"
+    assert read_spectrum(path, signal="mueller").elements == ("m12",)
+
+
+def test_elements_beside_a_reflectance(write):
+    path = write("nm,m12,R", M12, 0.3)
+    with pytest.raises(UsageError, match="has Mueller elements as well as R; choose one with `signal`"):
+        read_spectrum(path)
+    assert [one.signal for one in read_spectra(path)] == ["mueller", "R"]
+    assert read_spectrum(path, signal="R").signal == "R"
+    with pytest.raises(UsageError, match='Mueller matrix, which contradicts `signal="R"`'):
+        read_spectrum(write("nm,m12", M12), signal="R")
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".nc", ".nxs"])
+def test_a_written_spectrum_is_read_back(tmp_path, suffix):
+    random = np.random.default_rng(0)
+    values, sigma = random.uniform(-1, 1, (6, 3)), random.uniform(0.001, 0.01, (6, 3))
+    angle = np.repeat([60.0, 70.0], 3)
+    nm = np.tile([400.0, 500.0, 600.0], 2)
+    spectrum = Spectrum(nm, values, "mueller", sigma=sigma, angle=angle, elements=("m12", "m23", "m44"))
+    back = read_spectrum(write_spectrum(tmp_path / f"matrix{suffix}", spectrum))
+    assert back.elements == spectrum.elements
+    for name in ("wavelength", "angle", "values", "sigma"):
+        np.testing.assert_array_equal(getattr(back, name), getattr(spectrum, name))
+
+
+def test_points_are_sorted_with_their_elements():
+    spectrum = Spectrum(NM[::-1], np.stack([M12, M33], axis=1), "mueller", elements=("m12", "m33"))
+    np.testing.assert_array_equal(spectrum.values, np.stack([M12, M33], axis=1)[::-1])
+    assert len(spectrum.cut(450, 850)) == 5
+
+
+def test_repeated_sweeps_are_averaged(tmp_path):
+    path = tmp_path / "sweeps.csv"
+    sweeps = [M12 + 0.001, M12 - 0.001]
+    rows = [f"{nm},{m}" for own in sweeps for nm, m in zip(NM, own, strict=True)]
+    path.write_text("\n".join(["nm,m12", *rows, ""]))
+    spectrum = read_spectrum(path)
+    assert len(spectrum.sweeps) == 2
+    np.testing.assert_allclose(spectrum.values[:, 0], M12, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ({"elements": ()}, '`elements` go with `signal="mueller"`'),
+        ({"elements": ("m12", "m12")}, "are repeated"),
+        ({"elements": ("m15", "m12")}, "not 'm15'"),
+    ],
+)
+def test_elements_are_checked(words, message):
+    with pytest.raises(UsageError, match=message):
+        Spectrum(NM, np.zeros((6, 2)) if words["elements"] else M12, "mueller", **words)

@@ -1,0 +1,119 @@
+"""Fits of normalised Mueller elements, against data by the package tmm."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import tmm
+
+import pellicle as pl
+from pellicle.data.read_spectrum import read_spectrum
+from pellicle.errors import UsageError
+from pellicle.fitting.comparison import compare
+from pellicle.reporting.csv_tables import fit_csv
+from pellicle.reporting.fit_figure import draw
+from pellicle.reporting.fit_text import report
+from pellicle.reporting.json_record import to_json
+
+NM = np.linspace(400.0, 800.0, 128)
+ANGLE, THICKNESS, INDEX, SUBSTRATE = 70.0, 180.0, 1.46, 3.9 + 0.02j
+ELEMENTS = ("m12", "m22", "m33", "m34", "m43")
+NOISE = np.array([0.001, 0.002, 0.004, 0.002, 0.008])
+
+
+def measured(thickness: float = THICKNESS, seed: int = 3) -> pl.Spectrum:
+    """Data without σ, whose elements have a noise of their own."""
+    rows = []
+    for nm in NM:
+        rs, rp = (
+            tmm.coh_tmm(x, [1, INDEX, SUBSTRATE], [np.inf, thickness, np.inf], np.deg2rad(ANGLE), nm)["r"]
+            for x in "sp"
+        )
+        both = abs(rs) ** 2 + abs(rp) ** 2
+        N, cross = (abs(rs) ** 2 - abs(rp) ** 2) / both, 2 * np.conj(rp) * rs / both
+        rows.append([-N, 1.0, cross.real, cross.imag, -cross.imag])
+    values = np.array(rows) + NOISE * np.random.default_rng(seed).normal(size=(len(NM), len(ELEMENTS)))
+    return pl.Spectrum(NM, values, "mueller", elements=ELEMENTS)
+
+
+def scene(index: complex = INDEX) -> pl.Scene:
+    light = pl.Light(angle=ANGLE, signal="mueller")
+    return pl.Scene(pl.Layer(index, pl.Free(10, 500)), SUBSTRATE, light=light, uncertainty=NONE)
+
+
+NONE = pl.Uncertainty.none()
+
+
+@pytest.fixture(scope="module")
+def fit() -> pl.Fit:
+    return pl.fit(measured(), scene())
+
+
+def test_the_thickness_is_found(fit):
+    thickness = fit["thickness"]
+    assert fit.status == "converged"
+    assert abs(thickness.value - THICKNESS) < 4 * thickness.stderr
+    assert thickness.stderr < 0.02
+
+
+def test_each_element_has_its_own_noise(fit):
+    [part] = fit.parts
+    np.testing.assert_allclose(part.curve.sigma[0], NOISE, rtol=0.2)  # 1/√256 = 0.06
+    assert part.curve.data.shape == part.curve.model.shape == (128, 5)
+    # of all values; that of the noisiest counts most
+    assert fit.rms == pytest.approx(np.sqrt(np.mean(NOISE**2)), rel=0.15)
+
+
+def test_records(fit, tmp_path):
+    record = to_json(fit)
+    assert record["data"]["signal"] == "mueller"
+    assert record["data"]["points"] == 128
+    assert "mueller (m12, m22, m33, m34, m43), 128 points from 400 to 800 nm" in report(fit)
+    path = tmp_path / "fit.csv"
+    path.write_text(fit_csv(fit))
+    back = read_spectrum(path)
+    assert back.elements == ELEMENTS
+    np.testing.assert_allclose(back.values, fit.parts[0].data.values, rtol=1e-9)
+    np.testing.assert_allclose(back.sigma, fit.parts[0].curve.sigma, rtol=1e-9)
+
+
+def test_the_figure_has_a_panel_for_each_element(fit):
+    figure = draw(fit)
+    panels = figure.axes[0].child_axes
+    lines = [len(panel.lines) for panel in panels]
+    drawn = [i for i, count in enumerate(lines) if count]
+    assert drawn == [1, 5, 10, 11, 14]
+    np.testing.assert_allclose(panels[1].lines[0].get_ydata(), fit.parts[0].data.values[:, 0])
+
+
+def test_a_wrong_index_is_a_misfit_and_compare_says_so(fit):
+    wrong = pl.fit(measured(), scene(1.8))
+    assert wrong.status == "misfit"
+    compared = compare({"right": fit, "wrong": wrong})
+    assert compared.best.name == "right"
+
+
+def test_a_given_sigma_for_each_element_is_absolute(fit):
+    given = pl.fit(replace(measured(), sigma=np.tile(NOISE, (128, 1))), scene())
+    assert given.parts[0].sigma_from == "given"
+    assert given.chi2_reduced == pytest.approx(1.0, abs=0.2)  # √(2/640) = 0.06
+    assert given["thickness"].stderr == pytest.approx(fit["thickness"].stderr, rel=0.3)
+
+
+def test_ellipsometry_has_no_scale_and_needs_an_angle():
+    with pytest.raises(UsageError, match="ellipsometry has no scale and no offset"):
+        pl.fit(measured(), replace(scene(), instrument=pl.Instrument(scale="free")))
+    with pytest.raises(UsageError, match="ellipsometry needs its angle of incidence"):
+        pl.fit(measured(), replace(scene(), light=pl.Light(signal="mueller")))
+
+
+def test_simulation_of_chosen_elements():
+    exact = replace(scene(), layers=(pl.Layer(INDEX, THICKNESS),))
+    spectrum = pl.simulate(exact, NM, elements=["m34", "m12"])
+    assert spectrum.elements == ("m34", "m12")
+    np.testing.assert_allclose(spectrum.values[:, 1], measured().values[:, 0], atol=6 * NOISE[0])
+    assert pl.simulate(exact, NM).values.shape == (128, 15)
+    with pytest.raises(UsageError, match="`elements` go with"):
+        pl.simulate(replace(exact, light=pl.Light()), NM, elements=["m12"])
