@@ -112,7 +112,7 @@ def _panels_of_data(part: Part) -> list[_Panel]:
     elif isinstance(part.curve, BrdfCurve):
         rows = [(brdf_figure.draw_samples, 3.0, 0), (brdf_figure.draw_residuals, 1.3, 0)]
     elif part.spectrum.elements:
-        rows = [(mueller_figure.matrix, 5.4, 0), (mueller_figure.residuals, 1.5, 3)]
+        rows = [(mueller_figure.matrix, 5.4, 0), (mueller_figure.residuals, 1.5, 2)]
     elif part.spectral.delta_data is None:
         rows = [(_data, 3.0, 0), (_residuals, 1.3, 1)]
     else:

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 _COLOURS = (ORANGE, BLUE, GREEN, BLACK)
 MOST_NAMED = 6
 """Most angles that the first panel lists."""
+_GAPS = (0.06, 0.055)
+"""Gaps between panels, as shares of the width and the height of the matrix."""
 _MARGIN = 0.08
 SMALLEST = 0.02
 """Least height of a panel: an element of 0 shows its noise, without magnifying it."""
@@ -45,7 +47,7 @@ def matrix(axes: Axes, part: Part) -> None:
             for stroke in unbroken(x, points):
                 color = _COLOURS[i % len(_COLOURS)]
                 cell.plot(x[stroke], model[stroke], **{**FITTED, "color": color, "linewidth": 0.9})
-        _finish(cell, name, place, np.concatenate([data, model]))
+        _finish(cell, name, part.spectrum.elements, np.concatenate([data, model]))
     axes.set_xlabel(label, labelpad=16)
     axes.set_ylabel("normalised element", labelpad=30)
 
@@ -89,7 +91,7 @@ def draw_measured(
                 error = sigma[points, elements.index(name)]
                 band = own[points] - error, own[points] + error
                 cell.fill_between(x[points], *band, color=color, alpha=0.2, linewidth=0)
-        _finish(cell, name, place, own)
+        _finish(cell, name, elements, own)
 
 
 def abscissa(wavelength: np.ndarray, angle: np.ndarray | None) -> tuple[np.ndarray, str]:
@@ -119,12 +121,12 @@ def _grid(axes: Axes) -> dict[int, Axes]:
     """Sixteen axes within one, row by row; that one keeps its labels only."""
     axes.set(xticks=[], yticks=[])
     axes.spines[:].set_visible(False)
-    cells, gap = {}, 0.055
-    size = (1 - 3 * gap) / 4
+    width, height = ((1 - 3 * gap) / 4 for gap in _GAPS)
+    cells = {}
     for place in range(16):
         row, column = divmod(place, 4)
-        low = (column * (size + gap), (3 - row) * (size + gap * 0.6) + 0.02)
-        cells[place] = axes.inset_axes((*low, size, size))
+        low = column * (width + _GAPS[0]), (3 - row) * (height + _GAPS[1])
+        cells[place] = axes.inset_axes((*low, width, height))
     return cells
 
 
@@ -145,14 +147,13 @@ def _unmeasured(cell: Axes, name: str) -> None:
     cell.text(0.5, 0.5, name, ha="center", va="center", color="0.7", transform=cell.transAxes)
 
 
-def _finish(cell: Axes, name: str, place: int, shown: np.ndarray) -> None:
+def _finish(cell: Axes, name: str, elements: Sequence[str], shown: np.ndarray) -> None:
+    """Limits and labels of a panel; the lowest of its column that was measured has numbers below it."""
+    lowest = name == max(other for other in elements if other[2] == name[2])
     low, high = float(np.min(shown)), float(np.max(shown))
     room = max(high - low, SMALLEST) * (1 + 2 * _MARGIN) / 2
     cell.set_ylim((low + high) / 2 - room, (low + high) / 2 + room)
-    cell.tick_params(labelsize="x-small", labelbottom=place >= 12, pad=1, length=2)
+    cell.tick_params(labelsize="x-small", labelbottom=lowest, pad=1, length=2)
     cell.locator_params(nbins=3)
     cell.margins(x=0.02)
-    cell.text(
-        0.04, 0.94, name, va="top", fontsize="small", transform=cell.transAxes,
-        bbox={"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 0.5},
-    )  # fmt: skip
+    cell.set_title(name, fontsize="x-small", loc="left", pad=2)

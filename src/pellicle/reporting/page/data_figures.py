@@ -10,7 +10,7 @@ import numpy as np
 
 from pellicle.fitting.result import BrdfCurve, ColourCurve, Curve
 from pellicle.fitting.status import RIVAL
-from pellicle.reporting import brdf_figure, fit_figure, fitted_colours, psi_delta
+from pellicle.reporting import brdf_figure, fit_figure, fitted_colours, mueller_figure, psi_delta
 from pellicle.reporting.page.figure import (
     Column,
     Panel,
@@ -70,6 +70,8 @@ _Drawn = tuple[str, list[Panel], list[Column], dict[str, Any]]
 
 def _spectrum(part: Part) -> _Drawn:
     curve = part.spectral
+    if part.spectrum.elements:
+        return _mueller(part)
     if curve.delta_data is not None:
         return _psi_delta(part)
     nm, strokes, data = curve.wavelength, fit_figure.series(part), part.spectrum
@@ -143,6 +145,33 @@ def _psi_delta(part: Part) -> _Drawn:
         columns.append(Column("angle (degrees)", part.spectrum.angle[order]))
     for title, data, model, _ in quantities:
         columns += [Column(title, data[order]), Column(f"fit of {title}", model[order])]
+    return abscissa, panels, columns, {}
+
+
+def _mueller(part: Part) -> _Drawn:
+    """A panel for each element of a Mueller matrix, and one for all residuals."""
+    curve, spectrum = part.spectral, part.spectrum
+    x, abscissa = mueller_figure.abscissa(curve.wavelength, spectrum.angle)
+    lines = mueller_figure.series(curve.wavelength, spectrum.angle)
+    panels, residuals = [], []
+    for column, name in enumerate(spectrum.elements):
+        of_model = []
+        for i, (points, angle) in enumerate(lines):
+            label = "fit" if angle is None else f"fit, {angle:g}°"
+            strokes = mueller_figure.unbroken(x, points)
+            trace = line(x, curve.model[:, column], strokes, label, _LINES[i % len(_LINES)])
+            of_model.append(trace | {"showlegend": not column})
+            own = line(x, curve.residual[:, column], strokes, name, _CHANNELS[column % len(_CHANNELS)])
+            residuals.append(own | {"showlegend": False})
+        of_data = markers(x, curve.data[:, column], "data", "var(--data)") | {"showlegend": not column}
+        panels.append(Panel(name, 110, [of_data], of_model))
+    panels.append(Panel("data − fit", 130, [], residuals))
+    order = np.argsort(x, kind="stable")[:: thinning(x.size)]
+    columns = [Column(abscissa, x[order])]
+    if spectrum.angle is not None and abscissa.startswith("wavelength"):
+        columns.append(Column("angle (degrees)", spectrum.angle[order]))
+    for i, name in enumerate(spectrum.elements):
+        columns += [Column(name, curve.data[order, i]), Column(f"fit of {name}", curve.model[order, i])]
     return abscissa, panels, columns, {}
 
 
