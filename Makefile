@@ -65,9 +65,10 @@ notebooks: $(VENV)/.dev
 $(EXECUTED): $(NOTEBOOKS)
 	$(MAKE) notebooks
 
-# into site/, with the executed notebooks; warnings are errors (--quiet would hide them from --strict)
+# into site/, with the executed notebooks; broken links are errors
 docs: $(VENV)/.dev $(EXECUTED)
-	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+	$(BIN)/python scripts/stage_docs.py
+	$(BIN)/zensical build --clean --strict
 
 # sdist and wheel into dist/, with their metadata and lists of files checked
 dist: $(VENV)/.dev
@@ -122,4 +123,4 @@ measurements: $(VENV)/.fit
 	$(BIN)/python scripts/make_measurements.py
 
 clean:
-	rm -rf $(VENV) .venv-peers results executed site dist .pytest_cache .ruff_cache .hypothesis .coverage
+	rm -rf $(VENV) .venv-peers results executed build site dist .cache .pytest_cache .ruff_cache .hypothesis .coverage

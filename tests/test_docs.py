@@ -327,7 +327,7 @@ def test_the_citation_file_is_complete():
 
 @pytest.mark.parametrize("page", PAGES)
 def test_linked_files_exist(page):
-    """In the repository; `mkdocs build --strict` checks the links of the site."""
+    """In the repository; `make docs` checks the links of the site."""
     text = FENCE.sub("", PAGES[page])
     for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", text):
         assert "://" in target or (ROOT / page).parent.joinpath(target).exists(), target

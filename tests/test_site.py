@@ -1,0 +1,70 @@
+"""The documentation site: its navigation, and the pages that are made of executed notebooks.
+
+`make docs` checks links and anchors; the engine does not report what is checked here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import nbformat
+import pytest
+import yaml
+
+ROOT = Path(__file__).parents[1]
+CONFIG = yaml.safe_load((ROOT / "mkdocs.yml").read_text("utf-8"))
+FIGURE = "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
+"""A PNG of one pixel."""
+
+
+def pages(entries: object) -> Iterator[str]:
+    """Yield the paths of a navigation, in order."""
+    if isinstance(entries, str):
+        yield entries
+    for entry in (
+        entries if isinstance(entries, list) else entries.values() if isinstance(entries, dict) else ()
+    ):
+        yield from pages(entry)
+
+
+def test_the_navigation_has_every_page_once():
+    written = [path.relative_to(ROOT / "docs").as_posix() for path in (ROOT / "docs").rglob("*.md")]
+    tutorials = [f"tutorials/{path.stem}.md" for path in (ROOT / "notebooks").glob("*.ipynb")]
+    assert sorted(pages(CONFIG["nav"])) == sorted([*written, *tutorials])
+
+
+@pytest.fixture
+def staged(load_script, tmp_path):
+    """Return a function that stages a page and a notebook with these outputs, and returns the folder."""
+    pytest.importorskip("nbconvert", reason="the extra docs is not installed")
+    script = load_script("scripts/stage_docs.py")
+    docs, executed, target = tmp_path / "docs", tmp_path / "executed", tmp_path / "build" / "docs"
+    docs.mkdir()
+    (docs / "index.md").write_text("Read the [tutorial](../notebooks/01_films.ipynb).\n", "utf-8")
+    executed.mkdir()
+
+    def stage(*outputs: nbformat.NotebookNode) -> Path:
+        cells = [
+            nbformat.v4.new_markdown_cell("# Films"),
+            nbformat.v4.new_code_cell("plot()", outputs=list(outputs)),
+        ]
+        nbformat.write(nbformat.v4.new_notebook(cells=cells), executed / "01_films.ipynb")
+        script.stage(docs, executed, target)
+        return target
+
+    return stage
+
+
+def test_a_notebook_becomes_a_page_with_its_figures(staged):
+    target = staged(nbformat.v4.new_output("display_data", {"image/png": FIGURE}))
+    assert (target / "index.md").read_text("utf-8") == "Read the [tutorial](tutorials/01_films.md).\n"
+    page = (target / "tutorials" / "01_films.md").read_text("utf-8")
+    assert page.startswith("# Films")
+    figure = page.partition("![figure drawn by the code above](")[2].partition(")")[0]
+    assert (target / "tutorials" / figure).read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_notebook_that_wrote_to_stderr_is_refused(staged):
+    with pytest.raises(SystemExit, match=r"01_films\.ipynb wrote to stderr: a warning"):
+        staged(nbformat.v4.new_output("stream", name="stderr", text="a warning"))
