@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from pellicle.data.spectrum import Spectrum as Spectrum
     from pellicle.data.write_spectrum import write_spectrum as write_spectrum
     from pellicle.dispersion import effective_medium as mixing  # noqa: F401
+    from pellicle.dispersion import profiles as profile  # noqa: F401
     from pellicle.dispersion.anisotropic import Anisotropic as Anisotropic
     from pellicle.fitting.result import Fit as Fit
     from pellicle.fitting.result import Status as Status
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
     from pellicle.scene.film import Light as Light
     from pellicle.scene.film import Scene as Scene
     from pellicle.scene.free import Free as Free
+    from pellicle.scene.graded import Graded as Graded
     from pellicle.scene.instrument import Instrument as Instrument
     from pellicle.scene.layers import Interface as Interface
     from pellicle.scene.layers import Layer as Layer
@@ -92,6 +94,7 @@ _NAMES = {
     "pellicle.sampling.result": ("Posterior",),
     "pellicle.scene.film": ("Light", "Scene"),
     "pellicle.scene.free": ("Free",),
+    "pellicle.scene.graded": ("Graded",),
     "pellicle.scene.instrument": ("Instrument",),
     "pellicle.scene.uncertainty": ("Uncertainty",),
     "pellicle.scene.layers": ("Interface", "Layer", "Plate", "Substrate", "medium"),
@@ -106,6 +109,7 @@ _NAMESPACES = {
     "fitting": "pellicle.fitting",
     "mixing": "pellicle.dispersion.effective_medium",
     "priors": "pellicle.scene.priors",
+    "profile": "pellicle.dispersion.profiles",
 }
 
 __all__ = sorted([*_MODULE, *_NAMESPACES])  # pyright: ignore[reportUnsupportedDunderAll]

@@ -27,6 +27,7 @@ def scene(layer=1.46, substrate=3.9 + 0.02j, thickness=300.0, ambient=1.0, instr
 
 
 BANDWIDTH = pl.Instrument(bandwidth=5.0)
+GRADED = pl.Graded(1.46, 2.0, pl.profile.Linear(0.0, pl.Free(0.5, 1.0)))
 TABLE = [
     ("absorption", False, "no layer has any extinction", scene()),
     ("absorption", False, "no layer has any extinction", scene(Constant(1.46, 0.0))),
@@ -41,6 +42,11 @@ TABLE = [
         "extinction is free, or not zero",
         scene(Shifted(Constant(1.46), k=FREE_K)),
     ),
+    ("gradient", False, "no layer is graded", scene()),
+    ("gradient", True, "slices of sixth order", scene(GRADED)),
+    ("stack", True, "a graded layer", scene(GRADED)),
+    ("orders", False, "averaged over nodes instead", scene(GRADED, instrument=BANDWIDTH)),
+    ("tunnelling", True, "in the layer is possible", scene(GRADED, ambient=1.52, angle=75.0)),
     ("tunnelling", False, "normal incidence", scene()),
     ("tunnelling", False, "no real index can fall below", scene(angle=60.0)),
     ("tunnelling", True, "in the layer is possible", scene(1.33, ambient=1.52, angle=65.0)),

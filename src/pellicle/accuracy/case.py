@@ -8,12 +8,10 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import numpy as np
 
-from pellicle.dispersion.base import AbstractDispersion
 from pellicle.effects.plan import Plan
 from pellicle.planning.film import full_plan
-from pellicle.scene.film import Scene, with_wavelength
+from pellicle.scene.film import Scene, media, with_wavelength
 from pellicle.scene.free import free_leaves, insert, start_values
-from pellicle.scene.layers import Interface
 
 MOST_DRAWS, LEAST_DRAWS, POINTS = 256, 16, 65536
 """Limits of the number of draws in one call, which hides the cost of the call itself, and about the number of
@@ -56,13 +54,6 @@ def case(scene: Scene, wavelength: np.ndarray, tolerance: float = 1e-3, seed: in
     draws = np.random.default_rng(seed).uniform(low, high, (count, len(free)))
     draws[0] = start_values(scene)
     return Case(scene, full_plan(scene), draws, tolerance)
-
-
-def media(scene: Scene) -> list[AbstractDispersion]:
-    """Every medium of a scene: layers, substrate, ambient, and the medium behind a plate."""
-    back = [] if scene.substrate.back is None else [scene.substrate.back]
-    layers = [layer.material for layer in scene.layers if not isinstance(layer, Interface)]
-    return [*layers, scene.substrate.material, scene.ambient, *back]
 
 
 def disperses(case: Case) -> bool:

@@ -31,6 +31,8 @@ def unsuitable(case: Case) -> str | None:
         return "this layer's thickness is uneven"
     if instrument.has_cone:
         return "this light comes in a cone"
+    if case.plan.on("gradient"):
+        return "this layer's index varies with depth"
     if case.plan.on("roughness"):
         return "this scene has a rough face"
     if case.ellipsometric and case.plan.on("back-face"):

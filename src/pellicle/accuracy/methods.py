@@ -11,13 +11,14 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.accuracy.case import Case, disperses, media, with_effect
+from pellicle.accuracy.case import Case, disperses, with_effect
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.effects.plan import Plan
 from pellicle.effects.removal import FilmRemoval, RealPart
 from pellicle.optics.pair import Pair, is_real, parts
 from pellicle.planning.film import full_plan, plan
-from pellicle.scene.film import Scene, coherent_layers, with_wavelength
+from pellicle.scene.film import Scene, coherent_layers, media, with_wavelength
+from pellicle.scene.graded import each_medium
 from pellicle.scene.layers import Layer
 
 
@@ -93,7 +94,8 @@ def _transparent(case: Case) -> Variant | str:
     if not case.plan.on("absorption"):
         return "no layer absorbs"
     layers = tuple(
-        replace(x, material=RealPart(x.material)) if isinstance(x, Layer) else x for x in case.scene.layers
+        replace(x, material=each_medium(RealPart, x.material)) if isinstance(x, Layer) else x
+        for x in case.scene.layers
     )
     clear = eqx.tree_at(lambda s: s.layers, case.scene, layers)
     return Variant(full_plan(clear), clear)

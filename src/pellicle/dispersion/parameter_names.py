@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-_BRANCHES = ("host", "inclusion")
+_BRANCHES = ("host", "inclusion", "first", "second")
 
 
 class ParameterLocation(NamedTuple):

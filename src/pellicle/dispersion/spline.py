@@ -60,10 +60,7 @@ class Spline(AbstractDispersion):
         _check("spline", self.knots, n=self.n, k=self.k)
 
     def index(self, wavelength):
-        degree = min(3, len(self.knots) - 1)
-        sites = np.array(self.knots)
-        inner = [sites[i : i + degree].mean() for i in range(1, len(sites) - degree)]
-        around = np.concatenate([[sites[0]] * (degree + 1), inner, [sites[-1]] * (degree + 1)])
+        around, degree = greville_knots(self.knots)
         inside = namespace(wavelength).clip(wavelength, self.knots[0], self.knots[-1])
         basis = b_splines(inside, around, degree)
         n = _combine(basis, self.n)
@@ -102,6 +99,13 @@ class KramersKronigSpline(AbstractDispersion):
         rising = self.k[::-1]
         n = self.n_inf + _combine(_conjugates(energy, around), rising)
         return Pair(n, _combine(b_splines(energy, around, 3), rising))
+
+
+def greville_knots(sites: Sequence[float]) -> tuple[np.ndarray, int]:
+    """Knots of the B-splines whose coefficients belong to `sites` (de Boor's averages), and their degree."""
+    degree, at = min(3, len(sites) - 1), np.array(sites)
+    inner = [at[i : i + degree].mean() for i in range(1, len(at) - degree)]
+    return np.concatenate([[at[0]] * (degree + 1), inner, [at[-1]] * (degree + 1)]), degree
 
 
 def _combine(basis: Any, coefficients: tuple[Any, ...]) -> Any:

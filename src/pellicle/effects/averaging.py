@@ -16,7 +16,7 @@ from pellicle.effects.plan import Row
 from pellicle.effects.presence import roughness
 from pellicle.optics import orders as series
 from pellicle.optics import quadrature
-from pellicle.scene.film import Scene, coherent_layers, thickness_spread
+from pellicle.scene.film import Scene, coherent_layers, is_graded, thickness_spread
 from pellicle.scene.free import Free
 from pellicle.scene.layers import Layer, absorbs
 
@@ -80,7 +80,8 @@ def _unresolved(scene: Scene) -> str | None:
 def _has_series(scene: Scene) -> bool:
     """True for one smooth coherent layer whose signal is an intensity."""
     one = len(coherent_layers(scene)) == 1
-    return one and not scene.light.ellipsometric and not roughness(scene).on
+    smooth = one and not roughness(scene).on and not is_graded(scene)
+    return smooth and not scene.light.ellipsometric
 
 
 def _by_orders(scene: Scene) -> bool:

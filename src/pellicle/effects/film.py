@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from pellicle.effects import averaging, presence
+from pellicle.effects import averaging, gradient, presence
 from pellicle.effects.plan import Plan, Row
 from pellicle.scene.film import Scene
 
@@ -22,6 +22,7 @@ class Effect:
 EFFECTS = (
     Effect("absorption", presence.absorption),
     Effect("stack", presence.stack),
+    Effect("gradient", gradient.gradient),
     Effect("roughness", presence.roughness),
     Effect("tunnelling", presence.tunnelling),
     Effect("oblique", presence.oblique),

@@ -14,8 +14,9 @@ from pellicle.effects.bounds import normal_incidence, upper
 from pellicle.effects.plan import Row
 from pellicle.materials import Material
 from pellicle.optics.pair import real
-from pellicle.scene.film import Scene, coherent_layers, groups
+from pellicle.scene.film import Scene, coherent_layers, groups, is_graded
 from pellicle.scene.free import Free, free_leaves
+from pellicle.scene.graded import Graded
 from pellicle.scene.layers import Interface, absorbs
 
 
@@ -29,6 +30,8 @@ def absorption(scene: Scene) -> Row:
 def stack(scene: Scene) -> Row:
     """On where the closed form of one layer does not apply: several layers, or rough faces."""
     count = max(len(group.layers) for group in groups(scene)[0])
+    if is_graded(scene):
+        return Row("stack", True, "a graded layer: a product of the characteristic matrices of its slices")
     if count > 1:
         return Row("stack", True, f"{count} coherent layers: a product of characteristic matrices")
     if roughness(scene).on:
@@ -74,7 +77,13 @@ def _media(scene: Scene) -> list[tuple[str, AbstractDispersion]]:
     """Every medium that a wave enters, with its name in messages."""
     own = [(i, x.material) for i, x in enumerate(scene.layers) if not isinstance(x, Interface)]
     names = {id(material): name(scene, i) for i, material in own}
-    coherent = [(names.get(id(x.material), "interface"), x.material) for x in coherent_layers(scene)]
+    coherent = [
+        (names.get(id(x.material), "interface"), part)
+        for x in coherent_layers(scene)
+        for part in (
+            (x.material.first, x.material.second) if isinstance(x.material, Graded) else (x.material,)
+        )
+    ]
     thick = [(names.get(id(g.below), "substrate"), g.below) for g in groups(scene)[0]]
     return [*coherent, *thick]
 

@@ -21,6 +21,7 @@ from pellicle.dispersion.empirical import Constant
 from pellicle.optics.pair import parts, real
 from pellicle.scene.film import Scene
 from pellicle.scene.free import free_leaves, is_free
+from pellicle.scene.graded import Graded, each_medium
 from pellicle.scene.layers import Interface, Layer, Plate, Substrate
 
 
@@ -78,6 +79,25 @@ def _opaque(scene: Scene, removal: FilmRemoval) -> Scene:
     return _with(scene, layers=scene.layers[: removal.depth], substrate=substrate)
 
 
+def _gradient(scene: Scene, _: FilmRemoval) -> Scene:
+    """Give every graded layer its mean permittivity."""
+    return _with(scene, layers=_each(scene, lambda layer: _with(layer, material=_mean(layer.material))))
+
+
+def _mean(material: AbstractDispersion) -> AbstractDispersion:
+    return MeanOverDepth(material) if isinstance(material, Graded) else material
+
+
+@final
+class MeanOverDepth(AbstractDispersion):
+    """Homogeneous medium with the mean permittivity of a graded one."""
+
+    base: AbstractDispersion
+
+    def index(self, wavelength):
+        return self.base.index(wavelength)
+
+
 def _oblique(scene: Scene, _: FilmRemoval) -> Scene:
     """Take normal incidence."""
     instrument = _with(scene.instrument, angle_shift=None)
@@ -97,7 +117,10 @@ def _polarisation(scene: Scene, _: FilmRemoval) -> Scene:
 
 def _absorption(scene: Scene, _: FilmRemoval) -> Scene:
     """Drop the extinction of every layer."""
-    return _with(scene, layers=_each(scene, lambda layer: _with(layer, material=_lossless(layer.material))))
+    return _with(
+        scene,
+        layers=_each(scene, lambda layer: _with(layer, material=each_medium(_lossless, layer.material))),
+    )
 
 
 def _lossless(material: AbstractDispersion) -> AbstractDispersion:
@@ -120,7 +143,11 @@ class RealPart(AbstractDispersion):
 def _dispersion(scene: Scene, _: FilmRemoval) -> Scene:
     """Give every fixed medium its index at the middle wavelength."""
     at = scene.light.wavelength
-    flat = _each(scene, lambda layer: _with(layer, material=_flat(layer.material, at)))
+
+    def constant(layer: Layer) -> Layer:
+        return _with(layer, material=each_medium(lambda medium: _flat(medium, at), layer.material))
+
+    flat = _each(scene, constant)
     plates = [_with(x, material=_flat(x.material, at)) if isinstance(x, Plate) else x for x in flat]
     back = scene.substrate.back
     substrate = _with(
@@ -158,6 +185,7 @@ _REMOVALS: dict[str, Callable[[Scene, FilmRemoval], Scene]] = {
     "opaque": _opaque,
     "oblique": _oblique,
     "roughness": _roughness,
+    "gradient": _gradient,
     "polarisation": _polarisation,
     "absorption": _absorption,
     "dispersion": _dispersion,

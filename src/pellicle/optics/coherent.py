@@ -7,6 +7,7 @@ from typing import Any
 
 from pellicle.optics.few_layers import FEW, few_layers
 from pellicle.optics.film import film
+from pellicle.optics.gradient import is_graded
 from pellicle.optics.pair import Number
 from pellicle.optics.response import Response
 from pellicle.optics.stack import stack
@@ -34,7 +35,8 @@ def responses(
     - `ambient`, `substrate`: refractive indices. A real index promises that the wave propagates there;
       `interface.allow_tunnelling` turns it into one that may be totally reflected. The ambient is real,
       except for light from within a plate.
-    - `layers`: refractive indices from the ambient down. In a real one the wave may be evanescent.
+    - `layers`: refractive indices from the ambient down. In a real one the wave may be evanescent. A graded
+      layer is a `pellicle.optics.gradient.Gradient`.
     - `phases`: k₀d = 2πd/λ of each layer.
     - `angle`: of incidence in radians, or `interface.Inside` for light from within a plate. None is
       normal incidence, where s and p are equal and only the first polarisation is computed.
@@ -52,6 +54,8 @@ def responses(
 
     ```
     """
+    if is_graded(layers):
+        return stack(ambient, layers, substrate, phases, angle, polarisations, roughness)
     if len(layers) == 1 and roughness is None:
         return film(ambient, layers[0], substrate, phases[0], angle, polarisations, propagating)
     if len(layers) <= FEW and roughness is None:

@@ -4,7 +4,8 @@ The fields (E, H) at a layer's lower face give those at its upper face by the el
 `characteristic.matrix_elements`, times their scale. After each layer the fields are divided by their
 norm, so that 50 layers with an opaque one among them stay finite without clamping. Complex arithmetic:
 separate real arrays bring nothing here. One `lax.scan` runs over the layers; unrolled, 50 of them do not
-compile in minutes. Two or three smooth layers take `pellicle.optics.few_layers`.
+compile in minutes. Two or three smooth layers take `pellicle.optics.few_layers`. A graded layer is a row of
+slices in that loop (`pellicle.optics.gradient`).
 
 Source: Born and Wolf, Principles of Optics, section 1.6 (characteristic matrices).
 """
@@ -12,12 +13,13 @@ Source: Born and Wolf, Principles of Optics, section 1.6 (characteristic matrice
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 
 from pellicle.optics.characteristic import matrix_elements
+from pellicle.optics.gradient import Gradient, coefficients, faces, is_graded
 from pellicle.optics.interface import (
     equal_media,
     incident_factor,
@@ -45,33 +47,31 @@ def stack(
     **Arguments:** as for `coherent.responses`. Every array broadcasts against every other.
     """
     a, q0 = transverse(ambient, angle)
-    leaves = jax.tree_util.tree_leaves((ambient, list(layers), substrate, list(phases), a, roughness))
-    shape = jnp.broadcast_shapes(*(jnp.shape(x) for x in leaves))
-    dtype = jnp.promote_types(jnp.result_type(*leaves), jnp.complex64)
+    rows = _rows((ambient, substrate, a), layers, phases, roughness)
+    shape, dtype = rows.depth.shape[1:], rows.points[0].dtype
 
     def full(number: Number) -> Any:
-        return jnp.broadcast_to(to_complex(number).astype(dtype), shape)
+        return _full(number, shape, dtype)
 
-    def rows(numbers: Sequence[Any]) -> Any:
-        return jnp.stack([full(n) for n in numbers]) if numbers else jnp.zeros((0, *shape), dtype)
-
-    index, depth = rows(layers), jnp.real(rows(phases))
     bottom, top, q_top = full(substrate), full(ambient), full(q0)
     q_bottom = normal(bottom, a)
-    empty = equal_media(ambient, substrate, *layers)
+    empty = equal_media(ambient, substrate, *(() if is_graded(layers) else layers))
+    if is_graded(layers):
+        empty = empty & jnp.all(jnp.stack(rows.points) == top, axis=(0, 1))
     responses = []
     for polarisation in polarisations[:1] if angle is None else polarisations:
         e0, e2 = _weight(top, polarisation), _weight(bottom, polarisation)
         down_faces = up_faces = None
-        if roughness is not None:
-            weight = jnp.concatenate([e0[None], _weight(index, polarisation), e2[None]])
-            q = jnp.concatenate([q_top[None], normal(index, a), q_bottom[None]])
-            rough = jnp.real(rows(roughness))
-            down_faces = _rough_faces(q[:-1], weight[:-1], q[1:], weight[1:], rough)[:, ::-1]
-            up_faces = _rough_faces(q[1:], weight[1:], q[:-1], weight[:-1], rough)
-        below = (index[::-1], depth[::-1], q_bottom / e2, down_faces)
-        (E, H), scale_square = _fields(*below, a, polarisation)
-        (E_, H_), _ = _fields(index, depth, q_top / e0, up_faces, a, polarisation)
+        if rows.rough is not None:
+            upper, lower = faces(rows.points) if is_graded(layers) else rows.points * 2
+            q, q_ = jnp.concatenate([q_top[None], normal(lower, a)]), normal(upper, a)
+            q_ = jnp.concatenate([q_, q_bottom[None]])
+            weight = jnp.concatenate([e0[None], _weight(lower, polarisation)])
+            weight_ = jnp.concatenate([_weight(upper, polarisation), e2[None]])
+            down_faces = _rough_faces(q, weight, q_, weight_, rows.rough)[:, ::-1]
+            up_faces = _rough_faces(q_, weight_, q, weight, rows.rough)
+        (E, H), scale_square = _fields(rows.upside_down(), q_bottom / e2, down_faces, a, polarisation)
+        (E_, H_), _ = _fields(rows, q_top / e0, up_faces, a, polarisation)
         down, up = q_top * E / e0, q_bottom * E_ / e2
         flux = incident_factor(ambient, q0, polarisation) * normal_flux(bottom, q_bottom, polarisation)
         denominator = down + H
@@ -81,6 +81,65 @@ def stack(
         squares = Amplitudes(*(abs2(amplitude) for amplitude in amplitudes))
         responses.append(Response(*amplitudes, squares, flux / abs2(e0 * e2), scale_square))
     return tuple(responses)
+
+
+class _Rows(NamedTuple):
+    """Layers of a stack, those of a graded one its slices; each array has the shape (layers, ...)."""
+
+    points: tuple[Any, ...]  # complex index, or three at the Gauss points where a layer is graded
+    depth: Any  # k₀ times the thickness
+    rough: Any  # k₀σ of each face, one more than layers; None where all are smooth
+
+    def upside_down(self) -> _Rows:
+        """The layers in the opposite order, smooth."""
+        return _Rows(tuple(x[::-1] for x in self.points[::-1]), self.depth[::-1], None)
+
+
+def _rows(
+    media: tuple, layers: Sequence[Number], phases: Sequence[Any], roughness: Sequence[Any] | None
+) -> _Rows:
+    """Return the layers in the shape to which all arrays broadcast; `media` are those around them."""
+    uniform = [layer for layer in layers if not isinstance(layer, Gradient)]
+    leaves = jax.tree_util.tree_leaves((media, uniform, list(phases), roughness))
+    sliced = jax.tree_util.tree_leaves([layer for layer in layers if isinstance(layer, Gradient)])
+    shape = jnp.broadcast_shapes(*(jnp.shape(x) for x in leaves), *(jnp.shape(x)[1:] for x in sliced))
+    dtype = jnp.promote_types(jnp.result_type(*leaves, *sliced), jnp.complex64)
+    counts = [layer.slices if isinstance(layer, Gradient) else 1 for layer in layers]
+
+    def joined(blocks: Sequence[Any]) -> Any:
+        return jnp.concatenate(blocks) if blocks else jnp.zeros((0, *shape), dtype)
+
+    def each_slice(number: Number) -> Any:
+        """One complex number for each slice of a graded layer, (slices, ...)."""
+        each = to_complex(number).astype(dtype)
+        lacking = (1,) * (len(shape) + 1 - each.ndim)
+        return jnp.broadcast_to(each.reshape(each.shape[0], *lacking, *each.shape[1:]), (len(each), *shape))
+
+    def of_layers(numbers: Sequence[Any]) -> Any:
+        """One number for each layer, repeated for its slices, (layers, ...)."""
+        blocks = [_full(x, shape, dtype)[None] for x in numbers]
+        return joined([x if n == 1 else jnp.repeat(x, n, 0) for x, n in zip(blocks, counts, strict=True)])
+
+    def at(point: int) -> Any:
+        rows = [
+            each_slice(x[point]) if isinstance(x, Gradient) else _full(x, shape, dtype)[None] for x in layers
+        ]
+        return joined(rows)
+
+    depth = jnp.real(
+        of_layers([phase if n == 1 else phase / n for phase, n in zip(phases, counts, strict=True)])
+    )
+    points = tuple(map(at, range(3 if sliced else 1)))
+    if roughness is None:
+        return _Rows(points, depth, None)
+    rough = [_full(roughness[0], shape, dtype)[None]]
+    for count, face in zip(counts, roughness[1:], strict=True):
+        rough += [jnp.zeros((count - 1, *shape), dtype), _full(face, shape, dtype)[None]]
+    return _Rows(points, depth, jnp.real(joined(rough)))
+
+
+def _full(number: Number, shape: tuple[int, ...], dtype: Any) -> Any:
+    return jnp.broadcast_to(to_complex(number).astype(dtype), shape)
 
 
 def _weight(index: Any, polarisation: str) -> Any:
@@ -113,22 +172,27 @@ def _expm1_ratio(x: Any) -> Any:
     return jnp.where(near, taylor, (1 - jnp.exp(-far)) / far)
 
 
-def _fields(index: Any, depth: Any, admittance: Any, faces: Any, a: Any, polarisation: str) -> Any:
-    """Return (E, H) at the far face for a unit wave in the last medium, and |scale|²."""
+def _fields(rows: _Rows, admittance: Any, faces: Any, a: Any, polarisation: str) -> Any:
+    """Return (E, H) at the far face for a unit wave in the last medium, the first row first, and |scale|²."""
 
     def through_layer(carry, layer):
         (E, H), scale_square = carry
-        n, k, face = layer
+        points, k, face = layer
         if face is not None:
             E, H = E * face[0], H * face[1]
-        square, e = normal_square(n, a), _weight(n, polarisation)
-        c, f, layer_scale, _ = matrix_elements(square, k)
-        E, H = E * c - 1j * f * e * H, H * c - 1j * f * (square / e) * E
+        if len(points) == 1:
+            square, e = normal_square(points[0], a), _weight(points[0], polarisation)
+            c, f, layer_scale, _ = matrix_elements(square, k)
+            E, H = E * c - 1j * f * e * H, H * c - 1j * f * (square / e) * E
+        else:
+            alpha, beta, skew, square = coefficients(points, k, a, polarisation)
+            c, f, layer_scale, _ = matrix_elements(square, k)
+            E, H = E * (c + f * skew) - 1j * f * alpha * H, H * (c - f * skew) - 1j * f * beta * E
         size = jax.lax.stop_gradient(abs2(E) + abs2(H))
         shrink = jax.lax.rsqrt(size)
         return ((E * shrink, H * shrink), scale_square * layer_scale / size), None
 
     start = (jnp.ones_like(admittance), admittance), jnp.ones_like(jnp.real(admittance))
     inner = None if faces is None else jnp.moveaxis(faces[:, :-1], 0, 1)
-    ((E, H), scale_square), _ = jax.lax.scan(through_layer, start, (index, depth, inner))
+    ((E, H), scale_square), _ = jax.lax.scan(through_layer, start, (rows.points, rows.depth, inner))
     return ((E, H) if faces is None else (E * faces[0, -1], H * faces[1, -1])), scale_square

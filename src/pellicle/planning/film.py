@@ -25,6 +25,7 @@ from pellicle.planning.tolerance import (
 )
 from pellicle.scene.film import Scene
 from pellicle.scene.free import is_free
+from pellicle.scene.graded import Graded
 from pellicle.scene.layers import Layer, absorbs
 from pellicle.simulation.film import build, tabulated
 
@@ -47,7 +48,7 @@ def plan(scene: Scene, tolerance: float = 0.0, keep: Iterable[str] = ()) -> Plan
         raise ValueError("what an effect changes depends on the wavelengths: give the light its wavelengths")
     kept = set(keep)
     removals = [partial(_removals, effect) for effect in REMOVABLE if effect not in kept]
-    averages = [partial(_fewer, effect) for effect in ("coherence", "orders", "angle-spread")]
+    averages = [partial(_fewer, effect) for effect in ("coherence", "orders", "angle-spread", "gradient")]
     with jax.enable_x64(True):
         moves = (_by_orders, *removals, *averages)
         return reduced_plan(full_plan(scene), scene, evaluation(scene), moves, tolerance)
@@ -102,7 +103,9 @@ def _removals(effect: str, stage: Stage) -> Iterator[Step]:
     }
     removals = []
     if effect == "opaque" and light.signal != "T":
-        opaque = (isinstance(x, Layer) and absorbs(x.material) for x in scene.layers)
+        # a graded layer is no half space
+        plain = (isinstance(x, Layer) and not isinstance(x.material, Graded) for x in scene.layers)
+        opaque = (one and absorbs(x.material) for one, x in zip(plain, scene.layers, strict=True))
         removals = [FilmRemoval(effect, depth) for depth, may_be in enumerate(opaque) if may_be]
     elif stage.plan.on(effect) and not meaningless.get(effect, False):
         removals = [FilmRemoval(effect)]
@@ -120,7 +123,7 @@ def _removals(effect: str, stage: Stage) -> Iterator[Step]:
 
 
 def _fewer(effect: str, stage: Stage) -> Iterator[Step]:
-    """Fewer orders, nodes or rays of an average."""
+    """Fewer orders, nodes or rays of an average, or slices of a graded layer."""
     row = stage.plan.row(effect)
     for count in sorted({max(row.count // 4, 1), row.count // 2, 3 * row.count // 4}):
         if 1 <= count < row.count:

@@ -23,6 +23,7 @@ from pellicle.recipes.dispersion_models import (
     build_oscillator,
     sum_of_oscillators,
 )
+from pellicle.recipes.graded_media import GradedTable, graded_medium
 from pellicle.scene.free import Free
 from pellicle.scene.priors import HalfNormal, LogUniform, Normal, Prior
 
@@ -114,7 +115,7 @@ class MixTable(BaseModel):
     mix: str = Field(json_schema_extra={"enum": [*MIXTURES]})
 
 
-Medium = str | float | MediumTable | MixTable
+Medium = str | float | MediumTable | MixTable | GradedTable
 _MEDIUM: TypeAdapter[Any] = TypeAdapter(Medium)
 
 
@@ -148,6 +149,8 @@ def medium(value: Medium, folder: Path, name: str = "material") -> AbstractDispe
 
     Raises UsageError, or DataError for a table that cannot be read.
     """
+    if isinstance(value, GradedTable):
+        return graded_medium(value, lambda key, each: _component(key, each, folder), _parameter)
     if isinstance(value, MixTable):
         return _mixture(value.mix, dict(value.model_extra or {}), folder)
     if isinstance(value, MediumTable):

@@ -24,6 +24,7 @@ from pellicle.recipes.dispersion_models import (
 )
 from pellicle.recipes.number_words import parse_number, parse_range
 from pellicle.scene.free import Free, is_free
+from pellicle.scene.graded import Graded
 
 _CALL = re.compile(r"\s*([A-Za-z][\w-]*)\s*(?:\((.*)\))?\s*")
 
@@ -106,6 +107,8 @@ def free_numbers(dispersion: AbstractDispersion, items: Iterable[str]) -> Abstra
     its least value, for a metal), to k from 0 to 1. Raises UsageError.
     """
     for item in items:
+        if isinstance(dispersion, Graded):
+            raise UsageError("cannot free numbers of a graded material: give bounds to those of its profile")
         name, _, words = item.partition("=")
         bounds = parse_range(words, f"the range of {name}") if words else None
         if name in ("n", "k"):

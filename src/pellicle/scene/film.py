@@ -16,8 +16,18 @@ import numpy as np
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.errors import UsageError
 from pellicle.scene.free import Free
+from pellicle.scene.graded import AtDepth, Graded, face
 from pellicle.scene.instrument import Instrument
-from pellicle.scene.layers import Interface, Layer, Plate, Quantity, Substrate, absorbs, ambient_medium
+from pellicle.scene.layers import (
+    Interface,
+    Layer,
+    Plate,
+    Quantity,
+    Substrate,
+    absorbs,
+    ambient_medium,
+    divided,
+)
 from pellicle.scene.uncertainty import Uncertainty
 
 SIGNALS = ("R", "T", "psi-delta", "mueller")
@@ -116,6 +126,10 @@ class Scene(eqx.Module):
             raise ValueError("a scene needs at least one layer; a bare surface is a layer of thickness 0")
         if any(isinstance(a, Interface) and isinstance(b, Interface) for a, b in pairwise(self.layers)):
             raise ValueError("two interfaces are adjacent: an interface mixes the media at its sides")
+        thick = [x.material for x in self.layers if isinstance(x, Plate)]
+        for medium in (*thick, self.substrate.material, self.substrate.back, self.ambient):
+            if isinstance(medium, Graded):
+                raise UsageError("a graded medium has a depth: it is the material of a pl.Layer")
         if absorbs(self.ambient):
             raise ValueError("the ambient must not absorb: give it a real index")
         if self.instrument.thickness_spread is not None:
@@ -174,7 +188,37 @@ def _neighbours(scene: Scene, position: int) -> tuple[AbstractDispersion, Abstra
     media = [scene.ambient, *(getattr(x, "material", None) for x in scene.layers), scene.substrate.material]
     above, below = media[position], media[position + 2]
     assert above is not None and below is not None  # two interfaces are never adjacent  # noqa: PT018
-    return above, below
+    return face(above, 1.0), face(below, 0.0)
+
+
+def media(scene: Scene) -> list[AbstractDispersion]:
+    """Return every medium of a scene: of its layers, the substrate, the ambient, and that behind a plate.
+
+    Of a graded layer both of its media.
+    """
+    back = [] if scene.substrate.back is None else [scene.substrate.back]
+    layers = [layer.material for layer in scene.layers if not isinstance(layer, Interface)]
+    own = [part for x in layers for part in ((x.first, x.second) if isinstance(x, Graded) else (x,))]
+    return [*own, scene.substrate.material, scene.ambient, *back]
+
+
+def is_graded(scene: Scene) -> bool:
+    """Return True where the index of a layer varies with depth."""
+    return any(isinstance(layer, Layer) and isinstance(layer.material, Graded) for layer in scene.layers)
+
+
+def sliced(scene: Scene, count: int) -> Scene:
+    """Return the scene with every graded layer replaced by `count` homogeneous slices of it."""
+    layers: list[Any] = []
+    for layer in scene.layers:
+        if not (isinstance(layer, Layer) and isinstance(layer.material, Graded)):
+            layers.append(layer)
+            continue
+        for i in range(count):
+            rough = layer.roughness if i == 0 else None
+            medium = AtDepth(layer.material, (i + 0.5) / count)
+            layers.append(Layer(medium, divided(layer.thickness, count), layer.name, roughness=rough))
+    return eqx.tree_at(lambda s: s.layers, scene, tuple(layers))
 
 
 def coherent_layers(scene: Scene) -> tuple[Layer, ...]:

@@ -11,8 +11,10 @@ import jax.numpy as jnp
 
 from pellicle.effects.plan import Plan
 from pellicle.optics import coherent, interface, orders, plate, response
+from pellicle.optics.gradient import Gradient, gauss_points
 from pellicle.optics.pair import Number, imag, real
 from pellicle.scene.film import Group, Scene, groups, thickness_spread
+from pellicle.scene.graded import Graded
 from pellicle.scene.layers import Layer
 
 
@@ -20,7 +22,7 @@ class CoherentGroup(NamedTuple):
     """Coherent layers between two thick media: numbers at each wavelength, of the types the plan needs."""
 
     above: Number
-    layers: list[Number]
+    layers: list[Number]  # of a graded one its `Gradient`
     below: Number
     phases: list[Any]
     angle: Any  # of incidence in radians; None is normal, `Inside` within a plate
@@ -68,6 +70,9 @@ def _roughness(group: Group, wavelength: Any) -> list[Any] | None:
 
 
 def _layer_index(plan: Plan, layer: Layer, wavelength: Any) -> Number:
+    if isinstance(layer.material, Graded):
+        points = [layer.material.at(z, wavelength) for z in gauss_points(plan.row("gradient").count)]
+        return Gradient(*(point if plan.on("absorption") else real(point) for point in points))
     index = layer.material.index(wavelength)
     return index if plan.on("absorption") else real(index)
 

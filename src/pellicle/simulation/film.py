@@ -18,9 +18,9 @@ from pellicle.materials import materials_in
 from pellicle.optics import ellipsometry, plate
 from pellicle.optics.layout import stack_rows
 from pellicle.optics.pointwise import pointwise
-from pellicle.scene.film import ELLIPSOMETRY, Scene, thickness_spread
+from pellicle.scene.film import ELLIPSOMETRY, Scene, media, thickness_spread
 from pellicle.scene.free import free_leaves
-from pellicle.scene.layers import Interface, Layer
+from pellicle.scene.layers import Layer
 from pellicle.simulation import instrument
 from pellicle.simulation.coherent_groups import (
     CoherentGroup,
@@ -43,11 +43,6 @@ def tabulated(scene: Scene, slope: bool = True) -> Scene:
     **Raises:** ValueError where a material has no data, naming it and the wavelengths.
     """
     wavelength = np.asarray(scene.light.wavelength, dtype=float)
-
-    def media(s: Scene) -> list[AbstractDispersion]:
-        back = [] if s.substrate.back is None else [s.substrate.back]
-        layers = [layer.material for layer in s.layers if not isinstance(layer, Interface)]
-        return [*layers, s.substrate.material, s.ambient, *back]
 
     return eqx.tree_at(media, scene, [_tabulated(m, wavelength, slope) for m in media(scene)])
 
@@ -84,7 +79,9 @@ def build(plan: Plan) -> Simulate:
         return list(powers(groups)) if averaged else finish(powers(groups))
 
     def monochromatic(scene: Scene, /) -> Any:
-        return pointwise(at_each_wavelength, coherent_groups(plan, scene))
+        groups = coherent_groups(plan, scene)
+        # slices have an axis of their own, along which nothing acts element by element
+        return at_each_wavelength(groups) if plan.on("gradient") else pointwise(at_each_wavelength, groups)
 
     intensities: Intensities = monochromatic
     if plan.row("coherence").count:

@@ -18,6 +18,7 @@ from pellicle.fitting.spectra.view import SpectrumForm, SpectrumView
 from pellicle.optics.pair import Pair, imag, real
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free, free_leaves, insert, is_free
+from pellicle.scene.graded import each_medium
 from pellicle.scene.layers import Interface, Layer
 
 OXIDE_INDEX = 1.46
@@ -145,14 +146,15 @@ class ExtendedScene:
         return Number(len(self._free) - 1, value), free
 
     def _layer(self, i: int, layer: Layer, fitted: Layer, nm: np.ndarray) -> Layer:
-        material = _with_slope(layer.material, nm)
+        material = each_medium(lambda medium: _with_slope(medium, nm), layer.material)
         if _solid(fitted.material, nm):
             position = 2 * (nm - nm.min()) / max(np.ptp(nm), 1e-9) - 1
             given = not free_leaves(getattr(self._view.scene.layers[i], "material", None))
             number, change = self._number(0.0, -0.5)
             (self.index if given else self.shape)[i] = number
             # level and slope of a model are its own: what it may lack is a curvature
-            material = Scaled(material, change, 1.0 if given else 2 * position**2 - 1)
+            shape = 1.0 if given else 2 * position**2 - 1
+            material = each_medium(lambda medium: Scaled(medium, change, shape), material)
         thickness: Any = layer.thickness
         if is_free(thickness):
             position = next(j for j, own in enumerate(self._free) if own is thickness)

@@ -13,6 +13,7 @@ from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.cody_lorentz import CodyLorentz
 from pellicle.dispersion.oscillators import AbstractOscillator, Gaussian, Lorentz, Oscillators, TaucLorentz
 from pellicle.dispersion.parameter_names import ParameterLocation, locate_parameter
+from pellicle.dispersion.profiles import Spline as FreeProfile
 from pellicle.dispersion.spline import Spline
 from pellicle.fitting.parameter import Parameter
 from pellicle.scene.film import Scene
@@ -29,10 +30,10 @@ _UNITS = {
     "angle_shift": "deg",
     **_WIDTHS,
 }
-_NATURAL_ZERO = ("k", "k0", "fraction", "offset", "numerical_aperture", *_WIDTHS)
+_NATURAL_ZERO = ("k", "k0", "fraction", "top", "bottom", "values", "offset", "numerical_aperture", *_WIDTHS)
 _STRENGTHS = (Lorentz, Gaussian, TaucLorentz, CodyLorentz)
 """Their A is a strength, which cannot be negative; the A of Cauchy is an index."""
-_SEARCHED = ("thickness", "n", "A", "B", "k", "B1", "Ep", "E0", "Eg", "eps_inf", "fraction")
+_SEARCHED = ("thickness", "n", "A", "B", "k", "B1", "Ep", "E0", "Eg", "eps_inf", "fraction", "top", "bottom")
 """Parameters that move fringes or make them vanish: a start in the middle of their bounds fails."""
 _RESOLUTION = 0.5
 """Thicknesses (nm) closer than this belong to one minimum."""
@@ -84,7 +85,7 @@ def _parameter(scene: Scene, path: tuple, free: Free, name: str) -> Parameter:
     full = _full_name(scene, path, location.name, name)
     strength = key == "A" and issubclass(owner, _STRENGTHS)
     # a search moves the index of a spline as a whole
-    group = full.removesuffix(key) + field if owner is Spline else full
+    group = full.removesuffix(key) + field if owner in (Spline, FreeProfile) else full
     oscillator = owner is Oscillators or issubclass(owner, AbstractOscillator)
     return Parameter(
         name=full,
@@ -97,7 +98,7 @@ def _parameter(scene: Scene, path: tuple, free: Free, name: str) -> Parameter:
         limits=free.limits,
         natural=((strength or (field or key) in _NATURAL_ZERO) and free.lower == 0, False),
         resolution=_RESOLUTION if key == "thickness" else None,
-        searched=key in _SEARCHED or (owner is Spline and field == "n"),
+        searched=key in _SEARCHED or (owner is Spline and field == "n") or owner is FreeProfile,
         group=group,
         levels=_FEW if oscillator else None,
     )

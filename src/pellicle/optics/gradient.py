@@ -1,0 +1,114 @@
+"""Graded layers: their slices, each of which is integrated to sixth order in its thickness.
+
+In a layer whose index varies with depth the fields obey u′ = i k₀ [[0, α], [β, 0]] u with α = 1, β = ε − a²
+for s and α = ε, β = 1 − a²/ε for p. Magnus' expansion with three Gauss points in a slice of thickness h gives
+the fields at its far face, in steps against the light, from those at its near face by exp Ω with
+
+    Ω = −i k₀h [[ig, ᾱ], [β̄, −ig]].
+
+ᾱ and β̄ are means, corrected by products of the differences between the points, and g is a commutator. Ω is
+traceless and its square is −(k₀h)² Q with Q = ᾱβ̄ − g². So exp Ω has the elements c and f of a homogeneous
+layer (`pellicle.optics.characteristic`) with this Q, and c ± fg on its diagonal. It has determinant 1 and
+conserves energy where nothing absorbs. A homogeneous slice has ᾱ = α, β̄ = β and g = 0.
+
+Source: Blanes, Casas, Oteo and Ros, Physics Reports 470, 151 (2009), section 5.4 (sixth order).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from pellicle.optics.interface import normal_square
+from pellicle.optics.pair import Number
+
+OFFSET = math.sqrt(0.15)
+"""Distance of the outer Gauss points from the middle of a slice, in slices."""
+
+
+class Gradient(NamedTuple):
+    """Refractive index at the three Gauss points of each slice of a graded layer, in the order of depth.
+
+    Slices are along the first axis of each array.
+    """
+
+    first: Number
+    middle: Number
+    last: Number
+
+    @property
+    def slices(self) -> int:
+        """Number of slices."""
+        return jnp.shape(jax.tree_util.tree_leaves(self)[0])[0]
+
+
+def gauss_points(count: int) -> np.ndarray:
+    """Return relative depths 0 to 1 of the Gauss points of each slice, (3, slices)."""
+    middle = (np.arange(count) + 0.5) / count
+    return np.stack([middle - OFFSET / count, middle, middle + OFFSET / count])
+
+
+def is_graded(layers: Sequence[Any]) -> bool:
+    """True where a layer is a `Gradient`."""
+    return any(isinstance(layer, Gradient) for layer in layers)
+
+
+class Coefficients(NamedTuple):
+    """ᾱ, β̄, g and Q of a slice."""
+
+    alpha: Any
+    beta: Any
+    skew: Any
+    square: Any
+
+
+def coefficients(points: Sequence[Any], depth: Any, a: Any, polarisation: str) -> Coefficients:
+    """Return the coefficients of a slice from its index at three Gauss points, in the order of the steps.
+
+    **Arguments:** `depth`, k₀h of the slice; `a`, the transverse index; "s" or "p".
+    """
+    squares = [normal_square(n, a) for n in points]
+    if polarisation == "s":
+        first, middle, last = (_Coupling(1.0, Q) for Q in squares)
+    else:
+        first, middle, last = (_Coupling(n * n, Q / (n * n)) for n, Q in zip(points, squares, strict=True))
+    slope = _combined((math.sqrt(15) / 3, last), (-math.sqrt(15) / 3, first))
+    bend = _combined((10 / 3, last), (-20 / 3, middle), (10 / 3, first))
+    square = depth * depth
+    twist = square * _commutator(middle, slope)
+    turn = square * _commutator(middle, bend) * (-1 / 30)
+    outer = _combined((-20, middle), (-1, bend))
+    inner = _Coupling(slope.alpha + middle.alpha * twist / 30, slope.beta - middle.beta * twist / 30)
+    alpha = middle.alpha + bend.alpha / 12 + (inner.alpha * twist - outer.alpha * turn) / 120
+    beta = middle.beta + bend.beta / 12 + (outer.beta * turn - inner.beta * twist) / 120
+    skew = depth * _commutator(outer, inner) / 240
+    return Coefficients(alpha, beta, skew, alpha * beta - skew * skew)
+
+
+class _Coupling(NamedTuple):
+    """α and β at a point, or a combination of them: −i[[0, α], [β, 0]]."""
+
+    alpha: Any
+    beta: Any
+
+
+def _combined(*terms: tuple[float, _Coupling]) -> _Coupling:
+    return _Coupling(sum(w * x.alpha for w, x in terms), sum(w * x.beta for w, x in terms))
+
+
+def _commutator(x: _Coupling, y: _Coupling) -> Any:
+    """The upper element of the diagonal commutator of two couplings; the lower one is its negative."""
+    return y.alpha * x.beta - x.alpha * y.beta
+
+
+def faces(gradient: Sequence[Any]) -> tuple[Any, Any]:
+    """Return the index at the near and the far face of each slice: the parabola through its Gauss points."""
+    first, middle, last = gradient
+    reach = 0.5 / OFFSET
+    slope, bend = 0.5 * reach * (last - first), 0.5 * reach * reach * (last - 2 * middle + first)
+    return middle - slope + bend, middle + slope + bend
