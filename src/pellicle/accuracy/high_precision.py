@@ -12,7 +12,7 @@ import mpmath
 import numpy as np
 
 from pellicle.accuracy.case import Case
-from pellicle.scene.film import Scene, groups, thickness_spread, with_wavelength
+from pellicle.scene.film import Plate, Scene, groups, thickness_spread, with_wavelength
 from pellicle.scene.free import insert
 
 mp: Any = mpmath.mp  # its functions are created at run time, which type checkers do not see
@@ -68,6 +68,8 @@ class _Point(NamedTuple):
     angle: Any  # radians
     groups: list[_Group]
     plates_mm: list[Any]
+    collected: Any  # share of the light from the back face, 0 to 1
+    reflections: int | None  # the most at the back face, None for any
 
 
 def _points(scene: Scene) -> list[_Point]:
@@ -87,9 +89,17 @@ def _points(scene: Scene) -> list[_Point]:
                 for above, layers, below, depths in tables
             ],
             [_exact(plate.plate_mm) for plate in plates],
+            *_collected(plates),
         )
         for i, nm in enumerate(wavelength)
     ]
+
+
+def _collected(plates: tuple[Plate, ...]) -> tuple[Any, int | None]:
+    """Share and reflections that are collected; a scene with several plates collects all."""
+    part = plates[0] if len(plates) == 1 else None
+    share = 1.0 if part is None or part.back_collected is None else part.back_collected
+    return _exact(share), None if part is None else part.back_reflections
 
 
 def _exact(number: Any) -> Any:
@@ -124,8 +134,16 @@ def _powers(point: _Point, first: int, letter: str) -> tuple[Any, Any]:
     R_next, T_next = _powers(point, first + 1, letter)
     q = _normal(point, point.groups[first].below)
     passed = mp.exp(-4 * mp.pi * mp.im(q) * point.plates_mm[first] * 10**6 / point.wavelength)
-    between = 1 - R_below * R_next * passed**2
-    return R + T * T_below * R_next * passed**2 / between, T * T_next * passed / between
+    round_trip = R_below * R_next * passed**2
+    returned = T * T_below * R_next * passed**2 * _orders(point, round_trip)
+    further = round_trip * _orders(point, round_trip)
+    return R + point.collected * returned, T * T_next * passed * (1 + point.collected * further)
+
+
+def _orders(point: _Point, round_trip: Any) -> Any:
+    """Sum of the powers of what returns from one round trip in a plate, up to the reflections collected."""
+    closed = 1 if point.reflections is None else 1 - round_trip**point.reflections
+    return closed / (1 - round_trip)
 
 
 def _product(point: _Point, first: int, letters: str) -> Any:
@@ -136,7 +154,8 @@ def _product(point: _Point, first: int, letters: str) -> Any:
     q = _normal(point, point.groups[first].below)
     passed = mp.exp(-4 * mp.pi * mp.im(q) * point.plates_mm[first] * 10**6 / point.wavelength)
     beneath = _product(point, first + 1, letters) * passed**2
-    return r * mp.conj(r_) + twice * mp.conj(twice_) * beneath / (1 - back * mp.conj(back_) * beneath)
+    returned = twice * mp.conj(twice_) * beneath * _orders(point, back * mp.conj(back_) * beneath)
+    return r * mp.conj(r_) + point.collected * returned
 
 
 def _normal(point: _Point, index: Any) -> Any:

@@ -17,9 +17,9 @@ from pellicle.effects.plan import Plan
 from pellicle.effects.removal import FilmRemoval, RealPart
 from pellicle.optics.pair import Pair, is_real, parts
 from pellicle.planning.film import full_plan, plan
-from pellicle.scene.film import Scene, coherent_layers, media, with_wavelength
+from pellicle.scene.film import Scene, all_collected, coherent_layers, media, with_wavelength
 from pellicle.scene.graded import each_medium
-from pellicle.scene.layers import Layer
+from pellicle.scene.layers import Layer, Plate
 
 
 class Variant(NamedTuple):
@@ -67,6 +67,21 @@ def _half_space(case: Case) -> Variant | str:
     if case.plan.signal == "T":
         return "light transmitted by a plate passes its back face"
     return _without("back-face", "the substrate has no back face", case)
+
+
+def _collection(reflections: int | None, case: Case) -> Variant | str:
+    """The scene with all light from its back face collected, or that of so many reflections there."""
+    if not case.plan.on("back-face"):
+        return "the substrate has no back face"
+    if reflections is None:
+        scene = all_collected(case.scene)
+        same = scene.substrate == case.scene.substrate and scene.layers == case.scene.layers
+        return "all light from the back face is collected" if same else Variant(full_plan(scene), scene)
+    plates = [x for x in case.scene.layers if isinstance(x, Plate)]
+    if plates or case.scene.substrate.back_reflections is not None:
+        return "reflections are counted at the back of a substrate, where all are collected"
+    scene = replace(case.scene, substrate=replace(case.scene.substrate, back_reflections=reflections))
+    return Variant(full_plan(scene), scene)
 
 
 def _closed_form(case: Case) -> Variant | str:
@@ -176,6 +191,8 @@ METHODS = (
     Method("s alone", "p", _s_alone),
     Method("one ray", "the cone of light", partial(_without, "angle-spread", "no cone of light")),
     Method("half space", "the plate's back face", _half_space),
+    Method("one back reflection", "later ones", partial(_collection, 1)),
+    Method("all collected", "that part of the light misses the detector", partial(_collection, None)),
     Method("smooth faces", "roughness", partial(_without, "roughness", "every face is smooth")),
     Method("transparent layer", "its absorption", _transparent),
     Method("constant index", "dispersion: the index of mid-band", _constant_index),

@@ -59,8 +59,17 @@ class SceneFlags(Flags):
         None
     )
     free: Annotated[str | None, flag(SCENE, "Parameters of the layer to free: n,k or n=1.3:1.7.")] = None
-    back: Annotated[str | None, flag(SCENE, "Medium behind a substrate that is a plate.")] = None
+    back: Annotated[
+        str | None, flag(SCENE, "Medium behind a substrate that is a plate; or rough, or taped.")
+    ] = None
     plate_mm: Annotated[float | None, flag(SCENE, "Thickness of the plate in mm (1).")] = None
+    back_collected: Annotated[
+        str | None,
+        flag(SCENE, "Share of the light from the back face that is collected, 0 to 1, free, or LO:HI (1)."),
+    ] = None
+    back_reflections: Annotated[
+        int | None, flag(SCENE, "Most reflections at the back face of light that is collected (any number).")
+    ] = None
     scale: Annotated[str | None, flag(INSTRUMENT, "free, slow or a number (1).")] = None
     offset: Annotated[str | None, flag(INSTRUMENT, "free, slow or a number (0).")] = None
     bandwidth: Annotated[

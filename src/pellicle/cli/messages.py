@@ -50,6 +50,8 @@ FLAGS = {
     "overwrite": "--overwrite",
     "path": "--out",
     "plate_mm": "--plate-mm",
+    "back_collected": "--back-collected",
+    "back_reflections": "--back-reflections",
     "points": "--points",
     "polarisation": "--polarisation",
     "preview": "--preview",

@@ -23,7 +23,7 @@ def scene_from_flags(flags: SceneFlags, reading: ReadingFlags) -> tuple[Scene, l
     from pellicle.scene.film import Scene
     from pellicle.scene.free import Free
     from pellicle.scene.instrument import Instrument
-    from pellicle.scene.layers import Layer, Substrate
+    from pellicle.scene.layers import SCATTERING_BACKS, Layer, Substrate
     from pellicle.scene.uncertainty import Uncertainty
 
     if flags.layer is None or flags.substrate is None:
@@ -41,11 +41,23 @@ def scene_from_flags(flags: SceneFlags, reading: ReadingFlags) -> tuple[Scene, l
     free = [item.strip() for item in (flags.free or "").split(",") if item.strip()]
     assumed = [] if flags.thickness else ["thickness: 1 to 5000 nm, since no --thickness was given"]
     layer = Layer(w.medium(flags.layer, free), w.thickness(flags.thickness or DEFAULT_THICKNESS))
-    back = None if flags.back is None else w.medium(flags.back, name="`back`")
+    part = flags.back_collected
+    collected = None if part is None else w.free_or_number(part, "`back_collected`", Free(0.0, 1.0))
+    if flags.back in SCATTERING_BACKS:
+        stated = collected, flags.back_reflections
+        back, collected = w.scattering_back(flags.back, light(reading).signal, stated)
+    else:
+        back = None if flags.back is None else w.medium(flags.back, name="`back`")
     bandwidth, slit = flags.bandwidth, Free(0.0, 20.0, start=2.0, limits=(0.0, 50.0))
     scene = Scene(
         layer,
-        Substrate(w.medium(flags.substrate, name="`substrate`"), back, flags.plate_mm or 1.0),
+        Substrate(
+            w.medium(flags.substrate, name="`substrate`"),
+            back,
+            flags.plate_mm or 1.0,
+            back_collected=collected,
+            back_reflections=flags.back_reflections,
+        ),
         ambient=w.medium(flags.ambient or "air", name="`ambient`"),
         light=light(reading),
         instrument=Instrument(

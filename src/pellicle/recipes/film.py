@@ -29,7 +29,7 @@ from pellicle.recipes.schema import (
 from pellicle.scene.film import Light, Scene
 from pellicle.scene.free import Free, check_free_count, free_leaves
 from pellicle.scene.instrument import Instrument
-from pellicle.scene.layers import Interface, Layer, Plate, Substrate
+from pellicle.scene.layers import SCATTERING_BACKS, Interface, Layer, Plate, Substrate
 from pellicle.scene.uncertainty import Uncertainty
 
 TABLES: dict[str, type[BaseModel]] = {
@@ -44,6 +44,7 @@ TABLES: dict[str, type[BaseModel]] = {
     "camera": CameraTable,
     "thickness": FreeTable,
     "plate_mm": FreeTable,
+    "back_collected": FreeTable,
     "bandwidth": FreeTable,
     "thickness_spread": FreeTable,
     "roughness": FreeTable,
@@ -114,14 +115,15 @@ def light_signal(signal: str | None, transmitted: bool | None) -> str:
 
 def _scene(tables: RecipeTable, folder: Path) -> Scene:
     scene, data, instrument = tables.scene, tables.data, tables.instrument
+    signal = light_signal(data.signal, tables.camera.transmitted)
     built = Scene(
         [_layer(layer, folder) for layer in scene.layer],
-        _substrate(scene.substrate, folder),
+        _substrate(scene.substrate, folder, signal),
         ambient=medium(scene.ambient, folder, "ambient"),
         light=Light(
             None,
             optional(data.angle, "angle") or 0.0,
-            light_signal(data.signal, tables.camera.transmitted),
+            signal,
             data.polarisation or "unpolarised",
         ),
         instrument=Instrument(
@@ -161,19 +163,30 @@ def _layer(table: LayerTable, folder: Path) -> Layer | Interface | Plate:
     stated: Any = table.material  # LayerTable has checked that it is there
     material = media_words.free_numbers(medium(stated, folder), table.free)
     if table.plate_mm is not None:
-        return Plate(material, number(table.plate_mm, "plate_mm", minimum=0.0), table.name)
+        return Plate(
+            material, number(table.plate_mm, "plate_mm", minimum=0.0), table.name, *_collected(table)
+        )
     spread = optional(table.thickness_spread, "thickness_spread")
     roughness = optional(table.roughness, "roughness")
     return Layer(material, thickness, table.name, spread, roughness, table.index_uncertainty)
 
 
-def _substrate(value: Medium | PlateTable, folder: Path) -> Substrate:
+def _substrate(value: Medium | PlateTable, folder: Path, signal: str) -> Substrate:
     if not isinstance(value, PlateTable):
         return Substrate(medium(value, folder, "substrate"))
-    back = None if value.back is None else medium(value.back, folder, "back")
+    collected, reflections = _collected(value)
+    if isinstance(value.back, str) and value.back in SCATTERING_BACKS:
+        back, collected = media_words.scattering_back(value.back, signal, (collected, reflections))
+    else:
+        back = None if value.back is None else medium(value.back, folder, "back")
     plate_mm = number(value.plate_mm, "plate_mm", minimum=0.0)
     roughness = optional(value.roughness, "roughness")
-    return Substrate(medium(value.material, folder), back, plate_mm, roughness, value.index_uncertainty)
+    about = plate_mm, roughness, value.index_uncertainty, collected, reflections
+    return Substrate(medium(value.material, folder), back, *about)
+
+
+def _collected(table: PlateTable | LayerTable) -> tuple[float | Free | None, int | None]:
+    return optional(table.back_collected, "back_collected"), table.back_reflections
 
 
 def optional(value: Number | None, name: str, minimum: float | None = 0.0) -> float | Free | None:

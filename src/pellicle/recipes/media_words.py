@@ -68,6 +68,23 @@ def medium(text: str, free: Iterable[str] = (), name: str = "`layer`") -> Abstra
     return free_numbers(_dispersion(text.strip(), name), free)
 
 
+def scattering_back(
+    word: str, signal: str, part: tuple[Free | float | None, int | None]
+) -> tuple[AbstractDispersion, float]:
+    """Medium behind a back face that is `rough` or `taped`, and the share of its light that is collected: 0.
+
+    `part` is the share and the number of reflections that were given with it. Raises UsageError for either,
+    and for a transmittance.
+    """
+    if part != (None, None):
+        raise UsageError(f"`back` {word} returns no light: leave out `back_collected` and `back_reflections`")
+    if signal == "T":
+        raise UsageError(
+            f"light through a {word} back is scattered or blocked, and its transmittance is not simulated"
+        )
+    return Constant(1.0), 0.0
+
+
 def _dispersion(text: str, name: str) -> AbstractDispersion:
     try:
         index = complex(re.sub("i$", "j", text.replace(" ", "")))

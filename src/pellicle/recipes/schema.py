@@ -35,12 +35,18 @@ Uncertain = Annotated[float, Field(ge=0)] | None
 """Standard uncertainty of a number that is taken as known; None leaves the usual one."""
 
 
+_BACK = ("back_collected", "back_reflections")
+"""Keys of a plate: which part of the light from beneath it reaches the detector."""
+
+
 class PlateTable(_Table):
     """A substrate with more than a material, such as a plate with an incoherent back face."""
 
     material: Medium
     back: Medium | None = None
     plate_mm: Number = 1.0
+    back_collected: Number | None = None
+    back_reflections: int | None = None
     roughness: Number | None = None
     index_uncertainty: Uncertain = None
 
@@ -57,6 +63,8 @@ class LayerTable(_Table):
     fraction: Number | None = None
     thickness: Number | None = None
     plate_mm: Number | None = None
+    back_collected: Number | None = None
+    back_reflections: int | None = None
     thickness_spread: Number | None = None
     roughness: Number | None = None
     index_uncertainty: Uncertain = None
@@ -80,11 +88,11 @@ class LayerTable(_Table):
 
     def _foreign(self) -> set[str]:
         if self.between is not None:
-            return {"plate_mm", "thickness_spread", "roughness", "index_uncertainty", "free"}
+            return {"plate_mm", *_BACK, "thickness_spread", "roughness", "index_uncertainty", "free"}
         return (
             {"steps", "fraction", "thickness_spread", "roughness", "index_uncertainty"}
             if self.plate_mm is not None
-            else {"steps", "fraction"}
+            else {"steps", "fraction", *_BACK}
         )
 
 
@@ -229,7 +237,9 @@ def of_file(tables: RecipeTable, file: FileTable) -> RecipeTable:
     )
     scene, plate = tables.scene, tables.scene.substrate
     if file.back is False and isinstance(plate, PlateTable):
-        scene = scene.model_copy(update={"substrate": plate.model_copy(update={"back": None})})
+        scene = scene.model_copy(
+            update={"substrate": plate.model_copy(update=dict.fromkeys(("back", *_BACK)))}
+        )
     return tables.model_copy(
         update={"data": data, "instrument": instrument, "camera": camera, "scene": scene}
     )

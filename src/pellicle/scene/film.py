@@ -7,6 +7,7 @@ marks an absent effect, which costs nothing.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any, NamedTuple, final
 
@@ -132,6 +133,15 @@ class Scene(eqx.Module):
                 raise UsageError("a graded medium has a depth: it is the material of a pl.Layer")
         if absorbs(self.ambient):
             raise ValueError("the ambient must not absorb: give it a real index")
+        plates: list[Any] = [x for x in self.layers if isinstance(x, Plate)]
+        if self.substrate.back is not None:
+            plates.append(self.substrate)
+        collected = [x for x in plates if (x.back_collected, x.back_reflections) != (None, None)]
+        if collected and len(plates) > 1:
+            raise ValueError(
+                "`back_collected` and `back_reflections` are for a scene with one plate, and this one has"
+                f" {len(plates)}"
+            )
         if self.instrument.thickness_spread is not None:
             if len(self.layers) > 1:
                 raise ValueError(
@@ -162,7 +172,8 @@ def groups(scene: Scene) -> tuple[tuple[Group, ...], tuple[Plate, ...]]:
     substrate = scene.substrate
     plates = [layer for layer in scene.layers if isinstance(layer, Plate)]
     if substrate.back is not None:
-        plates.append(Plate(substrate.material, substrate.plate_mm))
+        part = substrate.back_collected, substrate.back_reflections
+        plates.append(Plate(substrate.material, substrate.plate_mm, None, *part))
     runs: list[list[Layer]] = [[]]
     for position, item in enumerate(scene.layers):
         if isinstance(item, Plate):
@@ -182,6 +193,13 @@ def groups(scene: Scene) -> tuple[tuple[Group, ...], tuple[Plate, ...]]:
         for above, run, below, roughness in zip(media[:-1], runs, media[1:], feet, strict=True)
     ]
     return tuple(coherent), tuple(plates)
+
+
+def all_collected(scene: Scene) -> Scene:
+    """Return the scene with all light from its plates collected by the detector."""
+    everything = {"back_collected": None, "back_reflections": None}
+    layers = tuple(replace(x, **everything) if isinstance(x, Plate) else x for x in scene.layers)
+    return replace(scene, layers=layers, substrate=replace(scene.substrate, **everything))
 
 
 def _neighbours(scene: Scene, position: int) -> tuple[AbstractDispersion, AbstractDispersion]:

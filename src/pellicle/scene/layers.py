@@ -23,6 +23,10 @@ from pellicle.optics.pair import is_real
 from pellicle.scene.free import Free, insert, is_free, start_values
 from pellicle.scene.uncertainty import check_uncertainty
 
+SCATTERING_BACKS = ("rough", "taped")
+"""Words of recipes and flags for a back face that returns no light to the detector."""
+MOST_REFLECTIONS = 100
+"""Largest number of reflections at a back face that can be counted."""
 METRE = 1e9
 """Largest length in nm that a layer can have."""
 
@@ -90,6 +94,11 @@ def _named(name: str) -> AbstractDispersion:
 
 def medium_or_none(value: MediumLike | None) -> AbstractDispersion | None:
     """Return `medium(value)`, or None for None."""
+    if isinstance(value, str) and value in SCATTERING_BACKS:
+        raise UsageError(
+            f"{value!r} is no medium: give the medium behind the plate, and a `back_collected` of 0 where its"
+            " back face is rough or taped over"
+        )
     return None if value is None else medium(value)
 
 
@@ -220,19 +229,37 @@ def divided(thickness: Quantity, parts: int) -> Quantity:
     return thickness / parts
 
 
-def _check_plate(plate_mm: Quantity) -> None:
-    check_not_negative("plate_mm", plate_mm, "mm")
-    if isinstance(plate_mm, int | float) and plate_mm == 0:
+def _check_plate(plate: Plate | Substrate) -> None:
+    check_not_negative("plate_mm", plate.plate_mm, "mm")
+    if isinstance(plate.plate_mm, int | float) and plate.plate_mm == 0:
         raise ValueError("`plate_mm` must be above 0 mm")
+    check_not_negative("back_collected", plate.back_collected, "")
+    share, count = plate.back_collected, plate.back_reflections
+    if isinstance(share, int | float) and share > 1:
+        raise ValueError(f"`back_collected` must be at most 1, all of the light, got {share:g}")
+    if count is not None and (isinstance(count, bool) or not isinstance(count, int)):
+        raise UsageError(f"`back_reflections` must be a whole number, not {count!r}")
+    if count is not None and not 1 <= count <= MOST_REFLECTIONS:
+        raise ValueError(
+            f"`back_reflections` must be 1 to {MOST_REFLECTIONS}, got {count};"
+            " a `back_collected` of 0 collects none"
+        )
+
+
+def _none_if_all(share: Quantity | None) -> Quantity | None:
+    """None for a share of exactly 1, which costs nothing."""
+    return None if isinstance(share, int | float) and share == 1 else share
 
 
 @final
 class Plate(eqx.Module):
     """Thick, incoherent layer: light between its faces adds as intensities.
 
-    **Arguments:** `material` and `name` as in `Layer`; thickness `plate_mm` in mm.
+    **Arguments:** `material` and `name` as in `Layer`; thickness `plate_mm` in mm; `back_collected` and
+    `back_reflections` as in `Substrate`, of the light from beneath the plate.
 
-    **Raises:** ValueError for an unknown material or a thickness that is not positive.
+    **Raises:** ValueError for an unknown material, a thickness that is not positive, a share outside 0 to 1
+    or a number of reflections below 1.
 
     >>> Plate("BK7", 1.1).plate_mm
     1.1
@@ -241,20 +268,34 @@ class Plate(eqx.Module):
     material: AbstractDispersion = eqx.field(converter=medium)
     plate_mm: Quantity = 1.0
     name: str | None = eqx.field(static=True, default=None)
+    back_collected: Quantity | None = eqx.field(converter=_none_if_all, default=None)
+    back_reflections: int | None = eqx.field(static=True, default=None)
 
     def __check_init__(self):
-        _check_plate(self.plate_mm)
+        _check_plate(self)
 
 
 @final
 class Substrate(eqx.Module):
     """Substrate: a half space, or with `back` a plate with an incoherent back face.
 
-    **Arguments:** `material` as in `Layer`; `back`, the medium behind the plate; `plate_mm`, the plate's
-    thickness in mm; `roughness`, the root mean square height of its upper face in nm; `index_uncertainty` as
-    in `Layer`.
+    **Arguments:**
 
-    **Raises:** ValueError for an unknown material, an impossible length or a negative uncertainty.
+    - `material` as in `Layer`.
+    - `back`: the medium behind the plate.
+    - `plate_mm`: the plate's thickness in mm.
+    - `roughness`: the root mean square height of its upper face in nm.
+    - `index_uncertainty` as in `Layer`.
+    - `back_collected`: share, 0 to 1, of the light reflected at the back face that reaches the detector; None
+      or 1 is all. 0 is a back that is roughened or taped over. In a thick plate the beams from the back face
+      are displaced, and a small spot or an aperture cuts part of them off.
+    - `back_reflections`: largest number of reflections at the back face after which light still reaches the
+      detector; None is any.
+
+    Light transmitted without a reflection at the back face is collected in any case.
+
+    **Raises:** ValueError for an unknown material, an impossible length, a negative uncertainty, a share
+    outside 0 to 1, other than 1 to 100 reflections, and for either of them without a `back`.
 
     >>> Substrate("BK7", back="air").plate_mm
     1.0
@@ -265,8 +306,13 @@ class Substrate(eqx.Module):
     plate_mm: Quantity = 1.0
     roughness: Quantity | None = eqx.field(converter=none_if_zero, default=None)
     index_uncertainty: float | None = eqx.field(static=True, default=None)
+    back_collected: Quantity | None = eqx.field(converter=_none_if_all, default=None)
+    back_reflections: int | None = eqx.field(static=True, default=None)
 
     def __check_init__(self):
         check_uncertainty("index", self.index_uncertainty)
-        _check_plate(self.plate_mm)
+        _check_plate(self)
         check_not_negative("roughness", self.roughness, "nm")
+        if self.back is None and (self.back_collected, self.back_reflections) != (None, None):
+            stated = "back_reflections" if self.back_collected is None else "back_collected"
+            raise UsageError(f"`{stated}` needs the medium behind the plate, as `back` air")

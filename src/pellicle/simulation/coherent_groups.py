@@ -15,7 +15,7 @@ from pellicle.optics.gradient import Gradient, gauss_points
 from pellicle.optics.pair import Number, imag, real
 from pellicle.scene.film import Group, Scene, groups, thickness_spread
 from pellicle.scene.graded import Graded
-from pellicle.scene.layers import Layer
+from pellicle.scene.layers import Layer, Plate
 
 
 class CoherentGroup(NamedTuple):
@@ -27,6 +27,7 @@ class CoherentGroup(NamedTuple):
     phases: list[Any]
     angle: Any  # of incidence in radians; None is normal, `Inside` within a plate
     internal: Any  # internal transmittance of the plate below, None on a half space
+    collected: plate.Collection | None  # part of the light from beneath that plate, None for all
     roughness: list[Any] | None  # k₀σ of each face, None where all are smooth
     phase_variance: Any  # of the round-trip phase, None without damped orders
 
@@ -35,6 +36,8 @@ def coherent_groups(plan: Plan, scene: Scene) -> list[CoherentGroup]:
     """The coherent groups of a scene from the ambient down."""
     wavelength = scene.light.wavelength
     described, plates = groups(scene)
+    if not plan.on("back-face"):
+        described, plates = described[:1], ()
     angle = jnp.deg2rad(scene.light.angle) if plan.on("oblique") else None
     thick = [scene.ambient.index(wavelength)]
     a = interface.transverse(thick[0], angle)[0]
@@ -43,10 +46,11 @@ def coherent_groups(plan: Plan, scene: Scene) -> list[CoherentGroup]:
         thick.append(interface.allow_tunnelling(index) if plan.on("tunnelling") else index)
     evaluated = []
     for i, group in enumerate(described):
-        internal = None
+        internal, collected = None, None
         if i < len(plates):
             extinction = imag(interface.normal(thick[i + 1], a))
             internal = plate.internal_transmittance(extinction, plates[i].plate_mm, wavelength)
+            collected = _collection(plates[i])
         evaluated.append(
             CoherentGroup(
                 above=thick[i],
@@ -55,11 +59,18 @@ def coherent_groups(plan: Plan, scene: Scene) -> list[CoherentGroup]:
                 phases=[2 * jnp.pi / wavelength * layer.thickness for layer in group.layers],
                 angle=angle if i == 0 or angle is None else interface.Inside(a),
                 internal=internal,
+                collected=collected,
                 roughness=_roughness(group, wavelength),
                 phase_variance=_phase_variance(plan, scene, group, angle),
             )
         )
     return evaluated
+
+
+def _collection(described: Plate) -> plate.Collection | None:
+    if described.back_collected is None and described.back_reflections is None:
+        return None
+    return plate.Collection(described.back_collected, described.back_reflections)
 
 
 def _roughness(group: Group, wavelength: Any) -> list[Any] | None:
@@ -84,7 +95,8 @@ def reflected(plan: Plan, groups: list[CoherentGroup], polarisation: str):
     if not below:
         return powers.R()
     front = plate.Face(powers.R(), powers.T(), powers.R_below())
-    return plate.plate_reflectance(front, reflected(plan, below, polarisation), group.internal)
+    back = reflected(plan, below, polarisation)
+    return plate.plate_reflectance(front, back, group.internal, group.collected)
 
 
 def transmitted(plan: Plan, groups: list[CoherentGroup], polarisation: str):
@@ -95,7 +107,7 @@ def transmitted(plan: Plan, groups: list[CoherentGroup], polarisation: str):
         return powers.T()
     front = plate.Face(powers.R(), powers.T(), powers.R_below())
     back, passed = reflected(plan, below, polarisation), transmitted(plan, below, polarisation)
-    return plate.plate_transmittance(front, back, passed, group.internal)
+    return plate.plate_transmittance(front, back, passed, group.internal, group.collected)
 
 
 class _Powers(NamedTuple):

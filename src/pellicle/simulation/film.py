@@ -172,4 +172,4 @@ def _cross_product(plan: Plan, groups: list[CoherentGroup]):
     front = ellipsometry.cross_products(response_of(plan, group, "s"), response_of(plan, group, "p"))
     if not below:
         return front.reflected
-    return plate.multiple_reflections(*front, _cross_product(plan, below), group.internal)
+    return plate.multiple_reflections(*front, _cross_product(plan, below), group.internal, group.collected)

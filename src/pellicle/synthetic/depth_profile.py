@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from pellicle.effects.film import exact
 from pellicle.errors import UsageError
 from pellicle.optics.interface import transverse
-from pellicle.scene.film import Scene, groups, with_wavelength
+from pellicle.scene.film import Scene, all_collected, groups, with_wavelength
 from pellicle.scene.free import insert, start_values
 from pellicle.scene.instrument import Instrument
 from pellicle.scene.layers import Interface, Layer, Plate
@@ -54,6 +54,7 @@ class DepthProfile:
 
     `absorptance` (media, wavelengths) is that of each layer and plate in `media`, from the ambient down. With
     `R` and `T` (wavelengths,) it adds up to 1; T enters the substrate, or the medium behind its back face.
+    Both are of all light, also where a detector collects only a part of that from a back face.
     `sections` have the field at the wavelengths `at`, one for each group of layers between thick media;
     `shares` (chosen wavelengths,) are R, T and the absorptances there, by name.
     """
@@ -84,7 +85,7 @@ def depth_profile(scene: Scene, at: ArrayLike, wavelength: ArrayLike) -> DepthPr
     if chosen.size == 0 or not np.all(np.isfinite(chosen) & (chosen > 0)):
         raise UsageError("the wavelengths of a depth profile must be numbers of nm above zero")
     with jax.enable_x64(True):
-        fixed = insert(scene, start_values(scene))
+        fixed = all_collected(insert(scene, start_values(scene)))
         plane = [replace(x, thickness_spread=None) if isinstance(x, Layer) else x for x in fixed.layers]
         fixed = eqx.tree_at(lambda s: (s.layers, s.instrument), fixed, (tuple(plane), Instrument()))
         names, runs = _names(scene)

@@ -59,6 +59,10 @@ def log_scene(scene: Scene) -> None:
             layers.append(f"{medium}, {size} {unit}")
         on, back = medium_in_words(scene.substrate.material), scene.substrate.back
         behind = "" if back is None else f", a plate with {medium_in_words(back)} behind it"
+        if back is not None:
+            share, count = scene.substrate.back_collected, scene.substrate.back_reflections
+            behind += "" if share is None else f", back collected {'free' if is_free(share) else share}"
+            behind += "" if count is None else f", back reflections {count}"
         stack = ", then ".join(layers)
         log.info("scene: from %s: %s, on %s%s", medium_in_words(scene.ambient), stack, on, behind)
 

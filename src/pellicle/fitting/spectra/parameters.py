@@ -15,6 +15,7 @@ from pellicle.dispersion.oscillators import AbstractOscillator, Gaussian, Lorent
 from pellicle.dispersion.parameter_names import ParameterLocation, locate_parameter
 from pellicle.dispersion.profiles import Spline as FreeProfile
 from pellicle.dispersion.spline import Spline
+from pellicle.errors import UsageError
 from pellicle.fitting.parameter import Parameter
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free, free_leaves, insert, is_free
@@ -30,7 +31,12 @@ _UNITS = {
     "angle_shift": "deg",
     **_WIDTHS,
 }
-_NATURAL_ZERO = ("k", "k0", "fraction", "top", "bottom", "values", "offset", "numerical_aperture", *_WIDTHS)
+_NATURAL_ONE = ("back_collected",)
+_NATURAL_ZERO = (
+    *("k", "k0", "fraction", "top", "bottom", "values", "offset", "numerical_aperture"),
+    *_NATURAL_ONE,
+    *_WIDTHS,
+)
 _STRENGTHS = (Lorentz, Gaussian, TaucLorentz, CodyLorentz)
 """Their A is a strength, which cannot be negative; the A of Cauchy is an index."""
 _SEARCHED = ("thickness", "n", "A", "B", "k", "B1", "Ep", "E0", "Eg", "eps_inf", "fraction", "top", "bottom")
@@ -83,6 +89,8 @@ def _parameter(scene: Scene, path: tuple, free: Free, name: str) -> Parameter:
     location = _place(scene, path)
     owner, key, field = type(location.owner), location.key, location.field
     full = _full_name(scene, path, location.name, name)
+    if key in _NATURAL_ONE and free.upper > 1:
+        raise UsageError(f"`{key}` must be at most 1: its upper bound is {free.upper:g}")
     strength = key == "A" and issubclass(owner, _STRENGTHS)
     # a search moves the index of a spline as a whole
     group = full.removesuffix(key) + field if owner in (Spline, FreeProfile) else full
@@ -96,7 +104,10 @@ def _parameter(scene: Scene, path: tuple, free: Free, name: str) -> Parameter:
         upper=free.upper,
         prior=free.prior,
         limits=free.limits,
-        natural=((strength or (field or key) in _NATURAL_ZERO) and free.lower == 0, False),
+        natural=(
+            (strength or (field or key) in _NATURAL_ZERO) and free.lower == 0,
+            key in _NATURAL_ONE and free.upper == 1,
+        ),
         resolution=_RESOLUTION if key == "thickness" else None,
         searched=key in _SEARCHED or (owner is Spline and field == "n") or owner is FreeProfile,
         group=group,

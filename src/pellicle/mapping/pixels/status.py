@@ -75,6 +75,8 @@ def _at_bound(
         resting = (margin <= _ON_BOUND * (p.upper - p.lower)) & (not p.periodic)
         if p.natural[0] and p.lower == 0 and p.key != "thickness":
             resting &= value > _ON_BOUND * p.upper
+        if p.natural[1] and p.upper == 1:
+            resting &= value < 1 - _ON_BOUND * (1 - p.lower)
         if p.limits is not None:
             # a default bound beside a thickness that is well determined is a remark
             if i in depths or not len(depths):

@@ -1,0 +1,56 @@
+"""Fits of the share of the light from a back face that reaches the detector."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pellicle as pl
+
+NM = np.linspace(400.0, 900.0, 128)
+SHARE, NOISE = 0.4, 0.001
+COLLECTED = "substrate.back_collected"
+
+
+def scene(thickness, **part) -> pl.Scene:
+    return pl.Scene(pl.Layer(2.1, thickness), pl.Substrate("BK7", back="air", **part))
+
+
+@pytest.fixture(scope="module")
+def measured() -> pl.Spectrum:
+    return pl.simulate(scene(180.0, back_collected=SHARE), NM, noise=NOISE, seed=3)
+
+
+def test_a_free_share_is_found(measured):
+    fit = pl.fit(measured, scene(pl.Free(50, 400), back_collected=pl.Free(0, 1)))
+    assert fit.status == "converged"
+    found = fit[COLLECTED]
+    # least error: the light from the back face is known to the noise at each of 128 points
+    added = pl.simulate(scene(180.0), NM).values - pl.simulate(scene(180.0, back_collected=0.0), NM).values
+    assert found.stderr_noise < 2 * NOISE / np.linalg.norm(added)
+    assert abs(found.value - SHARE) < 4 * found.stderr_noise
+    assert abs(fit["thickness"].value - 180.0) < 4 * fit["thickness"].stderr_noise
+
+
+def test_a_share_of_all_is_a_limit():
+    """1 is a bound that physics sets: the answer stands, with a limit on one side."""
+    data = pl.simulate(scene(180.0), NM, noise=NOISE, seed=2)
+    fit = pl.fit(data, scene(pl.Free(50, 400), back_collected=pl.Free(0, 1)))
+    assert fit.status == "converged"
+    assert fit[COLLECTED].value > 0.99
+    assert 0.6 < fit[COLLECTED].lower_limit < 1
+    assert any("compatible with 1: it is at least" in said for said in fit.warnings)
+
+
+def test_a_whole_back_face_says_what_part_would_explain_the_data(measured):
+    verdict = pl.fit(measured, scene(pl.Free(50, 400))).verdict
+    assert "about 40 % is collected would explain" in verdict
+    assert "`back_collected=Free(0, 1)`" in verdict
+    whole = pl.fit(pl.simulate(scene(180.0), NM, noise=NOISE, seed=2), scene(pl.Free(50, 400)))
+    assert "back face matters" in whole.verdict
+    assert "collected" not in whole.verdict
+
+
+def test_more_than_all_is_refused(measured):
+    with pytest.raises(ValueError, match="`back_collected` must be at most 1: its upper bound is 2"):
+        pl.fit(measured, scene(pl.Free(50, 400), back_collected=pl.Free(0, 2)))
