@@ -80,7 +80,8 @@ def file_candidates(
     polarisation: str | None,
     elements: Sequence[str] | None = None,
 ) -> list[Candidate]:
-    """Find the spectra of all tables of a file that have the wanted signal and polarisation.
+    """Find the spectra of all tables of a file that have the wanted signal and polarisation; of Ψ and Δ and
+    a Mueller matrix beside them Ψ and Δ, where neither is wanted.
 
     Raises as `candidates` does where no table has them.
     """
@@ -95,6 +96,8 @@ def file_candidates(
             refusals.append(refusal)
     if not found:
         raise refusals[0]
+    if signal is None and elements is None and any(one.signal == SIGNAL for one in found):
+        return [one for one in found if one.signal != mueller.SIGNAL]
     return found
 
 

@@ -62,11 +62,22 @@ def test_a_heading_without_its_mark(write):
     np.testing.assert_array_equal(read_spectrum(write(text)).angle, [50.2, 70.1] * 3)
 
 
-def test_a_mueller_matrix_is_named(refused):
-    heading = f"; WAVELENGTH{' 70.20000' * 16}\n"
-    refused(f"{heading}190.5{' 0.5' * 16}\n", "line 1", "16 times, as a Mueller matrix is", "export psi")
-    both = heading.strip() + f"{' 60.2' * 16}\n"
-    refused(f"{both}190.5{' 0.5' * 32}\n", "Mueller")
+def test_a_mueller_matrix(write, refused):
+    """Sixteen columns for each angle, row by row of the matrix."""
+    matrix = " ".join(
+        f"{x / 100:.2f}" for x in (100, *range(12, 15), *range(21, 25), *range(31, 35), *range(41, 45))
+    )
+    heading = f"; WAVELENGTH{' 70.20000' * 16}{' 60.2' * 16}\n"
+    rows = "".join(f"{nm} {matrix} {matrix.replace('0.12', f'0.{nm}')}\n" for nm in (190, 191, 192))
+    spectrum = read_spectrum(write(heading + rows))
+    assert spectrum.signal == "mueller"
+    assert spectrum.elements[0] == "m12"
+    assert len(spectrum.elements) == 15
+    np.testing.assert_array_equal(spectrum.angle, [60.2, 70.2] * 3)
+    np.testing.assert_allclose(spectrum.values[:, 0], [0.190, 0.12, 0.191, 0.12, 0.192, 0.12])
+    np.testing.assert_allclose(spectrum.values[0, 1:], [0.13, 0.14, *np.r_[21:25, 31:35, 41:45] / 100])
+    refused(f"{heading}190.5{' 0.5' * 31}\n", "line 2 has 32 values", "make 33")
+    refused(heading.replace(" 60.2", "", 1), "line 1", "16 times, for a Mueller matrix")
 
 
 @pytest.mark.parametrize("text", [SPECTRARAY, SPECTRARAY.replace(".", ",")])

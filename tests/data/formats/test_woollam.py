@@ -229,15 +229,51 @@ def test_trigonometric_tables_leave_the_sign_of_delta_open(write, refused):
     refused(WVASE.replace("nm\n", "nm  TRIG\n"), "line 5", "170.25 is no cos(delta)")
 
 
-def test_mueller_and_generalised_rows_are_named(write, refused):
-    rows = "mm11\t3.0\t65\t1\t0.1\nmm12\t3.0\t65\t.1\t.1\t0.1\t.1\nAnE\t3\t65\t20\t100\t1\t1\n"
-    spectrum = read_spectrum(write(COMPLETE_EASE + rows))
-    words = "rows of other quantities ignored: a Mueller matrix (mm11, mm12); generalised ellipsometry (AnE)"
-    assert words in spectrum.notes
-    heading = "".join(COMPLETE_EASE.splitlines(keepends=True)[:4])
+ELEMENTS = """mm11	400	65	1	0.001
+mm11	410	65	1	0.001
+mm12	400	65	-.2	0.002
+mm12	410	65	-.25	0.003
+mm33	400	65	.5	0.004
+mm33	410	65	.55	0.005
+"""
+
+
+def test_rows_of_mueller_elements(write, refused):
+    heading = "".join(WVASE.splitlines(keepends=True)[:4])
+    spectrum = read_spectrum(write(heading + ELEMENTS))
+    assert spectrum.elements == ("m12", "m33")
+    np.testing.assert_array_equal(spectrum.wavelength, [400, 410])
+    np.testing.assert_array_equal(spectrum.angle, [65, 65])
+    np.testing.assert_array_equal(spectrum.values, [[-0.2, 0.5], [-0.25, 0.55]])
+    np.testing.assert_array_equal(spectrum.sigma, [[0.002, 0.004], [0.003, 0.005]])
+    fewer = read_spectrum(write(heading + ELEMENTS.replace("mm33	410	65	.55	0.005\n", "")))
+    np.testing.assert_array_equal(fewer.values, [[-0.2, 0.5]])
+    assert "1 points that all Mueller elements have" in fewer.notes
+    without = re.sub(r"\t0.00\d", "\t0", ELEMENTS)
+    assert read_spectrum(write(heading + without)).sigma is None
     refused(
-        heading + rows, "only a Mueller matrix (mm11, mm12); generalised ellipsometry (AnE)", "export psi"
+        heading + ELEMENTS.replace("	.55	", "	.55	0	"),
+        "line 10 is not mm33, wavelength, angle",
     )
+    refused(heading + ELEMENTS.replace("mm33	4", "mm33	5"), "no point in common")
+
+
+def test_mueller_elements_beside_psi_and_delta(write):
+    path = write(COMPLETE_EASE + ELEMENTS)
+    spectrum = read_spectrum(path)
+    assert spectrum.signal == "psi-delta"
+    said = 'Mueller elements beside psi and delta: `signal="mueller"` reads mm11, mm12, mm33'
+    assert said in spectrum.notes
+    assert read_spectrum(path, signal="mueller").elements == ("m12", "m33")
+    assert read_spectrum(path, elements=["m33"]).elements == ("m33",)
+
+
+def test_generalised_rows_are_named(write, refused):
+    rows = "AnE	3	65	20	100	1	1\n"
+    spectrum = read_spectrum(write(COMPLETE_EASE + rows))
+    assert "rows of other quantities ignored: generalised ellipsometry (AnE)" in spectrum.notes
+    heading = "".join(COMPLETE_EASE.splitlines(keepends=True)[:4])
+    refused(heading + rows, "only generalised ellipsometry (AnE)", "export psi")
     back = JOINT.replace("pR", "uRb").replace("sR", "uRb").replace("E\t", "Aps\t")
     assert read_spectra(write(back))[0].signal == "T"
 

@@ -3,8 +3,9 @@
 Lines of heading (a title, `VASEmethod[...]`, `Original[...]`, `Dynamic`), a line with the unit of the axis
 (`nm`, `Angstroms`, `eV`, `1/cm`), then rows of wavelength, angle of incidence, values and usually their
 errors. A label before a row names its quantity: `E` or none is Ψ and Δ, `dpolE` the depolarisation in
-percent, `pR`, `sR`, `uR`, `pT`, `sT`, `uT` a reflectance or transmittance of p, s or unpolarised light. Rows
-of dynamic data end with their time in minutes. The layout is that of files of both programs.
+percent, `mm12` an element of a normalised Mueller matrix, `pR`, `sR`, `uR`, `pT`, `sT`, `uT` a reflectance
+or transmittance of p, s or unpolarised light. Rows of dynamic data end with their time in minutes. The layout is
+that of files of both programs.
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ _BEHIND_UNIT = ([], [TRIGONOMETRIC], NAMES)
 _POWERS = {f"{p}{q}": q if p == "u" else f"{q}{p}" for p in "psu" for q in "RT"}
 """Labels of reflectances and transmittances, and the column names of these."""
 _KNOWN = re.compile(r"(?i:dpole|AnE|Aps|Asp|mm[1-4][1-4])|E|[psu][RT][rb]?|R[ps][ps]|T[ps][ps]")
+_ELEMENT = re.compile(r"(?i:mm[1-4][1-4])")
 _OTHERS = {
-    r"(?i:mm[1-4][1-4])": "a Mueller matrix",
     r"(?i:AnE|Aps|Asp)": "generalised ellipsometry",
     r"[psu][RT][rb]": "measurements from the back",
 }
@@ -97,6 +98,16 @@ def _tables(
         if shares is not None:
             selected = woollam_rows.with_depolarisation(selected, shares, groups.pop(shares))
         tables.append(("", selected))
+    elements = {label: groups[label] for label in groups if _ELEMENT.fullmatch(label)}
+    if any(label.lower() != "mm11" for label in elements) and not transmitted:
+        selected = woollam_rows.mueller(elements, path)
+        if tables:
+            quantity, (names, rows, notes) = tables[0]
+            said = f'Mueller elements beside psi and delta: `signal="mueller"` reads {", ".join(elements)}'
+            tables[0] = quantity, woollam_rows.Selected(names, rows, [*notes, said])
+        tables.append(("mueller", selected))
+        for label in elements:
+            del groups[label]
     for label, quantity in _POWERS.items():
         if label in groups and (own := woollam_rows.power(label, quantity, groups[label], path)):
             del groups[label]

@@ -120,6 +120,42 @@ def power(label: str, quantity: str, rows: Rows, path: str) -> Selected | None:
     return Selected(names, rows, [*notes, *missing]) if rows else None
 
 
+def mueller(groups: dict[str, Rows], path: str) -> Selected:
+    """Elements of a Mueller matrix, one label each, at the points that all have, and their errors.
+
+    Raises DataError for rows of other lengths, and without a point that all elements have.
+    """
+    found, errors, notes = {}, [], []
+    for label, rows in groups.items():
+        odd = next((line for line, cells in rows if len(cells) not in (3, 4)), None)
+        if odd is not None:
+            raise DataError(
+                f"{path}: line {odd.number} is not {label}, wavelength, angle, a value and its error; "
+                "correct that line"
+            )
+        rows, missing = _measured(rows, slice(2, 3))
+        found[label] = dict(zip(_points(rows, False), rows, strict=True))
+        errors.append([cells[3] for _, cells in rows if len(cells) == 4])
+        notes += [f"{label}: {note}" for note in missing]
+    first, *others = found.values()
+    common = [point for point in first if all(point in other for other in others)]
+    if not common:
+        raise DataError(f"{path}: its Mueller elements have no point in common; export them together")
+    if len(common) < max(map(len, found.values())):
+        notes.append(f"{len(common)} points that all Mueller elements have")
+    # 0 and 1 stand for unknown errors
+    known = all(len(own) == len(rows) for own, rows in zip(errors, found.values(), strict=True))
+    known = known and not any(all(_is(e, x) for own in errors for e in own) for x in (0.0, 1.0))
+    measured = [label for label in found if label.lower() != "mm11"] if known else []
+    names = ("angle_deg", *found, *(f"sigma_{label}" for label in measured))
+    rows = []
+    for point in common:
+        line, cells = first[point]
+        own = [*cells[:2], *(of[point][1][2] for of in found.values())]
+        rows.append((line, [*own, *(found[label][point][1][3] for label in measured)]))
+    return Selected(names, rows, notes)
+
+
 def _measured(rows: Rows, positions: slice) -> tuple[Rows, list[str]]:
     """The rows whose values are not written NaN, and a sentence on the others."""
     kept = [(line, cells) for line, cells in rows if _MISSING.isdisjoint(cells[positions])]
