@@ -50,6 +50,8 @@ SLOW = {
     "pellicle chart docs/cost/soap_film.toml --view": "tests/synthetic/test_bubble.py and"
     " tests/accuracy/test_colour_maps.py: smaller ones",
     "pellicle chart docs/surfaces/tempered_steel.toml --out results/steel.png": "draws a sphere of full size",
+    "pellicle fit film.csv --recipe docs/examples/mueller.toml": "compiles for 10 s;"
+    " tests/fitting/spectra/test_mueller.py fits another film",
     "pellicle compare film.csv": "compiles for 6 s; tests/cli/test_compare_command.py compares other scenes",
     "pellicle fit --recipe fits/cauchy_100nm/recipe.toml": "one of the studies of tests/test_fits.py",
     "pellicle cost docs/cost/soap_film.toml --out cost": "fits with many solvers: one to two minutes",
@@ -85,6 +87,7 @@ ELSEWHERE = {
     "make schema": "tests/recipes/test_schema.py: the kept schema",
     "make figures": "tests/reference checks the numbers; the figures are kept",
     "source .venv/bin/activate": "a shell builtin; make fit creates the folder",
+    "pellicle fit wafer.txt --layer cauchy --substrate Si": "a file of the reader",
     "pellicle demo": "tests/cli/test_demo_command.py",
     "pellicle --install-completion": "would change the user's shell; part of cyclopts",
     "python benchmarks/calibration.py": _LONG_STUDY,
