@@ -1,0 +1,160 @@
+"""Uniaxial layers of any orientation, in closed form.
+
+With ε = ε_o + (ε_e − ε_o) c cᵀ and the direction cosines c of the axis, Δ is that of an isotropic medium
+and a matrix of rank one, Δ = Δ_o + γ b ℓᵀ, where ℓᵀψ is the field along the axis up to a factor. By Duhamel's
+formula
+
+    exp(−ikΔ) = exp(−ikΔ_o) − iγ [X″ b ℓᵀ − i X′ (b rᵀ + d ℓᵀ) − X d rᵀ],    rᵀ = ℓᵀΔ_o,  d = Δ_o b
+
+X(k) is the response of (D² + Q)((D + iμ)² + W) to an impulse. It is an entire function of Q = ε_o − a² and of
+the extraordinary roots μ ± √W. No eigenvectors appear, and γX is regular where n_o = n_e. Where the
+wave runs along the axis, the elimination that gives X is singular, and differences of exponentials replace it.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from pellicle.optics.anisotropy import Uniaxial, birefringence
+from pellicle.optics.berreman.propagation import Fields, Propagation, elements_and_exponent, exp, full
+from pellicle.optics.characteristic import nonzero_root
+from pellicle.optics.interface import normal_square
+from pellicle.optics.pair import Number, Pair, abs2, imag, real, times_i, where
+
+ALONG_AXIS = 0.03
+"""Relative size of the determinant below which differences of exponentials replace the elimination."""
+
+
+class Terms(NamedTuple):
+    """Numbers of a uniaxial medium at a transverse index, as in the formula of the module."""
+
+    epsilon: Number  # ε_o
+    Q: Number  # squared normal index of the ordinary wave
+    mu: Number
+    W: Number  # the extraordinary wave has the normal index μ ± √W
+    gamma: Number
+    eta: Number  # ℓᵀb
+    zeta: Number  # ℓᵀΔ_o b
+    across: Number  # −a c_z
+    tilt: Number  # −a c_z/ε_o
+
+
+def terms(medium: Uniaxial, a: Any, upwards: bool = False) -> Terms:
+    """Return the numbers of a medium; `upwards` for waves with the opposite transverse index."""
+    x, y, z = medium.axis
+    index = getattr(a, "index", a)
+    epsilon = medium.ordinary * medium.ordinary
+    difference = birefringence(medium)
+    Q = normal_square(medium.ordinary, a)
+    gamma = difference * epsilon / (epsilon + difference * (z * z))
+    across = index * z if upwards else -index * z
+    tilt = across / epsilon
+    eta = 2 * x * tilt
+    zeta = (across * across + Q * (x * x)) / epsilon + y * y
+    mu = 0.5 * gamma * eta
+    return Terms(epsilon, Q, mu, mu * mu + Q + gamma * zeta, gamma, eta, zeta, across, tilt)
+
+
+def downward_roots(medium: Uniaxial, a: Any) -> tuple[Number, Number]:
+    """Return the normal indices of the ordinary and the extraordinary wave that travel downwards."""
+    t = terms(medium, a)
+    return nonzero_root(full(t.Q)), t.mu + nonzero_root(full(t.W))
+
+
+def dichroism(medium: Uniaxial, a: Any) -> Any:
+    """Return by how much the extinctions Im q of the ordinary and the extraordinary wave differ.
+
+    The larger difference of the two directions.
+    """
+    t = terms(medium, a)
+    q, w, drift = imag(nonzero_root(full(t.Q))), imag(nonzero_root(full(t.W))), imag(t.mu)
+    return jax.lax.stop_gradient(jnp.abs(w - q) + jnp.abs(drift))
+
+
+def propagation(medium: Uniaxial, a: Any, k: Any, upwards: bool = False) -> Propagation:
+    """Return the propagation through a layer of k = k₀d.
+
+    **Arguments:** `a`: transverse index. `upwards`: of exp(+ikΔ) in place of exp(−ikΔ), up to the signs of Hy
+    and −Hx, which gives the fields at the lower face from those at the upper one.
+    """
+    t = terms(medium, a, upwards)
+    x, y, _ = medium.axis
+    c, f, exponent = elements_and_exponent(t.Q, k)
+    c_e, f_e, exponent_e = elements_and_exponent(t.W, k)
+    drift = times_i(k * full(t.mu))
+    exponent_e = exponent_e + drift
+    growth = jax.lax.stop_gradient(jnp.maximum(-real(exponent), -real(exponent_e)))
+    factor, factor_e = exp(-exponent - growth), exp(-exponent_e - growth)
+    c, f, c_e, f_e = c * factor, f * factor, c_e * factor_e, f_e * factor_e
+
+    # γX and γX′ from two linear equations; they do not divide by γ
+    sines, cosines = f - f_e, c - c_e - times_i(full(t.mu)) * f_e
+    determinant = t.zeta * t.zeta - t.eta * t.eta * t.Q
+    size = abs2(t.zeta) + abs2(t.eta) * jnp.sqrt(abs2(t.Q) + jnp.finfo(growth.dtype).tiny)
+    near = jax.lax.stop_gradient(abs2(determinant) <= (ALONG_AXIS * size) ** 2)
+    inverse = 1 / where(near, 1.0 + 0.0 * determinant, determinant)
+    X = (t.zeta * sines - times_i(full(t.eta)) * cosines) * inverse
+    Y = (t.zeta * cosines + times_i(full(t.eta)) * t.Q * sines) * inverse
+    shape = jnp.broadcast_shapes(jnp.shape(near), jnp.shape(real(X)))
+    X, Y, near = _broadcast(X, shape), _broadcast(Y, shape), jnp.broadcast_to(near, shape)
+
+    def by_differences(_: Any) -> tuple[Number, Number]:
+        found = _differences(t, k, growth)
+        return tuple(where(near, _broadcast(new, shape), old) for new, old in zip(found, (X, Y), strict=True))  # type: ignore[return-value]
+
+    X, Y = jax.lax.cond(jnp.any(near), by_differences, lambda _: (X, Y), None)
+    V = t.gamma * f_e - t.Q * X
+
+    isotropic = times_i(-f)
+    ordinary_p = isotropic * (t.Q / t.epsilon), isotropic * t.epsilon
+    ordinary_s = isotropic, isotropic * t.Q
+    lower = x * (t.Q / t.epsilon)
+
+    def apply(fields: Fields) -> Fields:
+        Ex, Hy, Ey, Hx = fields
+        along = x * Ex + t.tilt * Hy + y * Ey
+        slope = t.across * Ex + lower * Hy + y * Hx
+        into_b = times_i(-(V * along)) - Y * slope
+        into_d = times_i(X * slope) - Y * along
+        return (
+            c * Ex + ordinary_p[0] * Hy + t.tilt * into_b + lower * into_d,
+            c * Hy + ordinary_p[1] * Ex + x * into_b + t.across * into_d,
+            c * Ey + ordinary_s[0] * Hx + y * into_d,
+            c * Hx + ordinary_s[1] * Ey + y * into_b,
+        )
+
+    return Propagation(apply, growth)
+
+
+def _broadcast(number: Number, shape: Any) -> Pair:
+    return Pair(jnp.broadcast_to(real(number), shape), jnp.broadcast_to(imag(number), shape))
+
+
+def _differences(t: Terms, k: Any, growth: Any) -> tuple[Number, Number]:
+    """Return γX and γX′ times exp(−growth) as sums of sin u/u, with roots that are not near zero."""
+    q, w, mu = nonzero_root(full(t.Q)), nonzero_root(full(t.W)), full(t.mu)
+    X, Y = Pair(0.0, 0.0), Pair(0.0, 0.0)
+    for sign in (1, -1):
+        for sign_e in (1, -1):
+            one, other = sign * q, mu + sign_e * w
+            J = _exponential_difference(one, other, k, growth)
+            X, Y = X + (sign * sign_e) * J, Y + sign_e * J
+    X = X * (-0.25 * t.gamma / (q * w))
+    return X, times_i(Y * (0.25 * t.gamma / w))
+
+
+def _exponential_difference(one: Number, other: Number, k: Any, growth: Any) -> Number:
+    """Return (e^{−ik·one} − e^{−ik·other})/(i (other − one)) times exp(−growth)."""
+    difference = other - one
+    half = 0.5 * k * difference
+    near = jax.lax.stop_gradient(abs2(half) < 1.0)
+    small, far = where(near, half, 0.0 * half), where(near, 1.0 + 0.0 * difference, difference)
+    square, series = small * small, Pair(1.0, 0.0)
+    for n in range(9, 0, -1):
+        series = 1 - square * series * (1 / (2 * n * (2 * n + 1)))
+    close = exp(times_i(-0.5 * k * (one + other)) - growth) * series * k
+    apart = (exp(times_i(-k * one) - growth) - exp(times_i(-k * other) - growth)) / times_i(far)
+    return where(near, close, apart)
