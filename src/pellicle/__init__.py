@@ -61,6 +61,8 @@ if TYPE_CHECKING:
     from pellicle.simulation.functions import reflectance as reflectance
     from pellicle.simulation.functions import refractive_index as refractive_index
     from pellicle.simulation.functions import transmittance as transmittance
+    from pellicle.simulation.polarisation import jones as jones
+    from pellicle.simulation.polarisation import mueller as mueller
     from pellicle.synthetic.brdf import Directions as Directions
 
 _NAMES = {
@@ -101,6 +103,7 @@ _NAMES = {
     "pellicle.scene.surface": ("Surface",),
     "pellicle.simulation.depth": ("absorptance", "field"),
     "pellicle.simulation.functions": ("ellipsometry", "reflectance", "refractive_index", "transmittance"),
+    "pellicle.simulation.polarisation": ("jones", "mueller"),
     "pellicle.synthetic.brdf": ("Directions",),
 }
 _MODULE = {name: module for module, names in _NAMES.items() for name in names}

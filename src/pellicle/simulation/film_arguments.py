@@ -13,6 +13,7 @@ from jax.core import Tracer
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.errors import UsageError
 from pellicle.optics import interface
+from pellicle.optics.anisotropy import is_anisotropic
 from pellicle.optics.pair import Number, is_real, to_pair
 from pellicle.scene.film import check_polarisation
 from pellicle.scene.layers import ambient_medium, medium
@@ -60,7 +61,7 @@ def film_arguments(wavelength, thickness, layer, substrate, ambient, angle, pola
     substrate = index_at(substrate, wavelength)
     if not is_real(ambient):
         raise ValueError("the ambient must not absorb: give it a real index")
-    if not into_below:
+    if not into_below and not is_anisotropic(substrate):
         substrate = interface.allow_tunnelling(substrate)
     theta = None if normal else jnp.deg2rad(floating(angle))
     letters = "sp" if polarisation == "unpolarised" else polarisation

@@ -12,7 +12,7 @@ from pellicle.optics.berreman.matrices import Matrix
 from pellicle.optics.berreman.propagation import Fields, Propagation, elements_and_exponent, exp, full
 from pellicle.optics.characteristic import nonzero_root
 from pellicle.optics.interface import normal_square
-from pellicle.optics.pair import Number, imag, real, times_i
+from pellicle.optics.pair import Number, real, times_i
 
 
 def _numbers(medium: Any, a: Any) -> tuple[Number, Number, Number]:
@@ -20,13 +20,6 @@ def _numbers(medium: Any, a: Any) -> tuple[Number, Number, Number]:
     x, y, z = medium if isinstance(medium, Principal) else (medium, medium, medium)
     ratio = x * x / (z * z) if isinstance(medium, Principal) else 1.0
     return normal_square(z, a) * ratio, normal_square(y, a), x * x
-
-
-def dichroism(medium: Any, a: Any) -> Any:
-    """Return by how much the extinctions Im q of p and s differ."""
-    Q_p, Q_s, _ = _numbers(medium, a)
-    p, s = imag(nonzero_root(full(Q_p))), imag(nonzero_root(full(Q_s)))
-    return jax.lax.stop_gradient(jnp.abs(p - s))
 
 
 def half_space(medium: Any, a: Any) -> Matrix:

@@ -29,13 +29,12 @@ def dichroism(medium: Tensor, a: Any) -> Any:
     return jnp.maximum(q[0] - q[1], q[2] - q[3])
 
 
-def propagation(medium: Tensor, a: Any, k: Any, upwards: bool = False) -> Propagation:
-    """Return the propagation through a layer of k = k₀d; `upwards` as for `uniaxial.propagation`."""
+def propagation(medium: Tensor, a: Any, k: Any, direction: Any = 1.0) -> Propagation:
+    """Return the propagation through a layer of k = k₀d; `direction` as for `uniaxial.propagation`."""
     A, B, C, D, m, n = map(to_complex, delta(medium, a))
     roots = four_roots(medium, a)
-    if upwards:
-        m, n, roots = -m, -n, -roots
-    extinction = jnp.max(roots.imag, axis=0)
+    m, n = m * direction, n * direction
+    extinction = jnp.where(direction > 0, jnp.max(roots.imag, axis=0), -jnp.min(roots.imag, axis=0))
     zero, one = jnp.zeros_like(A), jnp.ones_like(A)
     rows = ((m, A, n, zero), (B, m, C, zero), (zero, zero, zero, one), (C, n, D, zero))
     elements = jnp.broadcast_arrays(*(x for row in rows for x in row), k, extinction)[:16]

@@ -49,8 +49,9 @@ def four_roots(epsilon: Tensor, a: Any) -> Any:
 def downward_pair(epsilon: Tensor, a: Any) -> tuple[Any, Any]:
     """Return the sum and the product of the normal indices of the two downward waves.
 
-    The quartic is split into two quadratic factors, whose coefficients are smooth where waves of one direction
-    are equal. Newton's method finds them; a last step with a constant matrix carries the derivatives.
+    The quartic is split into two quadratic factors, whose coefficients are smooth where waves of one
+    direction are equal. Newton's method finds them; a last step with a constant matrix carries the
+    derivatives.
     """
     roots = four_roots(epsilon, a)
     c3, c2, c1, c0 = coefficients(epsilon, a)

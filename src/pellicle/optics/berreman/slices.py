@@ -13,8 +13,8 @@ import jax
 import jax.numpy as jnp
 
 from pellicle.optics.berreman.matrices import Matrix, inverse, one_minus, plus
-from pellicle.optics.berreman.propagation import Fields, Propagation, select
-from pellicle.optics.pair import Number, Pair, imag, real
+from pellicle.optics.berreman.propagation import Propagation, select
+from pellicle.optics.pair import Pair, imag, real
 
 DIRECT = 3.0
 """Largest difference of the attenuations, as exponents of amplitudes, that takes no slices: it costs e³."""
@@ -44,47 +44,36 @@ def join(upper: Scattering, lower: Scattering) -> Scattering:
     )
 
 
-def wave_columns(propagation: Propagation, reverse: bool) -> list[tuple[Number, Number, Number, Number]]:
-    """Return the waves (down p, s, up p, s) at the far face, for each of the four waves at the near face.
+def scattering(propagation: Propagation, direction: Any) -> Scattering:
+    """Return the scattering matrix of a layer.
 
-    `reverse` undoes the signs of Hy and −Hx with which `uniaxial.propagation` propagates upwards.
+    **Arguments:** `propagation` upwards in its first row and, with the opposite transverse index, in its
+    second; `direction` is 1 and −1 in these. Reversed, Hy and −Hx change their signs.
     """
-    sign = -1 if reverse else 1
-    columns = []
+    waves = []  # down p, s, up p, s at the far face, for each of them at the near face
     for E, H in (((1, 0), (1, 0)), ((0, 1), (0, 1)), ((1, 0), (-1, 0)), ((0, 1), (0, -1))):
-        fields: Fields = (
-            Pair(1.0 * E[0], 0.0),
-            Pair(1.0 * sign * H[0], 0.0),
-            Pair(1.0 * E[1], 0.0),
-            Pair(1.0 * sign * H[1], 0.0),
-        )
-        Ex, Hy, Ey, Hx = propagation.apply(fields)
-        Hy, Hx = sign * Hy, sign * Hx
-        columns.append((0.5 * (Ex + Hy), 0.5 * (Ey + Hx), 0.5 * (Ex - Hy), 0.5 * (Ey - Hx)))
-    return columns
+        zero = 0.0 * direction
+        near = (E[0] + zero, H[0] * direction, E[1] + zero, H[1] * direction)
+        Ex, Hy, Ey, Hx = propagation.apply(near)
+        Hy, Hx = direction * Hy, direction * Hx
+        waves.append((0.5 * (Ex + Hy), 0.5 * (Ey + Hx), 0.5 * (Ex - Hy), 0.5 * (Ey - Hx)))
 
+    def block(side: int, row: int, column: int) -> Matrix:
+        elements = (waves[column + j][row + i] for i in range(2) for j in range(2))
+        return Matrix(*(Pair(real(x)[side], imag(x)[side]) for x in elements))
 
-def scattering(up: Propagation, down: Propagation) -> Scattering:
-    """Return the scattering matrix of a layer from its propagation up and down."""
-
-    def block(columns: Any, rows: int, first: int) -> Matrix:
-        one, two = columns[first], columns[first + 1]
-        return Matrix(one[rows], two[rows], one[rows + 1], two[rows + 1])
-
-    forward, backward = wave_columns(up, False), wave_columns(down, True)
-    through = inverse(block(forward, 0, 0))
-    back = inverse(block(backward, 2, 2))
-    loss, loss_back = jnp.exp(-up.growth), jnp.exp(-down.growth)
+    through, back = inverse(block(0, 0, 0)), inverse(block(1, 2, 2))
+    loss = jnp.exp(-propagation.growth)
     return Scattering(
-        reflected=block(forward, 2, 0) @ through,
-        down=Matrix(*(x * loss for x in through)),
-        up=Matrix(*(x * loss_back for x in back)),
-        below=Matrix(*(-x for x in through @ block(forward, 0, 2))),
+        reflected=block(0, 2, 0) @ through,
+        down=Matrix(*(x * loss[0] for x in through)),
+        up=Matrix(*(x * loss[1] for x in back)),
+        below=Matrix(*(-x for x in through @ block(0, 0, 2))),
     )
 
 
 def sliced(
-    layer: Callable[[Any, bool], Propagation],
+    layer: Callable[[Any, Any], Propagation],
     k: Any,
     exponent: Any,
     below: Matrix,
@@ -93,17 +82,14 @@ def sliced(
 ) -> tuple[Matrix, Matrix]:
     """Return reflection and transmission of a layer, by slices where it is strongly dichroic.
 
-    **Arguments:** `layer(k, upwards)` returns the propagation; `exponent`: difference of the attenuations;
+    **Arguments:** `layer(k, direction)` returns the propagation; `exponent`: difference of the attenuations;
     `below`: reflection of what lies below; `direct` and `through`: the result without slices.
     """
-    shape = jnp.broadcast_shapes(
-        *(jnp.shape(x) for x in jax.tree.leaves((k, exponent, below, direct, through)))
-    )
+    shape = jnp.broadcast_shapes(*map(jnp.shape, jax.tree.leaves((k, exponent, below, direct, through))))
 
     def spread(matrix: Matrix) -> Matrix:
-        return Matrix(
-            *(Pair(jnp.broadcast_to(real(x), shape), jnp.broadcast_to(imag(x), shape)) for x in matrix)
-        )
+        parts = ((jnp.broadcast_to(part(x), shape) for part in (real, imag)) for x in matrix)
+        return Matrix(*(Pair(*both) for both in parts))
 
     state = spread(direct), spread(through)
     needed = exponent > DIRECT
@@ -111,7 +97,8 @@ def sliced(
 
     def by_slices(state: Any) -> Any:
         depth = jnp.where(needed, k, 0.0) * jnp.exp2(-count)
-        one = Scattering(*map(spread, scattering(layer(depth, False), layer(depth, True))))
+        direction = jnp.array([1.0, -1.0], depth.dtype).reshape(2, *[1] * len(shape))
+        one = Scattering(*map(spread, scattering(layer(depth, direction), direction)))
 
         def double(i: Any, s: Scattering) -> Scattering:
             twice, more = join(s, s), i < count

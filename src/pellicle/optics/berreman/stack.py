@@ -2,7 +2,8 @@
 
 From the substrate upwards, each layer turns the reflection matrix Γ of what lies below it into that
 of the layer with it. Γ is that of waves against free space at normal incidence, E = d + u and H = d − u in
-the tangential fields: for passive media no element exceeds 1, whatever the layers are. The ambient enters last.
+the tangential fields: for passive media no element exceeds 1, whatever the layers are. The ambient enters
+last.
 
 Source: D. W. Berreman, J. Opt. Soc. Am. 62, 502 (1972); L. Li, J. Opt. Soc. Am. A 13, 1024 (1996), for
 recursions that stay bounded.
@@ -16,7 +17,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from pellicle.optics.anisotropy import Medium, Tensor, Uniaxial, tensor
+from pellicle.optics.anisotropy import Medium, Tensor, Uniaxial, mixes_polarisations, tensor
 from pellicle.optics.berreman import aligned, biaxial, uniaxial
 from pellicle.optics.berreman.delta import delta, half_space
 from pellicle.optics.berreman.matrices import Matrix, inverse, one_minus, one_plus
@@ -82,6 +83,21 @@ def transmittances(response: Polarised) -> tuple[Any, Any]:
     return p / response.incident, s / response.incident
 
 
+def most_dichroic(ambient: Any, layers: Sequence[Medium], phases: Sequence[Any], angle: Any) -> Any:
+    """Return the largest difference of the attenuations of the two waves in any of the layers.
+
+    As exponents of amplitudes. Above `slices.DIRECT` the layer is cut into slices.
+    """
+    a, _ = transverse(ambient, jnp.asarray(angle) * 1.0)
+    layers_and_phases = zip(layers, phases, strict=True)
+    exponents = [_method(m).dichroism(m, a) * k for m, k in layers_and_phases if mixes_polarisations(m)]
+    return jnp.max(jnp.stack([jnp.max(x) for x in exponents])) if exponents else jnp.zeros(())
+
+
+def _method(medium: Medium) -> Any:
+    return uniaxial if isinstance(medium, Uniaxial) else biaxial if isinstance(medium, Tensor) else aligned
+
+
 def _substrate(medium: Medium, a: Any) -> Matrix:
     if isinstance(medium, Uniaxial):
         one, other = uniaxial.downward_roots(medium, a)
@@ -93,16 +109,16 @@ def _substrate(medium: Medium, a: Any) -> Matrix:
 
 
 def _add(medium: Medium, a: Any, k: Any, below: Matrix, dichroic: bool) -> tuple[Matrix, Matrix]:
-    """Return the reflection matrix with a layer above, and the downward waves behind it for those before it."""
-    method: Any = uniaxial if isinstance(medium, Uniaxial) else biaxial
-    if not isinstance(medium, Uniaxial | Tensor):
-        return _direct(aligned.propagation(medium, a, k), below)
-    if not dichroic:
+    """Return the reflection matrix with a layer above, and the downward waves behind it for those before."""
+    method = _method(medium)
+    if not (dichroic and mixes_polarisations(medium)):
         return _direct(method.propagation(medium, a, k), below)
     exponent = method.dichroism(medium, a) * jax.lax.stop_gradient(k)
     shallow = jnp.where(exponent > DIRECT, 0.0, k)
     found = _direct(method.propagation(medium, a, shallow), below)
-    return sliced(lambda k, up: method.propagation(medium, a, k, up), k, exponent, below, *found)
+    return sliced(
+        lambda k, direction: method.propagation(medium, a, k, direction), k, exponent, below, *found
+    )
 
 
 def _direct(layer: Propagation, below: Matrix) -> tuple[Matrix, Matrix]:

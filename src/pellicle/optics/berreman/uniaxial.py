@@ -8,7 +8,7 @@ formula
 
 X(k) is the response of (D² + Q)((D + iμ)² + W) to an impulse. It is an entire function of Q = ε_o − a² and of
 the extraordinary roots μ ± √W. No eigenvectors appear, and γX is regular where n_o = n_e. Where the
-wave runs along the axis, the elimination that gives X is singular, and differences of exponentials replace it.
+wave runs along the axis, the elimination that gives X is singular; differences of exponentials replace it.
 """
 
 from __future__ import annotations
@@ -42,15 +42,15 @@ class Terms(NamedTuple):
     tilt: Number  # −a c_z/ε_o
 
 
-def terms(medium: Uniaxial, a: Any, upwards: bool = False) -> Terms:
-    """Return the numbers of a medium; `upwards` for waves with the opposite transverse index."""
+def terms(medium: Uniaxial, a: Any, direction: Any = 1.0) -> Terms:
+    """Return the numbers of a medium; a `direction` of −1 is for the opposite transverse index."""
     x, y, z = medium.axis
     index = getattr(a, "index", a)
     epsilon = medium.ordinary * medium.ordinary
     difference = birefringence(medium)
     Q = normal_square(medium.ordinary, a)
     gamma = difference * epsilon / (epsilon + difference * (z * z))
-    across = index * z if upwards else -index * z
+    across = -index * z * direction
     tilt = across / epsilon
     eta = 2 * x * tilt
     zeta = (across * across + Q * (x * x)) / epsilon + y * y
@@ -74,13 +74,13 @@ def dichroism(medium: Uniaxial, a: Any) -> Any:
     return jax.lax.stop_gradient(jnp.abs(w - q) + jnp.abs(drift))
 
 
-def propagation(medium: Uniaxial, a: Any, k: Any, upwards: bool = False) -> Propagation:
+def propagation(medium: Uniaxial, a: Any, k: Any, direction: Any = 1.0) -> Propagation:
     """Return the propagation through a layer of k = k₀d.
 
-    **Arguments:** `a`: transverse index. `upwards`: of exp(+ikΔ) in place of exp(−ikΔ), up to the signs of Hy
-    and −Hx, which gives the fields at the lower face from those at the upper one.
+    **Arguments:** `a`: transverse index, times `direction`. A direction of −1 gives exp(+ikΔ) in place of
+    exp(−ikΔ), up to the signs of Hy and −Hx: the fields at the lower face from those at the upper one.
     """
-    t = terms(medium, a, upwards)
+    t = terms(medium, a, direction)
     x, y, _ = medium.axis
     c, f, exponent = elements_and_exponent(t.Q, k)
     c_e, f_e, exponent_e = elements_and_exponent(t.W, k)
