@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -93,6 +94,16 @@ def test_a_wrong_index_is_a_misfit_and_compare_says_so(fit):
     assert wrong.status == "misfit"
     compared = compare({"right": fit, "wrong": wrong})
     assert compared.best.name == "right"
+
+
+def test_the_other_sign_of_the_fourth_stokes_parameter_is_named():
+    data = measured()
+    signs = np.array([1, 1, 1, -1, -1])
+    found = pl.fit(replace(data, values=data.values * signs), scene())
+    assert found.status == "misfit"
+    words = r"with the opposite signs of m34, m43 it would fit, with thickness ([\d.]+) nm"
+    [thickness] = [match[1] for warning in found.warnings if (match := re.match(words, warning))]
+    assert float(thickness) == pytest.approx(THICKNESS, abs=0.05)
 
 
 def test_a_given_sigma_for_each_element_is_absolute(fit):

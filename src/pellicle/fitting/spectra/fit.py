@@ -33,6 +33,7 @@ from pellicle.fitting.spectra import (
     depolarisation,
     folded_reading,
     messages,
+    mueller_signs,
     parts,
     residual_structure,
     summary,
@@ -94,11 +95,15 @@ def fitted(
         targets = measurements(data, scene)
         spectra = _listed(data)
         fit, ranked = _fit(spectra, targets, tolerance, loss, progress)
-        folded = folded_reading.as_folded(spectra) if fit.status is Status.MISFIT else None
-        if folded is not None:
-            read = folded[0] if isinstance(data, Spectrum | Colours) else folded
-            other, _ = _fit(folded, measurements(read, scene), tolerance, loss, progress)
-            fit = replace(fit, warnings=(*folded_reading.remarks(other), *fit.warnings))
+        readings = (
+            (folded_reading.as_folded, folded_reading.remarks),
+            (mueller_signs.with_other_signs, mueller_signs.remarks),
+        )
+        for read_again, remarks in readings if fit.status is Status.MISFIT else ():
+            if (again := read_again(spectra)) is not None:
+                read = again[0] if isinstance(data, Spectrum | Colours) else again
+                other, _ = _fit(again, measurements(read, scene), tolerance, loss, progress)
+                fit = replace(fit, warnings=(*remarks(other), *fit.warnings))
         return fit, ranked
 
 

@@ -24,10 +24,16 @@ def as_folded(spectra: Sequence[Spectrum | Colours]) -> list[Spectrum | Colours]
     return None if all(a is b for a, b in zip(found, spectra, strict=True)) else found
 
 
+def explains(other: Fit) -> str | None:
+    """`thickness 123.4 nm` of the fit of another reading that explains the data; None where it does not."""
+    if other.status in _NO_FIT:
+        return None
+    named = [p for p in other.free if p.name.split(".")[-1] == "thickness"] or list(other.free)
+    return f"{named[0].name} {named[0].value:.6g} {named[0].unit}".rstrip()
+
+
 def remarks(other: Fit) -> list[str]:
     """A sentence that names the flag, where the fit of Δ as folded explains the data."""
-    if other.status in _NO_FIT:
+    if (value := explains(other)) is None:
         return []
-    named = [p for p in other.free if p.name.split(".")[-1] == "thickness"] or list(other.free)
-    value = f"{named[0].name} {named[0].value:.6g} {named[0].unit}".rstrip()
     return [f"delta lies within 0 to 180, and read as folded it would fit, with {value}: give `folded=True`"]
