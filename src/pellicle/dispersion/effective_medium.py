@@ -13,12 +13,15 @@ import jax
 import numpy as np
 
 from pellicle.dispersion.base import AbstractDispersion, bounds_of
+from pellicle.dispersion.principal_media import require_isotropic
 from pellicle.optics import pair
 from pellicle.optics.array_namespace import namespace
 from pellicle.optics.pair import Number, Pair, abs2, imag, is_real, real, times_i
 
 
 def _check(mixture: Any) -> None:
+    for part in (mixture.host, mixture.inclusion):
+        require_isotropic(part, "a mixture is made of")
     found = bounds_of(mixture.fraction)
     if found is not None and not 0 <= found[0] <= found[1] <= 1:
         wrong = found[0] if not 0 <= found[0] <= 1 else found[1]

@@ -1,8 +1,11 @@
-"""Names of numbers inside a dispersion: `A`, `B1`, `fraction`, `host.E0`, `term2.gamma`."""
+"""Names of numbers inside a dispersion: `A`, `B1`, `fraction`, `host.E0`, `term2.gamma`, `ordinary.n`."""
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple
+
+from pellicle.dispersion.anisotropic import Anisotropic
+from pellicle.dispersion.base import AbstractDispersion
 
 _BRANCHES = ("host", "inclusion", "first", "second")
 
@@ -18,6 +21,8 @@ class ParameterLocation(NamedTuple):
     @property
     def unit(self) -> str:
         """The unit that the model gives it, empty for none."""
+        if isinstance(self.owner, Anisotropic):
+            return "deg"
         return getattr(self.owner, "units", {}).get(self.field, "")
 
 
@@ -32,7 +37,11 @@ def locate_parameter(tree: Any, path: tuple) -> ParameterLocation:
         if hasattr(step, "name"):
             owner, field, count = node, step.name, ""
             node = getattr(node, field)
-            if field in _BRANCHES:
+            if isinstance(owner, Anisotropic):
+                field = owner.names[field]
+                if isinstance(node, AbstractDispersion):
+                    words.append(field)
+            elif field in _BRANCHES:
                 words.append(field)
             continue
         index = step.idx if hasattr(step, "idx") else step.key

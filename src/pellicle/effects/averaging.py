@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from pellicle.dispersion.principal_media import mixes_polarisations
+from pellicle.effects.anisotropy import scene_media
 from pellicle.effects.bounds import (
     largest_index,
     largest_ratio,
@@ -79,7 +81,7 @@ def _unresolved(scene: Scene) -> str | None:
 
 def _has_series(scene: Scene) -> bool:
     """True for one smooth coherent layer whose signal is an intensity."""
-    one = len(coherent_layers(scene)) == 1
+    one = len(coherent_layers(scene)) == 1 and not any(map(mixes_polarisations, scene_media(scene)))
     smooth = one and not roughness(scene).on and not is_graded(scene)
     return smooth and not scene.light.ellipsometric
 

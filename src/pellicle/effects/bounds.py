@@ -10,6 +10,7 @@ import numpy as np
 
 from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.dispersion.empirical import Tabulated
+from pellicle.dispersion.principal_media import isotropic_in_plane, principal_media
 from pellicle.optics import interface, orders
 from pellicle.optics.pair import abs2, real
 from pellicle.scene.film import Scene, groups
@@ -39,12 +40,13 @@ def upper(number: Any) -> float:
 
 def largest_index(material: AbstractDispersion, wavelength: np.ndarray) -> float:
     """The largest real index at these wavelengths (nm) over the corners of the bounds (at most 64)."""
-    return float(np.nanmax(_corner_indices(material, wavelength)))
+    return max(float(np.nanmax(_corner_indices(m, wavelength))) for m in principal_media(material))
 
 
 def smallest_index(material: AbstractDispersion, wavelength: np.ndarray) -> float:
     """The smallest real index likewise, but at least 0.1: a metal has no fringes to count."""
-    return max(float(np.nanmin(_corner_indices(material, wavelength))), 0.1)
+    least = min(float(np.nanmin(_corner_indices(m, wavelength))) for m in principal_media(material))
+    return max(least, 0.1)
 
 
 def _corner_indices(material: AbstractDispersion, wavelength: np.ndarray) -> np.ndarray:
@@ -68,12 +70,13 @@ def largest_ratio(scene: Scene) -> float:
 def _ratio(scene: Scene) -> float:
     at = jnp.asarray(scene.light.wavelength, dtype=float)
     group = next(group for group in groups(scene)[0] if group.layers)
-    above, layer, below = (m.index(at) for m in (group.above, group.layers[0].material, group.below))
+    media = (group.above, group.layers[0].material, group.below)
+    above, layer, below = (medium.index(at) for medium in media)
     squares = []
     for angle in _extreme_angles(scene):
         a, _ = interface.transverse(scene.ambient.index(at), angle)
         inside = None if angle is None else interface.Inside(a)
-        for polarisation in "s" if angle is None else "sp":
+        for polarisation in "s" if angle is None and all(map(isotropic_in_plane, media)) else "sp":
             b = orders.airy_series(above, layer, below, 0.0 * at, inside, polarisation)
             squares.append(np.asarray(abs2(b.upper * b.lower)))
     return float(np.sqrt(np.nanmax(np.stack(squares))))

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from pellicle.effects import averaging, gradient, presence
+from pellicle.effects import anisotropy, averaging, gradient, presence
 from pellicle.effects.plan import Plan, Row
 from pellicle.scene.film import Scene
 
@@ -21,6 +21,7 @@ class Effect:
 
 EFFECTS = (
     Effect("absorption", presence.absorption),
+    Effect("anisotropy", anisotropy.anisotropy),
     Effect("stack", presence.stack),
     Effect("gradient", gradient.gradient),
     Effect("roughness", presence.roughness),

@@ -10,6 +10,8 @@ import numpy as np
 
 from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.dispersion.empirical import Constant
+from pellicle.dispersion.principal_media import isotropic_in_plane, principal_media
+from pellicle.effects.anisotropy import scene_media
 from pellicle.effects.bounds import normal_incidence, upper
 from pellicle.effects.plan import Row
 from pellicle.materials import Material
@@ -74,7 +76,7 @@ def tunnelling(scene: Scene) -> Row:
 
 
 def _media(scene: Scene) -> list[tuple[str, AbstractDispersion]]:
-    """Every medium that a wave enters, with its name in messages."""
+    """Every medium that a wave enters, with its name in messages; of anisotropic ones the principal media."""
     own = [(i, x.material) for i, x in enumerate(scene.layers) if not isinstance(x, Interface)]
     names = {id(material): name(scene, i) for i, material in own}
     coherent = [
@@ -85,7 +87,7 @@ def _media(scene: Scene) -> list[tuple[str, AbstractDispersion]]:
         )
     ]
     thick = [(names.get(id(g.below), "substrate"), g.below) for g in groups(scene)[0]]
-    return [*coherent, *thick]
+    return [(name, own) for name, medium in (*coherent, *thick) for own in principal_media(medium)]
 
 
 def name(scene: Scene, position: int) -> str:
@@ -110,10 +112,12 @@ def polarisation(scene: Scene) -> Row:
         return Row("polarisation", True, "ellipsometry compares p with s")
     if scene.instrument.has_cone:
         return Row("polarisation", True, "the light's cone has s and p")
-    if normal_incidence(scene):
+    if normal_incidence(scene) and all(map(isotropic_in_plane, scene_media(scene))):
         return Row("polarisation", False, "s and p are equal at normal incidence")
     if scene.light.polarisation != "unpolarised":
         return Row("polarisation", False, f"the light is {scene.light.polarisation}-polarised")
+    if normal_incidence(scene):
+        return Row("polarisation", True, "the optic axis of a medium is not the normal: the mean of s and p")
     return Row("polarisation", True, "unpolarised light at an angle: the mean of s and p")
 
 

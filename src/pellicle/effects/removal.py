@@ -16,8 +16,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from pellicle.dispersion.anisotropic import Anisotropic
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.empirical import Constant
+from pellicle.dispersion.principal_media import mean_medium
 from pellicle.optics.pair import parts, real
 from pellicle.scene.film import Scene
 from pellicle.scene.free import free_leaves, is_free
@@ -127,6 +129,8 @@ def _lossless(material: AbstractDispersion) -> AbstractDispersion:
     """The material without extinction, unless a parameter is free: it may be lost with the extinction."""
     if free_leaves(material):
         return material
+    if isinstance(material, Anisotropic):
+        return material.with_media(_lossless)
     return Constant(material.n) if isinstance(material, Constant) else RealPart(material)
 
 
@@ -138,6 +142,22 @@ class RealPart(AbstractDispersion):
 
     def index(self, wavelength):
         return real(self.base.index(wavelength))
+
+
+def _anisotropy(scene: Scene, _: FilmRemoval) -> Scene:
+    """Give every birefringent medium the mean of its indices; free angles of an axis are lost."""
+
+    def isotropic(x: Any) -> Any:
+        return _with(x, material=mean_medium(x.material)) if _birefringent(x) else x
+
+    layers, substrate = tuple(map(isotropic, scene.layers)), isotropic(scene.substrate)
+    if isinstance(substrate.back, Anisotropic):
+        substrate = _with(substrate, back=mean_medium(substrate.back))
+    return _with(scene, layers=layers, substrate=substrate)
+
+
+def _birefringent(x: Any) -> bool:
+    return not isinstance(x, Interface) and isinstance(x.material, Anisotropic)
 
 
 def _dispersion(scene: Scene, _: FilmRemoval) -> Scene:
@@ -162,6 +182,8 @@ def _flat(material: AbstractDispersion, wavelength: Any) -> AbstractDispersion:
     """The material with its index at the middle wavelength, unless a parameter is free."""
     if free_leaves(material):
         return material
+    if isinstance(material, Anisotropic):
+        return material.with_media(lambda medium: _flat(medium, wavelength))
     middle = np.size(wavelength) // 2
     re, im = (None if x is None else jnp.ravel(x)[middle] for x in parts(material.index(wavelength)))
     return Constant(0.0 if re is None else re, im)
@@ -183,6 +205,7 @@ _REMOVALS: dict[str, Callable[[Scene, FilmRemoval], Scene]] = {
     "coherence": _coherence,
     "back-face": _back_face,
     "opaque": _opaque,
+    "anisotropy": _anisotropy,
     "oblique": _oblique,
     "roughness": _roughness,
     "gradient": _gradient,

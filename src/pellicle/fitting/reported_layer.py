@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
+from pellicle.dispersion.principal_media import principal_media
 from pellicle.optics.layout import stack_rows
 from pellicle.scene.film import Scene
 from pellicle.scene.free import free_leaves, insert
@@ -37,7 +38,7 @@ def linearised(form: Any, scene: Scene, data: Any, values: Any) -> Linearised:
     def both(values):
         numbers = insert(scene, list(values))
         medium: Any = numbers.substrate if shown is None else numbers.layers[shown]
-        index = medium.material(numbers.light.wavelength)
+        index = principal_media(medium.material)[0](numbers.light.wavelength)
         return form.simulate(numbers, data), stack_rows([index.real, index.imag])
 
     found, push = jax.linearize(both, values)

@@ -23,6 +23,7 @@ from pellicle.optics.interface import (
     zero_where,
 )
 from pellicle.optics.pair import Number, abs2, is_real, times_i
+from pellicle.optics.principal_axes import tangential_permittivity
 from pellicle.optics.response import Amplitudes, Response
 
 FEW = 3
@@ -55,12 +56,13 @@ def few_layers(
     responses = []
     for polarisation in polarisations[:1] if angle is None else polarisations:
         s = polarisation == "s"
-        e0, e2 = (1.0, 1.0) if s else (ambient * ambient, substrate * substrate)
+        e0, e2 = (1.0, 1.0) if s else (tangential_permittivity(ambient), tangential_permittivity(substrate))
         # −if times ε and Q/ε: the elements off the diagonal
         matrices = []
         for n, Q, element in zip(layers, squares, elements, strict=True):
             g = times_i(-element.f)
-            matrices.append((element.c, g, g * Q) if s else (element.c, g * (n * n), g * (Q / (n * n))))
+            e = 1.0 if s else tangential_permittivity(n)
+            matrices.append((element.c, g, g * Q) if s else (element.c, g * e, g * (Q / e)))
         E, H = _fields(q2 / e2, matrices[::-1])
         E_, H_ = _fields(q0 / e0, matrices)
         down, up = (q0 / e0) * E, (q2 / e2) * E_

@@ -35,6 +35,7 @@ from pellicle.optics.interface import (
     zero_where,
 )
 from pellicle.optics.pair import Number, abs2, conj, is_real, real, times_i, where
+from pellicle.optics.principal_axes import tangential_permittivity
 from pellicle.optics.response import Amplitudes, Response
 
 
@@ -171,8 +172,8 @@ def film(
     **Source:** Gerardin et al. 2019, eqs. 11 and 12.
     """
     a, q0 = transverse(ambient, angle)
-    e0, e1, e2, q1_square = ambient * ambient, layer * layer, substrate * substrate, normal_square(layer, a)
-    q2 = normal(substrate, a)
+    e0, e1, e2 = map(tangential_permittivity, (ambient, layer, substrate))
+    q1_square, q2 = normal_square(layer, a), normal(substrate, a)
     bare, empty = equal_media(ambient, substrate), equal_media(ambient, layer, substrate)
     sides, fluxes = [], []
     for polarisation in polarisations[:1] if angle is None else polarisations:

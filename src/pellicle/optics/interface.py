@@ -2,6 +2,10 @@
 
 No angle is computed inside a layer. The transverse index a = n₀ sin θ₀ is the same in every medium, and
 a medium enters by the normal component of its index, q = √(n² − a²).
+
+A medium with principal axes along those of the laboratory (`anisotropy.Principal`) stands for its p waves
+here, q = (n_x/n_z) √(n_z² − a²), with n_x² in place of n² in the boundary condition. For s waves it is an
+isotropic medium of index n_y (`principal_axes.seen_by`).
 """
 
 from __future__ import annotations
@@ -14,7 +18,9 @@ import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 
+from pellicle.optics.anisotropy import Principal
 from pellicle.optics.pair import Number, Pair, abs2, conj, is_real, real, sqrt, where
+from pellicle.optics.principal_axes import each_index, tangential_permittivity
 
 _NUMBERS = int | float | complex | np.ndarray | np.generic | jax.Array
 
@@ -57,6 +63,11 @@ def normal_square(index: Number, a: Any) -> Number:
     With a `Transverse` it does not cancel near grazing incidence either, where
     n − a = (n − n₀) + (n₀ − a): a medium equal to the ambient has the q of the ambient there.
     """
+    if isinstance(index, Principal):
+        if isinstance(a, float) and a == 0.0:
+            return index.x * index.x
+        ratio = index.x / index.z
+        return ratio * ratio * normal_square(index.z, a)
     if isinstance(a, Transverse):
         difference = where(a.shortfall < a.index, index - a.ambient + a.shortfall, index - a.index)
         return difference * (index + a.index)
@@ -65,12 +76,23 @@ def normal_square(index: Number, a: Any) -> Number:
 
 def normal(index: Number, a: Any) -> Number:
     """Return q = √(n² − a²), Im q ≥ 0. A real index is a promise that the wave propagates (n ≥ a)."""
-    return index if isinstance(a, float) and a == 0.0 else sqrt(normal_square(index, a))
+    if isinstance(a, float) and a == 0.0:
+        return index.x if isinstance(index, Principal) else index
+    return sqrt(normal_square(index, a))
 
 
 def equal_media(ambient: Any, *others: Number) -> Any:
     """True where all other media are exactly equal to the ambient."""
-    return reduce(jnp.logical_and, [abs2(other - ambient) == 0 for other in others])
+    pairs = [pair for other in others for pair in _same_axes(other, ambient)]
+    return reduce(jnp.logical_and, [abs2(a - b) == 0 for a, b in pairs])
+
+
+def _same_axes(medium: Any, ambient: Any) -> list[tuple[Number, Number]]:
+    """Pairs of indices, all equal where p waves propagate in both media alike."""
+    if not isinstance(medium, Principal) and not isinstance(ambient, Principal):
+        return [(medium, ambient)]
+    own, other = (n if isinstance(n, Principal) else Principal(n, n, n) for n in (medium, ambient))
+    return [(own.x, other.x), (own.z, other.z)]
 
 
 def zero_where(test: Any, amplitude: Number) -> Number:
@@ -97,6 +119,8 @@ def propagates(medium: Any, ambient: Any, angle: Any) -> bool:
 
 def allow_tunnelling(index: Number) -> Number:
     """Turn a real index into a `Pair`, which does not promise that the wave propagates."""
+    if isinstance(index, tuple):
+        return each_index(allow_tunnelling, index)
     return Pair(index, jnp.zeros_like(jnp.asarray(index) * 1.0)) if is_real(index) else index
 
 
@@ -112,7 +136,7 @@ def fresnel(n1: Number, q1: Number, n2: Number, q2: Number, polarisation: str) -
     """
     if polarisation == "s":
         return (q1 - q2) / (q1 + q2)
-    u, v = n2 * n2 * q1, n1 * n1 * q2
+    u, v = tangential_permittivity(n2) * q1, tangential_permittivity(n1) * q2
     return (u - v) / (u + v)
 
 
@@ -122,7 +146,7 @@ def normal_flux(index: Number, q: Number, polarisation: str) -> Any:
     Gerardin et al. 2019 (eq. 21) use one factor for both polarisations. With an absorbing substrate that
     is wrong for p (1 % in R + T at 60°).
     """
-    return real(q) if polarisation == "s" else real(index * index * conj(q))
+    return real(q) if polarisation == "s" else real(tangential_permittivity(index) * conj(q))
 
 
 def incident_factor(index: Number, q: Number, polarisation: str) -> Any:
@@ -131,8 +155,8 @@ def incident_factor(index: Number, q: Number, polarisation: str) -> Any:
     For a medium that does not absorb these are 4 q and 4 ε q, without a division at grazing incidence.
     """
     if is_real(index) and is_real(q):
-        return 4 * q if polarisation == "s" else 4 * index * index * q
-    amplitude = q if polarisation == "s" else index * index * q
+        return 4 * q if polarisation == "s" else 4 * tangential_permittivity(index) * q
+    amplitude = q if polarisation == "s" else tangential_permittivity(index) * q
     flux = normal_flux(index, q, polarisation)
     zero = flux == 0
     return jnp.where(zero, 0.0, 4 * abs2(amplitude) / jnp.where(zero, 1.0, flux))
@@ -151,5 +175,6 @@ def transmittance(n1: Number, q1: Number, n2: Number, q2: Number, polarisation: 
     if polarisation == "s":
         amplitude = 4 * abs2(q1) / abs2(q1 + q2)
     else:
-        amplitude = 4 * abs2(n1 * n1 * q1) / abs2(n2 * n2 * q1 + n1 * n1 * q2)
+        e1, e2 = tangential_permittivity(n1), tangential_permittivity(n2)
+        amplitude = 4 * abs2(e1 * q1) / abs2(e2 * q1 + e1 * q2)
     return jnp.where(zero, 0.0, amplitude * ratio)

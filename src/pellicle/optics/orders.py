@@ -20,6 +20,7 @@ import jax.numpy as jnp
 from pellicle.optics.elementary import sincos
 from pellicle.optics.interface import fresnel, incident_factor, normal, normal_flux, transverse
 from pellicle.optics.pair import Number, Pair, abs2, conj, imag, real
+from pellicle.optics.principal_axes import seen_by, tangential_permittivity
 
 Window = Callable[[int], Any]
 """m → W_m, the factor by which order m is damped."""
@@ -43,9 +44,10 @@ def airy_series(
     ambient: Any, layer: Number, substrate: Number, phase: Any, angle: Any, polarisation: str
 ) -> AirySeries:
     """Return the series of one layer; arguments as for `film.film`, with φ = 2 k₀d q₁."""
+    ambient, layer, substrate = (seen_by(n, polarisation) for n in (ambient, layer, substrate))
     a, q0 = transverse(ambient, angle)
     q1, q2 = normal(layer, a), normal(substrate, a)
-    e0, e1, e2 = ambient * ambient, layer * layer, substrate * substrate
+    e0, e1, e2 = map(tangential_permittivity, (ambient, layer, substrate))
     if polarisation == "s":
         direct = 4 * abs2(q1) / abs2((q0 + q1) * (q1 + q2))
     else:

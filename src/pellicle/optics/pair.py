@@ -113,7 +113,9 @@ def imag(z: Number) -> Any:
 
 
 def is_real(z: Number) -> bool:
-    """True if the type of the number excludes an imaginary part."""
+    """True if the type of the number, or of all numbers of a tuple, excludes an imaginary part."""
+    if isinstance(z, tuple):
+        return all(map(is_real, z))
     return z.im is None if isinstance(z, Pair) else not jnp.iscomplexobj(z)
 
 

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
+from pellicle.optics.anisotropy import Principal
 from pellicle.optics.characteristic import matrix_elements
 from pellicle.optics.gradient import Gradient, coefficients, faces, is_graded
 from pellicle.optics.interface import (
@@ -30,6 +31,7 @@ from pellicle.optics.interface import (
     zero_where,
 )
 from pellicle.optics.pair import Number, abs2, to_complex
+from pellicle.optics.principal_axes import tangential_permittivity
 from pellicle.optics.response import Amplitudes, Response
 
 
@@ -48,7 +50,7 @@ def stack(
     """
     a, q0 = transverse(ambient, angle)
     rows = _rows((ambient, substrate, a), layers, phases, roughness)
-    shape, dtype = rows.depth.shape[1:], rows.points[0].dtype
+    shape, dtype = rows.depth.shape[1:], jax.tree.leaves(rows.points)[0].dtype
 
     def full(number: Number) -> Any:
         return _full(number, shape, dtype)
@@ -86,13 +88,13 @@ def stack(
 class _Rows(NamedTuple):
     """Layers of a stack, those of a graded one its slices; each array has the shape (layers, ...)."""
 
-    points: tuple[Any, ...]  # complex index, or three at the Gauss points where a layer is graded
+    points: tuple[Any, ...]  # complex or `Principal` index, three at Gauss points where a layer is graded
     depth: Any  # k₀ times the thickness
     rough: Any  # k₀σ of each face, one more than layers; None where all are smooth
 
     def upside_down(self) -> _Rows:
         """The layers in the opposite order, smooth."""
-        return _Rows(tuple(x[::-1] for x in self.points[::-1]), self.depth[::-1], None)
+        return _Rows(jax.tree.map(lambda x: x[::-1], self.points[::-1]), self.depth[::-1], None)
 
 
 def _rows(
@@ -121,6 +123,9 @@ def _rows(
         return joined([x if n == 1 else jnp.repeat(x, n, 0) for x, n in zip(blocks, counts, strict=True)])
 
     def at(point: int) -> Any:
+        if any(isinstance(layer, Principal) for layer in layers):
+            axes = zip(*(x if isinstance(x, Principal) else (x, x, x) for x in layers), strict=True)
+            return Principal(*map(of_layers, axes))
         rows = [
             each_slice(x[point]) if isinstance(x, Gradient) else _full(x, shape, dtype)[None] for x in layers
         ]
@@ -139,12 +144,14 @@ def _rows(
 
 
 def _full(number: Number, shape: tuple[int, ...], dtype: Any) -> Any:
+    if isinstance(number, Principal):
+        return Principal(*(_full(x, shape, dtype) for x in number))
     return jnp.broadcast_to(to_complex(number).astype(dtype), shape)
 
 
 def _weight(index: Any, polarisation: str) -> Any:
     """Return the divisor of q in the boundary condition: 1 for s, ε for p."""
-    return jnp.ones_like(index) if polarisation == "s" else index * index
+    return jnp.ones_like(index) if polarisation == "s" else tangential_permittivity(index)
 
 
 def _rough_faces(q: Any, weight: Any, q_below: Any, weight_below: Any, rough: Any) -> Any:

@@ -15,6 +15,7 @@ import equinox as eqx
 import numpy as np
 
 from pellicle.dispersion.base import AbstractDispersion
+from pellicle.dispersion.principal_media import principal_media, require_isotropic
 from pellicle.errors import UsageError
 from pellicle.scene.free import Free
 from pellicle.scene.graded import AtDepth, Graded, face
@@ -131,6 +132,10 @@ class Scene(eqx.Module):
         for medium in (*thick, self.substrate.material, self.substrate.back, self.ambient):
             if isinstance(medium, Graded):
                 raise UsageError("a graded medium has a depth: it is the material of a pl.Layer")
+        for position, layer in enumerate(self.layers):
+            if isinstance(layer, Interface):
+                for medium in _neighbours(self, position):
+                    require_isotropic(medium, "a mixed interface is made of")
         if absorbs(self.ambient):
             raise ValueError("the ambient must not absorb: give it a real index")
         plates: list[Any] = [x for x in self.layers if isinstance(x, Plate)]
@@ -212,12 +217,13 @@ def _neighbours(scene: Scene, position: int) -> tuple[AbstractDispersion, Abstra
 def media(scene: Scene) -> list[AbstractDispersion]:
     """Return every medium of a scene: of its layers, the substrate, the ambient, and that behind a plate.
 
-    Of a graded layer both of its media.
+    Of a graded layer both of its media, of an anisotropic medium the principal ones.
     """
     back = [] if scene.substrate.back is None else [scene.substrate.back]
     layers = [layer.material for layer in scene.layers if not isinstance(layer, Interface)]
     own = [part for x in layers for part in ((x.first, x.second) if isinstance(x, Graded) else (x,))]
-    return [*own, scene.substrate.material, scene.ambient, *back]
+    every = (*own, scene.substrate.material, scene.ambient, *back)
+    return [principal for medium in every for principal in principal_media(medium)]
 
 
 def is_graded(scene: Scene) -> bool:

@@ -17,6 +17,7 @@ from pellicle.dispersion.anisotropic import Anisotropic
 from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.dispersion.effective_medium import MIXTURES
 from pellicle.dispersion.empirical import Constant
+from pellicle.dispersion.principal_media import principal_media, require_isotropic
 from pellicle.errors import UsageError
 from pellicle.materials import Material, UnknownMaterial, material
 from pellicle.optics.pair import is_real
@@ -41,7 +42,7 @@ def medium(value: MediumLike) -> AbstractDispersion:
     """Return the dispersion of a medium: what layers, substrates and ambients are made of.
 
     **Arguments:** `value`: a catalogue name (`"SiO2"`) or the path of an n,k table, an index n + ik, a `Free`
-    index, or a dispersion, which is returned.
+    index, or a dispersion, which is returned; the principal media of a `pl.Anisotropic` may be all of these.
 
     **Returns:** a dispersion, whose `index(wavelength)` takes nm.
 
@@ -104,6 +105,8 @@ def medium_or_none(value: MediumLike | None) -> AbstractDispersion | None:
 
 def absorbs(dispersion: AbstractDispersion) -> bool:
     """Return False where the type of the index, or an extinction fixed at 0, rules absorption out."""
+    if isinstance(dispersion, Anisotropic):
+        return any(map(absorbs, principal_media(dispersion)))
     if isinstance(dispersion, Constant) and isinstance(dispersion.k, int | float) and dispersion.k == 0:
         return False
     numbers = insert(dispersion, start_values(dispersion))
@@ -115,6 +118,7 @@ def absorbs(dispersion: AbstractDispersion) -> bool:
 def ambient_medium(value: MediumLike) -> AbstractDispersion:
     """Return `medium(value)`; of a material with a little absorption (`CLEAR`) only the real part."""
     dispersion = medium(value)
+    require_isotropic(dispersion, "the ambient is made of")
     if isinstance(dispersion, Material) and absorbs(dispersion):
         return dispersion.as_ambient()
     return dispersion

@@ -11,8 +11,10 @@ import jax.numpy as jnp
 
 from pellicle.effects.plan import Plan
 from pellicle.optics import coherent, interface, orders, plate, response
+from pellicle.optics.anisotropy import Principal
 from pellicle.optics.gradient import Gradient, gauss_points
 from pellicle.optics.pair import Number, imag, real
+from pellicle.optics.principal_axes import each_index, seen_by
 from pellicle.scene.film import Group, Scene, groups, thickness_spread
 from pellicle.scene.graded import Graded
 from pellicle.scene.layers import Layer, Plate
@@ -26,10 +28,26 @@ class CoherentGroup(NamedTuple):
     below: Number
     phases: list[Any]
     angle: Any  # of incidence in radians; None is normal, `Inside` within a plate
-    internal: Any  # internal transmittance of the plate below, None on a half space
+    internal: Any  # internal transmittance of the plate below, None on a half space; may be `PerPolarisation`
     collected: plate.Collection | None  # part of the light from beneath that plate, None for all
     roughness: list[Any] | None  # k₀σ of each face, None where all are smooth
-    phase_variance: Any  # of the round-trip phase, None without damped orders
+    phase_variance: Any  # of the round-trip phase, None without damped orders; may be `PerPolarisation`
+
+
+class PerPolarisation(NamedTuple):
+    """A number that is not the same for s and p, as in a birefringent medium."""
+
+    s: Any
+    p: Any
+
+
+def _per_polarisation(function: Callable[[str], Any], medium: Number) -> Any:
+    """function(polarisation), for s and p apart where the medium is birefringent, else one for both."""
+    return PerPolarisation(function("s"), function("p")) if isinstance(medium, Principal) else function("s")
+
+
+def _of(number: Any, polarisation: str) -> Any:
+    return getattr(number, polarisation) if isinstance(number, PerPolarisation) else number
 
 
 def coherent_groups(plan: Plan, scene: Scene) -> list[CoherentGroup]:
@@ -48,8 +66,8 @@ def coherent_groups(plan: Plan, scene: Scene) -> list[CoherentGroup]:
     for i, group in enumerate(described):
         internal, collected = None, None
         if i < len(plates):
-            extinction = imag(interface.normal(thick[i + 1], a))
-            internal = plate.internal_transmittance(extinction, plates[i].plate_mm, wavelength)
+            medium = thick[i + 1]
+            internal = _per_polarisation(partial(_internal, medium, a, plates[i], wavelength), medium)
             collected = _collection(plates[i])
         evaluated.append(
             CoherentGroup(
@@ -73,6 +91,11 @@ def _collection(described: Plate) -> plate.Collection | None:
     return plate.Collection(described.back_collected, described.back_reflections)
 
 
+def _internal(medium: Number, a: Any, below: Plate, wavelength: Any, polarisation: str) -> Any:
+    extinction = imag(interface.normal(seen_by(medium, polarisation), a))
+    return plate.internal_transmittance(extinction, below.plate_mm, wavelength)
+
+
 def _roughness(group: Group, wavelength: Any) -> list[Any] | None:
     if all(face is None for face in group.roughness):
         return None
@@ -85,7 +108,7 @@ def _layer_index(plan: Plan, layer: Layer, wavelength: Any) -> Number:
         points = [layer.material.at(z, wavelength) for z in gauss_points(plan.row("gradient").count)]
         return Gradient(*(point if plan.on("absorption") else real(point) for point in points))
     index = layer.material.index(wavelength)
-    return index if plan.on("absorption") else real(index)
+    return index if plan.on("absorption") else each_index(real, index)
 
 
 def reflected(plan: Plan, groups: list[CoherentGroup], polarisation: str):
@@ -95,8 +118,8 @@ def reflected(plan: Plan, groups: list[CoherentGroup], polarisation: str):
     if not below:
         return powers.R()
     front = plate.Face(powers.R(), powers.T(), powers.R_below())
-    back = reflected(plan, below, polarisation)
-    return plate.plate_reflectance(front, back, group.internal, group.collected)
+    back, internal = reflected(plan, below, polarisation), _of(group.internal, polarisation)
+    return plate.plate_reflectance(front, back, internal, group.collected)
 
 
 def transmitted(plan: Plan, groups: list[CoherentGroup], polarisation: str):
@@ -107,7 +130,8 @@ def transmitted(plan: Plan, groups: list[CoherentGroup], polarisation: str):
         return powers.T()
     front = plate.Face(powers.R(), powers.T(), powers.R_below())
     back, passed = reflected(plan, below, polarisation), transmitted(plan, below, polarisation)
-    return plate.plate_transmittance(front, back, passed, group.internal, group.collected)
+    internal = _of(group.internal, polarisation)
+    return plate.plate_transmittance(front, back, passed, internal, group.collected)
 
 
 class _Powers(NamedTuple):
@@ -132,8 +156,9 @@ def _powers(plan: Plan, group: CoherentGroup, polarisation: str) -> _Powers:
 
 
 def _bare_face(group: CoherentGroup, polarisation: str) -> _Powers:
-    a, q_above = interface.transverse(group.above, group.angle)
-    face = (group.above, q_above, group.below, interface.normal(group.below, a), polarisation)
+    above, below = (seen_by(medium, polarisation) for medium in (group.above, group.below))
+    a, q_above = interface.transverse(above, group.angle)
+    face = (above, q_above, below, interface.normal(below, a), polarisation)
     reflectance = partial(interface.reflectance, *face)
     return _Powers(reflectance, partial(interface.transmittance, *face), reflectance)
 
@@ -158,7 +183,8 @@ def _damped_orders(plan: Plan, group: CoherentGroup, polarisation: str) -> _Powe
     layer = interface.allow_tunnelling(group.layers[0]) if plan.on("tunnelling") else group.layers[0]
     series = orders.airy_series(group.above, layer, group.below, group.phases[0], group.angle, polarisation)
     damped = group.phase_variance is not None
-    window = orders.gaussian(group.phase_variance) if damped else orders.monochromatic
+    variance = _of(group.phase_variance, polarisation)
+    window = orders.gaussian(variance) if damped else orders.monochromatic
     count = plan.row("orders").count
     from_below = orders.reversed_series(series)
     return _Powers(
@@ -178,15 +204,19 @@ def _phase_variance(plan: Plan, scene: Scene, group: Group, angle: Any) -> Any:
         return None
     wavelength = scene.light.wavelength
 
-    def cosine_index(at):
-        a, _ = interface.transverse(scene.ambient.index(at), angle)
-        index = _layer_index(plan, layer, at)
-        index = interface.allow_tunnelling(index) if plan.on("tunnelling") else index
-        return real(interface.normal(index, a))
-
-    def phase(at):
-        return 4 * jnp.pi / at * cosine_index(at) * layer.thickness
-
-    _, slope = jax.jvp(phase, (wavelength,), (jnp.ones_like(wavelength),))
     bandwidth, spread = (0.0 if width is None else width for width in widths)
-    return orders.phase_variance(slope, bandwidth, cosine_index(wavelength), spread, wavelength)
+
+    def variance(polarisation):
+        def cosine_index(at):
+            a, _ = interface.transverse(scene.ambient.index(at), angle)
+            index = seen_by(_layer_index(plan, layer, at), polarisation)
+            index = interface.allow_tunnelling(index) if plan.on("tunnelling") else index
+            return real(interface.normal(index, a))
+
+        def phase(at):
+            return 4 * jnp.pi / at * cosine_index(at) * layer.thickness
+
+        _, slope = jax.jvp(phase, (wavelength,), (jnp.ones_like(wavelength),))
+        return orders.phase_variance(slope, bandwidth, cosine_index(wavelength), spread, wavelength)
+
+    return _per_polarisation(variance, layer.material.index(wavelength))

@@ -152,7 +152,7 @@ def _power_rows(plan: Plan, groups: list[CoherentGroup]) -> list[Any]:
     power = reflected if plan.signal == "R" else transmitted
     polarisations = "sp"
     if not plan.on("polarisation"):
-        one = plan.on("oblique") and plan.polarisation != "unpolarised"
+        one = (plan.on("oblique") or plan.on("anisotropy")) and plan.polarisation != "unpolarised"
         polarisations = plan.polarisation if one else "s"
     return [power(plan, groups, p) for p in polarisations]
 

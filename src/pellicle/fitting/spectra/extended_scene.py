@@ -8,8 +8,9 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
-from pellicle.dispersion.base import known_index
+from pellicle.dispersion.anisotropic import Anisotropic
 from pellicle.dispersion.empirical import Constant, Scaled, Tabulated
+from pellicle.dispersion.principal_media import each_principal, ordinary_index
 from pellicle.effects.film import exact
 from pellicle.fitting.colours.view import ColourForm, ColoursView
 from pellicle.fitting.program_cache import kept
@@ -130,7 +131,7 @@ class ExtendedScene:
                 self.mixture, thin = self._number(0.0)
                 layers.append(Interface(thin))
                 self._with_face[self.mixture.position] = (*plain, layers[-1])
-            below = Scaled(below, change)
+            below = _scaled(below, change)
         self._scene = replace(
             opened,
             layers=tuple(layers),
@@ -154,7 +155,7 @@ class ExtendedScene:
             (self.index if given else self.shape)[i] = number
             # level and slope of a model are its own: what it may lack is a curvature
             shape = 1.0 if given else 2 * position**2 - 1
-            material = each_medium(lambda medium: Scaled(medium, change, shape), material)
+            material = each_medium(lambda medium: _scaled(medium, change, shape), material)
         thickness: Any = layer.thickness
         if is_free(thickness):
             position = next(j for j, own in enumerate(self._free) if own is thickness)
@@ -205,8 +206,15 @@ def _program(view: SpectrumView | ColoursView, numbers: list[Free], scene: Scene
     return Program(form, jax.tree_util.tree_map(np.asarray, anonymous(scene)), order)
 
 
+def _scaled(medium: Any, change: Any, shape: Any = 1.0) -> Any:
+    """The medium with a relative change of its index, in an anisotropic one the same of all its indices."""
+    return each_principal(lambda own: Scaled(own, change, shape), medium)
+
+
 def _with_slope(medium: Any, nm: np.ndarray) -> Any:
     """A tabulated medium with its slope in wavelength, from neighbouring points; others as they are."""
+    if isinstance(medium, Anisotropic):
+        return medium.with_media(lambda own: _with_slope(own, nm))
     if not isinstance(medium, Tabulated) or medium.slope is not None:
         return medium
     order, first, inverse = np.unique(nm, return_index=True, return_inverse=True)
@@ -223,13 +231,15 @@ def _with_slope(medium: Any, nm: np.ndarray) -> Any:
 
 
 def _median(medium: Any, nm: np.ndarray) -> float:
-    return float(np.median(np.asarray(real(known_index(medium, nm)))))
+    return float(np.median(np.asarray(real(ordinary_index(medium, nm)))))
 
 
 def _solid(medium: Any, nm: np.ndarray) -> bool:
-    index = known_index(medium, nm)
+    index = ordinary_index(medium, nm)
     return bool(np.max(np.hypot(np.asarray(real(index)) - 1, np.asarray(imag(index)))) > _GAS)
 
 
 def _oxidises(medium: Any, nm: np.ndarray) -> bool:
-    return bool(_median(medium, nm) > _OXIDISES or np.median(np.asarray(imag(known_index(medium, nm)))) > 0.1)
+    return bool(
+        _median(medium, nm) > _OXIDISES or np.median(np.asarray(imag(ordinary_index(medium, nm)))) > 0.1
+    )

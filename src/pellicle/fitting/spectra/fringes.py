@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pellicle.dispersion.base import known_index
+from pellicle.dispersion.principal_media import ordinary_index
 from pellicle.fitting.colours.view import ColoursView
 from pellicle.fitting.noise import local_noise
 from pellicle.fitting.problem import Problem
@@ -74,7 +75,9 @@ def phase_per_thickness(
         or view.rows < 16
     ):
         return None
-    indices = [np.broadcast_to(real(known_index(x.material, wavelength)), wavelength.shape) for x in layers]
+    indices = [
+        np.broadcast_to(real(ordinary_index(x.material, wavelength)), wavelength.shape) for x in layers
+    ]
     own = [i for i, layer in enumerate(layers) if layer.thickness == thickness]
     thin = all(
         float(np.max(n)) * np.asarray(layer.thickness).item() < _THIN * wavelength.min()

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pellicle.dispersion.base import known_index
+from pellicle.dispersion.principal_media import ordinary_index
 from pellicle.fitting.noise import student
 from pellicle.fitting.profile_likelihood import Limits
 from pellicle.fitting.result import Estimate, Profile
@@ -86,7 +86,7 @@ def opaque(spectra: Sequence[Target], ranked: RankedMinima) -> frozenset[str]:
     return frozenset(
         thickness_name(spectra[0].scene, i)
         for i, layer in enumerate(scene.layers)
-        if isinstance(layer, Layer) and np.median(imag(known_index(layer.material, wavelength))) > _ABSORBS
+        if isinstance(layer, Layer) and np.median(imag(ordinary_index(layer.material, wavelength))) > _ABSORBS
     )
 
 

@@ -1,0 +1,67 @@
+"""Anisotropic media of a scene: whether the closed forms of s and p serve, or s and p mix."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pellicle.dispersion.anisotropic import Anisotropic
+from pellicle.dispersion.principal_media import isotropic_in_plane, mixes_polarisations
+from pellicle.effects.plan import Row
+from pellicle.errors import UsageError
+from pellicle.scene.film import Scene, groups, is_graded
+from pellicle.scene.layers import Interface
+
+CLOSED_FORMS, GENERAL = 2, 4
+"""`Row.count` of the effect: size of the matrices."""
+
+
+def anisotropy(scene: Scene) -> Row:
+    """On where a medium is anisotropic, by matrices of 2×2 or 4×4, chosen by the type of its orientation.
+
+    **Raises:** UsageError for what is not computed: see `_check`.
+    """
+    media = [medium for medium in scene_media(scene) if isinstance(medium, Anisotropic)]
+    if not media:
+        return Row("anisotropy", False, "no medium is birefringent")
+    _check(scene)
+    if any(map(mixes_polarisations, media)):
+        why = "an optic axis is tilted or its angles are free: s and p mix, matrices of 4×4"
+        return Row("anisotropy", True, why, count=GENERAL)
+    why = "axes along the normal and the plane of incidence: s and p stay apart, closed forms of 2×2"
+    return Row("anisotropy", True, why, count=CLOSED_FORMS)
+
+
+def scene_media(scene: Scene) -> list[Any]:
+    """Every medium of a scene but the ambient, from the top down; interfaces have none of their own."""
+    back = [] if scene.substrate.back is None else [scene.substrate.back]
+    layers = [layer.material for layer in scene.layers if not isinstance(layer, Interface)]
+    return [*layers, scene.substrate.material, *back]
+
+
+def _check(scene: Scene) -> None:
+    """UsageError for an anisotropic medium where it is not computed."""
+    if is_graded(scene):
+        raise UsageError("a graded layer and a birefringent medium in one scene are not computed: omit one")
+    described, plates = groups(scene)
+    thick = [plate.material for plate in plates]
+    if any(map(mixes_polarisations, thick)):
+        raise UsageError(
+            "the optic axis of an incoherent plate must be the normal or along the plane of incidence:"
+            " give its angles as 0 or 90, or the plate one index"
+        )
+    if scene.light.signal == "psi-delta" and any(isinstance(m, Anisotropic) for m in thick):
+        raise UsageError(
+            "Ψ and Δ of light from the back face of a birefringent plate are not computed: leave out `back`"
+        )
+    if scene.instrument.has_cone and not all(map(isotropic_in_plane, scene_media(scene))):
+        raise UsageError(
+            "a cone of light on a medium whose optic axis is not the normal is not computed: leave out"
+            " `angle_spread` and `numerical_aperture`"
+        )
+    if any(map(mixes_polarisations, scene_media(scene))) and any(
+        rough is not None for group in described for rough in group.roughness
+    ):
+        raise UsageError(
+            "`roughness` goes with axes along the normal and the plane of incidence: leave it out, or give"
+            " the angles of the optic axis as 0 or 90"
+        )
