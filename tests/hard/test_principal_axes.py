@@ -74,9 +74,7 @@ def computed():
     with jax.enable_x64(True):
         numbers = np.array([_numbers(case) for case in CASES.values()])
         values, slopes = values_and_slopes(jnp.asarray(numbers))
-        return {
-            name: (np.asarray(v), np.asarray(s)) for name, v, s in zip(CASES, values, slopes, strict=True)
-        }
+        return dict(zip(CASES, zip(np.asarray(values), np.asarray(slopes), strict=True), strict=True))
 
 
 def _numbers(case) -> list[float]:
@@ -116,18 +114,11 @@ def test_equal_indices_are_an_isotropic_medium_to_the_last_digits():
 def test_four_layers_with_rough_faces_take_the_same_indices():
     """The loop of `stack` against the product of `few_layers`, each with the same stack cut in two."""
     with jax.enable_x64(True):
-        medium, below = (
-            Principal(*map(jnp.array, (1.6, 1.5, 1.7))),
-            Principal(*map(jnp.array, (2.6, 2.6, 2.9))),
-        )
-        angle = jnp.linspace(0.0, 1.5, 16)
-        few = responses(1.0, [medium, 1.4, medium], below, [jnp.array(2.0)] * 3, angle)
-        many = responses(
-            1.0, [medium, medium, 1.4, medium], below, [jnp.array(x) for x in (0.5, 1.5, 2, 2)], angle
-        )
-        smooth = responses(
-            1.0, [medium, 1.4, medium], below, [2.0] * 3, angle, roughness=[jnp.array(0.0)] * 4
-        )
+        medium, below = (Principal(*map(jnp.array, n)) for n in ((1.6, 1.5, 1.7), (2.6, 2.6, 2.9)))
+        angle, three = jnp.linspace(0.0, 1.5, 16), [medium, 1.4, medium]
+        few = responses(1.0, three, below, [jnp.array(2.0)] * 3, angle)
+        many = responses(1.0, [medium, *three], below, [jnp.array(x) for x in (0.5, 1.5, 2, 2)], angle)
+        smooth = responses(1.0, three, below, [2.0] * 3, angle, roughness=[jnp.array(0.0)] * 4)
         for a, b, c in zip(few, many, smooth, strict=True):
             np.testing.assert_allclose(reflectance(b), reflectance(a), rtol=1e-12)
             np.testing.assert_allclose(reflectance(c), reflectance(a), rtol=1e-12)

@@ -59,11 +59,19 @@ class Anisotropic(AbstractDispersion):
 
     def with_media(self, convert: Callable[[Any], AbstractDispersion]) -> Anisotropic:
         """Return a copy whose principal media are `convert(medium)`."""
-        x, z = convert(self.x), convert(self.z)
-        axis = (self.theta, self.phi)
-        if self.y is None:
-            return Anisotropic(x, z, axis=axis)
-        return Anisotropic(x=x, y=convert(self.y), z=z, axis=(*axis, self.psi))
+        # neither by the constructor, where traced angles lose the order of the axes, nor by `eqx.tree_at`,
+        # which copies free parameters
+        other = object.__new__(Anisotropic)
+        for name, value in vars(self).items():
+            medium = name in ("x", "y", "z") and value is not None
+            object.__setattr__(other, name, convert(value) if medium else value)
+        return other
+
+    @property
+    def names(self) -> dict[str, str]:
+        """Names of the fields in results."""
+        own = {"x": "ordinary", "z": "extraordinary"} if self.y is None else {"x": "x", "y": "y", "z": "z"}
+        return own | {"theta": "axis_theta", "phi": "axis_phi", "psi": "axis_psi"}
 
     @property
     def is_uniaxial(self) -> bool:

@@ -32,14 +32,16 @@ def locate_parameter(tree: Any, path: tuple) -> ParameterLocation:
     The numbers of a tuple are counted from 1 (`B1`); a mixture's components and, where there are
     several, the terms of a sum go in front.
     """
-    node, owner, field, count, words = tree, tree, "", "", []
+    node: Any = tree
+    owner: Any = tree
+    field, count, words = "", "", []
     for depth, step in enumerate(path):
         if hasattr(step, "name"):
             owner, field, count = node, step.name, ""
             node = getattr(node, field)
             if isinstance(owner, Anisotropic):
                 field = owner.names[field]
-                if isinstance(node, AbstractDispersion):
+                if isinstance(getattr(owner, step.name), AbstractDispersion):
                     words.append(field)
             elif field in _BRANCHES:
                 words.append(field)
