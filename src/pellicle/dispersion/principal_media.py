@@ -9,7 +9,6 @@ import numpy as np
 
 from pellicle.dispersion.anisotropic import Anisotropic
 from pellicle.dispersion.base import AbstractDispersion, known_index
-from pellicle.errors import UsageError
 from pellicle.optics.pair import Number
 
 
@@ -43,9 +42,9 @@ def isotropic_in_plane(medium: Any) -> bool:
 
 
 def require_isotropic(medium: Any, what: str) -> None:
-    """UsageError where a medium is anisotropic; `what` begins the sentence: "a mixture is made of"."""
+    """ValueError where a medium is anisotropic; `what` begins the sentence: "a mixture is made of"."""
     if isinstance(medium, Anisotropic):
-        raise UsageError(f"{what} isotropic media, not of an anisotropic one: give it one index")
+        raise ValueError(f"{what} isotropic media, not of an anisotropic one: give it one index")
 
 
 @final
