@@ -34,7 +34,7 @@ def four_roots(epsilon: Tensor, a: Any) -> Any:
     size = 1 + jnp.max(jnp.abs(c), axis=0) ** 0.5
     start = jnp.stack([size * jnp.exp(1j * (0.4 + 0.5 * jnp.pi * j)) for j in range(4)])
 
-    def improve(_: int, x: Any) -> Any:
+    def improve(_: Any, x: Any) -> Any:
         value = (((x + c3) * x + c2) * x + c1) * x + c0
         slope = ((4 * x + 3 * c3) * x + 2 * c2) * x + c1
         gap = x[:, None] - x[None]
