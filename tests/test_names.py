@@ -17,7 +17,7 @@ import pellicle as pl
 from pellicle.dispersion import effective_medium, empirical, oscillators, spline
 from pellicle.dispersion.cody_lorentz import CodyLorentz
 
-NAMESPACES = ("dispersion", "fitting", "mixing", "priors")
+NAMESPACES = ("dispersion", "fitting", "mixing", "priors", "profile")
 PAGES = (Path(__file__).parents[1] / "docs" / "reference").glob("*.md")
 LISTED = [
     name for page in PAGES for name in re.findall(r"^::: ([\w.]+)$", page.read_text("utf-8"), re.MULTILINE)
@@ -28,10 +28,12 @@ def in_namespaces():
     """Every class of the namespaces, and every name of `pl.fitting`, by the name that a user types."""
     models = {**vars(pl.dispersion), **vars(pl.mixing)}
     kinds = (empirical.AbstractDispersion, oscillators.AbstractOscillator)
+    profiles = {f"profile.{name}": x for name, x in vars(pl.profile).items() if inspect.isclass(x)}
+    profiles = {name: x for name, x in profiles.items() if issubclass(x, pl.profile.AbstractProfile)}
     found = {name: x for name, x in models.items() if inspect.isclass(x) and issubclass(x, kinds)}
     priors = {name: x for name, x in vars(pl.priors).items() if x in typing.get_args(pl.priors.Prior)}
-    found |= {name: getattr(pl.fitting, name) for name in pl.fitting.__all__}
-    return {name: x for name, x in {**found, **priors}.items() if not name.startswith("Abstract")}
+    found |= {name: getattr(pl.fitting, name) for name in pl.fitting.__all__} | profiles
+    return {name: x for name, x in {**found, **priors}.items() if "Abstract" not in name}
 
 
 PUBLIC = {name: getattr(pl, name) for name in pl.__all__ if name not in NAMESPACES} | in_namespaces()
