@@ -126,8 +126,10 @@ def simulate(
       degrees for Ψ and Δ, that of each normalised Mueller element, 1/sr for a BRDF. It becomes the σ of the
       result. Of a BRDF also a share of the signal, as "2 %", or a list of one for each channel.
     - `seed` of the noise.
-    - `depolarisation_noise`: standard deviation of a measured depolarisation, a fraction, which then becomes
-      part of a spectrum of Ψ and Δ; 0 for one without noise.
+    - `depolarisation_noise`: standard deviation of the depolarisation, a fraction; 0 for one without noise. A
+      spectrum of Ψ and Δ has a depolarisation where something in the scene depolarises (a thickness spread, a
+      bandwidth, a cone of light, a back face), and wherever this noise is given. By default the noise is
+      4·`noise` in radians, that of 1 − N² − C² − S².
     - `elements`: names of the elements of a Mueller matrix, such as ["m12", "m33", "m34"]; all 15 beside m11
       by default.
     - `sensor`, `space`: for colours, of a `Scene` only. `sensor` is wavelengths (N,), nm, and weights (N, 3)

@@ -118,6 +118,25 @@ def test_ellipsometry_comes_back_as_psi_and_delta(pellicle, recipe, tmp_path):
     assert not (tmp_path / "none.csv").exists()
 
 
+def test_a_depolarisation_is_a_column(pellicle, recipe, tmp_path):
+    """Where the scene depolarises, and read back with its noise."""
+    uneven = RECIPE.replace('signal = "R"\nnoise = 0.002', 'signal = "psi-delta"\nangle = 65')
+    recipe.write_text(uneven + "thickness_spread = 10.0\n")
+    out = tmp_path / "film.csv"
+    flags = ("--noise", 0.05, "--depolarisation-noise", 0.002)
+    assert pellicle("simulate", recipe, "--out", out, *flags).code == 0
+    header = "wavelength_nm,angle_deg,psi_deg,delta_deg,depolarisation,sigma,sigma_depolarisation"
+    assert out.read_text().splitlines()[4] == header
+    read = pl.read_spectrum(out)
+    np.testing.assert_array_equal(read.depolarisation_sigma, 0.002)
+    exact = pl.simulate(pl.read_recipe(recipe).scene(), read.wavelength).depolarisation
+    assert exact.max() > 0.02
+    assert np.std(read.depolarisation - exact) == pytest.approx(0.002, rel=0.3)
+    recipe.write_text(RECIPE)
+    flags = ("--out", tmp_path / "R.csv", "--depolarisation-noise", 0.002)
+    pellicle("simulate", recipe, *flags).refused(2, "is for a film with the signal psi-delta")
+
+
 def test_depth_profile(pellicle, recipe, tmp_path):
     """Figure, tables and JSON of where the light goes; the film is transparent, and the substrate takes T."""
     recipe.write_text(

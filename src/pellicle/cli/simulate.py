@@ -35,6 +35,14 @@ def simulate(
             help='Standard deviation of the noise, or "2 %" of a BRDF (the recipe\'s, or 0).', metavar="SIGMA"
         ),
     ] = None,
+    depolarisation_noise: Annotated[
+        float | None,
+        Parameter(
+            help="Standard deviation of the depolarisation, a fraction: it comes with Ψ and Δ where the scene"
+            " depolarises (4 times --noise in radians).",
+            metavar="SIGMA",
+        ),
+    ] = None,
     seed: Annotated[int, Parameter(help="Seed of the noise.")] = 0,
     tolerance: Annotated[
         float, Parameter(help="Leave out effects that change the signal by less than this (0: none).")
@@ -63,6 +71,10 @@ def simulate(
     spread = _spread(noise)
     not_negative("--tolerance", tolerance)
     described = read_recipe(recipe)
+    if depolarisation_noise is not None:
+        not_negative("--depolarisation-noise", depolarisation_noise)
+        if isinstance(described, SurfaceRecipe) or described.tables.data.signal != "psi-delta":
+            raise UsageError("--depolarisation-noise is for a film with the signal psi-delta")
     if depth is not None:
         if isinstance(described, SurfaceRecipe) or described.tables.data.signal in SPACES:
             raise DataError(f"{recipe}: --depth is for a film and its spectrum")
@@ -84,8 +96,10 @@ def simulate(
         )
     sigma = (described.tables.data.noise or 0.0) if spread is None else spread
     comments[1] = source.format(f"{sigma:g}")
-    write = _write_colours if described.tables.data.signal in SPACES else _write_spectrum
-    write(described, out, sigma, seed, tolerance, comments)
+    if described.tables.data.signal in SPACES:
+        _write_colours(described, out, sigma, seed, tolerance, comments)
+    else:
+        _write_spectrum(described, out, (sigma, depolarisation_noise), seed, tolerance, comments)
     return 0
 
 
@@ -138,8 +152,14 @@ def _write_depth_profile(recipe: FilmRecipe, out: str, at: list[float], json: bo
 
 
 def _write_spectrum(
-    recipe: FilmRecipe, out: str, noise: float, seed: int, tolerance: float, comments: list[str]
+    recipe: FilmRecipe,
+    out: str,
+    noises: tuple[float, float | None],
+    seed: int,
+    tolerance: float,
+    comments: list[str],
 ) -> None:
+    """Write a spectrum; `noises` are those of the signal and of the depolarisation."""
     from pellicle.files import write_text
     from pellicle.fitting.spectra.messages import log_plan, log_scene
     from pellicle.synthetic.spectra import simulate_signal
@@ -149,7 +169,8 @@ def _write_spectrum(
     if scene.light.ellipsometric and recipe.tables.data.angle is None:
         raise DataError(f"{recipe.path}: ellipsometry needs an angle of incidence: give [data] angle = 70")
     nm = wavelengths(recipe, scene)
-    result = simulate_signal(scene, nm, noise, seed, tolerance)
+    noise, of_depolarisation = noises
+    result = simulate_signal(scene, nm, noise, seed, tolerance, of_depolarisation)
     log_plan(result.plan)
     write_text(out, _csv(scene, result, noise, comments, recipe.tables.data.elements))
     say(f"{out}: {len(nm)} points, {nm[0]:g} to {nm[-1]:g} nm")
@@ -200,6 +221,8 @@ def _csv(
     elements: Sequence[str] | None,
 ) -> str:
     """The spectrum as CSV below its comments, which end with the true values of the parameters."""
+    import numpy as np
+
     from pellicle.data.mueller import ELEMENTS, SIGNAL, check_elements
 
     light = scene.light
@@ -217,6 +240,11 @@ def _csv(
         columns, middle = f"wavelength_nm,angle_deg,{','.join(chosen)}", f"{angle},"
         table = table[:, [ELEMENTS.index(name) for name in chosen]]
     columns, end = (f"{columns},sigma", f",{noise:g}") if noise else (columns, "")
+    if result.depolarisation is not None:
+        table = np.column_stack([table, result.depolarisation])
+        columns = columns.replace("delta_deg", "delta_deg,depolarisation")
+        if result.depolarisation_noise:
+            columns, end = f"{columns},sigma_depolarisation", f"{end},{result.depolarisation_noise:g}"
     rows = [
         f"{nm:.10g},{middle}{','.join(f'{value:.8f}' for value in row)}{end}"
         for nm, row in zip(result.wavelength, table, strict=True)

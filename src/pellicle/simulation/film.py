@@ -103,6 +103,14 @@ def build(plan: Plan) -> Simulate:
     return simulate
 
 
+def depolarises(plan: Plan) -> bool:
+    """True where intensities of several polarisations add, so that some light is unpolarised.
+
+    (N, C, S) of `build` is then shorter than 1: the depolarisation is 1 − N² − C² − S².
+    """
+    return plan.on("back-face") or plan.on("angle-spread") or bool(plan.row("coherence").count)
+
+
 def _shifted(scene: Scene) -> Scene:
     """The scene at its true wavelengths and angles, where the instrument's are shifted.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -20,7 +21,7 @@ from pellicle.planning.film import plan
 from pellicle.scene.film import Scene, with_wavelength
 from pellicle.scene.free import insert, is_free, start_values
 from pellicle.scene.instrument import Drift
-from pellicle.simulation.film import build, tabulated
+from pellicle.simulation.film import build, depolarises, tabulated
 
 VISIBLE = (380.0, 780.0, 2.0)
 """Default wavelengths: start, stop and step in nm."""
@@ -30,7 +31,8 @@ class SimulatedSignal(NamedTuple):
     """A simulated signal with and without noise, and its plan: (wavelengths,), Ψ and Δ (wavelengths, 2), or
     Mueller elements m12 to m44 (wavelengths, 15).
 
-    `depolarisation` (wavelengths,) is without noise; None for other signals than Ψ and Δ.
+    `depolarisation` (wavelengths,) is a fraction with noise of the standard deviation `depolarisation_noise`;
+    None where nothing in the scene depolarises, and for other signals than Ψ and Δ.
     """
 
     wavelength: np.ndarray
@@ -38,6 +40,7 @@ class SimulatedSignal(NamedTuple):
     clean: np.ndarray
     plan: Plan
     depolarisation: np.ndarray | None = None
+    depolarisation_noise: float = 0.0
 
 
 def simulate_spectrum(
@@ -53,7 +56,7 @@ def simulate_spectrum(
 
     **Arguments:** `wavelength` in nm (`default_wavelengths` if None); `noise` the standard deviation of the
     normal noise, in the unit of the signal, which becomes the σ of the spectrum; `seed` of the noise;
-    `depolarisation_noise` that of the depolarisation, a fraction; None leaves the depolarisation out;
+    `depolarisation_noise` that of the depolarisation, a fraction, None for `usual_depolarisation_noise`;
     `elements` of a Mueller matrix, all 15 if None.
 
     **Raises:** ValueError where a material has no data at a wavelength; UsageError for a depolarisation
@@ -65,7 +68,7 @@ def simulate_spectrum(
         raise UsageError('`depolarisation_noise` goes with `signal="psi-delta"`: leave it out')
     if elements is not None and light.signal != mueller.SIGNAL:
         raise UsageError('`elements` go with `signal="mueller"`: leave them out')
-    simulated = simulate_signal(scene, nm, noise, seed)
+    simulated = simulate_signal(scene, nm, noise, seed, depolarisation_noise=depolarisation_noise)
     angle = np.broadcast_to(getattr(light.angle, "start", light.angle), nm.shape)
     if light.signal == mueller.SIGNAL:
         chosen = mueller.ELEMENTS if elements is None else tuple(elements)
@@ -73,11 +76,8 @@ def simulate_spectrum(
         values = simulated.values[:, [mueller.ELEMENTS.index(name) for name in chosen]]
         sigma = np.full(values.shape, noise) if noise > 0 else None
         return Spectrum(nm, values, light.signal, sigma=sigma, angle=angle, elements=chosen)
-    values, share, share_sigma = simulated.values, None, None
-    if depolarisation_noise is not None and simulated.depolarisation is not None:
-        own = np.random.default_rng((seed, 1)).normal(0.0, 1.0, nm.shape)
-        share = simulated.depolarisation + depolarisation_noise * own
-        share_sigma = np.full(nm.shape, depolarisation_noise) if depolarisation_noise > 0 else None
+    values, share, share_noise = simulated.values, simulated.depolarisation, simulated.depolarisation_noise
+    share_sigma = np.full(nm.shape, share_noise) if share is not None and share_noise > 0 else None
     psi_or_power, delta = values.T if ellipsometric else (values, None)
     sigma = np.full(nm.shape, noise) if noise > 0 else None
     return Spectrum(
@@ -96,13 +96,19 @@ def simulate_spectrum(
 
 
 def simulate_signal(
-    scene: Scene, wavelength: ArrayLike, noise: float = 0.0, seed: int = 0, tolerance: float = 0.0
+    scene: Scene,
+    wavelength: ArrayLike,
+    noise: float = 0.0,
+    seed: int = 0,
+    tolerance: float = 0.0,
+    depolarisation_noise: float | None = None,
 ) -> SimulatedSignal:
     """Simulate the signal of a film at `wavelength` (nm) with normal noise of standard deviation `noise`.
 
     Free parameters take their start values; a free scale is 1 and a free offset 0. Effects that change
     the signal by less than the `tolerance` are left out (see `pellicle.plan`). The signal of ellipsometry is
-    Ψ and Δ in degrees, or the elements m12 to m44 of the normalised Mueller matrix.
+    Ψ and Δ in degrees, or the elements m12 to m44 of the normalised Mueller matrix. The depolarisation comes
+    with Ψ and Δ where the scene depolarises or a `depolarisation_noise` is given, None for the usual one.
 
     **Raises:** ValueError where a material has no data at a wavelength.
     """
@@ -115,16 +121,29 @@ def simulate_signal(
         fixed = eqx.tree_at(lambda s: s.instrument, fixed, instrument)
         chosen = plan(fixed, tolerance)
         signal = np.asarray(jax.jit(build(chosen))(tabulated(fixed, chosen.on("coherence"))))
-    clean, depolarisation = float(scale) * signal + float(offset), None
+    clean, share, share_noise = float(scale) * signal + float(offset), None, 0.0
     if scene.light.signal == "psi-delta":
-        depolarisation = 1 - np.sum(clean.reshape(-1, 3) ** 2, axis=1)
+        if depolarises(chosen) or depolarisation_noise is not None:
+            given = depolarisation_noise
+            share_noise = usual_depolarisation_noise(noise) if given is None else given
+            scatter = np.random.default_rng((seed, 1)).normal(0.0, 1.0, wavelength.shape)
+            share = 1 - np.sum(clean.reshape(-1, 3) ** 2, axis=1) + share_noise * scatter
         clean = np.stack(np.broadcast_arrays(*psi_delta(*clean.reshape(-1, 3).T)), axis=1)
     elif scene.light.signal == mueller.SIGNAL:
         clean = clean.reshape(len(wavelength), -1)
     values = clean + noise * np.random.default_rng(seed).normal(0.0, 1.0, clean.shape)
     if scene.light.signal == "psi-delta":
         values = np.stack([np.clip(values[:, 0], 0.0, 90.0), np.mod(values[:, 1], 360.0)], axis=1)
-    return SimulatedSignal(wavelength, values, clean, chosen, depolarisation)
+    return SimulatedSignal(wavelength, values, clean, chosen, share, share_noise)
+
+
+def usual_depolarisation_noise(noise: float) -> float:
+    """Return the noise of a depolarisation 1 − N² − C² − S² where that of Ψ is `noise` in degrees.
+
+    N = cos 2Ψ has up to 2 · noise in radians, and so have C and S; the squared length of (N, C, S), which is
+    near 1, has twice as much.
+    """
+    return 4 * math.radians(noise)
 
 
 def default_wavelengths(scene: Scene) -> np.ndarray:

@@ -216,7 +216,10 @@ def test_a_simulation_is_the_average_of_tmm(measured):
     noisy = pl.simulate(film, WAVELENGTH, noise=PSI, depolarisation_noise=SHARE)
     assert np.std(noisy.depolarisation - share) == pytest.approx(SHARE, rel=0.3)
     assert set(noisy.depolarisation_sigma) == {SHARE}
-    assert pl.simulate(film, WAVELENGTH, noise=PSI).depolarisation is None
+    usual = pl.simulate(film, WAVELENGTH, noise=PSI)
+    # N, C, S have twice the noise of Ψ, 1 − N² − C² − S² twice theirs
+    np.testing.assert_allclose(usual.depolarisation_sigma, 4 * np.deg2rad(PSI))
+    assert np.std(usual.depolarisation - share) == pytest.approx(4 * np.deg2rad(PSI), rel=0.3)
     with pytest.raises(UsageError, match="`depolarisation_noise` goes with"):
         pl.simulate(pl.Scene(pl.Layer(1.46, 100.0), "Si"), depolarisation_noise=0.0)
 

@@ -16,10 +16,10 @@ from pellicle.errors import DataError, UsageError
 from pellicle.fitting import noise
 from pellicle.fitting.colours.targets import MeasuredColours
 from pellicle.fitting.problem import Noise
-from pellicle.fitting.spectra.view import depolarises
 from pellicle.scene.film import Light, Scene
 from pellicle.scene.free import free_leaves, is_free
 from pellicle.scene.instrument import ONE_NUMBER, Drift, Instrument
+from pellicle.simulation.film import depolarises
 
 ROUGH = 0.01
 """First guess of the noise of N, C, S, of a depolarisation and of Mueller elements."""

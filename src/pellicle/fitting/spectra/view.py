@@ -24,7 +24,7 @@ from pellicle.planning.differences import largest_difference, signals
 from pellicle.planning.film import full_plan
 from pellicle.scene.film import Scene
 from pellicle.scene.free import insert, is_free
-from pellicle.simulation.film import build
+from pellicle.simulation.film import build, depolarises
 
 ROUND = 64
 """Spectra are padded to a multiple of this, so that files of nearly one length share a program."""
@@ -80,11 +80,6 @@ class SpectrumForm:
         signal = compute_once(self.simulate(insert(scene, values), data))
         solved = nuisance.solve(signal, data, scene.instrument)
         return Explained(solved.model, solved.residual, solved.deviance)
-
-
-def depolarises(plan: Plan) -> bool:
-    """True where intensities of several polarisations add, so that some light is unpolarised."""
-    return plan.on("back-face") or plan.on("angle-spread") or bool(plan.row("coherence").count)
 
 
 class Local(NamedTuple):
