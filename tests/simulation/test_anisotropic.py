@@ -89,6 +89,34 @@ def test_plan_chooses_the_method_by_the_type_of_the_orientation(medium, on, coun
     assert (row.on, row.count) == (on, count)
 
 
+SLOW = pytest.mark.slow  # 10 s of compilation each
+
+
+@pytest.mark.parametrize(
+    ("signal", "k"), [("mueller", 0), *(pytest.param(x, 0.1j, marks=SLOW) for x in ("R", "T", "psi-delta"))]
+)
+def test_general_method_equals_the_closed_form_where_both_compute(signal, k):
+    """The plan takes 4×4 for a free angle, whatever its value."""
+    closed = pl.Anisotropic(ORDINARY, EXTRAORDINARY + k)
+    general = pl.Anisotropic(ORDINARY, EXTRAORDINARY + k, axis=(pl.Free(0, 90, start=0), 20.0))
+    one, other = (pl.simulate(scene(pl.Layer(x, 300.0), "Si", signal), NM) for x in (closed, general))
+    np.testing.assert_allclose(other.values, one.values, rtol=0, atol=1e-10)
+    if one.delta is not None:
+        np.testing.assert_allclose(other.delta, one.delta, rtol=0, atol=1e-9)
+
+
+@pytest.mark.slow  # 30 s of compilation
+def test_tilted_axis_gives_the_mueller_matrix_and_the_powers_of_the_functions():
+    tilted = pl.Anisotropic(ORDINARY, EXTRAORDINARY + 0.05j, axis=(40.0, 30.0))
+    own = pl.mueller(NM, 300.0, tilted, "Si", angle=ANGLE, normalised=False)
+    simulated = pl.simulate(scene(pl.Layer(tilted, 300.0), "Si", "mueller"), NM)
+    expected = np.asarray(own / own[:, :1, :1]).reshape(-1, 16)[:, 1:]
+    np.testing.assert_allclose(np.reshape(simulated.values, (-1, 15)), expected, atol=1e-6)
+    for letter, sign in (("p", 1), ("s", -1)):
+        power = values(scene(pl.Layer(tilted, 300.0), "Si", "R", letter))
+        np.testing.assert_allclose(power, own[:, 0, 0] + sign * own[:, 0, 1], atol=1e-6)
+
+
 def test_what_is_not_computed_is_refused():
     crystal, tilted = pl.Anisotropic(1.6, 1.7), pl.Anisotropic(1.6, 1.7, axis=(30, 0))
     refused = {
@@ -97,6 +125,7 @@ def test_what_is_not_computed_is_refused():
         "mixture": lambda: pl.mixing.Bruggeman(crystal, pl.material("SiO2"), 0.5),
         "incoherent plate": lambda: pl.plan(scene([pl.Layer(1.5, 9.0), pl.Plate(tilted, 1.0)])),
         "back face": lambda: pl.plan(scene([pl.Layer(1.5, 9.0), pl.Plate(crystal, 1.0)], 1.0, "psi-delta")),
+        "tilted": lambda: pl.plan(scene([pl.Layer(tilted, 9.0), pl.Plate(1.5, 1.0)])),
         "roughness": lambda: pl.plan(scene(pl.Layer(tilted, 10.0, roughness=1.0))),
     }
     for words, make in refused.items():

@@ -49,18 +49,23 @@ def _check(scene: Scene) -> None:
             "the optic axis of an incoherent plate must be the normal or along the plane of incidence:"
             " give its angles as 0 or 90, or the plate one index"
         )
-    if scene.light.signal == "psi-delta" and any(isinstance(m, Anisotropic) for m in thick):
+    if scene.light.ellipsometric and any(isinstance(m, Anisotropic) for m in thick):
         raise UsageError(
-            "Ψ and Δ of light from the back face of a birefringent plate are not computed: leave out `back`"
+            "the polarisation of light from the back face of a birefringent plate is not computed: leave out"
+            " `back`, or measure R or T"
         )
     if scene.instrument.has_cone and not all(map(isotropic_in_plane, scene_media(scene))):
         raise UsageError(
             "a cone of light on a medium whose optic axis is not the normal is not computed: leave out"
             " `angle_spread` and `numerical_aperture`"
         )
-    if any(map(mixes_polarisations, scene_media(scene))) and any(
-        rough is not None for group in described for rough in group.roughness
-    ):
+    mixed = any(map(mixes_polarisations, scene_media(scene)))
+    if mixed and plates:
+        raise UsageError(
+            "a plate with an incoherent back face under a film whose optic axis is tilted is not computed:"
+            " leave out `back`"
+        )
+    if mixed and any(rough is not None for group in described for rough in group.roughness):
         raise UsageError(
             "`roughness` goes with axes along the normal and the plane of incidence: leave it out, or give"
             " the angles of the optic axis as 0 or 90"

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 
 from pellicle.effects.plan import Plan
 from pellicle.optics import coherent, interface, orders, plate, response
-from pellicle.optics.anisotropy import Principal
+from pellicle.optics.anisotropy import Principal, mixes_polarisations
 from pellicle.optics.gradient import Gradient, gauss_points
 from pellicle.optics.pair import Number, imag, real
 from pellicle.optics.principal_axes import each_index, seen_by
@@ -61,7 +61,8 @@ def coherent_groups(plan: Plan, scene: Scene) -> list[CoherentGroup]:
     a = interface.transverse(thick[0], angle)[0]
     for group in described:
         index = group.below.index(wavelength)
-        thick.append(interface.allow_tunnelling(index) if plan.on("tunnelling") else index)
+        opened = plan.on("tunnelling") and not mixes_polarisations(index)
+        thick.append(interface.allow_tunnelling(index) if opened else index)
     evaluated = []
     for i, group in enumerate(described):
         internal, collected = None, None

@@ -13,6 +13,7 @@ import numpy as np
 
 from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.dispersion.empirical import Tabulated
+from pellicle.effects.anisotropy import GENERAL
 from pellicle.effects.plan import Plan
 from pellicle.materials import materials_in
 from pellicle.optics import ellipsometry, plate
@@ -21,7 +22,7 @@ from pellicle.optics.pointwise import pointwise
 from pellicle.scene.film import ELLIPSOMETRY, Scene, media, thickness_spread
 from pellicle.scene.free import free_leaves
 from pellicle.scene.layers import Layer
-from pellicle.simulation import instrument
+from pellicle.simulation import instrument, mixed_polarisations
 from pellicle.simulation.coherent_groups import (
     CoherentGroup,
     coherent_groups,
@@ -73,6 +74,9 @@ def build(plan: Plan) -> Simulate:
     ellipsometric = plan.signal in ELLIPSOMETRY
     powers = partial(_stokes_rows if ellipsometric else _power_rows, plan)
     finish = _normalised_rows if ellipsometric else _mean
+    mixed = plan.row("anisotropy").count == GENERAL
+    if mixed:
+        powers, finish = partial(mixed_polarisations.rows, plan), partial(mixed_polarisations.finished, plan)
     averaged = plan.row("coherence").count or plan.on("angle-spread")
 
     def at_each_wavelength(groups: list[CoherentGroup]) -> Sequence[Any]:
@@ -97,7 +101,7 @@ def build(plan: Plan) -> Simulate:
             scene = remove(scene)
         rows = finish(intensities(scene)) if averaged else intensities(scene)
         # behind the averages, whose slopes then have three rows
-        rows = _mueller_rows(*rows) if plan.signal == "mueller" else rows
+        rows = _mueller_rows(*rows) if plan.signal == "mueller" and not mixed else rows
         return stack_rows(rows).T.reshape(-1) if ellipsometric else rows[0]
 
     return simulate

@@ -1,0 +1,51 @@
+"""Signals of coherent layers that mix s and p, by the 4×4 method."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import jax.numpy as jnp
+
+from pellicle.effects.plan import Plan
+from pellicle.optics import ellipsometry
+from pellicle.optics.berreman.matrices import Matrix
+from pellicle.optics.berreman.stack import polarised, transmittances
+from pellicle.optics.mueller import mueller_elements, normalised
+from pellicle.optics.pair import abs2, conj, imag, real, to_pair
+from pellicle.simulation.coherent_groups import CoherentGroup
+
+
+def rows(plan: Plan, groups: list[CoherentGroup]) -> list[Any]:
+    """Return sums of intensities, which averages of an instrument are taken over.
+
+    R or T of the incident polarisations, with all light that is reflected or transmitted; for Ψ and Δ the
+    Stokes sums of r_pp and r_ss; for a Mueller matrix its 16 elements.
+    """
+    (group,) = groups
+    angle = jnp.zeros_like(group.phases[0]) if group.angle is None else group.angle
+    # the waves of a layer have different attenuations only where it absorbs or where one is evanescent
+    dichroic = plan.on("absorption") or plan.on("tunnelling")
+    response = polarised(group.above, group.layers, group.below, group.phases, angle, dichroic)
+    jones = Matrix(*map(to_pair, response.reflected))
+    if plan.signal == "mueller":
+        return [jnp.ravel(x) for row in mueller_elements(*jones) for x in row]
+    if plan.signal == "psi-delta":
+        both = 2 * (conj(jones.pp) * jones.ss)
+        p, s = abs2(jones.pp), abs2(jones.ss)
+        return [s - p, real(both), imag(both), s + p]
+    if plan.signal == "T":
+        p, s = transmittances(response)
+    else:
+        p, s = abs2(jones.pp) + abs2(jones.sp), abs2(jones.ps) + abs2(jones.ss)
+    return [s, p] if plan.on("polarisation") else [s if plan.polarisation == "s" else p]
+
+
+def finished(plan: Plan, sums: Sequence[Any]) -> Sequence[Any]:
+    """Return the rows of the signal from averaged sums of intensities."""
+    if plan.signal == "mueller":
+        elements = jnp.stack(sums, axis=-1).reshape(*sums[0].shape, 4, 4)
+        return [normalised(elements)[..., i // 4, i % 4] for i in range(1, 16)]
+    if plan.signal == "psi-delta":
+        return ellipsometry.normalised(ellipsometry.Stokes(*sums))
+    return sums if len(sums) == 1 else [0.5 * (sums[0] + sums[1])]
