@@ -102,6 +102,8 @@ class Batch:
                 f" {len(self.records)} of {len(groups)} files are done; fit the others with fewer --jobs"
             )
             worst = FAILED
+        if self.out is not None and len(groups) > 1 and self.records:
+            worst = max(worst, self._index(folders))
         if self.kept:
             say(
                 f"{self.kept} of {len(groups)} files were not fitted again: an earlier run has their results,"
@@ -122,6 +124,18 @@ class Batch:
         except ValueError as error:
             if len(self.records) == files:  # said once
                 say(f"pellicle: {error}")
+            return FAILED
+        return CONVERGED
+
+    def _index(self, folders: list[Path | None]) -> int:
+        """Write the page of all results so far, and return FAILED where it cannot be written."""
+        from pellicle.reporting.folders import write_index
+
+        assert self.out is not None
+        try:
+            write_index(self.out, self.records, folders)
+        except ValueError as error:
+            say(f"pellicle: {error}")
             return FAILED
         return CONVERGED
 

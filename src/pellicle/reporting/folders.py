@@ -102,7 +102,7 @@ def folder_per_file(folder: str | os.PathLike[str], paths: Sequence[str | os.Pat
     """
     if len(paths) < 2:
         return [Path(folder) for _ in paths]
-    root, names = new_folder(folder), distinct_stems(paths, {MARKER, SUMMARY, *REPEATS})
+    root, names = new_folder(folder), distinct_stems(paths, {MARKER, PAGE, SUMMARY, *REPEATS})
     files = [{"path": os.fspath(path), "folder": name} for path, name in zip(paths, names, strict=True)]
     index = {"schema": INDEX_SCHEMA, "files": files, "versions": versions()}
     write_text(root / MARKER, indented(index), overwrite=True)
@@ -146,6 +146,27 @@ def write_summary(path: str | os.PathLike[str], records: Iterable[Mapping[str, A
     writer.writerows(rows)
     new_folder(Path(path).parent)
     write_text(path, text.getvalue(), overwrite=True)
+
+
+def write_index(
+    folder: str | os.PathLike[str],
+    records: Sequence[Mapping[str, Any]],
+    folders: Sequence[str | os.PathLike[str] | None],
+) -> None:
+    """Write the page of several fits into their folder, with links to each one's page in its own folder.
+
+    `records` are JSON records of fits and failures, as many as there are `folders` or fewer. Raises as
+    `write_summary` does.
+    """
+    from pellicle.reporting.page.batch_page import batch_page
+
+    target = new_folder(folder)
+    places = [None if own is None else Path(own) / PAGE for own in folders[: len(records)]]
+    links = [
+        place.relative_to(target).as_posix() if place is not None and place.exists() else None
+        for place in places
+    ]
+    write_text(target / PAGE, batch_page(records, links), overwrite=True)
 
 
 def _summary_row(record: Mapping[str, Any]) -> dict[str, Any]:

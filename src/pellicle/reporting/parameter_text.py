@@ -18,7 +18,7 @@ MOST_RIVALS = 6
 _IMPOSSIBLE = 1e-6
 """Share of a posterior below which nothing more is said of it."""
 
-_NUISANCE = re.compile(r"instrument\.((scale|offset)(_\d+)?|white_balance_.+|camera_\d+)(\..+)?")
+NUISANCE = re.compile(r"instrument\.((scale|offset)(_\d+)?|white_balance_.+|camera_\d+)(\..+)?")
 
 
 def parameters(fit: Fit) -> list[str]:
@@ -80,7 +80,7 @@ def correlations(fit: Fit) -> list[str]:
         for j in range(len(names))
         for i in range(j)
         if abs(matrix[i, j]) > LEAST_CORRELATION
-        and not (_NUISANCE.fullmatch(names[i]) and _NUISANCE.fullmatch(names[j]))
+        and not (NUISANCE.fullmatch(names[i]) and NUISANCE.fullmatch(names[j]))
     ]
     pairs.sort(key=lambda pair: -abs(pair[0]))
     shown = pairs[:MOST_CORRELATIONS]

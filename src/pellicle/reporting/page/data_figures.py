@@ -26,7 +26,7 @@ from pellicle.reporting.page.figure import (
 if TYPE_CHECKING:
     from pellicle.fitting.result import Fit, Part, Rival
 
-_CHANNELS = "var(--red)", "var(--green)", "var(--blue)", "var(--fourth)"
+CHANNELS = "var(--red)", "var(--green)", "var(--blue)", "var(--fourth)"
 _LINES = "var(--fit)", "var(--index-n)", "var(--green)", "var(--fourth)"
 _SIGNALS = {"R": "reflectance", "T": "transmittance"}
 _PROFILE_POINTS = 1500
@@ -62,7 +62,8 @@ def _caption(part: Part) -> str:
     step = thinning(size) if size else thinning(len(getattr(part.curve, "wavelength", ())))
     thinned = f" One point of {step} is drawn; the CSV file has them all." if step > 1 else ""
     unit = " degrees" if isinstance(part.curve, Curve) and part.curve.delta_data is not None else ""
-    return f"{name}data, fit and residuals (data − fit). The rms residual is {part.rms:.3g}{unit}.{thinned}"
+    about = f"{name}data, fit and residuals (data − fit). The rms residual is {part.rms:.3g}{unit}.{thinned}"
+    return about if name else f"D{about[1:]}"
 
 
 _Drawn = tuple[str, list[Panel], list[Column], dict[str, Any]]
@@ -132,13 +133,15 @@ def _psi_delta(part: Part) -> _Drawn:
         panels.append(Panel(title, 190, [of_data], of_model))
     residuals: list[Trace] = []
     for points, _ in lines:
-        for name, values, colour in (
-            ("residual of Ψ", curve.residual, "var(--data)"),
-            ("residual of Δ", curve.delta_residual, "var(--fourth)"),
+        for name, values, colour, dash in (
+            ("residual of Ψ", curve.residual, "var(--data)", "solid"),
+            ("residual of Δ", curve.delta_residual, "var(--green)", "dot"),
         ):
             strokes = psi_delta.unbroken(x, values, points, False)
-            residuals.append(line(x, values, strokes, name, colour) | {"showlegend": False})
-    panels.append(Panel("data − fit (degrees)", 130, [], residuals))
+            trace = line(x, values, strokes, name, colour) | {"showlegend": len(residuals) < 2}
+            trace["line"] = {"color": colour, "width": 1.5, "dash": dash}
+            residuals.append(trace)
+    panels.append(Panel("data − fit (°)", 130, [], residuals))
     order = np.argsort(x, kind="stable")[:: thinning(x.size)]
     columns = [Column(abscissa, x[order])]
     if part.spectrum.angle is not None and abscissa.startswith("wavelength"):
@@ -183,14 +186,14 @@ def _samples(part: Part) -> _Drawn:
     residual = (samples.values - model) / one
     data, fitted, missed = [], [], []
     for c, name in enumerate(samples.channels):
-        colour = _CHANNELS[c % len(_CHANNELS)]
+        colour = CHANNELS[c % len(CHANNELS)]
         own = f" {escape(name)}"
         data.append(markers(angle[order], samples.values[order, c], f"data{own}", colour, "circle-open"))
         fitted.append(markers(angle[order], model[order, c], f"fit{own}", colour, "x-thin-open"))
         missed.append(markers(angle[order], residual[order, c], own, colour) | {"showlegend": False})
     positive = min(samples.values.min(), model.min()) > 0
     panels = [
-        Panel("BRDF (1/sr)", 320, data, fitted, {"type": "log"} if positive else {}),
+        Panel("BRDF (1/sr)", 320, data, fitted, {"type": "log", "dtick": "D2"} if positive else {}),
         Panel("residual (1/sr)" if samples.sigma is None else "residual / σ", 140, [], missed),
     ]
     columns = [Column("half angle (degrees)", angle[order])]
@@ -205,7 +208,7 @@ def _colours(part: Part) -> _Drawn:
     abscissa = "number of the colour" if data.angle is None else "angle of incidence (degrees)"
     measured, fitted, missed = [], [], []
     for c, name in enumerate(data.channels):
-        colour = _CHANNELS[c]
+        colour = CHANNELS[c]
         measured.append(markers(at, curve.data[:, c], f"data {name}", colour))
         fitted.append(markers(at, curve.model[:, c], f"fit {name}", colour, "x-thin-open"))
         scaled = curve.residual[:, c] / curve.sigma[:, c]
@@ -261,7 +264,7 @@ def of_misfit(fit: Fit) -> dict[str, Any] | None:
                 places, "rivals", "diamond", "var(--rival)", ["click to see its curve"] * len(found), numbered
             )
         )
-    decades = np.arange(2, 9)
+    decades = np.arange(1 if y.max() < 1000 * RIVAL else 2, 9)
     axis = {
         "tickvals": numbers(_height(np.array([0.0, RIVAL, *10.0**decades]))),
         "ticktext": [
@@ -278,7 +281,8 @@ def of_misfit(fit: Fit) -> dict[str, Any] | None:
     ]
     caption = (
         f"Misfit Δχ² against thickness, searched from {thickness.min():.5g} to {thickness.max():.5g} nm,"
-        f" linear below {RIVAL:g} and logarithmic above. Its minima are the best fit and {len(found)} rivals."
+        f" linear below {RIVAL:g} and logarithmic above. Its minima are the best fit and"
+        f" {len(found) or 'no'} rival{'s' * (len(found) != 1)}."
     )
     panel = Panel("misfit Δχ²", 260, traces, [], axis)
     drawn = figure("misfit", caption, "thickness (nm)", [panel], columns, rivals, {"range": [left, right]})

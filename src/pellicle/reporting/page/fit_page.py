@@ -55,6 +55,12 @@ def fit_page(
 
         about = section(posterior, pictures or {})
         shown.append(about["trace"])
+    surface = None
+    if fit.layer_test is not None:
+        from pellicle.reporting.page.surface_section import section as surface_section
+
+        surface = surface_section(fit)
+        shown.append(surface["lobes"])
     names = " and ".join(name for name in file_names(fit) if name) or "fit"
     content = {
         "tone": TONES[fit.status],
@@ -73,7 +79,7 @@ def fit_page(
         "budget": _budget(fit),
         "together": budget_text.together(fit.free[0]) if fit.budget and fit.free else "",
         "layer": Table("Error on samples that were held out", (), fit_text.layer_test_rows(fit)),
-        "surface": [],
+        "surface": surface,
         "posterior": about,
         "plans": [_plan(part) for part in fit.parts],
         "statistics": _statistics(fit),

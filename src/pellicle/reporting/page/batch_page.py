@@ -1,0 +1,145 @@
+"""Page of a batch: numbers of files of each status, a figure of the results, a table to sort and filter."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from html import escape
+from pathlib import PurePosixPath
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+
+from pellicle.fitting.result import Status
+from pellicle.reporting.page.document import page
+from pellicle.reporting.page.figure import Column, Panel, Trace, figure, numbers
+from pellicle.reporting.page.fit_page import TONES
+from pellicle.reporting.parameter_text import NUISANCE
+
+Record = Mapping[str, Any]
+_MOST_PARAMETERS = 8
+"""Columns of free parameters, the first of each file."""
+_STYLES = {
+    "good": ("circle", "var(--green)"),
+    "warn": ("diamond", "var(--fit)"),
+    "bad": ("x", "var(--red)"),
+}
+"""Symbol and colour of the results of a tone: both differ."""
+
+
+def batch_page(records: Sequence[Record], pages: Sequence[str | None]) -> str:
+    """Format the results of several files as a page.
+
+    **Arguments:** `records`, the JSON records of fits and failures; `pages`, the path of each one's own page
+    relative to this one, with slashes, None where there is none.
+    """
+    links = [None if each is None else quote(each) for each in pages]
+    names = _parameters(records)
+    units = {name: _unit(records, name) for name in names}
+    drawn = _figure(records, links, names[0], units[names[0]]) if names else None
+    rows = [_row(record, link, names) for record, link in zip(records, links, strict=True)]
+    counts = Counter(str(record["status"]) for record in records)
+    return page(
+        "batch.html",
+        f"{len(records)} fits",
+        [drawn] if drawn else [],
+        figure=drawn,
+        heads=[(name, units[name]) for name in names],
+        rows=rows,
+        counts=[(status, TONES[Status(status)], number) for status, number in counts.most_common()],
+    )
+
+
+def _parameters(records: Sequence[Record]) -> list[str]:
+    """Names of free parameters, those of the instrument last, without scale and offset."""
+    found = dict.fromkeys(
+        name
+        for record in records
+        for name, p in record["parameters"].items()
+        if p["free"] and not NUISANCE.fullmatch(name)
+    )
+    return sorted(found, key=lambda name: name.startswith("instrument."))[:_MOST_PARAMETERS]
+
+
+def _unit(records: Sequence[Record], name: str) -> str:
+    found = (record["parameters"][name]["unit"] for record in records if name in record["parameters"])
+    return next(found, "")
+
+
+def _row(record: Record, link: str | None, names: Sequence[str]) -> dict[str, Any]:
+    cells = []
+    for name in names:
+        p = record["parameters"].get(name)
+        if p is None or not p["free"] or p["value"] is None:
+            cells.append({"value": "", "text": ""})
+            continue
+        error = "" if p["stderr"] is None else f" ± {p['stderr']:.2g}"
+        cells.append({"value": f"{p['value']:.10g}", "text": f"{p['value']:.6g}{error}"})
+    chi2 = record["chi2_reduced"]
+    return {
+        "name": _name(record),
+        "link": link,
+        "status": str(record["status"]),
+        "tone": TONES[Status(record["status"])],
+        "verdict": record.get("error") or record["verdict"],
+        "cells": cells,
+        "chi2": "" if chi2 is None else f"{chi2:.4g}",
+        "warnings": len(record["warnings"]),
+    }
+
+
+def _name(record: Record) -> str:
+    """The file without its folder, and the spectrum in it."""
+    data = record["data"]
+    data = data[0] if isinstance(data, list) else data
+    spectrum = f" [{data['spectrum']}]" if data.get("spectrum") else ""
+    return PurePosixPath(str(data["path"]).replace("\\", "/")).name + spectrum
+
+
+def _figure(records: Sequence[Record], links: Sequence[str | None], name: str, unit: str) -> dict[str, Any]:
+    """The leading parameter of each file with its standard error, in the order of the files."""
+    traces: list[Trace] = []
+    of_tone = {tone: [status for status, own in TONES.items() if own == tone] for tone in _STYLES}
+    for tone, statuses in of_tone.items():
+        found = [
+            (i, record, record["parameters"][name])
+            for i, record in enumerate(records)
+            if record["status"] in statuses and name in record["parameters"]
+        ]
+        found = [(i, record, p) for i, record, p in found if p["free"] and p["value"] is not None]
+        if not found:
+            continue
+        symbol, colour = _STYLES[tone]
+        traces.append(
+            {
+                "type": "scatter",
+                "mode": "markers",
+                "name": ", ".join(sorted({str(record["status"]) for _, record, _ in found})),
+                "x": [i + 1 for i, _, _ in found],
+                "y": numbers(p["value"] for _, _, p in found),
+                "error_y": {
+                    "array": numbers(np.nan if p["stderr"] is None else p["stderr"] for _, _, p in found),
+                    "color": colour,
+                    "thickness": 1,
+                },
+                "marker": {"symbol": symbol, "color": colour, "size": 8},
+                "text": [escape(_name(record)) for _, record, _ in found],
+                "hovertemplate": "%{text}: %{y:.6g}<extra></extra>",
+                "customdata": [{"link": links[i]} if links[i] else {} for i, _, _ in found],
+            }
+        )
+    label = f"{name} ({unit})" if unit else name
+    caption = (
+        f"Fitted {label} of each file with its standard error. A click on a point opens the page of its fit."
+    )
+    values = [record["parameters"].get(name, {}).get("value") for record in records]
+    columns = [
+        Column("file", np.arange(1.0, len(records) + 1)),
+        Column(label, [np.nan if value is None else value for value in values]),
+    ]
+    panel = Panel(escape(label), 300, traces, [])
+    whole = {"tickformat": "d", **({"dtick": 1} if len(records) < 12 else {})}
+    drawn = figure("results", caption, "number of the file", [panel], columns, axis=whole)
+    drawn["layout"]["hovermode"] = "closest"
+    return drawn

@@ -1,0 +1,123 @@
+"""Section of a surface in the page of a fit: lobes of its BRDF, and a sphere under one lamp."""
+
+from __future__ import annotations
+
+from html import escape
+from io import BytesIO
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from pellicle.brdf.directions import direction, frame
+from pellicle.brdf.models import model
+from pellicle.fitting.program_cache import kept
+from pellicle.rendering.films import with_values
+from pellicle.reporting.page.data_figures import CHANNELS, label
+from pellicle.reporting.page.document import picture
+from pellicle.reporting.page.figure import Column, Panel, Trace, figure, line
+from pellicle.reporting.picture import display
+from pellicle.synthetic.sphere import EYE, sphere
+
+if TYPE_CHECKING:
+    from pellicle.fitting.result import Fit
+    from pellicle.scene.surface import Surface
+
+_INCIDENCES = (15.0, 45.0, 70.0)
+_LEAVING = np.linspace(-88.0, 88.0, 177)
+"""Angles (degrees) of the light and to the eye."""
+_SIZE, _LAMP = 200, 35.0
+"""Pixels across the sphere; angle (degrees) of the lamp from the line of sight, at the upper right."""
+
+
+class Views(NamedTuple):
+    """BRDF (incidences, angles, channels) in the plane of incidence, and radiance (pixels, channels)."""
+
+    lobes: Any
+    pixels: Any
+
+
+@kept
+def _views(name: str, numbers: Any, normals: Any) -> Views:
+    """What is shown of a model by its name: one program for the fit and its rivals, kept between processes.
+
+    `normals` (pixels, 3) are those of the sphere.
+    """
+    brdf = model(name)
+    o = direction(jnp.abs(_LEAVING), jnp.where(_LEAVING >= 0, 180.0, 0.0))
+    i = jnp.stack([jnp.broadcast_to(direction(angle, 0.0), o.shape) for angle in _INCIDENCES])
+    axes = frame(
+        jnp.rad2deg(jnp.arccos(normals[:, 2])), jnp.rad2deg(jnp.arctan2(normals[:, 1], normals[:, 0]))
+    )
+    light, sight = axes @ direction(_LAMP, 60.0), axes @ jnp.asarray(EYE)
+    lit = light[:, 2:] > 0
+    above = jnp.where(lit, light, EYE)  # from below the horizon there is no light
+    pixels = jnp.where(lit, brdf(numbers, above, sight) * light[:, 2:], 0.0)
+    return Views(brdf(numbers, i, jnp.broadcast_to(o, i.shape)), pixels)
+
+
+def section(fit: Fit) -> dict[str, Any]:
+    """The figure of lobes, with those of rivals, and the picture of a sphere."""
+    best = with_values(fit.surface, {name: p.value for name, p in fit.parameters.items()})
+    rivals = [with_values(fit.surface, _numbers(fit, rival.parameters)) for rival in fit.rivals]
+    names = _names(fit.surface)
+    with jax.enable_x64(True):
+        lobes, pixels = _seen(best)
+        of_rivals = [_seen(own).lobes for own in rivals]
+    panels = [_panel(angle, values, names) for angle, values in zip(_INCIDENCES, lobes, strict=True)]
+    others = [
+        (
+            f"rival: {escape(label(rival, fit))}",
+            [_panel(angle, values, names) for angle, values in zip(_INCIDENCES, own, strict=True)],
+        )
+        for rival, own in zip(fit.rivals, of_rivals, strict=True)
+    ]
+    columns = [Column("angle to the eye (degrees)", _LEAVING)]
+    for angle, values in zip(_INCIDENCES, lobes, strict=True):
+        columns += [Column(f"{n}, light at {angle:g}°", x) for n, x in zip(names, values.T, strict=True)]
+    caption = (
+        "BRDF of the fitted surface in the plane of incidence, for light at 15, 45 and 70 degrees. Positive"
+        " angles to the eye are on the side of the mirror direction."
+    )
+    drawn = figure("lobes", caption, "angle to the eye (degrees)", panels, columns, others)
+    return {"lobes": drawn, "sphere": _sphere(pixels)}
+
+
+def _numbers(fit: Fit, parameters: dict[str, float]) -> dict[str, float]:
+    return {name: p.value for name, p in fit.parameters.items()} | parameters
+
+
+def _names(surface: Surface) -> list[str]:
+    count = surface.channels
+    return ["R", "G", "B"] if count == 3 else [f"channel {i + 1}" for i in range(count)]
+
+
+def _seen(surface: Surface) -> Views:
+    numbers = {key: np.asarray(value, dtype=float) for key, value in surface.start_numbers().items()}
+    found = _views(surface.model, numbers, sphere(_SIZE).normal)
+    return Views(*map(np.asarray, found))
+
+
+def _panel(angle: float, values: np.ndarray, names: list[str]) -> Panel:
+    whole = [np.arange(len(_LEAVING))]
+    traces: list[Trace] = [
+        line(_LEAVING, values[:, c], whole, name, CHANNELS[c % len(CHANNELS)])
+        | {"showlegend": angle == _INCIDENCES[0]}
+        for c, name in enumerate(names)
+    ]
+    return Panel(f"light at {angle:g}°", 150, [], traces)
+
+
+def _sphere(radiance: np.ndarray) -> dict[str, str]:
+    """PNG of the sphere: its three channels as red, green and blue, others as the grey of their mean."""
+    from matplotlib.image import imsave
+
+    rgb = radiance if radiance.shape[1] == 3 else np.repeat(radiance.mean(axis=1, keepdims=True), 3, axis=1)
+    file = BytesIO()
+    imsave(file, np.clip(display(sphere(_SIZE).picture(rgb)), 0.0, 1.0), format="png")
+    about = (
+        f"Sphere of the fitted surface under one lamp, {_LAMP:g} degrees from the line of sight, its channels"
+        " shown as red, green and blue."
+    )
+    return picture(file.getvalue(), about)
