@@ -15,7 +15,7 @@ PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
 NOTEBOOKS := $(wildcard notebooks/*.ipynb)
 EXECUTED := executed/done
 
-.PHONY: schema fit fits notebooks test exact coverage docs dist dist-check lint bench verdicts peers properties fuzz tolerance measurements slow clean figures
+.PHONY: schema fit fits notebooks test exact coverage docs dist dist-check lint browser-tests bench verdicts peers properties fuzz tolerance measurements slow clean figures
 
 # on Debian, pip for virtual environments is a separate package; without it, the system's pip is used
 $(VENV)/bin/python:
@@ -78,6 +78,11 @@ dist: $(VENV)/.dev
 PYTHONS ?= python3.11 python3.12 python3.13
 dist-check: $(VENV)/.dev
 	$(BIN)/python scripts/check_distribution.py $(PYTHONS)
+
+# pages of reports in a headless Chromium, which must be installed; half a minute
+browser-tests: $(VENV)/.dev
+	$(BIN)/python -m pip install --quiet --no-compile --editable ".[browser]"
+	$(BIN)/python -m pytest -ra tests/reporting/test_page_in_browser.py
 
 slow: $(VENV)/.dev
 	$(BIN)/python -m pytest -m slow

@@ -13,7 +13,7 @@ import yaml
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
 EXTRAS = PROJECT["optional-dependencies"]
-OF_DEVELOPERS = {"all", "dev", "docs", "notebooks"}
+OF_DEVELOPERS = {"all", "browser", "dev", "docs", "notebooks"}
 MAKEFILE = (ROOT / "Makefile").read_text("utf-8")
 WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
 OTHER_NAMES = {"matplotlib-base": "matplotlib", "python-flatbuffers": "flatbuffers"}

@@ -2,15 +2,21 @@
 
 import json
 import math
+import re
 from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
 import pytest
 
-from pellicle.fitting.result import Rival
+from pellicle.fitting.result import Estimate, Rival
+from pellicle.reporting.json_record import failure, to_json
+from pellicle.reporting.page.batch_page import batch_page
 from pellicle.reporting.page.fit_page import fit_page
 from pellicle.reporting.page.repetition import repetition
+from pellicle.scene.free import Free
+from pellicle.scene.surface import Surface
+from pellicle.synthetic.surface_sphere import in_plane
 
 IMAGE = b"\x89PNG\r\n"
 VOID = {"meta", "img", "input", "br", "link", "hr"}
@@ -108,6 +114,18 @@ def test_the_figure_has_the_data_the_fit_and_the_residuals(curved):
     assert [trace["showlegend"] for trace in second] == [True, False]
 
 
+def test_each_part_of_a_joint_fit_has_its_own_figure_with_its_own_rivals(curved):
+    [part] = curved.parts
+    [curve] = curved.rivals[0].curves
+    other = replace(curve, model=curve.model + 0.1)
+    rival = replace(curved.rivals[0], curves=(curve, other))
+    both = replace(curved, parts=(replace(part, name="one"), replace(part, name="two")), rivals=(rival,))
+    figures = Page(fit_page(both, IMAGE)).figures
+    for i, shown in enumerate((curve, other)):
+        assert np.allclose(figures[f"data-{i}"]["rivals"][0][0]["y"], shown.model, rtol=1e-5)
+    assert figures["data-1"]["layout"]["meta"].startswith("two: ")
+
+
 def test_rivals_are_buttons_where_their_curves_are_known(fit, curved):
     for result, count in ((fit, 0), (curved, 2)):
         buttons = [a for tag, a in Page(fit_page(result, IMAGE)).elements if "data-rival" in a]
@@ -148,3 +166,50 @@ def test_the_page_has_what_repeats_the_fit(fit, tmp_path):
     [(_, command)] = repetition(fit, {"flags": flags, "reading": {"folded": True}})
     assert command == "pellicle fit /data/film.csv --layer 'SiO2 of (me)' --plate-mm 1.0 --folded"
     assert repetition(fit, None) == []
+
+
+def luminance(colour):
+    """Relative luminance of #rrggbb (WCAG 2.2)."""
+    channels = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in channels]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+@pytest.mark.parametrize("mode", [0, 1], ids=["light", "dark"])
+def test_colours_have_the_contrast_of_wcag_aa(fit, mode):
+    """4.5 for text, 3 for lines and markers of figures."""
+    style = Page(fit_page(fit, IMAGE)).scripts["style"]
+    block = style.split(":root {")[mode + 1].split("}")[0]
+    colours = dict(re.findall(r"--([\w-]+): (#\w{6});", block))
+    texts = [(name, back) for name in ("text", "soft", "link") for back in ("page", "panel")]
+    texts += [(tone, back) for tone in ("good", "warn", "bad") for back in ("page", f"{tone}-back")]
+    lines = "data", "fit", "rival", "index-n", "index-k", "red", "green", "blue", "fourth", "focus"
+    pairs = [(*pair, 4.5) for pair in texts] + [(name, "page", 3.0) for name in lines]
+    for one, other, least in pairs:
+        low, high = sorted((luminance(colours[one]), luminance(colours[other])))
+        assert (high + 0.05) / (low + 0.05) >= least, (one, other)
+
+
+def test_the_page_of_a_batch_escapes_and_links(fit):
+    nasty = "<img src=x onerror=alert(1)>.csv"
+    records = [failure(f"/data/{nasty}", nasty), to_json(fit)]
+    page = Page(batch_page(records, [None, "a b/%41.html"]))
+    links = [attributes["href"] for tag, attributes in page.elements if tag == "a"]
+    assert links == ["summary.csv", "a%20b/%2541.html"]
+    assert page.text.count(nasty) == 2
+    assert "img" not in [tag for tag, _ in page.elements]
+    [trace] = page.figures["results"]["traces"]
+    assert (trace["x"], trace["y"], trace["error_y"]["array"]) == ([2], [486.28], [3.6])
+    assert trace["customdata"] == [{"link": "a%20b/%2541.html"}]
+
+
+def test_a_page_of_a_surface_has_the_lobes_of_the_fitted_numbers(brdf_fit):
+    numbers = {"n": [1.5], "exponent": 20.0, "diffuse": 0.1}
+    free = Surface("blinn-phong-film", numbers | {"thickness": Free(10.0, 500.0)}, (550.0,))
+    parameters = {"thickness": Estimate("thickness", 40.0, 1.0, "nm", 10.0, 500.0, True)}
+    page = Page(fit_page(replace(brdf_fit, scene=free, parameters=parameters), IMAGE))
+    fitted = Surface("blinn-phong-film", numbers | {"thickness": 40.0}, (550.0,))
+    exact = in_plane(fitted, 45.0, np.linspace(-88.0, 88.0, 177))
+    [drawn] = [trace for trace in page.figures["lobes"]["traces"] if trace["yaxis"] == "y2"]
+    assert np.allclose(drawn["y"], exact[:, 0], rtol=1e-5)
+    assert [tag for tag, _ in page.elements].count("img") == 2
