@@ -164,7 +164,7 @@ def _mueller(part: Part) -> _Drawn:
             strokes = mueller_figure.unbroken(x, points)
             trace = line(x, curve.model[:, column], strokes, label, _LINES[i % len(_LINES)])
             of_model.append(trace | {"showlegend": not column})
-            own = line(x, curve.residual[:, column], strokes, name, _CHANNELS[column % len(_CHANNELS)])
+            own = line(x, curve.residual[:, column], strokes, name, CHANNELS[column % len(CHANNELS)])
             residuals.append(own | {"showlegend": False})
         of_data = markers(x, curve.data[:, column], "data", "var(--data)") | {"showlegend": not column}
         panels.append(Panel(name, 110, [of_data], of_model))

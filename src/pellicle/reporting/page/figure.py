@@ -17,8 +17,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 Trace = dict[str, Any]
-_GAP = 0.07
-"""Space between panels, as a share of the height of all."""
+_GAP, _AROUND = 34, 98
+"""Pixels between panels, and above and below them."""
 MOST_POINTS = 4000
 """Points of a line or a cloud of markers above which every other one, or fewer, is drawn."""
 
@@ -59,10 +59,10 @@ def figure(
     each rival, of which the model is drawn; `axis`, added to the abscissa's layout.
     """
     heights = np.array([panel.height for panel in panels], dtype=float)
-    shares = heights / heights.sum() * (1 - _GAP * (len(panels) - 1))
+    inside = heights.sum() + _GAP * (len(panels) - 1)
     layout: dict[str, Any] = {
         "meta": caption,
-        "height": int(heights.sum()) + 110,
+        "height": int(inside) + _AROUND,
         "margin": {"l": 60, "r": 12, "t": 50, "b": 48},
         "paper_bgcolor": "var(--page)",
         "plot_bgcolor": "var(--page)",
@@ -74,10 +74,10 @@ def figure(
         "xaxis": _axis(abscissa) | {"anchor": _axis_name("y", len(panels))} | dict(axis or {}),
     }
     top = 1.0
-    for number, (panel, share) in enumerate(zip(panels, shares.tolist(), strict=True), start=1):
+    for number, (panel, share) in enumerate(zip(panels, (heights / inside).tolist(), strict=True), start=1):
         place = {"domain": [max(top - share, 0.0), top], "anchor": "x"}
         layout[_axis_name("yaxis", number)] = _axis(panel.label) | place | dict(panel.axis)
-        top -= share + _GAP
+        top -= share + _GAP / inside
     return {
         "id": name,
         "traces": _placed([[*panel.data, *panel.model] for panel in panels]),

@@ -18,11 +18,11 @@ from pellicle.reporting.page.data_figures import CHANNELS, label
 from pellicle.reporting.page.document import picture
 from pellicle.reporting.page.figure import Column, Panel, Trace, figure, line
 from pellicle.reporting.picture import display
+from pellicle.scene.surface import Surface
 from pellicle.synthetic.sphere import EYE, sphere
 
 if TYPE_CHECKING:
     from pellicle.fitting.result import Fit
-    from pellicle.scene.surface import Surface
 
 _INCIDENCES = (15.0, 45.0, 70.0)
 _LEAVING = np.linspace(-88.0, 88.0, 177)
@@ -59,8 +59,7 @@ def _views(name: str, numbers: Any, normals: Any) -> Views:
 
 def section(fit: Fit) -> dict[str, Any]:
     """The figure of lobes, with those of rivals, and the picture of a sphere."""
-    best = with_values(fit.surface, {name: p.value for name, p in fit.parameters.items()})
-    rivals = [with_values(fit.surface, _numbers(fit, rival.parameters)) for rival in fit.rivals]
+    best, *rivals = (_at(fit, changed) for changed in ({}, *(rival.parameters for rival in fit.rivals)))
     names = _names(fit.surface)
     with jax.enable_x64(True):
         lobes, pixels = _seen(best)
@@ -84,8 +83,12 @@ def section(fit: Fit) -> dict[str, Any]:
     return {"lobes": drawn, "sphere": _sphere(pixels)}
 
 
-def _numbers(fit: Fit, parameters: dict[str, float]) -> dict[str, float]:
-    return {name: p.value for name, p in fit.parameters.items()} | parameters
+def _at(fit: Fit, changed: dict[str, float]) -> Surface:
+    """The fitted surface, with some of its numbers changed."""
+    values = {name: p.value for name, p in fit.parameters.items()} | changed
+    found = with_values(fit.surface, values)
+    assert isinstance(found, Surface)
+    return found
 
 
 def _names(surface: Surface) -> list[str]:
