@@ -14,6 +14,7 @@ from pellicle.dispersion.oscillators import AbstractOscillator
 from pellicle.errors import UsageError, did_you_mean
 from pellicle.materials.files import SUFFIXES as MATERIAL_SUFFIXES
 from pellicle.recipes import media_words
+from pellicle.recipes.anisotropic_media import AnisotropicTable, anisotropic_medium
 from pellicle.recipes.dispersion_models import (
     MODELS,
     SPLINES,
@@ -115,7 +116,7 @@ class MixTable(BaseModel):
     mix: str = Field(json_schema_extra={"enum": [*MIXTURES]})
 
 
-Medium = str | float | MediumTable | MixTable | GradedTable
+Medium = str | float | MediumTable | MixTable | GradedTable | AnisotropicTable
 _MEDIUM: TypeAdapter[Any] = TypeAdapter(Medium)
 
 
@@ -149,6 +150,8 @@ def medium(value: Medium, folder: Path, name: str = "material") -> AbstractDispe
 
     Raises UsageError, or DataError for a table that cannot be read.
     """
+    if isinstance(value, AnisotropicTable):
+        return anisotropic_medium(value, lambda key, each: _component(key, each, folder), _parameter)
     if isinstance(value, GradedTable):
         return graded_medium(value, lambda key, each: _component(key, each, folder), _parameter)
     if isinstance(value, MixTable):

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 import jax
 import numpy as np
 
+from pellicle.dispersion.anisotropic import Anisotropic
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.effective_medium import MIXTURES
 from pellicle.dispersion.empirical import Constant, Shifted
@@ -127,6 +128,11 @@ def free_numbers(dispersion: AbstractDispersion, items: Iterable[str]) -> Abstra
         if isinstance(dispersion, Graded):
             raise UsageError("cannot free numbers of a graded material: give bounds to those of its profile")
         name, _, words = item.partition("=")
+        if isinstance(dispersion, Anisotropic) and (name in ("n", "k") or name.startswith("axis_")):
+            raise UsageError(
+                f"cannot free {name!r} of a birefringent layer: in the recipe, give bounds to its principal"
+                " media, or to the angles of its axis"
+            )
         bounds = parse_range(words, f"the range of {name}") if words else None
         if name in ("n", "k"):
             dispersion = _free_index(dispersion, name, bounds)
