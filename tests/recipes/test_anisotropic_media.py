@@ -9,9 +9,9 @@ from pellicle.errors import DataError
 from pellicle.fitting.spectra.parameters import parameters
 from pellicle.recipes.read import read_recipe
 
-LAYER = (
-    "{ ordinary = 1.5, extraordinary = { model = 'constant', n = { lower = 1.5, upper = 2 } }, axis = AXIS }"
-)
+FREE = "{ model = 'constant', n = { lower = 1.5, upper = 2 } }"
+LAYER = f"{{ ordinary = 1.5, extraordinary = {FREE}, axis = AXIS }}"
+BIREFRINGENT = "{ ordinary = 1.5, extraordinary = 1.6 }"
 
 
 def scene(tmp_path, material: str, more: str = ""):
