@@ -1,5 +1,6 @@
 """Ψ and Δ from plain columns: every way they are written, and one sentence where they cannot be."""
 
+import re
 from functools import partial
 
 import numpy as np
@@ -322,5 +323,7 @@ def test_other_quantities_of_ellipsometers_are_named(tmp_path, header, words):
     path = tmp_path / "other.csv"
     path.write_text(f"{header}\n2,0.1,0.2\n3,0.3,0.4\n")
     first, second = header.split(",")[1:]
-    with pytest.raises(DataError, match=f"'{first}', '{second}' are neither .* psi and delta"):
+    with pytest.raises(
+        DataError, match=f"'{re.escape(first)}', '{re.escape(second)}' are neither .* psi and delta"
+    ):
         read_spectrum(path, **words)
