@@ -20,19 +20,21 @@ from pellicle.errors import DataError, UsageError
 
 _REMEDY = "correct or delete that row"
 _EXAMPLE = '`columns=["wavelength", "angle", "m12", "m33", "m34"]`'
+_MOST_LISTED = 6
 _NORMALISED = 1e-3
 """Deviation of m11 from 1 by rounding."""
 
 
 @dataclass(frozen=True)
 class MuellerColumns:
-    """Columns of elements, m11 or None, standard deviations (one for each element, one for all, or none), and
-    sentences on the choice."""
+    """Columns of elements, of m11 and of the sample's azimuth (or None), and of standard deviations (one for
+    each element, one for all, or none), and sentences on the choice."""
 
     wavelength: Column
     angle: Column | None
     values: tuple[Column, ...]
     m11: Column | None
+    azimuth: Column | None
     errors: tuple[Column, ...]
     notes: tuple[str, ...]
 
@@ -76,13 +78,13 @@ def mueller_columns(
             )
     wavelength, angle = wavelength_and_angle(table, columns, _EXAMPLE)
     errors, notes = _error_columns(table, columns, values)
-    m11 = present["m11"]
-    read = [wavelength, *values, *errors, *([m11] if m11 else []), *([angle] if angle else [])]
+    m11, azimuth = present["m11"], only(table, columns, "azimuth")
+    read = [wavelength, *values, *errors, *(column for column in (m11, azimuth, angle) if column)]
     ignored = [c for c in columns if c not in read and c.name not in ("_", "")]
     said = [f"{listed([wavelength])} read as the wavelength, {listed(values)} as Mueller elements", *notes]
     said += [f"{listed([angle])} read as the angle of incidence in degrees"] if angle else []
     said += [f"ignored: {listed(ignored)}"] if ignored else []
-    return MuellerColumns(wavelength, angle, values, m11, errors, tuple(said))
+    return MuellerColumns(wavelength, angle, values, m11, azimuth, errors, tuple(said))
 
 
 def _error_columns(
@@ -111,6 +113,7 @@ def read_mueller(
 ) -> Spectrum:
     """Read the chosen elements; other arguments as in `read_spectrum`. Raises DataError or UsageError."""
     unit = axis_unit(table, chosen.wavelength, wavelength_unit)
+    _check_azimuth(table, chosen.azimuth)
     cells = (*chosen.values, *chosen.errors, *([chosen.m11] if chosen.m11 else []))
     wavelength, angle, read = read_axis(table, chosen.wavelength, chosen.angle, cells, unit)
     count = len(chosen.values)
@@ -154,6 +157,21 @@ def read_mueller(
         sha256=table.sha256,
         notes=tuple(notes),
     )
+
+
+def _check_azimuth(table: Table, column: Column | None) -> None:
+    """Raise DataError for several azimuths of the sample: rows of them are no repeats."""
+    if column is None:
+        return
+    [azimuths] = table.numbers([column.position])
+    several = np.unique(azimuths)
+    if len(several) > 1:
+        listed = ", ".join(f"{azimuth:g}" for azimuth in several[:_MOST_LISTED])
+        more = ", ..." if len(several) > _MOST_LISTED else ""
+        raise DataError(
+            f"{table.path}: {table.label(column.position)} has {len(several)} azimuths of the sample"
+            f" ({listed}{more}), which are measurements of their own; write each into its own file"
+        )
 
 
 def _normalised(

@@ -41,6 +41,7 @@ NAMES: dict[str, tuple[str, ...]] = {
     "dark counts": ("dark counts",),
     "sigma": ("sigma", "σ"),
     "angle": ("angle", "aoi", "angle of incidence", "angle_of_incidence"),
+    "azimuth": ("azimuth", "sample azimuth", "sample_azimuth", "sample rotation"),
     "psi": ("psi", "ψ"),
     "delta": ("delta", "δ"),
     "sigma_psi": ("sigma_psi", "psi_sigma", "psi_err", "psi_error", "err_psi"),

@@ -32,6 +32,7 @@ _OTHER_UNITS = ("a.u.", "abs", "abs.", "a", "counts", "deg", "°")
 _UNIT_OF = {
     "wavelength": units.wavelength_unit,
     "angle": units.angle_unit,
+    "azimuth": units.angle_unit,
     "psi": units.angle_unit,
     "delta": units.angle_unit,
     "analyser": units.angle_unit,
