@@ -39,6 +39,8 @@ EXIT_4 = (
 )
 """Their fits do not converge to one answer (exit code 4), as their pages say."""
 SLOW = {
+    "pellicle fit partial.csv --recipe docs/examples/partial_window.toml": "compiles for 6 s; "
+    "tests/fitting/spectra/test_back_collected.py fits these data",
     **{
         f"pellicle chart docs/surfaces/{name}.toml": "one sphere of eight is drawn here"
         for name in (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -69,7 +70,11 @@ def comparison(spectra: Sequence[Target], ranked: RankedMinima) -> Comparison | 
     )
     if any(plate.back_collected is not None for plate in backs):
         return Comparison(*rms)
-    return Comparison(*rms, *_collected(without, ranked, dependent))
+    share, explains = _collected(without, ranked, dependent)
+    # no light from the back face may explain them as well
+    if share is None or rms[0] * math.sqrt(1 - explains) > rms[1] / 1.05:
+        return Comparison(*rms)
+    return Comparison(*rms, share, explains)
 
 
 def _collected(
