@@ -110,7 +110,7 @@ def test_the_figure_has_the_data_the_fit_and_the_residuals(curved):
     second = figure["rivals"][1]
     assert np.allclose(second[0]["y"], curve.model + 0.02, rtol=1e-5)
     assert np.allclose(second[1]["y"], curve.residual - 0.02, rtol=1e-5)
-    assert second[0]["name"] == "rival: A 1.4"
+    assert second[0]["name"] == "rival: thickness 963.57 nm"
     assert [trace["showlegend"] for trace in second] == [True, False]
 
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from pellicle.fitting.result import Fit, Part, Rival
 
 CHANNELS = "var(--red)", "var(--green)", "var(--blue)", "var(--fourth)"
-_LINES = "var(--fit)", "var(--index-n)", "var(--green)", "var(--fourth)"
+_LINES = "var(--fit)", "var(--blue)", "var(--green)", "var(--fourth)"
 _SIGNALS = {"R": "reflectance", "T": "transmittance"}
 _PROFILE_POINTS = 1500
 """Ranges of thickness of which the least and the largest misfit are drawn: a scan may have 400 000 points."""
@@ -36,10 +36,10 @@ _LINEAR = 0.8
 
 
 def label(rival: Rival, fit: Fit) -> str:
-    """`thickness 242.87 nm`: the first free parameter of a rival."""
-    name, value = next(iter(rival.parameters.items()))
+    """`thickness 242.87 nm`: the leading parameter of the fit, with a rival's value."""
+    name = next(iter([name for name in fit.parameters if name in rival.parameters] or rival.parameters))
     unit = fit.parameters[name].unit if name in fit.parameters else ""
-    return f"{name} {value:.5g} {unit}".rstrip()
+    return f"{name} {rival.parameters[name]:.5g} {unit}".rstrip()
 
 
 def of_part(fit: Fit, number: int) -> dict[str, Any]:

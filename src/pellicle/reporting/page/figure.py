@@ -63,7 +63,7 @@ def figure(
     layout: dict[str, Any] = {
         "meta": caption,
         "height": int(inside) + _AROUND,
-        "margin": {"l": 60, "r": 12, "t": 50, "b": 48},
+        "margin": {"l": 68, "r": 12, "t": 50, "b": 48},
         "paper_bgcolor": "var(--page)",
         "plot_bgcolor": "var(--page)",
         "font": {"color": "var(--text)", "size": 13},
@@ -99,7 +99,6 @@ def _axis(label: str) -> dict[str, Any]:
         "gridcolor": "var(--line)",
         "zerolinecolor": "var(--line)",
         "linecolor": "var(--line)",
-        "automargin": True,
     }
 
 

@@ -30,7 +30,7 @@ TONES = {
 """Class of the page's style for each status."""
 _MOST_FIGURES = 40
 """Parts of a joint fit that have an interactive figure: each takes the browser some 0.1 s."""
-_FAINT = 0.55
+_FAINT = 0.4
 """Opacity of the background of a correlation of ±1; text on it keeps its contrast."""
 
 
@@ -173,7 +173,7 @@ def _plan(part: Part) -> Table:
         for row in part.plan.rows
     ]
     name = f"{part.name}: effects" if part.name else "Effects"
-    return Table(f"{name} of the simulation", ("effect", "", "error bound", "why"), rows)
+    return Table(f"{name} of the simulation", ("effect", "simulated", "error bound", "why"), rows)
 
 
 def _statistics(fit: Fit) -> Table:
