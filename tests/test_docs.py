@@ -75,6 +75,7 @@ CI = ("make fit", "make test", "make notebooks", "make docs", "make dist")
 _LONG_STUDY = "takes hours; its tables are kept, and the modules that it uses have their own tests"
 ELSEWHERE = {
     **dict.fromkeys(CI, "run by CI: .ci/run"),
+    "make browser-tests": "needs Chromium; tests/reporting/test_page_in_browser.py",
     "make dist-check": "installs the wheel for every Python found; .ci/run: make dist",
     "make fits": "tests/test_fits.py: one study in every run, all of them in make slow",
     **dict.fromkeys(("make slow", "make coverage"), "run these tests"),
