@@ -44,8 +44,8 @@ def rows(plan: Plan, groups: list[CoherentGroup]) -> list[Any]:
 def finished(plan: Plan, sums: Sequence[Any]) -> Sequence[Any]:
     """Return the rows of the signal from averaged sums of intensities."""
     if plan.signal == "mueller":
-        elements = jnp.stack(sums, axis=-1).reshape(*sums[0].shape, 4, 4)
-        return [normalised(elements)[..., i // 4, i % 4] for i in range(1, 16)]
+        elements = normalised(jnp.stack(sums, axis=-1).reshape(*sums[0].shape, 4, 4))
+        return [elements[..., i // 4, i % 4] for i in range(1, 16)]
     if plan.signal == "psi-delta":
         return ellipsometry.normalised(ellipsometry.Stokes(*sums))
     return sums if len(sums) == 1 else [0.5 * (sums[0] + sums[1])]
