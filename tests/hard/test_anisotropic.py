@@ -24,7 +24,8 @@ CASES = TABLE["cases"]
 POINTS = np.array([case["at"] for case in CASES.values()])
 pytestmark = pytest.mark.slow  # compiles for a minute; tests/optics/test_berreman.py: random stacks
 
-VALUE, SLOPE = 1e-12, 1e-9
+VALUE, SLOPE = 3e-12, 1e-10
+"""Layers of 1 mm need these: 2e4 radians are rounded to 4e-12. All others are within 5e-13 and 1e-11."""
 
 
 def outputs(as_tensors, d, no, ko, ne, ke, theta, phi, so, se, sk, theta_s, phi_s, n0, angle, wavelength):

@@ -54,10 +54,13 @@ def propagation(medium: Tensor, a: Any, k: Any, direction: Any = 1.0) -> Propaga
     def product(one: Any, other: Any) -> Any:
         return jnp.sum(one[:, :, None] * other[None], axis=1)
 
-    double = jnp.finfo(growth.dtype).bits == 64
-    rest = jnp.zeros_like(small)
-    for n_term in range(14 if double else 8, 0, -1):
-        rest = (small + product(small, rest)) / n_term
+    # Horner's rule, in a loop: unrolled, it takes a minute to compile with its derivatives
+    terms = 14 if jnp.finfo(growth.dtype).bits == 64 else 8
+
+    def add_term(i: Any, rest: Any) -> Any:
+        return (small + product(small, rest)) / (terms - i)
+
+    rest = jax.lax.fori_loop(0, terms, add_term, jnp.zeros_like(small))
 
     def square(i: Any, rest: Any) -> Any:
         return jnp.where(i < count, 2 * rest + product(rest, rest), rest)

@@ -9,10 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 
 from pellicle.optics.berreman.matrices import Matrix
-from pellicle.optics.characteristic import matrix_elements, scale_exponent
+from pellicle.optics.characteristic import is_real_array, matrix_elements, scale_exponent
 from pellicle.optics.elementary import sincos
 from pellicle.optics.pair import Number, Pair, imag, real, where
 
@@ -27,28 +28,40 @@ class Propagation(NamedTuple):
     growth: Any  # real: the exponent of the mode that grows most
 
 
-class Elements(NamedTuple):
-    """cos(k√Q) and sin(k√Q)/√Q, both times exp(−growth)."""
-
-    c: Number
-    f: Number
-
-
 def full(number: Number) -> Pair:
     """Return a number as a `Pair` of two arrays, which promises nothing."""
-    return Pair(real(number) * jnp.ones(()), imag(number) + 0.0 * real(number))
+    return Pair(jnp.asarray(real(number)) * 1.0, imag(number) + 0.0 * real(number))
 
 
-def exp(z: Pair) -> Pair:
-    """Return the exponential of a `Pair`."""
-    size, (sine, cosine) = jnp.exp(z.re), sincos(z.im)
+def exp(z: Number) -> Number:
+    """Return the exponential of a real array or a `Pair`."""
+    if not isinstance(z, Pair):
+        return jnp.exp(z)
+    sine, cosine = sincos(z.im)
+    if z.re is None:
+        return Pair(cosine, sine)
+    size = jnp.exp(z.re)
     return Pair(size * cosine, size * sine)
 
 
 def elements_and_exponent(Q: Number, k: Any) -> tuple[Number, Number, Number]:
     """Return c and f times e^x, and x, whose slope is that of the scale: see `matrix_elements`."""
-    scaled = matrix_elements(full(Q), k)
-    return scaled.c, scaled.f, scale_exponent(full(Q), k)
+    scaled = matrix_elements(Q, k)
+    return scaled.c, scaled.f, (_real_exponent if is_real_array(Q) else scale_exponent)(Q, k)
+
+
+@jax.custom_jvp
+def _real_exponent(Q: Any, k: Any) -> Any:
+    """Return x for a real Q: 0 where the wave propagates, −k√−Q where it is evanescent."""
+    return jnp.where(Q < 0, -k * jnp.sqrt(jnp.abs(Q)), 0.0)
+
+
+@_real_exponent.defjvp
+def _real_exponent_slope(primal: Any, tangent: Any) -> tuple[Any, Any]:
+    (Q, k), (dQ, dk) = primal, tangent
+    varies = (Q < 0) & (jnp.abs(k * k * Q) >= 0.01)  # as in `matrix_elements`
+    root = jnp.sqrt(jnp.where(varies, -Q, 1.0))
+    return _real_exponent(Q, k), jnp.where(varies, (Q * dk + 0.5 * k * dQ) / root, 0.0)
 
 
 def select(test: Any, yes: Matrix, no: Matrix) -> Matrix:

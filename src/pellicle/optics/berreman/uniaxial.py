@@ -84,20 +84,20 @@ def propagation(medium: Uniaxial, a: Any, k: Any, direction: Any = 1.0) -> Propa
     x, y, _ = medium.axis
     c, f, exponent = elements_and_exponent(t.Q, k)
     c_e, f_e, exponent_e = elements_and_exponent(t.W, k)
-    drift = times_i(k * full(t.mu))
-    exponent_e = exponent_e + drift
-    growth = jax.lax.stop_gradient(jnp.maximum(-real(exponent), -real(exponent_e)))
-    factor, factor_e = exp(-exponent - growth), exp(-exponent_e - growth)
+    drift = times_i(k * t.mu)
+    growth = jnp.maximum(-real(exponent), -real(exponent_e) - real(drift))
+    growth = jax.lax.stop_gradient(growth)
+    factor, factor_e = exp(-exponent - growth), exp(-exponent_e - drift - growth)
     c, f, c_e, f_e = c * factor, f * factor, c_e * factor_e, f_e * factor_e
 
     # γX and γX′ from two linear equations; they do not divide by γ
-    sines, cosines = f - f_e, c - c_e - times_i(full(t.mu)) * f_e
+    sines, cosines = f - f_e, c - c_e - times_i(t.mu) * f_e
     determinant = t.zeta * t.zeta - t.eta * t.eta * t.Q
     size = abs2(t.zeta) + abs2(t.eta) * jnp.sqrt(abs2(t.Q) + jnp.finfo(growth.dtype).tiny)
     near = jax.lax.stop_gradient(abs2(determinant) <= (ALONG_AXIS * size) ** 2)
     inverse = 1 / where(near, 1.0 + 0.0 * determinant, determinant)
-    X = (t.zeta * sines - times_i(full(t.eta)) * cosines) * inverse
-    Y = (t.zeta * cosines + times_i(full(t.eta)) * t.Q * sines) * inverse
+    X = (t.zeta * sines - times_i(t.eta) * cosines) * inverse
+    Y = (t.zeta * cosines + times_i(t.eta) * t.Q * sines) * inverse
     shape = jnp.broadcast_shapes(jnp.shape(near), jnp.shape(real(X)))
     X, Y, near = _broadcast(X, shape), _broadcast(Y, shape), jnp.broadcast_to(near, shape)
 
