@@ -1,9 +1,9 @@
 """Interactive figures as Plotly's dictionaries: panels that share one abscissa, and overlays of rivals.
 
-Plotly's basic bundle of version 4.1.1 (MIT licence) is a file of this package, 0.4 MB compressed, and each
-page includes it. Of the alternatives with zooming and labels, the Python packages plotly and Bokeh add 4.8
-and 1.3 MB of script to each page, and Bokeh's figures need it at import (0.5 s); Altair's need 0.8 MB for
-Vega and are slower to draw. The dictionaries need no Python package.
+Plotly's basic bundle of version 4.1.1 (npm plotly.js-basic-dist-min, MIT licence) is a file of this package,
+1.2 MB or compressed 0.4 MB, which each page includes. The script in the Python package plotly has 4.8 MB,
+that of Bokeh 1.3 MB (versions 7.1.0 and 3.9.2), and both would be an optional dependency: these
+dictionaries need no Python package.
 
 Colours are names of the page's style, `var(--fit)`, which differ between light and dark pages. Labels of
 Plotly take some HTML: names of files must be escaped.

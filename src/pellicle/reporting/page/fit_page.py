@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 from pellicle.fitting.result import ColourCurve, Status
@@ -29,7 +28,7 @@ TONES = {
 }
 """Class of the page's style for each status."""
 _MOST_FIGURES = 40
-"""Parts of a joint fit that have an interactive figure: each takes the browser some 0.1 s."""
+"""Parts of a joint fit that have an interactive figure; the CSV file has them all."""
 _FAINT = 0.4
 """Opacity of the background of a correlation of ±1; text on it keeps its contrast."""
 
@@ -208,8 +207,3 @@ def _swatches(part: Part) -> dict[str, Any]:
 
 def _hex(rgb: Any) -> str:
     return "#" + "".join(f"{round(255 * min(max(float(x), 0.0), 1.0)):02x}" for x in rgb)
-
-
-def stem(path: str) -> str:
-    """Name of a file without its folder, whatever system wrote the path."""
-    return PurePath(path.replace("\\", "/")).name
