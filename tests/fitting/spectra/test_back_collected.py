@@ -42,6 +42,7 @@ def test_a_share_of_all_is_a_limit():
     assert any("compatible with 1: it is at least" in said for said in fit.warnings)
 
 
+@pytest.mark.slow  # two fits, each with the simulated effects of a back face
 def test_a_whole_back_face_says_what_part_would_explain_the_data(measured):
     verdict = pl.fit(measured, scene(pl.Free(50, 400))).verdict
     assert "about 40 % is collected would explain" in verdict
