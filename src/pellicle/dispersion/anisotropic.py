@@ -54,7 +54,7 @@ class Anisotropic(AbstractDispersion):
         if len(axis) not in ((2,) if uniaxial else (2, 3)):
             raise ValueError(f"`axis`: expected (theta, phi){'' if uniaxial else ' or (theta, phi, psi)'}")
         self.x, self.y, self.z = (ordinary, None, extraordinary) if uniaxial else (x, y, z)
-        self.theta, self.phi, self.psi = (*axis, 0.0)[:3]
+        self.theta, self.phi, self.psi = (*axis, None if uniaxial else 0.0)[:3]
         self.order = _axis_order(self.theta, self.phi, None if uniaxial else self.psi)
 
     def with_media(self, convert: Callable[[Any], AbstractDispersion]) -> Anisotropic:
@@ -85,12 +85,10 @@ class Anisotropic(AbstractDispersion):
         if self.order is not None:
             return Principal(*((x, y, z)[i] for i in self.order))
         xp = namespace(self.theta, self.phi, self.psi, wavelength)
-        theta, phi, psi = (xp.deg2rad(angle * 1.0) for angle in (self.theta, self.phi, self.psi))
-        return (
-            uniaxial(x, z, theta, phi)
-            if self.y is None
-            else permittivity(Principal(x, y, z), theta, phi, psi)
-        )
+        theta, phi = (xp.deg2rad(angle * 1.0) for angle in (self.theta, self.phi))
+        if self.y is None:
+            return uniaxial(x, z, theta, phi)
+        return permittivity(Principal(x, y, z), theta, phi, xp.deg2rad(self.psi * 1.0))
 
 
 def _axis_order(theta: Any, phi: Any, psi: Any) -> tuple[int, int, int] | None:
