@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import jax
 import numpy as np
 
 from pellicle.dispersion.base import known_index
+from pellicle.dispersion.empirical import Scaled, Tabulated
 from pellicle.effects.bounds import least_ambient, normal_incidence, upper
 from pellicle.effects.plan import Row
 from pellicle.optics.gradient import coefficients, gauss_points
 from pellicle.optics.pair import imag, real, sqrt
 from pellicle.scene.film import Group, Scene, groups, is_graded, with_wavelength
-from pellicle.scene.free import free_leaves, insert, start_values
+from pellicle.scene.free import free_leaves, insert, is_free, start_values
 from pellicle.scene.graded import Graded
 from pellicle.scene.layers import Layer
 
@@ -64,7 +66,10 @@ def _scenes(scene: Scene) -> list[Scene]:
     at, angle = np.asarray(scene.light.wavelength, dtype=float), scene.light.angle
     chosen = np.linspace(0, at.size - 1, _WAVELENGTHS).round().astype(int)
     chosen = np.unique([*chosen, int(np.argmin(at))])
-    few = with_wavelength(scene, at[chosen], np.asarray(angle)[chosen] if np.ndim(angle) else angle)
+    few = jax.tree_util.tree_map(
+        lambda x: _at(x, at, chosen), scene, is_leaf=lambda x: is_free(x) or isinstance(x, Tabulated | Scaled)
+    )
+    few = with_wavelength(few, at[chosen], np.asarray(angle)[chosen] if np.ndim(angle) else angle)
     free = [leaf for _, leaf in free_leaves(few)]
     if 2 ** len(free) < _SCENES:
         corners = list(itertools.product(*[(f.lower, f.upper) for f in free]))
@@ -73,6 +78,17 @@ def _scenes(scene: Scene) -> list[Scene]:
         sides[0] = 1  # the thickest of all layers
         corners = [[(f.lower, f.upper)[side] for f, side in zip(free, row, strict=True)] for row in sides]
     return [insert(few, values) for values in (start_values(few), *corners)]
+
+
+def _at(medium: Any, wavelength: np.ndarray, chosen: np.ndarray) -> Any:
+    """A medium that is given at each wavelength, at the chosen ones; anything else as it is."""
+
+    def part(x: Any) -> Any:
+        return np.broadcast_to(np.asarray(x), wavelength.shape)[chosen]
+
+    if isinstance(medium, Scaled):
+        return replace(medium, base=_at(medium.base, wavelength, chosen), shape=part(medium.shape))
+    return jax.tree_util.tree_map(part, medium) if isinstance(medium, Tabulated) else medium
 
 
 def _least_count(scene: Scene) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, final
 
 import equinox as eqx
@@ -72,7 +73,7 @@ class Graded(AbstractDispersion):
 
     def with_media(self, change: Callable[[AbstractDispersion], AbstractDispersion]) -> Graded:
         """Return the graded medium with both of its media changed."""
-        return eqx.tree_at(lambda m: (m.first, m.second), self, (change(self.first), change(self.second)))
+        return replace(self, first=change(self.first), second=change(self.second))
 
 
 @final
