@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -40,11 +40,12 @@ EFFECTS = (
 """Every effect of a film, in the order of a plan."""
 
 
-def exact(scene: Scene) -> Plan:
-    """The effects that a scene has, judged from its types and bounds.
+def exact(scene: Scene, given: Sequence[Row] = ()) -> Plan:
+    """The effects that a scene has, judged from its types and bounds; rows that are `given` are not judged.
 
     An effect is off only where it is provably absent; its error bound is 0. The orders, nodes and rays of
     an average have a bound above 0 (see `effects.averaging`).
     """
-    rows = tuple(effect.judge(scene) for effect in EFFECTS)
+    known = {row.effect: row for row in given}
+    rows = tuple(known.get(effect.name) or effect.judge(scene) for effect in EFFECTS)
     return Plan(rows, scene.light.signal, scene.light.polarisation)

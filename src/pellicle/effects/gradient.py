@@ -20,7 +20,7 @@ from pellicle.scene.free import free_leaves, insert, is_free, start_values
 from pellicle.scene.graded import Graded
 from pellicle.scene.layers import Layer
 
-GRADIENT_ERROR = 1e-7
+GRADIENT_ERROR = 1e-6
 """Error of R, T, or N, C and S that the slices may make: below the noise of any spectrum."""
 COUNTS = tuple(m * 2**e for e in range(1, 11) for m in (2, 3))
 """Numbers of slices that are tried, each of which is compared with twice as many."""
@@ -128,6 +128,7 @@ class _Response(NamedTuple):
     powers: tuple[np.ndarray, ...]
 
 
+@np.errstate(all="ignore")
 def _response(group: Group, count: int, at: np.ndarray, a: np.ndarray, polarisation: str) -> _Response:
     """Response of a smooth group: the product of the matrices of its slices, by pairs."""
     product, decay = np.eye(2)[:, :, None] + 0j * at, np.zeros_like(at)

@@ -30,7 +30,7 @@ from pellicle.optics.interface import (
     transverse,
     zero_where,
 )
-from pellicle.optics.pair import Number, abs2, to_complex
+from pellicle.optics.pair import Number, Pair, abs2, is_real, to_complex
 from pellicle.optics.principal_axes import tangential_permittivity
 from pellicle.optics.response import Amplitudes, Response
 
@@ -50,7 +50,7 @@ def stack(
     """
     a, q0 = transverse(ambient, angle)
     rows = _rows((ambient, substrate, a), layers, phases, roughness)
-    shape, dtype = rows.depth.shape[1:], jax.tree.leaves(rows.points)[0].dtype
+    shape, dtype = rows.depth.shape[1:], jnp.promote_types(rows.depth.dtype, jnp.complex64)
 
     def full(number: Number) -> Any:
         return _full(number, shape, dtype)
@@ -135,12 +135,18 @@ def _rows(
         of_layers([phase if n == 1 else phase / n for phase, n in zip(phases, counts, strict=True)])
     )
     points = tuple(map(at, range(3 if sliced else 1)))
+    if sliced and all(is_real(x) for x in jax.tree_util.tree_leaves(list(layers), is_leaf=_is_pair)):
+        points = tuple(map(jnp.real, points))  # three times as fast
     if roughness is None:
         return _Rows(points, depth, None)
     rough = [_full(roughness[0], shape, dtype)[None]]
     for count, face in zip(counts, roughness[1:], strict=True):
         rough += [jnp.zeros((count - 1, *shape), dtype), _full(face, shape, dtype)[None]]
     return _Rows(points, depth, jnp.real(joined(rough)))
+
+
+def _is_pair(number: Any) -> bool:
+    return isinstance(number, Pair)
 
 
 def _full(number: Number, shape: tuple[int, ...], dtype: Any) -> Any:
@@ -194,7 +200,7 @@ def _fields(rows: _Rows, admittance: Any, faces: Any, a: Any, polarisation: str)
         else:
             alpha, beta, skew, square = coefficients(points, k, a, polarisation)
             c, f, layer_scale, _ = matrix_elements(square, k)
-            E, H = E * (c + f * skew) - 1j * f * alpha * H, H * (c - f * skew) - 1j * f * beta * E
+            E, H = E * (c + f * skew) - 1j * (H * (f * alpha)), H * (c - f * skew) - 1j * (E * (f * beta))
         size = jax.lax.stop_gradient(abs2(E) + abs2(H))
         shrink = jax.lax.rsqrt(size)
         return ((E * shrink, H * shrink), scale_square * layer_scale / size), None

@@ -58,7 +58,12 @@ class Graded(AbstractDispersion):
 
     def at(self, depth: Any, wavelength: Any) -> Number:
         """Return the index at relative depths 0 to 1 (d,) for wavelengths in nm of any shape: (d, ...)."""
-        depth = np.asarray(depth, dtype=jnp.result_type(float, wavelength))
+        dtype = jnp.result_type(float, wavelength)
+        depth = (
+            namespace(depth).asarray(depth, dtype=dtype)
+            if hasattr(depth, "dtype")
+            else np.array(depth, dtype)
+        )
         column = self.profile.fraction(depth.reshape(depth.shape + (1,) * np.ndim(wavelength)))
         return MIXTURES[self.mix](self.first, self.second, column).index(wavelength)
 
@@ -81,10 +86,10 @@ class AtDepth(AbstractDispersion):
     """Homogeneous medium that a graded one is at one relative depth, 0 to 1."""
 
     graded: Graded
-    depth: float = eqx.field(static=True)
+    depth: Any
 
     def index(self, wavelength):
-        index = self.graded.at([self.depth], wavelength)
+        index = self.graded.at(namespace(self.depth, wavelength).reshape(self.depth, (1,)), wavelength)
         return narrow(*(None if x is None else x[0] for x in parts(index)))
 
 

@@ -202,7 +202,8 @@ class Program(NamedTuple):
 def _program(view: SpectrumView | ColoursView, numbers: list[Free], scene: Scene) -> Program:
     # the order of a pytree is that of its fields
     order = [next(i for i, own in enumerate(numbers) if own is x) for _, x in free_leaves(scene)]
-    form = view.form.with_plan(exact(scene).static_key)
+    # the further numbers have wide bounds, but change little: the slices of the fit are enough
+    form = view.form.with_plan(exact(scene, [view.form.plan.row("gradient")]).static_key)
     return Program(form, jax.tree_util.tree_map(np.asarray, anonymous(scene)), order)
 
 
