@@ -14,6 +14,7 @@ from pellicle.recipes import media_words, read_recipe
 from pellicle.recipes.dispersion_models import KNOTS, MODELS, TERMS
 from pellicle.scene.film import Scene
 from pellicle.scene.free import is_free
+from pellicle.scene.graded import Graded
 from pellicle.scene.layers import Layer
 
 AT = np.array([450.0, 633.0, 850.0])
@@ -189,3 +190,40 @@ def test_numbers_of_two_layers_do_not_collide():
     found = [p.name for p in parameters(Scene(layers, "Si"))]
     assert len(set(found)) == len(found) == 8
     assert {"top.A", "layer2.A"} <= set(found)
+
+
+def test_a_graded_layer(tmp_path):
+    scene = scene_of(
+        tmp_path,
+        '{ graded = ["SiO2", { model = "cauchy", A = { lower = 1.8, upper = 2.1 } }], mix = "linear",'
+        ' profile = "exponential", top = { lower = 0, upper = 1 }, bottom = 0.2, length = 0.3 }',
+    )
+    material = scene.layers[0].material
+    assert isinstance(material, Graded)
+    assert (type(material.profile).__name__, material.mix) == ("Exponential", "linear")
+    assert list(names(scene)) == ["second.A", "top"]
+    assert names(scene)["top"].searched
+
+
+def test_a_free_profile(tmp_path):
+    graded = (
+        '{ graded = ["SiO2", "Si3N4"], profile = "spline", values = [0, { lower = 0, upper = 1 }, 0.4, 1] }'
+    )
+    (value,) = parameters(scene_of(tmp_path, graded))
+    assert (value.name, value.group, value.natural) == ("values2", "values", (True, False))
+
+
+@pytest.mark.parametrize(
+    ("material", "message"),
+    [
+        ('{ graded = ["SiO2", "Si3N4"], topp = 0.1 }', "linear profile has no 'topp' .did you mean 'top'"),
+        ('{ graded = ["SiO2", "Si3N4"], profile = "expnential" }', "did you mean 'exponential'"),
+        ('{ graded = ["SiO2", "Si3N4"], mix = "brugeman" }', "did you mean 'bruggeman'"),
+        ('{ graded = ["SiO2", "Si3N4"], top = 1.5 }', "top is a volume fraction, 0 to 1, got 1.5"),
+        ('{ graded = ["SiO2", "Si3N4"], profile = "spline" }', "needs values"),
+        ('{ graded = ["SiO2"] }', "graded"),
+    ],
+)
+def test_graded_layers_that_are_refused(tmp_path, material, message):
+    with pytest.raises(DataError, match=message):
+        scene_of(tmp_path, material)

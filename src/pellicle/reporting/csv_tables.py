@@ -16,6 +16,7 @@ from pellicle.data.colours import Colours
 from pellicle.data.tabular.columns import DIRECTIONS
 
 if TYPE_CHECKING:
+    from pellicle.fitting.depth_profiles import FittedProfile
     from pellicle.fitting.result import Fit, Part
 
 Columns = Mapping[str, Sequence[float] | np.ndarray]
@@ -58,6 +59,18 @@ def nk_csv(fit: Fit) -> str:
     columns = {("wavelength_nm" if name == "wavelength" else name): c for name, c in vars(fit.index).items()}
     about = ["n and k of the fitted layer, a material that pellicle takes by its path"]
     return _csv(about, fit, list(columns), zip(*columns.values(), strict=True))
+
+
+def profile_csv(fit: Fit, profiles: Sequence[FittedProfile]) -> str:
+    """Format the fitted profiles of graded layers; infinite errors are empty cells."""
+    about = [f"profiles at {profiles[0].wavelength:g} nm against depth from the upper face of each layer"]
+    names = ["fraction", "fraction_stderr", "n", "n_stderr", "k", "k_stderr"]
+    rows = [
+        [each.layer, *row]
+        for each in profiles
+        for row in np.column_stack([each.depth, *(getattr(each, name) for name in names)]).tolist()
+    ]
+    return _csv(about, fit, ["layer", "depth_nm", *names], rows)
 
 
 def _spectrum(part: Part) -> tuple[list[str], Columns]:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from pellicle.fitting.result import BrdfCurve, ColourCurve, Curve
+from pellicle.fitting.depth_profiles import FittedProfile, fitted_profiles
+from pellicle.fitting.result import BrdfCurve, ColourCurve, Curve, Index
 from pellicle.fitting.status import RIVAL
 from pellicle.reporting import brdf_figure, fitted_colours, mueller_figure, psi_delta
 from pellicle.reporting.drawing import ABOVE, BLACK, BLUE, FITTED, GAP, GREY, ORANGE, marker_size, new_figure
@@ -60,6 +61,8 @@ def draw(fit: Fit) -> Figure:
         panels.append(_Panel(partial(_misfit, fit=fit), 1.9, lines_above=1))
     if index_is_free(fit):
         panels.append(_Panel(partial(_index, fit=fit), 1.5))
+    for profile in fitted_profiles(fit):
+        panels.append(_Panel(partial(_against_depth, profile=profile), 1.5))
     figure = new_figure(WIDTH_INCHES, 1.0, constrained=False)
     rows = figure.subplots(len(panels), 1, squeeze=False)[:, 0]
     for part in fit.parts:
@@ -259,15 +262,24 @@ def _ellipsometric(part: Part) -> bool:
 
 
 def _index(axes: Axes, fit: Fit) -> None:
-    """n on the left axis; k, if there is any, on the right axis and below n, so that they do not overlap."""
-    curve = fit.index
-    _band(axes, curve.wavelength, curve.n, curve.n_stderr, BLUE, "-")
+    _n_and_k(axes, fit.index.wavelength, fit.index)
     axes.set(xlabel="wavelength (nm)")
+
+
+def _against_depth(axes: Axes, profile: FittedProfile) -> None:
+    _n_and_k(axes, profile.depth, profile)
+    of = "" if profile.layer == "layer" else f"in {profile.layer} "
+    axes.set(xlabel=f"depth {of}(nm), at {profile.wavelength:g} nm".replace("$", r"\$"))
+
+
+def _n_and_k(axes: Axes, position: np.ndarray, curve: Index | FittedProfile) -> None:
+    """n on the left axis; k, if there is any, on the right axis and below n, so that they do not overlap."""
+    _band(axes, position, curve.n, curve.n_stderr, BLUE, "-")
     axes.margins(x=0.01)
     axes.set_ylabel("n", color=BLUE)
     if np.any(curve.k) or np.any(curve.k_stderr > 0):
         beside = axes.twinx()
-        _band(beside, curve.wavelength, curve.k, curve.k_stderr, ORANGE, "--")
+        _band(beside, position, curve.k, curve.k_stderr, ORANGE, "--")
         beside.margins(x=0.01)
         beside.set_ylabel("k (dashed)", color=ORANGE)
         _stretch(axes, below=1.0)

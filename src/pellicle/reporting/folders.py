@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pellicle.files import MARKER, new_folder, write_text
-from pellicle.reporting.csv_tables import fit_csv, nk_csv
+from pellicle.reporting.csv_tables import fit_csv, nk_csv, profile_csv
 from pellicle.reporting.json_record import indented, to_json, versions
 from pellicle.reporting.repeats import FILES as REPEATS
 
@@ -66,6 +66,10 @@ def write_fit(
     write_text(target / "fit.csv", fit_csv(fit), overwrite=True)
     if fit.layer_test is None:
         write_text(target / "nk.csv", nk_csv(fit), overwrite=True)
+    from pellicle.fitting.depth_profiles import fitted_profiles  # imports JAX
+
+    if profiles := fitted_profiles(fit):
+        write_text(target / "profile.csv", profile_csv(fit, profiles), overwrite=True)
     save_figure(draw(fit), target / "figure.png", overwrite=True)
     pictures = {}
     if posterior is not None:
