@@ -1,4 +1,4 @@
-"""Graded layers and their derivatives against 20 digits (gradient.json, by make_gradient.py)."""
+"""Graded layers and their derivatives against 14 digits (gradient.json, by make_gradient.py)."""
 
 from __future__ import annotations
 

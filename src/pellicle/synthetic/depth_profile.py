@@ -224,7 +224,7 @@ def _depths(
     margin = max(MARGIN * total, 20.0)
     spans = [(above, -margin, 0.0, POINTS)]
     for (name, _, _), a, b in zip(layers, slices[:-1], slices[1:], strict=True):
-        spans += [(name, faces[j], faces[j + 1], _points(b - a)) for j in range(a, b)]
+        spans += [(name, faces[j], faces[j + 1], _points(int(b - a))) for j in range(a, b)]
     spans.append((below, total, total + margin, POINTS))
     shares = [np.linspace(EDGE, 1 - EDGE, count) if count > 1 else np.array([0.5]) for *_, count in spans]
     parts = [x + share * (y - x) for (_, x, y, _), share in zip(spans, shares, strict=True)]
