@@ -12,6 +12,7 @@ import numpy as np
 
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.effective_medium import MIXTURES
+from pellicle.dispersion.principal_media import require_isotropic
 from pellicle.dispersion.profiles import AbstractProfile, Linear
 from pellicle.errors import UsageError
 from pellicle.optics.array_namespace import namespace
@@ -53,6 +54,8 @@ class Graded(AbstractDispersion):
             raise ValueError(f"no mix {self.mix!r}; known: {', '.join(MIXTURES)}")
         if not isinstance(self.profile, AbstractProfile):
             raise UsageError(f"`profile` must be as pl.profile.Linear(0.0, 1.0), not {self.profile!r}")
+        for each in (self.first, self.second):
+            require_isotropic(each, "a graded medium is made of")
         if isinstance(self.first, Graded) or isinstance(self.second, Graded):
             raise UsageError("a graded medium mixes homogeneous media: stack graded layers instead")
 
