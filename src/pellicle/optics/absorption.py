@@ -14,6 +14,7 @@ from typing import Any
 
 import jax.numpy as jnp
 
+from pellicle.optics.anisotropy import is_anisotropic
 from pellicle.optics.interface import incident_factor
 from pellicle.optics.interface_fields import InterfaceFields, Media, interface_fields, media
 from pellicle.optics.layer_integrals import LayerIntegrals, layer_integrals
@@ -42,6 +43,8 @@ def absorptances(
 
     ```
     """
+    if any(map(is_anisotropic, (ambient, *layers, substrate))):
+        raise ValueError("fields and absorptances of birefringent layers are not computed: give one index")
     stack = media(ambient, layers, substrate, phases, angle)
     integrals = layer_integrals(stack.squares, stack.phases, stack.elements)
     letters = polarisations[:1] if angle is None else polarisations

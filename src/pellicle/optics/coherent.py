@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from pellicle.optics.anisotropy import Principal
+from pellicle.optics.anisotropy import Principal, mixes_polarisations
 from pellicle.optics.few_layers import FEW, few_layers
 from pellicle.optics.film import film
 from pellicle.optics.gradient import is_graded
@@ -58,6 +58,8 @@ def responses(
 
     ```
     """
+    if mixes_polarisations(ambient, *layers, substrate):
+        raise ValueError("s and p mix where an optic axis is tilted: take pl.jones or pl.mueller, or a scene")
     if any(isinstance(n, Principal) for n in (ambient, *layers, substrate)):
         return tuple(
             _responses(*_seen(ambient, layers, substrate, one), phases, angle, one, propagating, roughness)[0]

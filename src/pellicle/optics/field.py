@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
+from pellicle.optics.anisotropy import is_anisotropic
 from pellicle.optics.characteristic import matrix_elements, scale_exponent
 from pellicle.optics.interface import incident_factor
 from pellicle.optics.interface_fields import Media, interface_fields, media
@@ -78,6 +79,8 @@ def fields(
     in nm from the first interface downwards, negative in the ambient. At an interface the field is that just
     below it. `angle` has no None.
     """
+    if any(map(is_anisotropic, (ambient, *layers, substrate))):
+        raise ValueError("fields and absorptances of birefringent layers are not computed: give one index")
     stack = media(ambient, layers, substrate, [wavenumber * d for d in thicknesses], angle)
     shape, dtype = stack.substrate.re.shape, stack.substrate.re.dtype
     rows = [jnp.broadcast_to(jnp.asarray(d, dtype), shape) for d in thicknesses]
