@@ -67,6 +67,9 @@ SLOW = {
     "pellicle cost docs/examples/film_colours.toml": "compiles twenty programs",
     "pellicle plan docs/examples/graded.toml": "compiles ten programs; tests/effects/test_plan.py: its row",
     "pellicle fit graded.csv --recipe docs/examples/graded.toml --out results/graded": "compiles for 20 s",
+    "pellicle compare graded.csv --recipe docs/examples/mixture.toml --recipe docs/examples/graded.toml": (
+        "compiles for 20 s"
+    ),
     "pellicle cost docs/surfaces/tempered_steel.toml --out cost": "compiles forty programs in half a minute",
     "pellicle fit steel.csv --recipe docs/surfaces/tempered_steel.toml": "compiles for 10 s; "
     "tests/cli/test_brdf_command.py fits another surface",

@@ -119,7 +119,7 @@ def test_ellipsometry_leaves_out_the_scale_of_all(pellicle, beside, asked):
 
 def test_ellipsometry_with_a_scale_of_its_own_is_refused(pellicle, beside):
     ran = pellicle("fit", "--recipe", beside("instrument = { scale = 1.1 }"))
-    ran.refused(3, "e.csv: Ψ and Δ have no scale")
+    ran.refused(3, "e.csv: ellipsometry has no scale and no offset")
 
 
 def test_a_folded_delta_is_said_by_flag_or_recipe(pellicle, beside, scene, tmp_path, asked):

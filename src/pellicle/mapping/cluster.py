@@ -72,7 +72,7 @@ def local_cluster(workers: int) -> Iterator[Client]:
             silence_logs=logging.CRITICAL,
         )
         try:
-            with Client(cluster) as client:
+            with Client(cluster, set_as_default=False) as client:
                 yield client
         finally:
             with suppress(TimeoutError):
@@ -87,7 +87,8 @@ def connected(address: str) -> Iterator[Client]:
     **Raises:** UsageError where none answers; DataError where it has no workers.
     """
     try:
-        client = Client(address, timeout=ANSWER)
+        # one that finds no scheduler must not become dask's default client: later computations would hang
+        client = Client(address, timeout=ANSWER, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         raise UsageError(
             f"`scheduler`: no dask scheduler answers at {address} ({type(error).__name__}); start one, or"
@@ -113,7 +114,7 @@ def on_cluster(client: Client, job: Job, todo: Sequence[tuple[int, ...]], *, loc
     sent = replace(job.cube, arrays={}, mask=None, coords={}) if shipped else job.cube
     plugin = _Model(name, pickle.dumps(job._replace(cube=sent)), local)
     waiting = iter(todo)
-    queue: Any = as_completed()
+    queue: Any = as_completed(loop=client.loop)
     most = _WINDOW * max(1, len(client.scheduler_info(n_workers=-1)["workers"])) if shipped else len(todo)
 
     def submit() -> None:

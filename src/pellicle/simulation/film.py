@@ -84,8 +84,11 @@ def build(plan: Plan) -> Simulate:
 
     def monochromatic(scene: Scene, /) -> Any:
         groups = coherent_groups(plan, scene)
-        # slices have an axis of their own, along which nothing acts element by element
-        return at_each_wavelength(groups) if plan.on("gradient") else pointwise(at_each_wavelength, groups)
+        # slices have an axis of their own, along which nothing acts element by element; a program of the 4×4
+        # method with its slopes in each number one by one takes a minute to compile
+        if plan.on("gradient") or mixed:
+            return at_each_wavelength(groups)
+        return pointwise(at_each_wavelength, groups)
 
     intensities: Intensities = monochromatic
     if plan.row("coherence").count:

@@ -51,7 +51,8 @@ def jones(
 
     ```python
     >>> calcite = pl.Anisotropic(1.658, 1.486, axis=(45.0, 30.0))
-    >>> print(np.round(abs(pl.jones(589.3, 500.0, calcite, 1.52, angle=60.0)), 3))
+    >>> matrix = np.asarray(pl.jones(589.3, 500.0, calcite, 1.52, angle=60.0))
+    >>> print(np.abs(matrix).round(3))
     [[0.026 0.039]
      [0.012 0.5  ]]
 
