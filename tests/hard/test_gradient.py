@@ -55,14 +55,7 @@ def computed():
     return jax.tree.map(np.asarray, both(*arguments))
 
 
-# each compiles programs of its own: the others run with make slow
-IN_CI = 3
-
-
-@pytest.mark.parametrize(
-    "name",
-    [pytest.param(n, marks=[pytest.mark.slow] * (i >= IN_CI)) for i, n in enumerate(TABLE["rows"])],
-)
+@pytest.mark.parametrize("name", TABLE["rows"])
 def test_a_graded_layer_and_its_slopes(name):
     row, position = TABLE["rows"][name], [*TABLE["rows"]].index(name)
     values, slopes = (x[position] for x in computed())
