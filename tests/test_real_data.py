@@ -60,7 +60,10 @@ def plate(shared_data, name: str, back):
 
 @pytest.mark.parametrize(
     ("name", "truth", "tolerance"),
-    [pytest.param("hafnia_T.csv", 194, 3, marks=pytest.mark.slow), ("scandia_T.csv", 92, 2)],
+    [
+        pytest.param("hafnia_T.csv", 194, 3, marks=pytest.mark.slow),
+        pytest.param("scandia_T.csv", 92, 2, marks=pytest.mark.slow),
+    ],
 )
 def test_oxides_on_a_plate_are_better_with_its_back_face(shared_data, name, truth, tolerance):
     found, without = plate(shared_data, name, "air"), plate(shared_data, name, None)
@@ -88,6 +91,7 @@ def test_soap_films(fitted, name, layer, truth):
     assert abs(found["parameters"]["thickness"]["value"] / truth - 1) < 0.02
 
 
+@pytest.mark.slow  # one of several real soap films
 def test_thin_soap_films_are_not_decided_by_one_spectrum(fitted):
     """Order zero: nobody gives a reliable thickness for these."""
     code, found = fitted("soap_films/000006544.csv", "soap_films/000018918.csv", flags=f"{WATER} {SOAP}")

@@ -62,6 +62,7 @@ def test_json_is_one_strict_object_a_line_with_the_contracts_keys(pellicle, spec
     assert {"pellicle", "jax"} <= set(found["versions"])
 
 
+@pytest.mark.slow  # a fit of its own; tests/fitting/test_status.py has an infinite error
 def test_an_infinite_error_is_null(pellicle, spectrum_file):
     """20 µm of an absorber: no light comes back from below."""
     flags = ("--layer", "1.46+0.9j", "--substrate", "3.9", "--thickness", "2000:4000", "--noise", "1")

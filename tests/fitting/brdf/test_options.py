@@ -134,6 +134,7 @@ def two(grey_samples):
     return [dataclasses.replace(s, path=f"{n}.csv") for s, n in zip((first, second), "ab", strict=True)]
 
 
+@pytest.mark.slow  # compiles two surfaces
 def test_a_joint_fit_is_that_of_all_samples(grey, two, truth):
     joint, *alone = (pl.fit(data, grey()) for data in (two, *two))
     assert joint.status is pl.Status.CONVERGED

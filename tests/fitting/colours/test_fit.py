@@ -102,6 +102,7 @@ def test_a_camera_with_free_white_balance():
     np.testing.assert_allclose(found, 0.6 * gains, rtol=1e-3)
 
 
+@pytest.mark.slow  # several fits of a chart; cameras are tested in tests/data and tests/recipes
 def test_a_chart_says_what_an_unknown_camera_sees():
     matrix = np.array([[0.6, 0.2, 0.1], [-0.2, 1.0, 0.1], [0.05, -0.1, 0.9]])
     values = xyz(300.0) @ matrix.T

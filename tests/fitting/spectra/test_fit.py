@@ -52,6 +52,7 @@ def test_at_an_angle_in_either_polarisation(film, measured, polarisation, sees):
     assert pl.fit(wrong, film(light=pl.Light(angle=60.0))).rms > 0.05
 
 
+@pytest.mark.slow  # compiles a fit of its own
 def test_angles_of_the_spectrum_go_before_those_of_the_scene(film, measured):
     data = measured(film(light=pl.Light(angle=60.0, polarisation="s")), 480.0)
     angle = np.full(len(data), 60.0)
