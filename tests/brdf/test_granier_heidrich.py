@@ -124,6 +124,7 @@ def test_energy_exceeds_one_as_published():
     assert max_albedo(PUBLISHED, broad) > 2
 
 
+@pytest.mark.slow  # integrates over the hemisphere
 def test_the_energy_warning_gives_the_albedo():
     """Figure 3 has weights 1 and 0.7; here light at the normal, summed over the hemisphere by quadrature."""
     name, figure = PRESETS["granier-heidrich figure 3, parallel"]

@@ -46,6 +46,7 @@ def test_a_natural_bound_gives_an_upper_limit_and_stays_converged(film, measured
     assert sum(w.startswith("k is compatible with 0") for w in fit.warnings) == 1
 
 
+@pytest.mark.slow  # compiles a fit of its own
 def test_a_bound_above_zero_is_not_natural(film, measured):
     """k ≥ 0.02 is no law of physics."""
     scene = film(material=pl.dispersion.Constant(1.46, pl.Free(0.02, 1.0)))

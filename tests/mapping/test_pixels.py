@@ -135,6 +135,7 @@ def test_thickness_and_index_are_those_of_fit():
     assert np.abs(best.values[:, 0, 0] - 1.62).max() < 0.03
 
 
+@pytest.mark.slow  # compiles a search of its own
 def test_priors_weigh_against_the_noise_of_the_residuals():
     prior = Normal(1.60, 0.004)
     scene = pl.Scene(pl.Layer(pl.Free(1.3, 2.0, prior=prior), FREE), 3.9)

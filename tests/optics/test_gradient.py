@@ -102,6 +102,7 @@ def test_energy_is_conserved_by_few_slices():
         assert abs(float(response.reflectance(each)[0] - response.reflectance_below(each)[0])) < 1e-14
 
 
+@pytest.mark.slow  # compiles stacks of several kinds
 def test_equal_points_are_a_homogeneous_layer():
     """Value and slopes, rough faces too, beside a layer without slices."""
     index, rough = jnp.array([1.9, 2.2]), [0.1, 0.2, 0.3]

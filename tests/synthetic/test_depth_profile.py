@@ -27,6 +27,7 @@ def both(request):
     return request.param, pl.depth_profile(scene, 550.0, NM)
 
 
+@pytest.mark.slow  # compiles many stacks; tests/simulation/test_depth.py has stacks as tmm
 def test_absorptances_as_tmm(both):
     """An absorbing plate: the tmm package has other transmittances of its faces upwards by (k/n)²."""
     letter, profile = both

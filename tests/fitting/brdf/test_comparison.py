@@ -30,6 +30,7 @@ def test_the_right_index_is_better_by_the_criteria(grey, grey_samples):
         assert candidate.bic == pytest.approx(deviance + 3 * np.log(points), rel=1e-6)
 
 
+@pytest.mark.slow  # compiles two surfaces
 def test_fits_of_other_samples_are_not_compared(grey, grey_samples):
     samples = grey_samples()
     one = pl.fit(samples, grey())

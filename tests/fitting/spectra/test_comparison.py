@@ -6,6 +6,7 @@ import pytest
 import pellicle as pl
 
 
+@pytest.mark.slow  # compiles fits of its own
 def test_residuals_count_along_the_sweep_of_each_angle():
     """Slow errors of one sign at one angle and of the other at the next look like noise in file order."""
     nm, angles = np.linspace(450.0, 800.0, 32), np.array([20.0, 40.0, 50.0, 60.0])

@@ -71,6 +71,7 @@ def test_the_error_is_that_of_both_angles_with_their_own_noise(psi_sigma, delta_
     assert pl.fit(spectrum, scene())["thickness"].stderr_noise == pytest.approx(information**-0.5, rel=0.03)
 
 
+@pytest.mark.slow  # compiles a fit of its own
 def test_several_angles_in_one_file():
     found = pl.fit(measured(100.0, angles=(65.0, 70.0, 75.0)), scene())
     assert found.status == "converged"

@@ -189,6 +189,7 @@ def test_one_point_is_no_spectrum(film):
         pl.fit(pl.Spectrum(np.array([550.0]), np.array([0.2]), "R", path="spot.csv"), film())
 
 
+@pytest.mark.slow  # compiles a fit of its own
 def test_an_uncalibrated_intensity_needs_a_scale(film, measured):
     data = measured(film(), 480.0)
     counts = pl.Spectrum(data.wavelength, 900 * data.values, "R", calibrated=False, path="lamp.csv")
@@ -205,6 +206,7 @@ def test_outside_a_table(measured, film):
         pl.fit(data, film(material="HfO2"))
 
 
+@pytest.mark.slow  # compiles a fit of its own
 def test_a_scene_without_a_free_thickness(film, measured):
     scene = film(480.0, Constant(N, K))
     fit = pl.fit(measured(scene, 1.6, 0.02), scene)

@@ -49,6 +49,7 @@ def test_errors_of_n_and_c_by_finite_differences():
     assert seen(np.zeros(5), np.full(5, 90.0)).sigma.min() > 0  # where neither moves to first order
 
 
+@pytest.mark.slow  # two fits; tests/data has how folded angles are recognised
 def test_a_misfit_that_would_fit_as_folded():
     """Δ of 205 to 283 degrees, folded: nothing shows it but that the scene explains it so only."""
     nm = np.linspace(600.0, 900.0, 64)

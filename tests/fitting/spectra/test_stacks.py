@@ -17,6 +17,7 @@ def scene(oxide, nitride, **options) -> pl.Scene:
     return pl.Scene(layers, "Si", **options)
 
 
+@pytest.mark.slow  # fits of two layers; test_compiled_operations.py has their programs
 @pytest.mark.parametrize(
     ("bandwidth", "oxide", "nitride"),
     [

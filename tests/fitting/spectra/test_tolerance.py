@@ -40,6 +40,7 @@ def test_a_fit_leaves_out_what_the_tolerance_allows():
     assert cheap.warnings == whole.warnings
 
 
+@pytest.mark.slow  # two fits of different plans
 def test_a_fit_beyond_its_tolerance_is_done_again(monkeypatch):
     """As where the design of the plan missed the place that the best fit is at."""
     thing = scene(0.05)
