@@ -35,7 +35,7 @@ class Anisotropic(AbstractDispersion):
     phi: Any
     psi: Any
     order: tuple[int, int, int] | None = eqx.field(static=True)
-    """Which principal axis lies along each laboratory axis; None if any orientation is possible."""
+    """Number of the principal axis along each laboratory axis; None if any orientation is possible."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""Anisotropic media of a scene: whether the closed forms of s and p serve, or s and p mix."""
+"""Anisotropic media of a scene: closed forms of s and p, or the 4×4 method where s and p mix."""
 
 from __future__ import annotations
 

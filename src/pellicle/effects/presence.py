@@ -146,7 +146,7 @@ def back_face(scene: Scene) -> Row:
 
 
 def _collected(share: Quantity | None, count: int | None) -> str:
-    """What part of the light from a back face is collected, in words."""
+    """The collected part of the light from a back face, in words."""
     words = []
     if isinstance(share, Free):
         words.append("the share that is collected is free")

@@ -253,6 +253,7 @@ def _scale(axes: Axes, misfit: np.ndarray, minima: list[tuple[float, float]]) ->
 
 
 def index_is_free(fit: Fit) -> bool:
+    """True where n or k was fitted and is worth a curve against wavelength."""
     several = fit.index.wavelength.size > 1 or not all(_ellipsometric(part) for part in fit.parts)
     return several and bool(np.any(fit.index.n_stderr > 0) or np.any(fit.index.k_stderr > 0))
 

@@ -181,6 +181,7 @@ def read(sheet: Sheet, variable: str, frame: int, used: np.ndarray) -> np.ndarra
 
 
 def values_panel(sheet: Sheet, panel: Axes, variable: str) -> None:
+    """Draw the decided values of a variable, with their colour bar."""
     codes = sheet.codes(0)
     values = read(sheet, variable, 0, is_decided(codes))
     low, high, extend = map_blocks.limits(values)
@@ -189,6 +190,7 @@ def values_panel(sheet: Sheet, panel: Axes, variable: str) -> None:
 
 
 def errors_panel(sheet: Sheet, panel: Axes, variable: str) -> None:
+    """Draw the standard errors of a variable, on a logarithmic scale where they differ much."""
     from matplotlib.colors import LogNorm
 
     codes = sheet.codes(0)

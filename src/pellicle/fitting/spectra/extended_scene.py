@@ -11,13 +11,14 @@ import numpy as np
 from pellicle.dispersion.anisotropic import Anisotropic
 from pellicle.dispersion.empirical import Constant, Scaled, Tabulated
 from pellicle.dispersion.principal_media import each_principal, mixes_polarisations, ordinary_index
+from pellicle.effects.anisotropy import scene_media
 from pellicle.effects.film import exact
 from pellicle.fitting.colours.view import ColourForm, ColoursView
 from pellicle.fitting.program_cache import kept
 from pellicle.fitting.spectra.parameters import anonymous
 from pellicle.fitting.spectra.view import SpectrumForm, SpectrumView
 from pellicle.optics.pair import Pair, imag, real
-from pellicle.scene.film import Scene, coherent_layers
+from pellicle.scene.film import Scene
 from pellicle.scene.free import Free, free_leaves, insert, is_free
 from pellicle.scene.graded import each_medium
 from pellicle.scene.layers import Interface, Layer
@@ -119,7 +120,7 @@ class ExtendedScene:
         if _solid(bulk, nm):
             self.substrate_index, change = self._number(0.0, -0.5)
             # rough faces go with s and p apart
-            mixed = any(map(mixes_polarisations, (*(x.material for x in coherent_layers(scene)), bulk)))
+            mixed = any(map(mixes_polarisations, scene_media(scene)))
             if isinstance(top, Layer) and top.roughness is None and not mixed:
                 self.roughness, rough = self._number(0.0)
                 layers[0] = replace(top, roughness=rough)

@@ -25,7 +25,7 @@ _PICTURES = {
 
 
 def section(posterior: Posterior, pictures: Mapping[str, bytes]) -> dict[str, Any]:
-    """What the template shows of a posterior."""
+    """Figures and tables of a posterior, as the template takes them."""
     checks = posterior.checks
     rows = [
         (m.name, *(f"{x:.6g}" for x in (m.q50, m.q025, m.q975, m.mean)), f"{m.sd:.2g}", m.unit)

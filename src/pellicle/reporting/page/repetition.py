@@ -1,4 +1,4 @@
-"""What repeats a fit: its command, its recipe, and the lines of Python, to copy from the page."""
+"""Command, recipe and lines of Python that repeat a fit, to copy from the page."""
 
 from __future__ import annotations
 

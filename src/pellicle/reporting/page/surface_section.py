@@ -40,7 +40,7 @@ class Views(NamedTuple):
 
 @kept
 def _views(name: str, numbers: Any, normals: Any) -> Views:
-    """What is shown of a model by its name: one program for the fit and its rivals, kept between processes.
+    """Lobes and sphere of a model by its name: one kept program for the fit and its rivals.
 
     `normals` (pixels, 3) are those of the sphere.
     """
