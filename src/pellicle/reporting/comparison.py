@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from pellicle.files import MARKER, new_folder, write_text
 from pellicle.fitting.status import describe
-from pellicle.reporting.folders import folder_per_file, write_fit
+from pellicle.reporting.folders import PAGE, REPORT, folder_per_file, write_fit
 from pellicle.reporting.json_record import indented, versions
 from pellicle.reporting.json_record import to_json as fit_to_json
 from pellicle.reporting.plain_text import INDENT, block, table, wrapped
@@ -86,14 +86,18 @@ def failure(path: str, error: str) -> dict[str, Any]:
 
 
 def write_comparison(folder: str | os.PathLike[str], comparison: Comparison) -> Path:
-    """Write report.txt and result.json into a folder, and each recipe's fit into a sub-folder.
+    """Write report.txt, report.html and result.json into a folder, and each recipe's fit into a sub-folder.
 
     Returns the folder. Raises UsageError as `write_fit` does.
     """
+    from pellicle.reporting.page.comparison_page import comparison_page
+
     target = new_folder(folder)
     folders = folder_per_file(target, [c.name for c in comparison.candidates])
     for c, own in zip(comparison.candidates, folders, strict=True):
         write_fit(own, c.fit)
     write_text(target / MARKER, indented(to_json(comparison)), overwrite=True)
-    write_text(target / "report.txt", report(comparison), overwrite=True)
+    write_text(target / REPORT, report(comparison), overwrite=True)
+    links = [(own / PAGE).relative_to(target).as_posix() for own in folders]
+    write_text(target / PAGE, comparison_page(comparison, links), overwrite=True)
     return target

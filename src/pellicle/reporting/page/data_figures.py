@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from html import escape
 from typing import TYPE_CHECKING, Any
@@ -54,6 +55,15 @@ def of_part(fit: Fit, number: int) -> dict[str, Any]:
             rivals.append((f"rival: {escape(label(rival, fit))}", _KINDS[kind](own)[1]))
     caption = _caption(part)
     return figure(f"data-{number}", caption, abscissa, panels, columns, rivals, axis)
+
+
+def of_candidates(best: Fit, others: Sequence[tuple[str, Fit]], number: int) -> dict[str, Any]:
+    """Data, model and residuals of one part of the best fit, with those of other fits of the same data."""
+    part = best.parts[number]
+    kind = type(part.curve)
+    abscissa, panels, columns, axis = _KINDS[kind](part)
+    curves = [(escape(name), _KINDS[kind](other.parts[number])[1]) for name, other in others]
+    return figure(f"data-{number}", _caption(part), abscissa, panels, columns, curves, axis)
 
 
 def _caption(part: Part) -> str:

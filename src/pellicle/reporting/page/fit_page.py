@@ -27,7 +27,7 @@ TONES = {
     Status.FAILED: "bad",
 }
 """Class of the page's style for each status."""
-_MOST_FIGURES = 40
+MOST_FIGURES = 40
 """Parts of a joint fit that have an interactive figure; the CSV file has them all."""
 _FAINT = 0.4
 """Opacity of the background of a correlation of ±1; text on it keeps its contrast."""
@@ -45,7 +45,7 @@ def fit_page(
     **Arguments:** `image`, the PNG of the fit's figure; `pictures`, other PNG images by name ("corner",
     "predictive"); `again`, what repeats the fit: descriptions and texts to copy.
     """
-    figures = [data_figures.of_part(fit, i) for i in range(min(len(fit.parts), _MOST_FIGURES))]
+    figures = [data_figures.of_part(fit, i) for i in range(min(len(fit.parts), MOST_FIGURES))]
     misfit, index = data_figures.of_misfit(fit), data_figures.of_index(fit)
     shown = [*figures, *(each for each in (misfit, index) if each)]
     about = None
