@@ -21,7 +21,7 @@ def test_a_map_is_reported_drawn_and_saved(cube, scene, fake_fits, tmp_path):
     assert len(made.plot().axes) >= 4
     made.save(tmp_path / "out")
     assert {path.name for path in (tmp_path / "out").iterdir()} == {
-        *("result.json", "report.txt", "map.png", "rival.png")
+        *("result.json", "report.txt", "report.html", "map.png", "rival.png")
     }
     record = json.loads((tmp_path / "out" / "result.json").read_text())
     assert record["schema"] == "pellicle.cube-map/1"

@@ -1,4 +1,4 @@
-"""Folder of the map of a cube: JSON record, report and figures, beside its zarr store and NetCDF file."""
+"""Folder of the map of a cube: record, report, page and figures, beside its zarr store and NetCDF file."""
 
 from __future__ import annotations
 
@@ -9,26 +9,32 @@ from typing import TYPE_CHECKING
 from pellicle.files import MARKER, new_folder, write_text
 from pellicle.mapping.map_result import Map
 from pellicle.reporting.drawing import save_figure
+from pellicle.reporting.folders import PAGE, REPORT
 from pellicle.reporting.json_record import indented
 from pellicle.reporting.map_summary import summarise
 from pellicle.reporting.map_text import cube_json, cube_report
+from pellicle.reporting.page.map_page import map_page
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
 
 def write_cube_map(folder: str | os.PathLike[str], made: Dataset | Map) -> Path:
-    """Write result.json, report.txt and figures of a map, each complete or not, and return the folder.
+    """Write result.json, report.txt, report.html and figures of a map, and return the folder.
+
+    Each file appears complete or not at all.
 
     **Raises:** UsageError where the folder holds files that pellicle did not write, or cannot be written.
     """
     from pellicle.reporting.map_figures import figures
 
     target, summary = new_folder(folder), summarise(made)
-    write_text(
-        target / MARKER, indented(cube_json(made, summary)), overwrite=True
-    )  # first: it marks the folder
-    write_text(target / "report.txt", cube_report(made, summary), overwrite=True)
+    record = indented(cube_json(made, summary))
+    write_text(target / MARKER, record, overwrite=True)  # first: it marks the folder as ours
+    write_text(target / REPORT, cube_report(made, summary), overwrite=True)
+    images = {}
     for name, figure in figures(made, summary):
-        save_figure(figure, target / f"{name}.png", overwrite=True)
+        path = save_figure(figure, target / f"{name}.png", overwrite=True)
+        images[name] = path.read_bytes()
+    write_text(target / PAGE, map_page(summary, images), overwrite=True)
     return target

@@ -36,17 +36,23 @@ def cube_report(made: Dataset | Map, summary: MapSummary | None = None) -> str:
     """
     summary = summarise(made) if summary is None else summary
     blocks = [
-        ("Map", [*wrapped(in_words(summary)), *facts(_facts(summary))]),
-        ("Status: what to do", facts((w, a) for w, a in _ADVICE.items() if w in summary.counts)),
-        (_title(summary), _parameters(summary)),
-        ("Rate of change: a straight line through the times", facts(_rates(summary))),
+        ("Map", [*wrapped(in_words(summary)), *facts(file_rows(summary))]),
+        ("Status: what to do", facts(status_rows(summary))),
+        (decided_in_words(summary), _parameters(summary)),
+        ("Rate of change: a straight line through the times", facts(rate_rows(summary))),
         ("Errors", wrapped(ERRORS)),
-        ("Plan: what was simulated", _plan(summary)),
+        ("Plan: what was simulated", facts(plan_rows(summary))),
     ]
     return "".join(block(title, lines) for title, lines in blocks if lines)
 
 
-def _rates(made: MapSummary) -> list[tuple[str, str]]:
+def status_rows(made: MapSummary) -> list[tuple[str, str]]:
+    """Each status that occurs, and what to do."""
+    return [(word, advice) for word, advice in _ADVICE.items() if word in made.counts]
+
+
+def rate_rows(made: MapSummary) -> list[tuple[str, str]]:
+    """Each parameter of a series of maps, and its rate of change."""
     return [(rate.variable, str(rate)) for rate in made.rates]
 
 
@@ -82,7 +88,8 @@ def pixels_in_words(made: MapSummary) -> str:
     return f"{' x '.join(before)} frames ({series.name}) of {last}" if series else last
 
 
-def _facts(made: MapSummary) -> list[tuple[str, str]]:
+def file_rows(made: MapSummary) -> list[tuple[str, str]]:
+    """File, its spectra, pixels without data, time of the fits, and how the file was read."""
     about = made.attributes
     rows = [("file", str(about["path"]))] if about.get("path") else []
     bands = f", {about['bands']} bands" if "bands" in about else ""
@@ -133,7 +140,8 @@ def _rounded(value: float) -> str:
     return f"{round(value, -digits):,.0f}".replace(",", " ")
 
 
-def _title(made: MapSummary) -> str:
+def decided_in_words(made: MapSummary) -> str:
+    """The number of pixels whose parameters can be used, and their statuses."""
     if not made.decided:
         return "Parameters: no pixel has numbers that can be used"
     words = " or ".join(word for word in DECIDED if word in made.counts)
@@ -141,7 +149,7 @@ def _title(made: MapSummary) -> str:
 
 
 def _parameters(made: MapSummary) -> list[str]:
-    lines = [line for p in made.parameters for line in facts(_parameter(p))]
+    lines = [line for p in made.parameters for line in facts(parameter_rows(p))]
     if made.sampled == 1 or not lines:
         return lines
     return [
@@ -150,7 +158,8 @@ def _parameters(made: MapSummary) -> list[str]:
     ]
 
 
-def _parameter(p: ParameterSummary) -> list[tuple[str, str]]:
+def parameter_rows(p: ParameterSummary) -> list[tuple[str, str]]:
+    """Median, range, standard error and slope of a parameter; the first row bears its name."""
     least, low, middle, high, largest = (_number(value, p) for value in p.percentiles)
     unit = f" {p.unit}" if p.unit else ""
     if not math.isfinite(p.percentiles[2]):
@@ -194,14 +203,15 @@ def _error(value: float, unit: str) -> str:
     return f"{value:.2g}{unit}" if math.isfinite(value) else "infinite"
 
 
-def _plan(made: MapSummary) -> list[str]:
+def plan_rows(made: MapSummary) -> list[tuple[str, str]]:
+    """Effects that are simulated or left out with an error, then the names of the absent ones."""
     rows = [
         (str(row["effect"]), f"{'on' if row['on'] else 'off'}: {row['why']}")
         for row in made.plan
         if row["on"] or row["error_bound"]
     ]
     absent = [str(row["effect"]) for row in made.plan if not row["on"] and not row["error_bound"]]
-    return facts([*rows, *([("left out", ", ".join(absent))] if absent else [])])
+    return [*rows, *([("left out", ", ".join(absent))] if absent else [])]
 
 
 def cube_json(made: Dataset | Map, summary: MapSummary | None = None) -> dict[str, Any]:
