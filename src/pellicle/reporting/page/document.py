@@ -30,17 +30,16 @@ def page(template: str, title: str, figures: Sequence[Mapping[str, Any]], **cont
 
     A page without figures leaves Plotly out.
     """
-    plotly = b64encode((_ASSETS / "plotly-basic.min.js.gz").read_bytes()).decode() if figures else ""
     return (
         _environment()
         .get_template(template)
         .render(
             title=title,
             version=version("pellicle"),
-            style=Markup(_text("page.css")),
+            style=Markup(palette() + _text("page.css")),
             script=Markup(_text("page.js")),
             figures=_json(figures),
-            plotly=Markup(plotly),
+            plotly=Markup(packed_plotly() if figures else ""),
             **content,
         )
     )
@@ -49,6 +48,17 @@ def page(template: str, title: str, figures: Sequence[Mapping[str, Any]], **cont
 def picture(content: bytes, about: str) -> dict[str, str]:
     """A PNG image and what it shows, for the macro `picture`."""
     return {"data": f"data:image/png;base64,{b64encode(content).decode()}", "about": about}
+
+
+def palette() -> str:
+    """Colours of pages as variables of CSS, the light ones and the dark ones."""
+    return _text("palette.css")
+
+
+@cache
+def packed_plotly() -> str:
+    """Plotly's script, compressed by gzip, in base64."""
+    return b64encode((_ASSETS / "plotly-basic.min.js.gz").read_bytes()).decode()
 
 
 @cache

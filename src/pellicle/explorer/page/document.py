@@ -1,0 +1,80 @@
+"""HTML of the explorer, its script as one ES module, and its style, for a page and for a notebook."""
+
+from __future__ import annotations
+
+import json
+import re
+from functools import cache
+from importlib.resources import files
+
+from jinja2 import Environment, PackageLoader
+from markupsafe import Markup
+
+from pellicle.reporting.page.document import packed_plotly, palette
+
+_ASSETS = files("pellicle.explorer.page") / "assets"
+_SCRIPTS = ("slider.js", "plot.js", "explorer.js")
+"""Parts of the module `explorer.js`, which share its scope: a widget takes a module without imports."""
+
+
+def page(title: str, token: str, nonce: str) -> str:
+    """Format the page of the explorer, one file that loads nothing.
+
+    **Arguments:** `title`, the heading; `token`, which the page sends with each request; `nonce`, a random
+    text for this response, which `policy` names.
+    """
+    loader = PackageLoader("pellicle.explorer.page", "assets")
+    template = Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    return template.get_template("explorer.html").render(
+        title=title,
+        nonce=nonce,
+        settings=_json({"token": token}),
+        style=Markup(style()),
+        script=Markup(script()),
+        plotly=Markup(packed_plotly()),
+    )
+
+
+def policy(nonce: str) -> str:
+    """Content-Security-Policy of the page: scripts with the nonce, requests to the same server, no more.
+
+    Plotly sets styles of elements, hence 'unsafe-inline' for styles.
+    """
+    return (
+        f"default-src 'none'; script-src 'nonce-{nonce}'; style-src 'unsafe-inline'; img-src data: blob:; "
+        "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    )
+
+
+@cache
+def script() -> str:
+    """The ES module that exports `explore(element, call, options)`."""
+    return "\n".join((_ASSETS / name).read_text(encoding="utf-8") for name in _SCRIPTS)
+
+
+@cache
+def style() -> str:
+    """Style of the explorer: the palette of reports, for its element only, and its own rules.
+
+    `data-theme` of the element, "light" or "dark", has precedence over the mode of the system: a notebook
+    has a mode of its own.
+    """
+    light, dark = re.findall(r":root \{([^{}]*)\}", palette())
+    own = ".pellicle-explorer"
+    return "\n".join(
+        (
+            f"{own} {{{light}}}",
+            f"@media (prefers-color-scheme: dark) {{ {own} {{{dark}}} }}",
+            f"{own}[data-theme=light] {{{light} color-scheme: light; }}",
+            f"{own}[data-theme=dark] {{{dark} color-scheme: dark; }}",
+            (_ASSETS / "explorer.css").read_text(encoding="utf-8"),
+        )
+    )
+
+
+def _json(settings: dict[str, str]) -> Markup:
+    """JSON inside an element of a script: no text in it can end the element."""
+    text = json.dumps(settings)
+    for sign in "<>&":
+        text = text.replace(sign, f"\\u{ord(sign):04x}")
+    return Markup(text)
