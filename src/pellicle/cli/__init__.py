@@ -13,6 +13,7 @@ from pellicle.cli.chart import chart
 from pellicle.cli.compare import compare
 from pellicle.cli.cost import cost
 from pellicle.cli.demo import demo
+from pellicle.cli.explore import explore
 from pellicle.cli.export import export
 from pellicle.cli.fit import fit
 from pellicle.cli.interruption import interruptible
@@ -47,6 +48,7 @@ app.command(compare)
 app.command(cost)
 app.command(chart)
 app.command(export)
+app.command(explore)
 app.command(map)
 app.command(materials)
 app.command(demo)

@@ -1,0 +1,98 @@
+"""`pellicle explore`: a local page whose sliders move a scene."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from pellicle.cli.flags import ReadingFlags, SceneFlags
+from pellicle.cli.options import scene_from_flags
+from pellicle.cli.session import say, start
+from pellicle.errors import UsageError
+
+if TYPE_CHECKING:
+    from pellicle.explorer.session import Session
+
+DEFAULT_LAYER, DEFAULT_SUBSTRATE, DEFAULT_THICKNESS = "SiO2", "Si", "0:1000"
+"""Film that is shown without a recipe and without flags."""
+
+
+def explore(
+    recipe: Annotated[
+        str | None, Parameter(help="TOML file that describes the scene or surface (SiO2 on Si).")
+    ] = None,
+    /,
+    *,
+    scene: Annotated[SceneFlags, Parameter(name="*")] = SceneFlags(),  # noqa: B008
+    signal: Annotated[str | None, Parameter(help="R, T, psi-delta or mueller.")] = None,
+    angle: Annotated[float | None, Parameter(help="Angle of incidence in degrees (0).")] = None,
+    polarisation: Annotated[str | None, Parameter(help="s, p or unpolarised.")] = None,
+    port: Annotated[int, Parameter(help="Port of this machine (0: a free one).")] = 0,
+    no_browser: Annotated[
+        bool, Parameter(help="Print the address of the page and do not open it.", negative="")
+    ] = False,
+) -> int:
+    """Open a page on this machine whose sliders move a scene: spectrum, colour, sphere and plan.
+
+    Data that are dropped on the page can be fitted. Ctrl-C ends it.
+
+    Example: pellicle explore film.toml
+    """
+    reading = ReadingFlags(signal=signal, angle=angle, polarisation=polarisation)
+    given = [*scene.given(), *reading.given()]
+    if recipe is not None and given:
+        raise UsageError(
+            f"{', '.join(given)} and a recipe exclude each other: describe the scene in the recipe"
+        )
+    start()
+    from pellicle.explorer.server import serve
+
+    session = _of_recipe(recipe) if recipe is not None else _of_flags(scene, reading)
+
+    def ready(address: str) -> None:
+        print(address, flush=True)
+        say("Ctrl-C ends the explorer")
+        if not no_browser:
+            import webbrowser
+
+            webbrowser.open(address)
+
+    try:
+        serve(session, port, ready)
+    except KeyboardInterrupt:
+        say("")
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(0)  # programs may be compiling in a thread, which Python cannot end
+
+
+def _of_recipe(path: str) -> Session:
+    from pellicle.cli.wavelengths import measured_scene
+    from pellicle.explorer.session import Session
+    from pellicle.recipes import read_recipe
+    from pellicle.recipes.surface import SurfaceRecipe
+
+    recipe, title = read_recipe(path), Path(path).name
+    if isinstance(recipe, SurfaceRecipe):
+        raise UsageError(f"{path}: the explorer takes the recipe of a film")
+    found, wavelength = measured_scene(recipe)
+    return Session(found, Path(path).parent, wavelength=wavelength, title=title)
+
+
+def _of_flags(flags: SceneFlags, reading: ReadingFlags) -> Session:
+    from dataclasses import replace
+
+    from pellicle.explorer.session import Session
+
+    film: Any = replace(
+        flags,
+        layer=flags.layer or DEFAULT_LAYER,
+        substrate=flags.substrate or DEFAULT_SUBSTRATE,
+        thickness=flags.thickness or DEFAULT_THICKNESS,
+    )
+    scene, _ = scene_from_flags(film, reading)
+    return Session(scene, title=f"{film.layer} on {film.substrate}")

@@ -1,0 +1,224 @@
+"""Controls of a scene: its numbers that can be moved, and those of effects that can be added."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+from jax.tree_util import GetAttrKey, SequenceKey
+
+from pellicle.dispersion.empirical import Constant
+from pellicle.errors import UsageError
+from pellicle.fitting.spectra.parameters import parameters
+from pellicle.scene.film import Scene
+from pellicle.scene.free import Free, is_free
+from pellicle.scene.layers import Interface, Layer, Plate
+from pellicle.synthetic.colours import varied_layer
+
+STEPS = 1000
+"""Steps of a slider, at least."""
+_WIDEST_RATIO = 1000.0
+"""Ratio of the bounds from which a slider is logarithmic."""
+_OPTIONAL = {
+    "k": 1.0,
+    "roughness": 20.0,
+    "thickness_spread": 50.0,
+    "bandwidth": 20.0,
+    "numerical_aperture": 0.9,
+    "angle_spread": 60.0,
+    "angle": 85.0,
+}
+"""Keys whose effect is absent at 0, and the upper bound of their sliders."""
+_LABELS = {
+    "thickness_spread": "thickness spread (standard deviation)",
+    "roughness": "roughness of the upper face (rms)",
+    "bandwidth": "bandwidth (FWHM)",
+    "numerical_aperture": "numerical aperture",
+    "angle_spread": "half angle of the cone",
+    "angle": "angle of incidence",
+    "plate_mm": "thickness of the plate",
+}
+
+
+@dataclass(frozen=True)
+class Control:
+    """One number of a scene and the slider that moves it.
+
+    `path` is its place in the scene, as of `jax.tree_util`. An `optional` one is the size of an effect that
+    is absent at 0. `scale` is "linear" or "log". `free` is the scene's own `Free`, None for a fixed number.
+    """
+
+    name: str
+    label: str
+    unit: str
+    lower: float
+    upper: float
+    value: float
+    group: str
+    path: tuple[Any, ...]
+    optional: bool = False
+    free: Free | None = None
+
+    @property
+    def scale(self) -> str:
+        """Logarithmic where the bounds are far apart."""
+        return "log" if self.lower > 0 and self.upper > _WIDEST_RATIO * self.lower else "linear"
+
+    @property
+    def step(self) -> float:
+        """Step of the slider: 1, 2 or 5 times a power of ten."""
+        raw = (self.upper - self.lower) / STEPS
+        power = 10.0 ** math.floor(math.log10(raw))
+        return float(f"{max(x for x in (1, 2, 5) if x * power <= raw * (1 + 1e-9)) * power:.6g}")
+
+    def to_json(self) -> dict[str, Any]:
+        """Return what a page needs to draw the slider."""
+        names = ("name", "label", "unit", "lower", "upper", "value", "step", "scale", "group")
+        return {name: getattr(self, name) for name in names} | {"free": self.free is not None}
+
+
+def film_controls(scene: Scene) -> tuple[Control, ...]:
+    """Return the controls of a film: thicknesses, constant indices, every free number and optional effects.
+
+    Raises UsageError where the light has several angles, which no slider can move.
+    """
+    if not isinstance(scene.light.angle, int | float | Free):
+        raise UsageError("the explorer takes a scene with one angle of incidence")
+    found = _present(scene)
+    for path in _addable(scene):
+        found.setdefault(path, 0.0)
+    scaffold = scene
+    for path, value in found.items():
+        scaffold = with_value(scaffold, path, _bounds(path, value))
+    named = dict(zip(_free_paths(scaffold), parameters(scaffold), strict=True))
+    controls = []
+    for path, number in named.items():
+        value = found[path]
+        controls.append(
+            Control(
+                name=number.name,
+                label=_LABELS.get(number.key, number.key),
+                unit={"deg": "°"}.get(number.unit, number.unit),
+                lower=number.lower,
+                upper=number.upper,
+                value=value.start if isinstance(value, Free) else float(value),
+                group=_group(scene, path),
+                path=path,
+                optional=_is_optional(path) and number.lower <= 0,
+                free=value if isinstance(value, Free) else None,
+            )
+        )
+    return tuple(controls)
+
+
+def template(scene: Scene, controls: Collection[Control], active: Collection[str]) -> Scene:
+    """Return the scene with a `Free` at each control that is not optional or is `active`.
+
+    Other optional effects are absent. The order of the controls is that of the free numbers.
+    """
+    for control in controls:
+        there = not control.optional or control.name in active
+        absent = 0.0 if control.path[-1] == GetAttrKey("angle") else None
+        number = Free(control.lower, control.upper, start=control.value) if there else absent
+        scene = with_value(scene, control.path, number)
+    return scene
+
+
+def with_value(tree: Any, path: tuple[Any, ...], value: Any) -> Any:
+    """Return the pytree with the number at `path` replaced; None may stand there, before and after.
+
+    The checks of the scene are not run: bounds of two sliders may contradict where no values of them do.
+    """
+    if not path:
+        return value
+    step, *rest = path
+    if isinstance(step, SequenceKey):
+        return tuple(with_value(x, tuple(rest), value) if i == step.idx else x for i, x in enumerate(tree))
+    changed = object.__new__(type(tree))
+    for name, field in vars(tree).items():
+        object.__setattr__(
+            changed, name, with_value(field, tuple(rest), value) if name == step.name else field
+        )
+    return changed
+
+
+def _free_paths(tree: Any) -> list[tuple[Any, ...]]:
+    leaves = jax.tree_util.tree_leaves_with_path(tree, is_leaf=is_free)
+    return [path for path, leaf in leaves if is_free(leaf)]
+
+
+def _present(scene: Scene) -> dict[tuple[Any, ...], Any]:
+    """Numbers that the scene has: free ones, thicknesses, constant indices and optional effects."""
+    leaves = jax.tree_util.tree_leaves_with_path(scene, is_leaf=is_free)
+    shown = {(*at, GetAttrKey(key)) for at in _constants(scene) for key in ("n", "k")}
+    found = {}
+    for path, leaf in leaves:
+        key, number = getattr(path[-1], "name", ""), isinstance(leaf, int | float)
+        own = path in shown or (path[0].name != "ambient" and key in ("thickness", *_OPTIONAL) and key != "k")
+        if is_free(leaf) or (number and own):
+            found[path] = leaf
+    return found
+
+
+def _constants(scene: Scene) -> list[tuple[Any, ...]]:
+    """Places of media of layers and of the substrate that are one constant index."""
+    layers = enumerate(scene.layers)
+    paths: list[tuple[Any, ...]] = [
+        (GetAttrKey("layers"), SequenceKey(i), GetAttrKey("material"))
+        for i, x in layers
+        if isinstance(x, Layer | Plate) and isinstance(x.material, Constant)
+    ]
+    if isinstance(scene.substrate.material, Constant):
+        paths.append((GetAttrKey("substrate"), GetAttrKey("material")))
+    return paths
+
+
+def _addable(scene: Scene) -> list[tuple[Any, ...]]:
+    """Places of effects that the scene leaves out and a slider can add."""
+    paths: list[tuple[Any, ...]] = [(*at, GetAttrKey("k")) for at in _constants(scene)]
+    coherent = [i for i, x in enumerate(scene.layers) if isinstance(x, Layer)]
+    if coherent:
+        layers = GetAttrKey("layers")
+        paths.append((layers, SequenceKey(coherent[0]), GetAttrKey("roughness")))
+        if scene.instrument.thickness_spread is None:
+            paths.append((layers, SequenceKey(varied_layer(scene)), GetAttrKey("thickness_spread")))
+    instrument = ["bandwidth", *([] if scene.instrument.has_cone else ["numerical_aperture"])]
+    return [*paths, *((GetAttrKey("instrument"), GetAttrKey(name)) for name in instrument)]
+
+
+def _is_optional(path: tuple[Any, ...]) -> bool:
+    return getattr(path[-1], "name", "") in _OPTIONAL
+
+
+def _bounds(path: tuple[Any, ...], value: Any) -> Free:
+    """Bounds of a slider: those of a free number, else usual ones that include a fixed number."""
+    if isinstance(value, Free):
+        return Free(value.lower, value.upper, start=value.start)
+    key, at = getattr(path[-1], "name", ""), float(value)
+    if key == "thickness":
+        return Free(0.0, _round_up(max(2 * at, 1000.0)), start=at)
+    if key in _OPTIONAL:
+        most = 89.0 if key == "angle" else math.inf
+        return Free(0.0, min(max(_OPTIONAL[key], _round_up(1.2 * at) if at else 0.0), most), start=at)
+    return Free(min(max(at - 0.5, 0.05), max(1.0, at - 0.5)), at + 0.5, start=at)
+
+
+def _round_up(number: float) -> float:
+    power = 10.0 ** math.floor(math.log10(number))
+    return next(x * power for x in (1, 2, 5, 10) if x * power >= number * (1 - 1e-9))
+
+
+def _group(scene: Scene, path: tuple[Any, ...]) -> str:
+    """Heading of the sliders of one part of the scene."""
+    part = path[0].name
+    if part != "layers":
+        return part
+    layer = scene.layers[path[1].idx]
+    if isinstance(layer, Interface):
+        return layer.name or "interface"
+    medium = getattr(layer.material, "name", "")
+    number = "" if len(scene.layers) == 1 else f" {path[1].idx + 1}"
+    return " ".join(x for x in (f"layer{number}", layer.name or "", f"({medium})" if medium else "") if x)

@@ -1,0 +1,127 @@
+"""Local server of the explorer: one page and the requests of its session, for this machine only.
+
+Every request must name this machine as its host, so that no other site can reach the server by rebinding its
+name, and bear a random token, which only the address that was printed has.
+"""
+
+from __future__ import annotations
+
+import json
+import secrets
+import socket
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from pellicle.errors import UsageError, install_command
+from pellicle.explorer.page.document import page as page_of
+from pellicle.explorer.page.document import policy
+from pellicle.explorer.session import Session
+
+if TYPE_CHECKING:
+    from starlette.applications import Starlette  # pyright: ignore[reportMissingImports]
+    from starlette.requests import Request  # pyright: ignore[reportMissingImports]
+    from starlette.responses import Response  # pyright: ignore[reportMissingImports]
+
+HOST = "127.0.0.1"
+LARGEST_BODY = 32_000_000
+"""Bytes of the largest request: a data file of `explorer.data.LARGEST_FILE` in base64."""
+_TOKEN = "X-Pellicle-Token"
+_HEADERS = {
+    "Cache-Control": "no-store",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Cross-Origin-Resource-Policy": "same-origin",
+}
+
+
+def application(session: Session, token: str, port: int) -> Starlette:
+    """Return the application of a session: `GET /?token=...` and `POST /api/NAME`.
+
+    **Raises:** UsageError without Starlette.
+    """
+    try:
+        from starlette.applications import Starlette  # pyright: ignore[reportMissingImports]
+        from starlette.concurrency import run_in_threadpool  # pyright: ignore[reportMissingImports]
+        from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse  # pyright: ignore[reportMissingImports]
+        from starlette.routing import Route  # pyright: ignore[reportMissingImports]
+    except ImportError:
+        raise UsageError(_missing("starlette")) from None
+    hosts = {f"{name}:{port}" for name in (HOST, "localhost")}
+
+    def refused(request: Request, given: str) -> Response | None:
+        if request.headers.get("host", "") not in hosts:
+            return PlainTextResponse("this server answers on this machine only\n", 421, _HEADERS)
+        if not secrets.compare_digest(given.encode(), token.encode()):
+            sentence = "the token is missing or wrong: open the address that pellicle explore has printed\n"
+            return PlainTextResponse(sentence, 403, _HEADERS)
+        return None
+
+    async def page(request: Request) -> Response:
+        refusal = refused(request, request.query_params.get("token", ""))
+        if refusal is not None:
+            return refusal
+        nonce = secrets.token_urlsafe(16)
+        headers = {**_HEADERS, "Content-Security-Policy": policy(nonce)}
+        return HTMLResponse(page_of(session.title, token, nonce), headers=headers)
+
+    async def api(request: Request) -> Response:
+        refusal = refused(request, request.headers.get(_TOKEN, ""))
+        if refusal is not None:
+            return refusal
+        content = bytearray()
+        async for part in request.stream():
+            content += part
+            if len(content) > LARGEST_BODY:
+                error = f"the request is larger than {LARGEST_BODY // 1_000_000} MB: give a smaller file"
+                return JSONResponse({"error": error}, 413, _HEADERS)
+        try:
+            body = json.loads(content or b"{}")
+        except (ValueError, RecursionError):
+            return JSONResponse({"error": "the body of a request must be JSON"}, 400, _HEADERS)
+        answer = await run_in_threadpool(session.answer, request.path_params["name"], body)
+        return JSONResponse(answer, 200, _HEADERS)
+
+    routes = [Route("/", page), Route("/api/{name}", api, methods=["POST"])]
+    return Starlette(routes=routes)
+
+
+def serve(session: Session, port: int = 0, ready: Callable[[str], Any] = lambda address: None) -> None:
+    """Serve a session on this machine until it is interrupted.
+
+    **Arguments:** `port`, 0 for a free one; `ready`, called with the page's address once it can be opened.
+
+    **Raises:** UsageError without the packages of the extra, and where the port cannot be opened.
+    """
+    try:
+        import uvicorn  # pyright: ignore[reportMissingImports]
+    except ImportError:
+        raise UsageError(_missing("uvicorn")) from None
+    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind((HOST, port))
+    except (OSError, OverflowError) as error:
+        listener.close()
+        reason = getattr(error, "strerror", None) or "it must be 0 to 65535"
+        raise UsageError(
+            f"port {port} cannot be opened ({reason}): choose another, or none for a free one"
+        ) from None
+    opened, token = listener.getsockname()[1], secrets.token_urlsafe(24)
+    settings = uvicorn.Config(
+        application(session, token, opened),
+        log_level="error",
+        access_log=False,
+        lifespan="off",
+        server_header=False,
+        timeout_graceful_shutdown=1,
+    )
+    with listener:
+        listener.listen(64)
+        session.prepare()
+        ready(f"http://{HOST}:{opened}/?token={token}")
+        uvicorn.Server(settings).run(sockets=[listener])
+
+
+def _missing(package: str) -> str:
+    return f"the explorer needs {package}: {install_command('explore')}"

@@ -1,0 +1,177 @@
+"""Session of the explorer: answers the requests of a page or a widget about one scene."""
+
+from __future__ import annotations
+
+import time
+from base64 import b64encode
+from collections.abc import Mapping
+from logging import getLogger
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pellicle.colour import lab, sensor
+from pellicle.errors import DataError, UsageError
+from pellicle.explorer.compiler import SOON, Compiler
+from pellicle.explorer.film_view import FilmView
+from pellicle.explorer.programs import Curve
+from pellicle.explorer.sphere import ball_picture, to_linear_srgb
+from pellicle.reporting.picture import encode
+from pellicle.scene.film import Scene
+
+log = getLogger(__name__)
+
+SIZE, LARGEST = 128, 512
+"""Pixels across the picture of a ball, and the most that a page may ask for."""
+WANTED = ("curves", "colour", "sphere", "plan")
+"""Parts of a view."""
+
+
+class Session:
+    """A scene whose numbers a page moves: one `answer` for each request.
+
+    **Arguments:** `scene`; `folder`, in which data files may be read (None: none); `wavelength` in nm,
+    (wavelengths,), by default those of the scene's light or the visible ones.
+
+    **Raises:** UsageError for a light of several angles, DataError where materials share no wavelengths.
+    """
+
+    def __init__(
+        self, scene: Scene, folder: str | Path | None = None, *, wavelength: Any = None, title: str = ""
+    ) -> None:
+        self.title, self.folder = title, None if folder is None else Path(folder).resolve()
+        self._compiler = Compiler()
+        self.view = FilmView(scene, wavelength)
+        self._requests = {"scene": self._scene, "view": self._view}
+
+    def answer(self, request: str, body: Mapping[str, Any]) -> dict[str, Any]:
+        """Answer one request; what is wrong with it is one sentence under `error`."""
+        if request not in self._requests:
+            return {"error": f"no request {request!r}; known: {', '.join(self._requests)}"}
+        if not isinstance(body, Mapping):
+            return {"error": "the body of a request must be a JSON object"}
+        try:
+            return self._requests[request](body)
+        except (UsageError, DataError, ValueError, OSError) as error:
+            return {"error": _sentence(error), **_serial(body)}
+        except Exception as error:  # a fault of ours must not end the session
+            log.exception("request %s", request)
+            return {"error": f"{request} failed: {type(error).__name__}: {error}", **_serial(body)}
+
+    def _scene(self, body: Mapping[str, Any]) -> dict[str, Any]:
+        return {"title": self.title, "kind": "spectrum", **self.view.describe()}
+
+    def _view(self, body: Mapping[str, Any]) -> dict[str, Any]:
+        values, warnings = self._values(body), []
+        wanted, size = body.get("want", WANTED), body.get("size", SIZE)
+        if not isinstance(wanted, list | tuple) or not all(x in WANTED for x in wanted):
+            raise UsageError(f"`want` must be a list of {', '.join(WANTED)}")
+        if not isinstance(size, int) or not 16 <= size <= LARGEST:
+            raise UsageError(f"`size` must be 16 to {LARGEST} pixels")
+        answer: dict[str, Any] = {**_serial(body), "compiling": [], "milliseconds": {}}
+        parts = {"curves": self._curves, "colour": self._colour, "sphere": self._sphere, "plan": self._plan}
+        for part in wanted:
+            began = time.perf_counter()
+            try:
+                found = parts[part](values, bool(body.get("wait")), size)
+            except ValueError as error:
+                warnings.append(_sentence(error))
+                continue
+            if found is None:
+                answer["compiling"].append(part)
+                continue
+            answer[part] = found
+            answer["milliseconds"][part] = round(1e3 * (time.perf_counter() - began), 3)
+        return {**answer, "warnings": list(dict.fromkeys(warnings))}
+
+    def _values(self, body: Mapping[str, Any]) -> dict[str, float]:
+        """The value of every control: those of the request, else the scene's. Raises UsageError."""
+        given, values = body.get("values") or {}, self.view.defaults()
+        if not isinstance(given, Mapping):
+            raise UsageError("`values` must be numbers by name")
+        for name, value in given.items():
+            control = self.view.by_name.get(name)
+            if control is None:
+                raise UsageError(f"no control {name!r}; known: {', '.join(self.view.by_name)}")
+            if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
+                raise UsageError(f"{name} must be a number, not {value!r}")
+            if not control.lower <= value <= control.upper:
+                bounds = f"{control.lower:g} to {control.upper:g} {control.unit}".rstrip()
+                raise UsageError(f"{name} must be {bounds}, got {value:g}")
+            values[name] = float(value)
+        return values
+
+    def _program(self, kind: str, values: Mapping[str, float], wait: bool) -> Any:
+        """A compiled program of the effects that these values have, None while it is compiled."""
+        structure = self.view.structure(values)
+        get = self._compiler.wait if wait else self._compiler.get
+        return get((kind, structure), lambda: self.view.compile(kind, structure))
+
+    def prepare(self) -> None:
+        """Compile in the background what the first views need, and then what one effect more needs."""
+        structure = self.view.structure(self.view.defaults())
+        for kind in ("curves", "colour", "sphere"):
+            self._compiler.get((kind, structure), lambda kind=kind: self.view.compile(kind, structure))
+        for other in self.view.neighbours(structure):
+            for kind in ("curves", "colour"):
+                make = lambda kind=kind, other=other: self.view.compile(kind, other)  # noqa: E731
+                self._compiler.get((kind, other), make, SOON)
+
+    def _curves(self, values: Mapping[str, float], wait: bool, size: int) -> list[dict[str, Any]] | None:
+        program = self._program("curves", values, wait)
+        return None if program is None else [curve_to_json(curve) for curve in program(values)]
+
+    def _colour(self, values: Mapping[str, float], wait: bool, size: int) -> dict[str, Any] | None:
+        program = self._program("colour", values, wait)
+        if program is None:
+            return None
+        xyz = program(values)
+        shown = encode(to_linear_srgb(xyz))
+        numbers = np.asarray(lab(xyz, sensor().white)).round(2).tolist()
+        in_words = ", ".join(f"{name} {x:.1f}" for name, x in zip(("L*", "a*", "b*"), numbers, strict=True))
+        return {
+            "hex": "#" + "".join(f"{round(255 * float(x)):02x}" for x in shown),
+            "lab": numbers,
+            "text": f"{self.view.light_in_words} under D65: {in_words}",
+        }
+
+    def _sphere(self, values: Mapping[str, float], wait: bool, size: int) -> str | None:
+        program = self._program("sphere", values, wait)
+        if program is None:
+            return None
+        return "data:image/png;base64," + b64encode(ball_picture(program(values), size)).decode()
+
+    def _plan(self, values: Mapping[str, float], wait: bool, size: int) -> list[dict[str, Any]]:
+        return [
+            {
+                "effect": row.effect,
+                "choice": "on" if row.on else "off",
+                "reason": row.why,
+                "error": row.error_bound,
+                "cost": None,
+            }
+            for row in self.view.plan(values).rows
+        ]
+
+
+def curve_to_json(curve: Curve) -> dict[str, Any]:
+    """Convert a curve; 7 digits are more than a plot shows, None is a point without a value."""
+    y = [float(f"{v:.7g}") if isfinite(v) else None for v in np.asarray(curve.y, float).tolist()]
+    return {
+        "label": curve.label,
+        "x": [float(f"{v:.7g}") for v in np.asarray(curve.x, float).tolist()],
+        "y": y,
+    }
+
+
+def _serial(body: Mapping[str, Any]) -> dict[str, Any]:
+    return {"serial": body["serial"]} if "serial" in body else {}
+
+
+def _sentence(error: Exception) -> str:
+    """A message on one line, without the backticks of Python arguments."""
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename or 'a file'}: {error.strerror}"
+    return " ".join(str(error).replace("`", "").split())
