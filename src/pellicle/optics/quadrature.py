@@ -21,7 +21,8 @@ class ConeRays(NamedTuple):
 
     angle: Any  # of incidence, radians
     weight: np.ndarray
-    s_share: Any  # fraction that each ray carries as s of light polarised s along the axis
+    cosine: Any  # cos 2ψ: ψ is the angle from s of the axis to s of the ray, behind the lens
+    square: Any  # cos² 2ψ
 
 
 @lru_cache(maxsize=64)
@@ -45,7 +46,8 @@ def cone_rays(angle: Any, sine: Any, count: int, around: int) -> ConeRays:
     nodes, weights = _legendre_rule(count)
     radius = np.sqrt(0.5 * (nodes + 1))
     if around == 1:
-        return ConeRays(jnp.arcsin(_leading_axis(radius, sine) * sine), 0.5 * weights, 0.5)
+        # means over all azimuths
+        return ConeRays(jnp.arcsin(_leading_axis(radius, sine) * sine), 0.5 * weights, 0.0, 0.5)
     azimuth = np.pi * (np.arange(around) + 0.5) / around
     r, phi = (x.ravel() for x in np.meshgrid(radius, azimuth, indexing="ij"))
     shape = jnp.broadcast_shapes(np.shape(angle), np.shape(sine))
@@ -56,7 +58,8 @@ def cone_rays(angle: Any, sine: Any, count: int, around: int) -> ConeRays:
     across = across + jnp.finfo(across.dtype).tiny  # so that no root has an infinite slope
     s = s0 * (along * cos_phi**2 + sin_phi**2) - rho * cos_phi * c0
     theta = jnp.arctan2(jnp.sqrt(across), along * c0 + rho * cos_phi * s0)
-    return ConeRays(theta, np.repeat(0.5 * weights, around) / around, s * s / across)
+    cosine = 2 * s * s / across - 1
+    return ConeRays(theta, np.repeat(0.5 * weights, around) / around, cosine, cosine * cosine)
 
 
 def _leading_axis(x: np.ndarray, like: Any) -> np.ndarray:

@@ -95,7 +95,7 @@ def build(plan: Plan) -> Simulate:
         intensities = _averaged(intensities, plan.row("coherence").count)
     if plan.on("angle-spread"):
         cone = plan.row("angle-spread")
-        mix = instrument.unmixed if ellipsometric else instrument.mixed(plan.polarisation)
+        mix = instrument.turned_stokes if ellipsometric else instrument.mixed(plan.polarisation)
         intensities = instrument.over_cone(intensities, cone.count, cone.around, mix)
 
     def simulate(scene: Scene) -> Any:
@@ -105,6 +105,8 @@ def build(plan: Plan) -> Simulate:
         rows = finish(intensities(scene)) if averaged else intensities(scene)
         # behind the averages, whose slopes then have three rows
         rows = _mueller_rows(*rows) if plan.signal == "mueller" and not mixed else rows
+        if plan.signal == "psi-delta":
+            rows = rows[:3]
         return stack_rows(rows).T.reshape(-1) if ellipsometric else rows[0]
 
     return simulate
@@ -152,14 +154,19 @@ def _mean(rows: Sequence[Any]) -> Sequence[Any]:
 
 
 def _normalised_rows(rows: Sequence[Any]) -> Sequence[Any]:
-    """N, C and S."""
-    return ellipsometry.normalised(ellipsometry.Stokes(*rows))
+    """N, C and S; behind a cone of light also m22 and m44 of the Mueller matrix."""
+    n, c, s, intensity, *others = rows
+    found = ellipsometry.normalised(ellipsometry.Stokes(n, c, s, intensity))
+    if not others:
+        return found
+    m22, m44 = others
+    return [*found, *ellipsometry.normalised(ellipsometry.Stokes(n, m22, m44, intensity))[1:]]
 
 
-def _mueller_rows(n: Any, c: Any, s: Any) -> Sequence[Any]:
+def _mueller_rows(n: Any, c: Any, s: Any, m22: Any = None, m44: Any = None) -> Sequence[Any]:
     """The elements m12, m13, ..., m44 of the normalised Mueller matrix of an isotropic sample."""
-    one, none = jnp.ones_like(n), jnp.zeros_like(n)
-    return [-n, none, none, -n, one, *[none] * 4, c, s, none, none, -s, c]
+    m22, m44, none = jnp.ones_like(n) if m22 is None else m22, c if m44 is None else m44, jnp.zeros_like(n)
+    return [-n, none, none, -n, m22, *[none] * 4, c, s, none, none, -s, m44]
 
 
 def _power_rows(plan: Plan, groups: list[CoherentGroup]) -> list[Any]:

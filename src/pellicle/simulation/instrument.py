@@ -74,33 +74,52 @@ def cone_sine(scene: Scene) -> Any:
     return jnp.sin(jnp.deg2rad(spread))  # pyright: ignore[reportArgumentType]
 
 
-def over_cone(simulate: Intensities, count: int, around: int, mix: Callable[[Any, Any], Any]) -> Intensities:
-    """The mean over the cone of light; `mix(rows, s_share)` combines the polarisations of a ray."""
+def over_cone(
+    simulate: Intensities, count: int, around: int, mix: Callable[[Any, Any, Any], Any]
+) -> Intensities:
+    """The mean over the cone of light; `mix(rows, cosine, square)` turns s and p of a ray: see `ConeRays`."""
 
     def average(scene: Scene):
         like = jnp.result_type(scene.light.wavelength)
         rays = cone_rays(jnp.deg2rad(scene.light.angle), cone_sine(scene), count, around)
 
-        def at(angle, s_share):
+        def at(angle, cosine, square):
             turned = eqx.tree_at(lambda s: s.light.angle, scene, jnp.rad2deg(angle))
-            return mix(simulate(turned), s_share)
+            return mix(simulate(turned), cosine, square)
 
-        share = jnp.broadcast_to(jnp.asarray(rays.s_share, like), jnp.shape(rays.angle))
-        return _mean(jnp.asarray(rays.weight, like), jax.vmap(at)(jnp.asarray(rays.angle, like), share))
+        shape = jnp.shape(rays.angle)
+        turns = (jnp.broadcast_to(jnp.asarray(x, like), shape) for x in (rays.cosine, rays.square))
+        return _mean(jnp.asarray(rays.weight, like), jax.vmap(at)(jnp.asarray(rays.angle, like), *turns))
 
     return average
 
 
-def mixed(polarisation: str) -> Callable[[Any, Any], Any]:
+def mixed(polarisation: str) -> Callable[[Any, Any, Any], Any]:
     """Weighted sum of s and p of a ray: one half each for unpolarised light, else by the lens's rotation."""
 
-    def mix(rows, s_share):
-        share = {"s": s_share, "p": 1 - s_share, "unpolarised": 0.5}[polarisation]
-        return [share * rows[0] + (1 - share) * rows[1]]
+    def mix(rows, cosine, square):
+        half = {"s": 0.5, "p": -0.5, "unpolarised": 0.0}[polarisation] * cosine
+        return [(0.5 + half) * rows[0] + (0.5 - half) * rows[1]]
 
     return mix
 
 
-def unmixed(rows: Any, s_share: Any) -> Any:
-    """The rows of an ellipsometer unchanged: the rotation of s and p by the lens is neglected."""
-    return rows
+def turned_stokes(rows: Any, cosine: Any, square: Any) -> Any:
+    """The Stokes sums (n, c, s, intensity) of a ray in the frame of the axis, then its m22 and m44.
+
+    The lens before the sample turns s and p of a ray by ψ against those of its plane of incidence, and the
+    lens behind it, its mirror image, by ψ again: the Jones matrix is R(ψ) diag(r_p, r_s) R(ψ). Elements of
+    its Mueller matrix that are odd in ψ cancel between mirror images of a ray. With n = |r_s|² − |r_p|²,
+    c + is = 2 conj(r_p) r_s and I = |r_s|² + |r_p|² the others are m12 = m21 = −n cos 2ψ,
+    m22 = I cos² 2ψ − c sin² 2ψ, m33 = c cos² 2ψ − I sin² 2ψ, m44 = c and m34 = −m43 = s cos 2ψ.
+    """
+    n, c, s, intensity = rows
+    sine = 1 - square
+    return [
+        n * cosine,
+        c * square - intensity * sine,
+        s * cosine,
+        intensity,
+        intensity * square - c * sine,
+        c,
+    ]
