@@ -1,12 +1,11 @@
-"""Time per point of a birefringent film of any orientation, beside pyElli and difftmm, and their agreement.
+"""Time per point of a birefringent film of any orientation, beside pyElli and difftmm.
 
 Run `python benchmarks/anisotropic.py`. A point is one wavelength, with the Jones matrix of reflection of a
 uniaxial film of 237 nm on glass at 55°. Times are processor times on one thread, and the methods take turns
 in each round; the table has medians. pyElli runs its 4×4 solver with its exact propagators (exponentials of
 matrices by SciPy, or by PyTorch where that is installed, and eigenvectors); difftmm is complex64 and lays
 principal axes along those of the laboratory. Both take part if they are installed
-(`pip install pyElli packaging difftmm`). `--agreement 1000` instead compares pellicle with pyElli on that
-many random stacks of a uniaxial, an isotropic and a biaxial layer.
+(`pip install pyElli packaging difftmm`). `benchmarks/peers/agreement.py` compares the values.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ import numpy as np
 
 from pellicle.optics.anisotropy import Medium, Principal, permittivity, uniaxial
 from pellicle.optics.berreman.stack import polarised
-from pellicle.optics.pair import to_complex, to_pair
+from pellicle.optics.pair import to_complex
 
 jax.config.update("jax_enable_x64", True)
 
@@ -131,47 +130,6 @@ def speed() -> None:
         print(f"| {name} | {statistics.median(each):.3g} | {statistics.median(each) / first:.3g} |")
 
 
-def agreement(count: int) -> None:
-    """Print the largest difference from pyElli over random stacks."""
-    rng = np.random.default_rng(1)
-    indices = rng.uniform(1.3, 2.4, (count, 7)) + 1j * rng.uniform(0, 0.2, (count, 7))
-    turns, depths = rng.uniform(0, 180, (count, 5)), rng.uniform(0, 400, (count, 3))
-    ambient, angle, nm = rng.uniform(1, 1.6, count), rng.uniform(0, 85, count), 400.0
-
-    @jax.jit
-    def matrices(n: Any, turns: Any, depths: Any, ambient: Any, angle: Any) -> Any:
-        n = [to_pair(x) for x in n]
-        layers = [
-            uniaxial(n[0], n[1], turns[0], turns[1]),
-            n[2],
-            permittivity(Principal(n[3], n[4], n[5]), turns[2], turns[3], turns[4]),
-        ]
-        phases = [2 * jnp.pi / nm * d for d in depths]
-        found = polarised(ambient, layers, n[6], phases, angle, dichroic=False)
-        return jnp.stack([to_complex(x) for x in found.reflected], axis=-1)
-
-    found = np.asarray(matrices(indices.T, np.deg2rad(turns).T, depths.T, ambient, np.deg2rad(angle)))
-    errors = []
-    for i in range(count):
-        n, t = indices[i], turns[i]
-        media = [
-            ((n[0], n[0], n[1]), (t[0], t[1], 0.0)),
-            ((n[2], n[2], n[2]), (0.0, 0.0, 0.0)),
-            ((n[3], n[4], n[5]), (t[2], t[3], t[4])),
-        ]
-        film = list(zip(media, depths[i], strict=True))
-        expected = by_pyelli(film, n[6], ambient[i], 1, "PropagatorExpm", "scipy")(angle[i])
-        errors.append(np.max(np.abs(found[i] - np.ravel(expected))))
-    print(f"{count} random stacks: largest difference {max(errors):.1e}, median {np.median(errors):.1e}")
-
-
-def main() -> None:
-    """Measure the speed, or compare with pyElli."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--agreement", type=int, metavar="COUNT")
-    count = parser.parse_args().agreement
-    agreement(count) if count else speed()
-
-
 if __name__ == "__main__":
-    main()
+    argparse.ArgumentParser(description=__doc__).parse_args()
+    speed()

@@ -99,6 +99,7 @@ ELSEWHERE = {
     "pellicle demo": "tests/cli/test_demo_command.py",
     "pellicle --install-completion": "would change the user's shell; part of cyclopts",
     "python benchmarks/anisotropic.py": "speed is measured by benchmarks; tests/optics/test_berreman.py",
+    "python benchmarks/peers/agreement.py --stacks 1000": "needs pyElli; tests/optics/test_berreman.py",
     "python benchmarks/calibration.py": _LONG_STUDY,
     "python benchmarks/colour_inverse.py": "tests/colour/test_inverse.py: 300 colours of one film",
     "python benchmarks/colour_series.py": "tests/colour/test_series.py: fewer colours",

@@ -16,38 +16,15 @@ from pathlib import Path
 from typing import Any
 
 from cases import CASES, WITHOUT_SLOPE
+from environment import ROOT, install, peers_python
 from packages import OURS, PEERS, Package
 from table import table
 from truth import truth
 
 HERE = Path(__file__).resolve().parent
-ROOT = HERE.parents[1]
-VENV = ROOT / ".venv-peers"
 PAGE = ROOT / "docs" / "hard_cases.md"
 SECONDS = 300  # for all remaining cases of a process
 BEGIN, END = "<!-- peers: written by make peers -->", "<!-- /peers -->"
-
-
-def peers_python() -> Path:
-    """Return the Python of the packages' environment, and create it if necessary."""
-    python = VENV / "bin" / "python"
-    if not python.exists():
-        made = subprocess.run([sys.executable, "-m", "venv", VENV], capture_output=True)
-        if made.returncode:  # on Debian, pip for virtual environments is a separate package; use ours
-            subprocess.run([sys.executable, "-m", "venv", "--without-pip", VENV], check=True)
-            pip = [sys.executable, "-m", "pip", "--python", str(python), "install", "--quiet", "pip"]
-            subprocess.run(pip, check=True)
-    return python
-
-
-def install(python: Path, package: Package) -> str | None:
-    """Install a package and return None, or the reason for a failure."""
-    command = [str(python), "-m", "pip", "install", "--quiet", *package.install]
-    done = subprocess.run(command, capture_output=True, text=True)
-    if done.returncode == 0:
-        return None
-    lines = [line for line in done.stderr.splitlines() if line.strip()]
-    return lines[-1].strip() if lines else f"pip ended with {done.returncode}"
 
 
 def run(python: Path, package: Package) -> dict[str, Any]:
