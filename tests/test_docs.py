@@ -61,7 +61,7 @@ SLOW = {
         f"pellicle cost docs/{scene}.toml --datasets 0": "compiles twenty programs"
         for scene in (
             *("cost/soap_film", "cost/cuo_on_aluminium"),
-            *("examples/coated_window", "examples/microscope"),
+            *("examples/coated_window", "examples/microscope", "examples/graded"),
         )
     },
     "pellicle cost docs/examples/film_colours.toml": "compiles twenty programs",

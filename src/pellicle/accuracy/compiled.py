@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from pellicle.accuracy.case import Case, remaining_parameters
-from pellicle.accuracy.methods import Variant
+from pellicle.accuracy.variant import Variant
 from pellicle.fitting.spectra.parameters import anonymous
 from pellicle.scene.film import Scene
 from pellicle.scene.free import insert

@@ -13,8 +13,6 @@ from pellicle.accuracy.interval_coverage import IntervalComparison, compare_inte
 from pellicle.accuracy.measure import MethodComparison, compare_methods
 from pellicle.accuracy.simulated_data import data_sets
 from pellicle.accuracy.solver_comparison import SolverComparison, compare_solvers
-from pellicle.dispersion.anisotropic import Anisotropic
-from pellicle.effects.anisotropy import scene_media
 from pellicle.errors import UsageError
 from pellicle.fitting.presentation import PlotMixin
 from pellicle.fitting.progress import Progress, quiet
@@ -65,8 +63,6 @@ def cost(
     **Raises:** UsageError for a tolerance that is not above zero, for a reference that cannot compute the
     scene, and for a scene whose signal is 0 everywhere.
     """
-    if any(isinstance(medium, Anisotropic) for medium in scene_media(scene)):
-        raise UsageError("methods for birefringent films are not compared: give each medium one index")
     default = TOLERANCE.get(scene.light.signal, DEFAULT_TOLERANCE)
     tolerance = (default if noise is None else noise) if tolerance is None else tolerance
     if not 0 < tolerance < np.inf:

@@ -12,6 +12,8 @@ import mpmath
 import numpy as np
 
 from pellicle.accuracy.case import Case
+from pellicle.dispersion.anisotropic import Anisotropic
+from pellicle.effects.anisotropy import GENERAL
 from pellicle.scene.film import Plate, Scene, groups, thickness_spread, with_wavelength
 from pellicle.scene.free import insert
 
@@ -31,6 +33,8 @@ def unsuitable(case: Case) -> str | None:
         return "this layer's thickness is uneven"
     if instrument.has_cone:
         return "this light comes in a cone"
+    if case.plan.row("anisotropy").count == GENERAL:
+        return "an optic axis is tilted"
     if case.plan.on("gradient"):
         return "this layer's index varies with depth"
     if case.plan.on("roughness"):
@@ -106,7 +110,20 @@ def _exact(number: Any) -> Any:
     return mpf(float(number))
 
 
+class _Principal(NamedTuple):
+    """Indices along x (in the plane of incidence), y and z (the normal) of an aligned birefringent medium."""
+
+    x: Any
+    y: Any
+    z: Any
+
+
 def _indices(medium: Any, wavelength: np.ndarray) -> list[Any]:
+    if isinstance(medium, Anisotropic) and medium.order is not None:
+        own = [medium.x, medium.x if medium.y is None else medium.y, medium.z]
+        return [
+            _Principal(*n) for n in zip(*(_indices(own[i], wavelength) for i in medium.order), strict=True)
+        ]
     return [mpc(float(n.real), float(n.imag)) for n in np.asarray(medium(wavelength))]
 
 
@@ -132,7 +149,7 @@ def _powers(point: _Point, first: int, letter: str) -> tuple[Any, Any]:
     if first == len(point.groups) - 1:
         return R, T
     R_next, T_next = _powers(point, first + 1, letter)
-    q = _normal(point, point.groups[first].below)
+    q, _ = _wave(point, point.groups[first].below, letter)
     passed = mp.exp(-4 * mp.pi * mp.im(q) * point.plates_mm[first] * 10**6 / point.wavelength)
     round_trip = R_below * R_next * passed**2
     returned = T * T_below * R_next * passed**2 * _orders(point, round_trip)
@@ -151,29 +168,31 @@ def _product(point: _Point, first: int, letters: str) -> Any:
     (r, back, twice), (r_, back_, twice_) = (_amplitudes(point, point.groups[first], x) for x in letters)
     if first == len(point.groups) - 1:
         return r * mp.conj(r_)
-    q = _normal(point, point.groups[first].below)
+    q, _ = _wave(point, point.groups[first].below, letters[0])
     passed = mp.exp(-4 * mp.pi * mp.im(q) * point.plates_mm[first] * 10**6 / point.wavelength)
     beneath = _product(point, first + 1, letters) * passed**2
     returned = twice * mp.conj(twice_) * beneath * _orders(point, back * mp.conj(back_) * beneath)
     return r * mp.conj(r_) + point.collected * returned
 
 
-def _normal(point: _Point, index: Any) -> Any:
+def _wave(point: _Point, index: Any, letter: str) -> tuple[Any, Any]:
+    """Normal index q of a wave in a medium, and the weight w of its admittance q/w."""
     a = point.groups[0].above * mp.sin(point.angle)
-    q = mp.sqrt(index**2 - a**2)
-    return -q if mp.im(q) < 0 else q
+    x, y, z = index if isinstance(index, _Principal) else (index, index, index)
+    q = mp.sqrt(y**2 - a**2) if letter == "s" else x / z * mp.sqrt(z**2 - a**2)
+    return -q if mp.im(q) < 0 else q, mpc(1) if letter == "s" else x**2
 
 
 def _admittance(point: _Point, index: Any, letter: str) -> Any:
-    q = _normal(point, index)
-    return q if letter == "s" else q / index**2
+    q, weight = _wave(point, index, letter)
+    return q / weight
 
 
 def _fields(point: _Point, layers: list[tuple[Any, Any]], bottom: Any, letter: str) -> tuple[Any, Any]:
     """(E, H) at the upper face for a unit wave that leaves below; in p they change places."""
     E, H = mpc(1), bottom
     for index, depth in reversed(layers):
-        q, weight = _normal(point, index), mpc(1) if letter == "s" else index**2
+        q, weight = _wave(point, index, letter)
         k0d = 2 * mp.pi * depth / point.wavelength
         cosine, sine = mp.cos(k0d * q), k0d * mp.sinc(k0d * q)  # the latter over q
         E, H = E * cosine - 1j * sine * weight * H, H * cosine - 1j * sine * q**2 / weight * E

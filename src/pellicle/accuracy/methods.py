@@ -2,71 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
-from typing import Any, NamedTuple, final
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.accuracy.case import Case, disperses, with_effect
-from pellicle.dispersion.base import AbstractDispersion
-from pellicle.effects.plan import Plan
-from pellicle.effects.removal import FilmRemoval, RealPart
-from pellicle.optics.pair import Pair, is_real, parts
+from pellicle.accuracy.case import Case, with_effect
+from pellicle.accuracy.media_methods import (
+    aligned_axes,
+    constant_index,
+    fewer_slices,
+    general_matrices,
+    homogeneous_slices,
+    transparent,
+)
+from pellicle.accuracy.variant import Method, Variant, without
 from pellicle.planning.film import full_plan, plan
-from pellicle.scene.film import Scene, all_collected, coherent_layers, media, with_wavelength
-from pellicle.scene.graded import each_medium
-from pellicle.scene.layers import Layer, Plate
-
-
-class Variant(NamedTuple):
-    """A method applied to a case: its plan and scene, a second program that completes the signal, and its
-    precision."""
-
-    plan: Plan
-    scene: Scene
-    finish: Callable[[Any], Any] | None = None
-    double: bool = True
-
-
-@dataclass(frozen=True)
-class Method:
-    """A method of simulating a scene; `variant` applies it to a case, or returns why it does not apply."""
-
-    name: str
-    leaves_out: str
-    variant: Callable[[Case], Variant | str]
-
-
-def _left_out(effect: str, case: Case) -> Variant:
-    removal = FilmRemoval(effect)
-    return Variant(replace(full_plan(removal(case.scene)), left_out=(removal,)), case.scene)
-
-
-def _without(effect: str, absent: str, case: Case) -> Variant | str:
-    """The scene without one effect, otherwise in full; `absent` is the reason where it does not have it."""
-    return _left_out(effect, case) if case.plan.on(effect) else absent
+from pellicle.scene.film import all_collected, coherent_layers, with_wavelength
+from pellicle.scene.layers import Plate
 
 
 def _without_angle(case: Case) -> Variant | str:
     if case.ellipsometric:
         return "ellipsometry compares s and p, which are equal at normal incidence"
-    return _without("oblique", "the light is at normal incidence", case)
+    return without("oblique", "the light is at normal incidence", case)
 
 
 def _s_alone(case: Case) -> Variant | str:
     if case.ellipsometric or case.scene.instrument.has_cone:
         return "this signal needs both polarisations"
-    return _without("polarisation", "there is only one polarisation", case)
+    return without("polarisation", "there is only one polarisation", case)
 
 
 def _half_space(case: Case) -> Variant | str:
     if case.plan.signal == "T":
         return "light transmitted by a plate passes its back face"
-    return _without("back-face", "the substrate has no back face", case)
+    return without("back-face", "the substrate has no back face", case)
 
 
 def _collection(reflections: int | None, case: Case) -> Variant | str:
@@ -105,39 +77,6 @@ def _nodes(count: int, case: Case) -> Variant | str:
     return Variant(with_effect(case.plan, "coherence", True, count), case.scene)
 
 
-def _transparent(case: Case) -> Variant | str:
-    if not case.plan.on("absorption"):
-        return "no layer absorbs"
-    layers = tuple(
-        replace(x, material=each_medium(RealPart, x.material)) if isinstance(x, Layer) else x
-        for x in case.scene.layers
-    )
-    clear = eqx.tree_at(lambda s: s.layers, case.scene, layers)
-    return Variant(full_plan(clear), clear)
-
-
-@final
-class AtOne(AbstractDispersion):
-    """Constant index: that of another medium at one wavelength (nm)."""
-
-    base: AbstractDispersion
-    at: float
-
-    def index(self, wavelength):
-        one = jnp.ones_like(wavelength)
-        index = self.base.index(self.at * one[..., :1] if one.ndim else self.at * one)
-        re, im = parts(index)
-        return re * one if is_real(index) else Pair(re * one, im * one)
-
-
-def _constant_index(case: Case) -> Variant | str:
-    if not disperses(case):
-        return "no index varies over the spectrum"
-    middle = float(0.5 * (case.wavelength.min() + case.wavelength.max()))
-    flat = [AtOne(m, middle) for m in media(case.scene)]
-    return Variant(case.plan, eqx.tree_at(media, case.scene, flat))
-
-
 def _is_rising(case: Case) -> bool:
     """True for one angle of incidence and rising wavelengths."""
     return not np.ndim(case.scene.light.angle) and bool(np.all(np.diff(case.wavelength) > 0))
@@ -174,6 +113,7 @@ def _finer(case: Case) -> Variant | str:
 
 
 ORDERS = (1, 2, 3, 5, 8)
+SLICES, HOMOGENEOUS_SLICES = (2, 4, 8), (8, 32)
 
 METHODS = (
     Method("float64", "nothing", lambda case: Variant(case.plan, case.scene)),
@@ -189,13 +129,22 @@ METHODS = (
     *(Method(f"{n} nodes", "finer averages", partial(_nodes, n)) for n in (3, 7)),
     Method("normal incidence", "the angle", _without_angle),
     Method("s alone", "p", _s_alone),
-    Method("one ray", "the cone of light", partial(_without, "angle-spread", "no cone of light")),
+    Method("one ray", "the cone of light", partial(without, "angle-spread", "no cone of light")),
     Method("half space", "the plate's back face", _half_space),
     Method("one back reflection", "later ones", partial(_collection, 1)),
     Method("all collected", "that part of the light misses the detector", partial(_collection, None)),
-    Method("smooth faces", "roughness", partial(_without, "roughness", "every face is smooth")),
-    Method("transparent layer", "its absorption", _transparent),
-    Method("constant index", "dispersion: the index of mid-band", _constant_index),
+    Method("smooth faces", "roughness", partial(without, "roughness", "every face is smooth")),
+    Method("isotropic average", "birefringence", partial(without, "anisotropy", "no medium is birefringent")),
+    Method("aligned axes", "the tilt of optic axes", aligned_axes),
+    Method("4×4 matrices", "nothing", general_matrices),
+    Method("mean of the depth", "the gradient", partial(without, "gradient", "no layer is graded")),
+    *(Method(f"{n} slices", "finer slices", partial(fewer_slices, n)) for n in SLICES),
+    *(
+        Method(f"{n} homogeneous slices", "the gradient within each", partial(homogeneous_slices, n))
+        for n in HOMOGENEOUS_SLICES
+    ),
+    Method("transparent layer", "its absorption", transparent),
+    Method("constant index", "dispersion: the index of mid-band", constant_index),
     Method("twice the wavelengths", "nothing", _finer),
     *(
         Method(f"every {nth} wavelength", "the others: interpolated", partial(_coarser, step))

@@ -8,7 +8,7 @@ import numpy as np
 
 from pellicle.accuracy.case import Case
 from pellicle.accuracy.compiled import compiled
-from pellicle.accuracy.methods import Variant
+from pellicle.accuracy.variant import Variant
 from pellicle.errors import UsageError, install_command
 
 REFERENCES = ("float64", "mpmath")

@@ -11,7 +11,7 @@ import numpy as np
 
 from pellicle.accuracy.case import Case
 from pellicle.accuracy.compiled import compiled
-from pellicle.accuracy.methods import Variant
+from pellicle.accuracy.variant import Variant
 from pellicle.fitting.problem import Explained, Form, Problem
 from pellicle.fitting.spectra.problem import make
 from pellicle.fitting.spectra.targets import Measured

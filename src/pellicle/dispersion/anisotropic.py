@@ -67,6 +67,13 @@ class Anisotropic(AbstractDispersion):
             object.__setattr__(other, name, convert(value) if medium else value)
         return other
 
+    def with_angles(self, convert: Callable[[Any], Any]) -> Anisotropic:
+        """Return a copy whose angles of the axis are `convert(angle)`."""
+        if self.is_uniaxial:
+            return Anisotropic(self.x, self.z, axis=(convert(self.theta), convert(self.phi)))
+        axis = [convert(angle) for angle in (self.theta, self.phi, self.psi)]
+        return Anisotropic(x=self.x, y=self.y, z=self.z, axis=axis)
+
     @property
     def names(self) -> dict[str, str]:
         """Names of the fields in results."""

@@ -51,14 +51,16 @@ def require_isotropic(medium: Any, what: str) -> None:
 class MeanIndex(AbstractDispersion):
     """Isotropic medium with the mean of the principal indices of an anisotropic one."""
 
-    media: list[AbstractDispersion]
-    """All three, the ordinary one twice."""
+    x: Any  # each medium once, by its name in `Anisotropic`: free parameters are known by their paths
+    y: Any
+    z: Any
 
     def index(self, wavelength):
-        x, y, z = (medium.index(wavelength) for medium in self.media)
+        x, z = self.x.index(wavelength), self.z.index(wavelength)
+        y = x if self.y is None else self.y.index(wavelength)
         return (x + y + z) * (1 / 3)
 
 
 def mean_medium(medium: Anisotropic) -> MeanIndex:
     """Return the isotropic mean of an anisotropic medium."""
-    return MeanIndex([medium.x, medium.x if medium.y is None else medium.y, medium.z])
+    return MeanIndex(medium.x, medium.y, medium.z)
