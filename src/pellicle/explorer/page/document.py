@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from functools import cache
 from importlib.resources import files
@@ -13,25 +12,20 @@ from markupsafe import Markup
 from pellicle.reporting.page.document import packed_plotly, palette
 
 _ASSETS = files("pellicle.explorer.page") / "assets"
-_SCRIPTS = ("slider.js", "plot.js", "explorer.js")
+_SCRIPTS = ("slider.js", "plot.js", "files.js", "requests.js", "explorer.js")
 """Parts of the module `explorer.js`, which share its scope: a widget takes a module without imports."""
 
 
-def page(title: str, token: str, nonce: str) -> str:
-    """Format the page of the explorer, one file that loads nothing.
+def document(nonce: str) -> str:
+    """Return the page of the explorer, one file that loads nothing.
 
-    **Arguments:** `title`, the heading; `token`, which the page sends with each request; `nonce`, a random
-    text for this response, which `policy` names.
+    **Arguments:** `nonce`, a random text for this response, which `policy` names. The page reads the token that
+    it sends with each request from the parameter `token` of its address.
     """
     loader = PackageLoader("pellicle.explorer.page", "assets")
     template = Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True)
     return template.get_template("explorer.html").render(
-        title=title,
-        nonce=nonce,
-        settings=_json({"token": token}),
-        style=Markup(style()),
-        script=Markup(script()),
-        plotly=Markup(packed_plotly()),
+        nonce=nonce, style=Markup(style()), script=Markup(script()), plotly=Markup(packed_plotly())
     )
 
 
@@ -70,11 +64,3 @@ def style() -> str:
             (_ASSETS / "explorer.css").read_text(encoding="utf-8"),
         )
     )
-
-
-def _json(settings: dict[str, str]) -> Markup:
-    """JSON inside an element of a script: no text in it can end the element."""
-    text = json.dumps(settings)
-    for sign in "<>&":
-        text = text.replace(sign, f"\\u{ord(sign):04x}")
-    return Markup(text)

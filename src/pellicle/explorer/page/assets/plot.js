@@ -18,21 +18,28 @@ async function library(packed, nonce) {
 
 /** The plot: curves of the scene, those before the last change, and data; panels share the abscissa. */
 class Plot {
-  constructor(element, caption, reading, axis) {
-    Object.assign(this, { element, caption, reading, axis, curves: [], before: [], data: [], ranges: {}, revision: 0, at: -1 });
+  constructor(element, caption, reading) {
+    Object.assign(this, { element, caption, reading, axis: { label: "" }, signals: [], curves: [], before: [], data: [], ranges: {}, revision: 0, at: -1 });
     element.addEventListener("keydown", (event) => this.#key(event));
+  }
+
+  /** Label of the ordinate of a curve: Ψ and Δ have panels of their own, other curves share one. */
+  #ordinate(curve) {
+    const shared = this.axis.value ?? this.signals.join(", ");
+    const own = this.signals.length > 1 && this.signals.find((signal) => curve.label.startsWith(signal));
+    return own ? `${own} ${/\(.*\)/.exec(shared)?.[0] ?? ""}`.trim() : shared;
   }
 
   /** Draws; while a slider moves, axes only grow. */
   async draw(moving) {
-    const ordinates = [...new Set([...this.curves, ...this.data].map(ordinate))];
-    if (!ordinates.length) return;
+    const ordinates = [...new Set([...this.curves, ...this.data].map((curve) => this.#ordinate(curve)))];
+    if (!ordinates.length || !window.Plotly) return;
     this.caption.textContent = this.#words();
     const style = getComputedStyle(this.element);
     const colour = (name) => style.getPropertyValue(name).trim();
     const labels = [...new Set([...this.curves, ...this.data].map((curve) => curve.label))];
     const own = (curve) => colour(COLOURS[Math.max(labels.indexOf(curve.label), 0) % COLOURS.length]);
-    const axis = (curve) => `y${Math.max(ordinates.indexOf(ordinate(curve)), 0) + 1}`.replace(/^y1$/, "y");
+    const axis = (curve) => `y${Math.max(ordinates.indexOf(this.#ordinate(curve)), 0) + 1}`.replace(/^y1$/, "y");
     const trace = (curve, more) => ({ type: "scatter", mode: "lines", name: curve.label, x: curve.x, y: curve.y, yaxis: axis(curve), ...more });
     const several = this.curves.length > 1;
     const traces = [
@@ -71,7 +78,7 @@ class Plot {
       paper_bgcolor: colour("--page"), plot_bgcolor: colour("--page"), font: { color: colour("--text"), size: 13 },
       hovermode: "x", hoversubplots: "axis", hoverlabel: { bgcolor: colour("--panel"), font: { color: colour("--text") } },
       showlegend: true, legend: { orientation: "h", y: 1, yanchor: "bottom", x: 0, bgcolor: "rgba(0,0,0,0)" },
-      xaxis: { ...line, title: { text: this.axis, standoff: 6 }, anchor: ordinates.length === 1 ? "y" : `y${ordinates.length}` },
+      xaxis: { ...line, title: { text: this.axis.label, standoff: 6 }, anchor: ordinates.length === 1 ? "y" : `y${ordinates.length}` },
     };
     ordinates.forEach((name, number) => {
       const top = 1 - number * (share + 0.08);
@@ -86,7 +93,7 @@ class Plot {
   #range(name, moving) {
     let [low, high] = [Infinity, -Infinity];
     for (const curve of [...this.curves, ...this.before, ...this.data]) {
-      if (ordinate(curve) !== name) continue;
+      if (this.#ordinate(curve) !== name) continue;
       for (const value of curve.y) {
         if (value === null) continue;
         if (value < low) low = value;
@@ -105,7 +112,7 @@ class Plot {
 
   /** Extremes of each curve, the text alternative of the plot. */
   #words() {
-    const unit = /\((.*)\)/.exec(this.axis)?.[1] ?? "";
+    const unit = /\((.*)\)/.exec(this.axis.label)?.[1] ?? "";
     return this.curves.map((curve) => {
       let [low, high] = [0, 0];
       curve.y.forEach((value, i) => {
@@ -124,11 +131,9 @@ class Plot {
     event.preventDefault();
     this.at = Math.min(Math.max(this.at + steps, 0), first.x.length - 1);
     const values = this.curves.map((curve) => `${curve.label} ${short(curve.y[this.at], 5)}`);
-    this.reading.textContent = `${this.axis} ${short(first.x[this.at], 5)}: ${values.join(", ")}`;
+    this.reading.textContent = `${this.axis.label} ${short(first.x[this.at], 5)}: ${values.join(", ")}`;
     try {
       window.Plotly.Fx.hover(this.element, { xval: first.x[this.at] }, ["xy"]);
     } catch { /* a point outside the zoomed range has no label */ }
   }
 }
-
-const ordinate = (curve) => curve.ordinate ?? curve.label.split(" ")[0];

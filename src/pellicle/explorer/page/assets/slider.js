@@ -45,7 +45,9 @@ class Control {
     });
     this.error = make("span", { class: "error-of-fit" });
     const name = make("label", { for: id }, label, unit ? make("span", { class: "soft" }, ` (${unit})`) : "");
-    const line = make("div", { class: "line" }, name, this.error, this.number);
+    this.free = make("input", { type: "checkbox", checked: Boolean(about.free), "aria-label": `Fit ${label}` });
+    const free = make("label", { class: "free", title: "Fitted to the data" }, this.free, "fit");
+    const line = make("div", { class: "line" }, name, this.error, this.number, free);
     const ends = make("div", { class: "ends soft", "aria-hidden": "true" },
       make("span", {}, short(lower, 4)), make("span", {}, short(upper, 4)));
     this.element = make("div", { class: "control" }, line, this.range, ends);
