@@ -12,20 +12,20 @@ from markupsafe import Markup
 from pellicle.reporting.page.document import packed_plotly, palette
 
 _ASSETS = files("pellicle.explorer.page") / "assets"
-_SCRIPTS = ("slider.js", "plot.js", "files.js", "requests.js", "explorer.js")
-"""Parts of the module `explorer.js`, which share its scope: a widget takes a module without imports."""
+_PARTS = ("slider.js", "plot.js", "files.js", "requests.js", "explorer.js")
+"""Parts of one ES module, which exports `explore(element, call, options)`: widgets have no imports."""
 
 
 def document(nonce: str) -> str:
     """Return the page of the explorer, one file that loads nothing.
 
-    **Arguments:** `nonce`, a random text for this response, which `policy` names. The page reads the token that
-    it sends with each request from the parameter `token` of its address.
+    **Arguments:** `nonce`, a random text for this response, which `policy` names. The page reads the token,
+    which it sends with each request, from the parameter `token` of its address.
     """
     loader = PackageLoader("pellicle.explorer.page", "assets")
     template = Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True)
     return template.get_template("explorer.html").render(
-        nonce=nonce, style=Markup(style()), script=Markup(script()), plotly=Markup(packed_plotly())
+        nonce=nonce, style=Markup(style()), script=Markup(_module()), plotly=Markup(packed_plotly())
     )
 
 
@@ -41,9 +41,9 @@ def policy(nonce: str) -> str:
 
 
 @cache
-def script() -> str:
-    """The ES module that exports `explore(element, call, options)`."""
-    return "\n".join((_ASSETS / name).read_text(encoding="utf-8") for name in _SCRIPTS)
+def widget_module() -> str:
+    """The ES module that anywidget loads: it needs no network, since Plotly is in it."""
+    return f'{_module()}\n{_text("widget.js")}\nconst PLOTLY = "{packed_plotly()}";\n'
 
 
 @cache
@@ -61,6 +61,14 @@ def style() -> str:
             f"@media (prefers-color-scheme: dark) {{ {own} {{{dark}}} }}",
             f"{own}[data-theme=light] {{{light} color-scheme: light; }}",
             f"{own}[data-theme=dark] {{{dark} color-scheme: dark; }}",
-            (_ASSETS / "explorer.css").read_text(encoding="utf-8"),
+            _text("explorer.css"),
         )
     )
+
+
+def _module() -> str:
+    return "\n".join(_text(name) for name in _PARTS)
+
+
+def _text(name: str) -> str:
+    return (_ASSETS / name).read_text(encoding="utf-8")

@@ -70,6 +70,7 @@ export async function explore(element, call, options = {}) {
   // ---- views of the current values ----
   const query = new URLSearchParams(options.query ?? "");
   let controls = [];
+  let limit = Infinity; // bytes of a file
   let serial = 0;
   let gesture = false; // a slider is being moved
   let planTimer = null;
@@ -162,6 +163,7 @@ export async function explore(element, call, options = {}) {
     const scene = await ask("scene");
     if (scene.error) return false;
     options.titled?.(scene.title);
+    limit = scene.limit ?? Infinity;
     Object.assign(plot, { axis: scene.axis, signals: scene.signals, curves: [], before: [], ranges: {} });
     canvas.setAttribute("aria-label", `Plot of ${scene.signals.join(", ")} against ${scene.axis.label}. Arrow keys read the points.`);
     controls = scene.controls.map((about, i) => new Control(about, `${id}-${i}`, moved));
@@ -179,10 +181,13 @@ export async function explore(element, call, options = {}) {
   }
 
   // ---- data ----
-  const stored = make("p", { class: "buttons" });
+  const stored = make("p", { class: "buttons stored" });
   const zone = fileZone((file) => takeData(file.name, null, file), options.dropTarget ?? element, element);
 
   async function takeData(name, body, file) {
+    if (file && file.size > limit) {
+      return trouble("data", `${name} has ${short(file.size / 1e6, 3)} MB: the explorer reads files of up to ${limit / 1e6} MB.`);
+    }
     say(`Reading ${name} …`);
     try {
       body ??= { name, base64: base64(await file.arrayBuffer()) };

@@ -48,9 +48,9 @@ class Plot {
         marker: { color: several ? own(curve) : colour("--data"), size: curve.x.length < 100 ? 7 : 4, symbol: several ? "circle-open" : "circle" },
       })),
       ...this.before.map((curve) => trace(curve, {
-        name: `${curve.label} before`, line: { color: own(curve), width: 2 }, opacity: 0.35, hoverinfo: "skip", showlegend: !several,
+        name: `${curve.label} before`, line: { color: own(curve), width: 2, simplify: false }, opacity: 0.35, hoverinfo: "skip", showlegend: !several,
       })),
-      ...this.curves.map((curve) => trace(curve, { line: { color: own(curve), width: 2 } })),
+      ...this.curves.map((curve) => trace(curve, { line: { color: own(curve), width: 2, simplify: false } })),
     ];
     await window.Plotly.react(this.element, traces, this.#layout(ordinates, colour, moving), {
       responsive: true, displaylogo: false, modeBarButtonsToRemove: ["lasso2d", "select2d"], doubleClick: "autosize",

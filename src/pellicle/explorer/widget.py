@@ -1,0 +1,73 @@
+"""Widget of the explorer for notebooks: the page's script, with messages to the kernel."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from threading import Thread
+from typing import Any
+
+from pellicle.errors import UsageError, install_command
+from pellicle.explorer.page.document import style, widget_module
+from pellicle.explorer.session import Session
+
+_LONG = frozenset({"fit"})
+"""Requests that are answered in a thread: the kernel answers others, and runs cells, meanwhile."""
+
+
+def widget(session: Session) -> Any:
+    """Return an anywidget that shows a session.
+
+    **Raises:** UsageError without anywidget.
+    """
+    return _widget_class()(session)
+
+
+@cache
+def _widget_class() -> Any:
+    try:
+        import anywidget  # pyright: ignore[reportMissingImports]
+        import traitlets  # pyright: ignore[reportMissingImports]
+    except ImportError:
+        raise UsageError(f"the explorer in notebooks needs anywidget: {install_command('explore')}") from None
+
+    class Explorer(anywidget.AnyWidget):
+        """Sliders of a film beside its spectrum, colour and plan, in a cell of a notebook.
+
+        `values` are the sliders' numbers by name, in their units; setting it moves the sliders.
+        """
+
+        _esm = widget_module()
+        _css = style()
+        values = traitlets.Dict().tag(sync=True)
+
+        def __init__(self, session: Session) -> None:
+            self._session = session
+            controls = session.answer("scene", {})["controls"]
+            super().__init__(values={control["name"]: control["value"] for control in controls})
+            self.on_msg(self._receive)
+
+        def recipe(self) -> str:
+            """Return the film with the current values as a recipe in TOML.
+
+            **Raises:** ValueError for a film that no recipe expresses.
+            """
+            answer = self._session.answer("recipe", {"values": self.values})
+            if "error" in answer:
+                raise ValueError(answer["error"])
+            return answer["toml"]
+
+        def _receive(self, _: Any, message: Any, buffers: Any) -> None:
+            """Answer a message `{id, request, body}` by `{id, answer}`."""
+            if not isinstance(message, Mapping) or not {"id", "request"} <= message.keys():
+                return
+            if message["request"] in _LONG:
+                Thread(target=self._answer, args=(message,), daemon=True).start()
+            else:
+                self._answer(message)
+
+        def _answer(self, message: Mapping[str, Any]) -> None:
+            answer = self._session.answer(message["request"], message.get("body", {}))
+            self.send({"id": message["id"], "answer": answer})
+
+    return Explorer

@@ -1,0 +1,334 @@
+"""The explorer in a headless Chromium, by real events: `make browser-tests`.
+
+Skipped where Playwright, a browser or the server's packages are absent. PELLICLE_BROWSER names another Chromium.
+"""
+
+import base64
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import pellicle as pl
+
+playwright = pytest.importorskip("playwright.sync_api", reason="Playwright is absent: make browser-tests")
+pytest.importorskip("uvicorn", reason="uvicorn is absent: make browser-tests")
+pytest.importorskip("starlette", reason="Starlette is absent: make browser-tests")
+
+NAMES = ("chromium", "chromium-browser", "google-chrome")
+RECIPE = """
+[data]
+signal = "R"
+wavelengths = { start = 400, stop = 800, step = 2 }
+
+[scene]
+ambient = "air"
+substrate = "Si"
+
+[[scene.layer]]
+material = "SiO2"
+thickness = { lower = 50, upper = 600, value = 250 }
+"""
+
+
+@pytest.fixture(scope="module")
+def browser():
+    found = os.environ.get("PELLICLE_BROWSER") or next(filter(None, map(shutil.which, NAMES)), None)
+    if found is None:
+        pytest.skip("there is no Chromium: install it, or name one in PELLICLE_BROWSER")
+    with playwright.sync_playwright() as driver:
+        with_root = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
+        chromium = driver.chromium.launch(executable_path=found, args=with_root)
+        yield chromium
+        chromium.close()
+
+
+def start(folder):
+    """A running `pellicle explore`, and the address that it prints."""
+    (folder / "film.toml").write_text(RECIPE)
+    code = "import sys; from pellicle.cli import process; process()"
+    command = [sys.executable, "-c", code, "explore", str(folder / "film.toml"), "--no-browser"]
+    server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    return server, server.stdout.readline().strip()
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory):
+    server, address = start(tmp_path_factory.mktemp("explorer"))
+    yield address
+    server.send_signal(signal.SIGINT)
+    server.communicate(timeout=20)
+    assert server.returncode == 0
+
+
+@pytest.fixture
+def opened(browser, address):
+    """Function that opens the page; script errors, messages and requests to others fail the test."""
+    pages, troubles = [], []
+    origin = address.split("/?")[0]
+
+    def open_page(query="", width=1400, scheme="light"):
+        page = browser.new_page(
+            viewport={"width": width, "height": 900}, color_scheme=scheme, accept_downloads=True
+        )
+        pages.append(page)
+        page.on("pageerror", lambda error: troubles.append(str(error)))
+        page.on("console", lambda said: troubles.append(said.text))
+        page.on("dialog", lambda dialog: troubles.append(dialog.message))
+        page.on("request", lambda request: _ours(request.url, origin) or troubles.append(request.url))
+        page.goto(address + query)
+        settle(page)
+        return page
+
+    yield open_page
+    for page in pages:
+        page.close()
+    assert troubles == []
+
+
+def _ours(url, origin):
+    return url.startswith((origin, "data:", f"blob:{origin}"))
+
+
+def settle(page):
+    """Wait until everything is compiled, drawn and listed."""
+    page.wait_for_selector(".plot[data-ready]")
+    page.wait_for_selector(".plan li")
+    page.wait_for_selector(".sphere:not([hidden])")
+    page.wait_for_selector("main:not(.compiling)")
+    page.wait_for_timeout(400)
+
+
+def curve(page, name="R"):
+    """Ordinates of a curve of the plot."""
+    script = "(name) => document.querySelector('.plot').data.find((t) => t.name === name)?.y"
+    return page.evaluate(script, name)
+
+
+def shown(page):
+    """What follows the sliders: the curve, the colour, the sphere, the address."""
+    style = "getComputedStyle(document.querySelector('.patch')).backgroundColor"
+    return {
+        "curve": curve(page),
+        "colour": page.evaluate(style),
+        "sphere": page.locator(".sphere").get_attribute("src"),
+        "address": page.url,
+    }
+
+
+def slider(page):
+    return page.get_by_role("slider", name="thickness in nm")
+
+
+def reflectance(thickness):
+    wavelength = np.arange(400.0, 801.0, 2.0)
+    return pl.reflectance(wavelength, thickness, pl.material("SiO2"), pl.material("Si"))
+
+
+def drop(page, name, content):
+    """Drop a file on the page, as a browser does."""
+    script = """([name, content]) => {
+      const bytes = Uint8Array.from(atob(content), (letter) => letter.charCodeAt(0));
+      const data = new DataTransfer();
+      data.items.add(new File([bytes], name));
+      for (const kind of ["dragenter", "dragover", "drop"]) {
+        document.querySelector("main").dispatchEvent(
+          new DragEvent(kind, { bubbles: true, cancelable: true, dataTransfer: data }));
+      }
+    }"""
+    page.evaluate(script, [name, base64.b64encode(content).decode()])
+
+
+def csv(thickness=320.0, noise=0.002):
+    wavelength = np.arange(420.0, 781.0, 4.0)
+    values = np.interp(wavelength, np.arange(400.0, 801.0, 2.0), reflectance(thickness))
+    values += noise * np.random.default_rng(1).standard_normal(len(values))
+    rows = "\n".join(f"{x:g},{y:.6f}" for x, y in zip(wavelength, values, strict=True))
+    return f"wavelength_nm,R\n{rows}\n".encode()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [400, 1400])
+def test_it_opens_at_every_width_without_error_or_foreign_request(opened, width, scheme):
+    page = opened(width=width, scheme=scheme)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert np.allclose(curve(page), reflectance(250.0), atol=2e-6)
+    background = page.evaluate("getComputedStyle(document.body).backgroundColor")
+    assert (background == "rgb(255, 255, 255)") == (scheme == "light")
+    beside = (
+        page.locator(".spectrum").bounding_box()["x"] > page.locator(".controls").bounding_box()["x"] + 100
+    )
+    assert beside == (width == 1400)
+    assert page.locator(".trouble").is_hidden()
+    assert "L*" in page.locator(".patch").get_attribute("aria-label")
+    assert "R: least" in page.locator("figcaption").inner_text()
+
+
+def test_keys_on_a_slider_move_everything(opened):
+    page = opened()
+    before = shown(page)
+    slider(page).focus()
+    for _ in range(3):
+        page.keyboard.press("PageUp")
+    page.wait_for_timeout(600)
+    after = shown(page)
+    value = float(page.get_by_role("spinbutton", name="thickness").input_value())
+    assert value > 250
+    assert np.allclose(after["curve"], reflectance(value), atol=2e-6)
+    assert np.allclose(curve(page, "R before"), before["curve"])
+    assert all(after[key] != before[key] for key in before)
+    assert f"thickness={value:g}" in after["address"]
+    page.keyboard.press("Delete")
+    page.wait_for_timeout(600)
+    assert np.allclose(curve(page), before["curve"])
+    assert page.url == before["address"]
+
+
+def test_a_drag_moves_everything_and_a_double_click_resets(opened):
+    page = opened()
+    before, box = shown(page), slider(page).bounding_box()
+    middle = box["y"] + box["height"] / 2
+    page.mouse.move(box["x"] + 0.36 * box["width"], middle)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.75 * box["width"], middle, steps=10)
+    page.wait_for_timeout(500)
+    assert page.url == before["address"]  # the address follows the release
+    page.mouse.up()
+    page.wait_for_timeout(600)
+    after = shown(page)
+    value = float(page.get_by_role("spinbutton", name="thickness").input_value())
+    assert 400 < value < 520
+    assert np.allclose(after["curve"], reflectance(value), atol=2e-6)
+    assert all(after[key] != before[key] for key in before)
+    page.mouse.dblclick(box["x"] + 0.5 * box["width"], middle)
+    page.wait_for_timeout(600)
+    assert page.get_by_role("spinbutton", name="thickness").input_value() == "250"
+    assert np.allclose(curve(page), before["curve"])
+
+
+def test_the_address_reproduces_the_state(opened):
+    page = opened("&thickness=333.5")
+    assert np.allclose(curve(page), reflectance(333.5), atol=2e-6)
+    assert page.get_by_role("spinbutton", name="thickness").input_value() == "333.5"
+
+
+def test_a_number_is_typed(opened):
+    page = opened()
+    number = page.get_by_role("spinbutton", name="thickness")
+    number.fill("123.4")
+    number.press("Enter")
+    page.wait_for_timeout(500)
+    assert np.allclose(curve(page), reflectance(123.4), atol=2e-6)
+    number.fill("9999")
+    number.press("Tab")
+    assert number.input_value() == "600"
+
+
+def test_a_dropped_file_is_drawn_and_fitted(opened):
+    page = opened()
+    drop(page, "wafer.csv", csv())
+    page.wait_for_function("document.querySelector('.plot').data.some((t) => t.mode === 'markers')")
+    fit = page.get_by_role("button", name="Fit", exact=True)
+    fit.click()
+    page.wait_for_selector(".fitted p", timeout=120_000)
+    page.wait_for_timeout(500)
+    number = page.get_by_role("spinbutton", name="thickness")
+    assert float(number.input_value()) == pytest.approx(320.0, abs=1.0)
+    assert "±" in page.locator(".error-of-fit").first.inner_text()
+    assert "nm" in page.locator(".fitted").inner_text()
+    assert np.allclose(curve(page), reflectance(float(number.input_value())), atol=1e-4)
+
+
+BAD = {
+    "words.csv": b"this is a letter\nand no spectrum\n",
+    "empty.csv": b"",
+    "binary.csv": bytes(range(256)) * 40,
+    "huge.csv": b"400,0.5\n" * 3_000_000,
+    "<img src=x onerror=alert(1)>.csv": b"wavelength,R\n400,<script>alert(2)</script>\n",
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_bad_file_gives_one_sentence_and_the_page_lives_on(opened, name):
+    page = opened()
+    drop(page, name, BAD[name])
+    page.wait_for_selector(".trouble:not([hidden])", timeout=60_000)
+    said = page.get_by_role("alert").inner_text()
+    assert len(said) > 20
+    assert "\n" not in said
+    assert "Traceback" not in said
+    assert page.get_by_role("button", name="Fit", exact=True).is_disabled()
+    slider(page).press("PageUp")
+    page.wait_for_timeout(600)
+    value = float(page.get_by_role("spinbutton", name="thickness").input_value())
+    assert np.allclose(curve(page), reflectance(value), atol=2e-6)
+    drop(page, "wafer.csv", csv())
+    page.wait_for_selector(".trouble", state="hidden")
+
+
+def test_the_recipe_reads_back_and_the_snippet_runs(opened, tmp_path):
+    page = opened("&thickness=300")
+    page.get_by_role("button", name="Recipe").click()
+    with page.expect_download() as download:
+        page.get_by_role("link", name="Download").click()
+    path = tmp_path / "recipe.toml"
+    download.value.save_as(path)
+    assert path.read_text() == page.locator("dialog code").text_content()
+    layer = pl.read_recipe(path).scene().layers[0]
+    assert float(getattr(layer.thickness, "value", layer.thickness)) == 300.0
+    page.keyboard.press("Escape")
+    page.get_by_role("button", name="Python").click()
+    code = page.locator("dialog code").text_content()
+    ran = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)
+    assert ran.returncode == 0, ran.stderr
+
+
+def test_a_wrong_token_is_refused(browser, address):
+    page = browser.new_page()
+    assert page.goto(address.replace("token=", "token=x")).status == 403
+    assert page.goto(address.split("?")[0]).status == 403
+    page.close()
+
+
+def test_one_request_is_sent_at_a_time_and_the_newest_next(browser, address):
+    """Slow answers: the sliders' events in between are not queued."""
+    page = browser.new_page()
+    bodies = []
+
+    def slowly(route):
+        body = json.loads(route.request.post_data)
+        if "curves" in body["want"]:
+            bodies.append(body["values"]["thickness"])
+            page.wait_for_timeout(150)
+        route.continue_()
+
+    page.goto(address)
+    settle(page)
+    page.route("**/api/view", slowly)
+    slider(page).focus()
+    for _ in range(10):
+        page.keyboard.press("ArrowRight")
+    page.wait_for_timeout(1500)
+    last = float(page.get_by_role("spinbutton", name="thickness").input_value())
+    assert bodies[-1] == last
+    assert len(bodies) < 10
+    assert np.allclose(curve(page), reflectance(last), atol=2e-6)
+    page.close()
+
+
+def test_a_server_that_ended_is_said_in_one_sentence(browser, tmp_path):
+    server, address = start(tmp_path)
+    page = browser.new_page()
+    page.goto(address)
+    settle(page)
+    server.send_signal(signal.SIGINT)
+    server.communicate(timeout=20)
+    slider(page).press("PageUp")
+    page.wait_for_selector(".trouble:not([hidden])")
+    assert "does not answer" in page.get_by_role("alert").inner_text()
+    page.close()
