@@ -1,6 +1,6 @@
 """The explorer in a headless Chromium, by real events: `make browser-tests`.
 
-Skipped where Playwright, a browser or the server's packages are absent. PELLICLE_BROWSER names another Chromium.
+Skipped where Playwright, a browser or packages of the server are absent. PELLICLE_BROWSER names a Chromium.
 """
 
 import base64
@@ -125,6 +125,10 @@ def slider(page):
     return page.get_by_role("slider", name="thickness in nm")
 
 
+def number(page):
+    return page.get_by_role("spinbutton", name="thickness (nm)")
+
+
 def reflectance(thickness):
     wavelength = np.arange(400.0, 801.0, 2.0)
     return pl.reflectance(wavelength, thickness, pl.material("SiO2"), pl.material("Si"))
@@ -177,7 +181,7 @@ def test_keys_on_a_slider_move_everything(opened):
         page.keyboard.press("PageUp")
     page.wait_for_timeout(600)
     after = shown(page)
-    value = float(page.get_by_role("spinbutton", name="thickness").input_value())
+    value = float(number(page).input_value())
     assert value > 250
     assert np.allclose(after["curve"], reflectance(value), atol=2e-6)
     assert np.allclose(curve(page, "R before"), before["curve"])
@@ -201,32 +205,32 @@ def test_a_drag_moves_everything_and_a_double_click_resets(opened):
     page.mouse.up()
     page.wait_for_timeout(600)
     after = shown(page)
-    value = float(page.get_by_role("spinbutton", name="thickness").input_value())
+    value = float(number(page).input_value())
     assert 400 < value < 520
     assert np.allclose(after["curve"], reflectance(value), atol=2e-6)
     assert all(after[key] != before[key] for key in before)
     page.mouse.dblclick(box["x"] + 0.5 * box["width"], middle)
     page.wait_for_timeout(600)
-    assert page.get_by_role("spinbutton", name="thickness").input_value() == "250"
+    assert number(page).input_value() == "250"
     assert np.allclose(curve(page), before["curve"])
 
 
 def test_the_address_reproduces_the_state(opened):
     page = opened("&thickness=333.5")
     assert np.allclose(curve(page), reflectance(333.5), atol=2e-6)
-    assert page.get_by_role("spinbutton", name="thickness").input_value() == "333.5"
+    assert number(page).input_value() == "333.5"
 
 
 def test_a_number_is_typed(opened):
     page = opened()
-    number = page.get_by_role("spinbutton", name="thickness")
-    number.fill("123.4")
-    number.press("Enter")
+    box = number(page)
+    box.fill("123.4")
+    box.press("Enter")
     page.wait_for_timeout(500)
     assert np.allclose(curve(page), reflectance(123.4), atol=2e-6)
-    number.fill("9999")
-    number.press("Tab")
-    assert number.input_value() == "600"
+    box.fill("9999")
+    box.press("Tab")
+    assert box.input_value() == "600"
 
 
 def test_a_dropped_file_is_drawn_and_fitted(opened):
@@ -237,11 +241,11 @@ def test_a_dropped_file_is_drawn_and_fitted(opened):
     fit.click()
     page.wait_for_selector(".fitted p", timeout=120_000)
     page.wait_for_timeout(500)
-    number = page.get_by_role("spinbutton", name="thickness")
-    assert float(number.input_value()) == pytest.approx(320.0, abs=1.0)
+    box = number(page)
+    assert float(box.input_value()) == pytest.approx(320.0, abs=1.0)
     assert "±" in page.locator(".error-of-fit").first.inner_text()
     assert "nm" in page.locator(".fitted").inner_text()
-    assert np.allclose(curve(page), reflectance(float(number.input_value())), atol=1e-4)
+    assert np.allclose(curve(page), reflectance(float(box.input_value())), atol=1e-4)
 
 
 BAD = {
@@ -265,7 +269,7 @@ def test_a_bad_file_gives_one_sentence_and_the_page_lives_on(opened, name):
     assert page.get_by_role("button", name="Fit", exact=True).is_disabled()
     slider(page).press("PageUp")
     page.wait_for_timeout(600)
-    value = float(page.get_by_role("spinbutton", name="thickness").input_value())
+    value = float(number(page).input_value())
     assert np.allclose(curve(page), reflectance(value), atol=2e-6)
     drop(page, "wafer.csv", csv())
     page.wait_for_selector(".trouble", state="hidden")
@@ -314,7 +318,7 @@ def test_one_request_is_sent_at_a_time_and_the_newest_next(browser, address):
     for _ in range(10):
         page.keyboard.press("ArrowRight")
     page.wait_for_timeout(1500)
-    last = float(page.get_by_role("spinbutton", name="thickness").input_value())
+    last = float(number(page).input_value())
     assert bodies[-1] == last
     assert len(bodies) < 10
     assert np.allclose(curve(page), reflectance(last), atol=2e-6)
