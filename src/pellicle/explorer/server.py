@@ -13,8 +13,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from pellicle.errors import UsageError, install_command
-from pellicle.explorer.page.document import page as page_of
-from pellicle.explorer.page.document import policy
+from pellicle.explorer.page.document import document, policy
 from pellicle.explorer.session import Session
 
 if TYPE_CHECKING:
@@ -63,7 +62,7 @@ def application(session: Session, token: str, port: int) -> Starlette:
             return refusal
         nonce = secrets.token_urlsafe(16)
         headers = {**_HEADERS, "Content-Security-Policy": policy(nonce)}
-        return HTMLResponse(page_of(session.title, token, nonce), headers=headers)
+        return HTMLResponse(document(nonce), headers=headers)
 
     async def api(request: Request) -> Response:
         refusal = refused(request, request.headers.get(_TOKEN, ""))
