@@ -6,6 +6,7 @@
 const PLAN_AFTER = 150; // ms without a change after which the plan is asked for
 const AGAIN_AFTER = 150; // ms between questions while the engine compiles
 const PROGRESS_EVERY = 400; // ms between questions about a fit
+const SAME_CHANGE = 1500; // ms within which several steps of a slider are one change, and have one curve before it
 const SPHERE = { moving: 64, still: 192 }; // pixels: the small one takes a quarter of the time
 
 /** Rows of a plan as two lists: effects that are simulated, and those that are left out. */
@@ -132,8 +133,12 @@ export async function explore(element, call, options = {}) {
   }
 
   // ---- sliders ----
+  let last = { control: null, time: 0 };
   function moved(control, moving) {
-    if (moving && !gesture) plot.before = plot.curves;
+    const now = performance.now();
+    const again = control === last.control && now - last.time < SAME_CHANGE;
+    if (moving && !gesture && !again) plot.before = plot.curves;
+    last = { control, time: now };
     gesture = moving;
     if (!moving) tellChange();
     refresh();
