@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import jax
 import jax.numpy as jnp
+from jax.custom_derivatives import SymbolicZero
 from jax.experimental.xla_metadata import set_xla_metadata
 
 from pellicle.optics.pair import Number
@@ -49,6 +51,31 @@ def _compute_slope_once(primal: Any, tangent: Any) -> tuple[Any, Any]:
 @jax.jit
 def _identity(value: Any) -> Any:
     return value
+
+
+def stored(numbers: Any) -> Any:
+    """Return a pytree of numbers unchanged, whose arrays are stored where they are computed.
+
+    XLA fuses an expression into each of the loops that use it. In a long formula whose intermediate results
+    are used many times, the code of a program grows by that to many times the code of the formula.
+    """
+    leaves, tree = jax.tree.flatten(numbers)
+    arrays = {i: x for i, x in enumerate(leaves) if isinstance(x, jax.Array) and jnp.ndim(x)}
+    kept = dict(zip(arrays, _stored(list(arrays.values())), strict=True))
+    return jax.tree.unflatten(tree, [kept.get(i, x) for i, x in enumerate(leaves)])
+
+
+@jax.custom_jvp
+def _stored(arrays: list[Any]) -> list[Any]:
+    with set_xla_metadata(inlineable="false"):
+        return _identity(arrays)
+
+
+@partial(_stored.defjvp, symbolic_zeros=True)
+def _stored_slope(primal: Any, tangent: Any) -> tuple[Any, Any]:
+    tangents = {i: x for i, x in enumerate(tangent[0]) if not isinstance(x, SymbolicZero)}
+    kept = dict(zip(tangents, _stored(list(tangents.values())), strict=True))
+    return _stored(primal[0]), [kept.get(i, x) for i, x in enumerate(tangent[0])]
 
 
 def not_inlined(function: Callable[..., Any], *arguments: Any) -> Any:

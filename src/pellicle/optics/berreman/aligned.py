@@ -9,7 +9,7 @@ import jax.numpy as jnp
 
 from pellicle.optics.anisotropy import Principal
 from pellicle.optics.berreman.matrices import Matrix
-from pellicle.optics.berreman.propagation import Fields, Propagation, elements_and_exponent, exp, full
+from pellicle.optics.berreman.propagation import Fields, Propagation, elements_and_exponents, exp, full
 from pellicle.optics.characteristic import nonzero_root
 from pellicle.optics.interface import normal_square
 from pellicle.optics.pair import Number, real, times_i
@@ -33,9 +33,10 @@ def half_space(medium: Any, a: Any) -> Matrix:
 def propagation(medium: Any, a: Any, k: Any) -> Propagation:
     """Return the propagation through a layer of k = k₀d."""
     Q_p, Q_s, epsilon = _numbers(medium, a)
-    c, f, exponent = elements_and_exponent(Q_p, k)
-    if isinstance(medium, Principal):
-        c_s, f_s, exponent_s = elements_and_exponent(Q_s, k)
+    squares = (Q_p, Q_s) if isinstance(medium, Principal) else (Q_p,)
+    (c, f, exponent), *of_s = elements_and_exponents(squares, k)
+    if of_s:
+        ((c_s, f_s, exponent_s),) = of_s
         growth = jax.lax.stop_gradient(jnp.maximum(-real(exponent), -real(exponent_s)))
         factor_s = exp(-exponent_s - growth)
     else:

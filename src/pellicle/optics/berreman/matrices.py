@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from pellicle.optics.pair import Number
 
@@ -22,21 +22,6 @@ class Matrix(NamedTuple):
             self.sp * other.pp + self.ss * other.sp,
             self.sp * other.ps + self.ss * other.ss,
         )
-
-
-def plus(one: Matrix, other: Matrix) -> Matrix:
-    """Return the sum of two matrices."""
-    return Matrix(*(x + y for x, y in zip(one, other, strict=True)))
-
-
-def minus(one: Matrix, other: Matrix) -> Matrix:
-    """Return the difference of two matrices."""
-    return Matrix(*(x - y for x, y in zip(one, other, strict=True)))
-
-
-def times(number: Any, matrix: Matrix) -> Matrix:
-    """Return a number times a matrix."""
-    return Matrix(*(number * x for x in matrix))
 
 
 def one_minus(matrix: Matrix) -> Matrix:

@@ -6,16 +6,22 @@ exp(−iωt); they obey dψ/dz = i k₀ Δ ψ. Source: D. W. Berreman, J. Opt. S
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 
-from pellicle.optics.berreman.matrices import Matrix
-from pellicle.optics.characteristic import is_real_array, matrix_elements, scale_exponent
+from pellicle.optics.characteristic import (
+    Characteristic,
+    element_slopes,
+    is_real_array,
+    matrix_elements,
+    scale_exponent,
+)
 from pellicle.optics.elementary import sincos
-from pellicle.optics.pair import Number, Pair, imag, real, where
+from pellicle.optics.hoisting import stored
+from pellicle.optics.pair import Number, Pair, imag, is_real, real
 
 Fields = tuple[Number, Number, Number, Number]
 """Ex, Hy, Ey and −Hx."""
@@ -44,10 +50,47 @@ def exp(z: Number) -> Number:
     return Pair(size * cosine, size * sine)
 
 
-def elements_and_exponent(Q: Number, k: Any) -> tuple[Number, Number, Number]:
-    """Return c and f times e^x, and x, whose slope is that of the scale: see `matrix_elements`."""
-    scaled = matrix_elements(Q, k)
-    return scaled.c, scaled.f, (_real_exponent if is_real_array(Q) else scale_exponent)(Q, k)
+def stacked(*numbers: Number, like: Any = 0.0) -> Number:
+    """Return numbers along a new first axis, as a real array or a `Pair`, so that one formula serves all.
+
+    Behind that axis there are at least as many as `like` has, a pytree of arrays.
+    """
+    shape = jnp.broadcast_shapes(*(jnp.shape(x) for x in jax.tree.leaves(numbers)))
+    rank = max(map(jnp.ndim, jax.tree.leaves(like)))
+    whole = len(numbers), *[1] * (rank - len(shape)), *shape
+
+    def joined(part: Callable[[Number], Any]) -> Any:
+        return jnp.stack([jnp.broadcast_to(part(x), shape) for x in numbers]).reshape(whole)
+
+    return joined(real) if is_real(numbers) else Pair(joined(real), joined(imag))
+
+
+def unstacked(number: Number, count: int) -> list[Number]:
+    """Return the numbers along the first axis."""
+
+    def at(i: int) -> Number:
+        return jax.tree.map(lambda x: jax.lax.index_in_dim(x, i, keepdims=False), number)
+
+    return [at(i) for i in range(count)]
+
+
+def elements_and_exponents(squares: Sequence[Number], k: Any) -> Iterator[tuple[Number, Number, Number]]:
+    """Return c and f times e^x, and x, whose slope is that of the scale, of each Q: see `matrix_elements`."""
+    Q = stacked(*squares, like=k)
+    scaled = _stored_elements(Q, k)
+    exponent = stored((_real_exponent if is_real_array(Q) else scale_exponent)(Q, k))
+    return zip(*(unstacked(x, len(squares)) for x in (scaled.c, scaled.f, exponent)), strict=True)
+
+
+@jax.custom_jvp
+def _stored_elements(Q: Number, k: Any) -> Characteristic:
+    return stored(matrix_elements(Q, k))
+
+
+@_stored_elements.defjvp
+def _stored_element_slopes(primal: Any, tangent: Any) -> tuple[Characteristic, Characteristic]:
+    values, slopes = element_slopes(_stored_elements, primal, tangent)
+    return values, stored(slopes)
 
 
 @jax.custom_jvp
@@ -62,8 +105,3 @@ def _real_exponent_slope(primal: Any, tangent: Any) -> tuple[Any, Any]:
     varies = (Q < 0) & (jnp.abs(k * k * Q) >= 0.01)  # as in `matrix_elements`
     root = jnp.sqrt(jnp.where(varies, -Q, 1.0))
     return _real_exponent(Q, k), jnp.where(varies, (Q * dk + 0.5 * k * dQ) / root, 0.0)
-
-
-def select(test: Any, yes: Matrix, no: Matrix) -> Matrix:
-    """Apply `where` to each element."""
-    return Matrix(*(where(test, x, y) for x, y in zip(yes, no, strict=True)))

@@ -12,6 +12,7 @@ recursions that stay bounded.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -21,9 +22,10 @@ from pellicle.optics.anisotropy import Medium, Tensor, Uniaxial, mixes_polarisat
 from pellicle.optics.berreman import aligned, biaxial, uniaxial
 from pellicle.optics.berreman.delta import delta, half_space
 from pellicle.optics.berreman.matrices import Matrix, inverse, one_minus, one_plus
-from pellicle.optics.berreman.propagation import Propagation
+from pellicle.optics.berreman.propagation import Propagation, stacked, unstacked
 from pellicle.optics.berreman.quartic import downward_pair
-from pellicle.optics.berreman.slices import DIRECT, sliced
+from pellicle.optics.berreman.slices import sliced
+from pellicle.optics.hoisting import stored
 from pellicle.optics.interface import transverse
 from pellicle.optics.pair import conj, real, to_pair
 
@@ -68,7 +70,8 @@ def polarised(
     tilt = cosine / ambient
     into = inverse(Matrix(E.pp + tilt * H.pp, E.ps + tilt * H.ps, q0 * E.sp + H.sp, q0 * E.ss + H.ss))
     out = Matrix(tilt * H.pp - E.pp, tilt * H.ps - E.ps, q0 * E.sp - H.sp, q0 * E.ss - H.ss)
-    r = out @ into
+    into = stored(into)
+    r = stored(out @ into)
     waves = Matrix(into.pp * (2 * cosine), into.ps * (2 * q0), into.sp * (2 * cosine), into.ss * (2 * q0))
     waves = waves if through is None else through @ waves
     jones = Matrix(r.pp, r.ps * ambient, r.sp * (1 / ambient), r.ss)
@@ -114,19 +117,16 @@ def _add(medium: Medium, a: Any, k: Any, below: Matrix, dichroic: bool) -> tuple
     if not (dichroic and mixes_polarisations(medium)):
         return _direct(method.propagation(medium, a, k), below)
     exponent = method.dichroism(medium, a) * jax.lax.stop_gradient(k)
-    shallow = jnp.where(exponent > DIRECT, 0.0, k)
-    found = _direct(method.propagation(medium, a, shallow), below)
-    return sliced(
-        lambda k, direction: method.propagation(medium, a, k, direction), k, exponent, below, *found
-    )
+    return sliced(partial(method.propagation, medium, a), k, exponent, below)
 
 
 def _direct(layer: Propagation, below: Matrix) -> tuple[Matrix, Matrix]:
     E, H = one_plus(below), one_minus(below)
-    p = layer.apply((E.pp, H.pp, E.sp, H.sp))
-    s = layer.apply((E.ps, H.ps, E.ss, H.ss))
-    down = Matrix(p[0] + p[1], s[0] + s[1], p[2] + p[3], s[2] + s[3])
-    up = Matrix(p[0] - p[1], s[0] - s[1], p[2] - p[3], s[2] - s[3])
-    through = inverse(down)
+    columns = (E.pp, E.ps), (H.pp, H.ps), (E.sp, E.ss), (H.sp, H.ss)
+    fields = stored(tuple(stacked(*p_s, like=layer.growth) for p_s in columns))
+    Ex, Hy, Ey, Hx = stored(layer.apply(fields))
+    down = Matrix(*unstacked(Ex + Hy, 2), *unstacked(Ey + Hx, 2))
+    up = Matrix(*unstacked(Ex - Hy, 2), *unstacked(Ey - Hx, 2))
+    through = stored(inverse(down))
     loss = 2 * jnp.exp(-layer.growth)
-    return up @ through, Matrix(*(x * loss for x in through))
+    return stored((up @ through, Matrix(*(x * loss for x in through))))

@@ -19,8 +19,17 @@ import jax
 import jax.numpy as jnp
 
 from pellicle.optics.anisotropy import Uniaxial, birefringence
-from pellicle.optics.berreman.propagation import Fields, Propagation, elements_and_exponent, exp, full
+from pellicle.optics.berreman.propagation import (
+    Fields,
+    Propagation,
+    elements_and_exponents,
+    exp,
+    full,
+    stacked,
+    unstacked,
+)
 from pellicle.optics.characteristic import nonzero_root
+from pellicle.optics.hoisting import stored
 from pellicle.optics.interface import normal_square
 from pellicle.optics.pair import Number, Pair, abs2, imag, real, times_i, where
 
@@ -80,22 +89,21 @@ def propagation(medium: Uniaxial, a: Any, k: Any, direction: Any = 1.0) -> Propa
     **Arguments:** `a`: transverse index, times `direction`. A direction of −1 gives exp(+ikΔ) in place of
     exp(−ikΔ), up to the signs of Hy and −Hx: the fields at the lower face from those at the upper one.
     """
-    t = terms(medium, a, direction)
+    t = stored(terms(medium, a, direction))
     x, y, _ = medium.axis
-    c, f, exponent = elements_and_exponent(t.Q, k)
-    c_e, f_e, exponent_e = elements_and_exponent(t.W, k)
+    (c, f, exponent), (c_e, f_e, exponent_e) = elements_and_exponents((t.Q, t.W), k)
     drift = times_i(k * t.mu)
     growth = jnp.maximum(-real(exponent), -real(exponent_e) - real(drift))
     growth = jax.lax.stop_gradient(growth)
-    factor, factor_e = exp(-exponent - growth), exp(-exponent_e - drift - growth)
-    c, f, c_e, f_e = c * factor, f * factor, c_e * factor_e, f_e * factor_e
+    factor, factor_e = stored((exp(-exponent - growth), exp(-exponent_e - drift - growth)))
+    c, f, c_e, f_e = stored((c * factor, f * factor, c_e * factor_e, f_e * factor_e))
 
     # γX and γX′ from two linear equations; they do not divide by γ
     sines, cosines = f - f_e, c - c_e - times_i(t.mu) * f_e
     determinant = t.zeta * t.zeta - t.eta * t.eta * t.Q
     size = abs2(t.zeta) + abs2(t.eta) * jnp.sqrt(abs2(t.Q) + jnp.finfo(growth.dtype).tiny)
     near = jax.lax.stop_gradient(abs2(determinant) <= (ALONG_AXIS * size) ** 2)
-    inverse = 1 / where(near, 1.0 + 0.0 * determinant, determinant)
+    inverse = stored(1 / where(near, 1.0 + 0.0 * determinant, determinant))
     X = (t.zeta * sines - times_i(t.eta) * cosines) * inverse
     Y = (t.zeta * cosines + times_i(t.eta) * t.Q * sines) * inverse
     shape = jnp.broadcast_shapes(jnp.shape(near), jnp.shape(real(X)))
@@ -106,7 +114,7 @@ def propagation(medium: Uniaxial, a: Any, k: Any, direction: Any = 1.0) -> Propa
         return tuple(where(near, _broadcast(new, shape), old) for new, old in zip(found, (X, Y), strict=True))  # type: ignore[return-value]
 
     X, Y = jax.lax.cond(jnp.any(near), by_differences, lambda _: (X, Y), None)
-    V = t.gamma * f_e - t.Q * X
+    X, Y, V = stored((X, Y, t.gamma * f_e - t.Q * X))
 
     isotropic = times_i(-f)
     ordinary_p = isotropic * (t.Q / t.epsilon), isotropic * t.epsilon
@@ -117,8 +125,8 @@ def propagation(medium: Uniaxial, a: Any, k: Any, direction: Any = 1.0) -> Propa
         Ex, Hy, Ey, Hx = fields
         along = x * Ex + t.tilt * Hy + y * Ey
         slope = t.across * Ex + lower * Hy + y * Hx
-        into_b = times_i(-(V * along)) - Y * slope
-        into_d = times_i(X * slope) - Y * along
+        along, slope = stored((along, slope))
+        into_b, into_d = stored((times_i(-(V * along)) - Y * slope, times_i(X * slope) - Y * along))
         return (
             c * Ex + ordinary_p[0] * Hy + t.tilt * into_b + lower * into_d,
             c * Hy + ordinary_p[1] * Ex + x * into_b + t.across * into_d,
@@ -136,14 +144,12 @@ def _broadcast(number: Number, shape: Any) -> Pair:
 def _differences(t: Terms, k: Any, growth: Any) -> tuple[Number, Number]:
     """Return γX and γX′ times exp(−growth) as sums of sin u/u, with roots that are not near zero."""
     q, w, mu = nonzero_root(full(t.Q)), nonzero_root(full(t.W)), full(t.mu)
-    X, Y = Pair(0.0, 0.0), Pair(0.0, 0.0)
-    for sign in (1, -1):
-        for sign_e in (1, -1):
-            one, other = sign * q, mu + sign_e * w
-            J = _exponential_difference(one, other, k, growth)
-            X, Y = X + (sign * sign_e) * J, Y + sign_e * J
-    X = X * (-0.25 * t.gamma / (q * w))
-    return X, times_i(Y * (0.25 * t.gamma / w))
+    one = stacked(q, q, -q, -q, like=growth)
+    other = stacked(mu + w, mu - w, mu + w, mu - w, like=growth)
+    one, other = stored((one, other))
+    first, second, third, fourth = unstacked(_exponential_difference(one, other, k, growth), 4)
+    X = (first - second - third + fourth) * (-0.25 * t.gamma / (q * w))
+    return X, times_i((first - second + third - fourth) * (0.25 * t.gamma / w))
 
 
 def _exponential_difference(one: Number, other: Number, k: Any, growth: Any) -> Number:
@@ -152,9 +158,10 @@ def _exponential_difference(one: Number, other: Number, k: Any, growth: Any) -> 
     half = 0.5 * k * difference
     near = jax.lax.stop_gradient(abs2(half) < 1.0)
     small, far = where(near, half, 0.0 * half), where(near, 1.0 + 0.0 * difference, difference)
-    square, series = small * small, Pair(1.0, 0.0)
+    square, series = stored(small * small), Pair(1.0, 0.0)
     for n in range(9, 0, -1):
         series = 1 - square * series * (1 / (2 * n * (2 * n + 1)))
-    close = exp(times_i(-0.5 * k * (one + other)) - growth) * series * k
-    apart = (exp(times_i(-k * one) - growth) - exp(times_i(-k * other) - growth)) / times_i(far)
-    return where(near, close, apart)
+    exponents = times_i(-k * stacked(0.5 * (one + other), one, other)) - growth
+    middle, of_one, of_other = unstacked(stored(exp(stored(exponents))), 3)
+    close, apart = middle * series * k, (of_one - of_other) / times_i(far)
+    return stored(where(near, close, apart))
