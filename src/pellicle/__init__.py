@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from pellicle.recipes.colours import read_colours as read_colours
     from pellicle.recipes.colours import read_colours_by_film as read_colours_by_film
     from pellicle.recipes.read import read_recipe as read_recipe
+    from pellicle.recipes.write import write_recipe as write_recipe
     from pellicle.reporting.present import report as report
     from pellicle.sampling.result import Posterior as Posterior
     from pellicle.scene import priors as priors
@@ -92,6 +93,7 @@ _NAMES = {
     "pellicle.materials": ("material",),
     "pellicle.recipes.colours": ("read_colours", "read_colours_by_film"),
     "pellicle.recipes.read": ("read_recipe",),
+    "pellicle.recipes.write": ("write_recipe",),
     "pellicle.reporting.present": ("report",),
     "pellicle.sampling.result": ("Posterior",),
     "pellicle.scene.film": ("Light", "Scene"),

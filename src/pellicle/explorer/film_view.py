@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from jax.tree_util import GetAttrKey
 
+from pellicle.data.spectrum import Spectrum
 from pellicle.effects.film import exact
 from pellicle.effects.plan import Plan
 from pellicle.errors import DataError, UsageError
-from pellicle.explorer.controls import Control, film_controls, template
+from pellicle.explorer.controls import Control, film_controls, template, with_value
 from pellicle.explorer.programs import angle_program, colour_program, spectrum_program
-from pellicle.scene.film import Scene, with_wavelength
-from pellicle.scene.free import insert
+from pellicle.scene.film import Light, Scene, with_wavelength
+from pellicle.scene.free import Free, insert
 from pellicle.synthetic.spectra import VISIBLE, default_wavelengths
 
 _AVERAGED = ("thickness_spread", "bandwidth", "numerical_aperture", "angle_spread")
@@ -23,6 +25,8 @@ _CONES = ("numerical_aperture", "angle_spread")
 _SHARES = (0.125, 0.25, 0.5, 1.0)
 """Shares of the range of an average for which programs are compiled: a small spread needs few nodes."""
 
+_FEWEST, _MOST, _POINTS = 100, 1500, 401
+"""Numbers of wavelengths of data at which the curve is computed too, and that of its own otherwise."""
 _ANGLES, _GRAZING = 5.0, 89.0
 """Step of the largest angle of incidence of programs with a cone of light, and the steepest ray (degrees)."""
 
@@ -107,6 +111,22 @@ class FilmView:
         if kind == "colour":
             return colour_program(scene, names)
         return spectrum_program(scene, names, self.wavelength)
+
+    def measured(self, spectra: Sequence[Spectrum]) -> FilmView | None:
+        """Return the view with the light and the range of the first spectrum; None where it has them."""
+        data, own = spectra[0], self.scene.light
+        angles = [] if data.angle is None else np.unique(data.angle).tolist()
+        start = own.angle.start if isinstance(own.angle, Free) else float(own.angle)
+        angle = own.angle if not angles or start in angles else angles[0]
+        polarised = data.polarisation if data.polarisation != "unpolarised" else own.polarisation
+        nm = np.unique(data.wavelength)
+        if not _FEWEST <= len(nm) <= _MOST:
+            nm = np.linspace(nm[0], nm[-1], _POINTS)
+        light = Light(own.wavelength, angle, data.signal, polarised)
+        if light == own and np.array_equal(nm, self.wavelength):
+            return None
+        scene = with_value(self.scene, (GetAttrKey("light"),), light)
+        return FilmView(scene, nm)
 
     def plan(self, values: Mapping[str, float]) -> Plan:
         """Return the exact plan of the scene with these values."""

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import time
 from base64 import b64encode
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from functools import partial
 from logging import getLogger
 from math import isfinite
 from pathlib import Path
@@ -13,18 +15,23 @@ from typing import Any
 import numpy as np
 
 from pellicle.colour import lab, sensor
+from pellicle.data.spectrum import Spectrum
 from pellicle.errors import DataError, UsageError
-from pellicle.explorer.compiler import SOON, Compiler
+from pellicle.explorer.compiler import NOW, SOON, Compiler
+from pellicle.explorer.dropped_files import LARGEST_FILE, data_curves, data_text, measured_spectra
 from pellicle.explorer.film_view import FilmView
+from pellicle.explorer.fit_run import FitRun, fitted_curves, fitted_names, scene_with, to_json
 from pellicle.explorer.programs import Curve
 from pellicle.explorer.sphere import ball_picture, to_linear_srgb
+from pellicle.recipes.python_text import python_program
+from pellicle.recipes.write import recipe_text
 from pellicle.reporting.picture import encode
-from pellicle.scene.film import Scene
+from pellicle.scene.film import Scene, with_wavelength
 
 log = getLogger(__name__)
 
-SIZE, LARGEST = 128, 512
-"""Pixels across the picture of a ball, and the most that a page may ask for."""
+SIZE, MOVING, LARGEST = 192, 96, 512
+"""Pixels across the picture of a ball, while a slider moves, and the most that a page may ask for."""
 WANTED = ("curves", "colour", "sphere", "plan")
 """Parts of a view."""
 
@@ -33,18 +40,35 @@ class Session:
     """A scene whose numbers a page moves: one `answer` for each request.
 
     **Arguments:** `scene`; `folder`, in which data files may be read (None: none); `wavelength` in nm,
-    (wavelengths,), by default those of the scene's light or the visible ones.
+    (wavelengths,), by default those of the scene's light or the visible ones; `title` of the page; `files`,
+    names of data in the folder, of which the first is read.
 
     **Raises:** UsageError for a light of several angles, DataError where materials share no wavelengths.
     """
 
     def __init__(
-        self, scene: Scene, folder: str | Path | None = None, *, wavelength: Any = None, title: str = ""
+        self,
+        scene: Scene,
+        folder: str | Path | None = None,
+        *,
+        wavelength: Any = None,
+        title: str = "",
+        files: Sequence[str] = (),
     ) -> None:
         self.title, self.folder = title, None if folder is None else Path(folder).resolve()
-        self._compiler = Compiler()
+        self.files = list(files)
         self.view = FilmView(scene, wavelength)
-        self._requests = {"scene": self._scene, "view": self._view}
+        self.spectra: list[Spectrum] = []
+        self._compiler, self._fit_run = Compiler(), FitRun()
+        self._requests: dict[str, Callable[[Mapping[str, Any]], dict[str, Any]]] = {
+            "scene": self._scene,
+            "view": self._view,
+            "data": self._data,
+            "fit": self._fit,
+            "fit_status": lambda body: self._fit_run.status(),
+            "fit_stop": lambda body: self._fit_run.stop(),
+            "recipe": self._recipe,
+        }
 
     def answer(self, request: str, body: Mapping[str, Any]) -> dict[str, Any]:
         """Answer one request; what is wrong with it is one sentence under `error`."""
@@ -61,11 +85,55 @@ class Session:
             return {"error": f"{request} failed: {type(error).__name__}: {error}", **_serial(body)}
 
     def _scene(self, body: Mapping[str, Any]) -> dict[str, Any]:
-        return {"title": self.title, "kind": "spectrum", **self.view.describe()}
+        about = {"title": self.title, "kind": "spectrum", "limit": LARGEST_FILE, "files": self.files}
+        data = {"data": self._data_shown()} if self.spectra else {}
+        return {**about, **self.view.describe(), **data}
+
+    def _data(self, body: Mapping[str, Any]) -> dict[str, Any]:
+        """Read data, and take the light of the scene from them."""
+        view = self.view
+        spectra = measured_spectra(body, self.folder, view.scene.light.signal)
+        changed = view.measured(spectra)
+        self.spectra = spectra
+        if changed is None:
+            return self._data_shown()
+        self.view = changed
+        self.prepare()
+        return {**self._data_shown(), "scene_changed": True}
+
+    def _data_shown(self) -> dict[str, Any]:
+        return {
+            "name": self.spectra[0].path,
+            "curves": [curve_to_json(curve) for curve in data_curves(self.spectra)],
+            "notes": data_text(self.spectra),
+        }
+
+    def _fit(self, body: Mapping[str, Any]) -> dict[str, Any]:
+        view, values = self.view, self._values(body)
+        if not self.spectra:
+            raise UsageError("there are no data to fit: open a file first")
+        names = fitted_names(view.controls, body.get("free"))
+        found = self._fit_run.run(self.spectra, scene_with(view.scene, view.controls, values, names))
+        if found is None:
+            return {"stopped": True}
+        return {
+            **to_json(found, view.controls),
+            "curves": [curve_to_json(curve) for curve in fitted_curves(found)],
+        }
+
+    def _recipe(self, body: Mapping[str, Any]) -> dict[str, Any]:
+        view, values = self.view, self._values(body)
+        free = [control.name for control in view.controls if control.free is not None]
+        scene = scene_with(view.scene, view.controls, values, free)
+        folder = Path.cwd() if self.folder is None else self.folder
+        sampled = with_wavelength(scene, view.wavelength)
+        files = list(dict.fromkeys(folder / spectrum.path for spectrum in self.spectra))
+        toml = recipe_text(scene if files else sampled, folder, files=files)
+        return {"toml": toml, "python": python_program(sampled)}
 
     def _view(self, body: Mapping[str, Any]) -> dict[str, Any]:
         values, warnings = self._values(body), []
-        wanted, size = body.get("want", WANTED), body.get("size", SIZE)
+        wanted, size = body.get("want", WANTED), body.get("size", MOVING if body.get("moving") else SIZE)
         if not isinstance(wanted, list | tuple) or not all(x in WANTED for x in wanted):
             raise UsageError(f"`want` must be a list of {', '.join(WANTED)}")
         if not isinstance(size, int) or not 16 <= size <= LARGEST:
@@ -105,19 +173,22 @@ class Session:
 
     def _program(self, kind: str, values: Mapping[str, float], wait: bool) -> Any:
         """A compiled program of the effects that these values have, None while it is compiled."""
-        structure = self.view.structure(values)
+        view = self.view
+        structure = view.structure(values)
         get = self._compiler.wait if wait else self._compiler.get
-        return get((kind, structure), lambda: self.view.compile(kind, structure))
+        return get((view, kind, structure), lambda: view.compile(kind, structure))
 
     def prepare(self) -> None:
         """Compile in the background what the first views need, and then what one effect more needs."""
-        structure = self.view.structure(self.view.defaults())
-        for kind in ("curves", "colour", "sphere"):
-            self._compiler.get((kind, structure), lambda kind=kind: self.view.compile(kind, structure))
-        for other in self.view.neighbours(structure):
-            for kind in ("curves", "colour"):
-                make = lambda kind=kind, other=other: self.view.compile(kind, other)  # noqa: E731
-                self._compiler.get((kind, other), make, SOON)
+        view = self.view
+        structure = view.structure(view.defaults())
+        several = [(kind, structure, NOW) for kind in ("curves", "colour", "sphere")]
+        for other in view.neighbours(structure):
+            several += [(kind, other, SOON) for kind in ("curves", "colour")]
+        for kind, needed, urgency in several:
+            # a ValueError, of a colour without data, is raised by the view that wants it
+            with suppress(ValueError):
+                self._compiler.get((view, kind, needed), partial(view.compile, kind, needed), urgency)
 
     def _curves(self, values: Mapping[str, float], wait: bool, size: int) -> list[dict[str, Any]] | None:
         program = self._program("curves", values, wait)

@@ -1,0 +1,117 @@
+"""Data files that are dropped on the explorer, or lie in its folder."""
+
+from __future__ import annotations
+
+import tempfile
+from base64 import b64decode
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pellicle.data.mueller import SIGNAL as MUELLER
+from pellicle.data.read_spectrum import read_spectra
+from pellicle.data.spectrum import Spectrum
+from pellicle.errors import DataError, UsageError
+from pellicle.explorer.programs import Curve
+
+LARGEST_FILE = 20_000_000
+"""Bytes of the largest data file."""
+_LONGEST_NAME = 120
+
+
+def measured_spectra(body: Mapping[str, Any], folder: Path | None, signal: str) -> list[Spectrum]:
+    """Read the spectra of a request: `name` with `text` or `base64`, or `file`, one in the folder.
+
+    A file that does not state its signal has that of the scene. **Raises:** DataError or UsageError in one
+    sentence.
+    """
+    if "file" in body:
+        path = _inside(folder, body["file"])
+        return _read(path, path.name, signal)
+    name, content = _content(body)
+    with tempfile.TemporaryDirectory(prefix="pellicle-") as place:
+        path = Path(place) / name
+        path.write_bytes(content)
+        return _read(path, name, signal)
+
+
+def _content(body: Mapping[str, Any]) -> tuple[str, bytes]:
+    name = body.get("name")
+    if not isinstance(name, str):
+        raise UsageError("a file needs a name")
+    name = "".join(x for x in name.replace("\\", "/").rpartition("/")[2] if x.isprintable()).strip(". ")
+    name = name[-_LONGEST_NAME:] or "data.csv"
+    encoded = body.get("base64")
+    given = body.get("text") if encoded is None else encoded
+    if not isinstance(given, str):
+        raise UsageError(f"{name}: a file needs its text, or its bytes in base64")
+    try:
+        content = given.encode() if encoded is None else b64decode(given, validate=True)
+    except ValueError:
+        raise UsageError(f"{name}: is not base64") from None
+    if len(content) > LARGEST_FILE:
+        raise DataError(f"{name}: has more than {LARGEST_FILE // 1_000_000} MB: fit it with pellicle fit")
+    return name, content
+
+
+def _inside(folder: Path | None, name: Any) -> Path:
+    """The path of a file in the folder. Raises UsageError for one outside, whether it exists or not."""
+    path = None if folder is None or not isinstance(name, str) or "\0" in name else (folder / name).resolve()
+    if path is None or folder is None or not path.is_relative_to(folder):
+        raise UsageError(f"{name}: only files in the folder of the recipe can be read")
+    if not path.is_file():
+        raise DataError(f"{name}: no such file in the folder of the recipe")
+    if path.stat().st_size > LARGEST_FILE:
+        raise DataError(f"{name}: has more than {LARGEST_FILE // 1_000_000} MB: fit it with pellicle fit")
+    return path
+
+
+def _read(path: Path, name: str, signal: str) -> list[Spectrum]:
+    """Read a file whose errors and spectra bear its name without the folder."""
+    try:
+        try:
+            found = read_spectra(path)
+        except UsageError as error:
+            try:
+                found = read_spectra(path, signal=signal)
+            except UsageError:
+                raise error from None
+            note = f"the file does not say what it is: taken as {signal}, the signal of the scene"
+            found = [replace(each, notes=(*each.notes, note)) for each in found]
+    except (UsageError, DataError) as error:
+        kind = type(error)
+        raise kind(str(error).replace(str(path), name)) from None
+    notes = [tuple(note.replace(str(path), name) for note in each.notes) for each in found]
+    return [replace(each, path=name, notes=own) for each, own in zip(found, notes, strict=True)]
+
+
+def data_curves(spectra: list[Spectrum]) -> list[Curve]:
+    """Return the curves of spectra, one for each angle."""
+    curves = []
+    for spectrum in spectra:
+        angles = [None] if spectrum.angle is None else np.unique(spectrum.angle).tolist()
+        for angle in angles:
+            rows = slice(None) if angle is None else spectrum.angle == angle
+            name = " ".join(x for x in (spectrum.name, "" if len(angles) == 1 else f"{angle:g}°") if x)
+            columns = {spectrum.signal: spectrum.values}
+            if spectrum.signal == "psi-delta":
+                columns = {"Ψ": spectrum.values, "Δ": spectrum.delta}
+            elif spectrum.signal == MUELLER:
+                columns = dict(zip(spectrum.elements, spectrum.values.T, strict=True))
+            for label, values in columns.items():
+                shown = f"{label} ({name})" if name else label
+                curves.append(Curve(shown, spectrum.wavelength[rows], np.asarray(values)[rows]))
+    return curves
+
+
+def data_text(spectra: list[Spectrum]) -> list[str]:
+    """Sentences on what was read."""
+    found = []
+    for spectrum in spectra:
+        nm = spectrum.wavelength
+        about = f"{spectrum.signal}, {len(nm)} points from {nm.min():g} to {nm.max():g} nm"
+        found += [f"{spectrum.path}: {about}", *spectrum.notes]
+    return list(dict.fromkeys(found))

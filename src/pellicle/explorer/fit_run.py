@@ -1,0 +1,124 @@
+"""One fit at a time: the scene of the sliders fitted to data, with progress, and stopped on request."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from pellicle.data.spectrum import Spectrum
+from pellicle.errors import UsageError
+from pellicle.explorer.controls import Control, with_value
+from pellicle.explorer.programs import Curve
+from pellicle.fitting.result import Curve as FittedCurve
+from pellicle.fitting.result import Fit
+from pellicle.fitting.spectra.fit import fit
+from pellicle.reporting import fit_text
+from pellicle.scene.film import Scene
+from pellicle.scene.free import Free
+
+
+class _Stopped(Exception):
+    """A fit whose result is no longer wanted."""
+
+
+class FitRun:
+    """The fit that is running, and its progress."""
+
+    def __init__(self) -> None:
+        self._running, self._stop = threading.Lock(), threading.Event()
+        self._progress = ("", 0, 0)
+
+    def run(self, data: Sequence[Spectrum], scene: Scene) -> Fit | None:
+        """Fit a scene to spectra; None where it was stopped. Raises UsageError while another fit runs."""
+        if not self._running.acquire(blocking=False):
+            raise UsageError("a fit is running: stop it, or wait for its result")
+        try:
+            self._stop.clear()
+            return fit(data[0] if len(data) == 1 else list(data), scene, progress=self._report)
+        except _Stopped:
+            return None
+        finally:
+            self._progress = ("", 0, 0)
+            self._running.release()
+
+    def status(self) -> dict[str, Any]:
+        """Return the stage of the fit in numbers and words."""
+        stage, done, total = self._progress
+        text = f"{stage} {done}/{total}" if total > 1 else stage
+        return {"running": self._running.locked(), "stage": stage, "done": done, "total": total, "text": text}
+
+    def stop(self) -> dict[str, Any]:
+        """End the fit at its next step."""
+        self._stop.set()
+        return {"running": self._running.locked()}
+
+    def _report(self, stage: str, done: int, total: int) -> None:
+        self._progress = (stage, done, total)
+        if self._stop.is_set():
+            raise _Stopped
+
+
+def fitted_names(controls: Collection[Control], asked: Any) -> list[str]:
+    """Names of the controls to fit: those that are `asked`, else the scene's free ones, else thicknesses.
+
+    Raises UsageError for an unknown name.
+    """
+    if asked is not None:
+        known = {control.name for control in controls}
+        if not isinstance(asked, list | tuple) or not asked or not all(name in known for name in asked):
+            raise UsageError(f"`free` must be a list of one or more of {', '.join(sorted(known))}")
+        return list(asked)
+    free = [control.name for control in controls if control.free is not None]
+    return free or [control.name for control in controls if control.path[-1].name == "thickness"]
+
+
+def scene_with(
+    scene: Scene, controls: Collection[Control], values: Mapping[str, float], free: Collection[str]
+) -> Scene:
+    """Return the scene with the values of its controls; those named `free` are free within their bounds."""
+    for control in controls:
+        value: Any = values[control.name]
+        if control.name in free:
+            prior = None if control.free is None else control.free.prior
+            value = Free(control.lower, control.upper, start=value, prior=prior)
+        elif control.optional and value == 0 and control.path[-1].name != "angle":
+            value = None
+        scene = with_value(scene, control.path, value)
+    return scene
+
+
+def to_json(found: Fit, controls: Collection[Control]) -> dict[str, Any]:
+    """Convert a fit: values and standard errors of controls, verdict, report and fitted curves."""
+    values, errors = {}, {}
+    for control in controls:
+        estimate = found.parameters.get(control.name)
+        if estimate is not None and estimate.free:
+            values[control.name] = min(max(estimate.value, control.lower), control.upper)
+            errors[control.name] = estimate.stderr if math.isfinite(estimate.stderr) else None
+    return {
+        "values": values,
+        "errors": errors,
+        "status": str(found.status),
+        "verdict": found.verdict.replace("`", ""),
+        "warnings": [warning.replace("`", "") for warning in found.warnings],
+        "summary": fit_text.report(found).replace("`", ""),
+    }
+
+
+def fitted_curves(found: Fit) -> list[Curve]:
+    """Return the fitted signal of each spectrum, with its scale and offset."""
+    curves = []
+    for part in found.parts:
+        curve = part.curve
+        if isinstance(curve, FittedCurve) and np.ndim(curve.model) == 1:
+            order = np.argsort(curve.wavelength, kind="stable")
+            rows = {part.spectrum.signal: curve.model}
+            if curve.delta_model is not None:
+                rows = {"Ψ": curve.model, "Δ": curve.delta_model}
+            for label, y in rows.items():
+                curves.append(Curve(f"fit: {label}", curve.wavelength[order], y[order]))
+    return curves

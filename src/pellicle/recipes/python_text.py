@@ -1,0 +1,174 @@
+"""Python expression of a scene, which builds the same scene where `pl` is pellicle."""
+
+from __future__ import annotations
+
+from dataclasses import MISSING, fields, is_dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from pellicle.dispersion.anisotropic import Anisotropic
+from pellicle.dispersion.base import AbstractDispersion
+from pellicle.dispersion.empirical import Constant
+from pellicle.errors import UsageError
+from pellicle.materials import Material, UnknownMaterial
+from pellicle.materials import material as find
+from pellicle.scene.film import Light, Scene
+from pellicle.scene.free import Free
+from pellicle.scene.graded import Graded
+from pellicle.scene.instrument import ONE_NUMBER, Drift, Instrument
+from pellicle.scene.layers import Interface, Layer, Plate, Substrate
+from pellicle.scene.surface import Surface
+from pellicle.scene.uncertainty import Uncertainty
+
+_PLACES = {
+    "pellicle.dispersion.effective_medium": "mixing",
+    "pellicle.dispersion.profiles": "profile",
+    "pellicle.scene.priors": "priors",
+}
+"""Public namespaces of classes by their module; other dispersions are in `pl.dispersion`."""
+_POSITIONAL = {
+    Scene: ("layers", "substrate"),
+    Layer: ("material", "thickness"),
+    Interface: ("thickness",),
+    Plate: ("material", "plate_mm"),
+    Substrate: ("material",),
+    Graded: ("first", "second"),
+    Surface: ("model", "numbers"),
+}
+"""Fields that are given without their names."""
+
+
+class _Text(str):
+    """An expression that is finished."""
+
+
+def python_program(scene: Scene | Surface) -> str:
+    """Return a program that builds a scene and simulates it, at the wavelengths of its light where given."""
+    nm = scene.light.wavelength if isinstance(scene, Scene) else None
+    lines = ["import pellicle as pl", "", f"scene = {python_text(scene)}"]
+    if nm is None:
+        return "\n".join([*lines, "simulated = pl.simulate(scene)", "print(simulated.values)", ""])
+    at = np.asarray(nm, float)
+    grid = np.linspace(at[0], at[-1], len(at))
+    even = bool(np.allclose(grid, at, rtol=0, atol=1e-9))
+    first, last = at[[0, -1]].tolist()
+    text = f"np.linspace({first!r}, {last!r}, {len(at)})" if even else f"np.array({at.tolist()!r})"
+    lines = ["import numpy as np", *lines, f"wavelength = {text}  # nm"]
+    return "\n".join([*lines, "spectrum = pl.simulate(scene, wavelength)", "print(spectrum.values)", ""])
+
+
+def python_text(thing: Any) -> str:
+    """Format a scene, a surface or a part of them as an expression in Python.
+
+    The wavelengths of a light are left out. **Raises:** UsageError for what has no expression, such as the
+    sensor of a camera.
+    """
+    if isinstance(thing, Free):
+        about = {} if thing.start == 0.5 * (thing.lower + thing.upper) else {"start": thing.start}
+        about |= {key: x for key in ("prior", "limits") if (x := getattr(thing, key)) is not None}
+        return _call("pl.Free", [thing.lower, thing.upper], about)
+    if isinstance(thing, Anisotropic):
+        return _anisotropic(thing)
+    if isinstance(thing, Uncertainty) and thing == Uncertainty.none():
+        return "pl.Uncertainty.none()"
+    if isinstance(thing, Drift):
+        return repr("free" if thing == ONE_NUMBER else "slow")
+    if isinstance(thing, Material | Constant):
+        return _medium(thing)
+    if isinstance(thing, _Text):
+        return str(thing)
+    if is_dataclass(thing) and not isinstance(thing, type):
+        return _module(thing)
+    if isinstance(thing, dict):
+        return "{" + ", ".join(f"{key!r}: {python_text(x)}" for key, x in thing.items()) + "}"
+    if isinstance(thing, list):
+        return "[" + ", ".join(map(python_text, thing)) + "]"
+    if isinstance(thing, tuple):
+        inside = ", ".join(map(python_text, thing))
+        return f"({inside},)" if len(thing) == 1 else f"({inside})"
+    if isinstance(thing, str | bool) or thing is None:
+        return repr(thing)
+    number: Any = thing
+    if np.ndim(number) == 0 and hasattr(number, "__float__"):
+        return repr(float(number))
+    raise UsageError(f"{type(thing).__name__} has no expression in Python")
+
+
+def _medium(medium: Material | Constant) -> str:
+    """A name, a path or a number, which a layer takes for a medium."""
+    return repr(_name(medium)) if isinstance(medium, Material) else _constant(medium)
+
+
+def _name(material: Material) -> str:
+    """The catalogue name, or the path of the file."""
+    try:
+        known: Any = find(material.name)
+    except UnknownMaterial:
+        return material.page
+    return material.name if known.page == material.page else material.page
+
+
+def _constant(medium: Constant) -> str:
+    if isinstance(medium.n, Free) or isinstance(medium.k, Free):
+        both = [medium.n] if medium.k is None else [medium.n, medium.k]
+        return _call("pl.dispersion.Constant", both, {})
+    n, k = float(medium.n), 0.0 if medium.k is None else float(medium.k)
+    return repr(complex(n, k)).strip("()") if k else repr(n)
+
+
+def _anisotropic(medium: Anisotropic) -> str:
+    if medium.is_uniaxial:
+        both = {"ordinary": medium.x, "extraordinary": medium.z}
+        return _call("pl.Anisotropic", [], {**both, "axis": (medium.theta, medium.phi)})
+    axes = {"x": medium.x, "y": medium.y, "z": medium.z}
+    return _call("pl.Anisotropic", [], {**axes, "axis": (medium.theta, medium.phi, medium.psi)})
+
+
+def _module(module: Any) -> str:
+    kind = type(module)
+    first = _POSITIONAL.get(kind, ())
+    given, named = [], {}
+    whole = isinstance(module, AbstractDispersion) and not isinstance(module, Graded)
+    for field in fields(module):
+        value = getattr(module, field.name)
+        if field.name in first:
+            given.append(_shortened(module, field.name, value))
+        elif whole and isinstance(value, Material | Constant):
+            named[field.name] = _Text(f"pl.medium({_medium(value)})")  # a model takes no names and numbers
+        elif field.name == "wavelength" or _is_default(module, field, value):
+            continue
+        else:
+            named[field.name] = _shortened(module, field.name, value)
+    return _call(_place(kind), given, named)
+
+
+def _shortened(module: Any, name: str, value: Any) -> Any:
+    """The value of a field as its converter takes it: one layer, and a plain substrate by its material."""
+    if isinstance(module, Scene) and name == "layers":
+        return value[0] if len(value) == 1 else list(value)
+    if isinstance(module, Scene) and name == "substrate" and value == Substrate(value.material):
+        return value.material
+    return dict(value) if isinstance(module, Surface) and name == "numbers" else value
+
+
+def _is_default(module: Any, field: Any, value: Any) -> bool:
+    default = field.default if field.default is not MISSING else None
+    if isinstance(module, Scene) and field.name == "ambient":
+        return isinstance(value, Constant) and value == Constant(1.0)
+    if isinstance(value, Light):
+        return bool(replace(value, wavelength=None) == Light())
+    if isinstance(value, Instrument | Uncertainty) or isinstance(module, Scene):
+        return bool(value == default)
+    return value is default or (isinstance(value, str | int | float) and value == default)
+
+
+def _place(kind: type) -> str:
+    if kind in _POSITIONAL or kind in (Light, Instrument, Uncertainty):
+        return f"pl.{kind.__name__}"
+    return f"pl.{_PLACES.get(kind.__module__, 'dispersion')}.{kind.__name__}"
+
+
+def _call(name: str, given: list[Any], named: dict[str, Any]) -> str:
+    arguments = [*map(python_text, given), *(f"{key}={python_text(x)}" for key, x in named.items())]
+    return f"{name}({', '.join(arguments)})"

@@ -1,0 +1,246 @@
+"""Writing recipes: the TOML text of a film or a surface, which reads back as the same scene."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Iterable
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pellicle.colour.observers import ILLUMINANTS, OBSERVERS
+from pellicle.errors import UsageError
+from pellicle.files import write_text
+from pellicle.recipes import film, surface, toml_text
+from pellicle.recipes.film import FilmRecipe
+from pellicle.recipes.sensors import SRGB, band_sensor
+from pellicle.recipes.surface import SurfaceRecipe
+from pellicle.recipes.validation import validated
+from pellicle.recipes.written_media import layer_medium, medium, number, same
+from pellicle.scene.film import Scene, with_wavelength
+from pellicle.scene.free import Free
+from pellicle.scene.instrument import ONE_NUMBER, SLOW_OFFSET, SLOW_SCALE, Drift
+from pellicle.scene.kinds import check_scene
+from pellicle.scene.layers import Interface, Layer, Plate, Substrate
+from pellicle.scene.layers import medium as medium_of
+from pellicle.scene.surface import Surface
+from pellicle.scene.uncertainty import Uncertainty
+
+_OF_THE_SCENE = ("index", "dispersion", "roughness", "thickness_spread", "interlayer")
+"""Uncertainties that stand in [scene]; the others stand in [instrument]."""
+
+
+def write_recipe(
+    scene: Scene | Surface,
+    path: str | os.PathLike[str],
+    *,
+    files: Iterable[str | os.PathLike[str]] = (),
+) -> None:
+    """Write a scene as a recipe, a TOML file that `pellicle.read_recipe` reads as the same scene.
+
+    **Arguments:** `scene`, a `Scene` or a `Surface`; `path` of the recipe, which must not exist; `files`,
+    data files that the recipe shall name. Paths in the recipe are relative to it.
+
+    **Raises:** UsageError where a recipe cannot express a part of the scene, naming it, and where the file
+    exists or cannot be written.
+
+    ```python
+    >>> import tempfile, pathlib
+    >>> path = pathlib.Path(tempfile.mkdtemp()) / "film.toml"
+    >>> pl.write_recipe(pl.Scene(pl.Layer("SiO2", pl.Free(10, 3000)), "Si"), path)
+    >>> pl.read_recipe(path).scene().layers[0].thickness.upper
+    3000.0
+
+    ```
+    """
+    write_text(path, recipe_text(scene, Path(path).parent, files=files))
+
+
+def recipe_text(
+    scene: Scene | Surface,
+    folder: str | os.PathLike[str] = ".",
+    *,
+    files: Iterable[str | os.PathLike[str]] = (),
+) -> str:
+    """Return the text of a recipe that lies in `folder`; the rest as for `write_recipe`."""
+    check_scene(scene)
+    at = Path(folder)
+    data = {"files": [Path(os.path.relpath(file, at)).as_posix() for file in files]}
+    data = {key: names for key, names in data.items() if names}
+    if isinstance(scene, Surface):
+        text = toml_text.document({"data": {"signal": "brdf", **data}, "scene.surface": _surface(scene, at)})
+        again: Any = SurfaceRecipe(str(at / "recipe"), validated(tomllib.loads(text), surface.TABLES)).scene()
+        _check_surface(scene, again)
+        return text
+    text = toml_text.document(
+        {
+            "data": _data(scene) | data,
+            "scene": _scene(scene, at),
+            "scene.layer": [_layer(layer, i, scene, at) for i, layer in enumerate(scene.layers)],
+            "instrument": _instrument(scene),
+        }
+    )
+    again = FilmRecipe(str(at / "recipe"), validated(tomllib.loads(text), film.TABLES)).scene()
+    _check_film(with_wavelength(scene, None), again)
+    return text
+
+
+def _data(scene: Scene) -> dict[str, Any]:
+    light, found = scene.light, {}
+    if light.signal != "R":
+        found["signal"] = light.signal
+    if isinstance(light.angle, Free) or np.ndim(light.angle) or light.angle != 0:
+        found["angle"] = number(light.angle, "the angle of incidence")
+    if light.polarisation != "unpolarised":
+        found["polarisation"] = light.polarisation
+    if light.wavelength is not None:
+        found["wavelengths"] = _wavelengths(np.asarray(light.wavelength, float))
+    return found
+
+
+def _wavelengths(nm: np.ndarray) -> Any:
+    """Start, stop and step where they give these wavelengths exactly, else a list."""
+    if len(nm) > 2:
+        start, stop, step = float(nm[0]), float(nm[-1]), float(nm[1] - nm[0])
+        grid = np.arange(start, stop + step / 2, step) if step > 0 else nm[:0]
+        if np.array_equal(grid, nm):
+            return {"start": start, "stop": stop, "step": step}
+    return nm.tolist()
+
+
+def _scene(scene: Scene, folder: Path) -> dict[str, Any]:
+    ambient = medium(scene.ambient, "the ambient", folder)
+    return {
+        **({} if ambient == 1.0 else {"ambient": ambient}),
+        "substrate": _substrate(scene.substrate, folder),
+        **_uncertainties(scene.uncertainty, _OF_THE_SCENE, "uncertainty"),
+    }
+
+
+def _substrate(substrate: Substrate, folder: Path) -> Any:
+    material = medium(substrate.material, "the substrate", folder)
+    keys: dict[str, Any] = {}
+    if substrate.back is not None:
+        keys["back"] = medium(substrate.back, "the medium behind the substrate", folder)
+    if isinstance(substrate.plate_mm, Free) or substrate.plate_mm != 1:
+        keys["plate_mm"] = number(substrate.plate_mm, "plate_mm")
+    keys |= _optional(substrate, ("back_collected", "roughness"), "substrate")
+    keys |= _given(substrate, ("back_reflections", "index_uncertainty"))
+    return {"material": material, **keys} if keys else material
+
+
+def _layer(layer: Layer | Interface | Plate, position: int, scene: Scene, folder: Path) -> dict[str, Any]:
+    name = layer.name or f"layer {position + 1}"
+    head = {} if layer.name is None else {"name": layer.name}
+    if isinstance(layer, Interface):
+        steps = {} if layer.steps == 1 else {"steps": layer.steps}
+        thickness = {"thickness": number(layer.thickness, f"{name}: thickness")}
+        return {**head, "between": layer.mix, **steps, **thickness, **_optional(layer, ("fraction",), name)}
+    head |= layer_medium(layer.material, name, folder)
+    if isinstance(layer, Plate):
+        plate = {"plate_mm": number(layer.plate_mm, f"{name}: plate_mm")}
+        collected = _optional(layer, ("back_collected",), name) | _given(layer, ("back_reflections",))
+        return {**head, **plate, **collected}
+    thickness = {"thickness": number(layer.thickness, f"{name}: thickness")}
+    about = _optional(layer, ("thickness_spread", "roughness"), name)
+    return {**head, **thickness, **about, **_given(layer, ("index_uncertainty",))}
+
+
+def _instrument(scene: Scene) -> dict[str, Any]:
+    instrument, found = scene.instrument, {}
+    for key, slow, usual in (("scale", SLOW_SCALE, 1.0), ("offset", SLOW_OFFSET, 0.0)):
+        value = getattr(instrument, key)
+        if isinstance(value, Drift):
+            if value not in (slow, ONE_NUMBER):
+                raise UsageError(f"{key}: a recipe has free and slow, not a drift of degree {value.degree}")
+            found[key] = "slow" if value == slow else "free"
+        elif value != usual:
+            found[key] = number(value, key)
+    others = [field.name for field in fields(instrument) if field.name not in ("scale", "offset")]
+    rest = [field.name for field in fields(Uncertainty) if field.name not in _OF_THE_SCENE]
+    stated = _uncertainties(scene.uncertainty, rest, None)
+    return {**found, **_optional(instrument, others, "instrument"), **stated}
+
+
+def _base(uncertainty: Uncertainty) -> Uncertainty:
+    """The usual uncertainties or none, whichever leaves fewer to state."""
+
+    def stated(base: Uncertainty) -> int:
+        return sum(getattr(uncertainty, f.name) != getattr(base, f.name) for f in fields(Uncertainty))
+
+    return min((Uncertainty(), Uncertainty.none()), key=stated)
+
+
+def _uncertainties(uncertainty: Uncertainty, names: Iterable[str], word: str | None) -> dict[str, Any]:
+    """Uncertainties `names` that differ from the usual ones or none, and that choice under the key `word`."""
+    base = _base(uncertainty)
+    found: dict[str, Any] = {word: "none"} if word and base != Uncertainty() else {}
+    for name in names:
+        if getattr(uncertainty, name) != getattr(base, name):
+            found[f"{name}_uncertainty"] = float(getattr(uncertainty, name))
+    return found
+
+
+def _optional(owner: Any, names: Iterable[str], label: str) -> dict[str, Any]:
+    """Numbers that are there."""
+    given = {name: getattr(owner, name) for name in names}
+    return {name: number(x, f"{label}: {name}") for name, x in given.items() if x is not None}
+
+
+def _given(owner: Any, names: Iterable[str]) -> dict[str, Any]:
+    return {name: getattr(owner, name) for name in names if getattr(owner, name) is not None}
+
+
+def _surface(scene: Surface, folder: Path) -> dict[str, Any]:
+    found: dict[str, Any] = {"model": scene.model}
+    if scene.wavelengths is not None:
+        found["wavelengths"] = [float(nm) for nm in scene.wavelengths]
+    if scene.sensor is not None:
+        found |= _sensor(scene, folder)
+    for part in ("film", "base"):
+        own = getattr(scene, part)
+        if own is not None:
+            found[part] = medium(medium_of(own), part, folder)
+    for key, value in scene.numbers.items():
+        several = not isinstance(value, Free) and np.ndim(value) == 1
+        found[key] = [float(x) for x in np.ravel(value)] if several else number(value, key)  # pyright: ignore[reportArgumentType,reportCallIssue]
+    return found
+
+
+def _sensor(scene: Surface, folder: Path) -> dict[str, str]:
+    """Name of the observer and the illuminant that the sensor is. Raises UsageError for a camera."""
+    for name in (*OBSERVERS, SRGB):
+        for illuminant in ILLUMINANTS:
+            known = band_sensor(name, illuminant, None, folder)
+            if same(known, scene.sensor):
+                return {"sensor": name, "illuminant": illuminant}
+    raise UsageError("the sensor is no observer of the CIE: name the file of its sensitivities in a recipe")
+
+
+def _check_film(scene: Scene, again: Scene) -> None:
+    """Raise UsageError for the first part of a scene that the recipe does not give back."""
+    parts = [
+        (f"layer {i + 1}", x, y) for i, (x, y) in enumerate(zip(scene.layers, again.layers, strict=True))
+    ]
+    names = ("substrate", "ambient", "light", "instrument", "uncertainty")
+    parts += [(name, getattr(scene, name), getattr(again, name)) for name in names]
+    for name, one, other in parts:
+        if one != other if name == "uncertainty" else not same(one, other):
+            raise UsageError(f"a recipe cannot express the {name} of this scene")
+
+
+def _check_surface(scene: Surface, again: Surface) -> None:
+    """Raise UsageError for the first part of a surface that the recipe does not give back."""
+    pairs: list[tuple[str, Any, Any]] = [
+        (key, scene.numbers[key], again.numbers[key]) for key in scene.numbers
+    ]
+    for part in ("film", "base"):
+        media = [None if x is None else medium_of(x) for x in (getattr(scene, part), getattr(again, part))]
+        pairs.append((part, media[0], media[1]))
+    pairs += [(name, getattr(scene, name), getattr(again, name)) for name in ("wavelengths", "sensor")]
+    for name, one, other in pairs:
+        if not same(one, other):
+            raise UsageError(f"a recipe cannot express {name} of this surface")
