@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from pellicle.api import compare as compare
     from pellicle.api import cost as cost
     from pellicle.api import depth_profile as depth_profile
+    from pellicle.api import explore as explore
     from pellicle.api import export as export
     from pellicle.api import fit as fit
     from pellicle.api import map as map
@@ -71,6 +72,7 @@ _NAMES = {
         "compare",
         "cost",
         "depth_profile",
+        "explore",
         "export",
         "fit",
         "map",

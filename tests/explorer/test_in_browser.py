@@ -5,8 +5,6 @@ Skipped where Playwright, a browser or packages of the server are absent. PELLIC
 
 import base64
 import json
-import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -16,11 +14,9 @@ import pytest
 
 import pellicle as pl
 
-playwright = pytest.importorskip("playwright.sync_api", reason="Playwright is absent: make browser-tests")
 pytest.importorskip("uvicorn", reason="uvicorn is absent: make browser-tests")
 pytest.importorskip("starlette", reason="Starlette is absent: make browser-tests")
 
-NAMES = ("chromium", "chromium-browser", "google-chrome")
 RECIPE = """
 [data]
 signal = "R"
@@ -34,18 +30,6 @@ substrate = "Si"
 material = "SiO2"
 thickness = { lower = 50, upper = 600, value = 250 }
 """
-
-
-@pytest.fixture(scope="module")
-def browser():
-    found = os.environ.get("PELLICLE_BROWSER") or next(filter(None, map(shutil.which, NAMES)), None)
-    if found is None:
-        pytest.skip("there is no Chromium: install it, or name one in PELLICLE_BROWSER")
-    with playwright.sync_playwright() as driver:
-        with_root = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
-        chromium = driver.chromium.launch(executable_path=found, args=with_root)
-        yield chromium
-        chromium.close()
 
 
 def start(folder):
