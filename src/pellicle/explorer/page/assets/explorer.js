@@ -225,17 +225,21 @@ export async function explore(element, call, options = {}) {
     if (focused) stop.focus(); // the button that had it is disabled
     fitted.textContent = "Fitting …";
     const progress = setInterval(async () => {
-      const { running, stage, done, total } = await call("fit_status", {}).catch(() => ({}));
-      if (running && !stop.hidden) fitted.textContent = `Fitting: ${stage}${total ? `, ${done} of ${total}` : ""} …`;
+      const { running, text } = await call("fit_status", {}).catch(() => ({}));
+      if (running && text && !stop.hidden) fitted.textContent = `Fitting: ${text} …`;
     }, PROGRESS_EVERY);
     const free = controls.filter((each) => each.free.checked).map((each) => each.about.name);
-    const answer = await ask("fit", { values: values(), free });
+    const answer = await ask("fit", { values: values(), ...(free.length ? { free } : {}) });
     clearInterval(progress);
     fit.disabled = false;
     if (document.activeElement === stop) fit.focus();
     stop.hidden = true;
     fitted.textContent = "";
     if (answer.error) return;
+    if (!answer.values) { // stopped
+      fitted.textContent = "The fit was stopped; the sliders are as they were.";
+      return;
+    }
     setAll(answer.values, answer.errors);
     fitted.replaceChildren(make("p", {}, answer.verdict));
     if (answer.summary) fitted.append(make("details", {}, make("summary", {}, "Summary of the fit"), make("pre", { tabindex: 0 }, answer.summary)));
