@@ -8,7 +8,10 @@ EXAMPLE := measurements/recipes/hematite_on_glass_140nm.toml
 # Tests spend most of their time in compilation. These flags halve the compilation time, at the cost of run time.
 # Rounding may differ, so tests that count digits (EXACT) run without them.
 QUICK_COMPILE := XLA_FLAGS="--xla_backend_optimization_level=0 --xla_llvm_disable_expensive_passes=true \
-  --xla_cpu_use_fusion_emitters=false"
+  --xla_cpu_use_fusion_emitters=false --xla_cpu_parallel_codegen_split_count=1"
+# both cores have tests, so a program is compiled by one thread; glibc keeps memory that a compilation returns
+ONE_THREAD := XLA_FLAGS=--xla_cpu_parallel_codegen_split_count=1
+KEEP_MEMORY := MALLOC_TRIM_THRESHOLD_=4000000000 MALLOC_MMAP_THRESHOLD_=4000000000 MALLOC_TOP_PAD_=67108864
 EXACT := tests/hard tests/fitting/test_nist.py
 PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
 
@@ -45,10 +48,10 @@ fits: $(VENV)/.fit
 # pyright takes one core for a minute, and shares the two with the first tests
 test: $(VENV)/.dev
 	$(MAKE) --jobs 2 lint exact
-	$(QUICK_COMPILE) $(PYTEST) $(addprefix --ignore=,$(EXACT))
+	$(KEEP_MEMORY) $(QUICK_COMPILE) $(PYTEST) $(addprefix --ignore=,$(EXACT))
 
 exact: $(VENV)/.dev
-	$(PYTEST) $(EXACT)
+	$(KEEP_MEMORY) $(ONE_THREAD) $(PYTEST) $(EXACT)
 
 coverage: $(VENV)/.dev
 	$(PYTEST) --cov --cov-report=term
@@ -56,7 +59,7 @@ coverage: $(VENV)/.dev
 # executed once, for the reader and for the documentation. PELLICLE_SHORT=1 is for tests: fewer points, quick compilation
 notebooks: $(VENV)/.dev
 	rm -rf executed && mkdir executed && cp notebooks/*.ipynb notebooks/matplotlibrc executed
-	$(if $(PELLICLE_SHORT),$(QUICK_COMPILE)) PYTHONWARNINGS="ignore:Error reading persistent compilation cache entry" \
+	$(if $(PELLICLE_SHORT),$(KEEP_MEMORY) $(QUICK_COMPILE)) PYTHONWARNINGS="ignore:Error reading persistent compilation cache entry" \
 	  JAX_COMPILATION_CACHE_DIR=$(CURDIR)/.pytest_cache/jax \
 	  JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS=0 PELLICLE_CACHE=$(CURDIR)/executed/compiled \
 	  $(BIN)/python -m pytest -n 2 --nbmake --nbmake-timeout 300 --overwrite --durations 8 executed

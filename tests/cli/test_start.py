@@ -101,6 +101,7 @@ def test_a_folder_that_others_can_write_keeps_no_machine_code(spectrum_file, tmp
     assert f"{cache}: others can write to this folder" in ran.stderr
 
 
+@pytest.mark.slow  # a process that compiles for 4 s; the test above has one without a cache
 def test_no_cache_where_it_is_off(spectrum_file, tmp_path):
     flags = ("--layer", "1.46", "--substrate", "3.9", "--thickness", "299:301")
     home = tmp_path / "home"

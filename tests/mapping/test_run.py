@@ -88,6 +88,7 @@ def test_a_scheduler_that_is_not_there(cube, scene, tmp_path, monkeypatch):
         run_map(cube, scene, tmp_path / "map.zarr", scheduler="tcp://127.0.0.1:1")
 
 
+@pytest.mark.slow  # compiles for 12 s; test_pixel_errors.py compares fits of pixels without a store
 def test_fits_are_those_of_fit(tmp_path):
     """Two pixels, one of them without data, by the whole way."""
     scene = pl.Scene(pl.Layer(1.46, pl.Free(10, 800)), 3.9)
