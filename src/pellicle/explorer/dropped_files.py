@@ -51,7 +51,8 @@ def _content(body: Mapping[str, Any]) -> tuple[str, bytes]:
     try:
         content = given.encode() if encoded is None else b64decode(given, validate=True)
     except ValueError:
-        raise UsageError(f"{name}: is not base64") from None
+        form = "Unicode text" if encoded is None else "base64"
+        raise UsageError(f"{name}: is not {form}") from None
     if len(content) > LARGEST_FILE:
         raise DataError(f"{name}: has more than {LARGEST_FILE // 1_000_000} MB: fit it with pellicle fit")
     return name, content

@@ -59,6 +59,7 @@ class Session:
         self.files = list(files)
         self.view = FilmView(scene, wavelength)
         self.spectra: list[Spectrum] = []
+        self._ahead = False  # whether programs are compiled before a view needs them
         self._compiler, self._fit_run = Compiler(), FitRun()
         self._requests: dict[str, Callable[[Mapping[str, Any]], dict[str, Any]]] = {
             "scene": self._scene,
@@ -70,7 +71,7 @@ class Session:
             "recipe": self._recipe,
         }
 
-    def answer(self, request: str, body: Mapping[str, Any]) -> dict[str, Any]:
+    def answer(self, request: str, body: Any) -> dict[str, Any]:
         """Answer one request; what is wrong with it is one sentence under `error`."""
         if request not in self._requests:
             return {"error": f"no request {request!r}; known: {', '.join(self._requests)}"}
@@ -98,7 +99,8 @@ class Session:
         if changed is None:
             return self._data_shown()
         self.view = changed
-        self.prepare()
+        if self._ahead:
+            self.prepare()
         return {**self._data_shown(), "scene_changed": True}
 
     def _data_shown(self) -> dict[str, Any]:
@@ -180,7 +182,7 @@ class Session:
 
     def prepare(self) -> None:
         """Compile in the background what the first views need, and then what one effect more needs."""
-        view = self.view
+        view, self._ahead = self.view, True
         structure = view.structure(view.defaults())
         several = [(kind, structure, NOW) for kind in ("curves", "colour", "sphere")]
         for other in view.neighbours(structure):

@@ -1,0 +1,166 @@
+"""Data files and fits of the explorer's session."""
+
+import base64
+import threading
+
+import numpy as np
+import pytest
+
+import pellicle as pl
+from pellicle.explorer import dropped_files, fit_run
+from pellicle.explorer.session import Session
+from pellicle.scene.free import Free
+
+NM = np.linspace(400.0, 800.0, 128)
+
+
+@pytest.fixture
+def session(tmp_path):
+    (tmp_path / "recipe").mkdir()
+    return Session(
+        pl.Scene(pl.Layer("SiO2", pl.Free(10.0, 1000.0)), "Si"), tmp_path / "recipe", wavelength=NM
+    )
+
+
+def csv(header, *columns):
+    return "\n".join([header, *(",".join(f"{x:.8g}" for x in row) for row in zip(*columns, strict=True))])
+
+
+GOOD = csv("wavelength_nm,R", NM, np.full(128, 0.2))
+
+
+def test_data_are_drawn_as_they_are(session):
+    answer = session.answer("data", {"name": "film.csv", "text": GOOD})
+    [curve] = answer["curves"]
+    assert curve["label"] == "R"
+    assert np.allclose(curve["x"], NM)
+    assert curve["y"] == [0.2] * 128
+    assert answer["notes"][0] == "film.csv: R, 128 points from 400 to 800 nm"
+    again = session.answer("data", {"name": "film.csv", "base64": base64.b64encode(GOOD.encode()).decode()})
+    assert again["curves"] == answer["curves"]
+    assert session.answer("scene", {})["data"]["curves"] == answer["curves"]
+
+
+def test_light_and_range_of_the_data_replace_those_of_the_scene(session):
+    text = csv("wavelength_nm,angle_deg,psi_deg,delta_deg", NM + 100, 0 * NM + 70, 0 * NM + 30, 0 * NM + 90)
+    answer = session.answer("data", {"name": "e.csv", "text": text})
+    assert answer["scene_changed"]
+    assert [curve["label"] for curve in answer["curves"]] == ["Ψ", "Δ"]
+    about = session.answer("scene", {})
+    assert about["signals"] == ["Ψ", "Δ"]
+    assert {each["name"]: each["value"] for each in about["controls"]}["angle"] == 70.0
+    assert session.view.wavelength[0] == 500.0
+
+
+BAD = {
+    "words": "this is no spectrum\nat all",
+    "empty": "",
+    "blank": "\n\n  \n",
+    "header": "wavelength_nm,R\n",
+    "negative": csv("wavelength_nm,R", NM, -NM),
+    "percent": csv("wavelength_nm,R", NM, 0 * NM + 40),
+    "missing": "wavelength_nm,R\n500,0.2\n510,\n520,0.3\n",
+    "html": "<html><body>not found</body></html>",
+    "json": '{"R": [1, 2, 3]}',
+}
+
+
+@pytest.mark.parametrize("kind", BAD)
+def test_bad_text_is_refused_in_one_sentence(session, kind):
+    answer = session.answer("data", {"name": f"{kind}.csv", "text": BAD[kind]})
+    assert set(answer) == {"error"}
+    assert answer["error"].startswith(f"{kind}.csv: ")
+    assert "\n" not in answer["error"]
+    assert "/tmp" not in answer["error"]
+    assert "data" not in session.answer("scene", {})
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        ({"name": "a.csv", "base64": base64.b64encode(bytes(range(256)) * 9).decode()}, "a.csv: "),
+        ({"name": "a.csv", "base64": "###"}, "is not base64"),
+        ({"name": "a.csv"}, "needs its text"),
+        ({"name": 3, "text": GOOD}, "needs a name"),
+        ({"name": "a.csv", "text": 7}, "needs its text"),
+        ({"name": "a.csv", "text": "\ud800"}, "is not Unicode"),
+        ({"file": 3}, "only files in the folder"),
+    ],
+)
+def test_bad_bodies_are_refused(session, body, said):
+    assert said in session.answer("data", body)["error"]
+
+
+def test_names_lead_to_no_other_folder(session, tmp_path):
+    for name in ("../../evil.csv", "/etc/evil.csv", "..\\evil.csv", "..", ".", "", "a/../..", "evil\0.csv"):
+        answer = session.answer("data", {"name": name, "text": GOOD})
+        assert "/" not in answer["name"]
+        assert ".." not in answer["name"]
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+
+
+def test_only_files_of_the_folder_are_read(session, tmp_path):
+    secret = tmp_path / "secret.csv"
+    secret.write_text(GOOD)
+    folder = tmp_path / "recipe"
+    (folder / "own.csv").write_text(GOOD)
+    (folder / "link.csv").symlink_to(secret)
+    assert session.answer("data", {"file": "own.csv"})["name"] == "own.csv"
+    for name in ("../secret.csv", str(secret), "link.csv", "./../secret.csv", "x\0", "~/secret.csv", "."):
+        answer = session.answer("data", {"file": name})
+        assert set(answer) == {"error"}, name
+    without = Session(pl.Scene(pl.Layer("SiO2", 100.0), "Si"))
+    assert "only files in the folder" in without.answer("data", {"file": "own.csv"})["error"]
+
+
+def test_large_files_are_refused(session, monkeypatch, tmp_path):
+    monkeypatch.setattr(dropped_files, "LARGEST_FILE", 100)
+    assert "more than" in session.answer("data", {"name": "a.csv", "text": GOOD})["error"]
+    (tmp_path / "recipe" / "own.csv").write_text(GOOD)
+    assert "more than" in session.answer("data", {"file": "own.csv"})["error"]
+
+
+def test_a_fit_is_stopped_and_others_wait(session, monkeypatch):
+    session.answer("data", {"name": "film.csv", "text": GOOD})
+    began, go_on, seen = threading.Event(), threading.Event(), []
+
+    def slow(data, scene, progress):
+        seen.append(scene)
+        progress("scan", 3, 10)
+        began.set()
+        assert go_on.wait(20)
+        progress("scan", 4, 10)
+
+    monkeypatch.setattr(fit_run, "fit", slow)
+    answers = []
+    body = {"values": {"thickness": 300.0, "roughness": 2.0}, "free": ["thickness", "instrument.bandwidth"]}
+    thread = threading.Thread(target=lambda: answers.append(session.answer("fit", body)))
+    thread.start()
+    assert began.wait(20)
+    assert session.answer("fit_status", {})["text"] == "scan 3/10"
+    assert "a fit is running" in session.answer("fit", {})["error"]
+    assert session.answer("view", {"want": ["plan"]})["plan"]
+    session.answer("fit_stop", {})
+    go_on.set()
+    thread.join()
+    assert answers == [{"stopped": True}]
+    assert not session.answer("fit_status", {})["running"]
+    [scene] = seen
+    layer, width = scene.layers[0], scene.instrument.bandwidth
+    assert (layer.thickness.lower, layer.thickness.upper, layer.thickness.start) == (10.0, 1000.0, 300.0)
+    assert layer.roughness == 2.0
+    assert isinstance(width, Free)
+    assert width.lower == 0.0
+
+
+@pytest.mark.slow  # compiles a fit; the stubbed fit above covers the requests
+def test_a_fit_finds_the_thickness(session):
+    truth = pl.Scene(pl.Layer("SiO2", 432.1), "Si")
+    measured = pl.simulate(truth, NM, noise=0.002, seed=3)
+    session.answer("data", {"name": "film.csv", "text": csv("wavelength_nm,R", NM, measured.values)})
+    answer = session.answer("fit", {"values": {"thickness": 100.0}})
+    assert abs(answer["values"]["thickness"] - 432.1) < 3 * answer["errors"]["thickness"]
+    assert answer["errors"]["thickness"] < 5
+    assert answer["status"] == "converged"
+    [curve] = answer["curves"]
+    assert np.sqrt(np.mean((np.array(curve["y"]) - measured.values) ** 2)) < 0.0025
