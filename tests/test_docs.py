@@ -97,6 +97,14 @@ ELSEWHERE = {
     "source .venv/bin/activate": "a shell builtin; make fit creates the folder",
     "pellicle fit wafer.txt --layer cauchy --substrate Si": "a file of the reader",
     "pellicle demo": "tests/cli/test_demo_command.py",
+    **dict.fromkeys(
+        (
+            "pellicle explore",
+            "pellicle explore docs/examples/oxide.toml",
+            "pellicle explore --layer TiO2 --substrate BK7 --back air --signal T",
+        ),
+        "serves a page until it is interrupted; tests/explorer/test_server.py",
+    ),
     "pellicle --install-completion": "would change the user's shell; part of cyclopts",
     "python benchmarks/anisotropic.py": "speed is measured by benchmarks; tests/optics/test_berreman.py",
     "python benchmarks/peers/agreement.py --stacks 1000": "needs pyElli; tests/optics/test_berreman.py",
@@ -374,7 +382,7 @@ def test_toml_parses_and_complete_recipes_are_valid(page):
 
 
 def test_every_flag_on_a_page_exists(monkeypatch, capsys):
-    helps, names = [], "fit sample simulate plan compare cost chart export map materials read"
+    helps, names = [], "fit sample simulate plan compare cost chart explore export map materials read"
     for command in ("", *names.split()):
         monkeypatch.setattr(sys, "argv", ["pellicle", *command.split(), "--help"])
         main()

@@ -2,19 +2,24 @@
 
 import json
 import math
+import os
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
 
+import equinox as eqx
 import numpy as np
 import pytest
 
 from pellicle.fitting.result import Estimate, Rival
+from pellicle.recipes import read_recipe
 from pellicle.reporting.json_record import failure, to_json
 from pellicle.reporting.page.batch_page import batch_page
 from pellicle.reporting.page.fit_page import fit_page
 from pellicle.reporting.page.repetition import repetition
+from pellicle.scene.film import Light, Scene, with_wavelength
 from pellicle.scene.free import Free
+from pellicle.scene.layers import Layer
 from pellicle.scene.surface import Surface
 from pellicle.synthetic.surface_sphere import in_plane
 
@@ -166,6 +171,21 @@ def test_the_page_has_what_repeats_the_fit(fit, tmp_path):
     [(_, command)] = repetition(fit, {"flags": flags, "reading": {"folded": True}})
     assert command == "pellicle fit /data/film.csv --layer 'SiO2 of (me)' --plate-mm 1.0 --folded"
     assert repetition(fit, None) == []
+
+
+def test_the_page_of_a_fit_without_a_recipe_has_one(fit, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    light = Light(np.array([500.0, 600.0]), 30.0)
+    film = Scene(Layer("SiO2", Free(10.0, 1000.0)), "Si", light=light)
+    own = replace(fit, scene=film)
+    [(name, text)] = repetition(own, None)
+    assert repetition(own, {"flags": {"layer": "SiO2"}})[1] == (name, text)
+    (tmp_path / "film.toml").write_text(text)
+    recipe = read_recipe(tmp_path / "film.toml")
+    assert [os.path.abspath(file) for file in recipe.files] == ["/data/film.csv"]
+    assert eqx.tree_equal(recipe.scene(), with_wavelength(film, None))
+    odd = replace(film, light=Light(np.array([500.0, 600.0]), np.array([30.0, 40.0])))
+    assert repetition(replace(fit, scene=odd), None) == []  # two angles that the file does not have
 
 
 def luminance(colour):

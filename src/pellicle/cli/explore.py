@@ -95,4 +95,6 @@ def _of_flags(flags: SceneFlags, reading: ReadingFlags) -> Session:
         thickness=flags.thickness or DEFAULT_THICKNESS,
     )
     scene, _ = scene_from_flags(film, reading)
+    if flags.thickness is None:
+        say("thickness: 0 to 1000 nm, since no --thickness was given")
     return Session(scene, title=f"{film.layer} on {film.substrate}")

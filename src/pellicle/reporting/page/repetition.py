@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pellicle.errors import UsageError
+
 if TYPE_CHECKING:
     from pellicle.fitting.result import Fit
 
@@ -15,12 +17,12 @@ _LONGEST = 200_000
 
 
 def repetition(fit: Fit, described: Mapping[str, Any] | None) -> list[tuple[str, str]]:
-    """Descriptions and texts of the command and the recipe of a fit; empty for a fit in Python.
+    """Descriptions and texts of the command and the recipe of a fit; only the recipe for a fit in Python.
 
     `described` is what the scene was built from: a recipe's path, or flags.
     """
     if described is None:
-        return []
+        return _written(fit)
     files = list(dict.fromkeys(part.data.path for part in fit.parts if part.data.path))
     words = ["pellicle", "fit", *files]
     recipe = described.get("recipe")
@@ -31,7 +33,7 @@ def repetition(fit: Fit, described: Mapping[str, Any] | None) -> list[tuple[str,
     joint = ["--joint"] if len(files) > 1 and recipe is None else []
     result = [("Command", shlex.join([*words, *joint]))]
     if recipe is None:
-        return result
+        return [*result, *_written(fit)]
     text = _text(Path(recipe))
     return result if text is None else [*result, (f"Recipe {Path(recipe).name}", text)]
 
@@ -41,6 +43,23 @@ def _word(value: Any) -> str:
         numbers = all(isinstance(each, float | int) for each in value)
         return (":" if numbers and isinstance(value, tuple) else ",").join(f"{each}" for each in value)
     return str(value)
+
+
+def _written(fit: Fit) -> list[tuple[str, str]]:
+    """The recipe of a fit of one spectrum; none where a recipe cannot express its scene."""
+    from pellicle.data.spectrum import Spectrum
+    from pellicle.recipes.write import recipe_text
+    from pellicle.scene.film import Scene, with_wavelength
+
+    scene, data = fit.scene, fit.parts[0].data
+    if len(fit.parts) != 1 or not isinstance(scene, Scene) or not isinstance(data, Spectrum):
+        return []
+    # the file has its own angles, and its wavelengths in any case
+    own = with_wavelength(scene, None, None if data.angle is None else 0.0)
+    try:
+        return [("Recipe", recipe_text(own, files=[data.path] if data.path else []))]
+    except UsageError:
+        return []
 
 
 def _text(path: Path) -> str | None:
