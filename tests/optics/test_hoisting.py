@@ -5,7 +5,7 @@ from __future__ import annotations
 import jax
 import numpy as np
 
-from pellicle.optics.hoisting import hoist
+from pellicle.optics.hoisting import hoist, stored
 from pellicle.optics.pair import Pair
 
 
@@ -39,3 +39,32 @@ def test_hoisted_coefficients_are_stored():
 def test_values_used_at_few_points_are_not_hoisted():
     x = np.ones(50)
     assert hoist(x, np.ones((7, 50))) is x
+
+
+def test_storing_changes_no_value_and_no_slope():
+    def function(x, y):
+        a, b, c = stored((x, Pair(y, None), 2.0))
+        assert b.im is None
+        return a * b.re * c
+
+    x, y = np.arange(3.0), np.arange(5.0, 8.0)
+    value, slope = jax.jit(lambda x: jax.jvp(lambda x: function(x, y), (x,), (np.ones(3),)))(x)
+    np.testing.assert_array_equal(value, 2 * x * y)
+    np.testing.assert_array_equal(slope, 2 * y)
+
+
+def test_stored_values_are_computed_once_for_all_their_uses():
+    x = np.ones(200)
+
+    def temporary_bytes(stored):
+        def both(x):
+            power = x
+            for _ in range(20):
+                power = power * x + 1.0
+            power = stored(power)
+            return power + x, power * x
+
+        return jax.jit(both).lower(x).compile().memory_analysis().temp_size_in_bytes
+
+    assert temporary_bytes(lambda x: x) < x.nbytes
+    assert temporary_bytes(stored) >= x.nbytes

@@ -128,7 +128,6 @@ def test_what_is_not_computed_is_refused():
         "tilted": lambda: pl.plan(scene([pl.Layer(tilted, 9.0), pl.Plate(1.5, 1.0)])),
         "fields": lambda: pl.absorptance(NM, 10.0, crystal, "Si", angle=ANGLE),
         "pl.jones": lambda: pl.reflectance(NM, 10.0, tilted, "Si", angle=ANGLE),
-        "not compared": lambda: pl.cost(scene(pl.Layer(crystal, 10.0))),
         "roughness": lambda: pl.plan(scene(pl.Layer(tilted, 10.0, roughness=1.0))),
     }
     for words, make in refused.items():

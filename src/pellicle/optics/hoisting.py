@@ -60,7 +60,7 @@ def stored(numbers: Any) -> Any:
     are used many times, the code of a program grows by that to many times the code of the formula.
     """
     leaves, tree = jax.tree.flatten(numbers)
-    arrays = {i: x for i, x in enumerate(leaves) if isinstance(x, jax.Array) and jnp.ndim(x)}
+    arrays = {i: x for i, x in enumerate(leaves) if isinstance(x, jax.Array)}
     kept = dict(zip(arrays, _stored(list(arrays.values())), strict=True))
     return jax.tree.unflatten(tree, [kept.get(i, x) for i, x in enumerate(leaves)])
 

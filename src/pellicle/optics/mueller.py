@@ -52,8 +52,12 @@ def mueller_elements(pp: Number, ps: Number, sp: Number, ss: Number) -> list[lis
 
 def normalised(matrix: Any) -> Any:
     """Return a Mueller matrix (..., 4, 4) divided by its element 1,1; all 0 where there is no light."""
-    intensity = matrix[..., :1, :1]
-    dark = intensity < jnp.finfo(matrix.dtype).tiny
+    return matrix * inverse_intensity(matrix[..., :1, :1])
+
+
+def inverse_intensity(intensity: Any) -> Any:
+    """Return 1/m11; 0 where there is no light."""
+    dark = intensity < jnp.finfo(intensity.dtype).tiny
     # scaled first: the derivative of 1/x contains 1/x², which overflows where there is little light
     size = jax.lax.stop_gradient(jnp.where(dark, 0.0, 1 / jnp.where(dark, 1.0, intensity)))
-    return matrix * size * jnp.where(dark, 0.0, 1 / jnp.where(dark, 1.0, intensity * size))
+    return size * jnp.where(dark, 0.0, 1 / jnp.where(dark, 1.0, intensity * size))

@@ -10,9 +10,10 @@ import jax.numpy as jnp
 from pellicle.effects.plan import Plan
 from pellicle.optics import ellipsometry
 from pellicle.optics.anisotropy import mixes_polarisations
-from pellicle.optics.berreman.matrices import Matrix
+from pellicle.optics.berreman.matrices import Elements
 from pellicle.optics.berreman.stack import polarised, transmittances
-from pellicle.optics.mueller import mueller_elements, normalised
+from pellicle.optics.hoisting import stored
+from pellicle.optics.mueller import inverse_intensity, mueller_elements
 from pellicle.optics.pair import abs2, conj, imag, is_real, real, to_pair
 from pellicle.simulation.coherent_groups import CoherentGroup
 
@@ -29,7 +30,7 @@ def rows(plan: Plan, groups: list[CoherentGroup]) -> list[Any]:
     absorbing = any(mixes_polarisations(layer) and not is_real(layer) for layer in group.layers)
     dichroic = absorbing or plan.on("tunnelling")
     response = polarised(group.above, group.layers, group.below, group.phases, angle, dichroic)
-    jones = Matrix(*map(to_pair, response.reflected))
+    jones = Elements(*map(to_pair, response.reflected))
     if plan.signal == "mueller":
         return [jnp.ravel(x) for row in mueller_elements(*jones) for x in row]
     if plan.signal == "psi-delta":
@@ -46,8 +47,8 @@ def rows(plan: Plan, groups: list[CoherentGroup]) -> list[Any]:
 def finished(plan: Plan, sums: Sequence[Any]) -> Sequence[Any]:
     """Return the rows of the signal from averaged sums of intensities."""
     if plan.signal == "mueller":
-        elements = normalised(jnp.stack(sums, axis=-1).reshape(*sums[0].shape, 4, 4))
-        return [elements[..., i // 4, i % 4] for i in range(1, 16)]
+        factor = stored(inverse_intensity(sums[0]))
+        return [element * factor for element in sums[1:]]
     if plan.signal == "psi-delta":
         return ellipsometry.normalised(ellipsometry.Stokes(*sums))
     return sums if len(sums) == 1 else [0.5 * (sums[0] + sums[1])]

@@ -12,7 +12,7 @@ from jaxtyping import Array, Complex, Float
 from pellicle.errors import UsageError
 from pellicle.optics import mueller as mueller_matrices
 from pellicle.optics.anisotropy import is_anisotropic
-from pellicle.optics.berreman.matrices import Matrix
+from pellicle.optics.berreman.matrices import Elements
 from pellicle.optics.berreman.slices import DIRECT
 from pellicle.optics.berreman.stack import Polarised, most_dichroic, polarised
 from pellicle.optics.interface import normal, normal_flux, transverse
@@ -99,7 +99,7 @@ def mueller(
         per_field = flux[0] / abs2(film.substrate), flux[1]
         p, s = (jnp.sqrt(jnp.maximum(x, 0.0) / response.incident) for x in per_field)
         t = _transmitted(film, response)
-        amplitudes = Matrix(t.pp * p, t.ps * p, t.sp * s, t.ss * s)
+        amplitudes = Elements(t.pp * p, t.ps * p, t.sp * s, t.ss * s)
     matrix = mueller_matrices.mueller(_array([to_complex(x) for x in amplitudes]))
     return mueller_matrices.normalised(matrix) if normalised else matrix
 
@@ -131,11 +131,11 @@ def _normal(film: FilmArguments) -> Any:
     return normal(film.substrate, transverse(film.ambient, film.angle)[0])
 
 
-def _transmitted(film: FilmArguments, response: Polarised) -> Matrix:
+def _transmitted(film: FilmArguments, response: Polarised) -> Elements:
     """Return the Jones matrix of transmission: of the electric field of p and s in the substrate."""
     E, H = response.fields
     index = 1 / film.substrate
-    return Matrix(index * H.pp, index * H.ps, E.sp, E.ss)
+    return Elements(index * H.pp, index * H.ps, E.sp, E.ss)
 
 
 def _array(elements: list[Any]) -> Any:

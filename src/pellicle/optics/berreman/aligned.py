@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 
 from pellicle.optics.anisotropy import Principal
-from pellicle.optics.berreman.matrices import Matrix
+from pellicle.optics.berreman.matrices import matrix
 from pellicle.optics.berreman.propagation import Fields, Propagation, elements_and_exponents, exp, full
 from pellicle.optics.characteristic import nonzero_root
 from pellicle.optics.interface import normal_square
@@ -22,12 +22,12 @@ def _numbers(medium: Any, a: Any) -> tuple[Number, Number, Number]:
     return normal_square(z, a) * ratio, normal_square(y, a), x * x
 
 
-def half_space(medium: Any, a: Any) -> Matrix:
+def half_space(medium: Any, a: Any, like: Any) -> Number:
     """Return the reflection matrix of a substrate against free space at normal incidence."""
     Q_p, Q_s, epsilon = _numbers(medium, a)
     p, s = nonzero_root(full(Q_p)), nonzero_root(full(Q_s))
     zero = 0.0 * p
-    return Matrix((p - epsilon) / (p + epsilon), zero, zero, (1 - s) / (1 + s))
+    return matrix((p - epsilon) / (p + epsilon), zero, zero, (1 - s) / (1 + s), like=like)
 
 
 def propagation(medium: Any, a: Any, k: Any) -> Propagation:

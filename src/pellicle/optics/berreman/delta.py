@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from pellicle.optics.anisotropy import Tensor
-from pellicle.optics.berreman.matrices import Matrix, inverse
+from pellicle.optics.berreman.matrices import inverse, matrix, one_minus, stacked
+from pellicle.optics.hoisting import stored
 from pellicle.optics.pair import Number
 
 
@@ -35,7 +36,7 @@ def delta(epsilon: Tensor, a: Any) -> Delta:
     )
 
 
-def half_space(matrix: Delta, total: Number, product: Number) -> Matrix:
+def half_space(of: Delta, total: Number, product: Number, like: Any) -> Number:
     """Return the reflection matrix Γ of a substrate against free space at normal incidence.
 
     **Arguments:** sum and product of the normal indices q₁ and q₂ of its two downward waves. As no more is
@@ -45,13 +46,12 @@ def half_space(matrix: Delta, total: Number, product: Number) -> Matrix:
     [S(S − 2m)A − n²] Y₁ = S (AB + m² + P − Sm, AC + mn − Sn) + n (C, D + P) for its first row, and
     S Y₂ = (C, D + P) + n Y₁. Γ = (1 − Y)(1 + Y)⁻¹ = 2 (1 + Y)⁻¹ − 1 is finite where Y is not.
     """
-    A, B, C, D, m, n = matrix
+    A, B, C, D, m, n = of
     S, P = total, product
     scale = S * (S - 2 * m) * A - n * n
     second = C, D + P
     first = S * (A * B + m * (m - S) + P) + n * second[0], S * (A * C + n * (m - S)) + n * second[1]
     below = scale * second[0] + n * first[0], scale * second[1] + n * first[1]
-    sum_inverse = inverse(Matrix(scale + first[0], first[1], below[0], scale * S + below[1]))
-    pp, ps, sp, ss = sum_inverse
-    down = 2 * scale
-    return Matrix(pp * down - 1, ps * down * S, sp * down, ss * down * S - 1)
+    one_plus_Y = matrix(scale + first[0], first[1], below[0], scale * S + below[1], like=like)
+    columns = stacked(2 * scale, 2 * scale * S, like=like)
+    return -one_minus(inverse(stored(one_plus_Y)) * columns)

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
+from pellicle.optics.berreman.matrices import stacked, unstacked
 from pellicle.optics.characteristic import (
     Characteristic,
     element_slopes,
@@ -21,7 +22,7 @@ from pellicle.optics.characteristic import (
 )
 from pellicle.optics.elementary import sincos
 from pellicle.optics.hoisting import stored
-from pellicle.optics.pair import Number, Pair, imag, is_real, real
+from pellicle.optics.pair import Number, Pair, imag, real
 
 Fields = tuple[Number, Number, Number, Number]
 """Ex, Hy, Ey and −Hx."""
@@ -48,30 +49,6 @@ def exp(z: Number) -> Number:
         return Pair(cosine, sine)
     size = jnp.exp(z.re)
     return Pair(size * cosine, size * sine)
-
-
-def stacked(*numbers: Number, like: Any = 0.0) -> Number:
-    """Return numbers along a new first axis, as a real array or a `Pair`, so that one formula serves all.
-
-    Behind that axis there are at least as many as `like` has, a pytree of arrays.
-    """
-    shape = jnp.broadcast_shapes(*(jnp.shape(x) for x in jax.tree.leaves(numbers)))
-    rank = max(map(jnp.ndim, jax.tree.leaves(like)))
-    whole = len(numbers), *[1] * (rank - len(shape)), *shape
-
-    def joined(part: Callable[[Number], Any]) -> Any:
-        return jnp.stack([jnp.broadcast_to(part(x), shape) for x in numbers]).reshape(whole)
-
-    return joined(real) if is_real(numbers) else Pair(joined(real), joined(imag))
-
-
-def unstacked(number: Number, count: int) -> list[Number]:
-    """Return the numbers along the first axis."""
-
-    def at(i: int) -> Number:
-        return jax.tree.map(lambda x: jax.lax.index_in_dim(x, i, keepdims=False), number)
-
-    return [at(i) for i in range(count)]
 
 
 def elements_and_exponents(squares: Sequence[Number], k: Any) -> Iterator[tuple[Number, Number, Number]]:

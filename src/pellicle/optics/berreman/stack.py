@@ -21,20 +21,32 @@ import jax.numpy as jnp
 from pellicle.optics.anisotropy import Medium, Tensor, Uniaxial, mixes_polarisations, tensor
 from pellicle.optics.berreman import aligned, biaxial, uniaxial
 from pellicle.optics.berreman.delta import delta, half_space
-from pellicle.optics.berreman.matrices import Matrix, inverse, one_minus, one_plus
-from pellicle.optics.berreman.propagation import Propagation, stacked, unstacked
+from pellicle.optics.berreman.matrices import (
+    Elements,
+    elements,
+    inverse,
+    matrix,
+    one_minus,
+    one_plus,
+    product,
+    stacked,
+    unstacked,
+)
+from pellicle.optics.berreman.propagation import Propagation
 from pellicle.optics.berreman.quartic import downward_pair
 from pellicle.optics.berreman.slices import sliced
 from pellicle.optics.hoisting import stored
 from pellicle.optics.interface import transverse
-from pellicle.optics.pair import conj, real, to_pair
+from pellicle.optics.pair import Number, conj, real, to_pair
 
 
 class Polarised(NamedTuple):
     """Reflection and transmission of layers that mix s and p. Rows are outgoing, columns incident."""
 
-    reflected: Matrix  # Jones matrix
-    fields: tuple[Matrix, Matrix]  # (Ex, Ey) and (Hy, −Hx) at the substrate for unit electric field incident
+    reflected: Elements  # Jones matrix
+    fields: tuple[
+        Elements, Elements
+    ]  # (Ex, Ey) and (Hy, −Hx) at the substrate for unit electric field incident
     incident: Any  # power flux of a unit electric field, n₀ cos θ
 
 
@@ -58,24 +70,28 @@ def polarised(
       amplitudes, differ by less than `slices.DIRECT`.
     """
     a, q0 = transverse(ambient, jnp.asarray(angle) * 1.0)
-    reflection = _substrate(substrate, a)
-    bottom = reflection
-    through: Matrix | None = None
+    a, q0, layers, substrate, phases = stored((a, q0, layers, substrate, phases))
+    every = q0, layers, substrate, phases
+    reflection = bottom = stored(_substrate(substrate, a, every))
+    through: Number | None = None
     for medium, k in zip(reversed(layers), reversed(phases), strict=True):
-        reflection, layer_through = _add(medium, a, k, reflection, dichroic)
-        through = layer_through if through is None else through @ layer_through
+        reflection, layer_through = stored(_add(medium, a, k, reflection, dichroic))
+        through = layer_through if through is None else product(through, layer_through)
     # p of the incident wave: Ex = p cos θ, Hy = n₀ p; of the reflected one: Ex = −r cos θ, Hy = n₀ r
     E, H = one_plus(reflection), one_minus(reflection)
     cosine = q0 / ambient
     tilt = cosine / ambient
-    into = inverse(Matrix(E.pp + tilt * H.pp, E.ps + tilt * H.ps, q0 * E.sp + H.sp, q0 * E.ss + H.ss))
-    out = Matrix(tilt * H.pp - E.pp, tilt * H.ps - E.ps, q0 * E.sp - H.sp, q0 * E.ss - H.ss)
-    into = stored(into)
-    r = stored(out @ into)
-    waves = Matrix(into.pp * (2 * cosine), into.ps * (2 * q0), into.sp * (2 * cosine), into.ss * (2 * q0))
-    waves = waves if through is None else through @ waves
-    jones = Matrix(r.pp, r.ps * ambient, r.sp * (1 / ambient), r.ss)
-    return Polarised(jones, (one_plus(bottom) @ waves, one_minus(bottom) @ waves), q0)
+
+    def rows(p: Any, s: Any) -> Any:
+        return stacked(p, s, like=every)[:, None]
+
+    into = stored(inverse(stored(rows(1.0, q0) * E + rows(tilt, 1.0) * H)))
+    r = product(rows(-1.0, q0) * E + rows(tilt, -1.0) * H, into)
+    units = matrix(1.0, ambient, 1 / ambient, 1.0, like=every)
+    waves = into * stacked(2 * cosine, 2 * q0, like=every)
+    waves = stored(waves if through is None else product(through, waves))
+    fields = product(one_plus(bottom), waves), product(one_minus(bottom), waves)
+    return Polarised(elements(stored(r * units)), (elements(fields[0]), elements(fields[1])), q0)
 
 
 def transmittances(response: Polarised) -> tuple[Any, Any]:
@@ -101,17 +117,17 @@ def _method(medium: Medium) -> Any:
     return uniaxial if isinstance(medium, Uniaxial) else biaxial if isinstance(medium, Tensor) else aligned
 
 
-def _substrate(medium: Medium, a: Any) -> Matrix:
+def _substrate(medium: Medium, a: Any, like: Any) -> Number:
     if isinstance(medium, Uniaxial):
         one, other = uniaxial.downward_roots(medium, a)
-        return half_space(delta(tensor(medium), a), one + other, one * other)
+        return half_space(delta(tensor(medium), a), one + other, one * other, like)
     if isinstance(medium, Tensor):
-        matrix = delta(medium, a)
-        return half_space(matrix, *map(to_pair, downward_pair(medium, a)))
-    return aligned.half_space(medium, a)
+        total, both = downward_pair(medium, a)
+        return half_space(delta(medium, a), to_pair(total), to_pair(both), like)
+    return aligned.half_space(medium, a, like)
 
 
-def _add(medium: Medium, a: Any, k: Any, below: Matrix, dichroic: bool) -> tuple[Matrix, Matrix]:
+def _add(medium: Medium, a: Any, k: Any, below: Number, dichroic: bool) -> tuple[Number, Number]:
     """Return the reflection matrix with a layer above, and the downward waves behind it for those before."""
     method = _method(medium)
     if not (dichroic and mixes_polarisations(medium)):
@@ -120,13 +136,9 @@ def _add(medium: Medium, a: Any, k: Any, below: Matrix, dichroic: bool) -> tuple
     return sliced(partial(method.propagation, medium, a), k, exponent, below)
 
 
-def _direct(layer: Propagation, below: Matrix) -> tuple[Matrix, Matrix]:
-    E, H = one_plus(below), one_minus(below)
-    columns = (E.pp, E.ps), (H.pp, H.ps), (E.sp, E.ss), (H.sp, H.ss)
-    fields = stored(tuple(stacked(*p_s, like=layer.growth) for p_s in columns))
-    Ex, Hy, Ey, Hx = stored(layer.apply(fields))
-    down = Matrix(*unstacked(Ex + Hy, 2), *unstacked(Ey + Hx, 2))
-    up = Matrix(*unstacked(Ex - Hy, 2), *unstacked(Ey - Hx, 2))
-    through = stored(inverse(down))
-    loss = 2 * jnp.exp(-layer.growth)
-    return stored((up @ through, Matrix(*(x * loss for x in through))))
+def _direct(layer: Propagation, below: Number) -> tuple[Number, Number]:
+    (Ex, Ey), (Hy, Hx) = unstacked(one_plus(below), 2), unstacked(one_minus(below), 2)
+    Ex, Hy, Ey, Hx = stored(layer.apply(stored((Ex, Hy, Ey, Hx))))
+    electric, magnetic = (stored(stacked(x, y)) for x, y in ((Ex, Ey), (Hy, Hx)))
+    through = stored(inverse(electric + magnetic))
+    return product(electric - magnetic, through), through * (2 * jnp.exp(-layer.growth))
