@@ -12,7 +12,7 @@ from cyclopts import Parameter
 from pellicle.cli.flags import ReadingFlags, SceneFlags
 from pellicle.cli.options import scene_from_flags
 from pellicle.cli.session import say, start
-from pellicle.errors import UsageError
+from pellicle.errors import DataError, UsageError
 
 if TYPE_CHECKING:
     from pellicle.explorer.session import Session
@@ -71,16 +71,29 @@ def explore(
 
 
 def _of_recipe(path: str) -> Session:
-    from pellicle.cli.wavelengths import measured_scene
+    """The session of a film's recipe, with the data of its first file."""
+    from pellicle.cli.colours import SPACES
+    from pellicle.cli.options import merged, read
+    from pellicle.cli.wavelengths import wavelengths
     from pellicle.explorer.session import Session
     from pellicle.recipes import read_recipe
     from pellicle.recipes.surface import SurfaceRecipe
+    from pellicle.scene.instrument import Drift
 
     recipe, title = read_recipe(path), Path(path).name
     if isinstance(recipe, SurfaceRecipe):
-        raise UsageError(f"{path}: the explorer takes the recipe of a film")
-    found, wavelength = measured_scene(recipe)
-    return Session(found, Path(path).parent, wavelength=wavelength, title=title)
+        raise UsageError(f"{path}: the explorer shows films, and this recipe describes a surface")
+    own = recipe.each[0] if recipe.each else recipe
+    scene, data = own.scene(), own.tables.data
+    spectra = []
+    if recipe.files and data.signal not in SPACES:
+        try:
+            free_scale = isinstance(scene.instrument.scale, Drift)
+            spectra = read(recipe.files[0], merged(ReadingFlags(), own), free_scale=free_scale)
+        except DataError as error:
+            say(f"{error} (the explorer starts without data)")
+    given = None if data.wavelengths is None else wavelengths(own, scene)
+    return Session(scene, Path(path).parent, wavelength=given, title=title, spectra=spectra)
 
 
 def _of_flags(flags: SceneFlags, reading: ReadingFlags) -> Session:

@@ -51,12 +51,16 @@ class FilmView:
         self.by_name = {control.name: control for control in self.controls}
         if wavelength is None:
             wavelength = scene.light.wavelength
+        if wavelength is not None and np.size(wavelength) < 2:
+            raise UsageError(
+                "the explorer draws signals against the wavelength: give two or more wavelengths"
+            )
         if wavelength is None:
             wavelength = default_wavelengths(scene)
             if len(wavelength) > 1:
                 wavelength = np.arange(wavelength[0], wavelength[-1] + 0.5)
         self.wavelength = np.asarray(wavelength, float)
-        if self.wavelength.ndim != 1 or len(self.wavelength) < 2:
+        if len(self.wavelength) < 2:
             raise DataError(
                 f"the materials share no wavelengths in {VISIBLE[0]:g} to {VISIBLE[1]:g} nm:"
                 " give [data] wavelengths = { start, stop, step }"
@@ -120,6 +124,10 @@ class FilmView:
         angle = own.angle if not angles or start in angles else angles[0]
         polarised = data.polarisation if data.polarisation != "unpolarised" else own.polarisation
         nm = np.unique(data.wavelength)
+        if len(nm) < 2:
+            raise UsageError(
+                f"{data.path}: the explorer draws signals against the wavelength, and here it is one"
+            )
         if not _FEWEST <= len(nm) <= _MOST:
             nm = np.linspace(nm[0], nm[-1], _POINTS)
         light = Light(own.wavelength, angle, data.signal, polarised)

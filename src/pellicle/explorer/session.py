@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import time
 from base64 import b64encode
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from logging import getLogger
 from math import isfinite
@@ -40,8 +42,8 @@ class Session:
     """A scene whose numbers a page moves: one `answer` for each request.
 
     **Arguments:** `scene`; `folder`, in which data files may be read (None: none); `wavelength` in nm,
-    (wavelengths,), by default those of the scene's light or the visible ones; `title` of the page; `files`,
-    names of data in the folder, of which the first is read.
+    (wavelengths,), by default those of the scene's light or the visible ones; `title` of the page; `spectra`,
+    the data to begin with.
 
     **Raises:** UsageError for a light of several angles, DataError where materials share no wavelengths.
     """
@@ -53,12 +55,15 @@ class Session:
         *,
         wavelength: Any = None,
         title: str = "",
-        files: Sequence[str] = (),
+        spectra: Sequence[Spectrum] = (),
     ) -> None:
         self.title, self.folder = title, None if folder is None else Path(folder).resolve()
-        self.files = list(files)
-        self.view = FilmView(scene, wavelength)
-        self.spectra: list[Spectrum] = []
+        if wavelength is None and spectra:
+            wavelength = np.unique(spectra[0].wavelength)
+        view = FilmView(scene, wavelength)
+        self.view = (view.measured(spectra) if spectra else None) or view
+        here = self.folder or Path.cwd()
+        self.spectra = [replace(each, path=os.path.relpath(each.path, here)) for each in spectra]
         self._ahead = False  # whether programs are compiled before a view needs them
         self._compiler, self._fit_run = Compiler(), FitRun()
         self._requests: dict[str, Callable[[Mapping[str, Any]], dict[str, Any]]] = {
@@ -86,7 +91,7 @@ class Session:
             return {"error": f"{request} failed: {type(error).__name__}: {error}", **_serial(body)}
 
     def _scene(self, body: Mapping[str, Any]) -> dict[str, Any]:
-        about = {"title": self.title, "kind": "spectrum", "limit": LARGEST_FILE, "files": self.files}
+        about = {"title": self.title, "kind": "spectrum", "limit": LARGEST_FILE}
         data = {"data": self._data_shown()} if self.spectra else {}
         return {**about, **self.view.describe(), **data}
 

@@ -1,0 +1,103 @@
+"""`pellicle explore`: what it serves, and what it refuses before it does."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pellicle.cli import main
+
+ROOT = Path(__file__).parents[2]
+RECIPE = """
+[data]
+files = ["film.csv"]
+signal = "T"
+range = [450, 700]
+
+[scene]
+substrate = "BK7"
+
+[[scene.layer]]
+material = "SiO2"
+thickness = { lower = 10, upper = 3000, value = 500 }
+"""
+
+
+@pytest.fixture
+def explore(monkeypatch):
+    """Run the command up to its server; returns the exit code and the session that would be served."""
+
+    def run(*words):
+        served = []
+        ended = type("Ended", (Exception,), {})
+
+        def serve(session, port, ready):
+            served.append((session, port))
+            raise ended
+
+        monkeypatch.setattr("pellicle.explorer.server.serve", serve)
+        monkeypatch.setattr(sys, "argv", ["pellicle", "explore", *words])
+        try:
+            return main(), served
+        except ended:
+            return 0, served
+
+    return run
+
+
+def values(session):
+    return {each["name"]: each["value"] for each in session.answer("scene", {})["controls"]}
+
+
+def test_without_a_recipe_it_shows_oxide_on_silicon(explore, capsys):
+    code, [(session, port)] = explore("--port", "8123", "--no-browser")
+    assert (code, port, session.title) == (0, 8123, "SiO2 on Si")
+    assert values(session)["thickness"] == 500.0
+    assert "0 to 1000 nm" in capsys.readouterr().err
+
+
+def test_flags_describe_another_film(explore):
+    words = "--layer 1.7 --substrate BK7 --back air --signal T --thickness 100:300 --angle 30"
+    _, [(session, _)] = explore(*words.split())
+    about = session.answer("scene", {})
+    assert about["signals"] == ["T"]
+    assert {"thickness": 200.0, "n": 1.7, "angle": 30.0}.items() <= values(session).items()
+
+
+def test_a_recipe_comes_with_its_data(explore, tmp_path):
+    (tmp_path / "film.toml").write_text(RECIPE)
+    rows = [f"{nm:g},0.9" for nm in np.arange(400, 801, 2)]
+    (tmp_path / "film.csv").write_text("\n".join(["wavelength_nm,T", *rows]))
+    _, [(session, _)] = explore(str(tmp_path / "film.toml"))
+    about = session.answer("scene", {})
+    assert (about["title"], about["signals"], about["data"]["name"]) == ("film.toml", ["T"], "film.csv")
+    [curve] = about["data"]["curves"]
+    assert (curve["x"][0], curve["x"][-1]) == (450.0, 700.0)  # the range of the recipe
+    assert 'files = ["film.csv"]' in session.answer("recipe", {})["toml"]
+
+
+def test_missing_data_are_no_obstacle(explore, tmp_path, capsys):
+    (tmp_path / "film.toml").write_text(RECIPE)
+    code, [(session, _)] = explore(str(tmp_path / "film.toml"))
+    assert code == 0
+    assert "data" not in session.answer("scene", {})
+    assert "film.csv" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (["none.toml"], 3, "none.toml"),
+        ([str(ROOT / "docs/surfaces/oil_film.toml")], 2, "describes a surface"),
+        (["film.toml", "--layer", "SiO2"], 2, "exclude each other"),
+        (["--layer", "Si02"], 2, "Si02"),
+        (["--layer", "Si/Chandler-Horowitz"], 3, "share no wavelengths"),
+    ],
+)
+def test_refusals(explore, words, code, said, capsys):
+    found, served = explore(*words)
+    assert (found, served) == (code, [])
+    error = capsys.readouterr().err
+    assert said in error
+    assert "Traceback" not in error
