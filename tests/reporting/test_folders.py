@@ -17,7 +17,7 @@ from pellicle.effects.plan import Plan, Row
 from pellicle.errors import UsageError
 from pellicle.fitting.result import Curve, Estimate, Fit, Part, Profile, Rival, Status
 from pellicle.materials import material
-from pellicle.reporting.csv_tables import fit_csv, nk_csv
+from pellicle.reporting.csv_tables import fit_csv, nk_csvs
 from pellicle.reporting.folders import folder_per_file, write_fit, write_summary
 from pellicle.reporting.json_record import failure, one_line, to_json
 
@@ -213,7 +213,7 @@ def test_uncalibrated_data_at_angles_are_read_again_as_such(fit, with_part, tmp_
 
 def test_nk_csv_is_a_material(fit, tmp_path):
     path = tmp_path / "nk.csv"
-    path.write_text(nk_csv(fit), encoding="utf-8")
+    path.write_text(nk_csvs(fit)["nk.csv"], encoding="utf-8")
     frame = pd.read_csv(path, comment="#")
     assert list(frame) == ["wavelength_nm", "n", "k", "n_stderr", "k_stderr"]
     assert frame["k_stderr"].isna().sum() == 20  # infinite below 600 nm
@@ -223,9 +223,9 @@ def test_nk_csv_is_a_material(fit, tmp_path):
 
 def test_nk_csv_of_several_angles_holds_each_wavelength_once(fit, with_part, tmp_path):
     path = tmp_path / "nk.csv"
-    twice = {name: np.repeat(getattr(fit.curve, name), 2) for name in vars(fit.curve)}
-    path.write_text(nk_csv(with_part(fit, curve=Curve(**twice))), encoding="utf-8")
-    assert path.read_text() == nk_csv(fit)
+    twice = {name: np.repeat(getattr(fit.curve, name), 2) for name in vars(fit.curve) if name != "principal"}
+    path.write_text(nk_csvs(with_part(fit, curve=Curve(**twice)))["nk.csv"], encoding="utf-8")
+    assert path.read_text() == nk_csvs(fit)["nk.csv"]
     material(str(path))
 
 
@@ -233,7 +233,7 @@ def test_nk_csv_of_several_angles_holds_each_wavelength_once(fit, with_part, tmp
 def test_nk_csv_is_a_material_whatever_errors_are_infinite(fit, with_part, tmp_path, everywhere):
     path = tmp_path / "nk.csv"
     unseen = replace(fit.curve, **{name: np.full(41, np.inf) for name in everywhere})
-    path.write_text(nk_csv(with_part(fit, curve=unseen)), encoding="utf-8")
+    path.write_text(nk_csvs(with_part(fit, curve=unseen))["nk.csv"], encoding="utf-8")
     index = np.asarray(material(str(path))(fit.curve.wavelength))
     np.testing.assert_allclose(index, fit.curve.n + 1j * fit.curve.k, rtol=1e-9)
 
@@ -328,8 +328,8 @@ def test_tables_of_a_joint_fit(joint, fit, tmp_path):
     }
     np.testing.assert_allclose(frame["data"][:41], fit.curve.data, rtol=1e-9)
     assert set(frame["residual"][frame["signal"] == "delta"]) == {-2.0}
-    without = [line for line in nk_csv(joint).splitlines() if not line.startswith("#")]
-    assert without == [line for line in nk_csv(fit).splitlines() if not line.startswith("#")]
+    without = [line for line in nk_csvs(joint)["nk.csv"].splitlines() if not line.startswith("#")]
+    assert without == [line for line in nk_csvs(fit)["nk.csv"].splitlines() if not line.startswith("#")]
 
 
 def test_a_joint_fit_that_failed_lists_its_files():

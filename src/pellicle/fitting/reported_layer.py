@@ -22,24 +22,30 @@ def reported_layer(scene: Scene) -> int | None:
     return next(iter([*free, *(i for i, _ in known)]), None)
 
 
+def reported_medium(scene: Scene, numbers: Scene | None = None) -> Any:
+    """Medium of the reported layer of a scene; of the same scene in `numbers` if given."""
+    shown, own = reported_layer(scene), scene if numbers is None else numbers
+    layer: Any = own.substrate if shown is None else own.layers[shown]
+    return layer.material
+
+
 class Linearised(NamedTuple):
     """A simulated signal and the n and k of the reported layer, with their derivatives."""
 
     signal: Any  # as the form simulates it
-    layer: Any  # n and k, (2, wavelengths)
+    layer: Any  # n and k, (2, wavelengths); of a birefringent one n and k of each principal medium in turn
     slope: Any  # ∂ signal / ∂ parameter in its own unit, (..., parameters)
-    layer_slope: Any  # (2, wavelengths, parameters)
+    layer_slope: Any  # (2 or more, wavelengths, parameters)
 
 
 def linearised(form: Any, scene: Scene, data: Any, values: Any) -> Linearised:
     """The signal that a form simulates of a scene, and the layer, around `values` (parameters,); traced."""
-    shown = reported_layer(scene)
 
     def both(values):
         numbers = insert(scene, list(values))
-        medium: Any = numbers.substrate if shown is None else numbers.layers[shown]
-        index = principal_media(medium.material)[0](numbers.light.wavelength)
-        return form.simulate(numbers, data), stack_rows([index.real, index.imag])
+        media = principal_media(reported_medium(scene, numbers))
+        indices = [medium(numbers.light.wavelength) for medium in media]
+        return form.simulate(numbers, data), stack_rows([x for n in indices for x in (n.real, n.imag)])
 
     found, push = jax.linearize(both, values)
     return Linearised(*found, *jax.vmap(push, out_axes=-1)(jnp.eye(len(values))))

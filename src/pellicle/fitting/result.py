@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
 
@@ -21,6 +22,8 @@ LEVEL = 0.95
 """Level of confidence of expanded uncertainties."""
 _NORMAL = 1.959964
 """Quantile of the normal distribution at that level."""
+BIREFRINGENCE = "birefringence"
+"""Name of the extraordinary index less the ordinary one among the principal indices."""
 _FITTED = {
     Spectrum: "a spectrum was fitted",
     Colours: "colours were fitted",
@@ -119,11 +122,30 @@ class SystematicEffect:
 
 
 @dataclass(frozen=True)
+class Index:
+    """A layer's n and k with standard errors at each wavelength (nm), rising."""
+
+    wavelength: np.ndarray
+    n: np.ndarray
+    k: np.ndarray
+    n_stderr: np.ndarray
+    k_stderr: np.ndarray
+
+
+def _at_each_wavelength(curves: Sequence[Index | Curve | ColourCurve]) -> Index:
+    """n and k of several curves at every wavelength of any of them, each once."""
+    columns = {f.name: np.concatenate([getattr(c, f.name) for c in curves]) for f in fields(Index)}
+    _, first = np.unique(columns["wavelength"], return_index=True)
+    return Index(**{name: column[first] for name, column in columns.items()})
+
+
+@dataclass(frozen=True)
 class Curve:
     """Data and model at each wavelength (nm), and the layer's index with standard errors.
 
     For ellipsometry `data`, `model` and `sigma` are Ψ, and `delta_data` and `delta_model` Δ, in degrees;
     `depolarisation_data` and `depolarisation_model` are fractions, None where it was not measured.
+    Of a birefringent layer `n` and `k` are the ordinary ones, and `principal` has each index by its name.
     """
 
     wavelength: np.ndarray
@@ -138,6 +160,7 @@ class Curve:
     delta_model: np.ndarray | None = None
     depolarisation_data: np.ndarray | None = None
     depolarisation_model: np.ndarray | None = None
+    principal: Mapping[str, Index] | None = None
 
     @property
     def residual(self) -> np.ndarray:
@@ -182,6 +205,7 @@ class ColourCurve:
     k: np.ndarray
     n_stderr: np.ndarray
     k_stderr: np.ndarray
+    principal: Mapping[str, Index] | None = None
 
     @property
     def residual(self) -> np.ndarray:
@@ -202,17 +226,6 @@ class Rival:
     probability: float | None = None
     stderr: dict[str, float] | None = None
     curves: tuple[Curve | ColourCurve | BrdfCurve, ...] = field(default=(), compare=False, repr=False)
-
-
-@dataclass(frozen=True)
-class Index:
-    """The layer's n and k with standard errors at each wavelength (nm), rising."""
-
-    wavelength: np.ndarray
-    n: np.ndarray
-    k: np.ndarray
-    n_stderr: np.ndarray
-    k_stderr: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -381,12 +394,23 @@ class Fit(PlotMixin):
     @property
     def index(self) -> Index:
         """The layer's n and k at every wavelength of any spectrum or sensor, each once."""
+        return _at_each_wavelength(self._film_curves)
+
+    @property
+    def principal_indices(self) -> dict[str, Index]:
+        """Each index of a birefringent layer by its name ("ordinary", "extraordinary", or "x", "y", "z"), and
+        "birefringence", their difference, of a uniaxial one; empty for an isotropic layer."""
+        curves = self._film_curves
+        each = [curve.principal or {} for curve in curves]
+        names = [name for name in each[0] if all(name in own for own in each)]
+        return {name: _at_each_wavelength([own[name] for own in each]) for name in names}
+
+    @property
+    def _film_curves(self) -> list[Curve | ColourCurve]:
         curves = [part.curve for part in self.parts if not isinstance(part.curve, BrdfCurve)]
         if not curves:
             raise TypeError("BRDF samples were fitted: the index is among the parameters")
-        columns = {f.name: np.concatenate([getattr(c, f.name) for c in curves]) for f in fields(Index)}
-        _, first = np.unique(columns["wavelength"], return_index=True)
-        return Index(**{name: column[first] for name, column in columns.items()})
+        return curves
 
     @property
     def _only(self) -> Part:

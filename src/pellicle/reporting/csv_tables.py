@@ -51,14 +51,26 @@ def fit_csv(fit: Fit) -> str:
     return _csv(about, fit, list(columns), zip(*columns.values(), strict=True))
 
 
-def nk_csv(fit: Fit) -> str:
-    """Format n and k of the layer with their standard errors, each wavelength once.
+def nk_csvs(fit: Fit) -> dict[str, str]:
+    """Format n and k of the layer with their standard errors, each wavelength once, by the name of the file.
 
-    pellicle reads the table as a material. Infinite errors are empty cells.
+    pellicle reads the tables as materials. Infinite errors are empty cells. A birefringent layer has a table
+    for each principal index; the one of the extraordinary index also contains the birefringence.
     """
-    columns = {("wavelength_nm" if name == "wavelength" else name): c for name, c in vars(fit.index).items()}
-    about = ["n and k of the fitted layer, a material that pellicle takes by its path"]
-    return _csv(about, fit, list(columns), zip(*columns.values(), strict=True))
+    from pellicle.fitting.result import BIREFRINGENCE  # imports JAX
+
+    principal = dict(fit.principal_indices)
+    difference = principal.pop(BIREFRINGENCE, None)
+    found = {}
+    for name, index in (principal or {"": fit.index}).items():
+        columns = {("wavelength_nm" if key == "wavelength" else key): x for key, x in vars(index).items()}
+        if difference is not None and name == "extraordinary":
+            columns |= {BIREFRINGENCE: difference.n, f"{BIREFRINGENCE}_stderr": difference.n_stderr}
+        which = f" ({name})" if name else ""
+        about = [f"n and k of the fitted layer{which}, a material that pellicle takes by its path"]
+        table = _csv(about, fit, list(columns), zip(*columns.values(), strict=True))
+        found[f"nk_{name}.csv" if name else "nk.csv"] = table
+    return found
 
 
 def profile_csv(fit: Fit, profiles: Sequence[FittedProfile]) -> str:

@@ -3,17 +3,28 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from pellicle.fitting.depth_profiles import FittedProfile, fitted_profiles
-from pellicle.fitting.result import BrdfCurve, ColourCurve, Curve, Index
+from pellicle.fitting.result import BIREFRINGENCE, BrdfCurve, ColourCurve, Curve, Index
 from pellicle.fitting.status import RIVAL
 from pellicle.reporting import brdf_figure, fitted_colours, mueller_figure, psi_delta
-from pellicle.reporting.drawing import ABOVE, BLACK, BLUE, FITTED, GAP, GREY, ORANGE, marker_size, new_figure
+from pellicle.reporting.drawing import (
+    ABOVE,
+    BLACK,
+    BLUE,
+    FITTED,
+    GAP,
+    GREEN,
+    GREY,
+    ORANGE,
+    marker_size,
+    new_figure,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -255,7 +266,8 @@ def _scale(axes: Axes, misfit: np.ndarray, minima: list[tuple[float, float]]) ->
 def index_is_free(fit: Fit) -> bool:
     """True where n or k was fitted and is worth a curve against wavelength."""
     several = fit.index.wavelength.size > 1 or not all(_ellipsometric(part) for part in fit.parts)
-    return several and bool(np.any(fit.index.n_stderr > 0) or np.any(fit.index.k_stderr > 0))
+    curves = [fit.index, *fit.principal_indices.values()]
+    return several and any(bool(np.any(c.n_stderr > 0) or np.any(c.k_stderr > 0)) for c in curves)
 
 
 def _ellipsometric(part: Part) -> bool:
@@ -263,8 +275,30 @@ def _ellipsometric(part: Part) -> bool:
 
 
 def _index(axes: Axes, fit: Fit) -> None:
-    _n_and_k(axes, fit.index.wavelength, fit.index)
+    principal = {name: x for name, x in fit.principal_indices.items() if name != BIREFRINGENCE}
+    if principal:
+        _principal(axes, principal)
+    else:
+        _n_and_k(axes, fit.index.wavelength, fit.index)
     axes.set(xlabel="wavelength (nm)")
+
+
+def _principal(axes: Axes, indices: Mapping[str, Index]) -> None:
+    """n of each principal index on the left axis, k on the right one in the same colours, if any absorbs."""
+    absorbing = any(np.any(index.k) or np.any(index.k_stderr > 0) for index in indices.values())
+    beside = axes.twinx() if absorbing else None
+    for color, (name, index) in zip((BLUE, GREEN, BLACK), indices.items(), strict=False):
+        _band(axes, index.wavelength, index.n, index.n_stderr, color, "-", name)
+        if beside is not None:
+            _band(beside, index.wavelength, index.k, index.k_stderr, color, "--")
+    axes.margins(x=0.01)
+    axes.set_ylabel("n")
+    axes.legend(**{**ABOVE, "ncols": 3}, fontsize="x-small")
+    if beside is not None:
+        beside.margins(x=0.01)
+        beside.set_ylabel("k (dashed)")
+        _stretch(axes, below=1.0)
+        _stretch(beside, above=1.0)
 
 
 def _against_depth(axes: Axes, profile: FittedProfile) -> None:
@@ -293,9 +327,17 @@ def _stretch(axes: Axes, below: float = 0.0, above: float = 0.0) -> None:
     axes.set_ylim(low - below * (high - low), high + above * (high - low))
 
 
-def _band(axes: Axes, nm: np.ndarray, value: np.ndarray, stderr: np.ndarray, color: str, style: str) -> None:
+def _band(
+    axes: Axes,
+    nm: np.ndarray,
+    value: np.ndarray,
+    stderr: np.ndarray,
+    color: str,
+    style: str,
+    label: str = "_",
+) -> None:
     """Draw a line and the band of ± its standard error, where that is finite."""
     order = np.argsort(nm, kind="stable")
     nm, value, stderr = nm[order], value[order], stderr[order]
     axes.fill_between(nm, value - stderr, value + stderr, color=color, alpha=0.25, lw=0)
-    axes.plot(nm, value, color=color, linestyle=style, linewidth=1.2)
+    axes.plot(nm, value, color=color, linestyle=style, linewidth=1.2, label=label)

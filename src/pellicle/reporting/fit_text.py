@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pellicle.fitting.lack_of_fit import lack_of_fit
-from pellicle.fitting.result import BrdfCurve, ColourCurve, Curve, Status
+from pellicle.fitting.result import BIREFRINGENCE, BrdfCurve, ColourCurve, Curve, Status
 from pellicle.fitting.status import RIVAL
 from pellicle.reporting import budget_text, fitted_colours, parameter_text
 from pellicle.reporting.parameter_text import LEAST_CORRELATION
@@ -52,6 +52,7 @@ def report(fit: Fit, posterior: Posterior | None = None) -> str:
         ("With and without a layer", facts(layer_test_rows(fit))),
         ("Fit statistics", facts(statistic_rows(fit))),
         ("Parameters", parameter_text.parameters(fit)),
+        ("Birefringence: extraordinary less ordinary index", facts(_birefringence(fit))),
         ("Uncertainty budget", budget_text.budget(fit)),
         (f"Correlations above {LEAST_CORRELATION:g}", parameter_text.correlations(fit)),
         (
@@ -67,6 +68,17 @@ def report(fit: Fit, posterior: Posterior | None = None) -> str:
     from pellicle.reporting.posterior import posterior_report
 
     return text + posterior_report(posterior)
+
+
+def _birefringence(fit: Fit) -> list[tuple[str, str]]:
+    """Rows of the birefringence at both ends and in the middle of the spectrum, where it was fitted."""
+    found = None if fit.layer_test else fit.principal_indices.get(BIREFRINGENCE)
+    if found is None or not np.any(found.n_stderr > 0):
+        return []
+    if np.ptp(found.n) < 1e-9:
+        return [("all wavelengths", f"{found.n[0]:.5f} ± {found.n_stderr[0]:.2g}")]
+    some = np.unique([0, found.wavelength.size // 2, found.wavelength.size - 1])
+    return [(f"{found.wavelength[i]:g} nm", f"{found.n[i]:.5f} ± {found.n_stderr[i]:.2g}") for i in some]
 
 
 def _verdict(fit: Fit) -> list[str]:

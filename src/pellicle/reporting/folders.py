@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pellicle.files import MARKER, new_folder, write_text
-from pellicle.reporting.csv_tables import fit_csv, nk_csv, profile_csv
+from pellicle.reporting.csv_tables import fit_csv, nk_csvs, profile_csv
 from pellicle.reporting.json_record import indented, to_json, versions
 from pellicle.reporting.repeats import FILES as REPEATS
 
@@ -41,7 +41,8 @@ def write_fit(
 ) -> Path:
     """Write a fit, and its posterior if there is one, into a folder.
 
-    A fit has result.json, report.txt, report.html, fit.csv, figure.png and, of films, nk.csv; a posterior
+    A fit has result.json, report.txt, report.html, fit.csv, figure.png and, of films, nk.csv, or one for each
+    principal index of a birefringent layer; a posterior
     adds posterior.nc, corner.png and predictive.png. Each file appears complete or not at all; files of an
     earlier result are replaced. A `fingerprint` of what was fitted is added to result.json when all files are
     written. `described` is what the scene was built from, a recipe or flags.
@@ -65,7 +66,8 @@ def write_fit(
     write_text(target / REPORT, report(fit, posterior), overwrite=True)
     write_text(target / "fit.csv", fit_csv(fit), overwrite=True)
     if fit.layer_test is None:
-        write_text(target / "nk.csv", nk_csv(fit), overwrite=True)
+        for name, table in nk_csvs(fit).items():
+            write_text(target / name, table, overwrite=True)
     from pellicle.fitting.depth_profiles import fitted_profiles  # imports JAX
 
     if profiles := fitted_profiles(fit):

@@ -10,7 +10,7 @@ from pellicle.data.colours import Colours
 from pellicle.fitting.colours.view import ColoursView, Local
 from pellicle.fitting.result import ColourCurve, Part
 from pellicle.fitting.reweighting import ViewFit
-from pellicle.fitting.spectra.layer_errors import layer_errors
+from pellicle.fitting.spectra.layer_errors import layer_errors, principal_indices
 
 
 def colours_part(colours: Colours, view: ColoursView, fit: ViewFit, covariance: np.ndarray) -> Part:
@@ -31,7 +31,7 @@ def colour_curve(colours: Colours, view: ColoursView, at: Local, covariance: np.
     """Data and model in the space of the data, and the layer's index at the wavelengths of the sensor."""
     bands = slice(len(colours.sensor[0]))
     n_stderr, k_stderr = layer_errors(at, covariance, bands.stop)
-    n, k = np.asarray(at.layer)[:, bands]
+    n, k = np.asarray(at.layer)[:2, bands]
     return ColourCurve(
         data=colours.values,
         sigma=colours.noise,
@@ -42,6 +42,7 @@ def colour_curve(colours: Colours, view: ColoursView, at: Local, covariance: np.
         k=k,
         n_stderr=n_stderr,
         k_stderr=k_stderr,
+        principal=principal_indices(view.scene, at, covariance, colours.sensor[0]),
     )
 
 

@@ -20,7 +20,7 @@ from pellicle.fitting.misfit import Accuracy, misfit
 from pellicle.fitting.result import ColourCurve, Curve, Part, Rival
 from pellicle.fitting.reweighting import RankedMinima, ViewFit
 from pellicle.fitting.spectra import fringes
-from pellicle.fitting.spectra.layer_errors import layer_errors
+from pellicle.fitting.spectra.layer_errors import layer_errors, principal_indices
 from pellicle.fitting.spectra.view import Local, SpectrumView
 
 LARGEST_POWER, LARGEST_ANGLES = 0.02, 0.02
@@ -116,7 +116,8 @@ def _curve(spectrum: Spectrum, view: SpectrumView, at: Local, covariance: np.nda
     """Data, model and the layer's index with errors, at the real points."""
     rows = view.rows
     n_stderr, k_stderr = layer_errors(at, covariance, rows)
-    n, k = np.asarray(at.layer)[:, :rows]
+    n, k = np.asarray(at.layer)[:2, :rows]
+    wavelength = np.asarray(view.scene.light.wavelength)[:rows]
     data, model = view.in_columns(view.data.values), view.in_columns(at.model)
     weight = np.asarray(view.data.weight)[: view.points].reshape(rows, view.channels)
     sigma, angles = 1 / (weight if view.elements else weight[:, 0]), {}
@@ -131,7 +132,7 @@ def _curve(spectrum: Spectrum, view: SpectrumView, at: Local, covariance: np.nda
         sigma = np.rad2deg(sigma) / 2
         angles |= {"delta_data": delta_data, "delta_model": delta_model}
     return Curve(
-        wavelength=np.asarray(view.scene.light.wavelength)[:rows],
+        wavelength=wavelength,
         data=data if view.elements else np.ravel(data),
         sigma=sigma,
         model=model if view.elements else np.ravel(model),
@@ -139,5 +140,6 @@ def _curve(spectrum: Spectrum, view: SpectrumView, at: Local, covariance: np.nda
         k=k,
         n_stderr=n_stderr,
         k_stderr=k_stderr,
+        principal=principal_indices(view.scene, at, covariance, wavelength),
         **angles,
     )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pellicle.fitting.result import BrdfCurve, ColourCurve, Curve
+from pellicle.fitting.result import BIREFRINGENCE, BrdfCurve, ColourCurve, Curve
 from pellicle.fitting.status import RIVAL
 from pellicle.reporting import brdf_figure, fit_figure, fitted_colours, mueller_figure, psi_delta
 from pellicle.reporting.page.figure import (
@@ -356,28 +356,46 @@ def of_index(fit: Fit) -> dict[str, Any] | None:
     if fit.layer_test is not None or not fit_figure.index_is_free(fit):
         return None
     curve = fit.index
-    panels = _index_panels(curve, errors=True)
+    panels = _fit_panels(fit, errors=True)
     size = len(curve.wavelength)
     rivals = []
     for rival in fit.rivals:
         own = replace(
             fit, parts=tuple(replace(p, curve=c) for p, c in zip(fit.parts, rival.curves, strict=False))
         )
-        panel = _index_panels(own.index, errors=False)[: len(panels)] if rival.curves else []
+        panel = _fit_panels(own, errors=False)[: len(panels)] if rival.curves else []
         rivals.append((f"rival: {escape(label(rival, fit))}", panel))
     columns = [Column("wavelength (nm)", curve.wavelength)]
-    for name in ("n", "k"):
-        columns += [
-            Column(name, getattr(curve, name)),
-            Column(f"error of {name}", getattr(curve, f"{name}_stderr")),
-        ]
+    for which, index in (fit.principal_indices or {"": curve}).items():
+        for name in ("n", "k"):
+            title = f"{which} {name}".strip()
+            columns += [
+                Column(title, getattr(index, name)),
+                Column(f"error of {title}", getattr(index, f"{name}_stderr")),
+            ]
     caption = f"n and k of the layer at {size} wavelengths, with bands of ± one standard error."
     return figure("index", caption, "wavelength (nm)", panels, columns, rivals)
 
 
-def _index_panels(curve: Any, errors: bool) -> list[Panel]:
+def _fit_panels(fit: Fit, errors: bool) -> list[Panel]:
+    """Panels of n and k; of a birefringent layer those of each principal index and the birefringence."""
+    if not fit.principal_indices:
+        return _index_panels(fit.index, errors)
+    absorbs = any(_absorbs(index) for index in fit.principal_indices.values())
+    return [
+        panel._replace(label=f"{panel.label}, {name}")
+        for name, index in fit.principal_indices.items()
+        for panel in _index_panels(index, errors, absorbs and name != BIREFRINGENCE)
+    ]
+
+
+def _absorbs(index: Any) -> bool:
+    return bool(np.any(index.k) or np.any(index.k_stderr > 0))
+
+
+def _index_panels(curve: Any, errors: bool, absorbs: bool | None = None) -> list[Panel]:
     panels, nm = [], curve.wavelength
-    absorbs = bool(np.any(curve.k) or np.any(curve.k_stderr > 0))
+    absorbs = _absorbs(curve) if absorbs is None else absorbs
     for name, height in (("n", 180), ("k", 180))[: 1 + absorbs]:
         value, stderr = getattr(curve, name), getattr(curve, f"{name}_stderr")
         bands = []
