@@ -12,6 +12,7 @@ import pellicle as pl
 from pellicle.dispersion import Cauchy, Constant, Shifted
 from pellicle.effects.averaging import MOST_ORDERS, ORDERS_ERROR
 from pellicle.effects.film import EFFECTS
+from pellicle.effects.gradient import gradient, signals
 from pellicle.scene.free import free_leaves, insert
 from pellicle.simulation.film import build
 
@@ -47,6 +48,7 @@ TABLE = [
     ),
     ("gradient", False, "no layer is graded", scene()),
     ("gradient", True, "slices of sixth order", scene(GRADED)),
+    ("gradient", True, "Re ε passes 0", scene(pl.Graded(1.46, 0.5 + 3j, mix="linear"), angle=60.0)),
     ("stack", True, "a graded layer", scene(GRADED)),
     ("orders", False, "averaged over nodes instead", scene(GRADED, instrument=BANDWIDTH)),
     ("tunnelling", True, "in the layer is possible", scene(GRADED, ambient=1.52, angle=75.0)),
@@ -259,3 +261,16 @@ def test_stronger_reflections_need_more_orders():
     counts.append(pl.plan(ORDERS["absorbing on metal"]).row("orders").count)
     assert counts == sorted(counts)
     assert counts[0] < 5 < counts[-1] <= MOST_ORDERS
+
+
+@pytest.mark.parametrize(("metal", "angle"), [(0.9 + 3.2j, 45.0), (2.2, 70.0)])
+def test_the_stated_error_of_slices_is_kept_between_the_bounds(metal, angle):
+    """Against four times as many slices at new points; `benchmarks/slices.py` does this for 1000 scenes."""
+    profile = pl.profile.Exponential(pl.Free(0.1, 0.4), pl.Free(0.3, 0.9), 0.1)
+    layer = pl.Layer(pl.Graded(1.5, metal, profile, mix="linear"), pl.Free(200.0, 500.0))
+    graded, rng = scene(layer, 2.0, angle=angle), np.random.default_rng(2)
+    row, bounds = gradient(graded), [(leaf.lower, leaf.upper) for _, leaf in free_leaves(graded)]
+    for _ in range(10):
+        numbers = insert(graded, [rng.uniform(*each) for each in bounds])
+        apart = np.abs(signals(numbers, row.count) - signals(numbers, 4 * row.count))
+        assert np.max(apart) < row.error_bound
