@@ -44,7 +44,7 @@ def propagation(medium: Tensor, a: Any, k: Any, direction: Any = 1.0) -> Propaga
     index = jnp.sqrt(jnp.maximum(jnp.max(size, axis=(0, 1)), 1.0))
     sides = (1.0, index, 1.0, index)
     balance = jnp.stack([jnp.stack([sides[j] / sides[i] + 0 * index for j in range(4)]) for i in range(4)])
-    identity = jnp.eye(4).reshape(4, 4, *[1] * index.ndim)
+    identity = jnp.eye(4, dtype=index.dtype).reshape(4, 4, *[1] * index.ndim)
     growth = jax.lax.stop_gradient(extinction * k) + 0 * index
     exponent = -1j * k * matrix * balance - growth * identity
     norm = jnp.max(jnp.sum(jnp.abs(jax.lax.stop_gradient(exponent)), axis=1), axis=0)
