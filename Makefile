@@ -82,10 +82,11 @@ PYTHONS ?= python3.11 python3.12 python3.13
 dist-check: $(VENV)/.dev
 	$(BIN)/python scripts/check_distribution.py $(PYTHONS)
 
-# pages of reports in a headless Chromium, which must be installed; half a minute
+# pages of reports and the explorer in a headless Chromium, which must be installed; two minutes
 browser-tests: $(VENV)/.dev
-	$(BIN)/python -m pip install --quiet --no-compile --editable ".[browser]"
-	$(BIN)/python -m pytest -ra tests/reporting/test_page_in_browser.py
+	$(BIN)/python -m pip install --quiet --no-compile --editable ".[browser,explore]"
+	$(BIN)/python -m pytest -ra tests/reporting/test_page_in_browser.py tests/explorer/test_in_browser.py \
+	  tests/explorer/test_widget.py
 
 slow: $(VENV)/.dev
 	$(BIN)/python -m pytest -m slow

@@ -1,6 +1,7 @@
 // Elements of HTML, and sliders with their numbers.
 
 const LOG_POSITIONS = 1000; // of a slider with a logarithmic scale
+const RELEASE_AFTER = 300; // ms after the last key: several presses are one change
 const LOG_STEPS = 200; // of the keyboard from one end to the other
 
 /** Makes an element: its tag, attributes (`onclick` and others are listeners), and children. */
@@ -32,7 +33,7 @@ class Control {
       onchange: () => changed(this, false),
       ondblclick: () => { this.set(about.value); changed(this, false); },
       onkeydown: (event) => this.#key(event),
-      onkeyup: (event) => { if (this.#steps(event) !== 0) changed(this, false); },
+      onkeyup: (event) => { if (this.#steps(event) !== 0) this.#timer = setTimeout(() => changed(this, false), RELEASE_AFTER); },
     });
     this.number = make("input", {
       type: "number", id, step: about.step || "any", min: lower, max: upper, "data-control": about.name,
@@ -84,6 +85,8 @@ class Control {
     return Math.min(Math.max(Number(rounded.toPrecision(12)), lower), upper);
   }
 
+  #timer = null; // of the end of a change by keys
+
   #steps(event) {
     const count = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10, PageDown: -10 };
     return (count[event.key] ?? 0) * (event.shiftKey ? 10 : 1);
@@ -99,6 +102,7 @@ class Control {
     else if (steps !== 0) wanted = this.log ? this.value * (upper / lower) ** (steps / LOG_STEPS) : this.value + steps * (step || (upper - lower) / 100);
     else return;
     event.preventDefault();
+    clearTimeout(this.#timer);
     this.range.value = this.#position(Math.min(Math.max(wanted, lower), upper));
     this.range.dispatchEvent(new Event("input", { bubbles: true }));
     if (steps === 0) this.range.dispatchEvent(new Event("change", { bubbles: true }));
