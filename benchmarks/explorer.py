@@ -1,13 +1,13 @@
 """Latency of the explorer in a headless Chromium, from a slider's `input` event to the painted curve.
 
-Run `python benchmarks/explorer.py`, with Playwright and Chromium as for `make browser-tests`. Each scene's thickness is
-dragged by the mouse, an event every 16 ms, and stepped by the keyboard, a key every 60 ms. A curve counts
-as painted when the frame after Plotly's redraw is finished; events that a newer one has overtaken count until
-the newer curve. `drawn` is the number of curves drawn for that number of events, `request` the median time from
-sending the values to having the answer, `engine` the time within it that computes curve and colour.
+Run `python benchmarks/explorer.py`, with Playwright and Chromium as for `make browser-tests`. Each scene's
+thickness is dragged by the mouse, an event every 16 ms, and stepped by the keyboard, a key every 60 ms. A
+curve counts as painted when the frame after Plotly's redraw is finished; events that a newer one has overtaken
+count until the newer curve. `drawn` is the number of curves drawn for these events, `request` the median time
+from sending the values to having the answer, `engine` the time within it that computes curve and colour.
 
-Linux, 2 cores with 9 other processes waiting for them, Chromium 150 without a GPU, 1400 × 900 pixels. The processes
-of the benchmark went before the others (`chrt -r 5`); without that, medians were 35 to 60 ms.
+Linux, 2 cores with 9 other processes waiting for them, Chromium 150 without a GPU, 1400 × 900 pixels. The
+processes of the benchmark went before the others (`chrt -r 5`); without that, medians were 35 to 60 ms.
 
     scene                      moved by  events  drawn  median ms  95 % ms  request ms  engine ms
     film                       mouse        101    100       22.6     27.6         7.8       1.93
@@ -47,8 +47,7 @@ COUNT = """() => {
   window.pending = [];
   window.latency = [];
   window.drawn = 0;
-  box.addEventListener("input", (event) => window.pending.push([event.timeStamp, Number(number.value)]), true);
-  box.addEventListener("input", () => { window.pending.at(-1)[1] = Number(number.value); });
+  box.addEventListener("input", (event) => window.pending.push([event.timeStamp, Number(number.value)]));
   box.addEventListener("drawn", (event) => {
     const painted = new MessageChannel();
     painted.port2.onmessage = () => {
@@ -99,16 +98,11 @@ def keys(page: Page, events: int) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description="Latency of the explorer's sliders.")
     parser.add_argument("--events", type=int, default=200)
     events = parser.parse_args().events
     chromium = os.environ.get("PELLICLE_BROWSER") or shutil.which("chromium") or shutil.which("google-chrome")
-    print(
-        f"{'scene':<26} {'moved by':<9} {'events':>6} {'drawn':>6} {'median ms':>10} {'95 % ms':>8}", end=""
-    )
-    print(f" {'request ms':>11} {'engine ms':>10}")
+    print("scene                      moved by  events  drawn  median ms  95 % ms  request ms  engine ms")
     code = "from pellicle.cli import process; process()"
     with sync_playwright() as driver, tempfile.TemporaryDirectory() as folder:
         browser = driver.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
@@ -131,10 +125,8 @@ def main() -> None:
                 median, most = np.percentile(latency, [50, 95])
                 answer, engine = np.median(requests, axis=0)
                 drawn = page.evaluate("drawn")
-                print(
-                    f"{scene:<26} {name:<9} {len(latency):>6} {drawn:>6} {median:>10.1f} {most:>8.1f}", end=""
-                )
-                print(f" {answer:>11.1f} {engine:>10.2f}", flush=True)
+                row = f"{scene:<26} {name:<9} {len(latency):>6} {drawn:>6} {median:>10.1f} {most:>8.1f}"
+                print(f"{row} {answer:>11.1f} {engine:>10.2f}", flush=True)
             page.close()
             server.send_signal(signal.SIGINT)
             server.wait(20)

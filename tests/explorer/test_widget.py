@@ -129,7 +129,7 @@ def cell(browser, widget):
 
 
 def test_the_widget_follows_its_slider_and_its_model(cell):
-    curve = "document.querySelector('.plot').data.at(-1).y"
+    curve = "document.querySelector('.plot').data.find((t) => t.name === 'R').y"
     assert np.allclose(cell.evaluate(curve), pl.reflectance(WAVELENGTH, 250.0, 1.46, 3.9), atol=2e-7)
     background = "getComputedStyle(document.querySelector('.pellicle-explorer')).backgroundColor"
     assert cell.evaluate(background) == "rgb(18, 23, 28)"  # dark as the notebook, in a light browser

@@ -96,7 +96,7 @@ def serve(session: Session, port: int = 0, ready: Callable[[str], Any] = lambda 
         import uvicorn  # pyright: ignore[reportMissingImports]
     except ImportError:
         raise UsageError(_missing("uvicorn")) from None
-    # the protocol is named: asyncio then sends without delay, else each answer waits 40 ms for an acknowledgement
+    # the protocol is named, or asyncio sends with delay: answers would wait 40 ms for an acknowledgement
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:

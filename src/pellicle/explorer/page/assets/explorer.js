@@ -7,7 +7,6 @@ const PLAN_AFTER = 150; // ms without a change after which the plan is asked for
 const AGAIN_AFTER = 150; // ms between questions while the engine compiles
 const PROGRESS_EVERY = 400; // ms between questions about a fit
 const SAME_CHANGE = 1500; // ms within which several steps of a slider are one change, and have one curve before it
-const SPHERE = { moving: 64, still: 192 }; // pixels: the small one takes a quarter of the time
 
 /** Rows of a plan as two lists: effects that are simulated, and those that are left out. */
 function planLists(rows) {
@@ -63,7 +62,7 @@ export async function explore(element, call, options = {}) {
   const warnings = make("ul", { class: "warnings warn", "aria-label": "Warnings", hidden: true });
   const plan = make("div", { class: "plan" });
   const fitted = make("div", { class: "fitted", role: "status" });
-  const notes = make("ul", { class: "notes soft" });
+  const notes = make("ul", { class: "notes soft", "aria-live": "polite" });
   const sliders = make("section", { class: "controls", "aria-label": "Controls" });
   const plot = new Plot(canvas, caption, reading);
   const say = (text) => { if (status.textContent !== text) status.textContent = text; };
@@ -78,9 +77,7 @@ export async function explore(element, call, options = {}) {
   let againTimer = null;
   const unfinished = new Set(); // parts of the view whose programs are being compiled
   const values = () => Object.fromEntries(controls.map((each) => [each.about.name, each.value]));
-  const view = (...want) => () => ({
-    values: values(), want, serial: ++serial, moving: gesture, size: gesture ? SPHERE.moving : SPHERE.still,
-  });
+  const view = (...want) => () => ({ values: values(), want, serial: ++serial, moving: gesture });
   const asView = (body) => ask("view", body);
   const refresh = () => askCurves(view("curves", "colour"));
 
@@ -138,6 +135,7 @@ export async function explore(element, call, options = {}) {
     const now = performance.now();
     const again = control === last.control && now - last.time < SAME_CHANGE;
     if (moving && !gesture && !again) plot.before = plot.curves;
+    plot.fitted = [];
     last = { control, time: now };
     gesture = moving;
     if (!moving) tellChange();
@@ -153,7 +151,7 @@ export async function explore(element, call, options = {}) {
   }
 
   function setAll(wanted, errors = {}) {
-    plot.before = plot.curves;
+    Object.assign(plot, { before: plot.curves, fitted: [] });
     for (const each of controls) {
       if (wanted[each.about.name] !== undefined) each.set(wanted[each.about.name]);
       each.note(errors[each.about.name]);
@@ -169,7 +167,7 @@ export async function explore(element, call, options = {}) {
     if (scene.error) return false;
     options.titled?.(scene.title);
     limit = scene.limit ?? Infinity;
-    Object.assign(plot, { axis: scene.axis, signals: scene.signals, curves: [], before: [], ranges: {} });
+    Object.assign(plot, { axis: scene.axis, signals: scene.signals, curves: [], before: [], fitted: [], ranges: {} });
     canvas.setAttribute("aria-label", `Plot of ${scene.signals.join(", ")} against ${scene.axis.label}. Arrow keys read the points.`);
     controls = scene.controls.map((about, i) => new Control(about, `${id}-${i}`, moved));
     for (const each of controls) {
@@ -182,6 +180,7 @@ export async function explore(element, call, options = {}) {
     stored.replaceChildren(...(scene.files ?? []).map((name) => make("button", {
       type: "button", onclick: () => takeData(name, { file: name }),
     }, `Load ${name}`)));
+    if (scene.data) showData(scene.data);
     return true;
   }
 
@@ -204,14 +203,16 @@ export async function explore(element, call, options = {}) {
     say("");
     if (answer.error) return;
     if (answer.scene_changed && !(await takeScene(new URLSearchParams(Object.entries(values()))))) return;
-    plot.data = answer.curves;
-    plot.before = [];
-    notes.replaceChildren(...(answer.notes ?? []).map((text) => make("li", {}, text)));
+    showData(answer);
+    await plot.draw(false);
+    if (answer.scene_changed) refresh();
+  }
+
+  function showData(data) {
+    Object.assign(plot, { data: data.curves, before: [], fitted: [] });
+    notes.replaceChildren(...data.notes.map((text) => make("li", {}, text)));
     fit.disabled = false;
     element.classList.add("with-data");
-    await plot.draw(false);
-    say(`${name} is drawn beside the simulation.`);
-    if (answer.scene_changed) refresh();
   }
 
   // ---- fit ----
@@ -241,6 +242,7 @@ export async function explore(element, call, options = {}) {
       return;
     }
     setAll(answer.values, answer.errors);
+    plot.fitted = answer.curves ?? []; // with scale and offset
     fitted.replaceChildren(make("p", {}, answer.verdict));
     if (answer.summary) fitted.append(make("details", {}, make("summary", {}, "Summary of the fit"), make("pre", { tabindex: 0 }, answer.summary)));
   }

@@ -19,14 +19,14 @@ async function library(packed, nonce) {
 /** The plot: curves of the scene, those before the last change, and data; panels share the abscissa. */
 class Plot {
   constructor(element, caption, reading) {
-    Object.assign(this, { element, caption, reading, axis: { label: "" }, signals: [], curves: [], before: [], data: [], ranges: {}, revision: 0, at: -1 });
+    Object.assign(this, { element, caption, reading, axis: { label: "" }, signals: [], curves: [], before: [], fitted: [], data: [], ranges: {}, revision: 0, at: -1 });
     element.addEventListener("keydown", (event) => this.#key(event));
   }
 
   /** Label of the ordinate of a curve: Ψ and Δ have panels of their own, other curves share one. */
   #ordinate(curve) {
     const shared = this.axis.value ?? this.signals.join(", ");
-    const own = this.signals.length > 1 && this.signals.find((signal) => curve.label.startsWith(signal));
+    const own = this.signals.length > 1 && this.signals.find((signal) => curve.label.replace("fit: ", "").startsWith(signal));
     return own ? `${own} ${/\(.*\)/.exec(shared)?.[0] ?? ""}`.trim() : shared;
   }
 
@@ -51,6 +51,7 @@ class Plot {
         name: `${curve.label} before`, line: { color: own(curve), width: 2, simplify: false }, opacity: 0.35, hoverinfo: "skip", showlegend: !several,
       })),
       ...this.curves.map((curve) => trace(curve, { line: { color: own(curve), width: 2, simplify: false } })),
+      ...this.fitted.map((curve) => trace(curve, { line: { color: colour("--rival"), width: 2, dash: "dot" } })),
     ];
     await window.Plotly.react(this.element, traces, this.#layout(ordinates, colour, moving), {
       responsive: true, displaylogo: false, modeBarButtonsToRemove: ["lasso2d", "select2d"], doubleClick: "autosize",
@@ -92,7 +93,7 @@ class Plot {
 
   #range(name, moving) {
     let [low, high] = [Infinity, -Infinity];
-    for (const curve of [...this.curves, ...this.before, ...this.data]) {
+    for (const curve of [...this.curves, ...this.before, ...this.fitted, ...this.data]) {
       if (this.#ordinate(curve) !== name) continue;
       for (const value of curve.y) {
         if (value === null) continue;
