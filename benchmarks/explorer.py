@@ -2,7 +2,7 @@
 
 Run `python benchmarks/explorer.py`, with Playwright and Chromium as for `make browser-tests`. Each scene's
 thickness is dragged by the mouse, an event every 16 ms, and stepped by the keyboard, a key every 60 ms. A
-curve counts as painted when the frame after Plotly's redraw is finished; events that a newer one has overtaken
+curve counts as painted when the frame after the redraw is finished; events that a newer one has overtaken
 count until the newer curve. `drawn` is the number of curves drawn for these events, `request` the median time
 from sending the values to having the answer, `engine` the time within it that computes curve and colour.
 
