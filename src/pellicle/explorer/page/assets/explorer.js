@@ -29,19 +29,23 @@ function planLists(rows) {
  */
 export async function explore(element, call, options = {}) {
   const id = `explorer-${Math.random().toString(36).slice(2, 8)}`;
-  const alert = make("p", { class: "trouble bad", role: "alert", hidden: true });
-  const columns = make("div", { class: "columns" }, alert);
+  const sentence = make("p", { role: "alert" });
+  const dismiss = make("button", { type: "button", onclick: () => { troubles.clear(); trouble(); } }, "Dismiss");
+  const alert = make("div", { class: "trouble bad", hidden: true }, sentence, dismiss);
+  const columns = make("div", { class: "columns" }, make("section", { class: "spectrum" }, alert));
   element.classList.add("pellicle-explorer");
   element.replaceChildren(columns);
   const theme = () => { element.dataset.theme = options.theme?.() ?? ""; };
   theme();
 
   const troubles = new Map(); // kind of trouble to its sentence
-  function trouble(kind, sentence) {
-    if (sentence) troubles.set(kind, sentence); else troubles.delete(kind);
+  function trouble(kind, found) {
+    if (found) troubles.set(kind, found); else troubles.delete(kind);
     const text = [...troubles.values()].join(" ");
-    if (alert.textContent !== text) alert.textContent = text;
     alert.hidden = !text;
+    if (sentence.textContent === text) return;
+    sentence.textContent = text;
+    if (found) alert.scrollIntoView({ block: "nearest" });
   }
   /** The answer; what is wrong is shown, and removed by the next answer of its kind. */
   async function ask(request, body = {}) {
@@ -269,9 +273,9 @@ export async function explore(element, call, options = {}) {
     });
   }
   if (!(await ready)) return null;
-  columns.append(
+  columns.replaceChildren(
     sliders,
-    make("section", { class: "spectrum", "aria-label": "Spectrum" }, make("figure", {}, canvas, caption), reading),
+    make("section", { class: "spectrum", "aria-label": "Spectrum" }, alert, make("figure", {}, canvas, caption), reading),
     look,
     make("section", { class: "actions", "aria-label": "Data and results" }, buttons, status, fitted,
       make("div", { class: "zone" }, zone.element, stored, notes), warnings),

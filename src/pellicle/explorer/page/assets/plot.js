@@ -79,7 +79,7 @@ class Plot {
       paper_bgcolor: colour("--page"), plot_bgcolor: colour("--page"), font: { color: colour("--text"), size: 13 },
       hovermode: "x", hoversubplots: "axis", hoverlabel: { bgcolor: colour("--panel"), font: { color: colour("--text") } },
       showlegend: true, legend: { orientation: "h", y: 1, yanchor: "bottom", x: 0, bgcolor: "rgba(0,0,0,0)" },
-      xaxis: { ...line, title: { text: this.axis.label, standoff: 6 }, anchor: ordinates.length === 1 ? "y" : `y${ordinates.length}` },
+      xaxis: { ...line, range: this.#span(), title: { text: this.axis.label, standoff: 6 }, anchor: ordinates.length === 1 ? "y" : `y${ordinates.length}` },
     };
     ordinates.forEach((name, number) => {
       const top = 1 - number * (share + 0.08);
@@ -89,6 +89,13 @@ class Plot {
       };
     });
     return layout;
+  }
+
+  /** Range of the abscissa. */
+  #span() {
+    const ends = [...this.curves, ...this.data].flatMap(({ x }) => [x[0], x.at(-1)]);
+    const room = this.data.length ? 0.01 * (Math.max(...ends) - Math.min(...ends)) : 0; // for whole markers
+    return [Math.min(...ends) - room, Math.max(...ends) + room];
   }
 
   #range(name, moving) {
