@@ -61,6 +61,7 @@ def gradient(scene: Scene) -> Row:
 
     least = max(_least_count(numbers) for numbers in few)
     counts = [n for n in COUNTS if n >= min(least, COUNTS[-1])]
+    count, error = COUNTS[-1], np.inf
     for count in counts:
         error = tried(count) if count != counts[-1] else 0.0
         error = measured(count) if error < GRADIENT_ERROR else error
