@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle import api
 from pellicle.effects.surface_removal import REMOVABLE
 from pellicle.planning import film, surface
 from pellicle.scene.surface import surface_view
@@ -44,4 +43,4 @@ def test_plan_takes_a_film_or_a_surface():
 )
 def test_arguments_of_the_other_kind_are_refused(verb, scene, arguments, message):
     with pytest.raises(TypeError, match=message):
-        getattr(api, verb)(scene, **arguments)
+        getattr(pl, verb)(scene, **arguments)

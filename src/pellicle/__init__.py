@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from pellicle import dispersion as dispersion
     from pellicle import fitting as fitting
-    from pellicle.api import compare as compare
-    from pellicle.api import cost as cost
-    from pellicle.api import depth_profile as depth_profile
-    from pellicle.api import explore as explore
-    from pellicle.api import export as export
-    from pellicle.api import fit as fit
-    from pellicle.api import map as map
-    from pellicle.api import plan as plan
-    from pellicle.api import sample as sample
-    from pellicle.api import simulate as simulate
+    from pellicle.api.explorer import explore as explore
+    from pellicle.api.export import export as export
+    from pellicle.api.fits import compare as compare
+    from pellicle.api.fits import fit as fit
+    from pellicle.api.fits import sample as sample
+    from pellicle.api.maps import map as map
+    from pellicle.api.plans import cost as cost
+    from pellicle.api.plans import plan as plan
+    from pellicle.api.simulations import depth_profile as depth_profile
+    from pellicle.api.simulations import simulate as simulate
     from pellicle.data.brdf_samples import BrdfSamples as BrdfSamples
     from pellicle.data.colours import CameraMatrix as CameraMatrix
     from pellicle.data.colours import Colours as Colours
@@ -68,18 +68,22 @@ if TYPE_CHECKING:
     from pellicle.synthetic.brdf import Directions as Directions
 
 _NAMES = {
-    "pellicle.api": (
-        "compare",
-        "cost",
-        "depth_profile",
-        "explore",
-        "export",
-        "fit",
-        "map",
-        "plan",
-        "sample",
+    "pellicle.api.simulations": (
         "simulate",
+        "depth_profile",
     ),
+    "pellicle.api.plans": (
+        "plan",
+        "cost",
+    ),
+    "pellicle.api.fits": (
+        "fit",
+        "sample",
+        "compare",
+    ),
+    "pellicle.api.maps": ("map",),
+    "pellicle.api.export": ("export",),
+    "pellicle.api.explorer": ("explore",),
     "pellicle.data.brdf_samples": ("BrdfSamples",),
     "pellicle.data.colours": ("CameraMatrix", "Colours"),
     "pellicle.data.cube": ("Cube",),

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pellicle import api
+from pellicle.api import fits as verbs
 from pellicle.data.read_brdf import read_brdf_samples
 from pellicle.effects.surface import exact
 from pellicle.fitting.result import (
@@ -93,7 +93,7 @@ def fits(monkeypatch):
             layer_test=LayerTest(False, 1.9, (Baseline("two lobes", 2.0),), options["residual"] or "linear"),
         )
 
-    monkeypatch.setattr(api, "fit", fit)
+    monkeypatch.setattr(verbs, "fit", fit)
     return calls
 
 
@@ -132,7 +132,7 @@ def posterior(monkeypatch, fits):
     """A normal posterior of the thickness by the real ensemble, in place of that of the surface."""
 
     def sample(samples, surface, *, walkers, seed, chain, progress, steps=STEPS, **options):
-        fit = api.fit(samples, surface, **options)
+        fit = verbs.fit(samples, surface, **options)
         axis = Axis("rank_R", "samples", np.arange(30))
         rows = 1.0 + np.random.default_rng(0).random((50, 30))
         subject = Subject(
@@ -148,7 +148,7 @@ def posterior(monkeypatch, fits):
         )
         return sampled(subject, walkers, steps, seed, chain, progress, 0.0)
 
-    monkeypatch.setattr(api, "sample", sample)
+    monkeypatch.setattr(verbs, "sample", sample)
 
 
 def test_a_posterior_of_a_surface(folder, posterior, pellicle):

@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from pellicle import api
+from pellicle.api import fits
 
 RESULT_KEYS = [
     "schema",
@@ -144,7 +144,7 @@ def test_a_folder_with_a_users_files_is_refused_before_anything_is_fitted(
     def never(*_, **__):
         raise AssertionError("fitted for nothing")
 
-    monkeypatch.setattr(api, "fit", never)
+    monkeypatch.setattr(fits, "fit", never)
     for files in ([spectrum_file()], [spectrum_file("a.csv"), spectrum_file("b.csv")]):
         ran = pellicle("fit", *files, *scene, "--out", out)
         ran.refused(2, "pellicle did not write", "--out")
@@ -160,7 +160,7 @@ def test_nothing_is_written_where_the_fit_fails(pellicle, scene, tmp_path):
 
 
 def test_ctrl_c_keeps_what_is_done(pellicle, spectrum_file, scene, tmp_path, monkeypatch):
-    real, calls = api.fit, []
+    real, calls = fits.fit, []
 
     def interrupted(*arguments, **options):
         calls.append(arguments)
@@ -168,7 +168,7 @@ def test_ctrl_c_keeps_what_is_done(pellicle, spectrum_file, scene, tmp_path, mon
             raise KeyboardInterrupt
         return real(*arguments, **options)
 
-    monkeypatch.setattr(api, "fit", interrupted)
+    monkeypatch.setattr(fits, "fit", interrupted)
     files = [spectrum_file(f"{name}.csv") for name in ("one", "two", "three")]
     ran = pellicle("fit", *files, *scene, "--json", "--out", tmp_path / "out")
     assert ran.code == 130

@@ -62,7 +62,7 @@ def asked(monkeypatch):
         calls.append((spectra, scenes))
         raise DataError("not fitted here")
 
-    monkeypatch.setattr("pellicle.api.fit", fit)
+    monkeypatch.setattr("pellicle.api.fits.fit", fit)
     return calls
 
 

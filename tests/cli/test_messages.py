@@ -100,15 +100,15 @@ def doubtful(monkeypatch):
     """Makes every fit of spectra warn, and name an argument in its verdict."""
     from dataclasses import replace
 
-    import pellicle.api
+    from pellicle.api import fits
 
-    real = pellicle.api.fit
+    real = fits.fit
 
     def fit(*arguments, **options):
         result = real(*arguments, **options)
         return replace(result, verdict="Give `angle=70`.", warnings=("noise: give `noise=0.01`",))
 
-    monkeypatch.setattr(pellicle.api, "fit", fit)
+    monkeypatch.setattr(fits, "fit", fit)
 
 
 @pytest.mark.usefixtures("doubtful")

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pellicle import api
+from pellicle.api import fits
 from pellicle.cli.resume import fingerprint
 from pellicle.dispersion import Cauchy
 from pellicle.scene.film import Scene
@@ -38,8 +38,8 @@ class Fitted:
 
 @pytest.fixture
 def fitted(monkeypatch):
-    counter = Fitted(api.fit)
-    monkeypatch.setattr(api, "fit", counter.fit)
+    counter = Fitted(fits.fit)
+    monkeypatch.setattr(fits, "fit", counter.fit)
     return counter
 
 

@@ -241,7 +241,7 @@ class Batch:
     def _result(
         self, data: Any, scene: Any, folder: Path | None, progress: Progress
     ) -> tuple[Fit, Posterior | None]:
-        from pellicle.api import fit, sample
+        from pellicle.api.fits import fit, sample
 
         options: dict[str, Any] = {"tolerance": self.tolerance, "residual": self.inputs.residual}
         if self.sampler is None:

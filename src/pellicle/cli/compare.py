@@ -64,7 +64,7 @@ def _compare(
     candidates: dict[str, Inputs], position: int, paths: list[str], folder: Path | None, as_json: bool
 ) -> int:
     """Compare the fits of one group of files, print and write the result, and return its exit code."""
-    from pellicle.api import fit
+    from pellicle.api.fits import fit
     from pellicle.fitting.comparison import compare as compare_fits
     from pellicle.reporting.comparison import failure, report, to_json, write_comparison
     from pellicle.reporting.json_record import one_line

@@ -68,13 +68,13 @@ def cost(
     if out is not None:
         check_folder(out)
     start(keep=False)
-    from pellicle import api
+    from pellicle.api import plans
     from pellicle.reporting.cost_files import to_json, write_cost
     from pellicle.reporting.cost_text import text
     from pellicle.reporting.json_record import one_line
 
     with Progress(recipe) as progress:
-        result = api.cost(scene, tolerance=tolerance, progress=progress, **options)
+        result = plans.cost(scene, tolerance=tolerance, progress=progress, **options)
     print(one_line(to_json(result, recipe)) if json else text(result, recipe), flush=True)
     if out is not None:
         say(f"{write_cost(out, result, recipe)}: report, figure and tables written")

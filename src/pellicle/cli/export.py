@@ -49,11 +49,11 @@ def export(
     """
     described = _described(film, recipe)
     start()
-    from pellicle import api
+    from pellicle.api.export import export as export_scene
     from pellicle.reporting.export_text import text
     from pellicle.reporting.json_record import one_line
 
-    written = api.export(
+    written = export_scene(
         described, to=to, path=out, numbers=numbers, thickness_map=thickness_map, layer=layer
     )
     print(one_line({"target": to} | written.material.record()) if as_json else text(written), flush=True)

@@ -114,13 +114,13 @@ def _map_picture(
     start()
     import equinox as eqx
 
-    from pellicle import api
+    from pellicle.api import maps
     from pellicle.reporting.json_record import one_line
     from pellicle.reporting.picture_map import report, to_json, write_map
 
     if transmitted:
         scene = eqx.tree_at(lambda s: s.light, scene, replace(scene.light, signal="T"))
-    made: Any = api.map(picture, scene, space=space, noise=noise, **flags, **seen)
+    made: Any = maps.map(picture, scene, space=space, noise=noise, **flags, **seen)
     print(one_line(to_json(made)) if json else report(made), flush=True)
     if out is not None:
         say(f"{write_map(out, made)}: report, figure and tables written")

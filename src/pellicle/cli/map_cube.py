@@ -91,7 +91,7 @@ def map_cube(
             f"{described.path}: nothing is free to fit: give the thickness bounds, as in"
             " thickness = { lower = 10, upper = 3000 }"
         )
-    from pellicle import api
+    from pellicle.api import maps
     from pellicle.reporting.json_record import one_line
     from pellicle.reporting.map_text import cube_json, cube_report
 
@@ -105,7 +105,7 @@ def map_cube(
     progress = PixelProgress(path)
     try:
         with progress:
-            made = api.map(
+            made = maps.map(
                 path,
                 scene,
                 out=None if folder is None else folder / STORE,

@@ -127,14 +127,14 @@ def _wavelengths_of(text: str) -> list[float]:
 def _write_depth_profile(recipe: FilmRecipe, out: str, at: list[float], json: bool) -> None:
     check_folder(out)
     start()
-    from pellicle import api
+    from pellicle.api.simulations import depth_profile
     from pellicle.fitting.spectra.messages import log_scene
     from pellicle.reporting.depth_profile import report, to_json, write_depth_profile
     from pellicle.reporting.json_record import one_line
 
     scene = recipe.scene()
     log_scene(scene)
-    profile = api.depth_profile(scene, at, wavelengths(recipe, scene))
+    profile = depth_profile(scene, at, wavelengths(recipe, scene))
     source = f"recipe {Path(recipe.path).name}, pellicle {version('pellicle')}"
     angle, light = getattr(scene.light.angle, "start", scene.light.angle), scene.light.polarisation
     comments = [

@@ -1,0 +1,38 @@
+"""Verb of the explorer: a film with sliders in a notebook."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from pellicle.errors import UsageError
+from pellicle.scene.film import Scene
+from pellicle.scene.kinds import check_scene
+from pellicle.scene.surface import Surface
+
+
+def explore(scene: Scene | Surface, *, wavelength: ArrayLike | None = None) -> Any:
+    """Show a film in a notebook: sliders beside its spectrum, colour, sphere and plan, which follow them.
+
+    The page is that of `pellicle explore`; it needs no network.
+
+    **Arguments:**
+
+    - `scene`: the film; every number in it that a slider can move has one, free or not.
+    - `wavelength`: wavelengths of the plot in nm, (wavelengths,), by default those of the scene's light or
+      the visible ones.
+
+    **Returns:** A widget (anywidget): `values` are the sliders' numbers by name, in their units, and setting
+    them moves the sliders; `recipe()` is the film in its current state as TOML.
+
+    **Raises:** UsageError without the package anywidget, and for a surface; DataError where the materials
+    share no wavelengths.
+    """
+    from pellicle.explorer.session import Session
+    from pellicle.explorer.widget import widget
+
+    check_scene(scene)
+    if isinstance(scene, Surface):
+        raise UsageError("`scene` must be a Scene: the explorer shows films, and no surfaces")
+    return widget(Session(scene, wavelength=wavelength))

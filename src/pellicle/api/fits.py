@@ -1,0 +1,156 @@
+"""Verbs of fitting: fit, posterior, and comparison of several descriptions."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from pellicle.api.arguments import refuse
+from pellicle.data.brdf_samples import BrdfSamples
+from pellicle.data.measurement import Measurement, check_measurement
+from pellicle.errors import UsageError
+from pellicle.fitting.brdf.fit import fit as fit_brdf
+from pellicle.fitting.comparison import Comparison
+from pellicle.fitting.comparison import compare as compare_fits
+from pellicle.fitting.joint import fit as fit_jointly
+from pellicle.fitting.joint import of_both_kinds
+from pellicle.fitting.progress import Progress, quiet
+from pellicle.fitting.result import Fit
+from pellicle.fitting.spectra.fit import fit as fit_spectra
+from pellicle.sampling.ensemble import STEPS
+from pellicle.sampling.result import Posterior
+from pellicle.sampling.sample import OF_A_FILM, measured
+from pellicle.sampling.sample import sample as sample_posterior
+from pellicle.scene.film import Scene
+from pellicle.scene.kinds import check_scene
+from pellicle.scene.surface import Surface
+
+
+def fit(
+    data: Measurement,
+    scene: Scene | Surface | Sequence[Scene | Surface],
+    *,
+    tolerance: float = 0.0,
+    loss: str = "least-squares",
+    residual: str | None = None,
+    progress: Progress = quiet,
+) -> Fit:
+    """Fit the free parameters of `scene` to `data`, in float64.
+
+    **Arguments:**
+
+    - `data`: `Spectrum` or `Colours`, or a list of these, of one sample (a joint fit); or `BrdfSamples`, or a
+      list; or a list of both kinds.
+    - `scene`: `Scene`, or a list with one for each spectrum; `Surface` for `BrdfSamples`. Signal, angle and
+      polarisation come from the data. For a list of both kinds it is a list too, of scenes and the surface:
+      free numbers of one name, such as `thickness`, are then one.
+    - `tolerance`: leave out effects that change the signal by less (see `pellicle.plan`); where the best fit
+      turns out to be off by more, the fit is done again with every effect.
+    - `loss`: "least-squares", or "huber" or "student-t" against outliers.
+    - `residual`: what is compared of a BRDF (`Surface` only): "linear", "cosine", "log" or "cube-root". By
+      default "linear" where the samples have a σ, else "cube-root".
+    - `progress`: called with the name of a stage, the number of steps done and their total.
+
+    **Returns:** `Fit`: parameters with errors, a status with a verdict, every rival minimum.
+    `print(fit)` is short; `fit.report()`, `fit.plot()` and `fit.save(folder)` are the full report, the
+    figure, and files of both.
+
+    **Raises:** UsageError where nothing is free, where the scenes of a joint fit are not of one sample,
+    where an uncalibrated signal has a fixed scale, for an unknown loss or residual, and for too few samples;
+    ValueError where a material has no data at a wavelength.
+
+    ```python
+    >>> scene = pl.Scene(pl.Layer("SiO2", pl.Free(100, 1000)), "Si")
+    >>> spectrum = pl.simulate(pl.Scene(pl.Layer("SiO2", 500.0), "Si"), noise=0.002)
+    >>> fit = pl.fit(spectrum, scene)
+    >>> round(fit["thickness"].value), fit.status.value
+    (500, 'converged')
+
+    ```
+    """
+    check_measurement(data)
+    check_scene(scene, several=True)
+    if of_both_kinds(scene):
+        both: Any = data, scene
+        return fit_jointly(*both, residual=residual, tolerance=tolerance, loss=loss, progress=progress)
+    if isinstance(scene, Surface):
+        samples = measured((BrdfSamples,), data)
+        return fit_brdf(samples, scene, residual=residual, tolerance=tolerance, loss=loss, progress=progress)
+    refuse("a Scene", residual=residual)
+    films: Any = measured(OF_A_FILM, data), scene
+    return fit_spectra(*films, tolerance=tolerance, loss=loss, progress=progress)
+
+
+def sample(
+    data: Measurement,
+    scene: Scene | Surface | Sequence[Scene | Surface],
+    *,
+    walkers: int | None = None,
+    steps: int = STEPS,
+    seed: int = 0,
+    chain: str | os.PathLike[str] | None = None,
+    tolerance: float = 0.0,
+    residual: str | None = None,
+    progress: Progress = quiet,
+) -> Posterior:
+    """Fit as `pellicle.fit` does, then sample the posterior of the free parameters, in float64.
+
+    Priors are those of the `Free` parameters, uniform between the bounds by default. Walkers start in every
+    minimum of the fit in proportion to its share.
+
+    **Arguments:**
+
+    - `data`, `scene`, `tolerance`, `residual`, `progress`: as in `pellicle.fit`.
+    - `walkers`: number of walkers, two for each free parameter at least.
+    - `steps`: most steps; the chain ends before that where it is 50 autocorrelation times long and passes
+      its checks. 20000 by default.
+    - `seed` of the chain.
+    - `chain`: file in which the chain is kept as it grows; an interrupted run continues from it.
+
+    **Returns:** `Posterior`: draws, marginals, modes with their mass, and the checks of the chain.
+
+    **Raises:** as `pellicle.fit` does; UsageError for too few walkers, or more than fit into memory;
+    DataError for the chain of another problem.
+    """
+    check_measurement(data)
+    check_scene(scene, several=True)
+    if not isinstance(scene, Surface):
+        refuse("a Scene", residual=residual)
+    return sample_posterior(
+        data,
+        scene,
+        walkers=walkers,
+        steps=steps,
+        seed=seed,
+        chain=chain,
+        tolerance=tolerance,
+        residual=residual,
+        progress=progress,
+    )
+
+
+def compare(
+    data: Measurement,
+    scenes: Mapping[str, Scene | Surface | Sequence[Scene | Surface]],
+    *,
+    tolerance: float = 0.0,
+    residual: str | None = None,
+    progress: Progress = quiet,
+) -> Comparison:
+    """Fit several scenes to the same data and compare them by AIC and BIC.
+
+    **Arguments:**
+
+    - `data`: as in `pellicle.fit`.
+    - `scenes`: two or more descriptions by name, each as `pellicle.fit` takes it.
+    - `tolerance`, `residual`, `progress`: as in `pellicle.fit`.
+
+    **Returns:** `Comparison`: each candidate with its fit and criteria, the `best`, and a verdict.
+
+    **Raises:** UsageError for fewer than two scenes, and as `pellicle.fit` does.
+    """
+    if not isinstance(scenes, Mapping):
+        raise UsageError("`scenes` must have names, as in {'oxide': scene, 'nitride': other}")
+    options = {"tolerance": tolerance, "residual": residual, "progress": progress}
+    return compare_fits({name: fit(data, scene, **options) for name, scene in scenes.items()})

@@ -1,0 +1,153 @@
+"""Verbs of planning: the effects that a simulation needs, and what accuracy costs in time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, overload
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pellicle.api.arguments import refuse, viewed
+from pellicle.data.brdf_samples import BrdfSamples
+from pellicle.effects.plan import Plan
+from pellicle.fitting.progress import Progress, quiet
+from pellicle.planning.film import plan as film_plan
+from pellicle.planning.surface import plan as surface_plan
+from pellicle.scene.film import Scene
+from pellicle.scene.kinds import check_scene
+from pellicle.scene.surface import Surface
+from pellicle.synthetic.brdf import Directions
+from pellicle.synthetic.spectra import default_wavelengths
+
+if TYPE_CHECKING:
+    from pellicle.accuracy.cost import Cost
+    from pellicle.accuracy.surface import SurfaceCost
+
+
+def plan(
+    scene: Scene | Surface,
+    tolerance: float = 0.0,
+    *,
+    keep: Iterable[str] = (),
+    directions: Directions | BrdfSamples | None = None,
+) -> Plan:
+    """List the effects that a simulation of `scene` needs, to be exact or within `tolerance`.
+
+    **Arguments:**
+
+    - `scene`: `Scene`, with wavelengths in its light if `tolerance` is not 0, or `Surface`.
+    - `tolerance`: largest error of the signal anywhere within the bounds. R and T: a fraction. Ψ and Δ:
+      degrees on the sphere of N, C and S (Ψ is off by half of that at most, Δ by that over sin 2Ψ). BRDF:
+      relative to its value, or to 0.01/π where it is darker than that. At 0 an effect is left out only
+      where it is absent.
+    - `keep`: effects that must stay, by the keys of a plan (`"back-face"`, `"polarisation"`, ...).
+    - `directions`: pairs of directions to light and eye. Of a `Surface` only; see `pellicle.simulate`.
+
+    **Returns:** `Plan`, whose `rows` name each effect, whether it is on, why, and a bound on the error of
+    leaving it out.
+
+    **Raises:** ValueError for a negative tolerance, and for a tolerance without wavelengths.
+
+    ```python
+    >>> plan = pl.plan(pl.Scene(pl.Layer("SiO2", 500.0), "Si", light=pl.Light(angle=60.0)))
+    >>> plan.on("polarisation"), plan.on("back-face")
+    (True, False)
+
+    ```
+    """
+    check_scene(scene)
+    if isinstance(scene, Surface):
+        return surface_plan(viewed(scene, directions), tolerance, keep)
+    refuse("a Scene", directions=directions)
+    return film_plan(scene, tolerance, keep)
+
+
+@overload
+def cost(
+    scene: Scene,
+    wavelength: ArrayLike | None = None,
+    *,
+    reference: str = "float64",
+    tolerance: float | None = None,
+    noise: float | None = None,
+    datasets: int = 20,
+    space: str | None = None,
+    angle: ArrayLike | None = None,
+    progress: Progress = quiet,
+) -> Cost: ...
+@overload
+def cost(
+    scene: Surface,
+    *,
+    directions: Directions | BrdfSamples | None = None,
+    tolerance: float | None = None,
+    progress: Progress = quiet,
+) -> SurfaceCost: ...
+def cost(
+    scene: Scene | Surface,
+    wavelength: ArrayLike | None = None,
+    *,
+    directions: Directions | BrdfSamples | None = None,
+    reference: str = "float64",
+    tolerance: float | None = None,
+    noise: float | None = None,
+    datasets: int = 20,
+    space: str | None = None,
+    angle: ArrayLike | None = None,
+    progress: Progress = quiet,
+) -> Cost | SurfaceCost:
+    """Measure error and time of every method of simulating `scene`, and of fitting it.
+
+    **Arguments:**
+
+    - `scene`: `Scene` or `Surface`.
+    - `wavelength`: nm, shape (wavelengths,). Of a `Scene` only; by default those of its light, or as in
+      `pellicle.simulate`.
+    - `directions`: pairs of directions to light and eye. Of a `Surface` only; see `pellicle.simulate`.
+    - `reference`: what errors are measured against: "float64", or "mpmath" with 50 digits (`Scene` only).
+    - `tolerance`: the error that is small enough. R and T: a fraction, 0.001 by default. Ψ and Δ: degrees on
+      the sphere of N, C and S, 0.1 by default. BRDF: mean ΔE2000 of its film's colour, 0.5 by default, or
+      relative to its value where it has no such film.
+    - `noise`: standard deviation of the spectra that are fitted, as in `pellicle.simulate`; by default the
+      tolerance. A noise without a tolerance is the tolerance too. (`Scene` only)
+    - `datasets`: number of simulated spectra that every solver fits; 0 leaves the solvers out.
+      (`Scene` only)
+    - `space`: a colour space such as "srgb", for the methods of integrating the colours of a film at `angle`
+      of incidence in degrees, (angles,): mean ΔE2000 of the observer 1931 under D65, 0.5 by default.
+      (`Scene` only)
+    - `progress`: called with the name of a stage, the number of steps done and their total.
+
+    **Returns:** `Cost` or `SurfaceCost`: for each method its error, its time, and whether another one is
+    both faster and more accurate.
+
+    **Raises:** UsageError for a tolerance that is not above zero, for a reference that cannot compute the
+    scene, for a scene whose signal is 0 everywhere, and for the colours of a surface without
+    colour-science.
+    """
+    from pellicle.accuracy.cost import cost as film_cost  # solvers, a fifth of the time of importing this
+    from pellicle.accuracy.film_colours import colour_cost
+    from pellicle.accuracy.surface import cost as surface_cost
+
+    check_scene(scene)
+    if isinstance(scene, Surface):
+        refuse("a Surface", wavelength=wavelength, noise=noise, space=space, angle=angle)
+        view = viewed(scene, directions)
+        return surface_cost(view, tolerance=tolerance, progress=progress)
+    refuse("a Scene", directions=directions)
+    if space is not None:
+        refuse("colours", wavelength=wavelength, noise=noise)
+        return colour_cost(scene, angle, tolerance=tolerance, progress=progress)
+    refuse("spectra, whose angle is that of the scene's light", angle=angle)
+    if wavelength is None:
+        own = scene.light.wavelength
+        wavelength = default_wavelengths(scene) if own is None else own
+    return film_cost(
+        scene,
+        np.asarray(wavelength, dtype=float),
+        reference=reference,
+        tolerance=tolerance,
+        noise=noise,
+        datasets=datasets,
+        progress=progress,
+    )

@@ -1,0 +1,173 @@
+"""Verbs of simulation: spectra, colours and BRDF samples of a scene, and light against depth."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import overload
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pellicle.api.arguments import refuse
+from pellicle.data.brdf_samples import BrdfSamples
+from pellicle.data.colours import Colours
+from pellicle.data.spectrum import Spectrum
+from pellicle.errors import UsageError
+from pellicle.scene.film import Scene
+from pellicle.scene.kinds import check_scene
+from pellicle.scene.surface import Surface
+from pellicle.synthetic.brdf import Directions, simulate_samples
+from pellicle.synthetic.depth_profile import DepthProfile
+from pellicle.synthetic.depth_profile import depth_profile as film_depth_profile
+from pellicle.synthetic.measured_colours import simulate_colours
+from pellicle.synthetic.spectra import default_wavelengths, simulate_spectrum
+
+
+@overload
+def simulate(
+    scene: Scene,
+    wavelength: ArrayLike | None = None,
+    *,
+    noise: float = 0.0,
+    seed: int = 0,
+    depolarisation_noise: float | None = None,
+    elements: Sequence[str] | None = None,
+    sensor: None = None,
+    space: None = None,
+) -> Spectrum: ...
+@overload
+def simulate(
+    scene: Scene,
+    *,
+    sensor: tuple[np.ndarray, np.ndarray] | Colours | None = None,
+    space: str | None = None,
+    angle: ArrayLike | None = None,
+    gamma: float = 1.0,
+    noise: float = 0.0,
+    seed: int = 0,
+) -> Colours: ...
+@overload
+def simulate(
+    scene: Surface,
+    *,
+    directions: Directions | BrdfSamples | None = None,
+    noise: float | str | Sequence[float | str] = 0.0,
+    seed: int = 0,
+) -> BrdfSamples: ...
+def simulate(
+    scene: Scene | Surface,
+    wavelength: ArrayLike | None = None,
+    *,
+    directions: Directions | BrdfSamples | None = None,
+    noise: float | str | Sequence[float | str] = 0.0,
+    seed: int = 0,
+    depolarisation_noise: float | None = None,
+    elements: Sequence[str] | None = None,
+    sensor: tuple[np.ndarray, np.ndarray] | Colours | None = None,
+    space: str | None = None,
+    angle: ArrayLike | None = None,
+    gamma: float = 1.0,
+) -> Spectrum | BrdfSamples | Colours:
+    """Simulate a measurement of `scene`: spectrum or colours of a film, or samples of a surface's BRDF.
+
+    **Arguments:**
+
+    - `scene`: `Scene` or `Surface`. Free parameters take their start values; a free scale is 1 and a free
+      offset 0.
+    - `wavelength`: nm, shape (wavelengths,). Of a `Scene` only; 380 to 780 every 2 nm by default, within the
+      tables of its materials.
+    - `directions`: pairs of directions to light and eye, or the samples of which to take them. Of a
+      `Surface` only; 1000 pairs by default, spread over the lobe and around it.
+    - `noise`: standard deviation of the normal noise, in the unit of the signal: a fraction for R and T,
+      degrees for Ψ and Δ, that of each normalised Mueller element, 1/sr for a BRDF. It becomes the σ of the
+      result. Of a BRDF also a share of the signal, as "2 %", or a list of one for each channel.
+    - `seed` of the noise.
+    - `depolarisation_noise`: standard deviation of the depolarisation, a fraction; 0 for one without noise. A
+      spectrum of Ψ and Δ has a depolarisation where something in the scene depolarises (a thickness spread, a
+      bandwidth, a cone of light, a back face), and wherever this noise is given. By default the noise is
+      4·`noise` in radians, that of 1 − N² − C² − S².
+    - `elements`: names of the elements of a Mueller matrix, such as ["m12", "m33", "m34"]; all 15 beside m11
+      by default.
+    - `sensor`, `space`: for colours, of a `Scene` only. `sensor` is wavelengths (N,), nm, and weights (N, 3)
+      as of `pellicle.colour.sensor`, the CIE observer 1931 under D65 by default, or `Colours` of which
+      sensor, space, gamma and angles are taken. `space` is "srgb" (the default), "rgb", "xyz" or "lab".
+    - `angle` of incidence of the colours in degrees, (colours,); that of the scene by default.
+    - `gamma` of "rgb".
+
+    **Returns:** `Spectrum`, `BrdfSamples` or `Colours`, as `pellicle.fit` takes them.
+
+    **Raises:** ValueError where a material has no data at a wavelength; UsageError for a surface that
+    reflects nothing, or has neither one channel nor R, G and B.
+
+    ```python
+    >>> scene = pl.Scene(pl.Layer("SiO2", 500.0), "Si")
+    >>> pl.simulate(scene, [500.0, 600.0, 700.0]).values.round(4).tolist()
+    [0.3769, 0.1065, 0.3259]
+    >>> pl.simulate(scene, space="srgb", angle=[0, 60]).values.round(2).tolist()
+    [[0.28, 0.52, 0.6], [0.65, 0.6, 0.52]]
+
+    ```
+    """
+    check_scene(scene)
+    if isinstance(noise, float | int) and not noise >= 0:
+        raise UsageError(f"`noise` must not be negative, got {noise:g}")
+    if isinstance(scene, Surface):
+        refuse("a Surface", wavelength=wavelength, depolarisation_noise=depolarisation_noise)
+        refuse("a Surface", sensor=sensor, space=space, angle=angle, elements=elements)
+        return simulate_samples(scene, directions, noise, seed).samples
+    refuse("a Scene", directions=directions)
+    if not isinstance(noise, float | int):
+        raise UsageError(f"`noise` of a Scene must be one number, a standard deviation, not {noise!r}")
+    if sensor is not None or space is not None:
+        refuse("colours", wavelength=wavelength, depolarisation_noise=depolarisation_noise)
+        refuse("colours", elements=elements)
+        camera = None
+        if isinstance(sensor, Colours):
+            space, gamma, camera = sensor.space, sensor.gamma, sensor.camera
+            sensor, angle = sensor.sensor, sensor.angle if angle is None else angle
+        return simulate_colours(
+            scene, sensor, space or "srgb", angle, gamma=gamma, camera=camera, noise=noise, seed=seed
+        )[0]
+    refuse("a spectrum, whose angle is that of the scene's light", angle=angle)
+    return simulate_spectrum(
+        scene,
+        wavelength,
+        noise=noise,
+        seed=seed,
+        depolarisation_noise=depolarisation_noise,
+        elements=elements,
+    )
+
+
+def depth_profile(scene: Scene, at: ArrayLike, wavelength: ArrayLike | None = None) -> DepthProfile:
+    """Compute where a film absorbs light: absorptance of each layer and plate, and the field against depth.
+
+    Plane monochromatic waves: the instrument's bandwidth, cone and spreads are left out.
+
+    **Arguments:**
+
+    - `scene`: `Scene`, whose free parameters take their start values.
+    - `at`: wavelengths in nm of the field, a number or (chosen,).
+    - `wavelength`: nm, (wavelengths,), of the absorptances; by default as in `pellicle.simulate`.
+
+    **Returns:** `DepthProfile`: R, T and the `absorptance` of each layer and plate, which add up to 1, and
+    |E|² and absorbed power per nm in the `sections` between thick media. T enters the substrate, which
+    absorbs it unless it is transparent.
+
+    **Raises:** UsageError for rough faces and for a light of several angles; ValueError where a material has
+    no data at a wavelength.
+
+    ```python
+    >>> scene = pl.Scene(pl.Layer("Au", 40.0), pl.Substrate("BK7", back="air"))
+    >>> profile = pl.depth_profile(scene, 550.0, [500.0, 550.0])
+    >>> profile.media
+    ('Au', 'substrate')
+    >>> (profile.R + profile.T + profile.absorptance.sum(axis=0)).round(12).tolist()
+    [1.0, 1.0]
+
+    ```
+    """
+    check_scene(scene)
+    if isinstance(scene, Surface):
+        raise UsageError("a depth profile is one of a film: give a pl.Scene, not a Surface")
+    return film_depth_profile(scene, at, default_wavelengths(scene) if wavelength is None else wavelength)
