@@ -85,11 +85,15 @@ def test_missing_data_are_no_obstacle(explore, tmp_path, capsys):
     assert "film.csv" in capsys.readouterr().err
 
 
+def test_a_recipe_of_a_surface_is_shown_too(explore):
+    code, [(session, _)] = explore(str(ROOT / "docs/surfaces/oil_film.toml"))
+    assert (code, session.answer("scene", {})["kind"]) == (0, "surface")
+
+
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
         (["none.toml"], 3, "none.toml"),
-        ([str(ROOT / "docs/surfaces/oil_film.toml")], 2, "describes a surface"),
         (["film.toml", "--layer", "SiO2"], 2, "exclude each other"),
         (["--layer", "Si02"], 2, "Si02"),
         (["--layer", "Si/Chandler-Horowitz"], 3, "share no wavelengths"),

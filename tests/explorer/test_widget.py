@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.errors import UsageError
 
 pytest.importorskip("anywidget", reason="anywidget is absent: pip install 'pellicle[explore]'")
 
@@ -68,11 +67,6 @@ def test_its_module_loads_nothing(widget):
     assert "export default" in module
     own = module[: module.index("const PLOTLY")]
     assert not any(word in own for word in ("import ", "import(", "http:", "https:", "fetch("))
-
-
-def test_a_surface_is_refused():
-    with pytest.raises(UsageError, match="films"):
-        pl.explore(pl.Surface("microfacet-film", {"thickness": 50.0, "n": 2.3, "base_n": 2.9}))
 
 
 MODEL = """async (module) => {

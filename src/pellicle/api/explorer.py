@@ -6,7 +6,6 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from pellicle.errors import UsageError
 from pellicle.scene.film import Scene
 from pellicle.scene.kinds import check_scene
 from pellicle.scene.surface import Surface
@@ -15,24 +14,24 @@ from pellicle.scene.surface import Surface
 def explore(scene: Scene | Surface, *, wavelength: ArrayLike | None = None) -> Any:
     """Show a film in a notebook: sliders beside its spectrum, colour, sphere and plan, which follow them.
 
+    Of a surface, sliders beside the lobes of its BRDF in the plane of incidence, a sphere and the plan.
+
     The page is that of `pellicle explore`; it needs no network.
 
     **Arguments:**
 
-    - `scene`: the film; every number in it that a slider can move has one, free or not.
+    - `scene`: the film or the surface; every number in it that a slider can move has one, free or not.
     - `wavelength`: wavelengths of the plot in nm, (wavelengths,), by default those of the scene's light or
       the visible ones.
 
     **Returns:** A widget (anywidget): `values` are the sliders' numbers by name, in their units, and setting
     them moves the sliders; `recipe()` is the film in its current state as TOML.
 
-    **Raises:** UsageError without the package anywidget, and for a surface; DataError where the materials
+    **Raises:** UsageError without the package anywidget; DataError where the materials
     share no wavelengths.
     """
     from pellicle.explorer.session import Session
     from pellicle.explorer.widget import widget
 
     check_scene(scene)
-    if isinstance(scene, Surface):
-        raise UsageError("`scene` must be a Scene: the explorer shows films, and no surfaces")
     return widget(Session(scene, wavelength=wavelength))

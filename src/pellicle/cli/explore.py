@@ -82,7 +82,7 @@ def _of_recipe(path: str) -> Session:
 
     recipe, title = read_recipe(path), Path(path).name
     if isinstance(recipe, SurfaceRecipe):
-        raise UsageError(f"{path}: the explorer shows films, and this recipe describes a surface")
+        return Session(recipe.scene(), Path(path).parent, title=title)
     own = recipe.each[0] if recipe.each else recipe
     scene, data = own.scene(), own.tables.data
     spectra = []

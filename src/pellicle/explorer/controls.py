@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -143,6 +143,21 @@ def with_value(tree: Any, path: tuple[Any, ...], value: Any) -> Any:
             changed, name, with_value(field, tuple(rest), value) if name == step.name else field
         )
     return changed
+
+
+def scene_with(
+    scene: Scene, controls: Collection[Control], values: Mapping[str, float], free: Collection[str]
+) -> Scene:
+    """Return the scene with the values of its controls; those named `free` are free within their bounds."""
+    for control in controls:
+        value: Any = values[control.name]
+        if control.name in free:
+            prior = None if control.free is None else control.free.prior
+            value = Free(control.lower, control.upper, start=value, prior=prior)
+        elif control.optional and value == 0 and control.path[-1].name != "angle":
+            value = None
+        scene = with_value(scene, control.path, value)
+    return scene
 
 
 def _free_paths(tree: Any) -> list[tuple[Any, ...]]:

@@ -14,8 +14,9 @@ from pellicle.data.spectrum import Spectrum
 from pellicle.effects.film import exact
 from pellicle.effects.plan import Plan
 from pellicle.errors import DataError, UsageError
-from pellicle.explorer.controls import Control, film_controls, template, with_value
+from pellicle.explorer.controls import Control, film_controls, scene_with, template, with_value
 from pellicle.explorer.programs import angle_program, colour_program, spectrum_program
+from pellicle.explorer.sphere import ball_picture
 from pellicle.scene.film import Light, Scene, with_wavelength
 from pellicle.scene.free import Free, insert
 from pellicle.synthetic.spectra import VISIBLE, default_wavelengths
@@ -44,6 +45,8 @@ class Structure(NamedTuple):
 
 class FilmView:
     """Controls and programs of a film, whose spectra are computed at `wavelength` in nm."""
+
+    kind, parts = "spectrum", ("curves", "colour", "sphere", "plan")
 
     def __init__(self, scene: Scene, wavelength: Any = None) -> None:
         self.scene = scene
@@ -135,6 +138,15 @@ class FilmView:
             return None
         scene = with_value(self.scene, (GetAttrKey("light"),), light)
         return FilmView(scene, nm)
+
+    def picture(self, found: np.ndarray, size: int) -> bytes:
+        """Draw a ball with the colours `found` by the program "sphere", as a PNG."""
+        return ball_picture(found, size)
+
+    def stated(self, values: Mapping[str, float]) -> Scene:
+        """Return the scene with these values, at which its own free numbers start."""
+        free = [control.name for control in self.controls if control.free is not None]
+        return scene_with(self.scene, self.controls, values, free)
 
     def plan(self, values: Mapping[str, float]) -> Plan:
         """Return the exact plan of the scene with these values."""

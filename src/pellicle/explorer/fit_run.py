@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
 
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
-from pellicle.explorer.controls import Control, with_value
+from pellicle.explorer.controls import Control
 from pellicle.explorer.programs import Curve
 from pellicle.fitting.result import Curve as FittedCurve
 from pellicle.fitting.result import Fit
 from pellicle.fitting.spectra.fit import fit
 from pellicle.reporting import fit_text
 from pellicle.scene.film import Scene
-from pellicle.scene.free import Free
 
 
 class _Stopped(Exception):
@@ -74,21 +73,6 @@ def fitted_names(controls: Collection[Control], asked: Any) -> list[str]:
         return list(asked)
     free = [control.name for control in controls if control.free is not None]
     return free or [control.name for control in controls if control.path[-1].name == "thickness"]
-
-
-def scene_with(
-    scene: Scene, controls: Collection[Control], values: Mapping[str, float], free: Collection[str]
-) -> Scene:
-    """Return the scene with the values of its controls; those named `free` are free within their bounds."""
-    for control in controls:
-        value: Any = values[control.name]
-        if control.name in free:
-            prior = None if control.free is None else control.free.prior
-            value = Free(control.lower, control.upper, start=value, prior=prior)
-        elif control.optional and value == 0 and control.path[-1].name != "angle":
-            value = None
-        scene = with_value(scene, control.path, value)
-    return scene
 
 
 def to_json(found: Fit, controls: Collection[Control]) -> dict[str, Any]:

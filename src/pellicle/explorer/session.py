@@ -20,15 +20,18 @@ from pellicle.colour import lab, sensor
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import DataError, UsageError
 from pellicle.explorer.compiler import NOW, SOON, Compiler
+from pellicle.explorer.controls import scene_with
 from pellicle.explorer.dropped_files import LARGEST_FILE, data_curves, data_text, measured_spectra
 from pellicle.explorer.film_view import FilmView
-from pellicle.explorer.fit_run import FitRun, fitted_curves, fitted_names, scene_with, to_json
+from pellicle.explorer.fit_run import FitRun, fitted_curves, fitted_names, to_json
 from pellicle.explorer.programs import Curve
-from pellicle.explorer.sphere import ball_picture, to_linear_srgb
+from pellicle.explorer.sphere import to_linear_srgb
+from pellicle.explorer.surface_view import SurfaceExplorerView
 from pellicle.recipes.python_text import python_program
 from pellicle.recipes.write import recipe_text
 from pellicle.reporting.picture import encode
 from pellicle.scene.film import Scene, with_wavelength
+from pellicle.scene.surface import Surface
 
 log = getLogger(__name__)
 
@@ -50,7 +53,7 @@ class Session:
 
     def __init__(
         self,
-        scene: Scene,
+        scene: Scene | Surface,
         folder: str | Path | None = None,
         *,
         wavelength: Any = None,
@@ -60,8 +63,8 @@ class Session:
         self.title, self.folder = title, None if folder is None else Path(folder).resolve()
         if wavelength is None and spectra:
             wavelength = np.unique(spectra[0].wavelength)
-        view = FilmView(scene, wavelength)
-        self.view = (view.measured(spectra) if spectra else None) or view
+        view = SurfaceExplorerView(scene) if isinstance(scene, Surface) else FilmView(scene, wavelength)
+        self.view: FilmView | SurfaceExplorerView = (view.measured(spectra) if spectra else None) or view
         here = self.folder or Path.cwd()
         self.spectra = [replace(each, path=os.path.relpath(each.path, here)) for each in spectra]
         self._ahead = False  # whether programs are compiled before a view needs them
@@ -91,13 +94,15 @@ class Session:
             return {"error": f"{request} failed: {type(error).__name__}: {error}", **_serial(body)}
 
     def _scene(self, body: Mapping[str, Any]) -> dict[str, Any]:
-        about = {"title": self.title, "kind": "spectrum", "limit": LARGEST_FILE}
+        about = {"title": self.title, "kind": self.view.kind, "limit": LARGEST_FILE}
         data = {"data": self._data_shown()} if self.spectra else {}
         return {**about, **self.view.describe(), **data}
 
     def _data(self, body: Mapping[str, Any]) -> dict[str, Any]:
         """Read data, and take the light of the scene from them."""
         view = self.view
+        if isinstance(view, SurfaceExplorerView):
+            view.measured([])
         spectra = measured_spectra(body, self.folder, view.scene.light.signal)
         changed = view.measured(spectra)
         self.spectra = spectra
@@ -117,7 +122,7 @@ class Session:
 
     def _fit(self, body: Mapping[str, Any]) -> dict[str, Any]:
         view, values = self.view, self._values(body)
-        if not self.spectra:
+        if not self.spectra or isinstance(view, SurfaceExplorerView):
             raise UsageError("there are no data to fit: open a file first")
         names = fitted_names(view.controls, body.get("free"))
         found = self._fit_run.run(self.spectra, scene_with(view.scene, view.controls, values, names))
@@ -130,9 +135,9 @@ class Session:
 
     def _recipe(self, body: Mapping[str, Any]) -> dict[str, Any]:
         view, values = self.view, self._values(body)
-        free = [control.name for control in view.controls if control.free is not None]
-        scene = scene_with(view.scene, view.controls, values, free)
-        folder = Path.cwd() if self.folder is None else self.folder
+        scene, folder = view.stated(values), Path.cwd() if self.folder is None else self.folder
+        if isinstance(scene, Surface) or isinstance(view, SurfaceExplorerView):
+            return {"toml": recipe_text(scene, folder), "python": python_program(scene)}
         sampled = with_wavelength(scene, view.wavelength)
         files = list(dict.fromkeys(folder / spectrum.path for spectrum in self.spectra))
         toml = recipe_text(scene if files else sampled, folder, files=files)
@@ -147,7 +152,7 @@ class Session:
             raise UsageError(f"`size` must be 16 to {LARGEST} pixels")
         answer: dict[str, Any] = {**_serial(body), "compiling": [], "milliseconds": {}}
         parts = {"curves": self._curves, "colour": self._colour, "sphere": self._sphere, "plan": self._plan}
-        for part in wanted:
+        for part in (part for part in wanted if part in self.view.parts):
             began = time.perf_counter()
             try:
                 found = parts[part](values, bool(body.get("wait")), size)
@@ -189,7 +194,7 @@ class Session:
         """Compile in the background what the first views need, and then what one effect more needs."""
         view, self._ahead = self.view, True
         structure = view.structure(view.defaults())
-        several = [(kind, structure, NOW) for kind in ("curves", "colour", "sphere")]
+        several = [(kind, structure, NOW) for kind in view.parts if kind != "plan"]
         for other in view.neighbours(structure):
             several += [(kind, other, SOON) for kind in ("curves", "colour")]
         for kind, needed, urgency in several:
@@ -219,7 +224,7 @@ class Session:
         program = self._program("sphere", values, wait)
         if program is None:
             return None
-        return "data:image/png;base64," + b64encode(ball_picture(program(values), size)).decode()
+        return "data:image/png;base64," + b64encode(self.view.picture(program(values), size)).decode()
 
     def _plan(self, values: Mapping[str, float], wait: bool, size: int) -> list[dict[str, Any]]:
         return [
