@@ -107,6 +107,7 @@ ELSEWHERE = {
     ),
     "pellicle --install-completion": "would change the user's shell; part of cyclopts",
     "python benchmarks/anisotropic.py": "speed is measured by benchmarks; tests/optics/test_berreman.py",
+    "python benchmarks/peers --group birefringent --write": "make peers",
     "python benchmarks/peers/agreement.py --stacks 1000": "needs pyElli; tests/optics/test_berreman.py",
     "python benchmarks/calibration.py": _LONG_STUDY,
     "python benchmarks/colour_inverse.py": "tests/colour/test_inverse.py: 300 colours of one film",

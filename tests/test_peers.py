@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 HERE = Path(__file__).parents[1] / "benchmarks" / "peers"
-NAMES = ("cases", "truth", "table", "packages", "adapters.pellicle_any")
+NAMES = ("cases", "truth", "table", "packages", "birefringent", "adapters.pellicle_any")
 
 
 @pytest.fixture(scope="module")
@@ -40,18 +40,19 @@ def test_reference_values_agree_with_pellicle(peers):
             assert table.error(ours.slopes(case, np.float64), truth["slopes"], "slopes") < 1e-9, name
 
 
-def test_tables_are_inserted_into_the_page(peers):
+@pytest.mark.parametrize("name", ["films", "birefringent"])
+def test_tables_are_inserted_into_the_page(peers, name):
     script = runpy.run_path(str(HERE / "__main__.py"), run_name="peers")
-    page = script["PAGE"].read_text("utf-8")
-    again = script["inserted"](page, "new tables")
-    before, begin, rest = page.partition(script["BEGIN"])
-    assert again == before + begin + "\n\nnew tables\n\n" + rest[rest.index(script["END"]) :]
+    page, (begin, end) = script["PAGE"].read_text("utf-8"), (script[x].format(name) for x in ("BEGIN", "END"))
+    again = script["inserted"](page, "new tables", name)
+    before, _, rest = page.partition(begin)
+    assert again == before + begin + "\n\nnew tables\n\n" + rest[rest.index(end) :]
 
 
 def test_every_package_has_an_adapter(peers):
-    packages = peers["packages"]
+    packages, others = peers["packages"], peers["birefringent"].PACKAGES
     adapters = {path.stem for path in (HERE / "adapters").glob("*.py")}
-    assert {p.adapter for p in (*packages.OURS, *packages.PEERS)} <= adapters
+    assert {p.adapter for p in (*packages.OURS, *packages.PEERS, *others)} <= adapters
     assert all(p.install for p in packages.PEERS)
 
 

@@ -13,8 +13,9 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+import birefringent
 from cases import CASES, WITHOUT_SLOPE
 from environment import ROOT, install, peers_python
 from packages import OURS, PEERS, Package
@@ -24,16 +25,17 @@ from truth import truth
 HERE = Path(__file__).resolve().parent
 PAGE = ROOT / "docs" / "hard_cases.md"
 SECONDS = 300  # for all remaining cases of a process
-BEGIN, END = "<!-- peers: written by make peers -->", "<!-- /peers -->"
+BEGIN, END = "<!-- {}: written by make peers -->", "<!-- /{} -->"
+GROUPS = "films", "birefringent"
 
 
-def run(python: Path, package: Package) -> dict[str, Any]:
+def run(python: Path, package: Package, cases: dict[str, Any]) -> dict[str, Any]:
     """Return {case: answer}; a case that ends the process is a "crash" or "hang", and the rest run again.
 
     Raises ImportError with the package's message if it cannot be imported.
     """
     answers: dict[str, Any] = {}
-    while remaining := {name: case for name, case in CASES.items() if name not in answers}:
+    while remaining := {name: case for name, case in cases.items() if name not in answers}:
         lines, end = work(python, package, remaining)
         if any("unusable" in line for line in lines):
             raise ImportError(lines[0]["unusable"])
@@ -64,25 +66,58 @@ def version(python: Path, package: Package) -> str:
     return subprocess.run([str(python), "-c", code], capture_output=True, text=True).stdout.strip()
 
 
-def main(every_case: bool, write: bool) -> None:
-    truths = {name: truth(case, slopes=name not in WITHOUT_SLOPE) for name, case in CASES.items()}
+class Group(NamedTuple):
+    """Cases of one kind, the packages that compute them, and the headings of their tables."""
+
+    packages: tuple[Package, ...]
+    cases: dict[str, Any]
+    truths: dict[str, Any]
+    values: str
+    slopes: str
+
+
+def group(name: str) -> Group:
+    """Return the films or the birefringent films."""
+    if name == "birefringent":
+        return Group(
+            birefringent.PACKAGES,
+            *birefringent.cases_and_truths(),
+            values="Largest error of the elements of the Jones matrix:",
+            slopes="Largest error of their derivatives in all 15 numbers, as |g − g*|/(|g*| + 0.001):",
+        )
+    return Group(
+        (*OURS, *PEERS),
+        CASES,
+        {case: truth(at, slopes=case not in WITHOUT_SLOPE) for case, at in CASES.items()},
+        values="Largest error of R and T, s and p:",
+        slopes="Largest error of their derivatives in d, n, k, the substrate's n and the angle, "
+        "as |g − g*|/(|g*| + 0.001):",
+    )
+
+
+def main(names: list[str], every_case: bool, write: bool) -> None:
+    for name in names:
+        text = compared(group(name), every_case)
+        print(text)
+        if write:
+            PAGE.write_text(inserted(PAGE.read_text(encoding="utf-8"), text, name), encoding="utf-8")
+
+
+def compared(given: Group, every_case: bool) -> str:
     columns, notes = {}, []
-    for package in (*OURS, *PEERS):
+    for package in given.packages:
         python = peers_python() if package.install else Path(sys.executable)
         problem = install(python, package) if package.install else None
         try:
             if problem:
                 raise ImportError(problem)
-            columns[package.head] = run(python, package)
+            columns[package.head] = run(python, package, given.cases)
             notes.append(f"- {package.head} {version(python, package)}: {package.note}.")
         except ImportError as why:
             notes.append(f"- {package.head}: not installed: {why}")
         print(notes[-1], file=sys.stderr, flush=True)
         notes += refusals(columns.get(package.head, {}))
-    text = report(columns, truths, notes, every_case)
-    print(text)
-    if write:
-        PAGE.write_text(inserted(PAGE.read_text(encoding="utf-8"), text), encoding="utf-8")
+    return report(given, columns, notes, every_case)
 
 
 def refusals(answers: dict[str, Any]) -> list[str]:
@@ -95,28 +130,28 @@ def refusals(answers: dict[str, Any]) -> list[str]:
     return [f"  - refuses {', '.join(dict.fromkeys(names))}: {why}" for why, names in reasons.items()]
 
 
-def report(columns: dict[str, Any], truths: dict[str, Any], notes: list[str], every_case: bool) -> str:
+def report(given: Group, columns: dict[str, Any], notes: list[str], every_case: bool) -> str:
     heads, answers = list(columns), list(columns.values())
     return "\n\n".join(
         [
-            "Largest error of R and T, s and p:",
-            table(heads, answers, truths, "values", every_case),
-            "Largest error of their derivatives in d, n, k, the substrate's n and the angle, "
-            "as |g − g*|/(|g*| + 0.001):",
-            table(heads, answers, truths, "slopes", every_case),
-            "Bold: not a number, refused, or an error of more than 0.0005 (R, T) or 1 % (derivatives). "
+            given.values,
+            table(heads, answers, given.truths, "values", every_case),
+            given.slopes,
+            table(heads, answers, given.truths, "slopes", every_case),
+            "Bold: not a number, refused, or an error of more than 0.0005 (values) or 1 % (derivatives). "
             "†: the package warned.",
             "\n".join(notes),
         ]
     )
 
 
-def inserted(page: str, text: str) -> str:
-    """Return the page with `text` between its two markers."""
-    before, begin, rest = page.partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not begin or not end:
-        raise SystemExit(f"{PAGE.name} does not contain the markers {BEGIN} and {END}")
+def inserted(page: str, text: str, name: str = "films") -> str:
+    """Return the page with `text` between the two markers of a group."""
+    begin, end = BEGIN.format(name), END.format(name)
+    before, found, rest = page.partition(begin)
+    _, last, after = rest.partition(end)
+    if not found or not last:
+        raise SystemExit(f"{PAGE.name} does not contain the markers {begin} and {end}")
     return f"{before}{begin}\n\n{text}\n\n{end}{after}"
 
 
@@ -124,5 +159,6 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("--all", action="store_true", help="show every case, not only those with an error")
     parser.add_argument("--write", action="store_true", help="write the tables to docs/hard_cases.md too")
+    parser.add_argument("--group", choices=GROUPS, help="only these cases; by default all")
     given = parser.parse_args()
-    main(given.all, given.write)
+    main([given.group] if given.group else list(GROUPS), given.all, given.write)

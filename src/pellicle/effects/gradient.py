@@ -33,7 +33,7 @@ _CORNERS, _WAVELENGTHS = 16, 12
 """Corners of the bounds, and wavelengths, at which numbers of slices are first tried."""
 _INSIDE, _MORE_WAVELENGTHS = 48, 48
 """Random points between the bounds, and wavelengths, at which the error of a number is then measured. Without
-them, 9 of 1000 random scenes exceeded their stated error, one of them 26 times (`benchmarks/slices.py`)."""
+them, 5 of 720 random scenes exceeded their stated error, one of them 26 times (`benchmarks/slices.py`)."""
 _STEP = 2.0
 """Largest k₀nh of a slice that is worth a trial: Magnus' expansion converges below about π."""
 
