@@ -80,7 +80,7 @@ CI = ("make fit", "make test", "make notebooks", "make docs", "make dist")
 _LONG_STUDY = "takes hours; its tables are kept, and the modules that it uses have their own tests"
 ELSEWHERE = {
     **dict.fromkeys(CI, "run by CI: .ci/run"),
-    "make browser-tests": "needs Chromium; tests/reporting/test_page_in_browser.py",
+    "make browser-tests": "needs Chromium; tests/reporting/test_page_in_browser.py, tests/explorer",
     "make dist-check": "installs the wheel for every Python found; .ci/run: make dist",
     "make fits": "tests/test_fits.py: one study in every run, all of them in make slow",
     **dict.fromkeys(("make slow", "make coverage"), "run these tests"),
@@ -109,6 +109,7 @@ ELSEWHERE = {
     "python benchmarks/anisotropic.py": "speed is measured by benchmarks; tests/optics/test_berreman.py",
     "python benchmarks/peers --group birefringent --write": "make peers",
     "python benchmarks/peers/agreement.py --stacks 1000": "needs pyElli; tests/optics/test_berreman.py",
+    "python benchmarks/explorer.py": "speed is measured by benchmarks; tests/explorer",
     "python benchmarks/calibration.py": _LONG_STUDY,
     "python benchmarks/colour_inverse.py": "tests/colour/test_inverse.py: 300 colours of one film",
     "python benchmarks/colour_series.py": "tests/colour/test_series.py: fewer colours",

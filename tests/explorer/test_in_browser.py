@@ -161,6 +161,17 @@ def test_it_opens_at_every_width_without_error_or_foreign_request(opened, width,
     assert "R: least" in page.locator("figcaption").inner_text()
 
 
+def test_the_plot_follows_the_width_of_the_window(opened):
+    page = opened()
+    for width in (1000, 420, 1300):
+        page.set_viewport_size({"width": width, "height": 800})
+        page.wait_for_timeout(400)
+        box, drawing = (page.locator(place).first.bounding_box() for place in (".plot", ".plot .main-svg"))
+        assert drawing["width"] == pytest.approx(box["width"], abs=3)
+        assert drawing["height"] == pytest.approx(box["height"], abs=3)
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+
+
 def test_keys_on_a_slider_move_everything(opened):
     page = opened()
     before = shown(page)

@@ -290,7 +290,7 @@ export async function explore(element, call, options = {}) {
   const close = () => {
     dark.removeEventListener("change", redraw);
     zone.end();
-    window.Plotly?.purge(canvas);
+    plot.end();
   };
   return { values, set: (wanted) => setAll(wanted), redraw, close };
 }

@@ -21,6 +21,15 @@ class Plot {
   constructor(element, caption, reading) {
     Object.assign(this, { element, caption, reading, axis: { label: "" }, signals: [], curves: [], before: [], fitted: [], data: [], ranges: {}, revision: 0, at: -1 });
     element.addEventListener("keydown", (event) => this.#key(event));
+    this.observer = new ResizeObserver(() => {
+      if (element.clientWidth && element.clientWidth !== this.width) this.draw(false);
+    });
+    this.observer.observe(element);
+  }
+
+  end() {
+    this.observer.disconnect();
+    window.Plotly?.purge(this.element);
   }
 
   /** Label of the ordinate of a curve: Ψ and Δ have panels of their own, other curves share one. */
@@ -54,7 +63,7 @@ class Plot {
       ...this.fitted.map((curve) => trace(curve, { line: { color: colour("--rival"), width: 2, dash: "dot" } })),
     ];
     await window.Plotly.react(this.element, traces, this.#layout(ordinates, colour, moving), {
-      responsive: true, displaylogo: false, modeBarButtonsToRemove: ["lasso2d", "select2d"], doubleClick: "autosize",
+      displaylogo: false, modeBarButtonsToRemove: ["lasso2d", "select2d"], doubleClick: "autosize",
       toImageButtonOptions: { format: "svg", filename: "spectrum" },
     });
     if (!this.element.dataset.ready) {
@@ -69,12 +78,13 @@ class Plot {
   }
 
   #layout(ordinates, colour, moving) {
-    const narrow = this.element.clientWidth < 560;
+    this.width = this.element.clientWidth;
+    const narrow = this.width < 560;
     const coarse = window.matchMedia("(pointer: coarse)").matches;
     const line = { gridcolor: colour("--line"), zerolinecolor: colour("--line"), linecolor: colour("--line") };
     const share = (1 - 0.08 * (ordinates.length - 1)) / ordinates.length;
     const layout = {
-      height: (narrow ? 150 : 250) * ordinates.length + (narrow ? 90 : 110),
+      width: this.width, height: (narrow ? 150 : 250) * ordinates.length + (narrow ? 90 : 110),
       margin: { l: narrow ? 52 : 68, r: 12, t: 34, b: narrow ? 40 : 48 }, uirevision: this.revision, dragmode: coarse ? false : "zoom",
       paper_bgcolor: colour("--page"), plot_bgcolor: colour("--page"), font: { color: colour("--text"), size: 13 },
       hovermode: "x", hoversubplots: "axis", hoverlabel: { bgcolor: colour("--panel"), font: { color: colour("--text") } },
@@ -88,6 +98,7 @@ class Plot {
         ...line, title: { text: name, standoff: 6 }, range, domain: [Math.max(top - share, 0), top], anchor: "x",
       };
     });
+    this.element.style.minHeight = `${layout.height + 2}px`;
     return layout;
   }
 
