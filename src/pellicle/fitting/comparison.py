@@ -21,7 +21,7 @@ from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
 from pellicle.fitting.noise import correlation_length
 from pellicle.fitting.presentation import ReportMixin
-from pellicle.fitting.result import BrdfCurve, ColourCurve, Curve, Fit, Part, Status
+from pellicle.fitting.result import BIREFRINGENCE, BrdfCurve, ColourCurve, Curve, Fit, Part, Status
 from pellicle.fitting.spectra.sweeps import correlation_in_sweeps, sweeps
 
 log = getLogger(__name__)
@@ -29,6 +29,14 @@ log = getLogger(__name__)
 UNDECIDED, STRONG = 2.0, 6.0
 """ΔBIC below which two descriptions cannot be distinguished, and from which the evidence is strong (R. Kass
 and A. Raftery 1995, J. Am. Stat. Assoc. 90, 773)."""
+
+
+_COMPATIBLE = 1.96
+"""Standard errors within which a number is compatible with 0, at 95 %."""
+
+
+_UNSEEN_BIREFRINGENCE = 0.1
+"""Error of a birefringence that data do not show: few crystals have more."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +69,10 @@ class Comparison(ReportMixin):
         best, second, *_ = sorted(self.candidates, key=lambda c: c.bic)
         apart = second.bic - best.bic
         more, less = _extra(best.fit, second.fit), _extra(second.fit, best.fit)
+        birefringent = [_birefringent(one.fit) for one in (best, second)]
+        if birefringent[0] != birefringent[1]:
+            # its indices have other names than the one that they stand for
+            more, less = [["birefringence"] if one else [] for one in birefringent]
         verb = "strongly favour" if apart >= STRONG else "favour"
         if apart < UNDECIDED:
             sentence = f"The data do not distinguish {best.name} from {second.name} (ΔBIC {apart:.1f})"
@@ -74,6 +86,12 @@ class Comparison(ReportMixin):
             else:
                 rather = f" rather than {' and '.join(less)}" if less else ""
                 sentence += f"the data {verb} {' and '.join(more) or 'its materials'}{rather}"
+            if birefringent == [True, False]:
+                sentence += _size_of_birefringence(best.fit)
+            elif birefringent == [False, True]:
+                found = _clearest_birefringence(second.fit)
+                unseen = found is not None and found[2] > _UNSEEN_BIREFRINGENCE
+                sentence += ", and these data would not show it" if unseen else ""
         if best.fit.status is Status.MISFIT:
             return f"{sentence}. But even {best.name} does not explain the data."
         if best.fit.status is not Status.CONVERGED:
@@ -201,6 +219,31 @@ def _deviance(residuals: Sequence[_Residuals], lengths: Sequence[float]) -> floa
         square, count = float(np.sum(own.rows**2)), own.independent
         total += (square if own.known else count * math.log(max(square / count, 1e-300))) / length
     return total
+
+
+def _birefringent(fit: Fit) -> bool:
+    return any(row.effect == "anisotropy" and row.on for part in fit.parts for row in part.plan.rows)
+
+
+def _clearest_birefringence(fit: Fit) -> tuple[float, float, float] | None:
+    """Wavelength (nm) at which the fitted birefringence is largest against its error, and both there; None
+    where it was not fitted or the layer is biaxial."""
+    found = fit.principal_indices.get(BIREFRINGENCE)
+    if found is None or not np.all(found.n_stderr > 0):
+        return None
+    i = int(np.argmax(np.abs(found.n) / found.n_stderr))
+    return float(found.wavelength[i]), float(found.n[i]), float(found.n_stderr[i])
+
+
+def _size_of_birefringence(fit: Fit) -> str:
+    """Words on the fitted birefringence where it is largest against its error."""
+    if (found := _clearest_birefringence(fit)) is None:
+        return ""
+    wavelength, n, error = found
+    text = f", {n:.3g} ± {error:.2g} at {wavelength:g} nm"
+    if abs(n) > _COMPATIBLE * error:
+        return text
+    return text + ": by noise alone it is there, but usual errors of instruments and samples would imitate it"
 
 
 def _extra(one: Fit, other: Fit) -> list[str]:

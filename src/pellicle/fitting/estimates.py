@@ -90,7 +90,10 @@ def estimates(
     # a profile likelihood has corrected the error of the noise; what is not noise adds to it
     more = np.maximum(discrepancy.variance - errors.stderr**2, 0.0).tolist()
     free = []
-    for p, value, own, extra in zip(parameters, values, bounded, more[: len(values)], strict=True):
+    rows = zip(parameters, values, bounded, more[: len(values)], errors.stderr.tolist(), strict=False)
+    for p, value, own, extra, linear_error in rows:
+        if linear_error > p.upper - p.lower:
+            extra = 0.0  # only the bounds limit it: the difference of two huge variances is rounding
         limit = _widened(own, value, extra, ranked.freedom, (p.lower, p.upper))
         margin = min(value - p.lower, p.upper - value)
         at_bound = not p.periodic and margin <= _ON_BOUND * (p.upper - p.lower)

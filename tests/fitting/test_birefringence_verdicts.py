@@ -1,0 +1,83 @@
+"""Verdicts on isotropic and birefringent descriptions of one film, from fits written down by hand."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pellicle as pl
+from pellicle.effects.plan import Plan, Row
+from pellicle.fitting.comparison import Candidate, Comparison
+from pellicle.fitting.result import BIREFRINGENCE, Curve, Estimate, Fit, Index, Part, Status
+
+
+def candidate(name: str, bic: float, delta: tuple[float, float] | None = None) -> Candidate:
+    """A candidate with a birefringence and its error, or isotropic."""
+    nm, zero = np.array([400.0, 500.0]), np.zeros(2)
+    principal = {}
+    if delta is not None:
+        n, error = delta
+        # at 400 nm it is half as clear
+        principal[BIREFRINGENCE] = Index(nm, np.full(2, n), zero, np.array([2 * error, error]), zero)
+    free = ["ordinary.n", "extraordinary.n"] if delta else ["n"]
+    plan = Plan((Row("anisotropy", delta is not None, ""),), "psi-delta", "unpolarised")
+    curve = Curve(nm, zero, zero + 1, zero, zero, zero, zero, zero, principal=principal)
+    fit = Fit(
+        parts=(Part("", pl.Spectrum(nm, zero + 0.2, "R"), curve, plan, 0.0, 1.0, 2.0),),
+        status=Status.CONVERGED,
+        verdict="",
+        parameters={word: Estimate(word, 1.0, 0.1, "", 0.0, 9.0, True) for word in ("thickness", *free)},
+        rivals=(),
+        chi2_reduced=1.0,
+        rms=0.0,
+        effective_points=2.0,
+        correlation_names=(),
+        correlation=np.zeros((0, 0)),
+        warnings=(),
+        profile=None,
+        seconds=0.0,
+    )
+    return Candidate(name, fit, 1 + len(free), 0.0, 0.0, bic)
+
+
+@pytest.mark.parametrize(
+    ("difference", "delta", "expected"),
+    [
+        (100.0, (0.03, 0.007), "the data strongly favour birefringence, 0.03 ± 0.007 at 500 nm."),
+        (76.0, (0.002, 0.007), "usual errors of instruments and samples would imitate it."),
+        (-4.1, (0.0, 0.007), "birefringence is not needed."),
+        (-4.1, (0.0, 0.5), "birefringence is not needed, and these data would not show it."),
+        (-1.0, (0.0, 0.007), "prefer isotropic, which has fewer free parameters."),
+    ],
+)
+def test_birefringence_is_called_what_it_is(difference, delta, expected):
+    both = candidate("isotropic", difference), candidate("uniaxial", 0.0, delta)
+    assert Comparison(both, 100.0).verdict.endswith(expected)
+
+
+@pytest.mark.slow  # compiles two fits
+def test_data_that_do_not_see_birefringence_have_no_huge_errors():
+    """R of p at one angle depends on two combinations of n_o, n_e and thickness: bounds limit them."""
+    light, nm = pl.Light(angle=60.0, polarisation="p"), np.linspace(400, 900, 64)
+
+    def index():
+        return pl.dispersion.Constant(pl.Free(1.5, 2.2, start=1.8))
+
+    def scene(material, thickness: Any = 150.0):
+        return pl.Scene(pl.Layer(material, thickness), "Si", light=light)
+
+    data = pl.simulate(scene(pl.Anisotropic(1.8, 1.83)), nm, noise=0.002, seed=3)
+    found = pl.compare(
+        data,
+        {
+            "isotropic": scene(index(), pl.Free(100, 200)),
+            "uniaxial": scene(pl.Anisotropic(index(), index()), pl.Free(100, 200)),
+        },
+    )
+    assert found.verdict.endswith("birefringence is not needed, and these data would not show it.")
+    for one in found.candidates:
+        assert one.fit.parameters["thickness"].stderr < 100 or np.isinf(
+            one.fit.parameters["thickness"].stderr
+        )
