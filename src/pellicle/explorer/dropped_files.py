@@ -89,12 +89,12 @@ def _read(path: Path, name: str, signal: str) -> list[Spectrum]:
     return [replace(each, path=name, notes=own) for each, own in zip(found, notes, strict=True)]
 
 
-def data_curves(spectra: list[Spectrum]) -> list[Curve]:
-    """Return the curves of spectra, one for each angle."""
+def data_curves(spectra: list[Spectrum], at: float) -> list[Curve]:
+    """Return the curves of spectra; of several angles that nearest to `at`, the scene's angle in degrees."""
     curves = []
     for spectrum in spectra:
         angles = [None] if spectrum.angle is None else np.unique(spectrum.angle).tolist()
-        for angle in angles:
+        for angle in angles if len(angles) == 1 else [min(angles, key=lambda each: abs(each - at))]:
             rows = slice(None) if angle is None else spectrum.angle == angle
             name = " ".join(x for x in (spectrum.name, "" if len(angles) == 1 else f"{angle:g}°") if x)
             columns = {spectrum.signal: spectrum.values}
@@ -115,4 +115,7 @@ def data_text(spectra: list[Spectrum]) -> list[str]:
         nm = spectrum.wavelength
         about = f"{spectrum.signal}, {len(nm)} points from {nm.min():g} to {nm.max():g} nm"
         found += [f"{spectrum.path}: {about}", *spectrum.notes]
+        count = 1 if spectrum.angle is None else len(np.unique(spectrum.angle))
+        if count > 1:
+            found.append(f"data at one of {count} angles of incidence are drawn; a fit uses all of them")
     return list(dict.fromkeys(found))

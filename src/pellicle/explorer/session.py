@@ -114,9 +114,10 @@ class Session:
         return {**self._data_shown(), "scene_changed": True}
 
     def _data_shown(self) -> dict[str, Any]:
+        angle = self.view.defaults().get("angle", 0.0)
         return {
             "name": self.spectra[0].path,
-            "curves": [curve_to_json(curve) for curve in data_curves(self.spectra)],
+            "curves": [curve_to_json(curve) for curve in data_curves(self.spectra, angle)],
             "notes": data_text(self.spectra),
         }
 

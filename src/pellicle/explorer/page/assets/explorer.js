@@ -102,8 +102,9 @@ export async function explore(element, call, options = {}) {
     compiling(answer);
     if (!answer.sphere) return;
     sphere.src = answer.sphere;
-    sphere.hidden = false;
-    sphere.alt = `Ball with this film under a lamp and sky; ${colourText.textContent}`;
+    sphere.hidden = look.hidden = false;
+    patch.hidden = !colourText.textContent; // a surface has no one colour
+    sphere.alt = `Ball with this film under a lamp and sky; ${colourText.textContent}`.replace(/; $/, "");
   });
   const askPlan = newestOf(asView, (answer) => { if (answer.plan) plan.replaceChildren(...planLists(answer.plan)); });
 
