@@ -93,18 +93,21 @@ def data_curves(spectra: list[Spectrum], at: float) -> list[Curve]:
     """Return the curves of spectra; of several angles that nearest to `at`, the scene's angle in degrees."""
     curves = []
     for spectrum in spectra:
-        angles = [None] if spectrum.angle is None else np.unique(spectrum.angle).tolist()
-        for angle in angles if len(angles) == 1 else [min(angles, key=lambda each: abs(each - at))]:
-            rows = slice(None) if angle is None else spectrum.angle == angle
-            name = " ".join(x for x in (spectrum.name, "" if len(angles) == 1 else f"{angle:g}°") if x)
-            columns = {spectrum.signal: spectrum.values}
-            if spectrum.signal == "psi-delta":
-                columns = {"Ψ": spectrum.values, "Δ": spectrum.delta}
-            elif spectrum.signal == MUELLER:
-                columns = dict(zip(spectrum.elements, spectrum.values.T, strict=True))
-            for label, values in columns.items():
-                shown = f"{label} ({name})" if name else label
-                curves.append(Curve(shown, spectrum.wavelength[rows], np.asarray(values)[rows]))
+        rows: Any = slice(None)
+        words = [spectrum.name] if spectrum.name else []
+        angles = [] if spectrum.angle is None else np.unique(spectrum.angle).tolist()
+        if len(angles) > 1:
+            nearest = min(angles, key=lambda angle: abs(angle - at))
+            rows = spectrum.angle == nearest
+            words.append(f"{nearest:g}°")
+        columns = {spectrum.signal: spectrum.values}
+        if spectrum.signal == "psi-delta":
+            columns = {"Ψ": spectrum.values, "Δ": spectrum.delta}
+        elif spectrum.signal == MUELLER:
+            columns = dict(zip(spectrum.elements, spectrum.values.T, strict=True))
+        for label, values in columns.items():
+            shown = f"{label} ({' '.join(words)})" if words else label
+            curves.append(Curve(shown, spectrum.wavelength[rows], np.asarray(values)[rows]))
     return curves
 
 
