@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 
 import pellicle as pl
+from pellicle.dispersion.empirical import Constant
+from pellicle.effects.anisotropy import GENERAL, SLICED
+from pellicle.effects.film import exact
 
 NM = np.linspace(500.0, 700.0, 16)
 ORDINARY, EXTRAORDINARY = 1.658, 1.486  # calcite at 589 nm (Ghosh 1999, to 1e-3)
@@ -115,6 +118,22 @@ def test_tilted_axis_gives_the_mueller_matrix_and_the_powers_of_the_functions():
     for letter, sign in (("p", 1), ("s", -1)):
         power = values(scene(pl.Layer(tilted, 300.0), "Si", "R", letter))
         np.testing.assert_allclose(power, own[:, 0, 0] + sign * own[:, 0, 1], atol=1e-6)
+
+
+def test_slices_only_where_one_wave_may_decay_within_the_bounds():
+    def size(ordinary, thickness, angle=ANGLE):
+        crystal = pl.Anisotropic(ordinary, 1.75 + 0.05j, axis=(40.0, 25.0))
+        at = pl.Scene(pl.Layer(crystal, thickness), "Si", light=pl.Light(NM, angle))
+        return exact(at).row("anisotropy").count
+
+    # 2π · 0.05 · 400/400 is a tenth of the limit, and ten times the limit in a layer of 40 µm
+    assert size(1.6, pl.Free(100, 400)) == GENERAL
+    assert size(1.6, pl.Free(100, 40_000)) == SLICED
+    assert size(Constant(1.6, pl.Free(0, 0.01)), 400.0) == GENERAL
+    assert size(Constant(1.6, pl.Free(0, 2)), 400.0) == SLICED
+    # a wave of index 0.8 is evanescent at 60 degrees
+    assert size(0.8, 400.0) == SLICED
+    assert size(0.8, 400.0, angle=20.0) == GENERAL
 
 
 def test_what_is_not_computed_is_refused():

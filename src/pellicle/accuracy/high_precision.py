@@ -33,7 +33,7 @@ def unsuitable(case: Case) -> str | None:
         return "this layer's thickness is uneven"
     if instrument.has_cone:
         return "this light comes in a cone"
-    if case.plan.row("anisotropy").count == GENERAL:
+    if case.plan.row("anisotropy").count >= GENERAL:
         return "an optic axis is tilted"
     if case.plan.on("gradient"):
         return "this layer's index varies with depth"

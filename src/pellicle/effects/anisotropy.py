@@ -6,13 +6,16 @@ from typing import Any
 
 from pellicle.dispersion.anisotropic import Anisotropic
 from pellicle.dispersion.principal_media import isotropic_in_plane, mixes_polarisations
+from pellicle.effects.bounds import largest_attenuation
 from pellicle.effects.plan import Row
 from pellicle.errors import UsageError
-from pellicle.scene.film import Scene, groups, is_graded
+from pellicle.optics.berreman.slices import DIRECT
+from pellicle.scene.film import Scene, coherent_layers, groups, is_graded
 from pellicle.scene.layers import Interface
 
-CLOSED_FORMS, GENERAL = 2, 4
-"""`Row.count` of the effect: size of the matrices."""
+CLOSED_FORMS, GENERAL, SLICED = 2, 4, 8
+"""`Row.count` of the effect: size of the matrices; `SLICED` is 4×4 with layers that may be strongly dichroic,
+which are computed in slices."""
 
 
 def anisotropy(scene: Scene) -> Row:
@@ -26,9 +29,17 @@ def anisotropy(scene: Scene) -> Row:
     _check(scene)
     if any(map(mixes_polarisations, media)):
         why = "an optic axis is tilted or its angles are free: s and p mix, matrices of 4×4"
+        if any(_strongly_dichroic(layer, scene) for layer in coherent_layers(scene)):
+            return Row("anisotropy", True, f"{why}, in slices where one wave decays", count=SLICED)
         return Row("anisotropy", True, why, count=GENERAL)
     why = "axes along the normal and the plane of incidence: s and p stay apart, closed forms of 2×2"
     return Row("anisotropy", True, why, count=CLOSED_FORMS)
+
+
+def _strongly_dichroic(layer: Any, scene: Scene) -> bool:
+    """True where one of the waves that mix in a layer may be absorbed while the other passes."""
+    mixing = mixes_polarisations(layer.material)
+    return mixing and not largest_attenuation(layer.material, layer.thickness, scene) <= DIRECT
 
 
 def scene_media(scene: Scene) -> list[Any]:

@@ -12,7 +12,7 @@ from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.dispersion.empirical import Tabulated
 from pellicle.dispersion.principal_media import isotropic_in_plane, principal_media
 from pellicle.optics import interface, orders
-from pellicle.optics.pair import abs2, real
+from pellicle.optics.pair import Number, abs2, imag, real
 from pellicle.scene.film import Scene, groups
 from pellicle.scene.free import Free, free_leaves, insert, start_values
 
@@ -40,21 +40,48 @@ def upper(number: Any) -> float:
 
 def largest_index(material: AbstractDispersion, wavelength: np.ndarray) -> float:
     """The largest real index at these wavelengths (nm) over the corners of the bounds (at most 64)."""
-    return max(float(np.nanmax(_corner_indices(m, wavelength))) for m in principal_media(material))
+    return max(float(np.nanmax(np.real(_corner_indices(m, wavelength)))) for m in principal_media(material))
 
 
 def smallest_index(material: AbstractDispersion, wavelength: np.ndarray) -> float:
     """The smallest real index likewise, but at least 0.1: a metal has no fringes to count."""
-    least = min(float(np.nanmin(_corner_indices(m, wavelength))) for m in principal_media(material))
+    least = min(float(np.nanmin(np.real(_corner_indices(m, wavelength)))) for m in principal_media(material))
     return max(least, 0.1)
 
 
+def largest_attenuation(material: AbstractDispersion, thickness: Any, scene: Scene) -> float:
+    """The largest attenuation of a wave in a layer over the corners of the bounds, as an exponent of its
+    amplitude; infinite where a wave may be evanescent.
+
+    An estimate: waves of an anisotropic medium count as those of isotropic media between its principal ones.
+    """
+    if scene.light.wavelength is None or free_leaves(scene.ambient):
+        return np.inf
+    wavelength = np.atleast_1d(np.asarray(scene.light.wavelength, dtype=float))
+    degrees = upper(scene.light.angle) if isinstance(scene.light.angle, Free) else scene.light.angle
+    sine = np.sin(np.deg2rad(np.asarray(degrees) + upper(scene.instrument.angle_shift)))
+    a = real(known_index(scene.ambient, wavelength)) * sine
+    indices = np.concatenate([_corner_indices(m, wavelength) for m in principal_media(material)])
+    least = np.min(np.real(indices), axis=0)
+    if not np.all(least > 1.01 * a):
+        return np.inf
+    extinction = (
+        np.max(np.real(indices), axis=0) * np.max(np.imag(indices), axis=0) / np.sqrt(least**2 - a**2)
+    )
+    return float(np.max(2 * np.pi / wavelength * upper(thickness) * extinction))
+
+
 def _corner_indices(material: AbstractDispersion, wavelength: np.ndarray) -> np.ndarray:
+    """Complex indices (corners, wavelengths)."""
+
+    def row(index: Number) -> np.ndarray:
+        return np.broadcast_to(np.asarray(real(index)) + 1j * np.asarray(imag(index)), wavelength.shape)
+
     if isinstance(material, Tabulated):
-        return np.asarray(real(material.value))
+        return row(material.value)[None]
     free = [leaf for _, leaf in free_leaves(material)]
     corners = itertools.islice(itertools.product(*[(f.lower, f.upper) for f in free]), 64)
-    return np.stack([real(known_index(insert(material, corner), wavelength)) for corner in corners])
+    return np.stack([row(known_index(insert(material, corner), wavelength)) for corner in corners])
 
 
 def largest_ratio(scene: Scene) -> float:

@@ -74,7 +74,7 @@ def build(plan: Plan) -> Simulate:
     ellipsometric = plan.signal in ELLIPSOMETRY
     powers = partial(_stokes_rows if ellipsometric else _power_rows, plan)
     finish = _normalised_rows if ellipsometric else _mean
-    mixed = plan.row("anisotropy").count == GENERAL
+    mixed = plan.row("anisotropy").count >= GENERAL
     if mixed:
         powers, finish = partial(mixed_polarisations.rows, plan), partial(mixed_polarisations.finished, plan)
     averaged = plan.row("coherence").count or plan.on("angle-spread")

@@ -7,14 +7,14 @@ from typing import Any
 
 import jax.numpy as jnp
 
+from pellicle.effects.anisotropy import SLICED
 from pellicle.effects.plan import Plan
 from pellicle.optics import ellipsometry
-from pellicle.optics.anisotropy import mixes_polarisations
 from pellicle.optics.berreman.matrices import Elements
 from pellicle.optics.berreman.stack import polarised, transmittances
 from pellicle.optics.hoisting import stored
 from pellicle.optics.mueller import inverse_intensity, mueller_elements
-from pellicle.optics.pair import abs2, conj, imag, is_real, real, to_pair
+from pellicle.optics.pair import abs2, conj, imag, real, to_pair
 from pellicle.simulation.coherent_groups import CoherentGroup
 
 
@@ -26,9 +26,7 @@ def rows(plan: Plan, groups: list[CoherentGroup]) -> list[Any]:
     """
     (group,) = groups
     angle = jnp.zeros_like(group.phases[0]) if group.angle is None else group.angle
-    # the waves of a layer have different attenuations only where it absorbs or where one is evanescent
-    absorbing = any(mixes_polarisations(layer) and not is_real(layer) for layer in group.layers)
-    dichroic = absorbing or plan.on("tunnelling")
+    dichroic = plan.row("anisotropy").count == SLICED
     response = polarised(group.above, group.layers, group.below, group.phases, angle, dichroic)
     jones = Elements(*map(to_pair, response.reflected))
     if plan.signal == "mueller":
