@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
+from pellicle.errors import UsageError
 
 NM = np.linspace(400.0, 900.0, 128)
 SHARE, NOISE = 0.4, 0.001
@@ -55,3 +56,10 @@ def test_a_whole_back_face_says_what_part_would_explain_the_data(measured):
 def test_more_than_all_is_refused(measured):
     with pytest.raises(ValueError, match="`back_collected` must be at most 1: its upper bound is 2"):
         pl.fit(measured, scene(pl.Free(50, 400), back_collected=pl.Free(0, 2)))
+
+
+def test_a_transmittance_through_a_back_that_returns_nothing_is_refused():
+    """The scene of a file without a stated signal is that of R, where a rough back is simulated."""
+    rough = scene(pl.Free(50, 400), back_collected=0.0)
+    with pytest.raises(UsageError, match="through a rough or taped back is not simulated"):
+        pl.fit(pl.Spectrum(NM, np.full(128, 0.8), "T", path="film.csv"), rough)

@@ -55,6 +55,12 @@ Target: TypeAlias = Measured | MeasuredColours
 
 def measured(data: Spectrum, scene: Scene, name: str = "") -> Measured:
     """A spectrum in numbers, with the scene in its light. Raises UsageError as `fit` does."""
+    if data.signal == "T" and scene.light.signal != "T" and scene.substrate.back_collected == 0.0:
+        raise UsageError(
+            f"{data.path}: is a transmittance, and no light from the back face is collected: that through a"
+            ' rough or taped back is not simulated; for a clear back give `signal="T"`, or leave out'
+            " `back_collected`"
+        )
     scene = seen_as(scene, data)
     _check(data, scene)
     source = Noise(data.sigma is not None, data.sigma is None and drifts(scene))
