@@ -63,5 +63,6 @@ def test_a_fit_needs_the_back_face(ncs):
     )
     found = pl.fit(noisy, SCENE)
     assert found.status == "converged"
-    assert abs(found["thickness"].value - 120.0) < 4 * found["thickness"].stderr < 0.5
+    # the data have noise and no systematic effects
+    assert abs(found["thickness"].value - 120.0) < 4 * found["thickness"].stderr_noise < 0.1
     assert "The back face matters" in found.verdict
