@@ -32,9 +32,21 @@ thickness = { lower = 50, upper = 600, value = 250 }
 """
 
 
-def start(folder):
+SURFACE = """
+[scene.surface]
+model = "microfacet-film"
+wavelengths = [645, 525, 445]
+thickness = { value = 180, lower = 100, upper = 300 }
+n = 1.46
+roughness = 0.2
+base_n = 2.9
+base_k = 3.0
+"""
+
+
+def start(folder, recipe=RECIPE):
     """A running `pellicle explore`, and the address that it prints."""
-    (folder / "film.toml").write_text(RECIPE)
+    (folder / "film.toml").write_text(recipe)
     code = "import sys; from pellicle.cli import process; process()"
     command = [sys.executable, "-c", code, "explore", str(folder / "film.toml"), "--no-browser"]
     server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
@@ -341,3 +353,21 @@ def test_a_server_that_ended_is_said_in_one_sentence(browser, tmp_path):
     page.wait_for_selector(".trouble:not([hidden])")
     assert "does not answer" in page.get_by_role("alert").inner_text()
     page.close()
+
+
+def test_a_surface_shows_its_lobes_in_one_panel_and_takes_no_data(browser, tmp_path):
+    server, address = start(tmp_path, SURFACE)
+    page = browser.new_page()
+    page.goto(address)
+    settle(page)
+    lobes = [curve(page, name) for name in ("645 nm", "525 nm", "445 nm")]
+    assert page.evaluate("document.querySelector('.plot').data.map((t) => t.yaxis)") == ["y"] * 3
+    assert min(map(min, lobes)) >= 0
+    slider(page).press("PageUp")
+    page.wait_for_timeout(1000)
+    assert curve(page, "645 nm") != lobes[0]
+    assert page.locator(".patch").is_hidden()
+    assert page.get_by_role("button", name="Open data").is_hidden()
+    page.close()
+    server.send_signal(signal.SIGINT)
+    server.communicate(timeout=20)

@@ -103,8 +103,7 @@ export async function explore(element, call, options = {}) {
     if (!answer.sphere) return;
     sphere.src = answer.sphere;
     sphere.hidden = look.hidden = false;
-    patch.hidden = !colourText.textContent; // a surface has no one colour
-    sphere.alt = `Ball with this film under a lamp and sky; ${colourText.textContent}`.replace(/; $/, "");
+    sphere.alt = `Ball with this film or surface in a studio. ${colourText.textContent}`.trim();
   });
   const askPlan = newestOf(asView, (answer) => { if (answer.plan) plan.replaceChildren(...planLists(answer.plan)); });
 
@@ -171,8 +170,9 @@ export async function explore(element, call, options = {}) {
     const scene = await ask("scene");
     if (scene.error) return false;
     options.titled?.(scene.title);
+    element.classList.toggle("of-surface", scene.kind === "surface");
     limit = scene.limit ?? Infinity;
-    Object.assign(plot, { axis: scene.axis, signals: scene.signals, curves: [], before: [], fitted: [], ranges: {} });
+    Object.assign(plot, { kind: scene.kind, axis: scene.axis, signals: scene.signals, curves: [], before: [], fitted: [], ranges: {} });
     canvas.setAttribute("aria-label", `Plot of ${scene.signals.join(", ")} against ${scene.axis.label}. Arrow keys read the points.`);
     controls = scene.controls.map((about, i) => new Control(about, `${id}-${i}`, moved));
     for (const each of controls) {
@@ -221,7 +221,7 @@ export async function explore(element, call, options = {}) {
   }
 
   // ---- fit ----
-  const fit = make("button", { type: "button", disabled: true, onclick: runFit, title: "Fits the marked sliders to the data" }, "Fit");
+  const fit = make("button", { type: "button", class: "fit", disabled: true, onclick: runFit, title: "Fits the marked sliders to the data" }, "Fit");
   const stop = make("button", { type: "button", hidden: true, onclick: () => ask("fit_stop") }, "Stop");
 
   async function runFit() {

@@ -1,6 +1,8 @@
 // Plotly, and the plot of curves and data.
 
 const COLOURS = ["--fit", "--blue", "--index-n", "--fourth", "--red", "--green"];
+const CHANNELS = ["--red", "--green", "--blue", "--fourth"]; // of a surface, the longest wavelength first
+const PANELS = ["Ψ", "Δ"]; // signals that have a panel of their own
 const ROOM = 0.04; // above and below the curves, as a fraction of the axis
 
 /** Unpacks and runs Plotly, which is a gzipped script in base64, and returns it. */
@@ -35,7 +37,7 @@ class Plot {
   /** Label of the ordinate of a curve: Ψ and Δ have panels of their own, other curves share one. */
   #ordinate(curve) {
     const shared = this.axis.value ?? this.signals.join(", ");
-    const own = this.signals.length > 1 && this.signals.find((signal) => curve.label.replace("fit: ", "").startsWith(signal));
+    const own = PANELS.find((signal) => curve.label.replace("fit: ", "").startsWith(signal));
     return own ? `${own} ${/\(.*\)/.exec(shared)?.[0] ?? ""}`.trim() : shared;
   }
 
@@ -47,7 +49,8 @@ class Plot {
     const style = getComputedStyle(this.element);
     const colour = (name) => style.getPropertyValue(name).trim();
     const labels = [...new Set([...this.curves, ...this.data].map((curve) => curve.label))];
-    const own = (curve) => colour(COLOURS[Math.max(labels.indexOf(curve.label), 0) % COLOURS.length]);
+    const colours = this.kind === "surface" ? CHANNELS : COLOURS;
+    const own = (curve) => colour(colours[Math.max(labels.indexOf(curve.label), 0) % colours.length]);
     const axis = (curve) => `y${Math.max(ordinates.indexOf(this.#ordinate(curve)), 0) + 1}`.replace(/^y1$/, "y");
     const trace = (curve, more) => ({ type: "scatter", mode: "lines", name: curve.label, x: curve.x, y: curve.y, yaxis: axis(curve), ...more });
     const several = this.curves.length > 1;
@@ -121,8 +124,8 @@ class Plot {
     }
     if (!(low <= high)) return [0, 1];
     const room = ROOM * (high - low || Math.abs(high) || 1);
-    const fraction = low >= 0 && high <= 1.5;
-    let range = [fraction ? 0 : low - room, high + room];
+    const fromZero = low >= 0 && (high <= 1.5 || low < high / 2);
+    let range = [fromZero ? 0 : low - room, high + room];
     const old = this.ranges[name];
     if (moving && old) range = [Math.min(old[0], range[0]), Math.max(old[1], range[1])];
     this.ranges[name] = range;
