@@ -103,6 +103,7 @@ export async function explore(element, call, options = {}) {
     if (!answer.sphere) return;
     sphere.src = answer.sphere;
     sphere.hidden = look.hidden = false;
+    patch.hidden = !colourText.textContent; // a surface has no one colour
     sphere.alt = `Ball with this film or surface in a studio. ${colourText.textContent}`.trim();
   });
   const askPlan = newestOf(asView, (answer) => { if (answer.plan) plan.replaceChildren(...planLists(answer.plan)); });
@@ -120,7 +121,7 @@ export async function explore(element, call, options = {}) {
   }
 
   function showColour(colour) {
-    look.hidden = false;
+    patch.hidden = look.hidden = false;
     patch.style.background = colour.hex;
     colourText.textContent = `${colour.hex}: ${colour.text}`;
     patch.setAttribute("aria-label", `Colour ${colourText.textContent}`);
