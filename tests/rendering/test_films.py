@@ -62,3 +62,9 @@ def test_a_fit_has_its_best_values():
     object.__setattr__(fit, "scene", scene)
     object.__setattr__(fit, "parameters", {"thickness": estimate})
     assert start_values(film_of(fit).scene).tolist() == [287]
+
+
+def test_a_birefringent_film_is_refused():
+    film = pl.Scene(pl.Layer(pl.Anisotropic(1.8, 1.95), 150.0), "Si")
+    with pytest.raises(UsageError, match="birefringent film is not exported"):
+        film_of(film)

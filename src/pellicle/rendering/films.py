@@ -8,7 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pellicle.dispersion.anisotropic import Anisotropic
 from pellicle.dispersion.empirical import Constant, Table, along_the_spectrum
+from pellicle.effects.anisotropy import scene_media
 from pellicle.errors import DataError, UsageError
 from pellicle.fitting.result import Fit
 from pellicle.fitting.spectra.parameters import parameters
@@ -33,7 +35,8 @@ class Film(NamedTuple):
 def film_of(described: Scene | Surface | Fit) -> Film:
     """Return the film of a scene or a surface, or of a fit with its best values.
 
-    **Raises:** UsageError for a surface without a film on a base, and for a fit without a scene.
+    **Raises:** UsageError for a surface without a film on a base, for a fit without a scene and for a
+    birefringent film.
     """
     if isinstance(described, Fit):
         scene: Any = described.scene
@@ -42,7 +45,13 @@ def film_of(described: Scene | Surface | Fit) -> Film:
         values = {name: estimate.value for name, estimate in described.parameters.items()}
         return film_of(with_values(scene[0] if isinstance(scene, tuple) else scene, values))
     check_scene(described)
-    return _of_surface(described) if isinstance(described, Surface) else Film(described)
+    if isinstance(described, Surface):
+        return _of_surface(described)
+    if any(isinstance(medium, Anisotropic) for medium in scene_media(described)):
+        raise UsageError(
+            "a birefringent film is not exported: materials of renderers have one index: give it one"
+        )
+    return Film(described)
 
 
 def with_values(described: Scene | Surface, values: Mapping[str, float]) -> Scene | Surface:
