@@ -52,8 +52,12 @@ SLOW = {
     "pellicle chart docs/cost/soap_film.toml --view": "tests/synthetic/test_bubble.py and"
     " tests/accuracy/test_colour_maps.py: smaller ones",
     "pellicle chart docs/surfaces/tempered_steel.toml --out results/steel.png": "draws a sphere of full size",
+    "pellicle simulate docs/examples/tilted_mueller.toml --out tilted.csv": "compiles for 4 s;"
+    " tests/simulation/test_anisotropic.py",
     "pellicle fit film.csv --recipe docs/examples/mueller.toml": "compiles for 10 s;"
     " tests/fitting/spectra/test_mueller.py fits another film",
+    "pellicle fit tilted.csv --recipe docs/examples/tilted_mueller.toml": "compiles for half a minute;"
+    " tests/hard/test_anisotropic.py: values and derivatives",
     "pellicle compare film.csv": "compiles for 6 s; tests/cli/test_compare_command.py compares other scenes",
     "pellicle fit --recipe fits/cauchy_100nm/recipe.toml": "one of the studies of tests/test_fits.py",
     "pellicle cost docs/cost/soap_film.toml --out cost": "fits with many solvers: one to two minutes",

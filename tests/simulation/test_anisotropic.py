@@ -121,7 +121,7 @@ def test_tilted_axis_gives_the_mueller_matrix_and_the_powers_of_the_functions():
 
 
 def test_slices_only_where_one_wave_may_decay_within_the_bounds():
-    def size(ordinary, thickness, angle=ANGLE):
+    def size(ordinary: Any, thickness: Any, angle: float = ANGLE) -> int:
         crystal = pl.Anisotropic(ordinary, 1.75 + 0.05j, axis=(40.0, 25.0))
         at = pl.Scene(pl.Layer(crystal, thickness), "Si", light=pl.Light(NM, angle))
         return exact(at).row("anisotropy").count
