@@ -33,6 +33,7 @@ from pellicle.data.spectrum import Spectrum, inside_range
 from pellicle.data.tabular.column_selection import only, wavelength_and_angle
 from pellicle.data.tabular.columns import Column, listed
 from pellicle.data.tabular.named_columns import first_column
+from pellicle.data.tabular.sample_azimuth import check_azimuth
 from pellicle.data.tabular.table import Table
 from pellicle.data.tabular.wavelength_axis import axis_note, axis_unit, read_axis
 from pellicle.errors import DataError, UsageError
@@ -211,6 +212,7 @@ def ellipsometry_columns(table: Table, columns: Sequence[Column] | None) -> Elli
                 "psi and delta in degrees, the others without a unit"
             )
     wavelength, angle = wavelength_and_angle(table, columns, _EXAMPLE)
+    check_azimuth(table, only(table, columns, "azimuth"))
     errors = _error_columns(table, columns) if form == PSI_DELTA else ()
     analyser = only(table, columns, "analyser") if form == ALPHA_BETA else None
     shares = depolarisation.columns(table, columns)

@@ -14,13 +14,13 @@ from pellicle.data.spectrum import Spectrum, inside_range
 from pellicle.data.tabular.column_names import MUELLER
 from pellicle.data.tabular.column_selection import only, wavelength_and_angle
 from pellicle.data.tabular.columns import Column, listed
+from pellicle.data.tabular.sample_azimuth import check_azimuth
 from pellicle.data.tabular.table import Table
 from pellicle.data.tabular.wavelength_axis import axis_note, axis_unit, read_axis
 from pellicle.errors import DataError, UsageError
 
 _REMEDY = "correct or delete that row"
 _EXAMPLE = '`columns=["wavelength", "angle", "m12", "m33", "m34"]`'
-_MOST_LISTED = 6
 _NORMALISED = 1e-3
 """Deviation of m11 from 1 by rounding."""
 
@@ -113,7 +113,7 @@ def read_mueller(
 ) -> Spectrum:
     """Read the chosen elements; other arguments as in `read_spectrum`. Raises DataError or UsageError."""
     unit = axis_unit(table, chosen.wavelength, wavelength_unit)
-    _check_azimuth(table, chosen.azimuth)
+    check_azimuth(table, chosen.azimuth)
     cells = (*chosen.values, *chosen.errors, *([chosen.m11] if chosen.m11 else []))
     wavelength, angle, read = read_axis(table, chosen.wavelength, chosen.angle, cells, unit)
     count = len(chosen.values)
@@ -157,21 +157,6 @@ def read_mueller(
         sha256=table.sha256,
         notes=tuple(notes),
     )
-
-
-def _check_azimuth(table: Table, column: Column | None) -> None:
-    """Raise DataError for several azimuths of the sample: rows of them are no repeats."""
-    if column is None:
-        return
-    [azimuths] = table.numbers([column.position])
-    several = np.unique(azimuths)
-    if len(several) > 1:
-        listed = ", ".join(f"{azimuth:g}" for azimuth in several[:_MOST_LISTED])
-        more = ", ..." if len(several) > _MOST_LISTED else ""
-        raise DataError(
-            f"{table.path}: {table.label(column.position)} has {len(several)} azimuths of the sample"
-            f" ({listed}{more}), which are measurements of their own; write each into its own file"
-        )
 
 
 def _normalised(

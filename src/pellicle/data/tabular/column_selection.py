@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pellicle.data.tabular.column_names import COUNTERS, MUELLER
 from pellicle.data.tabular.columns import COUNTS, SIGNALS, Column, listed
 from pellicle.data.tabular.named_columns import first_column, named_columns
+from pellicle.data.tabular.sample_azimuth import check_azimuth
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError, UsageError
 
@@ -113,6 +114,7 @@ def _by_position(table: Table, role: str) -> SpectrumColumns:
 
 def _with_wavelength(table: Table, columns: Sequence[Column], signal: Column) -> SpectrumColumns:
     wavelength, angle = wavelength_and_angle(table, columns, '`columns=["wavelength", "R"]`')
+    check_azimuth(table, only(table, columns, "azimuth"))
     sigma = only(table, columns, "sigma")
     used = {c.position for c in (wavelength, signal, sigma, angle) if c}
     ignored = [c for c in columns if c.position not in used and c.name not in ("_", "")]
