@@ -17,9 +17,9 @@ from pellicle.explorer.page.document import document, policy
 from pellicle.explorer.session import Session
 
 if TYPE_CHECKING:
-    from starlette.applications import Starlette  # pyright: ignore[reportMissingImports]
-    from starlette.requests import Request  # pyright: ignore[reportMissingImports]
-    from starlette.responses import Response  # pyright: ignore[reportMissingImports]
+    from starlette.applications import Starlette
+    from starlette.requests import Request
+    from starlette.responses import Response
 
 HOST = "127.0.0.1"
 LARGEST_BODY = 32_000_000
@@ -40,10 +40,10 @@ def application(session: Session, token: str, port: int) -> Starlette:
     **Raises:** UsageError without Starlette.
     """
     try:
-        from starlette.applications import Starlette  # pyright: ignore[reportMissingImports]
-        from starlette.concurrency import run_in_threadpool  # pyright: ignore[reportMissingImports]
-        from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse  # pyright: ignore[reportMissingImports]
-        from starlette.routing import Route  # pyright: ignore[reportMissingImports]
+        from starlette.applications import Starlette
+        from starlette.concurrency import run_in_threadpool
+        from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse
+        from starlette.routing import Route
     except ImportError:
         raise UsageError(_missing("starlette")) from None
     hosts = {f"{name}:{port}" for name in (HOST, "localhost")}
@@ -93,7 +93,7 @@ def serve(session: Session, port: int = 0, ready: Callable[[str], Any] = lambda 
     **Raises:** UsageError without the packages of the extra, and where the port cannot be opened.
     """
     try:
-        import uvicorn  # pyright: ignore[reportMissingImports]
+        import uvicorn
     except ImportError:
         raise UsageError(_missing("uvicorn")) from None
     # the protocol is named, or asyncio sends with delay: answers would wait 40 ms for an acknowledgement

@@ -26,8 +26,8 @@ def widget(session: Session) -> Any:
 @cache
 def _widget_class() -> Any:
     try:
-        import anywidget  # pyright: ignore[reportMissingImports]
-        import traitlets  # pyright: ignore[reportMissingImports]
+        import anywidget
+        import traitlets
     except ImportError:
         raise UsageError(f"the explorer in notebooks needs anywidget: {install_command('explore')}") from None
 
