@@ -150,7 +150,13 @@ def test_total_reflection_is_total():
         assert float(reflectance(glass, jnp.array(1.2))[0]) == pytest.approx(1, rel=1e-12)
 
 
-@pytest.mark.parametrize("name", MODELS)
+_SLOW = pytest.mark.slow  # compile for 3 to 5 s each
+_LONGEST = ("clear-coat-film", "microfacet-film")
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=_SLOW) if name in _LONGEST else name for name in MODELS]
+)
 def test_every_model_has_finite_values_and_slopes(name):
     """At the defaults, in every parameter; 0 below the horizon; float32 in gives float32 out."""
     m = model(name)

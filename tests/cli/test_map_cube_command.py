@@ -110,6 +110,7 @@ def test_undecided_pixels_have_their_exit_code(pellicle, words, fits):
     assert pellicle(*words).code == 4
 
 
+@pytest.mark.slow  # four maps; tests/mapping/test_store.py has the refusals
 def test_another_map_is_kept_unless_it_is_to_be_replaced(pellicle, words, fits):
     assert pellicle(*words).code == 0
     pellicle(*words, "--signal-unit", "percent").refused(2, "another input", "--overwrite")

@@ -75,6 +75,7 @@ def test_outside_the_table_the_edge_counts(tables):
     assert jax.grad(lambda d: table.xyz(d, 1.0).sum())(900.0) == 0.0
 
 
+@pytest.mark.slow  # compiles for 4 s
 def test_table_of_a_scene_is_that_of_the_film():
     """The forward model of scenes, with materials by name and a layer of no thickness."""
     scene = pl.Scene([pl.Layer(2.0, 0.0), pl.Layer("SiO2", pl.Free(0, 600), name="oxide")], "Si")

@@ -68,6 +68,7 @@ def solved(films):
     return np.asarray(y), np.asarray(converged), chi2
 
 
+@pytest.mark.slow  # compiles for 3 s; the NIST problems are others of known χ²
 def test_the_same_chi2_as_scipy_with_k_on_its_bound_or_not(films, solved):
     y, converged, chi2 = solved
     function, slope = jax.jit(residual), jax.jit(jax.jacfwd(residual))

@@ -74,6 +74,7 @@ def test_thicknesses_lose_their_bias(joint, wedge):
     assert after < 1.1 * best
 
 
+@pytest.mark.slow  # compiles for 3 s
 def test_films_of_one_thickness_are_no_evidence(wedge):
     with pytest.raises(UsageError, match="too much alike"):
         lamp_curve(lit(600 + 0.002 * wedge), SCENE)

@@ -61,6 +61,7 @@ def wedge():
     return cube, scene, *found(cube, scene)
 
 
+@pytest.mark.slow  # compiles for 7 s; test_pixel_errors.py compares the same fits
 def test_thickness_is_that_of_fit(wedge):
     cube, scene, model, best = wedge
     check(cube, scene, (6, 7, 59), best=(model, best))

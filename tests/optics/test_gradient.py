@@ -127,6 +127,7 @@ def test_equal_points_are_a_homogeneous_layer():
         np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.slow  # compiles for 4 s; tests/hard has gradients against 50 digits
 def test_an_opaque_gradient_is_finite():
     """A tenth of a millimetre of a metal that grows from glass; value and slopes."""
 

@@ -74,6 +74,7 @@ def steel():
     return appearance(pl.Scene(pl.Layer(2.9, 40.0), pl.material("Fe")))
 
 
+@pytest.mark.slow  # solves for 3 s; the other formulas are solved in the same way
 def test_solved_numbers_come_closer(steel):
     assert cycles_formula(steel) is METAL
     own, solved = physical(METAL, steel), effective(METAL, steel)

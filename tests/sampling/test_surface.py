@@ -80,6 +80,7 @@ def fitted_before(monkeypatch, known):
     monkeypatch.setattr(fitting, "fitted", lambda *args, **options: (known.fit, known.ranked))
 
 
+@pytest.mark.slow  # fits and samples for 6 s; tests/sampling/test_sample.py samples a film
 def test_a_posterior_is_as_wide_as_the_errors_say(fitted_before, known, tmp_path):
     """Every number is determined and far from its bounds: the posterior is normal."""
     posterior = pl.sample(known.samples, FREE, chain=tmp_path / "chain.h5")
@@ -131,6 +132,7 @@ def test_a_chain_is_resumed_and_belongs_to_its_problem(fitted_before, known, tmp
             pl.sample(samples, surface, chain=path)
 
 
+@pytest.mark.slow  # needs the fit of the test above
 def test_a_prior_narrows_the_fit_and_its_posterior_alike(known, monkeypatch):
     """Two independent measurements of one number: their inverse variances add.
 

@@ -144,6 +144,7 @@ def test_one_layer_has_an_axis_of_layers_too():
     assert not np.any(pl.absorptance(nm, [100.0], [2.0], 1.5))
 
 
+@pytest.mark.slow  # compiles for 6 s
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_precision_follows_the_input(dtype):
     nm = np.array([500.0, 600.0], dtype)

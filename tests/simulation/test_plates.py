@@ -107,6 +107,7 @@ def test_the_whole_matrix():
         np.testing.assert_allclose(elements, exact, rtol=0, atol=5e-8)
 
 
+@pytest.mark.slow  # compiles for 3 s
 def test_its_slope_is_that_of_differences():
     scene = with_wavelength(
         pl.Scene(pl.Layer(2.2 + 0.05j, pl.Free(1, 500, start=120.0)), PLATE, light=LIGHT), NM, ANGLE

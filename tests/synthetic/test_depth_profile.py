@@ -41,6 +41,7 @@ def test_absorptances_as_tmm(both):
         assert profile.T[i] == pytest.approx(exact["T"], abs=2e-8)
 
 
+@pytest.mark.slow  # compiles stacks for 5 s; tests/simulation/test_depth.py has the same sum of a stack
 def test_energy_is_conserved_through_plates(both):
     """Absorptances do not follow from R and T, so this can fail."""
     _, profile = both
@@ -49,6 +50,7 @@ def test_energy_is_conserved_through_plates(both):
     assert sum(x[0] for x in profile.shares.values()) == pytest.approx(1, abs=1e-12)
 
 
+@pytest.mark.slow  # needs the stacks of the tests above
 def test_the_density_integrates_to_each_layer(both):
     _, profile = both
     for section in profile.sections:

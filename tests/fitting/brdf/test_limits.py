@@ -134,6 +134,7 @@ def turned():
     return pl.simulate(surface, directions=directions, noise=0.01)
 
 
+@pytest.mark.slow  # compiles for 3 s; the other limits are profiles of the same fit
 @pytest.mark.parametrize(
     ("tilt", "azimuth", "stderr"),
     [

@@ -81,6 +81,7 @@ def spoiled(samples: BrdfSamples) -> BrdfSamples:
     return dataclasses.replace(samples, values=values)
 
 
+@pytest.mark.slow  # four fits; tests/fitting/test_robust_losses.py has the losses
 @pytest.mark.parametrize("loss", ["huber", "student-t"])
 def test_outliers_move_a_plain_fit_and_not_a_robust_one(grey, grey_samples, truth, loss):
     samples = spoiled(grey_samples())
@@ -99,6 +100,7 @@ def test_huber_against_scipy(grey, grey_samples):
     agrees(pl.fit(samples, grey(), loss="huber"), values)
 
 
+@pytest.mark.slow  # compiles for 4 s; tests/planning/test_surface.py has such plans
 def test_a_tolerance_leaves_an_effect_out(grey, grey_samples):
     """A diffuse part of 1e-6 changes no value by 1 % of a hundredth of a white one."""
     samples = grey_samples()
@@ -110,6 +112,7 @@ def test_a_tolerance_leaves_an_effect_out(grey, grey_samples):
     assert reduced.warnings == whole.warnings
 
 
+@pytest.mark.slow  # compiles two plans
 def test_a_fit_beyond_its_tolerance_is_done_again(grey, grey_samples, truth, monkeypatch):
     """As where the design of the plan missed the values of the best fit."""
 

@@ -147,6 +147,7 @@ def test_a_folded_delta(measured, together):
     assert fit[SPREADS].stderr_noise < 1.5 * together[SPREADS].stderr_noise
 
 
+@pytest.mark.slow  # compiles a fit for 4 s
 def test_a_scene_without_depolarisation(measured, together):
     """Its fit is that of Ψ and Δ, and says what it leaves out; a comparison counts it."""
     bare = scene(None)

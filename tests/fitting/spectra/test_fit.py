@@ -28,7 +28,8 @@ def agrees(fit, truth, sigmas=4.0):
         assert estimate.stderr < 0.1 * (estimate.upper - estimate.lower), (name, estimate)
 
 
-@pytest.mark.parametrize("signal", [pytest.param("R", marks=pytest.mark.slow), "T"])  # R: other tests here
+@pytest.mark.slow  # compiles for 5 s each; test_search.py recovers thickness and n
+@pytest.mark.parametrize("signal", ["R", "T"])
 def test_thickness_n_and_k(film, measured, signal):
     scene = film(
         material=Constant(N, K),

@@ -64,6 +64,7 @@ def test_fringes_with_dispersion_and_a_wrong_start_raise_no_alarm(film, measured
     assert suggestions(pl.fit(measured(scene, 1.5, 2e4, 1800.0), scene)) == []
 
 
+@pytest.mark.slow  # fits for 4 s; a test above has the same warning of R or T
 def test_fringes_of_raw_counts_that_no_thin_film_has(film):
     """A soap film of 1200 nm in a fading lamp; without an offset only a thin film fits."""
     nm = np.linspace(420.0, 800.0, 256)
