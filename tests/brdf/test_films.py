@@ -188,6 +188,7 @@ def test_an_unknown_name_suggests_the_nearest():
         model("microfacet-fil")
 
 
+@pytest.mark.slow  # compiles for 2 s
 def test_slopes_of_the_film_against_finite_differences():
     m = FACETS
     s = {**STEEL, "diffuse": 0.1, "k": 0.05}

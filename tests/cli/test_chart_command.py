@@ -18,6 +18,7 @@ def oxide():
     return scene, interference_colours(scene, NM, DEGREES)
 
 
+@pytest.mark.slow  # compiles for 3 s
 def test_one_layer_is_the_film(oxide):
     """Against the colour package's own film, by other bands."""
     layer, substrate = pl.material("SiO2"), pl.material("Si")

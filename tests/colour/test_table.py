@@ -37,6 +37,7 @@ def films(name):
     return RNG.uniform(0.5, top - 0.5, 400), RNG.uniform(np.cos(np.deg2rad(79)), 0.999, 400), n1, n2
 
 
+@pytest.mark.slow  # compiles for 4 s
 @pytest.mark.parametrize("name", FILMS)
 def test_colours_in_single_precision(tables, name):
     """Measured: 0.0004 on average and 0.03 at most, with a soap film that is almost black."""

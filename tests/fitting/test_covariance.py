@@ -45,6 +45,7 @@ def ordered(names):
     return [names.index(name) for name in ("thickness", "A", "B")]
 
 
+@pytest.mark.slow  # compiles for 3 s; tests/fitting/test_nist.py has certified deviations
 def test_absolute_sigma_against_scipy(scene, measured, model):
     data = measured(scene, *TRUTH, sigma=True)
     fit = pl.fit(data, scene)
@@ -151,6 +152,7 @@ def test_a_strong_correlation_gives_a_warning(film, measured):
     assert any(warning.startswith("n and thickness are strongly correlated") for warning in fit.warnings)
 
 
+@pytest.mark.slow  # compiles for 3 s
 def test_a_parameter_without_effect_has_an_infinite_error(film, measured):
     """k of a layer of no thickness."""
     scene = film(0.0, pl.dispersion.Constant(1.46, pl.Free(0.0, 1.0)))

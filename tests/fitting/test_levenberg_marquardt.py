@@ -123,6 +123,7 @@ def test_one_by_one_as_all_at_once(films, solved):
         np.testing.assert_allclose(found, y[i], atol=1e-7)
 
 
+@pytest.mark.slow  # compiles for 2 s
 def test_never_an_increase(films):
     """χ² after n steps falls with n, from starts that are far off, where trial steps are rejected."""
     far = np.tile([0.9, 0.9, 0.9], (4, 1))

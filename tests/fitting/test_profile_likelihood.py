@@ -39,6 +39,7 @@ def without_effects(scene):
     return replace(scene, uncertainty=pl.Uncertainty.none())
 
 
+@pytest.mark.slow  # compiles for 3 s
 def test_an_extinction_beside_zero(film, measured):
     """k is 0; its upper limit is where χ², the thickness fitted again, is 2.71 above the best."""
     scene = without_effects(film(material=pl.dispersion.Constant(1.46, pl.Free(0.0, 1.0))))

@@ -68,6 +68,7 @@ def test_the_formula_is_the_published_one(index, thickness, base):
     np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
+@pytest.mark.slow  # compiles for 2 s
 def test_without_a_film_the_base_is_left():
     """At thickness 0 and normal incidence a base of F0 reflects F0."""
     base = np.array([0.3, 0.5, 0.7])

@@ -17,6 +17,7 @@ conductor = jax.jit(materialx_formula.conductor)
 schlick = jax.jit(materialx_formula.schlick)
 
 
+@pytest.mark.slow  # compiles for 3 s
 @pytest.mark.parametrize(
     ("ior", "base", "thickness"),
     [(1.33, 1.0, 300.0), (1.5, 1.33, 400.0), (1.46, 4.0 + 0.1j, 300.0), (2.4, 2.7 + 2.8j, 40.0)],

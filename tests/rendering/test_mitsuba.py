@@ -98,6 +98,7 @@ def pixel(bsdf, light, viewer):
     return np.asarray(mi.render(scene), float).reshape(-1)[:3]
 
 
+@pytest.mark.slow  # renders for 5 s each
 @pytest.mark.parametrize("kind", ["measured", "lookup"])
 def test_rendered_colours_are_the_exact_ones(exported, kind):
     mi.set_variant("scalar_rgb")

@@ -123,6 +123,7 @@ def test_deviation_and_thickness_follow_the_noise_between_their_bounds():
     assert following(LAYERED, noise) == {}
 
 
+@pytest.mark.slow  # renders for 3 s
 def test_media_have_their_own_index_at_each_wavelength():
     """A table of a named film and base is that of `film_colour`, whatever the channels of the surface."""
     oxide = pl.Surface(

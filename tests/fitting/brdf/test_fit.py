@@ -124,6 +124,7 @@ def test_errors_are_those_of_the_inverse_hessian(known):
     np.testing.assert_allclose([known[name].stderr for name in NAMES], expected * np.sqrt(length), rtol=1e-4)
 
 
+@pytest.mark.slow  # a fit of 4 s
 def test_a_lambertian_surface_has_no_layer():
     result = fit(noisy(np.full((200, 3), 0.2), seed=0), FREE)
     assert not result.layer_test.layered

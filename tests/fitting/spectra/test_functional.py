@@ -80,6 +80,7 @@ def test_prepared_problems_stack_and_deviances_are_chi_squared(spectra):
         assert np.allclose(found.deviance[i, 0], chi2, rtol=1e-6)
 
 
+@pytest.mark.slow  # compiles for 2 s
 def test_other_sigma_weighs_points(spectra):
     """Points of huge σ do not count: the rest alone gives the same thickness."""
     sigma = np.where(NM < 700, 0.002, 1e6)
