@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 import gc
 import importlib.util
+import os
+import shutil
 import signal
 from pathlib import Path
 
@@ -14,6 +16,7 @@ import jaxtyping
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
 jax.config.update("jax_enable_x64", True)
 # compiled programs are reused by later runs; the user's own cache is not touched
@@ -112,3 +115,17 @@ def refusal():
         assert not message.endswith(".")
 
     return refusal
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """A headless Chromium, which PELLICLE_BROWSER may name; skips where it or Playwright is absent."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="Playwright is absent: make browser-tests")
+    found = os.environ.get("PELLICLE_BROWSER") or next(filter(None, map(shutil.which, BROWSERS)), None)
+    if found is None:
+        pytest.skip("there is no Chromium: install it, or name one in PELLICLE_BROWSER")
+    with playwright.sync_playwright() as driver:
+        with_root = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
+        chromium = driver.chromium.launch(executable_path=found, args=with_root)
+        yield chromium
+        chromium.close()

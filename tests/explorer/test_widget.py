@@ -19,10 +19,16 @@ def widget():
 
 
 @pytest.fixture
-def ask(widget, monkeypatch):
-    """Function that sends a message as the notebook does, and returns the answer."""
+def sent(widget, monkeypatch):
+    """Answers of the widget."""
     sent = []
     monkeypatch.setattr(type(widget), "send", lambda self, content, buffers=None: sent.append(content))
+    return sent
+
+
+@pytest.fixture
+def ask(widget, sent):
+    """Function that sends a message as the notebook does, and returns the answer."""
 
     def ask(request, body, count=[0]):  # noqa: B006
         count[0] += 1
@@ -57,9 +63,11 @@ def test_a_wrong_request_is_answered_by_a_sentence(ask):
     assert "error" in ask("nothing", {})
 
 
-def test_other_messages_are_ignored(widget):
+def test_other_messages_are_ignored(widget, ask, sent):
     widget._handle_custom_msg("text", [])
     widget._handle_custom_msg({"request": "scene"}, [])
+    ask("scene", {})
+    assert len(sent) == 1
 
 
 def test_its_module_loads_nothing(widget):

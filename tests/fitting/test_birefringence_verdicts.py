@@ -10,7 +10,8 @@ import pytest
 import pellicle as pl
 from pellicle.effects.plan import Plan, Row
 from pellicle.fitting.comparison import Candidate, Comparison
-from pellicle.fitting.result import BIREFRINGENCE, Curve, Estimate, Fit, Index, Part, Status
+from pellicle.fitting.curves import BIREFRINGENCE, Curve, Index
+from pellicle.fitting.result import Estimate, Fit, Part, Status
 
 
 def candidate(name: str, bic: float, delta: tuple[float, float] | None = None) -> Candidate:

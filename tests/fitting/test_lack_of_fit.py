@@ -5,8 +5,9 @@ import pytest
 
 import pellicle as pl
 from pellicle.data.repeated_sweeps import mean_spectrum
+from pellicle.fitting.curves import Curve
 from pellicle.fitting.lack_of_fit import LackOfFit, lack_of_fit
-from pellicle.fitting.result import Curve, Part
+from pellicle.fitting.result import Part
 
 NM = np.linspace(400.0, 800.0, 128)
 

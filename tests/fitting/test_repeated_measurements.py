@@ -8,8 +8,9 @@ import pytest
 
 import pellicle as pl
 from pellicle.errors import UsageError
+from pellicle.fitting.curves import Curve
 from pellicle.fitting.repeated_measurements import LEVEL, Agreement, RepeatedParameter
-from pellicle.fitting.result import Curve, Estimate, Fit, Part, Rival, Status
+from pellicle.fitting.result import Estimate, Fit, Part, Rival, Status
 
 
 def parameter(values, noise: Any = 1.0, common=0.0):

@@ -10,17 +10,8 @@ from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.spectrum import Spectrum
 from pellicle.effects.plan import Plan, Row
 from pellicle.effects.surface import exact
-from pellicle.fitting.result import (
-    BrdfCurve,
-    Curve,
-    Estimate,
-    Fit,
-    LayerTest,
-    Part,
-    Profile,
-    Rival,
-    Status,
-)
+from pellicle.fitting.curves import BrdfCurve, Curve
+from pellicle.fitting.result import Estimate, Fit, LayerTest, Part, Profile, Rival, Status
 from pellicle.scene.surface import Surface, surface_view
 
 

@@ -3,8 +3,6 @@
 Skipped where Playwright or a browser is absent. PELLICLE_BROWSER names another Chromium.
 """
 
-import os
-import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -15,22 +13,7 @@ from pellicle.reporting.folders import write_fit, write_index
 from pellicle.reporting.json_record import failure, to_json
 from pellicle.reporting.page.fit_page import fit_page
 
-playwright = pytest.importorskip("playwright.sync_api", reason="Playwright is absent: make browser-tests")
-
-NAMES = ("chromium", "chromium-browser", "google-chrome")
 IMAGE = b"\x89PNG\r\n"
-
-
-@pytest.fixture(scope="module")
-def browser():
-    found = os.environ.get("PELLICLE_BROWSER") or next(filter(None, map(shutil.which, NAMES)), None)
-    if found is None:
-        pytest.skip("there is no Chromium: install it, or name one in PELLICLE_BROWSER")
-    with playwright.sync_playwright() as driver:
-        with_root = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
-        chromium = driver.chromium.launch(executable_path=found, args=with_root)
-        yield chromium
-        chromium.close()
 
 
 @pytest.fixture

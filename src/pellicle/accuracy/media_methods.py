@@ -26,6 +26,7 @@ from pellicle.scene.layers import Layer
 
 
 def transparent(case: Case) -> Variant | str:
+    """Layers without absorption: the real parts of their indices."""
     if not case.plan.on("absorption"):
         return "no layer absorbs"
     layers = tuple(
@@ -38,7 +39,7 @@ def transparent(case: Case) -> Variant | str:
 
 @final
 class AtOne(AbstractDispersion):
-    """Constant index: that of another medium at one wavelength (nm)."""
+    """Index of another medium at one wavelength (nm), used at all wavelengths."""
 
     base: AbstractDispersion
     at: float
@@ -51,6 +52,7 @@ class AtOne(AbstractDispersion):
 
 
 def constant_index(case: Case) -> Variant | str:
+    """Every medium with its index at the middle of the spectrum."""
     if not disperses(case):
         return "no index varies over the spectrum"
     middle = float(0.5 * (case.wavelength.min() + case.wavelength.max()))
@@ -79,6 +81,7 @@ class _HomogeneousSlices:
 
 
 def homogeneous_slices(count: int, case: Case) -> Variant | str:
+    """Graded layers as homogeneous slices, as programs without graded layers take them."""
     if not case.plan.on("gradient"):
         return "no layer is graded"
     removal = _HomogeneousSlices(count)
@@ -97,8 +100,9 @@ def aligned_axes(case: Case) -> Variant | str:
 
 
 def general_matrices(case: Case) -> Variant | str:
+    """4×4 matrices where the full plan takes the closed forms of aligned axes."""
     if case.plan.row("anisotropy").count != CLOSED_FORMS:
-        return "the full plan is that" if case.plan.on("anisotropy") else "no medium is birefringent"
+        return "the full plan has them" if case.plan.on("anisotropy") else "no medium is birefringent"
     return _with_angles(np.asarray, case)  # an array is no literal angle
 
 

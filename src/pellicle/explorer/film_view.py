@@ -89,7 +89,7 @@ class FilmView:
 
     @property
     def light_in_words(self) -> str:
-        """What the colour is that of."""
+        """The light whose colour is shown, in words."""
         return "transmitted light" if self.scene.light.signal == "T" else "reflected light"
 
     def structure(self, values: Mapping[str, float]) -> Structure:

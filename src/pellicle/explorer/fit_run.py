@@ -13,7 +13,7 @@ from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
 from pellicle.explorer.controls import Control
 from pellicle.explorer.programs import Curve
-from pellicle.fitting.result import Curve as FittedCurve
+from pellicle.fitting.curves import Curve as FittedCurve
 from pellicle.fitting.result import Fit
 from pellicle.fitting.spectra.fit import fit
 from pellicle.reporting import fit_text

@@ -19,9 +19,10 @@ from pellicle.data.colours import Colours
 from pellicle.data.ellipsometry_angles import ncs
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
+from pellicle.fitting.curves import BIREFRINGENCE, BrdfCurve, ColourCurve, Curve
 from pellicle.fitting.noise import correlation_length
 from pellicle.fitting.presentation import ReportMixin
-from pellicle.fitting.result import BIREFRINGENCE, BrdfCurve, ColourCurve, Curve, Fit, Part, Status
+from pellicle.fitting.result import Fit, Part, Status
 from pellicle.fitting.spectra.sweeps import correlation_in_sweeps, sweeps
 
 log = getLogger(__name__)

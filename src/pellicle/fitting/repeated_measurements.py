@@ -285,7 +285,7 @@ def _paths(fits: Sequence[Fit]) -> list[str]:
 
 
 def _reasons(fits: Sequence[Fit], paths: Sequence[str]) -> list[str]:
-    """Why the numbers of each fit are left out: it is not usable, or of a copy; empty where they are used."""
+    """Reasons to leave out the numbers of each fit: it is not usable or a copy; empty where they are used."""
     reasons = []
     for i, fit in enumerate(fits):
         copied = [path for path, earlier in zip(paths, fits[:i], strict=False) if _same_data(fit, earlier)]

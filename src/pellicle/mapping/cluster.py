@@ -176,7 +176,7 @@ class _Pickler(pickle.Pickler):
 
 
 class _Model(WorkerPlugin):
-    """What all blocks need, as a plugin of each worker; it is unpickled by the worker's first task."""
+    """Model and settings of all blocks, as a plugin of each worker; the worker's first task unpickles it."""
 
     def __init__(self, name: str, content: bytes, local: bool):
         self.name, self.content, self.local = name, content, local

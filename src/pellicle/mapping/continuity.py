@@ -36,7 +36,7 @@ _HIDDEN, _SHARE, _PATCH = 20_000, 0.1, 4
 
 @dataclass(frozen=True)
 class Continuity:
-    """What the neighbours decided in a map, and how often they are right.
+    """Decisions by neighbours in a map, and how often they are right.
 
     Of the `undecided` pixels, `decided` take the order of their neighbours, `changed` of them another one
     than fits best by itself; for that a Δχ² of up to `overruled` was set aside, half of the times more than
@@ -83,7 +83,7 @@ def row(found: Continuity | None) -> Row:
 
 
 def evidence(dataset: Any) -> Continuity | None:
-    """What neighbours decided in a map's dataset; None where they were not asked."""
+    """Read the decisions by neighbours from a map's dataset; None where they were not asked."""
     text = dataset.attrs.get("neighbours")
     return None if text is None else Continuity(**json.loads(text))
 

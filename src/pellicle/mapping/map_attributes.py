@@ -14,7 +14,7 @@ from pellicle.mapping.pixels.fit import PixelModel
 
 
 def attributes(cube: Cube, model: PixelModel, recipe: str, preview: int) -> dict[str, Any]:
-    """What a map is of: input, recipe, plan, free parameters with their units.
+    """Attributes of a map's store: input, recipe, plan, free parameters with their units.
 
     `preview` is the distance of its pixels in the input.
     """

@@ -78,7 +78,7 @@ class Map(PlotMixin):
 
     @property
     def input(self) -> str:
-        """What was mapped: the path of the cube, empty for one in memory."""
+        """Path of the cube, empty for one in memory."""
         return str(self._group.attrs["path"])
 
     @property

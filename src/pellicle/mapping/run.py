@@ -34,7 +34,7 @@ Fitter = Callable[[PixelModel, Cube, Where], PixelFits]
 
 
 class Job(NamedTuple):
-    """What every block of a map needs: model, cube, store, and the function that fits a block."""
+    """Objects that every block of a map needs: model, cube, store, and the function that fits a block."""
 
     model: PixelModel
     cube: Cube

@@ -14,6 +14,7 @@ import numpy as np
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.colours import Colours
 from pellicle.data.tabular.columns import DIRECTIONS
+from pellicle.fitting.curves import BIREFRINGENCE
 
 if TYPE_CHECKING:
     from pellicle.fitting.depth_profiles import FittedProfile
@@ -57,8 +58,6 @@ def nk_csvs(fit: Fit) -> dict[str, str]:
     pellicle reads the tables as materials. Infinite errors are empty cells. A birefringent layer has a table
     for each principal index; the one of the extraordinary index also contains the birefringence.
     """
-    from pellicle.fitting.result import BIREFRINGENCE  # imports JAX
-
     principal = dict(fit.principal_indices)
     difference = principal.pop(BIREFRINGENCE, None)
     found = {}

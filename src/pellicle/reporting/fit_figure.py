@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from pellicle.fitting.curves import BIREFRINGENCE, BrdfCurve, ColourCurve, Curve, Index
 from pellicle.fitting.depth_profiles import FittedProfile, fitted_profiles
-from pellicle.fitting.result import BIREFRINGENCE, BrdfCurve, ColourCurve, Curve, Index
 from pellicle.fitting.status import RIVAL
 from pellicle.reporting import brdf_figure, fitted_colours, mueller_figure, psi_delta
 from pellicle.reporting.drawing import (

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pellicle.fitting.curves import BIREFRINGENCE, BrdfCurve, ColourCurve, Curve
 from pellicle.fitting.lack_of_fit import lack_of_fit
-from pellicle.fitting.result import BIREFRINGENCE, BrdfCurve, ColourCurve, Curve, Status
+from pellicle.fitting.result import Status
 from pellicle.fitting.status import RIVAL
 from pellicle.reporting import budget_text, fitted_colours, parameter_text
 from pellicle.reporting.parameter_text import LEAST_CORRELATION

@@ -10,7 +10,7 @@ import numpy as np
 from pellicle.colour.encoding import encoding
 from pellicle.colour.spaces import linear_srgb, srgb
 from pellicle.data.colours import Colours
-from pellicle.fitting.result import ColourCurve
+from pellicle.fitting.curves import ColourCurve
 from pellicle.reporting.drawing import ABOVE, BLACK, BLUE, GREEN, GREY, ORANGE
 
 if TYPE_CHECKING:

@@ -81,7 +81,7 @@ class MapAxes:
 
     @property
     def points(self) -> str:
-        """What the map has numbers for: pixels or sites."""
+        """The word for places of the map: pixels or sites."""
         return "sites" if self.kind == "sites" else "pixels"
 
     @property

@@ -103,7 +103,7 @@ def ratio(axes: MapAxes) -> float:
 
 
 def _to_scale(axes: MapAxes) -> float | None:
-    """That ratio at equal scales, None where directions have different units or the picture would be flat."""
+    """Ratio of height to width at equal scales, None for different units and for very flat pictures."""
     if axes.y is None or axes.y.unit != axes.x.unit:
         return None
     ends = [axis.edges() if axes.kind == "image" else axis.values for axis in (axes.y, axes.x)]

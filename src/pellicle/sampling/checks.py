@@ -47,7 +47,7 @@ class Checks:
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """Why no interval should be taken from the chain; empty if it can be trusted."""
+        """Reasons not to take intervals from the chain; empty if it can be trusted."""
         reasons = []
         if not self.n_over_tau >= LONG_ENOUGH:
             reasons.append(

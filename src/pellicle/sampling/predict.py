@@ -13,9 +13,10 @@ from pellicle.data.ellipsometry_angles import psi_delta
 from pellicle.fitting.brdf.residuals import INVERSES, RESIDUALS
 from pellicle.fitting.brdf.view import SamplesView
 from pellicle.fitting.colours.view import ColoursView
+from pellicle.fitting.curves import BrdfCurve, ColourCurve, Curve
 from pellicle.fitting.evaluation import curves
 from pellicle.fitting.problem import Problem
-from pellicle.fitting.result import BrdfCurve, ColourCurve, Curve, Part
+from pellicle.fitting.result import Part
 from pellicle.fitting.spectra.view import SpectrumView
 
 DRAWS = 256

@@ -130,7 +130,7 @@ def _exchange(index: Number, q: Number, r: Number, polarisation: str) -> Any:
 def _upward_difference(
     groups: list[CoherentGroup], position: int, found: response.Response, q: Number, polarisation: str
 ) -> Any:
-    """What light from a plate loses at the face above it, besides R, A and the transmittance from above."""
+    """Power that light from a plate loses at the face above it, besides R, A and T of light from above."""
     group = groups[position]
     exchanged = _exchange(group.below, q, _ratio(found, from_below=True), polarisation)
     _, q_above = interface.transverse(group.above, group.angle)

@@ -164,7 +164,7 @@ class ShareOfSignal:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """That of the values."""
+        """Shape of the values."""
         return tuple(self.values.shape)
 
     @property

@@ -16,7 +16,7 @@ COUNTS = "counts"
 
 @dataclass(frozen=True, eq=False)
 class RawCube:
-    """What a reader finds in a file.
+    """Content of a file of spectra of many pixels, as a reader finds it.
 
     **Arguments:**
 
@@ -63,7 +63,7 @@ class RawCube:
 
 @dataclass(frozen=True)
 class Asked:
-    """What the caller states about the content of a file, as far as readers need it.
+    """The caller's statements about the content of a file, as far as readers need them.
 
     `wavelength` and its `unit` of the bands, None where the file has them; `variable` to read; `signal`.
     """

@@ -11,10 +11,11 @@ import numpy as np
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.fitting.brdf.view import SamplesView
 from pellicle.fitting.covariance import Scaled
+from pellicle.fitting.curves import BrdfCurve
 from pellicle.fitting.discrepancy import Evidence
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.profile_likelihood import Limits
-from pellicle.fitting.result import BrdfCurve, Estimate, Part, Rival
+from pellicle.fitting.result import Estimate, Part, Rival
 from pellicle.fitting.reweighting import RankedMinima, ViewFit
 from pellicle.scene.surface import Surface
 

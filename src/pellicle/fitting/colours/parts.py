@@ -8,7 +8,8 @@ from pellicle.colour.difference import delta_e76
 from pellicle.colour.spaces import lab
 from pellicle.data.colours import Colours
 from pellicle.fitting.colours.view import ColoursView, Local
-from pellicle.fitting.result import ColourCurve, Part
+from pellicle.fitting.curves import ColourCurve
+from pellicle.fitting.result import Part
 from pellicle.fitting.reweighting import ViewFit
 from pellicle.fitting.spectra.layer_errors import layer_errors, principal_indices
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from pellicle.dispersion.anisotropic import Anisotropic
+from pellicle.fitting.curves import BIREFRINGENCE, Index
 from pellicle.fitting.reported_layer import reported_medium
-from pellicle.fitting.result import BIREFRINGENCE, Index
 from pellicle.scene.film import Scene
 
 

@@ -15,9 +15,10 @@ from pellicle.fitting.colours.evidence import accuracy as colours_accuracy
 from pellicle.fitting.colours.parts import colour_curve, colours_part
 from pellicle.fitting.colours.view import ColoursView
 from pellicle.fitting.covariance import Errors
+from pellicle.fitting.curves import ColourCurve, Curve
 from pellicle.fitting.discrepancy import Discrepancy
 from pellicle.fitting.misfit import Accuracy, misfit
-from pellicle.fitting.result import ColourCurve, Curve, Part, Rival
+from pellicle.fitting.result import Part, Rival
 from pellicle.fitting.reweighting import RankedMinima, ViewFit
 from pellicle.fitting.spectra import fringes
 from pellicle.fitting.spectra.layer_errors import layer_errors, principal_indices

@@ -117,8 +117,8 @@ def discrepancy(evidence: PixelEvidence) -> PixelDiscrepancy:
 
 
 def other_material(evidence: PixelEvidence, effects: Sequence[Effect]) -> np.ndarray:
-    """Whether (pixels,) an index far from the given one explains the residuals as no effect of ordinary size
-    does: see `fitting.misfit.other_material`."""
+    """True (pixels,) where an index far from the given one explains the residuals as no effect of ordinary
+    size does: see `fitting.misfit.other_material`."""
     one = np.broadcast_to(evidence.noise[:, None, None], evidence.sigma.shape)
     state = _balanced(replace(evidence, sigma=one, least=1.0))
     known, pixels = evidence.known, len(evidence.residual)

@@ -29,7 +29,7 @@ _SAMPLE = 9
 
 @dataclass(frozen=True)
 class PixelModel:
-    """What the pixels of a cube have in common: scene, problem, search of minima and their errors.
+    """The common part of the fits of all pixels: scene, problem, search of minima and their errors.
 
     `example` is a spectrum as of one pixel, whose numbers do not matter but for their size.
     """

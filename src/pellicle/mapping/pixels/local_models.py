@@ -20,7 +20,7 @@ LANES, FEW = 256, 16
 
 
 class PixelArrays(NamedTuple):
-    """What differs between the data of pixels, each (pixels, ...), padded as the data of the view."""
+    """Arrays that differ between pixels, each (pixels, ...), padded as the data of the view."""
 
     values: Any
     weight: Any

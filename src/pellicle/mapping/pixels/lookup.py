@@ -208,7 +208,7 @@ def _simulated(problem: Problem, view: SpectrumView, units: np.ndarray) -> tuple
 
 
 def _reach(design: np.ndarray, depth: int | None, grid: np.ndarray) -> np.ndarray:
-    """How far the next node is at most, half the distance, in each parameter's unit: (nodes, parameters)."""
+    """Half the distance to the farther neighbouring node, in each parameter's unit: (nodes, parameters)."""
     reach = np.empty_like(design)
     for column, own in zip(design.T, reach.T, strict=True):
         levels = np.unique(column)

@@ -32,7 +32,7 @@ Static = tuple[SpectrumForm, Coordinates]
 
 
 class Common(NamedTuple):
-    """What all pixels have in common: the scene, data whose values are of no matter, and the box."""
+    """Arrays that all pixels share: the scene, data whose values are not used, and the box."""
 
     scene: Scene
     data: Data

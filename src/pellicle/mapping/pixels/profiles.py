@@ -78,7 +78,7 @@ def flat_sides(thickness: np.ndarray, rise: np.ndarray, value: np.ndarray) -> np
 
 
 def _open(rise: np.ndarray, side: np.ndarray, far: np.ndarray) -> np.ndarray:
-    """Where the misfit on a `side` never rises, or its `far` half is a plateau."""
+    """True where the misfit on a `side` never rises, or its `far` half is a plateau."""
     highest = np.max(np.where(side, rise, -np.inf), axis=1)
     top = np.max(np.where(far, rise, -np.inf), axis=1)
     foot = np.min(np.where(far, rise, np.inf), axis=1)
@@ -141,7 +141,7 @@ def _profiled(around: Around, who: np.ndarray, axis: int, flat: np.ndarray, erro
 
 
 class _Crossing:
-    """Where the profile of one parameter of each pixel rises on one side (−1 or 1), for those `wanted`."""
+    """Search for the point where a parameter's profile rises on one side (−1 or 1), for `wanted` pixels."""
 
     def __init__(self, around: Around, who: np.ndarray, axis: int, side: int, wanted: np.ndarray):
         self._around, self._who, self._axis = around, who, axis
@@ -204,5 +204,5 @@ def resampled(grid: np.ndarray, thickness: np.ndarray, profile: np.ndarray) -> n
 
 
 def natural_bounds(natural: Sequence[tuple[bool, bool]]) -> np.ndarray:
-    """Whether physics sets each lower and upper bound, (parameters, 2)."""
+    """Return (parameters, 2), True where physics sets the lower and the upper bound."""
     return np.reshape(natural, (-1, 2)).astype(bool)

@@ -241,7 +241,7 @@ def _minima(search: PixelSearch, data: PixelData) -> PixelMinima:
 
 
 def _weight_factor(points: _Points, lowest: np.ndarray, data: PixelData) -> np.ndarray:
-    """What the weights of the `data` are multiplied by, (pixels,), by the residuals of the `lowest` points.
+    """Factors (pixels,) of the weights of the `data`, from the residuals of the `lowest` points.
 
     As in `fitting.reweighting`: σ that is not given is their rms, and correlated neighbours count as one
     point. Without priors that moves no minimum.

@@ -1,4 +1,4 @@
-"""Interactive figures of a fit: data, model and residuals of each part; misfit against thickness; n and k."""
+"""Interactive figures of a fit: data, model and residuals of each part, and of several fits of one."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pellicle.fitting.result import BIREFRINGENCE, BrdfCurve, ColourCurve, Curve
-from pellicle.fitting.status import RIVAL
+from pellicle.fitting.curves import BrdfCurve, ColourCurve, Curve
 from pellicle.reporting import brdf_figure, fit_figure, fitted_colours, mueller_figure, psi_delta
 from pellicle.reporting.page.figure import (
     Column,
@@ -20,7 +19,6 @@ from pellicle.reporting.page.figure import (
     figure,
     line,
     markers,
-    numbers,
     thinning,
 )
 
@@ -30,10 +28,6 @@ if TYPE_CHECKING:
 CHANNELS = "var(--red)", "var(--green)", "var(--blue)", "var(--fourth)"
 _LINES = "var(--fit)", "var(--blue)", "var(--green)", "var(--fourth)"
 _SIGNALS = {"R": "reflectance", "T": "transmittance"}
-_PROFILE_POINTS = 1500
-"""Ranges of thickness of which the least and the largest misfit are drawn: a scan may have 400 000 points."""
-_LINEAR = 0.8
-"""Height of the linear part of the axis of misfits, in decades."""
 
 
 def label(rival: Rival, fit: Fit) -> str:
@@ -235,172 +229,3 @@ def _colours(part: Part) -> _Drawn:
 
 _KINDS = {Curve: _spectrum, BrdfCurve: _samples, ColourCurve: _colours}
 """Panels of a part, by the kind of its curve."""
-
-
-def of_misfit(fit: Fit) -> dict[str, Any] | None:
-    """Δχ² against thickness with the minima; None where no thickness was scanned."""
-    if fit.profile is None or fit.profile.thickness.size < 2:
-        return None
-    minima = fit_figure.minima_of(fit)
-    thickness, misfit = fit_figure.completed(fit.profile, minima)
-    left, right = fit_figure.span(thickness, misfit)
-    shown = (thickness >= left) & (thickness <= right)
-    x, y = _envelope(thickness[shown], misfit[shown])
-    scan = {
-        **line(x, _height(y), [np.arange(len(x))], "misfit", "var(--data)"),
-        "text": [f"{value:.4g}" for value in y],
-        "hovertemplate": "%{x:.5g} nm: Δχ² %{text}<extra></extra>",
-    }
-    limit = {
-        "type": "scatter",
-        "mode": "lines",
-        "name": f"ambiguous below {RIVAL:g}",
-        "x": [left, right],
-        "y": numbers(_height(np.array([RIVAL, RIVAL]))),
-        "line": {"color": "var(--fourth)", "width": 1, "dash": "dot"},
-        "hoverinfo": "skip",
-    }
-    traces = [scan, limit]
-    if minima:
-        traces.append(
-            _points([minima[0]], "best", "circle", "var(--fit)", ["best fit: show it alone"], [None])
-        )
-    found = [(i, rival) for i, rival in enumerate(fit.rivals) if minima and _depth(fit) in rival.parameters]
-    if found:
-        places = [(rival.parameters[_depth(fit)], rival.delta_chi2) for _, rival in found]
-        numbered = [i if rival.curves else None for i, rival in found]
-        traces.append(
-            _points(
-                places, "rivals", "diamond", "var(--rival)", ["click to see its curve"] * len(found), numbered
-            )
-        )
-    decades = np.arange(1 if y.max() < 1000 * RIVAL else 2, 9)
-    axis = {
-        "tickvals": numbers(_height(np.array([0.0, RIVAL, *10.0**decades]))),
-        "ticktext": [
-            "0",
-            f"{RIVAL:g}",
-            *(f"{10 ** int(i)}" if i < 5 else f"10<sup>{i}</sup>" for i in decades),
-        ],
-        "zeroline": False,
-    }
-    rivals = [(f"rival: {escape(label(rival, fit))}", [_highlight(rival, fit)]) for rival in fit.rivals]
-    columns = [
-        Column("thickness (nm)", [place for place, _ in minima]),
-        Column("misfit", [delta for _, delta in minima]),
-    ]
-    caption = (
-        f"Misfit Δχ² against thickness, searched from {thickness.min():.5g} to {thickness.max():.5g} nm,"
-        f" linear below {RIVAL:g} and logarithmic above. Its minima are the best fit and"
-        f" {len(found) or 'no'} rival{'s' * (len(found) != 1)}."
-    )
-    panel = Panel("misfit Δχ²", 260, traces, [], axis)
-    drawn = figure("misfit", caption, "thickness (nm)", [panel], columns, rivals, {"range": [left, right]})
-    drawn["layout"]["hovermode"] = "closest"
-    return drawn
-
-
-def _depth(fit: Fit) -> str:
-    """Name of the thickness of `fit_figure.minima_of`."""
-    return next(p.name for p in fit.free if p.name.split(".")[-1] == "thickness")
-
-
-def _highlight(rival: Rival, fit: Fit) -> Panel:
-    """A ring around a rival's minimum."""
-    name = next((p.name for p in fit.free if p.name.split(".")[-1] == "thickness"), None)
-    if name not in rival.parameters:
-        return Panel("", 1, [], [])
-    at, height = np.array([rival.parameters[name]]), _height(np.array([rival.delta_chi2]))
-    ring = markers(at, height, "", "var(--rival)")
-    return Panel("", 1, [], [ring | {"marker": {"size": 18, "line": {"width": 3}}, "hoverinfo": "skip"}])
-
-
-def _points(
-    places: list[tuple[float, float]],
-    name: str,
-    symbol: str,
-    colour: str,
-    hints: list[str],
-    rivals: list[int | None],
-) -> Trace:
-    x, y = np.transpose(places)
-    texts = [
-        f"{at:.5g} nm: Δχ² {delta:.3g}<br>{hint}" for (at, delta), hint in zip(places, hints, strict=True)
-    ]
-    return {
-        **markers(x, _height(y), name, colour, symbol),
-        "marker": {"color": colour, "symbol": symbol, "size": 11},
-        "text": texts,
-        "hovertemplate": "%{text}<extra></extra>",
-        "customdata": [{"rival": rival} for rival in rivals],
-    }
-
-
-def _height(misfit: np.ndarray) -> np.ndarray:
-    """Place of a misfit on an axis that is linear below the threshold of rivals and logarithmic above."""
-    above = np.maximum(misfit, RIVAL)
-    return np.where(misfit > RIVAL, _LINEAR + np.log10(above / RIVAL), _LINEAR * misfit / RIVAL)
-
-
-def _envelope(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The least and the largest value of each range of positions, where there are many points."""
-    if len(x) <= 2 * _PROFILE_POINTS:
-        return x, y
-    groups = np.array_split(np.arange(len(x)), _PROFILE_POINTS)
-    kept = sorted({int(group[pick(y[group])]) for group in groups for pick in (np.argmin, np.argmax)})
-    return x[kept], y[kept]
-
-
-def of_index(fit: Fit) -> dict[str, Any] | None:
-    """n and k of the layer with the bands of their standard errors; None where both are known."""
-    if fit.layer_test is not None or not fit_figure.index_is_free(fit):
-        return None
-    curve = fit.index
-    panels = _fit_panels(fit, errors=True)
-    size = len(curve.wavelength)
-    rivals = []
-    for rival in fit.rivals:
-        own = replace(
-            fit, parts=tuple(replace(p, curve=c) for p, c in zip(fit.parts, rival.curves, strict=False))
-        )
-        panel = _fit_panels(own, errors=False)[: len(panels)] if rival.curves else []
-        rivals.append((f"rival: {escape(label(rival, fit))}", panel))
-    columns = [Column("wavelength (nm)", curve.wavelength)]
-    for which, index in (fit.principal_indices or {"": curve}).items():
-        for name in ("n", "k"):
-            title = f"{which} {name}".strip()
-            columns += [
-                Column(title, getattr(index, name)),
-                Column(f"error of {title}", getattr(index, f"{name}_stderr")),
-            ]
-    caption = f"n and k of the layer at {size} wavelengths, with bands of ± one standard error."
-    return figure("index", caption, "wavelength (nm)", panels, columns, rivals)
-
-
-def _fit_panels(fit: Fit, errors: bool) -> list[Panel]:
-    """Panels of n and k; of a birefringent layer those of each principal index and the birefringence."""
-    if not fit.principal_indices:
-        return _index_panels(fit.index, errors)
-    absorbs = any(_absorbs(index) for index in fit.principal_indices.values())
-    return [
-        panel._replace(label=f"{panel.label}, {name}")
-        for name, index in fit.principal_indices.items()
-        for panel in _index_panels(index, errors, absorbs and name != BIREFRINGENCE)
-    ]
-
-
-def _absorbs(index: Any) -> bool:
-    return bool(np.any(index.k) or np.any(index.k_stderr > 0))
-
-
-def _index_panels(curve: Any, errors: bool, absorbs: bool | None = None) -> list[Panel]:
-    panels, nm = [], curve.wavelength
-    absorbs = _absorbs(curve) if absorbs is None else absorbs
-    for name, height in (("n", 180), ("k", 180))[: 1 + absorbs]:
-        value, stderr = getattr(curve, name), getattr(curve, f"{name}_stderr")
-        bands = []
-        if errors:
-            bands = [band(nm, value - stderr, value + stderr, f"± error of {name}", f"var(--band-{name})")]
-        whole = [np.arange(len(nm))]
-        panels.append(Panel(name, height, bands, [line(nm, value, whole, name, f"var(--index-{name})")]))
-    return panels

@@ -6,11 +6,12 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from pellicle.fitting.result import ColourCurve, Status
+from pellicle.fitting.curves import ColourCurve
+from pellicle.fitting.result import Status
 from pellicle.fitting.status import RIVAL
 from pellicle.reporting import budget_text, fit_text, fitted_colours, parameter_text
 from pellicle.reporting.fit_figure import file_names
-from pellicle.reporting.page import citations, data_figures
+from pellicle.reporting.page import citations, data_figures, index_figure, misfit_figure
 from pellicle.reporting.page.document import Table, page, picture
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ def fit_page(
     "predictive"); `again`, what repeats the fit: descriptions and texts to copy.
     """
     figures = [data_figures.of_part(fit, i) for i in range(min(len(fit.parts), MOST_FIGURES))]
-    misfit, index = data_figures.of_misfit(fit), data_figures.of_index(fit)
+    misfit, index = misfit_figure.of_misfit(fit), index_figure.of_index(fit)
     shown = [*figures, *(each for each in (misfit, index) if each)]
     about = None
     if posterior is not None:

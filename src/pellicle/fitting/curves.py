@@ -1,0 +1,102 @@
+"""Curves of a fit: data and model of each part, and the layer's index with standard errors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+BIREFRINGENCE = "birefringence"
+"""Name of the extraordinary index less the ordinary one among the principal indices."""
+
+
+@dataclass(frozen=True)
+class Index:
+    """A layer's n and k with standard errors at each wavelength (nm), rising."""
+
+    wavelength: np.ndarray
+    n: np.ndarray
+    k: np.ndarray
+    n_stderr: np.ndarray
+    k_stderr: np.ndarray
+
+
+def at_each_wavelength(curves: Sequence[Index | Curve | ColourCurve]) -> Index:
+    """Return n and k of several curves at every wavelength of any of them, each once."""
+    columns = {f.name: np.concatenate([getattr(c, f.name) for c in curves]) for f in fields(Index)}
+    _, first = np.unique(columns["wavelength"], return_index=True)
+    return Index(**{name: column[first] for name, column in columns.items()})
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Data and model at each wavelength (nm), and the layer's index with standard errors.
+
+    For ellipsometry `data`, `model` and `sigma` are Ψ, and `delta_data` and `delta_model` Δ, in degrees;
+    `depolarisation_data` and `depolarisation_model` are fractions, None where it was not measured.
+    Of a birefringent layer `n` and `k` are the ordinary ones, and `principal` has each index by its name.
+    """
+
+    wavelength: np.ndarray
+    data: np.ndarray
+    sigma: np.ndarray
+    model: np.ndarray
+    n: np.ndarray
+    k: np.ndarray
+    n_stderr: np.ndarray
+    k_stderr: np.ndarray
+    delta_data: np.ndarray | None = None
+    delta_model: np.ndarray | None = None
+    depolarisation_data: np.ndarray | None = None
+    depolarisation_model: np.ndarray | None = None
+    principal: Mapping[str, Index] | None = None
+
+    @property
+    def residual(self) -> np.ndarray:
+        return self.data - self.model
+
+    @property
+    def delta_residual(self) -> np.ndarray:
+        """Δ of the data less that of the model, in −180 to 180 degrees."""
+        if self.delta_data is None or self.delta_model is None:
+            raise ValueError("only ellipsometry has a Δ")
+        return (self.delta_data - self.delta_model + 180.0) % 360.0 - 180.0
+
+    @property
+    def depolarisation_residual(self) -> np.ndarray:
+        if self.depolarisation_data is None or self.depolarisation_model is None:
+            raise ValueError("no depolarisation was measured")
+        return self.depolarisation_data - self.depolarisation_model
+
+
+@dataclass(frozen=True)
+class BrdfCurve:
+    """Model of BRDF samples, (samples, channels) in 1/sr, and residuals in the unit of the comparison."""
+
+    model: np.ndarray
+    residual: np.ndarray
+
+
+@dataclass(frozen=True)
+class ColourCurve:
+    """Colours of data and model, each (colours, 3) in the space of the data, with σ.
+
+    `difference` (colours,) is ΔE*ab (CIE 1976), None for the channels of a camera. The layer's index, with
+    standard errors, is that at the wavelengths (nm) of the sensor.
+    """
+
+    data: np.ndarray
+    sigma: np.ndarray
+    model: np.ndarray
+    difference: np.ndarray | None
+    wavelength: np.ndarray
+    n: np.ndarray
+    k: np.ndarray
+    n_stderr: np.ndarray
+    k_stderr: np.ndarray
+    principal: Mapping[str, Index] | None = None
+
+    @property
+    def residual(self) -> np.ndarray:
+        return self.data - self.model
