@@ -1,6 +1,7 @@
 """`pellicle fit --repeats`: files of one spot, fitted one by one and compared."""
 
 import csv
+import html
 import json
 import math
 
@@ -42,6 +43,10 @@ def test_repeats_of_one_thickness_agree(pellicle, spectrum_file, scene, tmp_path
     [row] = csv.DictReader((out / "repeats.csv").read_text().splitlines()[1:])
     assert float(row["sd_mean"]) == pytest.approx(np.std(values, ddof=1) / math.sqrt(4))
     assert "[[Repeats]]" in (out / "repeats.txt").read_text()
+    page = (out / "report.html").read_text()
+    scatter = page[page.index('id="repeats-head"') : page.index('id="files"')]
+    assert html.escape(found["verdict"]) in scatter
+    assert f'<td class="number">{found["parameters"]["thickness"]["mean"]:.7g}</td>' in scatter
     assert (out / "summary.csv").exists()
 
 

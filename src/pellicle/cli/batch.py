@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from pellicle.cli.resume import Earlier
     from pellicle.data.brdf_samples import BrdfSamples
     from pellicle.data.spectrum import Spectrum
+    from pellicle.fitting.repeated_measurements import Repeats
     from pellicle.fitting.result import Fit
     from pellicle.sampling.result import Posterior
     from pellicle.scene.film import Scene
@@ -102,15 +103,14 @@ class Batch:
                 f" {len(self.records)} of {len(groups)} files are done; fit the others with fewer --jobs"
             )
             worst = FAILED
-        if self.out is not None and len(groups) > 1 and self.records:
-            worst = max(worst, self._index(folders))
         if self.kept:
             say(
                 f"{self.kept} of {len(groups)} files were not fitted again: an earlier run has their results,"
                 " of the same data, scene, settings and version; --refit fits them, too"
             )
-        if self.inputs.repeats and worst != INTERRUPTED:
-            self._compare()
+        found = self._compare() if self.inputs.repeats and worst != INTERRUPTED else None
+        if self.out is not None and len(groups) > 1 and self.records:
+            worst = max(worst, self._index(folders, found))
         return worst
 
     def _summarise(self, files: int) -> int:
@@ -127,20 +127,23 @@ class Batch:
             return FAILED
         return CONVERGED
 
-    def _index(self, folders: list[Path | None]) -> int:
+    def _index(self, folders: list[Path | None], repeats: Repeats | None) -> int:
         """Write the page of all results so far, and return FAILED where it cannot be written."""
         from pellicle.reporting.folders import write_index
 
         assert self.out is not None
         try:
-            write_index(self.out, self.records, folders)
+            write_index(self.out, self.records, folders, repeats)
         except ValueError as error:
             say(f"pellicle: {error}")
             return FAILED
         return CONVERGED
 
-    def _compare(self) -> None:
-        """Compare the scatter of repeated measurements with their errors, print and write the result."""
+    def _compare(self) -> Repeats | None:
+        """Compare the scatter of repeated measurements with their errors, print and write the result.
+
+        None where they cannot be compared.
+        """
         from pellicle.fitting.repeated_measurements import repeats
         from pellicle.reporting.json_record import one_line
         from pellicle.reporting.repeats import failure, report, to_json, write_repeats
@@ -151,10 +154,11 @@ class Batch:
             say(f"pellicle: {error}")
             if self.as_json:
                 print(one_line(failure([file.path for file in self.inputs.files], str(error))), flush=True)
-            return
+            return None
         print(one_line(to_json(found)) if self.as_json else report(found), flush=True)
         if self.out is not None:
             write_repeats(self.out, found)
+        return found
 
     def _codes(self, groups: list[list[Input]], folders: list[Path | None]) -> Iterator[int]:
         """Fit the groups one by one, or in worker processes, and yield their exit codes in order."""

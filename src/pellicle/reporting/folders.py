@@ -17,6 +17,7 @@ from pellicle.reporting.json_record import indented, to_json, versions
 from pellicle.reporting.repeats import FILES as REPEATS
 
 if TYPE_CHECKING:
+    from pellicle.fitting.repeated_measurements import Repeats
     from pellicle.fitting.result import Fit
     from pellicle.sampling.result import Posterior
 
@@ -158,11 +159,12 @@ def write_index(
     folder: str | os.PathLike[str],
     records: Sequence[Mapping[str, Any]],
     folders: Sequence[str | os.PathLike[str] | None],
+    repeats: Repeats | None = None,
 ) -> None:
     """Write the page of several fits into their folder, with links to each one's page in its own folder.
 
-    `records` are JSON records of fits and failures, as many as there are `folders` or fewer. Raises as
-    `write_summary` does.
+    `records` are JSON records of fits and failures, as many as there are `folders` or fewer; `repeats` is
+    their scatter where they are repeated measurements. Raises as `write_summary` does.
     """
     from pellicle.reporting.page.batch_page import batch_page
 
@@ -172,7 +174,7 @@ def write_index(
         place.relative_to(target).as_posix() if place is not None and place.exists() else None
         for place in places
     ]
-    write_text(target / PAGE, batch_page(records, links), overwrite=True)
+    write_text(target / PAGE, batch_page(records, links, repeats), overwrite=True)
 
 
 def _summary_row(record: Mapping[str, Any]) -> dict[str, Any]:

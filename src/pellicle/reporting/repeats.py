@@ -23,10 +23,20 @@ FILES = RECORD, TABLE, TEXT = "repeats.json", "repeats.csv", "repeats.txt"
 
 def report(repeats: Repeats) -> str:
     """Format the verdict, a row for each parameter, and what was left out."""
+    found = warnings(repeats)
+    return (
+        block("Repeats", wrapped(repeats.verdict))
+        + block("Scatter of the parameters", [*table(rows(repeats)), "", *facts(notes(repeats))])
+        + (block("Warnings", [line for text in found for line in wrapped(text, "- ", "  ")]) if found else "")
+    )
+
+
+def rows(repeats: Repeats) -> list[tuple[str, ...]]:
+    """Head and cells of a table with a row for each parameter."""
     from pellicle.fitting.repeated_measurements import short
 
-    rows = [("", "mean", "± its sd", "scatter", "stated noise", "ratio", "probability", "± 95 %", "unit")]
-    rows += [
+    head = ("", "mean", "± its sd", "scatter", "stated noise", "ratio", "probability", "± 95 %", "unit")
+    return [head] + [
         (
             p.name,
             f"{p.mean:.7g}",
@@ -40,8 +50,12 @@ def report(repeats: Repeats) -> str:
         )
         for p in repeats.parameters.values()
     ]
+
+
+def notes(repeats: Repeats) -> list[tuple[str, str]]:
+    """Names of columns of the table, each with its meaning."""
     few = next(iter(repeats.parameters.values()))
-    notes = [
+    return [
         (
             "scatter",
             f"standard deviation of one value; from {len(few.values)} values it is known within"
@@ -51,20 +65,13 @@ def report(repeats: Repeats) -> str:
         ("probability", "that noise as stated scatters at least so much"),
         ("± 95 %", "expanded uncertainty of the mean, with the effects that all repeats share"),
     ]
-    warnings = list(repeats.warnings)
-    if repeats.uncompared:
-        warnings.append(
-            f"not compared, on a bound or without a finite error: {', '.join(repeats.uncompared)}"
-        )
-    return (
-        block("Repeats", wrapped(repeats.verdict))
-        + block("Scatter of the parameters", [*table(rows), "", *facts(notes)])
-        + (
-            block("Warnings", [line for text in warnings for line in wrapped(text, "- ", "  ")])
-            if warnings
-            else ""
-        )
-    )
+
+
+def warnings(repeats: Repeats) -> list[str]:
+    """Sentences on fits that were left out and parameters that were not compared."""
+    uncompared = ", ".join(repeats.uncompared)
+    own = [f"not compared, on a bound or without a finite error: {uncompared}"] if uncompared else []
+    return [*repeats.warnings, *own]
 
 
 def to_json(repeats: Repeats) -> dict[str, Any]:

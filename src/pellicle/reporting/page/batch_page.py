@@ -1,4 +1,4 @@
-"""Page of a batch: numbers of files of each status, a figure of the results, a table to sort and filter."""
+"""Page of a batch: numbers of each status, a figure, a table to sort and filter, the scatter of repeats."""
 
 from __future__ import annotations
 
@@ -6,16 +6,20 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import PurePosixPath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 import numpy as np
 
 from pellicle.fitting.result import Status
+from pellicle.reporting import repeats as repeats_text
 from pellicle.reporting.page.document import page
 from pellicle.reporting.page.figure import Column, Panel, Trace, figure, numbers
 from pellicle.reporting.page.fit_page import TONES
 from pellicle.reporting.parameter_text import NUISANCE
+
+if TYPE_CHECKING:
+    from pellicle.fitting.repeated_measurements import Repeats
 
 Record = Mapping[str, Any]
 _MOST_PARAMETERS = 8
@@ -28,11 +32,12 @@ _STYLES = {
 """Symbol and colour of the results of a tone: both differ."""
 
 
-def batch_page(records: Sequence[Record], pages: Sequence[str | None]) -> str:
+def batch_page(records: Sequence[Record], pages: Sequence[str | None], repeats: Repeats | None = None) -> str:
     """Format the results of several files as a page.
 
     **Arguments:** `records`, the JSON records of fits and failures; `pages`, the path of each one's own page
-    relative to this one, with slashes, None where there is none.
+    relative to this one, with slashes, None where there is none; `repeats`, the scatter of their parameters
+    where the files are repeated measurements.
     """
     links = [None if each is None else quote(each) for each in pages]
     names = _parameters(records)
@@ -48,7 +53,19 @@ def batch_page(records: Sequence[Record], pages: Sequence[str | None]) -> str:
         heads=[(name, units[name]) for name in names],
         rows=rows,
         counts=[(status, TONES[Status(status)], number) for status, number in counts.most_common()],
+        repeats=None if repeats is None else _scatter(repeats),
     )
+
+
+def _scatter(repeats: Repeats) -> dict[str, Any]:
+    head, *rows = repeats_text.rows(repeats)
+    return {
+        "verdict": repeats.verdict,
+        "head": head[1:],
+        "rows": rows,
+        "notes": repeats_text.notes(repeats),
+        "warnings": repeats_text.warnings(repeats),
+    }
 
 
 def _parameters(records: Sequence[Record]) -> list[str]:

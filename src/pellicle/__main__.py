@@ -1,0 +1,5 @@
+"""`python -m pellicle`: the `pellicle` command."""
+
+from pellicle.cli import process
+
+process()
