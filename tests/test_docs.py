@@ -113,6 +113,7 @@ ELSEWHERE = {
     "python benchmarks/anisotropic.py": "speed is measured by benchmarks; tests/optics/test_berreman.py",
     "python benchmarks/peers --group birefringent --write": "make peers",
     "python benchmarks/peers/agreement.py --stacks 1000": "needs pyElli; tests/optics/test_berreman.py",
+    "python benchmarks/published.py": "tests/reference/test_published_layers.py: the same numbers",
     "python benchmarks/explorer.py": "speed is measured by benchmarks; tests/explorer",
     "python benchmarks/calibration.py": _LONG_STUDY,
     "python benchmarks/colour_inverse.py": "tests/colour/test_inverse.py: 300 colours of one film",

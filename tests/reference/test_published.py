@@ -70,15 +70,3 @@ def test_power_into_an_absorbing_substrate():
     film = (550.0, 100.0, 1.46, 0.2 + 3.4j)
     total = sum(f(*film, angle=60.0, polarisation="p") for f in (pl.reflectance, pl.transmittance))
     assert total == pytest.approx(1, abs=1e-14)
-
-
-def test_optical_density_of_a_rugate_filter():
-    """n_a + n_p/2 sin(2πz/p), N periods: OD = 1.36 N n_p/(2n_a) − log₁₀(4/n_s); Appl. Opt. 32, 4831 (1993),
-    equations 1 to 3. Their factor 1.36, rounded, allows 0.01.
-    """
-    mean, swing, periods, glass, peak = 2.0, 0.1, 80, 1.52, 600.0
-    material = pl.Graded(mean - swing / 2, mean + swing / 2, pl.profile.Sine(0.5, 0.5, periods), mix="linear")
-    rugate = pl.Scene(pl.Layer(material, periods * peak / (2 * mean)), glass)
-    R = pl.simulate(rugate, [peak]).values
-    published = 1.36 * periods * swing / (2 * mean) - np.log10(4 / glass)
-    assert -np.log10(1 - R[0]) == pytest.approx(published, abs=0.012)

@@ -46,7 +46,7 @@ def transverse(ambient: Any, angle: Any) -> tuple[Any, Any]:
     literal 0.0, so that nothing oblique is computed. Otherwise it is a `Transverse`.
     """
     if angle is None:
-        return 0.0, ambient
+        return 0.0, normal(ambient, 0.0)
     if isinstance(angle, Inside):
         return angle.a, normal(ambient, angle.a)
     # the cosine of a float32 π/2 is negative, and would bring T below 0 and R above 1

@@ -1,0 +1,16 @@
+"""Published numbers of birefringent and graded layers, which docs/published.md lists."""
+
+from __future__ import annotations
+
+import pytest
+
+
+@pytest.fixture(scope="module")
+def published(load_script):
+    return load_script("benchmarks/published.py")
+
+
+@pytest.mark.parametrize("study", ["gooch_tarry", "sapphire_window", "brewster_angles", "rugate_filters"])
+def test_numbers_are_those_published(published, study):
+    for row in getattr(published, study)():
+        assert row.computed == pytest.approx(row.published, abs=row.tolerance), row.quantity
