@@ -94,8 +94,10 @@ def test_pushed_against_a_bound_and_unseen_beside_one(film, measured):
     assert fit["n"].stderr == float("inf")
 
 
-def test_an_interval_by_profile_is_that_of_a_scan(film, measured):
-    """Both ends of the thickness, its index fitted again by SciPy, where χ² is 3.84 above the best."""
+def test_an_interval_by_profile_is_that_of_a_scan(film, measured, monkeypatch):
+    """Both ends of the thickness, its index fitted again by SciPy, where χ² is 3.84 above the best; and the
+    misfit beside the best, for which nothing but the search's programs is compiled."""
+    monkeypatch.setattr("pellicle.fitting.neighbourhood.total_deviance", None)
     scene = film(material=pl.dispersion.Constant(pl.Free(1.3, 1.7), 0.0))
     data = measured(scene, 1.46, 430.0, sigma=True)
     fit, ranked = fitted(data, scene, 0.0, quiet)
@@ -110,6 +112,12 @@ def test_an_interval_by_profile_is_that_of_a_scan(film, measured):
     for end in (low, high):
         assert profile(end) - best == pytest.approx(3.84, abs=0.1)
     assert low < fit["thickness"].value < high
+
+    units = around.best + np.array([[0.0, 0.0], [0.05, -0.01]])
+    values = around.lower + units * (around.upper - around.lower)
+    named = [dict(zip(fit.correlation_names, row, strict=True)) for row in values]
+    expected = [chi2(data, own["thickness"], own["n"]) / ranked.fits[0].variance for own in named]
+    assert np.diff(around.misfit(units)) == pytest.approx(np.diff(expected), rel=1e-9)
 
 
 @pytest.mark.parametrize(("rise", "status"), [(7.5, "not-identifiable"), (40.0, "converged")])

@@ -53,6 +53,7 @@ def test_a_program_that_calls_lapack_runs_in_a_new_process(tmp_path):
 
 def test_an_option_that_xla_does_not_have_is_left_out(tmp_path, monkeypatch):
     monkeypatch.setattr(executables, "_OPTIONS", {"xla_of_another_version": True})
+    monkeypatch.setattr(executables, "compiler_options", executables.compiler_options.__wrapped__)
     program = executables.make(tmp_path / "programs" / "one", KEY, lambda x: [x + 1], VECTOR, tmp_path)
     assert program is not None
     np.testing.assert_array_equal(program(np.arange(3.0))[0], [1, 2, 3])
@@ -180,6 +181,18 @@ def test_a_program_is_kept_by_its_plan_its_shapes_and_the_settings(cache, new_pr
     new_process()
     scaled(2, np.arange(4.0))
     assert len(TRACED) == 7
+
+
+def test_without_a_cache_programs_are_compiled_with_the_same_options(new_process, monkeypatch):
+    """XLA refuses an option that it does not have."""
+    monkeypatch.setattr(executables, "compiler_options", lambda: {"xla_of_another_version": True})
+    before = jax.config.values["jax_compilation_cache_dir"]
+    jax.config.update("jax_compilation_cache_dir", None)
+    try:
+        with pytest.raises(jax.errors.JaxRuntimeError, match="xla_of_another_version"):
+            kept(lambda _, x: Sum(jnp.sum(x)))("plan", np.arange(4.0))
+    finally:
+        jax.config.update("jax_compilation_cache_dir", before)
 
 
 def test_without_owners_the_traced_program_is_kept(cache, new_process, monkeypatch):

@@ -14,6 +14,7 @@ import re
 import secrets
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,18 @@ most run as fast within 20 %, those of a slow scale and offset a third slower (j
 
 _DIGEST = hashlib.sha256().digest_size
 _CALLS = re.compile(r"custom_call @([\w.]+)")
+
+
+@lru_cache(maxsize=1)
+def compiler_options() -> dict[str, str | bool]:
+    """Options of XLA for the programs of a fit; none for a GPU, or for an XLA that lacks them."""
+    if jax.default_backend() != "cpu":
+        return {}
+    try:
+        jax.jit(lambda: 0.0).lower().compile(compiler_options=_OPTIONS)
+    except jax.errors.JaxRuntimeError:
+        return {}
+    return _OPTIONS
 
 
 def load(path: Path, key: bytes) -> Callable[..., Any] | None:
@@ -66,10 +79,7 @@ def make(
         return None  # a library that the loading process may not have initialised
     from jax.experimental import serialize_executable
 
-    try:
-        compiled = lowered.compile(compiler_options=_OPTIONS)
-    except jax.errors.JaxRuntimeError:  # XLA of another version
-        compiled = lowered.compile()
+    compiled = lowered.compile(compiler_options=compiler_options())
     with suppress(OSError):
         for copy in cache.glob(f"*{name}*"):
             copy.unlink()

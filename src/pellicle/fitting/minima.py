@@ -88,6 +88,15 @@ def solve(
     return Minima(units, np.where(np.isfinite(deviance), deviance, np.inf), converged)
 
 
+def deviance_at(problem: Problem, units: np.ndarray) -> np.ndarray:
+    """Deviance of all views and priors at points (points, parameters) of the unit cube.
+
+    By the program of `solve`, whose first step evaluates its starts: where a fit has polished already,
+    `total_deviance` would compile another one for each number of points.
+    """
+    return solve(problem, units, steps=1).deviance
+
+
 def _padded(rows: np.ndarray) -> np.ndarray:
     return np.concatenate([rows, np.repeat(rows[-1:], SLOTS - len(rows), axis=0)])
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pellicle.fitting.evaluation import total_deviance
-from pellicle.fitting.minima import solve
+from pellicle.fitting.minima import deviance_at, solve
 from pellicle.fitting.reweighting import RankedMinima
 
 _SETTLED = 0.03
@@ -73,6 +73,7 @@ def neighbourhood(ranked: RankedMinima, covariance: np.ndarray, others: np.ndarr
     counted = ranked.problem._replace(views=tuple(view.counting(1 / fit.variance) for view, fit in pairs))
     own = counted.in_own_units(values)
     thinned, box = own.thinned(), own.box
+    searched_in_own_units = own.coordinates == ranked.problem.coordinates
     lower, upper = np.asarray(box.lower), np.asarray(box.upper)
     best, *further = np.clip((np.vstack([values, *others]) - lower) / (upper - lower), 0.0, 1.0)
 
@@ -89,7 +90,7 @@ def neighbourhood(ranked: RankedMinima, covariance: np.ndarray, others: np.ndarr
         upper,
         covariance[: len(best), : len(best)],
         tuple(p.natural for p in ranked.problem.parameters),
-        lambda units: total_deviance(thinned, units),
+        lambda units: deviance_at(own, units) if searched_in_own_units else total_deviance(thinned, units),
         profile,
         np.reshape(further, (-1, len(best))),
     )

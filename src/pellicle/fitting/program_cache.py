@@ -33,13 +33,16 @@ def kept(function: Program) -> Program:
     `function(plan, *pytrees)` must be pure and return a named tuple of arrays; `plan` is hashable, and
     its `repr` says all that the program depends on.
     """
-    jitted = jax.jit(function, static_argnums=0)
+
+    @lru_cache(maxsize=1)
+    def jitted() -> Program:  # at the first call, which starts JAX's backend anyway
+        return jax.jit(function, static_argnums=0, compiler_options=executables.compiler_options())
 
     @wraps(function)
     def call(plan: Hashable, *arguments: Any) -> Any:
         folder = jax.config.jax_compilation_cache_dir  # pyright: ignore[reportAttributeAccessIssue]
         if not folder or "://" in folder:  # JAX can cache in a cloud, too
-            return jitted(plan, *arguments)
+            return jitted()(plan, *arguments)
         leaves, structure = jax.tree_util.tree_flatten(arguments)
         arrays = [np.asarray(leaf) for leaf in leaves]
         shapes = tuple((a.shape, a.dtype.str) for a in arrays)
@@ -84,7 +87,7 @@ def _traced(path: Path, flat: Program, inputs: Sequence[jax.ShapeDtypeStruct]) -
             path.parent.mkdir(parents=True, exist_ok=True)
             with replacing(path, overwrite=True) as temporary:
                 temporary.write_bytes(program.serialize())
-    return jax.jit(program.call)
+    return jax.jit(program.call, compiler_options=executables.compiler_options())
 
 
 @lru_cache(maxsize=1)

@@ -14,8 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pellicle.fitting.evaluation import total_deviance
-from pellicle.fitting.minima import MOST, Minima, minima
+from pellicle.fitting.minima import MOST, Minima, deviance_at, minima
 from pellicle.fitting.problem import Problem, View
 from pellicle.fitting.robust_losses import LEAST_SQUARES, LOSSES, Loss, inflation, spread
 
@@ -75,7 +74,7 @@ class RankedMinima:
         pairs = zip(self.problem.views, self.fits, strict=True)
         views = tuple(view.counting(1 / fit.variance) for view, fit in pairs)
         problem = self.problem._replace(views=views)
-        deviance = total_deviance(problem, self.minima.units)
+        deviance = deviance_at(problem, self.minima.units)
         return replace(self, problem=problem, minima=replace(self.minima, deviance=deviance))
 
     @property
