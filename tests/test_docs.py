@@ -16,7 +16,6 @@ from pathlib import Path
 
 import jsonschema
 import pytest
-import yaml
 
 from pellicle.cli import app, main
 
@@ -219,15 +218,18 @@ def run_command(monkeypatch, capsys):
 
 @pytest.fixture
 def run_page(clone, run_command, outputs):
-    """Return a function that runs the quick commands of a page that have not run, or whose files it reads."""
+    """Return a function that runs the commands of a page that have not run, or whose files it reads.
 
-    def run(page):
+    The slow ones only where `slow`.
+    """
+
+    def run(page, slow=False):
         clone()
         shown = pellicle_commands(page)
         for i, command in enumerate(shown):
             out = command.partition("--out ")[2].partition(" ")[0]
             is_read_later = out and any(out in later.split() for later in shown[i + 1 :])
-            if not is_slow(command) and (is_read_later or command not in outputs):
+            if (slow or not is_slow(command)) and (is_read_later or command not in outputs):
                 outputs[command] = run_command(command)
 
     return run
@@ -303,12 +305,12 @@ def test_commands_run(page, run_page):
 @pytest.mark.parametrize("page", [page for page in PAGES_WITH_COMMANDS if results(PAGES[page])])
 def test_quoted_results_are_printed(page, run_page, outputs):
     """By a command of the page, or of another one that shows the same command."""
-    for source in [page, *PAGES_WITH_COMMANDS]:
-        run_page(source)
-        missing = missing_results(page, outputs.values())
-        if not missing:
+    run_page(page, slow=True)
+    for other in PAGES_WITH_COMMANDS:
+        if not missing_results(page, outputs.values()):
             break
-    assert not missing
+        run_page(other)
+    assert not missing_results(page, outputs.values())
 
 
 SLOW_PAGES = [page for page in PAGES_WITH_COMMANDS if any(map(is_slow, pellicle_commands(page)))]
@@ -316,11 +318,8 @@ SLOW_PAGES = [page for page in PAGES_WITH_COMMANDS if any(map(is_slow, pellicle_
 
 @pytest.mark.slow
 @pytest.mark.parametrize("page", SLOW_PAGES)
-def test_slow_commands_run(page, clone, run_command):
-    """With all commands of their page, because they may read what others write."""
-    clone()
-    for command in pellicle_commands(page):
-        run_command(command)
+def test_slow_commands_run(page, run_page):
+    run_page(page, slow=True)
 
 
 @pytest.mark.parametrize(
@@ -339,42 +338,12 @@ def test_python_runs(page, clone):
         exec(compile(block, page, "exec"), names)
 
 
-def test_the_citation_file_is_complete():
-    """The file and each reference have what the Citation File Format 1.2.0 requires, and this version."""
-    cited = yaml.safe_load((ROOT / "CITATION.cff").read_text("utf-8"))
-    assert cited["cff-version"] == "1.2.0"
-    assert {"message", "title", "authors"} <= cited.keys()
-    newest = re.findall(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.MULTILINE)[0]
-    assert cited["version"] == newest
-    for reference in cited["references"]:
-        assert {"type", "title", "authors", "year"} <= reference.keys(), reference
-        assert not reference.get("doi", "10.1/x").startswith("http"), reference
-        family = reference["authors"][0]["family-names"]
-        assert reference.get("doi", family) in PAGES["docs/sources.md"], reference["title"]
-
-
 @pytest.mark.parametrize("page", PAGES)
 def test_linked_files_exist(page):
     """In the repository; `make docs` checks the links of the site."""
     text = FENCE.sub("", PAGES[page])
     for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", text):
         assert "://" in target or (ROOT / page).parent.joinpath(target).exists(), target
-
-
-def test_the_house_is_drawn_in_the_order_of_the_import_contract():
-    """The diagram of CONTRIBUTING, whose indented lines are folders inside of others."""
-    (diagram,) = blocks("CONTRIBUTING.md", "text")
-    drawn = [re.split(r"\s{2,}", line)[0] for line in diagram.splitlines() if not line.startswith(" ")]
-    pyproject = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
-    assert drawn == pyproject["tool"]["importlinter"]["contracts"][0]["layers"]
-
-
-def test_modules_named_in_contributing_exist():
-    """By their path in the repository or in the package, or by the end of it."""
-    named = set(re.findall(r"`([\w./]+\.(?:py|toml|csv|md))`", PAGES["CONTRIBUTING.md"])) - {"NN_name.py"}
-    paths = [*ROOT.glob("*"), *ROOT.glob("[a-z]*/**/*")]
-    kept = ["/" + path.relative_to(ROOT).as_posix() for path in paths if path.is_file()]
-    assert not [name for name in named if not any(path.endswith("/" + name) for path in kept)]
 
 
 SCHEMA = json.loads((ROOT / "docs" / "recipe.schema.json").read_text("utf-8"))
