@@ -3,8 +3,8 @@
 Run `python benchmarks/anisotropic.py`. A point is one wavelength, with the Jones matrix of reflection of a
 uniaxial film of 237 nm on glass at 55°. Times are processor times on one thread, and the methods take turns
 in each round; the table has medians. pyElli runs its 4×4 solver with its exact propagators (exponentials of
-matrices by SciPy, or by PyTorch where that is installed, and eigenvectors); difftmm is complex64 and lays
-principal axes along those of the laboratory. Both take part if they are installed
+matrices by SciPy, or by PyTorch where that is installed, and eigenvectors); difftmm is complex64, and its
+`FilmSolver` lays principal axes along those of the laboratory. Both take part if they are installed
 (`pip install pyElli packaging difftmm`). `benchmarks/peers/agreement.py` compares the values.
 """
 

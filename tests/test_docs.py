@@ -110,7 +110,10 @@ ELSEWHERE = {
     ),
     "pellicle --install-completion": "would change the user's shell; part of cyclopts",
     "python benchmarks/anisotropic.py": "speed is measured by benchmarks; tests/optics/test_berreman.py",
-    "python benchmarks/peers --group birefringent --write": "make peers",
+    **dict.fromkeys(
+        [f"python benchmarks/peers --group {group} --write" for group in ("birefringent", "graded")],
+        "make peers",
+    ),
     "python benchmarks/peers/agreement.py --stacks 1000": "needs pyElli; tests/optics/test_berreman.py",
     "python benchmarks/published.py": "tests/reference/test_published_layers.py: the same numbers",
     "python benchmarks/explorer.py": "speed is measured by benchmarks; tests/explorer",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import json
 import math
 import runpy
 import sys
@@ -12,7 +13,7 @@ import numpy as np
 import pytest
 
 HERE = Path(__file__).parents[1] / "benchmarks" / "peers"
-NAMES = ("cases", "truth", "table", "packages", "birefringent", "adapters.pellicle_any")
+NAMES = ("cases", "truth", "table", "packages", "birefringent", "graded", "adapters.pellicle_any")
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +41,7 @@ def test_reference_values_agree_with_pellicle(peers):
             assert table.error(ours.slopes(case, np.float64), truth["slopes"], "slopes") < 1e-9, name
 
 
-@pytest.mark.parametrize("name", ["films", "birefringent"])
+@pytest.mark.parametrize("name", ["films", "birefringent", "graded"])
 def test_tables_are_inserted_into_the_page(peers, name):
     script = runpy.run_path(str(HERE / "__main__.py"), run_name="peers")
     page, (begin, end) = script["PAGE"].read_text("utf-8"), (script[x].format(name) for x in ("BEGIN", "END"))
@@ -88,3 +89,30 @@ def test_table_shows_cases_with_errors_and_names_the_rest(peers):
         "",
         "All are correct in: easy.",
     ]
+
+
+def test_graded_films_in_homogeneous_slices(peers, monkeypatch):
+    """Of second order in their thickness; tmm is among the tools of the tests."""
+    graded = peers["graded"]
+    monkeypatch.setattr(graded, "SLICES", (8, 16))
+    table = json.loads(graded.TABLE.read_text("utf-8"))
+    name = "linear on silicon"
+    rows = {name: table["rows"][name]}
+    monkeypatch.setattr(graded, "truths", lambda: {name: np.array(rows[name]["values"][:4], dtype=float)})
+    package = next(x for x in graded.PACKAGES if x.adapter == "tmm")
+    coarse, fine = graded.theirs(rows, table["nm"], package, Path(sys.executable))
+    assert np.log2(coarse.errors / fine.errors) == pytest.approx(2, abs=0.3)
+    assert 0 < coarse.microseconds < fine.microseconds
+
+
+def test_errors_at_equal_time(peers):
+    graded = peers["graded"]
+    each = [
+        (graded.OURS, 4, 1.0, 1e-4),
+        (graded.OURS, 8, 2.0, 1e-6),
+        ("tmm", 8, 1.5, 1e-2),
+        ("tmm", 4, 0.5, 0.1),
+    ]
+    rows = [graded.Row(*numbers, np.array([error])) for *numbers, error in each]
+    beside = [line.split(" | ")[-1].strip(" |") for line in graded.tabulated(rows).splitlines()[2:]]
+    assert beside == ["", "", "1e-04", "slower"]

@@ -1,4 +1,4 @@
-"""Hard cases in pellicle and in other packages, against 50 digits: `python benchmarks/peers`.
+"""Hard cases and graded films in pellicle and in other packages: `python benchmarks/peers`.
 
 Creates a virtual environment in .venv-peers (several GB: torch), installs each package by name, and
 runs each in a separate process. A package that cannot be installed, crashes or hangs becomes an entry of
@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import birefringent
+import graded
 from cases import CASES, WITHOUT_SLOPE
 from environment import ROOT, install, peers_python
 from packages import OURS, PEERS, Package
@@ -26,7 +27,7 @@ HERE = Path(__file__).resolve().parent
 PAGE = ROOT / "docs" / "hard_cases.md"
 SECONDS = 300  # for all remaining cases of a process
 BEGIN, END = "<!-- {}: written by make peers -->", "<!-- /{} -->"
-GROUPS = "films", "birefringent"
+GROUPS = "films", "birefringent", "graded"
 
 
 def run(python: Path, package: Package, cases: dict[str, Any]) -> dict[str, Any]:
@@ -97,10 +98,19 @@ def group(name: str) -> Group:
 
 def main(names: list[str], every_case: bool, write: bool) -> None:
     for name in names:
-        text = compared(group(name), every_case)
+        text = compared_graded() if name == "graded" else compared(group(name), every_case)
         print(text)
         if write:
             PAGE.write_text(inserted(PAGE.read_text(encoding="utf-8"), text, name), encoding="utf-8")
+
+
+def compared_graded() -> str:
+    """Return the table of graded films."""
+    pythons: dict[str, Path | str] = {}
+    for package in graded.PACKAGES:
+        python = peers_python()
+        pythons[package.adapter] = install(python, package) or python
+    return graded.compared(pythons)
 
 
 def compared(given: Group, every_case: bool) -> str:
@@ -156,7 +166,7 @@ def inserted(page: str, text: str, name: str = "films") -> str:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n\n")[0])
     parser.add_argument("--all", action="store_true", help="show every case, not only those with an error")
     parser.add_argument("--write", action="store_true", help="write the tables to docs/hard_cases.md too")
     parser.add_argument("--group", choices=GROUPS, help="only these cases; by default all")

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from packages import Package
+from packages import PYELLI, Package
 
 TABLE = Path(__file__).resolve().parents[2] / "tests" / "hard" / "anisotropic.json"
 PACKAGES = (
@@ -15,8 +15,14 @@ PACKAGES = (
     Package(
         "birefringent_pyelli",
         "pyElli 4×4",
-        ("pyElli",),
+        PYELLI,
         "float64, its default solver and propagator; it has no derivatives",
+    ),
+    Package(
+        "birefringent_difftmm",
+        "difftmm",
+        ("difftmm",),
+        "complex64 by construction; isotropic substrates only, so its derivatives are not compared",
     ),
 )
 ELEMENTS = 8

@@ -18,6 +18,9 @@ class Package:
     note: str
 
 
+PYELLI = "pyElli", "packaging"
+"""pyElli 0.23.1 needs packaging but does not declare it."""
+
 OURS = (
     Package("pellicle64", "pellicle", (), "float64"),
     Package("pellicle32", "pellicle float32", (), "the same functions on float32 input"),
@@ -34,8 +37,8 @@ PEERS = (
         "only by name and refuses d = 0",
     ),
     Package("tmm_faster", "tmm_faster", ("tmm_faster",), "float64"),
-    Package("pyelli2x2", "pyElli 2×2", ("pyElli",), "float64, its solver for isotropic stacks"),
-    Package("pyelli4x4", "pyElli 4×4", ("pyElli",), "float64, its default solver"),
+    Package("pyelli2x2", "pyElli 2×2", PYELLI, "float64, its solver for isotropic stacks"),
+    Package("pyelli4x4", "pyElli 4×4", PYELLI, "float64, its default solver"),
     Package("refellips", "refellips", ("refellips", "refnx"), "float64, R only: written for Ψ and Δ"),
     Package(
         "differentiable_tmm",
