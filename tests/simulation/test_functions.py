@@ -283,3 +283,21 @@ def test_known_media_are_known_under_jit_too(whole):
     given = pl.reflectance(wavelength, 100.0, layer + 0j, substrate + 0j, ambient=1.5, angle=angle)
     np.testing.assert_allclose(jax.jit(signal)(100.0), given, rtol=1e-12)
     np.testing.assert_allclose(signal(100.0), given, rtol=1e-12)
+
+
+def test_principal_indices_of_a_birefringent_medium():
+    """Against each medium alone; handbooks give 1.6584 and 1.4864 for calcite."""
+    NM = np.array([500.0, 589.3])
+    two = pl.Anisotropic(Cauchy(1.5, 3000.0), 1.7 + 0.1j, axis=(40.0, 0.0))(NM)
+    np.testing.assert_allclose(two, np.stack([Cauchy(1.5, 3000.0)(NM), np.full(2, 1.7 + 0.1j)], axis=-1))
+    named = pl.Anisotropic("calcite", "calcite-e")
+    np.testing.assert_allclose(pl.refractive_index(589.3, named), [1.6584, 1.4864], atol=5e-4)
+    assert pl.Anisotropic(x=1.5, y=1.6, z=1.7)(NM).shape == (2, 3)
+    with pytest.raises(ValueError, match="refractive_index"):
+        named(589.3)
+    for call in (
+        lambda: pl.refractive_index(50.0, named),
+        lambda: pl.jones(50.0, 1.0, named, 1.5, angle=9.0),
+    ):
+        with pytest.raises(ValueError, match="50"):
+            call()

@@ -7,6 +7,8 @@ from collections.abc import Callable
 from typing import Any, final
 
 import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Complex
 
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.optics.anisotropy import Principal, permittivity, uniaxial
@@ -26,6 +28,12 @@ class Anisotropic(AbstractDispersion):
       (`pellicle.optics.anisotropy`). By default the third axis is the surface normal.
 
     Angles that are literally multiples of 90° keep the axes along those of the laboratory.
+
+    Called with a wavelength in nm, it returns its principal indices, complex, along a last axis: (n_o, n_e)
+    or (n_x, n_y, n_z). `pellicle.refractive_index` also does where the principal media are names.
+
+    >>> [round(float(n.real), 2) for n in Anisotropic(1.66, 1.49)(550.0)]
+    [1.66, 1.49]
     """
 
     x: Any  # the ordinary medium of a uniaxial crystal
@@ -84,6 +92,21 @@ class Anisotropic(AbstractDispersion):
     def is_uniaxial(self) -> bool:
         """True for a medium of two indices."""
         return self.y is None
+
+    def __call__(self, wavelength: Any) -> Complex[Array, "..."]:
+        """Return the principal indices n + ik at `wavelength` (nm, any shape), along a last axis.
+
+        **Raises:** ValueError for a principal medium that is a name: `pellicle.refractive_index` looks it up.
+        """
+        at = jnp.asarray(wavelength, dtype=jnp.result_type(float, wavelength))
+        indices = []
+        for medium in (self.x, self.y, self.z):
+            if isinstance(medium, str):
+                raise ValueError(f"{medium!r} is a name: use pl.refractive_index(wavelength, medium)")
+            if medium is not None:
+                index = medium(at) if isinstance(medium, AbstractDispersion) else medium
+                indices.append(jnp.broadcast_to(index, at.shape) * (1 + 0j))
+        return jnp.stack(indices, axis=-1)
 
     def index(self, wavelength):
         """Return a `Principal` where the axes are those of the laboratory, else a `Uniaxial` or `Tensor`."""

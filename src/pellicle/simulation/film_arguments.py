@@ -11,6 +11,7 @@ import numpy as np
 from jax.core import Tracer
 
 from pellicle.dispersion.base import AbstractDispersion
+from pellicle.dispersion.principal_media import principal_media
 from pellicle.errors import UsageError
 from pellicle.optics import interface
 from pellicle.optics.anisotropy import is_anisotropic
@@ -85,9 +86,9 @@ def index_at(what: Medium, wavelength) -> Number:
     """Return the index at the wavelengths: arrays and numbers as they are, materials evaluated."""
     if isinstance(what, str | AbstractDispersion):
         material = medium(what)
-        check = getattr(material, "check_range", None)
-        if check is not None and not isinstance(wavelength, Tracer):
-            check(np.asarray(wavelength))
+        for own in [] if isinstance(wavelength, Tracer) else principal_media(material):
+            if hasattr(own, "check_range"):
+                own.check_range(np.asarray(wavelength))
         return material.index(wavelength)
     return to_pair(floating(what))
 

@@ -11,9 +11,11 @@ from typing import Any
 import jax.numpy as jnp
 from jaxtyping import Array, Complex, Float
 
+from pellicle.dispersion.anisotropic import Anisotropic
 from pellicle.optics import coherent, response
 from pellicle.optics.ellipsometry import normalised, psi_delta, stokes
 from pellicle.optics.pair import to_complex
+from pellicle.scene.layers import medium
 from pellicle.simulation.film_arguments import Medium, film_arguments, floating, index_at
 
 
@@ -125,7 +127,8 @@ def refractive_index(wavelength: Any, what: Medium) -> Complex[Array, "..."]:
 
     **Arguments:** `wavelength` in nm, any shape; `what`: material, name, number or array.
 
-    **Returns:** complex, in the shape that the arguments broadcast to.
+    **Returns:** complex, in the shape that the arguments broadcast to. Of a `pellicle.Anisotropic` the
+    principal indices, (n_o, n_e) or (n_x, n_y, n_z), along one more axis, the last.
 
     **Raises:** ValueError for an unknown material and for wavelengths outside its data.
 
@@ -136,6 +139,9 @@ def refractive_index(wavelength: Any, what: Medium) -> Complex[Array, "..."]:
     ```
     """
     wavelength = floating(wavelength)
+    if isinstance(what, Anisotropic):
+        index_at(what, wavelength)  # which raises for wavelengths outside the data
+        return medium(what)(wavelength)
     value = to_complex(index_at(what, wavelength))
     return jnp.broadcast_to(value, jnp.broadcast_shapes(value.shape, wavelength.shape))
 
