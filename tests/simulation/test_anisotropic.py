@@ -144,10 +144,13 @@ def test_what_is_not_computed_is_refused():
         "mixture": lambda: pl.mixing.Bruggeman(crystal, pl.material("SiO2"), 0.5),
         "incoherent plate": lambda: pl.plan(scene([pl.Layer(1.5, 9.0), pl.Plate(tilted, 1.0)])),
         "back face": lambda: pl.plan(scene([pl.Layer(1.5, 9.0), pl.Plate(crystal, 1.0)], 1.0, "psi-delta")),
-        "tilted": lambda: pl.plan(scene([pl.Layer(tilted, 9.0), pl.Plate(1.5, 1.0)])),
+        "birefringent plate": lambda: pl.plan(scene([pl.Layer(tilted, 9.0), pl.Plate(crystal, 1.0)])),
         "fields": lambda: pl.absorptance(NM, 10.0, crystal, "Si", angle=ANGLE),
         "pl.jones": lambda: pl.reflectance(NM, 10.0, tilted, "Si", angle=ANGLE),
-        "roughness": lambda: pl.plan(scene(pl.Layer(tilted, 10.0, roughness=1.0))),
+        "mixtures with the ambient": lambda: pl.plan(scene(pl.Layer(tilted, 10.0, roughness=1.0))),
+        "R and T only": lambda: pl.plan(
+            scene([pl.Layer(crystal, 9.0, roughness=1.0), pl.Plate(1.5, 1.0)], 1.0, "psi-delta")
+        ),
     }
     for words, make in refused.items():
         with pytest.raises(ValueError, match=words):

@@ -33,6 +33,8 @@ def anisotropy(scene: Scene) -> Row:
             return Row("anisotropy", True, f"{why}, in slices where one wave decays", count=SLICED)
         return Row("anisotropy", True, why, count=GENERAL)
     why = "axes along the normal and the plane of incidence: s and p stay apart, closed forms of 2×2"
+    if scene.light.ellipsometric and groups(scene)[1]:
+        why = f"{why}, and 4×4 where light crosses absorbing layers to the back face"
     return Row("anisotropy", True, why, count=CLOSED_FORMS)
 
 
@@ -71,13 +73,28 @@ def _check(scene: Scene) -> None:
             " `angle_spread` and `numerical_aperture`"
         )
     mixed = any(map(mixes_polarisations, scene_media(scene)))
-    if mixed and plates:
+    if mixed and any(isinstance(medium, Anisotropic) for medium in thick):
         raise UsageError(
-            "a plate with an incoherent back face under a film whose optic axis is tilted is not computed:"
-            " leave out `back`"
+            "a birefringent plate in a scene whose optic axis is tilted elsewhere is not computed: give the"
+            " plate one index"
         )
-    if mixed and any(rough is not None for group in described for rough in group.roughness):
+    rough = any(face is not None for group in described for face in group.roughness)
+    if rough and not computes_roughness(scene):
+        if mixed:
+            raise UsageError(
+                "`roughness` under a tilted optic axis is not computed: in its place put a layer on top, of"
+                " twice that thickness, whose principal media are mixtures with the ambient, half of each"
+            )
         raise UsageError(
-            "`roughness` goes with axes along the normal and the plane of incidence: leave it out, or give"
-            " the angles of the optic axis as 0 or 90"
+            "`roughness` of a birefringent film on a plate is computed for R and T only: leave out one of"
+            " `roughness` and `back`"
         )
+
+
+def computes_roughness(scene: Scene) -> bool:
+    """True where rough faces of a scene are computed: not where s and p mix, or lose their phase."""
+    media = scene_media(scene)
+    if any(map(mixes_polarisations, media)):
+        return False
+    birefringent = any(isinstance(medium, Anisotropic) for medium in media)
+    return not (birefringent and scene.light.ellipsometric and groups(scene)[1])

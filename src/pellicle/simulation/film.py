@@ -22,7 +22,7 @@ from pellicle.optics.pointwise import pointwise
 from pellicle.scene.film import ELLIPSOMETRY, Scene, media, thickness_spread
 from pellicle.scene.free import free_leaves
 from pellicle.scene.layers import Layer
-from pellicle.simulation import instrument, mixed_polarisations
+from pellicle.simulation import instrument, mixed_plates, mixed_polarisations
 from pellicle.simulation.coherent_groups import (
     CoherentGroup,
     coherent_groups,
@@ -86,7 +86,7 @@ def build(plan: Plan) -> Simulate:
         groups = coherent_groups(plan, scene)
         # slices have an axis of their own, along which nothing acts element by element; a program of the 4×4
         # method with its slopes in each number one by one takes a minute to compile
-        if plan.on("gradient") or mixed:
+        if plan.on("gradient") or mixed or _birefringent_on_plates(plan):
             return at_each_wavelength(groups)
         return pointwise(at_each_wavelength, groups)
 
@@ -184,8 +184,19 @@ def _stokes_rows(plan: Plan, groups: list[CoherentGroup]) -> ellipsometry.Stokes
     if len(groups) == 1:
         s, p = (response_of(plan, groups[0], polarisation) for polarisation in "sp")
         return ellipsometry.stokes(s, p)
+    if _birefringent_on_plates(plan):
+        return mixed_plates.stokes(plan, groups)
     s, p = (reflected(plan, groups, polarisation) for polarisation in "sp")
     return ellipsometry.stokes_from_sums(s, p, _cross_product(plan, groups))
+
+
+def _birefringent_on_plates(plan: Plan) -> bool:
+    """True where s and p may cross the layers with different phases that the 2×2 method leaves out.
+
+    Its amplitudes have a scale, which is real and the same for s and p in one layer without losses.
+    """
+    scaled = plan.on("absorption") or plan.on("tunnelling") or plan.on("stack")
+    return plan.on("anisotropy") and plan.on("back-face") and plan.ellipsometric and scaled
 
 
 def _cross_product(plan: Plan, groups: list[CoherentGroup]):

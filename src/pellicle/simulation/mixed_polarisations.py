@@ -15,6 +15,7 @@ from pellicle.optics.berreman.stack import polarised, transmittances
 from pellicle.optics.hoisting import stored
 from pellicle.optics.mueller import inverse_intensity, mueller_elements
 from pellicle.optics.pair import abs2, conj, imag, real, to_pair
+from pellicle.simulation import mixed_plates
 from pellicle.simulation.coherent_groups import CoherentGroup
 
 
@@ -24,6 +25,8 @@ def rows(plan: Plan, groups: list[CoherentGroup]) -> list[Any]:
     R or T of the incident polarisations, with all light that is reflected or transmitted; for Ψ and Δ the
     Stokes sums of r_pp and r_ss; for a Mueller matrix its 16 elements.
     """
+    if len(groups) > 1:
+        return _rows_of_plates(plan, groups)
     (group,) = groups
     angle = jnp.zeros_like(group.phases[0]) if group.angle is None else group.angle
     dichroic = plan.row("anisotropy").count == SLICED
@@ -39,6 +42,19 @@ def rows(plan: Plan, groups: list[CoherentGroup]) -> list[Any]:
         p, s = transmittances(response)
     else:
         p, s = abs2(jones.pp) + abs2(jones.sp), abs2(jones.ps) + abs2(jones.ss)
+    return [s, p] if plan.on("polarisation") else [s if plan.polarisation == "s" else p]
+
+
+def _rows_of_plates(plan: Plan, groups: list[CoherentGroup]) -> list[Any]:
+    if plan.signal == "T":
+        p, s = mixed_plates.transmitted(plan, groups)
+    elif plan.signal == "psi-delta":
+        return list(mixed_plates.stokes(plan, groups))
+    else:
+        m = mixed_plates.mueller_matrix(plan, groups)
+        if plan.signal == "mueller":
+            return [x for row in m for x in row]
+        p, s = m[0][0] + m[0][1], m[0][0] - m[0][1]
     return [s, p] if plan.on("polarisation") else [s if plan.polarisation == "s" else p]
 
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from pellicle.dispersion.anisotropic import Anisotropic
 from pellicle.dispersion.empirical import Constant, Scaled, Tabulated
-from pellicle.dispersion.principal_media import each_principal, mixes_polarisations, ordinary_index
-from pellicle.effects.anisotropy import scene_media
+from pellicle.dispersion.principal_media import each_principal, ordinary_index
+from pellicle.effects.anisotropy import computes_roughness
 from pellicle.effects.film import exact
 from pellicle.fitting.colours.view import ColourForm, ColoursView
 from pellicle.fitting.program_cache import kept
@@ -119,9 +119,7 @@ class ExtendedScene:
         below = _with_slope(opened.substrate.material, nm)
         if _solid(bulk, nm):
             self.substrate_index, change = self._number(0.0, -0.5)
-            # rough faces go with s and p apart
-            mixed = any(map(mixes_polarisations, scene_media(scene)))
-            if isinstance(top, Layer) and top.roughness is None and not mixed:
+            if isinstance(top, Layer) and top.roughness is None and computes_roughness(scene):
                 self.roughness, rough = self._number(0.0)
                 layers[0] = replace(top, roughness=rough)
                 self._with_face[self.roughness.position] = (layers[0], *plain[1:])

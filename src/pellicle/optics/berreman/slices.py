@@ -74,6 +74,22 @@ def scattering(transfer: Any, loss: Any) -> Scattering:
     )
 
 
+def slice_count(exponent: Any, shape: Any) -> Any:
+    """Return m of 2ᵐ slices, 0 where none are needed, for the difference of the attenuations."""
+    needed = jnp.broadcast_to(exponent > DIRECT, shape)
+    return jnp.ceil(jnp.log2(jnp.where(needed, exponent / DIRECT, 1.0)))
+
+
+def doubled(one: Scattering, count: Any) -> Scattering:
+    """Return the scattering matrix of 2^count equal layers, each `one`."""
+
+    def double(i: Any, s: Scattering) -> Scattering:
+        new = join(s, s)
+        return Scattering(*(jnp.where(i < count, x, y) for x, y in zip(new, s, strict=True)))
+
+    return jax.lax.fori_loop(0, DOUBLINGS, double, one)
+
+
 def sliced(
     layer: Callable[[Any, Any], Propagation], k: Any, exponent: Any, below: Number
 ) -> tuple[Number, Number]:
@@ -85,8 +101,8 @@ def sliced(
     lower = to_complex(below)
     shape = jnp.broadcast_shapes(jnp.shape(k), jnp.shape(exponent), lower.shape[2:])
     lower = jnp.broadcast_to(lower, (2, 2, *shape))
-    needed = jnp.broadcast_to(exponent > DIRECT, shape)
-    count = jnp.ceil(jnp.log2(jnp.where(needed, exponent / DIRECT, 1.0)))
+    count = slice_count(exponent, shape)
+    needed = count > 0
     # the whole layer, where it needs no slices
     depth = k * jnp.exp2(-count)
     direction = jnp.array([1.0, -1.0], depth.dtype).reshape(2, *[1] * len(shape))
@@ -98,11 +114,7 @@ def sliced(
     direct = product(upwards[2:, :2] + product(upwards[2:, 2:], lower), through), through * loss[0]
 
     def by_slices(state: Any) -> Any:
-        def double(i: Any, s: Scattering) -> Scattering:
-            new = join(s, s)
-            return Scattering(*(jnp.where(i < count, x, y) for x, y in zip(new, s, strict=True)))
-
-        whole = jax.lax.fori_loop(0, DOUBLINGS, double, scattering(matrix, loss))
+        whole = doubled(scattering(matrix, loss), count)
         inside = product(inverse(one_minus(product(whole.below, lower))), whole.down)
         reflected = whole.reflected + product(product(whole.up, lower), inside)
         return jnp.where(needed, reflected, state[0]), jnp.where(needed, inside, state[1])

@@ -36,7 +36,7 @@ from pellicle.optics.berreman.propagation import Propagation
 from pellicle.optics.berreman.quartic import downward_pair
 from pellicle.optics.berreman.slices import sliced
 from pellicle.optics.hoisting import stored
-from pellicle.optics.interface import transverse
+from pellicle.optics.interface import Inside, transverse
 from pellicle.optics.pair import Number, conj, real, to_pair
 
 
@@ -65,11 +65,11 @@ def polarised(
     - `ambient`: real refractive index.
     - `layers`: from the ambient down, each a number, `Principal`, `Uniaxial` or `Tensor`; `substrate` too.
     - `phases`: k₀d = 2πd/λ of each layer.
-    - `angle` of incidence in radians.
+    - `angle` of incidence in radians, or `Inside` a plate, whose index as `ambient` may absorb.
     - `dichroic`: False promises that the attenuations of the two waves in a layer, as exponents of
       amplitudes, differ by less than `slices.DIRECT`.
     """
-    a, q0 = transverse(ambient, jnp.asarray(angle) * 1.0)
+    a, q0 = transverse(ambient, angle if isinstance(angle, Inside) else jnp.asarray(angle) * 1.0)
     a, q0, layers, substrate, phases = stored((a, q0, layers, substrate, phases))
     every = q0, layers, substrate, phases
     reflection = bottom = stored(_substrate(substrate, a, every))
@@ -83,7 +83,7 @@ def polarised(
     tilt = cosine / ambient
 
     def rows(p: Any, s: Any) -> Any:
-        return stacked(p, s, like=every)[:, None]
+        return jax.tree.map(lambda x: x[:, None], stacked(p, s, like=every))
 
     into = stored(inverse(stored(rows(1.0, q0) * E + rows(tilt, 1.0) * H)))
     r = product(rows(-1.0, q0) * E + rows(tilt, -1.0) * H, into)
@@ -109,11 +109,12 @@ def most_dichroic(ambient: Any, layers: Sequence[Medium], phases: Sequence[Any],
     """
     a, _ = transverse(ambient, jnp.asarray(angle) * 1.0)
     layers_and_phases = zip(layers, phases, strict=True)
-    exponents = [_method(m).dichroism(m, a) * k for m, k in layers_and_phases if mixes_polarisations(m)]
+    exponents = [method_of(m).dichroism(m, a) * k for m, k in layers_and_phases if mixes_polarisations(m)]
     return jnp.max(jnp.stack([jnp.max(x) for x in exponents])) if exponents else jnp.zeros(())
 
 
-def _method(medium: Medium) -> Any:
+def method_of(medium: Medium) -> Any:
+    """Return the module that computes layers of this type of medium."""
     return uniaxial if isinstance(medium, Uniaxial) else biaxial if isinstance(medium, Tensor) else aligned
 
 
@@ -129,7 +130,7 @@ def _substrate(medium: Medium, a: Any, like: Any) -> Number:
 
 def _add(medium: Medium, a: Any, k: Any, below: Number, dichroic: bool) -> tuple[Number, Number]:
     """Return the reflection matrix with a layer above, and the downward waves behind it for those before."""
-    method = _method(medium)
+    method = method_of(medium)
     if not (dichroic and mixes_polarisations(medium)):
         return _direct(method.propagation(medium, a, k), below)
     exponent = method.dichroism(medium, a) * jax.lax.stop_gradient(k)

@@ -1,0 +1,109 @@
+"""Signals of layers that mix s and p on incoherent plates: orders of light between the faces add.
+
+In an isotropic plate s and p have the same phase, which differs at random from order to order. So each order
+keeps its polarisation, and the Mueller matrices of all orders add:
+
+    M = M_r + M_t′ B (1 − M_r′ B)⁻¹ M_t,    B = τ² M_b
+
+with the matrices of the layers from above (r, t) and from below (r′, t′), of the back face and all beneath it
+(b), and the transmittance τ of one passage through the plate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from pellicle.effects.anisotropy import SLICED
+from pellicle.effects.plan import Plan
+from pellicle.optics import plate
+from pellicle.optics.berreman.stack import Polarised, polarised
+from pellicle.optics.berreman.two_sided import two_sided
+from pellicle.optics.ellipsometry import Stokes
+from pellicle.optics.interface import Inside, transverse
+from pellicle.optics.mueller import mueller, mueller_elements
+from pellicle.optics.pair import conj, imag, real
+from pellicle.simulation.coherent_groups import CoherentGroup
+
+
+class _Lit(NamedTuple):
+    """Light that layers and plates return and pass on, by the Stokes parameters of the light from above."""
+
+    reflected: Any  # Mueller matrix (..., 4, 4) of electric fields
+    passed: Any  # row (..., 1, 4): the power that enters the substrate, per squared electric field
+
+
+def mueller_matrix(plan: Plan, groups: Sequence[CoherentGroup]) -> list[list[Any]]:
+    """Return the Mueller matrix of reflection, not normalised, as rows of arrays."""
+    matrix, _ = _lit(plan, groups)
+    return [[matrix[..., i, j] for j in range(4)] for i in range(4)]
+
+
+def stokes(plan: Plan, groups: Sequence[CoherentGroup]) -> Stokes:
+    """Return the Stokes sums of r_pp and r_ss: over all orders, |r_ss|² ± |r_pp|² and 2 conj(r_pp) r_ss."""
+    m = mueller_matrix(plan, groups)
+    return Stokes(-m[0][1] - m[1][0], m[2][2] + m[3][3], m[2][3] - m[3][2], m[0][0] + m[1][1])
+
+
+def transmitted(plan: Plan, groups: Sequence[CoherentGroup]) -> tuple[Any, Any]:
+    """Return the transmittances into the substrate for p and for s incident."""
+    first = groups[0]
+    _, row = _lit(plan, groups)
+    _, q0 = transverse(first.above, _angle(first))
+    mean, difference = row[..., 0, 0], row[..., 0, 1]
+    return (mean + difference) / q0, (mean - difference) / q0
+
+
+def _angle(group: CoherentGroup) -> Any:
+    return jnp.zeros_like(group.above) if group.angle is None else group.angle
+
+
+def _lit(plan: Plan, groups: Sequence[CoherentGroup]) -> _Lit:
+    a, _ = transverse(groups[0].above, _angle(groups[0]))
+    dichroic = plan.row("anisotropy").count == SLICED
+    *plates, last = groups
+    lit = _last(last, Inside(a), dichroic)
+    for group in reversed(plates):
+        angle = _angle(groups[0]) if group is groups[0] else Inside(a)
+        lit = _on_plate(group, angle, dichroic, lit)
+    return lit
+
+
+def _last(group: CoherentGroup, angle: Any, dichroic: bool) -> _Lit:
+    found = polarised(group.above, group.layers, group.below, group.phases, angle, dichroic)
+    rows = mueller_elements(*found.reflected)
+    shape = jnp.broadcast_shapes(*(jnp.shape(x) for row in rows for x in row))
+    columns = [jnp.stack([jnp.broadcast_to(x, shape) for x in row], axis=-1) for row in rows]
+    return _Lit(jnp.stack(columns, axis=-2), _power(found))
+
+
+def _power(found: Polarised) -> Any:
+    """Return the power that enters a substrate as a row of factors of the four Stokes parameters."""
+    E, H = found.fields
+    p = real(E.pp * conj(H.pp)) + real(E.sp * conj(H.sp))
+    s = real(E.ps * conj(H.ps)) + real(E.ss * conj(H.ss))
+    both = E.pp * conj(H.ps) + E.sp * conj(H.ss) + conj(E.ps) * H.pp + conj(E.ss) * H.sp
+    row = jnp.broadcast_arrays(p + s, p - s, real(both), -imag(both))
+    return 0.5 * jnp.stack(row, axis=-1)[..., None, :]
+
+
+def _on_plate(group: CoherentGroup, angle: Any, dichroic: bool, beneath: _Lit) -> _Lit:
+    """Return what layers on a plate do, from what the back face and all beneath it do."""
+    sides = two_sided(group.above, group.layers, group.below, group.phases, angle, dichroic)
+    r, down, up, below = (mueller(jnp.moveaxis(jones, (0, 1), (-2, -1))) for jones in sides)
+    internal = jnp.asarray(group.internal)[..., None, None]
+    returned = internal * internal * beneath.reflected
+    part = group.collected or plate.Collection()
+    round_trip = below @ returned
+    if part.reflections is None:
+        inside = jnp.linalg.solve(jnp.eye(4, dtype=r.dtype) - round_trip, down)
+        further = round_trip @ inside
+    else:
+        # up to n reflections at the back face: n orders of the reflected light, n further ones of the passed
+        inside = jax.lax.fori_loop(0, part.reflections - 1, lambda _, x: down + round_trip @ x, down)
+        further = round_trip @ inside
+    share = 1.0 if part.share is None else part.share
+    return _Lit(r + share * (up @ returned @ inside), internal * beneath.passed @ (down + share * further))
