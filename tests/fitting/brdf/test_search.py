@@ -105,8 +105,10 @@ def test_starts_of_one_thickness_are_filled_up_with_the_next_best(grey, monkeypa
     np.testing.assert_allclose(starts, np.tile([0.5, 0.5, 0.5, 0.5, 0.1], (2, 1)))
 
 
-def test_the_scan_sees_samples_of_all_values(grey, monkeypatch):
-    """150 of them, from the darkest to the brightest; where there are fewer, some twice."""
+@pytest.mark.parametrize("count", [1, 2, 4])
+def test_the_scan_sees_samples_of_all_values(grey, monkeypatch, count):
+    """150 of several views, from the darkest to the brightest, some twice where there are fewer. Few of one
+    view stay as they are, so that its polish and the scan share their shapes."""
     views = []
 
     def watched(static, samples, fixed, box, units):
@@ -118,13 +120,23 @@ def test_the_scan_sees_samples_of_all_values(grey, monkeypatch):
     [view] = grey.views
     weight = np.array(view.samples.weight)
     weight[10:20] = 0.0  # held out
-    values = np.zeros_like(view.samples.values)
-    values[: view.rows, 0] = np.arange(view.rows)
-    samples = view.samples._replace(weight=weight, values=values)
-    search(grey._replace(views=(dataclasses.replace(view, samples=samples),)), FEW, quiet)
+    several = []
+    for own in range(count):
+        values = np.zeros_like(view.samples.values)
+        values[: view.rows, 0] = own * view.rows + np.arange(view.rows)
+        several.append(dataclasses.replace(view, samples=view.samples._replace(weight=weight, values=values)))
+    search(grey._replace(views=tuple(several)), FEW, quiet)
     chosen = views[0]
+    if count == 1:
+        assert chosen is several[0].samples
+        return
     assert chosen.values.shape == (SCAN_SAMPLES, 1)
-    assert set(np.unique(chosen.values)) == set(range(view.rows)) - set(range(10, 20))
+    fitted = [own * 50 + row for own in range(count) for row in range(50) if not 10 <= row < 20]
+    seen = np.searchsorted(fitted, np.unique(chosen.values))
+    assert set(np.unique(chosen.values)) <= set(fitted)
+    assert (seen[0], seen[-1]) == (0, len(fitted) - 1)
+    assert np.diff(seen).max() <= max(1, len(fitted) // SCAN_SAMPLES + 1)
+    assert count == 4 or len(seen) == len(fitted)
 
 
 def test_candidates_of_a_channel_are_near_those_of_the_first(ones, tilted):

@@ -20,8 +20,7 @@ from pellicle.fitting.brdf.residuals import RESIDUALS
 from pellicle.fitting.brdf.search import FEW, SMOOTH, THOROUGH, Effort, search
 from pellicle.fitting.conclusion import common_rms, conclude, linearised, ranked_minima
 from pellicle.fitting.discrepancy import discrepancy
-from pellicle.fitting.evaluation import total_deviance
-from pellicle.fitting.minima import Minima, minima
+from pellicle.fitting.minima import Minima, deviance_at, minima
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.progress import Progress, quiet
 from pellicle.fitting.result import Baseline, Fit, LayerTest, Status
@@ -137,7 +136,7 @@ def _held_out(
         pairs = zip(judging.views, split.judging, strict=True)
         rows = [v.residuals(v.local(judging.seen_by(v, values)))[own].ravel() for v, own in pairs]
         return result, bulk_spread(np.concatenate(rows))
-    [chi2] = total_deviance(judging, result.units[:1])
+    [chi2] = deviance_at(judging, result.units[:1])
     return result, float(np.sqrt(chi2 / split.size))
 
 

@@ -119,7 +119,10 @@ def candidates(problem: Problem, count: int, seed: int = 0) -> np.ndarray:
 
 def _thinned(problem: Problem) -> Problem:
     """The problem with one view of `SCAN_SAMPLES` samples, spread evenly over the values of all views; where
-    there are fewer, some are repeated."""
+    there are fewer, some are repeated. One view with no more, padding included, stays: it needs no program
+    of its own."""
+    if len(problem.views) == 1 and len(problem.views[0].samples.values) <= SCAN_SAMPLES:
+        return problem
     every = Samples(
         *(np.concatenate(columns) for columns in zip(*(v.samples[:5] for v in problem.views), strict=True)),
         independent_fraction=np.float64(1.0),
