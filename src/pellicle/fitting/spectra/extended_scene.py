@@ -129,9 +129,13 @@ class ExtendedScene:
                     self.oxide, thin = self._number(0.0)
                     layers.append(Layer(Constant(OXIDE_INDEX), thin))
                     self._with_face[self.oxide.position] = (*plain, layers[-1])
-                self.mixture, thin = self._number(0.0)
-                layers.append(Interface(thin))
-                self._with_face[self.mixture.position] = (*plain, layers[-1])
+                # media with an index of their own mix: under a birefringent layer an oxide does
+                isotropic = not isinstance(foot.material, Anisotropic)
+                if isotropic or self.oxide is not None:
+                    self.mixture, thin = self._number(0.0)
+                    layers.append(Interface(thin))
+                    between = layers[-1:] if isotropic else layers[len(plain) :]
+                    self._with_face[self.mixture.position] = (*plain, *between)
             below = _scaled(below, change)
         self._scene = replace(
             opened,
