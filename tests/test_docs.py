@@ -38,6 +38,8 @@ EXIT_4 = (
 )
 """Their fits do not converge to one answer (exit code 4), as their pages say."""
 SLOW = {
+    "pellicle fit turned.csv --recipe docs/examples/tilted_azimuths.toml": "compiles the 4x4 method for 30 s; "
+    "tests/fitting/spectra/test_generalised.py fits such data",
     "pellicle fit partial.csv --recipe docs/examples/partial_window.toml": "compiles for 6 s; "
     "tests/fitting/spectra/test_back_collected.py fits these data",
     **{

@@ -110,22 +110,6 @@ def test_signs_of_another_convention_are_named(write, pair, values, words):
     assert not any("convention" in note for note in read_spectrum(write(f"nm,{pair}", *usual)).notes)
 
 
-def test_several_azimuths_of_the_sample_are_refused(write):
-    assert len(read_spectrum(write("nm,m12,azimuth_deg", M12, 45.0))) == 6
-    several = np.repeat([0.0, 45.0], 3)
-    with pytest.raises(DataError, match=r"2 azimuths of the sample \(0, 45\), .* its own file"):
-        read_spectrum(write("nm,m12,azimuth_deg", M12, several))
-
-
-@pytest.mark.parametrize(("names", "values"), [("R", [0.3]), ("psi_deg,delta_deg", [30.0, 120.0])])
-def test_several_azimuths_of_other_signals_are_refused(write, names, values):
-    """An anisotropic sample has another spectrum at each: rows at one wavelength are no repeats."""
-    assert len(read_spectrum(write(f"nm,{names},azimuth_deg", *values, 45.0))) == 6
-    several = np.repeat([0.0, 45.0], 3)
-    with pytest.raises(DataError, match=r"2 azimuths of the sample \(0, 45\), .* its own file"):
-        read_spectrum(write(f"nm,{names},azimuth_deg", *values, several))
-
-
 def test_psi_and_delta_come_first(write):
     path = write("nm,psi_deg,delta_deg,m12", 45.0, np.linspace(100, 170, 6), M12)
     assert read_spectrum(path).signal == "psi-delta"

@@ -65,7 +65,10 @@ def test_impossible_bounds_are_refused(arguments, message):
         (lambda: pl.Substrate(1.5, "air", -1), "`plate_mm` must not be negative, got -1 mm"),
         (lambda: pl.Substrate(1.5, "air", 0.0), "`plate_mm` must be above 0 mm"),
         (lambda: pl.Plate(1.5, 0), "`plate_mm` must be above 0 mm"),
-        (lambda: pl.Light(signal="A"), "`signal` must be one of R, T, psi-delta, mueller, not 'A'"),
+        (
+            lambda: pl.Light(signal="A"),
+            "`signal` must be one of R, T, psi-delta, mueller, generalised-psi-delta, not 'A'",
+        ),
         (lambda: pl.Light(polarisation="TE"), "`polarisation` must be one of unpolarised, s, p, not 'TE'"),
         (lambda: pl.Light(angle=95), "`angle` of incidence must lie in 0 to 90 degrees, got 95"),
         (lambda: pl.Light(angle=np.array([0.0, -5.0])), "must lie in 0 to 90 degrees, got -5"),

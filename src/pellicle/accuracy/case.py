@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import numpy as np
 
+from pellicle.data import generalised
 from pellicle.effects.plan import Plan
 from pellicle.planning.film import full_plan
 from pellicle.scene.film import Scene, media, with_wavelength
@@ -41,7 +42,7 @@ class Case(NamedTuple):
     @property
     def in_degrees(self) -> bool:
         """True where errors are degrees on the sphere of N, C, S."""
-        return self.plan.signal == "psi-delta"
+        return self.plan.signal in ("psi-delta", generalised.SIGNAL)
 
 
 def case(scene: Scene, wavelength: np.ndarray, tolerance: float = 1e-3, seed: int = 0) -> Case:

@@ -19,7 +19,7 @@ from pellicle.fitting.progress import Progress, quiet
 from pellicle.scene.film import Scene
 from pellicle.scene.free import free_leaves
 
-TOLERANCE = {"psi-delta": 0.1}
+TOLERANCE = {"psi-delta": 0.1, "generalised-psi-delta": 0.1}
 DEFAULT_TOLERANCE = 1e-3
 """Default tolerance: a fraction, or degrees on the sphere of N, C, S."""
 

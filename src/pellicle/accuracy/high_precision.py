@@ -12,6 +12,7 @@ import mpmath
 import numpy as np
 
 from pellicle.accuracy.case import Case
+from pellicle.data import generalised
 from pellicle.dispersion.anisotropic import Anisotropic
 from pellicle.effects.anisotropy import GENERAL
 from pellicle.scene.film import Plate, Scene, groups, thickness_spread, with_wavelength
@@ -47,7 +48,8 @@ def unsuitable(case: Case) -> str | None:
 
 
 def signal(case: Case, values: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """R or T (wavelengths, 1), N, C, S (wavelengths, 3) or Mueller elements (wavelengths, 15), at some of a
+    """R or T (wavelengths, 1), N, C, S (wavelengths, 3), those of each ratio (wavelengths, 9) or
+    Mueller elements (wavelengths, 15), at some of a
     case's wavelengths."""
     scene = insert(case.scene, [float(x) for x in values])
     angle = np.broadcast_to(scene.light.angle, case.wavelength.shape)[at]
@@ -137,6 +139,8 @@ def _signal(scene: Scene, point: _Point) -> list[Any]:
         )
         # tan Ψ e^{iΔ} = conj(r_p/r_s): N = cos 2Ψ, C = sin 2Ψ cos Δ, S = sin 2Ψ sin Δ
         N, C, S = (s - p) / (s + p), 2 * mp.re(cross) / (s + p), -2 * mp.im(cross) / (s + p)
+        if light.signal == generalised.SIGNAL:
+            return [N, C, S, 1, 0, 0, 1, 0, 0]
         return [N, C, S] if light.signal == "psi-delta" else [-N, 0, 0, -N, 1, *[0] * 4, C, S, 0, 0, -S, C]
     letters = "sp" if light.polarisation == "unpolarised" else light.polarisation
     which = 0 if light.signal == "R" else 1

@@ -92,6 +92,8 @@ def aligned_axes(case: Case) -> Variant | str:
     """Every tilted axis at the right angles next to its start values, so that s and p stay apart."""
     if case.plan.row("anisotropy").count < GENERAL:
         return "no optic axis is tilted"
+    if case.scene.light.azimuth is not None:
+        return "the sample is turned"
 
     def next_to(angle: Any) -> float:
         return 90.0 * round(float(start_values(angle)[0] if is_free(angle) else angle) / 90)

@@ -12,6 +12,7 @@ import numpy as np
 from pellicle.accuracy.case import Case
 from pellicle.accuracy.compiled import compiled
 from pellicle.accuracy.variant import Variant
+from pellicle.data.generalised import RATIOS, SIGNAL
 from pellicle.fitting.problem import Explained, Form, Problem
 from pellicle.fitting.spectra.problem import make
 from pellicle.fitting.spectra.targets import Measured
@@ -51,9 +52,10 @@ def data_sets(case: Case, scene: Scene, noise: float, count: int, seed: int = 0)
     channels = clean.shape[1] // len(case.wavelength)
     noisy = noisy.reshape(count, -1, channels) if channels > 1 else noisy
     elements = tuple(range(channels)) if scene.light.signal == "mueller" else ()
+    ratios = tuple(range(len(RATIOS))) if scene.light.signal == SIGNAL else ()
     nm, sigmas = case.wavelength, np.full(len(case.wavelength), sigma)
     return [
-        DataSet(make(Measured(scene, nm, values, sigmas, elements=elements)), unit, start)
+        DataSet(make(Measured(scene, nm, values, sigmas, elements=elements, ratios=ratios)), unit, start)
         for values, unit in zip(noisy, units, strict=True)
     ]
 

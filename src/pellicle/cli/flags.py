@@ -115,7 +115,10 @@ class ReadingFlags(CameraFlags):
     ] = None
     signal: Annotated[
         str | None,
-        flag(READING, "R, T, psi-delta or mueller, or srgb, rgb, xyz or lab, if the file does not name it."),
+        flag(
+            READING,
+            "R, T, psi-delta, mueller, generalised-psi-delta, srgb, rgb, xyz or lab (that of the file).",
+        ),
     ] = None
     region: Annotated[
         str | None, flag(COLOURS, "X,Y,WIDTH,HEIGHT of a film in a picture, in pixels; ';' between several.")
@@ -179,7 +182,7 @@ class ReadingFlags(CameraFlags):
         str | list[str] | None,
         Parameter(
             group=READING,
-            help="Elements of a Mueller matrix to use (all).",
+            help="Elements of a Mueller matrix, or ratios ane, aps, asp, to use (all).",
             metavar="m12,...",
             negative="",
             n_tokens=1,

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 log = getLogger(__name__)
 
 LEAST_SQUARES = "least-squares"
-_SIGNALS = ("R", "T", "psi-delta", "mueller", "srgb", "rgb", "xyz", "lab")
+_SIGNALS = ("R", "T", "psi-delta", "mueller", "generalised-psi-delta", "srgb", "rgb", "xyz", "lab")
 _FOR_SURFACES = ("columns", "noise", "signal", "loss")
 """Reading flags that BRDF samples can be given."""
 

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 
 from pellicle.cli.colours import SPACES, recipe_angles
 from pellicle.cli.session import check_folder, not_negative, say, start
-from pellicle.cli.wavelengths import directions, wavelengths
+from pellicle.cli.wavelengths import directions, each_azimuth, wavelengths
 from pellicle.errors import DataError, UsageError
 
 if TYPE_CHECKING:
@@ -168,7 +168,8 @@ def _write_spectrum(
     log_scene(scene)
     if scene.light.ellipsometric and recipe.tables.data.angle is None:
         raise DataError(f"{recipe.path}: ellipsometry needs an angle of incidence: give [data] angle = 70")
-    nm = wavelengths(recipe, scene)
+    grid = wavelengths(recipe, scene)
+    scene, nm = each_azimuth(scene, grid)
     noise, of_depolarisation = noises
     result = simulate_signal(scene, nm, noise, seed, tolerance, of_depolarisation)
     log_plan(result.plan)
@@ -223,31 +224,41 @@ def _csv(
     """The spectrum as CSV below its comments, which end with the true values of the parameters."""
     import numpy as np
 
-    from pellicle.data.mueller import ELEMENTS, SIGNAL, check_elements
+    from pellicle.data import generalised, mueller
 
-    light = scene.light
+    light, count = scene.light, len(result.wavelength)
     angle = f"{getattr(light.angle, 'start', light.angle):g}"
     about = "" if light.ellipsometric else f", {light.polarisation}"
-    lines = [*comments, f"signal {light.signal}, angle {angle} degrees{about}"]
-    lines.append(_truth(scene))
-    columns, middle = f"wavelength_nm,{light.signal}", ""
+    lines = [*comments, f"signal {light.signal}, angle {angle} degrees{about}", _truth(scene)]
+    names, before = [], []
+    if light.ellipsometric:
+        names, before = ["angle_deg"], [[angle] * count]
+    if light.azimuth is not None:
+        names.append("azimuth_deg")
+        before.append([f"{own:.10g}" for own in np.broadcast_to(light.azimuth, count).tolist()])
+    table = result.values.reshape(count, -1)
     if light.signal == "psi-delta":
-        columns, middle = "wavelength_nm,angle_deg,psi_deg,delta_deg", f"{angle},"
-    table = result.values.reshape(len(result.wavelength), -1)
-    if light.signal == SIGNAL:
-        chosen = ELEMENTS if elements is None else tuple(elements)
-        check_elements(chosen)
-        columns, middle = f"wavelength_nm,angle_deg,{','.join(chosen)}", f"{angle},"
-        table = table[:, [ELEMENTS.index(name) for name in chosen]]
-    columns, end = (f"{columns},sigma", f",{noise:g}") if noise else (columns, "")
+        names += ["psi_deg", "delta_deg"]
+    elif light.signal in (mueller.SIGNAL, generalised.SIGNAL):
+        every = mueller.ELEMENTS if light.signal == mueller.SIGNAL else generalised.RATIOS
+        chosen = every if elements is None else tuple(elements)
+        (mueller.check_elements if every is mueller.ELEMENTS else generalised.check_ratios)(chosen)
+        table = table.reshape(count, len(every), -1)[:, [every.index(name) for name in chosen]]
+        both = [f"{angle}_{name}_deg" for name in chosen for angle in ("psi", "delta")]
+        names += chosen if light.signal == mueller.SIGNAL else both
+        table = table.reshape(count, -1)
+    else:
+        names.append(light.signal)
     if result.depolarisation is not None:
         table = np.column_stack([table, result.depolarisation])
-        columns = columns.replace("delta_deg", "delta_deg,depolarisation")
-        if result.depolarisation_noise:
-            columns, end = f"{columns},sigma_depolarisation", f"{end},{result.depolarisation_noise:g}"
+        names.append("depolarisation")
+    errors = [("sigma", noise)] if noise else []
+    if result.depolarisation is not None and result.depolarisation_noise:
+        errors.append(("sigma_depolarisation", result.depolarisation_noise))
+    columns = ",".join(["wavelength_nm", *names, *(name for name, _ in errors)])
     rows = [
-        f"{nm:.10g},{middle}{','.join(f'{value:.8f}' for value in row)}{end}"
-        for nm, row in zip(result.wavelength, table, strict=True)
+        ",".join([f"{nm:.10g}", *own, *(f"{value:.8f}" for value in row), *(f"{x:g}" for _, x in errors)])
+        for nm, row, *own in zip(result.wavelength, table, *before, strict=True)
     ]
     return "\n".join([*(f"# {line}" for line in lines), columns, *rows, ""])
 

@@ -30,7 +30,7 @@ def measured_scene(recipe: FilmRecipe) -> tuple[Scene, np.ndarray]:
         scene, nm = _as_measured(recipe)
     else:
         scene = recipe.scene()
-        nm = wavelengths(recipe, scene)
+        scene, nm = each_azimuth(scene, wavelengths(recipe, scene))
     if scene.light.ellipsometric and scene.light.angle == 0.0:
         raise DataError(f"{recipe.path}: ellipsometry needs an angle of incidence: give [data] angle = 70")
     return scene, nm
@@ -51,12 +51,12 @@ def _in_colours(recipe: FilmRecipe) -> tuple[Scene, np.ndarray]:
     scene, nm, angles = own.scene(), own.sight().sensor.wavelength, recipe_angles(recipe)
     say(f"wavelengths: {nm[0]:g} to {nm[-1]:g} nm every 1 nm, those of the sensor")
     angle: Any = scene.light.angle if len(angles) == 1 else np.repeat(angles, len(nm))
-    light = Light(None, angle, scene.light.signal, scene.light.polarisation)
+    light = Light(None, angle, scene.light.signal, scene.light.polarisation, scene.light.azimuth)
     return eqx.tree_at(lambda s: s.light, scene, light), np.tile(nm, len(angles))
 
 
 def _as_measured(recipe: FilmRecipe) -> tuple[Scene, np.ndarray]:
-    """The scene in the light of the recipe's first file, at the first of its angles."""
+    """The scene in the light of the recipe's first file, at the first of its angles and azimuths."""
     import equinox as eqx
     import numpy as np
 
@@ -70,12 +70,25 @@ def _as_measured(recipe: FilmRecipe) -> tuple[Scene, np.ndarray]:
     scene, flags = own.scene(), merged(ReadingFlags(), own)
     spectrum = read(path, flags, free_scale=isinstance(scene.instrument.scale, Drift))[0]
     say(f"wavelengths: those of {path} (the recipe gives none)")
-    stated = light(flags)
-    angle = stated.angle if spectrum.angle is None else float(spectrum.angle[0])
-    same = slice(None) if spectrum.angle is None else spectrum.angle == spectrum.angle[0]
+    stated, first = light(flags), spectrum.settings[0]
+    angle = stated.angle if spectrum.angle is None else first.angle
+    azimuth = scene.light.azimuth if first.azimuth is None else first.azimuth or None
     polarised = spectrum.polarisation if spectrum.polarisation != "unpolarised" else stated.polarisation
-    own_light = Light(None, angle, spectrum.signal, polarised)
-    return eqx.tree_at(lambda s: s.light, scene, own_light), np.sort(spectrum.wavelength[same])
+    own_light = Light(None, angle, spectrum.signal, polarised, azimuth)
+    return eqx.tree_at(lambda s: s.light, scene, own_light), np.sort(spectrum.wavelength[first.rows])
+
+
+def each_azimuth(scene: Scene, nm: np.ndarray) -> tuple[Scene, np.ndarray]:
+    """The scene and the wavelengths at each of the azimuths that a recipe lists, one after the other."""
+    import numpy as np
+
+    from pellicle.scene.film import with_wavelength
+
+    azimuths = scene.light.azimuth
+    if not np.ndim(azimuths):
+        return scene, nm
+    turned = with_wavelength(scene, scene.light.wavelength, azimuth=np.repeat(azimuths, len(nm)))
+    return turned, np.tile(nm, len(azimuths))
 
 
 def wavelengths(recipe: FilmRecipe, scene: Scene) -> np.ndarray:

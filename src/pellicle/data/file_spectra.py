@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from pellicle.data import mueller
+from pellicle.data import generalised, mueller
 from pellicle.data.read_ellipsometry import (
     SIGNAL,
     EllipsometryColumns,
     ellipsometry_columns,
     has_ellipsometry,
 )
+from pellicle.data.read_generalised import GeneralisedColumns, generalised_columns, has_generalised
 from pellicle.data.read_mueller import MuellerColumns, has_mueller, mueller_columns
 from pellicle.data.tabular.column_selection import SpectrumColumns, signal_columns
 from pellicle.data.tabular.columns import DIRECTIONS, SIGNALS, listed
@@ -21,14 +22,20 @@ from pellicle.errors import DataError, UsageError
 
 ALL = "all"
 _MOST_LISTED = 40
-_ELLIPSOMETRY = {SIGNAL: "psi and delta", mueller.SIGNAL: "Mueller elements"}
+_ELLIPSOMETRY = {
+    SIGNAL: "psi and delta",
+    mueller.SIGNAL: "Mueller elements",
+    generalised.SIGNAL: "generalised psi and delta",
+}
+_OF_ANISOTROPIC = (mueller.SIGNAL, generalised.SIGNAL)
+"""Signals of anisotropic samples, which yield to psi and delta where none is asked for."""
 
 
 class Candidate(NamedTuple):
     """A spectrum of a file: its table and columns, and its name, signal and polarisation."""
 
     table: Table
-    columns: SpectrumColumns | EllipsometryColumns | MuellerColumns
+    columns: SpectrumColumns | EllipsometryColumns | MuellerColumns | GeneralisedColumns
     name: str
     signal: str
     polarisation: str | None
@@ -53,8 +60,24 @@ def candidates(
         )
     own = table.layout.name
     found = []
-    wanted = signal == mueller.SIGNAL or (signal is None and elements is not None)
-    if wanted or (signal is None and has_mueller(named) and not has_ellipsometry(named)):
+    ratios = elements is not None and set(elements) <= set(generalised.RATIOS)
+    wanted = signal == mueller.SIGNAL or (signal is None and elements is not None and not ratios)
+    generally = signal == generalised.SIGNAL or (signal is None and ratios)
+    if generally or (
+        not wanted and signal is None and has_generalised(named) and not has_ellipsometry(named)
+    ):
+        found.append(
+            Candidate(
+                table,
+                generalised_columns(table, named, elements),
+                own or generalised.SIGNAL,
+                generalised.SIGNAL,
+                None,
+            )
+        )
+        if generally or not any(column.role in SIGNALS for column in named or ()):
+            return found
+    elif wanted or (signal is None and has_mueller(named) and not has_ellipsometry(named)):
         chosen = mueller_columns(table, named, elements)
         found.append(Candidate(table, chosen, own or mueller.SIGNAL, mueller.SIGNAL, None))
         if wanted or not any(column.role in SIGNALS for column in named or ()):
@@ -81,7 +104,7 @@ def file_candidates(
     elements: Sequence[str] | None = None,
 ) -> list[Candidate]:
     """Find the spectra of all tables of a file that have the wanted signal and polarisation; of Ψ and Δ and
-    a Mueller matrix beside them Ψ and Δ, where neither is wanted.
+    a Mueller matrix or generalised Ψ and Δ beside them Ψ and Δ, where none is wanted.
 
     Raises as `candidates` does where no table has them.
     """
@@ -97,7 +120,7 @@ def file_candidates(
     if not found:
         raise refusals[0]
     if signal is None and elements is None and any(one.signal == SIGNAL for one in found):
-        return [one for one in found if one.signal != mueller.SIGNAL]
+        return [one for one in found if one.signal not in _OF_ANISOTROPIC]
     return found
 
 

@@ -45,7 +45,7 @@ def folding_at(
 ) -> float | None:
     """The wavelength at which Δ is folded, None where nothing shows it.
 
-    Ψ and Δ are in degrees; points of one `group` (an angle of incidence) form one curve.
+    Ψ and Δ are in degrees; points of one `group` (an angle of incidence and an azimuth) form one curve.
     """
     if not can_be_folded(delta):
         return None

@@ -68,16 +68,16 @@ def _only_table(path: str | os.PathLike[str]) -> Table:
 
 
 def _read(table: Table, chosen: SpectrumColumns, wavelength_unit: str | None) -> Spectrum:
-    axis = axis_unit(table, chosen.wavelength, wavelength_unit)
-    wavelength, values, _, angle = read_columns(table, chosen, axis)
+    unit = axis_unit(table, chosen.axis.wavelength, wavelength_unit)
+    axis, values, _ = read_columns(table, chosen, unit)
     counts = of_rows(
-        sweep_numbers(wavelength, angle),
-        {"wavelength": wavelength, "values": values, "angle": angle, "lines": table.lines},
+        sweep_numbers(axis.wavelength, axis.setting),
+        {**axis._asdict(), "values": values, "lines": table.lines},
         signal="counts",
         calibrated=False,
         path=table.path,
         sha256=table.sha256,
-        notes=(*table.notes, *chosen.notes, axis_note(axis)),
+        notes=(*table.notes, *chosen.notes, axis_note(unit)),
     )
     return replace(counts, declared=table.layout.declared.facts)
 
@@ -132,6 +132,7 @@ def reflectance_from_counts(
         sigma=sigma,
         polarisation=sample.polarisation,
         angle=sample.angle,
+        azimuth=sample.azimuth,
         path=sample.path,
         sha256=sample.sha256,
         notes=(*sample.notes, f"counts divided by those of the reference {reference.path}"),

@@ -30,12 +30,11 @@ from pellicle.data.folded_delta import can_be_folded, folding_at, folding_note
 from pellicle.data.repeated_sweeps import of_rows, sweep_numbers
 from pellicle.data.signal_checks import FOLDED_DELTA, check_psi_delta, refuse_first
 from pellicle.data.spectrum import Spectrum, inside_range
-from pellicle.data.tabular.column_selection import only, wavelength_and_angle
+from pellicle.data.tabular.column_selection import AxisColumns, axis_columns, only
 from pellicle.data.tabular.columns import Column, listed
 from pellicle.data.tabular.named_columns import first_column
-from pellicle.data.tabular.sample_azimuth import check_azimuth
 from pellicle.data.tabular.table import Table
-from pellicle.data.tabular.wavelength_axis import axis_note, axis_unit, read_axis
+from pellicle.data.tabular.wavelength_axis import Axis, axis_note, axis_unit, read_axis
 from pellicle.errors import DataError, UsageError
 
 SIGNAL = "psi-delta"
@@ -50,8 +49,7 @@ class EllipsometryColumns:
     """Columns of one form, with the errors of Ψ and Δ or none, the depolarisation (and its error) or none,
     and sentences on the choice."""
 
-    wavelength: Column
-    angle: Column | None
+    axis: AxisColumns
     form: tuple[str, ...]
     values: tuple[Column, ...]
     analyser: Column | None
@@ -80,11 +78,9 @@ def read_ellipsometry(
     Raises DataError or UsageError.
     """
     _check_form(table, chosen, folded, analyser)
-    unit = axis_unit(table, chosen.wavelength, wavelength_unit)
+    unit = axis_unit(table, chosen.axis.wavelength, wavelength_unit)
     cells = (*chosen.values, *([chosen.analyser] if chosen.analyser else []), *chosen.errors)
-    wavelength, angle, every = read_axis(
-        table, chosen.wavelength, chosen.angle, (*cells, *chosen.depolarisation), unit
-    )
+    axis, every = read_axis(table, chosen.axis, (*cells, *chosen.depolarisation), unit)
     read, shares = every[: len(cells)], every[len(cells) :]
     psi, delta, note, share = _psi_delta(table, chosen, read, analyser)
     errors = read[len(cells) - len(chosen.errors) :]
@@ -102,34 +98,32 @@ def read_ellipsometry(
     notes.append("psi and delta in degrees")
     folding = None
     if folded is None:
-        folding = _folding(wavelength, psi, delta, angle)
+        folding = _folding(axis, psi, delta)
     rows = np.arange(psi.size)
     if range is not None:
-        inside, note = inside_range(wavelength, range, table.path)
+        inside, note = inside_range(axis.wavelength, range, table.path)
         rows, notes = rows[inside], [*notes, note]
     sigma = [error[rows] for error in errors]
     shares = [share[rows] for share in shares]
-    angle = None if angle is None else angle[rows]
-    number = sweep_numbers(wavelength[rows], angle)
+    axis = axis.taken(rows)
     _check(table, chosen, rows, psi[rows], delta[rows], sigma, bool(folded))
     depolarisation.check(table, chosen.depolarisation, rows, shares)
     if folded is None:
         # outside of the range nothing is checked
-        folding = folding or _folding(wavelength[rows], psi[rows], delta[rows], angle)
+        folding = folding or _folding(axis, psi[rows], delta[rows])
         folded = folding is not None and can_be_folded(delta[rows])
         notes += [folding_note(folding)] if folded and folding else []
     elif folded:
         notes.append("delta is known in 0 to 180 only: cos(delta) is fitted")
     arrays = {
-        "wavelength": wavelength[rows],
+        **axis._asdict(),
         "values": psi[rows],
         "delta": np.clip(delta[rows], *FOLDED_DELTA) if folded else delta[rows] % 360.0,
-        "angle": angle,
     }
     errors = {"sigma": sigma[0] if sigma else None, "delta_sigma": sigma[-1] if sigma else None}
     errors |= dict(zip(("depolarisation", "depolarisation_sigma"), shares, strict=False))
     return of_rows(
-        number,
+        sweep_numbers(axis.wavelength, axis.setting),
         arrays | errors | {"lines": table.source_lines(rows)},
         signal=SIGNAL,
         path=table.path,
@@ -139,16 +133,14 @@ def read_ellipsometry(
     )
 
 
-def _folding(
-    wavelength: np.ndarray, psi: np.ndarray, delta: np.ndarray, angle: np.ndarray | None
-) -> float | None:
-    """The wavelength at which Δ is folded, in any sweep at any angle; None where nothing shows it."""
+def _folding(axis: Axis, psi: np.ndarray, delta: np.ndarray) -> float | None:
+    """The wavelength at which Δ is folded, in any sweep at any setting; None where nothing shows it."""
     if not can_be_folded(delta):
         return None
-    number = sweep_numbers(wavelength, angle)
-    pairs = np.stack([number, number if angle is None else angle])
+    number, setting = sweep_numbers(axis.wavelength, axis.setting), axis.setting
+    pairs = np.stack([number, number if setting is None else setting])
     curve = np.unique(pairs, axis=1, return_inverse=True)[1]
-    return folding_at(wavelength, psi, delta, curve.ravel().astype(float))
+    return folding_at(axis.wavelength, psi, delta, curve.ravel().astype(float))
 
 
 def _check_form(
@@ -211,26 +203,18 @@ def ellipsometry_columns(table: Table, columns: Sequence[Column] | None) -> Elli
                 f"{table.path}: {table.label(column.position)} is in {column.unknown_unit or '%'!r}; write "
                 "psi and delta in degrees, the others without a unit"
             )
-    wavelength, angle = wavelength_and_angle(table, columns, _EXAMPLE)
-    check_azimuth(table, only(table, columns, "azimuth"))
+    axis = axis_columns(table, columns, _EXAMPLE)
     errors = _error_columns(table, columns) if form == PSI_DELTA else ()
     analyser = only(table, columns, "analyser") if form == ALPHA_BETA else None
     shares = depolarisation.columns(table, columns)
-    read = [
-        wavelength,
-        *values,
-        *errors,
-        *shares,
-        *([angle] if angle else []),
-        *([analyser] if analyser else []),
-    ]
+    read = [*values, *errors, *shares, *(column for column in (*axis, analyser) if column)]
     ignored = [c for c in columns if c not in read and c.name not in ("_", "")]
-    notes = [f"{listed([wavelength])} read as the wavelength, {listed(values)} as {', '.join(form)}"]
+    notes = [f"{listed([axis.wavelength])} read as the wavelength, {listed(values)} as {', '.join(form)}"]
     notes += [f"{listed(errors)} read as the standard deviation of psi and delta"] if errors else []
     notes += depolarisation.notes(shares)
-    notes += [f"{listed([angle])} read as the angle of incidence in degrees"] if angle else []
+    notes += axis.notes
     notes += [f"ignored: {listed(ignored)}"] if ignored else []
-    return EllipsometryColumns(wavelength, angle, form, values, analyser, errors, shares, tuple(notes))
+    return EllipsometryColumns(axis, form, values, analyser, errors, shares, tuple(notes))
 
 
 def _by_position(table: Table) -> EllipsometryColumns:
@@ -239,10 +223,10 @@ def _by_position(table: Table) -> EllipsometryColumns:
             f"{table.path}: has {table.layout.width} columns and no header; name them in order, as in "
             f"{_EXAMPLE}"
         )
-    wavelength = first_column(table)
+    axis = AxisColumns(first_column(table))
     psi, delta = (Column(i, "", role) for i, role in ((1, "psi"), (2, "delta")))
     note = "no header: column 1 read as the wavelength, column 2 as psi, column 3 as delta"
-    return EllipsometryColumns(wavelength, None, PSI_DELTA, (psi, delta), None, (), (), (note,))
+    return EllipsometryColumns(axis, PSI_DELTA, (psi, delta), None, (), (), (note,))
 
 
 def _error_columns(table: Table, columns: Sequence[Column]) -> tuple[Column, ...]:
@@ -269,7 +253,7 @@ def _check(
     folded: bool,
 ) -> None:
     """Refuse Ψ, Δ and errors outside their limits, and values in radians. Raises DataError."""
-    named = columns.values if columns.form == PSI_DELTA else (columns.wavelength,) * 2
+    named = columns.values if columns.form == PSI_DELTA else (columns.axis.wavelength,) * 2
     at_psi, at_delta = (table.places(column.position, rows) for column in named)
     check_psi_delta(psi, delta, folded, at_psi, at_delta, _REMEDY)
     for column, values in zip((columns.errors * 2)[:2], sigma, strict=False):

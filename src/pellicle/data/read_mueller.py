@@ -12,9 +12,8 @@ from pellicle.data.repeated_sweeps import of_rows, sweep_numbers
 from pellicle.data.signal_checks import refuse_first
 from pellicle.data.spectrum import Spectrum, inside_range
 from pellicle.data.tabular.column_names import MUELLER
-from pellicle.data.tabular.column_selection import only, wavelength_and_angle
+from pellicle.data.tabular.column_selection import AxisColumns, axis_columns, only
 from pellicle.data.tabular.columns import Column, listed
-from pellicle.data.tabular.sample_azimuth import check_azimuth
 from pellicle.data.tabular.table import Table
 from pellicle.data.tabular.wavelength_axis import axis_note, axis_unit, read_axis
 from pellicle.errors import DataError, UsageError
@@ -27,14 +26,12 @@ _NORMALISED = 1e-3
 
 @dataclass(frozen=True)
 class MuellerColumns:
-    """Columns of elements, of m11 and of the sample's azimuth (or None), and of standard deviations (one for
-    each element, one for all, or none), and sentences on the choice."""
+    """Columns of elements, of m11 (or None), and of standard deviations (one for each element, one for all,
+    or none), and sentences on the choice."""
 
-    wavelength: Column
-    angle: Column | None
+    axis: AxisColumns
     values: tuple[Column, ...]
     m11: Column | None
-    azimuth: Column | None
     errors: tuple[Column, ...]
     notes: tuple[str, ...]
 
@@ -76,15 +73,18 @@ def mueller_columns(
                 f"{table.path}: {table.label(column.position)} is in "
                 f"{column.unknown_unit or column.unit!r}; write elements as fractions of m11, without a unit"
             )
-    wavelength, angle = wavelength_and_angle(table, columns, _EXAMPLE)
+    axis = axis_columns(table, columns, _EXAMPLE)
     errors, notes = _error_columns(table, columns, values)
-    m11, azimuth = present["m11"], only(table, columns, "azimuth")
-    read = [wavelength, *values, *errors, *(column for column in (m11, azimuth, angle) if column)]
+    m11 = present["m11"]
+    read = [*values, *errors, *(column for column in (*axis, m11) if column)]
     ignored = [c for c in columns if c not in read and c.name not in ("_", "")]
-    said = [f"{listed([wavelength])} read as the wavelength, {listed(values)} as Mueller elements", *notes]
-    said += [f"{listed([angle])} read as the angle of incidence in degrees"] if angle else []
+    said = [
+        f"{listed([axis.wavelength])} read as the wavelength, {listed(values)} as Mueller elements",
+        *notes,
+    ]
+    said += axis.notes
     said += [f"ignored: {listed(ignored)}"] if ignored else []
-    return MuellerColumns(wavelength, angle, values, m11, azimuth, errors, tuple(said))
+    return MuellerColumns(axis, values, m11, errors, tuple(said))
 
 
 def _error_columns(
@@ -112,10 +112,9 @@ def read_mueller(
     range: tuple[float, float] | None,
 ) -> Spectrum:
     """Read the chosen elements; other arguments as in `read_spectrum`. Raises DataError or UsageError."""
-    unit = axis_unit(table, chosen.wavelength, wavelength_unit)
-    check_azimuth(table, chosen.azimuth)
+    unit = axis_unit(table, chosen.axis.wavelength, wavelength_unit)
     cells = (*chosen.values, *chosen.errors, *([chosen.m11] if chosen.m11 else []))
-    wavelength, angle, read = read_axis(table, chosen.wavelength, chosen.angle, cells, unit)
+    axis, read = read_axis(table, chosen.axis, cells, unit)
     count = len(chosen.values)
     values, errors = np.stack(read[:count], axis=1), read[count : count + len(chosen.errors)]
     sigma = np.broadcast_to(np.stack(errors, axis=1), values.shape) if errors else None
@@ -125,7 +124,7 @@ def read_mueller(
         notes += ["the given noise replaces the columns of errors"] if errors else []
     rows = np.arange(len(values))
     if range is not None:
-        inside, note = inside_range(wavelength, range, table.path)
+        inside, note = inside_range(axis.wavelength, range, table.path)
         rows, notes = rows[inside], [*notes, note]
     values, sigma = values[rows], None if sigma is None else sigma[rows]
     if chosen.m11 is not None:
@@ -141,16 +140,10 @@ def read_mueller(
         check_mueller(values[:, i], None if sigma is None else sigma[:, i], elements[i], where, _REMEDY)
     values, sigma, elements, note = _without_constants(table, values, sigma, elements)
     notes += [*note, *sign_notes(elements, values)]
-    angle = None if angle is None else angle[rows]
+    axis = axis.taken(rows)
     return of_rows(
-        sweep_numbers(wavelength[rows], angle),
-        {
-            "wavelength": wavelength[rows],
-            "values": values,
-            "sigma": sigma,
-            "angle": angle,
-            "lines": table.source_lines(rows),
-        },
+        sweep_numbers(axis.wavelength, axis.setting),
+        {**axis._asdict(), "values": values, "sigma": sigma, "lines": table.source_lines(rows)},
         signal=SIGNAL,
         elements=elements,
         path=table.path,

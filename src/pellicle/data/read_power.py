@@ -30,24 +30,24 @@ def read_power(
     Arguments as in `read_spectrum`. Raises DataError or UsageError.
     """
     kind = signal or columns.signal.role
-    axis = axis_unit(table, columns.wavelength, wavelength_unit)
+    unit = axis_unit(table, columns.axis.wavelength, wavelength_unit)
     scale = signal_scale(table, columns, signal_unit)
-    wavelength, values, sigma, angle = read_columns(table, columns, axis)
+    axis, values, sigma = read_columns(table, columns, unit)
     values, sigma = scale.fractions(values, sigma)
-    notes = [*table.notes, *columns.notes, axis_note(axis), scale.note(kind, calibrated)]
+    notes = [*table.notes, *columns.notes, axis_note(unit), scale.note(kind, calibrated)]
     if noise is not None:
         notes += [] if sigma is None else ["the given noise replaces the column of standard deviations"]
         sigma = np.full(values.shape, float(noise))
     lines, rows = table.lines, None
     if range is not None:
-        inside, note = inside_range(wavelength, range, table.path)
+        inside, note = inside_range(axis.wavelength, range, table.path)
         rows, notes = np.flatnonzero(inside), [*notes, note]
-        wavelength, values = wavelength[rows], values[rows]
-        sigma, angle, lines = (None if array is None else array[rows] for array in (sigma, angle, lines))
+        axis, values = axis.taken(rows), values[rows]
+        sigma, lines = (None if array is None else array[rows] for array in (sigma, lines))
     _check(table, columns, kind, rows, values, sigma, calibrated, scale.stated)
     return of_rows(
-        sweep_numbers(wavelength, angle),
-        {"wavelength": wavelength, "values": values, "sigma": sigma, "angle": angle, "lines": lines},
+        sweep_numbers(axis.wavelength, axis.setting),
+        {**axis._asdict(), "values": values, "sigma": sigma, "lines": lines},
         signal=kind,
         polarisation=columns.signal.polarisation or polarisation or "unpolarised",
         calibrated=calibrated,

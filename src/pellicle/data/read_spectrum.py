@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from pellicle.data import mueller
+from pellicle.data import generalised, mueller
 from pellicle.data.file_spectra import ALL, Candidate, chosen, file_candidates
 from pellicle.data.formats.detect import read_tables
 from pellicle.data.read_ellipsometry import SIGNAL, read_ellipsometry
+from pellicle.data.read_generalised import GeneralisedColumns, read_generalised
 from pellicle.data.read_mueller import MuellerColumns, read_mueller
 from pellicle.data.read_power import read_power
 from pellicle.data.signal_checks import check_noise
@@ -49,7 +50,8 @@ def read_spectrum(
 
     - `path` of the file.
     - `spectrum`: the name of one of several spectra in the file.
-    - `signal`: "R", "T", "psi-delta" or "mueller"; needed where the file does not state it, or has several.
+    - `signal`: "R", "T", "psi-delta", "mueller" or "generalised-psi-delta"; needed where the file does not
+      state it, or has several.
     - `columns`: names in the order of the file's columns, "_" to skip one; overrides the header.
     - `wavelength_unit`: "nm", "um", "A", "eV", "cm-1" or "THz", where the file does not state it (else nm).
     - `signal_unit`: "fraction", "percent" or "absorbance" (−log₁₀ of the signal), where the file does not
@@ -63,7 +65,8 @@ def read_spectrum(
       stands.
     - `analyser`: for columns α and β, the angle of the fixed polariser in degrees.
     - `spot`: number of the spot, from 1 in the order of the file, for an Accurion file of several spots.
-    - `elements`: names of the elements of a Mueller matrix to read, such as ["m12", "m33"]; None for all.
+    - `elements`: names of the elements of a Mueller matrix to read, such as ["m12", "m33"], or ratios of
+      generalised Ψ and Δ, such as ["ane", "aps"]; None for all.
 
     **Returns:** a `Spectrum`; of several complete sweeps over the same wavelengths, their mean.
 
@@ -128,7 +131,10 @@ class _Reading:
     elements: Sequence[str] | None = None
 
     def __post_init__(self) -> None:
-        for name, known in (("signal", (*SIGNALS, SIGNAL, mueller.SIGNAL)), ("polarisation", POLARISATIONS)):
+        for name, known in (
+            ("signal", (*SIGNALS, SIGNAL, mueller.SIGNAL, generalised.SIGNAL)),
+            ("polarisation", POLARISATIONS),
+        ):
             value = getattr(self, name)
             if value is not None and value not in known:
                 raise UsageError(f"`{name}` must be one of {', '.join(known)}, not {value!r}")
@@ -142,6 +148,7 @@ class _Reading:
             name = "folded" if self.folded else "analyser"
             raise UsageError(f"{path}: `{name}` is for ellipsometry, and the file has none; leave it out")
         kinds = {SIGNAL: "psi and delta are in degrees", mueller.SIGNAL: "Mueller elements have no unit"}
+        kinds[generalised.SIGNAL] = kinds[SIGNAL]
         if all(one.signal in kinds for one in found):
             if self.signal_unit is not None:
                 raise UsageError(f"{path}: {kinds[found[0].signal]}; leave `signal_unit` out")
@@ -169,6 +176,8 @@ class _Reading:
             )
         elif isinstance(one.columns, MuellerColumns):
             spectrum = read_mueller(table, one.columns, self.wavelength_unit, self.noise, self.range)
+        elif isinstance(one.columns, GeneralisedColumns):
+            spectrum = read_generalised(table, one.columns, self.wavelength_unit, self.noise, self.range)
         else:
             spectrum = read_ellipsometry(
                 table,

@@ -23,14 +23,17 @@ noise."""
 
 
 def sweep_numbers(
-    wavelength: Float[np.ndarray, " rows"], angle: Float[np.ndarray, " rows"] | None = None
+    wavelength: Float[np.ndarray, " rows"], setting: Float[np.ndarray, " rows"] | None = None
 ) -> Int[np.ndarray, " rows"]:
-    """Number of the sweep of each row: how many earlier rows have the same wavelength and angle."""
-    if angle is None and one_way(wavelength):
+    """Number of the sweep of each row: how many earlier rows have the same wavelength and setting.
+
+    `setting` is that of `data.settings.setting_numbers`: an angle of incidence and an azimuth.
+    """
+    if setting is None and one_way(wavelength):
         return np.zeros(len(wavelength), dtype=np.int64)
-    angles = np.zeros(len(wavelength)) if angle is None else angle
-    order = np.lexsort((angles, wavelength))  # stable: equal points stay in the order of the rows
-    points = np.stack([wavelength, angles], axis=1)[order]
+    settings = np.zeros(len(wavelength)) if setting is None else setting
+    order = np.lexsort((settings, wavelength))  # stable: equal points stay in the order of the rows
+    points = np.stack([wavelength, settings], axis=1)[order]
     begins = np.flatnonzero(np.any(np.diff(points, axis=0, prepend=np.nan) != 0, axis=1))
     numbers = np.empty(len(wavelength), dtype=np.int64)
     numbers[order] = np.arange(len(order)) - np.repeat(begins, np.diff(begins, append=len(order)))
@@ -39,14 +42,14 @@ def sweep_numbers(
 
 def are_sweeps(
     wavelength: Float[np.ndarray, " rows"],
-    angle: Float[np.ndarray, " rows"] | None,
+    setting: Float[np.ndarray, " rows"] | None,
     number: Int[np.ndarray, " rows"],
 ) -> bool:
-    """True for several complete sweeps: each has every point, and goes one way within each angle."""
+    """True for several complete sweeps: each has every point, and goes one way within each setting."""
     counts = np.bincount(number)
     if len(counts) < 2 or counts.min() != counts.max() or counts[0] < FEWEST_POINTS:
         return False
-    groups = np.zeros(len(wavelength)) if angle is None else angle
+    groups = np.zeros(len(wavelength)) if setting is None else setting
     return all(
         one_way(wavelength[(number == k) & (groups == group)])
         for k in range(len(counts))
@@ -81,7 +84,7 @@ def mean_spectrum(sweeps: Sequence[Spectrum]) -> Spectrum:
 
     With equal weights, a fit of the mean is the fit of all sweeps together. Ψ and Δ are averaged as N, C, S.
 
-    **Arguments:** `sweeps`: two or more, of one signal at the same wavelengths and angles.
+    **Arguments:** `sweeps`: two or more, of one signal at the same wavelengths, angles and azimuths.
 
     **Returns:** the mean, with the standard deviations of the mean where all sweeps have theirs. Copies of a
     sweep are left out, with a note.
@@ -101,7 +104,7 @@ def mean_spectrum(sweeps: Sequence[Spectrum]) -> Spectrum:
     first, count = sweeps[0], len(sweeps)
     if count < 2:
         raise UsageError("a mean needs two sweeps or more")
-    for name in ("signal", "elements", "polarisation", "folded", "wavelength", "angle"):
+    for name in ("signal", "elements", "ratios", "polarisation", "folded", "wavelength", "angle", "azimuth"):
         if any(not np.array_equal(getattr(first, name), getattr(sweep, name)) for sweep in sweeps):
             raise UsageError(f"sweeps that are averaged must have the same {name}")
     copies = [i for i in range(1, count) if any(_same(sweeps[i], earlier) for earlier in sweeps[:i])]
@@ -132,22 +135,25 @@ def mean_spectrum(sweeps: Sequence[Spectrum]) -> Spectrum:
 def repeatability(sweeps: Sequence[Spectrum]) -> float:
     """Standard deviation of a point of one sweep, from the differences between sweeps, in any scene.
 
-    It is pooled over all points, on (sweeps − 1) · points degrees of freedom, twice as many for Ψ and Δ, as
-    many for each Mueller element. For Ψ and Δ it is in degrees of Ψ: half the distance on the sphere of N, C,
-    S, in each of its two directions.
+    It is pooled over all points, on (sweeps − 1) · points degrees of freedom, twice as many for Ψ and Δ and
+    for each ratio of generalised ones, as many for each Mueller element. For Ψ and Δ it is in degrees of Ψ:
+    half the distance on the sphere of N, C, S, in each of its two directions.
     """
     apart = deviations(sweeps)
     count, points, channels = apart.shape
-    independent = channels if sweeps[0].elements else min(channels, 2)
+    first = sweeps[0]
+    independent = channels if first.elements else 2 * len(first.ratios) or min(channels, 2)
     size = math.sqrt(float(np.sum(apart**2)) / ((count - 1) * points * independent))
-    return size if sweeps[0].delta is None else math.degrees(size) / 2
+    return size if first.delta is None else math.degrees(size) / 2
 
 
 def coordinates(spectrum: Spectrum) -> Float[np.ndarray, "points channels"]:
-    """The values as differences of them are compared: as they are, or N, C and S, of a folded Δ N and C."""
+    """The values as differences of them are compared: as they are, or N, C and S, of a folded Δ N and C, of
+    generalised Ψ and Δ those of each ratio."""
     if spectrum.delta is None:
         return spectrum.values.reshape(len(spectrum), -1)
-    return ncs(spectrum.values, spectrum.delta)[:, : 2 if spectrum.folded else 3]
+    sphere = ncs(spectrum.values, spectrum.delta)
+    return sphere.reshape(len(spectrum), -1) if spectrum.ratios else sphere[:, : 2 if spectrum.folded else 3]
 
 
 def deviations(sweeps: Sequence[Spectrum]) -> Float[np.ndarray, "sweeps points channels"]:
@@ -173,7 +179,8 @@ def _mean(sweeps: Sequence[Spectrum]) -> dict[str, Any]:
     found: dict[str, Any] = {"values": np.mean([sweep.values for sweep in sweeps], axis=0)}
     if first.delta is not None:
         mean = np.mean([coordinates(sweep) for sweep in sweeps], axis=0)
-        found["values"], found["delta"] = psi_delta(mean)
+        sphere = mean.reshape(len(first), -1, 3) if first.ratios else mean
+        found["values"], found["delta"] = psi_delta(sphere)
     depolarised = [sweep.depolarisation for sweep in sweeps if sweep.depolarisation is not None]
     found["depolarisation"] = np.mean(depolarised, axis=0) if len(depolarised) == count else None
     for name in ("sigma", "delta_sigma", "depolarisation_sigma"):

@@ -7,6 +7,7 @@ import os
 import numpy as np
 
 from pellicle.data.signal_checks import refuse_first
+from pellicle.data.tabular.column_selection import AxisColumns
 from pellicle.data.tabular.columns import Column, listed, recognise_all
 from pellicle.data.tabular.named_columns import first_column
 from pellicle.data.tabular.table import Table, read_table
@@ -84,12 +85,13 @@ def _bare(name: str) -> str:
 
 def _read(table: Table, wavelength: Column, others: list[Column]) -> tuple[np.ndarray, np.ndarray]:
     try:
-        nm, _, read = read_axis(table, wavelength, None, others, axis_unit(table, wavelength, None))
+        axis, read = read_axis(table, AxisColumns(wavelength), others, axis_unit(table, wavelength, None))
     except DataError as error:
         told, unclear, _ = str(error).partition("; state its unit")
         if not unclear:
             raise
         raise DataError(f"{told}; name the unit in the header, as in wavelength_um") from None
+    nm = axis.wavelength
     order = np.argsort(nm)
     if len(nm) < 2 or not np.all(np.diff(nm[order]) > 0):
         raise DataError(f"{table.path}: needs two or more wavelengths, each of them once")

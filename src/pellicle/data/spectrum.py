@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool
 
-from pellicle.data import mueller
+from pellicle.data import generalised, mueller
 from pellicle.data.folded_delta import folding_at, folding_note
+from pellicle.data.settings import Setting, setting_numbers, settings
 from pellicle.data.signal_checks import (
     Where,
     check_depolarisation,
@@ -19,8 +20,8 @@ from pellicle.data.signal_checks import (
 )
 from pellicle.errors import DataError, UsageError
 
-SIGNALS = ("R", "T", "psi-delta", mueller.SIGNAL, "counts")
-ELLIPSOMETRY = ("psi-delta", mueller.SIGNAL)
+SIGNALS = ("R", "T", "psi-delta", mueller.SIGNAL, generalised.SIGNAL, "counts")
+ELLIPSOMETRY = ("psi-delta", mueller.SIGNAL, generalised.SIGNAL)
 """Signals that compare polarisations, without a scale or an offset."""
 POLARISATIONS = ("s", "p", "unpolarised")
 FEWEST_POINTS = 5
@@ -31,6 +32,7 @@ _ARRAYS = (
     "values",
     "sigma",
     "angle",
+    "azimuth",
     "lines",
     "delta",
     "delta_sigma",
@@ -48,15 +50,20 @@ class Spectrum:
 
     - `wavelength` in nm.
     - `values`: reflectance or transmittance as fractions (on any scale if `calibrated` is False), or Ψ in
-      degrees, or elements of the normalised Mueller matrix (points, elements).
-    - `signal`: "R", "T", "psi-delta", "mueller", or "counts" for raw detector counts.
+      degrees, or elements of the normalised Mueller matrix (points, elements), or Ψ of generalised
+      ellipsometry (points, ratios).
+    - `signal`: "R", "T", "psi-delta", "mueller", "generalised-psi-delta", or "counts" for raw detector
+      counts.
     - `sigma`: standard deviations of `values`, in the same unit.
     - `polarisation`: "s", "p" or "unpolarised".
     - `angle` of incidence in degrees; None leaves it to the scene.
+    - `azimuth` of the sample in degrees: its rotation about its normal (see `pellicle.Light`); None leaves it
+      to the scene.
     - `calibrated`: False for values of unknown scale, which are not checked against 0 and 1.
     - `path`, `sha256`, `lines`: file, its digest and the source line of each point.
     - `notes`: sentences on how the file was read.
-    - `delta`, `delta_sigma`: Δ and its standard deviations in degrees, for "psi-delta".
+    - `delta`, `delta_sigma`: Δ and its standard deviations in degrees, for "psi-delta" and
+      "generalised-psi-delta".
     - `folded`: the sign of sin Δ was not measured, and Δ lies in 0 to 180. With None it is taken as folded
       where it turns back at 0 or 180 with a kink.
     - `sweeps`: the repeated measurements of which this is the mean (`data.repeated_sweeps.mean_spectrum`).
@@ -65,6 +72,8 @@ class Spectrum:
     - `depolarisation`, `depolarisation_sigma`: 1 − N² − C² − S² and its standard deviations, as fractions,
       for "psi-delta".
     - `elements`: names of the columns of `values`, such as ("m12", "m33", "m34"), for "mueller".
+    - `ratios`: names of the columns of `values`, `delta` and their errors, some of "ane", "aps" and "asp"
+      (`pellicle.data.generalised`), for "generalised-psi-delta".
 
     **Raises:** DataError for values that no sample has, UsageError for unknown words, ValueError for shapes.
 
@@ -92,23 +101,31 @@ class Spectrum:
     depolarisation: np.ndarray | None = None
     depolarisation_sigma: np.ndarray | None = None
     elements: tuple[str, ...] = ()
+    azimuth: np.ndarray | None = None
+    ratios: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name in _ARRAYS:
             if isinstance(value := getattr(self, name), str):
                 raise UsageError(f"`{name}` must be an array, not {value!r}: pl.read_spectrum reads files")
         size = np.size(self.wavelength)
-        rising = self.angle is None and size > 0 and bool(np.all(np.diff(self.wavelength) > 0))
+        rising = (
+            self.angle is None
+            and self.azimuth is None
+            and size > 0
+            and bool(np.all(np.diff(self.wavelength) > 0))
+        )
         order = None
         if not rising:
-            order = np.lexsort((np.zeros(size) if self.angle is None else self.angle, self.wavelength))
+            given = [x for x in (self.azimuth, self.angle) if x is not None]
+            order = np.lexsort((*given, self.wavelength))
         for name in _ARRAYS:
             value = getattr(self, name)
             if value is None:
                 continue
-            matrix = self.elements and name in ("values", "sigma")
-            if np.shape(value) != ((size, len(self.elements)) if matrix else (size,)):
-                expected = f"{len(self.elements)} numbers" if matrix else "one number"
+            columns = self._columns(name)
+            if np.shape(value) != ((size, len(columns)) if columns else (size,)):
+                expected = f"{len(columns)} numbers" if columns else "one number"
                 raise ValueError(
                     f"`{name}`: expected {expected} per wavelength ({size}), got {np.shape(value)}"
                 )
@@ -121,12 +138,18 @@ class Spectrum:
         if self.folded is None:
             self._find_folding()
 
+    def _columns(self, name: str) -> tuple[str, ...]:
+        """Names of the columns of an array; none where it has one number per wavelength."""
+        if name in ("values", "sigma"):
+            return self.elements or self.ratios
+        return self.ratios if name in ("delta", "delta_sigma") else ()
+
     def _find_folding(self) -> None:
         """Set `folded`, with a note where it is true."""
         at = None
-        if self.delta is not None:
-            angle = np.zeros(len(self)) if self.angle is None else self.angle
-            at = folding_at(self.wavelength, self.values, self.delta, angle)
+        if self.delta is not None and not self.ratios:
+            group = np.zeros(len(self)) if self.setting is None else self.setting
+            at = folding_at(self.wavelength, self.values, self.delta, group)
         object.__setattr__(self, "folded", at is not None)
         if at is not None:
             object.__setattr__(self, "notes", (*self.notes, folding_note(at)))
@@ -135,12 +158,17 @@ class Spectrum:
         for name, known in (("signal", SIGNALS), ("polarisation", POLARISATIONS)):
             if getattr(self, name) not in known:
                 raise UsageError(f"`{name}` must be one of {', '.join(known)}, not {getattr(self, name)!r}")
-        if (self.signal == "psi-delta") != (self.delta is not None):
+        if (self.signal in ("psi-delta", generalised.SIGNAL)) != (self.delta is not None):
             raise UsageError('`delta` goes with `signal="psi-delta"`: give both, or neither')
+        if (self.signal == generalised.SIGNAL) != bool(self.ratios):
+            raise UsageError(f'`ratios` go with `signal="{generalised.SIGNAL}"`: give both, or neither')
+        if self.ratios and self.folded:
+            raise UsageError("`folded` is for psi and delta of one ratio: leave it out")
         if (self.signal == mueller.SIGNAL) != bool(self.elements):
             raise UsageError('`elements` go with `signal="mueller"`: give both, or neither')
         mueller.check_elements(self.elements)
-        if self.depolarisation is not None and self.delta is None:
+        generalised.check_ratios(self.ratios)
+        if self.depolarisation is not None and (self.delta is None or self.ratios):
             raise UsageError('`depolarisation` goes with `signal="psi-delta"`: leave it out')
         if self.depolarisation_sigma is not None and self.depolarisation is None:
             raise UsageError("`depolarisation_sigma` goes with `depolarisation`: give both, or neither")
@@ -148,10 +176,10 @@ class Spectrum:
     def _check_arrays(self) -> None:
         """Refuse what a file may not contain either. Raises DataError."""
         present = {name: array for name in _ARRAYS if (array := getattr(self, name)) is not None}
-        for name in ("values", "sigma") if self.elements else ():
-            if name in present:
-                columns = zip(self.elements, present.pop(name).T, strict=True)
-                present |= {f"{element} {name}": column for element, column in columns}
+        for name in tuple(present):
+            if columns := self._columns(name):
+                pairs = zip(columns, present.pop(name).T, strict=True)
+                present |= {f"{column} {name}": own for column, own in pairs}
         for name, array in present.items():
             refuse_first(array, ~np.isfinite(array), self.place(f"`{name}`"), f"is not finite; {_REMEDY}")
             if name == "wavelength" or name.endswith("sigma"):
@@ -159,11 +187,16 @@ class Spectrum:
         angle = present.get("angle", np.zeros(len(self)))
         reason = f"is not from 0 to 90 degrees; {_REMEDY}"
         refuse_first(angle, (angle < 0) | (angle > 90), self.place("`angle`"), reason)
-        repeated = (np.diff(self.wavelength) == 0) & (np.diff(angle) == 0)
+        same = angle if self.azimuth is None else np.stack([angle, self.azimuth])
+        repeated = (np.diff(self.wavelength) == 0) & np.all(np.atleast_2d(np.diff(same)) == 0, axis=0)
         reason = "comes twice at one angle; keep one of the points, or their mean"
         refuse_first(self.wavelength[1:], repeated, lambda row: self.place("`wavelength`")(row + 1), reason)
         values = self.place("`values`")
-        if self.delta is not None:
+        if self.ratios and self.delta is not None:
+            for name, psi, delta in zip(self.ratios, self.values.T, self.delta.T, strict=True):
+                places = self.place(f"`{name} values`"), self.place(f"`{name} delta`")
+                check_psi_delta(psi, delta, False, *places, _REMEDY)
+        elif self.delta is not None:
             check_psi_delta(
                 self.values, self.delta, bool(self.folded), values, self.place("`delta`"), _REMEDY
             )
@@ -181,6 +214,16 @@ class Spectrum:
     def ellipsometric(self) -> bool:
         """True for Ψ and Δ and for Mueller elements, which have no scale and no offset."""
         return self.signal in ELLIPSOMETRY
+
+    @property
+    def setting(self) -> np.ndarray | None:
+        """A number for each point that is the same at one angle of incidence and azimuth, None without."""
+        return setting_numbers(self.angle, self.azimuth)
+
+    @property
+    def settings(self) -> list[Setting]:
+        """The points of each angle of incidence and azimuth."""
+        return settings(self.angle, self.azimuth, len(self))
 
     @property
     def source(self) -> str:

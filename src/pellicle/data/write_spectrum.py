@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pellicle.data.spectrum import Spectrum
+from pellicle.data.tabular.column_names import RATIO_COLUMNS
 from pellicle.errors import UsageError, install_command
 from pellicle.files import replacing
 
@@ -31,7 +32,7 @@ def write_spectrum(path: str | os.PathLike[str], spectrum: Spectrum, *, overwrit
 
     A CSV is read back unchanged by `read_spectrum`, repeated sweeps included. NetCDF is for xarray
     (`xarray.open_dataset(path, engine="h5netcdf")`). NeXus has an NXdata group under the definition
-    NXellipsometry for Ψ and Δ and for Mueller elements, NXoptical_spectroscopy for reflectance and
+    NXellipsometry for ellipsometry, NXoptical_spectroscopy for reflectance and
     transmittance. NetCDF and NeXus hold the mean of repeated sweeps and need the extra `formats`.
 
     **Arguments:** `path` of the file; `spectrum`; `overwrite` an existing file.
@@ -55,6 +56,10 @@ def _columns(spectrum: Spectrum) -> list[_Column]:
     found = [_Column("wavelength_nm", spectrum.wavelength, "nm", "wavelength")]
     if spectrum.angle is not None:
         found.append(_Column("angle_deg", spectrum.angle, "degree", "angle_of_incidence"))
+    if spectrum.azimuth is not None:
+        found.append(_Column("azimuth_deg", spectrum.azimuth, "degree", "sample_azimuth"))
+    if spectrum.ratios:
+        return found + _of_ratios(spectrum)
     if spectrum.delta is not None:
         found.append(_Column("psi_deg", spectrum.values, "degree", "psi"))
         found.append(_Column("delta_deg", spectrum.delta, "degree", "delta"))
@@ -82,6 +87,22 @@ def _columns(spectrum: Spectrum) -> list[_Column]:
     if spectrum.sigma is not None:
         found.append(_Column("sigma", spectrum.sigma, "", f"{name}_errors"))
     return found
+
+
+def _of_ratios(spectrum: Spectrum) -> list[_Column]:
+    """Generalised Ψ and Δ of each ratio, then their errors."""
+    assert spectrum.delta is not None
+    values, errors = [], []
+    for i, ratio in enumerate(spectrum.ratios):
+        for angle, own, sigma in (
+            ("psi", spectrum.values, spectrum.sigma),
+            ("delta", spectrum.delta, spectrum.delta_sigma),
+        ):
+            name = f"{angle}_{ratio}"
+            values.append(_Column(f"{name}_deg", own[:, i], "degree", name))
+            if sigma is not None:
+                errors.append(_Column(f"sigma_{name}_deg", sigma[:, i], "degree", f"{name}_errors"))
+    return values + errors
 
 
 def _facts(spectrum: Spectrum) -> list[tuple[str, str]]:
@@ -133,6 +154,9 @@ def _write_nexus(path: Path, spectrum: Spectrum) -> None:
         columns = _columns(spectrum)
         signals = [c.name for c in columns if c.name in ("psi", "reflectance", "transmittance", "counts")]
         others = [c.name for c in columns if c.name in ("delta", "depolarisation")]
+        if spectrum.ratios:
+            found = [c.name for c in columns if c.name in RATIO_COLUMNS]
+            signals, others = found[:1], found[1:]
         if spectrum.elements:
             signals, others = [spectrum.elements[0]], list(spectrum.elements[1:])
         data = _group(entry, "data", "NXdata", signal=signals[0], axes=["wavelength"])

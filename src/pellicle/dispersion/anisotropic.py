@@ -42,6 +42,7 @@ class Anisotropic(AbstractDispersion):
     theta: Any
     phi: Any
     psi: Any
+    azimuth: Any  # rotation of the sample about its normal in degrees, added to φ; None is 0
     order: tuple[int, int, int] | None = eqx.field(static=True)
     """Number of the principal axis along each laboratory axis; None if any orientation is possible."""
 
@@ -63,6 +64,7 @@ class Anisotropic(AbstractDispersion):
             raise ValueError(f"`axis`: expected (theta, phi){'' if uniaxial else ' or (theta, phi, psi)'}")
         self.x, self.y, self.z = (ordinary, None, extraordinary) if uniaxial else (x, y, z)
         self.theta, self.phi, self.psi = (*axis, None if uniaxial else 0.0)[:3]
+        self.azimuth = None
         self.order = _axis_order(self.theta, self.phi, None if uniaxial else self.psi)
 
     def with_media(self, convert: Callable[[Any], AbstractDispersion]) -> Anisotropic:
@@ -81,6 +83,19 @@ class Anisotropic(AbstractDispersion):
             return Anisotropic(self.x, self.z, axis=(convert(self.theta), convert(self.phi)))
         axis = [convert(angle) for angle in (self.theta, self.phi, self.psi)]
         return Anisotropic(x=self.x, y=self.y, z=self.z, axis=axis)
+
+    def turned(self, azimuth: Any) -> Anisotropic:
+        """Return the medium in a sample turned about its normal by `azimuth` degrees, from x towards y.
+
+        A uniaxial medium whose axis is the normal stays as it is. In another one s and p mix, whatever the
+        azimuth is.
+        """
+        if self.is_uniaxial and self.order is not None and self.order[2] == 2:
+            return self
+        other = object.__new__(Anisotropic)
+        for name, value in (vars(self) | {"azimuth": azimuth, "order": None}).items():
+            object.__setattr__(other, name, value)
+        return other
 
     @property
     def names(self) -> dict[str, str]:
@@ -115,7 +130,8 @@ class Anisotropic(AbstractDispersion):
         if self.order is not None:
             return Principal(*((x, y, z)[i] for i in self.order))
         xp = namespace(self.theta, self.phi, self.psi, wavelength)
-        theta, phi = (xp.deg2rad(angle * 1.0) for angle in (self.theta, self.phi))
+        azimuth = self.phi if self.azimuth is None else self.phi + self.azimuth
+        theta, phi = (xp.deg2rad(angle * 1.0) for angle in (self.theta, azimuth))
         if self.y is None:
             return uniaxial(x, z, theta, phi)
         return permittivity(Principal(x, y, z), theta, phi, xp.deg2rad(self.psi * 1.0))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from pellicle.data import generalised
 from pellicle.dispersion.anisotropic import Anisotropic
 from pellicle.dispersion.principal_media import isotropic_in_plane, mixes_polarisations
 from pellicle.effects.bounds import largest_attenuation
@@ -24,15 +25,21 @@ def anisotropy(scene: Scene) -> Row:
     **Raises:** UsageError for what is not computed: see `_check`.
     """
     media = [medium for medium in scene_media(scene) if isinstance(medium, Anisotropic)]
+    apart = "s and p stay apart" + (", r_ps = r_sp = 0" if scene.light.signal == generalised.SIGNAL else "")
+    if scene.light.azimuth is not None and all(map(isotropic_in_plane, media)):
+        apart += ", and the azimuth of the sample has no effect"
     if not media:
-        return Row("anisotropy", False, "no medium is birefringent")
+        unusual = apart != "s and p stay apart"
+        return Row("anisotropy", False, "no medium is birefringent" + f": {apart}" * unusual)
     _check(scene)
     if any(map(mixes_polarisations, media)):
         why = "an optic axis is tilted or its angles are free: s and p mix, matrices of 4×4"
+        if not any(isinstance(m, Anisotropic) and mixes_polarisations(m) for m in _media(scene)):
+            why = "the sample is turned: s and p mix, matrices of 4×4"
         if any(_strongly_dichroic(layer, scene) for layer in coherent_layers(scene)):
             return Row("anisotropy", True, f"{why}, in slices where one wave decays", count=SLICED)
         return Row("anisotropy", True, why, count=GENERAL)
-    why = "axes along the normal and the plane of incidence: s and p stay apart, closed forms of 2×2"
+    why = f"axes along the normal and the plane of incidence: {apart}, closed forms of 2×2"
     if scene.light.ellipsometric and groups(scene)[1]:
         why = f"{why}, and 4×4 where light crosses absorbing layers to the back face"
     return Row("anisotropy", True, why, count=CLOSED_FORMS)
@@ -40,12 +47,22 @@ def anisotropy(scene: Scene) -> Row:
 
 def _strongly_dichroic(layer: Any, scene: Scene) -> bool:
     """True where one of the waves that mix in a layer may be absorbed while the other passes."""
-    mixing = mixes_polarisations(layer.material)
+    mixing = mixes_polarisations(_turned(layer.material, scene))
     return mixing and not largest_attenuation(layer.material, layer.thickness, scene) <= DIRECT
 
 
 def scene_media(scene: Scene) -> list[Any]:
-    """Every medium of a scene but the ambient, from the top down; interfaces have none of their own."""
+    """Every medium of a scene but the ambient, from the top down, turned by the azimuth of the sample;
+    interfaces have none of their own."""
+    return [_turned(medium, scene) for medium in _media(scene)]
+
+
+def _turned(medium: Any, scene: Scene) -> Any:
+    turns = scene.light.azimuth is not None and isinstance(medium, Anisotropic)
+    return medium.turned(scene.light.azimuth) if turns else medium
+
+
+def _media(scene: Scene) -> list[Any]:
     back = [] if scene.substrate.back is None else [scene.substrate.back]
     layers = [layer.material for layer in scene.layers if not isinstance(layer, Interface)]
     return [*layers, scene.substrate.material, *back]
@@ -56,7 +73,7 @@ def _check(scene: Scene) -> None:
     if is_graded(scene):
         raise UsageError("a graded layer and a birefringent medium in one scene are not computed: omit one")
     described, plates = groups(scene)
-    thick = [plate.material for plate in plates]
+    thick = [_turned(plate.material, scene) for plate in plates]
     if any(map(mixes_polarisations, thick)):
         raise UsageError(
             "the optic axis of an incoherent plate must be the normal or along the plane of incidence:"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pellicle.data import generalised
 from pellicle.dispersion.principal_media import mixes_polarisations
 from pellicle.effects.anisotropy import scene_media
 from pellicle.effects.bounds import (
@@ -16,6 +17,7 @@ from pellicle.effects.bounds import (
 )
 from pellicle.effects.plan import Row
 from pellicle.effects.presence import roughness
+from pellicle.errors import UsageError
 from pellicle.optics import orders as series
 from pellicle.optics import quadrature
 from pellicle.scene.film import Scene, coherent_layers, is_graded, thickness_spread
@@ -164,10 +166,15 @@ def _path(at: np.ndarray, layers: list[tuple[Layer, float]]) -> float:
 def angle_spread(scene: Scene) -> Row:
     """Number of rays of a cone of light, and their error.
 
-    **Raises:** ValueError where the light has no wavelengths.
+    **Raises:** ValueError where the light has no wavelengths, UsageError for generalised Ψ and Δ.
     """
     if not scene.instrument.has_cone:
         return Row("angle-spread", False, "no cone of light: one angle of incidence")
+    if scene.light.signal == generalised.SIGNAL:
+        raise UsageError(
+            "generalised psi and delta in a cone of light are not computed: leave out `angle_spread` and"
+            ' `numerical_aperture`, or measure `signal="mueller"`'
+        )
     if scene.light.wavelength is None:
         raise ValueError("the cone's rays depend on the wavelengths: give the light its wavelengths")
     count, around, error = _rays(scene)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
+from pellicle.data import generalised
+
 
 @dataclass(frozen=True)
 class Row:
@@ -64,7 +66,7 @@ class Plan:
     @property
     def ellipsometric(self) -> bool:
         """True for the signals of ellipsometry."""
-        return self.signal in ("psi-delta", "mueller")
+        return self.signal in ("psi-delta", "mueller", generalised.SIGNAL)
 
     @property
     def error_bound(self) -> float:

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from jax.tree_util import GetAttrKey
 
+from pellicle.data import generalised
 from pellicle.data.spectrum import Spectrum
 from pellicle.effects.film import exact
 from pellicle.effects.plan import Plan
@@ -49,6 +50,13 @@ class FilmView:
     kind, parts = "spectrum", ("curves", "colour", "sphere", "plan")
 
     def __init__(self, scene: Scene, wavelength: Any = None) -> None:
+        if scene.light.signal == generalised.SIGNAL:
+            raise UsageError(
+                "the explorer does not draw generalised psi and delta: give the scene another signal, such as"
+                ' "psi-delta" or "mueller"'
+            )
+        if np.ndim(scene.light.azimuth):
+            raise UsageError("the explorer draws one azimuth of the sample: give the scene one")
         self.scene = scene
         self.controls = film_controls(scene)
         self.by_name = {control.name: control for control in self.controls}
@@ -133,7 +141,10 @@ class FilmView:
             )
         if not _FEWEST <= len(nm) <= _MOST:
             nm = np.linspace(nm[0], nm[-1], _POINTS)
-        light = Light(own.wavelength, angle, data.signal, polarised)
+        if data.azimuth is not None and np.ptp(data.azimuth) > 0:
+            raise UsageError(f"{data.path}: has several azimuths of the sample, and the explorer draws one")
+        azimuth = own.azimuth if data.azimuth is None else float(data.azimuth[0]) or None
+        light = Light(own.wavelength, angle, data.signal, polarised, azimuth)
         if light == own and np.array_equal(nm, self.wavelength):
             return None
         scene = with_value(self.scene, (GetAttrKey("light"),), light)

@@ -74,7 +74,7 @@ def colour_program(scene: Scene, names: Sequence[str]) -> Callable[[Numbers], np
     """
     bands, light = integration_bands(BANDS), scene.light
     if light.ellipsometric:
-        scene = with_value(scene, _LIGHT, Light(None, light.angle))
+        scene = with_value(scene, _LIGHT, Light(None, light.angle, azimuth=light.azimuth))
     return _compiled(with_wavelength(scene, bands.wavelength), names, after=lambda r: r @ bands.weights)
 
 
@@ -96,7 +96,7 @@ def angle_program(
             fixed = with_value(fixed, control.path, control.value)
     substrate = replace(fixed.substrate, back=None, back_collected=None, back_reflections=None)
     layers = tuple(replace(x, thickness_spread=None) if isinstance(x, Layer) else x for x in fixed.layers)
-    light = Light(bands.wavelength, Free(0.0, 90.0))
+    light = Light(bands.wavelength, Free(0.0, 90.0), azimuth=fixed.light.azimuth)
     bare = replace(fixed, layers=layers, substrate=substrate, light=light, instrument=Instrument())
     names = [control.name for control in own if not control.optional or control.name in active]
     degrees = np.rad2deg(np.arccos(np.arange(1, COSINES + 1) / COSINES))

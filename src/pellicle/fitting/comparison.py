@@ -136,10 +136,12 @@ def _check_same(fits: Mapping[str, Fit]) -> None:
         names: list[object] = [fit.layer_test and fit.layer_test.residual]
         for data in (part.data for part in fit.parts):
             names += [type(data)]
-            names += [(data.signal, data.folded, data.elements) if isinstance(data, Spectrum) else ""]
+            names += [
+                (data.signal, data.folded, data.elements, data.ratios) if isinstance(data, Spectrum) else ""
+            ]
             light = "angle" if isinstance(data, Colours) else "theta_i phi_i theta_o phi_o"
             if isinstance(data, Spectrum):
-                light = "wavelength delta delta_sigma depolarisation depolarisation_sigma"
+                light = "wavelength azimuth delta delta_sigma depolarisation depolarisation_sigma"
             columns += [getattr(data, name) for name in ("values", "sigma", *light.split())]
         return names, columns
 
@@ -175,6 +177,8 @@ def _residuals(part: Part) -> list[_Residuals]:
     known, of_part = part.sigma_from in ("given", "usual"), _residual(part)
     if isinstance(part.curve, Curve) and part.spectrum.elements:
         return [_Residuals(part, column[:, None], known) for column in of_part.T]  # each of its own noise
+    if isinstance(part.curve, Curve) and part.spectrum.ratios:
+        return [_Residuals(part, of_part[:, i], known) for i in range(len(part.spectrum.ratios))]
     result = [_Residuals(part, of_part, known)]
     if isinstance(part.curve, Curve) and part.curve.depolarisation_data is not None:
         sigma = part.spectrum.depolarisation_sigma
@@ -184,7 +188,8 @@ def _residuals(part: Part) -> list[_Residuals]:
 
 
 def _residual(part: Part) -> np.ndarray:
-    """Residuals over a given σ, else as they are, (points, channels): of Ψ and Δ on the sphere."""
+    """Residuals over a given σ, else as they are, (points, channels): of Ψ and Δ on the sphere, (points,
+    ratios, channels) of generalised ones."""
     if isinstance(part.curve, BrdfCurve):
         return part.curve.residual
     if isinstance(part.curve, ColourCurve):
@@ -199,7 +204,7 @@ def _residual(part: Part) -> np.ndarray:
     across = sigma if spectrum.delta_sigma is None else spectrum.delta_sigma
     # at the poles, where Δ has no meaning, the error of Ψ leaves some to it
     sine = np.sin(2 * np.deg2rad(c.data)) / np.hypot(np.sin(2 * np.deg2rad(c.data)), 2 * np.deg2rad(sigma))
-    return np.stack([c.residual / sigma, sine * c.delta_residual / across], axis=1)
+    return np.stack([c.residual / sigma, sine * c.delta_residual / across], axis=-1)
 
 
 def _correlation(residuals: _Residuals) -> float:

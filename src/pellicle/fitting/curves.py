@@ -33,7 +33,8 @@ def at_each_wavelength(curves: Sequence[Index | Curve | ColourCurve]) -> Index:
 class Curve:
     """Data and model at each wavelength (nm), and the layer's index with standard errors.
 
-    For ellipsometry `data`, `model` and `sigma` are Ψ, and `delta_data` and `delta_model` Δ, in degrees;
+    For ellipsometry `data`, `model` and `sigma` are Ψ, and `delta_data` and `delta_model` Δ, in degrees
+    (of generalised ones (wavelengths, ratios));
     `depolarisation_data` and `depolarisation_model` are fractions, None where it was not measured.
     Of a birefringent layer `n` and `k` are the ordinary ones, and `principal` has each index by its name.
     """

@@ -171,7 +171,7 @@ def _of_region(cube: Cube, reference: Scene, region: str | Sequence[int]) -> Lam
     wavelength, angle = cube.wavelength, known.light.angle
     if cube.angle is not None:
         wavelength, angle = np.repeat(wavelength, cube.angle.size), np.tile(cube.angle, wavelength.size)
-    light = Light(None, angle, cube.signal, cube.polarisation)
+    light = Light(None, angle, cube.signal, cube.polarisation, known.light.azimuth)
     known = eqx.tree_at(lambda s: s.light, known, light, is_leaf=lambda x: x is None)
     simulated = simulate_signal(known, wavelength).clean
     rows = (slice(None),) * (len(cube.dims) - 2)

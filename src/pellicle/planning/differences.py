@@ -13,6 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from pellicle.data import generalised
 from pellicle.effects.plan import Plan
 from pellicle.scene.free import free_leaves, insert, is_free, start_values
 
@@ -88,7 +89,7 @@ class Evaluation(NamedTuple):
 
 def signals(plan: Plan, scene: Any, points: np.ndarray, build: Build) -> np.ndarray:
     """Signal at each point, (points, values): for a film its wavelengths, for ellipsometry N, C and S of
-    each wavelength, for a surface the channels of each pair of directions."""
+    each wavelength (and ratio), for a surface the channels of each pair of directions."""
     return np.asarray(_signals(build, plan.static_key, *_split(scene, points)), dtype=float)
 
 
@@ -104,7 +105,7 @@ def largest_difference(one: np.ndarray, other: np.ndarray, signal: str) -> float
     signals is not a number.
     """
     apart = np.abs(one - other)
-    if signal == "psi-delta":
+    if signal in ("psi-delta", generalised.SIGNAL):
         apart = np.rad2deg(np.linalg.norm(apart.reshape(-1, 3), axis=1))
     return float(np.max(np.where(np.isfinite(apart), apart, np.inf), initial=0.0))
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pydantic import BaseModel
 
 from pellicle.data.colours import SPACES
@@ -125,6 +126,7 @@ def _scene(tables: RecipeTable, folder: Path) -> Scene:
             optional(data.angle, "angle") or 0.0,
             signal,
             data.polarisation or "unpolarised",
+            np.array(data.azimuth) if isinstance(data.azimuth, list) else data.azimuth,
         ),
         instrument=Instrument(
             instrument.scale,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeAlias
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
@@ -127,12 +127,18 @@ class InstrumentTable(_Table):
     mueller_uncertainty: Uncertain = None
 
 
+Signal: TypeAlias = Literal[
+    "R", "T", "psi-delta", "mueller", "generalised-psi-delta", "srgb", "rgb", "xyz", "lab"
+]
+
+
 class _Reading(_Table):
     """Reading options of data files, named as the flags of the command line."""
 
     spectrum: str | None = None
-    signal: Literal["R", "T", "psi-delta", "mueller", "srgb", "rgb", "xyz", "lab"] | None = None
+    signal: Signal | None = None
     angle: Annotated[float, Field(ge=0, le=90)] | FreeTable | None = None
+    azimuth: float | list[float] | None = None
     polarisation: Literal["unpolarised", "s", "p"] | None = None
     noise: float | None = Field(default=None, gt=0)
     columns: str | list[str] | None = None

@@ -94,6 +94,8 @@ def _data(scene: Scene) -> dict[str, Any]:
         found["signal"] = light.signal
     if isinstance(light.angle, Free) or np.ndim(light.angle) or light.angle != 0:
         found["angle"] = number(light.angle, "the angle of incidence")
+    if light.azimuth is not None:
+        found["azimuth"] = number(light.azimuth, "the azimuth of the sample")
     if light.polarisation != "unpolarised":
         found["polarisation"] = light.polarisation
     if light.wavelength is not None:

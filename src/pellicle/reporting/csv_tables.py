@@ -13,6 +13,7 @@ import numpy as np
 
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.colours import Colours
+from pellicle.data.spectrum import Spectrum
 from pellicle.data.tabular.columns import DIRECTIONS
 from pellicle.fitting.curves import BIREFRINGENCE
 
@@ -26,8 +27,8 @@ Columns = Mapping[str, Sequence[float] | np.ndarray]
 def fit_csv(fit: Fit) -> str:
     """Format data, model and residuals of a fit as CSV that pellicle can read again.
 
-    A spectrum has a row for each wavelength and angle, with σ; BRDF samples have one for each pair of
-    directions. Rows of a joint fit begin with the name of the file, and have one value of a spectrum each.
+    A spectrum has a row for each wavelength, angle and azimuth, with σ; BRDF samples have one for each pair
+    of directions. Rows of a joint fit begin with the name of the file, and have one value of a spectrum each.
     """
     if fit.layer_test is not None:
         return _samples_csv(fit)
@@ -43,6 +44,8 @@ def fit_csv(fit: Fit) -> str:
         about = [f"signal {data.space}, {light}, {data.polarisation}"]
         about += [note for note in data.notes if note.startswith("observer ")]
         about += [f"fit of {fitted_colours.summary(part)}: data, model_, sigma_ = standard deviation assumed"]
+    elif part.spectrum.ratios:
+        about, columns = _generalised(part)
     elif part.spectrum.elements:
         about, columns = _mueller(part)
     elif part.spectral.delta_data is not None:
@@ -95,8 +98,10 @@ def _spectrum(part: Part) -> tuple[list[str], Columns]:
         "sigma": curve.sigma,
     }
     if data.angle is not None:
-        columns["angle_deg"] = data.angle
         names.append("angle")
+    if data.azimuth is not None:
+        names.append("azimuth")
+    columns |= _settings(part)
     about = [
         f"fit of {data.signal}: data, model, residual = data - model, sigma = standard deviation assumed",
         f"pellicle reads the data again with --columns {','.join(names)}",
@@ -104,13 +109,17 @@ def _spectrum(part: Part) -> tuple[list[str], Columns]:
     return about, columns
 
 
+def _settings(part: Part) -> dict[str, np.ndarray]:
+    """The angle of incidence and the azimuth of the sample, as far as the data have them."""
+    each = {"angle_deg": part.spectrum.angle, "azimuth_deg": part.spectrum.azimuth}
+    return {name: own for name, own in each.items() if own is not None}
+
+
 def _psi_delta(part: Part) -> tuple[list[str], Columns]:
     curve, data = part.spectral, part.spectrum
     assert curve.delta_data is not None
     assert curve.delta_model is not None
-    columns = {"wavelength_nm": curve.wavelength}
-    if data.angle is not None:
-        columns["angle_deg"] = data.angle
+    columns = {"wavelength_nm": curve.wavelength, **_settings(part)}
     columns |= {
         "psi_deg": curve.data,
         "psi_model": curve.model,
@@ -133,11 +142,34 @@ def _psi_delta(part: Part) -> tuple[list[str], Columns]:
     return about, columns
 
 
+def _generalised(part: Part) -> tuple[list[str], Columns]:
+    curve, data = part.spectral, part.spectrum
+    columns = {"wavelength_nm": curve.wavelength, **_settings(part)}
+    for name, (own, model, residual, sigma) in _of_ratios(part).items():
+        columns |= {f"{name}_deg": own, f"{name}_model": model, f"{name}_residual": residual}
+        if data.sigma is not None and sigma is not None:
+            columns[f"sigma_{name}_deg"] = sigma
+    about = "fit of generalised psi and delta in degrees: data, model, residual = data - model"
+    return [f"{about} (of delta: -180 to 180)"], columns
+
+
+def _of_ratios(part: Part) -> dict[str, tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray | None]]:
+    """Data, model, residual and σ of Ψ and of Δ of each ratio; the σ of Δ is None where it is not known."""
+    curve, data = part.spectral, part.spectrum
+    assert curve.delta_data is not None
+    assert curve.delta_model is not None
+    found = {}
+    for i, ratio in enumerate(data.ratios):
+        psi = curve.data[:, i], curve.model[:, i], curve.residual[:, i], curve.sigma[:, i]
+        error = None if data.delta_sigma is None else data.delta_sigma[:, i]
+        delta = curve.delta_data[:, i], curve.delta_model[:, i], curve.delta_residual[:, i], error
+        found |= {f"psi_{ratio}": psi, f"delta_{ratio}": delta}
+    return found
+
+
 def _mueller(part: Part) -> tuple[list[str], Columns]:
     curve, data = part.spectral, part.spectrum
-    columns = {"wavelength_nm": curve.wavelength}
-    if data.angle is not None:
-        columns["angle_deg"] = data.angle
+    columns = {"wavelength_nm": curve.wavelength, **_settings(part)}
     for i, name in enumerate(data.elements):
         columns[name] = curve.data[:, i]
         columns[f"{name}_model"] = curve.model[:, i]
@@ -163,7 +195,20 @@ def _samples_csv(fit: Fit) -> str:
 def _joint_csv(fit: Fit) -> str:
     about = ["joint fit: data, model, residual = data - model, sigma = standard deviation assumed"]
     names = ["file", "signal", "wavelength_nm", "angle_deg", "data", "model", "residual", "sigma"]
-    return _csv(about, fit, names, (row for part in fit.parts for row in _joint_rows(part)))
+    if not any(isinstance(part.data, Spectrum) and part.data.azimuth is not None for part in fit.parts):
+        return _csv(about, fit, names, (row for part in fit.parts for row in _joint_rows(part)))
+    rows = ([*row, azimuth] for part in fit.parts for row, azimuth in _with_azimuths(part))
+    return _csv(about, fit, [*names, "azimuth_deg"], rows)
+
+
+def _with_azimuths(part: Part) -> Iterable[tuple[tuple[str | float, ...], float]]:
+    """Rows of a part, each with the azimuth of the sample, NaN where that is not known."""
+    rows = list(_joint_rows(part))
+    azimuth = part.data.azimuth if isinstance(part.data, Spectrum) else None
+    if azimuth is None:
+        return [(row, math.nan) for row in rows]
+    # the rows of one quantity after those of another
+    return zip(rows, np.tile(azimuth, len(rows) // len(azimuth)), strict=True)
 
 
 def _joint_rows(part: Part) -> Iterable[tuple[str | float, ...]]:
@@ -185,6 +230,13 @@ def _joint_rows(part: Part) -> Iterable[tuple[str | float, ...]]:
     curve, data = part.spectral, part.spectrum
     unknown = np.full(curve.wavelength.size, np.nan)
     angle = unknown if data.angle is None else data.angle
+    if data.ratios:
+        for name, (*numbers, sigma) in _of_ratios(part).items():
+            for row in zip(
+                curve.wavelength, angle, *numbers, unknown if sigma is None else sigma, strict=True
+            ):
+                yield part.name, name, *row
+        return
     if data.elements:
         for i, name in enumerate(data.elements):
             numbers = (curve.data[:, i], curve.model[:, i], curve.residual[:, i], curve.sigma[:, i])

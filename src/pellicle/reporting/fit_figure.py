@@ -12,7 +12,7 @@ import numpy as np
 from pellicle.fitting.curves import BIREFRINGENCE, BrdfCurve, ColourCurve, Curve, Index
 from pellicle.fitting.depth_profiles import FittedProfile, fitted_profiles
 from pellicle.fitting.status import RIVAL
-from pellicle.reporting import brdf_figure, fitted_colours, mueller_figure, psi_delta
+from pellicle.reporting import brdf_figure, fitted_colours, generalised_figure, mueller_figure, psi_delta
 from pellicle.reporting.drawing import (
     ABOVE,
     BLACK,
@@ -78,7 +78,9 @@ def draw(fit: Fit) -> Figure:
     rows = figure.subplots(len(panels), 1, squeeze=False)[:, 0]
     for part in fit.parts:
         first, *rest = [axes for axes, panel in zip(rows, panels, strict=True) if panel.part is part]
-        for axes in rest if not getattr(part.data, "elements", ()) else ():
+        # the axes around a grid of panels have no numbers to share
+        grid = getattr(part.data, "elements", ()) or getattr(part.data, "ratios", ())
+        for axes in () if grid else rest:
             axes.sharex(first)
         if len(fit.parts) > 1:
             first.set_title(part.name.replace("$", r"\$"), fontsize="small", loc="left")
@@ -125,6 +127,8 @@ def _panels_of_data(part: Part) -> list[_Panel]:
         rows = [(fitted_colours.patches, 1.6, 0), (fitted_colours.residuals, 1.3, 1)]
     elif isinstance(part.curve, BrdfCurve):
         rows = [(brdf_figure.draw_samples, 3.0, 0), (brdf_figure.draw_residuals, 1.3, 0)]
+    elif part.spectrum.ratios:
+        rows = [(generalised_figure.ratios, 4.6, 2), (generalised_figure.residuals, 1.5, 2)]
     elif part.spectrum.elements:
         rows = [(mueller_figure.matrix, 5.4, 0), (mueller_figure.residuals, 1.5, 2)]
     elif part.spectral.delta_data is None:
@@ -159,11 +163,10 @@ def file_names(fit: Fit) -> list[str]:
 
 
 def series(part: Part) -> list[np.ndarray]:
-    """Indices of the points that one line joins: of one angle of incidence, without a wide gap."""
-    nm, angle = part.spectral.wavelength, part.spectrum.angle
-    series = []
-    for value in [None] if angle is None else np.unique(angle):
-        points = np.arange(nm.size) if value is None else np.flatnonzero(angle == value)
+    """Indices of the points that one line joins: of one angle of incidence and azimuth, without a wide
+    gap."""
+    nm, series = part.spectral.wavelength, []
+    for points, _, _ in part.spectrum.settings:
         steps = np.diff(nm[points])
         gaps = np.flatnonzero(steps > GAP * np.median(steps)) if steps.size else []
         series += np.split(points, np.asarray(gaps, dtype=int) + 1)

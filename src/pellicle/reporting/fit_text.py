@@ -11,6 +11,7 @@ from pellicle.fitting.lack_of_fit import lack_of_fit
 from pellicle.fitting.result import Status
 from pellicle.fitting.status import RIVAL
 from pellicle.reporting import budget_text, fitted_colours, parameter_text
+from pellicle.reporting.generalised_figure import weighted_delta
 from pellicle.reporting.parameter_text import LEAST_CORRELATION
 from pellicle.reporting.plain_text import COLUMNS, INDENT, block, facts, wrapped
 
@@ -99,12 +100,15 @@ def _spectrum(part: Part) -> str:
     """`R, 41 points from 400 to 800 nm`."""
     data, nm = part.spectrum, part.spectral.wavelength
     light = "" if data.polarisation == "unpolarised" else f" of {data.polarisation}-polarised light"
-    own = f" ({', '.join(data.elements)})" if data.elements else ""
+    names = (*data.elements, *data.ratios)
+    own = f" ({', '.join(names)})" if names else ""
     text = f"{data.signal}{own}{light}, {nm.size} points"
     if nm.size:
         text += _range(nm, "nm")
         if data.ellipsometric and data.angle is not None:
             text += "," + _range(data.angle, "degrees")
+        if data.azimuth is not None:
+            text += f", azimuth{_range(data.azimuth, 'degrees')}"
     return text + _independent(part, nm.size, "")
 
 
@@ -176,7 +180,11 @@ def _residuals(part: Part) -> list[tuple[str, str]]:
     rows = [(f"rms residual{of}", rms), (f"noise{of}", noise)]
     if isinstance(curve, ColourCurve) and (apart := fitted_colours.differences(part)):
         rows.append((f"colour difference{of}", apart))
-    if isinstance(curve, Curve) and curve.delta_data is not None:
+    if isinstance(curve, Curve) and part.spectrum.ratios:
+        square = curve.residual**2 + weighted_delta(part) ** 2
+        each = ", ".join(f"{size:.4g}" for size in np.sqrt(np.mean(square, axis=0) / 2))
+        rows.append((f"of {', '.join(part.spectrum.ratios)}", f"{each} degrees of psi"))
+    elif isinstance(curve, Curve) and curve.delta_data is not None:
         psi, delta = (np.sqrt(np.mean(r**2)) for r in (curve.residual, curve.delta_residual))
         rows.append(("of psi and of delta", f"{psi:.4g} and {delta:.4g} degrees"))
     if isinstance(curve, Curve) and curve.depolarisation_data is not None:

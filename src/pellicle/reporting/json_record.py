@@ -78,15 +78,24 @@ def _errors(stderr: Mapping[str, float] | None) -> dict[str, Any]:
 
 def _data(part: Part, fit: Fit) -> dict[str, Any]:
     data = part.data
+    columns = getattr(data, "elements", ()) or getattr(data, "ratios", ())
     return {
         "path": data.path,
         "sha256": data.sha256,
         "signal": getattr(data, "space", getattr(data, "signal", "brdf")),
-        "points": len(part.curve.model) if getattr(data, "elements", ()) else int(part.curve.model.size),
+        "points": len(part.curve.model) if columns else int(part.curve.model.size),
+        **({"ratios": list(columns)} if getattr(data, "ratios", ()) else {}),
+        **_azimuths(data),
         **({"spectrum": name} if (name := getattr(data, "name", "")) else {}),
         **_depolarisation(part),
         **_sweeps(part, fit),
     }
+
+
+def _azimuths(data: Any) -> dict[str, Any]:
+    """Azimuths of the sample, where the data have them."""
+    azimuth = getattr(data, "azimuth", None)
+    return {} if azimuth is None else {"azimuths_deg": [float(own) for own in np.unique(azimuth)]}
 
 
 def _depolarisation(part: Part) -> dict[str, Any]:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pellicle.reporting.drawing import ABOVE, BLACK, BLUE, FITTED, GAP, GREEN, GREY, ORANGE, marker_size
+from pellicle.reporting.drawing import ABOVE, BLACK, BLUE, FITTED, GREEN, GREY, ORANGE, marker_size
+from pellicle.reporting.measured_lines import abscissa, lines_of, unbroken
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
 _COLOURS = (ORANGE, BLUE, GREEN, BLACK)
 MOST_NAMED = 6
-"""Most angles that the first panel lists."""
+"""Most angles and azimuths that the first panel lists."""
 _GAPS = (0.06, 0.055)
 """Gaps between panels, as shares of the width and the height of the matrix."""
 _MARGIN = 0.08
@@ -27,13 +28,13 @@ SMALLEST = 0.02
 def matrix(axes: Axes, part: Part) -> None:
     """Draw data and model of each measured element at its place of the matrix, those in a row side by side.
 
-    The first panel lists the angles; residuals have panels of their own below (`residuals`).
+    The first panel lists angles and azimuths; residuals have panels of their own below (`residuals`).
     """
     curve = part.spectral
-    x, label = abscissa(curve.wavelength, part.spectrum.angle)
-    lines = series(curve.wavelength, part.spectrum.angle)
+    x, label = abscissa(part.spectrum)
+    lines = lines_of(part.spectrum)
     cells = _grid(axes)
-    _list_angles(cells[0], [angle for _, angle in lines])
+    _list_settings(cells[0], [name for _, name in lines])
     for place, cell in cells.items():
         name = f"m{place // 4 + 1}{place % 4 + 1}"
         if name not in part.spectrum.elements:
@@ -55,8 +56,8 @@ def matrix(axes: Axes, part: Part) -> None:
 def residuals(axes: Axes, part: Part) -> None:
     """Draw data − model of all elements in one panel, the first ten solid and the others dashed."""
     curve = part.spectral
-    x, label = abscissa(curve.wavelength, part.spectrum.angle)
-    lines = series(curve.wavelength, part.spectrum.angle)
+    x, label = abscissa(part.spectrum)
+    lines = lines_of(part.spectrum)
     for column, name in enumerate(part.spectrum.elements):
         style: dict[str, Any] = {"linewidth": 0.7, "color": f"C{column % 10}"}
         style["linestyle"] = "-" if column < 10 else "--"
@@ -71,12 +72,12 @@ def residuals(axes: Axes, part: Part) -> None:
 
 
 def draw_measured(
-    axes: Axes, elements: Sequence[str], x: np.ndarray, lines: Sequence[tuple[np.ndarray, float | None]],
+    axes: Axes, elements: Sequence[str], x: np.ndarray, lines: Sequence[tuple[np.ndarray, str | None]],
     values: np.ndarray, sigma: np.ndarray | None,
 ) -> None:  # fmt: skip
     """Draw measured elements at their places of the matrix, with ± σ."""
     cells = _grid(axes)
-    _list_angles(cells[0], [angle for _, angle in lines])
+    _list_settings(cells[0], [name for _, name in lines])
     for place, cell in cells.items():
         name = f"m{place // 4 + 1}{place % 4 + 1}"
         if name not in elements:
@@ -94,29 +95,6 @@ def draw_measured(
         _finish(cell, name, elements, own)
 
 
-def abscissa(wavelength: np.ndarray, angle: np.ndarray | None) -> tuple[np.ndarray, str]:
-    """The x axis and its label: wavelength, or the angle of incidence if there is one wavelength only."""
-    if angle is not None and np.unique(wavelength).size == 1 and np.unique(angle).size > 1:
-        return angle, "angle of incidence (degrees)"
-    return wavelength, "wavelength (nm)"
-
-
-def series(wavelength: np.ndarray, angle: np.ndarray | None) -> list[tuple[np.ndarray, float | None]]:
-    """Indices of the points of each line in rising order, and its angle, None if there is one line."""
-    x, _ = abscissa(wavelength, angle)
-    if angle is None or x is angle or np.unique(angle).size == 1:
-        return [(np.argsort(x, kind="stable"), None)]
-    groups = [(np.flatnonzero(angle == value), float(value)) for value in np.unique(angle)]
-    return [(points[np.argsort(x[points], kind="stable")], value) for points, value in groups]
-
-
-def unbroken(x: np.ndarray, points: np.ndarray) -> list[np.ndarray]:
-    """Indices of the points of each stroke, split at wide gaps."""
-    steps = np.diff(x[points])
-    broken = steps > GAP * np.median(steps) if steps.size else np.zeros(0, dtype=bool)
-    return np.split(points, np.flatnonzero(broken) + 1)
-
-
 def _grid(axes: Axes) -> dict[int, Axes]:
     """Sixteen axes within one, row by row; that one keeps its labels only."""
     axes.set(xticks=[], yticks=[])
@@ -130,15 +108,15 @@ def _grid(axes: Axes) -> dict[int, Axes]:
     return cells
 
 
-def _list_angles(cell: Axes, angles: Sequence[float | None]) -> None:
-    """Write m11 and the colour of each angle into the first panel."""
+def _list_settings(cell: Axes, names: Sequence[str | None]) -> None:
+    """Write m11 and the colour of each angle and azimuth into the first panel."""
     cell.set_axis_off()
     cell.text(0.5, 0.9, "m11 = 1", ha="center", va="top", fontsize="small", transform=cell.transAxes)
-    named = [(i, angle) for i, angle in enumerate(angles) if angle is not None][:MOST_NAMED]
-    for line, (i, angle) in enumerate(named):
+    named = [(i, name) for i, name in enumerate(names) if name is not None][:MOST_NAMED]
+    for line, (i, name) in enumerate(named):
         where = (0.5, 0.68 - 0.13 * line)
         style: dict[str, Any] = {"color": _COLOURS[i % len(_COLOURS)], "fontsize": "x-small"}
-        cell.text(*where, f"{angle:g}°", ha="center", va="top", transform=cell.transAxes, **style)
+        cell.text(*where, name, ha="center", va="top", transform=cell.transAxes, **style)
 
 
 def _unmeasured(cell: Axes, name: str) -> None:

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
 _UNITS = {
     "psi-delta": "degrees on the sphere of N, C, S",
+    "generalised-psi-delta": "degrees on the spheres of N, C, S",
     "brdf": "of each value of the BRDF (of 0.01/π where that is more)",
 }
 

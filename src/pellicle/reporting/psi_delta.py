@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pellicle.reporting.drawing import ABOVE, BLACK, BLUE, FITTED, GAP, GREEN, GREY, ORANGE, marker_size
+from pellicle.reporting.drawing import ABOVE, BLACK, BLUE, FITTED, GREEN, GREY, ORANGE, marker_size
+from pellicle.reporting.measured_lines import abscissa, lines_of, unbroken
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -14,20 +15,21 @@ if TYPE_CHECKING:
     from pellicle.fitting.result import Part
 
 MOST_NAMED = 8
-"""Most lines, one for each angle, that get a label."""
+"""Most lines, one for each angle and azimuth, that get a label."""
 _COLOURS = (ORANGE, BLUE, GREEN, BLACK)
 _DASHES = ("-", "--")
 
 
 def psi(axes: Axes, part: Part) -> None:
-    """Draw Ψ of data and model, one line for each angle."""
+    """Draw Ψ of data and model, one line for each angle and azimuth."""
     _pair(axes, part, part.spectral.data, part.spectral.model)
     axes.set_ylabel("Ψ (degrees)")
     axes.legend(frameon=False, markerscale=3, ncols=2, fontsize="small")
 
 
 def delta(axes: Axes, part: Part) -> None:
-    """Draw Δ of data and model, one line for each angle, interrupted where Δ passes 360 degrees."""
+    """Draw Δ of data and model, one line for each angle and azimuth, interrupted where Δ passes
+    360 degrees."""
     curve = part.spectral
     assert curve.delta_data is not None
     assert curve.delta_model is not None
@@ -36,7 +38,7 @@ def delta(axes: Axes, part: Part) -> None:
 
 
 def depolarisation(axes: Axes, part: Part) -> None:
-    """Draw the depolarisation of data and model, one line for each angle."""
+    """Draw the depolarisation of data and model, one line for each angle and azimuth."""
     curve = part.spectral
     assert curve.depolarisation_data is not None
     assert curve.depolarisation_model is not None
@@ -46,11 +48,11 @@ def depolarisation(axes: Axes, part: Part) -> None:
 
 def residuals(axes: Axes, part: Part) -> None:
     """Draw data − model in degrees: Ψ solid, Δ dashed."""
-    x, label = abscissa(part)
+    x, label = abscissa(part.spectrum)
     of_psi: dict[str, Any] = {"color": BLACK, "linewidth": 0.9, "marker": ".", "markersize": 2}
     of_delta: dict[str, Any] = of_psi | {"color": BLUE, "linestyle": "--"}
-    for i, (line, _) in enumerate(lines_of(part)):
-        for points in unbroken(x, part.spectral.residual, line, turns=False):
+    for i, (line, _) in enumerate(lines_of(part.spectrum)):
+        for points in unbroken(x, line):
             hidden = "_" if i or points[0] != line[0] else ""
             axes.plot(x[points], part.spectral.residual[points], **of_psi, label=hidden or "Ψ")
             axes.plot(x[points], part.spectral.delta_residual[points], **of_delta, label=hidden or "Δ")
@@ -59,46 +61,15 @@ def residuals(axes: Axes, part: Part) -> None:
     axes.legend(**ABOVE, ncols=2, fontsize="small")
 
 
-def abscissa(part: Part) -> tuple[np.ndarray, str]:
-    """The x axis and its label: wavelength, or the angle of incidence if there is one wavelength only."""
-    if _sweeps_angle(part):
-        return np.asarray(part.spectrum.angle), "angle of incidence (degrees)"
-    return part.spectral.wavelength, "wavelength (nm)"
-
-
-def _sweeps_angle(part: Part) -> bool:
-    angle = part.spectrum.angle
-    return np.unique(part.spectral.wavelength).size == 1 and angle is not None and np.unique(angle).size > 1
-
-
-def lines_of(part: Part) -> list[tuple[np.ndarray, float | None]]:
-    """Indices of the points of each line in rising order, and its angle, None if there is one line."""
-    x, _ = abscissa(part)
-    angle = part.spectrum.angle
-    if angle is None or _sweeps_angle(part) or np.unique(angle).size == 1:
-        return [(np.argsort(x, kind="stable"), None)]
-    groups = [(np.flatnonzero(angle == value), float(value)) for value in np.unique(angle)]
-    return [(points[np.argsort(x[points], kind="stable")], value) for points, value in groups]
-
-
 def _pair(axes: Axes, part: Part, data: np.ndarray, model: np.ndarray, turns: bool = False) -> None:
-    x, _ = abscissa(part)
+    x, _ = abscissa(part.spectrum)
     axes.plot(x, data, ".", color=GREY, markersize=marker_size(x.size), label="data")
-    lines = lines_of(part)
-    for i, (points, angle) in enumerate(lines):
+    lines = lines_of(part.spectrum)
+    for i, (points, setting) in enumerate(lines):
         color, style = _COLOURS[i % len(_COLOURS)], _DASHES[i // len(_COLOURS) % len(_DASHES)]
-        name = "fit" if angle is None else f"fit, {angle:g}°"
-        for j, stroke in enumerate(unbroken(x, model, points, turns)):
+        name = "fit" if setting is None else f"fit, {setting}"
+        for j, stroke in enumerate(unbroken(x, points, model if turns else None)):
             label = "_" if j or len(lines) > MOST_NAMED else name
             axes.plot(x[stroke], model[stroke], **{**FITTED, "color": color}, linestyle=style, label=label)
     axes.tick_params(labelbottom=False)
     axes.margins(x=0.01)
-
-
-def unbroken(x: np.ndarray, y: np.ndarray, points: np.ndarray, turns: bool) -> list[np.ndarray]:
-    """Indices of the points of each stroke, split at wide gaps and, in Δ, where it passes 360 degrees."""
-    steps = np.diff(x[points])
-    broken = steps > GAP * np.median(steps) if steps.size else np.zeros(0, dtype=bool)
-    if turns:
-        broken = broken | (np.abs(np.diff(y[points])) > 180.0)
-    return np.split(points, np.flatnonzero(broken) + 1)

@@ -8,6 +8,7 @@ import numpy as np
 
 from pellicle.data.spectrum import Spectrum
 from pellicle.reporting.drawing import BLACK, BLUE, GREEN, ORANGE, marker_size, new_figure
+from pellicle.reporting.measured_lines import abscissa, lines_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,10 +19,12 @@ _LABELS = {"R": "reflectance", "T": "transmittance", "counts": "counts", "psi-de
 
 def draw(spectrum: Spectrum) -> Figure:
     """Draw the values against wavelength, with their errors; Ψ, Δ and the depolarisation in panels, Mueller
-    elements at their places of the matrix.
+    elements at their places of the matrix, generalised Ψ above Δ.
 
-    Values at one wavelength are drawn against the angle of incidence.
+    Values at one wavelength are drawn against the angle of incidence, or the azimuth of the sample.
     """
+    if spectrum.ratios:
+        return _ratios(spectrum)
     if spectrum.elements:
         return _matrix(spectrum)
     label = _LABELS[spectrum.signal] + ("" if spectrum.calibrated else " × unknown scale")
@@ -36,9 +39,8 @@ def draw(spectrum: Spectrum) -> Figure:
         _panel(axes, spectrum, values, errors)
         axes.set_ylabel(name)
         axes.margins(x=0.01)
-    against_angle = _against_angle(spectrum)
-    rows[-1].set_xlabel("angle of incidence (degrees)" if against_angle else "wavelength (nm)")
-    if spectrum.angle is not None and not against_angle:
+    rows[-1].set_xlabel(abscissa(spectrum)[1])
+    if rows[0].get_legend_handles_labels()[1]:
         rows[0].legend(frameon=False, markerscale=3, fontsize="small")
     figure.suptitle(_title(spectrum), fontsize="medium")
     return figure
@@ -50,12 +52,21 @@ def _matrix(spectrum: Spectrum) -> Figure:
 
     figure = new_figure(8.0, 6.0)
     axes = figure.subplots()
-    x, label = mueller_figure.abscissa(spectrum.wavelength, spectrum.angle)
-    lines = mueller_figure.series(spectrum.wavelength, spectrum.angle)
-    about = spectrum.elements, x, lines, spectrum.values, spectrum.sigma
+    x, label = abscissa(spectrum)
+    about = spectrum.elements, x, lines_of(spectrum), spectrum.values, spectrum.sigma
     mueller_figure.draw_measured(axes, *about)
     axes.set_xlabel(label, labelpad=16)
     axes.set_ylabel("normalised element", labelpad=30)
+    figure.suptitle(_title(spectrum), fontsize="medium")
+    return figure
+
+
+def _ratios(spectrum: Spectrum) -> Figure:
+    """Generalised Ψ above Δ, a column for each ratio."""
+    from pellicle.reporting import generalised_figure
+
+    figure = new_figure(9.0, 5.0)
+    generalised_figure.draw_measured(figure.subplots(), spectrum)
     figure.suptitle(_title(spectrum), fontsize="medium")
     return figure
 
@@ -65,23 +76,13 @@ def _title(spectrum: Spectrum) -> str:
     return title.replace("$", r"\$")  # no mathematics in a file's name
 
 
-def _against_angle(spectrum: Spectrum) -> bool:
-    return spectrum.angle is not None and bool(spectrum.wavelength[0] == spectrum.wavelength[-1])
-
-
 def _panel(axes: Axes, spectrum: Spectrum, values: np.ndarray, errors: np.ndarray | None) -> None:
-    """One panel, a colour for each angle of incidence."""
-    x, angles = spectrum.wavelength, [None]
-    if spectrum.angle is not None and _against_angle(spectrum):
-        x = spectrum.angle
-    elif spectrum.angle is not None:
-        angles = np.unique(spectrum.angle)
+    """One panel, a colour for each angle of incidence and azimuth."""
+    x, _ = abscissa(spectrum)
     colours = (BLACK, ORANGE, BLUE, GREEN)
-    for i, angle in enumerate(angles):
-        rows = np.arange(len(spectrum)) if angle is None else np.flatnonzero(spectrum.angle == angle)
+    for i, (rows, name) in enumerate(lines_of(spectrum)):
         at, own, colour = x[rows], values[rows], colours[i % len(colours)]
         size = marker_size(rows.size)
-        name = None if angle is None else f"{angle:g}°"
         wraps = np.flatnonzero(np.abs(np.diff(own)) > 180) + 1 if values is spectrum.delta else []
         line = (np.insert(numbers, wraps, np.nan) for numbers in (at, own))  # no line from 360 to 0
         axes.plot(*line, ".-", color=colour, markersize=size, linewidth=0.6, label=name)

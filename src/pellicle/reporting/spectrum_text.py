@@ -16,6 +16,7 @@ QUANTITIES = {
     "T": "transmittance T",
     "psi-delta": "ellipsometry, psi and delta",
     "mueller": "normalised elements of a Mueller matrix",
+    "generalised-psi-delta": "generalised ellipsometry, psi and delta of ratios",
     "counts": "raw counts",
 }
 _MAD = 1.4826  # standard deviation over median absolute deviation, for normal noise
@@ -26,7 +27,8 @@ def describe(spectrum: Spectrum, notes: tuple[str, ...] | None = None) -> str:
 
     `notes` replace those of the spectrum.
     """
-    nm, angles = spectrum.wavelength, _angles(spectrum)
+    nm, angles = spectrum.wavelength, _each(spectrum.angle)
+    azimuths = _each(spectrum.azimuth)
     steps = np.diff(np.unique(nm))
     reach = f"{nm[0]:g} to {nm[-1]:g} nm, every {np.median(steps):.3g} nm" if steps.size else f"{nm[0]:g} nm"
     quantity = QUANTITIES[spectrum.signal] + ("" if spectrum.calibrated else ", scale unknown")
@@ -38,6 +40,7 @@ def describe(spectrum: Spectrum, notes: tuple[str, ...] | None = None) -> str:
         *((label, _span(values)) for label, values in _values(spectrum).items()),
         ("wavelength", f"{reach}, {len(spectrum)} points"),
         ("angle", ", ".join(f"{angle:g}" for angle in angles) + " degrees" if angles else ""),
+        ("azimuth", ", ".join(f"{azimuth:g}" for azimuth in azimuths) + " degrees" if azimuths else ""),
         ("sweeps", f"{len(spectrum.sweeps)}, averaged" if spectrum.sweeps else ""),
         ("noise", _noise_text(spectrum)),
         *spectrum.declared,
@@ -65,7 +68,8 @@ def to_json(spectrum: Spectrum) -> dict[str, Any]:
         "points": len(spectrum),
         "sweeps": len(spectrum.sweeps),
         "range_nm": [low, high],
-        "angles_deg": _angles(spectrum),
+        "angles_deg": _each(spectrum.angle),
+        "azimuths_deg": _each(spectrum.azimuth),
         "values": {name: [number(x.min()), number(x.max())] for name, x in _values(spectrum).items()},
         "noise": {name: number(scatter(x)) for name, x in _values(spectrum).items()},
         **stated,
@@ -86,10 +90,17 @@ def scatter(values: np.ndarray) -> float:
 
 
 def _values(spectrum: Spectrum) -> dict[str, np.ndarray]:
-    """Measured values by name; of several angles in the order of the first."""
+    """Measured values by name; of several angles and azimuths in the order of the first."""
     order = slice(None)
-    if spectrum.angle is not None:
-        order = np.lexsort((spectrum.wavelength, spectrum.angle))  # neighbours are of one angle
+    if spectrum.setting is not None:
+        order = np.lexsort((spectrum.wavelength, spectrum.setting))  # neighbours are of one angle
+    if spectrum.ratios and spectrum.delta is not None:
+        each = ("psi", spectrum.values), ("delta", spectrum.delta)
+        return {
+            f"{angle}_{ratio}": own[order, i]
+            for i, ratio in enumerate(spectrum.ratios)
+            for angle, own in each
+        }
     if spectrum.elements:
         return dict(zip(spectrum.elements, spectrum.values[order].T, strict=True))
     if spectrum.delta is None:
@@ -100,8 +111,9 @@ def _values(spectrum: Spectrum) -> dict[str, np.ndarray]:
     return found
 
 
-def _angles(spectrum: Spectrum) -> list[float]:
-    return [] if spectrum.angle is None else [float(angle) for angle in np.unique(spectrum.angle)]
+def _each(values: np.ndarray | None) -> list[float]:
+    """Each angle or azimuth once."""
+    return [] if values is None else [float(value) for value in np.unique(values)]
 
 
 def _span(values: np.ndarray) -> str:

@@ -54,8 +54,8 @@ def chosen(units: np.ndarray, random: np.random.Generator) -> np.ndarray:
 def predictions(
     problem: Problem, parts: tuple[Part, ...], units: np.ndarray, seed: int
 ) -> tuple[Prediction, ...]:
-    """Predictions of each spectrum, of Ψ and Δ, of each Mueller element, or of each channel of colours and of
-    BRDF samples.
+    """Predictions of each spectrum, of Ψ and Δ (of each ratio of generalised ones), of each Mueller element,
+    or of each channel of colours and of BRDF samples.
 
     `units` are draws (steps, walkers, parameters) in the unit cube of an affine problem.
     """
@@ -89,6 +89,17 @@ def _spectrum(
         signal = part.spectrum.signal
         return [Prediction(signal + suffix, prefix + _SIGNALS[signal], axis, curve.data, model, noisy)]
     of_model, of_noisy = view.in_columns(model), view.in_columns(noisy)
+    if part.spectrum.ratios:
+        psi, delta = zip(
+            *(psi_delta(own.reshape(*own.shape[:-1], -1, 3)) for own in (of_model, of_noisy)), strict=True
+        )
+        return [
+            Prediction(
+                f"{name}_{e}{suffix}", f"{prefix}{sign} {e} (degrees)", axis, *(x[..., i] for x in own)
+            )
+            for i, e in enumerate(part.spectrum.ratios)
+            for name, sign, *own in (("psi", "Ψ", curve.data, *psi), ("delta", "Δ", curve.delta_data, *delta))
+        ]
     result = []
     if view.depolarisation is not None and curve.depolarisation_data is not None:
         name, drawn = "depolarisation", (of_model[..., -1], of_noisy[..., -1])

@@ -12,8 +12,11 @@ from itertools import pairwise
 from typing import Any, NamedTuple, final
 
 import equinox as eqx
+import jax
 import numpy as np
 
+from pellicle.data import generalised
+from pellicle.dispersion.anisotropic import Anisotropic
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.principal_media import principal_media, require_isotropic
 from pellicle.errors import UsageError
@@ -32,8 +35,8 @@ from pellicle.scene.layers import (
 )
 from pellicle.scene.uncertainty import Uncertainty
 
-SIGNALS = ("R", "T", "psi-delta", "mueller")
-ELLIPSOMETRY = ("psi-delta", "mueller")
+SIGNALS = ("R", "T", "psi-delta", "mueller", generalised.SIGNAL)
+ELLIPSOMETRY = ("psi-delta", "mueller", generalised.SIGNAL)
 POLARISATIONS = ("unpolarised", "s", "p")
 
 
@@ -42,10 +45,12 @@ class Light(eqx.Module):
     """Light and signal of a measurement.
 
     **Arguments:** `wavelength` in nm (None leaves it to the data); `angle` of incidence in degrees, one or
-    one per wavelength; `signal`, "R", "T", "psi-delta" or "mueller"; `polarisation`, "unpolarised", "s" or
-    "p".
+    one per wavelength; `signal`, "R", "T", "psi-delta", "mueller" or "generalised-psi-delta"; `polarisation`,
+    "unpolarised", "s" or "p"; `azimuth` in degrees, one or one per wavelength: the rotation of the sample
+    about its normal, clockwise as seen from the side of the light, which adds to the angle φ of every axis
+    (None is 0).
 
-    **Raises:** ValueError for an unknown word, and for angles outside 0 to 90 degrees.
+    **Raises:** ValueError for an unknown word, for angles outside 0 to 90 degrees, and for a free azimuth.
 
     >>> Light(angle=70.0, signal="psi-delta").polarisation
     'unpolarised'
@@ -55,14 +60,17 @@ class Light(eqx.Module):
     angle: Any = 0.0
     signal: str = eqx.field(static=True, default="R")
     polarisation: str = eqx.field(static=True, default="unpolarised")
+    azimuth: Any = None
 
     def __check_init__(self):
         if self.signal not in SIGNALS:
             raise ValueError(f"`signal` must be one of {', '.join(SIGNALS)}, not {self.signal!r}")
         check_polarisation(self.polarisation)
-        for name in ("wavelength", "angle"):
+        for name in ("wavelength", "angle", "azimuth"):
             if isinstance(getattr(self, name), str):
                 raise UsageError(f"`{name}` must be a number or an array, not {getattr(self, name)!r}")
+        if isinstance(self.azimuth, Free):
+            raise ValueError("`azimuth` of the sample cannot be free: free the angle phi of an axis instead")
         angle = [self.angle.lower, self.angle.upper] if isinstance(self.angle, Free) else self.angle
         if isinstance(angle, int | float | list | np.ndarray):
             wrong = [x for x in np.ravel(angle) if not 0 <= x <= 90]
@@ -71,7 +79,7 @@ class Light(eqx.Module):
 
     @property
     def ellipsometric(self) -> bool:
-        """True for signals that compare polarisations: Ψ and Δ, or Mueller elements."""
+        """True for signals that compare polarisations: Ψ and Δ, also generalised, or Mueller elements."""
         return self.signal in ELLIPSOMETRY
 
     @property
@@ -255,8 +263,19 @@ def thickness_spread(scene: Scene, layer: Layer) -> Quantity | None:
     return scene.instrument.thickness_spread if layer.thickness_spread is None else layer.thickness_spread
 
 
-def with_wavelength(scene: Scene, wavelength: Any, angle: Any = None) -> Scene:
-    """Return the scene with other wavelengths (nm), and other angles (degrees) if given."""
-    angle = scene.light.angle if angle is None else angle
-    light = Light(wavelength, angle, scene.light.signal, scene.light.polarisation)
+def turned(scene: Scene) -> Scene:
+    """Return a scene of numbers with its anisotropic media turned by the azimuth of its light."""
+    azimuth = scene.light.azimuth
+    if azimuth is None:
+        return scene
+    anisotropic = lambda x: isinstance(x, Anisotropic)  # noqa: E731
+    turn = lambda x: x.turned(azimuth) if anisotropic(x) else x  # noqa: E731
+    return jax.tree_util.tree_map(turn, scene, is_leaf=anisotropic)
+
+
+def with_wavelength(scene: Scene, wavelength: Any, angle: Any = None, azimuth: Any = None) -> Scene:
+    """Return the scene with other wavelengths (nm), and other angles and azimuths (degrees) if given."""
+    light = scene.light
+    angle, azimuth = light.angle if angle is None else angle, light.azimuth if azimuth is None else azimuth
+    light = Light(wavelength, angle, light.signal, light.polarisation, azimuth)
     return eqx.tree_at(lambda s: s.light, scene, light)

@@ -11,6 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from pellicle.data import generalised
 from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.dispersion.empirical import Tabulated
 from pellicle.effects.anisotropy import GENERAL
@@ -19,7 +20,7 @@ from pellicle.materials import materials_in
 from pellicle.optics import ellipsometry, plate
 from pellicle.optics.layout import stack_rows
 from pellicle.optics.pointwise import pointwise
-from pellicle.scene.film import ELLIPSOMETRY, Scene, media, thickness_spread
+from pellicle.scene.film import ELLIPSOMETRY, Scene, media, thickness_spread, turned
 from pellicle.scene.free import free_leaves
 from pellicle.scene.layers import Layer
 from pellicle.simulation import instrument, mixed_plates, mixed_polarisations
@@ -68,7 +69,8 @@ def build(plan: Plan) -> Simulate:
     """The forward model of a plan: simulate(scene) → signal at `scene.light.wavelength`.
 
     The signal is a fraction, without scale or offset; for ellipsometry it is one array with N, C, S of the
-    first wavelength, then of the next, or the 15 elements of a Mueller matrix beside m11. `scene` contains
+    first wavelength, then of the next, N, C, S of each ratio of `data.generalised`, or the 15 elements of a
+    Mueller matrix beside m11. `scene` contains
     numbers only (see `scene.free.insert`). The function is pure and can be traced.
     """
     ellipsometric = plan.signal in ELLIPSOMETRY
@@ -99,7 +101,7 @@ def build(plan: Plan) -> Simulate:
         intensities = instrument.over_cone(intensities, cone.count, cone.around, mix)
 
     def simulate(scene: Scene) -> Any:
-        scene = _shifted(scene)
+        scene = turned(_shifted(scene))
         for remove in plan.left_out:
             scene = remove(scene)
         rows = finish(intensities(scene)) if averaged else intensities(scene)
@@ -107,6 +109,9 @@ def build(plan: Plan) -> Simulate:
         rows = _mueller_rows(*rows) if plan.signal == "mueller" and not mixed else rows
         if plan.signal == "psi-delta":
             rows = rows[:3]
+        if plan.signal == generalised.SIGNAL and not mixed:
+            one, none = jnp.ones_like(rows[0]), jnp.zeros_like(rows[0])
+            rows = [*rows, *(one, none, none) * 2]  # r_ps = r_sp = 0
         return stack_rows(rows).T.reshape(-1) if ellipsometric else rows[0]
 
     return simulate

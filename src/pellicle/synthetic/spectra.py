@@ -12,7 +12,7 @@ import jax
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pellicle.data import mueller
+from pellicle.data import generalised, mueller
 from pellicle.data.spectrum import Spectrum
 from pellicle.effects.plan import Plan
 from pellicle.errors import UsageError
@@ -28,8 +28,9 @@ VISIBLE = (380.0, 780.0, 2.0)
 
 
 class SimulatedSignal(NamedTuple):
-    """A simulated signal with and without noise, and its plan: (wavelengths,), Ψ and Δ (wavelengths, 2), or
-    Mueller elements m12 to m44 (wavelengths, 15).
+    """A simulated signal with and without noise, and its plan: (wavelengths,), Ψ and Δ (wavelengths, 2), Ψ
+    and Δ of each ratio of `data.generalised` (wavelengths, 6), or Mueller elements m12 to m44
+    (wavelengths, 15).
 
     `depolarisation` (wavelengths,) is a fraction with noise of the standard deviation `depolarisation_noise`;
     None where nothing in the scene depolarises, and for other signals than Ψ and Δ.
@@ -57,7 +58,7 @@ def simulate_spectrum(
     **Arguments:** `wavelength` in nm (`default_wavelengths` if None); `noise` the standard deviation of the
     normal noise, in the unit of the signal, which becomes the σ of the spectrum; `seed` of the noise;
     `depolarisation_noise` that of the depolarisation, a fraction, None for `usual_depolarisation_noise`;
-    `elements` of a Mueller matrix, all 15 if None.
+    `elements` of a Mueller matrix, all 15 if None, or ratios of generalised Ψ and Δ, all 3 if None.
 
     **Raises:** ValueError where a material has no data at a wavelength; UsageError for a depolarisation
     or elements of another signal.
@@ -66,16 +67,43 @@ def simulate_spectrum(
     light, ellipsometric = scene.light, scene.light.signal == "psi-delta"
     if depolarisation_noise is not None and not ellipsometric:
         raise UsageError('`depolarisation_noise` goes with `signal="psi-delta"`: leave it out')
-    if elements is not None and light.signal != mueller.SIGNAL:
+    if elements is not None and light.signal not in (mueller.SIGNAL, generalised.SIGNAL):
         raise UsageError('`elements` go with `signal="mueller"`: leave them out')
+    for name, given in (("angle", light.angle), ("azimuth", light.azimuth)):
+        if np.ndim(given) and np.shape(given) != nm.shape:
+            raise UsageError(
+                f"`{name}` has {np.size(given)} numbers and there are {nm.size} wavelengths: give one number,"
+                " or one for each wavelength"
+            )
     simulated = simulate_signal(scene, nm, noise, seed, depolarisation_noise=depolarisation_noise)
     angle = np.broadcast_to(getattr(light.angle, "start", light.angle), nm.shape)
+    azimuth = None if light.azimuth is None else np.broadcast_to(light.azimuth, nm.shape)
+    if light.signal == generalised.SIGNAL:
+        ratios = generalised.RATIOS if elements is None else tuple(elements)
+        generalised.check_ratios(ratios)
+        psi, delta = (
+            np.stack([simulated.values[:, 2 * generalised.RATIOS.index(name) + i] for name in ratios], axis=1)
+            for i in (0, 1)
+        )
+        sigma = np.full(psi.shape, noise) if noise > 0 else None
+        return Spectrum(
+            nm,
+            psi,
+            light.signal,
+            sigma=sigma,
+            angle=angle,
+            azimuth=azimuth,
+            delta=delta,
+            delta_sigma=None if sigma is None else generalised.delta_sigma(psi, sigma),
+            ratios=ratios,
+        )
     if light.signal == mueller.SIGNAL:
         chosen = mueller.ELEMENTS if elements is None else tuple(elements)
         mueller.check_elements(chosen)
         values = simulated.values[:, [mueller.ELEMENTS.index(name) for name in chosen]]
         sigma = np.full(values.shape, noise) if noise > 0 else None
-        return Spectrum(nm, values, light.signal, sigma=sigma, angle=angle, elements=chosen)
+        about = {"angle": angle, "azimuth": azimuth, "elements": chosen}
+        return Spectrum(nm, values, light.signal, sigma=sigma, **about)
     values, share, share_noise = simulated.values, simulated.depolarisation, simulated.depolarisation_noise
     share_sigma = np.full(nm.shape, share_noise) if share is not None and share_noise > 0 else None
     psi_or_power, delta = values.T if ellipsometric else (values, None)
@@ -87,6 +115,7 @@ def simulate_spectrum(
         sigma=sigma,
         polarisation=light.polarisation,
         angle=angle,
+        azimuth=azimuth,
         delta=delta,
         folded=False,
         delta_sigma=sigma if ellipsometric else None,
@@ -107,7 +136,8 @@ def simulate_signal(
 
     Free parameters take their start values; a free scale is 1 and a free offset 0. Effects that change
     the signal by less than the `tolerance` are left out (see `pellicle.plan`). The signal of ellipsometry is
-    Ψ and Δ in degrees, or the elements m12 to m44 of the normalised Mueller matrix. The depolarisation comes
+    Ψ and Δ in degrees, or the elements m12 to m44 of the normalised Mueller matrix. The noise of generalised
+    Ψ and Δ is `noise` in Ψ and the same across it (`data.generalised.delta_sigma`). The depolarisation comes
     with Ψ and Δ where the scene depolarises or a `depolarisation_noise` is given, None for the usual one.
 
     **Raises:** ValueError where a material has no data at a wavelength.
@@ -131,10 +161,28 @@ def simulate_signal(
         clean = np.stack(np.broadcast_arrays(*psi_delta(*clean.reshape(-1, 3).T)), axis=1)
     elif scene.light.signal == mueller.SIGNAL:
         clean = clean.reshape(len(wavelength), -1)
+    elif scene.light.signal == generalised.SIGNAL:
+        sphere = clean.reshape(len(wavelength), -1, 3)
+        clean = _angles(sphere)
+        return SimulatedSignal(wavelength, _angles(_scattered(sphere, noise, seed)), clean, chosen)
     values = clean + noise * np.random.default_rng(seed).normal(0.0, 1.0, clean.shape)
     if scene.light.signal == "psi-delta":
         values = np.stack([np.clip(values[:, 0], 0.0, 90.0), np.mod(values[:, 1], 360.0)], axis=1)
     return SimulatedSignal(wavelength, values, clean, chosen, share, share_noise)
+
+
+def _angles(sphere: np.ndarray) -> np.ndarray:
+    """Ψ and Δ of each ratio side by side, (wavelengths, 6), of N, C, S (wavelengths, 3, 3)."""
+    psi, delta = psi_delta(*np.moveaxis(sphere, -1, 0))
+    return np.stack(np.broadcast_arrays(psi, delta), axis=-1).reshape(len(sphere), -1)
+
+
+def _scattered(sphere: np.ndarray, noise: float, seed: int) -> np.ndarray:
+    """N, C, S (..., 3) with noise of 2 · `noise` (degrees of Ψ) in any direction along their sphere."""
+    length = np.linalg.norm(sphere, axis=-1, keepdims=True)
+    points = sphere / np.where(length > 0, length, 1.0)
+    step = 2 * math.radians(noise) * np.random.default_rng(seed).normal(size=points.shape)
+    return points + step - points * np.sum(step * points, axis=-1, keepdims=True)
 
 
 def usual_depolarisation_noise(noise: float) -> float:

@@ -268,14 +268,46 @@ def test_mueller_elements_beside_psi_and_delta(write):
     assert read_spectrum(path, elements=["m33"]).elements == ("m33",)
 
 
-def test_generalised_rows_are_named(write, refused):
-    rows = "AnE	3	65	20	100	1	1\n"
-    spectrum = read_spectrum(write(COMPLETE_EASE + rows))
-    assert "rows of other quantities ignored: generalised ellipsometry (AnE)" in spectrum.notes
-    heading = "".join(COMPLETE_EASE.splitlines(keepends=True)[:4])
-    refused(heading + rows, "only generalised ellipsometry (AnE)", "export psi")
+GENERALISED = """AnE\t500\t65\t20\t100\t0.1\t0.2
+AnE\t600\t65\t21\t110\t0.1\t0.3
+Aps\t500\t65\t2\t-10\t0.05\t0.5
+Aps\t600\t65\t3\t20\t0.06\t0.6
+Asp\t600\t65\t1\t200\t0.07\t0.7
+"""
+
+
+def test_generalised_rows(write, refused):
+    heading = "film\nVASEmethod[EllipsometerType=10]\nOriginal[film.dat]\nnm\n"
+    some = read_spectrum(write(heading + GENERALISED.rpartition("Asp")[0]))
+    assert some.signal == "generalised-psi-delta"
+    assert some.ratios == ("ane", "aps")
+    np.testing.assert_array_equal(some.values, [[20, 2], [21, 3]])
+    np.testing.assert_array_equal(some.delta, [[100, 350], [110, 20]])
+    np.testing.assert_array_equal(some.sigma, [[0.1, 0.05], [0.1, 0.06]])
+    np.testing.assert_array_equal(some.delta_sigma, [[0.2, 0.5], [0.3, 0.6]])
+    every = read_spectrum(write(heading + GENERALISED))
+    assert every.ratios == ("ane", "aps", "asp")
+    assert every.wavelength.tolist() == [600.0]
+    assert "1 points that AnE, Aps, Asp have in common" in every.notes
+    without = re.sub(r"(?m)^(Aps.*)\t[\d.]+\t[\d.]+$", r"\1", GENERALISED)
+    assert read_spectrum(write(heading + without)).sigma is None
+    refused(heading + GENERALISED.replace("Aps\t500\t65\t2", "Aps\t500\t65"), "Aps psi, delta and")
+    apart = GENERALISED.splitlines(keepends=True)
+    refused(heading + apart[0] + apart[4], "AnE, Asp have no point in common")
+
+
+def test_generalised_rows_beside_psi_and_delta(write):
+    path = write(COMPLETE_EASE + GENERALISED)
+    assert read_spectrum(path).signal == "psi-delta"
+    said = (
+        'generalised psi and delta beside psi and delta: `signal="generalised-psi-delta"` reads AnE, Aps, Asp'
+    )
+    assert said in read_spectrum(path).notes
+    assert read_spectrum(path, signal="generalised-psi-delta").ratios == ("ane", "aps", "asp")
     back = JOINT.replace("pR", "uRb").replace("sR", "uRb").replace("E\t", "Aps\t")
-    assert read_spectra(write(back))[0].signal == "T"
+    turned = JOINT.replace("WVASE=3.688", "WVASE=3.688, TransmissionMeas=1").replace("E\t", "Aps\t")
+    assert "generalised-psi-delta" in [one.signal for one in read_spectra(write(back))]
+    assert {one.signal for one in read_spectra(write(turned), spectrum="all")} <= {"R", "T"}
 
 
 def test_ellipsometry_in_transmission_is_not_read(write, refused):

@@ -17,6 +17,7 @@ import numpy as np
 from pellicle.data.formats import hdf5_reading as hdf5
 from pellicle.data.formats import isolated
 from pellicle.data.mueller import ELEMENTS
+from pellicle.data.tabular.column_names import RATIO_COLUMNS
 from pellicle.data.tabular.columns import recognise
 from pellicle.data.tabular.layout import Layout, array_columns
 from pellicle.errors import DataError, install_command
@@ -24,8 +25,8 @@ from pellicle.errors import DataError, install_command
 _MEASURED = "measured_data"
 _OBSERVABLES = {"psi/delta": ("psi", "delta"), "n/c/s": ("N", "C", "S")}
 """Columns of `measured_data` by its `data_type`."""
-_ERRORS = {name: f"sigma_{name}" for name in ("psi", "delta", "depolarisation", *ELEMENTS)}
-_SIGNALS = {"R", "T", "psi", "N", "C", "S", "counts", "intensity", *ELEMENTS}
+_ERRORS = {name: f"sigma_{name}" for name in ("psi", "delta", "depolarisation", *ELEMENTS, *RATIO_COLUMNS)}
+_SIGNALS = {"R", "T", "psi", "N", "C", "S", "counts", "intensity", *ELEMENTS, *RATIO_COLUMNS}
 _MOST_MEMBERS = 1000
 
 
@@ -144,7 +145,7 @@ def _data(group: Any, name: str, path: str) -> tuple[dict[str, np.ndarray], list
             found = np.repeat(found.reshape(-1), values.size)
         if found is not None and found.size == sweeps * values.size and found.shape[-1:] == values.shape:
             columns[_named(child, units)] = found.reshape(-1)
-        elif role in _SIGNALS or role == "angle":
+        elif role in _SIGNALS or role in ("angle", "azimuth"):
             raise DataError(
                 f"{path}: {name}/{child} has the shape {None if found is None else found.shape}, which "
                 f"does not match {values.size} points of {axis}; export the spectrum as CSV"

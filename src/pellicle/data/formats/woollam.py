@@ -3,7 +3,8 @@
 Lines of heading (a title, `VASEmethod[...]`, `Original[...]`, `Dynamic`), a line with the unit of the axis
 (`nm`, `Angstroms`, `eV`, `1/cm`), then rows of wavelength, angle of incidence, values and usually their
 errors. A label before a row names its quantity: `E` or none is Ψ and Δ, `dpolE` the depolarisation in
-percent, `mm12` an element of a normalised Mueller matrix, `pR`, `sR`, `uR`, `pT`, `sT`, `uT` a reflectance
+percent, `AnE`, `Aps` and `Asp` generalised Ψ and Δ (`data.generalised`), `mm12` an element of a normalised
+Mueller matrix, `pR`, `sR`, `uR`, `pT`, `sT`, `uT` a reflectance
 or transmittance of p, s or unpolarised light. Rows of dynamic data end with their time in minutes. The layout
 is that of files of both programs.
 """
@@ -12,7 +13,7 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from pellicle.data.formats import woollam_rows
 from pellicle.data.formats.woollam_rows import Rows, Selected
@@ -33,8 +34,9 @@ _POWERS = {f"{p}{q}": q if p == "u" else f"{q}{p}" for p in "psu" for q in "RT"}
 """Labels of reflectances and transmittances, and the column names of these."""
 _KNOWN = re.compile(r"(?i:dpole|AnE|Aps|Asp|mm[1-4][1-4])|E|[psu][RT][rb]?|R[ps][ps]|T[ps][ps]")
 _ELEMENT = re.compile(r"(?i:mm[1-4][1-4])")
+_RATIO = re.compile(r"(?i:AnE|Aps|Asp)")
 _OTHERS = {
-    r"(?i:AnE|Aps|Asp)": "generalised ellipsometry",
+    r"(?i:AnE|Aps|Asp)": "generalised ellipsometry in transmission",
     r"[psu][RT][rb]": "measurements from the back",
 }
 _FACTS = {
@@ -98,13 +100,18 @@ def _tables(
         if shares is not None:
             selected = woollam_rows.with_depolarisation(selected, shares, groups.pop(shares))
         tables.append(("", selected))
+    ratios = {label: groups[label] for label in groups if _RATIO.fullmatch(label)}
+    if ratios and not (transmitted or trigonometric):
+        if tables:
+            tables[0] = _beside(tables[0], "generalised psi and delta", "generalised-psi-delta", ratios)
+        tables.append(("generalised-psi-delta", woollam_rows.generalised(ratios, path)))
+        for label in ratios:
+            del groups[label]
     elements = {label: groups[label] for label in groups if _ELEMENT.fullmatch(label)}
     if any(label.lower() != "mm11" for label in elements) and not transmitted:
         selected = woollam_rows.mueller(elements, path)
-        if tables:
-            quantity, (names, rows, notes) = tables[0]
-            said = f'Mueller elements beside psi and delta: `signal="mueller"` reads {", ".join(elements)}'
-            tables[0] = quantity, woollam_rows.Selected(names, rows, [*notes, said])
+        if tables and not tables[0][0]:
+            tables[0] = _beside(tables[0], "Mueller elements", "mueller", elements)
         tables.append(("mueller", selected))
         for label in elements:
             del groups[label]
@@ -113,6 +120,15 @@ def _tables(
             del groups[label]
             tables.append((quantity, own))
     return tables
+
+
+def _beside(
+    table: tuple[str, Selected], what: str, signal: str, labels: Iterable[str]
+) -> tuple[str, Selected]:
+    """The table of Ψ and Δ with a sentence on another signal of the file."""
+    quantity, (names, rows, notes) = table
+    said = f'{what} beside psi and delta: `signal="{signal}"` reads {", ".join(labels)}'
+    return quantity, Selected(names, rows, [*notes, said])
 
 
 def _unit_line(lines: Sequence[Line]) -> int | None:

@@ -1,4 +1,5 @@
-"""Columns of the rows of Woollam's text files: Ψ and Δ, tan Ψ and cos Δ, depolarisation, reflectance.
+"""Columns of the rows of Woollam's text files: Ψ and Δ, also generalised, tan Ψ and cos Δ, depolarisation,
+reflectance.
 
 Each function takes rows of wavelength, angle, values and errors, and returns the names of the columns behind
 the wavelength, the rows and sentences on what was done.
@@ -25,23 +26,24 @@ class Selected(NamedTuple):
     notes: list[str]
 
 
-def psi_delta(rows: Rows, path: str) -> Selected:
+def psi_delta(rows: Rows, path: str, label: str = "") -> Selected:
     """Ψ, Δ and, where they are not all zero, their errors. Raises DataError for rows of other lengths."""
     notes: list[str] = []
+    of = f"{label} " if label else ""
     width = len(rows[0][1])
     odd = next((line for line, cells in rows if len(cells) != width), None)
     if odd is not None or width not in (4, 6, 8):
         place = f"line {(odd or rows[0][0]).number}"
         raise DataError(
-            f"{path}: looks like a Woollam file, but {place} is not wavelength, angle, psi, delta and their "
-            "errors, as the other rows; export psi and delta as text, or correct that line"
+            f"{path}: looks like a Woollam file, but {place} is not wavelength, angle, {of}psi, delta and "
+            "their errors, as the other rows; export psi and delta as text, or correct that line"
         )
     if width == 8:  # CompleteEASE and programs of other makers write 1 and 1 there
         rows = [(line, cells[:6]) for line, cells in rows]
         notes.append("2 columns behind the errors ignored")
     rows, missing = _measured(rows, slice(2, 4))
     if not rows:
-        raise DataError(f"{path}: has no point with psi and delta; check the measurement")
+        raise DataError(f"{path}: has no point with {of}psi and delta; check the measurement")
     names = ("angle_deg", "psi_deg", "delta_deg", "sigma_psi", "sigma_delta")[: len(rows[0][1]) - 1]
     if len(names) == 5 and all(_is(x, 0.0) for _, cells in rows for x in cells[4:]):
         names, rows = names[:3], [(line, cells[:4]) for line, cells in rows]  # as simulations are written
@@ -118,6 +120,37 @@ def power(label: str, quantity: str, rows: Rows, path: str) -> Selected | None:
         notes.append("errors that are all zero ignored")
     rows, missing = _measured(rows, slice(2, 3))
     return Selected(names, rows, [*notes, *missing]) if rows else None
+
+
+def generalised(groups: dict[str, Rows], path: str) -> Selected:
+    """Ψ and Δ of each ratio, one label each, at the points that all have, and their errors.
+
+    Raises DataError for rows of other lengths, and without a point that all ratios have.
+    """
+    each = {label: psi_delta(rows, path, label) for label, rows in groups.items()}
+    points = {
+        label: dict(zip(_points(own.rows, False), own.rows, strict=True)) for label, own in each.items()
+    }
+    first, *others = points.values()
+    common = [point for point in first if all(point in other for other in others)]
+    if not common:
+        raise DataError(f"{path}: {', '.join(groups)} have no point in common; export them together")
+    notes = [f"{label}: {note}" for label, own in each.items() for note in own.notes]
+    if len(common) < max(map(len, points.values())):
+        notes.append(f"{len(common)} points that {', '.join(groups)} have in common")
+    with_errors = all(len(own.names) == 5 for own in each.values())
+    if not with_errors and any(len(own.names) == 5 for own in each.values()):
+        notes.append("errors ignored, which not all ratios have")
+    width = 4 if with_errors else 2
+    names = ["angle_deg"]
+    for label in each:
+        own = [f"{angle}_{label.lower()}" for angle in ("psi", "delta")]
+        names += [f"{name} (deg)" for name in (*own, *(f"sigma_{name}" for name in own))][:width]
+    rows = []
+    for point in common:
+        line, cells = first[point]
+        rows.append((line, [*cells[:2], *(x for of in points.values() for x in of[point][1][2 : 2 + width])]))
+    return Selected(tuple(names), rows, notes)
 
 
 def mueller(groups: dict[str, Rows], path: str) -> Selected:

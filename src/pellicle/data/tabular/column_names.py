@@ -87,6 +87,11 @@ NAMES |= {
     f"sigma_{element}": tuple(form.format(f"{m}{element[1:]}") for m in ("m", "mm") for form in _SIGMA_OF)
     for element in MUELLER
 }
+RATIO_COLUMNS = tuple(f"{angle}_{ratio}" for ratio in ("ane", "aps", "asp") for angle in ("psi", "delta"))
+"""Roles of generalised Ψ and Δ, those of each ratio side by side."""
+for _role in RATIO_COLUMNS:
+    NAMES[_role] = (_role, _role.replace("_", " "), "{}({})".format(*_role.split("_")))
+    NAMES[f"sigma_{_role}"] = tuple(form.format(_role) for form in _SIGMA_OF)
 FOREIGN = (
     *("absorptance", "cd", "circular dichroism", "ellipticity", "emission", "f(r)", "fluorescence"),
     *("irradiance", "k/s", "kubelka-munk", "mdeg", "photoluminescence", "pl", "pl intensity", "power"),

@@ -5,15 +5,32 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
-from pellicle.data.tabular.column_names import COUNTERS, MUELLER
+from pellicle.data.tabular.column_names import COUNTERS, MUELLER, RATIO_COLUMNS
 from pellicle.data.tabular.columns import COUNTS, SIGNALS, Column, listed
 from pellicle.data.tabular.named_columns import first_column, named_columns
-from pellicle.data.tabular.sample_azimuth import check_azimuth
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError, UsageError
 
 _EITHER_SIGNAL = '`signal="R"` or `signal="T"`'
+
+
+class AxisColumns(NamedTuple):
+    """Columns of the wavelength and, where the table has them, of the angle of incidence and the azimuth of
+    the sample."""
+
+    wavelength: Column
+    angle: Column | None = None
+    azimuth: Column | None = None
+
+    @property
+    def notes(self) -> list[str]:
+        """Sentences on the angle and the azimuth."""
+        found = [f"{listed([self.angle])} read as the angle of incidence in degrees"] if self.angle else []
+        if self.azimuth:
+            found.append(f"{listed([self.azimuth])} read as the azimuth of the sample in degrees")
+        return found
 
 
 @dataclass(frozen=True)
@@ -23,10 +40,9 @@ class SpectrumColumns:
     With a `reference`, the signal is (sample - dark) / (reference - dark) of three columns of counts.
     """
 
-    wavelength: Column
+    axis: AxisColumns
     signal: Column
     sigma: Column | None
-    angle: Column | None
     notes: tuple[str, ...]
     reference: Column | None = None
     dark: Column | None = None
@@ -73,7 +89,11 @@ def counts_columns(table: Table, columns: str | Sequence[str] | None) -> Spectru
     if named is None:
         return _by_position(table, "counts")
     sample = [c for c in named if c.role == "sample counts"]
-    free = [c for c in named if c.role not in ("wavelength", "sigma", "angle") and c.name not in ("_", "")]
+    free = [
+        c
+        for c in named
+        if c.role not in ("wavelength", "sigma", "angle", "azimuth") and c.name not in ("_", "")
+    ]
     counts = sample or free
     if len(counts) != 1:
         raise UsageError(
@@ -109,23 +129,21 @@ def _by_position(table: Table, role: str) -> SpectrumColumns:
         notes.append("column 3 read as sigma, the standard deviation of the signal")
     if width > 3:
         notes.append("column 4 (by custom the error of the wavelength) ignored")
-    return SpectrumColumns(first_column(table), Column(1, "", role), sigma, None, tuple(notes))
+    return SpectrumColumns(AxisColumns(first_column(table)), Column(1, "", role), sigma, tuple(notes))
 
 
 def _with_wavelength(table: Table, columns: Sequence[Column], signal: Column) -> SpectrumColumns:
-    wavelength, angle = wavelength_and_angle(table, columns, '`columns=["wavelength", "R"]`')
-    check_azimuth(table, only(table, columns, "azimuth"))
+    axis = axis_columns(table, columns, '`columns=["wavelength", "R"]`')
     sigma = only(table, columns, "sigma")
-    used = {c.position for c in (wavelength, signal, sigma, angle) if c}
+    used = {c.position for c in (*axis, signal, sigma) if c}
     ignored = [c for c in columns if c.position not in used and c.name not in ("_", "")]
-    notes = [f"{listed([wavelength])} read as the wavelength, {listed([signal])} as the signal"]
+    notes = [f"{listed([axis.wavelength])} read as the wavelength, {listed([signal])} as the signal"]
     if sigma:
         notes.append(f"{listed([sigma])} read as the standard deviation of the signal")
-    if angle:
-        notes.append(f"{listed([angle])} read as the angle of incidence in degrees")
+    notes += axis.notes
     if ignored:
         notes.append(f"ignored: {listed(ignored)}")
-    return SpectrumColumns(wavelength, signal, sigma, angle, tuple(notes))
+    return SpectrumColumns(axis, signal, sigma, tuple(notes))
 
 
 def _quotient(table: Table, columns: Sequence[Column], sample: Column) -> SpectrumColumns:
@@ -138,14 +156,13 @@ def _quotient(table: Table, columns: Sequence[Column], sample: Column) -> Spectr
     return dataclasses.replace(chosen, signal=signal, reference=reference, dark=dark, notes=notes)
 
 
-def wavelength_and_angle(
-    table: Table, columns: Sequence[Column], example: str
-) -> tuple[Column, Column | None]:
-    """Return the columns of the wavelength and, if present, of the angle of incidence. Raises DataError."""
+def axis_columns(table: Table, columns: Sequence[Column], example: str) -> AxisColumns:
+    """Return the columns of wavelength, angle and azimuth. Raises DataError."""
     axes = [column for column in columns if column.role == "wavelength"]
     if len({column.unit for column in axes} - {None}) == len(axes) > 1:  # one axis in several units
         axes = [next((column for column in axes if column.unit == "nm"), axes[0])]
     wavelength, angle = only(table, axes, "wavelength"), only(table, columns, "angle")
+    azimuth = only(table, columns, "azimuth")
     if wavelength is None and angle is not None:
         raise DataError(
             f"{table.path}: has angles of incidence but no wavelength among {listed(columns)}; add a column "
@@ -156,12 +173,13 @@ def wavelength_and_angle(
             f"{table.path}: no column is a wavelength, energy or wavenumber among {listed(columns)}; "
             f"name the columns in order, as in {example}"
         )
-    if angle and angle.unknown_unit:
-        raise DataError(
-            f"{table.path}: {table.label(angle.position)} is in {angle.unknown_unit!r}; "
-            "write angles in degrees"
-        )
-    return wavelength, angle
+    for column in (angle, azimuth):
+        if column and column.unknown_unit:
+            raise DataError(
+                f"{table.path}: {table.label(column.position)} is in {column.unknown_unit!r}; "
+                "write angles in degrees"
+            )
+    return AxisColumns(wavelength, angle, azimuth)
 
 
 def only(table: Table, columns: Sequence[Column], role: str) -> Column | None:
@@ -207,7 +225,7 @@ def _signals(
 
 def _renamed(columns: Sequence[Column], column: Column) -> str:
     """Names for the argument `columns` with which a column of absorbance is log(1/R)."""
-    words = {"wavelength": "wavelength", "sigma": "sigma", "angle": "angle"}
+    words = {"wavelength": "wavelength", "sigma": "sigma", "angle": "angle", "azimuth": "azimuth"}
     return ",".join("log(1/R)" if c is column else words.get(c.role, "_") for c in columns)
 
 
@@ -232,6 +250,11 @@ def _unnamed_signals(table: Table, columns: Sequence[Column], signal: str | None
     if roles & set(MUELLER):
         raise UsageError(
             f"{table.path}: has elements of a Mueller matrix, which contradicts "
+            f'`signal="{signal}"`; leave that out'
+        )
+    if roles & set(RATIO_COLUMNS):
+        raise UsageError(
+            f"{table.path}: has generalised psi and delta, which contradicts "
             f'`signal="{signal}"`; leave that out'
         )
     named = [c for c in columns if c.name not in ("_", "")]

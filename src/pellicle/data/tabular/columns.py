@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pellicle.data.tabular import units
-from pellicle.data.tabular.column_names import FOREIGN, NAMES
+from pellicle.data.tabular.column_names import FOREIGN, NAMES, RATIO_COLUMNS
 from pellicle.errors import UsageError
 
 SIGNALS = ("R", "T")
@@ -39,6 +39,8 @@ _UNIT_OF = {
     "sigma_psi": units.angle_unit,
     "sigma_delta": units.angle_unit,
     **dict.fromkeys(DIRECTIONS, units.angle_unit),
+    **dict.fromkeys(RATIO_COLUMNS, units.angle_unit),
+    **dict.fromkeys((f"sigma_{role}" for role in RATIO_COLUMNS), units.angle_unit),
     "counts": lambda text: None,
     "intensity": lambda text: None,
 }
@@ -150,7 +152,7 @@ def is_header(names: Sequence[str]) -> bool:
     roles = {column.role for column in recognise_all(names)}
     measured = bool(roles & {"R", "T", "intensity", "counts", "psi"})
     measured = measured or {"N", "C", "S"} <= roles or {"alpha", "beta"} <= roles
-    measured = measured or {"tan_psi", "cos_delta"} <= roles
+    measured = measured or {"tan_psi", "cos_delta"} <= roles or bool(roles & set(RATIO_COLUMNS))
     return ("wavelength" in roles and measured) or roles.issuperset(DIRECTIONS)
 
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from pellicle.data.repeated_sweeps import are_sweeps, one_way, sweep_numbers
+from pellicle.data.settings import setting_numbers
 from pellicle.data.signal_checks import refuse_first
-from pellicle.data.tabular.column_selection import SpectrumColumns
+from pellicle.data.tabular.column_selection import AxisColumns, SpectrumColumns
 from pellicle.data.tabular.columns import Column, unknown_unit
 from pellicle.data.tabular.table import Table
 from pellicle.data.tabular.units import WAVELENGTH_UNITS, to_nm, wavelength_unit
@@ -23,6 +25,24 @@ end at 3300 nm."""
 _LEAST = 1e-12
 _REMEDY = "correct or delete that row"
 _LONG = '`wavelength_unit="cm-1"`, `wavelength_unit="A"`'
+
+
+class Axis(NamedTuple):
+    """Wavelength (nm), angle of incidence and azimuth of the sample (degrees) of each row; None without such
+    a column."""
+
+    wavelength: np.ndarray
+    angle: np.ndarray | None = None
+    azimuth: np.ndarray | None = None
+
+    @property
+    def setting(self) -> np.ndarray | None:
+        """A number for each row that is the same at one angle and azimuth."""
+        return setting_numbers(self.angle, self.azimuth)
+
+    def taken(self, rows: Any) -> Axis:
+        """Return the axis of some rows."""
+        return Axis(*(None if x is None else x[rows] for x in self))
 
 
 def axis_unit(table: Table, column: Column, requested: str | None) -> str | None:
@@ -54,14 +74,14 @@ def axis_note(unit: str | None) -> str:
 
 def read_columns(
     table: Table, columns: SpectrumColumns, unit: str | None
-) -> tuple[np.ndarray, np.ndarray, np.ndarray | None, np.ndarray | None]:
-    """Return wavelength (nm), signal, sigma and angle (degrees) in file order; None for a missing column.
+) -> tuple[Axis, np.ndarray, np.ndarray | None]:
+    """Return the axis, signal and sigma in file order; None for a missing column.
 
     A quotient of counts is infinite where the reference has none. Raises DataError as `read_axis` does.
     """
     optional = (columns.sigma, columns.reference, columns.dark)
     others = [columns.signal, *(column for column in optional if column)]
-    wavelength, angle, read = read_axis(table, columns.wavelength, columns.angle, others, unit)
+    axis, read = read_axis(table, columns.axis, others, unit)
     signal, *rest = read
     sigma, reference, dark = (rest.pop(0) if column else None for column in optional)
     if reference is not None:
@@ -69,20 +89,22 @@ def read_columns(
         with np.errstate(divide="ignore", invalid="ignore"):
             quotient = (signal - background) / (reference - background)
         signal = np.where(reference > background, quotient, np.inf)
-    return wavelength, signal, sigma, angle
+    return axis, signal, sigma
 
 
 def read_axis(
-    table: Table, wavelength: Column, angle: Column | None, others: Sequence[Column], unit: str | None
-) -> tuple[np.ndarray, np.ndarray | None, list[np.ndarray]]:
-    """Return wavelength (nm), angle (degrees; None without such a column) and other columns, in file order.
+    table: Table, axis: AxisColumns, others: Sequence[Column], unit: str | None
+) -> tuple[Axis, list[np.ndarray]]:
+    """Return the axis and other columns, in file order.
 
     `unit` is the result of `axis_unit`; None means nm, assumed. Raises DataError for a cell that is not a
     finite number, an impossible wavelength or angle, or an axis that is not strictly monotone within one
-    angle and is not that of several complete sweeps.
+    angle and azimuth and is not that of several complete sweeps.
     """
-    columns = [wavelength, *others, *([angle] if angle else [])]
+    wavelength, angle, azimuth = axis
+    columns = [wavelength, *others, *(column for column in (angle, azimuth) if column)]
     values, *read = table.numbers([column.position for column in columns])
+    azimuths = read.pop() if azimuth else None
     angles = read.pop() if angle else None
     if angle and angles is not None:
         reason = f"is not from 0 to below 90 degrees; {_REMEDY}"
@@ -98,25 +120,28 @@ def read_axis(
             f"{table.path}: {table.label(wavelength.position)} runs from {values.min():g} to "
             f'{values.max():g}, which is unlike nm; state its unit: {likely} or `wavelength_unit="nm"`'
         )
-    if angles is None and one_way(values):
-        return to_nm(values, unit or "nm"), None, read
-    if are_sweeps(values, angles, sweep_numbers(values, angles)):
-        return to_nm(values, unit or "nm"), angles, read
-    groups = np.zeros(values.size) if angles is None else angles
+    found = Axis(to_nm(values, unit or "nm"), angles, azimuths)
+    if found.setting is None and one_way(values):
+        return found, read
+    if are_sweeps(values, found.setting, sweep_numbers(values, found.setting)):
+        return found, read
+    groups = np.zeros(values.size) if found.setting is None else found.setting
     for group in np.unique(groups):
-        _check_monotone(table, wavelength, values, np.flatnonzero(groups == group))
-    return to_nm(values, unit or "nm"), angles, read
+        _check_monotone(table, axis, values, np.flatnonzero(groups == group))
+    return found, read
 
 
-def _check_monotone(table: Table, column: Column, values: np.ndarray, rows: np.ndarray) -> None:
+def _check_monotone(table: Table, axis: AxisColumns, values: np.ndarray, rows: np.ndarray) -> None:
     steps = np.diff(values[rows])
     direction = np.sign(np.sum(np.sign(steps))) or 1.0
     wrong = np.flatnonzero(np.sign(steps) != direction)
     if wrong.size:
         here, before = int(rows[wrong[0] + 1]), int(rows[wrong[0]])
+        one = "angle and azimuth" if axis.azimuth else "angle"
         verb = "repeats" if values[here] == values[before] else "turns back after"
+        place = table.where(here, axis.wavelength.position)
         raise DataError(
-            f"{table.where(here, column.position)}: {values[here]:.10g} {verb} {values[before]:.10g} of "
-            f"{table.place(before)}; within one angle wavelengths must rise or fall strictly, or come in "
-            "several complete sweeps, so delete or correct one of the rows"
+            f"{place}: {values[here]:.10g} {verb} {values[before]:.10g} of "
+            f"{table.place(before)}; within one {one} wavelengths must rise or fall strictly, or come "
+            "in several complete sweeps, so delete or correct one of the rows"
         )

@@ -83,7 +83,8 @@ def measured_colours(data: Colours, scene: Scene, name: str = "") -> MeasuredCol
         raise UsageError(f"{place}a colour has no offset: leave it out")
     stated = data.polarisation != "unpolarised"
     polarisation = data.polarisation if stated else scene.light.polarisation
-    light = Light(np.tile(data.sensor[0], len(data)), angle, data.signal, polarisation)
+    wavelength = np.tile(data.sensor[0], len(data))
+    light = Light(wavelength, angle, data.signal, polarisation, scene.light.azimuth)
     return MeasuredColours(eqx.tree_at(lambda s: s.light, scene, light), data, name)
 
 

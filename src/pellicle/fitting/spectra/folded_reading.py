@@ -17,7 +17,10 @@ def as_folded(spectra: Sequence[Spectrum | Colours]) -> list[Spectrum | Colours]
     """The spectra with each Δ as folded that can be; None where none can."""
     found = [
         replace(s, folded=True, sweeps=tuple(replace(sweep, folded=True) for sweep in s.sweeps))
-        if isinstance(s, Spectrum) and s.delta is not None and not s.folded and can_be_folded(s.delta)
+        if isinstance(s, Spectrum)
+        and s.delta is not None
+        and not (s.folded or s.ratios)
+        and can_be_folded(s.delta)
         else s
         for s in spectra
     ]

@@ -128,15 +128,20 @@ def _curve(spectrum: Spectrum, view: SpectrumView, at: Local, covariance: np.nda
         angles = {"depolarisation_data": spectrum.depolarisation, "depolarisation_model": share}
     if view.depolarisation is not None:
         data, model = data[:, :-1], model[:, :-1]
+    if view.ratios:
+        # of each ratio the first channel: along Ψ where σ is known, else N, of which C and S have the σ too
+        first = [(2 if view.data.frame is not None else 3) * i for i in range(len(view.ratios))]
+        sigma = 1 / weight[:, first]
+        data, model = (x.reshape(rows, -1, 3) for x in (data, model))
     if spectrum.delta is not None:
         (data, delta_data), (model, delta_model) = psi_delta(data), psi_delta(model)
         sigma = np.rad2deg(sigma) / 2
         angles |= {"delta_data": delta_data, "delta_model": delta_model}
     return Curve(
         wavelength=wavelength,
-        data=data if view.elements else np.ravel(data),
+        data=data if view.elements or view.ratios else np.ravel(data),
         sigma=sigma,
-        model=model if view.elements else np.ravel(model),
+        model=model if view.elements or view.ratios else np.ravel(model),
         n=n,
         k=k,
         n_stderr=n_stderr,

@@ -41,8 +41,9 @@ def make(*spectra: Target, tolerance: float = 0.0) -> Problem:
         scene, wavelength, values = spectrum.scene, spectrum.wavelength, spectrum.values
         points, channels = len(wavelength), values.size // len(wavelength)
         extra = -points % ROUND
-        wavelength, values, angle = _pad(wavelength, extra), _pad(values, extra), scene.light.angle
-        scene = with_wavelength(scene, wavelength, _pad(angle, extra) if np.ndim(angle) else angle)
+        wavelength, values = _pad(wavelength, extra), _pad(values, extra)
+        turns = scene.light.angle, scene.light.azimuth
+        scene = with_wavelength(scene, wavelength, *(_pad(x, extra) if np.ndim(x) else x for x in turns))
         chosen = plan(scene, tolerance, _KEPT_EFFECTS)
         span = max(wavelength.max() - wavelength.min(), 1e-9)  # one wavelength at many angles has none
         sigma = np.reshape(spectrum.sigma, (-1, 1)) if np.ndim(spectrum.sigma) < 2 else spectrum.sigma
@@ -69,6 +70,7 @@ def make(*spectra: Target, tolerance: float = 0.0) -> Problem:
                 *numbers,
                 spectrum.depolarisation,
                 spectrum.elements,
+                spectrum.ratios,
             )
         )
     return Problem(tuple(views), free, box(*bounds(free), [p.prior for p in free]))

@@ -15,13 +15,21 @@ _SHORT = 5
 
 
 def sweeps(
-    wavelength: Float[np.ndarray, " rows"], angle: Float[np.ndarray, " rows"]
+    wavelength: Float[np.ndarray, " rows"],
+    angle: Float[np.ndarray, " rows"],
+    azimuth: Float[np.ndarray, " rows"] | None = None,
 ) -> list[Int[np.ndarray, " points"]]:
     """Positions of the rows of each sweep, in the order of measurement.
 
     A sweep goes one way along the wavelength at one angle, or along the angle at one wavelength where there
-    are fewer wavelengths than angles. Rows in no order form one sweep, sorted.
+    are fewer wavelengths than angles; each `azimuth` of the sample has its own, but one wavelength at one
+    angle has a sweep of azimuths. Rows in no order form one sweep, sorted.
     """
+    if azimuth is not None and _count(azimuth) > 1:
+        if _count(angle) == _count(wavelength) == 1:
+            return sweeps(azimuth, angle)
+        each = [np.flatnonzero(azimuth == value) for value in dict.fromkeys(azimuth.tolist())]
+        return [rows[own] for rows in each for own in sweeps(wavelength[rows], angle[rows])]
     fixed, along = (angle, wavelength) if _count(angle) <= _count(wavelength) else (wavelength, angle)
     result = []
     for value in dict.fromkeys(fixed.tolist()):

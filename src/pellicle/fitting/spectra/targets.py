@@ -9,6 +9,7 @@ import numpy as np
 
 from pellicle.data.colours import Colours
 from pellicle.data.ellipsometry_angles import ncs
+from pellicle.data.generalised import RATIOS
 from pellicle.data.mueller import ELEMENTS
 from pellicle.data.spectrum import Spectrum
 from pellicle.effects.film import exact
@@ -16,6 +17,7 @@ from pellicle.errors import DataError, UsageError
 from pellicle.fitting import noise
 from pellicle.fitting.colours.targets import MeasuredColours
 from pellicle.fitting.problem import Noise
+from pellicle.fitting.spectra import generalised
 from pellicle.scene.film import Light, Scene
 from pellicle.scene.free import free_leaves, is_free
 from pellicle.scene.instrument import ONE_NUMBER, Drift, Instrument
@@ -34,7 +36,8 @@ class Measured(NamedTuple):
     unpolarised and its depolarisation was measured, that follows N, C, S (or N, C), and `depolarisation` is
     its noise. With a `frame` (points, channels, channels) the values are those of N, C, S and depolarisation
     in it. Of a Mueller matrix the values are (points, elements), and `elements` their positions among m12,
-    m13, ..., m44.
+    m13, ..., m44. Of generalised Ψ and Δ they are the channels of `fitting.spectra.generalised`, and `ratios`
+    the positions of the ratios.
     """
 
     scene: Scene
@@ -47,6 +50,7 @@ class Measured(NamedTuple):
     frame: np.ndarray | None = None
     depolarisation: Noise | None = None
     elements: tuple[int, ...] = ()
+    ratios: tuple[int, ...] = ()
 
 
 Target: TypeAlias = Measured | MeasuredColours
@@ -67,6 +71,10 @@ def measured(data: Spectrum, scene: Scene, name: str = "") -> Measured:
     independent_fraction = 1 / noise.DRIFT_CORRELATION if source.drifting else 1.0
     values, sigma, frame = data.values, _sigma(data, source), None
     depolarisation = None
+    if data.ratios:
+        values, frame = _of_ratios(data)
+        known = scene, data.wavelength, values, sigma, independent_fraction, source, name, frame
+        return Measured(*known, ratios=tuple(RATIOS.index(ratio) for ratio in data.ratios))
     if data.delta is not None:
         values = ncs(data.values, data.delta)[:, : 2 if data.folded else 3]
     if data.depolarisation is not None and depolarises(exact(scene)):
@@ -86,6 +94,17 @@ def measured(data: Spectrum, scene: Scene, name: str = "") -> Measured:
             frame[:, at, 3] = 1.0
     known = scene, data.wavelength, values, sigma, independent_fraction, source, name, frame
     return Measured(*known, depolarisation, tuple(ELEMENTS.index(name) for name in data.elements))
+
+
+def _of_ratios(data: Spectrum) -> tuple[np.ndarray, np.ndarray | None]:
+    """The channels of generalised Ψ and Δ and, where their σ are known, the frame."""
+    assert data.delta is not None
+    sphere = ncs(data.values, data.delta)
+    if data.sigma is None:
+        return sphere.reshape(len(data), -1), None
+    outwards = np.zeros(sphere.shape)
+    outwards[..., 2] = 1.0
+    return generalised.in_directions(outwards), generalised.block_frame(sphere_frame(data.values, data.delta))
 
 
 def sphere_frame(psi: np.ndarray, delta: np.ndarray) -> np.ndarray:
@@ -121,7 +140,7 @@ def sphere_sigma(
 
 
 def seen_as(scene: Scene, data: Spectrum) -> Scene:
-    """The scene in the light of the spectrum: its signal, wavelengths, polarisation and angles."""
+    """The scene in the light of the spectrum: its signal, wavelengths, polarisation, angles and azimuths."""
     angle: Any = scene.light.angle
     if data.angle is not None and is_free(angle):
         if np.ptp(data.angle) > 0:
@@ -138,7 +157,29 @@ def seen_as(scene: Scene, data: Spectrum) -> Scene:
         angle = float(data.angle[0]) if np.ptp(data.angle) == 0 else data.angle
     stated = data.polarisation != "unpolarised"
     polarisation = data.polarisation if stated else scene.light.polarisation
-    return eqx.tree_at(lambda s: s.light, scene, Light(data.wavelength, angle, data.signal, polarisation))
+    light = Light(data.wavelength, angle, data.signal, polarisation, _azimuth(scene, data))
+    return eqx.tree_at(lambda s: s.light, scene, light)
+
+
+def _azimuth(scene: Scene, data: Spectrum) -> Any:
+    """The azimuth of the sample, one or one for each point; None where it is 0."""
+    stated: Any = scene.light.azimuth
+    if data.azimuth is None and np.ndim(stated):
+        raise UsageError(
+            f"{data.path}: has no column of azimuths, and the scene has several: give `azimuth=45`, for"
+            " instance, or add a column azimuth_deg"
+        )
+    if data.azimuth is None:
+        return stated if np.any(stated) else None
+    if np.ndim(stated) == 0 and stated and not np.isclose(data.azimuth, stated, atol=1e-3).any():
+        own = " to ".join(f"{end:g}" for end in np.unique([data.azimuth.min(), data.azimuth.max()]))
+        raise UsageError(
+            f"{data.path}: has its own azimuths of the sample, {own} degrees, which contradicts "
+            f"`azimuth={float(stated):g}`; leave that out"
+        )
+    if not np.any(data.azimuth):
+        return None
+    return float(data.azimuth[0]) if np.ptp(data.azimuth) == 0 else data.azimuth
 
 
 def without_scale(scene: Scene, data: Spectrum | Colours) -> Scene:
@@ -191,4 +232,5 @@ def _sigma(data: Spectrum, source: Noise) -> np.ndarray:
     if data.delta is None:
         return data.sigma
     delta_sigma = data.sigma if data.delta_sigma is None else data.delta_sigma
-    return sphere_sigma(data.values, data.delta, data.sigma, delta_sigma, bool(data.folded))
+    sigma = sphere_sigma(data.values, data.delta, data.sigma, delta_sigma, bool(data.folded))
+    return generalised.in_directions(sigma) if data.ratios else sigma

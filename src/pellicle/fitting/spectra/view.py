@@ -15,7 +15,7 @@ from pellicle.fitting.noise import DRIFT_CORRELATION
 from pellicle.fitting.problem import Explained, Noise, NoiseGroup
 from pellicle.fitting.program_cache import kept
 from pellicle.fitting.reported_layer import linearised
-from pellicle.fitting.spectra import nuisance
+from pellicle.fitting.spectra import generalised, nuisance
 from pellicle.fitting.spectra.nuisance import Coefficient, Data
 from pellicle.fitting.spectra.sweeps import correlation_in_sweeps, sweeps
 from pellicle.optics.hoisting import compute_once
@@ -38,12 +38,14 @@ class SpectrumForm:
     """The simulation of a spectrum by a plan without words, compared with data by variable projection.
 
     With `depolarisation` a channel of it follows N, C, S. `elements` are the positions of measured elements
-    of a Mueller matrix among m12, m13, ..., m44, empty for other signals.
+    of a Mueller matrix among m12, m13, ..., m44, `ratios` those of measured ratios of generalised Ψ and Δ;
+    both are empty for other signals.
     """
 
     plan: Plan
     depolarisation: bool = False
     elements: tuple[int, ...] = ()
+    ratios: tuple[int, ...] = ()
 
     def simulate(self, scene: Scene, data: Data) -> Any:
         """The signal as measured: all of it, or of N, C, S the N and C that a folded Δ leaves, or those
@@ -56,6 +58,8 @@ class SpectrumForm:
         signal = build(self.plan)(scene).reshape(scene.light.wavelength.size, -1)
         if self.elements:
             return stack_rows([signal[:, i] for i in self.elements]).T.reshape(-1)
+        if self.ratios:
+            return self._of_ratios(signal, data)
         channels = data.values.size // len(signal)
         if self.depolarisation:
             square = jnp.sum(signal**2, axis=1)
@@ -68,6 +72,18 @@ class SpectrumForm:
         if data.frame is not None:
             signal = jnp.einsum("pij,pj->pi", data.frame, signal)
         return signal[:, :channels].reshape(-1)
+
+    def _of_ratios(self, signal: Any, data: Data) -> Any:
+        """N, C, S of the measured ratios, each brought to its sphere, in the frame of the data."""
+        signal = stack_rows([signal[:, i] for i in generalised.positions(self.ratios)]).T
+        if depolarises(self.plan):
+            each = signal.reshape(len(signal), -1, generalised.CHANNELS)
+            square = jnp.sum(each**2, axis=-1, keepdims=True)
+            length = jnp.where(square > 0, jax.lax.rsqrt(jnp.where(square > 0, square, 1.0)), 0.0)
+            signal = (each * length).reshape(signal.shape)
+        if data.frame is not None:
+            signal = jnp.einsum("pij,pj->pi", data.frame, signal)
+        return signal.reshape(-1)
 
     def with_plan(self, plan: Plan) -> SpectrumForm:
         """Return the form with another plan."""
@@ -109,7 +125,8 @@ class SpectrumView:
 
     `scene` has anonymous free parameters and sampled media; `takes` are the positions of its parameters in
     the problem. `data` is padded to a round length. `depolarisation` is the noise of a measured one, where
-    that is a channel, `elements` the positions of elements of a Mueller matrix, as in `SpectrumForm`.
+    that is a channel, `elements` and `ratios` the positions of elements of a Mueller matrix and of ratios, as
+    in `SpectrumForm`.
     """
 
     name: str  # empty where there is no other
@@ -122,10 +139,12 @@ class SpectrumView:
     largest_index: float
     depolarisation: Noise | None = None
     elements: tuple[int, ...] = ()
+    ratios: tuple[int, ...] = ()
 
     @property
     def form(self) -> SpectrumForm:
-        return SpectrumForm(self.plan.static_key, self.depolarisation is not None, self.elements)
+        own = self.depolarisation is not None, self.elements, self.ratios
+        return SpectrumForm(self.plan.static_key, *own)
 
     @property
     def of_power(self) -> bool:
@@ -149,7 +168,7 @@ class SpectrumView:
     @property
     def measured_channels(self) -> int:
         """The first channels, which are measured: outwards from the sphere of N, C, S nothing is."""
-        return self.channels if self.data.frame is None else self.channels - 1
+        return self.channels if self.data.frame is None else self.channels - max(len(self.ratios), 1)
 
     @property
     def independent(self) -> int:
@@ -158,8 +177,12 @@ class SpectrumView:
 
     @property
     def noise_groups(self) -> tuple[NoiseGroup, ...]:
-        """The channels of the signal, and that of the depolarisation; elements of a matrix one by one."""
+        """The channels of the signal, and that of the depolarisation; elements of a matrix and ratios one by
+        one."""
         every = tuple(range(self.channels))
+        if self.ratios:
+            framed = self.data.frame is not None
+            return generalised.noise_groups(len(self.ratios), self.noise.known, framed, self.rows)
         if self.elements:
             return tuple(NoiseGroup((channel,), self.noise.known, self.rows) for channel in every)
         if self.depolarisation is None:
@@ -211,8 +234,11 @@ class SpectrumView:
         """Positions of the rows of each sweep."""
         light, rows = self.scene.light, slice(self.rows)
         angle: Any = 0.0 if is_free(light.angle) else light.angle  # a free one is the same for all
+        azimuth: Any = 0.0 if light.azimuth is None else light.azimuth
+        shape = np.shape(light.wavelength)
         return sweeps(
-            np.asarray(light.wavelength)[rows], np.broadcast_to(angle, np.shape(light.wavelength))[rows]
+            np.asarray(light.wavelength)[rows],
+            *(np.broadcast_to(x, shape)[rows] for x in (angle, azimuth)),
         )
 
     def correlation_length(self, residuals: np.ndarray) -> float:
@@ -290,4 +316,5 @@ class SpectrumView:
             return float(np.sqrt(np.mean((self.data.values - np.asarray(model))[: self.points] ** 2)))
         residual = self.in_columns(self.data.values - np.asarray(model))
         residual = residual if self.depolarisation is None else residual[:, :-1]
-        return float(np.rad2deg(np.sqrt(np.sum(residual**2) / (2 * self.rows))) / 2)
+        directions = 2 * self.rows * max(len(self.ratios), 1)
+        return float(np.rad2deg(np.sqrt(np.sum(residual**2) / directions)) / 2)

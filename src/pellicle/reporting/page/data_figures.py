@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pellicle.fitting.curves import BrdfCurve, ColourCurve, Curve
-from pellicle.reporting import brdf_figure, fit_figure, fitted_colours, mueller_figure, psi_delta
+from pellicle.reporting import brdf_figure, fit_figure, fitted_colours, measured_lines
+from pellicle.reporting.generalised_figure import NAMES, weighted_delta
 from pellicle.reporting.page.figure import (
     Column,
     Panel,
@@ -75,6 +76,8 @@ _Drawn = tuple[str, list[Panel], list[Column], dict[str, Any]]
 
 def _spectrum(part: Part) -> _Drawn:
     curve = part.spectral
+    if part.spectrum.ratios:
+        return _generalised(part)
     if part.spectrum.elements:
         return _mueller(part)
     if curve.delta_data is not None:
@@ -104,7 +107,7 @@ def _spectrum(part: Part) -> _Drawn:
     ]
     columns = [
         Column("wavelength (nm)", nm[every]),
-        *([] if data.angle is None else [Column("angle (degrees)", data.angle[every])]),
+        *_settings(part, every, ""),
         Column("data", curve.data[every]),
         Column("fit", curve.model[every]),
         Column("residual", curve.residual[every]),
@@ -113,24 +116,35 @@ def _spectrum(part: Part) -> _Drawn:
     return "wavelength (nm)", panels, columns, {}
 
 
+def _settings(part: Part, rows: np.ndarray, abscissa: str) -> list[Column]:
+    """Columns of the angle of incidence and of the azimuth, as far as the data have them beside the
+    abscissa."""
+    each = ("angle", part.spectrum.angle), ("azimuth", part.spectrum.azimuth)
+    return [
+        Column(f"{name} (degrees)", own[rows])
+        for name, own in each
+        if own is not None and not abscissa.startswith(name)
+    ]
+
+
 def _psi_delta(part: Part) -> _Drawn:
     curve = part.spectral
     assert curve.delta_data is not None
     assert curve.delta_model is not None
-    x, abscissa = psi_delta.abscissa(part)
+    x, abscissa = measured_lines.abscissa(part.spectrum)
     quantities = [
         ("Ψ (degrees)", curve.data, curve.model, False),
         ("Δ (degrees)", curve.delta_data, curve.delta_model, True),
     ]
     if curve.depolarisation_data is not None and curve.depolarisation_model is not None:
         quantities.append(("depolarisation", curve.depolarisation_data, curve.depolarisation_model, False))
-    lines = psi_delta.lines_of(part)
+    lines = measured_lines.lines_of(part.spectrum)
     panels = []
     for number, (title, data, model, turns) in enumerate(quantities):
         of_model = []
-        for i, (points, angle) in enumerate(lines):
-            name = "fit" if angle is None else f"fit, {angle:g}°"
-            strokes = psi_delta.unbroken(x, model, points, turns)
+        for i, (points, setting) in enumerate(lines):
+            name = "fit" if setting is None else f"fit, {setting}"
+            strokes = measured_lines.unbroken(x, points, model if turns else None)
             trace = line(x, model, strokes, name, _LINES[i % len(_LINES)])
             of_model.append(trace | {"showlegend": not number})
         of_data = markers(x, data, "data", "var(--data)") | {"showlegend": not number}
@@ -141,31 +155,63 @@ def _psi_delta(part: Part) -> _Drawn:
             ("residual of Ψ", curve.residual, "var(--data)", "solid"),
             ("residual of Δ", curve.delta_residual, "var(--green)", "dot"),
         ):
-            strokes = psi_delta.unbroken(x, values, points, False)
+            strokes = measured_lines.unbroken(x, points)
             trace = line(x, values, strokes, name, colour) | {"showlegend": len(residuals) < 2}
             trace["line"] = {"color": colour, "width": 1.5, "dash": dash}
             residuals.append(trace)
     panels.append(Panel("data − fit (°)", 130, [], residuals))
     order = np.argsort(x, kind="stable")[:: thinning(x.size)]
     columns = [Column(abscissa, x[order])]
-    if part.spectrum.angle is not None and abscissa.startswith("wavelength"):
-        columns.append(Column("angle (degrees)", part.spectrum.angle[order]))
+    columns += _settings(part, order, abscissa)
     for title, data, model, _ in quantities:
         columns += [Column(title, data[order]), Column(f"fit of {title}", model[order])]
+    return abscissa, panels, columns, {}
+
+
+def _generalised(part: Part) -> _Drawn:
+    """Panels of Ψ and of Δ for each ratio, and one for all residuals."""
+    curve, spectrum = part.spectral, part.spectrum
+    assert curve.delta_data is not None
+    assert curve.delta_model is not None
+    x, abscissa = measured_lines.abscissa(spectrum)
+    lines = measured_lines.lines_of(spectrum)
+    order = np.argsort(x, kind="stable")[:: thinning(x.size)]
+    panels, residuals = [], []
+    columns = [Column(abscissa, x[order]), *_settings(part, order, abscissa)]
+    for i, ratio in enumerate(spectrum.ratios):
+        for sign, data, model, residual in (
+            ("Ψ", curve.data, curve.model, curve.residual),
+            ("Δ", curve.delta_data, curve.delta_model, weighted_delta(part)),
+        ):
+            own, fitted, title = data[:, i], model[:, i], f"{sign} {NAMES[ratio]} (degrees)"
+            of_model = []
+            for j, (points, setting) in enumerate(lines):
+                strokes = measured_lines.unbroken(x, points, fitted if sign == "Δ" else None)
+                label = "fit" if setting is None else f"fit, {setting}"
+                trace = line(x, fitted, strokes, label, _LINES[j % len(_LINES)])
+                of_model.append(trace | {"showlegend": not panels})
+                strokes = measured_lines.unbroken(x, points)
+                colour = CHANNELS[(2 * i + (sign == "Δ")) % len(CHANNELS)]
+                missed = line(x, residual[:, i], strokes, f"{sign} {NAMES[ratio]}", colour)
+                residuals.append(missed | {"showlegend": False})
+            of_data = markers(x, own, "data", "var(--data)") | {"showlegend": not panels}
+            panels.append(Panel(title, 110, [of_data], of_model))
+            columns += [Column(title, own[order]), Column(f"fit of {title}", fitted[order])]
+    panels.append(Panel("data − fit (°; Δ × ½ sin 2Ψ)", 130, [], residuals))
     return abscissa, panels, columns, {}
 
 
 def _mueller(part: Part) -> _Drawn:
     """A panel for each element of a Mueller matrix, and one for all residuals."""
     curve, spectrum = part.spectral, part.spectrum
-    x, abscissa = mueller_figure.abscissa(curve.wavelength, spectrum.angle)
-    lines = mueller_figure.series(curve.wavelength, spectrum.angle)
+    x, abscissa = measured_lines.abscissa(spectrum)
+    lines = measured_lines.lines_of(spectrum)
     panels, residuals = [], []
     for column, name in enumerate(spectrum.elements):
         of_model = []
-        for i, (points, angle) in enumerate(lines):
-            label = "fit" if angle is None else f"fit, {angle:g}°"
-            strokes = mueller_figure.unbroken(x, points)
+        for i, (points, setting) in enumerate(lines):
+            label = "fit" if setting is None else f"fit, {setting}"
+            strokes = measured_lines.unbroken(x, points)
             trace = line(x, curve.model[:, column], strokes, label, _LINES[i % len(_LINES)])
             of_model.append(trace | {"showlegend": not column})
             own = line(x, curve.residual[:, column], strokes, name, CHANNELS[column % len(CHANNELS)])
@@ -175,8 +221,7 @@ def _mueller(part: Part) -> _Drawn:
     panels.append(Panel("data − fit", 130, [], residuals))
     order = np.argsort(x, kind="stable")[:: thinning(x.size)]
     columns = [Column(abscissa, x[order])]
-    if spectrum.angle is not None and abscissa.startswith("wavelength"):
-        columns.append(Column("angle (degrees)", spectrum.angle[order]))
+    columns += _settings(part, order, abscissa)
     for i, name in enumerate(spectrum.elements):
         columns += [Column(name, curve.data[order, i]), Column(f"fit of {name}", curve.model[order, i])]
     return abscissa, panels, columns, {}

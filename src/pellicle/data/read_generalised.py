@@ -1,0 +1,157 @@
+"""Reading of generalised Ψ and Δ from a table: the columns of each ratio, their units and checks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pellicle.data.generalised import RATIOS, SIGNAL, check_ratios, delta_sigma
+from pellicle.data.repeated_sweeps import of_rows, sweep_numbers
+from pellicle.data.signal_checks import check_psi_delta, refuse_first
+from pellicle.data.spectrum import Spectrum, inside_range
+from pellicle.data.tabular.column_names import RATIO_COLUMNS
+from pellicle.data.tabular.column_selection import AxisColumns, axis_columns, only
+from pellicle.data.tabular.columns import Column, listed
+from pellicle.data.tabular.table import Table
+from pellicle.data.tabular.wavelength_axis import axis_note, axis_unit, read_axis
+from pellicle.errors import DataError, UsageError
+
+_REMEDY = "correct or delete that row"
+_EXAMPLE = '`columns=["wavelength", "angle", "psi_ane", "delta_ane", "psi_aps", "delta_aps"]`'
+
+
+@dataclass(frozen=True)
+class GeneralisedColumns:
+    """Columns of Ψ and Δ of each ratio, of their standard deviations or none, and sentences on the choice."""
+
+    axis: AxisColumns
+    ratios: tuple[str, ...]
+    values: tuple[Column, ...]  # Ψ and Δ of the first ratio, then of the next
+    errors: tuple[Column, ...]
+    notes: tuple[str, ...]
+
+
+def has_generalised(columns: Sequence[Column] | None) -> bool:
+    """Return True if Ψ or Δ of one of the ratios is among the columns."""
+    return any(column.role in RATIO_COLUMNS for column in columns or ())
+
+
+def generalised_columns(
+    table: Table, columns: Sequence[Column] | None, ratios: Sequence[str] | None = None
+) -> GeneralisedColumns:
+    """Choose the columns of the ratios, all or those named. Raises DataError or UsageError."""
+    if columns is None:
+        raise UsageError(
+            f"{table.path}: has {table.layout.width} columns and no header; name them in order, as in "
+            f"{_EXAMPLE}"
+        )
+    if ratios is not None:
+        check_ratios(ratios)
+    found: dict[str, tuple[Column, Column]] = {}
+    for name in RATIOS:
+        psi, delta = (only(table, columns, f"{angle}_{name}") for angle in ("psi", "delta"))
+        if psi and delta:
+            found[name] = psi, delta
+        elif psi or delta:
+            raise DataError(
+                f"{table.path}: has {listed([c for c in (psi, delta) if c])} alone, and each ratio needs psi"
+                " and delta; add the other, or skip it with _ in `columns`"
+            )
+    if absent := [name for name in ratios or () if name not in found]:
+        raise UsageError(
+            f"{table.path}: has no ratio {', '.join(absent)}; it has {', '.join(found) or 'none'}"
+        )
+    if not found:
+        raise DataError(
+            f"{table.path}: no generalised psi and delta (psi_ane and delta_ane, or of aps or asp) are among "
+            f"{listed(columns)}; name the columns in order, as in {_EXAMPLE}"
+        )
+    chosen = tuple(name for name in found if ratios is None or name in ratios)
+    values = tuple(column for name in chosen for column in found[name])
+    for column in values:
+        if column.unknown_unit:
+            raise DataError(
+                f"{table.path}: {table.label(column.position)} is in {column.unknown_unit!r}; write psi and "
+                "delta in degrees"
+            )
+    axis, errors = axis_columns(table, columns, _EXAMPLE), _error_columns(table, columns, values)
+    read = [*values, *errors, *(column for column in axis if column)]
+    ignored = [c for c in columns if c not in read and c.name not in ("_", "")]
+    notes = [
+        f"{listed([axis.wavelength])} read as the wavelength, {listed(values)} as generalised psi and delta",
+        *([f"{listed(errors)} read as their standard deviations"] if errors else []),
+        *axis.notes,
+        *([f"ignored: {listed(ignored)}"] if ignored else []),
+    ]
+    return GeneralisedColumns(axis, chosen, values, errors, tuple(notes))
+
+
+def _error_columns(table: Table, columns: Sequence[Column], values: Sequence[Column]) -> tuple[Column, ...]:
+    """A standard deviation of each value, one `sigma` for every Ψ, or none."""
+    own = [only(table, columns, f"sigma_{column.role}") for column in values]
+    found = tuple(column for column in own if column is not None)
+    if found and len(found) < len(values):
+        raise DataError(
+            f"{table.path}: gives standard deviations of some of the columns only ({listed(found)}); add the"
+            " others, or skip these with _ in `columns`"
+        )
+    one = only(table, columns, "sigma")
+    return found or ((one,) if one else ())
+
+
+def read_generalised(
+    table: Table,
+    chosen: GeneralisedColumns,
+    wavelength_unit: str | None,
+    noise: float | None,
+    range: tuple[float, float] | None,
+) -> Spectrum:
+    """Read Ψ and Δ of the chosen ratios; other arguments as in `read_spectrum`.
+
+    One σ for all, of a column or the `noise`, is that of Ψ, and Δ has that of `generalised.delta_sigma`.
+    Raises DataError or UsageError.
+    """
+    unit = axis_unit(table, chosen.axis.wavelength, wavelength_unit)
+    axis, read = read_axis(table, chosen.axis, (*chosen.values, *chosen.errors), unit)
+    notes, rows = [*table.notes, *chosen.notes, axis_note(unit)], np.arange(len(axis.wavelength))
+    if range is not None:
+        inside, note = inside_range(axis.wavelength, range, table.path)
+        rows, notes = rows[inside], [*notes, note]
+    axis, columns = axis.taken(rows), [own[rows] for own in read]
+    count = len(chosen.values)
+    psi, delta = (np.stack(columns[i:count:2], axis=1) for i in (0, 1))
+    for i, name in enumerate(chosen.ratios):
+        places = [table.places(column.position, rows) for column in chosen.values[2 * i : 2 * i + 2]]
+        check_psi_delta(psi[:, i], delta[:, i], False, *places, f"{_REMEDY} ({name})")
+    errors = columns[count:] if noise is None else []
+    for column, error in zip(chosen.errors, errors, strict=False):
+        reason = f"is a standard deviation not above zero; {_REMEDY}"
+        refuse_first(error, error <= 0, table.places(column.position, rows), reason)
+    psi_sigma = delta_error = None
+    if noise is not None:
+        psi_sigma = np.full(psi.shape, float(noise))
+        notes += ["the given noise replaces the columns of errors"] if chosen.errors else []
+    elif len(errors) == 1:
+        psi_sigma = np.broadcast_to(errors[0][:, None], psi.shape)
+    elif errors:
+        psi_sigma, delta_error = (np.stack(errors[i::2], axis=1) for i in (0, 1))
+    if psi_sigma is not None and delta_error is None:
+        delta_error = delta_sigma(psi, psi_sigma)
+    return of_rows(
+        sweep_numbers(axis.wavelength, axis.setting),
+        {
+            **axis._asdict(),
+            "values": psi,
+            "sigma": psi_sigma,
+            "delta": delta % 360.0,
+            "delta_sigma": delta_error,
+            "lines": table.source_lines(rows),
+        },
+        signal=SIGNAL,
+        ratios=chosen.ratios,
+        path=table.path,
+        sha256=table.sha256,
+        notes=tuple(notes),
+    )
