@@ -58,7 +58,10 @@ def test_impossible_values(values, changes, message):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"signal": "Rs"}, "`signal` must be one of R, T, psi-delta, mueller, counts, not 'Rs'"),
+        (
+            {"signal": "Rs"},
+            "`signal` must be one of R, T, psi-delta, mueller, generalised-psi-delta, counts, not",
+        ),
         ({"polarisation": "x"}, "`polarisation` must be one of s, p, unpolarised, not 'x'"),
         ({"signal": "psi-delta"}, "`delta` goes with `signal"),
         ({"delta": NM}, "`delta` goes with `signal"),
