@@ -16,8 +16,9 @@ import pytest
 from mpmath import mp, mpc, mpf
 
 from pellicle.optics.berreman.matrices import Elements
+from pellicle.optics.mueller import mueller_elements
 from pellicle.optics.pair import Pair
-from pellicle.simulation.mixed_polarisations import ratio_angles, ratio_sums
+from pellicle.simulation.mixed_polarisations import ratio_angles, ratio_sums, ratio_sums_of_mueller
 
 CASES = json.loads(Path(__file__).with_name("anisotropic.json").read_text(encoding="utf-8"))["cases"]
 NUMBERS = np.array([case["value"] for case in CASES.values()])[:, :8]
@@ -77,6 +78,14 @@ def test_some_films_do_not_mix_s_and_p(computed):
     assert len(apart) >= 2
     none = [1.0, 0.0, 0.0] * 2
     np.testing.assert_allclose(computed[0][apart, 3:], np.tile(none, (len(apart), 1)), atol=1e-30)
+
+
+def test_sums_of_the_mueller_matrix():
+    """Two films whose light adds: the sums of both are those of the added Mueller matrices."""
+    jones = [Elements(*(Pair(*NUMBERS[row, i : i + 2]) for i in range(0, 8, 2))) for row in (0, 3)]
+    added = np.sum([mueller_elements(*own) for own in jones], axis=0)
+    expected = np.sum([ratio_sums(own) for own in jones], axis=0)
+    np.testing.assert_allclose(ratio_sums_of_mueller(added.tolist()), expected, atol=1e-15)
 
 
 def test_slopes_where_nothing_turns_p_into_s():

@@ -123,8 +123,8 @@ def read_generalised(
     count = len(chosen.values)
     psi, delta = (np.stack(columns[i:count:2], axis=1) for i in (0, 1))
     for i, name in enumerate(chosen.ratios):
-        places = [table.places(column.position, rows) for column in chosen.values[2 * i : 2 * i + 2]]
-        check_psi_delta(psi[:, i], delta[:, i], False, *places, f"{_REMEDY} ({name})")
+        at_psi, at_delta = (table.places(c.position, rows) for c in chosen.values[2 * i : 2 * i + 2])
+        check_psi_delta(psi[:, i], delta[:, i], False, at_psi, at_delta, f"{_REMEDY} ({name})")
     errors = columns[count:] if noise is None else []
     for column, error in zip(chosen.errors, errors, strict=False):
         reason = f"is a standard deviation not above zero; {_REMEDY}"

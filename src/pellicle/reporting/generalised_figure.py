@@ -96,7 +96,8 @@ def draw_measured(axes: Axes, spectrum: Spectrum) -> None:
 
 def _legend(axes: Axes) -> None:
     """Lines of the first panel, above the titles of all."""
-    handles = axes.child_axes[0].get_legend_handles_labels()
+    first: Any = axes.child_axes[0]
+    handles = first.get_legend_handles_labels()
     place = {"loc": "lower right", "bbox_to_anchor": (1, 1.05), "borderaxespad": 0, "ncols": 5}
     axes.legend(*handles, frameon=False, fontsize="small", **place)
 

@@ -90,16 +90,17 @@ def _spectrum(
         return [Prediction(signal + suffix, prefix + _SIGNALS[signal], axis, curve.data, model, noisy)]
     of_model, of_noisy = view.in_columns(model), view.in_columns(noisy)
     if part.spectrum.ratios:
-        psi, delta = zip(
-            *(psi_delta(own.reshape(*own.shape[:-1], -1, 3)) for own in (of_model, of_noisy)), strict=True
-        )
-        return [
-            Prediction(
-                f"{name}_{e}{suffix}", f"{prefix}{sign} {e} (degrees)", axis, *(x[..., i] for x in own)
-            )
-            for i, e in enumerate(part.spectrum.ratios)
-            for name, sign, *own in (("psi", "Ψ", curve.data, *psi), ("delta", "Δ", curve.delta_data, *delta))
-        ]
+        spheres = [own.reshape(*own.shape[:-1], -1, 3) for own in (of_model, of_noisy)]
+        drawn_psi, drawn_delta = zip(*map(psi_delta, spheres), strict=True)
+        result = []
+        for i, e in enumerate(part.spectrum.ratios):
+            for name, sign, own, (drawn, noise) in (
+                ("psi", "Ψ", curve.data, drawn_psi),
+                ("delta", "Δ", curve.delta_data, drawn_delta),
+            ):
+                about = f"{name}_{e}{suffix}", f"{prefix}{sign} {e} (degrees)", axis
+                result.append(Prediction(*about, own[:, i], drawn[..., i], noise[..., i]))
+        return result
     result = []
     if view.depolarisation is not None and curve.depolarisation_data is not None:
         name, drawn = "depolarisation", (of_model[..., -1], of_noisy[..., -1])

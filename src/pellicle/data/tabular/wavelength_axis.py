@@ -42,7 +42,8 @@ class Axis(NamedTuple):
 
     def taken(self, rows: Any) -> Axis:
         """Return the axis of some rows."""
-        return Axis(*(None if x is None else x[rows] for x in self))
+        rest = (None if x is None else x[rows] for x in self[1:])
+        return Axis(self.wavelength[rows], *rest)
 
 
 def axis_unit(table: Table, column: Column, requested: str | None) -> str | None:
