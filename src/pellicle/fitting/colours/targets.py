@@ -81,6 +81,8 @@ def measured_colours(data: Colours, scene: Scene, name: str = "") -> MeasuredCol
         )
     if isinstance(instrument.offset, Drift) or instrument.offset != 0.0:
         raise UsageError(f"{place}a colour has no offset: leave it out")
+    if np.ndim(scene.light.azimuth):
+        raise UsageError(f"{place}colours are of one azimuth of the sample: give the scene one")
     stated = data.polarisation != "unpolarised"
     polarisation = data.polarisation if stated else scene.light.polarisation
     wavelength = np.tile(data.sensor[0], len(data))
