@@ -1,11 +1,12 @@
 """Time per point of a birefringent film of any orientation, beside pyElli and difftmm.
 
 Run `python benchmarks/anisotropic.py`. A point is one wavelength, with the Jones matrix of reflection of a
-uniaxial film of 237 nm on glass at 55°. Times are processor times on one thread, and the methods take turns
-in each round; the table has medians. pyElli runs its 4×4 solver with its exact propagators (exponentials of
-matrices by SciPy, or by PyTorch where that is installed, and eigenvectors); difftmm is complex64, and its
-`FilmSolver` lays principal axes along those of the laboratory. Both take part if they are installed
-(`pip install pyElli packaging difftmm`). `benchmarks/peers/agreement.py` compares the values.
+uniaxial film of 237 nm on glass at 55°. Times are processor times on one thread, of POINTS wavelengths in one
+call. The methods take turns of at least TURN seconds, in which they repeat the call; the table has medians.
+pyElli runs its 4×4 solver with its exact propagators (exponentials of matrices by SciPy, or by PyTorch where
+that is installed, and eigenvectors); difftmm is complex64, and its `FilmSolver` lays principal axes along
+those of the laboratory. Both take part if they are installed (`pip install pyElli packaging difftmm`), and
+`benchmarks/peers/agreement.py` compares the values.
 """
 
 from __future__ import annotations
@@ -33,7 +34,9 @@ jax.config.update("jax_enable_x64", True)
 
 ORDINARY, EXTRAORDINARY, GLASS, DEPTH, ANGLE = 1.66, 1.49, 1.52, 237.0, 55.0
 THETA, PHI = 40.0, 25.0
-POINTS, FEWER, ROUNDS = 20_000, 2000, 5
+POINTS, ROUNDS = 20_000, 7
+TURN = 0.1
+"""s of processor time: one call of 1 ms after another program's would mostly measure the caches."""
 
 
 def ours(medium: Medium, count: int, dtype: Any = np.float64) -> tuple[Callable[[], Any], float]:
@@ -94,36 +97,43 @@ def by_difftmm(count: int) -> Callable[[], Any]:
     return lambda: film.simulate(angle, micrometres)
 
 
+def turn(run: Callable[[], Any]) -> float:
+    """Return the processor time of one computation in s, the mean of a turn."""
+    count, start = 0, time.process_time()
+    while (passed := time.process_time() - start) < TURN:
+        run()
+        count += 1
+    return passed / count
+
+
 def speed() -> None:
     """Print times per point."""
     turns = np.deg2rad(THETA), np.deg2rad(PHI)
     film = uniaxial(ORDINARY, EXTRAORDINARY, *turns)
     tensor = permittivity(Principal(ORDINARY, 1.55, EXTRAORDINARY), *turns, 0.3)
-    methods: dict[str, tuple[Callable[[], Any], int]] = {}
+    methods: dict[str, Callable[[], Any]] = {}
     for name, medium, dtype in (
         ("pellicle, uniaxial", film, np.float64),
         ("pellicle, uniaxial, float32", film, np.float32),
         ("pellicle, biaxial", tensor, np.float64),
     ):
         run, seconds = ours(medium, POINTS, dtype)
-        methods[name] = run, POINTS
+        methods[name] = run
         print(f"{name}: compiled in {seconds:.1f} s")
     if find_spec("elli"):
         crystal = (ORDINARY, ORDINARY, EXTRAORDINARY), (THETA, PHI, 0.0)
         torch = [("PropagatorExpm", "torch")] if find_spec("torch") else []
         for propagator in (("PropagatorExpm", "scipy"), *torch, ("PropagatorEig",)):
-            run = by_pyelli([(crystal, DEPTH)], GLASS, 1.0, FEWER, *propagator)
-            methods[f"pyElli, {' by '.join(propagator)}"] = run, FEWER
+            run = by_pyelli([(crystal, DEPTH)], GLASS, 1.0, POINTS, *propagator)
+            methods[f"pyElli, {' by '.join(propagator)}"] = run
     if find_spec("difftmm"):
-        methods["difftmm, axes along the surface, complex64"] = by_difftmm(FEWER), FEWER
+        methods["difftmm, axes along the surface, complex64"] = by_difftmm(POINTS)
     times: dict[str, list[float]] = {name: [] for name in methods}
-    for run, _ in methods.values():
+    for run in methods.values():
         run()
     for _ in range(ROUNDS):
-        for name, (run, count) in methods.items():
-            start = time.process_time()
-            run()
-            times[name].append((time.process_time() - start) / count * 1e6)
+        for name, run in methods.items():
+            times[name].append(turn(run) / POINTS * 1e6)
     first = statistics.median(times["pellicle, uniaxial"])
     print("| method | µs per point | relative |\n|---|---|---|")
     for name, each in times.items():

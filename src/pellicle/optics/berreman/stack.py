@@ -3,7 +3,7 @@
 From the substrate upwards, each layer turns the reflection matrix Γ of what lies below it into that
 of the layer with it. Γ is that of waves against free space at normal incidence, E = d + u and H = d − u in
 the tangential fields: for passive media no element exceeds 1, whatever the layers are. The ambient enters
-last.
+last, by the fields above the uppermost layer: their Γ is not needed.
 
 Source: D. W. Berreman, J. Opt. Soc. Am. 62, 502 (1972); L. Li, J. Opt. Soc. Am. A 13, 1024 (1996), for
 recursions that stay bounded.
@@ -72,13 +72,12 @@ def polarised(
     a, q0 = transverse(ambient, angle if isinstance(angle, Inside) else jnp.asarray(angle) * 1.0)
     a, q0, layers, substrate, phases = stored((a, q0, layers, substrate, phases))
     every = q0, layers, substrate, phases
-    reflection = bottom = stored(_substrate(substrate, a, every))
-    through: Number | None = None
+    bottom = stored(_substrate(substrate, a, every))
+    fields = _of_reflection(bottom, None)
     for medium, k in zip(reversed(layers), reversed(phases), strict=True):
-        reflection, layer_through = stored(_add(medium, a, k, reflection, dichroic))
-        through = layer_through if through is None else product(through, layer_through)
+        fields = _add(medium, a, k, _normalised(fields), dichroic)
     # p of the incident wave: Ex = p cos θ, Hy = n₀ p; of the reflected one: Ex = −r cos θ, Hy = n₀ r
-    E, H = one_plus(reflection), one_minus(reflection)
+    E, H, down, _ = fields
     cosine = q0 / ambient
     tilt = cosine / ambient
 
@@ -89,9 +88,9 @@ def polarised(
     r = product(rows(-1.0, q0) * E + rows(tilt, -1.0) * H, into)
     units = matrix(1.0, ambient, 1 / ambient, 1.0, like=every)
     waves = into * stacked(2 * cosine, 2 * q0, like=every)
-    waves = stored(waves if through is None else product(through, waves))
-    fields = product(one_plus(bottom), waves), product(one_minus(bottom), waves)
-    return Polarised(elements(stored(r * units)), (elements(fields[0]), elements(fields[1])), q0)
+    waves = stored(_behind(down, waves))
+    below = product(one_plus(bottom), waves), product(one_minus(bottom), waves)
+    return Polarised(elements(stored(r * units)), (elements(below[0]), elements(below[1])), q0)
 
 
 def transmittances(response: Polarised) -> tuple[Any, Any]:
@@ -128,18 +127,49 @@ def _substrate(medium: Medium, a: Any, like: Any) -> Number:
     return aligned.half_space(medium, a, like)
 
 
-def _add(medium: Medium, a: Any, k: Any, below: Number, dichroic: bool) -> tuple[Number, Number]:
-    """Return the reflection matrix with a layer above, and the downward waves behind it for those before."""
+class _Fields(NamedTuple):
+    """Tangential fields above some layers, of two independent waves: (Ex, Ey) and (Hy, −Hx) in columns."""
+
+    E: Number
+    H: Number
+    down: Any  # downward waves behind the layers: a matrix, a multiple of the unit matrix, or None for that
+    reflection: Number | None  # Γ, where the waves are unit waves incident from free space
+
+
+def _of_reflection(reflection: Number, down: Any) -> _Fields:
+    return _Fields(one_plus(reflection), one_minus(reflection), down, reflection)
+
+
+def _normalised(fields: _Fields) -> _Fields:
+    """Return the fields of unit waves incident from free space: Γ = (E − H)(E + H)⁻¹."""
+    if fields.reflection is not None:
+        return fields
+    through = stored(inverse(fields.E + fields.H))
+    reflection, down = stored((product(fields.E - fields.H, through), _behind(fields.down, 2 * through)))
+    return _of_reflection(reflection, down)
+
+
+def _behind(down: Any, waves: Number) -> Number:
+    if down is None:
+        return waves
+    return product(down, waves) if jnp.ndim(real(down)) == jnp.ndim(real(waves)) else down * waves
+
+
+def _add(medium: Medium, a: Any, k: Any, below: _Fields, dichroic: bool) -> _Fields:
+    """Return the fields above a layer; those below it are of unit waves."""
     method = method_of(medium)
     if not (dichroic and mixes_polarisations(medium)):
         return _direct(method.propagation(medium, a, k), below)
+    assert below.reflection is not None
     exponent = method.dichroism(medium, a) * jax.lax.stop_gradient(k)
-    return sliced(partial(method.propagation, medium, a), k, exponent, below)
+    reflection, through = sliced(partial(method.propagation, medium, a), k, exponent, below.reflection)
+    return _of_reflection(*stored((reflection, _behind(below.down, through))))
 
 
-def _direct(layer: Propagation, below: Number) -> tuple[Number, Number]:
-    (Ex, Ey), (Hy, Hx) = unstacked(one_plus(below), 2), unstacked(one_minus(below), 2)
-    Ex, Hy, Ey, Hx = stored(layer.apply(stored((Ex, Hy, Ey, Hx))))
-    electric, magnetic = (stored(stacked(x, y)) for x, y in ((Ex, Ey), (Hy, Hx)))
-    through = stored(inverse(electric + magnetic))
-    return product(electric - magnetic, through), through * (2 * jnp.exp(-layer.growth))
+def _direct(layer: Propagation, below: _Fields) -> _Fields:
+    (Ex, Ey), (Hy, Hx) = unstacked(below.E, 2), unstacked(below.H, 2)
+    Ex, Hy, Ey, Hx = layer.apply(stored((Ex, Hy, Ey, Hx)))
+    loss = jnp.exp(-layer.growth)
+    down = loss if below.down is None else below.down * loss
+    E, H, down = stored((stacked(Ex, Ey), stacked(Hy, Hx), down))
+    return _Fields(E, H, down, None)
