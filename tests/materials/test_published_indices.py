@@ -32,6 +32,8 @@ PUBLISHED = [
     ("ZrO2", 589.3, 2.165, 1e-2, "Webster, Gems, cubic zirconia 2.15 to 2.18"),
     ("LiNbO3", 632.8, 2.2863, 1e-3, "Nelson and Mikulyak 1974, congruent, n_o"),
     ("LiNbO3/Zelmon-e", 632.8, 2.2022, 1e-3, "Nelson and Mikulyak 1974, congruent, n_e"),
+    ("BaTiO3", 632.8, 2.416, 1.5e-2, "Johnston 1971, unclamped"),
+    ("BaTiO3-e", 589.3, 2.382, 1e-2, "Johnston 1971 less the birefringence of 0.055, Merz 1949"),
     ("GeO2", 589.3, 1.607, 2e-3, "CRC Handbook, glass"),
     ("borofloat", 587.6, 1.4714, 2e-4, "SCHOTT data sheet, n_d"),
     ("D263", 587.6, 1.5230, 4e-4, "SCHOTT data sheet, n_d 1.5230 to 1.5233"),
