@@ -15,7 +15,7 @@ from pellicle.fitting.spectra.view import SpectrumView
 _NARROWEST = 5
 """Points in the narrowest window whose mean is tested."""
 _CHANCE = 0.01
-"""Probability that pure noise is reported as structure."""
+"""Probability that pure noise is reported as structure, in any of the curves of a view."""
 _CLIP = 4.0
 """Standard deviations at which residuals are clipped: a lone outlier is no structure."""
 _MOST, _SHOWN = 12, 2
@@ -31,14 +31,15 @@ class Window(NamedTuple):
     score: float
 
 
-def windows(z: np.ndarray) -> list[Window]:
+def windows(z: np.ndarray, curves: int = 1) -> list[Window]:
     """Windows of residuals `z`, in standard deviations of white noise, whose mean noise does not explain.
 
     Means over windows of all positions, of widths that grow by half, are compared with the largest mean
-    that noise of as many points shows by chance. The strongest is taken first; neighbours merge.
+    that noise of as many points shows by chance in one of so many `curves`. The strongest is taken first;
+    neighbours merge.
     """
     z, size, result = np.clip(z, -_CLIP, _CLIP), len(z), []
-    bar = math.sqrt(2 * math.log(max(size, 2) / _CHANCE))
+    bar = math.sqrt(2 * math.log(max(size, 2) * curves / _CHANCE))
     widths = []
     while (width := _NARROWEST * 1.5 ** len(widths)) <= size / 2:
         widths.append(int(width))
@@ -93,11 +94,12 @@ def missed(view: SpectrumView | ColoursView, fit: ViewFit) -> Missed | None:
     residuals = (view.data.values - np.asarray(fit.at.model))[: view.points].reshape(shape)[:, columns]
     nm = np.asarray(view.scene.light.wavelength)[: view.rows]
     stretches, covered = [], 0
-    for part in (part for part in view.sweeps() if len(part) >= 2 * _NARROWEST):
+    parts = [part for part in view.sweeps() if len(part) >= 2 * _NARROWEST]
+    for part in parts:
         for column, inverse in zip(residuals[part].T, weight[part].T, strict=True):
             known = view.noise.given or view.noise.drifting
             scale = inverse if known else 1 / max(np.median(local_noise(column)), 1e-300)
-            for w in windows(column * scale):
+            for w in windows(column * scale, len(parts) * view.measured_channels):
                 inside = nm[part][w.first : w.last + 1]
                 size = float(np.mean(np.abs(column[w.first : w.last + 1])))
                 covered += len(inside)
