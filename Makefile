@@ -5,6 +5,9 @@ VENV := .venv
 BIN := $(VENV)/bin
 EXAMPLE := measurements/recipes/hematite_on_glass_140nm.toml
 
+# Python then keeps the bytecode of what it imports: a process that fits starts in 1.8 s of processor time, not 4.2 s
+unexport PYTHONDONTWRITEBYTECODE
+
 # Tests spend most of their time in compilation. These flags halve the compilation time, at the cost of run time.
 # Rounding may differ, so tests that count digits (EXACT) run without them.
 QUICK_COMPILE := XLA_FLAGS="--xla_backend_optimization_level=0 --xla_llvm_disable_expensive_passes=true \

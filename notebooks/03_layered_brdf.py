@@ -29,8 +29,9 @@ from pellicle.synthetic.environment import one_lamp
 from pellicle.synthetic.surface_sphere import in_plane, render
 
 jax.config.update("jax_enable_x64", True)  # double precision; JAX's default is single
-SHORT = os.environ.get("PELLICLE_SHORT") == "1"  # smaller pictures, for a quick run
+SHORT = os.environ.get("PELLICLE_SHORT") == "1"  # smaller pictures and fewer samples, for a quick run
 SIZE = 40 if SHORT else 220  # pixels
+SAMPLES = 100 if SHORT else 200  # pairs of directions
 
 # %% [markdown]
 # ## The model
@@ -91,12 +92,12 @@ NOISE = 0.01
 
 
 def goniometer(lamps):
-    """Return 200 pairs of directions in the plane of incidence for these angles of the lamp (degrees)."""
-    each = 200 // len(lamps)
+    """Return pairs of directions in the plane of incidence for these angles of the lamp (degrees)."""
+    each = SAMPLES // len(lamps)
     across = np.tile(np.linspace(-78, 78, each), len(lamps))
     return pl.Directions(
         theta_i=np.repeat(np.array(lamps, float), each),
-        phi_i=np.zeros(200),
+        phi_i=np.zeros(SAMPLES),
         theta_o=np.abs(across),
         phi_o=np.where(across > 0, 180.0, 0.0),
     )
