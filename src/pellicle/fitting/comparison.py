@@ -24,6 +24,7 @@ from pellicle.fitting.noise import correlation_length
 from pellicle.fitting.presentation import ReportMixin
 from pellicle.fitting.result import Fit, Part, Status
 from pellicle.fitting.spectra.sweeps import correlation_in_sweeps, sweeps
+from pellicle.fitting.spectra.targets import ratio_directions
 
 log = getLogger(__name__)
 
@@ -199,12 +200,17 @@ def _residual(part: Part) -> np.ndarray:
     if c.delta_data is None or c.delta_model is None:
         residual = c.residual if sigma is None else c.residual / sigma
         return residual if spectrum.elements else residual[:, None]
+    if spectrum.ratios:
+        frames, spread = ratio_directions(spectrum)
+        apart = ncs(c.data, c.delta_data) - ncs(c.model, c.delta_model)
+        residual = np.einsum("prij,prj->pri", frames, apart)
+        return (residual if sigma is None else residual / spread)[..., :2]
     if sigma is None:
         return ncs(c.data, c.delta_data) - ncs(c.model, c.delta_model)
     across = sigma if spectrum.delta_sigma is None else spectrum.delta_sigma
     # at the poles, where Δ has no meaning, the error of Ψ leaves some to it
     sine = np.sin(2 * np.deg2rad(c.data)) / np.hypot(np.sin(2 * np.deg2rad(c.data)), 2 * np.deg2rad(sigma))
-    return np.stack([c.residual / sigma, sine * c.delta_residual / across], axis=-1)
+    return np.stack([c.residual / sigma, sine * c.delta_residual / across], axis=1)
 
 
 def _correlation(residuals: _Residuals) -> float:

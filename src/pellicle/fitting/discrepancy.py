@@ -67,7 +67,8 @@ class Evidence(NamedTuple):
     `sigma` (rows, channels) is the σ of the points, `noise` what neighbouring points show of it; `weights`
     (rows, channels) are those of the residuals in the likelihood of the fit. `correlation` returns the number
     of points that count as one; `least` is the least factor on σ² that stands for it. `uncertain` is the
-    relative standard error of σ² where it is estimated.
+    relative standard error of σ² where it is estimated. `signals` are the channels of each signal that is
+    judged by itself, empty where all are one.
     """
 
     residual: np.ndarray
@@ -79,6 +80,7 @@ class Evidence(NamedTuple):
     correlation: Callable[[np.ndarray], float]
     least: float = 1.0
     uncertain: float = 0.0
+    signals: tuple[tuple[int, ...], ...] = ()
 
 
 class Remaining(NamedTuple):
@@ -147,8 +149,11 @@ def discrepancy(evidence: Sequence[Evidence], scaled: Scaled, unit: np.ndarray) 
     known, stretch, solution = len(scaled.names), scaled.stretch, system.solved(state.reduced)
     remaining = []
     for view, own, size in zip(evidence, system.residuals(solution), state.variance, strict=True):
-        typical = spread(own * view.sigma)
-        weighted = math.sqrt(np.mean((_weights(own) * own) ** 2))
+        # a signal of its own, such as one ratio, is not diluted by others that the scene has right
+        each = [own[:, list(group)] for group in view.signals] or [own]
+        sigmas = [view.sigma[:, list(group)] for group in view.signals] or [view.sigma]
+        typical = max(spread(x * sigma) for x, sigma in zip(each, sigmas, strict=True))
+        weighted = max(math.sqrt(np.mean((_weights(x) * x) ** 2)) for x in each)
         remaining.append(Remaining(typical / view.noise, typical, weighted, size))
     sizes, shares = solution[known:], _evidence_shares(evidence, state.variance)
     # the σ of a drifting lamp would hide what an effect explains

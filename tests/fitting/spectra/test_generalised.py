@@ -137,11 +137,27 @@ def test_channels_are_directions_along_psi_and_delta():
     # 2σ along Ψ and across it
     np.testing.assert_allclose(target.sigma[:, [0, 2, 4]], np.tile(2 * np.deg2rad(NOISE), (64, 1)))
     np.testing.assert_allclose(target.sigma[:, [1, 3, 5]], np.tile(2 * np.deg2rad(NOISE), (64, 1)), rtol=1e-9)
-    assert [group.channels for group in generalised.noise_groups(2, True, True, 64)] == [(0, 1, 4), (2, 3, 5)]
-    assert [group.channels for group in generalised.noise_groups(2, False, False, 64)] == [
-        (0, 1, 2),
-        (3, 4, 5),
-    ]
+    groups = generalised.noise_groups(2, True, 64)
+    assert [(group.channels, group.independent) for group in groups] == [((0, 1, 4), 128), ((2, 3, 5), 128)]
+
+
+def test_directions_of_a_ratio_of_nothing_do_not_turn_with_its_noise():
+    """Along Ψ, all residuals of a ratio of 0 have one sign; in the directions of C and S they scatter."""
+    target = measured(data(), scene())
+    model = np.einsum("pij,pj->pi", target.frame, film_ratios().reshape(64, -1))
+    residual = ((target.values - model) / target.sigma)[:, :6]
+    assert np.max(np.abs(np.mean(residual, axis=0))) < 4 / np.sqrt(64)
+    np.testing.assert_allclose(np.std(residual, axis=0), 1.0, atol=4 / np.sqrt(128))
+
+
+def test_errors_that_differ_keep_their_own_directions():
+    psi, delta = np.array([[20.0, 90.0]]), np.array([[100.0, 77.0]])
+    frames, sigma = sphere_frame(psi, delta), np.array([[[0.001, 0.004, 0.003], [0.004, 0.004, 0.004]]])
+    turned, shared = generalised.upright(frames, sigma, psi, delta)
+    np.testing.assert_array_equal(turned[0, 0], frames[0, 0])
+    np.testing.assert_allclose(shared, sigma, rtol=1e-12)
+    # at Ψ = 90, along C and S
+    np.testing.assert_allclose(turned[0, 1], [[0, -1, 0], [0, 0, 1], [-1, 0, 0]], atol=1e-12)
 
 
 def test_some_ratios_alone():

@@ -69,9 +69,16 @@ def evidence(spectra: Sequence[Target], ranked: RankedMinima, jacobian: Scaled) 
                 view.correlation_length,
                 DRIFT_CORRELATION if view.noise.drifting else 1.0,
                 0.0 if view.noise.known else SCATTER_OF_NOISE / math.sqrt(view.rows),
+                _signals(view) if view.ratios else (),
             )
         )
     return result
+
+
+def _signals(view: SpectrumView) -> tuple[tuple[int, ...], ...]:
+    """The measured channels of each ratio."""
+    keep = view.measured_channels
+    return tuple(tuple(c for c in group.channels if c < keep) for group in view.noise_groups)
 
 
 def short_range_noise(view: SpectrumView, residual: np.ndarray) -> float:

@@ -129,9 +129,7 @@ def _curve(spectrum: Spectrum, view: SpectrumView, at: Local, covariance: np.nda
     if view.depolarisation is not None:
         data, model = data[:, :-1], model[:, :-1]
     if view.ratios:
-        # of each ratio the first channel: along Ψ where σ is known, else N, of which C and S have the σ too
-        first = [(2 if view.data.frame is not None else 3) * i for i in range(len(view.ratios))]
-        sigma = 1 / weight[:, first]
+        sigma = 1 / weight[:, [2 * i for i in range(len(view.ratios))]]
         data, model = (x.reshape(rows, -1, 3) for x in (data, model))
     if spectrum.delta is not None:
         (data, delta_data), (model, delta_model) = psi_delta(data), psi_delta(model)

@@ -173,7 +173,9 @@ def effects_on_signal(view: SpectrumView, at: Local, scene: Scene) -> list[Effec
     if view.ratios:
         each, names = _spheres(view, signal), [RATIOS[i] for i in view.ratios]
         offsets = generalised.offsets(names, each[..., : view.rows, :, :], allowed)
-        return [replace(e, change=_in_frame(view, _flat(e.change))) for e in offsets]
+        return [
+            replace(e, change=_in_frame(view, e.change.reshape(*e.change.shape[:-2], -1))) for e in offsets
+        ]
     if not view.of_power:
         return _of_angles(view, at, allowed)
     position, curves = np.asarray(view.data.position), []
@@ -276,10 +278,6 @@ def _on_sphere(view: SpectrumView, at: Local, change: np.ndarray) -> np.ndarray:
     """Change of N, C, S without its part outwards: Ψ and Δ do not depend on the degree of polarisation."""
     if view.elements:
         return change
-    if view.ratios and view.data.frame is None:
-        outwards = _spheres(view, at.signal)[..., : view.rows, :, :]
-        each = change.reshape(*change.shape[:-1], -1, generalised.CHANNELS)
-        return _flat(generalised.sphere_tangent(outwards, each))
     sphere = view.channels if view.depolarisation is None else view.channels - 1
     if sphere < 3 or view.data.frame is not None:
         return change
@@ -306,14 +304,8 @@ def _spheres(view: SpectrumView, signal: Any) -> np.ndarray:
     """N, C, S of each ratio of a signal (..., data values), (..., wavelengths with padding, ratios, 3)."""
     signal = np.asarray(signal)
     columns = signal.reshape(*signal.shape[:-1], -1, view.channels)
-    if view.data.frame is not None:
-        columns = np.einsum("...pij,...pi->...pj", np.asarray(view.data.frame), columns)
+    columns = np.einsum("...pij,...pi->...pj", np.asarray(view.data.frame), columns)
     return columns.reshape(*columns.shape[:-1], -1, generalised.CHANNELS)
-
-
-def _flat(each: np.ndarray) -> np.ndarray:
-    """Numbers of each ratio (..., ratios, 3) side by side."""
-    return each.reshape(*each.shape[:-2], -1)
 
 
 def _sphere(view: SpectrumView, signal: Any) -> np.ndarray:

@@ -72,7 +72,10 @@ def measured(data: Spectrum, scene: Scene, name: str = "") -> Measured:
     values, sigma, frame = data.values, _sigma(data, source), None
     depolarisation = None
     if data.ratios:
-        values, frame = _of_ratios(data)
+        frames, spread = ratio_directions(data)
+        outwards = np.broadcast_to([0.0, 0.0, 1.0], spread.shape)
+        values, sigma = generalised.in_directions(outwards), generalised.in_directions(spread)
+        frame = generalised.block_frame(frames)
         known = scene, data.wavelength, values, sigma, independent_fraction, source, name, frame
         return Measured(*known, ratios=tuple(RATIOS.index(ratio) for ratio in data.ratios))
     if data.delta is not None:
@@ -96,15 +99,14 @@ def measured(data: Spectrum, scene: Scene, name: str = "") -> Measured:
     return Measured(*known, depolarisation, tuple(ELEMENTS.index(name) for name in data.elements))
 
 
-def _of_ratios(data: Spectrum) -> tuple[np.ndarray, np.ndarray | None]:
-    """The channels of generalised Ψ and Δ and, where their σ are known, the frame."""
+def ratio_directions(data: Spectrum) -> tuple[np.ndarray, np.ndarray]:
+    """Directions of each ratio of generalised Ψ and Δ, (points, ratios, 3, 3), and σ of N, C, S in them,
+    (points, ratios, 3): see `generalised.upright`."""
     assert data.delta is not None
-    sphere = ncs(data.values, data.delta)
-    if data.sigma is None:
-        return sphere.reshape(len(data), -1), None
-    outwards = np.zeros(sphere.shape)
-    outwards[..., 2] = 1.0
-    return generalised.in_directions(outwards), generalised.block_frame(sphere_frame(data.values, data.delta))
+    sigma = np.full((*data.values.shape, 3), ROUGH)
+    if data.sigma is not None and data.delta_sigma is not None:
+        sigma = sphere_sigma(data.values, data.delta, data.sigma, data.delta_sigma)
+    return generalised.upright(sphere_frame(data.values, data.delta), sigma, data.values, data.delta)
 
 
 def sphere_frame(psi: np.ndarray, delta: np.ndarray) -> np.ndarray:
@@ -232,5 +234,4 @@ def _sigma(data: Spectrum, source: Noise) -> np.ndarray:
     if data.delta is None:
         return data.sigma
     delta_sigma = data.sigma if data.delta_sigma is None else data.delta_sigma
-    sigma = sphere_sigma(data.values, data.delta, data.sigma, delta_sigma, bool(data.folded))
-    return generalised.in_directions(sigma) if data.ratios else sigma
+    return sphere_sigma(data.values, data.delta, data.sigma, delta_sigma, bool(data.folded))

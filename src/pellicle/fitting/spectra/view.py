@@ -81,9 +81,7 @@ class SpectrumForm:
             square = jnp.sum(each**2, axis=-1, keepdims=True)
             length = jnp.where(square > 0, jax.lax.rsqrt(jnp.where(square > 0, square, 1.0)), 0.0)
             signal = (each * length).reshape(signal.shape)
-        if data.frame is not None:
-            signal = jnp.einsum("pij,pj->pi", data.frame, signal)
-        return signal.reshape(-1)
+        return jnp.einsum("pij,pj->pi", data.frame, signal).reshape(-1)
 
     def with_plan(self, plan: Plan) -> SpectrumForm:
         """Return the form with another plan."""
@@ -181,8 +179,7 @@ class SpectrumView:
         one."""
         every = tuple(range(self.channels))
         if self.ratios:
-            framed = self.data.frame is not None
-            return generalised.noise_groups(len(self.ratios), self.noise.known, framed, self.rows)
+            return generalised.noise_groups(len(self.ratios), self.noise.known, self.rows)
         if self.elements:
             return tuple(NoiseGroup((channel,), self.noise.known, self.rows) for channel in every)
         if self.depolarisation is None:
