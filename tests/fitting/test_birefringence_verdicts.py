@@ -14,8 +14,10 @@ from pellicle.fitting.curves import BIREFRINGENCE, Curve, Index
 from pellicle.fitting.result import Estimate, Fit, Part, Status
 
 
-def candidate(name: str, bic: float, delta: tuple[float, float] | None = None) -> Candidate:
-    """A candidate with a birefringence and its error, or isotropic."""
+def candidate(
+    name: str, bic: float, delta: tuple[float, float] | None = None, angles: tuple[str, ...] | None = None
+) -> Candidate:
+    """A candidate with a birefringence and its error, or isotropic; `angles` are those of a tilted axis."""
     nm, zero = np.array([400.0, 500.0]), np.zeros(2)
     principal = {}
     if delta is not None:
@@ -23,7 +25,9 @@ def candidate(name: str, bic: float, delta: tuple[float, float] | None = None) -
         # at 400 nm it is half as clear
         principal[BIREFRINGENCE] = Index(nm, np.full(2, n), zero, np.array([2 * error, error]), zero)
     free = ["ordinary.n", "extraordinary.n"] if delta else ["n"]
-    plan = Plan((Row("anisotropy", delta is not None, ""),), "psi-delta", "unpolarised")
+    free += angles or ()
+    size = 0 if delta is None else 2 if angles is None else 4
+    plan = Plan((Row("anisotropy", delta is not None, "", count=size),), "psi-delta", "unpolarised")
     curve = Curve(nm, zero, zero + 1, zero, zero, zero, zero, zero, principal=principal)
     fit = Fit(
         parts=(Part("", pl.Spectrum(nm, zero + 0.2, "R"), curve, plan, 0.0, 1.0, 2.0),),
@@ -82,3 +86,14 @@ def test_data_that_do_not_see_birefringence_have_no_huge_errors():
         assert one.fit.parameters["thickness"].stderr < 100 or np.isinf(
             one.fit.parameters["thickness"].stderr
         )
+
+
+@pytest.mark.parametrize("angles", [(), ("axis_theta",), ("film.axis_theta", "film.axis_phi")])
+@pytest.mark.parametrize(
+    ("difference", "expected"),
+    [(9.0, "the data strongly favour a tilted optic axis."), (-9.0, "a tilted optic axis is not needed.")],
+)
+def test_tilt_is_called_what_it_is(difference, expected, angles):
+    """Against an axis along the normal, whether its angles are free or given."""
+    both = candidate("aligned", difference, (0.1, 0.01)), candidate("tilted", 0.0, (0.1, 0.01), angles)
+    assert Comparison(both, 100.0).verdict.endswith(expected)

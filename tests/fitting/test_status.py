@@ -284,6 +284,14 @@ UNSEEN = {"thickness": estimate(stderr=math.inf)}
             " thickness 300 nm should not be used.",
         ),
         (
+            Status.MISFIT,
+            {},
+            {"unit": " degrees"},
+            "The scene does not explain the data: even the best fit misses by 0.012 degrees on average, more"
+            " than noise and the usual errors of instruments and samples would. Its thickness 300 nm should"
+            " not be used.",
+        ),
+        (
             Status.NOT_CONVERGED,
             {},
             {},

@@ -18,6 +18,7 @@ import numpy as np
 from pellicle.data.colours import Colours
 from pellicle.data.ellipsometry_angles import ncs
 from pellicle.data.spectrum import Spectrum
+from pellicle.effects.anisotropy import GENERAL
 from pellicle.errors import UsageError
 from pellicle.fitting.curves import BIREFRINGENCE, BrdfCurve, ColourCurve, Curve
 from pellicle.fitting.noise import correlation_length
@@ -35,6 +36,10 @@ and A. Raftery 1995, J. Am. Stat. Assoc. 90, 773)."""
 
 _COMPATIBLE = 1.96
 """Standard errors within which a number is compatible with 0, at 95 %."""
+
+
+AXIS, TILTED = "axis_", "a tilted optic axis"
+"""Part of the names of an optic axis's angles, and what stands for them beside an aligned axis."""
 
 
 _UNSEEN_BIREFRINGENCE = 0.1
@@ -75,6 +80,11 @@ class Comparison(ReportMixin):
         if birefringent[0] != birefringent[1]:
             # its indices have other names than the one that they stand for
             more, less = [["birefringence"] if one else [] for one in birefringent]
+        elif (tilted := [_tilted(one.fit) for one in (best, second)])[0] != tilted[1]:
+            named = [[name for name in names if AXIS not in name] for names in (more, less)]
+            more, less = [
+                [*names, TILTED] if one else names for names, one in zip(named, tilted, strict=True)
+            ]
         verb = "strongly favour" if apart >= STRONG else "favour"
         if apart < UNDECIDED:
             sentence = f"The data do not distinguish {best.name} from {second.name} (ΔBIC {apart:.1f})"
@@ -235,6 +245,12 @@ def _deviance(residuals: Sequence[_Residuals], lengths: Sequence[float]) -> floa
 
 def _birefringent(fit: Fit) -> bool:
     return any(row.effect == "anisotropy" and row.on for part in fit.parts for row in part.plan.rows)
+
+
+def _tilted(fit: Fit) -> bool:
+    return any(
+        row.effect == "anisotropy" and row.count >= GENERAL for part in fit.parts for row in part.plan.rows
+    )
 
 
 def _clearest_birefringence(fit: Fit) -> tuple[float, float, float] | None:

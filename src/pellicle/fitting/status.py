@@ -85,15 +85,16 @@ def verdict(
     rivals: tuple[Rival, ...],
     rms: float,
     missed: str = "the data",
+    unit: str = "",
     where: str = "",
     opaque: Container[str] = (),
     trading: Sequence[str] = (),
 ) -> str:
     """The verdict in one or two sentences.
 
-    `missed`, `rms` and `where` name the data that a misfit does not explain, by how much and at which
-    wavelengths; `opaque` are thicknesses of layers that absorb, and `trading` sentences on parameters that
-    are correlated with the leading one.
+    `missed`, `rms` with its `unit` behind a space, and `where` name the data that a misfit does not explain,
+    by how much and at which wavelengths; `opaque` are thicknesses of layers that absorb, and `trading`
+    sentences on parameters that are correlated with the leading one.
     """
     lead = next((p for p in parameters.values() if p.free), None)
     if lead is None:
@@ -121,8 +122,8 @@ def verdict(
         return f"The data do not determine {lead.name}: it {limits_in_words(lead)}.{besides}"
     if status is Status.MISFIT:
         return (
-            f"The scene does not explain {missed}: even the best fit misses by {rms:.2g} on average, more"
-            " than noise and the usual errors of instruments and samples would"
+            f"The scene does not explain {missed}: even the best fit misses by {rms:.2g}{unit} on average,"
+            " more than noise and the usual errors of instruments and samples would"
             f"{f', most of all {where}' if where else ''}. Its {best} should not be used."
         )
     return f"The fit did not converge: its best point so far, {best}, should not be used."

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pellicle.fitting.comparison import Candidate, Comparison
 
 SCHEMA = "pellicle.compare/1"
-_SHOWN = 3
+_SHOWN = 5
 """Parameters shown of each fit."""
 
 
@@ -54,7 +54,8 @@ def report(comparison: Comparison) -> str:
 def _fit(c: Candidate) -> str:
     """The leading parameters of a fit and its verdict."""
     leading = [p for p in c.fit.free if not p.name.startswith("instrument.")]
-    values = ", ".join(describe(p) for p in leading[:_SHOWN]) + (", ..." if len(leading) > _SHOWN else "")
+    more = len(leading) - _SHOWN
+    values = ", ".join(describe(p) for p in leading[:_SHOWN]) + (f" and {more} more" if more > 0 else "")
     return f"{c.name}: {values}. {c.fit.verdict}"
 
 

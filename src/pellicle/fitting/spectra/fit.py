@@ -20,6 +20,7 @@ from pellicle.fitting.colours.orders import orders, with_orders
 from pellicle.fitting.colours.targets import measured_colours
 from pellicle.fitting.colours.view import ColoursView
 from pellicle.fitting.conclusion import conclude, linearised, ranked_minima
+from pellicle.fitting.curves import Curve
 from pellicle.fitting.discrepancy import discrepancy
 from pellicle.fitting.minima import Minima
 from pellicle.fitting.problem import Problem
@@ -216,6 +217,7 @@ def _fit(
         rivals,
         worst.rms,
         worst.name or "the data",
+        " degrees" if isinstance(worst.curve, Curve) and worst.curve.delta_data is not None else "",
         structure.place if structure else "",
         dark,
         identifiability.naming(next(iter(parameters)), conclusion.correlated),
