@@ -291,6 +291,7 @@ IN_EVERY_RUN = ("README.md", "docs/howto/uncertainty.md")
 LONG_BLOCKS = (
     "docs/howto/loops.md",
     "docs/howto/maps.md",
+    "docs/howto/mueller.md",
     "docs/howto/repeats.md",
     "docs/reference/colour.md",
 )
