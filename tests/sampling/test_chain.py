@@ -15,7 +15,12 @@ import pytest
 
 import pellicle as pl
 from pellicle.errors import DataError, UsageError
+from pellicle.fitting.progress import quiet
 from pellicle.reporting.netcdf import write_netcdf
+from pellicle.sampling.chain import empty
+from pellicle.sampling.modes import Modes
+from pellicle.sampling.run import run
+from pellicle.sampling.target import Target
 
 HERE = Path(__file__).parent
 RUN = """
@@ -100,6 +105,21 @@ def test_an_interrupted_chain_keeps_what_it_has(bands, film, tmp_path):
     found = pl.sample(bands(), film(), chain=path, progress=impatient)
     assert found.checks.steps == 200
     assert len(_draws(path)) == 200
+
+
+def test_an_interrupted_density_prints_nothing(capfd):
+    """stdout is the result's."""
+    one = Modes(np.array([[0.5]]), np.array([[[0.1]]]), np.array([1.0]))
+    calls = iter(range(10))
+
+    def density(units: np.ndarray) -> np.ndarray:
+        if next(calls):
+            raise KeyboardInterrupt
+        return np.zeros(len(units))
+
+    with pytest.raises(KeyboardInterrupt):
+        run(Target(density, 8), one, empty(8, 1, 0), 100, lambda chain: None, quiet)
+    assert capfd.readouterr().out == ""
 
 
 @pytest.mark.filterwarnings("ignore:Error writing persistent compilation cache")

@@ -169,6 +169,8 @@ def _stretch(steps: int, fit: RankedMinima) -> Interval:
     random = np.random.default_rng(0)
     start = np.clip(fit.minima.units[0] + 1e-4 * random.standard_normal((_WALKERS, size)), 1e-9, 1 - 1e-9)
     sampler = emcee.EnsembleSampler(_WALKERS, size, target, vectorize=True)
+    # emcee's wrapper prints to stdout where the target is interrupted
+    sampler.log_prob_fn = target  # pyright: ignore[reportAttributeAccessIssue]
     sampler.run_mcmc(start, steps, skip_initial_state_check=True)
     return _quantiles(np.asarray(sampler.get_chain(discard=steps // 2)))
 

@@ -42,7 +42,7 @@ def error_label(methods: MethodComparison, size: str = "") -> str:
         return f"relative error{of}"
     if size and methods.unit == "degrees":
         return f"error{of} degrees"
-    return f"error{of} in {methods.unit}"
+    return f"error{of} in {'Mueller elements' if methods.unit == 'mueller' else methods.unit}"
 
 
 def time_unit(methods: MethodComparison) -> tuple[str, float]:

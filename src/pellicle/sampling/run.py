@@ -68,6 +68,8 @@ def _extended(target: Target, modes: Modes, chain: Chain, steps: int) -> Chain:
         start = modes.start(walkers, random)
         state = emcee.State(start, log_prob=target(start), random_state=random.get_state(legacy=True))
     sampler = emcee.EnsembleSampler(walkers, size, target, moves=moves(modes), vectorize=True)
+    # emcee's wrapper prints to stdout where the target is interrupted
+    sampler.log_prob_fn = target  # pyright: ignore[reportAttributeAccessIssue]
     sampler.run_mcmc(state, steps, skip_initial_state_check=True)
     more = Chain(
         np.asarray(sampler.get_chain()),
