@@ -95,7 +95,9 @@ def _data(scene: Scene) -> dict[str, Any]:
     if isinstance(light.angle, Free) or np.ndim(light.angle) or light.angle != 0:
         found["angle"] = number(light.angle, "the angle of incidence")
     if light.azimuth is not None:
-        found["azimuth"] = number(light.azimuth, "the azimuth of the sample")
+        several = np.ndim(light.azimuth) and light.wavelength is None  # each for all wavelengths
+        own = np.asarray(light.azimuth, float).tolist()
+        found["azimuth"] = own if several else number(light.azimuth, "the azimuth of the sample")
     if light.polarisation != "unpolarised":
         found["polarisation"] = light.polarisation
     if light.wavelength is not None:
