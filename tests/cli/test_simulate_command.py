@@ -176,3 +176,16 @@ def test_bad_depth_flags(pellicle, recipe, tmp_path, flags, said):
     pellicle("simulate", recipe, "--out", tmp_path / "x", *flags).refused(2, said)
     assert "--depth" in pellicle("simulate", recipe, "--out", tmp_path / "x", "--json").err
     assert not (tmp_path / "x").exists()
+
+
+def test_each_azimuth_of_a_list_has_its_rows(pellicle, tmp_path):
+    path, out = tmp_path / "turned.toml", tmp_path / "turned.csv"
+    text = RECIPE.replace('signal = "R"', 'signal = "generalised-psi-delta"\nangle = 60\nazimuth = [0, 45]')
+    path.write_text(text.replace("noise = 0.002", 'noise = 0.05\nelements = ["asp", "ane"]'))
+    assert pellicle("simulate", path, "--out", out).code == 0
+    spectrum = pl.read_spectrum(out)
+    assert spectrum.ratios == ("ane", "asp")
+    assert [(own.azimuth, len(own.rows)) for own in spectrum.settings] == [(0.0, 100), (45.0, 100)]
+    assert "psi_asp_deg,delta_asp_deg,psi_ane_deg,delta_ane_deg,sigma" in out.read_text()
+    (about,) = pellicle("read", out, "--json").objects
+    assert about["azimuths_deg"] == [0.0, 45.0]
