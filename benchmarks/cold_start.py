@@ -4,19 +4,18 @@ Run `python benchmarks/cold_start.py`. First fits start with an empty cache of p
 ones with a filled cache. The commands take turns; the table gives medians of wall and processor time (s), and
 their ratios to bare JAX, the least that any program of JAX takes.
 
-Linux, 2 cores with 8 other processes waiting for them, which doubles the wall times and hardly changes the
-ratios of processor time; JAX 0.10.2, Python 3.11, medians of 5:
+Linux, 2 cores that did nothing else; JAX 0.10.2, Python 3.11, medians of 5:
 
                                           wall s   cpu s  wall ratio  cpu ratio
-    bare JAX                                2.41    0.96        1.00       1.00
-    pellicle --help                         0.57    0.25        0.24       0.26
-    R by a recipe                           4.41    1.79        1.84       1.87
-    R, CSV by flags                         3.99    1.60        1.66       1.66
-    psi and delta, recipe                   3.51    1.83        1.46       1.91
-    R by a recipe, --out                    4.70    2.65        1.96       2.76
-    R by a recipe, empty cache             12.54    4.85        5.21       5.06
-    R, CSV by flags, empty cache            9.42    4.15        3.92       4.33
-    psi and delta, recipe, empty cache     15.26    7.32        6.34       7.63
+    bare JAX                                0.63    0.73        1.00       1.00
+    pellicle --help                         0.17    0.16        0.26       0.23
+    R by a recipe                           1.37    1.68        2.18       2.31
+    R, CSV by flags                         1.53    1.83        2.44       2.51
+    psi and delta, recipe                   1.55    1.65        2.47       2.26
+    R by a recipe, --out                    2.29    2.58        3.65       3.54
+    R by a recipe, empty cache              3.98    4.92        6.34       6.76
+    R, CSV by flags, empty cache            3.95    5.03        6.31       6.91
+    psi and delta, recipe, empty cache      5.40    6.63        8.61       9.11
 """
 
 from __future__ import annotations
