@@ -49,6 +49,8 @@ def test_a_file_may_have_some_of_them(write):
         read_spectrum(path, elements=["aps"])
     with pytest.raises(UsageError, match="must be among ane, aps, asp, not 'm12'"):
         read_spectrum(path, signal=SIGNAL, elements=["m12"])
+    with pytest.raises(UsageError, match="must be among ane, aps, asp, not 'xyz'"):
+        read_spectrum(path, elements=["ane", "xyz"])
     with pytest.raises(DataError, match="has 'psi_ane' alone, and each ratio needs psi and delta"):
         read_spectrum(write("nm,psi_ane,psi_aps,delta_aps", *COLUMNS[:1], *COLUMNS[2:4]))
 

@@ -60,7 +60,7 @@ def candidates(
         )
     own = table.layout.name
     found = []
-    ratios = elements is not None and set(elements) <= set(generalised.RATIOS)
+    ratios = elements is not None and not set(elements).isdisjoint(generalised.RATIOS)
     wanted = signal == mueller.SIGNAL or (signal is None and elements is not None and not ratios)
     generally = signal == generalised.SIGNAL or (signal is None and ratios)
     if generally or (
