@@ -171,6 +171,20 @@ def test_weak_absorption_is_proportional_to_k_and_has_its_slope():
     assert slope > 1
 
 
+def test_a_second_call_compiles_nothing(caplog):
+    calls = [
+        lambda k: pl.absorptance(500.0, 30.0, 2.0 + 1j * k, 1.5),
+        lambda k: pl.field(500.0, 30.0, 2.0 + 1j * k, 1.5, 10.0),
+        lambda k: pl.ellipsometry(500.0, 30.0, 2.0 + 1j * k, 1.5, angle=60.0),
+    ]
+    for call in calls:
+        call(0.1)
+    with jax.log_compiles():
+        for call in calls:
+            call(0.2)
+    assert not [record.getMessage() for record in caplog.records if "ompil" in record.getMessage()]
+
+
 def test_what_is_refused():
     with pytest.raises(ValueError, match="ambient must not absorb"):
         pl.absorptance(500.0, 10.0, 2.0, 1.5, ambient=1.3 + 0.1j)

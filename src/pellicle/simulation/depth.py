@@ -6,6 +6,7 @@ the input.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -16,7 +17,7 @@ from pellicle.errors import UsageError
 from pellicle.optics.absorption import absorptances
 from pellicle.optics.field import fields
 from pellicle.optics.interface import transverse
-from pellicle.optics.pair import to_complex
+from pellicle.optics.pair import Number, to_complex
 from pellicle.simulation.film_arguments import Medium, film_arguments, floating
 
 
@@ -74,7 +75,11 @@ def absorptance(
 def _absorptances(*arguments: Any) -> tuple[Any, ...]:
     film = film_arguments(*arguments)
     phases = [2 * jnp.pi / film.wavelength * d for d in film.thicknesses]
-    return absorptances(film.ambient, film.layers, film.substrate, phases, film.angle, film.polarisations)
+    media = (film.ambient, film.layers, film.substrate)
+    return _compiled_absorptances(*media, phases, film.angle, polarisations=film.polarisations)
+
+
+_compiled_absorptances = jax.jit(absorptances, static_argnames="polarisations")
 
 
 def field(
@@ -118,12 +123,26 @@ def _field(*arguments_and_depth: Any) -> Field:
     film = film_arguments(*arguments)
     if isinstance(depth, str):
         raise UsageError(f"`depth` must be a number or an array, not {depth!r}")
-    wavenumber = 2 * jnp.pi / film.wavelength
     angle = floating(0.0) if film.angle is None else film.angle
     media = (film.ambient, film.layers, film.substrate)
-    found = fields(*media, wavenumber, film.thicknesses, floating(depth), angle, film.polarisations)
+    lengths = (2 * jnp.pi / film.wavelength, film.thicknesses, floating(depth))
+    return _fields(*media, *lengths, angle, polarisations=film.polarisations)
+
+
+@partial(jax.jit, static_argnames="polarisations")
+def _fields(
+    ambient: Number,
+    layers: list[Number],
+    substrate: Number,
+    wavenumber: Any,
+    thicknesses: list[Any],
+    depth: Any,
+    angle: Any,
+    polarisations: str,
+) -> Field:
+    found = fields(ambient, layers, substrate, wavenumber, thicknesses, depth, angle, polarisations)
     energy = sum(each.energy() * (1 / len(found)) for each in found)
-    _, q0 = transverse(film.ambient, angle)
+    _, q0 = transverse(ambient, angle)
     incident = jnp.sqrt(q0)  # |E| of the incident wave is 1, of each of these 1/√q₀
     turns = [jax.lax.complex(incident * jnp.cos(x.phase), incident * jnp.sin(x.phase)) for x in found]
 

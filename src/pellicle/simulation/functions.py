@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Complex, Float
 
@@ -15,6 +16,7 @@ from pellicle.dispersion.anisotropic import Anisotropic
 from pellicle.optics import coherent, response
 from pellicle.optics.ellipsometry import normalised, psi_delta, stokes
 from pellicle.optics.pair import to_complex
+from pellicle.optics.response import Response
 from pellicle.scene.layers import medium
 from pellicle.simulation.film_arguments import Medium, film_arguments, floating, index_at
 
@@ -119,6 +121,11 @@ def ellipsometry(
     """
     angle = floating(angle)  # also at 0 both polarisations are needed
     s, p = _responses(wavelength, thickness, layer, substrate, ambient, angle, "unpolarised")
+    return _psi_delta(s, p)
+
+
+@jax.jit
+def _psi_delta(s: Response, p: Response) -> tuple[Any, Any]:
     return psi_delta(*normalised(stokes(s, p)))
 
 
@@ -150,4 +157,8 @@ def _responses(wavelength, thickness, layer, substrate, ambient, angle, polarisa
     film = film_arguments(wavelength, thickness, layer, substrate, ambient, angle, polarisation)
     phases = [2 * jnp.pi / film.wavelength * d for d in film.thicknesses]
     media = (film.ambient, film.layers, film.substrate)
-    return coherent.responses(*media, phases, film.angle, film.polarisations, propagating=film.propagating)
+    static = {"polarisations": film.polarisations, "propagating": film.propagating}
+    return _compiled_responses(*media, phases, film.angle, **static)
+
+
+_compiled_responses = jax.jit(coherent.responses, static_argnames=("polarisations", "propagating"))
