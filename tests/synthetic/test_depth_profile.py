@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import jax
 import numpy as np
 import pytest
 import tmm
@@ -25,6 +26,14 @@ SUBSTRATE = 3.0 + 0.1j
 def both(request):
     scene = pl.Scene(LAYERS, SUBSTRATE, light=pl.Light(angle=ANGLE, polarisation=request.param))
     return request.param, pl.depth_profile(scene, 550.0, NM)
+
+
+def test_a_film_of_another_thickness_compiles_nothing(caplog):
+    first = pl.depth_profile(pl.Scene(pl.Layer(2.1 + 0.1j, 80.0), 1.5), 550.0, NM)
+    with jax.log_compiles():
+        other = pl.depth_profile(pl.Scene(pl.Layer(2.2 + 0.1j, 90.0), 1.5), 550.0, NM)
+    assert not [record.getMessage() for record in caplog.records if "ompil" in record.getMessage()]
+    assert np.all(other.absorptance != first.absorptance)
 
 
 @pytest.mark.slow  # compiles many stacks; tests/simulation/test_depth.py has stacks as tmm

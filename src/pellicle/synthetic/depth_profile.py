@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import equinox as eqx
@@ -12,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pellicle.effects.film import exact
+from pellicle.effects.plan import Plan
 from pellicle.errors import UsageError
 from pellicle.optics.interface import transverse
 from pellicle.scene.film import Scene, all_collected, groups, sliced, with_wavelength
@@ -146,31 +148,43 @@ def _slices_of(item: Layer | Interface) -> int:
     return SLICES if isinstance(item.material, Graded) else 1
 
 
-def _polarisations(plan: Any, scene: Scene) -> str:
+def _polarisations(plan: Plan, scene: Scene) -> str:
     if not plan.on("oblique"):
         return "s"
     return "sp" if scene.light.polarisation == "unpolarised" else scene.light.polarisation
 
 
-def _powers(plan: Any, scene: Scene, letter: str) -> Any:
-    found = coherent_groups(plan, scene)
-    return absorbed_power(plan, found, groups(scene)[1], jnp.asarray(scene.light.wavelength), letter)
-
-
-def _mean(plan: Any, scene: Scene) -> tuple[Any, ...]:
+def _mean(plan: Plan, scene: Scene) -> tuple[Any, ...]:
     """R, T, and the absorptances of the layers of each group and of the plates, over the polarisations."""
-    letters = _polarisations(plan, scene)
+    found = _mean_powers(tabulated(scene), plan=plan.static_key, letters=_polarisations(plan, scene))
+    return jax.tree.map(np.asarray, found)
 
-    @jax.jit
-    def compute(scene: Scene) -> Any:
-        each = [_powers(plan, scene, letter)[:4] for letter in letters]
-        return jax.tree.map(lambda *x: sum(x) / len(x), *each)
 
-    return jax.tree.map(np.asarray, compute(tabulated(scene)))
+@partial(jax.jit, static_argnames=("plan", "letters"))
+def _mean_powers(scene: Scene, plan: Plan, letters: str) -> Any:
+    found, wavelength = coherent_groups(plan, scene), jnp.asarray(scene.light.wavelength)
+    each = [absorbed_power(plan, found, groups(scene)[1], wavelength, letter)[:4] for letter in letters]
+    return jax.tree.map(lambda *x: sum(x) / len(x), *each)
+
+
+@partial(jax.jit, static_argnames=("plan", "letters", "position"))
+def _at_depths(
+    scene: Scene, depth: Any, thicknesses: list[Any], plan: Plan, letters: str, position: int
+) -> tuple[Any, Any]:
+    """|E|² and the absorbed share of the power per nm at depths of a group, at one wavelength."""
+    found, wavelength = coherent_groups(plan, scene), jnp.asarray(scene.light.wavelength)
+    thicknesses = [d * jnp.ones_like(wavelength) for d in thicknesses]
+    per_power = density = jnp.zeros_like(depth)
+    for letter in letters:
+        powers = absorbed_power(plan, found, groups(scene)[1], wavelength, letter)
+        E, loss = energy(found, position, wavelength, thicknesses, depth, powers, letter)
+        per_power += E / len(letters)
+        density += 2 * jnp.pi / wavelength * loss * E / len(letters)
+    return transverse(found[0].above, found[0].angle)[1] * per_power, density
 
 
 def _sections(
-    plan: Any, scene: Scene, chosen: np.ndarray, names: list[str], runs: list[list[tuple[str, int]]]
+    plan: Plan, scene: Scene, chosen: np.ndarray, names: list[str], runs: list[list[tuple[str, int]]]
 ) -> tuple[Section, ...]:
     letters = _polarisations(plan, scene)
     edges = ["ambient", *names, "substrate" if scene.substrate.back is None else "behind the substrate"]
@@ -187,20 +201,16 @@ def _sections(
         )
         depth, medium = _depths(layers, faces, slices, edges[i], edges[i + 1])
 
-        @jax.jit
-        def compute(scene: Scene, depth: Any, i: int = i, depths: list[Any] = depths) -> tuple[Any, Any]:
-            found, wavelength = coherent_groups(plan, scene), jnp.asarray(scene.light.wavelength)
-            thicknesses = [d * jnp.ones_like(wavelength) for d in depths]
-            per_power = density = jnp.zeros_like(depth)
-            for letter in letters:
-                powers = absorbed_power(plan, found, groups(scene)[1], wavelength, letter)
-                E, loss = energy(found, i, wavelength, thicknesses, depth, powers, letter)
-                per_power += E / len(letters)
-                density += 2 * jnp.pi / wavelength * loss * E / len(letters)
-            return transverse(found[0].above, found[0].angle)[1] * per_power, density
-
         rows = [
-            compute(tabulated(with_wavelength(scene, chosen[j : j + 1])), depth) for j in range(len(chosen))
+            _at_depths(
+                tabulated(with_wavelength(scene, chosen[j : j + 1])),
+                depth,
+                depths,
+                plan=plan.static_key,
+                letters=letters,
+                position=i,
+            )
+            for j in range(len(chosen))
         ]
         intensity, absorbed = (np.array(x) for x in zip(*rows, strict=True))
         sections.append(Section(layers, edges[i], edges[i + 1], medium, depth, intensity, absorbed))
