@@ -72,6 +72,12 @@ def test_an_interruption_keeps_whole_data_sets(several):
     assert compared.results[0].datasets == 1
 
 
+def test_the_time_limit_ends_after_a_whole_data_set(several):
+    compared = compare_solvers(several, NOISE, quiet, (Solver("oracle", "", from_truth),), time_limit=0.0)
+    assert not compared.interrupted
+    assert (compared.results[0].datasets, compared.requested) == (1, len(several))
+
+
 @pytest.mark.slow
 def test_every_solver_finds_the_only_minimum():
     """Bounds so narrow that there is one: 40 nm, a fifth of a fringe."""

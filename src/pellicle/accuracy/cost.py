@@ -52,13 +52,15 @@ def cost(
     tolerance: float | None = None,
     noise: float | None = None,
     datasets: int = 20,
+    time_limit: float = 120.0,
     progress: Progress = quiet,
 ) -> Cost:
     """Measure every method of computing the signal of a scene at `wavelength` (nm), and of fitting it.
 
     `reference` is "float64" or "mpmath". `tolerance` is in the unit of the signal: a fraction, or degrees on
     the sphere of N, C and S; its default is the `noise`, or else 0.001 (0.1 degrees). `datasets` spectra are
-    simulated with that noise, or else noise equal to the tolerance, and fitted by every solver.
+    simulated with that noise, or else noise equal to the tolerance, and fitted by every solver. `time_limit`
+    (s) ends these fits, and then their intervals, after as many data sets as it allows.
 
     **Raises:** UsageError for a tolerance that is not above zero, for a reference that cannot compute the
     scene, and for a scene whose signal is 0 everywhere.
@@ -79,6 +81,7 @@ def cost(
         noise = tolerance if noise is None else noise
         with_instrument = eqx.tree_at(lambda s: s.instrument, one.scene, scene.instrument)
         data = data_sets(one, with_instrument, noise, datasets)
-        solvers = compare_solvers(data, noise, progress)
-        intervals = None if solvers.interrupted else compare_intervals(data, progress)
-        return Cost(methods, solvers, intervals=intervals)
+        solvers = compare_solvers(data, noise, progress, time_limit=time_limit)
+        if solvers.interrupted:
+            return Cost(methods, solvers)
+        return Cost(methods, solvers, intervals=compare_intervals(data, progress, time_limit=time_limit))

@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from pellicle.accuracy.measure import first_runs, mark_pareto
+from pellicle.accuracy.measure import first_runs, mark_pareto, within
 from pellicle.accuracy.simulated_data import DataSet
 from pellicle.fitting.conclusion import linearised
 from pellicle.fitting.neighbourhood import neighbourhood
@@ -69,8 +69,12 @@ class IntervalResult:
 
 @dataclass
 class IntervalComparison:
-    """Results of all methods of one case, the fastest first, and the methods left out, with why."""
+    """Results of all methods of one case, the fastest first, and the methods left out, with why.
 
+    `requested` counts the data sets that were asked for, of which the time limit may allow fewer.
+    """
+
+    requested: int = 0
     results: list[IntervalResult] = field(default_factory=list)
     left_out: dict[str, str] = field(default_factory=dict)
     interrupted: bool = False
@@ -82,16 +86,23 @@ class IntervalComparison:
         return min(good, key=lambda result: result.seconds).name if good else None
 
 
-def compare_intervals(data: Sequence[DataSet], progress: Progress) -> IntervalComparison:
-    """Compute intervals for every data set by every method. Ctrl-C ends this and keeps the results so far."""
-    comparison, runs = IntervalComparison(), []
+def compare_intervals(
+    data: Sequence[DataSet], progress: Progress, *, time_limit: float = math.inf
+) -> IntervalComparison:
+    """Compute intervals for every data set by every method.
+
+    No data set begins later than `time_limit` seconds after the methods are compiled. Ctrl-C ends this and
+    keeps the results so far.
+    """
+    comparison, runs = IntervalComparison(len(data)), []
     try:
-        fits = [rank(one.problem, search(one.problem, quiet)).counted for one in data]
-        first = lambda method: method.intervals(fits[0])  # noqa: E731
+        fit = _fit(data[0])
+        first = lambda method: method.intervals(fit)  # noqa: E731
         for method, seconds in first_runs(INTERVAL_METHODS, first, comparison.left_out, progress):
             runs.append(_Run(method, seconds))
-        for done, (one, fit) in enumerate(zip(data, fits, strict=True)):
+        for done, one in enumerate(within(data, time_limit)):
             progress("intervals", done, len(data))
+            fit = _fit(one)
             for run in runs:
                 run.add(one, fit)
     except KeyboardInterrupt:
@@ -100,6 +111,10 @@ def compare_intervals(data: Sequence[DataSet], progress: Progress) -> IntervalCo
     comparison.results = sorted(results, key=lambda result: result.seconds)
     mark_pareto(comparison.results)
     return comparison
+
+
+def _fit(data: DataSet) -> RankedMinima:
+    return rank(data.problem, search(data.problem, quiet)).counted
 
 
 @dataclass

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import statistics
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
@@ -193,6 +193,16 @@ class Installable(Protocol):
 
 
 Kind = TypeVar("Kind", bound=Installable)
+Item = TypeVar("Item")
+
+
+def within(items: Iterable[Item], seconds: float) -> Iterator[Item]:
+    """Yield the first item, and further ones until `seconds` have passed since then."""
+    began = time.perf_counter()
+    for item in items:
+        yield item
+        if time.perf_counter() - began > seconds:
+            return
 
 
 def first_runs(

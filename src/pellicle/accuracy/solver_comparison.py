@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pellicle.accuracy.measure import first_runs, mark_pareto
+from pellicle.accuracy.measure import first_runs, mark_pareto, within
 from pellicle.accuracy.simulated_data import DataSet, deviances
 from pellicle.accuracy.solvers import SOLVERS, Solver, from_truth
 from pellicle.fitting.progress import Progress
@@ -38,9 +38,13 @@ class SolverResult:
 
 @dataclass
 class SolverComparison:
-    """Results of all solvers of one case, the fastest first, and the solvers left out, with why."""
+    """Results of all solvers of one case, the fastest first, and the solvers left out, with why.
+
+    `requested` counts the data sets that were asked for, of which the time limit may allow fewer.
+    """
 
     noise: float
+    requested: int = 0
     results: list[SolverResult] = field(default_factory=list)
     left_out: dict[str, str] = field(default_factory=dict)
     interrupted: bool = False
@@ -90,14 +94,23 @@ def _deviance(data: DataSet, unit: np.ndarray) -> float:
 
 
 def compare_solvers(
-    data: Sequence[DataSet], noise: float, progress: Progress, solvers: Sequence[Solver] = SOLVERS
+    data: Sequence[DataSet],
+    noise: float,
+    progress: Progress,
+    solvers: Sequence[Solver] = SOLVERS,
+    *,
+    time_limit: float = np.inf,
 ) -> SolverComparison:
-    """Fit every data set with every solver in turn. Ctrl-C ends this and keeps the results so far."""
-    comparison, runs = SolverComparison(noise), []
+    """Fit every data set with every solver in turn.
+
+    No data set begins later than `time_limit` seconds after the solvers are compiled. Ctrl-C ends this and
+    keeps the results so far.
+    """
+    comparison, runs = SolverComparison(noise, len(data)), []
     try:
         for solver, seconds in first_runs(solvers, lambda s: s.find(data[0]), comparison.left_out, progress):
             runs.append(_Run(solver, seconds))
-        for done, one in enumerate(data):
+        for done, one in enumerate(within(data, time_limit)):
             progress("data sets", done, len(data))
             least = _deviance(one, from_truth(one))
             for run in runs:

@@ -72,6 +72,7 @@ def cost(
     tolerance: float | None = None,
     noise: float | None = None,
     datasets: int = 20,
+    time_limit: float = 120.0,
     space: str | None = None,
     angle: ArrayLike | None = None,
     progress: Progress = quiet,
@@ -93,6 +94,7 @@ def cost(
     tolerance: float | None = None,
     noise: float | None = None,
     datasets: int = 20,
+    time_limit: float = 120.0,
     space: str | None = None,
     angle: ArrayLike | None = None,
     progress: Progress = quiet,
@@ -113,6 +115,8 @@ def cost(
       tolerance. A noise without a tolerance is the tolerance too. (`Scene` only)
     - `datasets`: number of simulated spectra that every solver fits; 0 leaves the solvers out.
       (`Scene` only)
+    - `time_limit`: seconds after which no further data set is fitted, and then none's intervals are computed.
+      Compilation is not counted. (`Scene` only)
     - `space`: a colour space such as "srgb", for the methods of integrating the colours of a film at `angle`
       of incidence in degrees, (angles,): mean ΔE2000 of the observer 1931 under D65, 0.5 by default.
       (`Scene` only)
@@ -149,5 +153,6 @@ def cost(
         tolerance=tolerance,
         noise=noise,
         datasets=datasets,
+        time_limit=time_limit,
         progress=progress,
     )

@@ -30,6 +30,9 @@ def cost(
     datasets: Annotated[
         int, Parameter(help="Number of simulated spectra that every solver fits; 0 for no solvers.")
     ] = 20,
+    time_limit: Annotated[
+        float, Parameter(help="Seconds after which no further simulated spectrum is fitted.")
+    ] = 120.0,
     out: Annotated[str | None, Parameter(help="Folder for report, figure and tables.")] = None,
     json: Annotated[bool, Parameter(help="Print one JSON object.", negative="")] = False,
 ) -> int:
@@ -44,6 +47,8 @@ def cost(
         raise UsageError(f"--tolerance must be above zero, got {tolerance:g}: give the largest error")
     if datasets < 0:
         raise UsageError(f"--datasets must not be negative, got {datasets}")
+    if not time_limit > 0:
+        raise UsageError(f"--time-limit must be above zero, got {time_limit:g} s")
     described = read_recipe(recipe)
     options: dict[str, Any]
     if isinstance(described, SurfaceRecipe):
@@ -64,7 +69,7 @@ def cost(
     else:
         scene, nm = measured_scene(described)
         noise = described.tables.data.noise
-        options = {"wavelength": nm, "reference": reference, "noise": noise, "datasets": datasets}
+        options = {"wavelength": nm, "reference": reference, "noise": noise, "datasets": datasets, "time_limit": time_limit}
     if out is not None:
         check_folder(out)
     start(keep=False)

@@ -31,6 +31,9 @@ def text(cost: Cost | SurfaceCost, name: str = "scene") -> str:
         blocks = [_methods(cost.methods, name)]
         blocks.append(f"No fits: {cost.no_solvers}.\n" if cost.solvers is None else _solvers(cost.solvers))
         blocks += [] if cost.intervals is None else [_intervals(cost.intervals)]
+        parts = [part for part in (cost.solvers, cost.intervals) if part is not None]
+        if not cost.interrupted and any(_done(part) < part.requested for part in parts):
+            blocks.append("The time limit ended the data sets early: --time-limit 600 allows ten minutes.\n")
     blocks += ["Interrupted: these are the measurements until then.\n"] if cost.interrupted else []
     return "\n".join(blocks)
 
@@ -85,10 +88,19 @@ def _compared(methods: MethodComparison) -> str:
     return f"{methods.wavelengths} wavelength{several}, the largest error of {methods.draws} {draws}"
 
 
+def _done(comparison: SolverComparison | IntervalComparison) -> int:
+    return max((result.datasets for result in comparison.results), default=0)
+
+
+def _counted(comparison: SolverComparison | IntervalComparison) -> str:
+    """Number of data sets, and of how many where the time limit or Ctrl-C ended them."""
+    done, requested = _done(comparison), comparison.requested
+    return f"{done}" if done == requested else f"{done} (of {requested})"
+
+
 def _solvers(solvers: SolverComparison) -> str:
-    count = max((solver.datasets for solver in solvers.results), default=0)
     title = (
-        f"Fits of {count} simulated spectra with noise {solvers.noise:g}, their true values anywhere between"
+        f"Fits of {_counted(solvers)} simulated spectra with noise {solvers.noise:g}, their true values anywhere between"
         " the bounds; errors as a share of the bounds"
     )
     columns: _Columns = {
@@ -107,9 +119,8 @@ def _solvers(solvers: SolverComparison) -> str:
 
 
 def _intervals(intervals: IntervalComparison) -> str:
-    count = max((way.datasets for way in intervals.results), default=0)
     title = (
-        f"95 % intervals of the same {count} data sets: share that contains the true value, width as a share"
+        f"95 % intervals of {_counted(intervals)} of these data sets: share that contains the true value, width as a share"
         " of the bounds, and time after the fit"
     )
     columns: _Columns = {
