@@ -10,6 +10,7 @@ from pellicle.reporting.drawing import save_figure
 from pellicle.reporting.fit_figure import draw
 from pellicle.reporting.fit_text import report
 from pellicle.reporting.json_record import to_json
+from pellicle.reporting.page.data_figures import of_part
 
 
 def labels(drawn) -> list[str]:
@@ -121,3 +122,18 @@ def test_the_table_holds_model_and_residuals(spectroscopic):
 def test_the_record_names_the_signal_and_counts_points(angular):
     assert to_json(angular)["data"]["signal"] == "psi-delta"
     assert to_json(angular)["data"]["points"] == 11
+
+
+def test_reflectances_of_one_wavelength_are_drawn_against_the_angle(angular, with_part):
+    """As those of a laser: one wavelength has no spectrum, in the figure as in the page."""
+    spectrum = dataclasses.replace(
+        angular.spectrum, signal="R", delta=None, values=angular.spectrum.values / 100
+    )
+    curve = dataclasses.replace(angular.curve, delta_data=None, delta_model=None)
+    of_laser = with_part(angular, data=spectrum, curve=curve)
+    values, residuals = draw(of_laser).axes[:2]
+    assert named(values) == ["data", "fit"]
+    assert residuals.get_xlabel() == "angle of incidence (degrees)"
+    for line in (*values.lines, residuals.lines[0]):
+        np.testing.assert_array_equal(line.get_xdata(), spectrum.angle)
+    assert of_part(of_laser, 0)["layout"]["xaxis"]["title"]["text"] == "angle of incidence (degrees)"

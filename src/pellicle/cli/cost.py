@@ -69,7 +69,13 @@ def cost(
     else:
         scene, nm = measured_scene(described)
         noise = described.tables.data.noise
-        options = {"wavelength": nm, "reference": reference, "noise": noise, "datasets": datasets, "time_limit": time_limit}
+        options = {
+            "wavelength": nm,
+            "reference": reference,
+            "noise": noise,
+            "datasets": datasets,
+            "time_limit": time_limit,
+        }
     if out is not None:
         check_folder(out)
     start(keep=False)

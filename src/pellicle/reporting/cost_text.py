@@ -100,8 +100,8 @@ def _counted(comparison: SolverComparison | IntervalComparison) -> str:
 
 def _solvers(solvers: SolverComparison) -> str:
     title = (
-        f"Fits of {_counted(solvers)} simulated spectra with noise {solvers.noise:g}, their true values anywhere between"
-        " the bounds; errors as a share of the bounds"
+        f"Fits of {_counted(solvers)} simulated spectra with noise {solvers.noise:g}, their true values"
+        " anywhere between the bounds; errors as a share of the bounds"
     )
     columns: _Columns = {
         "solver": lambda solver: solver.name,
@@ -120,8 +120,8 @@ def _solvers(solvers: SolverComparison) -> str:
 
 def _intervals(intervals: IntervalComparison) -> str:
     title = (
-        f"95 % intervals of {_counted(intervals)} of these data sets: share that contains the true value, width as a share"
-        " of the bounds, and time after the fit"
+        f"95 % intervals of {_counted(intervals)} of these data sets: share that contains the true value,"
+        " width as a share of the bounds, and time after the fit"
     )
     columns: _Columns = {
         "interval": lambda way: way.name,

@@ -12,17 +12,21 @@ import numpy as np
 from pellicle.fitting.curves import BIREFRINGENCE, BrdfCurve, ColourCurve, Curve, Index
 from pellicle.fitting.depth_profiles import FittedProfile, fitted_profiles
 from pellicle.fitting.status import RIVAL
-from pellicle.reporting import brdf_figure, fitted_colours, generalised_figure, mueller_figure, psi_delta
+from pellicle.reporting import (
+    brdf_figure,
+    fitted_colours,
+    generalised_figure,
+    intensity_figure,
+    mueller_figure,
+    psi_delta,
+)
 from pellicle.reporting.drawing import (
     ABOVE,
     BLACK,
     BLUE,
-    FITTED,
-    GAP,
     GREEN,
     GREY,
     ORANGE,
-    marker_size,
     new_figure,
 )
 
@@ -50,7 +54,6 @@ _LABEL: dict[str, Any] = {
     "fontsize": "small",
     "bbox": {"facecolor": "white", "alpha": 0.8, "edgecolor": "none", "pad": 0.5},
 }
-_SIGNALS = {"R": "reflectance", "T": "transmittance"}
 
 
 class _Panel(NamedTuple):
@@ -132,7 +135,7 @@ def _panels_of_data(part: Part) -> list[_Panel]:
     elif part.spectrum.elements:
         rows = [(mueller_figure.matrix, 5.4, 0), (mueller_figure.residuals, 1.5, 2)]
     elif part.spectral.delta_data is None:
-        rows = [(_data, 3.0, 0), (_residuals, 1.3, 1)]
+        rows = [(intensity_figure.intensity, 3.0, 0), (intensity_figure.residuals, 1.3, 1)]
     else:
         rows = [(psi_delta.psi, 2.2, 0), (psi_delta.delta, 2.2, 0), (psi_delta.residuals, 1.5, 1)]
         if part.spectral.depolarisation_data is not None:
@@ -160,41 +163,6 @@ def file_names(fit: Fit) -> list[str]:
         path.replace("\\", "/").rsplit("/", 1)[-1] + (f" [{', '.join(names)}]" if names else "")
         for path, names in files
     ]
-
-
-def series(part: Part) -> list[np.ndarray]:
-    """Indices of the points that one line joins: of one angle of incidence and azimuth, without a wide
-    gap."""
-    nm, series = part.spectral.wavelength, []
-    for points, _, _ in part.spectrum.settings:
-        steps = np.diff(nm[points])
-        gaps = np.flatnonzero(steps > GAP * np.median(steps)) if steps.size else []
-        series += np.split(points, np.asarray(gaps, dtype=int) + 1)
-    return series
-
-
-def _data(axes: Axes, part: Part) -> None:
-    curve, data = part.spectral, part.spectrum
-    size = marker_size(curve.wavelength.size)
-    axes.plot(curve.wavelength, curve.data, ".", color=GREY, markersize=size, label="data")
-    for i, line in enumerate(series(part)):
-        axes.plot(curve.wavelength[line], curve.model[line], **FITTED, label="_" if i else "fit")
-    kind = _SIGNALS.get(data.signal) or str(data.signal)
-    axes.set_ylabel(kind if data.calibrated else f"{kind} × unknown scale")
-    axes.tick_params(labelbottom=False)
-    axes.legend(frameon=False, markerscale=3)
-    axes.margins(x=0.01)
-
-
-def _residuals(axes: Axes, part: Part) -> None:
-    curve = part.spectral
-    for i, line in enumerate(series(part)):
-        nm, sigma = curve.wavelength[line], curve.sigma[line]
-        axes.fill_between(nm, -sigma, sigma, color=BLUE, alpha=0.2, lw=0, label="_" if i else "±σ")
-        axes.plot(nm, curve.residual[line], color=BLACK, linewidth=0.8)
-    axes.axhline(0, color=GREY, linewidth=0.6)
-    axes.set(xlabel="wavelength (nm)", ylabel="data − fit")
-    axes.legend(**ABOVE, fontsize="small")
 
 
 def _misfit(axes: Axes, fit: Fit) -> None:

@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from pellicle.data.settings import named
 from pellicle.data.spectrum import Spectrum
-from pellicle.reporting.drawing import GAP
+from pellicle.reporting.drawing import BLACK, BLUE, FITTED, GAP, GREEN, GREY, ORANGE, marker_size
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+MOST_NAMED = 8
+"""Most lines, one for each angle and azimuth, that get a label."""
+_COLOURS = (ORANGE, BLUE, GREEN, BLACK)
+_DASHES = ("-", "--")
 
 
 def abscissa(spectrum: Spectrum) -> tuple[np.ndarray, str]:
@@ -46,3 +56,23 @@ def unbroken(x: np.ndarray, points: np.ndarray, delta: np.ndarray | None = None)
     if delta is not None:
         broken = broken | (np.abs(np.diff(delta[points])) > 180.0)
     return np.split(points, np.flatnonzero(broken) + 1)
+
+
+def data_and_fit(
+    axes: Axes, spectrum: Spectrum, data: np.ndarray, model: np.ndarray, turns: bool = False
+) -> None:
+    """Draw data as points and the model as one line for each angle and azimuth.
+
+    Angles that turn, such as Δ, are interrupted where they pass 360 degrees.
+    """
+    x, _ = abscissa(spectrum)
+    axes.plot(x, data, ".", color=GREY, markersize=marker_size(x.size), label="data")
+    lines = lines_of(spectrum)
+    for i, (points, setting) in enumerate(lines):
+        color, style = _COLOURS[i % len(_COLOURS)], _DASHES[i // len(_COLOURS) % len(_DASHES)]
+        name = "fit" if setting is None else f"fit, {setting}"
+        for j, stroke in enumerate(unbroken(x, points, model if turns else None)):
+            label = "_" if j or len(lines) > MOST_NAMED else name
+            axes.plot(x[stroke], model[stroke], **{**FITTED, "color": color}, linestyle=style, label=label)
+    axes.tick_params(labelbottom=False)
+    axes.margins(x=0.01)

@@ -4,25 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from pellicle.reporting.drawing import ABOVE, BLACK, BLUE, FITTED, GREEN, GREY, ORANGE, marker_size
-from pellicle.reporting.measured_lines import abscissa, lines_of, unbroken
+from pellicle.reporting.drawing import ABOVE, BLACK, BLUE, GREY
+from pellicle.reporting.measured_lines import abscissa, data_and_fit, lines_of, unbroken
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from pellicle.fitting.result import Part
 
-MOST_NAMED = 8
-"""Most lines, one for each angle and azimuth, that get a label."""
-_COLOURS = (ORANGE, BLUE, GREEN, BLACK)
-_DASHES = ("-", "--")
-
 
 def psi(axes: Axes, part: Part) -> None:
     """Draw Ψ of data and model, one line for each angle and azimuth."""
-    _pair(axes, part, part.spectral.data, part.spectral.model)
+    data_and_fit(axes, part.spectrum, part.spectral.data, part.spectral.model)
     axes.set_ylabel("Ψ (degrees)")
     axes.legend(frameon=False, markerscale=3, ncols=2, fontsize="small")
 
@@ -33,7 +26,7 @@ def delta(axes: Axes, part: Part) -> None:
     curve = part.spectral
     assert curve.delta_data is not None
     assert curve.delta_model is not None
-    _pair(axes, part, curve.delta_data, curve.delta_model, turns=True)
+    data_and_fit(axes, part.spectrum, curve.delta_data, curve.delta_model, turns=True)
     axes.set_ylabel("Δ (degrees)")
 
 
@@ -42,7 +35,7 @@ def depolarisation(axes: Axes, part: Part) -> None:
     curve = part.spectral
     assert curve.depolarisation_data is not None
     assert curve.depolarisation_model is not None
-    _pair(axes, part, curve.depolarisation_data, curve.depolarisation_model)
+    data_and_fit(axes, part.spectrum, curve.depolarisation_data, curve.depolarisation_model)
     axes.set_ylabel("depolarisation")
 
 
@@ -59,17 +52,3 @@ def residuals(axes: Axes, part: Part) -> None:
     axes.axhline(0, color=GREY, linewidth=0.6)
     axes.set(xlabel=label, ylabel="data − fit (degrees)")
     axes.legend(**ABOVE, ncols=2, fontsize="small")
-
-
-def _pair(axes: Axes, part: Part, data: np.ndarray, model: np.ndarray, turns: bool = False) -> None:
-    x, _ = abscissa(part.spectrum)
-    axes.plot(x, data, ".", color=GREY, markersize=marker_size(x.size), label="data")
-    lines = lines_of(part.spectrum)
-    for i, (points, setting) in enumerate(lines):
-        color, style = _COLOURS[i % len(_COLOURS)], _DASHES[i // len(_COLOURS) % len(_DASHES)]
-        name = "fit" if setting is None else f"fit, {setting}"
-        for j, stroke in enumerate(unbroken(x, points, model if turns else None)):
-            label = "_" if j or len(lines) > MOST_NAMED else name
-            axes.plot(x[stroke], model[stroke], **{**FITTED, "color": color}, linestyle=style, label=label)
-    axes.tick_params(labelbottom=False)
-    axes.margins(x=0.01)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pellicle.fitting.curves import BrdfCurve, ColourCurve, Curve
-from pellicle.reporting import brdf_figure, fit_figure, fitted_colours, measured_lines
+from pellicle.reporting import brdf_figure, fitted_colours, intensity_figure, measured_lines
 from pellicle.reporting.generalised_figure import NAMES, weighted_delta
 from pellicle.reporting.page.figure import (
     Column,
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
 CHANNELS = "var(--red)", "var(--green)", "var(--blue)", "var(--fourth)"
 _LINES = "var(--fit)", "var(--blue)", "var(--green)", "var(--fourth)"
-_SIGNALS = {"R": "reflectance", "T": "transmittance"}
 
 
 def label(rival: Rival, fit: Fit) -> str:
@@ -82,38 +81,32 @@ def _spectrum(part: Part) -> _Drawn:
         return _mueller(part)
     if curve.delta_data is not None:
         return _psi_delta(part)
-    nm, strokes, data = curve.wavelength, fit_figure.series(part), part.spectrum
-    kind = _SIGNALS.get(data.signal) or str(data.signal)
-    every = np.argsort(nm, kind="stable")[:: thinning(nm.size)]
+    x, abscissa = measured_lines.abscissa(part.spectrum)
+    lines = measured_lines.lines_of(part.spectrum)
+    order = np.argsort(x, kind="stable")[:: thinning(x.size)]
+    of_model, bands, residuals = [], [], []
+    for i, (points, setting) in enumerate(lines):
+        strokes = measured_lines.unbroken(x, points)
+        name = "fit" if setting is None else f"fit, {setting}"
+        trace = line(x, curve.model, strokes, name, _LINES[i % len(_LINES)])
+        of_model.append(trace | {"showlegend": len(lines) <= measured_lines.MOST_NAMED})
+        bands += [band(x[own], -curve.sigma[own], curve.sigma[own], "±σ", "var(--band)") for own in strokes]
+        residuals.append(line(x, curve.residual, strokes, "residual", "var(--data)") | {"showlegend": False})
+    bands = [trace | {"showlegend": not i} for i, trace in enumerate(bands)]
+    of_data = markers(x[order], curve.data[order], "data", "var(--data)")
     panels = [
-        Panel(
-            kind if data.calibrated else f"{kind} × unknown scale",
-            300,
-            [markers(nm[every], curve.data[every], "data", "var(--data)")],
-            [line(nm, curve.model, strokes, "fit", "var(--fit)")],
-        ),
-        Panel(
-            "data − fit",
-            130,
-            [
-                {
-                    **band(nm[own], -curve.sigma[own], curve.sigma[own], "±σ", "var(--band)"),
-                    "showlegend": not i,
-                }
-                for i, own in enumerate(strokes)
-            ],
-            [line(nm, curve.residual, strokes, "residual", "var(--data)") | {"showlegend": False}],
-        ),
+        Panel(intensity_figure.quantity(part.spectrum), 300, [of_data], of_model),
+        Panel("data − fit", 130, bands, residuals),
     ]
     columns = [
-        Column("wavelength (nm)", nm[every]),
-        *_settings(part, every, ""),
-        Column("data", curve.data[every]),
-        Column("fit", curve.model[every]),
-        Column("residual", curve.residual[every]),
-        Column("sigma", curve.sigma[every]),
+        Column(abscissa, x[order]),
+        *_settings(part, order, abscissa),
+        Column("data", curve.data[order]),
+        Column("fit", curve.model[order]),
+        Column("residual", curve.residual[order]),
+        Column("sigma", curve.sigma[order]),
     ]
-    return "wavelength (nm)", panels, columns, {}
+    return abscissa, panels, columns, {}
 
 
 def _settings(part: Part, rows: np.ndarray, abscissa: str) -> list[Column]:
@@ -146,7 +139,8 @@ def _psi_delta(part: Part) -> _Drawn:
             name = "fit" if setting is None else f"fit, {setting}"
             strokes = measured_lines.unbroken(x, points, model if turns else None)
             trace = line(x, model, strokes, name, _LINES[i % len(_LINES)])
-            of_model.append(trace | {"showlegend": not number})
+            shown = not number and len(lines) <= measured_lines.MOST_NAMED
+            of_model.append(trace | {"showlegend": shown})
         of_data = markers(x, data, "data", "var(--data)") | {"showlegend": not number}
         panels.append(Panel(title, 190, [of_data], of_model))
     residuals: list[Trace] = []
