@@ -13,7 +13,7 @@ FILM = ("--layer", "1.46", "--substrate", "3.9", "--thickness", "10:500")
 RECIPE = """
 [data]
 signal = "srgb"
-angles = [0, 45]
+angle = [0, 45]
 noise = 0.006
 
 [camera]
@@ -125,7 +125,6 @@ def test_errors_name_flags(pellicle, photo, tmp_path, monkeypatch, words, code, 
         ("--region", "1,1,0,9", "x,y,width,height"),
         ("--white", "0,0,2,2,2", "x,y,width,height"),
         ("--points", "1", "x,y"),
-        ("--angles", "0,x", "degrees"),
     ],
 )
 def test_wrong_words_are_wrong_usage(pellicle, photo, tmp_path, monkeypatch, command, flag, value, said):

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from pellicle.cli.flags import ReadingFlags, SceneFlags
+from pellicle.cli.inputs import inputs
 from pellicle.errors import DataError
 from pellicle.scene.instrument import Drift
 
@@ -146,3 +148,15 @@ def test_columns_and_spots_are_said_by_flag_or_recipe(pellicle, scene, tmp_path,
     (by_recipe, _), (by_flag, _), (spot, _) = asked
     assert (by_recipe.values.tolist(), by_flag.values.tolist()) == ([0.3, 0.31], [0.2, 0.21])
     assert spot.values[0] == 34.733
+
+
+def test_the_recipe_turns_a_sample_whose_file_states_no_azimuth(tmp_path):
+    (tmp_path / "film.csv").write_text("wavelength_nm,R\n500,0.2\n600,0.3\n")
+    recipe = tmp_path / "film.toml"
+    recipe.write_text(
+        '[data]\nfiles = ["film.csv"]\nangle = 60\nazimuth = 45\n\n[scene]\nsubstrate = "BK7"\n\n[[scene.layer]]\n'
+        "thickness = { lower = 10, upper = 500 }\n"
+        "material = { ordinary = 1.6, extraordinary = 1.7, axis = [90, 0] }\n"
+    )
+    (file,) = inputs([], str(recipe), SceneFlags(), ReadingFlags(), joint=False).files
+    assert (file.scene.light.angle, file.scene.light.azimuth) == (60.0, 45.0)

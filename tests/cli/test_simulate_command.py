@@ -1,6 +1,7 @@
 """`pellicle simulate`: a file that says what it is, and whose fit finds the truth."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -80,7 +81,7 @@ def test_default_wavelengths_are_said(pellicle, recipe, tmp_path):
 
 @pytest.mark.parametrize(
     ("grid", "said"),
-    [("[500, 400]", "rising"), ("{ start = 700, stop = 400, step = 2 }", "wavelengths"), ("[400]", "two")],
+    [("[500, 400]", "rising"), ("{ start = 700, stop = 400, step = 2 }", "wavelengths"), ("[]", "rising")],
 )
 def test_bad_wavelengths(pellicle, recipe, tmp_path, grid, said):
     recipe.write_text(RECIPE.replace("{ start = 400, stop = 796, step = 4 }", grid))
@@ -189,3 +190,31 @@ def test_each_azimuth_of_a_list_has_its_rows(pellicle, tmp_path):
     assert "psi_asp_deg,delta_asp_deg,psi_ane_deg,delta_ane_deg,sigma" in out.read_text()
     (about,) = pellicle("read", out, "--json").objects
     assert about["azimuths_deg"] == [0.0, 45.0]
+
+
+def test_each_angle_of_a_list_has_its_rows_at_each_azimuth(pellicle, tmp_path):
+    path, out = tmp_path / "angles.toml", tmp_path / "angles.csv"
+    quiet = RECIPE.replace("noise = 0.002\n", "")
+    path.write_text(quiet.replace('signal = "R"', 'signal = "R"\nangle = [30, 0, 50]\nazimuth = [0, 45]'))
+    assert pellicle("simulate", path, "--out", out).code == 0
+    spectrum = pl.read_spectrum(out)
+    found = [(own.angle, own.azimuth, len(own.rows)) for own in spectrum.settings]
+    assert found == [(angle, turn, 100) for angle in (0.0, 30.0, 50.0) for turn in (0.0, 45.0)]
+    for own in spectrum.settings:
+        alone = pl.Scene(pl.Layer(1.46, 321.5), 3.9 + 0.02j, light=pl.Light(angle=own.angle))
+        one = pl.simulate(alone, spectrum.wavelength[own.rows])
+        np.testing.assert_allclose(spectrum.values[own.rows], one.values, atol=1e-8)
+
+
+def test_one_wavelength_is_simulated_at_each_angle(pellicle, tmp_path):
+    path, out = tmp_path / "laser.toml", tmp_path / "laser.csv"
+    text = RECIPE.replace('signal = "R"', 'signal = "R"\nangle = [30, 50]\nwavelengths = [632.8]')
+    path.write_text(re.sub(r"wavelengths = \{.*\}\n", "", text))
+    assert pellicle("simulate", path, "--out", out).code == 0
+    assert pl.read_spectrum(out).angle.tolist() == [30.0, 50.0]
+
+
+def test_words_are_no_angles(pellicle, tmp_path):
+    ran = pellicle("read", tmp_path / "x.csv", "--angle", "0,x")
+    assert ran.code == 2
+    assert "expected degrees such as 70, or 0,30,60" in " ".join(ran.err.replace("│", " ").split())

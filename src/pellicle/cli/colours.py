@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pellicle.recipes.film import FilmRecipe
 
 SPACES = ("srgb", "rgb", "xyz", "lab")
-_PIXELS = ("region", "points", "angles")
+_PIXELS = ("region", "points")
 _CAMERA = tuple(field.name for field in fields(CameraFlags))
 _OF_SPECTRA = (
     "range",
@@ -67,7 +67,6 @@ def check_words(reading: ReadingFlags) -> None:
             parse_regions(value, name)
     if reading.points is not None:
         whole_numbers(reading.points, 2, "points", "x,y")
-    _angles(reading.angles)
 
 
 def check_camera(given_flags: ReadingFlags, files: Iterable[tuple[str, ReadingFlags]]) -> None:
@@ -99,10 +98,11 @@ def refuse_camera(path: str, reading: ReadingFlags) -> None:
         raise UsageError(f"{path}: {', '.join(given(wrong))}: only pictures have pixels, with --signal srgb")
 
 
-def read_films(path: str, reading: ReadingFlags, angle: float | None = None) -> list[Colours]:
+def read_films(path: str, reading: ReadingFlags, angle: float | list[float] | None = None) -> list[Colours]:
     """Read the colours of every film of a file, or of the one that --spectrum names.
 
-    `angle` is that of all colours; None leaves it to the file or the scene.
+    `angle` is that of all colours, where the flags do not list one for each; None leaves it to the file or
+    the scene.
 
     **Raises:** DataError or UsageError.
     """
@@ -120,7 +120,7 @@ def read_films(path: str, reading: ReadingFlags, angle: float | None = None) -> 
         path,
         space=reading.signal,
         signal="T" if transmitted else "R",
-        angle=angle if reading.angles is None else _angles(reading.angles),
+        angle=reading.angle if isinstance(reading.angle, list) else angle,
         polarisation=reading.polarisation or "unpolarised",
         noise=sigma(reading.noise),
         signal_unit=reading.signal_unit,
@@ -137,28 +137,17 @@ def read_films(path: str, reading: ReadingFlags, angle: float | None = None) -> 
 
 
 def recipe_angles(recipe: FilmRecipe) -> np.ndarray:
-    """Angles of incidence (colours,) of a recipe: [data] angles, those of its first file, or [data] angle."""
+    """Angles of incidence (colours,) of a recipe: its list, those of its first file, or its one angle."""
     import numpy as np
 
     from pellicle.cli.options import light, merged
 
-    data = recipe.tables.data
     own = recipe.each[0] if recipe.each else recipe
     flags = merged(ReadingFlags(), own)
-    if recipe.files and data.angles is None:
+    if recipe.files and not isinstance(flags.angle, list):
         stated = read_films(recipe.files[0], flags)[0].angle
         if stated is not None:
             say(f"angles: those of {recipe.files[0]} (the recipe gives none)")
             return stated
     angle: Any = light(flags).angle
-    return np.atleast_1d(np.asarray(own.tables.data.angles or getattr(angle, "start", angle), float))
-
-
-def _angles(value: str | list[float] | None) -> list[float] | None:
-    """Angles of a flag, `0,30,60`, or of a recipe. Raises UsageError."""
-    if not isinstance(value, str):
-        return value
-    try:
-        return [float(word) for word in value.split(",")]
-    except ValueError:
-        raise UsageError(f"--angles must be degrees such as 0,30,60, got {value!r}") from None
+    return np.atleast_1d(np.asarray(getattr(angle, "start", angle), float))

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
-from cyclopts import Group, Parameter
+from cyclopts import Group, Parameter, Token
 
 SCENE = Group("Scene", sort_key=1)
 INSTRUMENT = Group("Instrument", sort_key=2)
@@ -24,6 +24,15 @@ def flag(group: Group, help: str) -> Parameter:
 def switch(group: Group, help: str) -> Parameter:
     """A flag without a value, and without a --no- form."""
     return Parameter(group=group, help=help, negative="")
+
+
+def _angle(_: Any, tokens: Sequence[Token]) -> float | list[float]:
+    """Convert a number, or several with commas between them."""
+    try:
+        angles = [float(word) for word in tokens[0].value.split(",")]
+    except ValueError:
+        raise ValueError(f"expected degrees such as 70, or 0,30,60, got {tokens[0].value!r}") from None
+    return angles[0] if len(angles) == 1 else angles
 
 
 def given(names: Iterable[str]) -> list[str]:
@@ -124,17 +133,17 @@ class ReadingFlags(CameraFlags):
         str | None, flag(COLOURS, "X,Y,WIDTH,HEIGHT of a film in a picture, in pixels; ';' between several.")
     ] = None
     points: Annotated[str | None, flag(COLOURS, "X,Y of a film in a picture; ';' between several.")] = None
-    angles: Annotated[
-        str | list[float] | None,
+    angle: Annotated[
+        float | list[float] | None,
         Parameter(
-            group=COLOURS,
-            help="Angle of each region, which show one film.",
-            metavar="DEG,...",
+            group=READING,
+            help="Angle of incidence in degrees (0); 0,30,60 where regions of a picture show one film.",
+            metavar="DEG",
+            converter=_angle,
             negative="",
             n_tokens=1,
         ),
     ] = None
-    angle: Annotated[float | None, flag(READING, "Angle of incidence in degrees (0).")] = None
     polarisation: Annotated[str | None, flag(READING, "s, p or unpolarised.")] = None
     range: Annotated[
         str | tuple[float, float] | None,

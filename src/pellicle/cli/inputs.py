@@ -161,7 +161,8 @@ def _by_recipe(files: list[str], recipe: FilmRecipe, reading: ReadingFlags) -> I
     check_camera(reading, each)
     inputs = []
     for (file, flags), own in zip(each, recipes, strict=True):
-        scene = eqx.tree_at(lambda s: s.light, own.scene(), light(flags))
+        scene = own.scene()
+        scene = eqx.tree_at(lambda s: s.light, scene, light(flags, scene.light.azimuth))
         _check_free(scene, recipe.path)
         own_scale = any(table.rescales for table in own.tables.data.file)
         inputs += _film_inputs(file, scene, flags, own_scale)
@@ -246,8 +247,9 @@ def _check_reading(reading: ReadingFlags, signals: tuple[str, ...]) -> None:
     if reading.signal not in (None, *signals):
         names = f"{', '.join(signals[:-1])} or {signals[-1]}"
         raise UsageError(f"--signal must be {names}, not {reading.signal!r}")
-    if reading.angle is not None and not 0 <= reading.angle <= 90:
-        raise UsageError(f"--angle must lie in 0 to 90 degrees, got {reading.angle:g}")
+    stated = reading.angle if isinstance(reading.angle, list) else [reading.angle]
+    if wrong := [angle for angle in stated if angle is not None and not 0 <= angle <= 90]:
+        raise UsageError(f"--angle must lie in 0 to 90 degrees, got {wrong[0]:g}")
     if reading.polarisation not in (None, "s", "p", "unpolarised"):
         raise UsageError(f"--polarisation must be s, p or unpolarised, not {reading.polarisation!r}")
     check_words(reading)

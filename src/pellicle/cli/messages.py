@@ -19,7 +19,6 @@ FLAGS = {
     "ambient": "--ambient",
     "analyser": "--analyser",
     "angle": "--angle",
-    "angles": "--angles",
     "back": "--back",
     "bandwidth": "--bandwidth",
     "chart": "--chart",

@@ -70,14 +70,16 @@ def scene_from_flags(flags: SceneFlags, reading: ReadingFlags) -> tuple[Scene, l
     return scene, assumed
 
 
-def light(reading: ReadingFlags) -> Light:
-    """Signal, angle and polarisation of a scene, where the file does not give them."""
-    from pellicle.recipes.film import light_signal, optional
+def light(reading: ReadingFlags, azimuth: Any = None) -> Light:
+    """Signal, angle and polarisation of a scene, where the file does not give them.
+
+    `azimuth` of the sample in degrees is that of a recipe: films that have one cannot be described by flags.
+    """
+    from pellicle.recipes.film import incidence, light_signal
     from pellicle.scene.film import Light
 
-    angle = optional(reading.angle, "angle") or 0.0
     signal = light_signal(reading.signal, reading.transmitted)
-    return Light(None, angle, signal, reading.polarisation or "unpolarised")
+    return Light(None, incidence(reading.angle), signal, reading.polarisation or "unpolarised", azimuth)
 
 
 def merged(reading: ReadingFlags, recipe: FilmRecipe) -> ReadingFlags:

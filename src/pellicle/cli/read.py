@@ -137,6 +137,8 @@ def _spectra(path: str, flags: ReadingFlags) -> list[Spectrum]:
     found = read_file(path, every, free_scale=False)
     if flags.angle is None:
         return found
+    if isinstance(flags.angle, list):
+        raise UsageError(f"{path}: --angle lists several: of spectra give one, or a column angle_deg")
     if stated := [one.source for one in found if one.angle is not None and np.any(one.angle != flags.angle)]:
         raise UsageError(f"{stated[0]}: states its own angles; leave --angle out")
     return [replace(one, angle=np.full(len(one), float(flags.angle))) for one in found]

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 
 from pellicle.cli.colours import SPACES, recipe_angles
 from pellicle.cli.session import check_folder, not_negative, say, start
-from pellicle.cli.wavelengths import directions, each_azimuth, wavelengths
+from pellicle.cli.wavelengths import directions, each_setting, wavelengths
 from pellicle.errors import DataError, UsageError
 
 if TYPE_CHECKING:
@@ -169,12 +169,13 @@ def _write_spectrum(
     if scene.light.ellipsometric and recipe.tables.data.angle is None:
         raise DataError(f"{recipe.path}: ellipsometry needs an angle of incidence: give [data] angle = 70")
     grid = wavelengths(recipe, scene)
-    scene, nm = each_azimuth(scene, grid)
+    scene, nm = each_setting(scene, grid)
     noise, of_depolarisation = noises
     result = simulate_signal(scene, nm, noise, seed, tolerance, of_depolarisation)
     log_plan(result.plan)
     write_text(out, _csv(scene, result, noise, comments, recipe.tables.data.elements))
-    say(f"{out}: {len(nm)} points, {nm[0]:g} to {nm[-1]:g} nm")
+    span = f"{grid[0]:g} to {grid[-1]:g} nm" if len(grid) > 1 else f"at {grid[0]:g} nm"
+    say(f"{out}: {len(nm)} points, {span}" if len(nm) > 1 else f"{out}: 1 point, {span}")
 
 
 def _write_colours(
@@ -227,12 +228,14 @@ def _csv(
     from pellicle.data import generalised, mueller
 
     light, count = scene.light, len(result.wavelength)
-    angle = f"{getattr(light.angle, 'start', light.angle):g}"
+    angles = np.asarray(getattr(light.angle, "start", light.angle), float)
     about = "" if light.ellipsometric else f", {light.polarisation}"
-    lines = [*comments, f"signal {light.signal}, angle {angle} degrees{about}", _truth(scene)]
+    stated = ", ".join(f"{angle:g}" for angle in np.unique(angles))
+    lines = [*comments, f"signal {light.signal}, angle {stated} degrees{about}", _truth(scene)]
     names, before = [], []
-    if light.ellipsometric:
-        names, before = ["angle_deg"], [[angle] * count]
+    if light.ellipsometric or angles.ndim:
+        names.append("angle_deg")
+        before.append([f"{angle:.10g}" for angle in np.broadcast_to(angles, count)])
     if light.azimuth is not None:
         names.append("azimuth_deg")
         before.append([f"{own:.10g}" for own in np.broadcast_to(light.azimuth, count).tolist()])

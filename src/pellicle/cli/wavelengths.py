@@ -30,8 +30,8 @@ def measured_scene(recipe: FilmRecipe) -> tuple[Scene, np.ndarray]:
         scene, nm = _as_measured(recipe)
     else:
         scene = recipe.scene()
-        scene, nm = each_azimuth(scene, wavelengths(recipe, scene))
-    if scene.light.ellipsometric and scene.light.angle == 0.0:
+        scene, nm = each_setting(scene, wavelengths(recipe, scene))
+    if scene.light.ellipsometric and scene.light.largest_angle == 0.0:
         raise DataError(f"{recipe.path}: ellipsometry needs an angle of incidence: give [data] angle = 70")
     return scene, nm
 
@@ -78,17 +78,22 @@ def _as_measured(recipe: FilmRecipe) -> tuple[Scene, np.ndarray]:
     return eqx.tree_at(lambda s: s.light, scene, own_light), np.sort(spectrum.wavelength[first.rows])
 
 
-def each_azimuth(scene: Scene, nm: np.ndarray) -> tuple[Scene, np.ndarray]:
-    """The scene and the wavelengths at each of the azimuths that a recipe lists, one after the other."""
+def each_setting(scene: Scene, nm: np.ndarray) -> tuple[Scene, np.ndarray]:
+    """The scene and the wavelengths at each angle and azimuth that a recipe lists, one after the other."""
     import numpy as np
 
     from pellicle.scene.film import with_wavelength
 
-    azimuths = scene.light.azimuth
-    if not np.ndim(azimuths):
+    angles, azimuths = scene.light.angle, scene.light.azimuth
+    if not np.ndim(angles) and not np.ndim(azimuths):
         return scene, nm
-    turned = with_wavelength(scene, scene.light.wavelength, azimuth=np.repeat(azimuths, len(nm)))
-    return turned, np.tile(nm, len(azimuths))
+    several, turns = np.size(angles), np.size(azimuths)
+    each = {}
+    if np.ndim(angles):
+        each["angle"] = np.repeat(angles, turns * len(nm))
+    if np.ndim(azimuths):
+        each["azimuth"] = np.tile(np.repeat(azimuths, len(nm)), several)
+    return with_wavelength(scene, scene.light.wavelength, **each), np.tile(nm, several * turns)
 
 
 def wavelengths(recipe: FilmRecipe, scene: Scene) -> np.ndarray:
@@ -115,8 +120,8 @@ def wavelengths(recipe: FilmRecipe, scene: Scene) -> np.ndarray:
         )
     else:
         nm = np.arange(grid.start, grid.stop + grid.step / 2, grid.step)
-    if len(nm) < 2 or not np.all(np.diff(nm) > 0) or nm[0] <= 0:
-        raise DataError(f"{recipe.path}: [data] wavelengths must be at least two rising positive numbers")
+    if not len(nm) or not np.all(np.diff(nm) > 0) or nm[0] <= 0:
+        raise DataError(f"{recipe.path}: [data] wavelengths must be rising positive numbers")
     return nm
 
 

@@ -107,6 +107,11 @@ class FilmRecipe:
             raise DataError(f"{self.path}: its materials are nested too deeply") from None
 
 
+def incidence(angle: Number | list[float] | None) -> float | Free | np.ndarray:
+    """Return the angle of incidence in degrees, or several; 0 if none is given. Raises UsageError."""
+    return np.array(angle) if isinstance(angle, list) else optional(angle, "angle") or 0.0
+
+
 def light_signal(signal: str | None, transmitted: bool | None) -> str:
     """Return the signal of the light: "R" or "T" where colours are measured."""
     if signal in SPACES:
@@ -123,7 +128,7 @@ def _scene(tables: RecipeTable, folder: Path) -> Scene:
         ambient=medium(scene.ambient, folder, "ambient"),
         light=Light(
             None,
-            optional(data.angle, "angle") or 0.0,
+            incidence(data.angle),
             signal,
             data.polarisation or "unpolarised",
             np.array(data.azimuth) if isinstance(data.azimuth, list) else data.azimuth,

@@ -132,12 +132,16 @@ Signal: TypeAlias = Literal[
 ]
 
 
+Degrees: TypeAlias = Annotated[float, Field(ge=0, le=90)]
+"""Angle of incidence."""
+
+
 class _Reading(_Table):
     """Reading options of data files, named as the flags of the command line."""
 
     spectrum: str | None = None
     signal: Signal | None = None
-    angle: Annotated[float, Field(ge=0, le=90)] | FreeTable | None = None
+    angle: Degrees | Annotated[list[Degrees], Field(min_length=1)] | FreeTable | None = None
     azimuth: float | list[float] | None = None
     polarisation: Literal["unpolarised", "s", "p"] | None = None
     noise: float | None = Field(default=None, gt=0)
@@ -151,7 +155,6 @@ class _Reading(_Table):
     elements: list[str] | None = None
     region: str | list[int] | list[list[int]] | None = None
     points: str | list[int] | list[list[int]] | None = None
-    angles: list[Annotated[float, Field(ge=0, le=90)]] | None = None
 
 
 class CameraTable(_Table):

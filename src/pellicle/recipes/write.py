@@ -20,7 +20,7 @@ from pellicle.recipes.sensors import SRGB, band_sensor
 from pellicle.recipes.surface import SurfaceRecipe
 from pellicle.recipes.validation import validated
 from pellicle.recipes.written_media import layer_medium, medium, number, same
-from pellicle.scene.film import Scene, with_wavelength
+from pellicle.scene.film import Light, Scene, with_wavelength
 from pellicle.scene.free import Free
 from pellicle.scene.instrument import ONE_NUMBER, SLOW_OFFSET, SLOW_SCALE, Drift
 from pellicle.scene.kinds import check_scene
@@ -93,16 +93,21 @@ def _data(scene: Scene) -> dict[str, Any]:
     if light.signal != "R":
         found["signal"] = light.signal
     if isinstance(light.angle, Free) or np.ndim(light.angle) or light.angle != 0:
-        found["angle"] = number(light.angle, "the angle of incidence")
+        found["angle"] = _one_or_several(light.angle, light, "the angle of incidence")
     if light.azimuth is not None:
-        several = np.ndim(light.azimuth) and light.wavelength is None  # each for all wavelengths
-        own = np.asarray(light.azimuth, float).tolist()
-        found["azimuth"] = own if several else number(light.azimuth, "the azimuth of the sample")
+        found["azimuth"] = _one_or_several(light.azimuth, light, "the azimuth of the sample")
     if light.polarisation != "unpolarised":
         found["polarisation"] = light.polarisation
     if light.wavelength is not None:
         found["wavelengths"] = _wavelengths(np.asarray(light.wavelength, float))
     return found
+
+
+def _one_or_several(angle: Any, light: Light, name: str) -> Any:
+    """An angle, or several of which each is for all wavelengths."""
+    if np.ndim(angle) and light.wavelength is None:
+        return np.asarray(angle, float).tolist()
+    return number(angle, name)
 
 
 def _wavelengths(nm: np.ndarray) -> Any:

@@ -105,7 +105,7 @@ def _spectrum(part: Part) -> str:
     text = f"{data.signal}{own}{light}, {nm.size} points"
     if nm.size:
         text += _range(nm, "nm")
-        if data.ellipsometric and data.angle is not None:
+        if data.angle is not None and np.any(data.angle):
             text += "," + _range(data.angle, "degrees")
         if data.azimuth is not None:
             text += f", azimuth{_range(data.azimuth, 'degrees')}"

@@ -204,6 +204,9 @@ def test_azimuths_of_data_and_scene():
     several = replace(scene(), light=pl.Light(angle=ANGLE, signal=SIGNAL, azimuth=np.array([0.0, 45.0])))
     with pytest.raises(UsageError, match="has no column of azimuths"):
         seen_as(several, data())
+    several = replace(scene(), light=pl.Light(angle=np.array([50.0, 60.0]), signal=SIGNAL))
+    with pytest.raises(UsageError, match="has no column of angles of incidence"):
+        seen_as(several, replace(data(), angle=None))
     assert "azimuth     0, 45 degrees" in describe(turned)
 
 

@@ -144,6 +144,11 @@ def sphere_sigma(
 def seen_as(scene: Scene, data: Spectrum) -> Scene:
     """The scene in the light of the spectrum: its signal, wavelengths, polarisation, angles and azimuths."""
     angle: Any = scene.light.angle
+    if data.angle is None and np.ndim(angle) and np.size(angle) != len(data):
+        raise UsageError(
+            f"{data.path}: has no column of angles of incidence, and the scene has several: give `angle=70`,"
+            " for instance, or add a column angle_deg"
+        )
     if data.angle is not None and is_free(angle):
         if np.ptp(data.angle) > 0:
             raise UsageError(
