@@ -154,7 +154,8 @@ def test_the_recipe_turns_a_sample_whose_file_states_no_azimuth(tmp_path):
     (tmp_path / "film.csv").write_text("wavelength_nm,R\n500,0.2\n600,0.3\n")
     recipe = tmp_path / "film.toml"
     recipe.write_text(
-        '[data]\nfiles = ["film.csv"]\nangle = 60\nazimuth = 45\n\n[scene]\nsubstrate = "BK7"\n\n[[scene.layer]]\n'
+        '[data]\nfiles = ["film.csv"]\nangle = 60\nazimuth = 45\n\n[scene]\nsubstrate = "BK7"\n\n'
+        "[[scene.layer]]\n"
         "thickness = { lower = 10, upper = 500 }\n"
         "material = { ordinary = 1.6, extraordinary = 1.7, axis = [90, 0] }\n"
     )
