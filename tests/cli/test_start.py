@@ -179,3 +179,25 @@ cli.process()
 def test_an_interrupted_process_ends_without_clean_up():
     ran = subprocess.run([sys.executable, "-c", INTERRUPTED], capture_output=True, text=True, check=False)
     assert (ran.returncode, ran.stdout, ran.stderr) == (130, "a result\n", "pellicle: interrupted\n")
+
+
+def test_files_are_written_where_the_pipe_is_closed(tmp_path):
+    """As in `pellicle fit ... --out results 2>&1 | head -1`: a computed result is not lost."""
+    code = (
+        "from pellicle.cli.session import say, show\n"
+        "import sys\n"
+        "sys.stdin.readline()\n"  # until the reader is gone
+        "say('a note'); show('a result', True); open('written', 'w').close(); show('another', False)\n"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", code],
+        cwd=tmp_path,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    ) as ran:
+        ran.stdout.close()
+        ran.stdin.write("\n")
+    assert (tmp_path / "written").exists()
+    assert ran.returncode == 0

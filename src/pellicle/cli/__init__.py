@@ -23,7 +23,7 @@ from pellicle.cli.messages import as_flags
 from pellicle.cli.plan import plan
 from pellicle.cli.read import read
 from pellicle.cli.sample import sample
-from pellicle.cli.session import say
+from pellicle.cli.session import abandon_stdout, say
 from pellicle.cli.simulate import simulate
 from pellicle.cli.verbose import log_to_stderr
 from pellicle.errors import UsageError
@@ -110,7 +110,7 @@ def _outcome(words: list[str]) -> tuple[int, str]:
     except CycloptsError as error:
         return WRONG_USAGE, str(error)  # cyclopts has printed the error
     except BrokenPipeError:
-        _abandon_stdout()
+        abandon_stdout()
         return 0, ""
     except KeyboardInterrupt:
         say("pellicle: interrupted")
@@ -118,13 +118,7 @@ def _outcome(words: list[str]) -> tuple[int, str]:
     except (ValueError, OSError) as error:
         message = as_flags(str(error))
         if isinstance(error, OSError) and error.filename is None and error.errno is not None:  # of a stream
-            _abandon_stdout()
+            abandon_stdout()
             message = f"the result cannot be printed ({error.strerror})"
         say(f"pellicle: {message}")
         return (WRONG_USAGE if isinstance(error, UsageError) else BAD_DATA), message
-
-
-def _abandon_stdout() -> None:
-    """Discard what stdout cannot take, which Python would try to write once more when it ends."""
-    with suppress(OSError, ValueError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from concurrent.futures import BrokenExecutor
-from contextlib import nullcontext, redirect_stderr, redirect_stdout
+from contextlib import nullcontext, redirect_stderr, redirect_stdout, suppress
 from dataclasses import dataclass, field, replace
 from io import StringIO
 from logging import INFO
@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from pellicle.cli.inputs import LEAST_SQUARES, Input, Inputs
 from pellicle.cli.messages import as_flags, with_flags
 from pellicle.cli.progress import Progress, TimeLeft, duration
-from pellicle.cli.session import check_folder, say
+from pellicle.cli.session import check_folder, say, show
 from pellicle.cli.verbose import LOG, log_to_stderr
 from pellicle.errors import UsageError
 
@@ -155,7 +155,7 @@ class Batch:
             if self.as_json:
                 print(one_line(failure([file.path for file in self.inputs.files], str(error))), flush=True)
             return None
-        print(one_line(to_json(found)) if self.as_json else report(found), flush=True)
+        show(one_line(to_json(found)) if self.as_json else report(found), self.out is not None)
         if self.out is not None:
             write_repeats(self.out, found)
         return found
@@ -180,8 +180,9 @@ class Batch:
             progress("fit", 0, len(tasks))
             for done, result in enumerate(in_order(_captured, zip(own, folders, strict=True), self.jobs), 1):
                 progress.clear()
-                print(result.err, end="", file=sys.stderr, flush=True)
-                print(result.out, end="", flush=True)
+                with suppress(BrokenPipeError):
+                    print(result.err, end="", file=sys.stderr, flush=True)
+                show(result.out, self.out is not None, end="")
                 self.records.append(result.record)
                 self.fits += result.fits
                 self.kept += result.kept
@@ -240,7 +241,7 @@ class Batch:
     def _print(self, record: dict[str, Any], report: str) -> None:
         from pellicle.reporting.json_record import one_line
 
-        print(one_line(record) if self.as_json else report, flush=True)
+        show(one_line(record) if self.as_json else report, self.out is not None)
 
     def _result(
         self, data: Any, scene: Any, folder: Path | None, progress: Progress

@@ -13,7 +13,7 @@ from pellicle.cli.flags import OUTPUT, SCENE, ReadingFlags, SceneFlags, flag, sw
 from pellicle.cli.inputs import LEAST_SQUARES, Input, Inputs, inputs
 from pellicle.cli.messages import with_flags
 from pellicle.cli.progress import Progress
-from pellicle.cli.session import check_folder, say, start
+from pellicle.cli.session import check_folder, say, show, start
 from pellicle.errors import DataError, UsageError
 
 log = getLogger(__name__)
@@ -85,7 +85,7 @@ def _compare(
         if as_json:
             print(one_line(failure(label, message)), flush=True)
         return FAILED
-    print(one_line(to_json(comparison)) if as_json else report(comparison), flush=True)
+    show(one_line(to_json(comparison)) if as_json else report(comparison), folder is not None)
     if folder is not None:
         try:
             write_comparison(folder, comparison)

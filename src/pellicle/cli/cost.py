@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from pellicle.cli.colours import SPACES, recipe_angles
 from pellicle.cli.progress import Progress
-from pellicle.cli.session import check_folder, say, start
+from pellicle.cli.session import check_folder, say, show, start
 from pellicle.cli.wavelengths import directions, measured_scene
 from pellicle.errors import UsageError
 
@@ -86,7 +86,7 @@ def cost(
 
     with Progress(recipe) as progress:
         result = plans.cost(scene, tolerance=tolerance, progress=progress, **options)
-    print(one_line(to_json(result, recipe)) if json else text(result, recipe), flush=True)
+    show(one_line(to_json(result, recipe)) if json else text(result, recipe), out is not None)
     if out is not None:
         say(f"{write_cost(out, result, recipe)}: report, figure and tables written")
     return 130 if result.interrupted else 0

@@ -13,7 +13,7 @@ from pellicle.cli.colours import SPACES
 from pellicle.cli.cube_flags import CubeFlags
 from pellicle.cli.flags import OUTPUT, CameraFlags, flag, given, switch
 from pellicle.cli.map_cube import RunFlags, map_cube
-from pellicle.cli.session import check_folder, say, start
+from pellicle.cli.session import check_folder, say, show, start
 from pellicle.errors import UsageError
 
 if TYPE_CHECKING:
@@ -121,7 +121,7 @@ def _map_picture(
     if transmitted:
         scene = eqx.tree_at(lambda s: s.light, scene, replace(scene.light, signal="T"))
     made: Any = maps.map(picture, scene, space=space, noise=noise, **flags, **seen)
-    print(one_line(to_json(made)) if json else report(made), flush=True)
+    show(one_line(to_json(made)) if json else report(made), out is not None)
     if out is not None:
         say(f"{write_map(out, made)}: report, figure and tables written")
     return CONVERGED if made.converged >= MOST_CONVERGED else UNCLEAR

@@ -14,7 +14,7 @@ from pellicle.cli.flags import OUTPUT, Flags, flag
 from pellicle.cli.messages import as_flags
 from pellicle.cli.options import wavelength_range
 from pellicle.cli.progress import PixelProgress
-from pellicle.cli.session import check_folder, say, start
+from pellicle.cli.session import check_folder, say, show, start
 from pellicle.errors import DataError, UsageError
 
 if TYPE_CHECKING:
@@ -133,7 +133,7 @@ def map_cube(
         raise
     if made.run is not None and made.run.earlier:
         say(f"{made.run.earlier} pixels are from an earlier run in {folder}; --overwrite fits them again")
-    print(one_line(cube_json(made)) if json else as_flags(cube_report(made)), flush=True)
+    show(one_line(cube_json(made)) if json else as_flags(cube_report(made)), folder is not None)
     if folder is not None:
         _write(folder, made)
     return CONVERGED if made.decided >= MOST_DECIDED else UNCLEAR

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from contextlib import suppress
 from math import inf
 from pathlib import Path
 from shutil import disk_usage
@@ -80,6 +81,26 @@ def check_folder(path: str) -> None:
 
 
 def say(*sentences: str) -> None:
-    """Print to stderr; arguments in backticks become flags."""
+    """Print to stderr; arguments in backticks become flags. A closed pipe is no error."""
     for sentence in sentences:
-        print(as_flags(sentence), file=sys.stderr)
+        with suppress(BrokenPipeError):
+            print(as_flags(sentence), file=sys.stderr)
+
+
+def show(text: str, files_follow: bool, end: str = "\n") -> None:
+    """Print a result to stdout.
+
+    Where the pipe is closed, as by `| head`, this ends the command, unless files are still to be written.
+    """
+    try:
+        print(text, end=end, flush=True)
+    except BrokenPipeError:
+        if not files_follow:
+            raise
+        abandon_stdout()
+
+
+def abandon_stdout() -> None:
+    """Discard what stdout cannot take, which Python would try to write once more when it ends."""
+    with suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
