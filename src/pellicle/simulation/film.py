@@ -16,7 +16,7 @@ from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.dispersion.empirical import Tabulated
 from pellicle.effects.anisotropy import GENERAL
 from pellicle.effects.plan import Plan
-from pellicle.materials import materials_in
+from pellicle.materials import Material, materials_in
 from pellicle.optics import ellipsometry, plate
 from pellicle.optics.layout import stack_rows
 from pellicle.optics.pointwise import pointwise
@@ -37,10 +37,11 @@ Simulate = Callable[[Scene], Any]
 
 
 def tabulated(scene: Scene, slope: bool = True) -> Scene:
-    """The scene with every medium evaluated at the wavelengths of its light, unless it has free parameters.
+    """The scene with every medium evaluated at the wavelengths of its light.
 
-    A fit then compiles one program for all materials, and evaluates each once. `slope` includes the
-    derivative in wavelength.
+    Of a medium with free parameters, the materials in it are evaluated. A fit then compiles one program for
+    all materials, and evaluates each once. `slope` includes the derivative in wavelength, with which the
+    index goes on where a shift of the wavelengths leaves the range of a table.
 
     **Raises:** ValueError where a material has no data, naming it and the wavelengths.
     """
@@ -53,7 +54,14 @@ def _tabulated(dispersion: AbstractDispersion, wavelength: np.ndarray, slope: bo
     for material in materials_in(dispersion):
         material.check_range(wavelength)
     if free_leaves(dispersion):
-        return dispersion
+
+        def known(part: Any) -> bool:
+            return isinstance(part, Material) and not free_leaves(part)
+
+        def at_wavelengths(part: Any) -> Any:
+            return _tabulated(part, wavelength, slope) if known(part) else part
+
+        return jax.tree.map(at_wavelengths, dispersion, is_leaf=known)
     if not slope:
         return Tabulated(wavelength, known_index(dispersion, wavelength), None)
     return Tabulated(wavelength, *jax.device_get(_index_and_slope(dispersion, wavelength)))

@@ -218,10 +218,16 @@ def _scaled(medium: Any, change: Any, shape: Any = 1.0) -> Any:
 
 
 def _with_slope(medium: Any, nm: np.ndarray) -> Any:
-    """A tabulated medium with its slope in wavelength, from neighbouring points; others as they are."""
+    """The medium with the slope in wavelength of all that is tabulated in it, from neighbouring points."""
     if isinstance(medium, Anisotropic):
         return medium.with_media(lambda own: _with_slope(own, nm))
-    if not isinstance(medium, Tabulated) or medium.slope is not None:
+    if not isinstance(medium, Tabulated):
+        return jax.tree.map(
+            lambda part: _with_slope(part, nm) if isinstance(part, Tabulated) else part,
+            medium,
+            is_leaf=lambda part: isinstance(part, Tabulated) or is_free(part),
+        )
+    if medium.slope is not None:
         return medium
     order, first, inverse = np.unique(nm, return_index=True, return_inverse=True)
 
