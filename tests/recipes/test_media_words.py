@@ -155,6 +155,8 @@ def test_freeing_a_table_adds_a_constant():
         ("1.46", "k=-1:1", "negative"),
         ("1.46", "n=1.7:1.3", "reversed"),
         ("1.46", "n=1.7", "LO:HI"),
+        ("SiO2", "n=1.3:1.7", "added to the index"),
+        ("cauchy", "n=1.3:1.7", "added to the index"),
     ],
 )
 def test_freeing_refused(layer, item, message):

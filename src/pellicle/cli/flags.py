@@ -67,7 +67,14 @@ class SceneFlags(Flags):
     thickness: Annotated[str | None, flag(SCENE, "Bounds LO:HI in nm (1:5000), or one number to fix it.")] = (
         None
     )
-    free: Annotated[str | None, flag(SCENE, "Parameters of the layer to free: n,k or n=1.3:1.7.")] = None
+    free: Annotated[
+        str | None,
+        flag(
+            SCENE,
+            "Parameters of the layer to free: n,k or A=1.4:1.6. To the index of a material or a model, n and "
+            "k are added (n=-0.1:0.1); of a number they are the index (n=1.3:1.7).",
+        ),
+    ] = None
     back: Annotated[
         str | None, flag(SCENE, "Medium behind a substrate that is a plate; or rough, or taped.")
     ] = None

@@ -27,6 +27,9 @@ from pellicle.recipes.number_words import parse_number, parse_range
 from pellicle.scene.free import Free, is_free
 from pellicle.scene.graded import Graded
 
+_LIKE_AN_INDEX = 0.9
+"""A lower bound of what is added to an index beyond which the index itself is meant."""
+
 _CALL = re.compile(r"\s*([A-Za-z][\w-]*)\s*(?:\((.*)\))?\s*")
 
 
@@ -178,6 +181,13 @@ def _free_index(
     shifted = dispersion if isinstance(dispersion, Shifted) else Shifted(dispersion)
     if name == "k":
         return Shifted(shifted.base, shifted.n, _free_k(0.0, bounds))
+    if bounds and bounds[0] >= _LIKE_AN_INDEX:
+        low, high = bounds
+        raise UsageError(
+            f"cannot free 'n' within {low:g} to {high:g}: it is added to the index of this material; write "
+            f"n=-0.1:0.1 for an index near the given one, or take the material constant to fit an index of "
+            f"{low:g} to {high:g} that does not vary with the wavelength"
+        )
     return Shifted(shifted.base, _within(bounds, _free_shift(dispersion)), shifted.k)
 
 

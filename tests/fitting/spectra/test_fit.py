@@ -208,6 +208,21 @@ def test_outside_a_table(measured, film):
 
 
 @pytest.mark.slow  # compiles a fit of its own
+def test_an_index_near_a_table_over_its_whole_range():
+    """An oxide whose index is 0.05 above SOPRA's table, from its first to its last wavelength."""
+    oxide, nm = pl.material("HfO2"), np.linspace(250, 900, 131)
+
+    def film(change, thickness):
+        return pl.Scene(pl.Layer(pl.dispersion.Shifted(oxide, change), thickness), "SiO2")
+
+    data = pl.simulate(film(0.05, 150.0), nm, noise=0.001, seed=2)
+    fit = pl.fit(data, film(pl.Free(-0.3, 0.3), pl.Free(20, 500)))
+    agrees(fit, {"n": 0.05, "thickness": 150.0})
+    total = np.interp(575.0, nm, np.real(oxide(nm))) + fit["n"].value
+    assert f"n is added to the index of HfO2; the sum is {total:.4g} at 575 nm" in fit.warnings
+
+
+@pytest.mark.slow  # compiles a fit of its own
 def test_a_scene_without_a_free_thickness(film, measured):
     scene = film(480.0, Constant(N, K))
     fit = pl.fit(measured(scene, 1.6, 0.02), scene)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pellicle.dispersion.empirical import Shifted
 from pellicle.dispersion.principal_media import ordinary_index
 from pellicle.fitting.noise import student
 from pellicle.fitting.profile_likelihood import Limits
@@ -18,9 +19,10 @@ from pellicle.fitting.spectra.problem import shortest_wavelength
 from pellicle.fitting.spectra.targets import Target, drifts
 from pellicle.fitting.spectra.view import SpectrumView
 from pellicle.fitting.status import RIVAL
-from pellicle.materials import materials_in
-from pellicle.optics.pair import imag
-from pellicle.scene.free import insert
+from pellicle.materials import Material, materials_in
+from pellicle.optics.pair import imag, real
+from pellicle.scene.film import Scene
+from pellicle.scene.free import insert, is_free
 from pellicle.scene.layers import Layer
 
 _RULED_OUT = 1e8
@@ -124,4 +126,23 @@ def warnings(spectra: Sequence[Target], ranked: RankedMinima, unclear: Sequence[
                 f"{own}transmittance into the substrate, as if the detector were inside it; "
                 '`back="air"` makes it a plate'
             )
+    messages += _added_to_an_index(spectra[0].scene, ranked)
     return tuple(dict.fromkeys([*messages, *unclear]))
+
+
+def _added_to_an_index(scene: Scene, ranked: RankedMinima) -> list[str]:
+    """A sentence for each free n that is added to a given index, with the sum at the middle wavelength."""
+    view = ranked.problem.views[0]
+    fitted = insert(view.scene, ranked.problem.seen_by(view, ranked.values))
+    nm = np.asarray(fitted.light.wavelength)
+    middle = int(np.argmin(np.abs(nm - np.median(np.unique(nm)))))  # rows may be repeated
+    result = []
+    for i, (layer, own) in enumerate(zip(scene.layers, fitted.layers, strict=True)):
+        if isinstance(layer, Layer) and isinstance(given := layer.material, Shifted) and is_free(given.n):
+            name = thickness_name(scene, i).removesuffix("thickness") + "n"
+            of = given.base.name if isinstance(given.base, Material) else "the model"
+            total = float(np.asarray(real(own.material.index(nm)))[middle])
+            result.append(
+                f"{name} is added to the index of {of}; the sum is {total:.4g} at {nm[middle]:.4g} nm"
+            )
+    return result
