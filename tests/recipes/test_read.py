@@ -96,3 +96,18 @@ def test_the_base_of_a_surface_is_fixed(write):
     assert (fixed["base_n"].tolist(), fixed["base_k"].tolist()) == ([2.9] * 3, [3.1] * 3)
     with pytest.raises(DataError, match=r"scene\.surface: base cannot be free: give base_n and base_k"):
         pl.read_recipe(write(surface.replace("3.1", "{ lower = 0, upper = 4 }"))).scene()
+
+
+@pytest.mark.parametrize(
+    ("angle", "said"),
+    [
+        ('"x"', r"data\.angle: .* a valid number"),
+        ("95", r"data\.angle: .* less than or equal to 90, got 95"),
+        ("[10, 95]", r"data\.angle\.1: .* less than or equal to 90, got 95"),
+        ('[10, "x"]', r"data\.angle\.1: .* a valid number, .*got 'x'"),
+        ("[]", r"data\.angle: .* at least 1 item"),
+    ],
+)
+def test_wrong_angles_are_named_without_the_types_that_were_tried(write, angle, said):
+    with pytest.raises(DataError, match=said):
+        pl.read_recipe(write(FILM.replace("[scene]", f"angle = {angle}\n[scene]")))

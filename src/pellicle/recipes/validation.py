@@ -23,14 +23,20 @@ def validated(loaded: dict[str, Any], tables: Mapping[str, type[_Table] | type[B
         raise UsageError(_first_error(error, tables)) from None
 
 
+def _is_branch(part: str) -> bool:
+    """True for the name of the branch of a union that was tried, which stands in the location of its errors."""
+    return part[:1].isupper() or part in ("str", "float") or part.startswith(("list[", "constrained-"))
+
+
 def _first_error(error: ValidationError, tables: Mapping[str, type[BaseModel]]) -> str:
     """One sentence: an unknown key or an infinity goes before the errors of each branch of a union."""
     errors = error.errors(include_url=False)
     clearest = (e for kind in ("extra_forbidden", "finite_number") for e in errors if e["type"] == kind)
     chosen = next(clearest, errors[0])
-    # unions put the name of the branch they tried into the location
-    branches = ("str", "float", "list[float]")
-    where = [str(part) for part in chosen["loc"] if not str(part)[:1].isupper() and part not in branches]
+    if isinstance(chosen["input"], list):  # a number was expected, or a list, whose errors tell more
+        of_lists = (e for e in errors if any(str(part).startswith("list[") for part in e["loc"]))
+        chosen = next(of_lists, chosen)
+    where = [str(part) for part in chosen["loc"] if not _is_branch(str(part))]
     if chosen["type"] == "extra_forbidden" and where[-1:] != [str(chosen["loc"][-1])]:
         where.append(str(chosen["loc"][-1]))  # a key of the user, as `Data`, is no branch
     key = ".".join(where)
