@@ -24,7 +24,7 @@ def validated(loaded: dict[str, Any], tables: Mapping[str, type[_Table] | type[B
 
 
 def _is_branch(part: str) -> bool:
-    """True for the name of the branch of a union that was tried, which stands in the location of its errors."""
+    """True for the name of the branch of a union that was tried, a part of the location of its errors."""
     return part[:1].isupper() or part in ("str", "float") or part.startswith(("list[", "constrained-"))
 
 
