@@ -169,7 +169,7 @@ def angle_spread(scene: Scene) -> Row:
     **Raises:** ValueError where the light has no wavelengths, UsageError for generalised Ψ and Δ.
     """
     if not scene.instrument.has_cone:
-        return Row("angle-spread", False, "no cone of light: one angle of incidence")
+        return Row("angle-spread", False, "no cone of light")
     if scene.light.signal == generalised.SIGNAL:
         raise UsageError(
             "generalised psi and delta in a cone of light are not computed: leave out `angle_spread` and"
