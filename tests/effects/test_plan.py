@@ -123,7 +123,7 @@ TABLE = [
     ("roughness", False, "no face has a roughness", scene()),
     ("roughness", True, "1 rough: up to 3 nm", scene(pl.Layer(1.46, 300.0, roughness=3.0))),
     ("stack", True, "rough faces", scene(pl.Layer(1.46, 300.0, roughness=FREE_K))),
-    ("angle-spread", False, "one angle of incidence", scene()),
+    ("angle-spread", False, "no cone of light", scene()),
     (
         "angle-spread",
         True,
