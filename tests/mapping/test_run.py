@@ -6,6 +6,7 @@ import dask.array
 import numpy as np
 import pytest
 import xarray
+from distributed import Client, LocalCluster
 
 import pellicle as pl
 from pellicle.data.cube import Cube
@@ -80,6 +81,17 @@ def test_an_error_of_a_fit_comes_back_as_it_is(workers, cube, scene, fake_fits, 
 def test_pixels_that_end_every_worker_are_an_error(cube, scene, fake_fits, tmp_path):
     with pytest.raises(DataError, match="fewer `workers`"):
         run_map(cube, scene, tmp_path / "map.zarr", workers=2, fit=fake_fits.deadly)
+
+
+@pytest.mark.usefixtures("small_blocks")
+def test_workers_that_do_not_come_back_are_an_error(cube, scene, fake_fits, tmp_path, monkeypatch):
+    monkeypatch.setattr("pellicle.mapping.cluster.WAIT", 0.1)
+    monkeypatch.setattr(Client, "wait_for_workers", lambda *_, **__: None)  # there was one
+    with (
+        LocalCluster(n_workers=0, processes=False, dashboard_address=":0") as cluster,
+        pytest.raises(DataError, match="all worker processes have ended"),
+    ):
+        run_map(cube, scene, tmp_path / "map.zarr", scheduler=cluster.scheduler_address, fit=fake_fits.deadly)
 
 
 def test_a_scheduler_that_is_not_there(cube, scene, tmp_path, monkeypatch):

@@ -11,6 +11,7 @@ from __future__ import annotations
 import logging
 import pickle
 import signal
+import time
 import uuid
 from collections.abc import Iterator, Sequence
 from concurrent.futures import CancelledError
@@ -45,8 +46,8 @@ _SETTINGS = (
 """JAX's settings that workers take over: a program that one of them compiles is found by all."""
 ANSWER = 10.0
 """Seconds to wait for the answer of a scheduler."""
-_WAIT = 60.0
-"""Seconds to wait for the workers of a scheduler."""
+WAIT = 60.0
+"""Seconds to wait for a scheduler's first worker, or for another one where all have ended."""
 LARGEST = 2**24
 """Bytes of an array in memory that is sent whole to every worker."""
 _WINDOW = 2
@@ -96,10 +97,10 @@ def connected(address: str) -> Iterator[Client]:
         ) from None
     with client:
         try:
-            client.wait_for_workers(1, timeout=_WAIT)
+            client.wait_for_workers(1, timeout=WAIT)
         except TimeoutError:
             raise DataError(
-                f"the scheduler at {address} has had no workers for {_WAIT:.0f} s; start some and repeat"
+                f"the scheduler at {address} has had no workers for {WAIT:.0f} s; start some and repeat"
             ) from None
         yield client
 
@@ -107,7 +108,8 @@ def connected(address: str) -> Iterator[Client]:
 def on_cluster(client: Client, job: Job, todo: Sequence[tuple[int, ...]], *, local: bool) -> Iterator[Fitted]:
     """Fit blocks on the workers of a client, and yield each when it is in the store.
 
-    **Raises:** DataError where a block is lost with every worker that fits it, ValueError of a fit as it is.
+    **Raises:** DataError where a block is lost with every worker that fits it, or where no worker is left;
+    ValueError of a fit as it is.
     """
     name = f"pellicle-{uuid.uuid4().hex}"
     shipped = not _can_be_read_there(job.cube)
@@ -127,7 +129,7 @@ def on_cluster(client: Client, job: Job, todo: Sequence[tuple[int, ...]], *, loc
     try:
         client.register_plugin(plugin, name=name)
         submit()
-        for future in queue:
+        for future in _completed(queue, client):
             yield future.result()
             submit()
     except (CancelledError, CommClosedError):
@@ -143,6 +145,31 @@ def on_cluster(client: Client, job: Job, todo: Sequence[tuple[int, ...]], *, loc
         with suppress(Exception):  # of a cluster that is gone
             client.cancel(list(queue.futures))
             client.unregister_worker_plugin(name)
+
+
+def _completed(queue: Any, client: Client) -> Iterator[Any]:
+    """Yield the futures of a queue when they are done.
+
+    **Raises:** DataError where there have been no workers for `WAIT` seconds. Their nannies start others, but
+    give up where that takes too long, and dask waits for ever.
+    """
+    seen = asked = time.monotonic()
+    while not queue.is_empty():
+        if queue.has_ready():
+            yield next(queue)
+            continue
+        time.sleep(0.02)
+        now = time.monotonic()
+        if now - asked < min(1.0, WAIT):
+            continue
+        asked = now
+        if client.scheduler_info(n_workers=-1)["workers"]:
+            seen = now
+        elif now - seen > WAIT:
+            raise DataError(
+                f"all worker processes have ended, and none has come for {WAIT:.0f} s; what is finished is"
+                " kept: repeat with fewer `workers`, or with one"
+            )
 
 
 def part(cube: Cube, where: Where) -> Cube:
