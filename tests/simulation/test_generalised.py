@@ -131,8 +131,6 @@ def test_noise_is_the_same_along_and_across_each_ratio():
 
 
 def test_refusals():
-    with pytest.raises(UsageError, match="in a cone of light are not computed"):
-        pl.simulate(scene(1.6, instrument=pl.Instrument(angle_spread=1.0)), NM)
     with pytest.raises(ValueError, match="`azimuth` of the sample cannot be free"):
         pl.Light(azimuth=pl.Free(0, 90))
     with pytest.raises(UsageError, match="`azimuth` has 2 numbers and there are 8 wavelengths"):

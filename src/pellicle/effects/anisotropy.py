@@ -19,6 +19,9 @@ CLOSED_FORMS, GENERAL, SLICED = 2, 4, 8
 which are computed in slices."""
 
 
+_PLANES = "the rays of the cone have different planes of incidence"
+
+
 def anisotropy(scene: Scene) -> Row:
     """On where a medium is anisotropic, by matrices of 2×2 or 4×4, chosen by the type of its orientation.
 
@@ -35,7 +38,8 @@ def anisotropy(scene: Scene) -> Row:
     if any(map(mixes_polarisations, media)):
         why = "an optic axis is tilted or its angles are free: s and p mix, matrices of 4×4"
         if not any(isinstance(m, Anisotropic) and mixes_polarisations(m) for m in _media(scene)):
-            why = "the sample is turned: s and p mix, matrices of 4×4"
+            turns = "the sample is turned" if scene.light.azimuth is not None else _PLANES
+            why = f"{turns}: s and p mix, matrices of 4×4"
         if any(_strongly_dichroic(layer, scene) for layer in coherent_layers(scene)):
             return Row("anisotropy", True, f"{why}, in slices where one wave decays", count=SLICED)
         return Row("anisotropy", True, why, count=GENERAL)
@@ -52,14 +56,16 @@ def _strongly_dichroic(layer: Any, scene: Scene) -> bool:
 
 
 def scene_media(scene: Scene) -> list[Any]:
-    """Every medium of a scene but the ambient, from the top down, turned by the azimuth of the sample;
-    interfaces have none of their own."""
+    """Every medium of a scene but the ambient, from the top down, turned by the azimuth of the sample and, in
+    a cone of light, against the planes of incidence of its rays; interfaces have none of their own."""
     return [_turned(medium, scene) for medium in _media(scene)]
 
 
 def _turned(medium: Any, scene: Scene) -> Any:
-    turns = scene.light.azimuth is not None and isinstance(medium, Anisotropic)
-    return medium.turned(scene.light.azimuth) if turns else medium
+    azimuth = scene.light.azimuth
+    if azimuth is None and scene.instrument.has_cone:
+        azimuth = 0.0
+    return medium.turned(azimuth) if azimuth is not None and isinstance(medium, Anisotropic) else medium
 
 
 def _media(scene: Scene) -> list[Any]:
@@ -75,6 +81,11 @@ def _check(scene: Scene) -> None:
     described, plates = groups(scene)
     thick = [_turned(plate.material, scene) for plate in plates]
     if any(map(mixes_polarisations, thick)):
+        if scene.instrument.has_cone:
+            raise UsageError(
+                "in a cone of light the optic axis of an incoherent plate must be the normal: give its angles"
+                " as 0, or the plate one index"
+            )
         raise UsageError(
             "the optic axis of an incoherent plate must be the normal or along the plane of incidence:"
             " give its angles as 0 or 90, or the plate one index"
@@ -83,11 +94,6 @@ def _check(scene: Scene) -> None:
         raise UsageError(
             "the polarisation of light from the back face of a birefringent plate is not computed: leave out"
             " `back`, or measure R or T"
-        )
-    if scene.instrument.has_cone and not all(map(isotropic_in_plane, scene_media(scene))):
-        raise UsageError(
-            "a cone of light on a medium whose optic axis is not the normal is not computed: leave out"
-            " `angle_spread` and `numerical_aperture`"
         )
     mixed = any(map(mixes_polarisations, scene_media(scene)))
     if mixed and any(isinstance(medium, Anisotropic) for medium in thick):

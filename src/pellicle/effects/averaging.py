@@ -1,23 +1,20 @@
-"""Averages of an instrument: numbers of orders, nodes and rays, with bounds on their errors."""
+"""Averages over a bandwidth and uneven thickness: numbers of orders and nodes, and bounds on their errors."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from pellicle.data import generalised
 from pellicle.dispersion.principal_media import mixes_polarisations
 from pellicle.effects.anisotropy import scene_media
 from pellicle.effects.bounds import (
     largest_index,
     largest_ratio,
     least_ambient,
-    normal_incidence,
     smallest_index,
     upper,
 )
 from pellicle.effects.plan import Row
 from pellicle.effects.presence import roughness
-from pellicle.errors import UsageError
 from pellicle.optics import orders as series
 from pellicle.optics import quadrature
 from pellicle.scene.film import Scene, coherent_layers, is_graded, thickness_spread
@@ -161,46 +158,3 @@ def _layers(scene: Scene) -> tuple[np.ndarray, list[tuple[Layer, float]]]:
 def _path(at: np.ndarray, layers: list[tuple[Layer, float]]) -> float:
     """The largest phase of a round trip through all layers, in radians."""
     return float(4 * np.pi / np.min(at) * sum(upper(layer.thickness) * index for layer, index in layers))
-
-
-def angle_spread(scene: Scene) -> Row:
-    """Number of rays of a cone of light, and their error.
-
-    **Raises:** ValueError where the light has no wavelengths, UsageError for generalised Ψ and Δ.
-    """
-    if not scene.instrument.has_cone:
-        return Row("angle-spread", False, "no cone of light")
-    if scene.light.signal == generalised.SIGNAL:
-        raise UsageError(
-            "generalised psi and delta in a cone of light are not computed: leave out `angle_spread` and"
-            ' `numerical_aperture`, or measure `signal="mueller"`'
-        )
-    if scene.light.wavelength is None:
-        raise ValueError("the cone's rays depend on the wavelengths: give the light its wavelengths")
-    count, around, error = _rays(scene)
-    half = np.rad2deg(scene.instrument.largest_half_angle(least_ambient(scene)))
-    why = f"light within {half:.3g}° of its axis, averaged over {count * around} rays"
-    return Row("angle-spread", True, why, error, count, around)
-
-
-RAYS = (3, 4, 6, 8, 12, 16, 24)
-CONE_ERROR = 1e-6
-
-
-def _rays(scene: Scene) -> tuple[int, int, float]:
-    """The fewest rays for a fringe of the thickest stack, and its error over the cone."""
-    at, ambient = np.asarray(scene.light.wavelength, dtype=float), least_ambient(scene)
-    sine = np.sin(scene.instrument.largest_half_angle(ambient))
-    axis = np.deg2rad(scene.light.largest_angle)
-    index = min([smallest_index(layer.material, at) for layer in coherent_layers(scene)], default=1.0)
-    path = 4 * np.pi / np.min(at) * sum(upper(layer.thickness) for layer in coherent_layers(scene))
-
-    def phase(angle):
-        return path * np.sqrt(np.maximum(index**2 - (ambient * np.sin(angle)) ** 2, 0.0))
-
-    def rays(count: int) -> tuple[int, int, float]:
-        around = 1 if normal_incidence(scene) else count
-        return count, around, quadrature.cone_error(phase, float(axis), float(sine), count, around)
-
-    tried = map(rays, RAYS)
-    return next((result for result in tried if result[2] < CONE_ERROR), rays(RAYS[-1]))

@@ -59,7 +59,10 @@ def largest_attenuation(material: AbstractDispersion, thickness: Any, scene: Sce
         return np.inf
     wavelength = np.atleast_1d(np.asarray(scene.light.wavelength, dtype=float))
     degrees = upper(scene.light.angle) if isinstance(scene.light.angle, Free) else scene.light.angle
-    sine = np.sin(np.deg2rad(np.asarray(degrees) + upper(scene.instrument.angle_shift)))
+    steepest = np.deg2rad(np.asarray(degrees) + upper(scene.instrument.angle_shift))
+    if scene.instrument.has_cone:
+        steepest = steepest + scene.instrument.largest_half_angle(least_ambient(scene))
+    sine = np.sin(np.minimum(steepest, np.pi / 2))
     a = real(known_index(scene.ambient, wavelength)) * sine
     indices = np.concatenate([_corner_indices(m, wavelength) for m in principal_media(material)])
     least = np.min(np.real(indices), axis=0)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from pellicle.effects import anisotropy, averaging, gradient, presence
+from pellicle.effects import anisotropy, averaging, cone, gradient, presence
 from pellicle.effects.plan import Plan, Row
 from pellicle.scene.film import Scene
 
@@ -32,7 +32,7 @@ EFFECTS = (
     Effect("back-face", presence.back_face),
     Effect("coherence", averaging.coherence),
     Effect("orders", averaging.orders),
-    Effect("angle-spread", averaging.angle_spread),
+    Effect("angle-spread", cone.angle_spread),
     Effect("dispersion", presence.dispersion),
     Effect("opaque", presence.opaque),
     Effect("precision", presence.precision),
@@ -44,7 +44,7 @@ def exact(scene: Scene, given: Sequence[Row] = ()) -> Plan:
     """The effects that a scene has, judged from its types and bounds; rows that are `given` are not judged.
 
     An effect is off only where it is provably absent; its error bound is 0. The orders, nodes and rays of
-    an average have a bound above 0 (see `effects.averaging`).
+    an average have a bound above 0 (see `effects.averaging` and `effects.cone`).
     """
     known = {row.effect: row for row in given}
     rows = tuple(known.get(effect.name) or effect.judge(scene) for effect in EFFECTS)

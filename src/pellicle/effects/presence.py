@@ -10,7 +10,7 @@ import numpy as np
 
 from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.dispersion.empirical import Constant
-from pellicle.dispersion.principal_media import isotropic_in_plane, principal_media
+from pellicle.dispersion.principal_media import isotropic_in_plane, mixes_polarisations, principal_media
 from pellicle.effects.anisotropy import scene_media
 from pellicle.effects.bounds import normal_incidence, upper
 from pellicle.effects.plan import Row
@@ -110,7 +110,7 @@ def polarisation(scene: Scene) -> Row:
     """On where s and p differ and both are needed."""
     if scene.light.ellipsometric:
         return Row("polarisation", True, "ellipsometry compares p with s")
-    if scene.instrument.has_cone:
+    if scene.instrument.has_cone and not any(map(mixes_polarisations, scene_media(scene))):
         return Row("polarisation", True, "the light's cone has s and p")
     if normal_incidence(scene) and all(map(isotropic_in_plane, scene_media(scene))):
         return Row("polarisation", False, "s and p are equal at normal incidence")

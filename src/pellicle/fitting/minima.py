@@ -8,6 +8,7 @@ from logging import getLogger
 import jax
 import numpy as np
 
+from pellicle.effects.cone import rays_of_axes
 from pellicle.fitting.evaluation import Until, polish
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.progress import Progress, quiet
@@ -71,7 +72,7 @@ def solve(
     lower, upper = (np.array(np.broadcast_to(side, shape), dtype=float) for side in (box.lower, box.upper))
     if fixed is not None:
         lower[:, fixed[0]] = upper[:, fixed[0]] = fixed[1]
-    rows = max(sum(view.rows for view in problem.views), 1)
+    rows = max(sum(view.rows * rays_of_axes(view.plan) for view in problem.views), 1)
     lanes = int(np.clip(2 ** int(np.log2(_WORK / rows)), 2, MOST))
     pieces = []
     progress("polish", 0, len(starts))

@@ -31,6 +31,13 @@ def _legendre_rule(count: int) -> tuple[np.ndarray, np.ndarray]:
     return np.polynomial.legendre.leggauss(count)
 
 
+def disc_rule(count: int, azimuths: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return radius, azimuth and weight of points that fill the unit disc, on `count` rings."""
+    nodes, weights = _legendre_rule(count)
+    radius, azimuth = np.meshgrid(np.sqrt(0.5 * (nodes + 1)), azimuths, indexing="ij")
+    return radius.ravel(), azimuth.ravel(), np.repeat(0.5 * weights, len(azimuths)) / len(azimuths)
+
+
 def cone_rays(angle: Any, sine: Any, count: int, around: int) -> ConeRays:
     """Return rays that fill a pupil evenly, as an aplanatic lens does, over half the azimuths.
 
@@ -43,13 +50,11 @@ def cone_rays(angle: Any, sine: Any, count: int, around: int) -> ConeRays:
 
     **Source:** Richards and Wolf 1959, Proc. R. Soc. A 253, 358.
     """
-    nodes, weights = _legendre_rule(count)
-    radius = np.sqrt(0.5 * (nodes + 1))
     if around == 1:
         # means over all azimuths
-        return ConeRays(jnp.arcsin(_leading_axis(radius, sine) * sine), 0.5 * weights, 0.0, 0.5)
-    azimuth = np.pi * (np.arange(around) + 0.5) / around
-    r, phi = (x.ravel() for x in np.meshgrid(radius, azimuth, indexing="ij"))
+        radius, _, weight = disc_rule(count, np.zeros(1))
+        return ConeRays(jnp.arcsin(_leading_axis(radius, sine) * sine), weight, 0.0, 0.5)
+    r, phi, weight = disc_rule(count, np.pi * (np.arange(around) + 0.5) / around)
     shape = jnp.broadcast_shapes(np.shape(angle), np.shape(sine))
     cos_phi, sin_phi = (_leading_axis(x, np.empty(shape)) for x in (np.cos(phi), np.sin(phi)))
     rho = _leading_axis(r, np.empty(shape)) * sine
@@ -59,7 +64,7 @@ def cone_rays(angle: Any, sine: Any, count: int, around: int) -> ConeRays:
     s = s0 * (along * cos_phi**2 + sin_phi**2) - rho * cos_phi * c0
     theta = jnp.arctan2(jnp.sqrt(across), along * c0 + rho * cos_phi * s0)
     cosine = 2 * s * s / across - 1
-    return ConeRays(theta, np.repeat(0.5 * weights, around) / around, cosine, cosine * cosine)
+    return ConeRays(theta, weight, cosine, cosine * cosine)
 
 
 def _leading_axis(x: np.ndarray, like: Any) -> np.ndarray:

@@ -127,7 +127,9 @@ def _fewer(effect: str, stage: Stage) -> Iterator[Step]:
     row = stage.plan.row(effect)
     for count in sorted({max(row.count // 4, 1), row.count // 2, 3 * row.count // 4}):
         if 1 <= count < row.count:
-            around = count if row.around > 1 else row.around
+            around = max(row.around * count // row.count, 1)
+            if row.around != row.count:
+                around |= 1  # odd: see `lens_rays`
             why = f"{count} suffice of {row.count}: {row.why}"
             cheaper = replace(row, count=count, around=around, why=why)
             rows = tuple(cheaper if r.effect == effect else r for r in stage.plan.rows)

@@ -263,9 +263,14 @@ def thickness_spread(scene: Scene, layer: Layer) -> Quantity | None:
     return scene.instrument.thickness_spread if layer.thickness_spread is None else layer.thickness_spread
 
 
-def turned(scene: Scene) -> Scene:
-    """Return a scene of numbers with its anisotropic media turned by the azimuth of its light."""
+def turned(scene: Scene, against: Any = None) -> Scene:
+    """Return a scene of numbers with its anisotropic media turned by the azimuth of its light.
+
+    In the frame of a ray whose plane of incidence has the azimuth `against` (degrees), they turn back by it.
+    """
     azimuth = scene.light.azimuth
+    if against is not None:
+        azimuth = -against if azimuth is None else azimuth - against
     if azimuth is None:
         return scene
     anisotropic = lambda x: isinstance(x, Anisotropic)  # noqa: E731

@@ -19,6 +19,7 @@ from pellicle.effects.plan import Plan
 from pellicle.materials import Material, materials_in
 from pellicle.optics import ellipsometry, plate
 from pellicle.optics.layout import stack_rows
+from pellicle.optics.lens import Turn
 from pellicle.optics.pointwise import pointwise
 from pellicle.scene.film import ELLIPSOMETRY, Scene, media, thickness_spread, turned
 from pellicle.scene.free import free_leaves
@@ -84,27 +85,33 @@ def build(plan: Plan) -> Simulate:
     ellipsometric = plan.signal in ELLIPSOMETRY
     powers = partial(_stokes_rows if ellipsometric else _power_rows, plan)
     finish = _normalised_rows if ellipsometric else _mean
+    if plan.signal == generalised.SIGNAL and plan.on("angle-spread"):
+        finish = _ratio_rows
     mixed = plan.row("anisotropy").count >= GENERAL
     if mixed:
         powers, finish = partial(mixed_polarisations.rows, plan), partial(mixed_polarisations.finished, plan)
     averaged = plan.row("coherence").count or plan.on("angle-spread")
 
-    def at_each_wavelength(groups: list[CoherentGroup]) -> Sequence[Any]:
-        return list(powers(groups)) if averaged else finish(powers(groups))
+    def at_each_wavelength(groups: list[CoherentGroup], **turn: Any) -> Sequence[Any]:
+        return list(powers(groups, **turn)) if averaged else finish(powers(groups))
 
-    def monochromatic(scene: Scene, /) -> Any:
+    def monochromatic(scene: Scene, /, **turn: Any) -> Any:
         groups = coherent_groups(plan, scene)
         # slices have an axis of their own, along which nothing acts element by element; a program of the 4×4
         # method with its slopes in each number one by one takes a minute to compile
         if plan.on("gradient") or mixed or _birefringent_on_plates(plan):
-            return at_each_wavelength(groups)
+            return at_each_wavelength(groups, **turn)
         return pointwise(at_each_wavelength, groups)
 
-    intensities: Intensities = monochromatic
-    if plan.row("coherence").count:
-        intensities = _averaged(intensities, plan.row("coherence").count)
-    if plan.on("angle-spread"):
-        cone = plan.row("angle-spread")
+    def of_ray(turn: Turn | None = None) -> Intensities:
+        one: Intensities = monochromatic if turn is None else partial(monochromatic, turn=turn)
+        count = plan.row("coherence").count
+        return _averaged(one, count) if count else one
+
+    intensities, cone = of_ray(), plan.row("angle-spread")
+    if cone.on and mixed:
+        intensities = instrument.over_lens(of_ray, cone.count, cone.around)
+    elif cone.on:
         mix = instrument.turned_stokes if ellipsometric else instrument.mixed(plan.polarisation)
         intensities = instrument.over_cone(intensities, cone.count, cone.around, mix)
 
@@ -117,7 +124,7 @@ def build(plan: Plan) -> Simulate:
         rows = _mueller_rows(*rows) if plan.signal == "mueller" and not mixed else rows
         if plan.signal == "psi-delta":
             rows = rows[:3]
-        if plan.signal == generalised.SIGNAL and not mixed:
+        if plan.signal == generalised.SIGNAL and not mixed and not cone.on:
             one, none = jnp.ones_like(rows[0]), jnp.zeros_like(rows[0])
             rows = [*rows, *(one, none, none) * 2]  # r_ps = r_sp = 0
         return stack_rows(rows).T.reshape(-1) if ellipsometric else rows[0]
@@ -180,6 +187,17 @@ def _mueller_rows(n: Any, c: Any, s: Any, m22: Any = None, m44: Any = None) -> S
     """The elements m12, m13, ..., m44 of the normalised Mueller matrix of an isotropic sample."""
     m22, m44, none = jnp.ones_like(n) if m22 is None else m22, c if m44 is None else m44, jnp.zeros_like(n)
     return [-n, none, none, -n, m22, *[none] * 4, c, s, none, none, -s, m44]
+
+
+def _ratio_rows(rows: Sequence[Any]) -> Sequence[Any]:
+    """N, C and S of each ratio, of an isotropic sample in a cone of light."""
+    n, c, s, intensity, m22, m44 = rows
+    none = jnp.zeros_like(n)
+    return mixed_polarisations.ratio_angles(
+        mixed_polarisations.ratio_sums_of_mueller(
+            [[intensity, -n, none, none], [-n, m22, none, none], [none, none, c, s], [none, none, -s, m44]]
+        )
+    )
 
 
 def _power_rows(plan: Plan, groups: list[CoherentGroup]) -> list[Any]:

@@ -14,9 +14,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from pellicle.optics.lens import Turn, lens_rays
 from pellicle.optics.orders import FWHM
 from pellicle.optics.quadrature import cone_rays, normal_rule
-from pellicle.scene.film import Scene, thickness_spread
+from pellicle.scene.film import Scene, thickness_spread, turned
 
 Intensities = Callable[[Scene], Any]
 """A scene in numbers → rows of intensities, each (wavelengths,)."""
@@ -84,12 +85,38 @@ def over_cone(
         rays = cone_rays(jnp.deg2rad(scene.light.angle), cone_sine(scene), count, around)
 
         def at(angle, cosine, square):
-            turned = eqx.tree_at(lambda s: s.light.angle, scene, jnp.rad2deg(angle))
-            return mix(simulate(turned), cosine, square)
+            inclined = eqx.tree_at(lambda s: s.light.angle, scene, jnp.rad2deg(angle))
+            return mix(simulate(inclined), cosine, square)
 
         shape = jnp.shape(rays.angle)
         turns = (jnp.broadcast_to(jnp.asarray(x, like), shape) for x in (rays.cosine, rays.square))
         return _mean(jnp.asarray(rays.weight, like), jax.vmap(at)(jnp.asarray(rays.angle, like), *turns))
+
+    return average
+
+
+def over_lens(of_ray: Callable[[Turn], Intensities], count: int, around: int) -> Intensities:
+    """The mean over the cone of light where s and p mix; `of_ray(turn)` are the intensities of a ray.
+
+    The rays of a ring are along a first axis of arrays, in front of the wavelengths. Rings are computed one
+    after the other: together they may need gigabytes.
+    """
+
+    def average(scene: Scene):
+        like = jnp.result_type(scene.light.wavelength)
+        rays = lens_rays(jnp.deg2rad(scene.light.angle), cone_sine(scene), count, around)
+
+        def of_ring(ring: Any):
+            angle, azimuth, *turn = ring
+            inclined = eqx.tree_at(lambda s: s.light.angle, scene, jnp.rad2deg(angle))
+            rows = of_ray(Turn(*turn))(turned(inclined, against=jnp.rad2deg(azimuth)))
+            return [jnp.mean(row, axis=0) for row in rows]
+
+        # one axis of wavelengths behind that of the rays
+        numbers = (rays.angle, rays.azimuth, *rays.turn)
+        rings = [jnp.asarray(x, like).reshape(count, around, -1) for x in numbers]
+        weights = jnp.asarray(rays.weight, like).reshape(count, around).sum(axis=1)
+        return _mean(weights, jax.lax.map(of_ring, rings))
 
     return average
 

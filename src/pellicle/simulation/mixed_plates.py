@@ -24,6 +24,7 @@ from pellicle.optics.berreman.stack import Polarised, polarised
 from pellicle.optics.berreman.two_sided import two_sided
 from pellicle.optics.ellipsometry import Stokes
 from pellicle.optics.interface import Inside, transverse
+from pellicle.optics.lens import Turn, turned_stokes
 from pellicle.optics.mueller import mueller, mueller_elements
 from pellicle.optics.pair import conj, imag, real
 from pellicle.simulation.coherent_groups import CoherentGroup
@@ -36,22 +37,22 @@ class _Lit(NamedTuple):
     passed: Any  # row (..., 1, 4): the power that enters the substrate, per squared electric field
 
 
-def mueller_matrix(plan: Plan, groups: Sequence[CoherentGroup]) -> list[list[Any]]:
-    """Return the Mueller matrix of reflection, not normalised, as rows of arrays."""
-    matrix, _ = _lit(plan, groups)
+def mueller_matrix(plan: Plan, groups: Sequence[CoherentGroup], turn: Turn | None = None) -> list[list[Any]]:
+    """Return the Mueller matrix of reflection, not normalised, as rows of arrays; `turn` is that of a ray."""
+    matrix, _ = _lit(plan, groups, turn)
     return [[matrix[..., i, j] for j in range(4)] for i in range(4)]
 
 
-def stokes(plan: Plan, groups: Sequence[CoherentGroup]) -> Stokes:
+def stokes(plan: Plan, groups: Sequence[CoherentGroup], turn: Turn | None = None) -> Stokes:
     """Return the Stokes sums of r_pp and r_ss: over all orders, |r_ss|² ± |r_pp|² and 2 conj(r_pp) r_ss."""
-    m = mueller_matrix(plan, groups)
+    m = mueller_matrix(plan, groups, turn)
     return Stokes(-m[0][1] - m[1][0], m[2][2] + m[3][3], m[2][3] - m[3][2], m[0][0] + m[1][1])
 
 
-def transmitted(plan: Plan, groups: Sequence[CoherentGroup]) -> tuple[Any, Any]:
+def transmitted(plan: Plan, groups: Sequence[CoherentGroup], turn: Turn | None = None) -> tuple[Any, Any]:
     """Return the transmittances into the substrate for p and for s incident."""
     first = groups[0]
-    _, row = _lit(plan, groups)
+    _, row = _lit(plan, groups, turn)
     _, q0 = transverse(first.above, _angle(first))
     mean, difference = row[..., 0, 0], row[..., 0, 1]
     return (mean + difference) / q0, (mean - difference) / q0
@@ -61,7 +62,7 @@ def _angle(group: CoherentGroup) -> Any:
     return jnp.zeros_like(group.above) if group.angle is None else group.angle
 
 
-def _lit(plan: Plan, groups: Sequence[CoherentGroup]) -> _Lit:
+def _lit(plan: Plan, groups: Sequence[CoherentGroup], turn: Turn | None) -> _Lit:
     a, _ = transverse(groups[0].above, _angle(groups[0]))
     dichroic = plan.row("anisotropy").count == SLICED
     *plates, last = groups
@@ -69,7 +70,10 @@ def _lit(plan: Plan, groups: Sequence[CoherentGroup]) -> _Lit:
     for group in reversed(plates):
         angle = _angle(groups[0]) if group is groups[0] else Inside(a)
         lit = _on_plate(group, angle, dichroic, lit)
-    return lit
+    if turn is None:
+        return lit
+    turned = turned_stokes(turn)
+    return _Lit(turned @ lit.reflected @ turned, lit.passed @ turned)
 
 
 def _last(group: CoherentGroup, angle: Any, dichroic: bool) -> _Lit:

@@ -14,28 +14,30 @@ from pellicle.optics import ellipsometry
 from pellicle.optics.berreman.matrices import Elements
 from pellicle.optics.berreman.stack import polarised, transmittances
 from pellicle.optics.hoisting import stored
+from pellicle.optics.lens import Turn, turned_response
 from pellicle.optics.mueller import inverse_intensity, mueller_elements
 from pellicle.optics.pair import Number, abs2, conj, imag, real, to_pair
 from pellicle.simulation import mixed_plates
 from pellicle.simulation.coherent_groups import CoherentGroup
 
 
-def rows(plan: Plan, groups: list[CoherentGroup]) -> list[Any]:
-    """Return sums of intensities, which averages of an instrument are taken over.
+def rows(plan: Plan, groups: list[CoherentGroup], turn: Turn | None = None) -> list[Any]:
+    """Return sums of intensities, which averages of an instrument are taken over; `turn` is that of a ray.
 
     R or T of the incident polarisations, with all light that is reflected or transmitted; for Ψ and Δ the
     Stokes sums of r_pp and r_ss; for generalised ones those of each ratio of `data.generalised`; for a
     Mueller matrix its 16 elements.
     """
     if len(groups) > 1:
-        return _rows_of_plates(plan, groups)
+        return _rows_of_plates(plan, groups, turn)
     (group,) = groups
     angle = jnp.zeros_like(group.phases[0]) if group.angle is None else group.angle
     dichroic = plan.row("anisotropy").count == SLICED
     response = polarised(group.above, group.layers, group.below, group.phases, angle, dichroic)
+    response = response if turn is None else turned_response(response, turn)
     jones = Elements(*map(to_pair, response.reflected))
     if plan.signal == "mueller":
-        return [jnp.ravel(x) for row in mueller_elements(*jones) for x in row]
+        return [jnp.atleast_1d(x) for row in mueller_elements(*jones) for x in row]
     if plan.signal == generalised.SIGNAL:
         return ratio_sums(jones)
     if plan.signal == "psi-delta":
@@ -49,13 +51,13 @@ def rows(plan: Plan, groups: list[CoherentGroup]) -> list[Any]:
     return [s, p] if plan.on("polarisation") else [s if plan.polarisation == "s" else p]
 
 
-def _rows_of_plates(plan: Plan, groups: list[CoherentGroup]) -> list[Any]:
+def _rows_of_plates(plan: Plan, groups: list[CoherentGroup], turn: Turn | None) -> list[Any]:
     if plan.signal == "T":
-        p, s = mixed_plates.transmitted(plan, groups)
+        p, s = mixed_plates.transmitted(plan, groups, turn)
     elif plan.signal == "psi-delta":
-        return list(mixed_plates.stokes(plan, groups))
+        return list(mixed_plates.stokes(plan, groups, turn))
     else:
-        m = mixed_plates.mueller_matrix(plan, groups)
+        m = mixed_plates.mueller_matrix(plan, groups, turn)
         if plan.signal == "mueller":
             return [x for row in m for x in row]
         if plan.signal == generalised.SIGNAL:
