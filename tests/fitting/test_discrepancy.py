@@ -129,6 +129,22 @@ def test_outliers_hardly_count():
     assert problem(spiked)[0].remaining[0].variance < 3
 
 
+@pytest.mark.parametrize("wrong", [0.4, 0.0])
+def test_a_channel_that_is_wrong_as_a_whole_is_no_outlier(wrong):
+    """As C, but not N and S, where Δ is 180 degrees less than the file has it."""
+    rest = np.random.default_rng(3).normal(0, SIGMA, (X.size, 3))
+    rest[:, 1] += wrong * np.cos(8 * np.pi * X)
+    sigma = np.full(rest.shape, SIGMA)
+    jacobian = np.repeat(np.stack([np.ones_like(X), X], axis=1)[:, None], 3, axis=1)
+    one = Evidence(rest, jacobian, sigma, SIGMA, 1 / sigma, (), lambda rest: 1.0)
+    found = discrepancy(
+        [one], Scaled(jacobian.reshape(-1, 2) / SIGMA, np.eye(2), ("a", "b")), np.full(2, 0.5)
+    )
+    # the median absolute value of a cosine is 0.707; that of normal noise is 0.6745 standard deviations
+    amplitude = wrong * np.sqrt(0.5) / 0.6745 / SIGMA
+    assert found.remaining[0].ratio == pytest.approx(max(amplitude, 1.0), rel=0.15)
+
+
 def test_effects_of_the_sample_are_shared_by_its_data():
     """Twice the same data: one shared effect is known better than two of their own."""
     change = 0.03 * np.exp(X)

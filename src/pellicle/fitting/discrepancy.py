@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pellicle.fitting.covariance import Errors, Scaled
+from pellicle.fitting.noise import local_noise
 from pellicle.fitting.robust_losses import spread
 
 HALF_NORMAL = math.sqrt(3)
@@ -25,6 +26,10 @@ HALF_NORMAL = math.sqrt(3)
 _ROUNDS = 4
 OUTLIER = 4.0
 """Residuals beyond this many standard deviations of their bulk count less (Huber's loss)."""
+_APART = 10.0
+"""Ratio of the residuals of one channel to those of all beyond which the whole channel is wrong."""
+_SMOOTH = 2.5
+"""Ratio to the noise of neighbouring points above which its residuals are no noise, as in `misfit`."""
 _SCATTER = 2.0
 """Standard deviations within which the size and correlation of residuals are those of noise."""
 _WINDOW = 5.0
@@ -152,7 +157,7 @@ def discrepancy(evidence: Sequence[Evidence], scaled: Scaled, unit: np.ndarray) 
         # a signal of its own, such as one ratio, is not diluted by others that the scene has right
         each = [own[:, list(group)] for group in view.signals] or [own]
         sigmas = [view.sigma[:, list(group)] for group in view.signals] or [view.sigma]
-        typical = max(spread(x * sigma) for x, sigma in zip(each, sigmas, strict=True))
+        typical = max(_bulk(x * sigma) for x, sigma in zip(each, sigmas, strict=True))
         weighted = max(math.sqrt(np.mean((_weights(x) * x) ** 2)) for x in each)
         remaining.append(Remaining(typical / view.noise, typical, weighted, size))
     sizes, shares = solution[known:], _evidence_shares(evidence, state.variance)
@@ -207,6 +212,20 @@ def _balanced(system: _System, evidence: Sequence[Evidence]) -> _Balance:
         variance = [_variance(*row) for row in zip(evidence, rest, robust, used, strict=True)]
         reduced = system.reduced(variance, robust)
     return _Balance(variance, robust, reduced)
+
+
+def _bulk(residual: np.ndarray) -> float:
+    """Size of most residuals (rows, channels), or of a channel that is wrong as a whole.
+
+    A third of all residuals are those of S alone where the sign of Δ is another one: they are no outliers.
+    """
+    size = spread(residual)
+    wrong = [
+        own
+        for channel in residual.T
+        if (own := spread(channel)) > max(_APART * size, _SMOOTH * float(np.median(local_noise(channel))))
+    ]
+    return max([size, *wrong])
 
 
 def _evidence_shares(evidence: Sequence[Evidence], variance: Sequence[float]) -> tuple[float, ...]:

@@ -31,6 +31,7 @@ from pellicle.fitting.robust_losses import LEAST_SQUARES, check_loss
 from pellicle.fitting.spectra import (
     backface,
     default_bounds,
+    delta_conventions,
     depolarisation,
     folded_reading,
     messages,
@@ -100,12 +101,23 @@ def fitted(
             (folded_reading.as_folded, folded_reading.remarks),
             (mueller_signs.with_other_signs, mueller_signs.remarks),
         )
-        for read_again, remarks in readings if fit.status is Status.MISFIT else ():
+        if fit.status is not Status.MISFIT:
+            return fit, ranked
+
+        def read_as(again: list[Spectrum | Colours]) -> Fit:
+            read = again[0] if isinstance(data, Spectrum | Colours) else again
+            return _fit(again, measurements(read, scene), tolerance, loss, progress)[0]
+
+        found: list[str] = []
+        for read_again, remarks in readings:
             if (again := read_again(spectra)) is not None:
-                read = again[0] if isinstance(data, Spectrum | Colours) else again
-                other, _ = _fit(again, measurements(read, scene), tolerance, loss, progress)
-                fit = replace(fit, warnings=(*remarks(other), *fit.warnings))
-        return fit, ranked
+                found += remarks(read_as(again))
+        for words, again in (
+            delta_conventions.readings(spectra, [part.rms for part in fit.parts]) if not found else ()
+        ):
+            if found := delta_conventions.remarks(words, read_as(again)):
+                break
+        return replace(fit, warnings=(*found, *fit.warnings)), ranked
 
 
 def _listed(data: Film) -> list[Spectrum | Colours]:
