@@ -72,6 +72,31 @@ def test_a_cell_that_is_no_number(write, row, line, column, what, refused):
     refused(path, DataError, f"line {line}", f"column {column}", what, "delete that row")
 
 
+@pytest.mark.parametrize(
+    ("cell", "message"),
+    [
+        ("", "is empty, and 2 more rows have no number; fill them in or delete those rows"),
+        ("nan", "nan is not a finite number, and 2 more rows have no number; delete those rows"),
+        ("#DIV/0!", "found '#DIV/0!', and 2 more rows have no number; correct or delete those rows"),
+        ("#N/A", "found '#N/A'"),
+        ("#WERT!", "found '#WERT!'"),
+    ],
+)
+def test_all_cells_without_a_number_are_counted(write, cell, message, refused):
+    """A spreadsheet's error begins as a comment does."""
+    rows = [f"{nm},{cell if nm in (410, 440, 450) else 0.2}" for nm in range(400, 500, 10)]
+    refused(write("\n".join(["wavelength,R", *rows])), DataError, "line 3, column 'R'", message)
+
+
+def test_decimal_commas_between_commas(write, refused):
+    text = "wavelength,R\n400,5,0,11\n500,5,0,21\n600,5,0,31\n"
+    refused(write(text), DataError, "4 values", "names 2 columns", "semicolons", "decimal commas")
+
+
+def test_a_comment_after_an_empty_cell(write, refused):
+    refused(write("wavelength,R\n400,0.1\n500, # dust\n600,0.3\n"), DataError, "line 3", "is empty; fill")
+
+
 @pytest.mark.parametrize("row", ["400,abc", "abc,0.1", "400,nan"])
 def test_a_bad_first_row_is_no_preamble(write, row, refused):
     refused(write(f"wavelength,R\n{row}\n500,0.2\n600,0.3\n"), DataError, "line 2, column")

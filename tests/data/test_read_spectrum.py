@@ -43,6 +43,19 @@ def test_decimal_commas(write, separator):
     assert any("decimal commas" in note for note in spectrum.notes)
 
 
+@pytest.mark.parametrize("quotes_in_header", [True, False])
+def test_decimal_commas_in_quotes(write, quotes_in_header):
+    """As spreadsheets of a German locale write a CSV with commas between the columns."""
+    quoted = "\n".join(
+        ",".join(f'"{cell}"'.replace(".", ",") for cell in row.split(",")) for row in rows().split()
+    )
+    header = '"wavelength","R"' if quotes_in_header else "wavelength,R"
+    spectrum = read_spectrum(write(f"sample,A 12\n{header}\n{quoted}\n"))
+    assert_film(spectrum)
+    assert "decimal commas" in spectrum.notes
+    assert not any("separated" in note for note in spectrum.notes)
+
+
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "latin-1", "utf-16"])
 def test_encodings(write, encoding):
     assert_film(read_spectrum(write(f"wavelength,R,Température (°C)\n{rows()}", encoding=encoding)))

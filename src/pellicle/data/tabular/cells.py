@@ -6,6 +6,7 @@ faulty line and column.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,6 +19,9 @@ from pellicle.errors import DataError
 SELECTED = "\x1f"
 """Delimiter of cells that a reader has selected: the unit separator of ASCII, which no text has."""
 DELIMITERS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}
+
+_SHEET_ERROR = re.compile(r"#(?:[A-Z]+/0!|N/A|N/V|NV|[A-ZÄÖÜ]+[!?])", re.IGNORECASE)
+"""An error in a cell of a spreadsheet, such as #DIV/0!, #N/A or #WERT!, which begins like a comment."""
 
 Place = Callable[[int, int], str]
 """File, line and column of a cell, by its row and column, for a message."""
@@ -69,7 +73,12 @@ class TextCells:
         return self._by_cell(positions, path, where)
 
     def _by_cell(self, positions: Sequence[int], path: str, where: Place) -> list[np.ndarray]:
+        """As `numbers`, cell by cell: names the first bad cell, and how many rows have one."""
         columns: list[list[float]] = [[] for _ in positions]
+
+        def faulty_after(row: int) -> int:
+            return sum(not self._complete(line, positions) for line in self.rows[row + 1 :])
+
         for row, line in enumerate(self.rows):
             cells = split(line.bare, self.delimiter)
             if len(cells) > self.width:
@@ -80,18 +89,35 @@ class TextCells:
                 )
             for column, position in zip(columns, positions, strict=True):
                 cell = cells[position] if position < len(cells) else ""
-                column.append(self._number(cell, where(row, position)))
+                if not cell and (found := _SHEET_ERROR.search(line.text.removeprefix(line.bare))):
+                    cell = found[0]
+                column.append(self._number(cell, where(row, position), lambda row=row: faulty_after(row)))
         return [np.array(column) for column in columns]
 
-    def _number(self, cell: str, where: str) -> float:
+    def _number(self, cell: str, where: str, others: Callable[[], int]) -> float:
         if not cell:
-            raise DataError(f"{where} is empty; fill it in or delete that row")
-        if not is_number(cell, self.decimal):
-            raise DataError(f"{where}: expected a number but found {cell!r}; correct or delete that row")
-        value = float(cell.replace(",", "."))
-        if not np.isfinite(value):
-            raise DataError(f"{where}: {cell} is not a finite number; delete that row or put # before it")
-        return value
+            fault, remedies = (
+                " is empty",
+                ("fill it in or delete that row", "fill them in or delete those rows"),
+            )
+        elif not is_number(cell, self.decimal):
+            fault = f": expected a number but found {cell!r}"
+            remedies = ("correct or delete that row", "correct or delete those rows")
+        elif np.isfinite(value := float(cell.replace(",", "."))):
+            return value
+        else:
+            fault = f": {cell} is not a finite number"
+            remedies = ("delete that row or put # before it", "delete those rows or put # before them")
+        count = others()
+        more = f", and {count} more row{'s have' if count > 1 else ' has'} no number" if count else ""
+        raise DataError(f"{where}{fault}{more}; {remedies[count > 0]}")
+
+    def _complete(self, line: Line, positions: Sequence[int]) -> bool:
+        cells = split(line.bare, self.delimiter)
+        own = [cells[position] if position < len(cells) else "" for position in positions]
+        return all(
+            is_number(cell, self.decimal) and np.isfinite(float(cell.replace(",", "."))) for cell in own
+        )
 
 
 @dataclass(frozen=True, eq=False)

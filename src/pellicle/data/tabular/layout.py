@@ -24,6 +24,8 @@ _COMMENT_MARKS = ("%", "!", "//", "*", ";")
 """Marks with which other programs begin a comment; `#` has been taken off before."""
 _MARKER = ">>>>>"  # Ocean Optics puts such lines around the rows
 _GROUPED = re.compile(r"\b\d{1,3}(?:\.\d{3})+,\d+\b(?=\s*[;\t])")
+_COMMAS = ", or separate the columns with semicolons if their numbers have decimal commas"
+_QUOTED_COMMA = re.compile(r'"\s*[+-]?\d+,\d+(?:[eE][+-]?\d+)?\s*"')
 _SAMPLE = 60  # lines that vote on the dialect, spread over the file so that a preamble cannot outvote rows
 
 
@@ -77,7 +79,7 @@ def array_columns(
 
 def find_layout(file: TextFile) -> Layout:
     """Find the layout of a file's lines. Raises DataError if no line has two numbers."""
-    lines, path = _without_empty_columns(file.lines), file.path
+    lines, path = _without_quotes(_without_empty_columns(file.lines)), file.path
     delimiter, decimal = _dialect(lines, path)
     first = _first_numeric(lines, delimiter, decimal)
     if first is None:
@@ -107,6 +109,7 @@ def find_layout(file: TextFile) -> Layout:
         raise DataError(
             f"{path}: line {lines[first].number} has {width} values but the header on line "
             f"{lines[header or 0].number} names {len(names)} columns; make them agree"
+            f"{_COMMAS if delimiter == ',' and width == 2 * len(names) else ''}"
         )
     skipped = start if header is None else header
     if skipped:
@@ -134,6 +137,19 @@ def _without_empty_columns(lines: Sequence[Line]) -> Sequence[Line]:
             return lines
         lines = filled
     return lines
+
+
+def _without_quotes(lines: Sequence[Line]) -> Sequence[Line]:
+    """Lines of cells as "550,5","0,21", which need no quotes with another mark between them."""
+    if not any(_QUOTED_COMMA.search(line.text) for line in lines):
+        return lines
+    rows = [line for line in lines if _QUOTED_COMMA.search(line.text)]
+    if any(";" in line.text or "\t" in line.text or len(split(line.bare, ",")) < 2 for line in rows):
+        return lines
+    return [
+        Line(line.number, *(SELECTED.join(split(text, ",")) for text in (line.text, line.bare)))
+        for line in lines
+    ]
 
 
 def _hint(text: str) -> str:
@@ -167,6 +183,8 @@ def _numbers_in(line: Line, delimiter: str, decimal: str = ",") -> tuple[int, in
 def _dialect(lines: Sequence[Line], path: str) -> tuple[str, str]:
     """Delimiter with which most lines are all numbers (ties: tab, `;`, `,`, blank), and decimal mark."""
     sample = lines[:: max(1, len(lines) // _SAMPLE)]
+    if any(SELECTED in line.bare for line in sample):
+        return SELECTED, ","
 
     def votes(delimiter: str) -> tuple[int, int]:
         counted = [_numbers_in(line, delimiter) for line in sample]
