@@ -232,6 +232,21 @@ def test_unknown_names_are_answered_with_the_nearest(name, nearest):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("words", "formula"),
+    [
+        ("silicon dioxide", "SiO2"),
+        ("Titanium Dioxide", "TiO2"),
+        ("aluminium oxide", "Al2O3"),
+        ("aluminum oxide", "Al2O3"),
+        ("hafnium oxide", "HfO2"),
+        ("chrome", "Cr"),
+    ],
+)
+def test_chemical_names(words, formula):
+    assert material(words) == material(formula)
+
+
 @pytest.mark.parametrize("name", ["", "   ", "/", "a/b/c/d", "qqqqqq"])
 def test_hopeless_names_point_at_the_list(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -146,6 +146,11 @@ def test_freeing_a_table_adds_a_constant():
     assert free_part(media_words.medium("SiO2", ["n=0.01:0.1"]).n) == (0.01, 0.01, 0.1)
 
 
+def test_an_index_with_a_decimal_comma():
+    with pytest.raises(UsageError, match=r"an index has a decimal point: 1\.46"):
+        media_words.medium("1,46")
+
+
 @pytest.mark.parametrize(
     ("layer", "item", "message"),
     [

@@ -82,7 +82,9 @@ class Material(AbstractDispersion):
             remedies.append(f"cut the data with `range=({max(low, at.min()):g}, {min(high, at.max()):g})`")
         others = covering(self.page, float(at.min()), float(at.max()))
         remedies.append(
-            f"use a page that covers them all ({', '.join(others)})" if others else "use another page"
+            f"use a page that covers them all ({', '.join(others)})"
+            if others
+            else "use a file of n and k that covers them all, or a model such as cauchy"
         )
         raise DataError(
             f"{self.name}{source} is known from {low:g} to {high:g} nm, not at {which}: "

@@ -27,6 +27,7 @@ from pellicle.recipes.number_words import parse_number, parse_range
 from pellicle.scene.free import Free, is_free
 from pellicle.scene.graded import Graded
 
+_DECIMAL_COMMA = re.compile(r"\s*\d+,\d+\s*")
 _LIKE_AN_INDEX = 0.9
 """A lower bound of what is added to an index beyond which the index itself is meant."""
 
@@ -116,6 +117,10 @@ def _material(name: str) -> AbstractDispersion:
     except UnknownMaterial as error:
         if name.lower() in (*MIXTURES, "oscillators"):
             raise UsageError(f"{name} consists of several parts: describe it in a recipe") from None
+        if _DECIMAL_COMMA.fullmatch(name):
+            raise UsageError(
+                f"{name!r} is no material; an index has a decimal point: {name.replace(',', '.')}"
+            ) from None
         close = did_you_mean(name.lower(), MODELS, 0.8)
         raise UsageError(f"no material or model {name!r}{close}" if close else str(error)) from None
 
