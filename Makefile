@@ -89,7 +89,7 @@ dist-check: $(VENV)/.dev
 browser-tests: $(VENV)/.dev
 	$(BIN)/python -m pip install --quiet --no-compile --editable ".[browser,explore]"
 	$(BIN)/python -m pytest -ra tests/reporting/test_page_in_browser.py tests/explorer/test_in_browser.py \
-	  tests/explorer/test_widget.py
+	  tests/explorer/test_angles_in_browser.py tests/explorer/test_widget.py
 
 slow: $(VENV)/.dev
 	$(BIN)/python -m pytest -m slow

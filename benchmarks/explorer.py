@@ -10,14 +10,16 @@ Linux, 2 cores with 9 other processes waiting for them, Chromium 150 without a G
 processes of the benchmark went before the others (`chrt -r 5`); without that, medians were 35 to 60 ms.
 
     scene                      moved by  events  drawn  median ms  95 % ms  request ms  engine ms
-    film                       mouse        101    100       22.6     27.6         7.8       1.93
-    film                       keyboard     100    100       22.2     36.7         7.4       1.61
-    film, 45 degrees           mouse        101    100       23.1     29.7         8.0       1.80
-    film, 45 degrees           keyboard     100    100       21.5     36.5         7.3       1.62
-    film, rough, bandwidth     mouse        101    100       21.3     25.4         7.5       1.81
-    film, rough, bandwidth     keyboard     100    100       26.1     38.0         8.5       1.55
-    film, psi and delta        mouse        101    100       24.8     31.9         7.7       2.03
-    film, psi and delta        keyboard     100    100       25.8     36.8         7.9       1.97
+    film                       mouse        101    100       21.3     26.5         7.1       1.93
+    film                       keyboard     100    100       25.7     35.6         8.3       1.81
+    film, 45 degrees           mouse        101    100       21.0     26.9         7.2       1.60
+    film, 45 degrees           keyboard     100    100       22.5     36.6         7.2       1.71
+    film, rough, bandwidth     mouse        101    100       22.2     26.8         7.5       1.74
+    film, rough, bandwidth     keyboard     100    100       23.6     35.6         7.8       1.82
+    film, psi and delta        mouse        101    100       26.1     31.5         7.8       2.26
+    film, psi and delta        keyboard     100    100       26.1     37.5         8.0       2.31
+    psi, delta, 3 angles       mouse        101    100       32.5     38.1        10.4       3.30
+    psi, delta, 3 angles       keyboard     100    100       30.9     40.4         9.5       3.06
 """
 
 from __future__ import annotations
@@ -39,6 +41,7 @@ SCENES = {
     "film, 45 degrees": ([], "&angle=45"),
     "film, rough, bandwidth": ([], "&layer.roughness=3&bandwidth=5"),
     "film, psi and delta": (["--signal", "psi-delta", "--angle", "70"], ""),
+    "psi, delta, 3 angles": (["--signal", "psi-delta", "--angle", "65,70,75"], ""),
 }
 """Flags and parameters of the address, by scene: SiO2 on Si, 401 wavelengths."""
 COUNT = """() => {

@@ -65,6 +65,11 @@ def test_flags_describe_another_film(explore):
     assert {"thickness": 200.0, "n": 1.7, "angle": 30.0}.items() <= values(session).items()
 
 
+def test_several_angles_are_shown(explore):
+    _, [(session, _)] = explore("--signal", "psi-delta", "--angle", "65,70,75")
+    assert session.answer("scene", {})["angles"] == [65.0, 70.0, 75.0]
+
+
 def test_a_recipe_comes_with_its_data(explore, tmp_path):
     (tmp_path / "film.toml").write_text(RECIPE)
     rows = [f"{nm:g},0.9" for nm in np.arange(400, 801, 2)]
@@ -95,6 +100,9 @@ def test_a_recipe_of_a_surface_is_shown_too(explore):
     [
         (["none.toml"], 3, "none.toml"),
         (["film.toml", "--layer", "SiO2"], 2, "exclude each other"),
+        (["--angle", "65,x"], 2, "got '65,x'"),
+        (["--angle", "65,95"], 2, "0 to 90 degrees"),
+        (["--angle", ",".join(map(str, range(60, 74)))], 2, "up to 12 angles of incidence"),
         (["--layer", "Si02"], 2, "Si02"),
         (["--layer", "Si/Chandler-Horowitz"], 3, "share no wavelengths"),
     ],

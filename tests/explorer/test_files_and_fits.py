@@ -52,15 +52,6 @@ def test_light_and_range_of_the_data_replace_those_of_the_scene(session):
     assert session.view.wavelength[0] == 500.0
 
 
-def test_of_several_angles_that_of_the_scene_is_drawn(session):
-    angles = np.repeat([0.0, 60.0], 64)
-    text = csv("wavelength_nm,angle_deg,R", np.tile(NM[::2], 2), angles, 0.2 + angles / 1000)
-    answer = session.answer("data", {"name": "two.csv", "text": text})
-    [curve] = answer["curves"]
-    assert set(curve["y"]) == {0.2}
-    assert "one of 2 angles" in " ".join(answer["notes"])
-
-
 BAD = {
     "words": "this is no spectrum\nat all",
     "empty": "",

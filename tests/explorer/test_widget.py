@@ -58,6 +58,19 @@ def test_a_view_is_that_of_the_library(ask):
     assert np.allclose(curve["y"], pl.reflectance(WAVELENGTH, 300.0, 1.46, 3.9), atol=2e-7)
 
 
+def test_its_recipe_has_the_angles_of_the_list(widget):
+    before = widget.values
+    widget.angles = [40, 50]
+    assert "angle = [40, 50]" in widget.recipe()
+    assert "angle" in before
+    assert "angle" not in widget.values
+    with pytest.raises(ValueError, match="from 0 to 90"):
+        widget.angles = [95]
+    widget.angles = []
+    assert widget.values == before
+    assert "angle" not in widget.recipe()
+
+
 def test_a_wrong_request_is_answered_by_a_sentence(ask):
     assert "thicknes" in ask("view", {"values": {"thicknes": 1.0}})["error"]
     assert "error" in ask("nothing", {})
@@ -79,12 +92,12 @@ def test_its_module_loads_nothing(widget):
 
 MODEL = """async (module) => {
   const listeners = [];
-  let values = null;
+  const traits = { angles: [] };
   window.saved = [];
   window.model = {
-    get: () => values,
-    set: (name, value) => { values = value; },
-    save_changes: () => window.saved.push(values),
+    get: (name) => traits[name],
+    set: (name, value) => { traits[name] = value; },
+    save_changes: () => window.saved.push({ ...traits }),
     on: (name, listener) => listeners.push([name, listener]),
     off: () => {},
     send: async (message) => {
@@ -94,11 +107,11 @@ MODEL = """async (module) => {
       }
     },
     fromPython: (wanted) => {
-      values = wanted;
-      for (const [name, listener] of listeners) if (name === "change:values") listener();
+      Object.assign(traits, wanted);
+      for (const [name, listener] of listeners) if (name.slice("change:".length) in wanted) listener();
     },
   };
-  values = await window.ask("defaults", {});
+  traits.values = await window.ask("defaults", {});
   const address = URL.createObjectURL(new Blob([module], { type: "text/javascript" }));
   const { default: widget } = await import(address);
   window.close = await widget.render({ model, el: document.getElementById("cell") });
@@ -137,12 +150,20 @@ def test_the_widget_follows_its_slider_and_its_model(cell):
     assert cell.evaluate(background) == "rgb(18, 23, 28)"  # dark as the notebook, in a light browser
     cell.get_by_role("slider", name="thickness in nm").press("PageUp")
     cell.wait_for_timeout(500)
-    moved = cell.evaluate("saved.at(-1).thickness")
+    moved = cell.evaluate("saved.at(-1).values.thickness")
     assert moved > 250
     assert np.allclose(cell.evaluate(curve), pl.reflectance(WAVELENGTH, moved, 1.46, 3.9), atol=2e-7)
-    cell.evaluate("model.fromPython({ ...model.get(), thickness: 321 })")
+    cell.evaluate("model.fromPython({ values: { ...model.get('values'), thickness: 321 } })")
     cell.wait_for_timeout(500)
     assert np.allclose(cell.evaluate(curve), pl.reflectance(WAVELENGTH, 321.0, 1.46, 3.9), atol=2e-7)
     assert cell.get_by_role("spinbutton", name="thickness (nm)").input_value() == "321"
+    cell.evaluate("model.fromPython({ angles: [40, 50] })")
+    cell.wait_for_selector(".pellicle-explorer:not(.compiling)")
+    cell.wait_for_timeout(2000)
+    names = "document.querySelector('.plot').data.map((t) => t.meta)"
+    assert cell.evaluate(names) == ["R 40°", "R 50°"]
+    saved = cell.evaluate("saved.at(-1)")
+    assert (saved["angles"], saved["values"]["thickness"]) == ([40, 50], 321)
+    assert "angle" not in saved["values"]
     assert cell.get_by_role("button", name="Copy link").count() == 0
     cell.evaluate("close()")

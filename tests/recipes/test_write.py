@@ -1,6 +1,7 @@
 """Written recipes read back as the same scene, and what they cannot express is refused by name."""
 
 import tomllib
+from itertools import product
 from pathlib import Path
 
 import equinox as eqx
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
+from pellicle.cli.wavelengths import measured_scene
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.empirical import WithExtinction
 from pellicle.recipes import film, surface
@@ -98,6 +100,37 @@ def test_medium_reads_back(name, tmp_path):
     pl.write_recipe(scene, path)
     assert eqx.tree_equal(pl.read_recipe(path).scene(), scene)
     assert recipe_text(eval(python_text(scene), {"pl": pl}), tmp_path) == path.read_text()
+
+
+def test_several_angles_read_back(tmp_path):
+    light = pl.Light(angle=[65, 70, 75], signal="psi-delta", azimuth=[0, 45])
+    scene = pl.Scene(pl.Layer("SiO2", 100.0), "Si", light=light)
+    path = tmp_path / "film.toml"
+    path.write_text(recipe_text(scene, tmp_path, wavelength=np.array([400.0, 500.0, 633.0])))
+    recipe = pl.read_recipe(path)
+    assert eqx.tree_equal(recipe.scene(), scene)
+    seen, nm = measured_scene(recipe)
+    rows = list(zip(seen.light.angle, seen.light.azimuth, nm, strict=True))
+    assert rows == list(product((65, 70, 75), (0, 45), (400, 500, 633)))
+
+
+ARRAYS = {
+    "np.linspace(1.0, 2.0, 3)": [1, 1.5, 2],
+    "np.array([633.0])": [633],
+    "np.array([1.0, 2.0, 4.0])": [1, 2, 4],
+    "np.repeat([65.0, 70.0], 3)": [65] * 3 + [70] * 3,
+    "np.repeat([5.0], 2)": [5, 5],
+    "np.array([1.0, 1.0, 2.0, 2.0, 3.0])": [1, 1, 2, 2, 3],
+    "np.tile(np.linspace(1.0, 3.0, 3), 2)": [1, 2, 3] * 2,
+    "np.tile(np.array([1.0, 2.0, 4.0]), 2)": [1, 2, 4] * 2,
+    "np.array([1.0, 2.0, 4.0, 1.0])": [1, 2, 4, 1],
+}
+
+
+@pytest.mark.parametrize("text", ARRAYS)
+def test_an_array_is_written_in_short(text):
+    assert python_text(np.array(ARRAYS[text], float)) == text
+    assert eval(text, {"np": np}).tolist() == ARRAYS[text]
 
 
 def test_every_part_of_a_scene_reads_back(tmp_path):

@@ -20,14 +20,17 @@ def explore(scene: Scene | Surface, *, wavelength: ArrayLike | None = None) -> A
 
     **Arguments:**
 
-    - `scene`: the film or the surface; every number in it that a slider can move has one, free or not.
+    - `scene`: the film or the surface; every number in it that a slider can move has one, free or not. Of
+      several angles of incidence, `pl.Light(angle=[65, 70, 75])`, each has a curve.
     - `wavelength`: wavelengths of the plot in nm, (wavelengths,), by default those of the scene's light or
       the visible ones.
 
     **Returns:** A widget (anywidget): `values` are the sliders' numbers by name, in their units, and setting
-    them moves the sliders; `recipe()` is the film in its current state as TOML.
+    them moves the sliders; `angles` are angles of incidence in degrees in place of the scene's, empty for
+    those; `recipe()` is the film in its current state as TOML.
 
-    **Raises:** UsageError without the package anywidget; DataError where the materials
+    **Raises:** UsageError without the package anywidget, and for a scene of several azimuths, of generalised
+    psi and delta or of more than 12 angles at several wavelengths; DataError where the materials
     share no wavelengths.
     """
     from pellicle.explorer.session import Session

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from pellicle.cli.flags import ReadingFlags, SceneFlags
+from pellicle.cli.flags import ReadingFlags, SceneFlags, one_or_several_angles
 from pellicle.cli.options import scene_from_flags
 from pellicle.cli.session import say, start
 from pellicle.errors import DataError, UsageError
@@ -29,7 +29,16 @@ def explore(
     *,
     scene: Annotated[SceneFlags, Parameter(name="*")] = SceneFlags(),  # noqa: B008
     signal: Annotated[str | None, Parameter(help="R, T, psi-delta or mueller.")] = None,
-    angle: Annotated[float | None, Parameter(help="Angle of incidence in degrees (0).")] = None,
+    angle: Annotated[
+        float | list[float] | None,
+        Parameter(
+            help="Angle of incidence in degrees (0), or several: 65,70,75.",
+            metavar="DEG",
+            converter=one_or_several_angles,
+            negative="",
+            n_tokens=1,
+        ),
+    ] = None,
     polarisation: Annotated[str | None, Parameter(help="s, p or unpolarised.")] = None,
     port: Annotated[int, Parameter(help="Port of this machine (0: a free one).")] = 0,
     no_browser: Annotated[
@@ -42,6 +51,9 @@ def explore(
 
     Example: pellicle explore film.toml
     """
+    stated = angle if isinstance(angle, list) else [angle or 0.0]
+    if not all(0 <= each <= 90 for each in stated):
+        raise UsageError("--angle must lie in 0 to 90 degrees")
     reading = ReadingFlags(signal=signal, angle=angle, polarisation=polarisation)
     given = [*scene.given(), *reading.given()]
     if recipe is not None and given:

@@ -26,7 +26,7 @@ def switch(group: Group, help: str) -> Parameter:
     return Parameter(group=group, help=help, negative="")
 
 
-def _angle(_: Any, tokens: Sequence[Token]) -> float | list[float]:
+def one_or_several_angles(_: Any, tokens: Sequence[Token]) -> float | list[float]:
     """Convert a number, or several with commas between them."""
     try:
         angles = [float(word) for word in tokens[0].value.split(",")]
@@ -146,7 +146,7 @@ class ReadingFlags(CameraFlags):
             group=READING,
             help="Angle of incidence in degrees (0); 0,30,60 where regions of a picture show one film.",
             metavar="DEG",
-            converter=_angle,
+            converter=one_or_several_angles,
             negative="",
             n_tokens=1,
         ),

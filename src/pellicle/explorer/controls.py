@@ -11,7 +11,6 @@ import jax
 from jax.tree_util import GetAttrKey, SequenceKey
 
 from pellicle.dispersion.empirical import Constant
-from pellicle.errors import UsageError
 from pellicle.fitting.spectra.parameters import parameters
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free, is_free
@@ -83,17 +82,15 @@ class Control:
 def film_controls(scene: Scene) -> tuple[Control, ...]:
     """Return the controls of a film: thicknesses, constant indices, every free number and optional effects.
 
-    Raises UsageError where the light has several angles, which no slider can move.
+    An array of angles of incidence has none.
     """
-    if not isinstance(scene.light.angle, int | float | Free):
-        raise UsageError("the explorer takes a scene with one angle of incidence")
     found = _present(scene)
     for path in _addable(scene):
         found.setdefault(path, 0.0)
     scaffold = scene
     for path, value in found.items():
         scaffold = with_value(scaffold, path, _bounds(path, value))
-    named = dict(zip(_free_paths(scaffold), parameters(scaffold), strict=True))
+    named = dict(zip(free_paths(scaffold), parameters(scaffold), strict=True))
     controls = []
     for path, number in named.items():
         value = found[path]
@@ -160,7 +157,8 @@ def scene_with(
     return scene
 
 
-def _free_paths(tree: Any) -> list[tuple[Any, ...]]:
+def free_paths(tree: Any) -> list[tuple[Any, ...]]:
+    """Return the place of each free number of a pytree, in their order."""
     leaves = jax.tree_util.tree_leaves_with_path(tree, is_leaf=is_free)
     return [path for path, leaf in leaves if is_free(leaf)]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from base64 import b64decode
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from pellicle.data.mueller import SIGNAL as MUELLER
 from pellicle.data.read_spectrum import read_spectra
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import DataError, UsageError
+from pellicle.explorer.incidence import MOST, measured_angles, named, thinned
 from pellicle.explorer.programs import Curve
 
 LARGEST_FILE = 20_000_000
@@ -89,36 +90,56 @@ def _read(path: Path, name: str, signal: str) -> list[Spectrum]:
     return [replace(each, path=name, notes=own) for each, own in zip(found, notes, strict=True)]
 
 
-def data_curves(spectra: list[Spectrum], at: float) -> list[Curve]:
-    """Return the curves of spectra; of several angles that nearest to `at`, the scene's angle in degrees."""
+def data_curves(spectra: Sequence[Spectrum], against_angle: bool = False) -> list[Curve]:
+    """Return the curves of spectra, one for each angle of incidence if they are measured at several.
+
+    Of more than `incidence.MOST` angles some are left out. With `against_angle` there is one curve against
+    the angle, and spectra at several wavelengths have none.
+    """
     curves = []
+    every = measured_angles(spectra)
     for spectrum in spectra:
-        rows: Any = slice(None)
-        words = [spectrum.name] if spectrum.name else []
-        angles = [] if spectrum.angle is None else np.unique(spectrum.angle).tolist()
-        if len(angles) > 1:
-            nearest = min(angles, key=lambda angle: abs(angle - at))
-            rows = spectrum.angle == nearest
-            words.append(f"{nearest:g}°")
         columns = {spectrum.signal: spectrum.values}
-        if spectrum.signal == "psi-delta":
+        if spectrum.delta is not None:
             columns = {"Ψ": spectrum.values, "Δ": spectrum.delta}
         elif spectrum.signal == MUELLER:
             columns = dict(zip(spectrum.elements, spectrum.values.T, strict=True))
-        for label, values in columns.items():
-            shown = f"{label} ({' '.join(words)})" if words else label
-            curves.append(Curve(shown, spectrum.wavelength[rows], np.asarray(values)[rows]))
+        for rows, x, setting in lines(spectrum, every, against_angle):
+            for label, values in columns.items():
+                curves.append(Curve(label, x, np.asarray(values)[rows], setting, spectrum.name))
     return curves
 
 
-def data_text(spectra: list[Spectrum]) -> list[str]:
+def lines(
+    spectrum: Spectrum, every: np.ndarray, against_angle: bool
+) -> list[tuple[np.ndarray, np.ndarray, str]]:
+    """Return the rows of each curve of a spectrum, their abscissa, and the name of their angle.
+
+    `every` has the angles of all spectra; one angle has no name.
+    """
+    if against_angle:
+        if spectrum.angle is None or np.ptp(spectrum.wavelength) > 0:
+            return []
+        rows = np.argsort(spectrum.angle, kind="stable")
+        return [(rows, spectrum.angle[rows], "")]
+    if spectrum.angle is None or len(every) < 2:
+        return [(np.arange(len(spectrum)), spectrum.wavelength, "")]
+    found = [(np.flatnonzero(spectrum.angle == angle), named(angle)) for angle in thinned(every)]
+    return [(rows, spectrum.wavelength[rows], setting) for rows, setting in found if rows.size]
+
+
+def data_text(spectra: Sequence[Spectrum]) -> list[str]:
     """Sentences on what was read."""
     found = []
     for spectrum in spectra:
-        nm = spectrum.wavelength
-        about = f"{spectrum.signal}, {len(nm)} points from {nm.min():g} to {nm.max():g} nm"
+        nm, angles = spectrum.wavelength, measured_angles([spectrum])
+        across = f"from {nm.min():g} to {nm.max():g} nm" if np.ptp(nm) > 0 else f"at {nm[0]:g} nm"
+        at = ", ".join(f"{angle:g}" for angle in angles)
+        if len(angles) > MOST:
+            at = f"{len(angles)} angles from {angles[0]:g} to {angles[-1]:g}"
+        about = f"{spectrum.signal}, {len(nm)} points {across}{f', at {at}°' if at else ''}"
         found += [f"{spectrum.path}: {about}", *spectrum.notes]
-        count = 1 if spectrum.angle is None else len(np.unique(spectrum.angle))
-        if count > 1:
-            found.append(f"data at one of {count} angles of incidence are drawn; a fit uses all of them")
+    count = len(measured_angles(spectra))
+    if count > MOST and any(np.ptp(spectrum.wavelength) > 0 for spectrum in spectra):
+        found.append(f"data at {MOST} of {count} angles of incidence are drawn; a fit uses all of them")
     return list(dict.fromkeys(found))

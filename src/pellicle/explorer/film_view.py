@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
+import equinox as eqx
 import numpy as np
 from jax.tree_util import GetAttrKey
 
@@ -16,40 +16,31 @@ from pellicle.effects.film import exact
 from pellicle.effects.plan import Plan
 from pellicle.errors import DataError, UsageError
 from pellicle.explorer.controls import Control, film_controls, scene_with, template, with_value
-from pellicle.explorer.programs import angle_program, colour_program, spectrum_program
+from pellicle.explorer.incidence import abscissa, light_angles, measured_angles, named, thinned
+from pellicle.explorer.programs import ANGLE, angle_program, colour_program, spectrum_program
 from pellicle.explorer.sphere import ball_picture
+from pellicle.explorer.structure import CONES, Structure, bucket, key_of, oblique_cone
 from pellicle.scene.film import Light, Scene, with_wavelength
 from pellicle.scene.free import Free, insert
 from pellicle.synthetic.spectra import VISIBLE, default_wavelengths
 
-_AVERAGED = ("thickness_spread", "bandwidth", "numerical_aperture", "angle_spread")
-_CONES = ("numerical_aperture", "angle_spread")
-_SHARES = (0.125, 0.25, 0.5, 1.0)
-"""Shares of the range of an average for which programs are compiled: a small spread needs few nodes."""
-
 _FEWEST, _MOST, _POINTS = 100, 1500, 401
 """Numbers of wavelengths of data at which the curve is computed too, and that of its own otherwise."""
-_ANGLES, _GRAZING = 5.0, 89.0
-"""Step of the largest angle of incidence of programs with a cone of light, and the steepest ray (degrees)."""
-
-
-class Structure(NamedTuple):
-    """Optional effects that a program is compiled for, with upper bounds of their sizes."""
-
-    active: tuple[tuple[str, float], ...]
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the controls of the effects that are there."""
-        return tuple(name for name, _ in self.active)
+_MANY, _FEW_POINTS = 4, 201
+"""Number of angles above which each curve has fewer points, and how many."""
 
 
 class FilmView:
-    """Controls and programs of a film, whose spectra are computed at `wavelength` in nm."""
+    """Controls and programs of a film, whose spectra are computed at `wavelength` in nm.
+
+    A light with an array of angles has a curve for each, and `angles` has them in degrees. Signals at one
+    wavelength are drawn against the angle, as `against_angle` says. `angles` is empty where the angle has a
+    slider. With `folded` Δ is drawn in 0 to 180 degrees, as it was measured.
+    """
 
     kind, parts = "spectrum", ("curves", "colour", "sphere", "plan")
 
-    def __init__(self, scene: Scene, wavelength: Any = None) -> None:
+    def __init__(self, scene: Scene, wavelength: Any = None, folded: bool = False) -> None:
         if scene.light.signal == generalised.SIGNAL:
             raise UsageError(
                 "the explorer does not draw generalised psi and delta: give the scene another signal, such as"
@@ -57,25 +48,45 @@ class FilmView:
             )
         if np.ndim(scene.light.azimuth):
             raise UsageError("the explorer draws one azimuth of the sample: give the scene one")
-        self.scene = scene
-        self.controls = film_controls(scene)
+        self.wavelength, self.folded = _wavelengths(scene, wavelength), folded
+        self.angles = light_angles(scene.light, len(self.wavelength))
+        self.against_angle = len(self.wavelength) == 1
+        if len(self.angles) == 1 and not self.against_angle:
+            scene, self.angles = with_value(scene, ANGLE, float(self.angles[0])), np.zeros(0)
+        if self.against_angle and not self.angles.size:
+            if isinstance(scene.light.angle, Free):
+                raise UsageError(
+                    "the explorer draws one wavelength against the angle of incidence, which is free: give"
+                    " the scene a fixed angle"
+                )
+            self.angles = np.array([float(scene.light.angle)])
+        scene = with_value(scene, (*ANGLE[:1], GetAttrKey("wavelength")), None)
+        self.scene = with_value(scene, ANGLE, self.angles) if self.angles.size else scene
+        self.controls = film_controls(self.scene)
         self.by_name = {control.name: control for control in self.controls}
-        if wavelength is None:
-            wavelength = scene.light.wavelength
-        if wavelength is not None and np.size(wavelength) < 2:
-            raise UsageError(
-                "the explorer draws signals against the wavelength: give two or more wavelengths"
-            )
-        if wavelength is None:
-            wavelength = default_wavelengths(scene)
-            if len(wavelength) > 1:
-                wavelength = np.arange(wavelength[0], wavelength[-1] + 0.5)
-        self.wavelength = np.asarray(wavelength, float)
-        if len(self.wavelength) < 2:
-            raise DataError(
-                f"the materials share no wavelengths in {VISIBLE[0]:g} to {VISIBLE[1]:g} nm:"
-                " give [data] wavelengths = { start, stop, step }"
-            )
+        self._programs: Any = self
+
+    def at(self, angles: np.ndarray) -> FilmView:
+        """Return the view with these angles of incidence in degrees: a curve for each, or a slider for one.
+
+        Programs are shared. Raises UsageError where the abscissa is the angle.
+        """
+        if self.against_angle:
+            raise UsageError("at one wavelength the abscissa is the angle of incidence: leave the angles out")
+        angle = angles if len(angles) > 1 else float(angles[0])
+        view = FilmView(with_value(self.scene, ANGLE, angle), self.wavelength, self.folded)
+        view._programs = self._programs
+        return view
+
+    def key(self, kind: str) -> Hashable:
+        """Key of the programs `kind`: programs are the same for other angles, if they are as many."""
+        return self._programs, kind, self.seen_at(kind).size
+
+    def seen_at(self, kind: str) -> np.ndarray:
+        """Angles of incidence in degrees that a program `kind` takes beside the values; none of a sphere."""
+        if kind == "sphere":
+            return np.zeros(0)
+        return abscissa(self.angles) if kind == "curves" and self.against_angle else thinned(self.angles)
 
     def defaults(self) -> dict[str, float]:
         """Return the scene's own value of each control."""
@@ -88,11 +99,14 @@ class FilmView:
             self.controls, key=lambda c: (groups.index(c.group), c.optional, c.label != "thickness")
         )
         signal = self.scene.light.signal
+        across = "angle of incidence (°)" if self.against_angle else "wavelength (nm)"
         units = {"psi-delta": "Ψ, Δ (°)", "mueller": "normalised Mueller element"}
         return {
             "controls": [control.to_json() for control in order],
             "signals": {"psi-delta": ["Ψ", "Δ"]}.get(signal, [signal]),
-            "axis": {"label": "wavelength (nm)", "value": units.get(signal, f"{signal} (fraction)")},
+            "axis": {"label": across, "value": units.get(signal, f"{signal} (fraction)")},
+            "angles": self.angles.tolist() if len(self.angles) > 1 and not self.against_angle else [],
+            "at_one_wavelength": float(self.wavelength[0]) if self.against_angle else None,
         }
 
     @property
@@ -103,72 +117,103 @@ class FilmView:
     def structure(self, values: Mapping[str, float]) -> Structure:
         """Return the effects that values other than 0 need. Raises UsageError for an impossible cone."""
         bounds = {
-            c.name: _bucket(c, values[c.name]) for c in self.controls if c.optional and values[c.name] > 0
+            c.name: bucket(c, values[c.name]) for c in self.controls if c.optional and values[c.name] > 0
         }
-        cone = next((name for name in bounds if _key(name) in _CONES), None)
-        if cone is not None and "angle" in bounds:
-            bounds["angle"], bounds[cone] = _oblique_cone(cone, values["angle"], values[cone], bounds[cone])
+        cone = next((name for name in bounds if key_of(name) in CONES), None)
+        if cone is not None and (self.angles.size or "angle" in bounds):
+            steepest = float(self.seen_at("curves").max()) if self.angles.size else values["angle"]
+            bounds["angle"], bounds[cone] = oblique_cone(cone, steepest, values[cone], bounds[cone])
         return Structure(tuple(bounds.items()))
 
     def neighbours(self, structure: Structure) -> list[Structure]:
         """Return the structures with one effect more, where its size is least."""
         there = dict(structure.active)
         more = [c for c in self.controls if c.optional and c.name not in there]
-        return [Structure((*structure.active, (c.name, _bucket(c, 0.0)))) for c in more] if not there else []
+        if there or self.angles.size:
+            return []
+        return [Structure((*structure.active, (c.name, bucket(c, 0.0)))) for c in more]
 
-    def compile(self, kind: str, structure: Structure) -> Callable[[Mapping[str, float]], Any]:
-        """Compile the program `kind`, "curves", "colour" or "sphere". Raises ValueError as programs do."""
+    def compile(self, kind: str, structure: Structure) -> Callable[[Mapping[str, float], np.ndarray], Any]:
+        """Compile the program `kind`, "curves", "colour" or "sphere", of values and of the angles `seen_at`.
+
+        Raises ValueError as programs do.
+        """
         controls, active = self._bounded(structure), structure.names
         if kind == "sphere":
             return angle_program(self.scene, controls, active)
-        scene = template(self.scene, controls, active)
+        scene, count = template(self.scene, controls, active), self.seen_at(kind).size
+        if count:
+            scene = with_value(scene, ANGLE, Free(0.0, dict(structure.active).get("angle", 90.0)))
         names = [c.name for c in controls if not c.optional or c.name in active]
         if kind == "colour":
-            return colour_program(scene, names)
-        return spectrum_program(scene, names, self.wavelength)
+            return colour_program(scene, names, count)
+        return spectrum_program(scene, names, self.wavelength, count, self.folded)
 
     def measured(self, spectra: Sequence[Spectrum]) -> FilmView | None:
-        """Return the view with the light and the range of the first spectrum; None where it has them."""
+        """Return the view with the light, the angles and the range of the first spectrum and of those like
+        it; None where it has them."""
         data, own = spectra[0], self.scene.light
-        angles = [] if data.angle is None else np.unique(data.angle).tolist()
-        start = own.angle.start if isinstance(own.angle, Free) else float(own.angle)
-        angle = own.angle if not angles or start in angles else angles[0]
+        alike = [x for x in spectra if (x.signal, x.polarisation) == (data.signal, data.polarisation)]
         polarised = data.polarisation if data.polarisation != "unpolarised" else own.polarisation
-        nm = np.unique(data.wavelength)
-        if len(nm) < 2:
-            raise UsageError(
-                f"{data.path}: the explorer draws signals against the wavelength, and here it is one"
-            )
-        if not _FEWEST <= len(nm) <= _MOST:
-            nm = np.linspace(nm[0], nm[-1], _POINTS)
+        nm = np.unique(np.concatenate([spectrum.wavelength for spectrum in alike]))
+        angles = measured_angles(alike)
+        angle = self._measured_angle(data.path, thinned(angles) if len(nm) > 1 else angles)
+        curves = max(np.size(angle), 1)
+        if len(nm) > 1 and not _FEWEST <= len(nm) <= _MOST / curves:
+            nm = np.linspace(nm[0], nm[-1], _POINTS if curves <= _MANY else _FEW_POINTS)
         if data.azimuth is not None and np.ptp(data.azimuth) > 0:
             raise UsageError(f"{data.path}: has several azimuths of the sample, and the explorer draws one")
         azimuth = own.azimuth if data.azimuth is None else float(data.azimuth[0]) or None
-        light = Light(own.wavelength, angle, data.signal, polarised, azimuth)
-        if light == own and np.array_equal(nm, self.wavelength):
-            return None
-        scene = with_value(self.scene, (GetAttrKey("light"),), light)
-        return FilmView(scene, nm)
+        light = Light(None, angle, data.signal, polarised, azimuth)
+        view = FilmView(with_value(self.scene, (GetAttrKey("light"),), light), nm, bool(data.folded))
+        same = view.folded == self.folded and np.array_equal(nm, self.wavelength)
+        same = same and eqx.tree_equal(view.scene.light, own) is True
+        return None if same else view
+
+    def _measured_angle(self, path: str, angles: np.ndarray) -> Any:
+        """The angle of a light as data state it, or the scene's own where they state none or that."""
+        own = self.scene.light.angle
+        if not angles.size:
+            if len(self.angles) > 1:
+                several = ", ".join(map(named, self.angles))
+                raise UsageError(
+                    f"{path}: states no angle of incidence, and the scene has {several}: leave one of them,"
+                    " or add a column angle_deg"
+                )
+            return float(self.angles[0]) if self.angles.size else own
+        if len(angles) > 1:
+            if isinstance(own, Free):
+                raise UsageError(
+                    f"{path}: has several angles of incidence, and one free angle cannot stand for them: fix"
+                    " it, and free angle_shift of the instrument for an error of all angles"
+                )
+            return angles
+        return own if not self.angles.size and getattr(own, "start", own) == angles[0] else float(angles[0])
 
     def picture(self, found: np.ndarray, size: int) -> bytes:
         """Draw a ball with the colours `found` by the program "sphere", as a PNG."""
         return ball_picture(found, size)
 
     def stated(self, values: Mapping[str, float]) -> Scene:
-        """Return the scene with these values, at which its own free numbers start."""
+        """Return the scene with these values, at which its own free numbers start, at no wavelengths."""
         free = [control.name for control in self.controls if control.free is not None]
-        return scene_with(self.scene, self.controls, values, free)
+        one = len(self.angles) == 1
+        scene = with_value(self.scene, ANGLE, float(self.angles[0])) if one else self.scene
+        return scene_with(scene, self.controls, values, free)
+
+    def sampled(self, scene: Scene) -> Scene:
+        """Return a scene of this view at each of its wavelengths and angles, one angle after the other."""
+        angles = self.angles
+        if len(angles) < 2:
+            return with_wavelength(scene, self.wavelength)
+        nm = np.tile(self.wavelength, len(angles))
+        return with_wavelength(scene, nm, np.repeat(angles, len(self.wavelength)))
 
     def plan(self, values: Mapping[str, float]) -> Plan:
         """Return the exact plan of the scene with these values."""
-        return exact(self.scene_at(values))
-
-    def scene_at(self, values: Mapping[str, float]) -> Scene:
-        """Return the scene with these values, at the wavelengths of the plot."""
         active = self.structure(values).names
         numbers = [values[c.name] for c in self.controls if not c.optional or c.name in active]
-        scene = insert(template(self.scene, self.controls, active), numbers)
-        return with_wavelength(scene, self.wavelength)
+        return exact(self.sampled(insert(template(self.scene, self.controls, active), numbers)))
 
     def _bounded(self, structure: Structure) -> tuple[Control, ...]:
         """The controls with the upper bounds of a structure."""
@@ -179,30 +224,16 @@ class FilmView:
         )
 
 
-def _bucket(control: Control, value: float) -> float:
-    """Upper bound of the program for a value: a share of the range of an average, else the whole range."""
-    if _key(control.name) not in _AVERAGED:
-        return control.upper
-    return next(share * control.upper for share in _SHARES if value <= share * control.upper * (1 + 1e-12))
-
-
-def _oblique_cone(name: str, angle: float, size: float, bound: float) -> tuple[float, float]:
-    """Upper bounds of the angle of incidence, in steps of `_ANGLES`, and of the size of a cone at it.
-
-    Raises UsageError where the cone reaches beyond `_GRAZING`.
-    """
-    aperture = _key(name) == "numerical_aperture"
-    half = math.degrees(math.asin(min(size, 1.0))) if aperture else size
-    if angle + half > _GRAZING:
-        raise UsageError(
-            f"the cone of light reaches beyond {_GRAZING:g} degrees: the angle of incidence is {angle:g}, and"
-            f" the half angle of the cone {half:.3g}"
+def _wavelengths(scene: Scene, wavelength: Any) -> np.ndarray:
+    """Wavelengths of a plot: those given, else of the scene's light, else visible ones of its materials."""
+    if wavelength is None:
+        wavelength = scene.light.wavelength
+    if wavelength is not None:
+        return np.unique(np.asarray(wavelength, float))
+    nm = default_wavelengths(scene)
+    if len(nm) < 2:
+        raise DataError(
+            f"the materials share no wavelengths in {VISIBLE[0]:g} to {VISIBLE[1]:g} nm:"
+            " give [data] wavelengths = { start, stop, step }"
         )
-    highest = min(math.ceil(angle / _ANGLES) * _ANGLES, _GRAZING - half)
-    room = _GRAZING - highest
-    return highest, min(bound, math.sin(math.radians(room)) if aperture else room)
-
-
-def _key(name: str) -> str:
-    """The last part of a control's name."""
-    return name.rpartition(".")[2]
+    return np.arange(nm[0], nm[-1] + 0.5)

@@ -12,6 +12,8 @@ import numpy as np
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
 from pellicle.explorer.controls import Control
+from pellicle.explorer.dropped_files import lines
+from pellicle.explorer.incidence import measured_angles
 from pellicle.explorer.programs import Curve
 from pellicle.fitting.curves import Curve as FittedCurve
 from pellicle.fitting.result import Fit
@@ -93,16 +95,17 @@ def to_json(found: Fit, controls: Collection[Control]) -> dict[str, Any]:
     }
 
 
-def fitted_curves(found: Fit) -> list[Curve]:
-    """Return the fitted signal of each spectrum, with its scale and offset."""
+def fitted_curves(found: Fit, against_angle: bool = False) -> list[Curve]:
+    """Return the fitted signal of each spectrum, with its scale and offset, as `data_curves` does data."""
     curves = []
+    every = measured_angles([part.spectrum for part in found.parts])
     for part in found.parts:
         curve = part.curve
         if isinstance(curve, FittedCurve) and np.ndim(curve.model) == 1:
-            order = np.argsort(curve.wavelength, kind="stable")
-            rows = {part.spectrum.signal: curve.model}
+            columns = {part.spectrum.signal: curve.model}
             if curve.delta_model is not None:
-                rows = {"Ψ": curve.model, "Δ": curve.delta_model}
-            for label, y in rows.items():
-                curves.append(Curve(f"fit: {label}", curve.wavelength[order], y[order]))
+                columns = {"Ψ": curve.model, "Δ": curve.delta_model}
+            for rows, x, setting in lines(part.spectrum, every, against_angle):
+                for label, y in columns.items():
+                    curves.append(Curve(label, x, y[rows], setting, part.spectrum.name))
     return curves

@@ -9,14 +9,16 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.tree_util import GetAttrKey
 
 from pellicle.colour import integration_bands
 from pellicle.data.mueller import ELEMENTS
 from pellicle.effects.film import exact
-from pellicle.explorer.controls import Control, template, with_value
+from pellicle.explorer.controls import Control, free_paths, template, with_value
+from pellicle.explorer.incidence import named
 from pellicle.optics.ellipsometry import psi_delta
 from pellicle.scene.film import Light, Scene, with_wavelength
-from pellicle.scene.free import Free, free_leaves, insert, start_values
+from pellicle.scene.free import Free, insert, start_values
 from pellicle.scene.instrument import Drift, Instrument
 from pellicle.scene.layers import Layer
 from pellicle.simulation.film import build, tabulated
@@ -32,19 +34,34 @@ Numbers = Mapping[str, float]
 
 
 class Curve(NamedTuple):
-    """One curve of a plot."""
+    """One curve of a plot: its signal, and its angle of incidence where several are drawn (`65°`).
 
-    label: str
+    `name` is that of one of several spectra in a file.
+    """
+
+    signal: str
     x: np.ndarray
     y: np.ndarray
+    setting: str = ""
+    name: str = ""
+
+    @property
+    def label(self) -> str:
+        """Signal, angle and name: `Ψ 65°`, `R (Rp)`."""
+        return " ".join(x for x in (self.signal, self.setting, f"({self.name})" if self.name else "") if x)
 
 
 def spectrum_program(
-    scene: Scene, names: Sequence[str], wavelength: np.ndarray
-) -> Callable[[Numbers], list[Curve]]:
+    scene: Scene, names: Sequence[str], wavelength: np.ndarray, count: int, folded: bool = False
+) -> Callable[[Numbers, np.ndarray], list[Curve]]:
     """Compile the spectrum of a scene at wavelengths in nm, as a function of its free numbers `names`.
 
-    A free scale is 1 and a free offset 0. **Raises:** ValueError where a material has no data.
+    The angle of incidence of the scene is free beside them if there are a `count` of angles in degrees,
+    (count,), the second argument of the function: each has a curve, or one wavelength has one against them.
+    With 0 the angle is the scene's. With `folded` Δ lies in 0 to 180 degrees. A free scale is 1 and a free
+    offset 0.
+
+    **Raises:** ValueError where a material has no data.
     """
     scale, offset, signal = scene.instrument.scale, scene.instrument.offset, scene.light.signal
     gain = 1.0 if isinstance(scale, Drift) else float(scale)
@@ -53,34 +70,49 @@ def spectrum_program(
 
     def rows(found: Any) -> Any:
         if signal == "psi-delta":
-            return jnp.stack(jnp.broadcast_arrays(*psi_delta(*found.reshape(-1, 3).T)))
+            psi, delta = jnp.broadcast_arrays(*psi_delta(*found.reshape(-1, 3).T))
+            return jnp.stack([psi, jnp.minimum(delta, 360.0 - delta) if folded else delta])
         if signal == "mueller":
             return found.reshape(len(wavelength), -1).T
         return gain * found[None] + shift
 
-    compute = _compiled(with_wavelength(scene, wavelength), names, after=rows)
+    compute = _compiled(with_wavelength(scene, wavelength), names, after=rows, count=count)
 
-    def curves(values: Numbers) -> list[Curve]:
-        return [Curve(label, wavelength, y) for label, y in zip(labels, compute(values), strict=True)]
+    def curves(values: Numbers, angles: np.ndarray) -> list[Curve]:
+        found = compute(values, angles)
+        if not count:
+            return [Curve(label, wavelength, y) for label, y in zip(labels, found, strict=True)]
+        if len(wavelength) == 1:
+            return [Curve(label, angles, found[:, i, 0]) for i, label in enumerate(labels)]
+        return [
+            Curve(label, wavelength, found[j, i], named(angle))
+            for i, label in enumerate(labels)
+            for j, angle in enumerate(angles)
+        ]
 
     return curves
 
 
-def colour_program(scene: Scene, names: Sequence[str]) -> Callable[[Numbers], np.ndarray]:
+def colour_program(
+    scene: Scene, names: Sequence[str], count: int
+) -> Callable[[Numbers, np.ndarray], np.ndarray]:
     """Compile XYZ (3,) of the reflected or transmitted light under D65, observer 1931, with Y = 1 for white.
 
-    It is that of the reflected light for ellipsometry. **Raises:** ValueError where a material has no data
-    between 380 and 730 nm.
+    With a `count` of angles, as in `spectrum_program`, it is (count, 3). It is that of the reflected light
+    for ellipsometry.
+
+    **Raises:** ValueError where a material has no data between 380 and 730 nm.
     """
     bands, light = integration_bands(BANDS), scene.light
     if light.ellipsometric:
         scene = with_value(scene, _LIGHT, Light(None, light.angle, azimuth=light.azimuth))
-    return _compiled(with_wavelength(scene, bands.wavelength), names, after=lambda r: r @ bands.weights)
+    scene = with_wavelength(scene, bands.wavelength)
+    return _compiled(scene, names, after=lambda r: r @ bands.weights, count=count)
 
 
 def angle_program(
     scene: Scene, controls: Sequence[Control], active: Sequence[str]
-) -> Callable[[Numbers], np.ndarray]:
+) -> Callable[[Numbers, np.ndarray], np.ndarray]:
     """Compile XYZ (`COSINES`, 3) of the light that a film reflects, against the cosine of the angle.
 
     The cosines are 1/`COSINES` to 1. The instrument, spreads of the thickness and the back face are left out.
@@ -100,40 +132,47 @@ def angle_program(
     bare = replace(fixed, layers=layers, substrate=substrate, light=light, instrument=Instrument())
     names = [control.name for control in own if not control.optional or control.name in active]
     degrees = np.rad2deg(np.arccos(np.arange(1, COSINES + 1) / COSINES))
-    return _compiled(template(bare, own, active), names, over=degrees, after=lambda r: r @ bands.weights)
+    compute = _compiled(
+        template(bare, own, active), names, after=lambda r: r @ bands.weights, count=len(degrees)
+    )
+    return lambda values, _: compute(values, degrees)
 
 
-_LIGHT = (jax.tree_util.GetAttrKey("light"),)
+_LIGHT = (GetAttrKey("light"),)
+ANGLE = (*_LIGHT, GetAttrKey("angle"))
+"""Place of the angle of incidence in a scene."""
 
 
 def _compiled(
-    scene: Scene,
-    names: Sequence[str],
-    *,
-    after: Callable[[Any], Any],
-    over: np.ndarray | None = None,
-) -> Callable[[Numbers], np.ndarray]:
+    scene: Scene, names: Sequence[str], *, after: Callable[[Any], Any], count: int = 0
+) -> Callable[[Numbers, np.ndarray], np.ndarray]:
     """Compile `after` of a scene's signal as a function of its free numbers, `names` in their order.
 
-    With `over`, one more free number, the last, takes all of these values.
+    With a `count` the angle of incidence, free too, takes as many values in degrees, the second argument.
     """
-    assert len(names) == len(free_leaves(scene)) - (over is not None)
+    paths = free_paths(scene)
+    assert len(names) == len(paths) - bool(count)
     with jax.enable_x64(True):
         simulate, evaluated = build(exact(scene).static_key), tabulated(scene)
-        start = start_values(scene)[: len(names)]
+        start, at = start_values(scene), paths.index(ANGLE) if count else 0
+        if count:
+            start = np.delete(start, at)
 
         @jax.jit
-        def program(numbers: Any, evaluated: Any) -> Any:
-            if over is None:
+        def program(numbers: Any, angles: Any, evaluated: Any) -> Any:
+            if not count:
                 return after(simulate(insert(evaluated, list(numbers))))
-            each = jax.vmap(lambda last: simulate(insert(evaluated, [*numbers, last])))
-            return after(each(jnp.asarray(over)))
 
-        compiled = program.lower(start, evaluated).compile()
+            def seen(angle: Any) -> Any:
+                return after(simulate(insert(evaluated, [*numbers[:at], angle, *numbers[at:]])))
 
-    def compute(values: Numbers) -> np.ndarray:
+            return jax.vmap(seen)(angles)
+
+        compiled = program.lower(start, np.zeros(count), evaluated).compile()
+
+    def compute(values: Numbers, angles: np.ndarray) -> np.ndarray:
         with jax.enable_x64(True):
             numbers = np.array([values[name] for name in names], float)
-            return np.asarray(compiled(numbers, evaluated))
+            return np.asarray(compiled(numbers, angles, evaluated))
 
     return compute

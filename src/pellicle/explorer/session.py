@@ -12,25 +12,24 @@ from functools import partial
 from logging import getLogger
 from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
-from pellicle.colour import lab, sensor
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import DataError, UsageError
+from pellicle.explorer.answers import colours_to_json, curve_to_json, plan_to_json
 from pellicle.explorer.compiler import NOW, SOON, Compiler
-from pellicle.explorer.controls import scene_with
+from pellicle.explorer.controls import scene_with, with_value
 from pellicle.explorer.dropped_files import LARGEST_FILE, data_curves, data_text, measured_spectra
 from pellicle.explorer.film_view import FilmView
 from pellicle.explorer.fit_run import FitRun, fitted_curves, fitted_names, to_json
-from pellicle.explorer.programs import Curve
-from pellicle.explorer.sphere import to_linear_srgb
+from pellicle.explorer.incidence import asked_angles, measured_angles
+from pellicle.explorer.programs import ANGLE
 from pellicle.explorer.surface_view import SurfaceExplorerView
 from pellicle.recipes.python_text import python_program
 from pellicle.recipes.write import recipe_text
-from pellicle.reporting.picture import encode
-from pellicle.scene.film import Scene, with_wavelength
+from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface
 
 log = getLogger(__name__)
@@ -39,6 +38,9 @@ SIZE, MOVING, LARGEST = 192, 96, 512
 """Pixels across the picture of a ball, while a slider moves, and the most that a page may ask for."""
 WANTED = ("curves", "colour", "sphere", "plan")
 """Parts of a view."""
+_VIEWS = 16
+"""Sets of angles of incidence that are remembered."""
+_View: TypeAlias = FilmView | SurfaceExplorerView
 
 
 class Session:
@@ -48,7 +50,8 @@ class Session:
     (wavelengths,), by default those of the scene's light or the visible ones; `title` of the page; `spectra`,
     the data to begin with.
 
-    **Raises:** UsageError for a light of several angles, DataError where materials share no wavelengths.
+    **Raises:** UsageError for more angles of incidence than are drawn, DataError where materials share no
+    wavelengths.
     """
 
     def __init__(
@@ -64,9 +67,10 @@ class Session:
         if wavelength is None and spectra:
             wavelength = np.unique(spectra[0].wavelength)
         view = SurfaceExplorerView(scene) if isinstance(scene, Surface) else FilmView(scene, wavelength)
-        self.view: FilmView | SurfaceExplorerView = (view.measured(spectra) if spectra else None) or view
+        self.view: _View = (view.measured(spectra) if spectra else None) or view
         here = self.folder or Path.cwd()
         self.spectra = [replace(each, path=os.path.relpath(each.path, here)) for each in spectra]
+        self._views: dict[tuple[Any, tuple[float, ...]], FilmView] = {}  # at other angles of incidence
         self._ahead = False  # whether programs are compiled before a view needs them
         self._compiler, self._fit_run = Compiler(), FitRun()
         self._requests: dict[str, Callable[[Mapping[str, Any]], dict[str, Any]]] = {
@@ -94,9 +98,22 @@ class Session:
             return {"error": f"{request} failed: {type(error).__name__}: {error}", **_serial(body)}
 
     def _scene(self, body: Mapping[str, Any]) -> dict[str, Any]:
-        about = {"title": self.title, "kind": self.view.kind, "limit": LARGEST_FILE}
+        view = self._view_of(body)
+        about = {"title": self.title, "kind": view.kind, "limit": LARGEST_FILE}
         data = {"data": self._data_shown()} if self.spectra else {}
-        return {**about, **self.view.describe(), **data}
+        return {**about, **view.describe(), **data}
+
+    def _view_of(self, body: Mapping[str, Any]) -> _View:
+        """The view at the angles of incidence of a request, where it has some. Raises UsageError."""
+        if body.get("angles") is None:
+            return self.view
+        angles = asked_angles(body["angles"])
+        key = self.view, tuple(angles.tolist())
+        if key not in self._views:
+            while len(self._views) >= _VIEWS:
+                del self._views[next(iter(self._views))]
+            self._views[key] = self.view.at(angles)
+        return self._views[key]
 
     def _data(self, body: Mapping[str, Any]) -> dict[str, Any]:
         """Read data, and take the light of the scene from them."""
@@ -104,7 +121,7 @@ class Session:
         if isinstance(view, SurfaceExplorerView):
             view.measured([])
         spectra = measured_spectra(body, self.folder, view.scene.light.signal)
-        changed = view.measured(spectra)
+        changed = self._view_of(body).measured(spectra)
         self.spectra = spectra
         if changed is None:
             return self._data_shown()
@@ -114,38 +131,49 @@ class Session:
         return {**self._data_shown(), "scene_changed": True}
 
     def _data_shown(self) -> dict[str, Any]:
-        angle = self.view.defaults().get("angle", 0.0)
+        curves = data_curves(self.spectra, isinstance(self.view, FilmView) and self.view.against_angle)
         return {
             "name": self.spectra[0].path,
-            "curves": [curve_to_json(curve) for curve in data_curves(self.spectra, angle)],
+            "curves": [curve_to_json(curve) for curve in curves],
             "notes": data_text(self.spectra),
+            "states_angle": any(spectrum.angle is not None for spectrum in self.spectra),
         }
 
     def _fit(self, body: Mapping[str, Any]) -> dict[str, Any]:
-        view, values = self.view, self._values(body)
+        view = self._view_of(body)
         if not self.spectra or isinstance(view, SurfaceExplorerView):
             raise UsageError("there are no data to fit: open a file first")
+        values = self._values(view, body)
         names = fitted_names(view.controls, body.get("free"))
-        found = self._fit_run.run(self.spectra, scene_with(view.scene, view.controls, values, names))
+        scene = scene_with(view.scene, view.controls, values, names)
+        if "angle" not in names and all(spectrum.angle is not None for spectrum in self.spectra):
+            scene = with_value(scene, ANGLE, 0.0)  # angles of the data, whatever the slider has
+        found = self._fit_run.run(self.spectra, scene)
         if found is None:
             return {"stopped": True}
-        return {
-            **to_json(found, view.controls),
-            "curves": [curve_to_json(curve) for curve in fitted_curves(found)],
-        }
+        answer = to_json(found, view.controls)
+        stated = measured_angles(self.spectra)
+        if "angle" not in names and "angle" in values and len(stated) == 1:
+            answer["values"]["angle"] = float(stated[0])
+        curves = fitted_curves(found, view.against_angle)
+        return {**answer, "curves": [curve_to_json(curve) for curve in curves]}
 
     def _recipe(self, body: Mapping[str, Any]) -> dict[str, Any]:
-        view, values = self.view, self._values(body)
-        scene, folder = view.stated(values), Path.cwd() if self.folder is None else self.folder
+        view = self._view_of(body)
+        scene, folder = view.stated(self._values(view, body)), self.folder or Path.cwd()
         if isinstance(scene, Surface) or isinstance(view, SurfaceExplorerView):
             return {"toml": recipe_text(scene, folder), "python": python_program(scene)}
-        sampled = with_wavelength(scene, view.wavelength)
+        program = python_program(view.sampled(scene))
+        if not self.spectra:
+            return {"toml": recipe_text(scene, folder, wavelength=view.wavelength), "python": program}
+        if np.ndim(scene.light.angle):  # those of the files
+            scene = with_value(scene, ANGLE, 0.0)
         files = list(dict.fromkeys(folder / spectrum.path for spectrum in self.spectra))
-        toml = recipe_text(scene if files else sampled, folder, files=files)
-        return {"toml": toml, "python": python_program(sampled)}
+        return {"toml": recipe_text(scene, folder, files=files), "python": program}
 
     def _view(self, body: Mapping[str, Any]) -> dict[str, Any]:
-        values, warnings = self._values(body), []
+        view, warnings = self._view_of(body), []
+        values = self._values(view, body)
         wanted, size = body.get("want", WANTED), body.get("size", MOVING if body.get("moving") else SIZE)
         if not isinstance(wanted, list | tuple) or not all(x in WANTED for x in wanted):
             raise UsageError(f"`want` must be a list of {', '.join(WANTED)}")
@@ -153,10 +181,10 @@ class Session:
             raise UsageError(f"`size` must be 16 to {LARGEST} pixels")
         answer: dict[str, Any] = {**_serial(body), "compiling": [], "milliseconds": {}}
         parts = {"curves": self._curves, "colour": self._colour, "sphere": self._sphere, "plan": self._plan}
-        for part in (part for part in wanted if part in self.view.parts):
+        for part in (part for part in wanted if part in view.parts):
             began = time.perf_counter()
             try:
-                found = parts[part](values, bool(body.get("wait")), size)
+                found = parts[part](view, values, bool(body.get("wait")), size)
             except ValueError as error:
                 warnings.append(_sentence(error))
                 continue
@@ -167,15 +195,15 @@ class Session:
             answer["milliseconds"][part] = round(1e3 * (time.perf_counter() - began), 3)
         return {**answer, "warnings": list(dict.fromkeys(warnings))}
 
-    def _values(self, body: Mapping[str, Any]) -> dict[str, float]:
+    def _values(self, view: _View, body: Mapping[str, Any]) -> dict[str, float]:
         """The value of every control: those of the request, else the scene's. Raises UsageError."""
-        given, values = body.get("values") or {}, self.view.defaults()
+        given, values = body.get("values") or {}, view.defaults()
         if not isinstance(given, Mapping):
             raise UsageError("`values` must be numbers by name")
         for name, value in given.items():
-            control = self.view.by_name.get(name)
+            control = view.by_name.get(name)
             if control is None:
-                raise UsageError(f"no control {name!r}; known: {', '.join(self.view.by_name)}")
+                raise UsageError(f"no control {name!r}; known: {', '.join(view.by_name)}")
             if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
                 raise UsageError(f"{name} must be a number, not {value!r}")
             if not control.lower <= value <= control.upper:
@@ -184,12 +212,12 @@ class Session:
             values[name] = float(value)
         return values
 
-    def _program(self, kind: str, values: Mapping[str, float], wait: bool) -> Any:
-        """A compiled program of the effects that these values have, None while it is compiled."""
-        view = self.view
+    def _computed(self, view: _View, kind: str, values: Mapping[str, float], wait: bool) -> Any:
+        """What a program of the effects that these values have returns, None while it is compiled."""
         structure = view.structure(values)
         get = self._compiler.wait if wait else self._compiler.get
-        return get((view, kind, structure), lambda: view.compile(kind, structure))
+        program = get((view.key(kind), structure), lambda: view.compile(kind, structure))
+        return None if program is None else program(values, view.seen_at(kind))
 
     def prepare(self) -> None:
         """Compile in the background what the first views need, and then what one effect more needs."""
@@ -201,53 +229,30 @@ class Session:
         for kind, needed, urgency in several:
             # a ValueError, of a colour without data, is raised by the view that wants it
             with suppress(ValueError):
-                self._compiler.get((view, kind, needed), partial(view.compile, kind, needed), urgency)
+                self._compiler.get((view.key(kind), needed), partial(view.compile, kind, needed), urgency)
 
-    def _curves(self, values: Mapping[str, float], wait: bool, size: int) -> list[dict[str, Any]] | None:
-        program = self._program("curves", values, wait)
-        return None if program is None else [curve_to_json(curve) for curve in program(values)]
+    def _curves(
+        self, view: _View, values: Mapping[str, float], wait: bool, size: int
+    ) -> list[dict[str, Any]] | None:
+        curves = self._computed(view, "curves", values, wait)
+        return None if curves is None else [curve_to_json(curve) for curve in curves]
 
-    def _colour(self, values: Mapping[str, float], wait: bool, size: int) -> dict[str, Any] | None:
-        program = self._program("colour", values, wait)
-        if program is None:
-            return None
-        xyz = program(values)
-        shown = encode(to_linear_srgb(xyz))
-        numbers = np.asarray(lab(xyz, sensor().white)).round(2).tolist()
-        in_words = ", ".join(f"{name} {x:.1f}" for name, x in zip(("L*", "a*", "b*"), numbers, strict=True))
-        return {
-            "hex": "#" + "".join(f"{round(255 * float(x)):02x}" for x in shown),
-            "lab": numbers,
-            "text": f"{self.view.light_in_words} under D65: {in_words}",
-        }
+    def _colour(
+        self, view: _View, values: Mapping[str, float], wait: bool, size: int
+    ) -> dict[str, Any] | None:
+        xyz = self._computed(view, "colour", values, wait)
+        return None if xyz is None else colours_to_json(xyz, view.seen_at("colour"), view.light_in_words)
 
-    def _sphere(self, values: Mapping[str, float], wait: bool, size: int) -> str | None:
-        program = self._program("sphere", values, wait)
-        if program is None:
-            return None
-        return "data:image/png;base64," + b64encode(self.view.picture(program(values), size)).decode()
+    def _sphere(self, view: _View, values: Mapping[str, float], wait: bool, size: int) -> str | None:
+        found = self._computed(view, "sphere", values, wait)
+        return (
+            None
+            if found is None
+            else f"data:image/png;base64,{b64encode(view.picture(found, size)).decode()}"
+        )
 
-    def _plan(self, values: Mapping[str, float], wait: bool, size: int) -> list[dict[str, Any]]:
-        return [
-            {
-                "effect": row.effect,
-                "choice": "on" if row.on else "off",
-                "reason": row.why,
-                "error": row.error_bound,
-                "cost": None,
-            }
-            for row in self.view.plan(values).rows
-        ]
-
-
-def curve_to_json(curve: Curve) -> dict[str, Any]:
-    """Convert a curve; 7 digits are more than a plot shows, None is a point without a value."""
-    y = [float(f"{v:.7g}") if isfinite(v) else None for v in np.asarray(curve.y, float).tolist()]
-    return {
-        "label": curve.label,
-        "x": [float(f"{v:.7g}") for v in np.asarray(curve.x, float).tolist()],
-        "y": y,
-    }
+    def _plan(self, view: _View, values: Mapping[str, float], wait: bool, size: int) -> list[dict[str, Any]]:
+        return plan_to_json(view.plan(values))
 
 
 def _serial(body: Mapping[str, Any]) -> dict[str, Any]:

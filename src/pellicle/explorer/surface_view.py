@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NoReturn
 
@@ -13,9 +13,9 @@ from pellicle.data.spectrum import Spectrum
 from pellicle.effects.plan import Plan
 from pellicle.errors import UsageError
 from pellicle.explorer.controls import Control
-from pellicle.explorer.film_view import Structure
 from pellicle.explorer.programs import Curve
 from pellicle.explorer.sphere import png
+from pellicle.explorer.structure import Structure
 from pellicle.planning.surface import plan
 from pellicle.reporting.picture import display
 from pellicle.scene.free import Free
@@ -50,6 +50,8 @@ class SurfaceExplorerView:
             "controls": [control.to_json() for control in self.controls],
             "signals": self._channels(),
             "axis": {"label": "angle of view (°)", "value": "BRDF (1/sr)"},
+            "angles": None,
+            "at_one_wavelength": None,
         }
 
     def structure(self, values: Mapping[str, float]) -> Structure:
@@ -60,13 +62,25 @@ class SurfaceExplorerView:
         """Return no other structures."""
         return []
 
-    def compile(self, kind: str, structure: Structure) -> Callable[[Mapping[str, float]], Any]:
+    def at(self, angles: np.ndarray) -> NoReturn:
+        """Raise UsageError: the angle of incidence has a slider."""
+        raise UsageError("a surface has one angle of incidence, a slider: leave the angles out")
+
+    def key(self, kind: str) -> Hashable:
+        """Key of the programs `kind`."""
+        return self, kind
+
+    def seen_at(self, kind: str) -> np.ndarray:
+        """Return no angles: programs take that of the slider."""
+        return np.zeros(0)
+
+    def compile(self, kind: str, structure: Structure) -> Callable[[Mapping[str, float], np.ndarray], Any]:
         """Compile the lobes ("curves") or the sphere by computing them once."""
         if kind == "curves":
             self._curves(self.defaults())
-            return self._curves
+            return lambda values, _: self._curves(values)
         self._sphere(self.defaults(), 32)
-        return lambda values: values
+        return lambda values, _: values
 
     def picture(self, found: Mapping[str, float], size: int) -> bytes:
         """Draw the sphere with these values as a PNG."""

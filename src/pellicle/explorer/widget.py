@@ -34,25 +34,40 @@ def _widget_class() -> Any:
     class Explorer(anywidget.AnyWidget):
         """Sliders of a film beside its spectrum, colour and plan, in a cell of a notebook.
 
-        `values` are the sliders' numbers by name, in their units; setting it moves the sliders.
+        `values` are the sliders' numbers by name, in their units; setting it moves the sliders. `angles` are
+        angles of incidence in degrees, with a curve for each; empty for those of the scene.
         """
 
         _esm = widget_module()
         _css = style()
         values = traitlets.Dict().tag(sync=True)
+        angles = traitlets.List(traitlets.Float()).tag(sync=True)
 
         def __init__(self, session: Session) -> None:
             self._session = session
-            controls = session.answer("scene", {})["controls"]
-            super().__init__(values={control["name"]: control["value"] for control in controls})
+            super().__init__(values=self._defaults([]))
             self.on_msg(self._receive)
+
+        def _defaults(self, angles: list[float]) -> dict[str, float]:
+            """The scene's own values of the sliders at these angles. Raises ValueError for wrong ones."""
+            answer = self._session.answer("scene", {"angles": angles or None})
+            if "error" in answer:
+                raise ValueError(answer["error"])
+            return {control["name"]: control["value"] for control in answer["controls"]}
+
+        @traitlets.validate("angles")
+        def _with_sliders(self, proposal: Any) -> list[float]:
+            """Keep the values of the sliders that there are at these angles."""
+            defaults = self._defaults(proposal["value"])
+            self.values = {name: self.values.get(name, value) for name, value in defaults.items()}
+            return proposal["value"]
 
         def recipe(self) -> str:
             """Return the film with the current values as a recipe in TOML.
 
             **Raises:** ValueError for a film that no recipe expresses.
             """
-            answer = self._session.answer("recipe", {"values": self.values})
+            answer = self._session.answer("recipe", {"values": self.values, "angles": self.angles or None})
             if "error" in answer:
                 raise ValueError(answer["error"])
             return answer["toml"]

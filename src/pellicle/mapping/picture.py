@@ -179,6 +179,8 @@ def _inverse(
 ) -> ColourInverse:
     """The inverse of the film's colours; a camera's channels are linear, with the σ of their median."""
     light: Any = scene.light.angle
+    if np.ndim(light):
+        raise UsageError("a picture has one angle of incidence: give the scene one number as `angle`")
     angle = float(getattr(light, "start", light))
     low = max(angle - 1.0, 0.0)  # a table needs a range of angles
     table = colour_table(scene, (bounds.lower, bounds.upper), (low, low + 1.0), layer, eye=eye)

@@ -47,14 +47,10 @@ def python_program(scene: Scene | Surface) -> str:
     """Return a program that builds a scene and simulates it, at the wavelengths of its light where given."""
     nm = scene.light.wavelength if isinstance(scene, Scene) else None
     lines = ["import pellicle as pl", "", f"scene = {python_text(scene)}"]
+    numpy = ["import numpy as np"] if nm is not None or "np." in lines[-1] else []
     if nm is None:
-        return "\n".join([*lines, "simulated = pl.simulate(scene)", "print(simulated.values)", ""])
-    at = np.asarray(nm, float)
-    grid = np.linspace(at[0], at[-1], len(at))
-    even = bool(np.allclose(grid, at, rtol=0, atol=1e-9))
-    first, last = at[[0, -1]].tolist()
-    text = f"np.linspace({first!r}, {last!r}, {len(at)})" if even else f"np.array({at.tolist()!r})"
-    lines = ["import numpy as np", *lines, f"wavelength = {text}  # nm"]
+        return "\n".join([*numpy, *lines, "simulated = pl.simulate(scene)", "print(simulated.values)", ""])
+    lines = [*numpy, *lines, f"wavelength = {_array(np.asarray(nm, float))}  # nm"]
     return "\n".join([*lines, "spectrum = pl.simulate(scene, wavelength)", "print(spectrum.values)", ""])
 
 
@@ -92,7 +88,25 @@ def python_text(thing: Any) -> str:
     number: Any = thing
     if np.ndim(number) == 0 and hasattr(number, "__float__"):
         return repr(float(number))
+    if np.ndim(number) == 1 and len(number):
+        return _array(np.asarray(number, float))
     raise UsageError(f"{type(thing).__name__} has no expression in Python")
+
+
+def _array(values: np.ndarray) -> str:
+    """A call of NumPy that makes an array of one dimension: even, repeated, or number by number."""
+    count = len(values)
+    even = np.linspace(values[0], values[-1], count)
+    if count > 2 and values[0] != values[-1] and np.allclose(even, values, rtol=0, atol=1e-9):
+        return f"np.linspace({float(values[0])!r}, {float(values[-1])!r}, {count})"
+    run = int(np.argmax(values != values[0])) or count  # of the first number
+    if run > 1 and count % run == 0 and np.array_equal(values, np.repeat(values[::run], run)):
+        return f"np.repeat({values[::run].tolist()!r}, {run})"
+    period = 1 + int(np.argmax(np.append(values[1:], values[0]) == values[0]))
+    tiled = 1 < period < count and count % period == 0
+    if tiled and np.array_equal(values, np.resize(values[:period], count)):
+        return f"np.tile({_array(values[:period])}, {count // period})"
+    return f"np.array({values.tolist()!r})"
 
 
 def _medium(medium: Material | Constant) -> str:

@@ -64,8 +64,13 @@ def recipe_text(
     folder: str | os.PathLike[str] = ".",
     *,
     files: Iterable[str | os.PathLike[str]] = (),
+    wavelength: np.ndarray | None = None,
 ) -> str:
-    """Return the text of a recipe that lies in `folder`; the rest as for `write_recipe`."""
+    """Return the text of a recipe that lies in `folder`; the rest as for `write_recipe`.
+
+    `wavelength` in nm, (wavelengths,), is that of a light which has none: each of its angles and azimuths is
+    seen at all of them.
+    """
     check_scene(scene)
     at = Path(folder)
     data = {"files": [Path(os.path.relpath(file, at)).as_posix() for file in files]}
@@ -75,9 +80,10 @@ def recipe_text(
         again: Any = SurfaceRecipe(str(at / "recipe"), validated(tomllib.loads(text), surface.TABLES)).scene()
         _check_surface(scene, again)
         return text
+    sampled = {} if wavelength is None else {"wavelengths": _wavelengths(wavelength)}
     text = toml_text.document(
         {
-            "data": _data(scene) | data,
+            "data": _data(scene) | sampled | data,
             "scene": _scene(scene, at),
             "scene.layer": [_layer(layer, i, scene, at) for i, layer in enumerate(scene.layers)],
             "instrument": _instrument(scene),

@@ -40,12 +40,18 @@ ELLIPSOMETRY = ("psi-delta", "mueller", generalised.SIGNAL)
 POLARISATIONS = ("unpolarised", "s", "p")
 
 
+def _listed(value: Any) -> Any:
+    """A list or a tuple of numbers as an array; other values as they are."""
+    return np.asarray(value, float) if isinstance(value, list | tuple) else value
+
+
 @final
 class Light(eqx.Module):
     """Light and signal of a measurement.
 
     **Arguments:** `wavelength` in nm (None leaves it to the data); `angle` of incidence in degrees, one or
-    one per wavelength; `signal`, "R", "T", "psi-delta", "mueller" or "generalised-psi-delta"; `polarisation`,
+    one per wavelength (without wavelengths, several that each have all of them, as a recipe and the explorer
+    take them); `signal`, "R", "T", "psi-delta", "mueller" or "generalised-psi-delta"; `polarisation`,
     "unpolarised", "s" or "p"; `azimuth` in degrees, one or one per wavelength: the rotation of the sample
     about its normal, clockwise as seen from the side of the light, which adds to the angle φ of every axis
     (None is 0).
@@ -57,10 +63,10 @@ class Light(eqx.Module):
     """
 
     wavelength: Any = None
-    angle: Any = 0.0
+    angle: Any = eqx.field(converter=_listed, default=0.0)
     signal: str = eqx.field(static=True, default="R")
     polarisation: str = eqx.field(static=True, default="unpolarised")
-    azimuth: Any = None
+    azimuth: Any = eqx.field(converter=_listed, default=None)
 
     def __check_init__(self):
         if self.signal not in SIGNALS:

@@ -49,7 +49,7 @@ export async function explore(element, call, options = {}) {
   }
   /** The answer; what is wrong is shown, and removed by the next answer of its kind. */
   async function ask(request, body = {}) {
-    const answer = await call(request, body).catch((error) => ({ error: error.message }));
+    const answer = await call(request, angles === null ? body : { angles, ...body }).catch((error) => ({ error: error.message }));
     trouble(request, answer.error);
     return answer;
   }
@@ -74,6 +74,7 @@ export async function explore(element, call, options = {}) {
   // ---- views of the current values ----
   const query = new URLSearchParams(options.query ?? "");
   let controls = [];
+  let angles = null; // of incidence, where they are not those of the scene
   let limit = Infinity; // bytes of a file
   let serial = 0;
   let gesture = false; // a slider is being moved
@@ -90,7 +91,7 @@ export async function explore(element, call, options = {}) {
     if (answer.curves) plot.curves = answer.curves;
     if (answer.colour) showColour(answer.colour);
     showWarnings(answer.warnings ?? []);
-    compiling(answer);
+    compiling(answer, asked);
     plot.draw(asked.moving).then(() => requestAnimationFrame(() => {
       element.dispatchEvent(new CustomEvent("drawn", { detail: { values: asked.values, parts: Object.keys(answer) } }));
     }));
@@ -98,8 +99,8 @@ export async function explore(element, call, options = {}) {
     clearTimeout(planTimer);
     planTimer = setTimeout(() => askPlan(view("plan")), PLAN_AFTER);
   });
-  const askSphere = newestOf(asView, (answer) => {
-    compiling(answer);
+  const askSphere = newestOf(asView, (answer, asked) => {
+    compiling(answer, asked);
     if (!answer.sphere) return;
     sphere.src = answer.sphere;
     sphere.hidden = look.hidden = false;
@@ -109,8 +110,8 @@ export async function explore(element, call, options = {}) {
   const askPlan = newestOf(asView, (answer) => { if (answer.plan) plan.replaceChildren(...planLists(answer.plan)); });
 
   /** Asks again for what is being compiled; the old picture stays. */
-  function compiling(answer) {
-    for (const part of Object.keys(answer)) unfinished.delete(part);
+  function compiling(answer, asked) {
+    for (const part of asked.want) unfinished.delete(part);
     for (const part of answer.compiling ?? []) unfinished.add(part);
     const was = element.classList.contains("compiling");
     element.classList.toggle("compiling", unfinished.size > 0);
@@ -122,8 +123,11 @@ export async function explore(element, call, options = {}) {
 
   function showColour(colour) {
     patch.hidden = look.hidden = false;
-    patch.style.background = colour.hex;
-    colourText.textContent = `${colour.hex}: ${colour.text}`;
+    const share = 100 / colour.each.length;
+    const stripes = colour.each.map((hex, i) => `${hex} ${i * share}% ${(i + 1) * share}%`);
+    patch.style.background = stripes.length > 1 ? `linear-gradient(to right, ${stripes.join(", ")})` : colour.hex;
+    look.classList.toggle("several", stripes.length > 1);
+    colourText.textContent = colour.text;
     patch.setAttribute("aria-label", `Colour ${colourText.textContent}`);
   }
 
@@ -148,11 +152,13 @@ export async function explore(element, call, options = {}) {
   }
 
   function tellChange() {
+    query.delete("angle"); // a list has no slider
+    if (angles === null) query.delete("angles"); else query.set("angles", angles.join(","));
     for (const { about, value } of controls) {
       if (value === about.value) query.delete(about.name); else query.set(about.name, short(value, 10));
     }
     options.changed?.(query.toString());
-    element.dispatchEvent(new CustomEvent("changed", { detail: values() }));
+    element.dispatchEvent(new CustomEvent("changed", { detail: { values: values(), angles: angles ?? [] } }));
   }
 
   function setAll(wanted, errors = {}) {
@@ -166,28 +172,50 @@ export async function explore(element, call, options = {}) {
     refresh();
   }
 
-  /** Makes the sliders of a scene, at the values of `given`. Returns whether there is a scene. */
-  async function takeScene(given) {
-    const scene = await ask("scene");
+  /**
+   * Makes the sliders of a scene, at the values of `given` and at the angles of incidence `listed`, null for its own.
+   * Returns whether there is a scene.
+   */
+  async function takeScene(given, listed = null) {
+    const scene = await ask("scene", { angles: listed });
     if (scene.error) return false;
+    angles = listed !== null && scene.angles?.length ? scene.angles : listed; // in rising order
+    const marked = new Map(controls.map((each) => [each.about.name, each.free.checked]));
     options.titled?.(scene.title);
     element.classList.toggle("of-surface", scene.kind === "surface");
     limit = scene.limit ?? Infinity;
     Object.assign(plot, { kind: scene.kind, axis: scene.axis, signals: scene.signals, curves: [], before: [], fitted: [], ranges: {} });
-    canvas.setAttribute("aria-label", `Plot of ${scene.signals.join(", ")} against ${scene.axis.label}. Arrow keys read the points.`);
+    const at = scene.angles?.length ? ` at ${scene.angles.map((angle) => `${short(angle, 8)}°`).join(", ")}` : "";
+    canvas.setAttribute("aria-label", `Plot of ${scene.signals.join(", ")} against ${scene.axis.label}${at}. Arrow keys read the points.`);
     controls = scene.controls.map((about, i) => new Control(about, `${id}-${i}`, moved));
     for (const each of controls) {
       const value = given.get(each.about.name);
       if (value !== null && value !== "" && Number.isFinite(Number(value))) each.set(Number(value));
+      each.free.checked = marked.get(each.about.name) ?? each.free.checked;
     }
     const groups = [...new Set(scene.controls.map((about) => about.group))];
+    const list = scene.angles ? [angleList.element] : []; // a surface has none
+    if (list.length && !groups.includes("light")) groups.splice(groups.includes("instrument") ? groups.indexOf("instrument") : groups.length, 0, "light");
+    const typing = document.activeElement === angleList.input;
+    if (list.length) angleList.show(scene);
     sliders.replaceChildren(...groups.map((name) => make("fieldset", {}, make("legend", {}, name),
-      ...controls.filter((each) => each.about.group === name).map((each) => each.element))));
+      ...controls.filter((each) => each.about.group === name).map((each) => each.element), ...(name === "light" ? list : []))));
+    if (typing) angleList.input.focus();
     stored.replaceChildren(...(scene.files ?? []).map((name) => make("button", {
       type: "button", onclick: () => takeData(name, { file: name }),
     }, `Load ${name}`)));
     if (scene.data) showData(scene.data);
     return true;
+  }
+
+  // ---- angles of incidence ----
+  const angleList = new AngleList(`${id}-angles`, (listed) => takeAngles(listed));
+
+  /** Draws a curve for each angle of a list, at the values of the sliders. */
+  async function takeAngles(listed, wanted = values()) {
+    if (!(await takeScene(new URLSearchParams(Object.entries(wanted)), listed))) return angleList.refuse();
+    tellChange();
+    refresh();
   }
 
   // ---- data ----
@@ -208,10 +236,14 @@ export async function explore(element, call, options = {}) {
     const answer = await ask("data", body);
     say("");
     if (answer.error) return;
-    if (answer.scene_changed && !(await takeScene(new URLSearchParams(Object.entries(values()))))) return;
+    const kept = values();
+    if (answer.states_angle) delete kept.angle;
+    if (answer.scene_changed && !(await takeScene(new URLSearchParams(Object.entries(kept))))) return;
+    if (answer.states_angle) for (const each of controls) if (each.about.name === "angle") each.set(each.about.value);
     showData(answer);
+    tellChange();
     await plot.draw(false);
-    if (answer.scene_changed) refresh();
+    refresh();
   }
 
   function showData(data) {
@@ -259,7 +291,7 @@ export async function explore(element, call, options = {}) {
     const answer = await ask("recipe", { values: values() });
     if (!answer.error) dialog.show(title, answer[kind], name);
   }
-  const reset = () => setAll(Object.fromEntries(controls.map(({ about }) => [about.name, about.value])));
+  const reset = () => (angles !== null ? takeAngles(null, {}) : setAll(Object.fromEntries(controls.map(({ about }) => [about.name, about.value]))));
   const button = (text, onclick) => make("button", { type: "button", onclick }, text);
   const link = button("Copy link", () => copyText(window.location.href, link, element));
   const buttons = make("div", { class: "buttons", role: "group", "aria-label": "Actions" }, fit, stop,
@@ -268,7 +300,14 @@ export async function explore(element, call, options = {}) {
     ...(options.changed ? [link] : []), button("Reset", reset));
 
   // ---- start ----
-  const ready = takeScene(query);
+  const asked = anglesOf(query.get("angles"));
+  const ready = takeScene(query, asked).then(async (found) => {
+    if (found || asked === null) return found;
+    const refused = sentence.textContent;
+    const other = await takeScene(query);
+    trouble("angles", other ? refused : "");
+    return other;
+  });
   if (!window.Plotly) {
     await library(options.plotly, options.nonce).catch((error) => {
       trouble("plot", `The curve cannot be drawn in this browser (${error.message}).`);
@@ -294,5 +333,5 @@ export async function explore(element, call, options = {}) {
     zone.end();
     plot.end();
   };
-  return { values, set: (wanted) => setAll(wanted), redraw, close };
+  return { values, angles: () => angles ?? [], set: (wanted) => setAll(wanted), list: takeAngles, redraw, close };
 }

@@ -2,7 +2,8 @@
 
 const COLOURS = ["--fit", "--blue", "--index-n", "--fourth", "--red", "--green"];
 const CHANNELS = ["--red", "--green", "--blue", "--fourth"]; // of a surface, the longest wavelength first
-const PANELS = ["Ψ", "Δ"]; // signals that have a panel of their own
+const ANGLES = ["--fit", "--blue", "--green", "--fourth"]; // of incidence, rising, as in reports of fits
+const DASHES = ["solid", "dash", "dashdot", "longdash"];
 const ROOM = 0.04; // above and below the curves, as a fraction of the axis
 
 /** Unpacks and runs Plotly, which is a gzipped script in base64, and returns it. */
@@ -34,11 +35,40 @@ class Plot {
     window.Plotly?.purge(this.element);
   }
 
-  /** Label of the ordinate of a curve: Ψ and Δ have panels of their own, other curves share one. */
+  /** Label of the ordinate of a curve, of which each has a panel. */
   #ordinate(curve) {
-    const shared = this.axis.value ?? this.signals.join(", ");
-    const own = PANELS.find((signal) => curve.label.replace("fit: ", "").startsWith(signal));
-    return own ? `${own} ${/\(.*\)/.exec(shared)?.[0] ?? ""}`.trim() : shared;
+    return curve.ordinate ?? this.axis.value ?? this.signals.join(", ");
+  }
+
+  /** Angles of incidence of the curves, rising; none where there is one. */
+  #settings() {
+    const every = new Set([...this.curves, ...this.data].map((curve) => curve.setting).filter(Boolean));
+    return [...every].sort((one, other) => parseFloat(one) - parseFloat(other));
+  }
+
+  /** Colour and dash of each curve: by its angle of incidence; by its label where there is one angle. */
+  #strokes(colour) {
+    const all = [...this.curves, ...this.data];
+    const settings = this.#settings();
+    const signals = [...new Set(all.map((curve) => curve.signal))];
+    const labels = [...new Set(all.map((curve) => curve.label))];
+    const colours = this.kind === "surface" ? CHANNELS : COLOURS;
+    const pick = (names, at) => colour(names[Math.max(at, 0) % names.length]);
+    return (curve) => {
+      const at = settings.indexOf(curve.setting);
+      if (at < 0) return { color: pick(colours, labels.indexOf(curve.label)), dash: "solid" };
+      if (signals.length > 2) return { color: pick(colours, signals.indexOf(curve.signal)), dash: DASHES[at % DASHES.length] };
+      return { color: pick(ANGLES, at), dash: DASHES[Math.floor(at / ANGLES.length) % DASHES.length] };
+    };
+  }
+
+  /** Abscissae and ordinates of a line, which is interrupted where an angle passes 360 degrees. */
+  static #points({ x, y, ordinate }) {
+    const steps = ordinate?.startsWith("Δ") ? y.flatMap((value, i) => (i && Math.abs(value - y[i - 1]) > 180 ? [i] : [])) : [];
+    if (!steps.length) return { x, y };
+    const gaps = (values, gap) => steps.concat(values.length).flatMap((end, i) => [
+      ...values.slice(i ? steps[i - 1] : 0, end), ...(end < values.length ? [gap(end)] : [])]);
+    return { x: gaps(x, (end) => x[end]), y: gaps(y, () => null) };
   }
 
   /** Draws; while a slider moves, axes only grow. */
@@ -48,24 +78,36 @@ class Plot {
     this.caption.textContent = this.#words();
     const style = getComputedStyle(this.element);
     const colour = (name) => style.getPropertyValue(name).trim();
-    const labels = [...new Set([...this.curves, ...this.data].map((curve) => curve.label))];
-    const colours = this.kind === "surface" ? CHANNELS : COLOURS;
-    const own = (curve) => colour(colours[Math.max(labels.indexOf(curve.label), 0) % colours.length]);
-    const axis = (curve) => `y${Math.max(ordinates.indexOf(this.#ordinate(curve)), 0) + 1}`.replace(/^y1$/, "y");
-    const trace = (curve, more) => ({ type: "scatter", mode: "lines", name: curve.label, x: curve.x, y: curve.y, yaxis: axis(curve), ...more });
+    const own = this.#strokes(colour);
+    const settings = this.#settings();
     const several = this.curves.length > 1;
+    const axis = (curve) => `y${Math.max(ordinates.indexOf(this.#ordinate(curve)), 0) + 1}`.replace(/^y1$/, "y");
+    const named = new Set(); // names in the legend: with several angles, of each once
+    const legend = (name, group) => {
+      if (!settings.length) return { name };
+      const first = !named.has(group);
+      named.add(group);
+      return { name: group, legendgroup: group, showlegend: first };
+    };
+    const trace = (curve, points, more) => ({
+      type: "scatter", mode: "lines", ...points, yaxis: axis(curve), meta: curve.label,
+      ...(settings.length ? { hovertemplate: `%{y}<extra>${curve.label}</extra>` } : {}), ...more,
+    });
+    const line = (curve, stroke, more) => trace(curve, Plot.#points(curve), { line: { width: 2, simplify: false, ...stroke }, ...more });
+    const group = (curve) => (new Set(this.curves.map((each) => each.signal)).size > 2 ? curve.label : curve.setting);
     const traces = [
-      ...this.data.map((curve) => trace(curve, {
-        mode: "markers", name: `${curve.label} data`,
-        marker: { color: several ? own(curve) : colour("--data"), size: curve.x.length < 100 ? 7 : 4, symbol: several ? "circle-open" : "circle" },
+      ...this.data.map((curve) => trace(curve, { x: curve.x, y: curve.y }, {
+        mode: "markers", ...legend(`${curve.label} data`, "data"),
+        marker: { color: several ? own(curve).color : colour("--data"), size: curve.x.length < 100 ? 7 : 4, symbol: several ? "circle-open" : "circle" },
       })),
-      ...this.before.map((curve) => trace(curve, {
-        name: `${curve.label} before`, line: { color: own(curve), width: 2, simplify: false }, opacity: 0.35, hoverinfo: "skip", showlegend: !several,
+      ...this.before.map((curve) => line(curve, own(curve), {
+        name: `${curve.label} before`, opacity: 0.35, hoverinfo: "skip", hovertemplate: null, showlegend: !several,
       })),
-      ...this.curves.map((curve) => trace(curve, { line: { color: own(curve), width: 2, simplify: false } })),
-      ...this.fitted.map((curve) => trace(curve, { line: { color: colour("--rival"), width: 2, dash: "dot" } })),
+      ...this.fitted.map((curve) => line(curve, { color: colour("--rival"), width: settings.length ? 4 : 2, dash: "dot" }, legend(`fit: ${curve.label}`, "fit"))),
+      ...this.curves.map((curve) => line(curve, own(curve), legend(curve.label, group(curve)))),
     ];
-    await window.Plotly.react(this.element, traces, this.#layout(ordinates, colour, moving), {
+    const entries = traces.filter((each) => each.showlegend !== false).map((each) => each.name);
+    await window.Plotly.react(this.element, traces, this.#layout(ordinates, entries, colour, moving), {
       displaylogo: false, modeBarButtonsToRemove: ["lasso2d", "select2d"], doubleClick: "autosize",
       toImageButtonOptions: { format: "svg", filename: "spectrum" },
     });
@@ -80,25 +122,27 @@ class Plot {
     }
   }
 
-  #layout(ordinates, colour, moving) {
+  #layout(ordinates, entries, colour, moving) {
     this.width = this.element.clientWidth;
     const narrow = this.width < 560;
+    const rows = Math.ceil(entries.reduce((sum, name) => sum + 44 + 8 * name.length, 0) / (this.width - (narrow ? 64 : 80)));
+    const top = 10 + 24 * Math.max(rows, 1); // room for the legend
     const coarse = window.matchMedia("(pointer: coarse)").matches;
     const line = { gridcolor: colour("--line"), zerolinecolor: colour("--line"), linecolor: colour("--line") };
     const share = (1 - 0.08 * (ordinates.length - 1)) / ordinates.length;
     const layout = {
-      width: this.width, height: (narrow ? 150 : 250) * ordinates.length + (narrow ? 90 : 110),
-      margin: { l: narrow ? 52 : 68, r: 12, t: 34, b: narrow ? 40 : 48 }, uirevision: this.revision, dragmode: coarse ? false : "zoom",
+      width: this.width, height: (narrow ? 150 : 250) * ordinates.length + (narrow ? 56 : 76) + top,
+      margin: { l: narrow ? 52 : 68, r: 12, t: top, b: narrow ? 40 : 48 }, uirevision: this.revision, dragmode: coarse ? false : "zoom",
       paper_bgcolor: colour("--page"), plot_bgcolor: colour("--page"), font: { color: colour("--text"), size: 13 },
       hovermode: "x", hoversubplots: "axis", hoverlabel: { bgcolor: colour("--panel"), font: { color: colour("--text") } },
       showlegend: true, legend: { orientation: "h", y: 1, yanchor: "bottom", x: 0, bgcolor: "rgba(0,0,0,0)" },
       xaxis: { ...line, range: this.#span(), title: { text: this.axis.label, standoff: 6 }, anchor: ordinates.length === 1 ? "y" : `y${ordinates.length}` },
     };
     ordinates.forEach((name, number) => {
-      const top = 1 - number * (share + 0.08);
+      const highest = 1 - number * (share + 0.08);
       const range = this.#range(name, moving);
       layout[number === 0 ? "yaxis" : `yaxis${number + 1}`] = {
-        ...line, title: { text: name, standoff: 6 }, range, domain: [Math.max(top - share, 0), top], anchor: "x",
+        ...line, title: { text: name, standoff: 6 }, range, domain: [Math.max(highest - share, 0), highest], anchor: "x",
       };
     });
     this.element.style.minHeight = `${layout.height + 2}px`;
@@ -132,18 +176,28 @@ class Plot {
     return range;
   }
 
-  /** Extremes of each curve, the text alternative of the plot. */
+  /** Extremes of each signal, the text alternative of the plot. */
   #words() {
     const unit = /\((.*)\)/.exec(this.axis.label)?.[1] ?? "";
-    return this.curves.map((curve) => {
-      let [low, high] = [0, 0];
-      curve.y.forEach((value, i) => {
-        if (value !== null && value < curve.y[low]) low = i;
-        if (value !== null && value > curve.y[high]) high = i;
-      });
-      const point = (i) => `${short(curve.y[i], 3)} at ${short(curve.x[i], 4)} ${unit}`.trim();
-      return `${curve.label}: least ${point(low)}, greatest ${point(high)}.`;
-    }).join(" ");
+    const signals = [...new Set(this.curves.map((curve) => curve.signal))];
+    const sentences = signals.map((signal) => {
+      const points = this.curves.filter((curve) => curve.signal === signal)
+        .flatMap(({ x, y, setting }) => y.map((value, i) => ({ x: x[i], y: value, setting })))
+        .filter((each) => each.y !== null);
+      if (!points.length) return `${signal}: no values.`;
+      const point = (better) => {
+        const found = points.reduce((best, each) => (better(each.y, best.y) ? each : best));
+        const place = `${short(found.y, 3)} at ${short(found.x, 4)}${unit === "°" ? "" : " "}${unit}`.trim();
+        return found.setting ? `${place} (${found.setting})` : place;
+      };
+      return `${signal}: least ${point((one, best) => one < best)}, greatest ${point((one, best) => one > best)}.`;
+    });
+    const settings = this.#settings();
+    if (settings.length && signals.length > 2) {
+      const words = settings.map((setting, i) => `${DASHES[i % DASHES.length]} ${setting}`);
+      sentences.push(`Lines: ${words.join(", ")}.`);
+    }
+    return sentences.join(" ");
   }
 
   #key(event) {

@@ -33,22 +33,30 @@ async function render({ model, el }) {
   const explorer = await explore(element, call, { plotly: PLOTLY, theme: notebookTheme });
   if (explorer === null) return;
 
-  const same = (one, other) => Object.entries(one).every(([name, value]) => other[name] === value);
-  const fromKernel = () => {
-    const wanted = model.get("values");
-    if (!same(wanted, explorer.values())) explorer.set(wanted);
+  const same = (one, other) => Object.entries(one).every(([name, value]) => other[name] === undefined || other[name] === value);
+  let own = false; // a change of this view
+  const fromKernel = async () => {
+    if (own) return;
+    const [wanted, angles] = [model.get("values"), model.get("angles")];
+    if (String(angles) !== String(explorer.angles())) await explorer.list(angles.length ? angles : null, wanted);
+    else if (!same(wanted, explorer.values())) explorer.set(wanted);
   };
   element.addEventListener("changed", (event) => {
-    model.set("values", event.detail);
+    own = true;
+    model.set("angles", event.detail.angles);
+    model.set("values", event.detail.values);
+    own = false;
     model.save_changes();
   });
   fromKernel();
   model.on("change:values", fromKernel);
+  model.on("change:angles", fromKernel);
   const themes = new MutationObserver(explorer.redraw);
   themes.observe(document.body, { attributeFilter: ["data-jp-theme-light", "data-vscode-theme-kind"] });
   return () => {
     model.off("msg:custom", receive);
     model.off("change:values", fromKernel);
+    model.off("change:angles", fromKernel);
     themes.disconnect();
     explorer.close();
   };

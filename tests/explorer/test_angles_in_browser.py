@@ -1,0 +1,225 @@
+"""Several angles of incidence in the explorer's page, by real events: `make browser-tests`."""
+
+import base64
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import pellicle as pl
+
+pytest.importorskip("uvicorn", reason="uvicorn is absent: make browser-tests")
+pytest.importorskip("starlette", reason="Starlette is absent: make browser-tests")
+
+RECIPE = """
+[data]
+signal = "psi-delta"
+angle = [65, 70, 75]
+wavelengths = { start = 400, stop = 800, step = 4 }
+
+[scene]
+substrate = "Si"
+
+[[scene.layer]]
+material = "SiO2"
+thickness = { lower = 50, upper = 600, value = 250 }
+"""
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("angles")
+    (folder / "film.toml").write_text(RECIPE)
+    code = "from pellicle.cli import process; process()"
+    command = [sys.executable, "-c", code, "explore", str(folder / "film.toml"), "--no-browser"]
+    server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    assert server.stdout is not None
+    yield server.stdout.readline().strip()
+    server.send_signal(signal.SIGINT)
+    server.communicate(timeout=20)
+
+
+@pytest.fixture
+def opened(browser, address):
+    """Function that opens the page; script errors and messages fail the test."""
+    pages, troubles = [], []
+
+    def open_page(query="", width=1400, scheme="light"):
+        page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
+        pages.append(page)
+        page.on("pageerror", lambda error: troubles.append(str(error)))
+        page.on("console", lambda said: troubles.append(said.text))
+        page.goto(address + query)
+        settle(page)
+        return page
+
+    yield open_page
+    for page in pages:
+        page.close()
+    assert troubles == []
+
+
+def settle(page):
+    page.wait_for_selector(".plot[data-ready]")
+    page.wait_for_selector(".plan li")
+    page.wait_for_selector("main:not(.compiling)", timeout=60_000)
+    page.wait_for_timeout(500)
+
+
+def traces(page, mode="lines"):
+    """Lines or markers of the plot by their labels, those before the last change left out."""
+    script = """(mode) => document.querySelector('.plot').data.filter((t) => t.mode === mode && !t.opacity)
+      .map(({ meta, name, x, y, yaxis, showlegend, line, marker }) =>
+        ({ meta, name, x, y, yaxis, showlegend, color: (line ?? marker).color }))"""
+    return {trace["meta"]: trace for trace in page.evaluate(script, mode)}
+
+
+def agrees(page, angles, thickness, atol=2e-3):
+    drawn = traces(page)
+    assert list(drawn) == [f"{signal} {angle:g}°" for signal in "ΨΔ" for angle in angles]
+    layer = pl.Layer("SiO2", thickness)
+    for angle in angles:
+        truth = pl.simulate(
+            pl.Scene(layer, "Si", light=pl.Light(angle=float(angle), signal="psi-delta")), nm(page)
+        )
+        for quantity, values in (("Ψ", truth.values), ("Δ", truth.delta)):
+            own = drawn[f"{quantity} {angle:g}°"]["y"]
+            assert np.allclose([y for y in own if y is not None], values, rtol=0, atol=atol)
+    return True
+
+
+def nm(page):
+    ends = traces(page)["Ψ 70°"]["x"]
+    return np.array(ends)
+
+
+def slider(page):
+    return page.get_by_role("slider", name="thickness in nm")
+
+
+def angle_list(page):
+    return page.get_by_role("textbox", name="angles")
+
+
+@pytest.mark.parametrize(("width", "scheme"), [(400, "dark"), (1400, "light")])
+def test_each_angle_has_its_colour_in_both_panels_and_one_entry(opened, width, scheme):
+    page = opened(width=width, scheme=scheme)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert agrees(page, (65, 70, 75), 250.0)
+    drawn = traces(page)
+    colour = "(name) => getComputedStyle(document.querySelector('.plot')).getPropertyValue(name).trim()"
+    expected = [page.evaluate(colour, name) for name in ("--fit", "--blue", "--green")]  # those of reports
+    for quantity, panel in (("Ψ", "y"), ("Δ", "y2")):
+        own = [drawn[f"{quantity} {angle}°"] for angle in (65, 70, 75)]
+        assert [trace["color"] for trace in own] == expected
+        assert {trace["yaxis"] for trace in own} == {panel}
+        assert [trace["name"] for trace in own] == ["65°", "70°", "75°"]
+        assert [trace["showlegend"] for trace in own] == [quantity == "Ψ"] * 3
+    assert "at 65°, 70°, 75°" in page.locator(".plot").get_attribute("aria-label")
+    assert page.get_by_role("slider", name="angle of incidence in °").count() == 0
+    assert page.locator(".patch").evaluate("(e) => getComputedStyle(e).backgroundImage").count("rgb") == 6
+    page.locator(".plot").focus()
+    page.keyboard.press("ArrowRight")
+    assert "Ψ 65° " in page.locator(".reading").inner_text()
+
+
+def test_a_slider_moves_every_curve_and_the_list_is_edited_by_keys(opened):
+    page = opened()
+    slider(page).focus()
+    for _ in range(3):
+        page.keyboard.press("PageUp")
+    page.wait_for_timeout(700)
+    value = float(page.get_by_role("spinbutton", name="thickness (nm)").input_value())
+    assert value > 250
+    assert agrees(page, (65, 70, 75), value)
+    box = angle_list(page)
+    assert box.input_value() == "65, 70, 75"
+    box.fill("70 60")
+    box.press("Enter")
+    settle(page)
+    assert agrees(page, (60, 70), value)
+    assert box.input_value() == "60, 70"
+    assert page.evaluate("document.activeElement.type") == "text"
+    assert "angles=60%2C70" in page.url
+    page.reload()
+    settle(page)
+    assert agrees(page, (60, 70), value)
+    box.fill("70, 95")
+    box.press("Enter")
+    page.wait_for_selector(".trouble:not([hidden])")
+    assert "from 0 to 90" in page.get_by_role("alert").inner_text()
+    assert box.get_attribute("aria-invalid") == "true"
+    box.fill("72")
+    box.press("Enter")
+    settle(page)
+    assert page.locator(".trouble").is_hidden()
+    assert page.get_by_role("spinbutton", name="angle of incidence (°)").input_value() == "72"
+    page.get_by_role("button", name="Reset", exact=True).click()
+    settle(page)
+    assert agrees(page, (65, 70, 75), 250.0)
+    assert "angles" not in page.url
+
+
+def test_an_address_with_wrong_angles_shows_the_scene(opened):
+    page = opened("&angles=65,x&thickness=300")
+    assert "from 0 to 90" in page.get_by_role("alert").inner_text()
+    assert agrees(page, (65, 70, 75), 300.0)
+
+
+def test_recipe_and_python_state_the_angles(opened):
+    page = opened("&angles=60,70&thickness=300")
+    for button, text in (("Recipe", "angle = [60, 70]"), ("Python", "np.repeat([60.0, 70.0], 101)")):
+        page.get_by_role("button", name=button).click()
+        page.get_by_role("heading", name=button).wait_for()
+        assert text in page.locator("dialog code").text_content()
+        page.keyboard.press("Escape")
+
+
+def drop(page, name, spectrum):
+    """Drop a file of Ψ and Δ on the page, as a browser does."""
+    script = """([name, content]) => {
+      const bytes = Uint8Array.from(atob(content), (letter) => letter.charCodeAt(0));
+      const data = new DataTransfer();
+      data.items.add(new File([bytes], name));
+      document.querySelector("main").dispatchEvent(
+        new DragEvent("drop", { bubbles: true, cancelable: true, dataTransfer: data }));
+    }"""
+    rows = np.transpose([spectrum.wavelength, spectrum.angle, spectrum.values, spectrum.delta])
+    text = "\n".join(
+        ["wavelength_nm,angle_deg,psi_deg,delta_deg", *(",".join(map(str, row)) for row in rows)]
+    )
+    page.evaluate(script, [name, base64.b64encode(text.encode()).decode()])
+    page.locator(".notes").get_by_text(name).first.wait_for()
+    settle(page)
+
+
+def measured(angles, wavelength):
+    pairs = np.repeat(angles, len(wavelength)), np.tile(wavelength, len(angles))
+    light = pl.Light(angle=pairs[0], signal="psi-delta")
+    return pl.simulate(pl.Scene(pl.Layer("SiO2", 320.0), "Si", light=light), pairs[1], noise=0.05, seed=1)
+
+
+def test_a_dropped_file_of_several_angles_is_fitted_and_one_wavelength_is_drawn_against_them(opened):
+    page = opened()
+    drop(page, "wafer.csv", measured((55.0, 65.0), np.arange(400.0, 800.0, 20.0)))
+    assert angle_list(page).input_value() == "55, 65"
+    data = traces(page, "markers")
+    assert {label: len(trace["x"]) for label, trace in data.items()} == dict.fromkeys(
+        ("Ψ 55°", "Ψ 65°", "Δ 55°", "Δ 65°"), 20
+    )
+    assert data["Δ 65°"]["color"] == traces(page)["Δ 65°"]["color"] != data["Δ 55°"]["color"]
+    page.get_by_role("button", name="Fit", exact=True).click()
+    page.wait_for_selector(".fitted p", timeout=120_000)
+    page.wait_for_timeout(500)
+    thickness = page.get_by_role("spinbutton", name="thickness (nm)")
+    assert float(thickness.input_value()) == pytest.approx(320.0, abs=0.3)
+    drop(page, "laser.csv", measured(np.arange(50.0, 71.0, 2.0), np.array([633.0])))
+    title = "document.querySelector('.plot').layout.xaxis.title.text"
+    assert page.evaluate(title) == "angle of incidence (°)"
+    assert traces(page, "markers")["Ψ"]["x"] == np.arange(50.0, 71.0, 2.0).tolist()
+    assert angle_list(page).is_hidden()
+    assert "against the angle of incidence" in page.locator(".angles").inner_text()
+    curve = traces(page)["Δ"]
+    assert (curve["x"][0], curve["x"][-1]) == (50.0, 70.0)
