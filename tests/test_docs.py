@@ -109,6 +109,7 @@ ELSEWHERE = {
             "pellicle explore",
             "pellicle explore docs/examples/oxide.toml",
             "pellicle explore --layer TiO2 --substrate BK7 --back air --signal T",
+            "pellicle explore --signal psi-delta --angle 65,70,75",
         ),
         "serves a page until it is interrupted; tests/explorer/test_server.py",
     ),
