@@ -38,26 +38,33 @@ def solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     return np.linalg.solve(scaled, (right / size)[..., None])[..., 0] / size
 
 
-def solve_within(normal: Normal, lower: np.ndarray, upper: np.ndarray, free: np.ndarray) -> np.ndarray:
+def held_within(free: np.ndarray, covariance: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
     """Solutions where coefficients that would leave their bounds stay on them, and are not let go again.
 
-    `free` are the solutions without bounds, `lower` and `upper` (pixels, columns); as `fitting.discrepancy`.
+    `free` are the solutions (pixels, columns) without bounds, of this `covariance`; `lower` and `upper`
+    (pixels, columns). Coefficients h that are held at b move the others as by Gaussian conditioning:
+    x = free + Σ[:, h] Σ[h, h]⁻¹ (b − free[h]). As `fitting.discrepancy`.
     """
-    solution, inside = free.copy(), np.ones(free.shape, bool)
+    bounded = np.flatnonzero((np.isfinite(lower) | np.isfinite(upper)).any(axis=0))
+    solution, held = free.copy(), np.zeros((len(free), len(bounded)), bool)
+    bounds = np.zeros(held.shape)
     todo = np.arange(len(free))
     for _ in range(_PASSES):
-        own = solution[todo]
-        outside = inside[todo] & ((own < lower[todo]) | (own > upper[todo]))
-        todo = todo[outside.any(axis=1)]
+        own = solution[todo][:, bounded]
+        inside = np.clip(own, lower[todo][:, bounded], upper[todo][:, bounded])
+        outside = (own != inside) & ~held[todo]
+        some = outside.any(axis=1)
+        todo, outside = todo[some], outside[some]
         if not len(todo):
             break
-        kept = inside[todo] & ~outside[outside.any(axis=1)]
-        inside[todo] = kept
-        held = np.where(kept, 0.0, np.clip(solution[todo], lower[todo], upper[todo]))
-        right = normal.right[todo] - np.einsum("pij,pj->pi", normal.matrix[todo], held)
-        both = kept[:, :, None] & kept[:, None, :]
-        matrix = np.where(both, normal.matrix[todo], np.eye(kept.shape[1]))
-        solution[todo] = held + solve(matrix, np.where(kept, right, 0.0))
+        bounds[todo] = np.where(outside, inside[some], bounds[todo])
+        held[todo] |= outside
+        now = held[todo]
+        beside = covariance[todo[:, None], bounded]
+        matrix = np.where(now[:, :, None] & now[:, None, :], beside[:, :, bounded], np.eye(len(bounded)))
+        force = solve(matrix, np.where(now, bounds[todo] - free[todo][:, bounded], 0.0))
+        solution[todo] = free[todo] + np.einsum("pij,pi->pj", beside, force)
+        solution[todo[:, None], bounded] = np.where(now, bounds[todo], solution[todo][:, bounded])
     return solution
 
 

@@ -21,7 +21,7 @@ from pellicle.fitting.discrepancy import (
     reduced_variance,
 )
 from pellicle.fitting.misfit import BETTER, BEYOND, DOUBTFUL, EXPLAINS
-from pellicle.mapping.pixels.covariance import Normal, inverse, solve, solve_within
+from pellicle.mapping.pixels.covariance import Normal, held_within, inverse, solve
 
 _ROUNDS = 4
 _SETTLED = 1e-6
@@ -33,13 +33,13 @@ _WHATEVER = 1e-6
 class PixelEvidence:
     """Residuals of pixels and what may explain them: see `fitting.discrepancy.Evidence`.
 
-    `residual` (pixels, rows, channels) and `columns` (pixels, points, columns), of parameters and nuisances
+    `residual` (pixels, rows, channels) and `columns` (pixels, columns, points), of parameters and nuisances
     in the steps of their covariance and then of effects, are in the unit of the data. `sigma` (pixels, rows,
     channels), `noise` (pixels,); `counted` (pixels,) is the median variance by which the fit counts points.
     `prior` (pixels, columns) are the weights of priors, `pull` (pixels, columns) distances from their means,
-    `lower` and `upper` (pixels, columns) bounds. `known` is the number of parameters and nuisances, `count`
-    (pixels,) that of effects. `middle` (pixels,) is the median σ. With `short` the noise is at least `noise`,
-    and `short(which)` is that which neighbouring points of some pixels show.
+    `lower` and `upper` (pixels, columns) bounds. `known` is the number of parameters and nuisances, `middle`
+    (pixels,) the median σ. With `short` the noise is at least `noise`, and `short(which)` is that which
+    neighbouring points of some pixels show.
     """
 
     residual: np.ndarray
@@ -52,7 +52,6 @@ class PixelEvidence:
     lower: np.ndarray
     upper: np.ndarray
     known: int
-    count: np.ndarray
     correlation: Callable[[np.ndarray], np.ndarray]
     least: float
     uncertain: float
@@ -84,8 +83,8 @@ class PixelDiscrepancy(NamedTuple):
 class _Balance(NamedTuple):
     """Systems with factors on σ² and weights that stand for the residuals which they leave."""
 
-    rows: np.ndarray
     data: np.ndarray
+    gram: np.ndarray
     variance: np.ndarray
     roots: np.ndarray
     normal: Normal
@@ -104,13 +103,15 @@ def discrepancy(evidence: PixelEvidence) -> PixelDiscrepancy:
         noise[large] = np.maximum(noise[large], evidence.short(large))
     weighted = np.sqrt(np.mean((_roots(rest) * rest) ** 2, axis=(1, 2)))
     sizes = state.solution[:, known:]
-    limit = np.array([improbable(int(n)) for n in range(int(evidence.count.max(initial=0)) + 1)])
+    # terms of a lamp that a pixel has too few fringes for are zero
+    count = np.sum(np.einsum("pii->pi", state.gram)[:, known:] > 0, axis=1)
+    limit = np.array([improbable(n) for n in range(sizes.shape[1] + 1)])
     now = state.variance * evidence.middle**2
     return PixelDiscrepancy(
         covariance=state.covariance[:, :known, :known],
         shift=state.solution[:, :known],
         remaining=Remaining(typical / noise, typical, weighted, state.variance),
-        implausible=(evidence.count > 0) & (np.sum(sizes**2, axis=1) > limit[evidence.count]),
+        implausible=(count > 0) & (np.sum(sizes**2, axis=1) > limit[count]),
         evidence_share=np.minimum(1.0, evidence.counted / now),
         noise=noise,
     )
@@ -139,7 +140,7 @@ def other_material(evidence: PixelEvidence, effects: Sequence[Effect]) -> np.nda
         matrix[:, -1, -1] += _WHATEVER**2 - priors[:, known + i]
         normal = Normal(matrix, state.normal.right[:, both])
         bounds = evidence.lower[:, both], evidence.upper[:, both]
-        x = solve_within(normal, *bounds, solve(*normal))
+        x = held_within(solve(*normal), inverse(matrix), *bounds)
         after = power - 2 * np.sum(x * right[:, both], axis=1)
         after += np.einsum("pi,pij,pj->p", x, gram[:, both][:, :, both], x)
         explains[:, i] = 1 - after / np.maximum(before, 1e-300)
@@ -168,13 +169,13 @@ def _roots(residual: np.ndarray) -> np.ndarray:
 def _balanced(evidence: PixelEvidence) -> _Balance:
     """Factors and weights of each pixel: those whose factors have settled are not computed again."""
     shape = evidence.residual.shape
-    pixels, columns = shape[0], evidence.columns.shape[2]
+    pixels, columns = evidence.columns.shape[:2]
     inverse_sigma = (1 / evidence.sigma).reshape(pixels, -1)
-    rows = evidence.columns * inverse_sigma[..., None]
+    rows = evidence.columns * inverse_sigma[:, None]
     data = evidence.residual.reshape(pixels, -1) * inverse_sigma
     variance = np.full(pixels, max(1.0, evidence.least))
     roots = np.ones(data.shape)
-    gram, against = np.swapaxes(rows, 1, 2) @ rows, np.einsum("pnc,pn->pc", rows, data)
+    gram, against = rows @ np.swapaxes(rows, 1, 2), _times(rows, data)
     at, pulled = np.arange(columns), evidence.prior * evidence.pull
     every = slice(None)
 
@@ -185,12 +186,12 @@ def _balanced(evidence: PixelEvidence) -> _Balance:
 
     def solved(normal: Normal, covariance: np.ndarray, which: np.ndarray | slice) -> np.ndarray:
         free = np.einsum("pij,pj->pi", covariance, normal.right)
-        return solve_within(normal, evidence.lower[which], evidence.upper[which], free)
+        return held_within(free, covariance, evidence.lower[which], evidence.upper[which])
 
     normal = system(every)
     covariance = inverse(normal.matrix)
     solution = solved(normal, covariance, every)
-    rest = data - np.einsum("pnc,pc->pn", rows, solution)
+    rest = data - _times(np.swapaxes(rows, 1, 2), solution)
     todo = np.arange(pixels)
     for _ in range(_ROUNDS):
         left = rest[todo].reshape(-1, *shape[1:])
@@ -201,9 +202,9 @@ def _balanced(evidence: PixelEvidence) -> _Balance:
         changed[robust] = np.abs(now[robust] - roots[some]).max(axis=1, initial=0.0) > _SETTLED
         roots[todo] = now
         if len(some):
-            weighted = rows[some] * (roots[some] ** 2)[..., None]
-            gram[some] = np.swapaxes(weighted, 1, 2) @ rows[some]
-            against[some] = np.einsum("pnc,pn->pc", weighted, data[some])
+            weighted = rows[some] * (roots[some] ** 2)[:, None]
+            gram[some] = weighted @ np.swapaxes(rows[some], 1, 2)
+            against[some] = _times(weighted, data[some])
         used = np.einsum("pij,pij->p", covariance[todo], gram[todo]) / variance[todo]
         factor = reduced_variance(
             now.reshape(left.shape) * left, used, evidence.correlation, evidence.least, evidence.uncertain
@@ -217,8 +218,13 @@ def _balanced(evidence: PixelEvidence) -> _Balance:
         normal.matrix[todo], normal.right[todo] = fresh
         covariance[todo] = inverse(fresh.matrix)
         solution[todo] = solved(fresh, covariance[todo], todo)
-        rest[todo] = data[todo] - np.einsum("pnc,pc->pn", rows[todo], solution[todo])
-    return _Balance(rows, data, variance, roots, normal, covariance, solution, rest)
+        rest[todo] = data[todo] - _times(np.swapaxes(rows[todo], 1, 2), solution[todo])
+    return _Balance(data, gram, variance, roots, normal, covariance, solution, rest)
+
+
+def _times(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Product of a matrix and a vector of each pixel."""
+    return (matrices @ vectors[..., None])[..., 0]
 
 
 def _over_own_size(effects: Sequence[Effect], coefficients: np.ndarray) -> np.ndarray:

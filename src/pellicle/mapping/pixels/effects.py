@@ -54,9 +54,10 @@ class PixelEffects:
         programs = extended.programs()
         by = [r.number.position if r.number.position in programs else None for r in self._rows]
         for position, program in programs.items():
-            own = [i for i, at in enumerate(by) if at == position]
-            if own:
-                self._simulations.append(_simulation(program, self._rows, own))
+            own = [at == position for at in by]
+            found = _simulation(program, self._rows, own, unchanged=position is None)
+            if found.terms:
+                self._simulations.append(found)
         if nodes is not None:
             self._table = np.zeros((len(nodes), len(self._rows), view.points))
             self._simulated_at = np.zeros(len(nodes), bool)
@@ -75,8 +76,9 @@ class PixelEffects:
             changes = self._interpolated(self._nodes, values[:, 0])
         else:
             changes = self._of_signal(values, view.data.frame)
-        pairs = zip(self._rows, np.moveaxis(changes, 1, 0), strict=True)
-        return [row.effect(change_of_data(view, at, change)) for row, change in pairs]
+        each = at._replace(signal=at.signal[:, None], gain=at.gain[:, None])
+        of_data = np.moveaxis(change_of_data(view, each, changes), 1, 0)
+        return [row.effect(change) for row, change in zip(self._rows, of_data, strict=True)]
 
     def _interpolated(self, nodes: np.ndarray, thickness: np.ndarray) -> np.ndarray:
         """Changes of the signal (pixels, effects, points) from those at the nodes of the table, linearly."""
@@ -86,9 +88,10 @@ class PixelEffects:
         if len(missing):
             self._table[missing] = self._of_signal(nodes[missing, None], None)
             self._simulated_at[missing] = True
-        share = ((thickness - nodes[at]) / (nodes[at + 1] - nodes[at]))[:, None, None]
-        changes = self._table[at]
-        changes += share * (self._table[at + 1] - changes)
+        changes, rise = self._table[at], self._table[at + 1]
+        rise -= changes
+        rise *= ((thickness - nodes[at]) / (nodes[at + 1] - nodes[at]))[:, None, None]
+        changes += rise
         return changes
 
     def _of_signal(self, values: np.ndarray, frames: Any) -> np.ndarray:
@@ -99,8 +102,8 @@ class PixelEffects:
         if frame is not None:  # with the padding of the scene
             extra = len(self._view.scene.light.wavelength) - frame.shape[1]
             frame = np.concatenate([frame, np.repeat(frame[:, -1:], extra, axis=1)], axis=1)
-        changes = np.empty((len(values), len(self._rows), self._view.points))
-        for (form, scene, order), rows, terms, weights in self._simulations:
+        changes = np.zeros((len(values), len(self._rows), self._view.points))
+        for (form, scene, order), terms, weights in self._simulations:
             candidates = np.repeat(numbers[:, None], len(terms), axis=1)
             for i, (row, relative) in enumerate(terms):
                 candidates[:, i, row.number.position] += relative * row.sizes(numbers)
@@ -110,35 +113,40 @@ class PixelEffects:
                 lanes = None if frame is None else _lanes(frame[of]), _lanes(candidates[of])
                 found = simulated_side_by_side(form, scene, self._view.data, *lanes).signal
                 signal = np.asarray(jax.device_get(found))[: len(values) - first, :, : self._view.points]
-                changes[of, rows] = weights @ signal
+                changes[of] += weights @ signal
         return changes
 
 
 class _Simulation(NamedTuple):
-    """A program that simulates some of the effects, those at positions `rows`.
+    """A program that simulates some of the effects.
 
-    Each is `weights` (effects, terms) times the signals at the `terms`: an effect whose number changes, and
-    by how much in units of its size. The unchanged signal is shared.
+    It adds `weights` (effects, terms) times the signals at the `terms` to the changes by the effects: a term
+    is an effect whose number changes, and by how much in units of its size.
     """
 
     program: Program
-    rows: list[int]
     terms: list[tuple[SimulatedEffect, float]]
     weights: np.ndarray
 
 
-def _simulation(program: Program, every: Sequence[SimulatedEffect], rows: list[int]) -> _Simulation:
-    keyed = {
-        (every[i].number.position if change else -1, change / every[i].size): every[i]
-        for i in rows
-        for change, _ in every[i].changes
-    }
-    weights, keys = np.zeros((len(rows), len(keyed))), list(keyed)
-    for i, own in zip(rows, weights, strict=True):
-        for change, weight in every[i].changes:
-            own[keys.index((every[i].number.position if change else -1, change / every[i].size))] += weight
-    terms = [(row, relative) for (_, relative), row in keyed.items()]
-    return _Simulation(program, rows, terms, weights)
+def _simulation(
+    program: Program, effects: Sequence[SimulatedEffect], own: Sequence[bool], *, unchanged: bool
+) -> _Simulation:
+    """The simulation of the program's `own` effects. The `unchanged` signal is that of one program for all
+    effects: where a face has no thickness, the others simulate the same."""
+    terms = [
+        (i, change, weight)
+        for i, effect in enumerate(effects)
+        for change, weight in effect.changes
+        if (own[i] if change else unchanged)
+    ]
+    # effects share the unchanged signal
+    keys = [(i if change else -1, change / effects[i].size) for i, change, _ in terms]
+    columns = list(dict.fromkeys(keys))
+    weights = np.zeros((len(effects), len(columns)))
+    for (i, _, weight), key in zip(terms, keys, strict=True):
+        weights[i, columns.index(key)] += weight
+    return _Simulation(program, [(effects[i], relative) for i, relative in columns], weights)
 
 
 def _lanes(x: np.ndarray) -> np.ndarray:
@@ -150,10 +158,3 @@ def of_pixels(view: SpectrumView, frame: np.ndarray | None) -> SpectrumView:
     """The view without padding, and with the frames of pixels (pixels, wavelengths, channels, channels)."""
     position = np.asarray(view.data.position)[: view.points]
     return replace(view, data=view.data._replace(position=position, frame=frame))
-
-
-def columns(changes: Sequence[np.ndarray], pixels: int, points: int) -> np.ndarray:
-    """Changes of the data, each (pixels, rows, channels), as columns (pixels, points, effects)."""
-    if not changes:
-        return np.zeros((pixels, points, 0))
-    return np.stack([change.reshape(pixels, points) for change in changes], axis=-1)

@@ -23,9 +23,10 @@ class Group(NamedTuple):
     rows: np.ndarray
     parts: list[np.ndarray]
 
-    def chunks(self) -> Iterator[Group]:
-        for first in range(0, len(self.pixels), BLOCK):
-            own = slice(first, first + BLOCK)
+    def chunks(self, size: int) -> Iterator[Group]:
+        """The group in parts of `size` pixels."""
+        for first in range(0, len(self.pixels), size):
+            own = slice(first, first + size)
             yield Group(self.pixels[own], self.rows[own], self.parts)
 
 

@@ -33,6 +33,10 @@ class PixelArrays(NamedTuple):
         frame = data.frame if self.frame is None else self.frame
         return Data(self.values, self.weight, data.position, self.independent_fraction, self.level, frame)
 
+    def some(self, which: np.ndarray) -> PixelArrays:
+        """The arrays of some of the pixels, by their positions."""
+        return PixelArrays(*(None if x is None else x[which] for x in self))
+
 
 class PixelLocals(NamedTuple):
     """Models around one point of each pixel: see `fitting.spectra.view.Local`."""

@@ -35,6 +35,11 @@ class PixelNoise(NamedTuple):
     variance: np.ndarray
     student_freedom: np.ndarray
 
+    def evidence(self, independent_fraction: float) -> np.ndarray:
+        """Factors (pixels,) of a misfit with the given weights and this share of independent points, for the
+        weights and the effective points of the ranking."""
+        return self.scale**2 * self.fraction / independent_fraction
+
 
 def noise_of(residual: np.ndarray, parts: Sequence[np.ndarray], noise: Noise, used: int) -> PixelNoise:
     """Noise by the weighted residuals (pixels, rows, channels); `used` numbers were fitted to each pixel.
