@@ -11,6 +11,7 @@ from pellicle.fitting import noise
 from pellicle.fitting.problem import Noise
 from pellicle.fitting.spectra.targets import ROUGH, sphere_frame, sphere_sigma
 from pellicle.mapping.pixels.minima import PixelData
+from pellicle.mapping.pixels.noise import medians
 
 _TO_NORMAL = 1.4826 / np.sqrt(6.0)
 """Standard deviation of normal noise over the median size of its second differences."""
@@ -34,7 +35,7 @@ def pixel_data(block: Mapping[str, np.ndarray], source: Noise) -> PixelData:
     else:
         weight = known / (_drifting(values) if source.drifting else _guess(values))
     size = np.abs(values)
-    level = np.median(size, axis=1) if whole else _median_of(size, known)
+    level = medians(size) if whole else _median_of(size, known)
     return PixelData(np.where(known, values, 0.0), weight, np.maximum(level, 1e-12))
 
 
@@ -71,7 +72,7 @@ def _median_of(size: np.ndarray, known: np.ndarray) -> np.ndarray:
 
 def _guess(values: np.ndarray) -> np.ndarray:
     """First guess of an unknown noise, (pixels, 1), which the residuals replace."""
-    rough = np.median(np.abs(values[:, :-2] - 2 * values[:, 1:-1] + values[:, 2:]), axis=1)
+    rough = medians(np.abs(values[:, :-2] - 2 * values[:, 1:-1] + values[:, 2:]))
     guess = np.maximum(0.01 * np.ptp(values, axis=1), _TO_NORMAL * rough)
     return np.maximum(guess, 1e-12)[:, None]
 

@@ -22,6 +22,7 @@ from pellicle.fitting.discrepancy import (
 )
 from pellicle.fitting.misfit import BETTER, BEYOND, DOUBTFUL, EXPLAINS
 from pellicle.mapping.pixels.covariance import Normal, held_within, inverse, solve
+from pellicle.mapping.pixels.noise import medians
 
 _ROUNDS = 4
 _SETTLED = 1e-6
@@ -105,13 +106,14 @@ def discrepancy(evidence: PixelEvidence) -> PixelDiscrepancy:
     sizes = state.solution[:, known:]
     # terms of a lamp that a pixel has too few fringes for are zero
     count = np.sum(np.einsum("pii->pi", state.gram)[:, known:] > 0, axis=1)
-    limit = np.array([improbable(n) for n in range(sizes.shape[1] + 1)])
+    each, which = np.unique(count, return_inverse=True)
+    limit = np.array([improbable(n) for n in each.tolist()])[which]
     now = state.variance * evidence.middle**2
     return PixelDiscrepancy(
         covariance=state.covariance[:, :known, :known],
         shift=state.solution[:, :known],
         remaining=Remaining(typical / noise, typical, weighted, state.variance),
-        implausible=(count > 0) & (np.sum(sizes**2, axis=1) > limit[count]),
+        implausible=(count > 0) & (np.sum(sizes**2, axis=1) > limit),
         evidence_share=np.minimum(1.0, evidence.counted / now),
         noise=noise,
     )
@@ -154,7 +156,7 @@ def other_material(evidence: PixelEvidence, effects: Sequence[Effect]) -> np.nda
 
 def _spread(values: np.ndarray) -> np.ndarray:
     """`fitting.robust_losses.spread` of each pixel."""
-    return np.maximum(1.4826 * np.median(np.abs(values), axis=(1, 2)), 1e-300)
+    return np.maximum(1.4826 * medians(np.abs(values)), 1e-300)
 
 
 def _roots(residual: np.ndarray) -> np.ndarray:

@@ -23,7 +23,14 @@ from pellicle.mapping.pixels.effects import PixelEffects, nodes, of_pixels
 from pellicle.mapping.pixels.groups import BLOCK, Group, Taken, groups
 from pellicle.mapping.pixels.limits import PixelLimits
 from pellicle.mapping.pixels.minima import PixelData, PixelMinima
-from pellicle.mapping.pixels.noise import PixelNoise, correlation, noise_of, short_range_noise, students
+from pellicle.mapping.pixels.noise import (
+    PixelNoise,
+    correlation,
+    medians,
+    noise_of,
+    short_range_noise,
+    students,
+)
 from pellicle.mapping.pixels.nuisances import Nuisances
 from pellicle.mapping.pixels.results import CODES, NO_DATA, PixelFits
 from pellicle.mapping.pixels.status import judge
@@ -177,7 +184,7 @@ class PixelErrors:
         pixels, known = len(values), jacobian.shape[2]
         left = taken(residual)[..., :keep]
         sigma = 1 / taken(weight)[..., :keep]
-        median = np.median(sigma, axis=(1, 2))
+        median = medians(sigma)
         counted, middle = median**2 / noise.fraction, median
         least = LEAST_NOISE * level
 

@@ -73,19 +73,23 @@ def correlation(residual: np.ndarray, parts: Sequence[np.ndarray]) -> np.ndarray
     if channels > 1 or len(parts) > 1 or rows <= _LAGS:
         return np.asarray(correlation_in_sweeps(residual, parts))
     series = residual[:, parts[0], 0]
-    power = np.einsum("pr,pr->p", series, series)
-    some = power > 0
-    time, result, open_ = np.ones(pixels), np.ones(pixels), some.copy()
-    for lag in range(_LAGS):
-        if lag:
-            products = np.einsum("pr,pr->p", series[:, lag:], series[:, :-lag])
-            time = time + 2 * products / np.where(some, power, 1.0)
-        closed = open_ & (lag >= _WINDOW * time)
-        result[closed] = np.maximum(time[closed], 1.0)
-        open_ &= ~closed
+    pairs = [(series[:, lag:], series[:, : rows - lag]) for lag in range(_LAGS)]
+    products = np.stack([np.einsum("pr,pr->p", *pair) for pair in pairs], axis=1)
+    times = 2 * np.cumsum(products / np.maximum(products[:, :1], 1e-300), axis=1) - 1
+    closed = np.arange(_LAGS) >= _WINDOW * times
+    result = np.maximum(times[np.arange(pixels), np.argmax(closed, axis=1)], 1.0)
+    open_ = ~closed.any(axis=1)
     if open_.any():
         result[open_] = integrated_time(series[open_][..., None])
     return result
+
+
+def medians(values: np.ndarray) -> np.ndarray:
+    """Median (pixels,) of the values of each pixel (pixels, ...): NumPy sorts them three times as fast as it
+    finds their median."""
+    ordered = np.sort(values.reshape(len(values), -1), axis=1)
+    middle = ordered.shape[1] // 2
+    return 0.5 * (ordered[:, middle] + ordered[:, -middle - 1])
 
 
 def typical_noise(values: np.ndarray, window: int = 51) -> np.ndarray:
@@ -119,7 +123,7 @@ def typical_noise(values: np.ndarray, window: int = 51) -> np.ndarray:
     middle = median_of_rank(points // 2)
     if points % 2 == 0:
         middle = (middle + median_of_rank(points // 2 - 1)) / 2
-    return 1.4826 * np.maximum(middle, np.median(rough, axis=1) / 3)
+    return 1.4826 * np.maximum(middle, medians(rough) / 3)
 
 
 def short_range_noise(residual: np.ndarray, parts: Sequence[np.ndarray], least: np.ndarray) -> np.ndarray:
