@@ -27,7 +27,7 @@ VECTOR = [jax.ShapeDtypeStruct((3,), np.float64)]
 def path(tmp_path) -> Path:
     """A program x + 1 that is kept."""
     path = tmp_path / "programs" / "one"
-    assert executables.make(path, KEY, lambda x: [x + 1], VECTOR, tmp_path) is not None
+    assert executables.make(path, KEY, lambda x: [x + 1], VECTOR, tmp_path, {}) is not None
     return path
 
 
@@ -40,7 +40,7 @@ def test_a_kept_program_computes_what_was_compiled(path):
 def test_a_program_that_calls_lapack_runs_in_a_new_process(tmp_path):
     """Without the initialisation of LAPACK that process is killed by a signal."""
     path, matrix = tmp_path / "programs" / "one", [jax.ShapeDtypeStruct((2, 2), np.float64)]
-    assert executables.make(path, KEY, lambda x: [jnp.linalg.cholesky(x)], matrix, tmp_path) is not None
+    assert executables.make(path, KEY, lambda x: [jnp.linalg.cholesky(x)], matrix, tmp_path, {}) is not None
     code = (
         "import sys, pathlib, jax, numpy as np; jax.config.update('jax_enable_x64', True)\n"
         "from pellicle.fitting import executables\n"
@@ -54,7 +54,8 @@ def test_a_program_that_calls_lapack_runs_in_a_new_process(tmp_path):
 def test_an_option_that_xla_does_not_have_is_left_out(tmp_path, monkeypatch):
     monkeypatch.setattr(executables, "_OPTIONS", {"xla_of_another_version": True})
     monkeypatch.setattr(executables, "compiler_options", executables.compiler_options.__wrapped__)
-    program = executables.make(tmp_path / "programs" / "one", KEY, lambda x: [x + 1], VECTOR, tmp_path)
+    path, options = tmp_path / "programs" / "one", executables.compiler_options()
+    program = executables.make(path, KEY, lambda x: [x + 1], VECTOR, tmp_path, options)
     assert program is not None
     np.testing.assert_array_equal(program(np.arange(3.0))[0], [1, 2, 3])
 
@@ -73,7 +74,7 @@ def test_a_file_or_folder_of_another_user_is_not_loaded(path, monkeypatch):
     owner = os.stat(path).st_uid
     monkeypatch.setattr(os, "geteuid", lambda: owner + 1)
     assert executables.load(path, KEY) is None
-    assert executables.make(path, KEY, lambda x: [x + 1], VECTOR, path.parent) is None
+    assert executables.make(path, KEY, lambda x: [x + 1], VECTOR, path.parent, {}) is None
 
 
 @pytest.mark.skipif(os.name != "posix" or os.geteuid() != 0, reason="only root can give files away")
@@ -135,10 +136,12 @@ class Sum(NamedTuple):
 TRACED = []
 
 
-@kept
-def scaled(factor: float, x: Any) -> Sum:
+def plain_scaled(factor: float, x: Any) -> Sum:
     TRACED.append(factor)
     return Sum(factor * jnp.sum(x))
+
+
+scaled = kept(plain_scaled)
 
 
 @pytest.fixture
@@ -193,6 +196,17 @@ def test_without_a_cache_programs_are_compiled_with_the_same_options(new_process
             kept(lambda _, x: Sum(jnp.sum(x)))("plan", np.arange(4.0))
     finally:
         jax.config.update("jax_compilation_cache_dir", before)
+
+
+@pytest.mark.parametrize("cached", [True, False])
+def test_programs_of_many_calls_have_no_options(cache, new_process, monkeypatch, cached):
+    """XLA refuses an option that it does not have."""
+    monkeypatch.setattr(executables, "compiler_options", lambda: {"xla_of_another_version": True})
+    if not cached:
+        jax.config.update("jax_compilation_cache_dir", None)
+    assert kept(plain_scaled, many_calls=True)(2, np.arange(4.0)).total == 12
+    with pytest.raises(jax.errors.JaxRuntimeError, match="xla_of_another_version"):
+        scaled(2, np.arange(5.0))
 
 
 def test_without_owners_the_traced_program_is_kept(cache, new_process, monkeypatch):

@@ -8,16 +8,20 @@ import pytest
 
 import pellicle as pl
 from pellicle.data.cube import Cube
+from pellicle.fitting.discrepancy import _least_squares
 from pellicle.fitting.noise import integrated_time, local_noise, student
 from pellicle.fitting.progress import quiet
 from pellicle.fitting.result import Fit
+from pellicle.fitting.spectra.extended_scene import Number, Program
 from pellicle.fitting.spectra.fit import fitted, measurements
 from pellicle.fitting.spectra.problem import make
 from pellicle.fitting.spectra.search import search
-from pellicle.mapping.pixels.covariance import Normal, solve, solve_within
+from pellicle.fitting.spectra.systematic_effects import SimulatedEffect
+from pellicle.mapping.pixels.covariance import held_within, inverse
+from pellicle.mapping.pixels.effects import _simulation
 from pellicle.mapping.pixels.fit import PixelModel, prepare, spectrum
 from pellicle.mapping.pixels.minima import ORDERS, PixelData, PixelMinima
-from pellicle.mapping.pixels.noise import correlation, students, typical_noise
+from pellicle.mapping.pixels.noise import correlation, medians, students, typical_noise
 from pellicle.mapping.pixels.results import STATUSES
 
 NM, SIGMA = np.linspace(400, 900, 100), 0.003
@@ -190,6 +194,13 @@ def test_psi_and_delta_at_two_angles(given):
     check(Cube(arrays, nm, "psi-delta", ("site",), angles), pl.Scene(pl.Layer(1.46, pl.Free(0, 1000)), "Si"))
 
 
+@pytest.mark.parametrize("points", [7, 100])
+def test_medians(points):
+    values = np.random.default_rng(0).normal(size=(20, points, 2))
+    assert medians(values) == pytest.approx(np.median(values, axis=(1, 2)), abs=0)
+    assert medians(values[..., 0]) == pytest.approx(np.median(values[..., 0], axis=1), abs=0)
+
+
 @pytest.mark.parametrize("points", [7, 51, 100])
 def test_typical_noise_is_the_median_of_the_local_noise(points):
     values = np.random.default_rng(0).normal(size=(20, points))
@@ -212,9 +223,37 @@ def test_students_of_many_degrees_of_freedom():
 
 def test_solutions_stay_on_bounds():
     # without bounds (1, -1); with the second held at 0 the first solves 2 x = 1
-    matrix, right = np.array([[[2.0, 1.0], [1.0, 2.0]]]), np.array([[1.0, -1.0]])
+    covariance = inverse(np.array([[[2.0, 1.0], [1.0, 2.0]]]))
     lower, upper = np.array([[-9.0, 0.0]]), np.full((1, 2), 9.0)
-    free = solve(matrix, right)
-    assert free == pytest.approx(np.array([[1.0, -1.0]]))
-    found = solve_within(Normal(matrix, right), lower, upper, free)
+    found = held_within(np.array([[1.0, -1.0]]), covariance, lower, upper)
     assert found == pytest.approx(np.array([[0.5, 0.0]]))
+
+
+def test_solutions_within_bounds_are_those_of_a_fit_of_each_pixel():
+    rng = np.random.default_rng(0)
+    rows, data = rng.normal(size=(50, 20, 6)) + rng.normal(size=(50, 20, 1)), rng.normal(size=(50, 20))
+    lower = np.tile([-np.inf, -0.1, 0.0, 0.0, 0.0, -np.inf], (50, 1))
+    upper = np.tile([np.inf, 0.1, np.inf, np.inf, np.inf, 0.2], (50, 1))
+    covariance = inverse(np.swapaxes(rows, 1, 2) @ rows + np.eye(6))
+    free = np.einsum("pij,pnj,pn->pi", covariance, rows, data)
+    found = held_within(free, covariance, lower, upper)
+    ends = lower[0], upper[0]
+    expected = [_least_squares(*one, np.eye(6), ends) for one in zip(rows, data, strict=True)]
+    assert found == pytest.approx(np.array(expected), abs=1e-12)
+
+
+def test_effects_share_the_unchanged_signal():
+    narrow = SimulatedEffect("narrow", 2.0, "", Number(0, 0.0), ((3.0, 0.4), (-3.0, 0.4), (0.0, -0.8)))
+    rough = SimulatedEffect("rough", 1.5, "nm", Number(1, 0.0), ((1.5, 1.7), (0.0, -1.7)))
+    program = Program(None, OXIDE, [0, 1])
+    plain = _simulation(program, [narrow, rough], [True, False], unchanged=True)
+    face = _simulation(program, [narrow, rough], [False, True], unchanged=False)
+    assert (len(plain.terms), len(face.terms)) == (3, 1)
+    changes = np.zeros(2)
+    for part in (plain, face):
+        moved = [(effect.number.position, relative * effect.size) for effect, relative in part.terms]
+        changes += part.weights @ [
+            np.exp(by) * (5 if position else 1) if by else 7.0 for position, by in moved
+        ]
+    expected = 0.4 * (np.exp(3.0) + np.exp(-3.0)) - 0.8 * 7, 1.7 * (5 * np.exp(1.5) - 7)
+    assert changes == pytest.approx(expected)

@@ -30,7 +30,8 @@ LIMIT = 256 * 2**20
 _OPTIONS: dict[str, str | bool] = {"xla_cpu_use_fusion_emitters": False}
 """XLA's older code generator compiles the programs of a fit in 5 to 22 s of processor time, not 7 to 30 s;
 most run as fast within 20 %, those of a slow scale and offset a third slower (jaxlib 0.10, by
-`benchmarks/fit.py` and `benchmarks/cold_start.py`)."""
+`benchmarks/fit.py` and `benchmarks/cold_start.py`). Derivatives of hundreds of spectra at once run at a third
+to two thirds of the speed (`benchmarks/map.py`): such programs are called often, and have no options."""
 
 _DIGEST = hashlib.sha256().digest_size
 _CALLS = re.compile(r"custom_call @([\w.]+)")
@@ -61,11 +62,16 @@ def load(path: Path, key: bytes) -> Callable[..., Any] | None:
 
 
 def make(
-    path: Path, key: bytes, function: Callable[..., Any], inputs: Sequence[jax.ShapeDtypeStruct], cache: Path
+    path: Path,
+    key: bytes,
+    function: Callable[..., Any],
+    inputs: Sequence[jax.ShapeDtypeStruct],
+    cache: Path,
+    options: dict[str, str | bool],
 ) -> Callable[..., Any] | None:
     """Compile a function of arrays and keep its machine code at `path`; None where it cannot be kept.
 
-    `cache` is the folder of JAX's own compilation cache.
+    `cache` is the folder of JAX's own compilation cache, `options` are those of XLA.
     """
     if not private_files.make_folder(path.parent):
         return None
@@ -79,7 +85,7 @@ def make(
         return None  # a library that the loading process may not have initialised
     from jax.experimental import serialize_executable
 
-    compiled = lowered.compile(compiler_options=compiler_options())
+    compiled = lowered.compile(compiler_options=options)
     with suppress(OSError):
         for copy in cache.glob(f"*{name}*"):
             copy.unlink()

@@ -25,18 +25,21 @@ from pellicle.files import replacing
 from pellicle.fitting import executables
 
 Program = Callable[..., Any]
+Options = dict[str, str | bool]
+"""Options of XLA."""
 
 
-def kept(function: Program) -> Program:
+def kept(function: Program, *, many_calls: bool = False) -> Program:
     """`jax.jit` with the first argument static, kept on disk where there is a cache.
 
     `function(plan, *pytrees)` must be pure and return a named tuple of arrays; `plan` is hashable, and
-    its `repr` says all that the program depends on.
+    its `repr` says all that the program depends on. With `many_calls` it is compiled to run fast, not in
+    a short time.
     """
 
     @lru_cache(maxsize=1)
     def jitted() -> Program:  # at the first call, which starts JAX's backend anyway
-        return jax.jit(function, static_argnums=0, compiler_options=executables.compiler_options())
+        return jax.jit(function, static_argnums=0, compiler_options=_options(many_calls))
 
     @wraps(function)
     def call(plan: Hashable, *arguments: Any) -> Any:
@@ -46,7 +49,7 @@ def kept(function: Program) -> Program:
         leaves, structure = jax.tree_util.tree_flatten(arguments)
         arrays = [np.asarray(leaf) for leaf in leaves]
         shapes = tuple((a.shape, a.dtype.str) for a in arrays)
-        run, output = _load(function, plan, structure, shapes, folder)
+        run, output = _load(function, many_calls, plan, structure, shapes, folder)
         return jax.tree_util.tree_unflatten(output, run(*arrays))
 
     return call
@@ -54,7 +57,7 @@ def kept(function: Program) -> Program:
 
 @lru_cache(maxsize=128)
 def _load(
-    function: Program, plan: Hashable, structure: Any, shapes: tuple, folder: str
+    function: Program, many_calls: bool, plan: Hashable, structure: Any, shapes: tuple, folder: str
 ) -> tuple[Program, Any]:
     """The program as a function of flat arrays, and the structure of its results."""
 
@@ -62,19 +65,23 @@ def _load(
         return jax.tree_util.tree_leaves(function(plan, *jax.tree_util.tree_unflatten(structure, arrays)))
 
     cache = Path(folder)
-    about = function.__module__, function.__qualname__, repr(plan), str(structure), shapes
+    about = function.__module__, function.__qualname__, many_calls, repr(plan), str(structure), shapes
     key = hashlib.sha256(repr((*about, _environment(), _sources())).encode()).digest()
     path = cache / "programs" / key.hex()
     inputs = [jax.ShapeDtypeStruct(shape, np.dtype(dtype)) for shape, dtype in shapes]
-    run = None
+    options, run = _options(many_calls), None
     if jax.default_backend() == "cpu":
-        run = executables.load(path, key) or executables.make(path, key, flat, inputs, cache)
-    run = run or _traced(path.with_suffix(".export"), flat, inputs)
+        run = executables.load(path, key) or executables.make(path, key, flat, inputs, cache, options)
+    run = run or _traced(path.with_suffix(".export"), flat, inputs, options)
     kind = get_type_hints(function)["return"]
     return run, jax.tree_util.tree_structure(kind(*range(len(kind._fields))))
 
 
-def _traced(path: Path, flat: Program, inputs: Sequence[jax.ShapeDtypeStruct]) -> Program:
+def _options(many_calls: bool) -> Options:
+    return {} if many_calls else executables.compiler_options()
+
+
+def _traced(path: Path, flat: Program, inputs: Sequence[jax.ShapeDtypeStruct], options: Options) -> Program:
     """The traced program at `path`, made if it is not there."""
     from jax import export
 
@@ -87,7 +94,7 @@ def _traced(path: Path, flat: Program, inputs: Sequence[jax.ShapeDtypeStruct]) -
             path.parent.mkdir(parents=True, exist_ok=True)
             with replacing(path, overwrite=True) as temporary:
                 temporary.write_bytes(program.serialize())
-    return jax.jit(program.call, compiler_options=executables.compiler_options())
+    return jax.jit(program.call, compiler_options=options)
 
 
 @lru_cache(maxsize=1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -62,7 +63,7 @@ class SideBySide(NamedTuple):
     signal: Any
 
 
-@kept
+@partial(kept, many_calls=True)
 def simulated_side_by_side(
     form: SpectrumForm | ColourForm, scene: Scene, data: Any, frame: Any, values: Any
 ) -> SideBySide:

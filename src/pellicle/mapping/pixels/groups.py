@@ -11,8 +11,9 @@ from pellicle.fitting.spectra.sweeps import sweeps
 from pellicle.fitting.spectra.view import SpectrumView
 from pellicle.scene.free import is_free
 
-BLOCK = 512
-"""Pixels that are judged at once: their systems of equations stay in the cache."""
+BLOCK = 1024
+"""Pixels that are judged at once. With 512 the calls of NumPy cost 1 to 3 µs more for each pixel; the systems
+of equations of 2048 no longer stay in the cache."""
 
 
 class Group(NamedTuple):

@@ -9,6 +9,7 @@ of matrices. A step counts up to half the distance to the next node only.
 
 from __future__ import annotations
 
+from functools import partial
 from logging import getLogger
 from typing import Any, NamedTuple
 
@@ -241,7 +242,7 @@ def _orthonormal(vectors: np.ndarray, rotation: np.ndarray) -> tuple[np.ndarray,
     return basis, triangle
 
 
-@kept
+@partial(kept, many_calls=True)
 def scan(layout: Layout, lookup: Lookup, values: Any, weight_scale: Any) -> Candidates:
     """Best nodes of pixels (pixels, points), each with weights `weight_scale` (pixels,) times the common."""
     gains, count = layout.gains, len(layout.order)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -104,7 +105,7 @@ def explained(static: Static, common: Common, rows: PixelData, units: Any) -> Ex
     return Explained(jax.vmap(jax.vmap(one, (None, 0)))(rows, units))
 
 
-@kept
+@partial(kept, many_calls=True)
 def stepped(static: Static, common: Common, rows: PixelData, units: Any, damping: Any) -> Stepped:
     """`EVALUATIONS` bounded Gauss-Newton steps from points `units` (starts, parameters).
 
@@ -144,7 +145,7 @@ def stepped(static: Static, common: Common, rows: PixelData, units: Any, damping
     return jax.vmap(one)(rows, units, damping)
 
 
-@kept
+@partial(kept, many_calls=True)
 def at_best(static: Static, common: Common, rows: PixelData, units: Any) -> Best:
     """One step of pixels from points `units` (pixels, parameters) next to their minima, and the model there.
 
