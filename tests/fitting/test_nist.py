@@ -22,8 +22,9 @@ from pellicle.fitting.covariance import errors, scaled
 from pellicle.fitting.levenberg_marquardt import BoundedLevenbergMarquardt
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.problem import Noise, Problem
+from pellicle.fitting.spectra.form import Local
 from pellicle.fitting.spectra.nuisance import Data
-from pellicle.fitting.spectra.view import Local, SpectrumView
+from pellicle.fitting.spectra.view import SpectrumView
 
 FOLDER = Path(__file__).parent / "nist_strd"
 

@@ -13,9 +13,10 @@ from pellicle.fitting.colours.targets import MeasuredColours
 from pellicle.fitting.minima import minima
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.reweighting import RankedMinima
+from pellicle.fitting.spectra.form import Local
 from pellicle.fitting.spectra.problem import make
 from pellicle.fitting.spectra.targets import Target
-from pellicle.fitting.spectra.view import Local, SpectrumView
+from pellicle.fitting.spectra.view import SpectrumView
 from pellicle.scene.free import free_leaves
 
 _STRUCTURE = 0.5

@@ -16,8 +16,9 @@ from pellicle.effects.anisotropy import computes_roughness
 from pellicle.effects.film import exact
 from pellicle.fitting.colours.view import ColourForm, ColoursView
 from pellicle.fitting.program_cache import kept
+from pellicle.fitting.spectra.form import SpectrumForm
 from pellicle.fitting.spectra.parameters import anonymous
-from pellicle.fitting.spectra.view import SpectrumForm, SpectrumView
+from pellicle.fitting.spectra.view import SpectrumView
 from pellicle.optics.pair import Pair, imag, real
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free, free_leaves, insert, is_free

@@ -21,8 +21,9 @@ from pellicle.fitting.misfit import Accuracy, misfit
 from pellicle.fitting.result import Part, Rival
 from pellicle.fitting.reweighting import RankedMinima, ViewFit
 from pellicle.fitting.spectra import fringes
+from pellicle.fitting.spectra.form import Local
 from pellicle.fitting.spectra.layer_errors import layer_errors, principal_indices
-from pellicle.fitting.spectra.view import Local, SpectrumView
+from pellicle.fitting.spectra.view import SpectrumView
 
 LARGEST_POWER, LARGEST_ANGLES = 0.02, 0.02
 """Structure in residuals of R and T, and of N, C and S (0.6° of Ψ), that no calibrated instrument makes."""

@@ -14,7 +14,8 @@ from pellicle.fitting.colours.view import ColoursView
 from pellicle.fitting.discrepancy import HALF_NORMAL, Effect
 from pellicle.fitting.spectra import generalised
 from pellicle.fitting.spectra.extended_scene import ExtendedScene, Number
-from pellicle.fitting.spectra.view import Local, SpectrumView
+from pellicle.fitting.spectra.form import Local
+from pellicle.fitting.spectra.view import SpectrumView
 from pellicle.optics.orders import FWHM
 from pellicle.scene.film import Scene
 from pellicle.scene.free import is_free

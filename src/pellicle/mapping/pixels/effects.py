@@ -11,13 +11,14 @@ import numpy as np
 
 from pellicle.fitting.discrepancy import Effect
 from pellicle.fitting.spectra.extended_scene import Program, simulated_side_by_side
+from pellicle.fitting.spectra.form import Local
 from pellicle.fitting.spectra.systematic_effects import (
     SimulatedEffect,
     change_of_data,
     effects_on_signal,
     simulations_of,
 )
-from pellicle.fitting.spectra.view import Local, SpectrumView
+from pellicle.fitting.spectra.view import SpectrumView
 from pellicle.scene.film import Scene
 
 _NODES = 48

@@ -12,10 +12,10 @@ from pellicle.fitting.misfit import DOUBTFUL, Accuracy, beyond_accuracy
 from pellicle.fitting.noise import DRIFT_CORRELATION
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.spectra.evidence import LEAST_NOISE, SCATTER_OF_NOISE
+from pellicle.fitting.spectra.form import Local
 from pellicle.fitting.spectra.parts import LARGEST_ANGLES, LARGEST_DRIFT, LARGEST_POWER
 from pellicle.fitting.spectra.problem import shortest_wavelength
 from pellicle.fitting.spectra.targets import Measured
-from pellicle.fitting.spectra.view import Local
 from pellicle.fitting.status import RIVAL
 from pellicle.mapping.pixels.covariance import noise_covariance
 from pellicle.mapping.pixels.discrepancy import PixelEvidence, discrepancy, other_material

@@ -11,8 +11,9 @@ import numpy as np
 from pellicle.fitting.program_cache import kept
 from pellicle.fitting.reported_layer import linearised
 from pellicle.fitting.spectra import nuisance
+from pellicle.fitting.spectra.form import Local, SpectrumForm
 from pellicle.fitting.spectra.nuisance import Data
-from pellicle.fitting.spectra.view import Local, SpectrumForm, SpectrumView
+from pellicle.fitting.spectra.view import SpectrumView
 from pellicle.scene.film import Scene
 
 LANES, FEW = 256, 16
@@ -39,7 +40,7 @@ class PixelArrays(NamedTuple):
 
 
 class PixelLocals(NamedTuple):
-    """Models around one point of each pixel: see `fitting.spectra.view.Local`."""
+    """Models around one point of each pixel: see `fitting.spectra.form.Local`."""
 
     signal: Any
     slope: Any

@@ -19,9 +19,10 @@ import numpy as np
 
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.program_cache import kept
+from pellicle.fitting.spectra.form import SpectrumForm
 from pellicle.fitting.spectra.nuisance import chebyshev, offset_prior, scale_prior
 from pellicle.fitting.spectra.search import design_points, thickness_grid
-from pellicle.fitting.spectra.view import SpectrumForm, SpectrumView
+from pellicle.fitting.spectra.view import SpectrumView
 from pellicle.scene.film import Scene
 from pellicle.scene.free import insert
 from pellicle.scene.instrument import Drift

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from pellicle.fitting.spectra.form import Local
 from pellicle.fitting.spectra.nuisance import offset_prior, scale_prior
-from pellicle.fitting.spectra.view import Local, SpectrumView
+from pellicle.fitting.spectra.view import SpectrumView
 from pellicle.scene.film import Scene
 from pellicle.scene.instrument import Drift
 
