@@ -215,6 +215,21 @@ def test_folded_data_fold_the_curve():
             assert np.allclose(curve["y"][::40], np.minimum(truth, 360 - np.array(truth)), atol=1e-3)
 
 
+def test_of_a_mueller_matrix_the_measured_elements_are_drawn():
+    session = Session(pl.Scene(pl.Layer(1.7, 180.0), 3.9 + 0.02j))
+    rows = [f"{nm},{angle},0.1,0.2" for angle in (60, 70) for nm in (500, 600, 700)]
+    session.answer("data", {"name": "m.csv", "text": "\n".join(["wavelength_nm,angle_deg,m33,m12", *rows])})
+    curves = view(session, ["curves"])["curves"]
+    assert [curve["label"] for curve in curves] == ["m12 60°", "m12 70°", "m33 60°", "m33 70°"]
+    for curve in curves:
+        truth = []
+        for nm in (500.0, 700.0):
+            psi, delta = np.deg2rad(seen(nm, 180.0, float(curve["setting"][:2])))
+            element = {"m12": -np.cos(2 * psi), "m33": np.sin(2 * psi) * np.cos(delta)}
+            truth.append(element[curve["signal"]])
+        assert np.allclose([curve["y"][0], curve["y"][-1]], truth, rtol=0, atol=1e-5)
+
+
 def test_data_without_an_angle_need_one(session):
     answer = session.answer(
         "data", {"name": "a.csv", "text": "wavelength_nm,psi_deg,delta_deg\n500,30,90\n600,30,90"}

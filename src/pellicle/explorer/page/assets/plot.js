@@ -46,6 +46,12 @@ class Plot {
     return [...every].sort((one, other) => parseFloat(one) - parseFloat(other));
   }
 
+  /** Whether a panel has several signals, as elements of a Mueller matrix. */
+  #shared() {
+    const panels = new Map([...this.curves, ...this.data].map((curve) => [curve.signal, this.#ordinate(curve)]));
+    return new Set(panels.values()).size < panels.size;
+  }
+
   /** Colour and dash of each curve: by its angle of incidence; by its label where there is one angle. */
   #strokes(colour) {
     const all = [...this.curves, ...this.data];
@@ -57,7 +63,7 @@ class Plot {
     return (curve) => {
       const at = settings.indexOf(curve.setting);
       if (at < 0) return { color: pick(colours, labels.indexOf(curve.label)), dash: "solid" };
-      if (signals.length > 2) return { color: pick(colours, signals.indexOf(curve.signal)), dash: DASHES[at % DASHES.length] };
+      if (this.#shared()) return { color: pick(colours, signals.indexOf(curve.signal)), dash: DASHES[at % DASHES.length] };
       return { color: pick(ANGLES, at), dash: DASHES[Math.floor(at / ANGLES.length) % DASHES.length] };
     };
   }
@@ -94,7 +100,8 @@ class Plot {
       ...(settings.length ? { hovertemplate: `%{y}<extra>${curve.label}</extra>` } : {}), ...more,
     });
     const line = (curve, stroke, more) => trace(curve, Plot.#points(curve), { line: { width: 2, simplify: false, ...stroke }, ...more });
-    const group = (curve) => (new Set(this.curves.map((each) => each.signal)).size > 2 ? curve.label : curve.setting);
+    const shared = this.#shared();
+    const group = (curve) => (shared ? curve.label : curve.setting);
     const traces = [
       ...this.data.map((curve) => trace(curve, { x: curve.x, y: curve.y }, {
         mode: "markers", ...legend(`${curve.label} data`, "data"),
@@ -103,7 +110,7 @@ class Plot {
       ...this.before.map((curve) => line(curve, own(curve), {
         name: `${curve.label} before`, opacity: 0.35, hoverinfo: "skip", hovertemplate: null, showlegend: !several,
       })),
-      ...this.fitted.map((curve) => line(curve, { color: colour("--rival"), width: settings.length ? 4 : 2, dash: "dot" }, legend(`fit: ${curve.label}`, "fit"))),
+      ...this.fitted.map((curve) => line(curve, { color: colour("--rival"), dash: "dot" }, legend(`fit: ${curve.label}`, "fit"))),
       ...this.curves.map((curve) => line(curve, own(curve), legend(curve.label, group(curve)))),
     ];
     const entries = traces.filter((each) => each.showlegend !== false).map((each) => each.name);
@@ -193,7 +200,7 @@ class Plot {
       return `${signal}: least ${point((one, best) => one < best)}, greatest ${point((one, best) => one > best)}.`;
     });
     const settings = this.#settings();
-    if (settings.length && signals.length > 2) {
+    if (settings.length && this.#shared()) {
       const words = settings.map((setting, i) => `${DASHES[i % DASHES.length]} ${setting}`);
       sentences.push(`Lines: ${words.join(", ")}.`);
     }
