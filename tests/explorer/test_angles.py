@@ -9,7 +9,7 @@ from pellicle.cli.wavelengths import measured_scene
 from pellicle.explorer import fit_run
 from pellicle.explorer.session import Session
 
-NM = np.linspace(400.0, 800.0, 21)
+NM = np.linspace(420.0, 800.0, 20)
 ANGLES = (65.0, 70.0, 75.0)
 
 
@@ -152,7 +152,7 @@ def test_data_at_several_angles_replace_the_light_and_are_fitted_together(monkey
     answer = session.answer("data", {"name": "film.csv", "text": csv(data)})
     assert answer["scene_changed"]
     assert answer["states_angle"]
-    assert answer["notes"][0] == "film.csv: psi-delta, 42 points from 400 to 800 nm, at 60, 72°"
+    assert answer["notes"][0] == "film.csv: psi-delta, 40 points from 420 to 800 nm, at 60, 72°"
     labels = [curve["label"] for curve in answer["curves"]]
     assert sorted(labels) == ["Δ 60°", "Δ 72°", "Ψ 60°", "Ψ 72°"]
     for curve in answer["curves"]:

@@ -192,6 +192,12 @@ def drop(page, name, spectrum):
     )
     page.evaluate(script, [name, base64.b64encode(text.encode()).decode()])
     page.locator(".notes").get_by_text(name).first.wait_for()
+    both = """() => {
+      const { data } = document.querySelector(".plot");
+      const curve = (label) => data.some((t) => t.mode === "lines" && t.meta === label);
+      return data.some((t) => t.mode === "markers") && data.every((t) => t.mode === "lines" || curve(t.meta));
+    }"""
+    page.wait_for_function(both, timeout=60_000)
     settle(page)
 
 

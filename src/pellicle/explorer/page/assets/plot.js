@@ -4,6 +4,7 @@ const COLOURS = ["--fit", "--blue", "--index-n", "--fourth", "--red", "--green"]
 const CHANNELS = ["--red", "--green", "--blue", "--fourth"]; // of a surface, the longest wavelength first
 const ANGLES = ["--fit", "--blue", "--green", "--fourth"]; // of incidence, rising, as in reports of fits
 const DASHES = ["solid", "dash", "dashdot", "longdash"];
+const DASHES_IN_WORDS = ["solid", "dashed", "dash-dotted", "long-dashed"];
 const ROOM = 0.04; // above and below the curves, as a fraction of the axis
 
 /** Unpacks and runs Plotly, which is a gzipped script in base64, and returns it. */
@@ -201,7 +202,7 @@ class Plot {
     });
     const settings = this.#settings();
     if (settings.length && this.#shared()) {
-      const words = settings.map((setting, i) => `${DASHES[i % DASHES.length]} ${setting}`);
+      const words = settings.map((setting, i) => `${DASHES_IN_WORDS[i % DASHES.length]} ${setting}`);
       sentences.push(`Lines: ${words.join(", ")}.`);
     }
     return sentences.join(" ");
