@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import chi2
 
 from pellicle.fitting.covariance import Scaled
-from pellicle.fitting.discrepancy import HALF_NORMAL, Effect, Evidence, discrepancy, improbable
+from pellicle.fitting.discrepancy import HALF_NORMAL, Effect, Evidence, bulk, discrepancy, improbable
 
 X = np.linspace(-1, 1, 200)
 SIGMA = 0.01
@@ -143,6 +143,16 @@ def test_a_channel_that_is_wrong_as_a_whole_is_no_outlier(wrong):
     # the median absolute value of a cosine is 0.707; that of normal noise is 0.6745 standard deviations
     amplitude = wrong * np.sqrt(0.5) / 0.6745 / SIGMA
     assert found.remaining[0].ratio == pytest.approx(max(amplitude, 1.0), rel=0.15)
+
+
+def test_bulk_of_pixels():
+    """One pixel of noise alone, one with a smooth wave in the second channel, one with more noise there."""
+    rest = np.random.default_rng(4).normal(0, 1, (3, 400, 3))
+    rest[1, :, 1] += 80 * np.cos(np.arange(400) / 9)
+    rest[2, :, 1] *= 50
+    noise = np.array([1.0, 1.0, np.sqrt((1 + 1 + 50**2) / 3)])  # of the channels, root mean square
+    wave, most = 80 * np.sqrt(0.5) / 0.6745, np.median(np.abs(rest[2])) / 0.6745
+    assert bulk(rest, noise) == pytest.approx([1.0, wave, most], rel=0.1)
 
 
 def test_effects_of_the_sample_are_shared_by_its_data():

@@ -18,7 +18,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pellicle.fitting.covariance import Errors, Scaled
-from pellicle.fitting.noise import local_noise
 from pellicle.fitting.robust_losses import spread
 
 HALF_NORMAL = math.sqrt(3)
@@ -157,7 +156,7 @@ def discrepancy(evidence: Sequence[Evidence], scaled: Scaled, unit: np.ndarray) 
         # a signal of its own, such as one ratio, is not diluted by others that the scene has right
         each = [own[:, list(group)] for group in view.signals] or [own]
         sigmas = [view.sigma[:, list(group)] for group in view.signals] or [view.sigma]
-        typical = max(_bulk(x * sigma) for x, sigma in zip(each, sigmas, strict=True))
+        typical = max(float(bulk(x * sigma, view.noise)) for x, sigma in zip(each, sigmas, strict=True))
         weighted = max(math.sqrt(np.mean((_weights(x) * x) ** 2)) for x in each)
         remaining.append(Remaining(typical / view.noise, typical, weighted, size))
     sizes, shares = solution[known:], _evidence_shares(evidence, state.variance)
@@ -214,18 +213,18 @@ def _balanced(system: _System, evidence: Sequence[Evidence]) -> _Balance:
     return _Balance(variance, robust, reduced)
 
 
-def _bulk(residual: np.ndarray) -> float:
-    """Size of most residuals (rows, channels), or of a channel that is wrong as a whole.
+def bulk(residual: np.ndarray, noise: Any) -> Any:
+    """Size (...) of most residuals (..., rows, channels), or of a channel that is wrong as a whole.
 
-    A third of all residuals are those of S alone where the sign of Δ is another one: they are no outliers.
+    A third of all residuals are those of C alone where 180 - Δ stands for Δ: they are no outliers. `noise`
+    (...) is the root mean square of that of the channels.
     """
-    size = spread(residual)
-    wrong = [
-        own
-        for channel in residual.T
-        if (own := spread(channel)) > max(_APART * size, _SMOOTH * float(np.median(local_noise(channel))))
-    ]
-    return max([size, *wrong])
+    size, channels = spread(residual, (-2, -1)), residual.shape[-1]
+    if channels == 1:
+        return size
+    each = spread(residual, -2)
+    least = np.maximum(_APART * size, _SMOOTH * math.sqrt(channels) * np.asarray(noise))[..., None]
+    return np.maximum(size, np.max(np.where(each > least, each, 0.0), axis=-1))
 
 
 def _evidence_shares(evidence: Sequence[Evidence], variance: Sequence[float]) -> tuple[float, ...]:
@@ -243,7 +242,7 @@ def huber_roots(residual: np.ndarray, size: Any) -> np.ndarray:
 
 def _weights(residual: np.ndarray) -> np.ndarray:
     """Square roots of Huber's weights."""
-    return huber_roots(residual, np.float64(spread(residual)))
+    return huber_roots(residual, spread(residual))
 
 
 def _variance(view: Evidence, residual: np.ndarray, weight: np.ndarray, used: float) -> float:

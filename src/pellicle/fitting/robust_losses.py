@@ -8,7 +8,7 @@ with weights ψ(z)/z, again and again (P. Huber and E. Ronchetti, 2009, Robust S
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -57,9 +57,9 @@ def check_loss(name: str, what: str = "loss") -> None:
         raise UsageError(f"{what} must be one of {', '.join([LEAST_SQUARES, *LOSSES])}, not {name!r}")
 
 
-def spread(residual: np.ndarray) -> float:
-    """Standard deviation of the bulk of the residuals, from their median absolute value."""
-    return float(max(_MAD * np.median(np.abs(residual)), 1e-300))
+def spread(residual: np.ndarray, axis: int | tuple[int, ...] | None = None) -> Any:
+    """Standard deviation of the bulk of residuals along `axis` (all), from their median absolute value."""
+    return np.maximum(_MAD * np.median(np.abs(residual), axis=axis), 1e-300)
 
 
 def inflation(loss: Loss, z: np.ndarray) -> float:

@@ -16,6 +16,7 @@ from pellicle.fitting.discrepancy import (
     OUTLIER,
     Effect,
     Remaining,
+    bulk,
     huber_roots,
     improbable,
     reduced_variance,
@@ -98,7 +99,8 @@ def discrepancy(evidence: PixelEvidence) -> PixelDiscrepancy:
     """The discrepancy of each pixel."""
     state = _balanced(evidence)
     known, rest = evidence.known, state.rest.reshape(evidence.residual.shape)
-    typical, noise = _spread(rest * evidence.sigma), evidence.noise.copy()
+    left, noise = rest * evidence.sigma, evidence.noise.copy()
+    typical = bulk(left, noise) if left.shape[2] > 1 else _spread(left)
     large = np.flatnonzero(typical > DOUBTFUL * noise)
     if evidence.short is not None and len(large):
         noise[large] = np.maximum(noise[large], evidence.short(large))
