@@ -88,6 +88,19 @@ def test_all_cells_without_a_number_are_counted(write, cell, message, refused):
     refused(write("\n".join(["wavelength,R", *rows])), DataError, "line 3, column 'R'", message)
 
 
+@pytest.mark.parametrize(
+    ("nm", "remedy"),
+    [
+        ([400, 401, 401, 402, 403, 404, 404, 405, 406, 407, 407, 408, 409, 410, 410], "4 repeated ones"),
+        ([440, 400, 430, 410, 420, 405, 450, 402, 455], "sort the rows, which turn back 4 times"),
+        ([*range(400, 410), *range(404, 399, -1)], "delete or correct one of the rows"),  # a broken sweep
+    ],
+)
+def test_remedies_for_a_whole_axis(write, nm, remedy, refused):
+    text = "wavelength,R\n" + "".join(f"{x},{0.2 + 0.001 * i}\n" for i, x in enumerate(nm))
+    refused(write(text), DataError, "within one angle", remedy)
+
+
 def test_decimal_commas_between_commas(write, refused):
     text = "wavelength,R\n400,5,0,11\n500,5,0,21\n600,5,0,31\n"
     refused(write(text), DataError, "4 values", "names 2 columns", "semicolons", "decimal commas")

@@ -23,6 +23,8 @@ LONGEST_ASSUMED = 3300.0
 end at 3300 nm."""
 
 _LEAST = 1e-12
+_FEW = 3
+"""Rows out of order that are corrected one by one; more are a matter of the whole file."""
 _REMEDY = "correct or delete that row"
 _LONG = '`wavelength_unit="cm-1"`, `wavelength_unit="A"`'
 
@@ -141,8 +143,17 @@ def _check_monotone(table: Table, axis: AxisColumns, values: np.ndarray, rows: n
         one = "angle and azimuth" if axis.azimuth else "angle"
         verb = "repeats" if values[here] == values[before] else "turns back after"
         place = table.where(here, axis.wavelength.position)
+        equal, turns = int(np.sum(steps == 0)), int(np.sum(np.sign(steps) == -direction))
+        remedy = "delete or correct one of the rows"
+        if turns > _FEW and np.unique(values[rows]).size == rows.size:
+            remedy = f"sort the rows, which turn back {turns} times"
+        elif equal > _FEW and not turns:
+            remedy = (
+                "export more digits of the wavelengths, or replace the rows of each of the "
+                f"{equal} repeated ones by their mean"
+            )
         raise DataError(
             f"{place}: {values[here]:.10g} {verb} {values[before]:.10g} of "
             f"{table.place(before)}; within one {one} wavelengths must rise or fall strictly, or come "
-            "in several complete sweeps, so delete or correct one of the rows"
+            f"in several complete sweeps, so {remedy}"
         )
