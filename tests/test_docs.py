@@ -40,6 +40,11 @@ EXIT_4 = (
 SLOW = {
     "pellicle fit turned.csv --recipe docs/examples/tilted_azimuths.toml": "compiles for half a minute;"
     " tests/fitting/spectra/test_generalised.py fits such data",
+    **{
+        f"pellicle {command} docs/examples/tilted_microscope.toml": "compiles for half a minute;"
+        " tests/simulation/test_lens.py"
+        for command in ("simulate", "fit oriented.csv --recipe")
+    },
     "pellicle fit partial.csv --recipe docs/examples/partial_window.toml": "compiles for 6 s; "
     "tests/fitting/spectra/test_back_collected.py fits these data",
     **{
