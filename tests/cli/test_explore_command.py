@@ -82,6 +82,24 @@ def test_a_recipe_comes_with_its_data(explore, tmp_path):
     assert 'files = ["film.csv"]' in session.answer("recipe", {})["toml"]
 
 
+def test_the_recipe_on_the_page_reads_its_data_as_they_were_read(explore, tmp_path):
+    rows = [
+        f"{nm},{angle},30,{delta}" for angle in (60, 70) for nm, delta in ((500, 20), (600, 60), (700, 90))
+    ]
+    (tmp_path / "e.csv").write_text("\n".join(["wavelength_nm,angle_deg,psi_deg,delta_deg", *rows]))
+    text = RECIPE[RECIPE.index("[scene]") :]
+    text = f'[data]\nfiles = ["e.csv"]\nsignal = "psi-delta"\nfolded = true\nnoise = 0.1\n{text}'
+    (tmp_path / "film.toml").write_text(text)
+    _, [(session, _)] = explore(str(tmp_path / "film.toml"))
+    toml = session.answer("recipe", {})["toml"]
+    assert "folded = true" in toml
+    assert "noise = 0.1" in toml
+    assert "angle" not in toml
+    dropped = {"name": "own.csv", "text": "wavelength_nm,R\n400,0.1\n500,0.2\n600,0.3\n", "angles": [0]}
+    assert "error" not in session.answer("data", dropped)
+    assert "folded" not in session.answer("recipe", {})["toml"]
+
+
 def test_missing_data_are_no_obstacle(explore, tmp_path, capsys):
     (tmp_path / "film.toml").write_text(RECIPE)
     code, [(session, _)] = explore(str(tmp_path / "film.toml"))

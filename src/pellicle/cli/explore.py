@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 
 DEFAULT_LAYER, DEFAULT_SUBSTRATE, DEFAULT_THICKNESS = "SiO2", "Si", "0:1000"
 """Film that is shown without a recipe and without flags."""
+_READING = ("spectrum", "columns", "wavelength_unit", "signal_unit", "range", "noise", "loss")
+"""Options of a recipe by which its data are read, beside its light."""
+_OF_ELLIPSOMETRY = ("folded", "analyser", "spot", "elements")
 
 
 def explore(
@@ -105,7 +108,13 @@ def _of_recipe(path: str) -> Session:
         except DataError as error:
             say(f"{error} (the explorer starts without data)")
     given = None if data.wavelengths is None else wavelengths(own, scene)
-    return Session(scene, Path(path).parent, wavelength=given, title=title, spectra=spectra)
+    reading = {
+        name: getattr(data, name)
+        for name in (*_READING, *_OF_ELLIPSOMETRY)
+        if getattr(data, name) is not None
+    }
+    about = {"title": title, "spectra": spectra, "reading": reading}
+    return Session(scene, Path(path).parent, wavelength=given, **about)
 
 
 def _of_flags(flags: SceneFlags, reading: ReadingFlags) -> Session:

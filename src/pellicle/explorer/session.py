@@ -12,6 +12,7 @@ from functools import partial
 from logging import getLogger
 from math import isfinite
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -48,7 +49,7 @@ class Session:
 
     **Arguments:** `scene`; `folder`, in which data files may be read (None: none); `wavelength` in nm,
     (wavelengths,), by default those of the scene's light or the visible ones; `title` of the page; `spectra`,
-    the data to begin with.
+    the data to begin with, and the options of a recipe by which they were read, `reading`.
 
     **Raises:** UsageError for more angles of incidence than are drawn, DataError where materials share no
     wavelengths.
@@ -62,6 +63,7 @@ class Session:
         wavelength: Any = None,
         title: str = "",
         spectra: Sequence[Spectrum] = (),
+        reading: Mapping[str, Any] = MappingProxyType({}),
     ) -> None:
         self.title, self.folder = title, None if folder is None else Path(folder).resolve()
         if wavelength is None and spectra:
@@ -70,6 +72,7 @@ class Session:
         self.view: _View = (view.measured(spectra) if spectra else None) or view
         here = self.folder or Path.cwd()
         self.spectra = [replace(each, path=os.path.relpath(each.path, here)) for each in spectra]
+        self._reading = reading
         self._views: dict[tuple[Any, tuple[float, ...]], FilmView] = {}  # at other angles of incidence
         self._ahead = False  # whether programs are compiled before a view needs them
         self._compiler, self._fit_run = Compiler(), FitRun()
@@ -122,7 +125,7 @@ class Session:
             view.measured([])
         spectra = measured_spectra(body, self.folder, view.scene.light.signal)
         changed = self._view_of(body).measured(spectra)
-        self.spectra = spectra
+        self.spectra, self._reading = spectra, {}
         if changed is None:
             return self._data_shown()
         self.view = changed
@@ -169,7 +172,7 @@ class Session:
         if np.ndim(scene.light.angle):  # those of the files
             scene = with_value(scene, ANGLE, 0.0)
         files = list(dict.fromkeys(folder / spectrum.path for spectrum in self.spectra))
-        return {"toml": recipe_text(scene, folder, files=files), "python": program}
+        return {"toml": recipe_text(scene, folder, files=files, reading=self._reading), "python": program}
 
     def _view(self, body: Mapping[str, Any]) -> dict[str, Any]:
         view, warnings = self._view_of(body), []

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import fields
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -65,11 +66,12 @@ def recipe_text(
     *,
     files: Iterable[str | os.PathLike[str]] = (),
     wavelength: np.ndarray | None = None,
+    reading: Mapping[str, Any] = MappingProxyType({}),
 ) -> str:
     """Return the text of a recipe that lies in `folder`; the rest as for `write_recipe`.
 
     `wavelength` in nm, (wavelengths,), is that of a light which has none: each of its angles and azimuths is
-    seen at all of them.
+    seen at all of them. `reading` has the options of `[data]` by which the files are read.
     """
     check_scene(scene)
     at = Path(folder)
@@ -83,7 +85,7 @@ def recipe_text(
     sampled = {} if wavelength is None else {"wavelengths": _wavelengths(wavelength)}
     text = toml_text.document(
         {
-            "data": _data(scene) | sampled | data,
+            "data": _data(scene) | sampled | data | dict(reading),
             "scene": _scene(scene, at),
             "scene.layer": [_layer(layer, i, scene, at) for i, layer in enumerate(scene.layers)],
             "instrument": _instrument(scene),
