@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pellicle.fitting.brdf.warnings import directions, numbers
+from pellicle.fitting.brdf.warnings import directions, numbers, weights
 from pellicle.fitting.result import Estimate
 from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface
@@ -51,3 +51,12 @@ def test_warnings_on_numbers(name, value, message):
 def test_lobes_that_are_not_normalised_are_named(tilted):
     fitted = {key: np.asarray(x) for key, x in tilted.start_numbers().items()}
     assert any("specular is a weight and no albedo" in each for each in numbers(tilted, {}, fitted))
+
+
+def test_weights_that_are_fixed_are_named():
+    fixed = Estimate("specular", 1.0, 0.0, "", 1.0, 1.0, False)
+    free = Estimate("diffuse", 0.3, 0.01, "1/sr", 0.0, 1.0, True)
+    [message] = weights({"specular": fixed, "diffuse": free, "base_n_r": fixed})
+    assert message.startswith("fixed: specular at 1; ")
+    assert "specular = { lower = 0, upper = 10 }" in message
+    assert weights({"diffuse": free}) == []

@@ -207,6 +207,7 @@ def _fit(
         correlation=found.errors.correlation,
         warnings=(
             *notes,
+            *(warnings.weights(parameters) if status is Status.MISFIT else ()),
             *warnings.directions(together(samples), surface),
             *warnings.numbers(surface, parameters, numbers),
             *identifiability.bounded(parameters, ()),

@@ -57,7 +57,9 @@ def _no_better(held_out: float, baselines: tuple[Baseline, ...]) -> list[str]:
         if not held_out < (1 - GAIN) * b.held_out:
             ratio = held_out / b.held_out if b.held_out > 0 else math.inf
             how = f"{100 * (1 - ratio):.0f} % below" if ratio < 0.995 else f"{ratio:.2f} times that of"
-            reasons.append(f"its held-out error is {how} {b.name}, and {100 * GAIN:.0f} % below is asked for")
+            reasons.append(
+                f"its held-out error is {how} {b.name}, where at least {100 * GAIN:.0f} % below is required"
+            )
     return reasons
 
 
@@ -82,9 +84,9 @@ def _empty(parameters: Mapping[str, Estimate]) -> list[str]:
         if not p.free:
             continue
         if key == "exponent" and p.value <= FLATTEST:
-            reasons.append(f"{name} {p.value:.2f} is no lobe (above {FLATTEST:g} is asked for)")
+            reasons.append(f"{name} {p.value:.2f} is no lobe (it must be above {FLATTEST:g})")
         elif name == "roughness" and p.value >= ROUGHEST:
-            reasons.append(f"roughness {p.value:.2f} is no lobe (below {ROUGHEST:g} is asked for)")
+            reasons.append(f"roughness {p.value:.2f} is no lobe (it must be below {ROUGHEST:g})")
         elif name == "specular" and p.value == p.lower:
             reasons.append("the layered lobes have no weight")
         elif p.at_bound and (

@@ -17,6 +17,7 @@ from pellicle.scene.surface import Surface
 
 _STEEP, _TOLERANCE = 15.0, 0.5
 """Degrees from the normal: directions below the first see little of n, and within the second are one."""
+_WEIGHTS = ("specular", "diffuse")
 _THIN = 5.0
 """nm; n and k of a thinner film are not seen."""
 
@@ -45,6 +46,18 @@ def directions(samples: BrdfSamples, surface: Surface) -> list[str]:
             "base_n and base_k are both free and strongly correlated (0.95): fix them from a table"
         )
     return messages
+
+
+def weights(parameters: Mapping[str, Estimate]) -> list[str]:
+    """A sentence on weights of lobes that are fixed, for a fit that does not explain the samples."""
+    fixed = [name for name, p in parameters.items() if name.split("_")[0] in _WEIGHTS and not p.free]
+    if not fixed:
+        return []
+    each = " and ".join(f"{name} at {parameters[name].value:g}" for name in fixed)
+    return [
+        f"fixed: {each}; unless they are known, give them bounds, as in {fixed[0]} = {{ lower = 0, "
+        "upper = 10 }"
+    ]
 
 
 def numbers(surface: Surface, parameters: Mapping[str, Estimate], fitted: Mapping[str, Any]) -> list[str]:
