@@ -203,7 +203,17 @@ def test_missing_wavelength(write, refused):
 def test_radians_are_not_taken_for_degrees(write, refused):
     small = write("wl,psi,delta\n400,0.35,2.9\n500,0.36,3.0\n")
     refused(small, DataError, "look like radians", "psi_deg")
-    refused(write("wl,psi (rad),delta (rad)\n400,0.35,2.9\n500,0.36,3.0\n"), DataError, "'rad'", "degrees")
+    refused(
+        write("wl,psi (rad),delta (rad)\n400,0.35,2.9\n500,0.36,3.0\n"),
+        DataError,
+        "'rad'",
+        "convert both to degrees",
+    )
+
+
+def test_a_pseudo_dielectric_function(write, refused):
+    eps = "eV,<eps1>,<eps2>\n2.1,3.1,1.0\n2.0,3.0,0.9\n"
+    refused(write(eps), DataError, "pseudo-dielectric function", "export psi and delta")
     stated = read_spectrum(write("wl,psi_deg,delta_deg\n400,0.35,2.9\n500,0.36,3.0\n"))
     np.testing.assert_array_equal(stated.values, [0.35, 0.36])
 

@@ -199,9 +199,9 @@ def ellipsometry_columns(table: Table, columns: Sequence[Column] | None) -> Elli
         )
     for column in values:
         if column.unknown_unit or column.unit == "percent":
+            known = "convert both to degrees" if form == PSI_DELTA else "write plain numbers, as 0.5"
             raise DataError(
-                f"{table.path}: {table.label(column.position)} is in {column.unknown_unit or '%'!r}; write "
-                "psi and delta in degrees, the others without a unit"
+                f"{table.path}: {table.label(column.position)} is in {column.unknown_unit or '%'!r}; {known}"
             )
     axis = axis_columns(table, columns, _EXAMPLE)
     errors = _error_columns(table, columns) if form == PSI_DELTA else ()

@@ -190,8 +190,7 @@ def _free_index(
         low, high = bounds
         raise UsageError(
             f"cannot free 'n' within {low:g} to {high:g}: it is added to the index of this material; write "
-            f"n=-0.1:0.1 for an index near the given one, or take the material constant to fit an index of "
-            f"{low:g} to {high:g} that does not vary with the wavelength"
+            "n=-0.1:0.1 for an index near the given one, or take the model cauchy for an unknown one"
         )
     return Shifted(shifted.base, _within(bounds, _free_shift(dispersion)), shifted.k)
 

@@ -52,9 +52,14 @@ def first_column(table: Table) -> Column:
 
 
 def _refuse_optical_constants(table: Table, columns: Sequence[Column]) -> None:
-    """Raise DataError for a table of n and k, which is no measurement."""
+    """Raise DataError for a table of n and k, or of a pseudo-dielectric function, which are not fitted."""
     names = {column.name.strip().lower() for column in columns if column.name}
     roles = {column.role for column in columns}
+    if names & {"<e1>", "<eps1>", "<n>", "<ε1>"} and roles <= {"wavelength", "N", "other"}:
+        raise DataError(
+            f"{table.path}: contains the pseudo-dielectric function of a sample ({listed(columns)}); export "
+            "psi and delta"
+        )
     constants = any({a, b} <= names for a, b in (("n", "k"), ("n", "kappa"), ("e1", "e2"), ("eps1", "eps2")))
     if constants and roles <= {"wavelength", "N", "other"}:
         raise DataError(
