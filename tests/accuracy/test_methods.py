@@ -119,6 +119,8 @@ def test_methods_that_do_not_apply_say_why():
     assert "compares s and p" in reason(angles, "normal incidence")
     assert "series of orders" in reason(angles, "incoherent")
     assert answer(angles, "every 2nd wavelength").shape == (3, 27)
+    tilted = few(pl.Scene(pl.Layer(pl.Anisotropic(1.6, 1.7, axis=(40, 25)), 300.0), 1.5), draws=1)
+    assert "s and p mix have no series" in reason(tilted, "1 order")
 
 
 @pytest.mark.parametrize("name", ["3 nodes", "smooth faces"])

@@ -18,6 +18,7 @@ from pellicle.accuracy.media_methods import (
     transparent,
 )
 from pellicle.accuracy.variant import Method, Variant, without
+from pellicle.effects.anisotropy import GENERAL
 from pellicle.planning.film import full_plan, plan
 from pellicle.scene.film import all_collected, coherent_layers, with_wavelength
 from pellicle.scene.layers import Plate
@@ -66,6 +67,8 @@ def _orders(count: int, case: Case) -> Variant | str:
     smooth = not case.plan.on("roughness")
     if case.ellipsometric or not smooth or len(coherent_layers(case.scene)) != 1:
         return "only one smooth layer has a series of orders"
+    if case.plan.row("anisotropy").count >= GENERAL:
+        return "layers in which s and p mix have no series of orders"
     if case.plan.on("orders"):
         return "fringes narrower than the sampling have no orders" if count else "this is the full plan"
     return Variant(with_effect(with_effect(case.plan, "coherence", True), "orders", True, count), case.scene)
