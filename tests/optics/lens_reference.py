@@ -21,7 +21,7 @@ DOWNWARDS = np.array([1.0, 1.0, -1.0])
 class Plate(NamedTuple):
     """An incoherent plate without losses: the mean over the phase of the light that crosses it."""
 
-    index: float
+    n: float
     phases: int = 32
 
 
@@ -66,9 +66,9 @@ def seen(
     for layer in layers:
         if isinstance(layer, Plate):
             # D² = q² in an isotropic medium
-            q = np.sqrt(layer.index**2 - kx**2 - ky**2)[:, None, None]
+            q = np.sqrt(layer.n**2 - kx**2 - ky**2)[:, None, None]
             one = np.cos(phase) * np.eye(4) - 1j * np.sin(phase) / q * _derivative(
-                layer.index**2 * np.eye(3), kx, ky
+                layer.n**2 * np.eye(3), kx, ky
             )
         else:
             q, modes = np.linalg.eig(_derivative(layer[0], kx, ky))

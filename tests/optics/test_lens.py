@@ -69,7 +69,8 @@ FILMS = [  # angle, half angle, indices, angles of the axis, nm, foot
 @pytest.mark.parametrize(("angle", "half", "indices", "axis", "depth", "foot"), FILMS)
 def test_the_stated_error_is_that_of_real_films(angle, half, indices, axis, depth, foot):
     """All orders of interference, not only the few of the model."""
-    films = [Film(1.0, *indices, tuple(radians(*axis)), 2 * np.pi / NM * depth, 1.0, 0.0)]
+    (ordinary, extraordinary), (theta, phi) = indices, radians(*axis)
+    films = [Film(1.0, ordinary, extraordinary, (theta, phi), 2 * np.pi / NM * depth, 1.0, 0.0)]
     layers = [(permittivity(indices, *axis), depth)]
     truth, _ = muellers(angle, half, layers, foot, NM, (24, 49))
     for columns in (1, 4):
