@@ -149,7 +149,7 @@ class _Crossing:
         bound = around.lower[axis] if side < 0 else around.upper[axis]
         room = bound - best[:, axis]
         sd = np.sqrt(around.covariance[who, axis, axis])
-        first = np.clip(ONE_SIDED**0.5 * sd / np.maximum(np.abs(room), 1e-300), 1e-6, 0.3)
+        first = np.clip(ONE_SIDED**0.5 * sd / np.maximum(np.abs(room), 1e-200), 1e-6, 0.3)
         slope = around.covariance[who, axis] / around.covariance[who, axis, axis][:, None]
         self._floor, _ = around.refitted(who, np.full(len(who), axis), best)
         self._inside, self._outside = best.copy(), best.copy()
