@@ -11,10 +11,10 @@ def fuzz(load_script):
 
 
 def test_every_file_is_read_or_refused_in_one_sentence(fuzz, tmp_path):
-    outcomes, failures = fuzz.run(50, tmp_path)
+    outcomes, failures = fuzz.run(150, tmp_path)
     assert not failures
-    assert outcomes["inputs"] == 50
-    assert outcomes["read_spectra: read"] > 0  # most damaged files are refused
+    assert outcomes["inputs"] == 150
+    assert outcomes["read_spectra: read"] > 0  # one in 25: most damaged files are refused
 
 
 def test_a_reader_that_fails_is_found(fuzz, tmp_path, monkeypatch):

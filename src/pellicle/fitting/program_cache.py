@@ -69,10 +69,12 @@ def _load(
     key = hashlib.sha256(repr((*about, _environment(), _sources())).encode()).digest()
     path = cache / "programs" / key.hex()
     inputs = [jax.ShapeDtypeStruct(shape, np.dtype(dtype)) for shape, dtype in shapes]
-    options, run = _options(many_calls), None
-    if jax.default_backend() == "cpu":
-        run = executables.load(path, key) or executables.make(path, key, flat, inputs, cache, options)
-    run = run or _traced(path.with_suffix(".export"), flat, inputs, options)
+    run = executables.load(path, key) if jax.default_backend() == "cpu" else None
+    if run is None:
+        options = _options(many_calls)  # found by compiling, which a kept program needs not
+        if jax.default_backend() == "cpu":
+            run = executables.make(path, key, flat, inputs, cache, options)
+        run = run or _traced(path.with_suffix(".export"), flat, inputs, options)
     kind = get_type_hints(function)["return"]
     return run, jax.tree_util.tree_structure(kind(*range(len(kind._fields))))
 

@@ -64,7 +64,7 @@ def with_curves(rivals: tuple[Rival, ...], problem: Problem) -> tuple[Rival, ...
 def misses(view: SamplesView, fit: ViewFit) -> bool:
     """True where the surface does not explain the samples of a view: residuals are large, and not noise."""
     structured = fit.chi2 / fit.freedom > _FAR if view.noise.given else 1 / fit.length < _STRUCTURED
-    return structured and view.rms(fit.at) > _LARGE * view.span()
+    return bool(structured and view.rms(fit.at) > _LARGE * view.span())
 
 
 def evidence(ranked: RankedMinima, jacobian: Scaled) -> list[Evidence]:

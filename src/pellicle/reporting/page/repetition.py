@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from pellicle.errors import UsageError
 
 if TYPE_CHECKING:
@@ -56,6 +58,8 @@ def _written(fit: Fit) -> list[tuple[str, str]]:
         return []
     # the file has its own angles, and its wavelengths in any case
     own = with_wavelength(scene, None, None if data.angle is None else 0.0)
+    if np.ndim(own.light.angle) or np.ndim(own.light.azimuth):
+        return []  # those of the points of a spectrum in Python: a recipe would take each for all wavelengths
     try:
         return [("Recipe", recipe_text(own, files=[data.path] if data.path else []))]
     except UsageError:
