@@ -216,7 +216,7 @@ class Session:
         return values
 
     def _computed(self, view: _View, kind: str, values: Mapping[str, float], wait: bool) -> Any:
-        """What a program of the effects that these values have returns, None while it is compiled."""
+        """The result of the program for the effects that these values have, None while it is compiled."""
         structure = view.structure(values)
         get = self._compiler.wait if wait else self._compiler.get
         program = get((view.key(kind), structure), lambda: view.compile(kind, structure))
