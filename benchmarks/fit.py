@@ -42,8 +42,8 @@ import numpy as np
 
 import pellicle as pl
 from pellicle.fitting.evaluation import deviances
-from pellicle.fitting.spectra.problem import make
-from pellicle.fitting.spectra.targets import measured
+from pellicle.fitting.film.problem import make
+from pellicle.fitting.film.targets import measured
 
 jax.config.update("jax_enable_x64", True)
 

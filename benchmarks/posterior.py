@@ -23,8 +23,8 @@ jax.config.update("jax_enable_x64", True)
 
 import pellicle as pl  # noqa: E402
 from pellicle.dispersion import Constant  # noqa: E402
+from pellicle.fitting.film.fit import fitted  # noqa: E402
 from pellicle.fitting.progress import quiet  # noqa: E402
-from pellicle.fitting.spectra.fit import fitted  # noqa: E402
 from pellicle.sampling.chain import empty  # noqa: E402
 from pellicle.sampling.density import log_density  # noqa: E402
 from pellicle.sampling.modes import modes  # noqa: E402

@@ -39,14 +39,14 @@ EXIT_4 = (
 """Their fits do not converge to one answer (exit code 4), as their pages say."""
 SLOW = {
     "pellicle fit turned.csv --recipe docs/examples/tilted_azimuths.toml": "compiles for half a minute;"
-    " tests/fitting/spectra/test_generalised.py fits such data",
+    " tests/fitting/film/test_generalised.py fits such data",
     **{
         f"pellicle {command} docs/examples/tilted_microscope.toml": "compiles for half a minute;"
         " tests/simulation/test_lens.py"
         for command in ("simulate", "fit oriented.csv --recipe")
     },
     "pellicle fit partial.csv --recipe docs/examples/partial_window.toml": "compiles for 6 s; "
-    "tests/fitting/spectra/test_back_collected.py fits these data",
+    "tests/fitting/film/test_back_collected.py fits these data",
     **{
         f"pellicle chart docs/surfaces/{name}.toml": "one sphere of eight is drawn here"
         for name in (
@@ -63,7 +63,7 @@ SLOW = {
     "pellicle simulate docs/examples/tilted_azimuths.toml --out turned.csv": "compiles for 4 s;"
     " tests/simulation/test_generalised.py",
     "pellicle fit film.csv --recipe docs/examples/mueller.toml": "compiles for 10 s;"
-    " tests/fitting/spectra/test_mueller.py fits another film",
+    " tests/fitting/film/test_mueller.py fits another film",
     "pellicle fit tilted.csv --recipe docs/examples/tilted_mueller.toml": "compiles for half a minute;"
     " tests/hard/test_anisotropic.py: values and derivatives",
     "pellicle compare film.csv": "compiles for 6 s; tests/cli/test_compare_command.py compares other scenes",
@@ -135,7 +135,7 @@ ELSEWHERE = {
     "python benchmarks/posterior.py": _LONG_STUDY,
     "python benchmarks/renderers.py": "takes minutes; tests/rendering: one film for each renderer",
     "python benchmarks/colour.py": _LONG_STUDY,
-    "python benchmarks/camera_colours.py": "takes minutes; tests/fitting/colours: a few films",
+    "python benchmarks/camera_colours.py": "minutes; tests/fitting/film/test_colour_fit.py: a few films",
     "python benchmarks/multiple_scattering.py": "tests/brdf/test_multiple_scattering.py: its limits",
     "python benchmarks/brdf_bands.py": "takes minutes; tests/brdf/test_sensor_bands.py: its bands",
     "python benchmarks/brdf_errors.py": "tests/fitting/brdf/test_errors.py: fewer runs",

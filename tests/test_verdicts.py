@@ -14,7 +14,7 @@ import pytest
 import tmm
 
 import pellicle as pl
-from pellicle.fitting.spectra.parameters import parameters
+from pellicle.fitting.film.parameters import parameters
 from pellicle.scene.free import insert
 
 HERE = Path(__file__).parents[1] / "benchmarks" / "verdicts"

@@ -145,10 +145,10 @@ def _by_pellicle(case: Case, spectrum: Any) -> Array:
 
 def _search(case: Case, spectrum: Any) -> Array:
     """The best values by the part of a fit that the other programs do: scan and polish."""
+    from pellicle.fitting.film.fit import measurements
+    from pellicle.fitting.film.problem import make
+    from pellicle.fitting.film.search import search
     from pellicle.fitting.progress import quiet
-    from pellicle.fitting.spectra.fit import measurements
-    from pellicle.fitting.spectra.problem import make
-    from pellicle.fitting.spectra.search import search
 
     with jax.enable_x64(True):
         problem = make(*measurements(spectrum, case.scene))

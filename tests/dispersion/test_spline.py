@@ -16,7 +16,7 @@ from scipy.interpolate import BSpline
 import pellicle as pl
 from pellicle.dispersion.base import HC
 from pellicle.dispersion.spline import KramersKronigSpline, Spline
-from pellicle.fitting.spectra.parameters import parameters
+from pellicle.fitting.film.parameters import parameters
 from pellicle.optics.pair import imag, is_real, real
 from pellicle.synthetic.spectra import simulate_signal
 

@@ -12,8 +12,8 @@ from scipy.optimize import curve_fit
 
 import pellicle as pl
 from pellicle.fitting.covariance import errors, scaled
-from pellicle.fitting.spectra.problem import make
-from pellicle.fitting.spectra.targets import measured as as_numbers
+from pellicle.fitting.film.problem import make
+from pellicle.fitting.film.targets import measured as as_numbers
 from pellicle.simulation.functions import reflectance
 from pellicle.synthetic.spectra import simulate_signal
 

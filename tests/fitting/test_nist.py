@@ -19,12 +19,12 @@ import pytest
 import pellicle as pl
 from pellicle.fitting.coordinates import box
 from pellicle.fitting.covariance import errors, scaled
+from pellicle.fitting.film.form import Local
+from pellicle.fitting.film.nuisance import Data
+from pellicle.fitting.film.view import SpectrumView
 from pellicle.fitting.levenberg_marquardt import BoundedLevenbergMarquardt
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.problem import Noise, Problem
-from pellicle.fitting.spectra.form import Local
-from pellicle.fitting.spectra.nuisance import Data
-from pellicle.fitting.spectra.view import SpectrumView
 
 FOLDER = Path(__file__).parent / "nist_strd"
 

@@ -13,9 +13,9 @@ import pellicle as pl
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.fitting.brdf.problem import make as make_surface
 from pellicle.fitting.evaluation import total_deviance
+from pellicle.fitting.film.problem import make as make_scene
+from pellicle.fitting.film.targets import measured
 from pellicle.fitting.problem import Explained, Form, Problem, View
-from pellicle.fitting.spectra.problem import make as make_scene
-from pellicle.fitting.spectra.targets import measured
 from pellicle.scene.surface import Surface
 
 NM = np.linspace(450.0, 850.0, 50)

@@ -8,10 +8,10 @@ from scipy.optimize import brentq, minimize_scalar
 
 import pellicle as pl
 from pellicle.fitting.conclusion import linearised
+from pellicle.fitting.film.fit import fitted
 from pellicle.fitting.neighbourhood import neighbourhood
 from pellicle.fitting.profile_likelihood import interval
 from pellicle.fitting.progress import quiet
-from pellicle.fitting.spectra.fit import fitted
 
 SUBSTRATE = 3.9 + 0.02j
 

@@ -9,14 +9,14 @@ import pytest
 import pellicle as pl
 from pellicle.data.cube import Cube
 from pellicle.fitting.discrepancy import _least_squares
+from pellicle.fitting.film.extended_scene import Number, Program
+from pellicle.fitting.film.fit import fitted, measurements
+from pellicle.fitting.film.problem import make
+from pellicle.fitting.film.search import search
+from pellicle.fitting.film.systematic_effects import SimulatedEffect
 from pellicle.fitting.noise import integrated_time, local_noise, student
 from pellicle.fitting.progress import quiet
 from pellicle.fitting.result import Fit
-from pellicle.fitting.spectra.extended_scene import Number, Program
-from pellicle.fitting.spectra.fit import fitted, measurements
-from pellicle.fitting.spectra.problem import make
-from pellicle.fitting.spectra.search import search
-from pellicle.fitting.spectra.systematic_effects import SimulatedEffect
 from pellicle.mapping.pixels.covariance import held_within, inverse
 from pellicle.mapping.pixels.effects import _simulation
 from pellicle.mapping.pixels.fit import PixelModel, prepare, spectrum

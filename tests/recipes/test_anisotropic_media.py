@@ -6,7 +6,7 @@ import pytest
 
 from pellicle.dispersion.anisotropic import Anisotropic
 from pellicle.errors import DataError
-from pellicle.fitting.spectra.parameters import parameters
+from pellicle.fitting.film.parameters import parameters
 from pellicle.recipes.read import read_recipe
 
 FREE = "{ model = 'constant', n = { lower = 1.5, upper = 2 } }"

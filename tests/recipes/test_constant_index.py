@@ -3,7 +3,7 @@
 import pytest
 
 from pellicle.dispersion.empirical import Constant
-from pellicle.fitting.spectra.parameters import parameters
+from pellicle.fitting.film.parameters import parameters
 from pellicle.scene.free import Free
 
 LAYER = '[[scene.layer]]\nmaterial = "SiO2"\nthickness = { lower = 10, upper = 3000 }\n'

@@ -5,7 +5,7 @@ import pytest
 
 from pellicle.dispersion.empirical import Cauchy, Constant
 from pellicle.errors import DataError
-from pellicle.fitting.spectra.parameters import parameters
+from pellicle.fitting.film.parameters import parameters
 from pellicle.recipes import read_recipe
 from pellicle.scene.free import Free
 from pellicle.scene.instrument import Drift

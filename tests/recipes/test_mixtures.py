@@ -9,7 +9,7 @@ import pytest
 from pellicle.dispersion.effective_medium import Bruggeman, Looyenga, MaxwellGarnett
 from pellicle.dispersion.oscillators import Gaussian, Lorentz, Oscillators, TaucLorentz
 from pellicle.errors import DataError, UsageError
-from pellicle.fitting.spectra.parameters import fixed_numbers, parameters
+from pellicle.fitting.film.parameters import fixed_numbers, parameters
 from pellicle.recipes import media_words, read_recipe
 from pellicle.recipes.dispersion_models import KNOTS, MODELS, TERMS
 from pellicle.scene.film import Scene

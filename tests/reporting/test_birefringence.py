@@ -11,7 +11,7 @@ import pytest
 
 import pellicle as pl
 from pellicle.fitting.curves import Index
-from pellicle.fitting.spectra.layer_errors import principal_indices
+from pellicle.fitting.film.layer_errors import principal_indices
 from pellicle.materials import material
 from pellicle.reporting.csv_tables import nk_csvs
 from pellicle.reporting.fit_figure import draw

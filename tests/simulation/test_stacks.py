@@ -12,7 +12,7 @@ import tmm
 import pellicle as pl
 from pellicle.dispersion.effective_medium import Bruggeman
 from pellicle.dispersion.empirical import Cauchy
-from pellicle.fitting.spectra.parameters import parameters
+from pellicle.fitting.film.parameters import parameters
 from pellicle.scene.free import insert
 from pellicle.scene.layers import medium
 from pellicle.simulation.film import build

@@ -13,7 +13,7 @@ import numpy as np
 
 from pellicle.accuracy.case import Case, remaining_parameters
 from pellicle.accuracy.variant import Variant
-from pellicle.fitting.spectra.parameters import anonymous
+from pellicle.fitting.film.parameters import anonymous
 from pellicle.scene.film import Scene
 from pellicle.scene.free import insert
 from pellicle.scene.layers import Plate

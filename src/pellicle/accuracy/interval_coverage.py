@@ -14,11 +14,11 @@ import numpy as np
 from pellicle.accuracy.measure import first_runs, mark_pareto, within
 from pellicle.accuracy.simulated_data import DataSet
 from pellicle.fitting.conclusion import linearised
+from pellicle.fitting.film.search import search
 from pellicle.fitting.neighbourhood import neighbourhood
 from pellicle.fitting.profile_likelihood import interval
 from pellicle.fitting.progress import Progress, quiet
 from pellicle.fitting.reweighting import RankedMinima, rank
-from pellicle.fitting.spectra.search import search
 from pellicle.sampling.chain import empty
 from pellicle.sampling.checks import missing
 from pellicle.sampling.density import log_density

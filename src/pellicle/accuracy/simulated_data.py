@@ -13,9 +13,9 @@ from pellicle.accuracy.case import Case
 from pellicle.accuracy.compiled import compiled
 from pellicle.accuracy.variant import Variant
 from pellicle.data.generalised import RATIOS, SIGNAL
+from pellicle.fitting.film.problem import make
+from pellicle.fitting.film.targets import Measured
 from pellicle.fitting.problem import Explained, Form, Problem
-from pellicle.fitting.spectra.problem import make
-from pellicle.fitting.spectra.targets import Measured
 from pellicle.scene.film import Scene
 from pellicle.scene.free import free_leaves
 

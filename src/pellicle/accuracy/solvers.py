@@ -15,10 +15,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from pellicle.accuracy.simulated_data import DataSet, deviance, deviance_and_slope, residual
+from pellicle.fitting.film.search import search
 from pellicle.fitting.minima import solve
 from pellicle.fitting.problem import Form
 from pellicle.fitting.progress import quiet
-from pellicle.fitting.spectra.search import search
 
 STEPS = 100
 """Most steps of a solver of another package."""

@@ -13,11 +13,11 @@ from pellicle.errors import UsageError
 from pellicle.fitting.brdf.fit import fit as fit_brdf
 from pellicle.fitting.comparison import Comparison
 from pellicle.fitting.comparison import compare as compare_fits
+from pellicle.fitting.film.fit import fit as fit_spectra
 from pellicle.fitting.joint import fit as fit_jointly
 from pellicle.fitting.joint import of_both_kinds
 from pellicle.fitting.progress import Progress, quiet
 from pellicle.fitting.result import Fit
-from pellicle.fitting.spectra.fit import fit as fit_spectra
 from pellicle.sampling.ensemble import STEPS
 from pellicle.sampling.result import Posterior
 from pellicle.sampling.sample import OF_A_FILM, measured

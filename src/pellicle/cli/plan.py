@@ -31,7 +31,7 @@ def plan(
         raise UsageError(f"--tolerance must be above zero, got {tolerance:g}: give the largest error")
     described = read_recipe(recipe)
     start()
-    from pellicle.fitting.spectra.messages import log_scene
+    from pellicle.fitting.film.messages import log_scene
     from pellicle.planning import film, surface
     from pellicle.reporting import plans
     from pellicle.reporting.json_record import one_line

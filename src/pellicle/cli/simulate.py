@@ -128,7 +128,7 @@ def _write_depth_profile(recipe: FilmRecipe, out: str, at: list[float], json: bo
     check_folder(out)
     start()
     from pellicle.api.simulations import depth_profile
-    from pellicle.fitting.spectra.messages import log_scene
+    from pellicle.fitting.film.messages import log_scene
     from pellicle.reporting.depth_profile import report, to_json, write_depth_profile
     from pellicle.reporting.json_record import one_line
 
@@ -161,7 +161,7 @@ def _write_spectrum(
 ) -> None:
     """Write a spectrum; `noises` are those of the signal and of the depolarisation."""
     from pellicle.files import write_text
-    from pellicle.fitting.spectra.messages import log_plan, log_scene
+    from pellicle.fitting.film.messages import log_plan, log_scene
     from pellicle.synthetic.spectra import simulate_signal
 
     scene = recipe.scene()
@@ -182,7 +182,7 @@ def _write_colours(
     recipe: FilmRecipe, out: str, noise: float, seed: int, tolerance: float, comments: list[str]
 ) -> None:
     from pellicle.data.write_colours import write_colours
-    from pellicle.fitting.spectra.messages import log_plan, log_scene
+    from pellicle.fitting.film.messages import log_plan, log_scene
     from pellicle.synthetic.measured_colours import simulate_colours
 
     scene, seen, table = recipe.scene(), recipe.sight(), recipe.tables
@@ -209,7 +209,7 @@ def _write_colours(
 
 def _truth(scene: Scene) -> str:
     """The true values of the parameters, as a comment."""
-    from pellicle.fitting.spectra.parameters import fixed_numbers, parameters
+    from pellicle.fitting.film.parameters import fixed_numbers, parameters
 
     numbers = [(p.name, p.start, p.unit) for p in parameters(scene)] + fixed_numbers(scene)
     return "truth: " + ", ".join(f"{name} = {value:.10g} {unit}".rstrip() for name, value, unit in numbers)
@@ -272,7 +272,7 @@ def _write_samples(
     import numpy as np
 
     from pellicle.data.write_brdf import write_brdf_samples
-    from pellicle.fitting.spectra.messages import log_plan
+    from pellicle.fitting.film.messages import log_plan
     from pellicle.synthetic.brdf import simulate_samples
 
     surface = recipe.scene()

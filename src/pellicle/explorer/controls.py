@@ -11,7 +11,7 @@ import jax
 from jax.tree_util import GetAttrKey, SequenceKey
 
 from pellicle.dispersion.empirical import Constant
-from pellicle.fitting.spectra.parameters import parameters
+from pellicle.fitting.film.parameters import parameters
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free, is_free
 from pellicle.scene.layers import Interface, Layer, Plate

@@ -16,8 +16,8 @@ from pellicle.explorer.dropped_files import lines
 from pellicle.explorer.incidence import measured_angles
 from pellicle.explorer.programs import Curve
 from pellicle.fitting.curves import Curve as FittedCurve
+from pellicle.fitting.film.fit import fit
 from pellicle.fitting.result import Fit
-from pellicle.fitting.spectra.fit import fit
 from pellicle.reporting import fit_text
 from pellicle.scene.film import Scene
 

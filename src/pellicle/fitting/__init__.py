@@ -7,20 +7,20 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from pellicle.fitting.film.functional import Prepared as Prepared
+    from pellicle.fitting.film.functional import Solution as Solution
+    from pellicle.fitting.film.functional import prepare as prepare
+    from pellicle.fitting.film.functional import solve as solve
     from pellicle.fitting.repeated_measurements import Repeats as Repeats
     from pellicle.fitting.repeated_measurements import repeats as repeats
-    from pellicle.fitting.spectra.functional import Prepared as Prepared
-    from pellicle.fitting.spectra.functional import Solution as Solution
-    from pellicle.fitting.spectra.functional import prepare as prepare
-    from pellicle.fitting.spectra.functional import solve as solve
 
 _MODULE: dict[str, str] = {
-    "Prepared": "pellicle.fitting.spectra.functional",
+    "Prepared": "pellicle.fitting.film.functional",
     "Repeats": "pellicle.fitting.repeated_measurements",
-    "Solution": "pellicle.fitting.spectra.functional",
-    "prepare": "pellicle.fitting.spectra.functional",
+    "Solution": "pellicle.fitting.film.functional",
+    "prepare": "pellicle.fitting.film.functional",
     "repeats": "pellicle.fitting.repeated_measurements",
-    "solve": "pellicle.fitting.spectra.functional",
+    "solve": "pellicle.fitting.film.functional",
 }
 
 __all__ = ["Prepared", "Repeats", "Solution", "prepare", "repeats", "solve"]

@@ -21,11 +21,11 @@ from pellicle.data.spectrum import Spectrum
 from pellicle.effects.anisotropy import GENERAL
 from pellicle.errors import UsageError
 from pellicle.fitting.curves import BIREFRINGENCE, BrdfCurve, ColourCurve, Curve
+from pellicle.fitting.film.sweeps import correlation_in_sweeps, sweeps
+from pellicle.fitting.film.targets import ratio_directions
 from pellicle.fitting.noise import correlation_length
 from pellicle.fitting.presentation import ReportMixin
 from pellicle.fitting.result import Fit, Part, Status
-from pellicle.fitting.spectra.sweeps import correlation_in_sweeps, sweeps
-from pellicle.fitting.spectra.targets import ratio_directions
 
 log = getLogger(__name__)
 

@@ -10,8 +10,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from pellicle.effects.presence import name
+from pellicle.fitting.film.parameters import parameters
 from pellicle.fitting.result import Fit
-from pellicle.fitting.spectra.parameters import parameters
 from pellicle.optics.pair import imag, real
 from pellicle.scene.film import Scene
 from pellicle.scene.free import free_leaves, insert

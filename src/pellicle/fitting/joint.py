@@ -26,16 +26,16 @@ from pellicle.fitting.conclusion import conclude, linearised
 from pellicle.fitting.coordinates import Box, Coordinates
 from pellicle.fitting.covariance import Scaled
 from pellicle.fitting.discrepancy import Evidence, discrepancy
+from pellicle.fitting.film import fit as of_film
+from pellicle.fitting.film import parts, summary
+from pellicle.fitting.film.evidence import evidence as film_evidence
+from pellicle.fitting.film.targets import Target
 from pellicle.fitting.minima import minima
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.progress import Progress, quiet
 from pellicle.fitting.result import Fit
 from pellicle.fitting.reweighting import RankedMinima, rank
 from pellicle.fitting.robust_losses import LEAST_SQUARES
-from pellicle.fitting.spectra import fit as of_film
-from pellicle.fitting.spectra import parts, summary
-from pellicle.fitting.spectra.evidence import evidence as film_evidence
-from pellicle.fitting.spectra.targets import Target
 from pellicle.fitting.status import verdict
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface

@@ -1,6 +1,6 @@
 """A least-squares problem: parameters with bounds and priors, and the data that they explain.
 
-Spectra (`fitting.spectra.problem`) and BRDF samples (`fitting.brdf.problem`) are two kinds of `View`;
+Spectra (`fitting.film.problem`) and BRDF samples (`fitting.brdf.problem`) are two kinds of `View`;
 whatever comes after the search takes a `Problem` and depends on neither.
 """
 

@@ -12,8 +12,8 @@ from pellicle.dispersion.anisotropic import Anisotropic
 from pellicle.dispersion.empirical import Constant, Table, along_the_spectrum
 from pellicle.effects.anisotropy import scene_media
 from pellicle.errors import DataError, UsageError
+from pellicle.fitting.film.parameters import parameters
 from pellicle.fitting.result import Fit
-from pellicle.fitting.spectra.parameters import parameters
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free, free_leaves, insert
 from pellicle.scene.kinds import check_scene

@@ -12,12 +12,12 @@ from pellicle.data.colours import Colours
 from pellicle.data.ellipsometry_angles import psi_delta
 from pellicle.fitting.brdf.residuals import INVERSES, RESIDUALS
 from pellicle.fitting.brdf.view import SamplesView
-from pellicle.fitting.colours.view import ColoursView
 from pellicle.fitting.curves import BrdfCurve, ColourCurve, Curve
 from pellicle.fitting.evaluation import curves
+from pellicle.fitting.film.colour_view import ColoursView
+from pellicle.fitting.film.view import SpectrumView
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.result import Part
-from pellicle.fitting.spectra.view import SpectrumView
 
 DRAWS = 256
 """Curves behind a band: 2.5 % of them are six."""

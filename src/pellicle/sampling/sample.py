@@ -18,13 +18,13 @@ from pellicle.errors import UsageError
 from pellicle.fitting import joint
 from pellicle.fitting.brdf import fit as brdf
 from pellicle.fitting.brdf.summary import evidence as sample_evidence
-from pellicle.fitting.colours.targets import arrays
 from pellicle.fitting.conclusion import linearised
 from pellicle.fitting.discrepancy import discrepancy
+from pellicle.fitting.film import fit as spectra
+from pellicle.fitting.film.colour_targets import arrays
+from pellicle.fitting.film.evidence import evidence as spectrum_evidence
 from pellicle.fitting.progress import Progress, quiet
 from pellicle.fitting.result import Status
-from pellicle.fitting.spectra import fit as spectra
-from pellicle.fitting.spectra.evidence import evidence as spectrum_evidence
 from pellicle.sampling.density import fingerprint, log_density
 from pellicle.sampling.ensemble import STEPS, Subject, installed, sampled
 from pellicle.sampling.modes import modes

@@ -1,4 +1,4 @@
-"""Measured values of many pixels as a fit sees them: those of `fitting.spectra.targets`, pixel by pixel."""
+"""Measured values of many pixels as a fit sees them: those of `fitting.film.targets`, pixel by pixel."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import numpy as np
 
 from pellicle.data.ellipsometry_angles import ncs
 from pellicle.fitting import noise
+from pellicle.fitting.film.targets import ROUGH, sphere_frame, sphere_sigma
 from pellicle.fitting.problem import Noise
-from pellicle.fitting.spectra.targets import ROUGH, sphere_frame, sphere_sigma
 from pellicle.mapping.pixels.minima import PixelData
 from pellicle.mapping.pixels.noise import medians
 

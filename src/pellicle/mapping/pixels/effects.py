@@ -10,15 +10,15 @@ import jax
 import numpy as np
 
 from pellicle.fitting.discrepancy import Effect
-from pellicle.fitting.spectra.extended_scene import Program, simulated_side_by_side
-from pellicle.fitting.spectra.form import Local
-from pellicle.fitting.spectra.systematic_effects import (
+from pellicle.fitting.film.extended_scene import Program, simulated_side_by_side
+from pellicle.fitting.film.form import Local
+from pellicle.fitting.film.systematic_effects import (
     SimulatedEffect,
     change_of_data,
     effects_on_signal,
     simulations_of,
 )
-from pellicle.fitting.spectra.view import SpectrumView
+from pellicle.fitting.film.view import SpectrumView
 from pellicle.scene.film import Scene
 
 _NODES = 48

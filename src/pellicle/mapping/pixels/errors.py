@@ -8,14 +8,14 @@ from typing import NamedTuple
 import jax
 import numpy as np
 
+from pellicle.fitting.film.evidence import LEAST_NOISE, SCATTER_OF_NOISE
+from pellicle.fitting.film.form import Local
+from pellicle.fitting.film.parts import LARGEST_ANGLES, LARGEST_DRIFT, LARGEST_POWER
+from pellicle.fitting.film.problem import shortest_wavelength
+from pellicle.fitting.film.targets import Measured
 from pellicle.fitting.misfit import DOUBTFUL, Accuracy, beyond_accuracy
 from pellicle.fitting.noise import DRIFT_CORRELATION
 from pellicle.fitting.problem import Problem
-from pellicle.fitting.spectra.evidence import LEAST_NOISE, SCATTER_OF_NOISE
-from pellicle.fitting.spectra.form import Local
-from pellicle.fitting.spectra.parts import LARGEST_ANGLES, LARGEST_DRIFT, LARGEST_POWER
-from pellicle.fitting.spectra.problem import shortest_wavelength
-from pellicle.fitting.spectra.targets import Measured
 from pellicle.fitting.status import RIVAL
 from pellicle.mapping.pixels.covariance import noise_covariance
 from pellicle.mapping.pixels.discrepancy import PixelEvidence, discrepancy, other_material

@@ -12,11 +12,11 @@ import numpy as np
 from pellicle.data.cube import Cube
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import DataError
+from pellicle.fitting.film.fit import measurements
+from pellicle.fitting.film.problem import make
+from pellicle.fitting.film.targets import Measured
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.problem import Problem
-from pellicle.fitting.spectra.fit import measurements
-from pellicle.fitting.spectra.problem import make
-from pellicle.fitting.spectra.targets import Measured
 from pellicle.mapping.pixels.data import pixel_data
 from pellicle.mapping.pixels.errors import PixelErrors
 from pellicle.mapping.pixels.results import PixelFits

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pellicle.fitting.spectra.sweeps import sweeps
-from pellicle.fitting.spectra.view import SpectrumView
+from pellicle.fitting.film.sweeps import sweeps
+from pellicle.fitting.film.view import SpectrumView
 from pellicle.scene.free import is_free
 
 BLOCK = 1024

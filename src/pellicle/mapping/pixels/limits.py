@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from pellicle.fitting.film.search import thickness_grid
+from pellicle.fitting.film.summary import FEWEST_FRINGES
+from pellicle.fitting.film.targets import drifts
 from pellicle.fitting.problem import Problem
-from pellicle.fitting.spectra.search import thickness_grid
-from pellicle.fitting.spectra.summary import FEWEST_FRINGES
-from pellicle.fitting.spectra.targets import drifts
 from pellicle.fitting.status import RIVAL
 from pellicle.mapping.pixels import profiles
 from pellicle.mapping.pixels.covariance import solve

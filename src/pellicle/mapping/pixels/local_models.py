@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
+from pellicle.fitting.film import nuisance
+from pellicle.fitting.film.form import Local, SpectrumForm
+from pellicle.fitting.film.nuisance import Data
+from pellicle.fitting.film.view import SpectrumView
 from pellicle.fitting.program_cache import kept
 from pellicle.fitting.reported_layer import linearised
-from pellicle.fitting.spectra import nuisance
-from pellicle.fitting.spectra.form import Local, SpectrumForm
-from pellicle.fitting.spectra.nuisance import Data
-from pellicle.fitting.spectra.view import SpectrumView
 from pellicle.scene.film import Scene
 
 LANES, FEW = 256, 16
@@ -40,7 +40,7 @@ class PixelArrays(NamedTuple):
 
 
 class PixelLocals(NamedTuple):
-    """Models around one point of each pixel: see `fitting.spectra.form.Local`."""
+    """Models around one point of each pixel: see `fitting.film.form.Local`."""
 
     signal: Any
     slope: Any

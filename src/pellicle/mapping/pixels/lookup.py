@@ -17,12 +17,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from pellicle.fitting.film.form import SpectrumForm
+from pellicle.fitting.film.nuisance import chebyshev, offset_prior, scale_prior
+from pellicle.fitting.film.search import design_points, thickness_grid
+from pellicle.fitting.film.view import SpectrumView
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.program_cache import kept
-from pellicle.fitting.spectra.form import SpectrumForm
-from pellicle.fitting.spectra.nuisance import chebyshev, offset_prior, scale_prior
-from pellicle.fitting.spectra.search import design_points, thickness_grid
-from pellicle.fitting.spectra.view import SpectrumView
 from pellicle.scene.film import Scene
 from pellicle.scene.free import insert
 from pellicle.scene.instrument import Drift
@@ -30,7 +30,7 @@ from pellicle.scene.instrument import Drift
 log = getLogger(__name__)
 
 _FINER = 4
-"""Nodes of the thickness for each step of the grid of `fitting.spectra.search`: an eighth of the shortest
+"""Nodes of the thickness for each step of the grid of `fitting.film.search`: an eighth of the shortest
 wavelength in the layer apart, a linear step leaves a third of the fringes' amplitude, a fourth of it 2 %."""
 _MOST_NUMBERS = 40_000_000
 """Numbers of a table at most, 160 MB: with more the design of the other parameters is coarser."""

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pellicle.fitting.film.sweeps import correlation_in_sweeps
 from pellicle.fitting.noise import DRIFT_CORRELATION, integrated_time, student
 from pellicle.fitting.problem import Noise
-from pellicle.fitting.spectra.sweeps import correlation_in_sweeps
 
 _LAGS = 12
 """Lags within which the window of a correlation time is looked for first: that of white noise closes at 5."""
@@ -128,7 +128,7 @@ def typical_noise(values: np.ndarray, window: int = 51) -> np.ndarray:
 
 def short_range_noise(residual: np.ndarray, parts: Sequence[np.ndarray], least: np.ndarray) -> np.ndarray:
     """Noise (pixels,) from differences of neighbouring residuals (pixels, rows, channels), at least `least`:
-    see `fitting.spectra.evidence`."""
+    see `fitting.film.evidence`."""
     channels = range(residual.shape[2])
     squares = [typical_noise(residual[:, part, c]) ** 2 for part in parts for c in channels]
     return np.maximum(np.sqrt(np.mean(squares, axis=0)), least)

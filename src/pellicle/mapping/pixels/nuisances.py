@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pellicle.fitting.spectra.form import Local
-from pellicle.fitting.spectra.nuisance import offset_prior, scale_prior
-from pellicle.fitting.spectra.view import SpectrumView
+from pellicle.fitting.film.form import Local
+from pellicle.fitting.film.nuisance import offset_prior, scale_prior
+from pellicle.fitting.film.view import SpectrumView
 from pellicle.scene.film import Scene
 from pellicle.scene.instrument import Drift
 

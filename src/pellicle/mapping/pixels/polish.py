@@ -10,11 +10,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from pellicle.fitting.coordinates import Box, Coordinates
+from pellicle.fitting.film import nuisance
+from pellicle.fitting.film.form import SpectrumForm
+from pellicle.fitting.film.nuisance import Data
 from pellicle.fitting.levenberg_marquardt import QuadraticModel, normal_equations
 from pellicle.fitting.program_cache import kept
-from pellicle.fitting.spectra import nuisance
-from pellicle.fitting.spectra.form import SpectrumForm
-from pellicle.fitting.spectra.nuisance import Data
 from pellicle.mapping.pixels.minima import PixelData
 from pellicle.optics.hoisting import compute_once
 from pellicle.scene.film import Scene

@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pellicle.fitting.film.view import SpectrumView
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.problem import Problem
-from pellicle.fitting.spectra.view import SpectrumView
 from pellicle.mapping.pixels import polish
 from pellicle.mapping.pixels.lookup import Layout, Lookup, scan, table
 from pellicle.mapping.pixels.minima import ORDERS, PixelData, PixelMinima
@@ -28,7 +28,7 @@ _MOST_PRODUCTS = 4_000_000
 """Numbers of the product of a block of pixels with the table, 16 MB: larger tables have smaller blocks."""
 _MOST_PIXELS, _FEWEST_PIXELS = 1024, 64
 _CHANCE, _REACH = 20.0, 1.25
-"""Which candidates are polished: as in `fitting.spectra.search`."""
+"""Which candidates are polished: as in `fitting.film.search`."""
 _SCALE = 0.02
 """Relative error of a scene or an instrument: candidates that it could put before the best are polished too,
 because differences of χ² count less by what a scene may leave out."""
@@ -269,7 +269,7 @@ def _polish_all_near(
 ) -> np.ndarray:
     """Polish all candidates that could be the best of their pixel or its rival; returns which they are.
 
-    As in `fitting.spectra.search`, residuals obey the triangle inequality: a candidate is left out where the
+    As in `fitting.film.search`, residuals obey the triangle inequality: a candidate is left out where the
     best is further away than `_REACH` times what polishing has brought in that pixel.
     """
     pixels, search, data = np.arange(len(exact)), points.search, points.data

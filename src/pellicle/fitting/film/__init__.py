@@ -1,0 +1,1 @@
+"""Fits of layer stacks to spectra, ellipsometry and colours."""

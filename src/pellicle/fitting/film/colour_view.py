@@ -1,0 +1,230 @@
+"""Colours of a film as a view of a least-squares problem."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from pellicle.colour.encoding import Encoding
+from pellicle.effects.plan import Plan
+from pellicle.fitting.coordinates import Array
+from pellicle.fitting.film.colour_response import ColourData, record
+from pellicle.fitting.problem import Explained, Noise, NoiseGroup
+from pellicle.fitting.program_cache import kept
+from pellicle.fitting.reported_layer import linearised
+from pellicle.optics.hoisting import compute_once
+from pellicle.planning.differences import largest_difference, signals
+from pellicle.planning.film import full_plan
+from pellicle.scene.film import Scene
+from pellicle.scene.free import insert
+from pellicle.simulation.film import build
+
+
+@dataclass(frozen=True)
+class ColourForm:
+    """The simulation of a spectrum for each colour by a plan without words, integrated by a sensor."""
+
+    plan: Plan
+
+    def simulate(self, scene: Scene, data: ColourData) -> Any:
+        """Colours of the sensor at every angle, (colours · 3,)."""
+        spectra = build(self.plan)(scene).reshape(len(data.values), -1)
+        return (spectra @ data.sensor).reshape(-1)
+
+    def with_plan(self, plan: Plan) -> ColourForm:
+        """Return the form with another plan."""
+        return replace(self, plan=plan)
+
+    def explain(self, arrays: tuple[Scene, ColourData], values: Any, /) -> Explained:
+        """The colours with the free parameters of their scene at `values`."""
+        scene, data = arrays
+        colours = compute_once(self.simulate(insert(scene, values), data)).reshape(-1, 3)
+        recorded = record(colours, data)
+        residual = jnp.concatenate([recorded.residual.reshape(-1), recorded.prior])
+        return Explained(recorded.model, residual, recorded.determinant + jnp.sum(residual**2))
+
+
+class Local(NamedTuple):
+    """The model of colours around one point, for errors and reports."""
+
+    colours: Array  # of the sensor, (colours, 3)
+    slope: Array  # ∂ colours / ∂ parameter in its own unit, (colours, 3, parameters)
+    model: Array  # linear channels as recorded, (colours, 3)
+    residual: Array  # weighted, (colours, 3)
+    coefficients: Array  # of the modes of the response
+    exposure: Array
+    layer: Array  # n and k of the layer at each wavelength
+    layer_slope: Array  # their derivatives, (2, wavelengths, parameters)
+
+
+@kept
+def local(form: ColourForm, scene: Scene, data: ColourData, values: Any) -> Local:
+    """Colours, their Jacobian, and the layer's index at `values` (parameters,)."""
+    found = linearised(form, scene, data, values)
+    colours = found.signal.reshape(-1, 3)
+    own = record(colours, data)
+    return Local(
+        colours,
+        found.slope.reshape(-1, 3, len(values)),
+        own.model,
+        own.residual / jnp.sqrt(data.independent_fraction),
+        own.coefficients,
+        own.exposure,
+        found.layer,
+        found.layer_slope,
+    )
+
+
+@dataclass(frozen=True)
+class Factor:
+    """A coefficient of a camera's response: its value, and the standard deviation of its prior."""
+
+    name: str
+    value: float
+    prior_sd: float
+    pull: float
+    not_negative: bool = False
+
+
+@dataclass(frozen=True)
+class ColoursView:
+    """Colours of a problem, one at each angle of incidence.
+
+    `scene` has anonymous free parameters and the wavelengths of the sensor, one after the other for each
+    colour; `takes` are the positions of its parameters in the problem. `modes` names those of the response.
+    """
+
+    name: str  # empty where there is no other
+    plan: Plan
+    scene: Scene
+    data: ColourData
+    takes: tuple[int, ...]
+    encoding: Encoding
+    modes: tuple[str, ...]
+    largest_index: float
+
+    noise = Noise(given=True)
+    channels = 3
+
+    @property
+    def form(self) -> ColourForm:
+        return ColourForm(self.plan.static_key)
+
+    @property
+    def arrays(self) -> tuple[Scene, ColourData]:
+        return self.scene, self.data
+
+    @property
+    def rows(self) -> int:
+        """Number of colours."""
+        return len(self.data.values)
+
+    @property
+    def points(self) -> int:
+        """Data values: three of each colour."""
+        return 3 * self.rows
+
+    @property
+    def independent(self) -> int:
+        """Data values that are no limits, one at least."""
+        return max(int(np.sum(np.asarray(self.data.limits) == 0)), 1)
+
+    @property
+    def noise_groups(self) -> tuple[NoiseGroup, ...]:
+        """One group of all channels."""
+        return (NoiseGroup((0, 1, 2), True, self.independent),)
+
+    @property
+    def independent_fraction(self) -> float:
+        """Effective points per point."""
+        return float(self.data.independent_fraction)
+
+    def local(self, values: Any) -> Local:
+        """The model around `values` (its parameters,)."""
+        return jax.device_get(local(self.form, self.scene, self.data, values))
+
+    def residuals(self, at: Local) -> np.ndarray:
+        """Weighted residuals (colours, 3); those of limits only where the model is on the wrong side."""
+        return np.asarray(at.residual)
+
+    def at_model(self, at: Local) -> float:
+        """1: the noise does not depend on the model."""
+        return 1.0
+
+    def response(self, at: Local) -> np.ndarray:
+        """The matrix (3, 3) from colours of the sensor to recorded linear channels."""
+        own = self.data.response
+        return own.known * own.channels + at.exposure * np.einsum("k,kij->ij", at.coefficients, own.modes)
+
+    def weighted(self, at: Local, change: np.ndarray) -> np.ndarray:
+        """A change of the recorded linear channels (colours, 3, ...) as the residuals have it."""
+        active = (np.asarray(self.data.limits) == 0) | (np.asarray(at.residual) != 0)
+        weight = np.asarray(self.data.weight) * active
+        return np.einsum("pi,pij,pj...->pi...", weight, np.asarray(self.data.frame), change)
+
+    def nuisances(self, at: Local) -> list[Factor]:
+        """Exposure, white balance and the modes of a chart's matrix."""
+        own, unit = f".{self.name}" if self.name else "", float(at.exposure)
+        mean, sd = (np.asarray(x).tolist() for x in (self.data.response.mean, self.data.response.sd))
+        rows = zip(self.modes, np.asarray(at.coefficients).tolist(), mean, sd, strict=True)
+        return [
+            # an unknown factor has next to no prior, and is in its own unit
+            Factor(f"instrument.{name}{own}", unit * c, unit * s, 0.0)
+            if m
+            else Factor(f"instrument.{name}{own}", c, s, c / s)
+            for name, c, m, s in rows
+        ]
+
+    def jacobian(self, at: Local) -> np.ndarray:
+        """Weighted ∂ model / ∂ parameter, then by each mode in units of its prior, (colours · 3, parameters
+        and modes)."""
+        steep = np.einsum("ij,pjk->pik", self.response(at), np.asarray(at.slope))
+        own = self.data.response
+        flat = np.einsum("kij,pj,k->pik", own.modes, at.colours, float(at.exposure) * np.asarray(own.sd))
+        return self.weighted(at, np.concatenate([steep, flat], axis=2)).reshape(self.points, -1)
+
+    def nuisance_freedom(self, at: Local) -> float:
+        """Trace of the hat matrix of the modes: colours add little to a matrix that a chart gives."""
+        design = self.jacobian(at)
+        design = design[:, design.shape[1] - len(self.modes) :]
+        fisher = design.T @ design
+        return float(np.trace(np.linalg.solve(fisher + np.eye(len(self.modes)), fisher)))
+
+    def correlation_length(self, residuals: np.ndarray) -> float:
+        """1: colours at several angles have nothing in common but the film."""
+        return 1.0
+
+    def reweighted(self, factor: Any, fraction: float) -> ColoursView:
+        """Weights times `factor` (a number, (channels,) or (rows, channels)), each point for `fraction` of
+        one."""
+        return replace(self, data=self.data._replace(weight=self.data.weight * factor)).counting(fraction)
+
+    def counting(self, fraction: float) -> ColoursView:
+        """The view with each point counting for `fraction` of an independent one."""
+        return replace(self, data=self.data._replace(independent_fraction=np.float64(fraction)))
+
+    def thinned(self) -> ColoursView:
+        """The view as it is: the integral needs all wavelengths."""
+        return self
+
+    def off_tolerance(self, values: np.ndarray) -> float:
+        """Error of the view's plan at `values`, in the reflectance or transmittance."""
+        if not self.plan.tolerance:
+            return 0.0
+        at = np.asarray(values)[None]
+        planned, whole = (signals(p, self.scene, at, build) for p in (self.plan, full_plan(self.scene)))
+        return largest_difference(planned, whole, self.plan.signal)
+
+    def encoded(self, linear: Any) -> np.ndarray:
+        """Linear channels (..., 3) in the space of the data."""
+        linear = np.asarray(linear)
+        return self.encoding.encode(linear, self.encoding.roots(linear))
+
+    def rms(self, at: Local) -> float:
+        """rms of the residuals in the space of the data, limits left out where they are kept."""
+        missed = self.encoded(self.data.values) - self.encoded(at.model)
+        return float(np.sqrt(np.mean(np.where(np.asarray(at.residual) == 0, 0.0, missed) ** 2)))

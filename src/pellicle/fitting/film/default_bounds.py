@@ -1,0 +1,184 @@
+"""Default bounds of a fit of spectra: widened where the best fit rests on one and the data want it.
+
+Nobody chose these bounds for the sample at hand. What lies beside them is searched, and where the data are
+explained better there, the fit is done again within wider bounds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Container, Iterator, Sequence
+from dataclasses import replace
+from logging import getLogger
+from typing import NamedTuple
+
+import numpy as np
+
+from pellicle.fitting.coordinates import box
+from pellicle.fitting.film import residual_structure
+from pellicle.fitting.film.parameters import bounds, with_bounds
+from pellicle.fitting.film.problem import make
+from pellicle.fitting.film.search import search
+from pellicle.fitting.film.targets import Target
+from pellicle.fitting.minima import MOST, Minima, distinct, minima, solve
+from pellicle.fitting.parameter import Parameter
+from pellicle.fitting.problem import Problem
+from pellicle.fitting.progress import Progress
+from pellicle.fitting.reweighting import RankedMinima, rank
+from pellicle.fitting.status import RIVAL
+
+log = getLogger(__name__)
+
+_ROUNDS = 3
+"""Times that bounds are moved outwards, each time by the width of the range."""
+_THIN = 0.05
+"""Share of the range within which what was added needs no search of its own."""
+_ON_BOUND = 1e-6
+
+
+class Wider(NamedTuple):
+    """Default bounds that were widened, and what was done, in words.
+
+    `parameters` are the problem's with their bounds; `values` (minima, parameters) are minima found within
+    them, in the parameters' own units. `binding` names parameters that rest on a default bound and, within
+    wider ones, on their end: those are then not used.
+    """
+
+    parameters: tuple[Parameter, ...]
+    values: np.ndarray
+    warnings: tuple[str, ...] = ()
+    binding: frozenset[str] = frozenset()
+
+
+def wider(
+    spectra: Sequence[Target], ranked: RankedMinima, tolerance: float, loss: str, progress: Progress
+) -> Wider:
+    """Widen the default bounds on which the best fit rests, if χ² falls by more than a rival's distance."""
+    old, now, gains = ranked.problem.parameters, ranked, 0.0
+    for _ in range(_ROUNDS):
+        before, values = now.problem.parameters, now.values
+        moved = tuple(_moved(p, value) for p, value in zip(before, values.tolist(), strict=True))
+        if moved == before:
+            break
+        problem = make(*measured_within(spectra, ranked, moved), tolerance=tolerance)
+        starts = [np.asarray(now.problem.values(now.minima.units))]
+        views = zip(now.problem.views, now.fits, strict=True)
+        missed = any(residual_structure.missed(view, fit) for view, fit in views)
+        # where noise alone is left, nothing far away can be better
+        for slab in _slabs(before, moved) if missed else ():
+            beside = _within(problem, slab)
+            starts.append(np.asarray(beside.values(search(beside, progress).units)))
+        again = rank(problem, minima(problem, _inside(problem, np.concatenate(starts))), loss)
+        pinned = again.problem._replace(box=problem.box._replace(lower=values, upper=values))
+        gain = float(solve(pinned, _inside(problem, values[None])).deviance[0] - again.minima.deviance[0])
+        log.info("default bounds: χ² falls by %.3g within %s", gain, ", ".join(map(_range, moved)))
+        if not gain > RIVAL:
+            break
+        now, gains = again, gains + gain
+    found, values = now.problem.parameters, np.asarray(now.problem.values(now.minima.units))
+    pairs = list(zip(old, found, values[0].tolist(), strict=True))
+    if any(_at_moved_bound(*each) for each in pairs):
+        resting = [p for p, value in zip(old, ranked.values.tolist(), strict=True) if _moved(p, value) != p]
+        words = tuple(
+            f"the best fit rests on the default bounds of {p.name}, and within wider ones on their end"
+            f" (Δχ² {gains:.3g}): the scene may be wrong"
+            for p in resting
+        )
+        return Wider(old, ranked.values[None], words, frozenset(p.name for p in resting))
+    words = tuple(
+        f"the default bounds of {p.name} were widened from {_range(p)} to {_range(q)}: the best fit lay on"
+        f" them (Δχ² {gains:.3g})"
+        for p, q, _ in pairs
+        if p != q
+    )
+    return Wider(found, values, words)
+
+
+def _moved(p: Parameter, value: float) -> Parameter:
+    """The parameter with its default bounds moved outwards where the value rests on one that can be.
+
+    Both are moved: a film of an index below the bounds may at first be taken for one of an index above.
+    """
+    if p.limits is None:
+        return p
+    (low, high), (least, most), span = _rests(p, value), p.limits, p.upper - p.lower
+    if not (low and p.lower > least) and not (high and p.upper < most):
+        return p
+    return replace(p, lower=max(p.lower - span, least), upper=min(p.upper + span, most))
+
+
+def _at_moved_bound(old: Parameter, new: Parameter, value: float) -> bool:
+    """True where a value rests on a bound that is not the old one."""
+    low, high = _rests(new, value)
+    return (low and new.lower < old.lower) or (high and new.upper > old.upper)
+
+
+def _slabs(before: Sequence[Parameter], moved: Sequence[Parameter]) -> Iterator[tuple[Parameter, ...]]:
+    """Bounds of what was added to the box on each side of each parameter, of the others all.
+
+    Thin slabs are left out: what they contain is near the minima that rest on the bound.
+    """
+    for i, (p, q) in enumerate(zip(before, moved, strict=True)):
+        for lower, upper in ((q.lower, p.lower), (p.upper, q.upper)):
+            if upper - lower > _THIN * (p.upper - p.lower):
+                yield (*moved[:i], replace(q, lower=lower, upper=upper), *moved[i + 1 :])
+
+
+def _within(problem: Problem, parameters: tuple[Parameter, ...]) -> Problem:
+    """The problem with the bounds of these parameters."""
+    own = box(*bounds(parameters), [p.prior for p in parameters])
+    return problem._replace(parameters=parameters, box=own)
+
+
+def _inside(problem: Problem, values: np.ndarray) -> np.ndarray:
+    """Values (..., parameters) in the problem's unit cube."""
+    lower, upper = np.asarray(problem.box.lower), np.asarray(problem.box.upper)
+    return np.clip((values - lower) / (upper - lower), 0.0, 1.0)
+
+
+def measured_within(
+    spectra: Sequence[Target], ranked: RankedMinima, parameters: tuple[Parameter, ...]
+) -> list[Target]:
+    """The spectra with scenes whose bounds are those of the parameters."""
+    pairs = zip(spectra, ranked.problem.views, strict=True)
+    return [
+        each._replace(scene=with_bounds(each.scene, [parameters[i] for i in view.takes]))
+        for each, view in pairs
+    ]
+
+
+def joined(problem: Problem, found: Minima, values: np.ndarray) -> Minima:
+    """The minima of a search and those below `values` (starts, parameters), best first."""
+    own = minima(problem, _inside(problem, values))
+    columns = ("units", "deviance", "converged")
+    both = {name: np.concatenate([getattr(found, name), getattr(own, name)]) for name in columns}
+    return distinct(problem, replace(found, **both), MOST)
+
+
+def remarks(ranked: RankedMinima, binding: Container[str]) -> list[str]:
+    """A sentence for each parameter that rests on a default bound, other than a zero that has a limit and
+    `binding` ones."""
+    sentences = []
+    for p, value in zip(ranked.problem.parameters, ranked.values.tolist(), strict=True):
+        low, high = _rests(p, value)
+        if p.limits is None or p.name in binding or not (low or high) or (low and p.natural[0]):
+            continue
+        words = f"{p.name} rests on {_amount(value, p)}"
+        if value in p.limits:
+            sentences.append(f"{words}, the {'least' if low else 'largest'} value that physics allows")
+        else:
+            sentences.append(f"{words}, a default bound: wider ones explain the data no better")
+    return sentences
+
+
+def _rests(p: Parameter, value: float) -> tuple[bool, bool]:
+    """True for the lower and the upper bound where a value lies on it."""
+    margin = _ON_BOUND * (p.upper - p.lower)
+    return value - p.lower <= margin, p.upper - value <= margin
+
+
+def _range(p: Parameter) -> str:
+    return f"{p.lower:g} ... {_amount(p.upper, p)}"
+
+
+def _amount(value: float, p: Parameter) -> str:
+    return f"{value:g} {p.unit}".rstrip()

@@ -1,0 +1,264 @@
+"""Fit a scene to spectra and colours of one sample: scan, polish, rank minima, estimate uncertainties."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TypeAlias
+
+import equinox as eqx
+import jax
+
+from pellicle.data.colours import Colours
+from pellicle.data.spectrum import Spectrum
+from pellicle.errors import UsageError
+from pellicle.fitting import identifiability
+from pellicle.fitting.budget import budget, likely_cause
+from pellicle.fitting.conclusion import conclude, linearised, ranked_minima
+from pellicle.fitting.curves import Curve
+from pellicle.fitting.discrepancy import discrepancy
+from pellicle.fitting.film import (
+    backface,
+    default_bounds,
+    delta_conventions,
+    depolarisation,
+    folded_reading,
+    messages,
+    mueller_signs,
+    parts,
+    residual_structure,
+    summary,
+    sweep_scatter,
+)
+from pellicle.fitting.film.colour_orders import orders, with_orders
+from pellicle.fitting.film.colour_targets import measured_colours
+from pellicle.fitting.film.colour_view import ColoursView
+from pellicle.fitting.film.evidence import evidence
+from pellicle.fitting.film.problem import make
+from pellicle.fitting.film.search import search
+from pellicle.fitting.film.targets import Target, measured, without_scale
+from pellicle.fitting.minima import Minima
+from pellicle.fitting.problem import Problem
+from pellicle.fitting.progress import Progress, quiet
+from pellicle.fitting.result import Fit, Status
+from pellicle.fitting.reweighting import RankedMinima
+from pellicle.fitting.robust_losses import LEAST_SQUARES, check_loss
+from pellicle.fitting.status import verdict
+from pellicle.scene.film import Scene
+from pellicle.scene.free import free_leaves
+
+Film: TypeAlias = Spectrum | Colours | Sequence[Spectrum | Colours]
+"""Measurements of one film."""
+
+
+def fit(
+    data: Film,
+    scene: Scene | Sequence[Scene],
+    *,
+    tolerance: float = 0.0,
+    loss: str = LEAST_SQUARES,
+    progress: Progress = quiet,
+) -> Fit:
+    """Fit the free parameters of `scene` to a spectrum or colours, in float64 whatever the caller's setting.
+
+    The signal, and the polarisation and angle where the file has them, come from the data. A list
+    of spectra and colours of one sample is fitted jointly: layers and substrate are shared, what is free of
+    the light and the instrument is each one's own (`instrument.scale.R`). `scene` may then be a list
+    too, of one scene for each, that differ in light, instrument and back face only; of a single scene,
+    Ψ and Δ leave out scale and offset.
+
+    With a `tolerance`, in the unit of each signal, effects that change less are left out (`pellicle.plan`);
+    where the best fit turns out to lie beyond it, all of them are put back and the fit is done again.
+
+    With the `loss` "huber" or "student-t" a few outliers hardly count; it is "least-squares" otherwise.
+
+    `progress` is called with a stage's name, how much is done and how much there is. Returns a
+    `Fit`: best parameters with errors, rivals, a status and what was simulated.
+
+    **Raises:** UsageError where nothing is free, where scenes are not of one sample, an uncalibrated
+    signal is given a fixed scale or the loss is unknown; ValueError where a material has no data at a
+    wavelength, naming it.
+    """
+    return fitted(data, scene, tolerance, progress, loss)[0]
+
+
+def fitted(
+    data: Film,
+    scene: Scene | Sequence[Scene],
+    tolerance: float,
+    progress: Progress,
+    loss: str = LEAST_SQUARES,
+) -> tuple[Fit, RankedMinima]:
+    """The result of `fit`, and the ranked minima that it rests on."""
+    check_loss(loss)
+    with jax.enable_x64(True):
+        targets = measurements(data, scene)
+        spectra = _listed(data)
+        fit, ranked = _fit(spectra, targets, tolerance, loss, progress)
+        readings = (
+            (folded_reading.as_folded, folded_reading.remarks),
+            (mueller_signs.with_other_signs, mueller_signs.remarks),
+        )
+        if fit.status is not Status.MISFIT:
+            return fit, ranked
+
+        def read_as(again: list[Spectrum | Colours]) -> Fit:
+            read = again[0] if isinstance(data, Spectrum | Colours) else again
+            return _fit(again, measurements(read, scene), tolerance, loss, progress)[0]
+
+        found: list[str] = []
+        for read_again, remarks in readings:
+            if (again := read_again(spectra)) is not None:
+                found += remarks(read_as(again))
+        for words, again in (
+            delta_conventions.readings(spectra, [part.rms for part in fit.parts]) if not found else ()
+        ):
+            if found := delta_conventions.remarks(words, read_as(again)):
+                break
+        return replace(fit, warnings=(*found, *fit.warnings)), ranked
+
+
+def _listed(data: Film) -> list[Spectrum | Colours]:
+    return [data] if isinstance(data, Spectrum | Colours) else list(data)
+
+
+def measurements(data: Film, scene: Scene | Sequence[Scene]) -> list[Target]:
+    """The numbers and the scene of each spectrum and of colours. Raises UsageError as `fit` does."""
+    spectra = _listed(data)
+    if not spectra:
+        raise UsageError("there is no spectrum to fit: give one, or a list of some")
+    scenes = [scene] * len(spectra) if isinstance(scene, Scene) else list(scene)
+    if not all(isinstance(each, Scene) for each in scenes):
+        raise UsageError(f"`scene` must be a Scene, a Surface or a list of scenes, not {scene!r}")
+    if len(scenes) != len(spectra):
+        raise UsageError(f"{len(spectra)} spectra need as many scenes, or one for all, not {len(scenes)}")
+    if isinstance(scene, Scene) and len(spectra) > 1:
+        scenes = [without_scale(scene, s) for s in spectra]
+    about = [(s.layers, s.ambient, s.substrate) for s in scenes]
+    samples = [(*rest, x.material, x.plate_mm, x.roughness) for *rest, x in about]
+    if not all(eqx.tree_equal(sample, samples[0]) is True for sample in samples):
+        raise UsageError("the scenes of a joint fit must have the same layers, ambient and substrate")
+    for each in scenes:
+        check_free(each)
+    names = [""] if isinstance(data, Spectrum | Colours) else labels(spectra)
+    return [
+        measured_colours(own, at, name) if isinstance(own, Colours) else measured(own, at, name)
+        for own, at, name in zip(spectra, scenes, names, strict=True)
+    ]
+
+
+def check_free(scene: Scene) -> None:
+    """Raise UsageError where a scene has nothing to fit."""
+    if not free_leaves(scene):
+        raise UsageError(
+            "nothing is free to fit: give bounds to the thickness, as in `thickness=Free(10, 3000)`, or in a "
+            "recipe thickness = { lower = 10, upper = 3000 }"
+        )
+
+
+def labels(spectra: Sequence[Spectrum | Colours]) -> list[str]:
+    """Unique names of spectra, without dots: files' stems, else with the names of spectra within a file (or
+    with their signals), else numbered.
+
+    Where a name would read as a parameter's it is numbered.
+    """
+    kinds = [s.space if isinstance(s, Colours) else s.signal for s in spectra]
+    stems = [Path(s.path).stem.replace(".", "_") or kind for s, kind in zip(spectra, kinds, strict=True)]
+    pairs = list(zip(stems, spectra, strict=True))
+    own = [f"{stem}-{s.name}".replace(".", "_") if s.name else stem for stem, s in pairs]
+    signals = [f"{stem}-{kind}" for stem, kind in zip(stems, kinds, strict=True)]
+    numbers = [f"{stem}-{i}" for i, stem in enumerate(stems, start=1)]
+    for names in (stems, own, signals):
+        if len(set(names)) == len(names) and "thickness" not in names:
+            return names
+    return numbers
+
+
+def _fit(
+    data: list[Spectrum | Colours], spectra: list[Target], tolerance: float, loss: str, progress: Progress
+) -> tuple[Fit, RankedMinima]:
+    began = time.perf_counter()
+
+    def build(allowed: float) -> Problem:
+        problem = make(*spectra, tolerance=allowed)
+        messages.log_problem(spectra, problem)
+        return problem
+
+    ranked, warnings = ranked_minima(build, lambda problem: search(problem, progress), tolerance, loss)
+    wider = default_bounds.wider(spectra, ranked, tolerance, loss, progress)
+    warnings += wider.warnings
+    if wider.parameters != ranked.problem.parameters:
+        spectra = default_bounds.measured_within(spectra, ranked, wider.parameters)
+
+        def again(problem: Problem) -> Minima:
+            return default_bounds.joined(problem, search(problem, progress), wider.values)
+
+        ranked, warnings = ranked_minima(build, again, tolerance, loss)
+        warnings += wider.warnings
+    progress("errors", 0, 1)
+    profile, depth = summary.scan_profile(ranked), ranked.problem.thickness_axis
+    jacobian, covariance = linearised(ranked)
+    found = discrepancy(evidence(spectra, ranked, jacobian), jacobian, ranked.minima.units[0])
+    each = parts.parts(data, ranked, found.errors)
+    missed = parts.missed(each, ranked, found)
+    conclusion = conclude(
+        ranked,
+        jacobian,
+        covariance,
+        found,
+        misfit=bool(missed),
+        binding=wider.binding,
+        fixed=summary.fixed(spectra),
+        scans={} if profile is None or depth is None else {depth: profile},
+        amend=lambda limits: summary.amended(spectra, ranked, limits),
+    )
+    parameters, drifts = sweep_scatter.with_sweeps(data, ranked, jacobian, conclusion.parameters)
+    dark = summary.opaque(spectra, ranked)
+    worst = (missed or each)[0]
+    at = next(i for i, part in enumerate(each) if part is worst)
+    structure = residual_structure.missed(ranked.problem.views[at], ranked.fits[at])
+    rivals, probability = conclusion.rivals, None
+    if any(isinstance(view, ColoursView) for view in ranked.problem.views):
+        every = orders(ranked, found)
+        rivals, probability = with_orders(rivals, every), float(every.probability[0])
+    sentence = verdict(
+        conclusion.status,
+        parameters,
+        rivals,
+        worst.rms,
+        worst.name or "the data",
+        " degrees" if isinstance(worst.curve, Curve) and worst.curve.delta_data is not None else "",
+        structure.place if structure else "",
+        dark,
+        identifiability.naming(next(iter(parameters)), conclusion.correlated),
+    )
+    unclear = [
+        *drifts,
+        *depolarisation.unexplained(data, spectra, ranked.problem.views),
+        # the few residuals of colours have a cause in any case, where they are noise
+        *(likely_cause(found, ranked.problem.parameters) if probability is None or missed else []),
+        *default_bounds.remarks(ranked, wider.binding),
+        *identifiability.bounded(parameters, dark),
+        *conclusion.correlated,
+    ]
+    fit = Fit(
+        parts=each,
+        status=conclusion.status,
+        verdict=sentence + backface.sentence(backface.comparison(spectra, ranked)),
+        parameters=parameters,
+        rivals=parts.with_curves(rivals, each, ranked),
+        probability=probability,
+        chi2_reduced=ranked.chi2_reduced,
+        rms=parts.together(each),
+        effective_points=sum(part.effective_points for part in each),
+        correlation_names=covariance.names,
+        correlation=found.errors.correlation,
+        warnings=(*warnings, *summary.warnings(spectra, ranked, unclear)),
+        profile=profile,
+        seconds=time.perf_counter() - began,
+        budget=budget(found, ranked.problem.parameters),
+        scene=spectra[0].scene if len(spectra) == 1 else tuple(m.scene for m in spectra),
+    )
+    return fit, ranked

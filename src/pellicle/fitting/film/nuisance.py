@@ -1,0 +1,197 @@
+"""Scale and offset: linear nuisances, solved exactly inside each evaluation (variable projection).
+
+The data are modelled as y = g(λ) f(λ) + o(λ), with f the simulated signal and g and o numbers or
+Chebyshev series in wavelength with Gaussian priors. Their least-squares values follow from a small
+linear system; what they cost in evidence is a log-determinant (marginal likelihood of a linear
+Gaussian model: Bishop 2006, section 3.5). Physical signs are imposed: g ≥ 0 and o ≥ 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import ScalarLike
+
+from pellicle.fitting.coordinates import Array
+from pellicle.fitting.film.nonnegative_curves import nonnegative_curves
+from pellicle.scene.instrument import Drift, Instrument
+
+_LOOSE = 10.0
+"""Prior standard deviation of a single free number, in units of its expected size: next to no prior."""
+_SLACK = 1e-6
+"""Tolerance below zero of a scale or an offset that is not held there, in units of its size."""
+
+
+class Data(NamedTuple):
+    """A spectrum as the fit sees it, padded to a round length with points of zero weight."""
+
+    values: Array
+    weight: Array  # 1/σ, 0 for padding
+    position: Array  # wavelength mapped to −1..1
+    independent_fraction: Array | np.floating  # effective points per point: correlated errors count less
+    level: Array | np.floating  # median of the values: the size an offset is measured in
+    frame: Array | None = None  # of N, C, S at each point, where Ψ and Δ have errors of their own
+
+
+@dataclass(frozen=True)
+class Coefficient:
+    """One coefficient of the scale or the offset, in physical units."""
+
+    name: str
+    value: float
+    basis: np.ndarray  # what it multiplies at each point
+    prior_sd: float
+    on_signal: bool
+    not_negative: bool  # one number that cannot be below zero
+
+    @property
+    def pull(self) -> float:
+        """Distance from the mean of its prior, in standard deviations of that."""
+        # the mean of a plain scale is the scale itself
+        plain = self.on_signal and bool(np.all(self.basis == 1))
+        return 0.0 if plain else float(self.value / self.prior_sd)
+
+
+class Solved(NamedTuple):
+    """The nuisances solved for one simulated signal."""
+
+    model: Array  # g f + o at every point
+    residual: Array  # weighted, tempered, with a row for each prior
+    gain: Array  # g at every point
+    offset: Array  # o at every point
+    deviance: Array  # −2 ln of the marginal likelihood, up to a constant
+
+
+def chebyshev(position, degree: int) -> list:
+    """T₀ ... T_degree at `position` in −1..1."""
+    terms = [jnp.ones_like(position), position]
+    while len(terms) <= degree:
+        terms.append(2 * position * terms[-1] - terms[-2])
+    return terms[: degree + 1]
+
+
+def solve(signal, data: Data, instrument: Instrument) -> Solved:
+    """The best scale and offset for a simulated signal, and the deviance."""
+    weight = data.weight * jnp.sqrt(data.independent_fraction)
+    gains, shifts = (
+        _series(instrument.scale, scale_prior, data),
+        _series(instrument.offset, offset_prior, data),
+    )
+    first = len(gains.mean)
+    known = gains.known * signal + shifts.known * jnp.ones_like(signal)
+    rest = data.values - known
+    if not first and not len(shifts.mean):
+        residual = weight * rest
+        one = jnp.ones_like(signal)
+        return Solved(known, residual, gains.known * one, shifts.known * one, jnp.sum(residual**2))
+    # sums over the points are products with terms and pairs of them that all candidates share
+    square = weight * weight
+    on_signal = square * signal
+    across = _sums(on_signal, gains.terms, shifts.terms)
+    gram = jnp.block(
+        [
+            [_sums(on_signal * signal, gains.terms, gains.terms), across],
+            [across.T, _sums(square, shifts.terms, shifts.terms)],
+        ]
+    )
+    projected = jnp.concatenate([gains.terms @ (on_signal * rest), shifts.terms @ (square * rest)])
+    # the plain scale, which a single free number would have
+    plain = jnp.sum(on_signal * data.values) / (jnp.sum(on_signal * signal) + 1e-30)
+    unit = jnp.concatenate([jnp.full(first, plain), jnp.full(len(shifts.mean), data.level)])
+    mean, sd = np.concatenate([gains.mean, shifts.mean]), np.concatenate([gains.sd, shifts.sd])
+    coefficients, log_determinant = _project(
+        gram * unit * unit[:, None], projected * unit, mean, sd, (first, len(shifts.mean))
+    )
+    in_units = coefficients * unit
+    gain = gains.known + in_units[:first] @ gains.terms
+    shift = shifts.known + in_units[first:] @ shifts.terms
+    model = gain * signal + shift
+    residual = jnp.concatenate([weight * (data.values - model), (coefficients - mean) / sd])
+    return Solved(model, residual, gain, shift, log_determinant + jnp.sum(residual**2))
+
+
+def _sums(weight, left, right):
+    """Σ weight · left · right over the points, for all terms (terms, points) of both sides."""
+    return jnp.einsum("p,ijp->ij", weight, left[:, None] * right)
+
+
+class _Series(NamedTuple):
+    """Functions of wavelength with a normal prior on their coefficients, and the number that is `known`."""
+
+    terms: Array  # (terms, points)
+    mean: np.ndarray
+    sd: np.ndarray
+    known: ScalarLike
+
+
+def _series(
+    number: ScalarLike | Drift, prior: Callable[[Drift], tuple[np.ndarray, np.ndarray]], data: Data
+) -> _Series:
+    """A nuisance as Chebyshev terms, or as a known number without terms."""
+    if not isinstance(number, Drift):
+        return _Series(jnp.zeros((0, len(data.position))), np.zeros(0), np.zeros(0), number)
+    return _Series(jnp.stack(chebyshev(data.position, number.degree)), *prior(number), 0.0)
+
+
+def scale_prior(drift: Drift) -> tuple[np.ndarray, np.ndarray]:
+    """Means and standard deviations of the gain's coefficients, in units of the plain scale."""
+    first = _LOOSE if drift.degree == 0 else 1.0
+    shrinking = [drift.width * 0.5**j for j in range(drift.degree)]
+    return np.array([1.0] + [0.0] * drift.degree), np.array([first, *shrinking])
+
+
+def offset_prior(drift: Drift) -> tuple[np.ndarray, np.ndarray]:
+    """Means and standard deviations of the offset's coefficients, in units of the signal's level."""
+    count = drift.degree + 1
+    sd = [_LOOSE] if drift.degree == 0 else [drift.width * 0.5**j for j in range(count)]
+    return np.zeros(count), np.array(sd)
+
+
+def coefficients(
+    data: Data, instrument: Instrument, gain: Any, offset: Any, points: int, suffix: str = ""
+) -> list[Coefficient]:
+    """Scale and offset as Chebyshev coefficients in wavelength, from their curves at the first `points`.
+
+    Priors of the gain are in units of its own mean, those of the offset in units of the signal's level. The
+    `suffix` ends the names of one spectrum among several.
+    """
+    result: list[Coefficient] = []
+    position = np.asarray(data.position)[:points]
+    for name, drift, prior, curve in (
+        ("scale", instrument.scale, scale_prior, gain),
+        ("offset", instrument.offset, offset_prior, offset),
+    ):
+        if not isinstance(drift, Drift):
+            continue
+        _, sd = prior(drift)
+        degree = len(sd) - 1
+        numbers = np.polynomial.chebyshev.chebfit(position, np.asarray(curve)[:points], degree)
+        basis = np.polynomial.chebyshev.chebvander(position, degree).T
+        prior_sd = sd * (abs(numbers[0]) if name == "scale" else float(data.level))
+        not_negative = name == "offset" and degree == 0
+        for j, (number, column, own_sd) in enumerate(zip(numbers.tolist(), basis, prior_sd, strict=True)):
+            full = f"instrument.{name}" + (f"_{j}" if j else "") + suffix
+            result.append(Coefficient(full, number, column, own_sd, name == "scale", not_negative))
+    return result
+
+
+def _project(gram, projected, mean: np.ndarray, sd: np.ndarray, counts: tuple[int, int]):
+    """Coefficients under their prior, so many of the scale and of the offset, and the deviance's
+    log-determinant.
+
+    Both curves are nowhere negative. The determinant is that of all coefficients, whether or not a curve is
+    held at zero somewhere: the volume that this cuts off is left out.
+    """
+    matrix, target = gram + np.diag(1 / sd**2), projected + mean / sd**2
+    degrees = tuple(count - 1 for count in counts if count)
+    inverse, start = nonnegative_curves(*jax.lax.stop_gradient((matrix, target)), degrees, _SLACK)
+    # adds nothing but a rounding error, and carries the implicit derivative A⁻¹(db − dA x)
+    target = target - jax.lax.stop_gradient(target) - (matrix - jax.lax.stop_gradient(matrix)) @ start
+    coefficients = start + inverse @ target
+    _, log_determinant = jnp.linalg.slogdet(matrix)
+    return coefficients, log_determinant + 2 * float(np.sum(np.log(sd)))

@@ -1,0 +1,150 @@
+"""Fit quality, curves and misfit of each spectrum, and of colours, of a fit."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from pellicle.data.colours import Colours
+from pellicle.data.ellipsometry_angles import psi_delta
+from pellicle.data.spectrum import Spectrum
+from pellicle.fitting.covariance import Errors
+from pellicle.fitting.curves import ColourCurve, Curve
+from pellicle.fitting.discrepancy import Discrepancy
+from pellicle.fitting.film import fringes
+from pellicle.fitting.film.colour_evidence import accuracy as colours_accuracy
+from pellicle.fitting.film.colour_parts import colour_curve, colours_part
+from pellicle.fitting.film.colour_view import ColoursView
+from pellicle.fitting.film.form import Local
+from pellicle.fitting.film.layer_errors import layer_errors, principal_indices
+from pellicle.fitting.film.view import SpectrumView
+from pellicle.fitting.misfit import Accuracy, misfit
+from pellicle.fitting.result import Part, Rival
+from pellicle.fitting.reweighting import RankedMinima, ViewFit
+
+LARGEST_POWER, LARGEST_ANGLES = 0.02, 0.02
+"""Structure in residuals of R and T, and of N, C and S (0.6° of Ψ), that no calibrated instrument makes."""
+LARGEST_DRIFT = 1.0
+"""Structure in residuals that no drifting lamp makes, in units of the error that its model has: 0.7 of it
+remains in a soap film of known thickness, 1.3 of titania on silicon that is fitted as a soap film."""
+
+
+def parts(data: list[Spectrum | Colours], ranked: RankedMinima, errors: Errors) -> tuple[Part, ...]:
+    """One part for each spectrum and each set of colours, in their order."""
+
+    def part(own: Spectrum | Colours, view: SpectrumView | ColoursView, fit: ViewFit) -> Part:
+        covariance = errors.covariance[np.ix_(view.takes, view.takes)]
+        if isinstance(own, Colours):
+            assert isinstance(view, ColoursView)
+            return colours_part(own, view, fit, covariance)
+        assert isinstance(view, SpectrumView)
+        return Part(
+            name=view.name,
+            data=own,
+            curve=_curve(own, view, fit.at, covariance),
+            plan=view.plan,
+            rms=view.rms(fit.at.model),
+            chi2_reduced=fit.chi2 / fit.freedom,
+            effective_points=view.rows / fit.length,
+            sigma_from="given" if view.noise.given else "model" if view.noise.drifting else "residuals",
+        )
+
+    rows = zip(data, ranked.problem.views, ranked.fits, strict=True)
+    return tuple(part(own, view, fit) for own, view, fit in rows)
+
+
+def together(parts: tuple[Part, ...]) -> float | None:
+    """rms over all spectra, None where they have no unit in common."""
+    if len(parts) == 1:
+        return parts[0].rms
+    spectra = [part.data for part in parts if isinstance(part.data, Spectrum)]
+    units = {spectrum.signal if spectrum.ellipsometric else "power" for spectrum in spectra}
+    if len(spectra) < len(parts) or len(units) > 1 or not all(spectrum.calibrated for spectrum in spectra):
+        return None
+    sizes = [part.spectral.wavelength.size for part in parts]
+    return math.sqrt(np.average([part.rms**2 for part in parts], weights=sizes))
+
+
+def missed(parts: tuple[Part, ...], ranked: RankedMinima, found: Discrepancy) -> tuple[Part, ...]:
+    """Spectra that the scene does not explain, and those of which it misses clear fringes."""
+    silent = fringes.missed(ranked.problem, ranked.fits, ranked.values)
+    each = zip(parts, ranked.problem.views, found.remaining, silent, strict=True)
+    return tuple(
+        part
+        for part, view, left, fringe in each
+        if fringe is not None or misfit(found, left, _accuracy(part, view))
+    )
+
+
+def with_curves(
+    rivals: tuple[Rival, ...], parts: tuple[Part, ...], ranked: RankedMinima
+) -> tuple[Rival, ...]:
+    """The rivals with the curve of each part there. The program that computed the parts computes them."""
+
+    def curve(part: Part, view: Any, values: np.ndarray) -> Curve | ColourCurve:
+        at = view.local(ranked.problem.seen_by(view, values))
+        unknown = np.full((len(view.takes), len(view.takes)), np.nan)
+        if isinstance(part.data, Colours):
+            return colour_curve(part.data, view, at, unknown)
+        return _curve(part.spectrum, view, at, unknown)
+
+    views = ranked.problem.views
+    each = [(rival, np.array(list(rival.parameters.values()))) for rival in rivals]
+    return tuple(
+        replace(
+            rival,
+            curves=tuple(curve(part, view, values) for part, view in zip(parts, views, strict=True)),
+        )
+        for rival, values in each
+    )
+
+
+def _accuracy(part: Part, view: SpectrumView | ColoursView) -> Accuracy:
+    if isinstance(view, ColoursView):
+        return colours_accuracy(view, part.sigma)
+    if not view.of_power:
+        # of Ψ and Δ the range says nothing: on a thin oxide it is that of the substrate
+        return Accuracy(largest=LARGEST_ANGLES)
+    if view.noise.drifting:
+        return Accuracy(weighted=LARGEST_DRIFT)
+    values = np.asarray(view.data.values)[: view.points]
+    return Accuracy(LARGEST_POWER if part.spectrum.calibrated else math.inf, float(np.ptp(values)))
+
+
+def _curve(spectrum: Spectrum, view: SpectrumView, at: Local, covariance: np.ndarray) -> Curve:
+    """Data, model and the layer's index with errors, at the real points."""
+    rows = view.rows
+    n_stderr, k_stderr = layer_errors(at, covariance, rows)
+    n, k = np.asarray(at.layer)[:2, :rows]
+    wavelength = np.asarray(view.scene.light.wavelength)[:rows]
+    data, model = view.in_columns(view.data.values), view.in_columns(at.model)
+    weight = np.asarray(view.data.weight)[: view.points].reshape(rows, view.channels)
+    sigma, angles = 1 / (weight if view.elements else weight[:, 0]), {}
+    if spectrum.depolarisation is not None:
+        # a scene without depolarisation has none at any wavelength
+        share = np.zeros(rows) if view.depolarisation is None else model[:, -1]
+        angles = {"depolarisation_data": spectrum.depolarisation, "depolarisation_model": share}
+    if view.depolarisation is not None:
+        data, model = data[:, :-1], model[:, :-1]
+    if view.ratios:
+        sigma = 1 / weight[:, [2 * i for i in range(len(view.ratios))]]
+        data, model = (x.reshape(rows, -1, 3) for x in (data, model))
+    if spectrum.delta is not None:
+        (data, delta_data), (model, delta_model) = psi_delta(data), psi_delta(model)
+        sigma = np.rad2deg(sigma) / 2
+        angles |= {"delta_data": delta_data, "delta_model": delta_model}
+    return Curve(
+        wavelength=wavelength,
+        data=data if view.elements or view.ratios else np.ravel(data),
+        sigma=sigma,
+        model=model if view.elements or view.ratios else np.ravel(model),
+        n=n,
+        k=k,
+        n_stderr=n_stderr,
+        k_stderr=k_stderr,
+        principal=principal_indices(view.scene, at, covariance, wavelength),
+        **angles,
+    )

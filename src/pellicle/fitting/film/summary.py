@@ -1,0 +1,148 @@
+"""Summary of a fit of spectra: scan profile, drift limits, opaque layers, warnings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from pellicle.dispersion.empirical import Shifted
+from pellicle.dispersion.principal_media import ordinary_index
+from pellicle.fitting.film import fringes, residual_structure
+from pellicle.fitting.film.parameters import fixed_numbers, thickness_name
+from pellicle.fitting.film.problem import shortest_wavelength
+from pellicle.fitting.film.targets import Target, drifts
+from pellicle.fitting.film.view import SpectrumView
+from pellicle.fitting.noise import student
+from pellicle.fitting.profile_likelihood import Limits
+from pellicle.fitting.result import Estimate, Profile
+from pellicle.fitting.reweighting import RankedMinima, ViewFit
+from pellicle.fitting.status import RIVAL
+from pellicle.materials import Material, materials_in
+from pellicle.optics.pair import imag, real
+from pellicle.scene.film import Scene
+from pellicle.scene.free import insert, is_free
+from pellicle.scene.layers import Layer
+
+_RULED_OUT = 1e8
+_ABSORBS = 1e-3
+"""An extinction above this is what makes a layer opaque."""
+FEWEST_FRINGES = 0.75
+"""Fringes that a spectrum must span where scale and offset drift: with fewer, drift can imitate the film.
+On real soap films from 510 to 910 nm this is 330 nm, below which no single spectrum was decided."""
+
+
+def scan_profile(ranked: RankedMinima) -> Profile | None:
+    """The scan against thickness, in χ² on the effective points; None where no thickness is free."""
+    scan = ranked.minima.scan
+    if scan is None:
+        return None
+    ratio = []
+    for before, after in zip(ranked.searched.views, ranked.problem.views, strict=True):
+        old, new = before.data, after.data
+        # a robust loss lowers the weights of some points
+        raised = np.max(new.weight / np.where(old.weight > 0, old.weight, np.inf))
+        ratio.append(float(raised**2 * new.independent_fraction / old.independent_fraction))
+    above = (scan.deviance * ratio).sum(-1).min(axis=0) / student(ranked.freedom, RIVAL) ** 2
+    # on their new weights several views together may have their least misfit elsewhere in the scan
+    return Profile(scan.thickness, np.minimum(above - min(above.min(), 0.0), _RULED_OUT))
+
+
+def amended(spectra: Sequence[Target], ranked: RankedMinima, limits: list[Limits]) -> list[Limits]:
+    """Limits with a thickness that drift of scale and offset could imitate bounded from above only."""
+    if not all(drifts(m.scene) and len(m.scene.layers) == 1 for m in spectra):
+        return limits
+    views = zip(ranked.problem.views, ranked.fits, strict=True)
+    least = min(thinnest(view, fit) for view, fit in views)
+    pairs = zip(ranked.problem.parameters, ranked.values.tolist(), limits, strict=True)
+    return [
+        Limits(math.inf, limit.lower, least)
+        if p.key == "thickness" and math.isfinite(limit.stderr) and value < least
+        else limit
+        for p, value, limit in pairs
+    ]
+
+
+def thinnest(view: SpectrumView, fit: ViewFit) -> float:
+    """The thickness (nm) of which the spectrum spans `FEWEST_FRINGES`."""
+    rows = slice(view.rows)
+    wavelength, n = np.asarray(view.scene.light.wavelength)[rows], np.asarray(fit.at.layer)[0, rows]
+    return float(FEWEST_FRINGES / max(np.ptp(2 * n / wavelength), 1e-12))
+
+
+def fixed(spectra: Sequence[Target]) -> list[Estimate]:
+    """The fixed numbers of the layers and the instruments."""
+    return [
+        Estimate(name, value, 0.0, unit, value, value, False)
+        for spectrum in spectra
+        for name, value, unit in fixed_numbers(spectrum.scene, spectrum.name)
+    ]
+
+
+def opaque(spectra: Sequence[Target], ranked: RankedMinima) -> frozenset[str]:
+    """Names of the thicknesses of layers that absorb at the best fit."""
+    view = ranked.problem.views[0]
+    scene = insert(view.scene, ranked.problem.seen_by(view, ranked.values))
+    wavelength = np.asarray(scene.light.wavelength)
+    return frozenset(
+        thickness_name(spectra[0].scene, i)
+        for i, layer in enumerate(scene.layers)
+        if isinstance(layer, Layer) and np.median(imag(ordinary_index(layer.material, wavelength))) > _ABSORBS
+    )
+
+
+def warnings(spectra: Sequence[Target], ranked: RankedMinima, unclear: Sequence[str]) -> tuple[str, ...]:
+    """Warnings that a reader needs before using the numbers; `unclear` is what the data do not determine."""
+    messages = [w for m in spectra for material in materials_in(m.scene) for w in material.warnings()]
+    scan, finest = ranked.minima.scan, shortest_wavelength(ranked.problem) / 8
+    if scan is not None and scan.thickness[1] - scan.thickness[0] > 1.01 * finest:
+        messages.append(
+            "the bounds of the thickness are so wide that its scan has steps of"
+            f" {scan.thickness[1] - scan.thickness[0]:.3g} nm, where fringes call for {finest:.3g}: minima"
+            " may be missed; narrow the bounds"
+        )
+    messages += fringes.disagreement(ranked.problem, ranked.fits, ranked.values)
+    for spectrum, view, fit in zip(spectra, ranked.problem.views, ranked.fits, strict=True):
+        scene, length, own = spectrum.scene, fit.length, f"{view.name}: " if view.name else ""
+        orders = view.plan.row("orders")
+        if orders.on and orders.error_bound > max(1e-4, view.plan.tolerance):
+            messages.append(
+                f"{own}{orders.count} orders leave an error of up to {orders.error_bound:.1g}: |q| is near 1"
+            )
+        if length >= 10:
+            messages.append(
+                f"{own}residuals are correlated over {length:.0f} points: {view.rows} points"
+                f" count as {view.rows / length:.0f}"
+            )
+        if place := residual_structure.missed(view, fit):
+            messages.append(f"{own}the model misses structure {place.words}")
+        if fit.outliers:
+            messages.append(
+                f"{own}{fit.outliers} of {view.rows} points are outliers that count for less than half"
+            )
+        if scene.light.signal == "T" and scene.substrate.back is None:
+            messages.append(
+                f"{own}transmittance into the substrate, as if the detector were inside it; "
+                '`back="air"` makes it a plate'
+            )
+    messages += _added_to_an_index(spectra[0].scene, ranked)
+    return tuple(dict.fromkeys([*messages, *unclear]))
+
+
+def _added_to_an_index(scene: Scene, ranked: RankedMinima) -> list[str]:
+    """A sentence for each free n that is added to a given index, with the sum at the middle wavelength."""
+    view = ranked.problem.views[0]
+    fitted = insert(view.scene, ranked.problem.seen_by(view, ranked.values))
+    nm = np.asarray(fitted.light.wavelength)
+    middle = int(np.argmin(np.abs(nm - np.median(np.unique(nm)))))  # rows may be repeated
+    result = []
+    for i, (layer, own) in enumerate(zip(scene.layers, fitted.layers, strict=True)):
+        if isinstance(layer, Layer) and isinstance(given := layer.material, Shifted) and is_free(given.n):
+            name = thickness_name(scene, i).removesuffix("thickness") + "n"
+            of = given.base.name if isinstance(given.base, Material) else "the model"
+            total = float(np.asarray(real(own.material.index(nm)))[middle])
+            result.append(
+                f"{name} is added to the index of {of}; the sum is {total:.4g} at {nm[middle]:.4g} nm"
+            )
+    return result

@@ -1,0 +1,228 @@
+"""A spectrum as a view of a least-squares problem: simulated by a plan, scaled, compared with data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import jax
+import numpy as np
+
+from pellicle.effects.plan import Plan
+from pellicle.fitting.film import generalised, nuisance
+from pellicle.fitting.film.form import Local, SpectrumForm, local
+from pellicle.fitting.film.nuisance import Coefficient, Data
+from pellicle.fitting.film.sweeps import correlation_in_sweeps, sweeps
+from pellicle.fitting.noise import DRIFT_CORRELATION
+from pellicle.fitting.problem import Noise, NoiseGroup
+from pellicle.planning.differences import largest_difference, signals
+from pellicle.planning.film import full_plan
+from pellicle.scene.film import Scene
+from pellicle.scene.free import is_free
+from pellicle.simulation.film import build
+
+ROUND = 64
+"""Spectra are padded to a multiple of this, so that files of nearly one length share a program."""
+
+SCAN_POINTS = 448
+"""Wavelengths used while scanning: enough for four samples in a fringe of 5 µm at index 2."""
+
+
+@dataclass(frozen=True)
+class SpectrumView:
+    """One spectrum of a problem.
+
+    `scene` has anonymous free parameters and sampled media; `takes` are the positions of its parameters in
+    the problem. `data` is padded to a round length. `depolarisation` is the noise of a measured one, where
+    that is a channel, `elements` and `ratios` the positions of elements of a Mueller matrix and of ratios, as
+    in `SpectrumForm`.
+    """
+
+    name: str  # empty where there is no other
+    plan: Plan
+    scene: Scene
+    data: Data
+    takes: tuple[int, ...]
+    noise: Noise
+    points: int  # data values: N, C, S, or N and C, and depolarisation, or elements, for each wavelength
+    largest_index: float
+    depolarisation: Noise | None = None
+    elements: tuple[int, ...] = ()
+    ratios: tuple[int, ...] = ()
+
+    @property
+    def form(self) -> SpectrumForm:
+        own = self.depolarisation is not None, self.elements, self.ratios
+        return SpectrumForm(self.plan.static_key, *own)
+
+    @property
+    def of_power(self) -> bool:
+        """True for R and T, which have a scale, an offset and fringes; False for ellipsometry."""
+        return not self.plan.ellipsometric
+
+    @property
+    def arrays(self) -> tuple[Scene, Data]:
+        return self.scene, self.data
+
+    @property
+    def channels(self) -> int:
+        """Data values at each wavelength."""
+        return len(self.data.values) // len(self.scene.light.wavelength)
+
+    @property
+    def rows(self) -> int:
+        """Wavelengths without padding."""
+        return self.points // self.channels
+
+    @property
+    def measured_channels(self) -> int:
+        """The first channels, which are measured: outwards from the sphere of N, C, S nothing is."""
+        return self.channels if self.data.frame is None else self.channels - max(len(self.ratios), 1)
+
+    @property
+    def independent(self) -> int:
+        """Independent data values: N, C and S lie on a sphere, so two of the three; elements count each."""
+        return sum(group.independent for group in self.noise_groups)
+
+    @property
+    def noise_groups(self) -> tuple[NoiseGroup, ...]:
+        """The channels of the signal, and that of the depolarisation; elements of a matrix and ratios one by
+        one."""
+        every = tuple(range(self.channels))
+        if self.ratios:
+            return generalised.noise_groups(len(self.ratios), self.noise.known, self.rows)
+        if self.elements:
+            return tuple(NoiseGroup((channel,), self.noise.known, self.rows) for channel in every)
+        if self.depolarisation is None:
+            return (NoiseGroup(every, self.noise.known, min(self.channels, 2) * self.rows),)
+        own = self.measured_channels - 1
+        others = tuple(channel for channel in every if channel != own)
+        return (
+            NoiseGroup(others, self.noise.known, 2 * self.rows),
+            NoiseGroup((own,), self.depolarisation.known, self.rows),
+        )
+
+    @property
+    def independent_fraction(self) -> float:
+        """Effective points per point: correlated errors count less."""
+        return float(self.data.independent_fraction)
+
+    def local(self, values: Any) -> Local:
+        """The model around `values` (its parameters,)."""
+        return jax.device_get(local(self.form, self.scene, self.data, values))
+
+    def residuals(self, at: Local) -> np.ndarray:
+        """Weighted residuals (rows, channels)."""
+        weighted = np.asarray((self.data.values - np.asarray(at.model)) * self.data.weight)
+        return weighted[: self.points].reshape(self.rows, self.channels)
+
+    def nuisances(self, at: Local) -> list[Coefficient]:
+        """Coefficients of scale and offset, recovered from their curves."""
+        own = f".{self.name}" if self.name else ""
+        return nuisance.coefficients(self.data, self.scene.instrument, at.gain, at.offset, self.points, own)
+
+    def nuisance_freedom(self, at: Local) -> float:
+        """Number of coefficients: a spectrum determines nearly all of them."""
+        return float(len(self.nuisances(at)))
+
+    def at_model(self, at: Any) -> float:
+        """1: the noise of a spectrum does not depend on the model."""
+        return 1.0
+
+    def jacobian(self, at: Local) -> np.ndarray:
+        """Weighted ∂ model / ∂ parameter, then by each coefficient of scale and offset in units of its prior,
+        (points, parameters and coefficients)."""
+        keep = slice(self.points)
+        signal, weight = np.asarray(at.signal)[keep], np.asarray(self.data.weight)[keep, None]
+        steep = np.asarray(at.gain)[keep, None] * np.asarray(at.slope)[keep]
+        flat = [c.basis * (signal if c.on_signal else 1.0) * c.prior_sd for c in self.nuisances(at)]
+        return weight * np.column_stack([steep, *flat])
+
+    def sweeps(self) -> list[np.ndarray]:
+        """Positions of the rows of each sweep."""
+        light, rows = self.scene.light, slice(self.rows)
+        angle: Any = 0.0 if is_free(light.angle) else light.angle  # a free one is the same for all
+        azimuth: Any = 0.0 if light.azimuth is None else light.azimuth
+        shape = np.shape(light.wavelength)
+        return sweeps(
+            np.asarray(light.wavelength)[rows],
+            *(np.broadcast_to(x, shape)[rows] for x in (angle, azimuth)),
+        )
+
+    def correlation_length(self, residuals: np.ndarray) -> float:
+        """Number of points of one channel whose residuals count as one: see `correlation_in_sweeps`."""
+        return correlation_in_sweeps(residuals[:, : self.measured_channels], self.sweeps())
+
+    def reweighted(self, factor: Any, fraction: float) -> SpectrumView:
+        """Weights times `factor` (a number, (channels,) or (rows, channels)), each point for `fraction` of
+        one."""
+        whole = np.ones(len(self.data.weight))
+        whole[: self.points] = np.broadcast_to(factor, (self.rows, self.channels)).reshape(-1)
+        most = 1 / DRIFT_CORRELATION if self.noise.drifting else 1.0
+        data = self.data._replace(
+            weight=self.data.weight * whole, independent_fraction=np.float64(min(fraction, most))
+        )
+        return replace(self, data=data)
+
+    def counting(self, fraction: float) -> SpectrumView:
+        """The view with each point counting for `fraction` of an independent one."""
+        return replace(self, data=self.data._replace(independent_fraction=np.float64(fraction)))
+
+    def thinned(self) -> SpectrumView:
+        """Every so-many-th wavelength, at most about `SCAN_POINTS`, with the weight of those left out."""
+        stride = -(-self.rows // SCAN_POINTS)
+        if stride <= 1:
+            return self
+        size, channels = len(self.scene.light.wavelength), self.channels
+        chosen = np.arange(0, self.rows, stride)
+        padding = -len(chosen) % ROUND
+        scene, data = self._taken(np.concatenate([chosen, np.full(padding, size - 1)]))
+        real = np.repeat(np.concatenate([np.ones(len(chosen)), np.zeros(padding)]), channels)
+        data = data._replace(
+            weight=data.weight * real, independent_fraction=data.independent_fraction * stride
+        )
+        return replace(self, scene=scene, data=data, points=len(chosen) * channels)
+
+    def unpadded(self) -> SpectrumView:
+        """The view without the points that make its length round."""
+        scene, data = self._taken(np.arange(self.rows))
+        return replace(self, scene=scene, data=data)
+
+    def _taken(self, take: np.ndarray) -> tuple[Scene, Data]:
+        """The arrays at the wavelengths of positions `take`."""
+        size, channels = len(self.scene.light.wavelength), self.channels
+
+        def pick(x):
+            if np.ndim(x) not in (1, 3) or len(x) not in (size, size * channels):
+                return x
+            taken = x.reshape(size, -1)[take]
+            return taken.reshape(-1) if np.ndim(x) == 1 else taken.reshape(-1, *x.shape[1:])
+
+        return jax.tree_util.tree_map(pick, (self.scene, self.data))
+
+    def off_tolerance(self, values: np.ndarray) -> float:
+        """Error of the view's plan at `values`, in the unit of its signal."""
+        if not self.plan.tolerance:
+            return 0.0
+        at = np.asarray(values)[None]
+        planned, whole = (signals(p, self.scene, at, build) for p in (self.plan, full_plan(self.scene)))
+        return largest_difference(planned, whole, self.plan.signal)
+
+    def in_columns(self, values: Any) -> np.ndarray:
+        """Data values or a model of them (..., data values) as signals, or as N, C and S, without padding,
+        (..., rows, channels). A depolarisation is the last channel."""
+        values = np.asarray(values)[..., : self.points]
+        columns = values.reshape(*values.shape[:-1], self.rows, self.channels)
+        if self.data.frame is None:
+            return columns
+        return np.einsum("pij,...pi->...pj", np.asarray(self.data.frame)[: self.rows], columns)
+
+    def rms(self, model: Any) -> float:
+        """rms of the residuals. For Ψ and Δ it is in degrees of Ψ: half the distance on the sphere, in each
+        of its two directions."""
+        if self.channels == 1 or self.elements:
+            return float(np.sqrt(np.mean((self.data.values - np.asarray(model))[: self.points] ** 2)))
+        residual = self.in_columns(self.data.values - np.asarray(model))
+        residual = residual if self.depolarisation is None else residual[:, :-1]
+        directions = 2 * self.rows * max(len(self.ratios), 1)
+        return float(np.rad2deg(np.sqrt(np.sum(residual**2) / directions)) / 2)

@@ -1,1 +1,0 @@
-"""Fits of layer stacks to reflectance, transmittance and ellipsometry spectra."""

@@ -1,0 +1,192 @@
+"""Fits of colours against films simulated with tmm."""
+
+import jax
+import numpy as np
+import pytest
+import tmm
+
+import pellicle as pl
+from pellicle.colour import sensor
+from pellicle.colour.encoding import camera_encoding, encoding
+from pellicle.data.colours import CameraMatrix, Colours
+from pellicle.errors import DataError, UsageError
+from pellicle.fitting.film.colour_targets import measured_colours
+from pellicle.fitting.film.problem import make
+
+EYE = sensor("1931", "D65")
+NM = EYE.wavelength[::5]
+SENSOR = NM, EYE.weights[::5] / EYE.weights[::5, 1].sum()
+ANGLES = np.array([0.0, 40.0, 60.0])
+EXACT = pl.Uncertainty.none()
+SIGMA = 1.5 / 255
+
+
+def scene(scale=1.0, thickness=(50.0, 700.0)):
+    return pl.Scene(
+        pl.Layer(1.46, pl.Free(*thickness)), 3.9, instrument=pl.Instrument(scale=scale), uncertainty=EXACT
+    )
+
+
+def xyz(thickness, angles=ANGLES):
+    """Colours of a film of 1.46 on 3.9 by tmm, (angles, 3)."""
+    rows = []
+    for angle in np.deg2rad(angles):
+        both = [
+            [tmm.coh_tmm(p, [1, 1.46, 3.9], [np.inf, thickness, np.inf], angle, x)["R"] for x in NM]
+            for p in "sp"
+        ]
+        rows.append(np.mean(both, axis=0) @ SENSOR[1])
+    return np.array(rows)
+
+
+def colours(thickness, code=None, angles=ANGLES, exposure=1.0, seed=0, sigma=SIGMA, **words):
+    """The film's colours with noise, in a space that is sRGB by default."""
+    code = code or encoding("srgb", SENSOR[1].sum(axis=0))
+    channels = exposure * code.channels(xyz(thickness, angles))
+    values = code.encode(channels, code.roots(channels))
+    values = values + sigma * np.random.default_rng(seed).standard_normal(values.shape)
+    values = np.clip(values, 0, 1) if code.clips else values
+    noise = np.full(values.shape, sigma)
+    return Colours(values, SENSOR, **{"angle": angles, "sigma": noise, **words})
+
+
+@pytest.mark.parametrize(("space", "sigma"), [("srgb", SIGMA), ("lab", 0.5), ("xyz", 0.003)])
+def test_three_angles_determine_the_thickness(space, sigma):
+    data = colours(432.0, encoding(space, SENSOR[1].sum(axis=0)), sigma=sigma, space=space)
+    fit = pl.fit(data, scene())
+    assert fit.status == "converged"
+    assert abs(fit["thickness"].value - 432.0) < 3 * fit["thickness"].stderr < 10.0
+    assert fit.probability > 0.999
+    # ΔE*ab by the standard's own formula
+    if space == "lab":
+        apart = np.linalg.norm(fit.model - data.values, axis=1)
+        np.testing.assert_allclose(fit.parts[0].curve.difference, apart, atol=1e-9)
+
+
+def test_one_colour_of_unknown_exposure_has_several_thicknesses():
+    data = colours(432.0, angles=ANGLES[:1])
+    fit = pl.fit(data, scene("free"))
+    orders = [(fit["thickness"].value, fit.probability)]
+    orders += [(rival.parameters["thickness"], rival.probability) for rival in fit.rivals]
+    assert fit.status == "ambiguous"
+    assert min(abs(nm - 432.0) for nm, share in orders if share > 0.01) < 10.0
+    assert sum(share for _, share in orders) == pytest.approx(1.0)
+    # the posterior on a grid; the prior of the exposure is uniform in its logarithm
+    grid, gains = np.arange(50.0, 700.0, 2.0), np.geomspace(0.5, 2.0, 801)
+    r01, r12 = (1 - 1.46) / (1 + 1.46), (1.46 - 3.9) / (1.46 + 3.9)
+    phase = np.exp(4j * np.pi * 1.46 * grid[:, None] / NM)
+    seen = np.abs((r01 + r12 * phase) / (1 + r01 * r12 * phase)) ** 2 @ SENSOR[1]
+    np.testing.assert_allclose(seen[125], xyz(300.0, ANGLES[:1])[0], rtol=1e-9)
+    code = encoding("srgb", SENSOR[1].sum(axis=0))
+    density = np.empty(len(grid))
+    for i, colour in enumerate(seen):
+        channels = gains[:, None] * code.channels(colour)
+        shown = code.encode(channels, code.roots(channels))
+        chi2 = np.sum(((shown - data.values) / SIGMA) ** 2, axis=1)
+        density[i] = np.trapezoid(np.exp(-chi2 / 2), np.log(gains))
+    for nm, share in orders:
+        if share > 0.01:
+            own = density[np.abs(grid - nm) < 40].sum() / density.sum()
+            assert own == pytest.approx(share, abs=0.1)
+
+
+@pytest.mark.slow  # compiles a scene of its own
+def test_a_camera_with_free_white_balance():
+    gains = np.array([0.8, 1.0, 1.3])
+    code = camera_encoding(2.2)._replace(linear=np.diag(1 / SENSOR[1].sum(axis=0)))
+    channels = 0.6 * gains * code.channels(xyz(300.0))
+    values = code.encode(channels, code.roots(channels))
+    fit = pl.fit(Colours(values, SENSOR, "rgb", angle=ANGLES, gamma=2.2, white_balance="free"), scene(1.0))
+    assert fit["thickness"].value == pytest.approx(300.0, abs=0.05)
+    found = [fit[f"instrument.white_balance_{letter}"].value for letter in "RGB"]
+    np.testing.assert_allclose(found, 0.6 * gains, rtol=1e-3)
+
+
+@pytest.mark.slow  # several fits of a chart; cameras are tested in tests/data and tests/recipes
+def test_a_chart_says_what_an_unknown_camera_sees():
+    matrix = np.array([[0.6, 0.2, 0.1], [-0.2, 1.0, 0.1], [0.05, -0.1, 0.9]])
+    values = xyz(300.0) @ matrix.T
+    known = CameraMatrix(matrix, 1e-6 * np.eye(9))
+    sigma = np.full((3, 3), 1e-3)
+    by_chart = pl.fit(Colours(values, SENSOR, "rgb", angle=ANGLES, sigma=sigma, camera=known), scene())
+    exact = known._replace(covariance=np.zeros((9, 9)))
+    alone = pl.fit(Colours(values, SENSOR, "rgb", angle=ANGLES, sigma=sigma, camera=exact), scene())
+    assert by_chart["thickness"].value == pytest.approx(300.0, abs=0.05)
+    # the error of the chart adds to that of the colours
+    assert by_chart["thickness"].stderr > 1.02 * alone["thickness"].stderr
+    # nine modes of a matrix that is nearly known do not use up nine values
+    off = values + 2e-3 * np.array([[1, -1, 1], [-1, 1, -1], [1, 1, -1]])
+    one, other = (
+        pl.fit(Colours(off, SENSOR, "rgb", angle=ANGLES, sigma=sigma, camera=camera), scene()).chi2_reduced
+        for camera in (known, exact)
+    )
+    assert one == pytest.approx(other, rel=0.3)
+
+
+def test_clipped_channels_are_limits():
+    bright = colours(300.0, exposure=3.0)
+    assert np.any(bright.values == 1.0)
+    fit = pl.fit(bright, scene("free"))
+    assert fit["thickness"].value == pytest.approx(300.0, abs=3 * fit["thickness"].stderr)
+    assert fit["instrument.scale"].value == pytest.approx(3.0, rel=0.02)
+
+
+@pytest.mark.slow  # two kinds of data, and each alone
+def test_a_joint_fit_with_a_spectrum_narrows_both():
+    nm = np.linspace(500.0, 700.0, 41)
+    values = [tmm.coh_tmm("s", [1, 1.46, 3.9], [np.inf, 432.0, np.inf], 0.0, x)["R"] for x in nm]
+    noise = 0.01 * np.random.default_rng(1).standard_normal(nm.size)
+    spectrum = pl.Spectrum(nm, np.array(values) + noise, "R", sigma=np.full(nm.size, 0.01))
+    parts = colours(432.0), spectrum
+    alone = [pl.fit(part, scene())["thickness"].stderr for part in parts]
+    both = pl.fit(list(parts), scene())
+    weights = sum(1 / error**2 for error in alone)
+    assert [part.name for part in both.parts] == ["srgb", "R"]
+    assert both["thickness"].value == pytest.approx(432.0, abs=3 * both["thickness"].stderr)
+    assert both["thickness"].stderr == pytest.approx(weights**-0.5, rel=0.25)
+
+
+def test_the_jacobian_is_that_of_finite_differences():
+    data = colours(300.0, exposure=0.8)
+    step = 1e-3
+    with jax.enable_x64(True):
+        (view,) = make(measured_colours(data, scene("free"))).views
+        at, above, below = (view.local(np.array([320.0 + change])) for change in (0.0, step, -step))
+        rows = view.jacobian(at)
+
+    def weighted(local):  # with the exposure where it was
+        exposed = at.exposure * at.coefficients[0] * local.colours @ view.data.response.channels.T
+        return np.einsum("pij,pj->pi", view.data.frame, exposed).ravel()
+
+    np.testing.assert_allclose(rows[:, 0], (weighted(above) - weighted(below)) / (2 * step), rtol=1e-5)
+    (scale,) = view.nuisances(at)
+    np.testing.assert_allclose(rows[:, 1] * scale.value / scale.prior_sd, weighted(at), rtol=1e-9)
+
+
+def test_different_colours_at_one_angle_are_refused():
+    values = np.array([[0.5, 0.4, 0.3], [0.3, 0.4, 0.5]])
+    with pytest.raises(DataError, match=r"2 colours of one film at one angle .* a column angle_deg"):
+        pl.fit(Colours(values, SENSOR), scene())
+
+
+def test_an_ignored_column_is_named_where_the_angles_are_missing(tmp_path):
+    path = tmp_path / "film.csv"
+    path.write_text("Winkel,R,G,B\n0,0.5,0.4,0.3\n60,0.3,0.4,0.5\n")
+    with pytest.raises(DataError, match=r"deviations \(ignored: Winkel\): .* a column angle_deg"):
+        pl.fit(pl.read_colours(path), scene())
+
+
+@pytest.mark.parametrize(
+    ("own", "message"),
+    [
+        ({"instrument": pl.Instrument(scale="slow")}, "a colour has one scale"),
+        ({"instrument": pl.Instrument(offset="free")}, "a colour has no offset"),
+        ({"light": pl.Light(angle=pl.Free(0, 60))}, "several angles of incidence"),
+        ({"light": pl.Light(angle=20.0)}, "contradict `angle=20`"),
+    ],
+)
+def test_refusals(own, message):
+    layer = pl.Layer(1.46, pl.Free(50, 700))
+    values = np.full((3, 3), 0.5)
+    with pytest.raises(UsageError, match=message):
+        pl.fit(Colours(values, SENSOR, angle=ANGLES), pl.Scene(layer, 3.9, **own))

@@ -1,0 +1,290 @@
+"""Several spectra of one sample, fitted together."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import tmm
+from scipy.optimize import least_squares
+
+import pellicle as pl
+from pellicle.dispersion.empirical import CauchyUrbach
+from pellicle.errors import UsageError
+from pellicle.fitting.evaluation import deviances, total_deviance
+from pellicle.fitting.film.fit import labels, measurements
+from pellicle.fitting.film.problem import make
+from pellicle.fitting.film.targets import measured
+from pellicle.reporting.fit_figure import draw
+from pellicle.reporting.fit_text import report
+from pellicle.reporting.json_record import to_json
+
+WAVELENGTH = np.linspace(400.0, 900.0, 60)
+GLASS = 1.52
+SIZE = np.array([100.0, 1.0, 1e4, 1.0, 1.0])
+"""What thickness, A, B and the scales of R and T are measured in."""
+TRUTH = np.array([150.0, 2.0, 2e4, 1.1, 0.9])
+NOISE = {"R": 0.002, "T": 0.001, "psi": 0.05, "delta": 0.1}
+FREE = (pl.Free(20, 600), pl.Free(1.6, 2.6), pl.Free(0, 5e4))
+
+
+def films(thickness, a, b, scale_r, scale_t) -> dict[str, np.ndarray]:
+    """Scaled R and T at 0°, Ψ and Δ at 70°, of a Cauchy film on glass, by the package tmm (S. J. Byrnes,
+    arXiv:1603.02720); its Δ is counted from −180° and with the other sign."""
+    found = {name: [] for name in NOISE}
+    for nm in WAVELENGTH:
+        stack = [1, a + b / nm**2, GLASS], [np.inf, thickness, np.inf]
+        straight = tmm.coh_tmm("s", *stack, 0, nm)
+        oblique = tmm.ellips(*stack, np.deg2rad(70.0), nm)
+        found["R"].append(scale_r * straight["R"])
+        found["T"].append(scale_t * straight["T"])
+        found["psi"].append(np.rad2deg(oblique["psi"]))
+        found["delta"].append(180.0 - np.rad2deg(oblique["Delta"]))
+    return {name: np.array(column) for name, column in found.items()}
+
+
+@pytest.fixture(scope="module")
+def spectra() -> list[pl.Spectrum]:
+    """R and T of unknown scales, and Ψ and Δ, of one film, each with its own noise."""
+    rng = np.random.default_rng(1)
+    clean = films(*TRUTH)
+    seen = {name: clean[name] + rng.normal(0, sd, 60) for name, sd in NOISE.items()}
+    sigma = {name: np.full(60, sd) for name, sd in NOISE.items()}
+    light = [pl.Spectrum(WAVELENGTH, seen[x], x, sigma=sigma[x], path=f"film_{x}.csv") for x in "RT"]
+    ellipsometric = pl.Spectrum(
+        WAVELENGTH,
+        seen["psi"],
+        "psi-delta",
+        sigma=sigma["psi"],
+        angle=np.full(60, 70.0),
+        delta=seen["delta"] % 360,
+        delta_sigma=sigma["delta"],
+        path="angles.csv",
+    )
+    return [*light, ellipsometric]
+
+
+@pytest.fixture(scope="module")
+def together(spectra) -> pl.Fit:
+    layer = pl.Layer(pl.dispersion.Cauchy(FREE[1], FREE[2]), FREE[0])
+    return pl.fit(spectra, pl.Scene(layer, GLASS, instrument=pl.Instrument(scale="free")))
+
+
+@pytest.mark.slow
+def test_reflectance_transmittance_and_ellipsometry_as_an_independent_fit(together, spectra):
+    """The same minimum and errors as scipy's least squares of tmm's films, started at the truth."""
+    angles = spectra[2]
+
+    def residual(scaled):
+        film = films(*(scaled * SIZE))
+        missed = [(s.values - film[s.signal]) / s.sigma for s in spectra[:2]]
+        missed.append((angles.values - film["psi"]) / angles.sigma)
+        turned = (angles.delta - film["delta"] + 180.0) % 360.0 - 180.0
+        return np.concatenate([*missed, turned / angles.delta_sigma])
+
+    found = least_squares(residual, TRUTH / SIZE, xtol=1e-12, ftol=1e-12)
+    stderr = np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac))) * SIZE
+    assert together.status == "converged"
+    scales = ["instrument.scale.film_R", "instrument.scale.film_T"]
+    assert [p.name for p in together.free] == ["thickness", "A", "B", *scales]
+    for estimate, value, error, truth in zip(together.free, found.x * SIZE, stderr, TRUTH, strict=True):
+        # on the sphere an error of Δ is a chord, and each measured point's own sin 2Ψ is its weight
+        assert abs(estimate.value - value) < 3e-2 * error
+        assert estimate.stderr_noise == pytest.approx(error, rel=1e-2)
+        assert abs(estimate.value - truth) < 4 * error
+    # Ψ and Δ of 60 points are 120 numbers; the sphere's curvature shows in the fourth digit
+    assert together.chi2_reduced == pytest.approx(2 * found.cost / (240 - 5), rel=1e-3)
+
+
+@pytest.mark.slow
+def test_a_part_for_each_spectrum(together, spectra):
+    assert [part.name for part in together.parts] == ["film_R", "film_T", "angles"]
+    for part, spectrum in zip(together.parts, spectra, strict=True):
+        assert part.plan.signal == spectrum.signal
+    for part, spectrum in list(zip(together.parts, spectra, strict=True))[:2]:
+        assert part.rms == pytest.approx(np.sqrt(np.mean((spectrum.values - part.curve.model) ** 2)))
+    assert together.rms is None  # fractions and degrees have none in common
+    with pytest.raises(ValueError, match="joint fit of 3 "):
+        together.curve  # noqa: B018
+
+
+OXIDE = pl.Scene(pl.Layer("SiO2", pl.Free(10, 400)), "Si")
+ARRAYS = ("wavelength", "values", "sigma")
+
+
+def oxide(thickness: float = 100.0) -> pl.Spectrum:
+    values = np.asarray(pl.reflectance(WAVELENGTH, thickness, "SiO2", "Si"))
+    noise = np.random.default_rng(2).normal(0, 0.002, 60)
+    return pl.Spectrum(WAVELENGTH, values + noise, "R", sigma=np.full(60, 0.002), path=f"{thickness:g}nm.csv")
+
+
+def test_a_file_in_two_is_the_whole_file():
+    """Every other wavelength apart, with a σ that both know.
+
+    The minimum may move by a little of its error: each half counts the correlation of its own residuals.
+    """
+    whole = oxide()
+    halves = [
+        replace(whole, **{name: getattr(whole, name)[first::2] for name in ARRAYS}, path=f"{first}.csv")
+        for first in (0, 1)
+    ]
+    one, two = pl.fit(whole, OXIDE), pl.fit(halves, OXIDE)
+    assert abs(two["thickness"].value - one["thickness"].value) < 0.02 * one["thickness"].stderr_noise
+    assert two["thickness"].stderr_noise == pytest.approx(one["thickness"].stderr_noise, rel=1e-4)
+    assert two.chi2_reduced == pytest.approx(one.chi2_reduced, rel=1e-4)
+    assert two.rms == pytest.approx(one.rms, rel=1e-4)
+    assert two.status == one.status
+
+
+def test_a_list_of_one_is_the_spectrum_with_a_name():
+    one, listed = pl.fit(oxide(), OXIDE), pl.fit([oxide()], OXIDE)
+    assert (one.joint, listed.joint) == (False, True)
+    assert listed.parts[0].name == "100nm"
+    assert listed["thickness"] == one["thickness"]
+
+
+def test_of_one_scene_ellipsometry_leaves_out_the_scale(spectra):
+    """And alone it is refused: a scale was asked for that it cannot have."""
+    scene = pl.Scene(OXIDE.layers, "Si", instrument=pl.Instrument(scale="free", offset=0.01, bandwidth=2.0))
+    found = measurements(spectra, scene)
+    scaled = [(m.scene.instrument.scale, m.scene.instrument.offset) for m in found]
+    assert scaled == [(scene.instrument.scale, 0.01)] * 2 + [(1.0, 0.0)]
+    assert [m.scene.instrument.bandwidth for m in found] == [2.0] * 3
+    with pytest.raises(UsageError, match="no scale and no offset"):
+        pl.fit(spectra[2], scene)
+
+
+def test_a_misfit_names_the_file():
+    right, wrong = oxide(100.0), oxide(130.0)
+    found = pl.fit([right, replace(wrong, sigma=np.full(60, 0.02))], OXIDE)
+    assert found.status == "misfit"
+    assert found.parts[1].name in found.verdict
+    assert found.parts[0].name not in found.verdict
+
+
+def test_a_spectrum_of_another_sample_is_not_given_up_in_silence():
+    """Without σ its noise would grow with its residuals until it counts for nothing."""
+    found = pl.fit([replace(oxide(thickness), sigma=None) for thickness in (100.0, 130.0)], OXIDE)
+    assert found.status == "misfit"
+
+
+def test_layers_are_shared_and_the_instrument_is_each_spectrums_own():
+    """A prior of what is shared counts once."""
+    width = pl.Free(0, 20, prior=pl.priors.Normal(5.0, 1.0))
+    thickness = pl.Free(10, 400, prior=pl.priors.Normal(100.0, 2.0))
+    scene = pl.Scene(pl.Layer(1.46, thickness), "Si", instrument=pl.Instrument(bandwidth=width))
+    problem = make(*(measured(oxide(), scene, name) for name in "ab"))
+    names = [p.name for p in problem.parameters]
+    assert names == ["thickness", "instrument.bandwidth.a", "instrument.bandwidth.b"]
+    assert [view.takes for view in problem.views] == [(0, 1), (0, 2)]
+    assert problem.box.prior_weight.tolist() == [0.5, 1.0, 1.0]
+    values = np.array([[105.0, 4.0, 8.0]])
+    own = [
+        deviances(view.form, view.arrays, problem.seen_by(view, values)).value[0] for view in problem.views
+    ]
+    [together] = total_deviance(
+        problem, (values - problem.box.lower) / (problem.box.upper - problem.box.lower)
+    )
+    assert together - sum(own) == pytest.approx(2.5**2 + 1.0**2 + 3.0**2, rel=1e-9)
+
+
+def test_what_tells_spectra_apart():
+    r = pl.Spectrum(WAVELENGTH, np.full(60, 0.1), "R", path="a/film.v2.csv")
+    t = replace(r, signal="T")
+    assert labels([r]) == ["film_v2"]
+    assert labels([r, replace(t, path="b.csv")]) == ["film_v2", "b"]
+    assert labels([r, t]) == ["film_v2-R", "film_v2-T"]
+    assert labels([r, r]) == ["film_v2-1", "film_v2-2"]
+    assert labels([replace(r, path=""), replace(t, path="")]) == ["R", "T"]
+    assert "thickness" not in labels([r, replace(t, path="thickness.csv")])
+
+
+@pytest.mark.parametrize(
+    ("spectra", "scenes", "said"),
+    [
+        ([], OXIDE, "no spectrum"),
+        ([oxide(), oxide()], [OXIDE], "2 spectra need as many scenes"),
+        ([oxide(), oxide()], [OXIDE, pl.Scene(pl.Layer("SiO2", 1.0), "Si")], "same layers"),
+        ([oxide(), oxide()], [OXIDE, pl.Scene(OXIDE.layers, "BK7")], "same layers, ambient and substrate"),
+    ],
+)
+def test_what_is_no_joint_fit(spectra, scenes, said):
+    with pytest.raises(UsageError, match=said):
+        pl.fit(spectra, scenes)
+
+
+@pytest.mark.slow
+def test_an_absorbing_film_on_a_plate_from_both_its_faces():
+    """R and T of what a user has: an absorbing film on a glass plate, against tmm's incoherent plate."""
+    rng, energy = np.random.default_rng(1), 1239.841984 / WAVELENGTH
+    index = 2.0 + 2e4 / WAVELENGTH**2 + 0.1j * np.exp((energy - 2.5) / 0.3)
+    stack, kinds = [np.inf, 150.0, 1e6, np.inf], ["i", "c", "i", "i"]
+    seen = [
+        tmm.inc_tmm("s", [1, n, GLASS, 1], stack, kinds, 0, nm)
+        for n, nm in zip(index, WAVELENGTH, strict=True)
+    ]
+    measured = [
+        pl.Spectrum(
+            WAVELENGTH,
+            np.array([at[x] for at in seen]) + rng.normal(0, NOISE[x], 60),
+            x,
+            sigma=np.full(60, NOISE[x]),
+            path=f"{x}.csv",
+        )
+        for x in "RT"
+    ]
+    k0, width = pl.Free(0, 1), pl.Free(0.1, 1)
+    film = CauchyUrbach(FREE[1], FREE[2], 0.0, k0, width, 2.5)
+    found = pl.fit(measured, pl.Scene(pl.Layer(film, FREE[0]), pl.Substrate(GLASS, "air")))
+    assert found.status == "converged"
+    assert "The back face matters" in found.verdict
+    for name, truth in (("thickness", 150.0), ("A", 2.0), ("B", 2e4), ("k0", 0.1), ("Eu", 0.3)):
+        assert abs(found[name].value - truth) < 4 * found[name].stderr
+
+
+@pytest.fixture(scope="module")
+def polarised() -> str:
+    """Ψ, Δ, R_p and R_s at 70° of one film in one table, as ellipsometers with a photometer write it."""
+    rng, rows = np.random.default_rng(3), []
+    for nm in WAVELENGTH:
+        stack = [1, 2.0 + 2e4 / nm**2, GLASS], [np.inf, 150.0, np.inf], np.deg2rad(70.0), nm
+        p, s = (tmm.coh_tmm(x, *stack)["R"] + rng.normal(0, 0.002) for x in "ps")
+        angles = tmm.ellips(*stack)
+        psi = np.rad2deg(angles["psi"]) + rng.normal(0, 0.05)
+        delta = (180.0 - np.rad2deg(angles["Delta"]) + rng.normal(0, 0.1)) % 360
+        rows.append(f"{nm:.10g},70,{psi:.8g},{delta:.8g},{p:.8g},{s:.8g}")
+    return "wavelength_nm,angle_deg,psi_deg,delta_deg,Rp,Rs\n" + "\n".join(rows) + "\n"
+
+
+@pytest.mark.slow  # a joint fit of a scene of its own
+def test_ellipsometry_with_both_polarised_reflectances(polarised, write):
+    """One scene for all: each spectrum brings its signal and its polarisation."""
+    spectra = pl.read_spectra(write(polarised))
+    assert [(s.name, s.signal, s.polarisation) for s in spectra] == [
+        ("psi-delta", "psi-delta", "unpolarised"),
+        ("Rp", "R", "p"),
+        ("Rs", "R", "s"),
+    ]
+    layer = pl.Layer(pl.dispersion.Cauchy(FREE[1], FREE[2]), FREE[0])
+    fit = pl.fit(spectra, pl.Scene(layer, GLASS))
+    assert fit.status == "converged"
+    for name, truth in (("thickness", 150.0), ("A", 2.0), ("B", 2e4)):
+        # σ comes from the residuals of each
+        assert abs(fit[name].value - truth) < 4 * fit[name].stderr_noise
+    assert [part.name for part in fit.parts] == ["film-psi-delta", "film-Rp", "film-Rs"]
+    assert [(part.plan.signal, part.plan.polarisation) for part in fit.parts] == [
+        ("psi-delta", "unpolarised"),
+        ("R", "p"),
+        ("R", "s"),
+    ]
+    for part in fit.parts[1:]:
+        assert part.rms == pytest.approx(0.002, rel=0.3)
+    text = " ".join(report(fit).split())
+    for name in ("psi-delta", "Rp", "Rs"):
+        assert f"film.csv [{name}]" in text
+    assert [one["spectrum"] for one in to_json(fit)["data"]] == ["psi-delta", "Rp", "Rs"]
+    figure = draw(fit)
+    assert "film.csv [psi-delta, Rp, Rs]: converged" in figure.get_suptitle()
+    titles = [axes.get_title(loc="left") for axes in figure.axes]
+    assert [title for title in titles if title] == ["film-psi-delta", "film-Rp", "film-Rs"]

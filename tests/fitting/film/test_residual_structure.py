@@ -1,0 +1,63 @@
+"""Where a model misses something: bumps whose place is known, and noise that has none."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import pellicle as pl
+from pellicle.fitting.film.residual_structure import windows
+
+
+def test_noise_has_no_structure():
+    """One spectrum of a hundred may be said to have some."""
+    random = np.random.default_rng(5)
+    assert sum(bool(windows(random.normal(size=200))) for _ in range(300)) <= 8
+
+
+def test_noise_of_many_curves_has_no_structure():
+    """Of 40 views with 18 curves, at three azimuths of three ratios, fewer than one are to have some."""
+    random = np.random.default_rng(11)
+    views = [[windows(random.normal(size=81), 18) for _ in range(18)] for _ in range(40)]
+    assert sum(any(view) for view in views) <= 1
+
+
+@pytest.mark.parametrize(("first", "last", "height"), [(40, 59, 2.0), (100, 139, -1.5), (10, 14, 4.0)])
+def test_a_step_is_found_where_it_is(first, last, height):
+    z = np.random.default_rng(6).normal(size=200)
+    z[first : last + 1] += height
+    [found] = windows(z)
+    assert abs(found.first - first) <= 6
+    assert abs(found.last - last) <= 6
+
+
+def test_an_outlier_is_no_structure():
+    z = np.random.default_rng(7).normal(size=200)
+    z[77] = 60.0
+    assert windows(z) == []
+
+
+@pytest.mark.parametrize("sigma", [True, False])
+def test_a_fit_says_where(film, measured, sigma):
+    scene = film(material=pl.dispersion.Constant(pl.Free(1.3, 1.7)))
+    data = measured(scene, 1.46, 430.0, sigma=sigma)
+    bump = 0.012 * np.exp(-(((data.wavelength - 500) / 15) ** 2))
+    fit = pl.fit(dataclasses.replace(data, values=data.values + bump), scene)
+    [told] = [warning for warning in fit.warnings if "misses structure" in warning]
+    low, high = (float(x) for x in told.split("at ")[1].split(" nm")[0].split("-"))
+    assert 470 <= low <= 500 <= high <= 530
+    assert not any("misses structure" in warning for warning in pl.fit(data, scene).warnings)
+
+
+def test_a_band_that_is_no_films_enlarges_the_error(film, measured):
+    """It moves the answer by less than the error that it causes; a wrong index is a misfit."""
+    data = measured(film(), 430.0, sigma=True)
+    band = 0.04 * np.exp(-(((data.wavelength - 700) / 8) ** 2))
+    plain, fit = pl.fit(data, film()), pl.fit(dataclasses.replace(data, values=data.values + band), film())
+    assert fit.status == "converged"
+    thickness = fit["thickness"]
+    assert 3 * plain["thickness"].stderr_noise < abs(thickness.value - 430.0) < 2 * thickness.stderr
+    wrong = pl.fit(data, film(material=1.6))
+    assert wrong.status == "misfit"
+    assert "usual errors of instruments and samples would. Its thickness" in wrong.verdict
+    assert any("structure over most of the spectrum (by 0.0" in warning for warning in wrong.warnings)
