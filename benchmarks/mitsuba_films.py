@@ -3,7 +3,7 @@
 Run `python benchmarks/mitsuba_films.py`. The first table has the ΔE2000 of what Mitsuba evaluates near the
 mirror direction at 0 to 80 degrees, from the film's spectrum integrated in steps of 1 nm (CIE 1931, D65); in
 RGB the exact colour is clipped to positive sRGB, as the tables are. The second table has the processor time
-of a picture relative to the built-in `roughconductor`, the least of five rounds in which the materials take
+of a rendering relative to the built-in `roughconductor`, the least of five rounds in which the materials take
 turns. Variants of Mitsuba that need LLVM are left out where Dr.Jit does not find it.
 """
 
@@ -88,7 +88,7 @@ def evaluated(bsdf: Any, i: np.ndarray, o: np.ndarray, wavelengths: Any = None) 
     return np.ravel(bsdf.eval(mi.BSDFContext(), at, mi.Vector3f(*o.tolist())))
 
 
-def picture(material: dict[str, Any]) -> Any:
+def rendering(material: dict[str, Any]) -> Any:
     """A sphere on a table in white light."""
     t = mi.ScalarTransform4f
     return mi.load_dict(
@@ -114,9 +114,9 @@ def times(variant: str, files: dict[str, Path]) -> dict[str, float]:
     register(files["pellicle_film.py"])
     table = "film_spectral.bsdf" if mi.is_spectral else "film.bsdf"
     scenes = {
-        "roughconductor": picture({"type": "roughconductor", "distribution": "ggx", "alpha": ALPHA}),
-        "lookup": picture({"type": "pellicle_film", "filename": str(files["film.npz"]), "alpha": ALPHA}),
-        "measured": picture({"type": "measured", "filename": str(files[table])}),
+        "roughconductor": rendering({"type": "roughconductor", "distribution": "ggx", "alpha": ALPHA}),
+        "lookup": rendering({"type": "pellicle_film", "filename": str(files["film.npz"]), "alpha": ALPHA}),
+        "measured": rendering({"type": "measured", "filename": str(files[table])}),
     }
     samples = SAMPLES if variant.startswith("llvm") else 4
     taken: dict[str, list[float]] = {name: [] for name in scenes}

@@ -24,12 +24,12 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import pellicle as pl
-from pellicle.reporting.picture import display
+from pellicle.reporting.rendering_display import display
 from pellicle.synthetic.environment import one_lamp
 from pellicle.synthetic.surface_sphere import in_plane, render
 
 jax.config.update("jax_enable_x64", True)  # double precision; JAX's default is single
-SHORT = os.environ.get("PELLICLE_SHORT") == "1"  # smaller pictures and fewer samples, for a quick run
+SHORT = os.environ.get("PELLICLE_SHORT") == "1"  # smaller renderings and fewer samples, for a quick run
 SIZE = 40 if SHORT else 220  # pixels
 SAMPLES = 100 if SHORT else 200  # pairs of directions
 
@@ -76,11 +76,11 @@ for axes, change in zip(panels.flat, changes, strict=True):
 plt.show()
 
 # %% [markdown]
-# The pictures show a sphere under one soft box at the upper right, in colours of the whole spectrum: the
+# The renderings show a sphere under one soft box at the upper right, in colours of the whole spectrum: the
 # model is evaluated at 32 wavelengths, with its index interpolated between the three. In the upper row only
 # the thickness changes, and with it the colour where the two lobes overlap. In the lower row the tilt
 # increases and separates the lobes: where only one face reflects, the light is white, because interference
-# needs both. In the last picture a smoother lower face has a narrower lobe.
+# needs both. In the last rendering a smoother lower face has a narrower lobe.
 #
 # ## Simulated measurement
 #
@@ -172,12 +172,12 @@ plt.show()
 # Rendered images of the true surface and of the fit, and sixteen times their difference:
 
 # %%
-pictures = [render(each, one_lamp(), size=SIZE) for each in (surface, fitted_surface)]
-difference = pictures[1].linear - pictures[0].linear
+renderings = [render(each, one_lamp(), size=SIZE) for each in (surface, fitted_surface)]
+difference = renderings[1].linear - renderings[0].linear
 figure, panels = plt.subplots(1, 3, figsize=(8, 3))
 for axes, image, title in zip(
     panels,
-    (*map(display, pictures), np.clip(0.5 + 16 * difference, 0, 1)),
+    (*map(display, renderings), np.clip(0.5 + 16 * difference, 0, 1)),
     ("true surface", "fit", "difference × 16, around grey"),
     strict=True,
 ):
@@ -186,7 +186,7 @@ for axes, image, title in zip(
     axes.set_axis_off()
 plt.show()
 
-worst = np.max(np.abs(difference)) / np.max(pictures[0].linear)
+worst = np.max(np.abs(difference)) / np.max(renderings[0].linear)
 print(f"largest difference: {worst:.2%} of the brightest pixel")
 
 # %% [markdown]

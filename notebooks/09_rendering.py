@@ -7,13 +7,13 @@
 # ---
 
 # %% [markdown]
-# # From a fit to a picture
+# # From a fit to a rendering
 #
 # A film is fitted to a spectrum, exported to the renderer Mitsuba 3, and drawn on a sphere. Mitsuba has no
 # model of thin films, so `pellicle export` writes tables of the exact colours. How far from these are the
 # formulas with which other renderers draw such films?
 #
-# The pictures need the package `mitsuba` (`pip install 'pellicle[render]'`); without it they are left out.
+# The renderings need the package `mitsuba` (`pip install 'pellicle[render]'`); without it they are left out.
 
 # %%
 import importlib.util
@@ -32,7 +32,7 @@ from pellicle.rendering import gltf_formula
 from pellicle.rendering.appearance import ANGLES, appearance
 
 jax.config.update("jax_enable_x64", True)  # double precision; JAX's default is single
-SHORT = os.environ.get("PELLICLE_SHORT") == "1"  # smaller pictures, for a quick run
+SHORT = os.environ.get("PELLICLE_SHORT") == "1"  # smaller renderings, for a quick run
 MITSUBA = importlib.util.find_spec("mitsuba") is not None
 FOLDER = Path(tempfile.mkdtemp())
 
@@ -70,7 +70,7 @@ for note in samples.notes:
     print("-", note)
 
 # %% [markdown]
-# ## The picture
+# ## The rendering
 #
 # Left: the tables. Middle: the lookup, whose thickness may vary over the object; here it grows from 5 nm at
 # one pole to 50 nm at the other. Right: the same film by the formula that glTF publishes for its extension
@@ -123,12 +123,12 @@ if MITSUBA:
     nm = np.linspace(*arrays["thickness"], thicknesses)[:, None]
     gltf = gltf_formula.colour(numbers, nm, np.linspace(0, 1, cosines))
     np.savez(FOLDER / "gltf.npz", **(arrays | {"rgb": np.asarray(gltf, np.float32)}))
-    pictures = {"43 nm, tables": sphere({"type": "measured", "filename": str(FOLDER / "steel.bsdf")})}
+    renderings = {"43 nm, tables": sphere({"type": "measured", "filename": str(FOLDER / "steel.bsdf")})}
     for name, table in (("5 to 50 nm, lookup", "steel.npz"), ("5 to 50 nm, glTF's formula", "gltf.npz")):
-        pictures[name] = sphere({"type": "pellicle_film", "filename": str(FOLDER / table), **uneven})
+        renderings[name] = sphere({"type": "pellicle_film", "filename": str(FOLDER / table), **uneven})
     figure, panels = plt.subplots(1, 3, figsize=(9, 3.2))
-    for axes, (name, picture) in zip(panels, pictures.items(), strict=True):
-        axes.imshow(np.asarray(srgb(picture)), origin="upper")
+    for axes, (name, rendering) in zip(panels, renderings.items(), strict=True):
+        axes.imshow(np.asarray(srgb(rendering)), origin="upper")
         axes.set_title(name)
         axes.axis("off")
     plt.show()

@@ -11,17 +11,17 @@ from PIL import Image
 import pellicle as pl
 from pellicle.synthetic.colours import interference_colours
 
-PICTURE = Path(__file__).parents[1] / "docs" / "examples" / "wedge.png"
+PHOTOGRAPH = Path(__file__).parents[1] / "docs" / "examples" / "wedge.png"
 THICKNESS = np.arange(20.0, 241.0)
 
 
 def main() -> None:
-    """Write the picture."""
+    """Write the photograph."""
     scene = pl.Scene(pl.Layer("SiO2", 100.0), "Si")
     colours = np.asarray(interference_colours(scene, THICKNESS, np.zeros(1)).srgb)[0]
     noise = np.random.default_rng(0).normal(0.0, 1 / 255, (24, THICKNESS.size, 3))
     pixels = np.round(255 * np.clip(colours + noise, 0, 1)).astype(np.uint8)
-    Image.fromarray(pixels).save(PICTURE, optimize=True)
+    Image.fromarray(pixels).save(PHOTOGRAPH, optimize=True)
 
 
 if __name__ == "__main__":

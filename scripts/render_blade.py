@@ -1,7 +1,7 @@
 """Render a heat-tinted steel blade by Mitsuba 3: the exact colours of its oxide, and those of glTF's formula.
 
 The oxide is that of `docs/surfaces/tempered_steel.toml`, from 10 nm at the tip to 58 nm at the handle. The
-upper picture is rendered spectrally, with the reflectance of the film at each wavelength; the lower one in
+upper image is rendered spectrally, with the reflectance of the film at each wavelength; the lower one in
 RGB, with the formula that `KHR_materials_iridescence` publishes and the numbers of the film as they are.
 
 python scripts/render_blade.py [--spp 256] [--width 1000]
@@ -238,7 +238,7 @@ def scene(table: Path, width: int, height: int) -> Any:
 
 
 def render(table: Path, variant: str, width: int, height: int, spp: int) -> np.ndarray:
-    """Linear sRGB of the picture, (height, width, 3)."""
+    """Linear sRGB of the rendering, (height, width, 3)."""
     mi.set_variant(variant)
     mitsuba_plugin.register()
     shown = scene(table, width, height)
@@ -264,7 +264,7 @@ def main() -> None:
 
 
 def draw(images: list[np.ndarray], path: Path) -> None:
-    """Both pictures below each other, with the same exposure and the thickness along the edge."""
+    """Both renderings below each other, with the same exposure and the thickness along the edge."""
     height, width, _ = images[0].shape
     figure = Figure(figsize=(width / 100, (2 * height + 6) / 100), dpi=100)
     share = height / (2 * height + 6)

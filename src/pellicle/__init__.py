@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from pellicle.fitting.result import Fit as Fit
     from pellicle.fitting.result import Status as Status
     from pellicle.mapping.map_result import Map as Map
-    from pellicle.mapping.picture import ThicknessMap as ThicknessMap
+    from pellicle.mapping.photograph import ThicknessMap as ThicknessMap
     from pellicle.materials import material as material
     from pellicle.recipes.colours import read_colours as read_colours
     from pellicle.recipes.colours import read_colours_by_film as read_colours_by_film
@@ -93,7 +93,7 @@ _NAMES = {
     "pellicle.data.spectrum": ("Spectrum",),
     "pellicle.data.write_spectrum": ("write_spectrum",),
     "pellicle.mapping.map_result": ("Map",),
-    "pellicle.mapping.picture": ("ThicknessMap",),
+    "pellicle.mapping.photograph": ("ThicknessMap",),
     "pellicle.dispersion.anisotropic": ("Anisotropic",),
     "pellicle.fitting.result": ("Fit", "Status"),
     "pellicle.materials": ("material",),

@@ -60,7 +60,7 @@ def test_a_plan_of_colours_is_that_of_the_spectra_behind_them(pellicle, recipe):
 
 @pytest.fixture
 def photo(tmp_path):
-    """Two films at 0 degrees, in a picture of 8 bits."""
+    """Two films at 0 degrees, in a photograph of 8 bits."""
     scenes = [pl.Scene(pl.Layer(1.46, d), 3.9) for d in (100.0, 200.0)]
     colours = [pl.simulate(scene, space="srgb").values[0] for scene in scenes]
     pixels = np.zeros((20, 40, 3), np.uint8)
@@ -86,10 +86,10 @@ def test_regions_of_a_photo_are_read_as_films(pellicle, photo):
     ("words", "code", "message"),
     [
         (["read", "photo.png"], 3, "give --region x,y,width,height or --points x,y"),
-        (["read", "photo.png", "--region", "1,1,90,9"], 3, "leaves the picture"),
+        (["read", "photo.png", "--region", "1,1,90,9"], 3, "leaves the photograph"),
         (["read", "photo.png", "--region", "1,1,9,9", "--range", "400:700"], 3, "--range: of spectra"),
         (["read", "photo.png", "--region", "1,1,9,9", "--chart", "a.csv"], 3, "--chart goes with"),
-        (["read", "s.csv", "--region", "1,1,9,9"], 3, "only pictures have pixels"),
+        (["read", "s.csv", "--region", "1,1,9,9"], 3, "only photographs have pixels"),
         (["read", "absent.png", "--region", "1,1,9,9"], 3, "no such file"),
         (["read", "photo.png", "--region", "1,1,9,9", "--gamma", "2"], 3, "--gamma goes with --signal rgb"),
         (["read", "c.csv", "--out", "o", "--to", "netcdf"], 2, "colours are written as csv"),

@@ -1,4 +1,4 @@
-"""`pellicle map`: thickness along a wedge and over a picture, from simulated photographs."""
+"""`pellicle map`: thickness along a wedge and over a photograph, from simulated photographs."""
 
 import json
 

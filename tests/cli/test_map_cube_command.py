@@ -58,7 +58,7 @@ def words(tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def picture(tmp_path):
+def photograph(tmp_path):
     Image.fromarray(np.full((8, 8, 3), 99, np.uint8)).save(tmp_path / "film.png")
     return "map", tmp_path / "film.png", "--recipe", tmp_path / "film.toml"
 
@@ -140,12 +140,12 @@ def test_without_a_folder_nothing_is_written(pellicle, words, fits, tmp_path):
     assert {*tmp_path.iterdir()} == before
 
 
-def test_flags_of_the_other_kind_are_refused(pellicle, words, picture):
+def test_flags_of_the_other_kind_are_refused(pellicle, words, photograph):
     pellicle(*words, "--strip", "0,0,5,5").refused(2, "is a cube", "--strip")
     pellicle(*words, "--sensitivities", "a.csv").refused(2, "is a cube", "--sensitivities")
-    pellicle(*picture, "--workers", 2).refused(2, "is a picture", "--workers")
-    pellicle(*picture, "--mask", "a.png", "--preview").refused(2, "is a picture", "--preview", "--mask")
-    pellicle(*picture, "--noise", "2 %").refused(2, "--noise")
+    pellicle(*photograph, "--workers", 2).refused(2, "is a photograph", "--workers")
+    pellicle(*photograph, "--mask", "a.png", "--preview").refused(2, "is a photograph", "--preview", "--mask")
+    pellicle(*photograph, "--noise", "2 %").refused(2, "--noise")
 
 
 def test_wrong_use(pellicle, words):

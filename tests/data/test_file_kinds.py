@@ -23,8 +23,8 @@ def packed(*names: str) -> bytes:
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        (b"\x89PNG\r\n\x1a\n\x00\x00", "a picture"),
-        (b"\xff\xd8\xff\xe0\x00\x10JFIF", "a picture"),
+        (b"\x89PNG\r\n\x1a\n\x00\x00", "an image"),
+        (b"\xff\xd8\xff\xe0\x00\x10JFIF", "an image"),
         (b"%PDF-1.7\n", "a PDF"),
         (packed("[Content_Types].xml", "xl/workbook.xml"), "an office file; save its sheet as CSV"),
         (packed("spectrum.csv"), "packed; unpack it"),

@@ -148,7 +148,7 @@ def test_files_that_hold_no_samples(write, tmp_path, refused):
     refused(write(HEADER), DataError, "without any row of two numbers")
     refused(write("a story\nof two lines\n"), DataError, "without any row of two numbers")
     (tmp_path / "x.png").write_bytes(b"\x89PNG\r\n\x1a\n\x00\x00\x00\x0dIHDR")
-    refused(tmp_path / "x.png", DataError, "is a picture", "as a CSV")
+    refused(tmp_path / "x.png", DataError, "is an image", "as a CSV")
 
 
 def test_files_are_never_written_over(write):

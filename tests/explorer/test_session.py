@@ -13,7 +13,7 @@ from PIL import Image
 import pellicle as pl
 from pellicle.colour import lab, sensor
 from pellicle.explorer.session import Session
-from pellicle.reporting.picture import display, exposure
+from pellicle.reporting.rendering_display import display, exposure
 from pellicle.synthetic.ball import ball
 from pellicle.synthetic.environment import studio
 from pellicle.synthetic.film_spectra import stack
@@ -75,8 +75,8 @@ def test_sphere_is_that_of_the_ball(session):
     assert head == "data:image/png;base64"
     shown = np.asarray(Image.open(io.BytesIO(base64.b64decode(content)))) / 255
     film = pl.Scene(pl.Layer(1.7, 250.0), 3.9 + 0.02j)
-    picture = ball(stack(film), 250.0, studio(), 40).reflected
-    expected = display(picture, exposure(picture, percentile=97.0), 0.06)
+    rendering = ball(stack(film), 250.0, studio(), 40).reflected
+    expected = display(rendering, exposure(rendering, percentile=97.0), 0.06)
     assert shown.shape == (40, 40, 3)
     assert np.max(np.abs(shown - expected)) < 1.5 / 255
 

@@ -50,11 +50,11 @@ def test_sliders_are_the_numbers_of_the_model(session):
 
 
 @pytest.mark.slow  # compiles the sphere for several seconds; tests/synthetic/test_surface_sphere.py
-def test_sphere_is_a_picture(session):
+def test_sphere_is_an_image(session):
     answer = session.answer("view", {"want": ["sphere"], "size": 32, "wait": True})
-    picture = np.asarray(Image.open(io.BytesIO(base64.b64decode(answer["sphere"].split(",")[1]))))
-    assert picture.shape == (32, 32, 3)
-    assert picture[16, 16].max() < 255
+    rendering = np.asarray(Image.open(io.BytesIO(base64.b64decode(answer["sphere"].split(",")[1]))))
+    assert rendering.shape == (32, 32, 3)
+    assert rendering[16, 16].max() < 255
 
 
 def test_recipe_states_the_sliders(session, tmp_path):

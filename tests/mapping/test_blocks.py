@@ -51,5 +51,5 @@ def test_a_chunk_that_is_too_large_is_divided():
     assert size == (128, 128)
 
 
-def test_several_frames_of_a_small_picture_are_one_block():
+def test_several_frames_of_a_small_image_are_one_block():
     assert blocks_of(lazy(1000, 8, 16, 50)).size == (128, 8, 16)

@@ -1,4 +1,4 @@
-"""Colours of films from files and pictures, against sums in NumPy and colour-science."""
+"""Colours of films from files and photographs, against sums in NumPy and colour-science."""
 
 import colour
 import numpy as np
@@ -87,10 +87,10 @@ def test_clipped_pixels_are_told_and_are_limits(photo):
     assert few.values.min() > 0.2
 
 
-def test_profiles_of_pictures(photo):
+def test_profiles_of_photographs(photo):
     profile = ImageCms.ImageCmsProfile(ImageCms.createProfile("XYZ")).tobytes()
     path = photo(icc_profile=profile)
-    with pytest.raises(DataError, match=r"colour profile 'XYZ.*convert the picture to sRGB"):
+    with pytest.raises(DataError, match=r"colour profile 'XYZ.*convert the photograph to sRGB"):
         read_colours(path, region="1,1,3,3")
     assert "ignored" in " ".join(read_colours(path, region="6,6,3,3", space="rgb").notes)
 
@@ -165,7 +165,7 @@ def test_a_camera_by_its_chart(tmp_path):
         ({"gamma": 2.2}, UsageError, "gamma"),
         ({"space": "rgb", "gamma": 0.0}, UsageError, "`gamma` must be a number from"),
         ({"white_balance": "free"}, UsageError, "white_balance"),
-        ({"region": "1,1,2,2"}, UsageError, "no picture"),
+        ({"region": "1,1,2,2"}, UsageError, "no photograph"),
         ({"angle": 30.0}, UsageError, "own angles"),
         ({"noise": 1.5}, UsageError, "divide 8-bit values"),
         ({"noise": -1.0}, UsageError, "above zero"),
@@ -182,12 +182,12 @@ def test_what_does_not_go_together(camera, options, error, reason):
     [
         ({}, "30 by 20 pixels: give `region"),
         ({"region": "1,1,2,2", "points": "1,1"}, "`points` exclude each other"),
-        ({"region": "1,1,2,2", "space": "lab"}, "a picture has"),
+        ({"region": "1,1,2,2", "space": "lab"}, "a photograph has"),
         ({"region": "1,1,2,2", "white": "0,0,4,4"}, "is black in 100 %"),
         ({"region": "1,1,2,2", "angle": [1, 2]}, "2 angles are given for 1 regions"),
         ({"region": "1,1,2,2", "columns": "R,G,B"}, "leave `columns`"),
     ],
 )
-def test_what_a_picture_needs(photo, options, reason):
+def test_what_a_photograph_needs(photo, options, reason):
     with pytest.raises(UsageError, match=reason):
         read_colours(photo(), **options)

@@ -103,7 +103,7 @@ def test_coordinates_and_scales():
     assert axes.get_aspect() == 1.0
     pixels = panel(dict(figures(made(image())))["map"], "thickness")
     assert pixels.get_xlabel() == "x (pixels)"
-    assert pixels.get_ylim() == (29.5, -0.5)  # pixels downward, as in pictures
+    assert pixels.get_ylim() == (29.5, -0.5)  # pixels downward, as in images
 
 
 def test_uneven_coordinates_are_drawn_where_they_are():

@@ -5,25 +5,25 @@ import pytest
 
 import pellicle as pl
 from pellicle.errors import UsageError
-from pellicle.reporting.picture import display, exposure
+from pellicle.reporting.rendering_display import display, exposure
 from pellicle.reporting.sphere_figures import balls, bubbles
-from pellicle.synthetic.sphere import Picture
+from pellicle.synthetic.sphere import Rendering
 
 PNG = b"\x89PNG"
 
 
-def test_one_exposure_for_several_pictures():
+def test_one_exposure_for_several_renderings():
     coverage = np.ones((4, 4))
-    dark, bright = (Picture(np.full((4, 4, 3), value), coverage) for value in (0.1, 4.0))
+    dark, bright = (Rendering(np.full((4, 4, 3), value), coverage) for value in (0.1, 4.0))
     assert exposure(dark) == pytest.approx(10.0)
     assert exposure(dark, bright) == pytest.approx(0.25)
-    assert exposure(Picture(np.zeros((4, 4, 3)), coverage)) == 1.0
+    assert exposure(Rendering(np.zeros((4, 4, 3)), coverage)) == 1.0
     np.testing.assert_allclose(display(bright), 1.0, atol=1e-6)
 
 
 def test_the_background_shows_through_what_the_sphere_leaves():
-    picture = Picture(np.full((1, 2, 3), 0.5), np.array([[1.0, 0.25]]))
-    inside, limb = display(picture, 1.0, background=0.2)[0, :, 0]
+    rendering = Rendering(np.full((1, 2, 3), 0.5), np.array([[1.0, 0.25]]))
+    inside, limb = display(rendering, 1.0, background=0.2)[0, :, 0]
     assert inside == pytest.approx(0.7354, abs=1e-3)  # sRGB of 0.5, IEC 61966-2-1
     assert limb == pytest.approx(0.25 * inside + 0.75 * 0.2)
 

@@ -53,14 +53,14 @@ def hematite():
 @pytest.mark.parametrize("at", [(10, 10), (6, 13), (15, 4)])
 def test_pixels_of_a_hematite_ball(hematite, at):
     """Reflection, straight through, and with one to four reflections inside; steps of 1 nm against 64."""
-    _, picture = hematite
+    _, rendering = hematite
     media = np.array([np.broadcast_to(pl.medium(m)(EYE.wavelength), 351) for m in (1.0, "Fe2O3", "BK7")])
     x, y = ((at[1] + 0.5) * 2 / SIZE - 1) / 0.95, -((at[0] + 0.5) * 2 / SIZE - 1) / 0.95
     normal = np.array([x, y, np.sqrt(1 - x * x - y * y)])
     R, T, back = airy(140.0, media, normal[2])
     sight = np.array([0.0, 0.0, -1.0])
     mirrored = colour(R) * studio().radiance(sight + 2 * normal[2] * normal)
-    np.testing.assert_allclose(picture.reflected.linear[at], mirrored, atol=3e-4)
+    np.testing.assert_allclose(rendering.reflected.linear[at], mirrored, atol=3e-4)
 
     index = np.real(np.interp(550.0, EYE.wavelength, np.real(media[2])))
     ray, point, through, spectrum = refracted(sight, normal, 1 / index), normal, 0.0, T * T
@@ -69,8 +69,8 @@ def test_pixels_of_a_hematite_ball(hematite, at):
         out = refracted(ray, -point, index)
         through = through + colour(spectrum) * studio().radiance(out)
         ray, spectrum = ray - 2 * (ray @ point) * point, spectrum * back
-    assert picture.transmitted is not None
-    np.testing.assert_allclose(picture.transmitted.linear[at], through, atol=3e-4)
+    assert rendering.transmitted is not None
+    np.testing.assert_allclose(rendering.transmitted.linear[at], through, atol=3e-4)
 
 
 def test_light_is_conserved_where_nothing_absorbs():
@@ -83,9 +83,9 @@ def test_light_is_conserved_where_nothing_absorbs():
 
 def test_an_opaque_ball_and_layers_without_a_thickness_of_their_own():
     films = stack(pl.Scene(pl.Layer("SiO2", 100.0), "Si"))
-    picture = ball(films, 120.0, WHITE, 5)
-    assert picture.transmitted is None
-    np.testing.assert_array_equal(picture.whole.linear, picture.reflected.linear)
+    rendering = ball(films, 120.0, WHITE, 5)
+    assert rendering.transmitted is None
+    np.testing.assert_array_equal(rendering.whole.linear, rendering.reflected.linear)
     with pytest.raises(UsageError, match="coherent layers only"):
         stack(pl.Scene([pl.Layer("SiO2", 100.0), pl.Plate("BK7", 1.0)], "Si"))
     with pytest.raises(UsageError, match="no data between 380 and 730"):

@@ -71,7 +71,7 @@ def pixel(at):
 
 @pytest.fixture(scope="module")
 def steel():
-    """Pictures in white surroundings and in the studio, with enough directions to converge."""
+    """Renderings in white surroundings and in the studio, with enough directions to converge."""
     return {at: render(UNEVEN, at, SIZE, count=2048).linear for at in (WHITE, studio())}
 
 
@@ -84,8 +84,8 @@ def test_pixels_of_a_rough_uneven_film(steel, at):
     )
     maps = following(UNEVEN, relief(pixels.normal, axes, np.random.default_rng(0)))
     nm = maps["thickness"][np.count_nonzero(pixels.mask.ravel()[: at[0] * SIZE + at[1]])]
-    for environment, picture in steel.items():
-        np.testing.assert_allclose(picture[at], seen(pixel(at), nm, environment), rtol=0.01)
+    for environment, rendering in steel.items():
+        np.testing.assert_allclose(rendering[at], seen(pixel(at), nm, environment), rtol=0.01)
 
 
 def test_few_directions_are_within_four_per_cent(steel):

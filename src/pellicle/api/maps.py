@@ -1,4 +1,4 @@
-"""Verb of maps: a fit at every pixel of a cube or a picture."""
+"""Verb of maps: a fit at every pixel of a cube or a photograph."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
-from pellicle.data.cubes.detect import is_picture
+from pellicle.data.cubes.detect import is_photograph
 from pellicle.data.read_cube import read_cube
 from pellicle.errors import UsageError
 from pellicle.fitting.progress import Progress, quiet
-from pellicle.mapping.picture import ThicknessMap, map_picture
+from pellicle.mapping.photograph import ThicknessMap, map_photograph
 from pellicle.scene.film import Scene
 from pellicle.scene.kinds import check_scene
 from pellicle.scene.surface import Surface
@@ -74,18 +74,18 @@ def map(
     **reading: Any,
 ) -> Map: ...
 def map(data: Any, scene: Scene, **options: Any) -> Any:
-    """Fit the free parameters of `scene` at every pixel of a cube of spectra, or the thickness of a picture.
+    """Fit `scene` at every pixel of a cube of spectra, or find the thickness at every pixel of a photograph.
 
     Every pixel of a cube is fitted as `pellicle.fit` fits a spectrum, with the same statuses. Each position
-    of a picture is inverted by itself (`pellicle.colour.ColourInverse`), between the bounds of the free
+    of a photograph is inverted by itself (`pellicle.colour.ColourInverse`), between the bounds of the free
     thickness; other free parameters take their start values, and a free scale of the instrument is a free
     exposure of each position.
 
     **Arguments:**
 
     - `data`: a cube: an xarray DataArray or Dataset, a `Cube`, or the path of one (zarr, NetCDF, ENVI, TIFF
-      stack, `.npy`, folder of spectra); or the path of a picture in colours (PNG, TIFF or JPEG).
-    - `scene`: a film; of a picture with a free thickness.
+      stack, `.npy`, folder of spectra); or the path of a photograph in colours (PNG, TIFF or JPEG).
+    - `scene`: a film; of a photograph with a free thickness.
 
     Of a cube:
 
@@ -106,29 +106,29 @@ def map(data: Any, scene: Scene, **options: Any) -> Any:
     - `progress`: called with the name of a stage, the number of pixels done and their total.
     - `reading`: arguments of `pellicle.read_cube`, such as `wavelengths`, `signal_unit`, `noise`, `mask`.
 
-    Of a picture:
+    Of a photograph:
 
     - `strip`: "x0,y0,x1,y1", the ends of a line, 5 pixels wide; or `region`: "x,y,width,height", by default
-      the whole picture. Pixels count from the upper left corner.
+      the whole photograph. Pixels count from the upper left corner.
     - `space`: "srgb" (the default), or "rgb" with its `gamma`.
     - `observer`, `illuminant`, `lamp`, `sensitivities`, `white`: as in `pellicle.read_colours_by_film`.
     - `layer`: name of the layer whose thickness is sought, the free one by default.
     - `noise`: standard deviation of a coded channel, by default 1.5/255 of sRGB and 0.01 of "rgb".
 
     **Returns:** of a cube a `Map`: `dataset` has values, standard errors, status and rivals of each pixel. Of
-    a picture a `ThicknessMap`: `found` has thickness, standard error (of the noise alone), probability and
+    a photograph a `ThicknessMap`: `found` has thickness, standard error (of the noise alone), probability and
     status of each position, the most probable thickness first.
 
     **Raises:** DataError for data that cannot be read; UsageError for arguments of the other kind of data,
-    for a store that is of another map, for pixels outside a picture, and where nothing is free.
+    for a store that is of another map, for pixels outside a photograph, and where nothing is free.
     """
     check_scene(scene)
     if isinstance(scene, Surface):
         raise UsageError("`scene` of a map must be a Scene, a film, not a Surface")
-    picture = isinstance(data, str | os.PathLike) and is_picture(Path(data))
-    _refuse_others(options, ("picture", "cube") if picture else ("cube", "picture"))
-    if picture:
-        return map_picture(data, scene, **options)
+    photograph = isinstance(data, str | os.PathLike) and is_photograph(Path(data))
+    _refuse_others(options, ("photograph", "cube") if photograph else ("cube", "photograph"))
+    if photograph:
+        return map_photograph(data, scene, **options)
     from pellicle.mapping.maps import map_cube
 
     return map_cube(data, scene, **options)
@@ -137,7 +137,7 @@ def map(data: Any, scene: Scene, **options: Any) -> Any:
 def _refuse_others(options: Iterable[str], kinds: tuple[str, str]) -> None:
     """Raise UsageError for an argument of `map` that is not for the first of the kinds of data."""
     names = {
-        "picture": {*signature(map_picture).parameters},
+        "photograph": {*signature(map_photograph).parameters},
         "cube": {*_OF_A_CUBE, *signature(read_cube).parameters},
     }
     own, other = kinds

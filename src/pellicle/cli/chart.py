@@ -1,4 +1,4 @@
-"""`pellicle chart`: colours of a film against thickness and angle, or pictures of objects under it."""
+"""`pellicle chart`: colours of a film against thickness and angle, or renderings of objects under it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ COUNT = 5
 def chart(
     recipe: Annotated[str, Parameter(help="TOML file that describes the scene or surface.")],
     *,
-    out: Annotated[str, Parameter(help="Picture to write (PNG, PDF, SVG); no file is overwritten.")],
+    out: Annotated[str, Parameter(help="Image to write (PNG, PDF, SVG); no file is overwritten.")],
     layer: Annotated[
         str | None, Parameter(help="Layer whose thickness varies (the one with a free thickness).")
     ] = None,

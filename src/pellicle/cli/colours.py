@@ -33,21 +33,21 @@ _OF_SPECTRA = (
 
 
 def is_of_colours(path: str, reading: ReadingFlags) -> bool:
-    """True for a file of colours or a picture: by the signal, or by the file's content without one."""
+    """True for a file of colours or a photograph: by the signal, or by the file's content without one."""
     from pellicle.data.read_colours import is_colour_table
-    from pellicle.data.read_picture import picture_format
+    from pellicle.data.read_photograph import image_format
 
     if reading.signal is not None:
         return reading.signal in SPACES
     try:
-        return picture_format(path) is not None or is_colour_table(path)
+        return image_format(path) is not None or is_colour_table(path)
     except ValueError:
         return False  # the reader of spectra reports it
 
 
 def check_words(reading: ReadingFlags) -> None:
     """Raise UsageError for a value of a colour flag that is wrong for every file."""
-    from pellicle.data.picture_regions import parse_regions, whole_numbers
+    from pellicle.data.pixel_regions import parse_regions, whole_numbers
 
     words: dict[str, tuple[str | None, tuple[str, ...]]] = {
         "--white-balance": (reading.white_balance, ("fixed", "free"))
@@ -74,7 +74,7 @@ def check_camera(given_flags: ReadingFlags, files: Iterable[tuple[str, ReadingFl
 
     `files` are paths, each with all flags of its reading; one that cannot be read is left to its reader.
     """
-    from pellicle.data.read_picture import picture_format
+    from pellicle.data.read_photograph import image_format
 
     wrong = [name for name in _CAMERA if getattr(given_flags, name) is not None]
     each = list(files)
@@ -82,7 +82,7 @@ def check_camera(given_flags: ReadingFlags, files: Iterable[tuple[str, ReadingFl
         return
     try:
         for path, _ in each:
-            picture_format(path)
+            image_format(path)
     except ValueError:
         return
     raise UsageError(f"{each[0][0]}: {', '.join(given(wrong))}: of colours, and it has none; leave it out")
@@ -90,12 +90,14 @@ def check_camera(given_flags: ReadingFlags, files: Iterable[tuple[str, ReadingFl
 
 def refuse_camera(path: str, reading: ReadingFlags) -> None:
     """Raise UsageError where flags of colours are given and the file has a spectrum."""
-    from pellicle.data.read_picture import picture_format
+    from pellicle.data.read_photograph import image_format
 
     wrong = [name for name in _PIXELS if getattr(reading, name) is not None]
     if wrong:
-        picture_format(path)  # reports a file that does not exist
-        raise UsageError(f"{path}: {', '.join(given(wrong))}: only pictures have pixels, with --signal srgb")
+        image_format(path)  # reports a file that does not exist
+        raise UsageError(
+            f"{path}: {', '.join(given(wrong))}: only photographs have pixels, with --signal srgb"
+        )
 
 
 def read_films(path: str, reading: ReadingFlags, angle: float | list[float] | None = None) -> list[Colours]:

@@ -50,7 +50,7 @@ def demo(
         count += 1
         folder = Path(out).with_name(f"{Path(out).name}-{count}")
     folder.mkdir(parents=True)
-    recipe, data, picture = folder / "hematite.toml", folder / "hematite.csv", folder / "colours.png"
+    recipe, data, image = folder / "hematite.toml", folder / "hematite.csv", folder / "colours.png"
     write_text(recipe, RECIPE)
     say(f"{recipe}: a recipe to change and try again")
     say("", f"$ pellicle simulate {recipe} --out {data} --seed 1")
@@ -60,9 +60,9 @@ def demo(
     files = inputs([], str(recipe), SceneFlags(), ReadingFlags(), joint=False)
     start()
     code = Batch(files, sampler=sampler, out=str(folder / "result")).run()
-    say("", f"$ pellicle chart {recipe} --out {picture} --thickness 0:600")
-    chart(str(recipe), out=str(picture), thickness="0:600")
+    say("", f"$ pellicle chart {recipe} --out {image} --thickness 0:600")
+    chart(str(recipe), out=str(image), thickness="0:600")
     if sampler is None:
         say(f"no posterior was sampled: {install_command('posterior')}")
-    say(f"see {folder}/result (report.txt, figure.png) and {picture}")
+    say(f"see {folder}/result (report.txt, figure.png) and {image}")
     return code

@@ -114,9 +114,9 @@ class CameraFlags(Flags):
     white_balance: Annotated[
         str | None, flag(COLOURS, "fixed, or free for an unknown factor of each channel.")
     ] = None
-    white: Annotated[str | None, flag(COLOURS, "X,Y,WIDTH,HEIGHT of a white in the picture, in pixels.")] = (
-        None
-    )
+    white: Annotated[
+        str | None, flag(COLOURS, "X,Y,WIDTH,HEIGHT of a white in the photograph, in pixels.")
+    ] = None
     transmitted: Annotated[
         bool | None, Parameter(group=COLOURS, help="The light has passed the film.", negative="")
     ] = None
@@ -137,14 +137,15 @@ class ReadingFlags(CameraFlags):
         ),
     ] = None
     region: Annotated[
-        str | None, flag(COLOURS, "X,Y,WIDTH,HEIGHT of a film in a picture, in pixels; ';' between several.")
+        str | None,
+        flag(COLOURS, "X,Y,WIDTH,HEIGHT of a film in a photograph, in pixels; ';' between several."),
     ] = None
-    points: Annotated[str | None, flag(COLOURS, "X,Y of a film in a picture; ';' between several.")] = None
+    points: Annotated[str | None, flag(COLOURS, "X,Y of a film in a photograph; ';' between several.")] = None
     angle: Annotated[
         float | list[float] | None,
         Parameter(
             group=READING,
-            help="Angle of incidence in degrees (0); 0,30,60 where regions of a picture show one film.",
+            help="Angle of incidence in degrees (0); 0,30,60 where regions of a photograph show one film.",
             metavar="DEG",
             converter=one_or_several_angles,
             negative="",

@@ -1,4 +1,4 @@
-"""`pellicle read`: what a file of measurements or a picture holds, and its conversion."""
+"""`pellicle read`: what a file of measurements or a photograph holds, and its conversion."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def read(
     ] = "csv",
     json: Annotated[bool, switch(OUTPUT, "Print one JSON object per spectrum.")] = False,
 ) -> int:
-    """Show what is understood of files, pictures and cubes, without fitting, and convert spectra.
+    """Show what is understood of files, photographs and cubes, without fitting, and convert spectra.
 
     Example: pellicle read wafer.txt --out converted --to csv,nexus
 

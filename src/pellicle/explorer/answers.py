@@ -12,7 +12,7 @@ from pellicle.effects.plan import Plan
 from pellicle.explorer.incidence import named
 from pellicle.explorer.programs import Curve
 from pellicle.explorer.sphere import to_linear_srgb
-from pellicle.reporting.picture import encode
+from pellicle.reporting.rendering_display import encode
 
 _ORDINATES = {"Ψ": "Ψ (°)", "Δ": "Δ (°)", "R": "R (fraction)", "T": "T (fraction)"}
 """Labels of the ordinate of signals."""

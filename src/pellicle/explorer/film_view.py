@@ -18,7 +18,7 @@ from pellicle.errors import DataError, UsageError
 from pellicle.explorer.controls import Control, film_controls, scene_with, template, with_value
 from pellicle.explorer.incidence import abscissa, light_angles, measured_angles, named, thinned
 from pellicle.explorer.programs import ANGLE, angle_program, colour_program, spectrum_program
-from pellicle.explorer.sphere import ball_picture
+from pellicle.explorer.sphere import ball_rendering
 from pellicle.explorer.structure import CONES, Structure, bucket, key_of, oblique_cone
 from pellicle.scene.film import Light, Scene, with_wavelength
 from pellicle.scene.free import Free, insert
@@ -190,9 +190,9 @@ class FilmView:
             return angles
         return own if not self.angles.size and getattr(own, "start", own) == angles[0] else float(angles[0])
 
-    def picture(self, found: np.ndarray, size: int) -> bytes:
+    def rendering(self, found: np.ndarray, size: int) -> bytes:
         """Draw a ball with the colours `found` by the program "sphere", as a PNG."""
-        return ball_picture(found, size)
+        return ball_rendering(found, size)
 
     def stated(self, values: Mapping[str, float]) -> Scene:
         """Return the scene with these values, at which its own free numbers start, at no wavelengths."""

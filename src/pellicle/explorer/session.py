@@ -36,7 +36,7 @@ from pellicle.scene.surface import Surface
 log = getLogger(__name__)
 
 SIZE, MOVING, LARGEST = 192, 96, 512
-"""Pixels across the picture of a ball, while a slider moves, and the most that a page may ask for."""
+"""Pixels across the rendering of a ball, while a slider moves, and the most that a page may ask for."""
 WANTED = ("curves", "colour", "sphere", "plan")
 """Parts of a view."""
 _VIEWS = 16
@@ -253,7 +253,7 @@ class Session:
         return (
             None
             if found is None
-            else f"data:image/png;base64,{b64encode(view.picture(found, size)).decode()}"
+            else f"data:image/png;base64,{b64encode(view.rendering(found, size)).decode()}"
         )
 
     def _plan(self, view: _View, values: Mapping[str, float], wait: bool, size: int) -> list[dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""Picture of a ball under a film, from the film's colours against the cosine of the angle of incidence."""
+"""Rendering of a ball under a film, from the film's colours against the cosine of the angle of incidence."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from PIL import Image
 from pellicle.colour import sensor
 from pellicle.colour.spaces import SRGB_WHITE, TO_SRGB, adaptation
 from pellicle.explorer.programs import COSINES
-from pellicle.reporting.picture import display, exposure
+from pellicle.reporting.rendering_display import display, exposure
 from pellicle.synthetic.environment import studio
 from pellicle.synthetic.sphere import Sphere, sphere
 
@@ -45,12 +45,12 @@ def to_linear_srgb(xyz: np.ndarray) -> np.ndarray:
     return xyz @ (TO_SRGB @ adaptation(sensor().white, SRGB_WHITE)).T
 
 
-def ball_picture(xyz: np.ndarray, size: int) -> bytes:
+def ball_rendering(xyz: np.ndarray, size: int) -> bytes:
     """Draw a ball that reflects the XYZ (`COSINES`, 3) of a film as a PNG of `size` × `size` pixels."""
     table, at = to_linear_srgb(xyz), _lookup(size)
     colour = (1 - at.share) * table[at.row] + at.share * table[at.row + 1]
-    picture = at.pixels.picture(colour * at.seen)
-    return png(display(picture, exposure(picture, percentile=WHITE_PERCENTILE), BACKGROUND))
+    rendering = at.pixels.rendering(colour * at.seen)
+    return png(display(rendering, exposure(rendering, percentile=WHITE_PERCENTILE), BACKGROUND))
 
 
 def png(image: np.ndarray) -> bytes:

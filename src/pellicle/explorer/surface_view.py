@@ -17,7 +17,7 @@ from pellicle.explorer.programs import Curve
 from pellicle.explorer.sphere import png
 from pellicle.explorer.structure import Structure
 from pellicle.planning.surface import plan
-from pellicle.reporting.picture import display
+from pellicle.reporting.rendering_display import display
 from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface, surface_view
 from pellicle.synthetic.brdf import default_directions
@@ -31,7 +31,7 @@ LARGEST_SPHERE, DIRECTIONS = 96, 96
 
 
 class SurfaceExplorerView:
-    """Sliders and pictures of a surface; the counterpart of `FilmView`."""
+    """Sliders and renderings of a surface; the counterpart of `FilmView`."""
 
     kind, parts, light_in_words = "surface", ("curves", "sphere", "plan"), ""
 
@@ -82,7 +82,7 @@ class SurfaceExplorerView:
         self._sphere(self.defaults(), 32)
         return lambda values, _: values
 
-    def picture(self, found: Mapping[str, float], size: int) -> bytes:
+    def rendering(self, found: Mapping[str, float], size: int) -> bytes:
         """Draw the sphere with these values as a PNG."""
         return self._sphere(found, size)
 

@@ -1,1 +1,1 @@
-"""Maps: cubes of spectra and pictures to the thickness at every pixel, with a status for each."""
+"""Maps: cubes of spectra and photographs to the thickness at every pixel, with a status for each."""

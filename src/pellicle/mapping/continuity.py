@@ -99,7 +99,7 @@ def decided_by_neighbours(
     """Choose the orders of undecided pixels of a map by their neighbours.
 
     Undecided are ambiguous pixels, and converged ones with a rival within `margin`. Their neighbours are
-    those in the picture, in time, or the nearest sites. A pixel whose order they decide has the status
+    those in the image, in time, or the nearest sites. A pixel whose order they decide has the status
     `by-neighbours`; all its numbers are those of the chosen minimum, with negative Δχ² where another fits
     better, except `chi2_reduced` and `rms`, which stay those of the best one. Converged pixels keep their
     status where the neighbours confirm them or are not clear.

@@ -1,4 +1,4 @@
-"""Colours of films from files and pictures, with the sensor that saw them."""
+"""Colours of films from files and photographs, with the sensor that saw them."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import numpy as np
 
 from pellicle.data.colours import Colours
 from pellicle.data.read_colours import ColourRows, read_colour_rows
-from pellicle.data.read_picture import picture_format, read_picture
+from pellicle.data.read_photograph import image_format, read_photograph
 from pellicle.errors import UsageError
 from pellicle.recipes.cameras import Camera, Sight, sight
-from pellicle.recipes.picture_colours import Pixels, picture_colours
+from pellicle.recipes.photograph_colours import Pixels, photograph_colours
 
 
 def read_colours(path: str | os.PathLike[str], *, name: str | None = None, **options) -> Colours:
-    """Read the colours of one film from CSV, or from a PNG, TIFF or JPEG picture.
+    """Read the colours of one film from CSV, or from a PNG, TIFF or JPEG photograph.
 
     A CSV has R, G, B, or X, Y, Z, or x, y, Y, or L*, a*, b*, and may have angle_deg, sigma and name. Of a
-    picture the mean colour of a region, or of points, is taken in linear light.
+    photograph the mean colour of a region, or of points, is taken in linear light.
 
     **Arguments:** `name` of the film where a file has several, or the region as written; all others are
     those of `read_colours_by_film`.
@@ -57,26 +57,26 @@ def read_colours_by_film(
     signal_unit: str | None = None,
     columns: str | Sequence[str] | None = None,
 ) -> list[Colours]:
-    """Read the colours of every film of a CSV file, or of every region of a picture.
+    """Read the colours of every film of a CSV file, or of every region of a photograph.
 
     **Arguments:**
 
-    - `path` of a CSV, or of a PNG, TIFF or JPEG picture (extra `images`).
+    - `path` of a CSV, or of a PNG, TIFF or JPEG photograph (extra `images`).
     - `space`: "srgb", "rgb" (a camera's channels), "xyz" or "lab", where the file does not say it; "srgb" of
-      R, G, B and of pictures.
+      R, G, B and of photographs.
     - `observer`: "1931" or "1964"; `illuminant`: E, A, D50, D55, D65 or D75; `lamp`: CSV of a spectrum in
       place of the illuminant.
     - `sensitivities`: CSV of a camera's three channels; `chart`: CSV of a photographed chart in their place,
       with R, G, B as measured and X, Y, Z of the reference. Without either, "rgb" is linear sRGB.
     - `gamma` of "rgb": values are linear ones to the power 1/`gamma`.
     - `white_balance`: "fixed", or "free" where each channel has an unknown factor.
-    - `white`: region of a picture that shows a perfect reflector, by which colours are divided.
-    - `region`: rectangles "x,y,width,height;..." of a picture in pixels from its upper left corner; `points`:
-      "x,y;...", each with the pixels around it, 5 by 5.
-    - `angle` of incidence in degrees, for all colours; or one for each, and for each region of a picture,
+    - `white`: region of a photograph that shows a perfect reflector, by which colours are divided.
+    - `region`: rectangles "x,y,width,height;..." of a photograph in pixels from its upper left corner;
+      `points`: "x,y;...", each with the pixels around it, 5 by 5.
+    - `angle` of incidence in degrees, for all colours; or one for each, and for each region of a photograph,
       which are then colours of one film.
     - `polarisation`: "unpolarised", "s" or "p"; `signal`: "R", or "T" for transmitted light.
-    - `noise`: standard deviation of the values, one or three; of a picture by default the scatter of the
+    - `noise`: standard deviation of the values, one or three; of a photograph by default the scatter of the
       region's pixels and the rounding.
     - `signal_unit`: "fraction", "percent", "8-bit" or "16-bit", where values do not show it.
     - `columns`: names in the order of a CSV's columns, "_" to skip one.
@@ -84,7 +84,7 @@ def read_colours_by_film(
     **Returns:** a list of `Colours`, one for each film.
 
     **Raises:** DataError (unreadable or impossible data) or UsageError (an argument missing or wrong, or a
-    picture without the extra `images`): one sentence.
+    photograph without the extra `images`): one sentence.
     """
     if signal not in ("R", "T"):
         raise UsageError(f'`signal` must be R or T, and `space` the colour space, not `signal="{signal}"`')
@@ -92,14 +92,14 @@ def read_colours_by_film(
     camera = Camera(
         observer, illuminant, lamp, sensitivities, chart, gamma, white_balance, transmitted=signal == "T"
     )
-    if picture_format(path) is not None:
+    if image_format(path) is not None:
         if columns is not None or signal_unit is not None:
-            raise UsageError(f"{path}: is a picture: leave `columns` and `signal_unit` out")
-        films, seen = picture_colours(read_picture(path), space, camera, region, points, white, angle)
+            raise UsageError(f"{path}: is a photograph: leave `columns` and `signal_unit` out")
+        films, seen = photograph_colours(read_photograph(path), space, camera, region, points, white, angle)
         angle = None
     else:
         if not region is points is white is None:
-            raise UsageError(f"{path}: is no picture: leave `region`, `points` and `white` out")
+            raise UsageError(f"{path}: is no photograph: leave `region`, `points` and `white` out")
         films = read_colour_rows(path, space, unit=signal_unit, columns=columns)
         seen = sight(camera, films[0].space)
     return [_assembled(film, seen, camera, angle, noise, polarisation) for film in films]

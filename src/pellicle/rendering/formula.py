@@ -55,6 +55,6 @@ class Formula:
 def lab_of(xyz: Any, brightest: Any) -> Any:
     """CIE 1976 L*, a*, b* of XYZ (..., 3) with the exposure at which the Y `brightest` is white.
 
-    A camera exposes for the picture: without that, errors of dark films would look small.
+    A camera exposes for the image: without that, errors of dark films would look small.
     """
     return lab(xyz / brightest, sensor().white)

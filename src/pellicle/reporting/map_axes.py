@@ -86,7 +86,7 @@ class MapAxes:
 
     @property
     def downward(self) -> bool:
-        """True where y increases downward, as in pictures; lengths increase upward."""
+        """True where y increases downward, as in images; lengths increase upward."""
         return self.y is not None and self.y.unit == PIXELS
 
     def frames(self, array: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Blocks of pixels of a large map as the points of a picture, and limits of its colours."""
+"""Blocks of pixels of a large map as the points of an image, and limits of its colours."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import numpy as np
 from pellicle.reporting.map_axes import MapAxes
 
 MOST_POINTS = 800
-"""Most points of a picture in each direction: more than a printed panel shows."""
+"""Most points of an image in each direction: more than a printed panel shows."""
 SLAB = 2**22
 """Most pixels that are read at once."""
 
 
 def block(axes: MapAxes) -> int:
-    """Side of the blocks of pixels that are one point of a picture."""
+    """Side of the blocks of pixels that are one point of an image."""
     return int(np.ceil(max(axes.shape[-2:]) / MOST_POINTS)) if axes.kind == "image" else 1
 
 
@@ -59,7 +59,7 @@ def _sums(array: np.ndarray, side: int) -> np.ndarray:
 
 
 def evenly(array: np.ndarray, axes: MapAxes, side: int) -> np.ndarray:
-    """Repeat rows and columns of a picture whose coordinates are uneven, so that all points have one size."""
+    """Repeat rows and columns of an image whose coordinates are uneven, so that all points have one size."""
     assert axes.y is not None
     for along, axis in enumerate((axes.y, axes.x)):
         if axis.is_even:

@@ -186,7 +186,7 @@ def _page(
 
 
 def _title(sheet: Sheet, columns: int, remark: str) -> str:
-    """File, statuses, and what a point of the picture is."""
+    """File, statuses, and what a point of the image is."""
     about = sheet.made.attributes
     lines = [Path(str(about.get("path", ""))).name, in_words(sheet.made)]
     every = int(about.get("preview", 1))

@@ -27,7 +27,7 @@ WIDE = 20.0
 SPOT = 60.0
 """Area of the circle of a site, in square points, where there are few."""
 FLAT = 0.12
-"""Ratio of height and width below which a picture is stretched."""
+"""Ratio of height and width below which an image is stretched."""
 COLOURS = {
     NO_DATA: "#FFFFFF",
     "failed": "#000000",
@@ -63,7 +63,7 @@ class Sheet:
 
     @property
     def side(self) -> int:
-        """Side of the blocks of pixels that are one point of a picture."""
+        """Side of the blocks of pixels that are one point of an image."""
         return map_blocks.block(self.axes)
 
     @property
@@ -98,12 +98,12 @@ def extent(axes: MapAxes) -> tuple[float, float, float, float]:
 
 
 def ratio(axes: MapAxes) -> float:
-    """Height of a picture divided by its width: at equal scales, or 0.6 where these would not be readable."""
+    """Height of an image divided by its width: at equal scales, or 0.6 where these would not be readable."""
     return _to_scale(axes) or 0.6
 
 
 def _to_scale(axes: MapAxes) -> float | None:
-    """Ratio of height to width at equal scales, None for different units and for very flat pictures."""
+    """Ratio of height to width at equal scales, None for different units and for very flat images."""
     if axes.y is None or axes.y.unit != axes.x.unit:
         return None
     ends = [axis.edges() if axes.kind == "image" else axis.values for axis in (axes.y, axes.x)]
@@ -131,13 +131,13 @@ def overlay(codes: np.ndarray) -> np.ndarray:
         "++++": near["-"] | near["|"],
         "....": (rows % period < width + 1) & (columns % period < width + 1),
     }
-    picture = np.zeros((*fine.shape, 4), np.float32)
+    image = np.zeros((*fine.shape, 4), np.float32)
     for word, hatch in HATCHES.items():
         own = fine == CODES[word]
         if own.any():
-            picture[own, :3], picture[own, 3] = PALE, 1.0
-            picture[own & marks[hatch], :3] = DARK
-    return picture
+            image[own, :3], image[own, 3] = PALE, 1.0
+            image[own & marks[hatch], :3] = DARK
+    return image
 
 
 def hatched(words: Sequence[str]) -> list[Patch]:
@@ -149,7 +149,7 @@ def hatched(words: Sequence[str]) -> list[Patch]:
 
 
 def label_axes(panel: Axes, axes: MapAxes) -> None:
-    """Name the axes of a picture, with equal scales where both have one unit."""
+    """Name the axes of an image, with equal scales where both have one unit."""
     panel.set_xlabel(axes.x.label.replace("$", r"\$"))
     assert axes.y is not None
     panel.set_ylabel(axes.y.label.replace("$", r"\$"))
@@ -173,7 +173,7 @@ def unusable(codes: np.ndarray) -> list[str]:
 
 
 def read(sheet: Sheet, variable: str, frame: int, used: np.ndarray) -> np.ndarray:
-    """A variable at the used pixels of a frame, reduced to the points of a picture; NaN elsewhere."""
+    """A variable at the used pixels of a frame, reduced to the points of an image; NaN elsewhere."""
     array = sheet.frame(variable, frame)
     if sheet.axes.kind == "image":
         return map_blocks.block_means(array, used, sheet.side)

@@ -11,7 +11,7 @@ from pellicle.accuracy.colour_maps import EXACT, ColourMap, colour_maps
 from pellicle.accuracy.colour_methods import EYE
 from pellicle.colour import linear_srgb, sensor
 from pellicle.reporting.drawing import figure_path, new_figure, save_figure
-from pellicle.reporting.picture import display
+from pellicle.reporting.rendering_display import display
 from pellicle.reporting.sphere_figures import DARK, DPI
 from pellicle.scene.film import Scene
 from pellicle.synthetic.sphere import Sphere, sphere
@@ -66,7 +66,7 @@ def _draw(
     for above, below, found in zip(*panels, maps, strict=True):
         linear = np.asarray(linear_srgb(found.xyz, white))
         above.imshow(
-            display(pixels.picture(_over(pixels, linear)), factor, DARK), interpolation="antialiased"
+            display(pixels.rendering(_over(pixels, linear)), factor, DARK), interpolation="antialiased"
         )
         above.set_title(f"{found.name}\n{_time(found.seconds)} a colour", fontsize="small")
         error = np.full(pixels.mask.shape, np.nan)

@@ -14,7 +14,7 @@ from pellicle.effects.plan import Plan
 from pellicle.fitting.comparison import Comparison
 from pellicle.fitting.repeated_measurements import Repeats
 from pellicle.fitting.result import Fit
-from pellicle.mapping.picture import ThicknessMap
+from pellicle.mapping.photograph import ThicknessMap
 from pellicle.reporting import (
     comparison,
     cost_figure,
@@ -23,7 +23,7 @@ from pellicle.reporting import (
     fit_figure,
     fit_text,
     folders,
-    picture_map,
+    photograph_map,
     plans,
     posterior,
     repeats,
@@ -75,7 +75,7 @@ def report(result: Fit | Posterior | Comparison | Repeats | Plan | AnyCost | Map
         case Cost() | SurfaceCost():
             return cost_text.text(result)
         case ThicknessMap():
-            return picture_map.report(result)
+            return photograph_map.report(result)
     if _is_map(result):
         from pellicle.reporting.map_text import cube_report
 
@@ -102,7 +102,7 @@ def plot(result: Fit | Posterior | AnyCost | Map | ThicknessMap) -> Figure:
         case Cost() | SurfaceCost():
             return cost_figure.draw(result)
         case ThicknessMap():
-            return picture_map.draw(result)
+            return photograph_map.draw(result)
     if _is_map(result):
         from pellicle.reporting.map_figures import figures
 
@@ -136,7 +136,7 @@ def save(
         case Cost() | SurfaceCost():
             return cost_files.write_cost(folder, result)
         case ThicknessMap():
-            return picture_map.write_map(folder, result)
+            return photograph_map.write_map(folder, result)
     if _is_map(result):
         from pellicle.reporting.map_files import write_cube_map
 

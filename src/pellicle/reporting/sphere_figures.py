@@ -10,7 +10,7 @@ import jax
 import numpy as np
 
 from pellicle.reporting.drawing import figure_path, new_figure, save_figure
-from pellicle.reporting.picture import display, encode, exposure
+from pellicle.reporting.rendering_display import display, encode, exposure
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface
 from pellicle.synthetic.ball import ball
@@ -34,7 +34,7 @@ SIZE, SMALL = 420, 260
 LAMP_PERCENTILE = 97.0
 """Percentile of the luminance that is white where a lamp is mirrored sharply: it covers 2 % of a ball."""
 DPI = 110
-"""Resolution at which a picture of several spheres has 200 to 400 kB."""
+"""Resolution at which a rendering of several spheres has 200 to 400 kB."""
 DARK = 0.06
 """sRGB value around balls in reflection alone."""
 _CHANNELS = ("#c03030", "#2f8f2f", "#3050c0")
@@ -57,14 +57,14 @@ def sphere(
     **Raises:** UsageError for another file type, and where the file exists or cannot be written.
     """
     target = figure_path(path)
-    picture = render(surface, ENVIRONMENTS[environment](light), size)
+    rendering = render(surface, ENVIRONMENTS[environment](light), size)
     with jax.enable_x64(True):
         lobes = {angle: in_plane(surface, angle, LEAVING) for angle in INCIDENCES}
-    factor = exposure(picture)
+    factor = exposure(rendering)
     figure = new_figure(8.0, 5.0)
     grid = figure.add_gridspec(len(lobes), 2, width_ratios=[2.2, 1])
     axes = figure.add_subplot(grid[:, 0])
-    _show(axes, display(picture, factor))
+    _show(axes, display(rendering, factor))
     axes.set_title(title.replace("$", r"\$"), loc="left", fontsize="medium")
     axes.text(
         0.0,
@@ -170,7 +170,7 @@ def _lighting(lamps: str, factor: float) -> str:
 
 
 def _draw_grid(rows: dict[str, list[np.ndarray]], names: list[str], title: str, note: str) -> Figure:
-    """Rows of pictures under the names of the columns."""
+    """Rows of renderings under the names of the columns."""
     count = len(names)
     figure = new_figure(0.3 + 1.9 * count, 0.6 + 1.95 * len(rows))
     panels = figure.subplots(len(rows), count, squeeze=False)
@@ -186,7 +186,7 @@ def _draw_grid(rows: dict[str, list[np.ndarray]], names: list[str], title: str, 
 
 
 def _show(axes: Axes, image: np.ndarray) -> None:
-    """A picture without ticks and frame."""
+    """A rendering without ticks and frame."""
     axes.imshow(image, interpolation="antialiased")
     axes.set(xticks=[], yticks=[])
     for spine in axes.spines.values():

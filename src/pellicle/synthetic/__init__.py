@@ -1,1 +1,1 @@
-"""Simulated measurements and pictures: spectra, BRDF samples, colours, spheres."""
+"""Simulated measurements and renderings: spectra, BRDF samples, colours, spheres."""

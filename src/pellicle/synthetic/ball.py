@@ -14,7 +14,7 @@ import numpy as np
 from pellicle.optics.pair import to_complex
 from pellicle.synthetic.environment import Environment
 from pellicle.synthetic.film_spectra import Spectra, Stack, linear_srgb, spectra
-from pellicle.synthetic.sphere import Picture, Sphere, sphere
+from pellicle.synthetic.sphere import Rendering, Sphere, sphere
 
 COSINES = 256
 """Nodes of the cosine between which colours are interpolated: within 0.001 of white for films to 1 µm."""
@@ -25,13 +25,13 @@ OPAQUE = 1e-4
 
 
 class Ball(NamedTuple):
-    """Pictures of a ball: in reflection alone, and of the light through it (None if it is opaque)."""
+    """Renderings of a ball: in reflection alone, and of the light through it (None if it is opaque)."""
 
-    reflected: Picture
-    transmitted: Picture | None
+    reflected: Rendering
+    transmitted: Rendering | None
 
     @property
-    def whole(self) -> Picture:
+    def whole(self) -> Rendering:
         """Both together."""
         if self.transmitted is None:
             return self.reflected
@@ -39,7 +39,7 @@ class Ball(NamedTuple):
 
 
 def ball(films: Stack, thickness: float, environment: Environment, size: int) -> Ball:
-    """Picture a ball under a film of this thickness (nm), size × size pixels.
+    """Render a ball under a film of this thickness (nm), size × size pixels.
 
     Colours are integrals of the spectra in steps of 1 nm. Within the ball each ray runs as its refractive
     index at 550 nm bends it: the ball disperses no colours.
@@ -53,11 +53,11 @@ def ball(films: Stack, thickness: float, environment: Environment, size: int) ->
         return np.stack([np.interp(pixels.cosine, cosine, channel) for channel in table.T], axis=-1)
 
     seen = environment.radiance(pixels.mirrored())[:, None]
-    reflected = pixels.picture(colour(found.reflected) * seen)
+    reflected = pixels.rendering(colour(found.reflected) * seen)
     if is_opaque(films):
         return Ball(reflected, None)
     return Ball(
-        reflected, pixels.picture(_through(pixels, _relative_index(films), found, environment, colour))
+        reflected, pixels.rendering(_through(pixels, _relative_index(films), found, environment, colour))
     )
 
 

@@ -14,7 +14,7 @@ from pellicle.errors import UsageError
 from pellicle.optics.pair import to_complex
 from pellicle.synthetic.environment import Environment
 from pellicle.synthetic.film_spectra import Stack, linear_srgb, spectra
-from pellicle.synthetic.sphere import Picture, sphere
+from pellicle.synthetic.sphere import Rendering, sphere
 
 CROSSINGS = 4
 """Crossings of the film on one line of sight: a further one has less than 1 % of the light up to 80°."""
@@ -37,8 +37,8 @@ def drained_thickness(angle: Any, top: float) -> Any:
     return top * np.sqrt(4 / 3 * integral) / np.sin(angle) ** (2 / 3)
 
 
-def bubble(films: Stack, top: float, environment: Environment, size: int) -> Picture:
-    """Picture a bubble whose film is `top` nm thick at its top, size × size pixels.
+def bubble(films: Stack, top: float, environment: Environment, size: int) -> Rendering:
+    """Render a bubble whose film is `top` nm thick at its top, size × size pixels.
 
     **Raises:** UsageError where the media on both sides differ.
     """
@@ -61,4 +61,4 @@ def bubble(films: Stack, top: float, environment: Environment, size: int) -> Pic
         seen = environment.radiance(pixels.deflected(-(crossing - 1) * step))
         linear += linear_srgb(films, passed * found.transmitted) * seen[:, None]
         passed = passed * found.reflected
-    return pixels.picture(linear)
+    return pixels.rendering(linear)

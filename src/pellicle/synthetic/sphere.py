@@ -12,13 +12,13 @@ import numpy as np
 
 EYE = np.array([0.0, 0.0, 1.0])
 FILLS = 0.95
-"""Diameter of the sphere, relative to the width of its picture."""
+"""Diameter of the sphere, relative to the width of its rendering."""
 LIMB = 0.9995
 """Largest sine of the angle of incidence: pixels that lie across the limb take the colour beside it."""
 
 
-class Picture(NamedTuple):
-    """Picture of a sphere: linear sRGB (size, size, 3), and the share of each pixel in it (size, size)."""
+class Rendering(NamedTuple):
+    """Rendering of a sphere: linear sRGB (size, size, 3), and the share of each pixel in it (size, size)."""
 
     linear: np.ndarray
     coverage: np.ndarray
@@ -38,15 +38,15 @@ class Sphere(NamedTuple):
 
     @property
     def outward(self) -> np.ndarray:
-        """Directions (pixels, 3) from the centre of the picture to each pixel."""
+        """Directions (pixels, 3) from the centre of the rendering to each pixel."""
         flat = self.normal * [1.0, 1.0, 0.0]
         return flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-12)
 
-    def picture(self, linear: np.ndarray) -> Picture:
-        """Make a picture of the linear sRGB (pixels, 3) of each pixel."""
+    def rendering(self, linear: np.ndarray) -> Rendering:
+        """Make a rendering of the linear sRGB (pixels, 3) of each pixel."""
         image, coverage = np.zeros((*self.mask.shape, 3)), np.zeros(self.mask.shape)
         image[self.mask], coverage[self.mask] = linear, self.share
-        return Picture(image, coverage)
+        return Rendering(image, coverage)
 
     def deflected(self, angle: np.ndarray) -> np.ndarray:
         """The line of sight (pixels, 3), away from the eye, turned outward by angles (pixels,) in radians."""
@@ -58,7 +58,7 @@ class Sphere(NamedTuple):
 
 
 def sphere(size: int) -> Sphere:
-    """Return the pixels of a sphere in a picture of `size` × `size`."""
+    """Return the pixels of a sphere in a rendering of `size` × `size`."""
     across = ((np.arange(size) + 0.5) * 2 / size - 1) / FILLS
     x, y = np.meshgrid(across, -across)
     radius = np.hypot(x, y)

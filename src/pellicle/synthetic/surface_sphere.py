@@ -16,7 +16,7 @@ from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface
 from pellicle.synthetic.environment import EDGE, Environment, studio
 from pellicle.synthetic.relief import Relief, relief
-from pellicle.synthetic.sphere import EYE, Picture, sphere
+from pellicle.synthetic.sphere import EYE, Rendering, sphere
 from pellicle.synthetic.surface_colour import in_colour
 
 DIRECTIONS = 192
@@ -38,11 +38,11 @@ def render(
     size: int = 300,
     seed: int = 0,
     count: int = DIRECTIONS,
-) -> Picture:
+) -> Rendering:
     """Render a sphere in an environment (`studio()` if None), size × size pixels, in colours of the spectrum.
 
     The light is integrated by importance sampling with `count` directions, which are the same for all pixels
-    relative to their normals: pictures have no grain. In white surroundings the default count is within 4 %.
+    relative to their normals: there is no grain. In white surroundings the default count is within 4 %.
 
     A free thickness follows smooth noise between its bounds; a free deviation of the normals follows the
     slope of that noise, up to its upper bound, in the direction of the slope. Other free parameters take
@@ -64,7 +64,7 @@ def render(
             batch = {key: jnp.asarray(x[rows, None], jnp.float32) for key, x in maps.items()}
             lit = _radiance(shading.brdf, narrowest > NARROW, batch, jnp.asarray(axes[rows]), *shared)
             found.append(np.asarray(lit))
-    return pixels.picture(np.concatenate(found)[: len(theta)] @ shading.to_srgb)
+    return pixels.rendering(np.concatenate(found)[: len(theta)] @ shading.to_srgb)
 
 
 def following(surface: Surface, noise: Relief) -> dict[str, np.ndarray]:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import tifffile
 
-from pellicle.data.cubes.detect import is_picture
+from pellicle.data.cubes.detect import is_photograph
 from pellicle.data.read_cube import read_cube
 from pellicle.errors import DataError, UsageError
 
@@ -79,13 +79,13 @@ def test_without_wavelengths(values, refused, tmp_path):
     refused(path, "8 wavelengths", error=DataError, wavelengths="400:750:50")
 
 
-def test_a_colour_picture_is_none(values, refused, tmp_path):
+def test_a_photograph_is_no_cube(values, refused, tmp_path):
     path = tmp_path / "photo.tif"
     tifffile.imwrite(path, (255 * values[..., :3]).astype("u1"), photometric="rgb")
-    assert is_picture(path)
+    assert is_photograph(path)
     refused(path, "three channels", '`signal="srgb"`', error=UsageError)
     tifffile.imwrite(tmp_path / "stack.tif", values.transpose(2, 0, 1), photometric="minisblack")
-    assert not is_picture(tmp_path / "stack.tif")
+    assert not is_photograph(tmp_path / "stack.tif")
 
 
 def test_a_compression_that_needs_another_package(values, refused, tmp_path):

@@ -39,7 +39,7 @@ def need_wavelengths(shape: tuple[int, ...], path: str) -> UsageError:
     text = " x ".join(map(str, shape))
     if 3 in (shape[0], shape[-1]) and len(shape) == 3:
         return UsageError(
-            f"{path}: has three channels ({text}) and no wavelengths: the map of colours reads a picture "
+            f"{path}: has three channels ({text}) and no wavelengths: the map of colours reads a photograph "
             "as PNG "
             'or TIFF in R, G, B (`signal="srgb"`); give `wavelengths` if it has three bands'
         )

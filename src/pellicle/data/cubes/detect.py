@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pellicle.data.cubes import envi, numpy_files, spectra_folder, stores, tiff_stacks
 from pellicle.data.cubes.raw_cube import Asked, RawCube
-from pellicle.data.read_picture import picture_format
+from pellicle.data.read_photograph import image_format
 from pellicle.errors import DataError
 
 LARGEST_SPECTRUM = 2**27
@@ -30,7 +30,7 @@ def read_raw(path: Path, asked: Asked) -> RawCube:
         return tiff_stacks.read_tiff(path, asked)
     if envi.header_of(path) is not None:
         return envi.read_envi(path, asked)
-    if picture_format(path) is None and spectra_folder.table_of(path) is not None:
+    if image_format(path) is None and spectra_folder.table_of(path) is not None:
         return spectra_folder.read_folder(path, asked)
     raise DataError(f"{path}: is no cube that pellicle reads ({READ}): convert it to one of these")
 
@@ -44,17 +44,17 @@ def is_cube(path: Path) -> bool:
     if numpy_files.is_numpy(path) or envi.header_of(path) is not None:
         return True
     if tiff_stacks.is_tiff(path):
-        return not tiff_stacks.is_colour_picture(path)
+        return not tiff_stacks.is_colour_image(path)
     if stores.is_netcdf(path):
         return stores.is_classic(path) or path.stat().st_size > LARGEST_SPECTRUM
-    return picture_format(path) is None and spectra_folder.table_of(path) is not None
+    return image_format(path) is None and spectra_folder.table_of(path) is not None
 
 
-def is_picture(path: Path) -> bool:
-    """True for a picture in colours: PNG, JPEG, or a TIFF of one page in R, G, B or with a palette."""
+def is_photograph(path: Path) -> bool:
+    """True for a photograph in colours: PNG, JPEG, or a TIFF of one page in R, G, B or with a palette."""
     if not path.is_file():
         return False
-    kind = picture_format(path)
+    kind = image_format(path)
     if kind != "TIFF":
         return kind is not None
-    return tiff_stacks.is_colour_picture(path)
+    return tiff_stacks.is_colour_image(path)

@@ -1,4 +1,4 @@
-"""Masks of pixels: which are used, from a picture, a NumPy file, an array or a variable of the cube."""
+"""Masks of pixels: which are used, from an image, a NumPy file, an array or a variable of the cube."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pellicle.data.cubes.raw_cube import RawCube
-from pellicle.data.read_picture import picture_format
+from pellicle.data.read_photograph import image_format
 from pellicle.errors import DataError, UsageError, install_command
 
 
@@ -50,19 +50,19 @@ def _file(path: Path, raw: RawCube) -> np.ndarray:
     if path.suffix.lower() == ".npy":
         values = np.load(path, mmap_mode="r")
         return np.asarray(values)
-    kind = picture_format(path)
+    kind = image_format(path)
     if kind is None:
         raise UsageError(f"`mask` {str(path)!r} is no PNG, TIFF or .npy file: save it as one of these")
     try:
-        values = _picture(path, kind)
+        values = _image(path, kind)
     except ImportError as error:
-        raise UsageError(f"{path}: pictures need {error.name}: {install_command('images')}") from None
+        raise UsageError(f"{path}: images need {error.name}: {install_command('images')}") from None
     except Exception as error:  # decoders raise errors of every kind on damaged files
         raise DataError(f"{path}: the {kind} cannot be read ({error}); save it again") from None
     return values if values.ndim == 2 else np.any(values[..., :3] != 0, axis=-1)
 
 
-def _picture(path: Path, kind: str) -> Any:
+def _image(path: Path, kind: str) -> Any:
     if kind == "TIFF":
         import tifffile
 

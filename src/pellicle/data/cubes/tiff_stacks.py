@@ -111,7 +111,7 @@ def _channel_wavelengths(file: Any) -> tuple[np.ndarray | None, str]:
     return None, ""
 
 
-def is_colour_picture(path: Path) -> bool:
+def is_colour_image(path: Path) -> bool:
     """True for a TIFF whose first page is in R, G, B or has a palette; also without tifffile."""
     try:
         import tifffile

@@ -143,7 +143,7 @@ def split(text: str, delimiter: str) -> list[str]:
 
 
 _FOREIGN = {
-    rb"\x89PNG|\xff\xd8\xff|GIF8|II\*\x00|MM\x00\*": "a picture; give the numbers behind it, as a CSV",
+    rb"\x89PNG|\xff\xd8\xff|GIF8|II\*\x00|MM\x00\*": "an image; give the numbers behind it, as a CSV",
     rb"%PDF": "a PDF; give the numbers in it as a CSV",
     rb"\xd0\xcf\x11\xe0|PK\x03\x04.*(\[Content_Types|spreadsheet)": "an office file; save its sheet as CSV",
     rb"PK\x03\x04|\x1f\x8b|BZh|7z\xbc\xaf|Rar!": "packed; unpack it and give the file inside",

@@ -17,7 +17,7 @@ from pellicle.rendering.films import with_values
 from pellicle.reporting.page.data_figures import CHANNELS, label
 from pellicle.reporting.page.document import picture
 from pellicle.reporting.page.figure import Column, Panel, Trace, figure, line
-from pellicle.reporting.picture import display
+from pellicle.reporting.rendering_display import display
 from pellicle.scene.surface import Surface
 from pellicle.synthetic.sphere import EYE, sphere
 
@@ -58,7 +58,7 @@ def _views(name: str, numbers: Any, normals: Any) -> Views:
 
 
 def section(fit: Fit) -> dict[str, Any]:
-    """The figure of lobes, with those of rivals, and the picture of a sphere."""
+    """The figure of lobes, with those of rivals, and the rendering of a sphere."""
     best, *rivals = (_at(fit, changed) for changed in ({}, *(rival.parameters for rival in fit.rivals)))
     names = _names(fit.surface)
     with jax.enable_x64(True):
@@ -118,7 +118,7 @@ def _sphere(radiance: np.ndarray) -> dict[str, str]:
 
     rgb = radiance if radiance.shape[1] == 3 else np.repeat(radiance.mean(axis=1, keepdims=True), 3, axis=1)
     file = BytesIO()
-    imsave(file, np.clip(display(sphere(_SIZE).picture(rgb)), 0.0, 1.0), format="png")
+    imsave(file, np.clip(display(sphere(_SIZE).rendering(rgb)), 0.0, 1.0), format="png")
     about = (
         f"Sphere of the fitted surface under one lamp, {_LAMP:g} degrees from the line of sight, its channels"
         " shown as red, green and blue."

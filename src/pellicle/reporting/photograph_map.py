@@ -1,4 +1,4 @@
-"""Thickness maps of pictures: text, JSON, figure, and their folder."""
+"""Thickness maps of photographs: text, JSON, figure, and their folder."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pellicle.files import MARKER, new_folder, replacing, write_text
-from pellicle.mapping.picture import ThicknessMap
+from pellicle.mapping.photograph import ThicknessMap
 from pellicle.reporting.drawing import BLUE, GREY, ORANGE, new_figure, save_figure
 from pellicle.reporting.json_record import indented, number, versions
 

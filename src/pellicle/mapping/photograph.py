@@ -1,4 +1,4 @@
-"""Thickness of a film at every pixel of a picture, or along a strip, from its colours."""
+"""Thickness of a film at every pixel of a photograph, or along a strip, from its colours."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from pellicle.colour import ColourInverse
 from pellicle.colour.inverse import ColourThickness
 from pellicle.colour.observers import Sensor
 from pellicle.data.colours import USUAL_NOISE
-from pellicle.data.picture_regions import Region, parse_regions, strip
-from pellicle.data.read_picture import Picture, read_picture
+from pellicle.data.pixel_regions import Region, parse_regions, strip
+from pellicle.data.read_photograph import Photograph, read_photograph
 from pellicle.errors import UsageError
 from pellicle.recipes.cameras import Camera, Sight, sight
-from pellicle.recipes.picture_colours import check_picture, white_reference
+from pellicle.recipes.photograph_colours import check_photograph, white_reference
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free
 from pellicle.scene.instrument import Drift
@@ -55,7 +55,7 @@ class ThicknessMap(NamedTuple):
         return float(np.mean(self.found.status == "converged"))
 
 
-def map_picture(
+def map_photograph(
     data: str | os.PathLike[str],
     scene: Scene,
     *,
@@ -71,12 +71,12 @@ def map_picture(
     layer: str | None = None,
     noise: float | None = None,
 ) -> ThicknessMap:
-    """Compute the thickness at each pixel of a picture; arguments as of `pellicle.map`."""
+    """Compute the thickness at each pixel of a photograph; arguments as of `pellicle.map`."""
     paths = [None if path is None else os.fspath(path) for path in (lamp, sensitivities)]
     transmitted = scene.light.signal == "T"
     eye = Camera(observer, illuminant, *paths, gamma=gamma, transmitted=transmitted)
-    pixels = read_picture(data)
-    space = check_picture(pixels, space)
+    pixels = read_photograph(data)
+    space = check_photograph(pixels, space)
     return thickness_map(
         pixels,
         scene,
@@ -92,7 +92,7 @@ def map_picture(
 
 
 def thickness_map(
-    picture: Picture,
+    photograph: Photograph,
     scene: Scene,
     seen: Sight,
     space: str = "srgb",
@@ -104,7 +104,7 @@ def thickness_map(
     layer: str | None = None,
     noise: float | None = None,
 ) -> ThicknessMap:
-    """Compute the thickness at each pixel of a region, of the whole picture, or along a strip.
+    """Compute the thickness at each pixel of a region, of the whole photograph, or along a strip.
 
     Each position is inverted by itself (`pellicle.colour.ColourInverse`), between the bounds of the free
     thickness. A free scale of the instrument is a free exposure of each position.
@@ -118,7 +118,7 @@ def thickness_map(
       values.
     - `noise`: standard deviation of the coded channels, 1.5/255 of sRGB and 0.01 of "rgb" by default.
 
-    **Raises:** UsageError for a chart, for a thickness that is not free and for pixels outside the picture.
+    **Raises:** UsageError for a chart, a thickness that is not free and pixels outside the photograph.
     """
     if seen.matrix is not None:
         raise UsageError("a map needs `sensitivities` or sRGB; a `chart` is for colours of regions")
@@ -127,23 +127,23 @@ def thickness_map(
     bounds: Any = getattr(scene.layers[varied_layer(scene, layer)], "thickness", None)
     if not isinstance(bounds, Free):
         raise UsageError("the thickness of the map must be free, between two bounds")
-    reference, notes = white_reference(picture, seen.coding, white)
+    reference, notes = white_reference(photograph, seen.coding, white)
     position = None
     if along is not None:
-        taken = strip(picture, along)
+        taken = strip(photograph, along)
         position, where = taken.position, along if isinstance(along, str) else ",".join(map(str, along))
         linear = seen.coding.decoded(taken.pixels).mean(axis=1, dtype=float)
         step = f"strip {where}: {len(position)} positions, means of {taken.pixels.shape[1]} pixels"
     else:
-        box = Region(0, 0, *picture.size) if region is None else _only(parse_regions(region))
-        pixels = box.pixels(picture).reshape(box.height, box.width, 3)
+        box = Region(0, 0, *photograph.size) if region is None else _only(parse_regions(region))
+        pixels = box.pixels(photograph).reshape(box.height, box.width, 3)
         linear, where = seen.coding.decoded(pixels), str(box)
         step = f"region {where}: {box.width * box.height} pixels"
     exposed = linear / reference
     coded = seen.coding.encode(exposed, seen.coding.roots(exposed))
     clipped = np.mean(np.any((coded <= 0) | (coded >= 1), axis=-1))
     sigma = USUAL_NOISE[space] if noise is None else noise
-    told = [*picture.notes, *seen.notes, *notes, step, f"noise {sigma:.2g} of each channel"]
+    told = [*photograph.notes, *seen.notes, *notes, step, f"noise {sigma:.2g} of each channel"]
     if clipped > 0:
         told.append(f"{100 * clipped:.2g} % of the positions are clipped in a channel")
     inverse = _inverse(scene, seen.sensor, space, bounds, layer, sigma, gamma, linear)
@@ -156,8 +156,8 @@ def thickness_map(
         where,
         space,
         tuple(told),
-        picture.path,
-        picture.sha256,
+        photograph.path,
+        photograph.sha256,
     )
 
 
@@ -180,7 +180,7 @@ def _inverse(
     """The inverse of the film's colours; a camera's channels are linear, with the σ of their median."""
     light: Any = scene.light.angle
     if np.ndim(light):
-        raise UsageError("a picture has one angle of incidence: give the scene one number as `angle`")
+        raise UsageError("a photograph has one angle of incidence: give the scene one number as `angle`")
     angle = float(getattr(light, "start", light))
     low = max(angle - 1.0, 0.0)  # a table needs a range of angles
     table = colour_table(scene, (bounds.lower, bounds.upper), (low, low + 1.0), layer, eye=eye)

@@ -1,4 +1,4 @@
-"""Pixels of a picture to measure: rectangles, points and strips."""
+"""Pixels of a photograph to measure: rectangles, points and strips."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pellicle.data.read_picture import Picture
+from pellicle.data.read_photograph import Photograph
 from pellicle.errors import UsageError
 
 POINT = 2
@@ -33,17 +33,17 @@ class Region(NamedTuple):
             raise UsageError(f"`{name}` must be x,y,width,height in pixels, from 0, got {self}")
         return self
 
-    def pixels(self, picture: Picture, name: str = "region") -> np.ndarray:
-        """Coded pixels (N, 3). Raises UsageError where the rectangle leaves the picture."""
+    def pixels(self, photograph: Photograph, name: str = "region") -> np.ndarray:
+        """Coded pixels (N, 3). Raises UsageError where the rectangle leaves the photograph."""
         self.checked(name)
-        width, height = picture.size
+        width, height = photograph.size
         if self.x + self.width > width or self.y + self.height > height:
             raise UsageError(
-                f"{picture.path}: `{name}` {self} leaves the picture of {width} by {height} pixels;"
+                f"{photograph.path}: `{name}` {self} leaves the photograph of {width} by {height} pixels;"
                 " shift or shrink it"
             )
         rows, columns = slice(self.y, self.y + self.height), slice(self.x, self.x + self.width)
-        return picture.pixels[rows, columns].reshape(-1, 3)
+        return photograph.pixels[rows, columns].reshape(-1, 3)
 
     def __str__(self) -> str:
         return f"{self.x},{self.y},{self.width},{self.height}"
@@ -54,14 +54,16 @@ def parse_regions(value: str | Sequence[int] | Sequence[Sequence[int]], name: st
     return [Region(*four).checked(name) for four in whole_numbers(value, 4, name, "x,y,width,height")]
 
 
-def parse_points(value: str | Sequence[int] | Sequence[Sequence[int]], picture: Picture) -> list[Region]:
+def parse_points(
+    value: str | Sequence[int] | Sequence[Sequence[int]], photograph: Photograph
+) -> list[Region]:
     """Return the squares of 5 by 5 pixels around points `x,y;x,y`, cut at the edges. Raises UsageError."""
-    width, height = picture.size
+    width, height = photograph.size
     found = []
     for x, y in whole_numbers(value, 2, "points", "x,y"):
         if not (0 <= x < width and 0 <= y < height):
             raise UsageError(
-                f"{picture.path}: the point {x},{y} is not in the picture of {width} by {height} pixels"
+                f"{photograph.path}: the point {x},{y} is not in the photograph of {width} by {height} pixels"
             )
         left, top = max(x - POINT, 0), max(y - POINT, 0)
         right, bottom = min(x + POINT + 1, width), min(y + POINT + 1, height)
@@ -76,19 +78,19 @@ class Strip(NamedTuple):
     pixels: np.ndarray
 
 
-def strip(picture: Picture, value: str | Sequence[int]) -> Strip:
+def strip(photograph: Photograph, value: str | Sequence[int]) -> Strip:
     """Return the pixels along the line `x0,y0,x1,y1`, one position per pixel, 5 pixels wide.
 
-    Pixels beyond the edges of the picture are those at the edge.
+    Pixels beyond the edges of the photograph are those at the edge.
 
-    **Raises:** UsageError for ends outside the picture or on the same pixel.
+    **Raises:** UsageError for ends outside the photograph or on the same pixel.
     """
     x0, y0, x1, y1 = whole_numbers(value, 4, "strip", "x0,y0,x1,y1")[0]
-    width, height = picture.size
+    width, height = photograph.size
     for x, y in ((x0, y0), (x1, y1)):
         if not (0 <= x < width and 0 <= y < height):
             raise UsageError(
-                f"{picture.path}: the end {x},{y} of `strip` is not in its {width} by {height} pixels"
+                f"{photograph.path}: the end {x},{y} of `strip` is not in its {width} by {height} pixels"
             )
     length = float(np.hypot(x1 - x0, y1 - y0))
     if length < 1:
@@ -98,7 +100,7 @@ def strip(picture: Picture, value: str | Sequence[int]) -> Strip:
     x = x0 + along[:, None] * (x1 - x0) - across * (y1 - y0) / length
     y = y0 + along[:, None] * (y1 - y0) + across * (x1 - x0) / length
     column, row = (np.clip(np.rint(at), 0, size - 1).astype(int) for at, size in ((x, width), (y, height)))
-    return Strip(along * length, picture.pixels[row, column])
+    return Strip(along * length, photograph.pixels[row, column])
 
 
 def whole_numbers(value: str | Sequence, count: int, name: str, form: str) -> list[tuple[int, ...]]:

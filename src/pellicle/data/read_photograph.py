@@ -1,4 +1,4 @@
-"""Reading of pictures, PNG, TIFF and JPEG, as coded values of R, G and B."""
+"""Reading of photographs, PNG, TIFF and JPEG, as coded values of R, G and B."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ _SIGNATURES = {
     "JPEG": (b"\xff\xd8\xff",),
 }
 LARGEST = 2**28
-"""Values of the largest TIFF, as many as Pillow reads of other pictures without a warning."""
+"""Values of the largest TIFF, as many as Pillow reads of other photographs without a warning."""
 _COLOUR_MODES = ("RGB", "RGBA", "RGBX")
 _FLOAT_LEVELS = 65535.0
-"""Levels of a picture in floats: cameras have 16 bits at most."""
+"""Levels of a photograph in floats: cameras have 16 bits at most."""
 
 
 @dataclass(frozen=True, eq=False)
-class Picture:
-    """Pixels of a picture: coded values from 0 to 1, float32, (height, width, 3), row 0 at the top.
+class Photograph:
+    """Pixels of a photograph: coded values from 0 to 1, float32, (height, width, 3), row 0 at the top.
 
     `step` is the step of the coding, 1/255 for 8 bits, that of 16 bits for floats; `profile` the name of an
     embedded colour profile that is not sRGB, or ""; `floats` is true of floating-point
@@ -51,29 +51,29 @@ class Picture:
         return self.pixels.shape[1], self.pixels.shape[0]
 
 
-def picture_format(path: str | os.PathLike[str]) -> str | None:
+def image_format(path: str | os.PathLike[str]) -> str | None:
     """Return "PNG", "TIFF" or "JPEG" by a file's first bytes, else None. Raises DataError if unreadable."""
     with open_binary(path) as file:
         head = file.read(8)
     return next((name for name, marks in _SIGNATURES.items() if head.startswith(marks)), None)
 
 
-def read_picture(path: str | os.PathLike[str]) -> Picture:
-    """Read a picture in colour.
+def read_photograph(path: str | os.PathLike[str]) -> Photograph:
+    """Read a photograph in colour.
 
-    A picture that a camera has turned is turned upright. Palettes become R, G, B.
+    A photograph that a camera has turned is turned upright. Palettes become R, G, B.
 
-    **Raises:** DataError, one sentence, for a file that is no such picture, damaged, without colours (grey),
+    **Raises:** DataError, one sentence, for a file that is no such photograph, damaged, grey,
     with transparent pixels, or in another colour model; UsageError without the extra `images`.
     """
-    kind = picture_format(path)
+    kind = image_format(path)
     if kind is None:
-        raise DataError(f"{path}: is no PNG, TIFF or JPEG picture; save it as one of these")
+        raise DataError(f"{path}: is no PNG, TIFF or JPEG photograph; save it as one of these")
     content, sha256 = read_bytes(path)
     try:
         values, full, profile, notes = _tiff(content) if kind == "TIFF" else _by_pillow(content)
     except ImportError as error:
-        raise UsageError(f"{path}: pictures need {error.name}: {install_command('images')}") from None
+        raise UsageError(f"{path}: photographs need {error.name}: {install_command('images')}") from None
     except DataError as error:
         raise DataError(f"{path}: {error}") from None
     except Exception as error:  # decoders raise errors of every kind on damaged files
@@ -86,7 +86,7 @@ def read_picture(path: str | os.PathLike[str]) -> Picture:
         notes = [*notes, "JPEG: its compression shifts colours by a few of 255; PNG and TIFF do not"]
     floats = values.dtype.kind == "f"
     step = 1 / (_FLOAT_LEVELS if floats else full)
-    return Picture(coded, step, str(path), sha256, tuple(notes), foreign, floats)
+    return Photograph(coded, step, str(path), sha256, tuple(notes), foreign, floats)
 
 
 def _by_pillow(content: bytes) -> tuple[np.ndarray, float, bytes | None, list[str]]:
@@ -110,7 +110,7 @@ def _by_pillow(content: bytes) -> tuple[np.ndarray, float, bytes | None, list[st
             "CMYK": "in CMYK",
         }
         raise DataError(
-            f"is {known.get(image.mode, f'in the mode {image.mode}')}: a picture in R, G, B is needed"
+            f"is {known.get(image.mode, f'in the mode {image.mode}')}: a photograph in R, G, B is needed"
         )
     return np.asarray(image), 255.0, profile, notes
 
@@ -124,7 +124,7 @@ def _tiff(content: bytes) -> tuple[np.ndarray, float, bytes | None, list[str]]:
         name = page.photometric.name if page.photometric is not None else "unknown"
         if name not in ("RGB", "PALETTE"):
             shown = "grey" if name.startswith("MINIS") else f"in the colour model {name}"
-            raise DataError(f"is {shown}: a picture in R, G, B is needed")
+            raise DataError(f"is {shown}: a photograph in R, G, B is needed")
         if page.size > LARGEST:
             raise DataError(f"has {page.size:,} values, more than {LARGEST:,}; cut it to the film")
         values = page.asarray()

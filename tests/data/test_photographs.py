@@ -1,12 +1,12 @@
-"""Pictures of any depth and layout give the pixels that were written; others are refused."""
+"""Photographs of any depth and layout give the pixels that were written; others are refused."""
 
 import numpy as np
 import pytest
 import tifffile
 from PIL import Image, ImageCms
 
-from pellicle.data.picture_regions import Region, parse_points, parse_regions, strip
-from pellicle.data.read_picture import picture_format, read_picture
+from pellicle.data.pixel_regions import Region, parse_points, parse_regions, strip
+from pellicle.data.read_photograph import image_format, read_photograph
 from pellicle.errors import DataError, UsageError
 
 PIXELS = np.random.default_rng(0).integers(0, 256, (12, 20, 3), dtype=np.uint8)
@@ -23,9 +23,9 @@ def by_tifffile(path, values, **options):
 
 
 def palette(path):
-    picture = Image.fromarray(np.arange(240, dtype=np.uint8).reshape(12, 20) % 7, "P")
-    picture.putpalette([10, 20, 30, 40, 50, 60, 70, 80, 90] + [5, 6, 7] * 4)
-    picture.save(path)
+    photograph = Image.fromarray(np.arange(240, dtype=np.uint8).reshape(12, 20) % 7, "P")
+    photograph.putpalette([10, 20, 30, 40, 50, 60, 70, 80, 90] + [5, 6, 7] * 4)
+    photograph.save(path)
     return path
 
 
@@ -44,36 +44,36 @@ LAYOUTS = {
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_pixels_of_every_layout(tmp_path, layout):
     path = LAYOUTS[layout](tmp_path)
-    picture = read_picture(path)
-    np.testing.assert_allclose(picture.pixels, PIXELS / 255, atol=1e-7)
-    assert picture.size == (20, 12)
-    assert picture.profile == ""
-    assert picture.step == pytest.approx({"16 bits": 1 / 65535, "float": 1 / 65535}.get(layout, 1 / 255))
+    photograph = read_photograph(path)
+    np.testing.assert_allclose(photograph.pixels, PIXELS / 255, atol=1e-7)
+    assert photograph.size == (20, 12)
+    assert photograph.profile == ""
+    assert photograph.step == pytest.approx({"16 bits": 1 / 65535, "float": 1 / 65535}.get(layout, 1 / 255))
 
 
 def test_palette_and_jpeg_are_told(tmp_path):
-    coloured = read_picture(palette(tmp_path / "p.png"))
+    coloured = read_photograph(palette(tmp_path / "p.png"))
     np.testing.assert_allclose(coloured.pixels[0, 1] * 255, [40, 50, 60], atol=1e-4)
     assert "palette converted to R, G, B" in coloured.notes
-    photo = read_picture(by_pillow(tmp_path / "p.jpg"))
+    photo = read_photograph(by_pillow(tmp_path / "p.jpg"))
     assert "compression" in " ".join(photo.notes)
-    assert picture_format(tmp_path / "p.jpg") == "JPEG"
+    assert image_format(tmp_path / "p.jpg") == "JPEG"
 
 
 def test_a_turned_photo_is_upright(tmp_path):
     exif = Image.Exif()
     exif[0x0112] = 6  # the camera was turned by 90 degrees
     path = by_pillow(tmp_path / "a.png", exif=exif)
-    np.testing.assert_allclose(read_picture(path).pixels, np.rot90(PIXELS, -1) / 255, atol=1e-7)
+    np.testing.assert_allclose(read_photograph(path).pixels, np.rot90(PIXELS, -1) / 255, atol=1e-7)
 
 
 def test_profiles_other_than_srgb_are_named(tmp_path):
     srgb = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
     lab = ImageCms.ImageCmsProfile(ImageCms.createProfile("LAB")).tobytes()
-    assert read_picture(by_pillow(tmp_path / "a.png", icc_profile=srgb)).profile == ""
-    assert "Lab" in read_picture(by_pillow(tmp_path / "b.png", icc_profile=lab)).profile
+    assert read_photograph(by_pillow(tmp_path / "a.png", icc_profile=srgb)).profile == ""
+    assert "Lab" in read_photograph(by_pillow(tmp_path / "b.png", icc_profile=lab)).profile
     tagged = by_tifffile(tmp_path / "c.tif", PIXELS, photometric="rgb", iccprofile=lab)
-    assert "Lab" in read_picture(tagged).profile
+    assert "Lab" in read_photograph(tagged).profile
 
 
 def truncated(path):
@@ -83,7 +83,7 @@ def truncated(path):
 
 
 REFUSED = {
-    "no picture": (lambda p: by_pillow(p / "a.bmp"), "is no PNG"),
+    "no photograph": (lambda p: by_pillow(p / "a.bmp"), "is no PNG"),
     "grey": (lambda p: by_pillow(p / "a.png", PIXELS[..., 0]), "is grey"),
     "grey tiff": (lambda p: by_tifffile(p / "a.tif", PIXELS[..., 0], photometric="minisblack"), "is grey"),
     "transparent": (
@@ -100,51 +100,51 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_what_is_no_colour_picture_is_refused(tmp_path, refusal, case):
+def test_what_is_no_photograph_is_refused(tmp_path, refusal, case):
     write, reason = REFUSED[case]
-    refusal(read_picture, write(tmp_path), DataError, reason)
+    refusal(read_photograph, write(tmp_path), DataError, reason)
 
 
 def test_regions_and_points(tmp_path):
-    picture = read_picture(by_pillow(tmp_path / "a.png"))
+    photograph = read_photograph(by_pillow(tmp_path / "a.png"))
     one, two = parse_regions("2,3,4,5; 0,0,1,1")
     assert parse_regions([[2, 3, 4, 5], [0, 0, 1, 1]]) == [one, two]
     assert parse_regions([2, 3, 4, 5]) == [one]
-    np.testing.assert_allclose(one.pixels(picture), PIXELS[3:8, 2:6].reshape(-1, 3) / 255, atol=1e-7)
-    assert parse_points("0,0;10,6", picture) == [Region(0, 0, 3, 3), Region(8, 4, 5, 5)]
+    np.testing.assert_allclose(one.pixels(photograph), PIXELS[3:8, 2:6].reshape(-1, 3) / 255, atol=1e-7)
+    assert parse_points("0,0;10,6", photograph) == [Region(0, 0, 3, 3), Region(8, 4, 5, 5)]
     for wrong in ("1,2,3", "1,2,a,4", "", "1.5,2,3,4"):
         with pytest.raises(UsageError, match="region"):
             parse_regions(wrong)
     for region in (Region(18, 0, 3, 1), Region(-1, 0, 3, 1), Region(0, 0, 0, 1)):
         with pytest.raises(UsageError, match="`region`"):
-            region.pixels(picture)
+            region.pixels(photograph)
     with pytest.raises(UsageError, match="20 by 12"):
-        parse_points("20,0", picture)
+        parse_points("20,0", photograph)
 
 
-def test_messages_on_damaged_and_transparent_pictures(tmp_path):
+def test_messages_on_damaged_and_transparent_photographs(tmp_path):
     (tmp_path / "a.png").write_bytes(b"\x89PNG\r\n\x1a\nrubbish")
     with pytest.raises(DataError, match=r"cannot identify image file\)"):
-        read_picture(tmp_path / "a.png")
+        read_photograph(tmp_path / "a.png")
     clear = np.dstack([PIXELS, np.zeros((12, 20), np.uint8)])
     with pytest.raises(DataError, match="100 % of its pixels are transparent"):
-        read_picture(by_pillow(tmp_path / "b.png", clear))
+        read_photograph(by_pillow(tmp_path / "b.png", clear))
 
 
 def test_a_strip_follows_its_line(tmp_path):
     row, column = np.mgrid[:30, :40]
     gradient = np.stack([6 * column, 8 * row, 0 * row], axis=-1).astype(np.uint8)
-    picture = read_picture(by_pillow(tmp_path / "a.png", gradient))
-    along = strip(picture, "5,20,35,20")
+    photograph = read_photograph(by_pillow(tmp_path / "a.png", gradient))
+    along = strip(photograph, "5,20,35,20")
     np.testing.assert_allclose(along.position, np.arange(31.0))
     np.testing.assert_allclose(along.pixels.mean(axis=1)[:, 0] * 255, 6 * np.arange(5, 36), atol=1e-3)
     np.testing.assert_allclose(sorted(along.pixels[0, :, 1] * 255), 8 * np.arange(18, 23), atol=1e-3)
-    slanted = strip(picture, [0, 0, 30, 29])
+    slanted = strip(photograph, [0, 0, 30, 29])
     mean = slanted.pixels.mean(axis=1) * 255
     fraction = slanted.position / slanted.position[-1]
-    middle = slice(4, -4)  # the ends are cut by the edges of the picture
+    middle = slice(4, -4)  # the ends are cut by the edges of the photograph
     np.testing.assert_allclose(mean[middle, 0], 180 * fraction[middle], atol=6)
     np.testing.assert_allclose(mean[middle, 1], 232 * fraction[middle], atol=8)
     for wrong in ("5,5,5,5", "0,0,40,0", "1,2,3"):
         with pytest.raises(UsageError, match="strip"):
-            strip(picture, wrong)
+            strip(photograph, wrong)
