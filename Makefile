@@ -18,6 +18,9 @@ KEEP_MEMORY := MALLOC_TRIM_THRESHOLD_=4000000000 MALLOC_MMAP_THRESHOLD_=40000000
 EXACT := tests/hard tests/fitting/test_nist.py
 PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
 
+BROWSER_TESTS := tests/reporting/test_page_in_browser.py $(addprefix tests/explorer/test_,in_browser.py \
+  angles_in_browser.py widget.py)
+
 NOTEBOOKS := $(wildcard notebooks/*.ipynb)
 EXECUTED := executed/done
 
@@ -85,14 +88,14 @@ PYTHONS ?= python3.11 python3.12 python3.13
 dist-check: $(VENV)/.dev
 	$(BIN)/python scripts/check_distribution.py $(PYTHONS)
 
-# pages of reports and the explorer in a headless Chromium, which must be installed; two minutes
+# pages of reports and the explorer in a headless Chromium; two minutes. Skipped, with a line, where there is none
 browser-tests: $(VENV)/.dev
 	$(BIN)/python -m pip install --quiet --no-compile --editable ".[browser,explore]"
-	$(BIN)/python -m pytest -ra tests/reporting/test_page_in_browser.py tests/explorer/test_in_browser.py \
-	  tests/explorer/test_angles_in_browser.py tests/explorer/test_widget.py
+	$(KEEP_MEMORY) $(QUICK_COMPILE) $(BIN)/python -m pytest -n 2 --dist loadfile -ra $(BROWSER_TESTS)
 
+# long statistical tests, and tests that a cheaper one covers
 slow: $(VENV)/.dev
-	$(BIN)/python -m pytest -m slow
+	$(KEEP_MEMORY) $(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist loadfile -m slow --durations 8
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .

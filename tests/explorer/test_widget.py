@@ -158,10 +158,10 @@ def test_the_widget_follows_its_slider_and_its_model(cell):
     assert np.allclose(cell.evaluate(curve), pl.reflectance(WAVELENGTH, 321.0, 1.46, 3.9), atol=2e-7)
     assert cell.get_by_role("spinbutton", name="thickness (nm)").input_value() == "321"
     cell.evaluate("model.fromPython({ angles: [40, 50] })")
+    drawn = "document.querySelector('.plot').data.map((t) => t.meta).join() === 'R 40°,R 50°'"
+    cell.wait_for_function(drawn, timeout=60_000)  # compiles a program
     cell.wait_for_selector(".pellicle-explorer:not(.compiling)")
-    cell.wait_for_timeout(2000)
-    names = "document.querySelector('.plot').data.map((t) => t.meta)"
-    assert cell.evaluate(names) == ["R 40°", "R 50°"]
+    cell.wait_for_timeout(500)  # the model is saved after the drawing
     saved = cell.evaluate("saved.at(-1)")
     assert (saved["angles"], saved["values"]["thickness"]) == ([40, 50], 321)
     assert "angle" not in saved["values"]
