@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from pellicle.data.colours import Colours as Colours
     from pellicle.data.cube import Cube as Cube
     from pellicle.data.read_brdf import read_brdf_samples as read_brdf_samples
+    from pellicle.data.read_colours import read_colours as read_colours
+    from pellicle.data.read_colours import read_colours_by_film as read_colours_by_film
     from pellicle.data.read_cube import read_cube as read_cube
     from pellicle.data.read_spectrum import read_spectra as read_spectra
     from pellicle.data.read_spectrum import read_spectrum as read_spectrum
@@ -38,8 +40,6 @@ if TYPE_CHECKING:
     from pellicle.mapping.map_result import Map as Map
     from pellicle.mapping.photograph import ThicknessMap as ThicknessMap
     from pellicle.materials import material as material
-    from pellicle.recipes.colours import read_colours as read_colours
-    from pellicle.recipes.colours import read_colours_by_film as read_colours_by_film
     from pellicle.recipes.read import read_recipe as read_recipe
     from pellicle.recipes.write import write_recipe as write_recipe
     from pellicle.reporting.present import report as report
@@ -97,7 +97,7 @@ _NAMES = {
     "pellicle.dispersion.anisotropic": ("Anisotropic",),
     "pellicle.fitting.result": ("Fit", "Status"),
     "pellicle.materials": ("material",),
-    "pellicle.recipes.colours": ("read_colours", "read_colours_by_film"),
+    "pellicle.data.read_colours": ("read_colours", "read_colours_by_film"),
     "pellicle.recipes.read": ("read_recipe",),
     "pellicle.recipes.write": ("write_recipe",),
     "pellicle.reporting.present": ("report",),

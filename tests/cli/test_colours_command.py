@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 import pellicle as pl
-from pellicle.data.write_colours import write_colours
+from pellicle.data.colours import write_colours
 
 FILM = ("--layer", "1.46", "--substrate", "3.9", "--thickness", "10:500")
 RECIPE = """

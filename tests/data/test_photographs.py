@@ -5,8 +5,14 @@ import pytest
 import tifffile
 from PIL import Image, ImageCms
 
-from pellicle.data.pixel_regions import Region, parse_points, parse_regions, strip
-from pellicle.data.read_photograph import image_format, read_photograph
+from pellicle.data.photographs import (
+    Region,
+    image_format,
+    parse_points,
+    parse_regions,
+    read_photograph,
+    strip,
+)
 from pellicle.errors import DataError, UsageError
 
 PIXELS = np.random.default_rng(0).integers(0, 256, (12, 20, 3), dtype=np.uint8)

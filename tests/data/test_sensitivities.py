@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pellicle.data.sensitivities import read_lamp, read_sensitivities
+from pellicle.data.sensors import read_lamp, read_sensitivities
 from pellicle.errors import DataError
 
 NM = [500.0, 600.0, 700.0]

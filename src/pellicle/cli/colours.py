@@ -34,8 +34,8 @@ _OF_SPECTRA = (
 
 def is_of_colours(path: str, reading: ReadingFlags) -> bool:
     """True for a file of colours or a photograph: by the signal, or by the file's content without one."""
-    from pellicle.data.read_colours import is_colour_table
-    from pellicle.data.read_photograph import image_format
+    from pellicle.data.colour_rows import is_colour_table
+    from pellicle.data.photographs import image_format
 
     if reading.signal is not None:
         return reading.signal in SPACES
@@ -47,7 +47,7 @@ def is_of_colours(path: str, reading: ReadingFlags) -> bool:
 
 def check_words(reading: ReadingFlags) -> None:
     """Raise UsageError for a value of a colour flag that is wrong for every file."""
-    from pellicle.data.pixel_regions import parse_regions, whole_numbers
+    from pellicle.data.photographs import parse_regions, whole_numbers
 
     words: dict[str, tuple[str | None, tuple[str, ...]]] = {
         "--white-balance": (reading.white_balance, ("fixed", "free"))
@@ -74,7 +74,7 @@ def check_camera(given_flags: ReadingFlags, files: Iterable[tuple[str, ReadingFl
 
     `files` are paths, each with all flags of its reading; one that cannot be read is left to its reader.
     """
-    from pellicle.data.read_photograph import image_format
+    from pellicle.data.photographs import image_format
 
     wrong = [name for name in _CAMERA if getattr(given_flags, name) is not None]
     each = list(files)
@@ -90,7 +90,7 @@ def check_camera(given_flags: ReadingFlags, files: Iterable[tuple[str, ReadingFl
 
 def refuse_camera(path: str, reading: ReadingFlags) -> None:
     """Raise UsageError where flags of colours are given and the file has a spectrum."""
-    from pellicle.data.read_photograph import image_format
+    from pellicle.data.photographs import image_format
 
     wrong = [name for name in _PIXELS if getattr(reading, name) is not None]
     if wrong:
@@ -110,7 +110,7 @@ def read_films(path: str, reading: ReadingFlags, angle: float | list[float] | No
     """
     from pellicle.cli.options import sigma
     from pellicle.data.file_spectra import ALL
-    from pellicle.recipes.colours import read_colours_by_film
+    from pellicle.data.read_colours import read_colours_by_film
 
     if wrong := [name for name in _OF_SPECTRA if getattr(reading, name) is not None]:
         raise UsageError(

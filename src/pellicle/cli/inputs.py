@@ -266,8 +266,7 @@ def _check_reading(reading: ReadingFlags, signals: tuple[str, ...]) -> None:
         check_loss(reading.loss, "--loss")
     if reading.dark is not None and reading.reference is None and reading.reference_material is None:
         raise UsageError("--dark needs --reference: the counts of a sample of known reflectance")
-    from pellicle.data.colour_scale import BITS, colour_unit
-    from pellicle.data.tabular.units import SIGNAL_UNITS, WAVELENGTH_UNITS, wavelength_unit
+    from pellicle.data.tabular.units import BITS, SIGNAL_UNITS, WAVELENGTH_UNITS, colour_unit, wavelength_unit
 
     for flag, value, known, find in (
         ("--wavelength-unit", reading.wavelength_unit, WAVELENGTH_UNITS, wavelength_unit),

@@ -170,8 +170,7 @@ def _show(measured: Spectrum | Colours | Cube, as_json: bool) -> None:
 
 
 def _write(folder: Path, found: list[Any], suffixes: list[str]) -> None:
-    from pellicle.data.colours import Colours
-    from pellicle.data.write_colours import write_colours
+    from pellicle.data.colours import Colours, write_colours
     from pellicle.data.write_spectrum import write_spectrum
     from pellicle.reporting.drawing import save_figure
     from pellicle.reporting.folders import distinct_stems

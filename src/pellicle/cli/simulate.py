@@ -181,7 +181,7 @@ def _write_spectrum(
 def _write_colours(
     recipe: FilmRecipe, out: str, noise: float, seed: int, tolerance: float, comments: list[str]
 ) -> None:
-    from pellicle.data.write_colours import write_colours
+    from pellicle.data.colours import write_colours
     from pellicle.fitting.film.messages import log_plan, log_scene
     from pellicle.synthetic.measured_colours import simulate_colours
 

@@ -1,197 +1,154 @@
-"""Reading of colours from CSV: R, G, B, or X, Y, Z, or x, y, Y, or L*, a*, b*, of one film or several."""
+"""Colours of films from files and photographs, with the sensor that saw them."""
 
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
-from pellicle.data.colour_columns import (
-    EXAMPLE,
-    bare_name,
-    channel_sets,
-    colour_table,
-    first_cells,
-    is_colour_header,
-    named_cells,
-)
-from pellicle.data.colour_scale import scaled
-from pellicle.data.colours import SPACES
-from pellicle.data.tabular.table import Table
-from pellicle.data.tabular.text import TextFile, open_binary, read_bytes, text_file
-from pellicle.errors import DataError, UsageError
-
-_ANGLES = ("angle", "aoi", "angle of incidence")
-_NAMES = ("name", "film", "sample", "patch", "label", "id")
-_HEAD = 65_536
-"""Bytes in which the header is looked for."""
-_STATED = re.compile(r"signal (rgb|srgb|xyz|lab)\b")
+from pellicle.data.cameras import Camera, Sight, sight
+from pellicle.data.colour_rows import ColourRows, read_colour_rows
+from pellicle.data.colours import Colours
+from pellicle.data.photograph_colours import Pixels, photograph_colours
+from pellicle.data.photographs import image_format, read_photograph
+from pellicle.errors import UsageError
 
 
-class ColourRows(NamedTuple):
-    """Colours of one film as a file gives them, in the units of `pellicle.data.colours.Colours`."""
+def read_colours(path: str | os.PathLike[str], *, name: str | None = None, **options) -> Colours:
+    """Read the colours of one film from CSV, or from a PNG, TIFF or JPEG photograph.
 
-    space: str
-    values: np.ndarray  # (colours, 3)
-    sigma: np.ndarray | None  # (colours, 3)
-    angle: np.ndarray | None  # (colours,), degrees
-    lines: np.ndarray | None
-    notes: tuple[str, ...]
-    name: str = ""
-    path: str = ""
-    sha256: str = ""
-    sight: str = ""  # "observer 1964 under D65", where the file states it
+    A CSV has R, G, B, or X, Y, Z, or x, y, Y, or L*, a*, b*, and may have angle_deg, sigma and name. Of a
+    photograph the mean colour of a region, or of points, is taken in linear light.
 
+    **Arguments:** `name` of the film where a file has several, or the region as written; all others are
+    those of `read_colours_by_film`.
 
-class _Columns(NamedTuple):
-    kind: str  # a key of _SETS
-    channels: list[int]
-    sigma: list[int]  # none, one for all, or three
-    angle: int | None
-    name: int | None
-    unit: str | None
-    ignored: list[str]
+    **Returns:** `Colours`, as `pellicle.fit` takes them.
+
+    **Raises:** as `read_colours_by_film`; UsageError for several films without a `name`, or an unknown one.
+    """
+    films = read_colours_by_film(path, **options)
+    chosen = [film for film in films if name is None or film.name == name]
+    if len(chosen) != 1:
+        known = ", ".join(repr(film.name) for film in films)
+        raise UsageError(f"{path}: has {len(films)} films, {known}: choose one with `name`")
+    return chosen[0]
 
 
-def read_colour_rows(
+def read_colours_by_film(
     path: str | os.PathLike[str],
-    space: str | None = None,
     *,
-    unit: str | None = None,
+    space: str | None = None,
+    observer: str = "1931",
+    illuminant: str = "D65",
+    lamp: str | os.PathLike[str] | None = None,
+    sensitivities: str | os.PathLike[str] | None = None,
+    chart: str | os.PathLike[str] | None = None,
+    gamma: float = 1.0,
+    white_balance: str = "fixed",
+    white: Pixels | None = None,
+    region: Pixels | None = None,
+    points: Pixels | None = None,
+    angle: float | Sequence[float] | None = None,
+    polarisation: str = "unpolarised",
+    signal: str = "R",
+    noise: float | Sequence[float] | None = None,
+    signal_unit: str | None = None,
     columns: str | Sequence[str] | None = None,
-) -> list[ColourRows]:
-    """Read colours from CSV, those of each film by itself.
-
-    The header names three channels: R, G, B (sRGB unless `space` or the file says "rgb"), X, Y, Z, or x, y,
-    Y, or L*, a*, b*. It may name angle_deg; sigma for all channels, or sigma_R and so on; and name, which
-    tells films apart: rows of one name are one film at several angles.
+) -> list[Colours]:
+    """Read the colours of every film of a CSV file, or of every region of a photograph.
 
     **Arguments:**
 
-    - `space`: "rgb", "srgb", "xyz" or "lab" where the file does not say it.
-    - `unit` of the values, "fraction", "percent" or "8-bit", where they do not show it.
-    - `columns`: names in the order of the columns, "_" to skip one; replaces the header.
+    - `path` of a CSV, or of a PNG, TIFF or JPEG photograph (extra `images`).
+    - `space`: "srgb", "rgb" (a camera's channels), "xyz" or "lab", where the file does not say it; "srgb" of
+      R, G, B and of photographs.
+    - `observer`: "1931" or "1964"; `illuminant`: E, A, D50, D55, D65 or D75; `lamp`: CSV of a spectrum in
+      place of the illuminant.
+    - `sensitivities`: CSV of a camera's three channels; `chart`: CSV of a photographed chart in their place,
+      with R, G, B as measured and X, Y, Z of the reference. Without either, "rgb" is linear sRGB.
+    - `gamma` of "rgb": values are linear ones to the power 1/`gamma`.
+    - `white_balance`: "fixed", or "free" where each channel has an unknown factor.
+    - `white`: region of a photograph that shows a perfect reflector, by which colours are divided.
+    - `region`: rectangles "x,y,width,height;..." of a photograph in pixels from its upper left corner;
+      `points`: "x,y;...", each with the pixels around it, 5 by 5.
+    - `angle` of incidence in degrees, for all colours; or one for each, and for each region of a photograph,
+      which are then colours of one film.
+    - `polarisation`: "unpolarised", "s" or "p"; `signal`: "R", or "T" for transmitted light.
+    - `noise`: standard deviation of the values, one or three; of a photograph by default the scatter of the
+      region's pixels and the rounding.
+    - `signal_unit`: "fraction", "percent", "8-bit" or "16-bit", where values do not show it.
+    - `columns`: names in the order of a CSV's columns, "_" to skip one.
 
-    **Raises:** DataError or UsageError: one sentence with file, line and remedy.
+    **Returns:** a list of `Colours`, one for each film.
+
+    **Raises:** DataError (unreadable or impossible data) or UsageError (an argument missing or wrong, or a
+    photograph without the extra `images`): one sentence.
     """
-    file = text_file(*read_bytes(path), path)
-    names, rows, cells, delimiter = named_cells(file, columns)
-    found = _recognised(names, file.path)
-    space = _space(file, found.kind, space)
-    comma = delimiter != "," and any("," in row[i] for row in cells for i in found.channels)
-    table = colour_table(file, names, rows, cells, comma)
-    numbers = table.numbers([*found.channels, *found.sigma, *([] if found.angle is None else [found.angle])])
-    values, rest = np.stack(numbers[:3], axis=1), numbers[3:]
-    sigma = np.stack((rest[: len(found.sigma)] * 3)[:3], axis=1) if found.sigma else None
-    angle = rest[-1] if found.angle is not None else None
-    if found.kind == "xyY":
-        values = _from_chromaticity(table, found.channels, values)
-    where = [table.places(position) for position in found.channels]
-    values, sigma, note = scaled(values, sigma, space, unit or found.unit, where, file.path)
-    shown = ", ".join(names[i].strip() for i in found.channels)
-    notes = [*table.notes, f"{shown} read as {_MEANING[space]}", *([note] if note else [])]
-    notes += [f"ignored: {', '.join(found.ignored)}"] if found.ignored else []
-    films = np.array(["" if found.name is None else row[found.name] for row in cells])
-    lines = np.array([row.number for row in rows])
-    sight = next((c.text.strip() for c in file.comments if _SIGHT.fullmatch(c.text.strip())), "")
-    return [
-        ColourRows(
-            space,
-            values[own],
-            None if sigma is None else sigma[own],
-            None if angle is None else angle[own],
-            lines[own],
-            tuple(notes),
-            film,
-            file.path,
-            file.sha256,
-            sight,
-        )
-        for film in dict.fromkeys(films.tolist())
-        for own in [films == film]
-    ]
+    if signal not in ("R", "T"):
+        raise UsageError(f'`signal` must be R or T, and `space` the colour space, not `signal="{signal}"`')
+    lamp, sensitivities, chart = (None if x is None else os.fspath(x) for x in (lamp, sensitivities, chart))
+    camera = Camera(
+        observer, illuminant, lamp, sensitivities, chart, gamma, white_balance, transmitted=signal == "T"
+    )
+    if image_format(path) is not None:
+        if columns is not None or signal_unit is not None:
+            raise UsageError(f"{path}: is a photograph: leave `columns` and `signal_unit` out")
+        films, seen = photograph_colours(read_photograph(path), space, camera, region, points, white, angle)
+        angle = None
+    else:
+        if not region is points is white is None:
+            raise UsageError(f"{path}: is no photograph: leave `region`, `points` and `white` out")
+        films = read_colour_rows(path, space, unit=signal_unit, columns=columns)
+        seen = sight(camera, films[0].space)
+    return [_assembled(film, seen, camera, angle, noise, polarisation) for film in films]
 
 
-_SIGHT = re.compile(r"observer (1931|1964) under (E|A|D50|D55|D65|D75)")
-"""Comment of pellicle's own files on the observer and the illuminant."""
-_MEANING = {
-    "srgb": "display values of sRGB",
-    "rgb": "channels of a camera",
-    "xyz": "CIE XYZ",
-    "lab": "CIE 1976 L*, a*, b*",
-}
-
-
-def is_colour_table(path: str | os.PathLike[str]) -> bool:
-    """Return True for a text file whose header names a colour. Raises DataError for an unreadable file."""
-    with open_binary(path) as file:
-        head = file.read(_HEAD)
-    return is_colour_header(first_cells(text_file(head, "", path))[0])
-
-
-def _recognised(names: Sequence[str], path: str) -> _Columns:
-    """The columns by their names. Raises UsageError where they name no colour, or several."""
-    sets = channel_sets(names)
-    listed = ", ".join(repr(name) for name in names)
-    if not sets:
-        raise UsageError(
-            f"{path}: no three columns are a colour among {listed}: name them R, G, B or X, Y, Z or x, y, Y"
-            f" or L*, a*, b*, as in {EXAMPLE}"
-        )
-    if len(sets) > 1:
-        raise UsageError(
-            f"{path}: has more than one colour ({listed}): choose with `columns`, _ for the others"
-        )
-    [(kind, channels)] = sets.items()
-    bare = [bare_name(name)[0] for name in names]
-    twice = next((x for i, x in enumerate(bare) if x not in ("", "_") and x in bare[:i]), None)
-    if twice is not None:
-        raise DataError(f"{path}: the header names {twice!r} twice; rename one")
-    plain = [re.sub(r"[\s_]+", " ", name).lower() for name in bare]
-    one = [plain.index("sigma")] if "sigma" in plain else []
-    each = [f"sigma {bare[i].lower()}" for i in channels]
-    each = [plain.index(name) for name in each if name in plain]
-    if each and (len(each) != 3 or one):
-        raise DataError(f"{path}: needs sigma, or one of each channel ({listed}); add the missing columns")
-    if kind == "xyY" and (one or each):
-        raise UsageError(f"{path}: has standard deviations of x, y, Y: convert them to X, Y, Z")
-    angle, name = (next((plain.index(x) for x in known if x in plain), None) for known in (_ANGLES, _NAMES))
-    used = {*channels, *one, *each, angle, name}
-    ignored = [name for i, name in enumerate(names) if i not in used and name.strip() not in ("", "_")]
-    units = {bare_name(names[i])[1] for i in channels}
-    if len(units) > 1:
-        raise DataError(f"{path}: the channels are in different units ({listed}); write them in one")
-    return _Columns(kind, channels, each or one, angle, name, units.pop(), ignored)
-
-
-def _space(file: TextFile, kind: str, requested: str | None) -> str:
-    """The space of the columns. Raises UsageError where it is not the requested one."""
-    said = [match[1] for comment in file.comments if (match := _STATED.match(comment.text))]
-    own = {"rgb": ("srgb", "rgb"), "xyz": ("xyz",), "xyY": ("xyz",), "lab": ("lab",)}[kind]
-    stated = said[0] if said and said[0] in own else None
-    if requested is None:
-        return stated or own[0]
-    if requested not in SPACES:
-        raise UsageError(f"`signal` of colours must be one of {', '.join(SPACES)}, not {requested!r}")
-    if requested not in own or (stated and requested != stated):
-        raise UsageError(
-            f"{file.path}: has colours in {stated or own[0]}, not in {requested}: leave `signal` out, or give"
-            f" `signal={stated or own[0]!r}`"
-        )
-    return requested
-
-
-def _from_chromaticity(table: Table, positions: list[int], values: np.ndarray) -> np.ndarray:
-    """X, Y, Z of x, y, Y. Raises DataError for a chromaticity that cannot be."""
-    x, y, luminance = values.T
-    wrong = (y <= 0) | (x < 0) | (x + y > 1)
-    if wrong.any():
-        row = int(np.argmax(wrong))
-        raise DataError(
-            f"{table.where(row, positions[1])}: x = {x[row]:g}, y = {y[row]:g} are no chromaticity;"
-            " correct them"
-        )
-    return np.stack([x / y * luminance, luminance, (1 - x - y) / y * luminance], axis=1)
+def _assembled(
+    film: ColourRows,
+    seen: Sight,
+    camera: Camera,
+    angle: float | Sequence[float] | None,
+    noise: float | Sequence[float] | None,
+    polarisation: str,
+) -> Colours:
+    sigma, stated = film.sigma, film.angle
+    if film.sight and camera.sensitivities is camera.chart is camera.lamp is None:
+        taken = f"observer {camera.observer} under {camera.illuminant}"
+        if taken != film.sight:
+            _, observer, _, illuminant = film.sight.split()
+            raise UsageError(
+                f"{film.path}: states the {film.sight}, and would be read for the {taken}: give"
+                f' `observer="{observer}"` and `illuminant="{illuminant}"`'
+            )
+    if noise is not None:
+        if not (np.all(np.isfinite(noise)) and np.all(np.asarray(noise) > 0) and np.size(noise) in (1, 3)):
+            raise UsageError(f"`noise` must be one standard deviation above zero, or three, got {noise}")
+        if film.space != "lab" and np.any(np.asarray(noise) > 0.5):
+            raise UsageError(f"`noise` {noise} is a fraction of white: divide 8-bit values by 255")
+        sigma = np.broadcast_to(noise, film.values.shape)
+    if angle is not None:
+        count = len(film.values)
+        if np.ndim(angle) and np.shape(angle) != (count,):
+            raise UsageError(f"{film.path}: has {count} colours and `angle` {np.size(angle)} numbers")
+        if stated is not None and not np.allclose(stated, angle, atol=1e-3):
+            raise UsageError(f"{film.path}: states its own angles; leave `angle` out")
+        stated = np.broadcast_to(np.asarray(angle, float), count)
+    return Colours(
+        film.values,
+        seen.sensor,
+        film.space,
+        "T" if camera.transmitted else "R",
+        sigma=sigma,
+        angle=stated,
+        polarisation=polarisation,
+        gamma=camera.gamma,
+        white_balance=camera.white_balance,
+        camera=seen.matrix,
+        path=film.path,
+        sha256=film.sha256,
+        lines=film.lines,
+        notes=(*film.notes, *seen.notes),
+        name=film.name,
+    )

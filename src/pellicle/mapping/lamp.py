@@ -15,7 +15,7 @@ import equinox as eqx
 import numpy as np
 
 from pellicle.data.cube import Cube
-from pellicle.data.pixel_regions import parse_regions
+from pellicle.data.photographs import parse_regions
 from pellicle.errors import DataError, UsageError
 from pellicle.mapping.joint_lamp import PIXELS, joint_gain
 from pellicle.scene.film import Light, Scene

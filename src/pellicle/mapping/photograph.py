@@ -10,12 +10,11 @@ import numpy as np
 from pellicle.colour import ColourInverse
 from pellicle.colour.inverse import ColourThickness
 from pellicle.colour.observers import Sensor
+from pellicle.data.cameras import Camera, Sight, sight
 from pellicle.data.colours import USUAL_NOISE
-from pellicle.data.pixel_regions import Region, parse_regions, strip
-from pellicle.data.read_photograph import Photograph, read_photograph
+from pellicle.data.photograph_colours import check_photograph, white_reference
+from pellicle.data.photographs import Photograph, Region, parse_regions, read_photograph, strip
 from pellicle.errors import UsageError
-from pellicle.recipes.cameras import Camera, Sight, sight
-from pellicle.recipes.photograph_colours import check_photograph, white_reference
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free
 from pellicle.scene.instrument import Drift

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel
 
+from pellicle.data.cameras import Camera, Sight, sight
 from pellicle.data.colours import SPACES
 from pellicle.errors import DataError, UsageError
 from pellicle.recipes import media_words
-from pellicle.recipes.cameras import Camera, Sight, sight
 from pellicle.recipes.media import FreeTable, Medium, Number, PriorTable, medium, number
 from pellicle.recipes.schema import (
     CameraTable,

@@ -7,8 +7,7 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
-from pellicle.data.colour_scale import BITS, colour_unit
-from pellicle.data.tabular.units import SIGNAL_UNITS, WAVELENGTH_UNITS, wavelength_unit
+from pellicle.data.tabular.units import BITS, SIGNAL_UNITS, WAVELENGTH_UNITS, colour_unit, wavelength_unit
 from pellicle.recipes.media import FreeTable, Medium, Number
 
 

@@ -12,9 +12,9 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 from pellicle.brdf.models import MODELS as BRDF_MODELS
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.read_brdf import read_brdf_samples
+from pellicle.data.sensors import band_sensor
 from pellicle.errors import DataError, UsageError
 from pellicle.recipes.media import Medium, Number, medium, number
-from pellicle.recipes.sensors import band_sensor
 from pellicle.scene.free import check_free_count
 from pellicle.scene.surface import Surface
 

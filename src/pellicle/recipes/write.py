@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 
 from pellicle.colour.observers import ILLUMINANTS, OBSERVERS
+from pellicle.data.sensors import SRGB, band_sensor
 from pellicle.errors import UsageError
 from pellicle.files import write_text
 from pellicle.recipes import film, surface, toml_text
 from pellicle.recipes.film import FilmRecipe
-from pellicle.recipes.sensors import SRGB, band_sensor
 from pellicle.recipes.surface import SurfaceRecipe
 from pellicle.recipes.validation import validated
 from pellicle.recipes.written_media import layer_medium, medium, number, same

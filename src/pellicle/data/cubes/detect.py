@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pellicle.data.cubes import envi, numpy_files, spectra_folder, stores, tiff_stacks
 from pellicle.data.cubes.raw_cube import Asked, RawCube
-from pellicle.data.read_photograph import image_format
+from pellicle.data.photographs import image_format
 from pellicle.errors import DataError
 
 LARGEST_SPECTRUM = 2**27

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pellicle.data.cubes.raw_cube import RawCube
-from pellicle.data.read_photograph import image_format
+from pellicle.data.photographs import image_format
 from pellicle.errors import DataError, UsageError, install_command
 
 

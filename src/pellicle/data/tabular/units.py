@@ -15,6 +15,8 @@ THZ_NM = 299792458 / 1e12 * 1e9
 
 WAVELENGTH_UNITS = ("nm", "um", "A", "eV", "cm-1", "THz")
 SIGNAL_UNITS = ("fraction", "percent", "absorbance")
+BITS = ("8-bit", "16-bit")
+"""Units of coded colours."""
 
 _WAVELENGTH_SPELLINGS = {
     "nm": ("nm", "nanometer", "nanometers", "nanometre", "nanometres"),
@@ -50,6 +52,11 @@ def signal_unit(text: str) -> str | None:
     `abs` is none: some programs write it for absolute, others for absorbance.
     """
     return _lookup(_SIGNAL_SPELLINGS, text)
+
+
+def colour_unit(text: str) -> str | None:
+    """Return the unit of a spectrum's signal or of colours that `text` spells, else None."""
+    return text if text in BITS else signal_unit(text)
 
 
 def angle_unit(text: str) -> str | None:

@@ -7,11 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from pellicle.colour.encoding import Encoding
-from pellicle.data.pixel_regions import Region, parse_points, parse_regions
-from pellicle.data.read_colours import ColourRows
-from pellicle.data.read_photograph import Photograph
+from pellicle.data.cameras import Camera, Sight, sight
+from pellicle.data.colour_rows import ColourRows
+from pellicle.data.photographs import Photograph, Region, parse_points, parse_regions
 from pellicle.errors import DataError, UsageError
-from pellicle.recipes.cameras import Camera, Sight, sight
 
 Pixels = str | Sequence[int] | Sequence[Sequence[int]]
 """Regions or points of a photograph: "x,y,w,h;x,y,w,h", or numbers."""

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pellicle.data.colour_chart import fit_matrix, read_chart
+from pellicle.data.cameras import fit_matrix, read_chart
 from pellicle.errors import DataError
 
 TRUTH = np.array([[2.1, -0.7, -0.3], [-0.5, 1.6, -0.1], [0.1, -0.4, 1.4]])

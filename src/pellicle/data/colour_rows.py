@@ -1,0 +1,346 @@
+"""Colours in CSV: R, G, B, or X, Y, Z, or x, y, Y, or L*, a*, b*, of one film or several, and their scale."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from pellicle.data.colours import SPACES
+from pellicle.data.signal_checks import Where, refuse_first
+from pellicle.data.tabular.layout import plain_columns
+from pellicle.data.tabular.table import Table
+from pellicle.data.tabular.text import Line, TextFile, is_number, open_binary, read_bytes, split, text_file
+from pellicle.data.tabular.units import colour_unit
+from pellicle.errors import DataError, UsageError
+
+_ANGLES = ("angle", "aoi", "angle of incidence")
+_NAMES = ("name", "film", "sample", "patch", "label", "id")
+_HEAD = 65_536
+"""Bytes in which the header is looked for."""
+_STATED = re.compile(r"signal (rgb|srgb|xyz|lab)\b")
+
+
+_SIGHT = re.compile(r"observer (1931|1964) under (E|A|D50|D55|D65|D75)")
+"""Comment of pellicle's own files on the observer and the illuminant."""
+_MEANING = {
+    "srgb": "display values of sRGB",
+    "rgb": "channels of a camera",
+    "xyz": "CIE XYZ",
+    "lab": "CIE 1976 L*, a*, b*",
+}
+_SETS = {
+    "rgb": (("r", "red"), ("g", "green"), ("b", "blue")),
+    "xyz": (("X",), ("Y",), ("Z",)),
+    "xyY": (("x",), ("y",), ("Y",)),
+    "lab": (("L*", "L", "l*"), ("a*", "a"), ("b*", "b")),
+}
+"""Names of the channels of each set; case matters where it tells X, Y, Z from x, y, Y."""
+_UNITS = {"%": "percent", "percent": "percent", "8 bit": "8-bit", "8-bit": "8-bit", "8bit": "8-bit"}
+EXAMPLE = '`columns=["angle_deg", "R", "G", "B"]`'
+UNITS = {"fraction": 1.0, "percent": 100.0, "8-bit": 255.0, "16-bit": 65535.0}
+_ASK = '`signal_unit="8-bit"`, `signal_unit="percent"` or `signal_unit="fraction"`'
+_HIGHEST = 1.5
+"""Largest fraction: calibrations are off by half at most."""
+
+
+class ColourRows(NamedTuple):
+    """Colours of one film as a file gives them, in the units of `pellicle.data.colours.Colours`."""
+
+    space: str
+    values: np.ndarray  # (colours, 3)
+    sigma: np.ndarray | None  # (colours, 3)
+    angle: np.ndarray | None  # (colours,), degrees
+    lines: np.ndarray | None
+    notes: tuple[str, ...]
+    name: str = ""
+    path: str = ""
+    sha256: str = ""
+    sight: str = ""  # "observer 1964 under D65", where the file states it
+
+
+class _Columns(NamedTuple):
+    kind: str  # a key of _SETS
+    channels: list[int]
+    sigma: list[int]  # none, one for all, or three
+    angle: int | None
+    name: int | None
+    unit: str | None
+    ignored: list[str]
+
+
+def read_colour_rows(
+    path: str | os.PathLike[str],
+    space: str | None = None,
+    *,
+    unit: str | None = None,
+    columns: str | Sequence[str] | None = None,
+) -> list[ColourRows]:
+    """Read colours from CSV, those of each film by itself.
+
+    The header names three channels: R, G, B (sRGB unless `space` or the file says "rgb"), X, Y, Z, or x, y,
+    Y, or L*, a*, b*. It may name angle_deg; sigma for all channels, or sigma_R and so on; and name, which
+    tells films apart: rows of one name are one film at several angles.
+
+    **Arguments:**
+
+    - `space`: "rgb", "srgb", "xyz" or "lab" where the file does not say it.
+    - `unit` of the values, "fraction", "percent" or "8-bit", where they do not show it.
+    - `columns`: names in the order of the columns, "_" to skip one; replaces the header.
+
+    **Raises:** DataError or UsageError: one sentence with file, line and remedy.
+    """
+    file = text_file(*read_bytes(path), path)
+    names, rows, cells, delimiter = named_cells(file, columns)
+    found = _recognised(names, file.path)
+    space = _space(file, found.kind, space)
+    comma = delimiter != "," and any("," in row[i] for row in cells for i in found.channels)
+    table = colour_table(file, names, rows, cells, comma)
+    numbers = table.numbers([*found.channels, *found.sigma, *([] if found.angle is None else [found.angle])])
+    values, rest = np.stack(numbers[:3], axis=1), numbers[3:]
+    sigma = np.stack((rest[: len(found.sigma)] * 3)[:3], axis=1) if found.sigma else None
+    angle = rest[-1] if found.angle is not None else None
+    if found.kind == "xyY":
+        values = _from_chromaticity(table, found.channels, values)
+    where = [table.places(position) for position in found.channels]
+    values, sigma, note = scaled(values, sigma, space, unit or found.unit, where, file.path)
+    shown = ", ".join(names[i].strip() for i in found.channels)
+    notes = [*table.notes, f"{shown} read as {_MEANING[space]}", *([note] if note else [])]
+    notes += [f"ignored: {', '.join(found.ignored)}"] if found.ignored else []
+    films = np.array(["" if found.name is None else row[found.name] for row in cells])
+    lines = np.array([row.number for row in rows])
+    sight = next((c.text.strip() for c in file.comments if _SIGHT.fullmatch(c.text.strip())), "")
+    return [
+        ColourRows(
+            space,
+            values[own],
+            None if sigma is None else sigma[own],
+            None if angle is None else angle[own],
+            lines[own],
+            tuple(notes),
+            film,
+            file.path,
+            file.sha256,
+            sight,
+        )
+        for film in dict.fromkeys(films.tolist())
+        for own in [films == film]
+    ]
+
+
+def is_colour_table(path: str | os.PathLike[str]) -> bool:
+    """Return True for a text file whose header names a colour. Raises DataError for an unreadable file."""
+    with open_binary(path) as file:
+        head = file.read(_HEAD)
+    return is_colour_header(first_cells(text_file(head, "", path))[0])
+
+
+def _recognised(names: Sequence[str], path: str) -> _Columns:
+    """The columns by their names. Raises UsageError where they name no colour, or several."""
+    sets = channel_sets(names)
+    listed = ", ".join(repr(name) for name in names)
+    if not sets:
+        raise UsageError(
+            f"{path}: no three columns are a colour among {listed}: name them R, G, B or X, Y, Z or x, y, Y"
+            f" or L*, a*, b*, as in {EXAMPLE}"
+        )
+    if len(sets) > 1:
+        raise UsageError(
+            f"{path}: has more than one colour ({listed}): choose with `columns`, _ for the others"
+        )
+    [(kind, channels)] = sets.items()
+    bare = [bare_name(name)[0] for name in names]
+    twice = next((x for i, x in enumerate(bare) if x not in ("", "_") and x in bare[:i]), None)
+    if twice is not None:
+        raise DataError(f"{path}: the header names {twice!r} twice; rename one")
+    plain = [re.sub(r"[\s_]+", " ", name).lower() for name in bare]
+    one = [plain.index("sigma")] if "sigma" in plain else []
+    each = [f"sigma {bare[i].lower()}" for i in channels]
+    each = [plain.index(name) for name in each if name in plain]
+    if each and (len(each) != 3 or one):
+        raise DataError(f"{path}: needs sigma, or one of each channel ({listed}); add the missing columns")
+    if kind == "xyY" and (one or each):
+        raise UsageError(f"{path}: has standard deviations of x, y, Y: convert them to X, Y, Z")
+    angle, name = (next((plain.index(x) for x in known if x in plain), None) for known in (_ANGLES, _NAMES))
+    used = {*channels, *one, *each, angle, name}
+    ignored = [name for i, name in enumerate(names) if i not in used and name.strip() not in ("", "_")]
+    units = {bare_name(names[i])[1] for i in channels}
+    if len(units) > 1:
+        raise DataError(f"{path}: the channels are in different units ({listed}); write them in one")
+    return _Columns(kind, channels, each or one, angle, name, units.pop(), ignored)
+
+
+def _space(file: TextFile, kind: str, requested: str | None) -> str:
+    """The space of the columns. Raises UsageError where it is not the requested one."""
+    said = [match[1] for comment in file.comments if (match := _STATED.match(comment.text))]
+    own = {"rgb": ("srgb", "rgb"), "xyz": ("xyz",), "xyY": ("xyz",), "lab": ("lab",)}[kind]
+    stated = said[0] if said and said[0] in own else None
+    if requested is None:
+        return stated or own[0]
+    if requested not in SPACES:
+        raise UsageError(f"`signal` of colours must be one of {', '.join(SPACES)}, not {requested!r}")
+    if requested not in own or (stated and requested != stated):
+        raise UsageError(
+            f"{file.path}: has colours in {stated or own[0]}, not in {requested}: leave `signal` out, or give"
+            f" `signal={stated or own[0]!r}`"
+        )
+    return requested
+
+
+def _from_chromaticity(table: Table, positions: list[int], values: np.ndarray) -> np.ndarray:
+    """X, Y, Z of x, y, Y. Raises DataError for a chromaticity that cannot be."""
+    x, y, luminance = values.T
+    wrong = (y <= 0) | (x < 0) | (x + y > 1)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise DataError(
+            f"{table.where(row, positions[1])}: x = {x[row]:g}, y = {y[row]:g} are no chromaticity;"
+            " correct them"
+        )
+    return np.stack([x / y * luminance, luminance, (1 - x - y) / y * luminance], axis=1)
+
+
+def is_colour_header(names: Sequence[str]) -> bool:
+    """Return True for a header that names three channels of a colour, and no wavelength or direction."""
+    plain = {name.strip().lower().split("_")[0].split(" ")[0] for name in names}
+    foreign = plain & {"wavelength", "wl", "lambda", "energy", "wavenumber", "frequency", "theta", "phi"}
+    return not foreign and bool(channel_sets(names))
+
+
+def first_cells(file: TextFile) -> tuple[list[str], str]:
+    """Return the cells of the first line and its delimiter, with which they name a colour if any does."""
+    first = file.lines[0].text
+    delimiter = max("\t;, ", key=lambda mark: (bool(channel_sets(split(first, mark))), first.count(mark)))
+    return split(first, delimiter), delimiter
+
+
+def named_cells(
+    file: TextFile, columns: str | Sequence[str] | None = None
+) -> tuple[list[str], list[Line], list[list[str]], str]:
+    """Return the column names, the rows with their cells, and the delimiter of a file of colours.
+
+    `columns` names the columns in order, in place of the header. Rows are filled up with empty cells.
+
+    **Raises:** UsageError without a header, DataError without rows and for a row of too many cells.
+    """
+    names, delimiter = first_cells(file)
+    headed = not any(is_number(cell, ",") for cell in names)
+    if columns is not None:
+        given = columns.split(",") if isinstance(columns, str) else columns
+        names = [name.strip() for name in given]
+    elif not headed:
+        raise UsageError(f"{file.path}: has no header, so name its columns, as in {EXAMPLE}")
+    rows = list(file.lines[headed:])
+    if not rows:
+        raise DataError(
+            f"{file.path}: has no row of colours below its header; expected rows as 0.41,0.35,0.22"
+        )
+    cells = [split(line.bare, delimiter) for line in rows]
+    for line, row in zip(rows, cells, strict=True):
+        if len(row) > len(names):
+            raise DataError(
+                f"{file.path}: line {line.number} has {len(row)} values where {len(names)} columns are named;"
+                " correct that line"
+            )
+    return names, rows, [[*row, *[""] * (len(names) - len(row))] for row in cells], delimiter
+
+
+def colour_table(
+    file: TextFile,
+    names: Sequence[str],
+    rows: Sequence[Line],
+    cells: Sequence[Sequence[str]],
+    decimal_comma: bool,
+) -> Table:
+    """Return the table of cells that `named_cells` has found."""
+    decimal = "," if decimal_comma else "."
+    layout = plain_columns(names, list(zip(rows, cells, strict=True)), [], decimal=decimal)
+    return Table(file.path, file.sha256, layout)
+
+
+def bare_name(name: str) -> tuple[str, str | None]:
+    """Return a column's name without its unit, and the unit."""
+    plain = name.strip()
+    for mark, unit in _UNITS.items():
+        for written in (f"({mark})", f"[{mark}]", f"_{mark.replace(' ', '_')}", f" {mark}"):
+            if plain.lower().endswith(written):
+                return plain[: -len(written)].strip(), unit
+    return re.sub(r"[\s_]*[(\[]?(deg|degrees|°)[)\]]?$", "", plain), None
+
+
+def channel_sets(names: Sequence[str]) -> dict[str, list[int]]:
+    """Return the positions of the channels of every set that the names have: rgb, xyz, xyY and lab."""
+    found = {}
+    for kind, channels in _SETS.items():
+        bare = [bare_name(name)[0] for name in names]
+        own = [name.lower() for name in bare] if kind == "rgb" else bare
+        at = [next((i for i, name in enumerate(own) if name in known), -1) for known in channels]
+        if min(at) >= 0:
+            found[kind] = at
+    return found
+
+
+def scaled(
+    values: np.ndarray,
+    sigma: np.ndarray | None,
+    space: str,
+    unit: str | None,
+    where: Sequence[Where],
+    path: str,
+) -> tuple[np.ndarray, np.ndarray | None, str]:
+    """Convert colours (colours, 3) of a file to those of `Colours`, with a sentence on what was done.
+
+    R, G, B that are whole numbers above 1 are 8-bit, or 16-bit above 255; X, Y, Z are percent where a Y is
+    above 1.5. L*, a*, b* are taken as they are. `where` are the places of each channel's values.
+
+    **Raises:** UsageError where the unit is unclear or unknown, DataError for values beyond every unit.
+    """
+    if unit is not None and colour_unit(unit) not in UNITS:
+        raise UsageError(f"`signal_unit` of colours must be one of {', '.join(UNITS)}, not {unit!r}")
+    unit = None if unit is None else colour_unit(unit)
+    if space == "lab":
+        lightness = values[:, 0]
+        refuse_first(
+            lightness, (lightness < -1) | (lightness > 150), where[0], "is no L*, of 0 to 100; correct it"
+        )
+        if lightness.max() <= 1:
+            raise DataError(
+                f"{path}: L* is at most {lightness.max():g}, and runs from 0 to 100; multiply it by 100"
+            )
+        return values, sigma, ""
+    chosen = unit or (_unit_of_xyz(values, path) if space == "xyz" else _unit_of_rgb(values, path))
+    full = UNITS[chosen]
+    if np.max(values) > _HIGHEST * full or (unit and chosen.endswith("bit") and np.max(values) > full):
+        wrong = np.max(values, axis=1) == np.max(values)
+        channel = int(np.argmax(np.max(values, axis=0)))
+        reason = f"is beyond {full:g}, the {'white' if space == 'xyz' else 'largest'} in {chosen}; correct it"
+        refuse_first(values[:, channel], wrong, where[channel], reason)
+    white = "Y = 1" if space == "xyz" else "1"
+    note = f"values divided by {full:g} ({chosen})" if full != 1 else f"values as they are: {white} is white"
+    return values / full, None if sigma is None else sigma / full, note
+
+
+def _unit_of_rgb(values: np.ndarray, path: str) -> str:
+    highest, whole = np.max(values), bool(np.all(values == np.round(values)))
+    if highest <= (1 if whole else _HIGHEST):
+        return "fraction"
+    if whole and highest <= UNITS["16-bit"]:
+        return "8-bit" if highest <= UNITS["8-bit"] else "16-bit"
+    if UNITS["percent"] < highest <= UNITS["8-bit"]:
+        return "8-bit"
+    raise UsageError(f"{path}: R, G, B go up to {highest:g}, in an unclear unit: state it, {_ASK}")
+
+
+def _unit_of_xyz(values: np.ndarray, path: str) -> str:
+    highest = np.max(values[:, 1])
+    if highest <= _HIGHEST:
+        return "fraction"
+    if highest <= _HIGHEST * UNITS["percent"]:
+        return "percent"
+    raise DataError(
+        f"{path}: Y goes up to {highest:g}, beyond the 100 of a perfect reflector in percent; divide X, Y, Z"
+        " by the Y of that white"
+    )
