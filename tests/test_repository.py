@@ -41,3 +41,17 @@ def test_modules_named_in_contributing_exist():
     paths = [*ROOT.glob("*"), *ROOT.glob("[a-z]*/**/*")]
     kept = ["/" + path.relative_to(ROOT).as_posix() for path in paths if path.is_file()]
     assert not [name for name in named if not any(path.endswith("/" + name) for path in kept)]
+
+
+def test_identifiers_named_in_contributing_exist():
+    """`NAME` in `module.py` (or of, to, from it) stands in that module; any other identifier stands in the code."""
+    code = {path: path.read_text("utf-8") for path in (ROOT / "src" / "pellicle").rglob("*.py")}
+    words = {word for text in code.values() for word in re.findall(r"\w+", text)}
+    words |= {word for path in (ROOT / "tests").rglob("*.py") for word in re.findall(r"\w+", path.read_text())}
+    beside = re.findall(r"`(\w+)(?:\([^`]*\))?` (?:in|of|to|from)\s+`([\w/]+\.py)`", CONTRIBUTING)
+    assert beside
+    for name, module in beside:
+        texts = [text for path, text in code.items() if path.as_posix().endswith("/" + module)]
+        assert any(re.search(rf"\b{name}\b", text) for text in texts), (name, module)
+    named = re.findall(r"`([A-Za-z_]\w*)(?:\([^`]*\))?`", CONTRIBUTING)
+    assert {name for name in named if name not in words} <= {"properdocs"}
