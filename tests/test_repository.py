@@ -44,10 +44,12 @@ def test_modules_named_in_contributing_exist():
 
 
 def test_identifiers_named_in_contributing_exist():
-    """`NAME` in `module.py` (or of, to, from it) stands in that module; any other identifier stands in the code."""
+    """`NAME` in `module.py` (or of, to, from it) stands in it, any other identifier in some module."""
     code = {path: path.read_text("utf-8") for path in (ROOT / "src" / "pellicle").rglob("*.py")}
     words = {word for text in code.values() for word in re.findall(r"\w+", text)}
-    words |= {word for path in (ROOT / "tests").rglob("*.py") for word in re.findall(r"\w+", path.read_text())}
+    words |= {
+        word for path in (ROOT / "tests").rglob("*.py") for word in re.findall(r"\w+", path.read_text())
+    }
     beside = re.findall(r"`(\w+)(?:\([^`]*\))?` (?:in|of|to|from)\s+`([\w/]+\.py)`", CONTRIBUTING)
     assert beside
     for name, module in beside:

@@ -106,7 +106,7 @@ def test_levels_by_simulation():
     [
         ((123.1, 123.4, 123.3), Agreement.AGREES, "the stated noise error agrees with the scatter"),
         ((122.5, 123.4, 124.1), Agreement.LARGER, "the stated noise error is too small"),
-        ((123.4, 123.41, 123.42), Agreement.SMALLER, "is the same in all repeats"),
+        ((123.4, 123.41, 123.42), Agreement.SMALLER, "the remainder is common to all of them"),
     ],
 )
 def test_verdicts(values, agreement, words):

@@ -50,7 +50,7 @@ def compiler_options() -> dict[str, str | bool]:
 
 
 def load(path: Path, key: bytes) -> Callable[..., Any] | None:
-    """The program that `make` kept under the same path and key; None where there is none that is safe."""
+    """Load the program that `make` kept under the same path and key, or None if no trusted file exists."""
     content = private_files.read(path)
     if content is None:
         return None

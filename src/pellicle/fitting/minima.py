@@ -66,7 +66,7 @@ def solve(
 
     `fixed` is the position of a parameter and its value in each start, in the coordinate's unit. A start has
     settled where the deviance would fall by less than `atol`², or by less than the share `coarse` of its
-    distance to the best of all. All numbers of starts share a program: they are padded to `SLOTS`.
+    distance to the best of all. Starts are padded to `SLOTS`, so that one compiled program serves any number.
     """
     box, shape = problem.box, np.shape(starts)
     lower, upper = (np.array(np.broadcast_to(side, shape), dtype=float) for side in (box.lower, box.upper))

@@ -113,7 +113,7 @@ class RepeatedParameter:
     @property
     def shared(self) -> float:
         """Standard error of type B: `common`, and where the scatter is too small for the stated noise errors,
-        what these have beyond it: it is the same in all repeats, as a misfit of the scene is."""
+        also their remainder, which all repeats have in common as they have a misfit of the scene."""
         hidden = max(self.stated**2 - self.sd**2, 0.0) if self.agreement is Agreement.SMALLER else 0.0
         return math.hypot(self.common, math.sqrt(hidden))
 
@@ -181,7 +181,9 @@ class Repeats(ReportMixin):
                     sentence += f", though the whole stated error, {short(whole)}{unit}, covers the scatter"
                 sentence += "."
             case Agreement.SMALLER:
-                sentence += " what the stated noise error has beyond the scatter is the same in all repeats."
+                sentence += (
+                    " the repeats scatter less than the stated error; the remainder is common to all of them."
+                )
             case _:
                 sentence += " the stated noise error agrees with the scatter."
         if p.shared:

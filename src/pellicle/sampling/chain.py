@@ -1,8 +1,8 @@
 """A chain of an ensemble of walkers, in memory and on disk.
 
-The file is HDF5 in emcee's own layout (`emcee.backends.HDFBackend` opens it), with whose chain it is beside
-it. It is written whole and renamed, so that a killed run leaves its last checkpoint; with the state of the
-random numbers in it, a resumed chain is the one that an undisturbed run would have given.
+The file is HDF5 in emcee's own layout (`emcee.backends.HDFBackend` opens it), plus the identity of the run
+that produced it. It is written whole and renamed, so that a killed run leaves its last checkpoint; with the
+state of the random numbers in it, a resumed chain is the one that an undisturbed run would have given.
 """
 
 from __future__ import annotations
