@@ -21,7 +21,7 @@ from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.materials import material
 from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface
-from pellicle.synthetic.brdf import Directions
+from pellicle.simulation.brdf import Directions
 
 THICKNESS, INDEX, ROUGHNESS, DIFFUSE, NOISE = 320.0, 1.46, 0.2, 0.02, 0.01
 FREE = {

@@ -21,7 +21,7 @@ from pellicle.brdf import direction
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface
-from pellicle.synthetic.brdf import Directions, default_directions
+from pellicle.simulation.brdf import Directions, default_directions
 
 SURFACE = Surface(
     "microfacet-film",

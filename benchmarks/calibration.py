@@ -37,7 +37,7 @@ from pellicle.fitting.profile_likelihood import interval  # noqa: E402
 from pellicle.fitting.progress import quiet  # noqa: E402
 from pellicle.scene.free import insert  # noqa: E402
 from pellicle.scene.instrument import Drift  # noqa: E402
-from pellicle.synthetic.spectra import simulate_signal  # noqa: E402
+from pellicle.simulation.spectra import simulate_signal  # noqa: E402
 
 WAVELENGTH = np.linspace(400.0, 900.0, 101)
 SILICON = pl.dispersion.Constant(3.9, 0.02)

@@ -30,7 +30,7 @@ from pellicle.sampling.density import log_density  # noqa: E402
 from pellicle.sampling.modes import modes  # noqa: E402
 from pellicle.sampling.run import run  # noqa: E402
 from pellicle.sampling.target import Target  # noqa: E402
-from pellicle.synthetic.spectra import simulate_signal  # noqa: E402
+from pellicle.simulation.spectra import simulate_signal  # noqa: E402
 
 WALKERS, STEPS, BURN = 32, 2000, 500
 SILICON = 3.9 + 0.02j

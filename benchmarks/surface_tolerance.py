@@ -15,13 +15,13 @@ from typing import Any
 import jax
 import numpy as np
 
-from pellicle.effects.surface import exact
-from pellicle.planning import surface as planning
-from pellicle.planning.differences import signals
+from pellicle.effects import surface_plan
+from pellicle.effects.differences import signals
+from pellicle.effects.surface_plan import exact
+from pellicle.forward_model.surface_signal import build
 from pellicle.scene.free import Free, free_leaves
 from pellicle.scene.surface import Surface, surface_view
-from pellicle.simulation.surface import build
-from pellicle.synthetic.brdf import default_directions
+from pellicle.simulation.brdf import default_directions
 
 FRESH = 64
 """Number of points per surface at which the bound is checked."""
@@ -81,14 +81,14 @@ KINDS = {"facets": facets, "shader": shader, "lobes": lobes}
 
 def tried(rng: np.random.Generator, surface: Surface, tolerance: float) -> tuple[set[str], float, float]:
     """Return what the plan leaves out, its error, and its stated bound."""
-    plan = planning.plan(surface_view(surface, PLANNED), tolerance)
+    plan = surface_plan.plan(surface_view(surface, PLANNED), tolerance)
     whole = surface_view(surface, PLANNED, len(PLANNED.theta_i))
     free = [leaf for _, leaf in free_leaves(whole)]
     low, high = (np.array([getattr(f, side) for f in free]) for side in ("lower", "upper"))
     points = rng.uniform(low, high, (FRESH, len(free)))
     with jax.enable_x64(True):
         true, found = (signals(each, whole, points, build) for each in (exact(whole), plan))
-    off = np.max(np.abs(found - true) / np.maximum(true, planning.FLOOR))
+    off = np.max(np.abs(found - true) / np.maximum(true, surface_plan.FLOOR))
     gone = {left_out.effect for left_out in plan.left_out}
     gone |= {f"{row.count} angles" for row in plan.rows if row.effect == "oblique" and row.count}
     return gone, float(off), plan.error_bound

@@ -16,11 +16,11 @@ import jax
 import numpy as np
 
 import pellicle as pl
-from pellicle.effects.plan import Plan
-from pellicle.planning.differences import largest_difference, signals
-from pellicle.planning.film import full_plan
+from pellicle.effects.differences import largest_difference, signals
+from pellicle.effects.film_plan import full_plan
+from pellicle.forward_model.film_signal import build, tabulated
+from pellicle.forward_model.plan import Plan
 from pellicle.scene.free import free_leaves
-from pellicle.simulation.film import build, tabulated
 
 FRESH = 400
 """Number of points per scene at which the bound is checked."""

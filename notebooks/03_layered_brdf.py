@@ -25,8 +25,8 @@ import numpy as np
 
 import pellicle as pl
 from pellicle.reporting.rendering_display import display
-from pellicle.synthetic.environment import one_lamp
-from pellicle.synthetic.surface_sphere import in_plane, render
+from pellicle.simulation.environment import one_lamp
+from pellicle.simulation.surface_sphere import in_plane, render
 
 jax.config.update("jax_enable_x64", True)  # double precision; JAX's default is single
 SHORT = os.environ.get("PELLICLE_SHORT") == "1"  # smaller renderings and fewer samples, for a quick run

@@ -26,7 +26,7 @@ import numpy as np
 import pellicle as pl
 from pellicle.colour import delta_e2000, film_colour, lab
 from pellicle.reporting.rendering_display import display
-from pellicle.synthetic.surface_sphere import render
+from pellicle.simulation.surface_sphere import render
 
 jax.config.update("jax_enable_x64", True)  # double precision; JAX's default is single
 SHORT = os.environ.get("PELLICLE_SHORT") == "1"  # fewer points, for a quick run

@@ -12,7 +12,7 @@ from pathlib import Path
 import pellicle
 from pellicle.data.write_brdf import write_brdf_samples
 from pellicle.recipes import read_recipe
-from pellicle.synthetic.brdf import default_directions, simulate_samples
+from pellicle.simulation.brdf import default_directions, simulate_samples
 
 STUDIES = Path(__file__).resolve().parents[1] / "fits" / "brdf"
 SAMPLES, NOISE = 250, 0.002

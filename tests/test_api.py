@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.effects.surface_removal import REMOVABLE
-from pellicle.planning import film, surface
+from pellicle.effects import film_plan, surface_plan
+from pellicle.effects.surface_plan import REMOVABLE
 from pellicle.scene.surface import surface_view
-from pellicle.synthetic.brdf import default_directions, simulate_samples
-from pellicle.synthetic.spectra import simulate_spectrum
+from pellicle.simulation.brdf import default_directions, simulate_samples
+from pellicle.simulation.spectra import simulate_spectrum
 
 FILM = pl.Scene(pl.Layer("SiO2", pl.Free(400, 600)), "Si")
 STEEL = pl.Surface("microfacet-film", {"thickness": pl.Free(20, 80), "n": 2.3, "base_n": 2.9, "base_k": 3.0})
@@ -24,11 +24,11 @@ def test_simulate_takes_a_film_or_a_surface():
 
 
 def test_plan_takes_a_film_or_a_surface():
-    assert pl.plan(FILM) == film.plan(FILM)
+    assert pl.plan(FILM) == film_plan.plan(FILM)
     keep = [effect for effect in REMOVABLE if effect != "precision"]  # each that may go is compiled
     found = pl.plan(STEEL, 1e-2, directions=DIRECTIONS, keep=keep)
     assert [effect.effect for effect in found.left_out] == ["precision"]
-    assert found == surface.plan(surface_view(STEEL, DIRECTIONS), 1e-2, keep)
+    assert found == surface_plan.plan(surface_view(STEEL, DIRECTIONS), 1e-2, keep)
 
 
 @pytest.mark.parametrize(

@@ -42,7 +42,7 @@ SLOW = {
     " tests/fitting/film/test_generalised.py fits such data",
     **{
         f"pellicle {command} docs/examples/tilted_microscope.toml": "compiles for half a minute;"
-        " tests/simulation/test_lens.py"
+        " tests/forward_model/test_lens.py"
         for command in ("simulate", "fit oriented.csv --recipe")
     },
     "pellicle fit partial.csv --recipe docs/examples/partial_window.toml": "compiles for 6 s; "
@@ -55,13 +55,13 @@ SLOW = {
         )
     },
     "pellicle chart measurements/recipes/gold_on_glass_12nm.toml": "the page draws balls of hematite",
-    "pellicle chart docs/cost/soap_film.toml --view": "tests/synthetic/test_bubble.py and"
+    "pellicle chart docs/cost/soap_film.toml --view": "tests/simulation/test_bubble.py and"
     " tests/accuracy/test_colour_maps.py: smaller ones",
     "pellicle chart docs/surfaces/tempered_steel.toml --out results/steel.png": "draws a sphere of full size",
     "pellicle simulate docs/examples/tilted_mueller.toml --out tilted.csv": "compiles for 4 s;"
-    " tests/simulation/test_anisotropic.py",
+    " tests/forward_model/test_anisotropic.py",
     "pellicle simulate docs/examples/tilted_azimuths.toml --out turned.csv": "compiles for 4 s;"
-    " tests/simulation/test_generalised.py",
+    " tests/forward_model/test_generalised.py",
     "pellicle fit film.csv --recipe docs/examples/mueller.toml": "compiles for 10 s;"
     " tests/fitting/film/test_mueller.py fits another film",
     "pellicle fit tilted.csv --recipe docs/examples/tilted_mueller.toml": "compiles for half a minute;"

@@ -57,6 +57,7 @@ if TYPE_CHECKING:
     from pellicle.scene.layers import medium as medium
     from pellicle.scene.surface import Surface as Surface
     from pellicle.scene.uncertainty import Uncertainty as Uncertainty
+    from pellicle.simulation.brdf import Directions as Directions
     from pellicle.simulation.depth import absorptance as absorptance
     from pellicle.simulation.depth import field as field
     from pellicle.simulation.functions import ellipsometry as ellipsometry
@@ -65,7 +66,6 @@ if TYPE_CHECKING:
     from pellicle.simulation.functions import transmittance as transmittance
     from pellicle.simulation.polarisation import jones as jones
     from pellicle.simulation.polarisation import mueller as mueller
-    from pellicle.synthetic.brdf import Directions as Directions
 
 _NAMES = {
     "pellicle.api.simulations": (
@@ -112,7 +112,7 @@ _NAMES = {
     "pellicle.simulation.depth": ("absorptance", "field"),
     "pellicle.simulation.functions": ("ellipsometry", "reflectance", "refractive_index", "transmittance"),
     "pellicle.simulation.polarisation": ("jones", "mueller"),
-    "pellicle.synthetic.brdf": ("Directions",),
+    "pellicle.simulation.brdf": ("Directions",),
 }
 _MODULE = {name: module for module, names in _NAMES.items() for name in names}
 _NAMESPACES = {

@@ -10,8 +10,8 @@ import pellicle as pl
 from pellicle.accuracy.compiled import compiled
 from pellicle.accuracy.methods import METHODS
 from pellicle.accuracy.reference import reference_signal
+from pellicle.effects.film_plan import alternatives
 from pellicle.errors import UsageError
-from pellicle.planning.film import alternatives
 
 from .conftest import NM, few
 

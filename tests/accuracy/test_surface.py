@@ -18,7 +18,7 @@ from pellicle.reporting.cost_files import to_json
 from pellicle.reporting.cost_text import text
 from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface, surface_view
-from pellicle.synthetic.brdf import default_directions
+from pellicle.simulation.brdf import default_directions
 
 STEEL = surface_view(
     Surface("microfacet-film", {"thickness": Free(10, 70), "n": 2.9}), default_directions(), 40

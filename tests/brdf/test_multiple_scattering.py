@@ -11,9 +11,9 @@ import pellicle as pl
 from pellicle.brdf.albedo import directional_albedo
 from pellicle.brdf.directions import direction
 from pellicle.brdf.models import model
-from pellicle.effects.surface import exact
+from pellicle.effects.surface_plan import exact
 from pellicle.scene.surface import Surface, surface_view
-from pellicle.synthetic.brdf import default_directions
+from pellicle.simulation.brdf import default_directions
 
 FACETS = model("microfacet-film")
 WHITE = {"thickness": 0.0, "n": 1.5, "base_n": 1e-4, "base_k": 100.0, "specular": 1.0, "wavelengths": [550.0]}

@@ -9,7 +9,7 @@ import pytest
 
 from pellicle.api import fits as verbs
 from pellicle.data.read_brdf import read_brdf_samples
-from pellicle.effects.surface import exact
+from pellicle.effects.surface_plan import exact
 from pellicle.fitting.curves import BrdfCurve
 from pellicle.fitting.result import Baseline, Estimate, Fit, LayerTest, Part, Rival, Status
 from pellicle.recipes import read_recipe

@@ -15,7 +15,7 @@ from pellicle.dispersion.empirical import Cauchy, Constant
 from pellicle.materials import material, materials_in
 from pellicle.optics.pair import imag, is_real, real
 from pellicle.recipes import media_words
-from pellicle.synthetic.spectra import simulate_signal
+from pellicle.simulation.spectra import simulate_signal
 
 EVERY_RULE = pytest.mark.parametrize("rule", MIXTURES.values(), ids=MIXTURES)
 AT = np.array([500.0])

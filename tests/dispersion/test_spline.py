@@ -18,7 +18,7 @@ from pellicle.dispersion.base import HC
 from pellicle.dispersion.spline import KramersKronigSpline, Spline
 from pellicle.fitting.film.parameters import parameters
 from pellicle.optics.pair import imag, is_real, real
-from pellicle.synthetic.spectra import simulate_signal
+from pellicle.simulation.spectra import simulate_signal
 
 KNOTS = (300.0, 400.0, 500.0, 700.0, 1000.0)
 AT = np.linspace(300.0, 1000.0, 141)

@@ -11,10 +11,10 @@ import pytest
 import pellicle as pl
 from pellicle.dispersion import Cauchy, Constant, Shifted
 from pellicle.effects.averaging import MOST_ORDERS, ORDERS_ERROR
-from pellicle.effects.film import EFFECTS
+from pellicle.effects.film_plan import EFFECTS
 from pellicle.effects.gradient import gradient, signals
+from pellicle.forward_model.film_signal import build
 from pellicle.scene.free import free_leaves, insert
-from pellicle.simulation.film import build
 
 WAVELENGTH = np.linspace(450.0, 850.0, 9)
 FREE_K = pl.Free(0, 1, start=0.0)
@@ -168,7 +168,7 @@ def test_each_effect_and_its_reason(effect, on, why, thing):
 
 
 def test_the_table_covers_every_effect_both_ways():
-    """But for what only a tolerance decides (tests/planning)."""
+    """But for what only a tolerance decides (test_film_plan.py)."""
     both = {(e.name, on) for e in EFFECTS for on in (True, False)}
     assert {(effect, on) for effect, on, *_ in TABLE} == both - {("opaque", True), ("precision", False)}
 

@@ -14,9 +14,8 @@ import pellicle as pl
 from pellicle.colour import lab, sensor
 from pellicle.explorer.session import Session
 from pellicle.reporting.rendering_display import display, exposure
-from pellicle.synthetic.ball import ball
-from pellicle.synthetic.environment import studio
-from pellicle.synthetic.film_spectra import stack
+from pellicle.simulation.environment import studio
+from pellicle.simulation.film_sphere import ball, stack
 
 NM = np.linspace(380.0, 780.0, 41)
 

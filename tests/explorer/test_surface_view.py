@@ -49,7 +49,7 @@ def test_sliders_are_the_numbers_of_the_model(session):
     assert about["kind"] == "surface"
 
 
-@pytest.mark.slow  # compiles the sphere for several seconds; tests/synthetic/test_surface_sphere.py
+@pytest.mark.slow  # compiles the sphere for several seconds; tests/simulation/test_surface_sphere.py
 def test_sphere_is_an_image(session):
     answer = session.answer("view", {"want": ["sphere"], "size": 32, "wait": True})
     rendering = np.asarray(Image.open(io.BytesIO(base64.b64decode(answer["sphere"].split(",")[1]))))

@@ -10,7 +10,7 @@ import pytest
 
 import pellicle as pl
 from pellicle.scene.free import insert
-from pellicle.synthetic.spectra import simulate_signal
+from pellicle.simulation.spectra import simulate_signal
 
 WAVELENGTH = np.linspace(400.0, 900.0, 128)
 SUBSTRATE = pl.dispersion.Constant(3.9, 0.02)

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.effects.plan import Plan, Row
 from pellicle.fitting.comparison import Candidate, Comparison
 from pellicle.fitting.curves import BIREFRINGENCE, Curve, Index
 from pellicle.fitting.result import Estimate, Fit, Part, Status
+from pellicle.forward_model.plan import Plan, Row
 
 
 def candidate(

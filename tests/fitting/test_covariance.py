@@ -15,7 +15,7 @@ from pellicle.fitting.covariance import errors, scaled
 from pellicle.fitting.film.problem import make
 from pellicle.fitting.film.targets import measured as as_numbers
 from pellicle.simulation.functions import reflectance
-from pellicle.synthetic.spectra import simulate_signal
+from pellicle.simulation.spectra import simulate_signal
 
 CAUCHY = (pl.Free(1.3, 1.7), pl.Free(0.0, 2e4))
 TRUTH = (1.45, 4000.0, 480.0)  # A, B, thickness

@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 from mpmath import mp, mpc, mpf
 
+from pellicle.forward_model.mixed_polarisations import ratio_angles, ratio_sums, ratio_sums_of_mueller
 from pellicle.optics.berreman.matrices import Elements
 from pellicle.optics.mueller import mueller_elements
 from pellicle.optics.pair import Pair
-from pellicle.simulation.mixed_polarisations import ratio_angles, ratio_sums, ratio_sums_of_mueller
 
 CASES = json.loads(Path(__file__).with_name("anisotropic.json").read_text(encoding="utf-8"))["cases"]
 NUMBERS = np.array([case["value"] for case in CASES.values()])[:, :8]

@@ -21,12 +21,12 @@ import pytest
 from mpmath import mp
 
 import pellicle as pl
+from pellicle.forward_model.film_signal import build
 from pellicle.optics import coherent, response
 from pellicle.optics.ellipsometry import normalised, psi_delta, stokes
 from pellicle.optics.pair import to_pair
 from pellicle.optics.stack import stack
 from pellicle.scene.free import insert
-from pellicle.simulation.film import build
 
 TABLE = json.loads(Path(__file__).with_name("stacks.json").read_text(encoding="utf-8"))
 SIGNALS = TABLE["signals"]

@@ -7,7 +7,7 @@ import pytest
 import tmm
 
 import pellicle as pl
-from pellicle.simulation.film import build
+from pellicle.forward_model.film_signal import build
 
 RNG = np.random.default_rng(20)
 COUNT = 60

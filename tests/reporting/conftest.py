@@ -8,10 +8,10 @@ import pytest
 
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.spectrum import Spectrum
-from pellicle.effects.plan import Plan, Row
-from pellicle.effects.surface import exact
+from pellicle.effects.surface_plan import exact
 from pellicle.fitting.curves import BrdfCurve, Curve
 from pellicle.fitting.result import Estimate, Fit, LayerTest, Part, Profile, Rival, Status
+from pellicle.forward_model.plan import Plan, Row
 from pellicle.scene.surface import Surface, surface_view
 
 

@@ -13,10 +13,10 @@ import pytest
 
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.data.spectrum import Spectrum
-from pellicle.effects.plan import Plan, Row
 from pellicle.errors import UsageError
 from pellicle.fitting.curves import Curve
 from pellicle.fitting.result import Estimate, Fit, Part, Profile, Rival, Status
+from pellicle.forward_model.plan import Plan, Row
 from pellicle.materials import material
 from pellicle.reporting.csv_tables import fit_csv, nk_csvs
 from pellicle.reporting.folders import folder_per_file, write_fit, write_summary

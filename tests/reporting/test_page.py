@@ -21,7 +21,7 @@ from pellicle.scene.film import Light, Scene, with_wavelength
 from pellicle.scene.free import Free
 from pellicle.scene.layers import Layer
 from pellicle.scene.surface import Surface
-from pellicle.synthetic.surface_sphere import in_plane
+from pellicle.simulation.surface_sphere import in_plane
 
 IMAGE = b"\x89PNG\r\n"
 VOID = {"meta", "img", "input", "br", "link", "hr"}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.synthetic.spectra import simulate_signal
+from pellicle.simulation.spectra import simulate_signal
 
 BANDS = np.array([450.0, 520.0, 600.0, 690.0, 800.0])
 

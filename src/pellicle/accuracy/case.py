@@ -9,8 +9,8 @@ import equinox as eqx
 import numpy as np
 
 from pellicle.data import generalised
-from pellicle.effects.plan import Plan
-from pellicle.planning.film import full_plan
+from pellicle.effects.film_plan import full_plan
+from pellicle.forward_model.plan import Plan
 from pellicle.scene.film import Scene, media, with_wavelength
 from pellicle.scene.free import free_leaves, insert, start_values
 

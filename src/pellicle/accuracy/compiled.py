@@ -14,10 +14,10 @@ import numpy as np
 from pellicle.accuracy.case import Case, remaining_parameters
 from pellicle.accuracy.variant import Variant
 from pellicle.fitting.film.parameters import anonymous
+from pellicle.forward_model.film_signal import build, tabulated
 from pellicle.scene.film import Scene
 from pellicle.scene.free import insert
 from pellicle.scene.layers import Plate
-from pellicle.simulation.film import build, tabulated
 
 
 @dataclass(frozen=True)

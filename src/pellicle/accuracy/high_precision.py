@@ -14,7 +14,7 @@ import numpy as np
 from pellicle.accuracy.case import Case
 from pellicle.data import generalised
 from pellicle.dispersion.anisotropic import Anisotropic
-from pellicle.effects.anisotropy import GENERAL
+from pellicle.forward_model.plan import GENERAL
 from pellicle.scene.film import Plate, Scene, groups, thickness_spread, with_wavelength
 from pellicle.scene.free import insert
 

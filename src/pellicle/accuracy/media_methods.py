@@ -15,10 +15,10 @@ from pellicle.accuracy.case import Case, disperses, with_effect
 from pellicle.accuracy.variant import Variant
 from pellicle.dispersion.anisotropic import Anisotropic
 from pellicle.dispersion.base import AbstractDispersion
-from pellicle.effects.anisotropy import CLOSED_FORMS, GENERAL
+from pellicle.effects.film_plan import full_plan
 from pellicle.effects.removal import RealPart
+from pellicle.forward_model.plan import CLOSED_FORMS, GENERAL
 from pellicle.optics.pair import Pair, is_real, parts
-from pellicle.planning.film import full_plan
 from pellicle.scene.film import Scene, media, sliced
 from pellicle.scene.free import is_free, start_values
 from pellicle.scene.graded import each_medium

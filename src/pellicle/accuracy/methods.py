@@ -18,8 +18,8 @@ from pellicle.accuracy.media_methods import (
     transparent,
 )
 from pellicle.accuracy.variant import Method, Variant, without
-from pellicle.effects.anisotropy import GENERAL
-from pellicle.planning.film import full_plan, plan
+from pellicle.effects.film_plan import full_plan, plan
+from pellicle.forward_model.plan import GENERAL
 from pellicle.scene.film import all_collected, coherent_layers, with_wavelength
 from pellicle.scene.layers import Plate
 

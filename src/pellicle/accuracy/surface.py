@@ -19,17 +19,15 @@ from pellicle.accuracy.renderer_methods import RENDERER_METHODS
 from pellicle.brdf.directions import angle_to_half
 from pellicle.colour import sensor
 from pellicle.dispersion.empirical import along_the_spectrum
-from pellicle.effects.plan import Plan
-from pellicle.effects.surface import exact
-from pellicle.effects.surface_removal import SurfaceRemoval
+from pellicle.effects import surface_plan
+from pellicle.effects.surface_plan import FLOOR, SurfaceRemoval, exact
 from pellicle.errors import UsageError
 from pellicle.fitting.presentation import PlotMixin
 from pellicle.fitting.progress import Progress, quiet
-from pellicle.planning import surface
-from pellicle.planning.surface import FLOOR
+from pellicle.forward_model.plan import Plan
+from pellicle.forward_model.surface_signal import build
 from pellicle.scene.free import free_leaves, insert, start_values
 from pellicle.scene.surface import SurfaceView
-from pellicle.simulation.surface import build
 
 DRAWS = 64
 """Number of surfaces drawn between the bounds: enough to hide the cost of a call."""
@@ -58,7 +56,7 @@ def cost(view: SurfaceView, *, tolerance: float | None = None, progress: Progres
     """Measure every method of computing the colours of a surface, and its BRDF.
 
     `tolerance` is in mean ΔE2000; where the surface has no film with a colour, it is relative, as in
-    `planning.surface.plan`.
+    `effects.surface_plan.plan`.
 
     **Raises:** UsageError for a tolerance that is not above zero, and without colour-science.
     """
@@ -154,7 +152,7 @@ def _by_angles(count: int, view: SurfaceView, tolerance: float) -> Plan | str:
 BRDF_METHODS = (
     BrdfMethod("float64", "nothing", lambda view, _: exact(view)),
     BrdfMethod("float32", "nine digits of sixteen", lambda view, _: exact(view), double=False),
-    BrdfMethod("planned", "what its plan leaves out", surface.plan),
+    BrdfMethod("planned", "what its plan leaves out", surface_plan.plan),
     *(
         BrdfMethod(f"{n} angles", "the film's colour between them", partial(_by_angles, n))
         for n in (8, 16, 32)

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from pellicle.accuracy.case import Case
-from pellicle.effects.plan import Plan
+from pellicle.effects.film_plan import full_plan
 from pellicle.effects.removal import FilmRemoval
-from pellicle.planning.film import full_plan
+from pellicle.forward_model.plan import Plan
 from pellicle.scene.film import Scene
 
 

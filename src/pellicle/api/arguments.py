@@ -6,7 +6,7 @@ from typing import Any
 
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.scene.surface import Surface, SurfaceView, surface_view
-from pellicle.synthetic.brdf import Directions, default_directions
+from pellicle.simulation.brdf import Directions, default_directions
 
 
 def refuse(kind: str, **arguments: Any) -> None:

@@ -10,15 +10,15 @@ from numpy.typing import ArrayLike
 
 from pellicle.api.arguments import refuse, viewed
 from pellicle.data.brdf_samples import BrdfSamples
-from pellicle.effects.plan import Plan
+from pellicle.effects.film_plan import plan as film_plan
+from pellicle.effects.surface_plan import plan as surface_plan
 from pellicle.fitting.progress import Progress, quiet
-from pellicle.planning.film import plan as film_plan
-from pellicle.planning.surface import plan as surface_plan
+from pellicle.forward_model.plan import Plan
 from pellicle.scene.film import Scene
 from pellicle.scene.kinds import check_scene
 from pellicle.scene.surface import Surface
-from pellicle.synthetic.brdf import Directions
-from pellicle.synthetic.spectra import default_wavelengths
+from pellicle.simulation.brdf import Directions
+from pellicle.simulation.spectra import default_wavelengths
 
 if TYPE_CHECKING:
     from pellicle.accuracy.cost import Cost

@@ -16,11 +16,11 @@ from pellicle.errors import UsageError
 from pellicle.scene.film import Scene
 from pellicle.scene.kinds import check_scene
 from pellicle.scene.surface import Surface
-from pellicle.synthetic.brdf import Directions, simulate_samples
-from pellicle.synthetic.depth_profile import DepthProfile
-from pellicle.synthetic.depth_profile import depth_profile as film_depth_profile
-from pellicle.synthetic.measured_colours import simulate_colours
-from pellicle.synthetic.spectra import default_wavelengths, simulate_spectrum
+from pellicle.simulation.brdf import Directions, simulate_samples
+from pellicle.simulation.colours import simulate_colours
+from pellicle.simulation.depth_profile import DepthProfile
+from pellicle.simulation.depth_profile import depth_profile as film_depth_profile
+from pellicle.simulation.spectra import default_wavelengths, simulate_spectrum
 
 
 @overload

@@ -161,7 +161,7 @@ def _range(flag: str, text: str, upper: float) -> tuple[float, float]:
 def _bounds(scene: Scene, layer: str | None) -> tuple[float, float]:
     """The recipe's bounds, or 0 to twice a fixed thickness."""
     from pellicle.scene.free import Free
-    from pellicle.synthetic.colours import varied_layer
+    from pellicle.simulation.colours import varied_layer
 
     chosen: Any = scene.layers[varied_layer(scene, layer)]
     if isinstance(chosen.thickness, Free):

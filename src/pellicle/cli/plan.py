@@ -24,6 +24,7 @@ def plan(
 
     Example: pellicle plan film.toml --tolerance 1e-3
     """
+    from pellicle.effects import film_plan, surface_plan
     from pellicle.recipes import read_recipe
     from pellicle.recipes.surface import SurfaceRecipe
 
@@ -32,7 +33,6 @@ def plan(
     described = read_recipe(recipe)
     start()
     from pellicle.fitting.film.messages import log_scene
-    from pellicle.planning import film, surface
     from pellicle.reporting import plans
     from pellicle.reporting.json_record import one_line
     from pellicle.scene.film import with_wavelength
@@ -40,13 +40,13 @@ def plan(
 
     if isinstance(described, SurfaceRecipe):
         view = surface_view(described.scene(), directions(described))
-        chosen = surface.plan(view, tolerance)
-        savings = surface.savings(view, chosen)
+        chosen = surface_plan.plan(view, tolerance)
+        savings = surface_plan.savings(view, chosen)
     else:
         scene = with_wavelength(*measured_scene(described))
         log_scene(scene)
-        chosen = film.plan(scene, tolerance)
-        savings = film.savings(scene, chosen)
+        chosen = film_plan.plan(scene, tolerance)
+        savings = film_plan.savings(scene, chosen)
     if json:
         print(one_line(plans.to_json(chosen, savings)), flush=True)
         return 0

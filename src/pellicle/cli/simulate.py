@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from pellicle.recipes.film import FilmRecipe
     from pellicle.recipes.surface import SurfaceRecipe
     from pellicle.scene.film import Scene
-    from pellicle.synthetic.spectra import SimulatedSignal
+    from pellicle.simulation.spectra import SimulatedSignal
 
 
 def simulate(
@@ -162,7 +162,7 @@ def _write_spectrum(
     """Write a spectrum; `noises` are those of the signal and of the depolarisation."""
     from pellicle.files import write_text
     from pellicle.fitting.film.messages import log_plan, log_scene
-    from pellicle.synthetic.spectra import simulate_signal
+    from pellicle.simulation.spectra import simulate_signal
 
     scene = recipe.scene()
     log_scene(scene)
@@ -183,7 +183,7 @@ def _write_colours(
 ) -> None:
     from pellicle.data.colours import write_colours
     from pellicle.fitting.film.messages import log_plan, log_scene
-    from pellicle.synthetic.measured_colours import simulate_colours
+    from pellicle.simulation.colours import simulate_colours
 
     scene, seen, table = recipe.scene(), recipe.sight(), recipe.tables
     if table.data.wavelengths is not None:
@@ -273,7 +273,7 @@ def _write_samples(
 
     from pellicle.data.write_brdf import write_brdf_samples
     from pellicle.fitting.film.messages import log_plan
-    from pellicle.synthetic.brdf import simulate_samples
+    from pellicle.simulation.brdf import simulate_samples
 
     surface = recipe.scene()
     samples, plan = simulate_samples(surface, directions(recipe), noise, seed, tolerance)

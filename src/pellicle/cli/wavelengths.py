@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from pellicle.recipes.film import FilmRecipe
     from pellicle.recipes.surface import SurfaceRecipe
     from pellicle.scene.film import Scene
-    from pellicle.synthetic.brdf import Directions
+    from pellicle.simulation.brdf import Directions
 
 MOST = 1_000_000
 """Most wavelengths of a simulation: more result from a mistaken step."""
@@ -100,7 +100,7 @@ def wavelengths(recipe: FilmRecipe, scene: Scene) -> np.ndarray:
     """The recipe's wavelengths, or the visible ones that every material has data for."""
     import numpy as np
 
-    from pellicle.synthetic.spectra import VISIBLE, default_wavelengths
+    from pellicle.simulation.spectra import VISIBLE, default_wavelengths
 
     grid = recipe.tables.data.wavelengths
     if grid is None:
@@ -127,7 +127,7 @@ def wavelengths(recipe: FilmRecipe, scene: Scene) -> np.ndarray:
 
 def directions(recipe: SurfaceRecipe) -> Directions | BrdfSamples:
     """Directions of the recipe's first file, or default ones spread over the lobe and around it."""
-    from pellicle.synthetic.brdf import default_directions
+    from pellicle.simulation.brdf import default_directions
 
     if recipe.files:
         say(f"directions: those of {recipe.files[0]}")

@@ -1,1 +1,1 @@
-"""Effects: which of them a scene or a surface has, and why the others are left out."""
+"""Plans: the effects of a scene or a surface, which of them may be left out within a tolerance, and why."""

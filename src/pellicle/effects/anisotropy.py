@@ -8,16 +8,11 @@ from pellicle.data import generalised
 from pellicle.dispersion.anisotropic import Anisotropic
 from pellicle.dispersion.principal_media import isotropic_in_plane, mixes_polarisations
 from pellicle.effects.bounds import largest_attenuation
-from pellicle.effects.plan import Row
 from pellicle.errors import UsageError
+from pellicle.forward_model.plan import CLOSED_FORMS, GENERAL, SLICED, Row
 from pellicle.optics.berreman.slices import DIRECT
 from pellicle.scene.film import Scene, coherent_layers, groups, is_graded
 from pellicle.scene.layers import Interface
-
-CLOSED_FORMS, GENERAL, SLICED = 2, 4, 8
-"""`Row.count` of the effect: size of the matrices; `SLICED` is 4×4 with layers that may be strongly dichroic,
-which are computed in slices."""
-
 
 _PLANES = "the rays of the cone have different planes of incidence"
 

@@ -13,8 +13,8 @@ from pellicle.effects.bounds import (
     smallest_index,
     upper,
 )
-from pellicle.effects.plan import Row
 from pellicle.effects.presence import roughness
+from pellicle.forward_model.plan import Row
 from pellicle.optics import orders as series
 from pellicle.optics import quadrature
 from pellicle.scene.film import Scene, coherent_layers, is_graded, thickness_spread

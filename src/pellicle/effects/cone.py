@@ -9,7 +9,7 @@ import numpy as np
 
 from pellicle.dispersion.anisotropic import Anisotropic
 from pellicle.dispersion.principal_media import mixes_polarisations, principal_media
-from pellicle.effects.anisotropy import GENERAL, scene_media
+from pellicle.effects.anisotropy import scene_media
 from pellicle.effects.bounds import (
     largest_index,
     least_ambient,
@@ -17,7 +17,7 @@ from pellicle.effects.bounds import (
     smallest_index,
     upper,
 )
-from pellicle.effects.plan import Plan, Row
+from pellicle.forward_model.plan import GENERAL, Plan, Row
 from pellicle.optics import quadrature
 from pellicle.optics.lens_quadrature import Film, chosen_rays
 from pellicle.scene.film import Scene, coherent_layers

@@ -15,7 +15,7 @@ from pellicle.data import generalised
 from pellicle.dispersion.base import known_index
 from pellicle.dispersion.empirical import Scaled, Tabulated
 from pellicle.effects.bounds import least_ambient, normal_incidence, upper
-from pellicle.effects.plan import Row
+from pellicle.forward_model.plan import Row
 from pellicle.optics.graded_stack import stack_response
 from pellicle.optics.gradient import Gradient, gauss_points
 from pellicle.optics.pair import imag, real

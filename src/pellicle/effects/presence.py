@@ -13,7 +13,7 @@ from pellicle.dispersion.empirical import Constant
 from pellicle.dispersion.principal_media import isotropic_in_plane, mixes_polarisations, principal_media
 from pellicle.effects.anisotropy import scene_media
 from pellicle.effects.bounds import normal_incidence, upper
-from pellicle.effects.plan import Row
+from pellicle.forward_model.plan import Row
 from pellicle.materials import Material
 from pellicle.optics.pair import real
 from pellicle.scene.film import Scene, coherent_layers, groups, is_graded
@@ -174,10 +174,10 @@ def _constant(material: AbstractDispersion) -> bool:
 
 
 def opaque(scene: Scene) -> Row:
-    """Off: only within a tolerance may an opaque layer hide what lies beneath (`pellicle.planning.film`)."""
+    """Off: only within a tolerance may an opaque layer hide what lies beneath (see `film_plan`)."""
     return Row("opaque", False, "light may reach every layer and the substrate")
 
 
 def precision(scene: Scene) -> Row:
-    """On: only a tolerance permits single precision (`pellicle.planning.film`)."""
+    """On: only a tolerance permits single precision (`pellicle.effects.film_plan`)."""
     return Row("precision", True, "double precision, where JAX has it enabled")

@@ -2,7 +2,7 @@
 
 Each function takes a scene, of `Free` parameters or of numbers, and returns a simpler one whose
 simulation does not contain the effect. If the simpler scene lacks a `Free` parameter its gradient would
-be lost, and the effect must stay (see `pellicle.planning.tolerance`).
+be lost, and the effect must stay (see `pellicle.effects.tolerance`).
 """
 
 from __future__ import annotations

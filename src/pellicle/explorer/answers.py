@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from pellicle.colour import lab, sensor
-from pellicle.effects.plan import Plan
 from pellicle.explorer.incidence import named
 from pellicle.explorer.programs import Curve
 from pellicle.explorer.sphere import to_linear_srgb
+from pellicle.forward_model.plan import Plan
 from pellicle.reporting.rendering_display import encode
 
 _ORDINATES = {"Ψ": "Ψ (°)", "Δ": "Δ (°)", "R": "R (fraction)", "T": "T (fraction)"}

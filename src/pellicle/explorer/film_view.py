@@ -12,17 +12,17 @@ from jax.tree_util import GetAttrKey
 
 from pellicle.data import generalised
 from pellicle.data.spectrum import Spectrum
-from pellicle.effects.film import exact
-from pellicle.effects.plan import Plan
+from pellicle.effects.film_plan import exact
 from pellicle.errors import DataError, UsageError
 from pellicle.explorer.controls import Control, film_controls, scene_with, template, with_value
 from pellicle.explorer.incidence import abscissa, light_angles, measured_angles, named, thinned
 from pellicle.explorer.programs import ANGLE, angle_program, colour_program, spectrum_program
 from pellicle.explorer.sphere import ball_rendering
 from pellicle.explorer.structure import CONES, Structure, bucket, key_of, oblique_cone
+from pellicle.forward_model.plan import Plan
 from pellicle.scene.film import Light, Scene, with_wavelength
 from pellicle.scene.free import Free, insert
-from pellicle.synthetic.spectra import VISIBLE, default_wavelengths
+from pellicle.simulation.spectra import VISIBLE, default_wavelengths
 
 _FEWEST, _MOST, _POINTS = 100, 1500, 401
 """Numbers of wavelengths of data at which the curve is computed too, and that of its own otherwise."""

@@ -13,16 +13,16 @@ from jax.tree_util import GetAttrKey
 
 from pellicle.colour import integration_bands
 from pellicle.data.mueller import ELEMENTS
-from pellicle.effects.film import exact
+from pellicle.effects.film_plan import exact
 from pellicle.explorer.controls import Control, free_paths, template, with_value
 from pellicle.explorer.incidence import named
+from pellicle.forward_model.film_signal import build, tabulated
 from pellicle.optics.ellipsometry import psi_delta
 from pellicle.scene.film import Light, Scene, with_wavelength
 from pellicle.scene.free import Free, insert, start_values
 from pellicle.scene.instrument import Drift, Instrument
 from pellicle.scene.layers import Layer
-from pellicle.simulation.film import build, tabulated
-from pellicle.synthetic.colours import BANDS
+from pellicle.simulation.colours import BANDS
 
 COSINES = 256
 """Nodes of the cosine of the angle of incidence: colours between them are within 0.001 of white."""

@@ -13,8 +13,8 @@ from pellicle.colour import sensor
 from pellicle.colour.spaces import SRGB_WHITE, TO_SRGB, adaptation
 from pellicle.explorer.programs import COSINES
 from pellicle.reporting.rendering_display import display, exposure
-from pellicle.synthetic.environment import studio
-from pellicle.synthetic.sphere import Sphere, sphere
+from pellicle.simulation.environment import studio
+from pellicle.simulation.sphere import Sphere, sphere
 
 WHITE_PERCENTILE = 97.0
 """Percentile of the luminance that is shown as white: a mirrored lamp covers 2 % of a ball."""

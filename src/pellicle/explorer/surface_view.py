@@ -10,18 +10,18 @@ import jax
 import numpy as np
 
 from pellicle.data.spectrum import Spectrum
-from pellicle.effects.plan import Plan
+from pellicle.effects.surface_plan import plan
 from pellicle.errors import UsageError
 from pellicle.explorer.controls import Control
 from pellicle.explorer.programs import Curve
 from pellicle.explorer.sphere import png
 from pellicle.explorer.structure import Structure
-from pellicle.planning.surface import plan
+from pellicle.forward_model.plan import Plan
 from pellicle.reporting.rendering_display import display
 from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface, surface_view
-from pellicle.synthetic.brdf import default_directions
-from pellicle.synthetic.surface_sphere import in_plane, render
+from pellicle.simulation.brdf import default_directions
+from pellicle.simulation.surface_sphere import in_plane, render
 
 INCIDENCE = Control("incidence", "angle of incidence of the lobes", "°", 0.0, 85.0, 45.0, "light", ())
 LEAVING = np.linspace(-88.0, 88.0, 353)

@@ -18,7 +18,6 @@ import numpy as np
 from pellicle.data.colours import Colours
 from pellicle.data.ellipsometry_angles import ncs
 from pellicle.data.spectrum import Spectrum
-from pellicle.effects.anisotropy import GENERAL
 from pellicle.errors import UsageError
 from pellicle.fitting.curves import BIREFRINGENCE, BrdfCurve, ColourCurve, Curve
 from pellicle.fitting.film.sweeps import correlation_in_sweeps, sweeps
@@ -26,6 +25,7 @@ from pellicle.fitting.film.targets import ratio_directions
 from pellicle.fitting.noise import correlation_length
 from pellicle.fitting.presentation import ReportMixin
 from pellicle.fitting.result import Fit, Part, Status
+from pellicle.forward_model.plan import GENERAL
 
 log = getLogger(__name__)
 

@@ -12,9 +12,9 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.effects.plan import Plan
 from pellicle.fitting.coordinates import Array, Box, Coordinates
 from pellicle.fitting.parameter import Parameter
+from pellicle.forward_model.plan import Plan
 
 
 class Noise(NamedTuple):

@@ -11,10 +11,10 @@ import numpy as np
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.colours import Colours
 from pellicle.data.spectrum import Spectrum
-from pellicle.effects.plan import Plan
 from pellicle.fitting.curves import BrdfCurve, ColourCurve, Curve, Index, at_each_wavelength
 from pellicle.fitting.noise import student
 from pellicle.fitting.presentation import PlotMixin
+from pellicle.forward_model.plan import Plan
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface
 

@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from pellicle.effects.plan import Row
 from pellicle.errors import UsageError
+from pellicle.forward_model.plan import Row
 from pellicle.mapping.neighbours import Neighbourhood, grid, scattered
 from pellicle.mapping.pixels.results import BY_NEIGHBOURS, CODES
 from pellicle.mapping.stored_minima import exchanged, minima_at

@@ -22,7 +22,7 @@ from pellicle.scene.film import Light, Scene
 from pellicle.scene.free import free_leaves
 from pellicle.scene.instrument import Instrument
 from pellicle.scene.layers import Layer
-from pellicle.synthetic.spectra import simulate_signal
+from pellicle.simulation.spectra import simulate_signal
 
 _DARK = 1e-3
 """Least simulated reflectance of a reference, as a share of its largest."""

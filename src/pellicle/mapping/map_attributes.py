@@ -8,7 +8,7 @@ from importlib.metadata import version
 from typing import Any
 
 from pellicle.data.cube import Cube
-from pellicle.effects.plan import Row
+from pellicle.forward_model.plan import Row
 from pellicle.mapping.continuity import evidence, row
 from pellicle.mapping.pixels.fit import PixelModel
 

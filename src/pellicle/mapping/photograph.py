@@ -18,7 +18,7 @@ from pellicle.errors import UsageError
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free
 from pellicle.scene.instrument import Drift
-from pellicle.synthetic.colours import colour_table, varied_layer
+from pellicle.simulation.colours import colour_table, varied_layer
 
 EXPOSURE = (0.25, 4.0)
 """Range of a free scale: two stops of a camera to either side."""

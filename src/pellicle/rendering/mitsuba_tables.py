@@ -17,8 +17,8 @@ from pellicle.data.write_rgl import ISOTROPIC, Brdf, TableSize, tabulate, write_
 from pellicle.errors import UsageError
 from pellicle.rendering.appearance import Appearance
 from pellicle.scene.surface import Surface
-from pellicle.synthetic.brdf import Directions, simulate_samples
-from pellicle.synthetic.colours import BANDS
+from pellicle.simulation.brdf import Directions, simulate_samples
+from pellicle.simulation.colours import BANDS
 
 WAVELENGTHS = np.arange(380.0, 731.0, 5.0)
 """Wavelengths (nm) of spectral tables; beyond them less than 0.01 % of the light is seen."""

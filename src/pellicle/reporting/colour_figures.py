@@ -10,7 +10,7 @@ import numpy as np
 from pellicle.colour.gamut import outside
 from pellicle.reporting.drawing import figure_path, new_figure, save_figure
 from pellicle.scene.film import Scene
-from pellicle.synthetic.colours import interference_colours
+from pellicle.simulation.colours import interference_colours
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -36,7 +36,7 @@ def chart(
     """Draw a film's colours against thickness and angle of incidence into `path` (.png, .pdf or .svg).
 
     **Arguments:** `thickness` (nm) and `angle` (degrees) are ranges; `layer`, `observer` and `illuminant` are
-    those of `pellicle.synthetic.colours.interference_colours`. `inverse` adds a panel with every thickness
+    those of `pellicle.simulation.colours.interference_colours`. `inverse` adds a panel with every thickness
     that has the colour of another one.
 
     **Returns:** the share of the colours that sRGB cannot show.

@@ -14,7 +14,7 @@ from pellicle.colour import ColourInverse
 from pellicle.colour.inverse import SIGMA, ColourThickness
 from pellicle.files import write_text
 from pellicle.scene.film import Scene
-from pellicle.synthetic.colours import colour_table
+from pellicle.simulation.colours import colour_table
 
 COLOURS = 301
 """Thicknesses, equally spaced, whose colours are inverted."""

@@ -11,7 +11,7 @@ import numpy as np
 from pellicle.files import MARKER, new_folder, write_text
 from pellicle.reporting.drawing import ABOVE, BLACK, BLUE, GREEN, GREY, ORANGE, new_figure, save_figure
 from pellicle.reporting.json_record import indented, number, versions
-from pellicle.synthetic.depth_profile import DepthProfile, Section
+from pellicle.simulation.depth_profile import DepthProfile, Section
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from pellicle.effects.plan import Row
     from pellicle.fitting.result import Estimate, Fit, Part, SystematicEffect
+    from pellicle.forward_model.plan import Row
     from pellicle.sampling.result import Marginal, Posterior
 
 SCHEMA = "pellicle.fit/1"

@@ -14,7 +14,7 @@ from pellicle.reporting.drawing import figure_path, new_figure, save_figure
 from pellicle.reporting.rendering_display import display
 from pellicle.reporting.sphere_figures import DARK, DPI
 from pellicle.scene.film import Scene
-from pellicle.synthetic.sphere import Sphere, sphere
+from pellicle.simulation.sphere import Sphere, sphere
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from pellicle.effects.plan import Plan, Row
+from pellicle.forward_model.plan import Plan, Row
 
 if TYPE_CHECKING:
-    from pellicle.planning.savings import Savings
+    from pellicle.effects.differences import Savings
 
 _UNITS = {
     "psi-delta": "degrees on the sphere of N, C, S",

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, TypeGuard
 
 from pellicle.accuracy.cost import Cost
 from pellicle.accuracy.surface import SurfaceCost
-from pellicle.effects.plan import Plan
 from pellicle.fitting.comparison import Comparison
 from pellicle.fitting.repeated_measurements import Repeats
 from pellicle.fitting.result import Fit
+from pellicle.forward_model.plan import Plan
 from pellicle.mapping.photograph import ThicknessMap
 from pellicle.reporting import (
     comparison,

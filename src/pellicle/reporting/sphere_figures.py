@@ -13,12 +13,10 @@ from pellicle.reporting.drawing import figure_path, new_figure, save_figure
 from pellicle.reporting.rendering_display import display, encode, exposure
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface
-from pellicle.synthetic.ball import ball
-from pellicle.synthetic.bubble import bubble
-from pellicle.synthetic.environment import Environment, light_tent, one_lamp, studio
-from pellicle.synthetic.film_spectra import stack
-from pellicle.synthetic.sphere import EYE
-from pellicle.synthetic.surface_sphere import in_plane, render
+from pellicle.simulation.environment import Environment, light_tent, one_lamp, studio
+from pellicle.simulation.film_sphere import ball, bubble, stack
+from pellicle.simulation.sphere import EYE
+from pellicle.simulation.surface_sphere import in_plane, render
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,1 +1,1 @@
-"""Forward models: signals of scenes and surfaces, with the effects of their plan."""
+"""Simulation: functions of numbers, simulated measurements of scenes and surfaces, renderings of spheres."""

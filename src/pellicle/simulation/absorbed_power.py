@@ -14,13 +14,13 @@ from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
-from pellicle.effects.plan import Plan
+from pellicle.forward_model.coherent_groups import CoherentGroup, reflected, response_of, transmitted
+from pellicle.forward_model.plan import Plan
 from pellicle.optics import interface, plate, response
 from pellicle.optics.absorption import absorptances
 from pellicle.optics.field import fields
 from pellicle.optics.pair import Number, abs2, imag, real
 from pellicle.scene.film import Plate
-from pellicle.simulation.coherent_groups import CoherentGroup, reflected, response_of, transmitted
 
 
 class AbsorbedPower(NamedTuple):

@@ -12,8 +12,7 @@ from scipy.optimize import least_squares
 import pellicle as pl
 from pellicle.brdf import direction, model
 from pellicle.data.brdf_samples import BrdfSamples
-from pellicle.effects.surface import exact
-from pellicle.effects.surface_removal import SurfaceRemoval
+from pellicle.effects.surface_plan import SurfaceRemoval, exact
 from pellicle.errors import UsageError
 
 pytestmark = pytest.mark.usefixtures("no_search")
@@ -100,7 +99,7 @@ def test_huber_against_scipy(grey, grey_samples):
     agrees(pl.fit(samples, grey(), loss="huber"), values)
 
 
-@pytest.mark.slow  # compiles for 4 s; tests/planning/test_surface.py has such plans
+@pytest.mark.slow  # compiles for 4 s; tests/effects/test_surface_plan.py has such plans
 def test_a_tolerance_leaves_an_effect_out(grey, grey_samples):
     """A diffuse part of 1e-6 changes no value by 1 % of a hundredth of a white one."""
     samples = grey_samples()

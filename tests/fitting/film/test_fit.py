@@ -9,10 +9,10 @@ import pytest
 import pellicle as pl
 from pellicle.dispersion import Cauchy, Constant
 from pellicle.errors import DataError, UsageError
+from pellicle.forward_model.film_signal import build
 from pellicle.scene.film import with_wavelength
 from pellicle.scene.free import free_leaves
-from pellicle.simulation.film import build
-from pellicle.synthetic.spectra import simulate_signal
+from pellicle.simulation.spectra import simulate_signal
 
 NM = np.linspace(400.0, 900.0, 128)
 N, K = pl.Free(1.3, 1.9), pl.Free(0.0, 0.5)

@@ -10,9 +10,9 @@ import pytest
 import pellicle as pl
 from pellicle.fitting.film.problem import make
 from pellicle.fitting.film.targets import measured
+from pellicle.forward_model.film_signal import build
 from pellicle.optics.ellipsometry import psi_delta
 from pellicle.scene.film import with_wavelength
-from pellicle.simulation.film import build
 
 NM = np.linspace(400.0, 800.0, 40)
 PLATE = pl.Substrate(1.52, back=1.0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.synthetic.spectra import simulate_signal
+from pellicle.simulation.spectra import simulate_signal
 
 WAVELENGTH = np.linspace(400.0, 900.0, 192)
 NOISE = 0.003

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.effects.film import exact
+from pellicle.effects.film_plan import exact
 from pellicle.effects.removal import FilmRemoval
 from pellicle.fitting.film import fit as fitting
-from pellicle.synthetic.spectra import simulate_signal
+from pellicle.simulation.spectra import simulate_signal
 
 NM = np.linspace(450.0, 850.0, 41)
 NOISE = 1e-3

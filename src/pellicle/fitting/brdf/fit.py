@@ -11,6 +11,7 @@ import jax
 import numpy as np
 
 from pellicle.data.brdf_samples import BrdfSamples, spread
+from pellicle.effects.surface_plan import plan
 from pellicle.errors import UsageError
 from pellicle.fitting import identifiability
 from pellicle.fitting.brdf import summary, warnings
@@ -28,7 +29,6 @@ from pellicle.fitting.reweighting import RankedMinima
 from pellicle.fitting.robust_losses import LEAST_SQUARES, check_loss
 from pellicle.fitting.robust_losses import spread as bulk_spread
 from pellicle.fitting.status import verdict
-from pellicle.planning.surface import plan
 from pellicle.scene.surface import Surface, surface_view
 
 HELD_OUT = 0.2

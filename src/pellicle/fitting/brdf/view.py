@@ -13,15 +13,14 @@ from pellicle.brdf.directions import direction
 from pellicle.brdf.models import Evaluate, model
 from pellicle.brdf.two_lobes import two_lobes
 from pellicle.data.brdf_samples import DARKEST, BrdfSamples
-from pellicle.effects.plan import Plan
-from pellicle.effects.surface import exact
+from pellicle.effects.surface_plan import evaluation, exact
 from pellicle.fitting.brdf.residuals import RESIDUALS, slope
 from pellicle.fitting.noise import correlation_length
 from pellicle.fitting.problem import Explained, Noise, NoiseGroup
 from pellicle.fitting.program_cache import kept
-from pellicle.planning.surface import evaluation
+from pellicle.forward_model.plan import Plan
+from pellicle.forward_model.surface_signal import build
 from pellicle.scene.surface import SurfaceView
-from pellicle.simulation.surface import build
 
 _ROUND = 128
 """Samples are padded to a multiple of this, so that files of nearly one length share a program."""
@@ -214,7 +213,7 @@ class SamplesView:
         return self
 
     def off_tolerance(self, values: np.ndarray) -> float:
-        """Relative error of the view's plan at `values`, as in `planning.surface`."""
+        """Relative error of the view's plan at `values`, as in `effects.surface_plan`."""
         if not self.plan.tolerance:
             return 0.0
         numbers = {key: np.asarray(x) for key, x in self.form.numbers(values, self.fixed).items()}

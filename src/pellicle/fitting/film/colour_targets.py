@@ -10,16 +10,16 @@ import numpy as np
 from pellicle.colour.encoding import Encoding, camera_encoding, encoding
 from pellicle.data.colours import Colours
 from pellicle.effects.bounds import largest_index
+from pellicle.effects.film_plan import plan
 from pellicle.errors import DataError, UsageError
 from pellicle.fitting.film.colour_response import ColourData, camera_response
 from pellicle.fitting.film.colour_view import ColoursView
 from pellicle.fitting.film.parameters import anonymous
 from pellicle.fitting.problem import Noise
-from pellicle.planning.film import plan
+from pellicle.forward_model.film_signal import tabulated
 from pellicle.scene.film import Light, Scene, coherent_layers, with_wavelength
 from pellicle.scene.free import is_free
 from pellicle.scene.instrument import Drift
-from pellicle.simulation.film import tabulated
 
 _APART = 8.0
 """Standard deviations by which no two measurements of one colour differ."""

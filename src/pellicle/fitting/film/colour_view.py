@@ -10,18 +10,18 @@ import jax.numpy as jnp
 import numpy as np
 
 from pellicle.colour.encoding import Encoding
-from pellicle.effects.plan import Plan
+from pellicle.effects.differences import largest_difference, signals
+from pellicle.effects.film_plan import full_plan
 from pellicle.fitting.coordinates import Array
 from pellicle.fitting.film.colour_response import ColourData, record
 from pellicle.fitting.problem import Explained, Noise, NoiseGroup
 from pellicle.fitting.program_cache import kept
 from pellicle.fitting.reported_layer import linearised
+from pellicle.forward_model.film_signal import build
+from pellicle.forward_model.plan import Plan
 from pellicle.optics.hoisting import compute_once
-from pellicle.planning.differences import largest_difference, signals
-from pellicle.planning.film import full_plan
 from pellicle.scene.film import Scene
 from pellicle.scene.free import insert
-from pellicle.simulation.film import build
 
 
 @dataclass(frozen=True)

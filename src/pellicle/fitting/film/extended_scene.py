@@ -13,7 +13,7 @@ from pellicle.dispersion.anisotropic import Anisotropic
 from pellicle.dispersion.empirical import Constant, Scaled, Tabulated
 from pellicle.dispersion.principal_media import each_principal, ordinary_index
 from pellicle.effects.anisotropy import computes_roughness
-from pellicle.effects.film import exact
+from pellicle.effects.film_plan import exact
 from pellicle.fitting.film.colour_view import ColourForm, ColoursView
 from pellicle.fitting.film.form import SpectrumForm
 from pellicle.fitting.film.parameters import anonymous

@@ -8,18 +8,18 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from pellicle.effects.plan import Plan
 from pellicle.fitting.coordinates import Array
 from pellicle.fitting.film import generalised, nuisance
 from pellicle.fitting.film.nuisance import Data
 from pellicle.fitting.problem import Explained
 from pellicle.fitting.program_cache import kept
 from pellicle.fitting.reported_layer import linearised
+from pellicle.forward_model.film_signal import build, depolarises
+from pellicle.forward_model.plan import Plan
 from pellicle.optics.hoisting import compute_once
 from pellicle.optics.layout import stack_rows
 from pellicle.scene.film import Scene
 from pellicle.scene.free import insert
-from pellicle.simulation.film import build, depolarises
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,10 @@ import numpy as np
 
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.empirical import Constant
-from pellicle.effects.plan import Plan
 from pellicle.fitting.film.colour_targets import MeasuredColours
 from pellicle.fitting.film.targets import Target
 from pellicle.fitting.problem import Problem
+from pellicle.forward_model.plan import Plan
 from pellicle.materials import Material
 from pellicle.scene.film import Scene
 from pellicle.scene.free import free_leaves, is_free

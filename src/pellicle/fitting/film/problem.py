@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pellicle.effects.bounds import largest_index
+from pellicle.effects.film_plan import plan
 from pellicle.fitting.coordinates import box
 from pellicle.fitting.film.colour_targets import MeasuredColours, colours_view
 from pellicle.fitting.film.nuisance import Data
@@ -12,9 +13,8 @@ from pellicle.fitting.film.parameters import anonymous, bounds, shared
 from pellicle.fitting.film.targets import Target
 from pellicle.fitting.film.view import ROUND, SpectrumView
 from pellicle.fitting.problem import Problem
-from pellicle.planning.film import plan
+from pellicle.forward_model.film_signal import tabulated
 from pellicle.scene.film import coherent_layers, with_wavelength
-from pellicle.simulation.film import tabulated
 
 _KEPT_EFFECTS = ("precision", "dispersion")
 """Effects that a tolerance does not remove: a fit stops by differences below single precision, and its media

@@ -12,16 +12,16 @@ from pellicle.data.ellipsometry_angles import ncs
 from pellicle.data.generalised import RATIOS
 from pellicle.data.mueller import ELEMENTS
 from pellicle.data.spectrum import Spectrum
-from pellicle.effects.film import exact
+from pellicle.effects.film_plan import exact
 from pellicle.errors import DataError, UsageError
 from pellicle.fitting import noise
 from pellicle.fitting.film import generalised
 from pellicle.fitting.film.colour_targets import MeasuredColours
 from pellicle.fitting.problem import Noise
+from pellicle.forward_model.film_signal import depolarises
 from pellicle.scene.film import Light, Scene
 from pellicle.scene.free import free_leaves, is_free
 from pellicle.scene.instrument import ONE_NUMBER, Drift, Instrument
-from pellicle.simulation.film import depolarises
 
 ROUGH = 0.01
 """First guess of the noise of N, C, S, of a depolarisation and of Mueller elements."""

@@ -8,18 +8,18 @@ from typing import Any
 import jax
 import numpy as np
 
-from pellicle.effects.plan import Plan
+from pellicle.effects.differences import largest_difference, signals
+from pellicle.effects.film_plan import full_plan
 from pellicle.fitting.film import generalised, nuisance
 from pellicle.fitting.film.form import Local, SpectrumForm, local
 from pellicle.fitting.film.nuisance import Coefficient, Data
 from pellicle.fitting.film.sweeps import correlation_in_sweeps, sweeps
 from pellicle.fitting.noise import DRIFT_CORRELATION
 from pellicle.fitting.problem import Noise, NoiseGroup
-from pellicle.planning.differences import largest_difference, signals
-from pellicle.planning.film import full_plan
+from pellicle.forward_model.film_signal import build
+from pellicle.forward_model.plan import Plan
 from pellicle.scene.film import Scene
 from pellicle.scene.free import is_free
-from pellicle.simulation.film import build
 
 ROUND = 64
 """Spectra are padded to a multiple of this, so that files of nearly one length share a program."""

@@ -19,7 +19,7 @@ from pellicle.reporting.page.document import picture
 from pellicle.reporting.page.figure import Column, Panel, Trace, figure, line
 from pellicle.reporting.rendering_display import display
 from pellicle.scene.surface import Surface
-from pellicle.synthetic.sphere import EYE, sphere
+from pellicle.simulation.sphere import EYE, sphere
 
 if TYPE_CHECKING:
     from pellicle.fitting.result import Fit

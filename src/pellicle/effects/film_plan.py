@@ -1,0 +1,175 @@
+"""Plans of a film: the exact one, and those within a tolerance, by measuring what each effect changes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import jax
+
+from pellicle.effects import anisotropy, averaging, cone, gradient, presence
+from pellicle.effects.differences import Evaluation, Savings, design, measured
+from pellicle.effects.removal import REMOVABLE, FilmRemoval
+from pellicle.effects.tolerance import (
+    Stage,
+    Step,
+    check_tolerance,
+    left_out_row,
+    plans_after,
+    reduced_plan,
+    removal_steps,
+)
+from pellicle.forward_model.film_signal import build, tabulated
+from pellicle.forward_model.plan import Plan, Row
+from pellicle.scene.film import Scene
+from pellicle.scene.free import is_free
+from pellicle.scene.graded import Graded
+from pellicle.scene.layers import Layer, absorbs
+
+
+@dataclass(frozen=True)
+class Effect:
+    """Name of an effect, and the function that makes its row of a plan from a scene."""
+
+    name: str
+    judge: Callable[[Any], Row]
+
+
+EFFECTS = (
+    Effect("absorption", presence.absorption),
+    Effect("anisotropy", anisotropy.anisotropy),
+    Effect("stack", presence.stack),
+    Effect("gradient", gradient.gradient),
+    Effect("roughness", presence.roughness),
+    Effect("tunnelling", presence.tunnelling),
+    Effect("oblique", presence.oblique),
+    Effect("polarisation", presence.polarisation),
+    Effect("transmission", presence.transmission),
+    Effect("back-face", presence.back_face),
+    Effect("coherence", averaging.coherence),
+    Effect("orders", averaging.orders),
+    Effect("angle-spread", cone.angle_spread),
+    Effect("dispersion", presence.dispersion),
+    Effect("opaque", presence.opaque),
+    Effect("precision", presence.precision),
+)
+"""Every effect of a film, in the order of a plan."""
+
+
+def exact(scene: Scene, given: Sequence[Row] = ()) -> Plan:
+    """The effects that a scene has, judged from its types and bounds; rows that are `given` are not judged.
+
+    An effect is off only where it is provably absent; its error bound is 0. The orders, nodes and rays of
+    an average have a bound above 0 (see `effects.averaging` and `effects.cone`).
+    """
+    known = {row.effect: row for row in given}
+    rows = tuple(known.get(effect.name) or effect.judge(scene) for effect in EFFECTS)
+    return Plan(rows, scene.light.signal, scene.light.polarisation)
+
+
+def plan(scene: Scene, tolerance: float = 0.0, keep: Iterable[str] = ()) -> Plan:
+    """The effects to simulate so that the signal is within `tolerance` of the exact model.
+
+    **Arguments:** `tolerance` in the unit of the signal: a fraction or, for ellipsometry, degrees on
+    the sphere of N, C and S (Ψ is off by half of that at most, Δ by that over sin 2Ψ). At 0 an effect
+    is left out only where it is provably absent. `keep` names effects that must stay.
+
+    An effect stays where the gradient of a free parameter would be lost with it.
+
+    **Raises:** ValueError for a negative tolerance and, with a tolerance, for a scene without wavelengths.
+    """
+    check_tolerance(tolerance)
+    if tolerance == 0:
+        return exact(scene)
+    if scene.light.wavelength is None:
+        raise ValueError("what an effect changes depends on the wavelengths: give the light its wavelengths")
+    kept = set(keep)
+    removals = [partial(_removals, effect) for effect in REMOVABLE if effect not in kept]
+    averages = [partial(_fewer, effect) for effect in ("coherence", "orders", "angle-spread", "gradient")]
+    with jax.enable_x64(True):
+        moves = (_by_orders, *removals, *averages)
+        return reduced_plan(full_plan(scene), scene, evaluation(scene), moves, tolerance)
+
+
+def full_plan(scene: Scene) -> Plan:
+    """The exact plan with averages taken over nodes in place of orders of interference."""
+    return _by_nodes(exact(scene), scene)
+
+
+def evaluation(scene: Scene) -> Evaluation:
+    """Simulations of the scene over its bounds."""
+    return Evaluation(build, tabulated(scene), design(scene))
+
+
+def alternatives(effect: str, scene: Scene) -> list[Plan]:
+    """Plans of the scene without one effect, otherwise exact; empty where it is absent or must stay."""
+    return plans_after(partial(_removals, effect), full_plan(scene), scene)
+
+
+def savings(scene: Scene, chosen: Plan) -> Savings:
+    """Error and time saved by leaving each effect out of the full plan, and the time of `chosen`."""
+    with jax.enable_x64(True):
+        cheaper = {effect: alternatives(effect, scene)[:1] for effect in REMOVABLE}
+        return measured(full_plan(scene), chosen, cheaper, evaluation(scene))
+
+
+def _by_nodes(plan: Plan, scene: Scene) -> Plan:
+    """The plan with the closed form averaged over nodes in place of orders, whose phase is linear."""
+    if not plan.row("orders").count:
+        return plan
+    rows = {"coherence": averaging.coherence_by_nodes(scene), "orders": Row("orders", False, "nodes instead")}
+    return replace(plan, rows=tuple(rows.get(row.effect, row) for row in plan.rows))
+
+
+def _by_orders(stage: Stage) -> Iterator[Step]:
+    plan = exact(stage.scene)
+    if plan.row("orders").count:
+        yield Step(plan, stage.scene, plan.row("coherence"))
+
+
+def _removals(effect: str, stage: Stage) -> Iterator[Step]:
+    """Removal of one effect; of opaque layers the uppermost first."""
+    scene, light = stage.scene, stage.scene.light
+    meaningless = {
+        "oblique": light.ellipsometric,
+        "back-face": light.signal == "T",
+        "polarisation": light.ellipsometric
+        or is_free(light.angle)
+        or is_free(scene.instrument.angle_shift)  # with the angle s and p change in opposite directions
+        or scene.instrument.has_cone,
+    }
+    removals = []
+    if effect == "opaque" and light.signal != "T":
+        # a graded layer is no half space
+        plain = (isinstance(x, Layer) and not isinstance(x.material, Graded) for x in scene.layers)
+        opaque = (one and absorbs(x.material) for one, x in zip(plain, scene.layers, strict=True))
+        removals = [FilmRemoval(effect, depth) for depth, may_be in enumerate(opaque) if may_be]
+    elif stage.plan.on(effect) and not meaningless.get(effect, False):
+        removals = [FilmRemoval(effect)]
+
+    def judge(simpler: Scene) -> Plan:
+        return exact(simpler) if stage.plan.on("orders") else full_plan(simpler)
+
+    def row(removal: FilmRemoval) -> Row:
+        if effect == "opaque":
+            name = presence.name(scene, removal.depth)
+            return Row("opaque", True, f"{name} lets nothing through: what lies beneath is left out")
+        return left_out_row(stage.plan.row(effect))
+
+    return removal_steps(stage, removals, judge, row)
+
+
+def _fewer(effect: str, stage: Stage) -> Iterator[Step]:
+    """Fewer orders, nodes or rays of an average, or slices of a graded layer."""
+    row = stage.plan.row(effect)
+    for count in sorted({max(row.count // 4, 1), row.count // 2, 3 * row.count // 4}):
+        if 1 <= count < row.count:
+            around = max(row.around * count // row.count, 1)
+            if row.around != row.count:
+                around |= 1  # odd: see `lens_rays`
+            why = f"{count} suffice of {row.count}: {row.why}"
+            cheaper = replace(row, count=count, around=around, why=why)
+            rows = tuple(cheaper if r.effect == effect else r for r in stage.plan.rows)
+            yield Step(replace(stage.plan, rows=rows), stage.scene, cheaper)

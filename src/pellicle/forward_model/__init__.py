@@ -1,0 +1,1 @@
+"""Forward model: a scene and a plan of its effects → the signal."""

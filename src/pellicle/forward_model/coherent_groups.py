@@ -1,0 +1,223 @@
+"""Coherent groups of layers between incoherent plates, and the intensities of all groups together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from pellicle.forward_model.plan import Plan
+from pellicle.optics import coherent, interface, orders, plate, response
+from pellicle.optics.anisotropy import Principal, mixes_polarisations
+from pellicle.optics.gradient import Gradient, gauss_points
+from pellicle.optics.pair import Number, imag, real
+from pellicle.optics.principal_axes import each_index, seen_by
+from pellicle.scene.film import Group, Scene, groups, thickness_spread
+from pellicle.scene.graded import Graded
+from pellicle.scene.layers import Layer, Plate
+
+
+class CoherentGroup(NamedTuple):
+    """Coherent layers between two thick media: numbers at each wavelength, of the types the plan needs."""
+
+    above: Number
+    layers: list[Number]  # of a graded one its `Gradient`
+    below: Number
+    phases: list[Any]
+    angle: Any  # of incidence in radians; None is normal, `Inside` within a plate
+    internal: Any  # internal transmittance of the plate below, None on a half space; may be `PerPolarisation`
+    collected: plate.Collection | None  # part of the light from beneath that plate, None for all
+    roughness: list[Any] | None  # k₀σ of each face, None where all are smooth
+    phase_variance: Any  # of the round-trip phase, None without damped orders; may be `PerPolarisation`
+
+
+class PerPolarisation(NamedTuple):
+    """A number that is not the same for s and p, as in a birefringent medium."""
+
+    s: Any
+    p: Any
+
+
+def _per_polarisation(function: Callable[[str], Any], medium: Number) -> Any:
+    """function(polarisation), for s and p apart where the medium is birefringent, else one for both."""
+    return PerPolarisation(function("s"), function("p")) if isinstance(medium, Principal) else function("s")
+
+
+def _of(number: Any, polarisation: str) -> Any:
+    return getattr(number, polarisation) if isinstance(number, PerPolarisation) else number
+
+
+def coherent_groups(plan: Plan, scene: Scene) -> list[CoherentGroup]:
+    """The coherent groups of a scene from the ambient down."""
+    wavelength = scene.light.wavelength
+    described, plates = groups(scene)
+    if not plan.on("back-face"):
+        described, plates = described[:1], ()
+    angle = jnp.deg2rad(scene.light.angle) if plan.on("oblique") else None
+    thick = [scene.ambient.index(wavelength)]
+    a = interface.transverse(thick[0], angle)[0]
+    for group in described:
+        index = group.below.index(wavelength)
+        opened = plan.on("tunnelling") and not mixes_polarisations(index)
+        thick.append(interface.allow_tunnelling(index) if opened else index)
+    evaluated = []
+    for i, group in enumerate(described):
+        internal, collected = None, None
+        if i < len(plates):
+            medium = thick[i + 1]
+            internal = _per_polarisation(partial(_internal, medium, a, plates[i], wavelength), medium)
+            collected = _collection(plates[i])
+        evaluated.append(
+            CoherentGroup(
+                above=thick[i],
+                layers=[_layer_index(plan, layer, wavelength) for layer in group.layers],
+                below=thick[i + 1],
+                phases=[2 * jnp.pi / wavelength * layer.thickness for layer in group.layers],
+                angle=angle if i == 0 or angle is None else interface.Inside(a),
+                internal=internal,
+                collected=collected,
+                roughness=_roughness(group, wavelength),
+                phase_variance=_phase_variance(plan, scene, group, angle),
+            )
+        )
+    return evaluated
+
+
+def _collection(described: Plate) -> plate.Collection | None:
+    if described.back_collected is None and described.back_reflections is None:
+        return None
+    return plate.Collection(described.back_collected, described.back_reflections)
+
+
+def _internal(medium: Number, a: Any, below: Plate, wavelength: Any, polarisation: str) -> Any:
+    extinction = imag(interface.normal(seen_by(medium, polarisation), a))
+    return plate.internal_transmittance(extinction, below.plate_mm, wavelength)
+
+
+def _roughness(group: Group, wavelength: Any) -> list[Any] | None:
+    if all(face is None for face in group.roughness):
+        return None
+    wavenumber = 2 * jnp.pi / wavelength
+    return [0.0 if face is None else wavenumber * face for face in group.roughness]
+
+
+def _layer_index(plan: Plan, layer: Layer, wavelength: Any) -> Number:
+    if isinstance(layer.material, Graded):
+        points = [layer.material.at(z, wavelength) for z in gauss_points(plan.row("gradient").count)]
+        return Gradient(*(point if plan.on("absorption") else real(point) for point in points))
+    index = layer.material.index(wavelength)
+    return index if plan.on("absorption") else each_index(real, index)
+
+
+def reflected(plan: Plan, groups: list[CoherentGroup], polarisation: str):
+    """R of the first group and everything below it."""
+    group, *below = groups
+    powers = _powers(plan, group, polarisation)
+    if not below:
+        return powers.R()
+    front = plate.Face(powers.R(), powers.T(), powers.R_below())
+    back, internal = reflected(plan, below, polarisation), _of(group.internal, polarisation)
+    return plate.plate_reflectance(front, back, internal, group.collected)
+
+
+def transmitted(plan: Plan, groups: list[CoherentGroup], polarisation: str):
+    """T through the first group and everything below it, into the last medium."""
+    group, *below = groups
+    powers = _powers(plan, group, polarisation)
+    if not below:
+        return powers.T()
+    front = plate.Face(powers.R(), powers.T(), powers.R_below())
+    back, passed = reflected(plan, below, polarisation), transmitted(plan, below, polarisation)
+    internal = _of(group.internal, polarisation)
+    return plate.plate_transmittance(front, back, passed, internal, group.collected)
+
+
+class _Powers(NamedTuple):
+    """Functions for the power coefficients of a group; one that is not called costs nothing."""
+
+    R: Callable[[], Any]
+    T: Callable[[], Any]
+    R_below: Callable[[], Any]
+
+
+def _powers(plan: Plan, group: CoherentGroup, polarisation: str) -> _Powers:
+    if not group.layers and group.roughness is None:
+        return _bare_face(group, polarisation)
+    if plan.on("orders"):
+        return _damped_orders(plan, group, polarisation)
+    amplitudes = response_of(plan, group, polarisation)
+    return _Powers(
+        partial(response.reflectance, amplitudes),
+        partial(response.transmittance, amplitudes),
+        partial(response.reflectance_below, amplitudes),
+    )
+
+
+def _bare_face(group: CoherentGroup, polarisation: str) -> _Powers:
+    above, below = (seen_by(medium, polarisation) for medium in (group.above, group.below))
+    a, q_above = interface.transverse(above, group.angle)
+    face = (above, q_above, below, interface.normal(below, a), polarisation)
+    reflectance = partial(interface.reflectance, *face)
+    return _Powers(reflectance, partial(interface.transmittance, *face), reflectance)
+
+
+def response_of(plan: Plan, group: CoherentGroup, polarisation: str) -> response.Response:
+    """The response of a group to one polarisation."""
+    (group_response,) = coherent.responses(
+        group.above,
+        group.layers,
+        group.below,
+        group.phases,
+        group.angle,
+        polarisation,
+        propagating=not plan.on("tunnelling"),
+        roughness=group.roughness,
+    )
+    return group_response
+
+
+def _damped_orders(plan: Plan, group: CoherentGroup, polarisation: str) -> _Powers:
+    """Sums of orders of interference, each damped by the instrument."""
+    layer = interface.allow_tunnelling(group.layers[0]) if plan.on("tunnelling") else group.layers[0]
+    series = orders.airy_series(group.above, layer, group.below, group.phases[0], group.angle, polarisation)
+    damped = group.phase_variance is not None
+    variance = _of(group.phase_variance, polarisation)
+    window = orders.gaussian(variance) if damped else orders.monochromatic
+    count = plan.row("orders").count
+    from_below = orders.reversed_series(series)
+    return _Powers(
+        lambda: orders.reflectance(series, window, count),
+        lambda: orders.transmittance(series, window, count),
+        lambda: orders.reflectance(from_below, window, count),
+    )
+
+
+def _phase_variance(plan: Plan, scene: Scene, group: Group, angle: Any) -> Any:
+    """Variance of the round-trip phase from bandwidth and thickness spread; None without damped orders."""
+    if not plan.on("orders") or not group.layers:
+        return None
+    layer = group.layers[0]
+    widths = (scene.instrument.bandwidth, thickness_spread(scene, layer))
+    if widths == (None, None):
+        return None
+    wavelength = scene.light.wavelength
+
+    bandwidth, spread = (0.0 if width is None else width for width in widths)
+
+    def variance(polarisation):
+        def cosine_index(at):
+            a, _ = interface.transverse(scene.ambient.index(at), angle)
+            index = seen_by(_layer_index(plan, layer, at), polarisation)
+            index = interface.allow_tunnelling(index) if plan.on("tunnelling") else index
+            return real(interface.normal(index, a))
+
+        def phase(at):
+            return 4 * jnp.pi / at * cosine_index(at) * layer.thickness
+
+        _, slope = jax.jvp(phase, (wavelength,), (jnp.ones_like(wavelength),))
+        return orders.phase_variance(slope, bandwidth, cosine_index(wavelength), spread, wavelength)
+
+    return _per_polarisation(variance, layer.material.index(wavelength))

@@ -1,0 +1,89 @@
+"""Plan: the effects that a simulation includes, why, and the error of leaving the others out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol, runtime_checkable
+
+from pellicle.data import generalised
+
+CLOSED_FORMS, GENERAL, SLICED = 2, 4, 8
+"""`Row.count` of the effect "anisotropy": size of the matrices; `SLICED` is 4×4 with layers that may be
+strongly dichroic, which are computed in slices."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One effect of a plan: its name, whether it is simulated, why, and the error of that choice.
+
+    `error_bound` is in the unit of the signal: the error of leaving the effect out where it is off, of its
+    numerical method where it is on. `count` is the number of orders, or of nodes of an average; a cone of
+    light has `around` rays for each node.
+    """
+
+    effect: str
+    on: bool
+    why: str
+    error_bound: float = 0.0
+    count: int = 0
+    around: int = 0
+
+
+@runtime_checkable
+class Removal(Protocol):
+    """Removes one effect from a scene or a surface; frozen and hashable."""
+
+    @property
+    def effect(self) -> str: ...
+
+    def __call__(self, scene: Any, /) -> Any: ...
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The effects that a simulation includes; frozen, hashable and printable.
+
+    The `build` functions of `pellicle.forward_model` turn it into a forward model. `left_out` are the effects
+    that are present but left out within the `tolerance` (in the unit of the signal), in the order in which
+    the scene is simplified. `gradient_error` is the largest change of a derivative in a free parameter by
+    that, relative to the largest value of that derivative.
+    """
+
+    rows: tuple[Row, ...]
+    signal: str
+    polarisation: str
+    left_out: tuple[Removal, ...] = ()
+    tolerance: float = 0.0
+    gradient_error: float = 0.0
+
+    def row(self, effect: str) -> Row:
+        """The row of one effect. Raises KeyError for an unknown name."""
+        for row in self.rows:
+            if row.effect == effect:
+                return row
+        raise KeyError(effect)
+
+    def on(self, effect: str) -> bool:
+        """True where the effect is simulated. Raises KeyError for an unknown name."""
+        return self.row(effect).on
+
+    @property
+    def ellipsometric(self) -> bool:
+        """True for the signals of ellipsometry."""
+        return self.signal in ("psi-delta", "mueller", generalised.SIGNAL)
+
+    @property
+    def error_bound(self) -> float:
+        """Bound on the error of the signal by everything that the plan leaves out or averages."""
+        return sum(row.error_bound for row in self.rows)
+
+    @property
+    def static_key(self) -> Plan:
+        """The plan without reasons and bounds: everything that a compiled program depends on."""
+        rows = tuple(Row(row.effect, row.on, "", count=row.count, around=row.around) for row in self.rows)
+        return Plan(rows, self.signal, self.polarisation, self.left_out)
+
+    def __str__(self) -> str:
+        width = max(len(row.effect) for row in self.rows)
+        lines = [f"{row.effect:<{width}}  {'on ' if row.on else 'off'}  {row.why}" for row in self.rows]
+        return "\n".join(lines)

@@ -1,1 +1,0 @@
-"""Plans within a tolerance, and what leaving out each effect saves."""

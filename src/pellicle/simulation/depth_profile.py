@@ -1,0 +1,243 @@
+"""Where a film absorbs light: absorptance of each layer, |E|² and absorbed power density against depth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pellicle.effects.film_plan import exact
+from pellicle.errors import UsageError
+from pellicle.forward_model.coherent_groups import coherent_groups
+from pellicle.forward_model.film_signal import tabulated
+from pellicle.forward_model.plan import Plan
+from pellicle.optics.interface import transverse
+from pellicle.scene.film import Scene, all_collected, groups, sliced, with_wavelength
+from pellicle.scene.free import insert, start_values
+from pellicle.scene.graded import Graded
+from pellicle.scene.instrument import Instrument
+from pellicle.scene.layers import Interface, Layer, Plate
+from pellicle.simulation.absorbed_power import absorbed_power, energy
+
+POINTS = 200
+"""Depths in each layer, and on each side of the layers."""
+EDGE = 1e-6
+"""Distance of the outermost depths of a layer from its faces, a share of its thickness."""
+SLICES = 64
+"""Homogeneous slices of a graded layer: R, T and absorptances are within about 1e-5. The field is
+shown in their middles, where the absorption is that of the graded layer."""
+MARGIN = 0.25
+"""Depth shown in the media above and below, a share of the thickness of the layers."""
+
+
+@dataclass(frozen=True)
+class Section:
+    """Field in one coherent group of layers, between the ambient, plates and the substrate."""
+
+    layers: tuple[tuple[str, float, float], ...]
+    """Name and depth of the upper and lower face in nm, from the uppermost interface of the group."""
+    above: str
+    below: str
+    medium: tuple[str, ...]
+    """Name of the medium at each depth."""
+    depth: np.ndarray
+    """nm, (depths,)."""
+    intensity: np.ndarray
+    """|E|² relative to the incident wave, (chosen wavelengths, depths)."""
+    absorbed: np.ndarray
+    """Share of the incident power absorbed per nm, (chosen wavelengths, depths)."""
+
+
+@dataclass(frozen=True)
+class DepthProfile:
+    """Absorption of a film against wavelength and against depth.
+
+    `absorptance` (media, wavelengths) is that of each layer and plate in `media`, from the ambient down. With
+    `R` and `T` (wavelengths,) it adds up to 1; T enters the substrate, or the medium behind its back face.
+    Both are of all light, also where a detector collects only a part of that from a back face.
+    `sections` have the field at the wavelengths `at`, one for each group of layers between thick media;
+    `shares` (chosen wavelengths,) are R, T and the absorptances there, by name.
+    """
+
+    wavelength: np.ndarray
+    R: np.ndarray
+    T: np.ndarray
+    media: tuple[str, ...]
+    absorptance: np.ndarray
+    at: np.ndarray
+    shares: dict[str, np.ndarray]
+    sections: tuple[Section, ...]
+
+
+def depth_profile(scene: Scene, at: ArrayLike, wavelength: ArrayLike) -> DepthProfile:
+    """Compute a depth profile, as `pellicle.depth_profile` does.
+
+    **Raises:** UsageError for rough faces and for several angles; ValueError where a material has no data.
+    """
+    if any(face is not None for group in groups(scene)[0] for face in group.roughness):
+        raise UsageError(
+            "a rough face scatters light, and the field at it has no value: describe it as a mixed interface,"
+            ' pl.Interface(thickness), or in a recipe a layer with between = "bruggeman"'
+        )
+    if np.size(scene.light.angle) != 1:
+        raise UsageError("a depth profile has one angle of incidence: give the light one `angle`")
+    chosen, nm = np.atleast_1d(np.asarray(at, dtype=float)), np.asarray(wavelength, dtype=float)
+    if chosen.size == 0 or not np.all(np.isfinite(chosen) & (chosen > 0)):
+        raise UsageError("the wavelengths of a depth profile must be numbers of nm above zero")
+    with jax.enable_x64(True):
+        fixed = all_collected(insert(scene, start_values(scene)))
+        plane = [replace(x, thickness_spread=None) if isinstance(x, Layer) else x for x in fixed.layers]
+        fixed = eqx.tree_at(lambda s: (s.layers, s.instrument), fixed, (tuple(plane), Instrument()))
+        names, runs = _names(scene)
+        fixed = sliced(fixed, SLICES)
+        every = with_wavelength(fixed, np.concatenate([nm, chosen]))
+        plan = exact(every)
+        R, T, layers, plates = _mean(plan, every)
+        media, rows = [], []
+        for i, run in enumerate(runs):
+            start = 0
+            for name, count in run:
+                media.append(name)
+                rows.append(np.sum(layers[i][start : start + count], axis=0))
+                start += count
+            if i < len(plates):
+                media.append(names[i])
+                rows.append(plates[i])
+        sections = _sections(plan, fixed, chosen, names, runs)
+    own, there = slice(nm.size), slice(nm.size, None)
+    absorptance = np.array(rows)
+    shares = {"R": R[there], "T": T[there], **dict(zip(media, absorptance[:, there], strict=True))}
+    return DepthProfile(nm, R[own], T[own], tuple(media), absorptance[:, own], chosen, shares, sections)
+
+
+def _names(scene: Scene) -> tuple[list[str], list[list[tuple[str, int]]]]:
+    """Names of the plates, and of the layers of each coherent group with the number of slices of each."""
+    taken: set[str] = {"R", "T", "ambient", "substrate"}
+
+    def unique(item: Any, position: int) -> str:
+        name = item.name or getattr(getattr(item, "material", None), "name", None) or f"layer{position}"
+        name = name if name not in taken else f"{name} ({position})"
+        taken.add(name)
+        return name
+
+    plates: list[str] = []
+    runs: list[list[tuple[str, int]]] = [[]]
+    for position, item in enumerate(scene.layers, start=1):
+        name = unique(item, position)
+        if isinstance(item, Plate):
+            plates.append(name)
+            runs.append([])
+        else:
+            runs[-1].append((name, _slices_of(item)))
+    if scene.substrate.back is not None:
+        plates.append("substrate")
+        runs.append([])
+    return plates, runs
+
+
+def _slices_of(item: Layer | Interface) -> int:
+    """Number of homogeneous layers that stand for one of a scene."""
+    if isinstance(item, Interface):
+        return item.steps
+    return SLICES if isinstance(item.material, Graded) else 1
+
+
+def _polarisations(plan: Plan, scene: Scene) -> str:
+    if not plan.on("oblique"):
+        return "s"
+    return "sp" if scene.light.polarisation == "unpolarised" else scene.light.polarisation
+
+
+def _mean(plan: Plan, scene: Scene) -> tuple[Any, ...]:
+    """R, T, and the absorptances of the layers of each group and of the plates, over the polarisations."""
+    found = _mean_powers(tabulated(scene), plan=plan.static_key, letters=_polarisations(plan, scene))
+    return jax.tree.map(np.asarray, found)
+
+
+@partial(jax.jit, static_argnames=("plan", "letters"))
+def _mean_powers(scene: Scene, plan: Plan, letters: str) -> Any:
+    found, wavelength = coherent_groups(plan, scene), jnp.asarray(scene.light.wavelength)
+    each = [absorbed_power(plan, found, groups(scene)[1], wavelength, letter)[:4] for letter in letters]
+    return jax.tree.map(lambda *x: sum(x) / len(x), *each)
+
+
+@partial(jax.jit, static_argnames=("plan", "letters", "position"))
+def _at_depths(
+    scene: Scene, depth: Any, thicknesses: list[Any], plan: Plan, letters: str, position: int
+) -> tuple[Any, Any]:
+    """|E|² and the absorbed share of the power per nm at depths of a group, at one wavelength."""
+    found, wavelength = coherent_groups(plan, scene), jnp.asarray(scene.light.wavelength)
+    thicknesses = [d * jnp.ones_like(wavelength) for d in thicknesses]
+    per_power = density = jnp.zeros_like(depth)
+    for letter in letters:
+        powers = absorbed_power(plan, found, groups(scene)[1], wavelength, letter)
+        E, loss = energy(found, position, wavelength, thicknesses, depth, powers, letter)
+        per_power += E / len(letters)
+        density += 2 * jnp.pi / wavelength * loss * E / len(letters)
+    return transverse(found[0].above, found[0].angle)[1] * per_power, density
+
+
+def _sections(
+    plan: Plan, scene: Scene, chosen: np.ndarray, names: list[str], runs: list[list[tuple[str, int]]]
+) -> tuple[Section, ...]:
+    letters = _polarisations(plan, scene)
+    edges = ["ambient", *names, "substrate" if scene.substrate.back is None else "behind the substrate"]
+    sections = []
+    for i, group in enumerate(groups(scene)[0]):
+        if not group.layers:
+            continue
+        depths: list[Any] = [layer.thickness for layer in group.layers]
+        faces = np.concatenate([[0.0], np.cumsum([float(d) for d in depths])])
+        slices = np.cumsum([0, *(count for _, count in runs[i])])
+        layers = tuple(
+            (name, float(faces[a]), float(faces[b]))
+            for (name, _), a, b in zip(runs[i], slices[:-1], slices[1:], strict=True)
+        )
+        depth, medium = _depths(layers, faces, slices, edges[i], edges[i + 1])
+
+        rows = [
+            _at_depths(
+                tabulated(with_wavelength(scene, chosen[j : j + 1])),
+                depth,
+                depths,
+                plan=plan.static_key,
+                letters=letters,
+                position=i,
+            )
+            for j in range(len(chosen))
+        ]
+        intensity, absorbed = (np.array(x) for x in zip(*rows, strict=True))
+        sections.append(Section(layers, edges[i], edges[i + 1], medium, depth, intensity, absorbed))
+    return tuple(sections)
+
+
+def _points(slices: int) -> int:
+    """Number of depths in each slice of a layer."""
+    return 1 if slices == SLICES else max(POINTS // slices, 2)
+
+
+def _depths(
+    layers: tuple[tuple[str, float, float], ...],
+    faces: np.ndarray,
+    slices: np.ndarray,
+    above: str,
+    below: str,
+) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Depths in the media above, in each slice of each layer and below, off the interfaces; their media."""
+    total = faces[-1]
+    margin = max(MARGIN * total, 20.0)
+    spans = [(above, -margin, 0.0, POINTS)]
+    for (name, _, _), a, b in zip(layers, slices[:-1], slices[1:], strict=True):
+        spans += [(name, faces[j], faces[j + 1], _points(int(b - a))) for j in range(a, b)]
+    spans.append((below, total, total + margin, POINTS))
+    shares = [np.linspace(EDGE, 1 - EDGE, count) if count > 1 else np.array([0.5]) for *_, count in spans]
+    parts = [x + share * (y - x) for (_, x, y, _), share in zip(spans, shares, strict=True)]
+    kept = [(span[0], part) for span, part in zip(spans, parts, strict=True) if span[2] > span[1]]
+    medium = tuple(name for name, part in kept for _ in part)
+    return np.concatenate([part for _, part in kept]), medium

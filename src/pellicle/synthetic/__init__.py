@@ -1,1 +1,0 @@
-"""Simulated measurements and renderings: spectra, BRDF samples, colours, spheres."""

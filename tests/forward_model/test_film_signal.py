@@ -1,0 +1,222 @@
+"""Models compiled from plans: they compute what the scene calls for, and nothing else."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import pellicle as pl
+from pellicle.dispersion import Cauchy, Constant
+from pellicle.forward_model.film_signal import build, tabulated
+from pellicle.scene.free import insert, start_values
+
+WAVELENGTH = np.linspace(450.0, 850.0, 9)
+
+
+def scene(layer=1.46, substrate=3.9 + 0.02j, thickness=300.0, ambient=1.0, instrument=None, **light):
+    light = {"wavelength": WAVELENGTH} | light
+    return pl.Scene(
+        pl.Layer(layer, thickness), substrate, ambient, pl.Light(**light), instrument or pl.Instrument()
+    )
+
+
+def predict(thing):
+    return np.asarray(jax.jit(build(pl.plan(thing)))(thing))
+
+
+PLATE = pl.Substrate(1.52, back=1.0)
+DENSE = {"ambient": 1.52, "angle": 65.0}
+SCENES = {
+    "transparent, normal": scene(),
+    "transparent, oblique": scene(angle=60.0),
+    "transmittance": scene(substrate=1.52, angle=60.0, signal="T"),
+    "k fixed at 0": scene(Constant(1.46, 0.0), angle=60.0),
+    "absorbing": scene(2.1 + 0.1j, angle=60.0),
+    "one polarisation": scene(angle=60.0, polarisation="p"),
+    "tunnelling layer": scene(1.33, 1.7, **DENSE),
+    "tunnelling substrate": scene(2.1, 1.0, **DENSE),
+    "dispersive": scene(Cauchy(1.45, 3e3), "Si"),
+    "plate": scene(substrate=PLATE),
+    "plate, oblique transmittance": scene(substrate=PLATE, angle=50.0, signal="T"),
+    "an angle for each wavelength": scene(angle=np.linspace(0, 60, 9)),
+}
+EVERY_SCENE = pytest.mark.parametrize("name", SCENES)
+
+
+def everything(thing):
+    """A plan that leaves out no effect but the windows: absorption, both polarisations, any angle."""
+    plan = pl.plan(thing)
+    both = thing.light.polarisation == "unpolarised"
+    on = {"absorption", "oblique", "tunnelling"} | ({"polarisation"} if both else set())
+    return replace(plan, rows=tuple(replace(row, on=row.on or row.effect in on) for row in plan.rows))
+
+
+@EVERY_SCENE
+def test_what_a_plan_leaves_out_changes_nothing(name):
+    thing = SCENES[name]
+    whole = jax.jit(build(everything(thing)))(thing)
+    np.testing.assert_allclose(predict(thing), whole, rtol=1e-12, atol=1e-15)
+
+
+@EVERY_SCENE
+def test_sampling_the_media_changes_nothing(name):
+    """What is fixed is evaluated before a fit; values and the slope in thickness stay."""
+    thing = SCENES[name]
+    np.testing.assert_allclose(predict(tabulated(thing)), predict(thing), rtol=1e-14)
+
+
+@pytest.mark.parametrize("name", [name for name, s in SCENES.items() if s.substrate.back is None])
+def test_a_model_is_the_front_door(name):
+    """The same film through `pl.reflectance` and `pl.transmittance`."""
+    thing = SCENES[name]
+    function = pl.reflectance if thing.light.signal == "R" else pl.transmittance
+    direct = function(
+        WAVELENGTH,
+        thing.layers[0].thickness,
+        thing.layers[0].material,
+        thing.substrate.material,
+        ambient=thing.ambient,
+        angle=thing.light.angle,
+        polarisation=thing.light.polarisation,
+    )
+    np.testing.assert_allclose(predict(thing), direct, rtol=1e-12, atol=1e-15)
+
+
+SHIFTED = pl.Instrument(angle_shift=-0.3)
+
+
+def test_ellipsometry_at_shifted_angles():
+    """Three angles in one measurement, all 0.3° smaller than the instrument's; the data keep its angles."""
+    nm, angle = np.repeat([450.0, 600.0, 800.0], 3), np.tile([65.0, 70.0, 75.0], 3)
+    light = {"wavelength": nm, "angle": angle, "signal": "psi-delta"}
+    found = pl.simulate(scene(instrument=SHIFTED, **light), nm)
+    psi, delta = pl.ellipsometry(nm, 300.0, 1.46, 3.9 + 0.02j, angle=angle - 0.3)
+    np.testing.assert_allclose(found.values, psi, atol=1e-9)
+    np.testing.assert_allclose(found.delta, np.mod(delta, 360), atol=1e-9)
+    np.testing.assert_array_equal(found.angle, angle)
+
+
+@pytest.mark.parametrize(("angle", "polarisation"), [(0.0, "unpolarised"), (50.0, "s")])
+def test_reflectance_at_a_shifted_angle(angle, polarisation):
+    """At normal incidence, too, where nothing else makes the light oblique."""
+    thing = scene(angle=angle, polarisation=polarisation, instrument=pl.Instrument(angle_shift=4.0))
+    truth = pl.reflectance(WAVELENGTH, 300.0, 1.46, 3.9 + 0.02j, angle=angle + 4.0, polarisation=polarisation)
+    np.testing.assert_allclose(predict(thing), truth, rtol=1e-12)
+
+
+def primitives(thing, plan=None):
+    """Number of operations that a model is made of, those inside others counted too."""
+
+    def count(jaxpr):
+        inner = [x for e in jaxpr.eqns for x in jax.tree.leaves(list(e.params.values()), is_leaf=is_jaxpr)]
+        return len(jaxpr.eqns) + sum(count(getattr(x, "jaxpr", x)) for x in inner if is_jaxpr(x))
+
+    def is_jaxpr(x):
+        return isinstance(x, jax.extend.core.ClosedJaxpr | jax.extend.core.Jaxpr)
+
+    numbers = jax.tree.map(jnp.asarray, thing)
+    return count(jax.make_jaxpr(build(plan or pl.plan(thing)))(numbers).jaxpr)
+
+
+BANDWIDTH = pl.Instrument(bandwidth=5.0)
+LEAVES_NO_TRACE = {
+    "absorption": (scene(), scene(1.46 + 0.1j)),
+    "absorption, k fixed at 0": (
+        scene(Constant(1.46, 0.0)),
+        scene(Constant(1.46, 0.1)),
+    ),
+    "oblique": (scene(polarisation="p"), scene(polarisation="p", angle=30.0)),
+    "angle shift": (scene(angle=30.0), scene(angle=30.0, instrument=SHIFTED)),
+    "polarisation": (scene(angle=30.0, polarisation="s"), scene(angle=30.0)),
+    "tunnelling": (scene(angle=80.0), scene(angle=80.0, ambient=1.6)),
+    "back face": (scene(substrate=1.52), scene(substrate=PLATE)),
+    "coherence": (scene(), scene(instrument=BANDWIDTH)),
+    "bandwidth of 0": (scene(instrument=pl.Instrument(bandwidth=0.0)), scene(instrument=BANDWIDTH)),
+    "transmission": (scene(substrate=1.52), scene(substrate=PLATE)),
+}
+
+
+@pytest.mark.parametrize("name", LEAVES_NO_TRACE)
+def test_an_absent_effect_leaves_no_trace(name):
+    without, with_it = LEAVES_NO_TRACE[name]
+    assert primitives(without) < primitives(with_it)
+
+
+def test_one_polarisation_is_half_the_work():
+    one, both = primitives(scene(angle=30.0, polarisation="s")), primitives(scene(angle=30.0))
+    assert one < 0.65 * both
+    normal = primitives(scene())
+    assert normal < one
+    assert primitives(scene(polarisation="p")) == normal
+
+
+def test_k_fixed_at_zero_costs_what_no_k_costs():
+    plain, fixed = scene(angle=30.0), scene(Constant(1.46, 0.0), angle=30.0)
+    assert primitives(fixed) <= primitives(plain) + 2  # the constant itself
+
+
+def test_k_free_from_zero_keeps_its_slope():
+    """The trap of judging by values: at k = 0 the model must still know that R falls with k."""
+    thing = scene(Constant(1.46, pl.Free(0, 1, start=0.0)))
+    model = build(pl.plan(thing))
+    predict = jax.jit(lambda k: model(insert(thing, [k])))
+    slope = jax.jacfwd(predict)(0.0)
+    numeric = (predict(1e-6) - predict(0.0)) / 1e-6
+    np.testing.assert_allclose(slope, numeric, rtol=1e-3, atol=1e-5)
+    assert np.max(np.abs(slope)) > 0.1
+
+
+def test_a_model_is_pure_and_can_be_traced():
+    """jit, vmap and gradients through the free parameters, in their own order."""
+    thing = scene(Constant(pl.Free(1.3, 1.7)), thickness=pl.Free(10, 900), angle=30.0)
+    model = build(pl.plan(thing))
+
+    @jax.jit
+    def predict(values):
+        return model(insert(thing, values))
+
+    start = start_values(thing)
+    many = jax.jit(jax.vmap(predict))(np.stack([start, 1.01 * start]))
+    assert many.shape == (2, 9)
+    slopes = jax.jacfwd(predict)(start)
+    h = 1e-6 * start
+    numeric = [(predict(start + e) - predict(start - e)) / (2 * np.sum(e)) for e in np.diag(h)]
+    np.testing.assert_allclose(slopes, np.transpose(numeric), rtol=1e-5, atol=1e-8)
+
+
+def test_wavelengths_outside_a_table_are_refused():
+    high = pl.material("Si").wavelength_range[1]
+    with pytest.raises(ValueError, match=r"Si .*is known from .* not at"):
+        tabulated(scene(substrate="Si", wavelength=np.array([500.0, high + 50])))
+
+
+# the back face
+
+
+def test_a_back_face_adds_its_reflection():
+    """Glass plate: R = 2r/(1 + r); the layer is a half wave thick, so it is absent."""
+    thing = scene(2.0, PLATE, thickness=150.0, wavelength=np.array([600.0]))
+    r = (0.52 / 2.52) ** 2
+    assert predict(thing)[0] == pytest.approx(2 * r / (1 + r), rel=1e-12)
+    passed = replace(thing, light=pl.Light(np.array([600.0]), signal="T"))
+    assert predict(passed)[0] == pytest.approx((1 - r) / (1 + r), rel=1e-12)
+
+
+def test_an_opaque_plate_is_a_half_space():
+    glass = 1.52 + 0.01j
+    np.testing.assert_allclose(
+        predict(scene(substrate=pl.Substrate(glass, back=1.0))), predict(scene(substrate=glass)), rtol=1e-14
+    )
+
+
+def test_an_absorbing_plate_passes_by_beers_law():
+    k = 2e-5
+    clear = scene(1.52, pl.Substrate(1.52, back=1.52), signal="T")
+    grey = scene(1.52, pl.Substrate(1.52 + 1j * k, back=1.52, plate_mm=2.0), signal="T")
+    truth = np.exp(-4 * np.pi * k * 2e6 / WAVELENGTH)
+    # the grey plate's faces reflect an amplitude k/2n too
+    np.testing.assert_allclose(predict(grey) / predict(clear), truth, rtol=2e-5)

@@ -1,0 +1,271 @@
+"""Stacks in full: plates anywhere, uneven layers, rough and graded interfaces, against independent codes."""
+
+from __future__ import annotations
+
+import math
+
+import jax
+import numpy as np
+import pytest
+import tmm
+
+import pellicle as pl
+from pellicle.dispersion.effective_medium import Bruggeman
+from pellicle.dispersion.empirical import Cauchy
+from pellicle.fitting.film.parameters import parameters
+from pellicle.forward_model.film_signal import build
+from pellicle.scene.free import insert
+from pellicle.scene.layers import medium
+from pellicle.simulation.spectra import simulate_signal
+
+WAVELENGTH = np.linspace(450.0, 850.0, 9)
+NODES = np.linspace(-8.0, 8.0, 161)
+WEIGHTS = np.exp(-0.5 * NODES**2) / np.sum(np.exp(-0.5 * NODES**2))
+
+
+def scene(layers, substrate=3.9 + 0.02j, instrument=None, **light):
+    light = {"wavelength": WAVELENGTH} | light
+    return pl.Scene(layers, substrate, light=pl.Light(**light), instrument=instrument or pl.Instrument())
+
+
+reflected_at = jax.jit(pl.reflectance, static_argnames="polarisation")
+
+
+def predict(thing):
+    return np.asarray(jax.jit(build(pl.plan(thing)))(thing))
+
+
+# plates anywhere
+
+SANDWICH = [
+    pl.Layer(2.1 + 0.01j, 80.0),
+    pl.Plate(1.52 + 1e-7j, 2.0),
+    pl.Layer(1.38, 120.0),
+    pl.Layer(2.3, 60.0),
+]
+COHERENCE = ["i", "c", "i", "c", "c", "i"]
+
+
+@pytest.mark.parametrize("signal", "RT")
+@pytest.mark.parametrize(("angle", "polarisation"), [(0.0, "s"), (50.0, "s"), (50.0, "p")])
+def test_layers_on_both_faces_of_a_plate(signal, angle, polarisation):
+    thing = scene(SANDWICH, 1.33, signal=signal, angle=angle, polarisation=polarisation)
+    indices, depths = [1, 2.1 + 0.01j, 1.52 + 1e-7j, 1.38, 2.3, 1.33], [np.inf, 80, 2e6, 120, 60, np.inf]
+    truth = [
+        tmm.inc_tmm(polarisation, indices, depths, COHERENCE, np.deg2rad(angle), w)[signal]
+        for w in WAVELENGTH
+    ]
+    # what tmm takes as the coherent part's transmittance both ways differs by k/n of the plate
+    np.testing.assert_allclose(predict(thing), truth, atol=1e-9)
+
+
+def test_two_plates_and_an_air_gap():
+    """A double-glazed window of bare panes: every face reflects r, and intensities add."""
+    thing = scene([pl.Plate(1.5), pl.Plate(1.0), pl.Plate(1.5)], 1.0, signal="T")
+    r = 0.04
+    pane = (1 - r) / (1 + r)
+    back = 2 * r / (1 + r)
+    np.testing.assert_allclose(predict(thing), pane**2 / (1 - back**2), rtol=1e-12)
+
+
+def test_a_substrate_with_a_back_is_a_plate():
+    layer = pl.Layer(2.1, 80.0)
+    back = scene(layer, pl.Substrate(1.52 + 1e-7j, "air", 2.0))
+    plate = scene([layer, pl.Plate(1.52 + 1e-7j, 2.0)], "air")
+    np.testing.assert_array_equal(predict(back), predict(plate))
+
+
+# uneven layers
+
+
+def test_each_layer_of_a_stack_is_uneven_by_itself():
+    layers = [pl.Layer(1.46, 300.0), pl.Layer(2.1 + 0.05j, 150.0, thickness_spread=12.0)]
+    each = [predict(scene([layers[0], pl.Layer(2.1 + 0.05j, 150.0 + 12.0 * x)])) for x in NODES[::4]]
+    weights = WEIGHTS[::4] / np.sum(WEIGHTS[::4])
+    plain = predict(scene([layers[0], pl.Layer(2.1 + 0.05j, 150.0)]))
+    np.testing.assert_allclose(predict(scene(layers)), weights @ each, atol=1e-9)
+    assert np.max(np.abs(plain - weights @ each)) > 1e-3
+
+
+def test_an_uneven_layer_in_ellipsometry_depolarises():
+    """Sums of intensities are averaged, so N, C, S come off the sphere as an instrument's do."""
+    thing = scene(pl.Layer(1.46, 600.0, thickness_spread=30.0), angle=65.0, signal="psi-delta")
+    n, c, s = predict(thing).reshape(-1, 3).T
+    square = n**2 + c**2 + s**2
+    assert np.all(square < 1)
+    assert np.min(square) < 0.95
+    spread = pl.Instrument(thickness_spread=30.0)
+    same = scene(pl.Layer(1.46, 600.0), angle=65.0, signal="psi-delta", instrument=spread)
+    np.testing.assert_array_equal(predict(same).reshape(-1, 3).T, [n, c, s])
+
+
+# interfaces
+
+
+def parratt(indices, depths, sigmas, angle, wavelength, polarisation):
+    """|r|² by Parratt's recursion with Névot and Croce's factors: no matrix anywhere."""
+    k = 2 * np.pi / wavelength
+    n = np.asarray(indices, dtype=complex)
+    q = np.sqrt(n**2 - (n[0] * np.sin(angle)) ** 2 + 0j)
+    q = np.where(q.imag < 0, -q, q)
+    y = q if polarisation == "s" else q / n**2
+    total = 0.0
+    for j in range(len(n) - 2, -1, -1):
+        r = (y[j] - y[j + 1]) / (y[j] + y[j + 1]) * np.exp(-2 * k**2 * q[j] * q[j + 1] * sigmas[j] ** 2)
+        echo = total * np.exp(2j * k * q[j + 1] * depths[j + 1])
+        total = (r + echo) / (1 + r * echo)
+    return np.abs(total) ** 2
+
+
+@pytest.mark.parametrize("polarisation", "sp")
+@pytest.mark.parametrize("angle", [1e-6, 40.0, 75.0])
+def test_rough_faces_are_parratts_recursion(polarisation, angle):
+    layers = [pl.Layer(1.46, 300.0, roughness=4.0), pl.Layer(2.1 + 0.3j, 40.0, roughness=7.0)]
+    thing = scene(layers, pl.Substrate(0.2 + 3.4j, roughness=2.0), angle=angle, polarisation=polarisation)
+    indices, depths = [1, 1.46, 2.1 + 0.3j, 0.2 + 3.4j], [0, 300, 40, 0]
+    truth = [parratt(indices, depths, [4, 7, 2], np.deg2rad(angle), w, polarisation) for w in WAVELENGTH]
+    np.testing.assert_allclose(predict(thing), truth, rtol=1e-11)
+
+
+def test_small_roughness_is_a_graded_interface():
+    """An error function's profile, in 200 slices, has the reflectance that the damping promises."""
+    sigma, w = 6.0, WAVELENGTH
+    z = (np.arange(200) + 0.5) / 200 * 48.0 - 24.0
+    share = np.array([0.5 * (1 + math.erf(x / sigma / math.sqrt(2))) for x in z])
+    slices = list(np.sqrt(1 + share * (1.5**2 - 1)))
+    truth = [tmm.coh_tmm("s", [1, *slices, 1.5], [np.inf, *[0.24] * 200, np.inf], 0, x)["R"] for x in w]
+    rough = predict(scene(pl.Layer(1.5, 0.0, roughness=sigma), 1.5))
+    loss = 0.04 - np.array(truth)
+    np.testing.assert_allclose(0.04 - rough, loss, rtol=0.03)  # the second order is left out
+    passed = predict(scene(pl.Layer(1.5, 0.0, roughness=sigma), 1.5, signal="T"))
+    # R + T is 1 but for the square of what the roughness takes away
+    assert np.max(np.abs(rough + passed - 1)) < (2 * np.pi / w[0] * sigma * 1.5) ** 4
+
+
+def test_an_interface_is_a_mixed_layer():
+    """One slice is the familiar half and half; many are a graded profile."""
+    rough = scene([pl.Interface(8.0), pl.Layer(2.1, 100.0)])
+    mixed = scene([pl.Layer(Bruggeman(medium(1.0), medium(2.1), 0.5), 8.0), pl.Layer(2.1, 100.0)])
+    np.testing.assert_allclose(predict(rough), predict(mixed), rtol=1e-13)
+
+
+def test_a_fraction_is_the_share_of_the_medium_below_whose_numbers_are_free_once():
+    film = Cauchy(pl.Free(1.9, 2.3, start=2.1), 0.0)
+    porous = scene([pl.Interface(80.0, fraction=0.7), pl.Layer(film, 100.0)])
+    mixed = scene([pl.Layer(Bruggeman(medium(1.0), medium(2.1), 0.7), 80.0), pl.Layer(2.1, 100.0)])
+    np.testing.assert_allclose(predict(insert(porous, [2.1])), predict(mixed), rtol=1e-13)
+    free = scene([pl.Interface(80.0, fraction=pl.Free(0, 1), name="top"), pl.Layer(film, 100.0, name="film")])
+    assert [p.name for p in parameters(free)] == ["top.fraction", "film.A"]
+
+
+def test_a_graded_interface_converges():
+    def reflected(steps):
+        return predict(scene([pl.Interface(200.0, steps=steps, mix="linear"), pl.Layer(2.1, 0.0)], 2.1))
+
+    share = (np.arange(400) + 0.5) / 400
+    slices = list(np.sqrt(1 + share * (2.1**2 - 1)))
+    depths = [np.inf, *[0.5] * 400, np.inf]
+    truth = [tmm.coh_tmm("s", [1, *slices, 2.1], depths, 0, w)["R"] for w in WAVELENGTH]
+    assert np.max(np.abs(reflected(40) - truth)) < 2e-4
+    assert np.max(np.abs(reflected(40) - truth)) < 0.2 * np.max(np.abs(reflected(8) - truth))
+
+
+# the light's cone
+
+
+def test_a_cone_at_normal_incidence_is_an_average_over_the_pupil():
+    thing = scene(pl.Layer(1.46, 1500.0), instrument=pl.Instrument(numerical_aperture=0.5))
+    rho = (np.arange(2000) + 0.5) / 2000 * 0.5
+    each = reflected_at(WAVELENGTH, 1500.0, 1.46, 3.9 + 0.02j, angle=np.rad2deg(np.arcsin(rho))[:, None])
+    truth = np.average(each, axis=0, weights=rho)
+    row = pl.plan(thing).row("angle-spread")
+    assert row.error_bound < 1e-6
+    np.testing.assert_allclose(predict(thing), truth, atol=1e-6)
+    assert np.max(np.abs(predict(scene(pl.Layer(1.46, 1500.0))) - truth)) > 0.05
+
+
+@pytest.mark.parametrize("polarisation", ["s", "p", "unpolarised"])
+def test_a_cone_at_an_angle(polarisation):
+    """Brute rays with vectors: each is turned about its own axis, and its field with it."""
+    half = 8.0
+    thing = scene(
+        pl.Layer(1.46, 900.0),
+        angle=55.0,
+        polarisation=polarisation,
+        instrument=pl.Instrument(angle_spread=half),
+    )
+    radius = np.sin(np.deg2rad(half)) * np.sqrt((np.arange(60) + 0.5) / 60)
+    phi = 2 * np.pi * (np.arange(64) + 0.5) / 64
+    normal = np.array([np.sin(np.deg2rad(55)), 0, np.cos(np.deg2rad(55))])
+    start = {"s": [np.array([0.0, 1, 0])], "p": [np.array([1.0, 0, 0])]}
+    start["unpolarised"] = [*start["s"], *start["p"]]
+    angles, shares = [], []
+    for rho in radius:
+        for azimuth in phi:
+            axis = np.array([-np.sin(azimuth), np.cos(azimuth), 0])
+            turn = _rotation(axis, np.arcsin(rho))
+            ray = turn @ np.array([0, 0, 1.0])
+            across = np.cross(ray, normal)
+            across = across / np.linalg.norm(across)
+            angles.append(np.rad2deg(np.arccos(ray @ normal)))
+            shares.append(np.mean([(turn @ e @ across) ** 2 for e in start[polarisation]]))
+    rows = [
+        reflected_at(WAVELENGTH, 900.0, 1.46, 3.9 + 0.02j, angle=np.array(angles)[:, None], polarisation=p)
+        for p in "sp"
+    ]
+    share = np.array(shares)[:, None]
+    truth = np.mean(share * rows[0] + (1 - share) * rows[1], axis=0)
+    np.testing.assert_allclose(predict(thing), truth, atol=2e-5)
+
+
+def _rotation(axis, angle):
+    cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+@pytest.mark.parametrize("angle", [0.0, 40.0])
+def test_a_free_cone_has_a_finite_slope_at_zero(angle):
+    free = pl.Instrument(angle_spread=pl.Free(0, 15, start=0.0))
+    thing = scene(pl.Layer(1.46, 900.0), angle=angle, instrument=free)
+    model = build(pl.plan(thing))
+    predict = jax.jit(lambda x: model(insert(thing, [x])))
+    slope = jax.jacfwd(predict)
+    assert np.max(np.abs(slope(0.0))) < 1e-10  # even in the half angle
+    numeric = (predict(6.001) - predict(5.999)) / 2e-3
+    np.testing.assert_allclose(slope(6.0), numeric, rtol=1e-5, atol=1e-9)
+
+
+@pytest.mark.slow
+def test_a_microscope_reads_a_wrong_thickness_without_its_cone():
+    """The reason for the effect: 5 to 30 nm at a numerical aperture of 0.5."""
+    wavelength = np.linspace(450.0, 850.0, 128)
+    truth = pl.Scene(pl.Layer(1.46, 2000.0), "Si", instrument=pl.Instrument(numerical_aperture=0.5))
+    values = simulate_signal(truth, wavelength, 0.002, 1).values
+    spectrum = pl.Spectrum(wavelength, values, "R", sigma=np.full(128, 0.002))
+    thickness = pl.Free(1500, 2500)
+    cone = pl.Scene(pl.Layer(1.46, thickness), "Si", instrument=pl.Instrument(numerical_aperture=0.5))
+    found = pl.fit(spectrum, cone)
+    assert abs(found["thickness"].value - 2000) < 4 * found["thickness"].stderr_noise < 4.0
+    assert abs(pl.fit(spectrum, pl.Scene(pl.Layer(1.46, thickness), "Si"))["thickness"].value - 2000) > 5
+
+
+REFUSED = [
+    (lambda: pl.Instrument(angle_spread=5, numerical_aperture=0.1), "not both"),
+    (
+        lambda: scene(pl.Layer(1.5, 1), angle=88.0, instrument=pl.Instrument(angle_spread=5)),
+        "beyond 90 degrees",
+    ),
+    (lambda: scene([pl.Interface(1.0), pl.Interface(2.0)]), "two interfaces are adjacent"),
+    (lambda: pl.Interface(1.0, steps=0), "1 to 100 steps"),
+    (lambda: pl.Interface(1.0, mix="brugeman"), "no mix 'brugeman'"),
+    (lambda: pl.Interface(1.0, fraction=1.5), "fraction must lie in 0 to 1"),
+    (lambda: pl.Interface(1.0, fraction=pl.Free(-0.1, 1)), "fraction must lie in 0 to 1"),
+    (lambda: pl.Interface(1.0, steps=5, fraction=0.5), "goes with one step"),
+    (lambda: pl.Layer(1.5, 1.0, roughness=-1), "roughness` must not be negative, got -1 nm"),
+]
+
+
+@pytest.mark.parametrize(("make", "message"), REFUSED)
+def test_what_makes_no_sense_is_refused(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()
