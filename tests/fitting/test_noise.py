@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pellicle.fitting.noise import MODEL_ERROR, correlation_length, drifting_sigma, local_noise, student
+from pellicle.fitting.noise import (
+    MODEL_ERROR,
+    correlation_length,
+    drifting_sigma,
+    integrated_time,
+    local_noise,
+    student,
+    typical_noise,
+)
 
 RANDOM = np.random.default_rng(8)
 POSITION = np.linspace(0.0, 1.0, 1000)
@@ -67,10 +75,28 @@ def test_drifting_sigma_is_a_share_of_the_signal_plus_the_noise():
     assert np.median(np.abs(found / expected - 1)) < 0.02
 
 
-@pytest.mark.parametrize("chi2", [3.84, 6.0])
-@pytest.mark.parametrize("freedom", [1.0, 1.5, 2.0, 7.3, 60.0, 999.0, 1001.0, 1e6])
-def test_student_is_wider_than_normal(freedom, chi2):
-    z = np.sqrt(chi2)
+@pytest.mark.parametrize("chi2", [1.0, 3.84, 6.0])
+def test_student_is_wider_than_normal(chi2):
+    freedom, z = np.array([1.0, 1.05, 2.0, 7.3, 60.0, 999.0, 1001.0, 1e6]), np.sqrt(chi2)
     expected = stats.t.isf(stats.norm.sf(z), freedom) / z
-    assert student(freedom, chi2) == pytest.approx(expected, rel=1e-4)
+    assert student(freedom, chi2) == pytest.approx(expected, rel=1e-5)
+    assert student(7.3, chi2) == pytest.approx(expected[3], rel=1e-5)
     assert student(np.inf, chi2) == 1.0
+
+
+@pytest.mark.parametrize("points", [4, 7, 51, 100])
+def test_typical_noise_is_the_median_of_the_local_noise(points):
+    values = RANDOM.normal(size=(20, points))
+    assert typical_noise(values) == pytest.approx(np.median(local_noise(values), axis=1))
+
+
+def test_correlation_times_by_sums_of_products_are_those_by_a_fourier_transform():
+    """White noise closes its window within a few lags, walks do not."""
+    white, walks = RANDOM.normal(size=(20, 100)), np.cumsum(RANDOM.normal(size=(20, 100)), axis=1)
+    series = np.concatenate([white, white + 0.3 * walks, np.zeros((1, 100))])
+    expected = []
+    for row in np.fft.irfft(np.abs(np.fft.rfft(series, 200, axis=1)) ** 2)[:, :100]:
+        times = 2 * np.cumsum(row / (row[0] or 1.0)) - 1
+        closed = np.flatnonzero(np.arange(100) >= 5 * times)
+        expected.append(max(times[closed[0]], 1.0) if len(closed) else 20.0)
+    assert integrated_time(series[..., None]) == pytest.approx(expected)

@@ -14,14 +14,12 @@ from pellicle.fitting.film.fit import fitted, measurements
 from pellicle.fitting.film.problem import make
 from pellicle.fitting.film.search import search
 from pellicle.fitting.film.systematic_effects import SimulatedEffect
-from pellicle.fitting.noise import integrated_time, local_noise, student
 from pellicle.fitting.progress import quiet
 from pellicle.fitting.result import Fit
 from pellicle.mapping.pixels.covariance import held_within, inverse
 from pellicle.mapping.pixels.effects import _simulation
 from pellicle.mapping.pixels.fit import PixelModel, prepare, spectrum
 from pellicle.mapping.pixels.minima import ORDERS, PixelData, PixelMinima
-from pellicle.mapping.pixels.noise import correlation, medians, students, typical_noise
 from pellicle.mapping.pixels.results import STATUSES
 
 NM, SIGMA = np.linspace(400, 900, 100), 0.003
@@ -192,33 +190,6 @@ def test_psi_and_delta_at_two_angles(given):
     if given:
         arrays |= {"sigma": np.full(psi.shape, 0.05), "delta_sigma": np.full(psi.shape, 0.1)}
     check(Cube(arrays, nm, "psi-delta", ("site",), angles), pl.Scene(pl.Layer(1.46, pl.Free(0, 1000)), "Si"))
-
-
-@pytest.mark.parametrize("points", [7, 100])
-def test_medians(points):
-    values = np.random.default_rng(0).normal(size=(20, points, 2))
-    assert medians(values) == pytest.approx(np.median(values, axis=(1, 2)), abs=0)
-    assert medians(values[..., 0]) == pytest.approx(np.median(values[..., 0], axis=1), abs=0)
-
-
-@pytest.mark.parametrize("points", [7, 51, 100])
-def test_typical_noise_is_the_median_of_the_local_noise(points):
-    values = np.random.default_rng(0).normal(size=(20, points))
-    assert typical_noise(values) == pytest.approx([np.median(local_noise(row)) for row in values])
-
-
-def test_correlation_by_sums_of_products_is_that_by_a_fourier_transform():
-    rng = np.random.default_rng(0)
-    white, walks = rng.normal(size=(20, 100)), np.cumsum(rng.normal(size=(20, 100)), axis=1)
-    series = np.concatenate([white, white + 0.3 * walks, np.zeros((1, 100))])
-    expected = [integrated_time(row[:, None]) for row in series]
-    assert correlation(series[..., None], [np.arange(100)]) == pytest.approx(expected)
-
-
-def test_students_of_many_degrees_of_freedom():
-    freedom = np.array([1.0, 3.3, 60.0, 2000.0, np.inf])
-    expected = [student(each, 6.0) for each in freedom.tolist()]
-    assert students(freedom, 6.0) == pytest.approx(expected, rel=1e-3)
 
 
 def test_solutions_stay_on_bounds():

@@ -10,11 +10,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from logging import getLogger
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from pellicle.fitting.minima import MOST, Minima, deviance_at, minima
+from pellicle.fitting.noise import NoiseEstimate, noise_of
 from pellicle.fitting.problem import Problem, View
 from pellicle.fitting.robust_losses import LEAST_SQUARES, LOSSES, Loss, inflation, spread
 
@@ -83,39 +84,16 @@ class RankedMinima:
         return np.asarray(self.problem.values(self.minima.units[0]))
 
 
-class _Noise(NamedTuple):
-    """Noise of one view by its residuals: χ², its degrees of freedom, and the correlation length.
-
-    `scale` (channels,) multiplies the weights, so that a noise that is not known becomes the rms of the
-    residuals of its channels; `chi2` is the misfit after that. Where a loss is robust, `factor` multiplies
-    the weight of each point, and `inflation` the variance. `at_model` multiplies the weights of noise that
-    depends on the signal.
-    """
-
-    chi2: float
-    freedom: float
-    length: float
-    scale: np.ndarray
-    factor: Any = 1.0
-    inflation: float = 1.0
-    at_model: Any = 1.0
-
-    @property
-    def reduced(self) -> float:
-        return max(self.chi2 / self.freedom, 1e-12)
-
-    def view_fit(self, view: View, at: Any) -> ViewFit:
-        """Fit quality of a view whose ranked weights carry this noise."""
-        # the ranked weights carry the rms already, so only the correlation remains to be counted
-        length = self.length if view.noise.correlated or not view.noise.given else 1.0
-        variance = length * (self.reduced if view.noise.drifting else 1.0)
-        weight, scores = np.square(self.factor), None
-        if view.noise.uneven:
-            scores = view.residuals(at)
-            if np.ndim(weight):  # the inflation contains their mean already
-                scores = scores * math.sqrt(np.mean(weight) / np.mean(weight * scores**2))
-        outliers = int(np.sum(weight < 0.5))
-        return ViewFit(at, variance * self.inflation, self.length, self.chi2, self.freedom, outliers, scores)
+def _view_fit(view: View, noise: NoiseEstimate, at: Any) -> ViewFit:
+    """Fit quality of a view whose ranked weights carry this noise."""
+    weight, scores = np.square(noise.factor), None
+    if view.noise.uneven:
+        scores = view.residuals(at)
+        if np.ndim(weight):  # the inflation contains their mean already
+            scores = scores * math.sqrt(np.mean(weight) / np.mean(weight * scores**2))
+    variance = float(noise.variance(view.noise))
+    numbers = float(noise.length), float(noise.chi2), float(noise.freedom)
+    return ViewFit(at, variance, *numbers, int(np.sum(weight < 0.5)), scores)
 
 
 def rank(
@@ -154,7 +132,7 @@ def rank(
             *(f" of {view.name}" if view.name else "", own.length, view.rows, view.rows / own.length),
         )
     at = zip(weighted.views, _local(weighted, candidates.units[0]), noise, strict=True)
-    fits = tuple(own.view_fit(view, local) for view, local, own in at)
+    fits = tuple(_view_fit(view, own, local) for view, local, own in at)
     return RankedMinima(problem, weighted, replace(candidates, scan=scan), fits)
 
 
@@ -175,38 +153,35 @@ def _typical(problem: Problem, candidates: Minima, loss: Loss) -> np.ndarray:
     return candidates.units[int(np.argmin(losses))]
 
 
-def _noise(problem: Problem, unit: np.ndarray, loss: Loss | None) -> list[_Noise]:
+def _noise(problem: Problem, unit: np.ndarray, loss: Loss | None) -> list[NoiseEstimate]:
     """Noise of every view. A parameter that several views share costs each a share of it, by their points."""
-    result = []
-    for view, at in zip(problem.views, _local(problem, unit), strict=True):
-        at_model, groups = view.at_model(at), view.noise_groups
-        residuals = view.residuals(at) * at_model
-        totals = [sum(v.independent for v in problem.views if i in v.takes) for i in view.takes]
-        used = sum(view.independent / total for total in totals) + view.nuisance_freedom(at)
-        freedom = max(view.independent - used, 1)
-        scale, chi2, size = np.ones(residuals.shape[1]), 0.0, np.ones(residuals.shape[1])
-        for group in groups:
-            channels, own = list(group.channels), freedom * group.independent / view.independent
-            if loss is None:
-                misfit = float(np.sum(residuals[:, channels] ** 2))
-            else:
-                bulk = spread(residuals[:, channels].ravel()) * math.sqrt(group.independent / own)
-                misfit, size[channels] = bulk**2 * own, bulk
-            if not group.known:
-                scale[channels] = 1 / math.sqrt(max(misfit / own, 1e-12))
-            chi2 += misfit if group.known else own
-        if loss is None:
-            length = view.correlation_length(residuals)
-            result.append(_Noise(chi2, freedom, length, scale, at_model=at_model))
-            continue
-        weight = loss.weight(residuals if view.noise.given else residuals / size)
-        length = view.correlation_length(np.sqrt(weight) * residuals)
-        widening = inflation(loss, residuals / size)
-        result.append(_Noise(chi2, freedom, length, scale, np.sqrt(weight), widening, at_model))
-    return result
+    return [
+        _noise_of_view(problem, view, at, loss)
+        for view, at in zip(problem.views, _local(problem, unit), strict=True)
+    ]
 
 
-def _reweighted(problem: Problem, noise: Sequence[_Noise]) -> Problem:
+def _noise_of_view(problem: Problem, view: View, at: Any, loss: Loss | None) -> NoiseEstimate:
+    at_model, groups = view.at_model(at), view.noise_groups
+    residuals = view.residuals(at) * at_model
+    totals = [sum(v.independent for v in problem.views if i in v.takes) for i in view.takes]
+    used = sum(view.independent / total for total in totals) + view.nuisance_freedom(at)
+    freedom = max(view.independent - used, 1)
+    if loss is None:
+        length = view.correlation_length(residuals)
+        return noise_of(residuals, groups, freedom, length)._replace(at_model=at_model)
+    size = np.ones(residuals.shape[1])
+    for group in groups:
+        channels, own = list(group.channels), freedom * group.independent / view.independent
+        size[channels] = spread(residuals[:, channels]) * math.sqrt(group.independent / own)
+    weight = loss.weight(residuals if view.noise.given else residuals / size)
+    length = view.correlation_length(np.sqrt(weight) * residuals)
+    return noise_of(residuals, groups, freedom, length, size)._replace(
+        factor=np.sqrt(weight), inflation=inflation(loss, residuals / size), at_model=at_model
+    )
+
+
+def _reweighted(problem: Problem, noise: Sequence[NoiseEstimate]) -> Problem:
     pairs = zip(problem.views, noise, strict=True)
     views = tuple(v.reweighted(own.scale * own.factor * own.at_model, 1 / own.length) for v, own in pairs)
     return problem._replace(views=views)

@@ -20,8 +20,8 @@ _HUBER = 1.345
 """Residual at which Huber's loss turns linear: 95 % of the efficiency of least squares for normal noise."""
 _FREEDOM = 4.0
 """Degrees of freedom of Student's t (Lange, Little and Taylor, 1989, J. Am. Stat. Assoc. 84, 881)."""
-_MAD = 1.4826
-"""From the median of |z| to the standard deviation of a normal distribution."""
+MAD_TO_SIGMA = 1.4826
+"""Standard deviation of normal noise over the median of its absolute values."""
 
 
 class Loss(NamedTuple):
@@ -59,7 +59,18 @@ def check_loss(name: str, what: str = "loss") -> None:
 
 def spread(residual: np.ndarray, axis: int | tuple[int, ...] | None = None) -> Any:
     """Standard deviation of the bulk of residuals along `axis` (all), from their median absolute value."""
-    return np.maximum(_MAD * np.median(np.abs(residual), axis=axis), 1e-300)
+    return np.maximum(MAD_TO_SIGMA * median(np.abs(residual), axis), 1e-300)
+
+
+def median(values: np.ndarray, axis: int | tuple[int, ...] | None = None) -> Any:
+    """Median of values along `axis` (all): NumPy sorts many short rows three times as fast as it finds their
+    median."""
+    axes = tuple(range(values.ndim)) if axis is None else (axis,) if isinstance(axis, int) else axis
+    last = tuple(range(-len(axes), 0))
+    rows = values if axes == last else np.moveaxis(values, axes, last)
+    ordered = np.sort(rows.reshape(*rows.shape[: rows.ndim - len(axes)], -1), axis=-1)
+    middle = ordered.shape[-1] // 2
+    return 0.5 * (ordered[..., middle] + ordered[..., -middle - 1])
 
 
 def inflation(loss: Loss, z: np.ndarray) -> float:

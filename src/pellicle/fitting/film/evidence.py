@@ -15,7 +15,7 @@ from pellicle.fitting.film.colour_view import ColoursView
 from pellicle.fitting.film.systematic_effects import systematic_effects
 from pellicle.fitting.film.targets import Target
 from pellicle.fitting.film.view import SpectrumView
-from pellicle.fitting.noise import DRIFT_CORRELATION, local_noise
+from pellicle.fitting.noise import DRIFT_CORRELATION, short_range_noise
 from pellicle.fitting.reweighting import RankedMinima
 
 LEAST_NOISE = 1e-9
@@ -44,10 +44,10 @@ def evidence(spectra: Sequence[Target], ranked: RankedMinima, jacobian: Scaled) 
         residual = residual[: view.points].reshape(view.rows, view.channels)[:, :keep]
         sigma = (1 / weight).reshape(view.rows, view.channels)[:, :keep]
         counted = np.sqrt(view.data.independent_fraction) / sigma
-        noises = np.empty(keep)
+        noises, sweeps, least = np.empty(keep), view.sweeps(), LEAST_NOISE * float(view.data.level)
         for group in view.noise_groups:
             own = [channel for channel in group.channels if channel < keep]
-            noise = short_range_noise(view, residual[:, own])
+            noise = float(short_range_noise(residual[:, own], sweeps, least))
             if not group.known:
                 # the weights have the rms of all residuals: noise is no larger than that
                 noise = min(noise, float(np.median(sigma[:, own])))
@@ -79,9 +79,3 @@ def _signals(view: SpectrumView) -> tuple[tuple[int, ...], ...]:
     """The measured channels of each ratio."""
     keep = view.measured_channels
     return tuple(tuple(c for c in group.channels if c < keep) for group in view.noise_groups)
-
-
-def short_range_noise(view: SpectrumView, residual: np.ndarray) -> float:
-    """Noise (of one point) from differences of neighbouring residuals (rows, channels) in each sweep."""
-    squares = [np.median(local_noise(column)) ** 2 for sweep in view.sweeps() for column in residual[sweep].T]
-    return max(math.sqrt(np.mean(squares)), LEAST_NOISE * float(view.data.level))

@@ -57,9 +57,10 @@ def correlation_in_sweeps(
     for size in {len(part) for part in parts}:
         # those of one length have one estimate: each alone may be too short for it
         alike = np.stack([residuals[..., part, :] for part in parts if len(part) == size], axis=-2)
-        count = alike.shape[-2]
-        among = count * np.mean(np.mean(alike, axis=-2) ** 2, axis=-2)
-        among = np.clip(among / np.maximum(np.mean(alike**2, axis=(-3, -2)), 1e-300), 1.0, count)
+        count, among = alike.shape[-2], np.ones(1)
+        if count > 1:
+            among = count * np.mean(np.mean(alike, axis=-2) ** 2, axis=-2)
+            among = np.clip(among / np.maximum(np.mean(alike**2, axis=(-3, -2)), 1e-300), 1.0, count)
         along = integrated_time(np.moveaxis(alike, -1, -3))
         total = total + np.mean(along * among, axis=-1) * alike.shape[-3] * count
     return total / residuals.shape[-2]

@@ -149,9 +149,10 @@ class SpectrumView:
             *(np.broadcast_to(x, shape)[rows] for x in (angle, azimuth)),
         )
 
-    def correlation_length(self, residuals: np.ndarray) -> float:
-        """Number of points of one channel whose residuals count as one: see `correlation_in_sweeps`."""
-        return correlation_in_sweeps(residuals[:, : self.measured_channels], self.sweeps())
+    def correlation_length(self, residuals: np.ndarray) -> Any:
+        """Number of points (...) of one channel whose residuals (..., rows, channels) count as one: see
+        `correlation_in_sweeps`."""
+        return correlation_in_sweeps(residuals[..., : self.measured_channels], self.sweeps())
 
     def reweighted(self, factor: Any, fraction: float) -> SpectrumView:
         """Weights times `factor` (a number, (channels,) or (rows, channels)), each point for `fraction` of

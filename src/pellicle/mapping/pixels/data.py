@@ -10,10 +10,10 @@ from pellicle.data.ellipsometry_angles import ncs
 from pellicle.fitting import noise
 from pellicle.fitting.film.targets import ROUGH, sphere_frame, sphere_sigma
 from pellicle.fitting.problem import Noise
+from pellicle.fitting.robust_losses import MAD_TO_SIGMA, median
 from pellicle.mapping.pixels.minima import PixelData
-from pellicle.mapping.pixels.noise import medians
 
-_TO_NORMAL = 1.4826 / np.sqrt(6.0)
+_TO_NORMAL = MAD_TO_SIGMA / np.sqrt(6.0)
 """Standard deviation of normal noise over the median size of its second differences."""
 
 
@@ -33,9 +33,9 @@ def pixel_data(block: Mapping[str, np.ndarray], source: Noise) -> PixelData:
     if "sigma" in arrays:
         weight = known / arrays["sigma"]
     else:
-        weight = known / (_drifting(values) if source.drifting else _guess(values))
+        weight = known / (noise.drifting_sigma(values) if source.drifting else _guess(values))
     size = np.abs(values)
-    level = medians(size) if whole else _median_of(size, known)
+    level = median(size, -1) if whole else _median_of(size, known)
     return PixelData(np.where(known, values, 0.0), weight, np.maximum(level, 1e-12))
 
 
@@ -72,11 +72,6 @@ def _median_of(size: np.ndarray, known: np.ndarray) -> np.ndarray:
 
 def _guess(values: np.ndarray) -> np.ndarray:
     """First guess of an unknown noise, (pixels, 1), which the residuals replace."""
-    rough = medians(np.abs(values[:, :-2] - 2 * values[:, 1:-1] + values[:, 2:]))
+    rough = median(np.abs(values[:, :-2] - 2 * values[:, 1:-1] + values[:, 2:]), -1)
     guess = np.maximum(0.01 * np.ptp(values, axis=1), _TO_NORMAL * rough)
     return np.maximum(guess, 1e-12)[:, None]
-
-
-def _drifting(values: np.ndarray) -> np.ndarray:
-    """Error of a model whose lamp drifts, in place of σ: it stays, so it is that of `pellicle.fit`."""
-    return np.stack([noise.drifting_sigma(row) for row in values]) if len(values) else values

@@ -22,8 +22,8 @@ from pellicle.fitting.discrepancy import (
     reduced_variance,
 )
 from pellicle.fitting.misfit import BETTER, BEYOND, DOUBTFUL, EXPLAINS
+from pellicle.fitting.robust_losses import spread
 from pellicle.mapping.pixels.covariance import Normal, held_within, inverse, solve
-from pellicle.mapping.pixels.noise import medians
 
 _ROUNDS = 4
 _SETTLED = 1e-6
@@ -100,7 +100,7 @@ def discrepancy(evidence: PixelEvidence) -> PixelDiscrepancy:
     state = _balanced(evidence)
     known, rest = evidence.known, state.rest.reshape(evidence.residual.shape)
     left, noise = rest * evidence.sigma, evidence.noise.copy()
-    typical = bulk(left, noise) if left.shape[2] > 1 else _spread(left)
+    typical = bulk(left, noise)
     large = np.flatnonzero(typical > DOUBTFUL * noise)
     if evidence.short is not None and len(large):
         noise[large] = np.maximum(noise[large], evidence.short(large))
@@ -156,17 +156,12 @@ def other_material(evidence: PixelEvidence, effects: Sequence[Effect]) -> np.nda
     return best > np.maximum(EXPLAINS, usual + BETTER)
 
 
-def _spread(values: np.ndarray) -> np.ndarray:
-    """`fitting.robust_losses.spread` of each pixel."""
-    return np.maximum(1.4826 * medians(np.abs(values)), 1e-300)
-
-
 def _roots(residual: np.ndarray) -> np.ndarray:
     """Square roots of Huber's weights; most pixels have no residual that counts less."""
     roots = np.ones(residual.shape)
     far = np.flatnonzero(np.max(np.abs(residual), axis=(1, 2)) > OUTLIER)
     if len(far):
-        roots[far] = huber_roots(residual[far], _spread(residual[far]))
+        roots[far] = huber_roots(residual[far], spread(residual[far], (1, 2)))
     return roots
 
 

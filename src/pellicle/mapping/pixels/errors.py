@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -12,25 +12,19 @@ from pellicle.fitting.film.evidence import LEAST_NOISE, SCATTER_OF_NOISE
 from pellicle.fitting.film.form import Local
 from pellicle.fitting.film.parts import LARGEST_ANGLES, LARGEST_DRIFT, LARGEST_POWER
 from pellicle.fitting.film.problem import shortest_wavelength
+from pellicle.fitting.film.sweeps import correlation_in_sweeps
 from pellicle.fitting.film.targets import Measured
 from pellicle.fitting.misfit import DOUBTFUL, Accuracy, beyond_accuracy
-from pellicle.fitting.noise import DRIFT_CORRELATION
-from pellicle.fitting.problem import Problem
+from pellicle.fitting.noise import DRIFT_CORRELATION, NoiseEstimate, noise_of, short_range_noise, student
+from pellicle.fitting.problem import NoiseGroup, Problem
+from pellicle.fitting.robust_losses import median
 from pellicle.fitting.status import RIVAL
 from pellicle.mapping.pixels.covariance import noise_covariance
 from pellicle.mapping.pixels.discrepancy import PixelEvidence, discrepancy, other_material
 from pellicle.mapping.pixels.effects import PixelEffects, nodes, of_pixels
 from pellicle.mapping.pixels.groups import BLOCK, Group, Taken, groups
-from pellicle.mapping.pixels.limits import PixelLimits
+from pellicle.mapping.pixels.limits import PixelLimits, evidence_factor
 from pellicle.mapping.pixels.minima import PixelData, PixelMinima
-from pellicle.mapping.pixels.noise import (
-    PixelNoise,
-    correlation,
-    medians,
-    noise_of,
-    short_range_noise,
-    students,
-)
 from pellicle.mapping.pixels.nuisances import Nuisances
 from pellicle.mapping.pixels.results import CODES, NO_DATA, PixelFits
 from pellicle.mapping.pixels.status import judge
@@ -46,7 +40,7 @@ class _Judged(NamedTuple):
     parameters' own units; `flat` the sides (pixels, 2) on which a scan of the thickness is flat.
     """
 
-    noise: PixelNoise
+    noise: NoiseEstimate
     covariance: np.ndarray
     systematic: np.ndarray
     flat: np.ndarray
@@ -102,16 +96,17 @@ class PixelErrors:
     def _fits(self, data: PixelData, minima: PixelMinima, group: Group) -> PixelFits:
         who = group.pixels
         chunks = [self._judged(data, minima, chunk) for chunk in group.chunks(BLOCK)]
-        judged = jax.tree_util.tree_map(lambda *pieces: np.concatenate(pieces), *chunks)
+        judged = jax.tree_util.tree_map(_joined, *chunks)
         noise, values = judged.noise, minima.values[who, 0]
-        arrays = self.limits.arrays(data, who, noise)._replace(independent_fraction=1 / noise.variance)
+        counted = 1 / noise.variance(self.view.noise)
+        arrays = self.limits.arrays(data, who, noise)._replace(independent_fraction=counted)
         noise_sd, converged = self.limits.stderr(
             arrays, values, judged.covariance, judged.flat, ~judged.misfit, minima.converged[who, 0]
         )
         stderr = np.sqrt(noise_sd**2 + judged.systematic)
         deviance = self._reweighted(minima, who, noise)
         above = judged.evidence_share[:, None] * np.maximum(deviance - deviance[:, :1], 0.0)
-        delta = above / students(noise.student_freedom, RIVAL)[:, None] ** 2
+        delta = above / student(noise.effective_freedom(self.view.noise), RIVAL)[:, None] ** 2
         delta = np.where(np.isfinite(deviance), delta, np.inf)
         rivals = minima.values[who, 1:]
         status = judge(self.parameters, values, stderr, converged, judged.misfit, rivals, delta[:, 1:])
@@ -123,8 +118,8 @@ class PixelErrors:
         values, count = minima.values[who, 0], len(self.parameters)
         taken = Taken(group, view)
         weight, residual = data.weight[who], data.values[who] - minima.model[who]
-        noise = noise_of(taken(weight * residual), group.parts, kind, count + self.nuisances.count)
-        weight = weight * noise.scale[:, None]
+        noise = self._noise(group, taken(weight * residual))
+        weight = weight * noise.scale
         empty = np.zeros(0)
         at = Local(
             *(minima.signal[who], minima.slope[who], minima.model[who]),
@@ -137,7 +132,7 @@ class PixelErrors:
         span = np.broadcast_to(self.upper - self.lower, values.shape)
         stretch = np.concatenate([span, prior_sd], axis=1)
         prior = np.concatenate([self.prior_weight * span, np.ones(prior_sd.shape)], axis=1)
-        own, _ = noise_covariance(jacobian * weight[..., None], noise.variance, prior)
+        own, _ = noise_covariance(jacobian * weight[..., None], noise.variance(kind), prior)
         own = own * stretch[:, :, None] * stretch[:, None, :]
         # systematic effects
         frame, level = None if data.frame is None else data.frame[who], data.level[who]
@@ -170,9 +165,19 @@ class PixelErrors:
             rms=_rms(taken(residual)),
         )
 
-    def _reweighted(self, minima: PixelMinima, who: np.ndarray, noise: PixelNoise) -> np.ndarray:
+    def _noise(self, group: Group, residual: np.ndarray) -> NoiseEstimate:
+        """Noise by the weighted residuals (pixels, rows, channels). Of three channels of ellipsometry two
+        are independent."""
+        pixels, rows, channels = residual.shape
+        independent = min(channels, 2) * rows
+        of_all = NoiseGroup(tuple(range(channels)), self.view.noise.known, independent)
+        used = len(self.parameters) + self.nuisances.count
+        freedom = np.full(pixels, max(independent - used, 1.0))
+        return noise_of(residual, [of_all], freedom, correlation_in_sweeps(residual, group.parts))
+
+    def _reweighted(self, minima: PixelMinima, who: np.ndarray, noise: NoiseEstimate) -> np.ndarray:
         """Deviances (pixels, orders) with the weights and the effective points of the ranking."""
-        factor = noise.evidence(self.view.independent_fraction)
+        factor = evidence_factor(noise, self.view)
         deviance, misfit = minima.deviance[who], minima.misfit[who]
         with np.errstate(invalid="ignore"):
             return np.where(np.isfinite(deviance), deviance + (factor[:, None] - 1) * misfit, np.inf)
@@ -184,17 +189,17 @@ class PixelErrors:
         pixels, known = len(values), jacobian.shape[2]
         left = taken(residual)[..., :keep]
         sigma = 1 / taken(weight)[..., :keep]
-        median = medians(sigma)
-        counted, middle = median**2 / noise.fraction, median
+        middle = typical = median(sigma, (1, 2))
+        counted = typical**2 / noise.fraction(kind)
         least = LEAST_NOISE * level
 
         def short(which: np.ndarray) -> np.ndarray:
             return short_range_noise(left[which], group.parts, least[which])
 
         given = kind.known and not kind.drifting
-        own = median if given else short(np.arange(pixels))
+        own = typical if given else short(np.arange(pixels))
         if not kind.known:
-            own = middle = np.minimum(own, median)
+            own = middle = np.minimum(own, typical)
             sigma = np.broadcast_to(own[:, None, None], sigma.shape)
         effects = self.effects.changes(of_pixels(view, frame), at, values)
         extra = len(effects)
@@ -221,7 +226,7 @@ class PixelErrors:
             lower=lower,
             upper=upper,
             known=known,
-            correlation=lambda rest: correlation(rest, group.parts),
+            correlation=lambda rest: correlation_in_sweeps(rest, group.parts),
             least=DRIFT_CORRELATION if kind.drifting else 1.0,
             uncertain=0.0 if kind.known else SCATTER_OF_NOISE / left.shape[1] ** 0.5,
             middle=middle,
@@ -243,6 +248,11 @@ class PixelErrors:
         if len(doubtful) and effects:
             misfit[doubtful] = other_material(replace(evidence, noise=found.noise).of(doubtful), effects)
         return misfit
+
+
+def _joined(*pieces: Any) -> Any:
+    """Arrays of several chunks of pixels one after the other; a number is the same in all."""
+    return np.concatenate(pieces) if np.ndim(pieces[0]) else pieces[0]
 
 
 def _rms(residual: np.ndarray) -> np.ndarray:

@@ -7,15 +7,23 @@ import numpy as np
 from pellicle.fitting.film.search import thickness_grid
 from pellicle.fitting.film.summary import FEWEST_FRINGES
 from pellicle.fitting.film.targets import drifts
+from pellicle.fitting.film.view import SpectrumView
+from pellicle.fitting.noise import NoiseEstimate, student
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.status import RIVAL
 from pellicle.mapping.pixels import profiles
 from pellicle.mapping.pixels.covariance import solve
 from pellicle.mapping.pixels.local_models import PixelArrays, deviances, in_lanes, locals_of, padded
 from pellicle.mapping.pixels.minima import PixelData, PixelMinima
-from pellicle.mapping.pixels.noise import PixelNoise, students
 from pellicle.mapping.pixels.nuisances import Nuisances
 from pellicle.scene.film import Scene
+
+
+def evidence_factor(noise: NoiseEstimate, view: SpectrumView) -> np.ndarray:
+    """Factors (pixels,) of a misfit with the given weights and the view's share of independent points, for
+    the weights and the effective points of the ranking."""
+    return noise.scale[:, 0] ** 2 * noise.fraction(view.noise) / view.independent_fraction
+
 
 _REFITS = 4
 """Steps of Gauss and Newton of the other parameters where a profile holds one."""
@@ -40,15 +48,21 @@ class PixelLimits:
             p = self._parameters[self._depth]
             self._grid = p.lower + thickness_grid(problem, 1) * (p.upper - p.lower)
 
-    def arrays(self, data: PixelData, which: np.ndarray, noise: PixelNoise) -> PixelArrays:
+    def arrays(self, data: PixelData, which: np.ndarray, noise: NoiseEstimate) -> PixelArrays:
         """Arrays of the pixels `which` with the weights and the effective points of their `noise`."""
-        weight = data.weight[which] * noise.scale[:, None]
+        weight = data.weight[which] * noise.scale
         frame = None if data.frame is None else data.frame[which]
-        own = PixelArrays(data.values[which], weight, noise.fraction, data.level[which], frame)
+        fraction = noise.fraction(self._view.noise)
+        own = PixelArrays(data.values[which], weight, fraction, data.level[which], frame)
         return padded(self._view, own)
 
     def flat_sides(
-        self, data: PixelData, minima: PixelMinima, which: np.ndarray, noise: PixelNoise, usable: np.ndarray
+        self,
+        data: PixelData,
+        minima: PixelMinima,
+        which: np.ndarray,
+        noise: NoiseEstimate,
+        usable: np.ndarray,
     ) -> np.ndarray:
         """On which sides (pixels, 2) of the best thickness of the pixels `which` the misfit never rises, or
         only to a plateau.
@@ -59,9 +73,9 @@ class PixelLimits:
         if self._depth is None or minima.profile.shape[1] < 2:
             return sides
         values = minima.values[which, 0]
-        student = students(noise.student_freedom, RIVAL)[:, None] ** 2
+        wider = student(noise.effective_freedom(self._view.noise), RIVAL)[:, None] ** 2
         rise = profiles.resampled(self._grid, minima.thickness, minima.profile[which])
-        rise = rise * noise.evidence(self._view.independent_fraction)[:, None] / student
+        rise = rise * evidence_factor(noise, self._view)[:, None] / wider
         rise = rise - np.minimum(rise.min(axis=1), 0.0)[:, None]
         sides = profiles.flat_sides(self._grid, rise, values[:, self._depth])
         doubtful = np.flatnonzero(sides.any(axis=1) & usable)
@@ -69,7 +83,7 @@ class PixelLimits:
             arrays = self.arrays(data, which, noise)
             points = np.concatenate([np.tile(self._grid, (len(doubtful), 1)), values[doubtful]], axis=1)
             exact = self._deviance(arrays, doubtful, points[..., None])
-            rise = (exact - exact.min(axis=1)[:, None])[:, :-1] / student[doubtful]
+            rise = (exact - exact.min(axis=1)[:, None])[:, :-1] / wider[doubtful]
             sides[doubtful] = profiles.flat_sides(self._grid, rise, values[doubtful, 0])
         return sides
 

@@ -257,9 +257,7 @@ def _weight_factor(points: _Points, lowest: np.ndarray, data: PixelData) -> np.n
     used = len(search.problem.parameters) + sum(x.degree + 1 for x in nuisances)
     square = np.sum(residual**2, axis=1) / np.maximum(known - used, 1.0)
     scale = np.ones(len(square)) if view.noise.known else 1 / np.sqrt(np.maximum(square, 1e-12))
-    length = np.array(
-        [view.correlation_length(x) for x in residual.reshape(len(residual), -1, view.channels)]
-    )
+    length = view.correlation_length(residual.reshape(len(residual), -1, view.channels))
     fraction = float(view.data.independent_fraction)
     return scale * np.sqrt(np.minimum(1 / length, fraction) / fraction)
 
