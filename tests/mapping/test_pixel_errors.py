@@ -214,8 +214,8 @@ def test_solutions_within_bounds_are_those_of_a_fit_of_each_pixel():
 
 
 def test_effects_share_the_unchanged_signal():
-    narrow = SimulatedEffect("narrow", 2.0, "", Number(0, 0.0), ((3.0, 0.4), (-3.0, 0.4), (0.0, -0.8)))
-    rough = SimulatedEffect("rough", 1.5, "nm", Number(1, 0.0), ((1.5, 1.7), (0.0, -1.7)))
+    narrow = SimulatedEffect("narrow", 2.0, "", Number(0), ((3.0, 0.4), (-3.0, 0.4), (0.0, -0.8)))
+    rough = SimulatedEffect("rough", 1.5, "nm", Number(1), ((1.5, 1.7), (0.0, -1.7)))
     program = Program(None, OXIDE, [0, 1])
     plain = _simulation(program, [narrow, rough], [True, False], unchanged=True)
     face = _simulation(program, [narrow, rough], [False, True], unchanged=False)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import Any, overload
 
+import jax
 import numpy as np
 
 BIREFRINGENCE = "birefringence"
@@ -101,3 +104,28 @@ class ColourCurve:
     @property
     def residual(self) -> np.ndarray:
         return self.data - self.model
+
+
+class Deferred(Sequence[Curve | ColourCurve | BrdfCurve]):
+    """Curves that are computed, in float64, when one of them is first read."""
+
+    def __init__(self, count: int, compute: Callable[[], tuple[Curve | ColourCurve | BrdfCurve, ...]]):
+        self._count, self._compute = count, compute
+
+    @cached_property
+    def _computed(self) -> tuple[Curve | ColourCurve | BrdfCurve, ...]:
+        with jax.enable_x64(True):
+            return self._compute()
+
+    def __len__(self) -> int:
+        return self._count
+
+    @overload
+    def __getitem__(self, index: int) -> Curve | ColourCurve | BrdfCurve: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Curve | ColourCurve | BrdfCurve, ...]: ...
+    def __getitem__(self, index: Any) -> Any:
+        return self._computed[index]
+
+    def __reduce__(self) -> Any:
+        return tuple, (self._computed,)

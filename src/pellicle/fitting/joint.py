@@ -27,7 +27,7 @@ from pellicle.fitting.coordinates import Box, Coordinates
 from pellicle.fitting.covariance import Scaled
 from pellicle.fitting.discrepancy import Evidence, discrepancy
 from pellicle.fitting.film import fit as of_film
-from pellicle.fitting.film import parts, summary
+from pellicle.fitting.film import fringes, parts, summary
 from pellicle.fitting.film.evidence import evidence as film_evidence
 from pellicle.fitting.film.targets import Target
 from pellicle.fitting.minima import minima
@@ -197,7 +197,8 @@ def _concluded(
     found = discrepancy(evidence(targets, ranked, jacobian), jacobian, ranked.minima.units[0])
     film_parts = parts.parts(own.films, of_films, found.errors)
     every = (*film_parts, *samples_summary.parts(own.samples, of_surface))
-    missed = parts.missed(film_parts, of_films, replace(found, remaining=found.remaining[:count]))
+    silent = fringes.missed(of_films.problem, of_films.fits, of_films.values)
+    missed = parts.missed(film_parts, of_films, replace(found, remaining=found.remaining[:count]), silent)
     pairs = zip(of_surface.problem.views, of_surface.fits, every[count:], strict=True)
     wrong = [*missed, *(part for view, fit, part in pairs if samples_summary.misses(view, fit))]
     conclusion = conclude(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
@@ -132,7 +133,7 @@ class Rival:
     delta_chi2: float
     probability: float | None = None
     stderr: dict[str, float] | None = None
-    curves: tuple[Curve | ColourCurve | BrdfCurve, ...] = field(default=(), compare=False, repr=False)
+    curves: Sequence[Curve | ColourCurve | BrdfCurve] = field(default=(), compare=False, repr=False)
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.fitting.film.extended_scene import ExtendedScene
+from pellicle.fitting.film.extended_scene import extended
 from pellicle.fitting.film.fit import measurements
 from pellicle.fitting.film.problem import make
 from pellicle.scene.layers import Interface
@@ -20,10 +20,10 @@ def test_mixed_interface_under_a_birefringent_film(film, mixes):
     """An oxide between film and silicon mixes with it; a film that is like an oxide has none beneath it."""
     scene = pl.Scene(pl.Layer(film, pl.Free(50, 400, start=200.0)), "Si", light=pl.Light(angle=60.0))
     (view,) = make(*measurements(pl.simulate(scene, NM, noise=0.01), scene)).views
-    extended = ExtendedScene(view, np.array([200.0]))
-    assert (extended.mixture is not None) == mixes
+    scene = extended(view, np.array([200.0]))
+    assert (scene.mixture is not None) == mixes
     interfaces = [
-        [type(x) is Interface for x in program.scene.layers] for program in extended.programs().values()
+        [type(x) is Interface for x in program.scene.layers] for program in scene.programs().values()
     ]
     assert any(map(any, interfaces)) == mixes
 
@@ -34,9 +34,11 @@ def test_a_shift_of_wavelengths_at_the_ends_of_a_table_beside_a_free_index():
     film = pl.dispersion.Shifted(pl.material("HfO2"), pl.Free(-0.3, 0.3, start=0.0))
     scene = pl.Scene(pl.Layer(film, 120.0), 1.5)
     (view,) = make(*measurements(pl.Spectrum(nm, np.full(66, 0.1), "R"), scene)).views
-    extended = ExtendedScene(view, np.array([0.05]))
-    assert extended.wavelength is not None
-    longer, as_is, shorter = extended.signals([(extended.wavelength, x) for x in (0.5, 0.0, -0.5)])[:, :66]
+    at = np.array([0.05])
+    shift = extended(view, at).wavelength
+    assert shift is not None
+    changes = [(shift, x) for x in (0.5, 0.0, -0.5)]
+    longer, as_is, shorter = extended(view, at).signals(view.data, at, changes)[:, :66]
 
     known = np.real(pl.material("HfO2")(nm)) + 0.05
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.fitting.brdf.view import SamplesView
 from pellicle.fitting.covariance import Scaled
-from pellicle.fitting.curves import BrdfCurve
+from pellicle.fitting.curves import BrdfCurve, Deferred
 from pellicle.fitting.discrepancy import Evidence
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.profile_likelihood import Limits
@@ -50,14 +51,15 @@ def _curve(view: SamplesView, at: Any) -> BrdfCurve:
 
 
 def with_curves(rivals: tuple[Rival, ...], problem: Problem) -> tuple[Rival, ...]:
-    """The rivals with the curve of each set of samples there."""
-    each = [(rival, np.array(list(rival.parameters.values()))) for rival in rivals]
+    """The rivals with the curve of each set of samples there, computed when it is first read."""
+
+    def curves(rival: Rival) -> tuple[BrdfCurve, ...]:
+        values = np.array(list(rival.parameters.values()))
+        return tuple(_curve(view, view.local(problem.seen_by(view, values))) for view in problem.views)
+
+    count = len(problem.views)
     return tuple(
-        dataclasses.replace(
-            rival,
-            curves=tuple(_curve(view, view.local(problem.seen_by(view, values))) for view in problem.views),
-        )
-        for rival, values in each
+        dataclasses.replace(rival, curves=Deferred(count, partial(curves, rival))) for rival in rivals
     )
 
 

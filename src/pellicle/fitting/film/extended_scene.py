@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import jax
@@ -12,7 +13,7 @@ import numpy as np
 from pellicle.dispersion.anisotropic import Anisotropic
 from pellicle.dispersion.empirical import Constant, Scaled, Tabulated
 from pellicle.dispersion.principal_media import each_principal, ordinary_index
-from pellicle.effects.anisotropy import computes_roughness
+from pellicle.effects.anisotropy import computes_roughness, scene_media
 from pellicle.effects.film_plan import exact
 from pellicle.fitting.film.colour_view import ColourForm, ColoursView
 from pellicle.fitting.film.form import SpectrumForm
@@ -20,7 +21,8 @@ from pellicle.fitting.film.parameters import anonymous
 from pellicle.fitting.film.view import SpectrumView
 from pellicle.fitting.program_cache import kept
 from pellicle.optics.pair import Pair, imag, real
-from pellicle.scene.film import Scene
+from pellicle.scene.content import Content, remembered
+from pellicle.scene.film import Scene, thickness_spread
 from pellicle.scene.free import Free, free_leaves, insert, is_free
 from pellicle.scene.graded import each_medium
 from pellicle.scene.layers import Interface, Layer
@@ -36,6 +38,8 @@ _ROUND = 16
 """Numbers of candidates are multiples of this."""
 _WIDEST = 10.0
 """Upper bound of the further numbers, in their own units."""
+_ANY = 1.0
+"""Number for a parameter on which no plan depends."""
 
 
 class Simulated(NamedTuple):
@@ -52,10 +56,9 @@ def simulated(form: SpectrumForm | ColourForm, scene: Scene, data: Any, values: 
 
 
 class Number(NamedTuple):
-    """A further number of a scene: its position among them, and the value that the fit has."""
+    """A further number of a scene: its position among all numbers."""
 
     position: int
-    value: float
 
 
 class SideBySide(NamedTuple):
@@ -81,8 +84,74 @@ def simulated_side_by_side(
     return SideBySide(jax.vmap(of_pixel, in_axes=(axes, 0))(frame, values))
 
 
+class Program(NamedTuple):
+    """The form and the scene of a program that simulates, and which numbers it takes, in its order."""
+
+    form: Any
+    scene: Scene
+    order: list[int]
+
+
+class _Judged(NamedTuple):
+    """What the indices of a scene allow: which layers and whether its substrate are no gas, whether that
+    oxidises, and whether the last layer is like an oxide already."""
+
+    layers: tuple[bool, ...]
+    substrate: bool
+    oxidises: bool
+    like_oxide: bool
+
+
+def extended(view: SpectrumView | ColoursView, values: np.ndarray) -> ExtendedScene:
+    """The extended scene of a view whose parameters are at `values` (parameters,).
+
+    It is prepared once for all views of one form and scene. Where media have free numbers, it depends on
+    whether these values make them gases; where fringes are averaged or media birefringent, its plan depends
+    on the values themselves.
+    """
+    scene, given = Content(view.scene), tuple(map(float, values))
+    of_media, of_plan = _depends(scene)
+    judged = _judged(scene, given if of_media else None)
+    return _extended(Content(view.form), scene, judged, given if of_plan else None)
+
+
+@remembered
+def _depends(scene: Scene) -> tuple[bool, bool]:
+    """Whether the free numbers of a scene change what its media are, and whether they change its plan."""
+    blurred = scene.instrument.bandwidth is not None or any(
+        isinstance(layer, Layer) and thickness_spread(scene, layer) is not None for layer in scene.layers
+    )
+    anisotropic = any(isinstance(medium, Anisotropic) for medium in scene_media(scene))
+    of_media = [getattr(layer, "material", None) for layer in scene.layers], scene.substrate, scene.ambient
+    return bool(free_leaves(of_media)), blurred or anisotropic
+
+
+@remembered
+def _judged(scene: Scene, values: tuple[float, ...] | None) -> _Judged:
+    """What the indices allow at these values of the free numbers; None where no medium has any."""
+    free = free_leaves(scene)
+    at = insert(scene, [0.5] * len(free) if values is None else values)
+    nm, foot = np.asarray(at.light.wavelength), at.layers[-1]
+    bulk, layers = at.substrate.material, [x.material if isinstance(x, Layer) else None for x in at.layers]
+    return _Judged(
+        tuple(medium is not None and _solid(medium, nm) for medium in layers),
+        _solid(bulk, nm),
+        _oxidises(bulk, nm),
+        isinstance(foot, Layer)
+        and not free_leaves(getattr(scene.layers[-1], "material", None))
+        and abs(_median(foot.material, nm) - OXIDE_INDEX) < _LIKE_OXIDE,
+    )
+
+
+@remembered
+def _extended(
+    form: SpectrumForm | ColourForm, scene: Scene, judged: _Judged, values: tuple[float, ...] | None
+) -> ExtendedScene:
+    return ExtendedScene(form, scene, judged, values)
+
+
 class ExtendedScene:
-    """The scene of a view at the best fit, with further numbers; None stands for those that it cannot have.
+    """A fitted scene with further numbers; None stands for those that it cannot have.
 
     The first numbers are the parameters of the view.
     `wavelength` and `angle` are shifts, `roughness` that of the upper face, `oxide` and `mixture` thicknesses
@@ -90,11 +159,18 @@ class ExtendedScene:
     given one; `shape`, one of a model with free numbers. `substrate_index` is a relative change.
     """
 
-    def __init__(self, view: SpectrumView | ColoursView, values: np.ndarray):
-        self._view, self._free = view, []
-        scene = insert(view.scene, np.asarray(values).tolist())
+    def __init__(
+        self,
+        form: SpectrumForm | ColourForm,
+        scene: Scene,
+        judged: _Judged,
+        values: tuple[float, ...] | None,
+    ):
+        self._form, self._fitted, self._judged, self._free = form, scene, judged, list[Free]()
+        self.parameters = len(free_leaves(scene))
         # as the scene, with its parameters still free: another best fit is no other program
-        opened = insert(view.scene, [self._number(value)[1] for value in np.asarray(values).tolist()])
+        starts = [_ANY] * self.parameters if values is None else values
+        opened = insert(scene, [self._number(value)[1] for value in starts])
         nm = np.asarray(scene.light.wavelength)
         instrument = opened.instrument
         self.wavelength = self.angle = self.roughness = self.oxide = self.mixture = None
@@ -114,50 +190,54 @@ class ExtendedScene:
         for i, layer in enumerate(opened.layers):
             if isinstance(layer, Layer):
                 own = layer if spread is None else replace(layer, thickness_spread=spread)
-                layers[i] = self._layer(i, own, scene.layers[i], nm)
-        plain = tuple(layers)
-        self._with_face: dict[int, tuple[Any, ...]] = {}
-        top, foot, bulk = layers[0], scene.layers[-1], scene.substrate.material
+                layers[i] = self._layer(i, own, nm)
         below = _with_slope(opened.substrate.material, nm)
-        if _solid(bulk, nm):
+        if judged.substrate:
             self.substrate_index, change = self._number(0.0, -0.5)
-            if isinstance(top, Layer) and top.roughness is None and computes_roughness(scene):
-                self.roughness, rough = self._number(0.0)
-                layers[0] = replace(top, roughness=rough)
-                self._with_face[self.roughness.position] = (layers[0], *plain[1:])
-            if isinstance(foot, Layer) and _oxidises(bulk, nm):
-                fixed = not free_leaves(getattr(view.scene.layers[-1], "material", None))
-                if not (fixed and abs(_median(foot.material, nm) - OXIDE_INDEX) < _LIKE_OXIDE):
-                    self.oxide, thin = self._number(0.0)
-                    layers.append(Layer(Constant(OXIDE_INDEX), thin))
-                    self._with_face[self.oxide.position] = (*plain, layers[-1])
-                # media with an index of their own mix: under a birefringent layer an oxide does
-                isotropic = not isinstance(foot.material, Anisotropic)
-                if isotropic or self.oxide is not None:
-                    self.mixture, thin = self._number(0.0)
-                    layers.append(Interface(thin))
-                    between = layers[-1:] if isotropic else layers[len(plain) :]
-                    self._with_face[self.mixture.position] = (*plain, *between)
             below = _scaled(below, change)
-        self._scene = replace(
+        self._plain = replace(
             opened,
             layers=tuple(layers),
             substrate=replace(opened.substrate, material=below),
             ambient=_with_slope(opened.ambient, nm),
             instrument=instrument,
         )
-        self._plain = replace(self._scene, layers=plain)
+        self._with_face: dict[int, tuple[Any, ...]] = {}
+        if judged.substrate:
+            layers = self._faces(layers)
+        self._whole = tuple(layers)
+
+    def _faces(self, layers: list[Any]) -> list[Any]:
+        """The layers with a roughness, an oxide and a mixed interface of no size."""
+        plain, top, foot = tuple(layers), layers[0], self._fitted.layers[-1]
+        if isinstance(top, Layer) and top.roughness is None and computes_roughness(self._fitted):
+            self.roughness, rough = self._number(0.0)
+            layers = [replace(top, roughness=rough), *plain[1:]]
+            self._with_face[self.roughness.position] = tuple(layers)
+        if isinstance(foot, Layer) and self._judged.oxidises:
+            if not self._judged.like_oxide:
+                self.oxide, thin = self._number(0.0)
+                layers = [*layers, Layer(Constant(OXIDE_INDEX), thin)]
+                self._with_face[self.oxide.position] = (*plain, layers[-1])
+            # media with an index of their own mix: under a birefringent layer an oxide does
+            isotropic = not isinstance(foot.material, Anisotropic)
+            if isotropic or self.oxide is not None:
+                self.mixture, thin = self._number(0.0)
+                between = [Interface(thin)] if isotropic else [*layers[len(plain) :], Interface(thin)]
+                layers = [*layers, Interface(thin)]
+                self._with_face[self.mixture.position] = (*plain, *between)
+        return layers
 
     def _number(self, value: float, lower: float = 0.0) -> tuple[Number, Free]:
         free = Free(min(lower, value), value + _WIDEST, start=value)
         self._free.append(free)
-        return Number(len(self._free) - 1, value), free
+        return Number(len(self._free) - 1), free
 
-    def _layer(self, i: int, layer: Layer, fitted: Layer, nm: np.ndarray) -> Layer:
+    def _layer(self, i: int, layer: Layer, nm: np.ndarray) -> Layer:
         material = each_medium(lambda medium: _with_slope(medium, nm), layer.material)
-        if _solid(fitted.material, nm):
+        if self._judged.layers[i]:
             position = 2 * (nm - nm.min()) / max(np.ptp(nm), 1e-9) - 1
-            given = not free_leaves(getattr(self._view.scene.layers[i], "material", None))
+            given = not free_leaves(getattr(self._fitted.layers[i], "material", None))
             number, change = self._number(0.0, -0.5)
             (self.index if given else self.shape)[i] = number
             # level and slope of a model are its own: what it may lack is a curvature
@@ -165,53 +245,63 @@ class ExtendedScene:
             material = each_medium(lambda medium: _scaled(medium, change, shape), material)
         thickness: Any = layer.thickness
         if is_free(thickness):
-            position = next(j for j, own in enumerate(self._free) if own is thickness)
-            self.thickness[i] = Number(position, thickness.start)
+            self.thickness[i] = Number(next(j for j, own in enumerate(self._free) if own is thickness))
         else:
             self.thickness[i], thickness = self._number(float(np.asarray(thickness)))
         return replace(layer, material=material, thickness=thickness)
 
-    @property
-    def start(self) -> np.ndarray:
-        """All numbers (numbers,) as the fit has them."""
-        return np.array([own.start for own in self._free])
+    def start(self, values: np.ndarray) -> np.ndarray:
+        """All numbers (numbers,) of the scene that is fitted at `values` (its parameters,)."""
+        further = [own.start for own in self._free[self.parameters :]]
+        return np.concatenate([np.asarray(values, dtype=float), further])
 
-    def signals(self, changes: list[tuple[Number, float]]) -> np.ndarray:
-        """Signals (changes, data values) with one number changed in each, without scale and offset."""
-        # padded: scenes with other uncertainties share a program
-        count = -(-len(changes) // _ROUND) * _ROUND
-        values = np.tile(self.start, (count, 1))
-        for row, (number, change) in zip(values, changes, strict=False):
-            row[number.position] += change
-        form, scene, order = _program(self._view, self._free, self._scene)
-        signals = simulated(form, scene, self._view.data, values[:, order]).signal
-        return np.asarray(signals)[: len(changes)]
+    def signals(self, data: Any, values: np.ndarray, changes: Sequence[tuple[Number, float]]) -> np.ndarray:
+        """Signals (changes, data values) at `values` (parameters,) of the fitted scene with one number
+        changed in each, without scale and offset."""
+        start = self.start(values)
+        keys = [(number.position if change else -1, change) for number, change in changes]
+        result: dict[tuple[int, float], np.ndarray] = {}
+        of_faces = [key for key in dict.fromkeys(keys) if key[0] in self._with_face]
+        others = [key for key in dict.fromkeys(keys) if key[0] not in self._with_face]
+        # a stack with all faces takes a hundred times as long for each of its rows. Padded: scenes with other
+        # uncertainties share a program
+        for program, own, multiple in (
+            (self._program_plain, others, _ROUND),
+            (self._program_whole, of_faces, len(self._with_face)),
+        ):
+            if not own:
+                continue
+            rows = np.tile(start, (-(-len(own) // multiple) * multiple, 1))
+            for row, (position, change) in zip(rows, own, strict=False):
+                row[position] += change  # of the last number, 0 where nothing changes
+            form, scene, order = program
+            found = np.asarray(simulated(form, scene, data, rows[:, order]).signal)
+            result |= dict(zip(own, found, strict=False))
+        return np.stack([result[key] for key in keys])
+
+    @cached_property
+    def _program_plain(self) -> Program:
+        return self._program(self._plain.layers)
+
+    @cached_property
+    def _program_whole(self) -> Program:
+        return self._program(self._whole)
 
     def programs(self) -> dict[int | None, Program]:
         """Programs of scenes with one number of a face alone, by its position, and of the scene without any.
 
         A scene with all of them is a deep stack, which takes a hundred times as long.
         """
-        scenes: dict[int | None, Scene] = {None: self._plain}
-        for position, layers in self._with_face.items():
-            scenes[position] = replace(self._scene, layers=layers)
-        return {at: _program(self._view, self._free, scene) for at, scene in scenes.items()}
+        faces = {position: self._program(layers) for position, layers in self._with_face.items()}
+        return {None: self._program_plain, **faces}
 
-
-class Program(NamedTuple):
-    """The form and the scene of a program that simulates, and which numbers it takes, in its order."""
-
-    form: Any
-    scene: Scene
-    order: list[int]
-
-
-def _program(view: SpectrumView | ColoursView, numbers: list[Free], scene: Scene) -> Program:
-    # the order of a pytree is that of its fields
-    order = [next(i for i, own in enumerate(numbers) if own is x) for _, x in free_leaves(scene)]
-    # the further numbers have wide bounds, but change little: the slices of the fit are enough
-    form = view.form.with_plan(exact(scene, [view.form.plan.row("gradient")]).static_key)
-    return Program(form, jax.tree_util.tree_map(np.asarray, anonymous(scene)), order)
+    def _program(self, layers: tuple[Any, ...]) -> Program:
+        scene = replace(self._plain, layers=layers)
+        # the order of a pytree is that of its fields
+        order = [next(i for i, own in enumerate(self._free) if own is x) for _, x in free_leaves(scene)]
+        # the further numbers have wide bounds, but change little: the slices of the fit are enough
+        form = self._form.with_plan(exact(scene, [self._form.plan.row("gradient")]).static_key)
+        return Program(form, jax.tree_util.tree_map(np.asarray, anonymous(scene)), order)
 
 
 def _scaled(medium: Any, change: Any, shape: Any = 1.0) -> Any:

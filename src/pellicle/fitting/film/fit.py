@@ -25,6 +25,7 @@ from pellicle.fitting.film import (
     delta_conventions,
     depolarisation,
     folded_reading,
+    fringes,
     messages,
     mueller_signs,
     parts,
@@ -202,7 +203,10 @@ def _fit(
     jacobian, covariance = linearised(ranked)
     found = discrepancy(evidence(spectra, ranked, jacobian), jacobian, ranked.minima.units[0])
     each = parts.parts(data, ranked, found.errors)
-    missed = parts.missed(each, ranked, found)
+    silent = fringes.missed(ranked.problem, ranked.fits, ranked.values)
+    views = zip(ranked.problem.views, ranked.fits, strict=True)
+    structures = [residual_structure.missed(view, fit) for view, fit in views]
+    missed = parts.missed(each, ranked, found, silent)
     conclusion = conclude(
         ranked,
         jacobian,
@@ -217,8 +221,7 @@ def _fit(
     parameters, drifts = sweep_scatter.with_sweeps(data, ranked, jacobian, conclusion.parameters)
     dark = summary.opaque(spectra, ranked)
     worst = (missed or each)[0]
-    at = next(i for i, part in enumerate(each) if part is worst)
-    structure = residual_structure.missed(ranked.problem.views[at], ranked.fits[at])
+    structure = next(own for own, part in zip(structures, each, strict=True) if part is worst)
     rivals, probability = conclusion.rivals, None
     if any(isinstance(view, ColoursView) for view in ranked.problem.views):
         every = orders(ranked, found)
@@ -255,7 +258,7 @@ def _fit(
         effective_points=sum(part.effective_points for part in each),
         correlation_names=covariance.names,
         correlation=found.errors.correlation,
-        warnings=(*warnings, *summary.warnings(spectra, ranked, unclear)),
+        warnings=(*warnings, *summary.warnings(spectra, ranked, silent, structures, unclear)),
         profile=profile,
         seconds=time.perf_counter() - began,
         budget=budget(found, ranked.problem.parameters),

@@ -12,6 +12,8 @@ others, Thin Solid Films 138, 117 (1986) (Fourier transform).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -99,7 +101,7 @@ def fringes(x: np.ndarray, values: np.ndarray) -> Fringes | None:
 
 def _with_trend(x: np.ndarray, values: np.ndarray, degree: int, fewest: float) -> Fringes | None:
     even, level = _even(x, values, degree)
-    span, window = even[-1] - even[0], np.hanning(_GRID)
+    span, window = even[-1] - even[0], _window(_GRID)
     spectrum = np.fft.rfft(level * window, 8 * _GRID)
     thickness = np.arange(len(spectrum)) / (8 * _GRID * (even[1] - even[0]))
     allowed = (thickness * span >= fewest) & (thickness <= len(x) / (2.5 * span))
@@ -124,20 +126,32 @@ def _even(x: np.ndarray, values: np.ndarray, degree: int = 3) -> tuple[np.ndarra
     order = np.argsort(x)
     even = np.linspace(x.min(), x.max(), _GRID)
     level = np.interp(even, x[order], values[order])
-    basis = np.polynomial.chebyshev.chebvander(np.linspace(-1, 1, _GRID), degree)
-    return even, level - basis @ np.linalg.lstsq(basis, level, rcond=None)[0]
+    basis = _polynomials(degree)
+    return even, level - basis @ (basis.T @ level)
+
+
+@lru_cache
+def _polynomials(degree: int) -> np.ndarray:
+    """Orthonormal polynomials up to a degree at even positions, (`_GRID`, degree + 1)."""
+    return np.linalg.qr(np.polynomial.chebyshev.chebvander(np.linspace(-1, 1, _GRID), degree))[0]
+
+
+@lru_cache
+def _window(size: int) -> np.ndarray:
+    """A Hann window."""
+    return np.hanning(size)
 
 
 def _amplitude(even: np.ndarray, level: np.ndarray, thickness: float) -> complex:
     """Complex amplitude of a fringe of this thickness."""
-    window = np.hanning(len(level))
+    window = _window(len(level))
     return complex(2 * np.sum(window * level * np.exp(2j * np.pi * thickness * even)) / np.sum(window))
 
 
 def _extrema(even: np.ndarray, level: np.ndarray, thickness: float) -> tuple[float, float]:
     """Mean spacing of neighbouring extrema, and their scatter around even spacing in units of it."""
     reach = max(int(_GRID / ((even[-1] - even[0]) * thickness) / 4), 1)
-    window = np.hanning(2 * reach + 3)[1:-1]  # half a period
+    window = _window(2 * reach + 3)[1:-1]  # half a period
     smooth = np.convolve(level, window / window.sum(), mode="valid")
     at = even[reach:-reach]
     turns = np.flatnonzero(np.diff(np.sign(np.diff(smooth))) != 0) + 1
@@ -159,19 +173,19 @@ def proposed(problem: Problem) -> list[float]:
     if depth is None:
         return []
     start = np.array([p.start for p in problem.parameters])
-    return [found.thickness for found in _of_views(problem, start, depth) if found is not None]
+    each = (_phase_and_fringes(problem, view, start, depth)[1] for view in problem.views)
+    return [clear.thickness for clear in each if clear is not None]
 
 
-def _of_views(problem: Problem, values: np.ndarray, depth: int) -> list[Fringes | None]:
-    result: list[Fringes | None] = []
-    for view in problem.views:
-        x = (
-            phase_per_thickness(view, problem.seen_by(view, values), values[depth])
-            if depth in view.takes
-            else None
-        )
-        result.append(None if x is None else fringes(x, view.data.values[: view.points]))
-    return result
+def _phase_and_fringes(
+    problem: Problem, view: SpectrumView | ColoursView, values: np.ndarray, depth: int
+) -> tuple[np.ndarray, Fringes | None]:
+    """x of a view at `values` (parameters,), empty where it has none, and the clear fringes of its data."""
+    seen = depth in view.takes
+    x = phase_per_thickness(view, problem.seen_by(view, values), values[depth]) if seen else None
+    if x is None:
+        return np.zeros(0), None
+    return x, fringes(x, np.asarray(view.data.values)[: view.points])
 
 
 def missed(problem: Problem, fits: tuple[ViewFit, ...], values: np.ndarray) -> list[Fringes | None]:
@@ -183,25 +197,28 @@ def missed(problem: Problem, fits: tuple[ViewFit, ...], values: np.ndarray) -> l
     depth, result = problem.thickness_axis, []
     if depth is None:
         return [None] * len(problem.views)
-    for view, fit, found in zip(problem.views, fits, _of_views(problem, values, depth), strict=True):
-        x = phase_per_thickness(view, problem.seen_by(view, values), values[depth])
-        if x is None or found is None or abs(found.thickness - values[depth]) < found.resolution:
+    for view, fit in zip(problem.views, fits, strict=True):
+        x, clear = _phase_and_fringes(problem, view, values, depth)
+        if clear is None or abs(clear.thickness - values[depth]) < clear.resolution:
             result.append(None)
             continue
         even, left = _even(x, (np.asarray(view.data.values) - np.asarray(fit.at.model))[: view.points])
-        kept = abs(_amplitude(even, left, found.thickness)) / abs(found.amplitude)
-        result.append(found if kept > _MISSED else None)
+        kept = abs(_amplitude(even, left, clear.thickness)) / abs(clear.amplitude)
+        result.append(clear if kept > _MISSED else None)
     return result
 
 
-def disagreement(problem: Problem, fits: tuple[ViewFit, ...], values: np.ndarray) -> list[str]:
-    """A sentence for each spectrum whose clear fringes the best fit misses: which thickness they suggest."""
+def disagreement(problem: Problem, silent: Sequence[Fringes | None], values: np.ndarray) -> list[str]:
+    """A sentence for each spectrum whose clear fringes the best fit misses: which thickness they suggest.
+
+    `silent` are those `missed` at `values` (parameters,).
+    """
     sentences = []
-    for view, found in zip(problem.views, missed(problem, fits, values), strict=True):
-        if found is not None:
+    for view, clear in zip(problem.views, silent, strict=True):
+        if clear is not None:
             own, best = f"{view.name}: " if view.name else "", values[problem.thickness_axis]
             sentences.append(
-                f"{own}the period of the fringes ({found.number:.2g} of them) suggests a thickness of"
-                f" {found.thickness:.4g} nm, the best fit has {best:.4g} nm and misses them"
+                f"{own}the period of the fringes ({clear.number:.2g} of them) suggests a thickness of"
+                f" {clear.thickness:.4g} nm, the best fit has {best:.4g} nm and misses them"
             )
     return sentences

@@ -17,6 +17,7 @@ from pellicle.dispersion.profiles import Spline as FreeProfile
 from pellicle.dispersion.spline import Spline
 from pellicle.errors import UsageError
 from pellicle.fitting.parameter import Parameter
+from pellicle.scene.content import remembered
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free, free_leaves, insert, is_free
 from pellicle.scene.layers import Layer
@@ -52,6 +53,7 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
     return shared([scene], [""])[0]
 
 
+@remembered
 def shared(
     scenes: Sequence[Scene], names: Sequence[str]
 ) -> tuple[tuple[Parameter, ...], list[tuple[int, ...]]]:

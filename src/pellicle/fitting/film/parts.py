@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,13 +14,13 @@ from pellicle.data.colours import Colours
 from pellicle.data.ellipsometry_angles import psi_delta
 from pellicle.data.spectrum import Spectrum
 from pellicle.fitting.covariance import Errors
-from pellicle.fitting.curves import ColourCurve, Curve
+from pellicle.fitting.curves import ColourCurve, Curve, Deferred
 from pellicle.fitting.discrepancy import Discrepancy
-from pellicle.fitting.film import fringes
 from pellicle.fitting.film.colour_evidence import accuracy as colours_accuracy
 from pellicle.fitting.film.colour_parts import colour_curve, colours_part
 from pellicle.fitting.film.colour_view import ColoursView
 from pellicle.fitting.film.form import Local
+from pellicle.fitting.film.fringes import Fringes
 from pellicle.fitting.film.layer_errors import layer_errors, principal_indices
 from pellicle.fitting.film.view import SpectrumView
 from pellicle.fitting.misfit import Accuracy, misfit
@@ -68,9 +70,10 @@ def together(parts: tuple[Part, ...]) -> float | None:
     return math.sqrt(np.average([part.rms**2 for part in parts], weights=sizes))
 
 
-def missed(parts: tuple[Part, ...], ranked: RankedMinima, found: Discrepancy) -> tuple[Part, ...]:
-    """Spectra that the scene does not explain, and those of which it misses clear fringes."""
-    silent = fringes.missed(ranked.problem, ranked.fits, ranked.values)
+def missed(
+    parts: tuple[Part, ...], ranked: RankedMinima, found: Discrepancy, silent: Sequence[Fringes | None]
+) -> tuple[Part, ...]:
+    """Spectra that the scene does not explain, and those of which it misses clear fringes, the `silent`."""
     each = zip(parts, ranked.problem.views, found.remaining, silent, strict=True)
     return tuple(
         part
@@ -82,7 +85,8 @@ def missed(parts: tuple[Part, ...], ranked: RankedMinima, found: Discrepancy) ->
 def with_curves(
     rivals: tuple[Rival, ...], parts: tuple[Part, ...], ranked: RankedMinima
 ) -> tuple[Rival, ...]:
-    """The rivals with the curve of each part there. The program that computed the parts computes them."""
+    """The rivals with the curve of each part there, computed when it is first read. The program that computed
+    the parts computes them."""
 
     def curve(part: Part, view: Any, values: np.ndarray) -> Curve | ColourCurve:
         at = view.local(ranked.problem.seen_by(view, values))
@@ -91,15 +95,14 @@ def with_curves(
             return colour_curve(part.data, view, at, unknown)
         return _curve(part.spectrum, view, at, unknown)
 
-    views = ranked.problem.views
-    each = [(rival, np.array(list(rival.parameters.values()))) for rival in rivals]
-    return tuple(
-        replace(
-            rival,
-            curves=tuple(curve(part, view, values) for part, view in zip(parts, views, strict=True)),
+    def curves(rival: Rival) -> tuple[Curve | ColourCurve, ...]:
+        values, pairs = (
+            np.array(list(rival.parameters.values())),
+            zip(parts, ranked.problem.views, strict=True),
         )
-        for rival, values in each
-    )
+        return tuple(curve(part, view, values) for part, view in pairs)
+
+    return tuple(replace(rival, curves=Deferred(len(parts), partial(curves, rival))) for rival in rivals)
 
 
 def _accuracy(part: Part, view: SpectrumView | ColoursView) -> Accuracy:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from pellicle.effects.bounds import largest_index
@@ -10,11 +12,13 @@ from pellicle.fitting.coordinates import box
 from pellicle.fitting.film.colour_targets import MeasuredColours, colours_view
 from pellicle.fitting.film.nuisance import Data
 from pellicle.fitting.film.parameters import anonymous, bounds, shared
-from pellicle.fitting.film.targets import Target
+from pellicle.fitting.film.targets import Measured, Target
 from pellicle.fitting.film.view import ROUND, SpectrumView
 from pellicle.fitting.problem import Problem
 from pellicle.forward_model.film_signal import tabulated
-from pellicle.scene.film import coherent_layers, with_wavelength
+from pellicle.forward_model.plan import Plan
+from pellicle.scene.content import remembered
+from pellicle.scene.film import Scene, coherent_layers, with_wavelength
 
 _KEPT_EFFECTS = ("precision", "dispersion")
 """Effects that a tolerance does not remove: a fit stops by differences below single precision, and its media
@@ -26,6 +30,32 @@ def shortest_wavelength(problem: Problem) -> float:
     return min(v.scene.light.wavelength.min() / v.largest_index for v in problem.views)
 
 
+class Structure(NamedTuple):
+    """What a scene and its grid alone determine about a view: the same for every spectrum.
+
+    `scene` has padded wavelengths, sampled media and anonymous parameters; `largest_index` is that of its
+    coherent layers over the bounds.
+    """
+
+    plan: Plan
+    scene: Scene
+    largest_index: float
+
+
+@remembered
+def structure(scene: Scene, tolerance: float) -> Structure:
+    """The structure of a spectrum that `scene` explains, at the wavelengths of its light."""
+    light = scene.light
+    extra = -len(light.wavelength) % ROUND
+    wavelength = _pad(light.wavelength, extra)
+    turns = (_pad(x, extra) if np.ndim(x) else x for x in (light.angle, light.azimuth))
+    scene = with_wavelength(scene, wavelength, *turns)
+    chosen = plan(scene, tolerance, _KEPT_EFFECTS)
+    scene = tabulated(scene, chosen.on("coherence") or scene.instrument.wavelength_shift is not None)
+    steepest = max((largest_index(x.material, wavelength) for x in coherent_layers(scene)), default=1.0)
+    return Structure(chosen, anonymous(scene), steepest)
+
+
 def make(*spectra: Target, tolerance: float = 0.0) -> Problem:
     """The problem of explaining these spectra and colours of one sample.
 
@@ -33,47 +63,44 @@ def make(*spectra: Target, tolerance: float = 0.0) -> Problem:
     wavelength.
     """
     free, positions = shared([m.scene for m in spectra], [m.name for m in spectra])
-    views = []
-    for spectrum, takes in zip(spectra, positions, strict=True):
-        if isinstance(spectrum, MeasuredColours):
-            views.append(colours_view(spectrum, takes, tolerance, _KEPT_EFFECTS))
-            continue
-        scene, wavelength, values = spectrum.scene, spectrum.wavelength, spectrum.values
-        points, channels = len(wavelength), values.size // len(wavelength)
-        extra = -points % ROUND
-        wavelength, values = _pad(wavelength, extra), _pad(values, extra)
-        turns = scene.light.angle, scene.light.azimuth
-        scene = with_wavelength(scene, wavelength, *(_pad(x, extra) if np.ndim(x) else x for x in turns))
-        chosen = plan(scene, tolerance, _KEPT_EFFECTS)
-        span = max(wavelength.max() - wavelength.min(), 1e-9)  # one wavelength at many angles has none
-        sigma = np.reshape(spectrum.sigma, (-1, 1)) if np.ndim(spectrum.sigma) < 2 else spectrum.sigma
-        weight = np.concatenate([1 / np.broadcast_to(sigma, (points, channels)), np.zeros((extra, channels))])
-        data = Data(
-            values=values.reshape(-1),
-            weight=weight.reshape(-1),
-            position=np.repeat(2 * (wavelength - wavelength.min()) / span - 1, channels),
-            independent_fraction=np.float64(spectrum.independent_fraction),
-            level=np.float64(max(float(np.median(np.abs(values[:points]))), 1e-12)),
-            frame=None if spectrum.frame is None else _pad(spectrum.frame, extra),
-        )
-        scene = tabulated(scene, chosen.on("coherence") or scene.instrument.wavelength_shift is not None)
-        steepest = max((largest_index(x.material, wavelength) for x in coherent_layers(scene)), default=1.0)
-        numbers = points * channels, steepest
-        views.append(
-            SpectrumView(
-                spectrum.name,
-                chosen,
-                anonymous(scene),
-                data,
-                takes,
-                spectrum.noise,
-                *numbers,
-                spectrum.depolarisation,
-                spectrum.elements,
-                spectrum.ratios,
-            )
-        )
-    return Problem(tuple(views), free, box(*bounds(free), [p.prior for p in free]))
+    views = tuple(
+        colours_view(spectrum, takes, tolerance, _KEPT_EFFECTS)
+        if isinstance(spectrum, MeasuredColours)
+        else _view(spectrum, takes, tolerance)
+        for spectrum, takes in zip(spectra, positions, strict=True)
+    )
+    return Problem(views, free, box(*bounds(free), [p.prior for p in free]))
+
+
+def _view(spectrum: Measured, takes: tuple[int, ...], tolerance: float) -> SpectrumView:
+    chosen, scene, steepest = structure(spectrum.scene, tolerance)
+    points, wavelength = len(spectrum.wavelength), scene.light.wavelength
+    channels, extra = spectrum.values.size // points, len(wavelength) - points
+    values = _pad(spectrum.values, extra)
+    span = max(wavelength.max() - wavelength.min(), 1e-9)  # one wavelength at many angles has none
+    sigma = np.reshape(spectrum.sigma, (-1, 1)) if np.ndim(spectrum.sigma) < 2 else spectrum.sigma
+    weight = np.concatenate([1 / np.broadcast_to(sigma, (points, channels)), np.zeros((extra, channels))])
+    data = Data(
+        values=values.reshape(-1),
+        weight=weight.reshape(-1),
+        position=np.repeat(2 * (wavelength - wavelength.min()) / span - 1, channels),
+        independent_fraction=np.float64(spectrum.independent_fraction),
+        level=np.float64(max(float(np.median(np.abs(spectrum.values))), 1e-12)),
+        frame=None if spectrum.frame is None else _pad(spectrum.frame, extra),
+    )
+    return SpectrumView(
+        spectrum.name,
+        chosen,
+        scene,
+        data,
+        takes,
+        spectrum.noise,
+        points * channels,
+        steepest,
+        spectrum.depolarisation,
+        spectrum.elements,
+        spectrum.ratios,
+    )
 
 
 def _pad(x: np.ndarray, extra: int) -> np.ndarray:

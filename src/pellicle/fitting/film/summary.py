@@ -9,9 +9,10 @@ import numpy as np
 
 from pellicle.dispersion.empirical import Shifted
 from pellicle.dispersion.principal_media import ordinary_index
-from pellicle.fitting.film import fringes, residual_structure
+from pellicle.fitting.film import fringes
 from pellicle.fitting.film.parameters import fixed_numbers, thickness_name
 from pellicle.fitting.film.problem import shortest_wavelength
+from pellicle.fitting.film.residual_structure import Missed
 from pellicle.fitting.film.targets import Target, drifts
 from pellicle.fitting.film.view import SpectrumView
 from pellicle.fitting.noise import student
@@ -92,8 +93,18 @@ def opaque(spectra: Sequence[Target], ranked: RankedMinima) -> frozenset[str]:
     )
 
 
-def warnings(spectra: Sequence[Target], ranked: RankedMinima, unclear: Sequence[str]) -> tuple[str, ...]:
-    """Warnings that a reader needs before using the numbers; `unclear` is what the data do not determine."""
+def warnings(
+    spectra: Sequence[Target],
+    ranked: RankedMinima,
+    silent: Sequence[fringes.Fringes | None],
+    structures: Sequence[Missed | None],
+    unclear: Sequence[str],
+) -> tuple[str, ...]:
+    """Warnings that a reader needs before using the numbers.
+
+    Of each view: `silent`, clear fringes that the fit misses, and `structures` of its residuals. `unclear` is
+    what the data do not determine.
+    """
     messages = [w for m in spectra for material in materials_in(m.scene) for w in material.warnings()]
     scan, finest = ranked.minima.scan, shortest_wavelength(ranked.problem) / 8
     if scan is not None and scan.thickness[1] - scan.thickness[0] > 1.01 * finest:
@@ -102,8 +113,9 @@ def warnings(spectra: Sequence[Target], ranked: RankedMinima, unclear: Sequence[
             f" {scan.thickness[1] - scan.thickness[0]:.3g} nm, where fringes call for {finest:.3g}: minima"
             " may be missed; narrow the bounds"
         )
-    messages += fringes.disagreement(ranked.problem, ranked.fits, ranked.values)
-    for spectrum, view, fit in zip(spectra, ranked.problem.views, ranked.fits, strict=True):
+    messages += fringes.disagreement(ranked.problem, silent, ranked.values)
+    views = zip(spectra, ranked.problem.views, ranked.fits, structures, strict=True)
+    for spectrum, view, fit, structure in views:
         scene, length, own = spectrum.scene, fit.length, f"{view.name}: " if view.name else ""
         orders = view.plan.row("orders")
         if orders.on and orders.error_bound > max(1e-4, view.plan.tolerance):
@@ -115,8 +127,8 @@ def warnings(spectra: Sequence[Target], ranked: RankedMinima, unclear: Sequence[
                 f"{own}residuals are correlated over {length:.0f} points: {view.rows} points"
                 f" count as {view.rows / length:.0f}"
             )
-        if place := residual_structure.missed(view, fit):
-            messages.append(f"{own}the model misses structure {place.words}")
+        if structure is not None:
+            messages.append(f"{own}the model misses structure {structure.words}")
         if fit.outliers:
             messages.append(
                 f"{own}{fit.outliers} of {view.rows} points are outliers that count for less than half"

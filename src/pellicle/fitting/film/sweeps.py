@@ -9,11 +9,13 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pellicle.fitting.noise import integrated_time
+from pellicle.scene.content import remembered
 
 _SHORT = 5
 """Fewest points of a sweep, on average; rows that turn back more often are in no order."""
 
 
+@remembered
 def sweeps(
     wavelength: Float[np.ndarray, " rows"],
     angle: Float[np.ndarray, " rows"],

@@ -13,7 +13,7 @@ from pellicle.data.mueller import ELEMENTS
 from pellicle.fitting.discrepancy import HALF_NORMAL, Effect
 from pellicle.fitting.film import generalised
 from pellicle.fitting.film.colour_view import ColoursView
-from pellicle.fitting.film.extended_scene import ExtendedScene, Number
+from pellicle.fitting.film.extended_scene import ExtendedScene, Number, extended
 from pellicle.fitting.film.form import Local
 from pellicle.fitting.film.view import SpectrumView
 from pellicle.optics.orders import FWHM
@@ -94,9 +94,9 @@ def simulated_effects(
     simulations = simulations_of(view, values, scene)
     if not simulations:
         return []
-    extended, every = simulations
+    extension, every = simulations
     each = [(row.number, change) for row in every for change, _ in row.changes]
-    signals = extended.signals(each) if each else np.zeros((0, 0))
+    signals = extension.signals(view.data, values, each) if each else np.zeros((0, 0))
     result, first = [], 0
     for row in every:
         weights = np.array([weight for _, weight in row.changes])
@@ -110,7 +110,8 @@ def simulations_of(
 ) -> tuple[ExtendedScene, list[SimulatedEffect]] | None:
     """The extended scene, and every effect that it simulates; None where there are none."""
     allowed, instrument = scene.uncertainty, scene.instrument
-    extended, rows = ExtendedScene(view, values), []
+    extension, rows = extended(view, values), []
+    start = extension.start(values)
 
     def add(name: str, size: float, unit: str, number: Number | None, changes: Any, **kind: Any) -> None:
         if number is not None and size > 0:
@@ -126,44 +127,44 @@ def simulations_of(
         nodes = [(reach, HALF_NORMAL / 6), (-reach, HALF_NORMAL / 6), (0.0, -HALF_NORMAL / 3)]
         add(name, size, unit, number, nodes, power=2, **kind)
 
-    linear("wavelength shift", allowed.wavelength, "nm", extended.wavelength, shared=False)
+    linear("wavelength shift", allowed.wavelength, "nm", extension.wavelength, shared=False)
     if instrument.bandwidth is None:
         sd = allowed.bandwidth / FWHM
-        width("bandwidth", allowed.bandwidth, "nm", extended.wavelength, sd, shared=False)
+        width("bandwidth", allowed.bandwidth, "nm", extension.wavelength, sd, shared=False)
     free = is_free(view.scene.light.angle)
     oblique = free or bool(np.any(np.asarray(view.scene.light.angle)))
     if oblique and not free:
-        linear("angle of incidence", allowed.angle, "deg", extended.angle, shared=False)
+        linear("angle of incidence", allowed.angle, "deg", extension.angle, shared=False)
     if not instrument.has_cone:
         # at normal incidence both directions of the cone turn the light away from the normal
         sd = allowed.angle_spread * _ROUND_PUPIL * (1.0 if oblique else math.sqrt(2))
-        width("angle spread", allowed.angle_spread, "deg", extended.angle, sd, shared=False)
+        width("angle spread", allowed.angle_spread, "deg", extension.angle, sd, shared=False)
     several = len(scene.layers) > 1
     for i, layer in enumerate(scene.layers):
         if not isinstance(layer, Layer):
             continue
         of = f" of {layer.name or f'layer{i + 1}'}" if several else ""
-        if i in extended.index:
+        if i in extension.index:
             own = allowed.index if layer.index_uncertainty is None else layer.index_uncertainty
-            linear(f"index{of or ' of the layer'}", own, "", extended.index[i], material=True)
-        if i in extended.shape:
-            linear(f"dispersion{of}", allowed.dispersion, "", extended.shape[i])
+            linear(f"index{of or ' of the layer'}", own, "", extension.index[i], material=True)
+        if i in extension.shape:
+            linear(f"dispersion{of}", allowed.dispersion, "", extension.shape[i])
         if instrument.thickness_spread is None and layer.thickness_spread is None:
-            size = min(allowed.thickness_spread * extended.thickness[i].value, _WIDEST_SPREAD)
+            size = min(allowed.thickness_spread * start[extension.thickness[i].position], _WIDEST_SPREAD)
             relative = allowed.thickness_spread
-            width(f"thickness spread{of}", size, "nm", extended.thickness[i], size, relative=relative)
+            width(f"thickness spread{of}", size, "nm", extension.thickness[i], size, relative=relative)
     substrate = scene.substrate
     own = allowed.index if substrate.index_uncertainty is None else substrate.index_uncertainty
-    linear("index of the substrate", own, "", extended.substrate_index, material=True)
+    linear("index of the substrate", own, "", extension.substrate_index, material=True)
     reach = allowed.roughness
     both = [(reach, HALF_NORMAL), (0.0, -HALF_NORMAL)]
-    add("roughness", reach, "nm", extended.roughness, both, power=2)
+    add("roughness", reach, "nm", extension.roughness, both, power=2)
     for name, size, number in (
-        ("native oxide", allowed.interlayer, extended.oxide),
-        ("mixed interface with the substrate", allowed.interlayer / 2, extended.mixture),
+        ("native oxide", allowed.interlayer, extension.oxide),
+        ("mixed interface with the substrate", allowed.interlayer / 2, extension.mixture),
     ):
         add(name, size, "nm", number, [(size, 1.0), (0.0, -1.0)], positive=True)
-    return (extended, rows) if rows else None
+    return (extension, rows) if rows else None
 
 
 def effects_on_signal(view: SpectrumView, at: Local, scene: Scene) -> list[Effect]:

@@ -51,7 +51,7 @@ class PixelEffects:
         if simulations is None:
             return
         extended, self._rows = simulations
-        self._start = extended.start
+        self._start = extended.start(example)
         programs = extended.programs()
         by = [r.number.position if r.number.position in programs else None for r in self._rows]
         for position, program in programs.items():
