@@ -11,7 +11,7 @@ import numpy as np
 from pellicle.data.brdf_samples import CHANNELS, ROUNDING, BrdfSamples, sigma_names
 from pellicle.data.formats import alta
 from pellicle.data.formats.merl import is_merl, read_merl
-from pellicle.data.formats.rgl_samples import read_rgl
+from pellicle.data.formats.rgl import read_rgl
 from pellicle.data.formats.tensor_file import is_tensor_file
 from pellicle.data.tabular.column_selection import only
 from pellicle.data.tabular.columns import DIRECTIONS, Column, listed

@@ -30,7 +30,7 @@ def test_spectraray(write):
         lines=[2, 2, 3, 3, 4, 4],
     )
     assert spectrum.sigma is None
-    assert spectrum.notes[0] == "read as a SpectraRay file of 50.20000, 70.10000 degrees"
+    assert spectrum.notes[1] == "measured at 50.20000, 70.10000 degrees"
 
 
 def test_spectraray_of_one_angle_with_decimal_commas(write):

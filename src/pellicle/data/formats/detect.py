@@ -10,26 +10,11 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 
-from pellicle.data.formats import (
-    accurion,
-    avantes,
-    bruker_dpt,
-    film_sense,
-    horiba,
-    jasco,
-    jcamp,
-    nexus,
-    ocean_optics,
-    perkin_elmer,
-    procspec,
-    regress_pro,
-    scans_side_by_side,
-    spectraray,
-    stacked_tables,
-    stellarnet,
-    vendor_binary,
-    woollam,
-)
+from pellicle.data.formats import accurion, jcamp, nexus, procspec, vendor_binary, woollam
+from pellicle.data.formats.bench_spectrometers import bruker_dpt, jasco, perkin_elmer
+from pellicle.data.formats.ellipsometers import film_sense, horiba, regress_pro, spectraray
+from pellicle.data.formats.fibre_spectrometers import avantes, ocean_optics, stellarnet
+from pellicle.data.formats.several_tables import scans_side_by_side, stacked_tables
 from pellicle.data.tabular.bulk import bulk_layout
 from pellicle.data.tabular.layout import Layout, find_layout
 from pellicle.data.tabular.table import Table
@@ -42,18 +27,18 @@ BinaryReader = Callable[[bytes, str], Sequence[Layout] | None]
 TEXT_READERS: tuple[TextReader, ...] = (
     jcamp.layouts,
     woollam.layouts,
-    spectraray.layouts,
-    film_sense.layouts,
-    regress_pro.layouts,
-    horiba.layouts,
-    ocean_optics.layouts,
-    avantes.layouts,
-    perkin_elmer.layouts,
-    jasco.layouts,
-    stellarnet.layouts,
-    bruker_dpt.layouts,
-    scans_side_by_side.layouts,
-    stacked_tables.layouts,
+    spectraray,
+    film_sense,
+    regress_pro,
+    horiba,
+    ocean_optics,
+    avantes,
+    perkin_elmer,
+    jasco,
+    stellarnet,
+    bruker_dpt,
+    scans_side_by_side,
+    stacked_tables,
 )
 BINARY_READERS: tuple[BinaryReader, ...] = (procspec.layouts, nexus.layouts, vendor_binary.layouts)
 
@@ -89,5 +74,4 @@ def _export_layouts(file: TextFile, spot: int | None) -> Sequence[Layout] | None
         return [layout]
     if spot is not None:
         raise UsageError(f"{file.path}: `spot` selects a spot of an Accurion file, which this is not")
-    found = (reader(file) for reader in TEXT_READERS)
-    return next((layouts for layouts in found if layouts), None)
+    return next((layouts for reader in TEXT_READERS if (layouts := reader(file))), None)

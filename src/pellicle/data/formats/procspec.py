@@ -18,7 +18,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from pellicle.data.formats.quantities import Curve, readable, signal_column
+from pellicle.data.formats.exports import Curve, readable, signal_column
 from pellicle.data.tabular.layout import Layout, array_columns
 from pellicle.errors import DataError, install_command
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from pellicle.data.formats.quantities import Curve, axis_column, readable, signal_column
+from pellicle.data.formats.exports import Curve, axis_column, readable, signal_column
 from pellicle.data.tabular.columns import recognise
 from pellicle.data.tabular.layout import Layout, array_columns
 from pellicle.errors import DataError, install_command

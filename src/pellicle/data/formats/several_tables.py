@@ -1,7 +1,8 @@
-"""Tables with several scans side by side, each with its own wavelengths.
+"""Files of several tables: scans side by side, each with its own wavelengths, or tables below each other.
 
 Agilent (Varian) Cary and Shimadzu UVProbe write a line with the name of each scan over its first column, a
-line such as `Wavelength (nm),%T,Wavelength (nm),%T`, the rows, and Cary the method below a blank line. The
+line such as `Wavelength (nm),%T,Wavelength (nm),%T`, the rows, and Cary the method below a blank line.
+Thermo's INSIGHT and other programs that measure a batch write title, date, names, rows, and again. The
 layouts are those of public exports.
 """
 
@@ -12,11 +13,11 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from pellicle.data.formats.instrument_rows import Rows, all_cells, decimal_mark, facts
-from pellicle.data.tabular.columns import Column, recognise
+from pellicle.data.formats.exports import Rows, all_cells, decimal_mark, facts, told_apart
+from pellicle.data.tabular.columns import Column, is_header, recognise
 from pellicle.data.tabular.declarations import declarations
-from pellicle.data.tabular.layout import Layout, plain_columns
-from pellicle.data.tabular.text import TextFile, is_number
+from pellicle.data.tabular.layout import Layout, find_layout, plain_columns
+from pellicle.data.tabular.text import Line, TextFile, is_number
 
 _MOST_HEADING = 40
 _BASELINE = re.compile(r"base ?line|(100|0) ?%? ?[TR]\b", re.IGNORECASE)
@@ -35,7 +36,7 @@ class _Scan(NamedTuple):
         return any(column.role not in _IGNORED for column in self.columns[1:])
 
 
-def layouts(file: TextFile) -> list[Layout] | None:
+def scans_side_by_side(file: TextFile) -> list[Layout] | None:
     """Return one layout for each scan, without baselines, or None for another format."""
     lines = file.lines
     for at in range(min(_MOST_HEADING, len(lines))):
@@ -43,7 +44,7 @@ def layouts(file: TextFile) -> list[Layout] | None:
             groups = _groups(all_cells(lines[at].text, delimiter))
             names = all_cells(lines[at - 1].text, delimiter) if at else []
             if groups and (len(groups) > 1 or _names_scan(names, lines[at - 1].text)):
-                return _layouts(file, at, delimiter, groups, names)
+                return _scans(file, at, delimiter, groups, names)
     return None
 
 
@@ -68,7 +69,7 @@ def _names_scan(names: Sequence[str], text: str) -> bool:
     return len(names) > 1 and bool(names[0]) and not any(names[1:]) and not is_number(names[0], ",")
 
 
-def _layouts(
+def _scans(
     file: TextFile, at: int, delimiter: str, groups: Sequence[tuple[Column, ...]], names: Sequence[str]
 ) -> list[Layout] | None:
     body = [(line, all_cells(line.bare, delimiter)) for line in file.lines[at + 1 :]]
@@ -87,7 +88,7 @@ def _layouts(
     notes += [f"text from line {below[0].number} on, below the rows, read as the method"] if below else []
     declared = declarations([*file.lines[:at], *file.comments])
     found = []
-    for scan, name in zip(kept, _different([scan.name for scan in kept]), strict=True):
+    for scan, name in zip(kept, told_apart([scan.name for scan in kept]), strict=True):
         index = scans.index(scan)
         date = collected[index] if len(collected) == len(scans) else ""
         title = scan.name if scan.name != scan.columns[1].name else ""
@@ -97,7 +98,7 @@ def _layouts(
             scan.rows,
             notes,
             name=name if len(kept) > 1 else "",
-            facts=facts("", [*file.lines[:at], *below], **known),
+            facts=facts([*file.lines[:at], *below], **known),
             decimal="." if delimiter == "," else decimal_mark(scan.rows),
         )
         stated = dataclasses.replace(declared, facts=layout.declared.facts)
@@ -136,9 +137,36 @@ def _name(group: Sequence[Column], names: Sequence[str]) -> str:
     return re.sub(r"\s*-\s*RawData$", "", title) or group[1].name
 
 
-def _different(names: Sequence[str]) -> list[str]:
-    """The names, with a number behind those that are not the first of their kind."""
-    return [
-        name if name not in names[:i] else f"{name} ({names[:i].count(name) + 1})"
-        for i, name in enumerate(names)
-    ]
+def stacked_tables(file: TextFile) -> list[Layout] | None:
+    """Return one layout for each table, or None where the names are not repeated."""
+    lines = file.lines
+    first = next((line for line in lines[:40] if _names(line)), None)
+    headers = [i for i, line in enumerate(lines) if first is not None and line.text == first.text]
+    if len(headers) < 2:
+        return None
+    starts = [_title(lines, header, after) for header, after in zip(headers, [-1, *headers], strict=False)]
+    found = []
+    for i, (start, header) in enumerate(zip(starts, headers, strict=True)):
+        stop = starts[i + 1] if i + 1 < len(starts) else len(lines)
+        layout = find_layout(TextFile(file.path, file.sha256, lines[start:stop]))
+        title = lines[start].text.strip('"') if start < header else f"table {i + 1}"
+        note = f"table {i + 1} of {len(headers)} in the file"
+        found.append(dataclasses.replace(layout, name=title, notes=(note, *layout.notes)))
+    return found
+
+
+def _names(line: Line) -> bool:
+    return is_header(all_cells(line.text))
+
+
+def _title(lines: Sequence[Line], header: int, after: int) -> int:
+    """Index of the first line above a header that is no row of the table before, whose header is `after`."""
+    start = header
+    while start > after + 1 and not _is_row(lines[start - 1]):
+        start -= 1
+    return start
+
+
+def _is_row(line: Line) -> bool:
+    cells = all_cells(line.text)[:2]
+    return len(cells) == 2 and all(is_number(cell, ",") for cell in cells)

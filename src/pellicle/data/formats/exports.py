@@ -1,4 +1,4 @@
-"""Quantities and axes as formats name them, and the choice of the spectra that can be read.
+"""Shared parts of the readers of instruments' files: cells, facts, names of quantities, choice of spectra.
 
 A format that stores several curves, such as a sample, a dark and a reference spectrum, gives a `Curve` for
 each; `readable` keeps reflectances, transmittances and absorbances, and names what it leaves out.
@@ -6,22 +6,101 @@ each; `readable` keeps reflectances, transmittances and absorbances, and names w
 
 from __future__ import annotations
 
+import csv
 import dataclasses
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 from pellicle.data.tabular.columns import Column, recognise
-from pellicle.data.tabular.declarations import Statement
-from pellicle.data.tabular.layout import Layout
+from pellicle.data.tabular.declarations import Statement, declarations
+from pellicle.data.tabular.layout import Layout, plain_columns
+from pellicle.data.tabular.text import Line, is_number
 from pellicle.data.tabular.units import wavelength_unit
 from pellicle.errors import DataError
+
+Rows: TypeAlias = list[tuple[Line, list[str]]]
+"""Lines of a table with their cells."""
+Facts: TypeAlias = Iterable[tuple[str, str]]
 
 UNNAMED = "intensity"
 """Column name of a quantity that a file calls arbitrary: the user may state what it is."""
 _NO_NAME = "ordinate"
 _SPECTRAL = ("R", "T")
 _NOT_STATED = "not stated"
+_DELIMITERS = ("\t", ";", ",")
+
+
+def export(
+    kind: str,
+    names: Sequence[str],
+    rows: Rows,
+    *,
+    facts: Facts = (),
+    notes: Sequence[str] = (),
+    name: str = "",
+    decimal: str | None = None,
+) -> Layout:
+    """Return the layout of a table of an export of the format `kind`, which its first note and fact name.
+
+    `names` state quantity and unit as a header does. The decimal mark is that of the rows by default.
+    """
+    read_as = f"read as {'an' if kind[0] in 'AEIOU' else 'a'} {kind} file"
+    stated = [("format", kind), *((key, value) for key, value in facts if value)]
+    mark = decimal_mark(rows) if decimal is None else decimal
+    return plain_columns(names, rows, [read_as, *notes], name=name, facts=stated, decimal=mark)
+
+
+def decimal_mark(rows: Rows) -> str:
+    """Return the decimal mark of the rows, which are no longer separated by commas."""
+    return "," if any(is_number(cell, ",") and "," in cell for _, cells in rows for cell in cells) else "."
+
+
+def delimiter_of(text: str) -> str:
+    """Return the tab, semicolon or comma that separates the cells of a line, a blank without one."""
+    return next((delimiter for delimiter in _DELIMITERS if delimiter in text), " ")
+
+
+def all_cells(text: str, delimiter: str | None = None) -> list[str]:
+    """Split a line into cells, keeping empty ones, without quotes and blanks around them.
+
+    Without a `delimiter` it is that of the line.
+    """
+    delimiter = delimiter_of(text) if delimiter is None else delimiter
+    if '"' in text and delimiter != " ":
+        cells = next(csv.reader([text], delimiter=delimiter, skipinitialspace=True))
+    else:
+        cells = text.split(None if delimiter == " " else delimiter)
+    return [cell.strip().strip('"').strip() for cell in cells]
+
+
+def keyword(line: Line) -> tuple[str, str]:
+    """Return keyword and value of a line `keyword: value`, the value empty without a colon."""
+    key, _, value = line.text.partition(":")
+    return key.strip(), value.strip()
+
+
+def facts(lines: Sequence[Line], **known: str) -> list[tuple[str, str]]:
+    """Return `known` facts that are not empty, and others that the lines declare."""
+    stated = {key: value for key, value in known.items() if value}
+    return [*stated.items(), *(fact for fact in declarations(lines).facts if fact[0] not in stated)]
+
+
+def counted(rows: Rows, stated: Iterable[str]) -> list[str]:
+    """Return a note where a file has fewer rows than the first number among `stated` says."""
+    number = next((text for text in stated if text.strip().isdigit()), None)
+    if number is None or len(rows) >= int(number):
+        return []
+    return [f"states {int(number)} points but has {len(rows)}: it may have been cut off"]
+
+
+def told_apart(names: Sequence[str]) -> list[str]:
+    """Return the names, with a number behind those that are not the first of their kind."""
+    return [
+        name if name not in names[:i] else f"{name} ({names[:i].count(name) + 1})"
+        for i, name in enumerate(names)
+    ]
 
 
 @dataclass(frozen=True)
@@ -97,18 +176,8 @@ def readable(curves: Sequence[Curve], path: str) -> list[Layout]:
         layout = along[0].layout
         return [dataclasses.replace(layout, declared=dataclasses.replace(layout.declared, signal=declared))]
     notes = (f"left out: {', '.join(map(repr, dict.fromkeys(left_out)))}",) if left_out else ()
-    names = _different([curve.layout.name or curve.quantity for curve in kept]) if len(kept) > 1 else [""]
+    names = told_apart([curve.layout.name or curve.quantity for curve in kept]) if len(kept) > 1 else [""]
     return [
         dataclasses.replace(curve.layout, name=name, notes=(*curve.layout.notes, *notes))
         for curve, name in zip(kept, names, strict=True)
     ]
-
-
-def _different(names: Sequence[str]) -> list[str]:
-    """The names, with a number behind those that are not the first of their kind."""
-    seen: dict[str, int] = {}
-    found = []
-    for name in names:
-        seen[name] = seen.get(name, 0) + 1
-        found.append(name if seen[name] == 1 else f"{name} ({seen[name]})")
-    return found
