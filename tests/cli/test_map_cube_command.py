@@ -119,7 +119,7 @@ def test_another_map_is_kept_unless_it_is_to_be_replaced(pellicle, words, fits):
 
 
 def test_a_preview_has_its_own_folder(pellicle, words, fits, tmp_path, monkeypatch):
-    monkeypatch.setattr("pellicle.mapping.maps.PREVIEW", 30)
+    monkeypatch.setattr("pellicle.mapping.run.PREVIEW", 30)
     [record] = pellicle(*words, "--preview", "--json").objects
     assert record["data"]["shape"] == {"y": 6, "x": 5}
     assert record["preview"] == 4

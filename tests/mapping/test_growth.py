@@ -106,6 +106,12 @@ def test_rates_in_a_window_follow_the_truth():
     assert np.std(pull) == pytest.approx(1.0, abs=0.15)
 
 
+def test_a_series_of_one_spectrum():
+    made = growth(series(100 + 3.0 * np.arange(5.0), np.arange(5.0), dims=("time",)))
+    assert made["thickness_rate"].dims == ()
+    assert made["thickness_rate"].item() == pytest.approx(3.0)
+
+
 def test_units_of_time():
     minutes = np.arange(5.0)
     value = (100 + 3.0 * minutes)[:, None]

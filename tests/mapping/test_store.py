@@ -158,6 +158,19 @@ def test_a_map_is_not_continued_unasked(mapped):
         mapped(resume=False)
 
 
+@pytest.mark.skipif(os.name == "nt", reason="folders cannot be locked")
+def test_a_map_that_another_run_writes_is_left_alone(mapped, fake_fits):
+    """The run is within its first block; the other one would remove its store."""
+
+    def meanwhile(model, cube, where):
+        with pytest.raises(UsageError, match="another run is writing this map"):
+            mapped(fit=fake_fits.refusing, overwrite=True)
+        return fake_fits.fit(model, cube, where)
+
+    assert mapped(fit=meanwhile).finished
+    assert mapped(overwrite=True).finished
+
+
 def test_a_full_disk_is_one_sentence_and_loses_nothing(mapped, fake_fits, same_files, monkeypatch):
     whole, write = mapped("whole.zarr"), zarr.Array.__setitem__
     monkeypatch.setattr(zarr.Array, "__setitem__", _disk_full_after(5, write))

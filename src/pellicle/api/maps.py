@@ -129,7 +129,7 @@ def map(data: Any, scene: Scene, **options: Any) -> Any:
     _refuse_others(options, ("photograph", "cube") if photograph else ("cube", "photograph"))
     if photograph:
         return map_photograph(data, scene, **options)
-    from pellicle.mapping.maps import map_cube
+    from pellicle.mapping.run import map_cube
 
     return map_cube(data, scene, **options)
 

@@ -30,8 +30,8 @@ from distributed.scheduler import KilledWorker
 
 from pellicle.data.cube import Cube
 from pellicle.errors import DataError, UsageError
+from pellicle.mapping.block_fit import Fitted, Job, fit_block
 from pellicle.mapping.blocks import Where
-from pellicle.mapping.run import Fitted, Job, fit_block
 
 log = logging.getLogger(__name__)
 

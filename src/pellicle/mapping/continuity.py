@@ -12,7 +12,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from logging import getLogger
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from pellicle.errors import UsageError
 from pellicle.forward_model.plan import Row
 from pellicle.mapping.neighbours import Neighbourhood, grid, scattered
 from pellicle.mapping.pixels.results import BY_NEIGHBOURS, CODES
-from pellicle.mapping.stored_minima import exchanged, minima_at
 from pellicle.mapping.unwrapping import Field, field_of, grow
 
 log = getLogger(__name__)
@@ -30,6 +29,8 @@ MARGIN = 12.0
 maps have more pixels than that."""
 LIMIT = 25.0
 """Largest Δχ² of a minimum that neighbours may choose."""
+_READ = 2_000_000
+"""Numbers of a variable that are read at a time."""
 _HIDDEN, _SHARE, _PATCH = 20_000, 0.1, 4
 """Decided pixels that are hidden to test the neighbours: number in all, share at a time, width of a patch."""
 
@@ -75,11 +76,17 @@ class Continuity:
         )
 
 
-def row(found: Continuity | None) -> Row:
+def row(continuity: Continuity | None) -> Row:
     """The row "neighbours" of a map's plan; None where the effect is off."""
-    if found is None:
+    if continuity is None:
         return Row("neighbours", False, "each pixel is decided by its own data")
-    return Row("neighbours", found.decided > 0, str(found))
+    return Row("neighbours", continuity.decided > 0, str(continuity))
+
+
+def record_of(effect: Row) -> dict[str, Any]:
+    """A row of a plan as in the record of a fit."""
+    error = effect.error_bound if math.isfinite(effect.error_bound) else None
+    return {"effect": effect.effect, "on": bool(effect.on), "why": effect.why, "error_bound": error}
 
 
 def evidence(dataset: Any) -> Continuity | None:
@@ -117,70 +124,109 @@ def decided_by_neighbours(
     neighbours decided, `neighbours_delta_chi2`, the Δχ² that was set aside, and `neighbours_number`.
 
     **Raises:** UsageError for a map without a thickness whose minima were kept.
-
-    **Source:** see `pellicle.mapping.unwrapping`.
     """
     names = [str(name).removeprefix("order_") for name in dataset.data_vars if str(name).startswith("order_")]
     names = [name for name in names if name in dataset.data_vars]
     name = parameter or _widest(dataset, names)
     if name is None or f"order_{name}" not in dataset:
         raise UsageError("neighbours choose between the minima of a thickness, and this map has kept none")
-    status = np.asarray(dataset["status"])
-    shape, state = status.shape, status.ravel()
     near = neighbourhood(dataset, tuple(map(str, dataset["status"].dims)), sites)
-    thickness = np.asarray(dataset[name], float).ravel()
-    stderr = np.asarray(dataset[f"{name}_stderr_noise"], float).ravel()
-    rival = np.nan_to_num(np.asarray(dataset["rival_delta_chi2"], float).ravel(), nan=np.inf)
+    pixels, field, continuous = _field(dataset, name, near, margin)
+    test = _tested(dataset, name, field, near)
+    choice = _choice(dataset, name, pixels, field, near, limit, test.weight)
+    result = _summary(len(pixels), choice, test, continuous, field.roughness, margin, limit)
+    log.info("neighbours: %s", result)
+    return _with_choice(dataset, names, choice, result)
+
+
+def _field(dataset: Any, name: str, near: Neighbourhood, margin: float) -> tuple[np.ndarray, Field, float]:
+    """Flat positions of the undecided pixels, the field of the decided ones, and the share on its planes."""
+    state = np.asarray(dataset["status"]).ravel()
+    thickness, stderr, rival = (
+        np.asarray(dataset[key], float).ravel() for key in (name, f"{name}_stderr_noise", "rival_delta_chi2")
+    )
     known = np.isfinite(thickness) & np.isfinite(stderr)
+    close = np.nan_to_num(rival, nan=np.inf) < margin
     converged, again = state == CODES["converged"], state == CODES[BY_NEIGHBOURS]
-    undecided = known & ((state == CODES["ambiguous"]) | (converged & (rival < margin)) | again)
+    undecided = known & ((state == CODES["ambiguous"]) | (converged & close) | again)
     decided = known & converged & ~undecided
     present = undecided | decided | (state == CODES["at-bound"])
-    pixels = np.flatnonzero(undecided)
-    field, continuous = field_of(thickness, stderr, decided, present, near)
+    return np.flatnonzero(undecided), *field_of(thickness, stderr, decided, present, near)
 
-    hidden, found, wrong = _tested(dataset, name, field, near)
-    # odds of a right order (Jeffreys' rule): neighbours outweigh no more Δχ² than they are seen to be worth
-    weight = max(2 * math.log((found - wrong + 0.5) / (wrong + 0.5)), 0.0)
 
+class _Decisions(NamedTuple):
+    """Flat positions of pixels that neighbours decide, their orders, Δχ² set aside, numbers of neighbours."""
+
+    pixels: np.ndarray
+    order: np.ndarray
+    overruled: np.ndarray
+    number: np.ndarray
+
+
+def _choice(
+    dataset: Any,
+    name: str,
+    pixels: np.ndarray,
+    field: Field,
+    near: Neighbourhood,
+    limit: float,
+    weight: float,
+) -> _Decisions:
+    """Orders of undecided pixels, where neighbours change their answer or decide between equals."""
     minima, delta = minima_at(dataset, name, pixels)
     least = delta.min(axis=1, keepdims=True, initial=np.inf)  # not the answer's, where neighbours chose it
     delta = delta - np.where(np.isfinite(least), least, 0.0)
     best = np.argmin(delta, axis=1) if len(pixels) else np.empty(0, int)
     choice = grow(field, near, pixels, minima, np.where(delta <= limit, delta, np.inf), weight)
-    changes = (choice.order >= 0) & ((choice.order != best) | ~converged[pixels])
-    chosen, order, number = pixels[changes], choice.order[changes], choice.number[changes]
-    overruled = delta[changes, order]
-    against = overruled[overruled > 0]
-    result = Continuity(
-        undecided=len(pixels),
-        decided=len(chosen),
+    converged = np.asarray(dataset["status"]).ravel()[pixels] == CODES["converged"]
+    changes = (choice.order >= 0) & ((choice.order != best) | ~converged)
+    order = choice.order[changes]
+    return _Decisions(pixels[changes], order, delta[changes, order], choice.number[changes])
+
+
+def _summary(
+    undecided: int,
+    choice: _Decisions,
+    test: _Test,
+    continuous: float,
+    roughness: float,
+    margin: float,
+    limit: float,
+) -> Continuity:
+    against = choice.overruled[choice.overruled > 0]
+    return Continuity(
+        undecided=undecided,
+        decided=len(choice.pixels),
         changed=len(against),
         overruled=float(against.max(initial=0.0)),
         median_overruled=float(np.median(against)) if len(against) else 0.0,
-        neighbours=int(np.median(number)) if len(number) else 0,
-        hidden=hidden,
-        found=found,
-        wrong=wrong,
+        neighbours=int(np.median(choice.number)) if len(choice.number) else 0,
+        **test._asdict(),
         continuous=continuous if math.isfinite(continuous) else 0.0,
-        roughness=field.roughness,
-        weight=weight,
+        roughness=roughness,
+        weight=test.weight,
         margin=margin,
         limit=limit,
     )
-    log.info("neighbours: %s", result)
-    made = exchanged(dataset, names, chosen, order)
-    state = state.copy()
-    state[chosen] = CODES[BY_NEIGHBOURS]
-    made["status"] = made["status"].copy(data=state.reshape(shape))
-    for key, numbers, kind, words in (
-        ("delta_chi2", overruled, np.float32, "chi-square that the neighbours overruled"),
-        ("number", number, np.uint8, "number of decided neighbours on the plane that decided"),
+
+
+def _with_choice(dataset: Any, names: list[str], choice: _Decisions, result: Continuity) -> Any:
+    """The dataset with these decisions, in its plan too."""
+    made = exchanged(dataset, names, choice.pixels, choice.order)
+    status = np.array(dataset["status"])
+    status.ravel()[choice.pixels] = CODES[BY_NEIGHBOURS]
+    made["status"] = made["status"].copy(data=status)
+    for key, numbers, empty, words in (
+        ("delta_chi2", choice.overruled, np.float32(np.nan), "chi-square that the neighbours overruled"),
+        ("number", choice.number, np.uint8(0), "number of decided neighbours on the plane that decided"),
     ):
-        flat = np.full(len(state), np.nan if kind == np.float32 else 0, kind)
-        flat[chosen] = numbers
-        made[f"neighbours_{key}"] = (dataset["status"].dims, flat.reshape(shape), {"long_name": words})
+        flat = np.full(status.size, empty)
+        flat[choice.pixels] = numbers
+        made[f"neighbours_{key}"] = (dataset["status"].dims, flat.reshape(status.shape), {"long_name": words})
     made.attrs["neighbours"] = json.dumps(asdict(result))
+    if "plan" in made.attrs:
+        others = [effect for effect in json.loads(made.attrs["plan"]) if effect["effect"] != "neighbours"]
+        made.attrs["plan"] = json.dumps([*others, record_of(row(result))])
     return made
 
 
@@ -220,15 +266,30 @@ def _widest(dataset: Any, names: list[str]) -> str | None:
     return max(thicknesses, key=spread) if len(thicknesses) > 1 else next(iter(thicknesses), None)
 
 
-def _tested(dataset: Any, name: str, field: Field, near: Neighbourhood) -> tuple[int, int, int]:
+class _Test(NamedTuple):
+    """Decided pixels that were `hidden`, those for which neighbours `found` an order, and a `wrong` one."""
+
+    hidden: int
+    found: int
+    wrong: int
+
+    @property
+    def weight(self) -> float:
+        """Largest weight of neighbours against Δχ²: they are worth no more than they are seen to be.
+
+        The odds of a right order by Jeffreys' rule, as a difference of χ².
+        """
+        return max(2 * math.log((self.found - self.wrong + 0.5) / (self.wrong + 0.5)), 0.0)
+
+
+def _tested(dataset: Any, name: str, field: Field, near: Neighbourhood) -> _Test:
     """Hide decided pixels and seek their orders by their neighbours alone, a tenth of the map at a time.
 
-    Returns how many were hidden, for how many of those with several minima neighbours chose one, and for how
-    many of these not their own. The pixels are hidden in patches, the same for the same map.
+    The pixels are hidden in patches, the same for the same map.
     """
     pixels = np.flatnonzero(field.decided)
     if not len(pixels):
-        return 0, 0, 0
+        return _Test(0, 0, 0)
     place = np.unravel_index(pixels, near.shape)
     width = [1 if axis == near.site_axis else _PATCH for axis in range(len(near.shape))]
     patch = np.ravel_multi_index(tuple(p // w for p, w in zip(place, width, strict=True)), near.shape)
@@ -241,12 +302,87 @@ def _tested(dataset: Any, name: str, field: Field, near: Neighbourhood) -> tuple
         decided[hidden] = False
         minima, delta = minima_at(dataset, name, hidden)
         known = np.isfinite(delta)
-        choice = grow(
-            field._replace(decided=decided), near, hidden, minima, np.where(known, 0.0, np.inf), np.inf
-        )
+        free = field._replace(decided=decided)
+        choice = grow(free, near, hidden, minima, np.where(known, 0.0, np.inf), np.inf)
         chosen = choice.order[known.sum(axis=1) > 1]
         counts += len(hidden), np.count_nonzero(chosen >= 0), np.count_nonzero(chosen > 0)
         if counts[0] >= _HIDDEN:
             break
-    hidden, found, wrong = map(int, counts)
-    return hidden, found, wrong
+    return _Test(*map(int, counts))
+
+
+def minima_at(dataset: Any, name: str, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Thickness and Δχ² (pixels, orders) of the minima of some pixels, in increasing flat order."""
+    thickness, delta = (_read(dataset[key], pixels) for key in (f"order_{name}", "order_delta_chi2"))
+    return thickness, np.where(np.isfinite(thickness) & ~np.isnan(delta), delta, np.inf)
+
+
+def _read(array: Any, pixels: np.ndarray) -> np.ndarray:
+    """Rows (pixels, orders) of an array (*map, orders), a slab at a time: it may be larger than memory."""
+    rows = int(np.prod(array.shape[1:-1], dtype=int))
+    slab = max(1, _READ // max(rows * array.shape[-1], 1))
+    read = np.empty((len(pixels), array.shape[-1]))
+    for first in range(0, array.shape[0], slab):
+        low, high = np.searchsorted(pixels, [first * rows, (first + slab) * rows])
+        if high > low:
+            part = np.asarray(array[first : first + slab], float).reshape(-1, array.shape[-1])
+            read[low:high] = part[pixels[low:high] - first * rows]
+    return read
+
+
+def exchanged(dataset: Any, names: list[str], pixels: np.ndarray, order: np.ndarray) -> Any:
+    """The dataset with the chosen minimum of each pixel as its answer, and the former answer as its rival."""
+    made = dataset.copy()
+    kept = dataset["order_delta_chi2"]
+    orders = kept.shape[-1]
+    rank = np.tile(np.arange(orders), (len(pixels), 1))
+    rank = np.concatenate([order[:, None], rank[rank != order[:, None]].reshape(-1, orders - 1)], axis=1)
+    swap, line = order > 0, np.arange(len(pixels))[:, None]
+
+    where = np.unravel_index(pixels[swap], dataset["status"].shape)
+
+    def put(key: str, rows: Any) -> None:
+        """Replace the rows of the pixels whose minimum changes."""
+        made[key] = dataset[key].copy(data=_replaced(dataset[key].data, where, np.asarray(rows)[swap]))
+
+    delta = _read(kept, pixels)[line, rank]
+    put("order_delta_chi2", delta - delta[:, :1])
+    if "rival_delta_chi2" in dataset:
+        put("rival_delta_chi2", delta[:, 1] - delta[:, 0])
+    for key in dataset.data_vars:
+        name = str(key)
+        if f"{name}_stderr_noise" not in dataset:
+            continue
+        if name in names:
+            minima = _read(dataset[f"order_{name}"], pixels)[line, rank]
+            put(f"order_{name}", minima)
+            put(name, minima[:, 0])
+            if f"rival_{name}" in dataset:
+                put(f"rival_{name}", minima[:, 1])
+        else:
+            for other in (name, f"{name}_stderr", f"{name}_stderr_noise"):
+                put(other, np.full(len(pixels), np.nan))
+    return made
+
+
+def _replaced(array: Any, where: tuple[np.ndarray, ...], rows: np.ndarray) -> Any:
+    """An array with other rows at some pixels; a dask array is changed chunk by chunk when it is computed."""
+    if hasattr(array, "map_blocks"):
+        return array.map_blocks(_in_chunk, where=where, rows=rows, dtype=array.dtype)
+    whole = np.array(array)
+    whole[where] = rows
+    return whole
+
+
+def _in_chunk(
+    chunk: np.ndarray, *, where: tuple[np.ndarray, ...], rows: np.ndarray, block_info: Any = None
+) -> np.ndarray:
+    """A chunk of `_replaced`, which dask places by `block_info`."""
+    if not block_info or not chunk.size:
+        return chunk
+    ends = np.array(block_info[0]["array-location"])[: len(where)]
+    at = np.stack(where, axis=-1)
+    inside = np.all((at >= ends[:, 0]) & (at < ends[:, 1]), axis=1)
+    changed = chunk.copy()
+    changed[tuple((at[inside] - ends[:, 0]).T)] = rows[inside]
+    return changed

@@ -107,7 +107,7 @@ def growth(
             "rate_chi2_reduced": ("reduced chi-square of a constant rate", "1"),
             "rate_points": ("number of times of the rate", "1"),
         }.items():
-            array = whole[key].reshape(*([] if window is None else [len(time)]), *shape)
+            array = whole[key].reshape((*([] if window is None else [len(time)]), *shape))
             made[f"{name}_{key}"] = (dims, array, {"long_name": f"{words} of {name}", "units": units})
         array = whole["rate_status"].reshape(made[f"{name}_rate"].shape)
         flags = {"flag_values": np.arange(len(RATES), dtype=np.uint8), "flag_meanings": " ".join(RATES)}

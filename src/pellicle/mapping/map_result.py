@@ -14,9 +14,8 @@ import numpy as np
 from pellicle.errors import DataError
 from pellicle.files import replacing
 from pellicle.fitting.presentation import PlotMixin
-from pellicle.mapping.map_variables import STATUS, variable_name
 from pellicle.mapping.pixels.results import BY_NEIGHBOURS, CODES, NO_DATA, STATUSES
-from pellicle.mapping.store import DONE, IDENTITY, write_dataset, zarr_package
+from pellicle.mapping.store import DONE, IDENTITY, STATUS, variable_name, write_dataset, zarr_package
 
 if TYPE_CHECKING:
     import xarray
@@ -144,12 +143,9 @@ class Map(PlotMixin):
         one. Raises UsageError for a map without a free thickness.
         """
         from pellicle.mapping.continuity import decided_by_neighbours
-        from pellicle.mapping.map_attributes import with_evidence
 
         target = self.path.with_name(f"{self.path.stem}-neighbours{self.path.suffix}")
-        decided = decided_by_neighbours(self.dataset)
-        with_evidence(decided)
-        write_dataset(target, decided)
+        write_dataset(target, decided_by_neighbours(self.dataset))
         return Map(target, self.run)
 
     def growth(self, *, window: int | None = None, unit: str | None = None) -> xarray.Dataset:

@@ -1,53 +1,98 @@
-"""Maps of cubes: blocks of pixels are fitted one by one here, or side by side in worker processes."""
+"""Maps of cubes: preparation, and fits of all blocks of pixels, here or in several worker processes."""
 
 from __future__ import annotations
 
+import hashlib
+import json
 import logging
+import math
 import os
+import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Mapping, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from pellicle.data.cube import Cube
+from pellicle.data.fingerprint import fingerprint
+from pellicle.data.read_cube import read_cube
 from pellicle.errors import UsageError
 from pellicle.fitting.progress import Progress, quiet
-from pellicle.mapping.blocks import Where
-from pellicle.mapping.map_attributes import attributes
-from pellicle.mapping.map_identity import identity
+from pellicle.mapping.block_fit import Fitted, Fitter, Job, fit_block
+from pellicle.mapping.blocks import BYTES
+from pellicle.mapping.continuity import record_of, row
+from pellicle.mapping.lamp import LampCurve, lamp_curve_of
 from pellicle.mapping.map_result import Map, Run
 from pellicle.mapping.pixels import fit as pixel_fit
 from pellicle.mapping.pixels.fit import PixelModel
 from pellicle.mapping.pixels.minima import ORDERS
-from pellicle.mapping.pixels.results import PixelFits
-from pellicle.mapping.store import MapStore, begin
+from pellicle.mapping.store import FORMAT, begin, held
 from pellicle.scene.film import Scene
+from pellicle.scene.instrument import Drift
 
 log = logging.getLogger(__name__)
 
 START = 30.0
 """Seconds of fits for which worker processes are worth their start: each imports JAX, for 5 to 10 s."""
 
-Fitter = Callable[[PixelModel, Cube, Where], PixelFits]
+PREVIEW = 4096
+"""Pixels of a preview, of each image, at most."""
 
 
-class Job(NamedTuple):
-    """Objects that every block of a map needs: model, cube, store, and the function that fits a block."""
+def map_cube(
+    data: Any,
+    scene: Scene,
+    *,
+    out: str | os.PathLike[str] | None = None,
+    workers: int | None = 1,
+    scheduler: str | None = None,
+    resume: bool = True,
+    overwrite: bool = False,
+    preview: bool = False,
+    neighbours: bool = False,
+    lamp_curve: str | Sequence[int] | LampCurve | None = None,
+    lamp_reference: Scene | None = None,
+    recipe: str = "",
+    progress: Progress = quiet,
+    **reading: Any,
+) -> Map:
+    """Fit every pixel of a cube; arguments as of `pellicle.map`."""
+    cube = cube_of(data, scene, **reading)
+    if lamp_curve is not None:
+        cube = lamp_curve_of(lamp_curve, cube, scene, lamp_reference).correct(cube)
+    elif lamp_reference is not None:
+        raise UsageError("`lamp_reference` is of a region: give it as `lamp_curve`, x,y,width,height")
+    factor = preview_factor(cube) if preview else 1
+    options: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "recipe": recipe}
+    options |= {"resume": resume, "overwrite": overwrite, "preview": factor, "progress": progress}
+    if factor > 1:
+        cube = cube.coarse(factor)
+    folder = None
+    if out is None:
+        if scheduler is not None:
+            raise UsageError("a map by `scheduler` needs `out`, a folder that its workers reach")
+        folder = tempfile.mkdtemp(prefix="pellicle-map-")
+        out = Path(folder) / "map.zarr"
+    made = run_map(cube, scene, out, **options)
+    if neighbours:
+        made = made.by_neighbours()
+    return made if folder is None else made.remove_at_exit(folder)
 
-    model: PixelModel
-    cube: Cube
-    store: MapStore
-    fit: Fitter
+
+def cube_of(data: Any, scene: Scene, **reading: Any) -> Cube:
+    """Read a cube; where the scale of the scene is free, its values may have any level."""
+    if isinstance(scene.instrument.scale, Drift):
+        reading = {"calibrated": False} | reading
+    return read_cube(data, **reading)
 
 
-class Fitted(NamedTuple):
-    """A block that is in the store: its number of pixels, seconds of its fits, and of compilation."""
-
-    pixels: int
-    seconds: float
-    compiling: float
+def preview_factor(cube: Cube) -> int:
+    """The distance of the pixels of a preview, at which each image has at most `PREVIEW`."""
+    sizes = [n for dim, n in zip(cube.dims, cube.shape, strict=True) if dim != "time"]
+    return max(1, math.ceil((math.prod(sizes) / PREVIEW) ** (1 / max(1, len(sizes)))))
 
 
 def run_map(
@@ -86,14 +131,24 @@ def run_map(
         raise UsageError(f"`workers` must be at least 1, got {workers}")
     began = time.monotonic()
     model = pixel_fit.prepare(cube, scene)
-    about = attributes(cube, model, recipe, preview)
-    who = identity(cube, scene, options or {})
+    about, who = attributes(cube, model, recipe, preview), identity(cube, scene, options or {})
     store = begin(path, cube, model.parameters, who, about, orders=ORDERS, resume=resume, overwrite=overwrite)
-    todo, total = store.unfinished(), int(np.prod(cube.shape))
-    earlier = done = total - sum(map(store.blocks.count, todo))
-    log.info("%s: %d of %d blocks of %s pixels are left", path, len(todo), *_sizes(store))
+    with held(store.path):
+        run = _fit_blocks(Job(model, cube, store, fit or pixel_fit.fit_pixels), workers, scheduler, progress)
+    return Map(path, run._replace(seconds=time.monotonic() - began))
+
+
+def _fit_blocks(job: Job, workers: int | None, scheduler: str | None, progress: Progress) -> Run:
+    """Fit the blocks that are left."""
+    blocks, todo = job.store.blocks, job.store.unfinished()
+    total = math.prod(blocks.shape)
+    earlier = done = total - sum(map(blocks.count, todo))
+    size = " x ".join(map(str, blocks.size))
+    log.info(
+        "%s: %d of %d blocks of %s pixels are left", job.store.path, len(todo), math.prod(blocks.grid), size
+    )
     progress("pixels", done, total)
-    job, compiling, used = Job(model, cube, store, fit or pixel_fit.fit_pixels), 0.0, 1
+    compiling, used = 0.0, 1
     if scheduler is None and workers is None and todo:
         first = fit_block(job, todo.pop(0))
         done, compiling = done + first.pixels, first.compiling
@@ -105,7 +160,7 @@ def run_map(
         done += fitted.pixels
         compiling = max(compiling, fitted.compiling)
         progress("pixels", done, total)
-    return Map(path, Run(done - earlier, earlier, used, time.monotonic() - began, compiling))
+    return Run(done - earlier, earlier, used, 0.0, compiling)
 
 
 def _worthwhile(blocks: int, seconds: float) -> int:
@@ -114,55 +169,63 @@ def _worthwhile(blocks: int, seconds: float) -> int:
     return cores if blocks * seconds > START else 1
 
 
-def _sizes(store: MapStore) -> tuple[int, str]:
-    return int(np.prod(store.blocks.grid)), " x ".join(map(str, store.blocks.size))
-
-
 def _fitted(
     job: Job, todo: list[tuple[int, ...]], workers: int, scheduler: str | None, progress: Progress
 ) -> Iterator[Fitted]:
-    if not todo:
+    if (scheduler is None and workers == 1) or not todo:
+        yield from (fit_block(job, place) for place in todo)
         return
-    if scheduler is None and workers == 1:
-        for place in todo:
-            yield fit_block(job, place)
-        return
-    from pellicle.mapping.cluster import connected, local_cluster, on_cluster
+    from pellicle.mapping.cluster import connected, local_cluster, on_cluster  # imports dask's scheduler
 
     progress("starting workers", 0, workers)
     with local_cluster(workers) if scheduler is None else connected(scheduler) as client:
         yield from on_cluster(client, job, todo, local=scheduler is None)
 
 
-def fit_block(job: Job, place: tuple[int, ...], block: Cube | None = None) -> Fitted:
-    """Fit the block at a place of the grid, and write it into the store.
+def attributes(cube: Cube, model: PixelModel, recipe: str, preview: int) -> dict[str, Any]:
+    """Attributes of a map's store: input, recipe, plan, free parameters with their units.
 
-    `block` is the part of the cube, read by another process; None where this one reads it.
+    `preview` is the distance of its pixels in the input.
     """
-    where, began = job.store.blocks.where(place), time.monotonic()
-    with _compilation() as seconds:
-        if block is None:
-            fits = job.fit(job.model, job.cube, where)
-        else:
-            fits = job.fit(job.model, block, tuple(slice(0, n) for n in block.shape))
-    job.store.write(place, fits)
-    compiling = sum(seconds)
-    return Fitted(job.store.blocks.count(place), time.monotonic() - began - compiling, compiling)
+    effects = [*(effect for view in model.problem.views for effect in view.plan.rows), row(None)]
+    return {
+        "title": "map of thin-film parameters",
+        "source": f"pellicle {version('pellicle')}",
+        "path": cube.path,
+        "fingerprint": cube.fingerprint,
+        "signal": cube.signal,
+        "bands": cube.wavelength.size,
+        "range_nm": [float(cube.wavelength[0]), float(cube.wavelength[-1])],
+        "preview": preview,
+        "recipe": recipe or str(model.scene),
+        "notes": list(cube.notes),
+        "parameters": {parameter.name: parameter.unit for parameter in model.parameters},
+        "plan": json.dumps(list(map(record_of, effects))),
+    }
 
 
-@contextmanager
-def _compilation() -> Iterator[list[float]]:
-    """Collect the seconds of every compilation in the block."""
-    import jax.monitoring as monitoring
+def identity(cube: Cube, scene: Scene, options: Mapping[str, Any]) -> dict[str, str]:
+    """Hash the input, the scene and the options of a map.
 
-    seconds: list[float] = []
+    The content of a cube without a `fingerprint` is read once, slab by slab.
+    """
+    read = cube.signal, cube.polarisation, cube.calibrated, cube.dims, cube.wavelength, cube.angle, cube.mask
+    return {
+        "format": FORMAT,
+        "version": version("pellicle"),
+        "input": fingerprint(cube.fingerprint or _content(cube), cube.shape, *read),
+        "scene": fingerprint(scene),
+        "options": fingerprint(dict(options)),
+    }
 
-    def listen(event: str, duration_secs: float, **_: Any) -> None:
-        if event.startswith("/jax/core/compile/"):
-            seconds.append(duration_secs)
 
-    monitoring.register_event_duration_secs_listener(listen)
-    try:
-        yield seconds
-    finally:
-        monitoring.unregister_event_duration_listener(listen)
+def _content(cube: Cube) -> list[str]:
+    """Hashes of all arrays, read in slabs along the first axis of pixels."""
+    found = []
+    for name, array in sorted(cube.arrays.items()):
+        digest = hashlib.sha256(f"{name} {array.dtype} {array.shape}".encode())
+        rows = max(1, int(BYTES * array.shape[0] / (np.dtype(array.dtype).itemsize * math.prod(array.shape))))
+        for start in range(0, array.shape[0], rows):
+            digest.update(np.ascontiguousarray(array[start : start + rows]).tobytes())
+        found.append(digest.hexdigest())
+    return found

@@ -11,11 +11,10 @@ from __future__ import annotations
 import os
 import shutil
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cached_property
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,14 +25,25 @@ from pellicle.errors import UsageError, install_command
 from pellicle.files import not_written
 from pellicle.fitting.parameter import Parameter
 from pellicle.mapping.blocks import Blocks, blocks_of
-from pellicle.mapping.map_identity import difference
-from pellicle.mapping.map_variables import ORDER, Variable, variables
-from pellicle.mapping.pixels.results import PixelFits
+from pellicle.mapping.pixels.results import CODES, NO_DATA, STATUSES, PixelFits
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
 IDENTITY, DONE = "pellicle_identity", "progress/done"
+FORMAT = "pellicle.map-store/1"
+"""Version of the layout of a store."""
+_OTHERWISE = {
+    "format": "has the layout of another version of pellicle",
+    "version": "was made by another version of pellicle",
+    "input": "is of another input, or of one that was read otherwise",
+    "scene": "is of another scene",
+    "options": "was made with other options",
+}
+"""What is stated of a store whose identity differs in one of its parts."""
+STATUS = "status"
+ORDER = "order"
+"""Name of the axis of the minima of a pixel, best first."""
 
 
 def zarr_package() -> Any:
@@ -42,9 +52,73 @@ def zarr_package() -> Any:
     **Raises:** UsageError where it is absent.
     """
     try:
-        return import_module("zarr")
+        import zarr
     except ImportError:
         raise UsageError(f"maps of cubes need zarr: {install_command('maps')}") from None
+    return zarr
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A variable of a map; `of` computes it from the fits of some pixels, with the axis of orders last.
+
+    Values of pixels that are not fitted yet are `fill`.
+    """
+
+    name: str
+    of: Callable[[PixelFits], np.ndarray]
+    attributes: dict[str, Any]
+    dtype: str = "float32"
+    orders: bool = False
+    fill: Any = np.nan
+
+
+def variable_name(parameter: str) -> str:
+    """The name of a parameter as a variable: `film.thickness` is `film_thickness`."""
+    return parameter.replace(".", "_")
+
+
+def variables(parameters: Sequence[Parameter]) -> list[Variable]:
+    """List the variables of a map of these free parameters, in the order of the fits' arrays."""
+
+    def about(words: str) -> dict[str, Any]:
+        return {"long_name": words, "units": "1"}
+
+    flags = {"flag_values": list(range(len(STATUSES))), "flag_meanings": " ".join(STATUSES)}
+    status = {"long_name": "status of the fit", **flags}
+    rival = about("delta chi2 of the best other minimum")
+    orders = about("delta chi2 of each minimum")
+    return [
+        Variable(STATUS, lambda fits: fits.status, status, "uint8", fill=CODES[NO_DATA]),
+        *(variable for i, parameter in enumerate(parameters) for variable in _of_parameter(i, parameter)),
+        Variable("rival_delta_chi2", lambda fits: _finite(fits.delta_chi2[:, 1]), rival),
+        Variable("order_delta_chi2", lambda fits: _finite(fits.delta_chi2), orders, orders=True),
+        Variable("chi2_reduced", lambda fits: fits.chi2_reduced, about("reduced chi2")),
+        Variable("rms", lambda fits: fits.rms, {"long_name": "root mean square of the residuals"}),
+    ]
+
+
+def _of_parameter(i: int, parameter: Parameter) -> list[Variable]:
+    name, text = variable_name(parameter.name), parameter.name
+    unit = {"degrees": "degree"}.get(parameter.unit, parameter.unit) or "1"
+
+    def about(words: str) -> dict[str, Any]:
+        return {"long_name": words, "units": unit}
+
+    noise, whole = (f"standard error of {text}, of {part}" for part in ("the noise alone", "noise and model"))
+    rival, orders = about(f"{text} of the best other minimum"), about(f"{text} of each minimum, best first")
+    value = {**about(text), "parameter": text}
+    return [
+        Variable(name, lambda fits: fits.values[:, i], value, "float64"),
+        Variable(f"{name}_stderr", lambda fits: fits.stderr[:, i], about(whole)),
+        Variable(f"{name}_stderr_noise", lambda fits: fits.stderr_noise[:, i], about(noise)),
+        Variable(f"rival_{name}", lambda fits: fits.minima[:, 1, i], rival),
+        Variable(f"order_{name}", lambda fits: fits.minima[:, :, i], orders, orders=True),
+    ]
+
+
+def _finite(values: np.ndarray) -> np.ndarray:
+    return np.where(np.isfinite(values), values, np.nan)
 
 
 @dataclass(frozen=True)
@@ -63,7 +137,7 @@ class MapStore:
         where = self.blocks.where(place)
         shape = tuple(part.stop - part.start for part in where)
         try:
-            for variable in self._variables:
+            for variable in self.variables:
                 values = np.asarray(variable.of(fits), variable.dtype)
                 self._group[variable.name][where] = values.reshape(*shape, *values.shape[1:])
             self._group[DONE][place] = 1
@@ -80,7 +154,8 @@ class MapStore:
         return zarr_package().open_group(self.path, mode="r+", use_consolidated=False)
 
     @cached_property
-    def _variables(self) -> list[Variable]:
+    def variables(self) -> list[Variable]:
+        """Variables of the map."""
         return variables(self.parameters)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -102,35 +177,19 @@ def begin(
 
     **Arguments:**
 
-    - `identity` of the map, as `map_identity.identity`; `attributes` of the dataset.
+    - `identity` of the map: hashes of what it is computed from; `attributes` of the dataset.
     - `orders`: number of minima of each pixel.
     - `resume`: continue a store of the same identity. `overwrite`: remove any store of a map at `path`.
 
-    **Raises:** UsageError where there is something else at `path`.
+    **Raises:** UsageError where there is something else at `path`, or another process writes it.
     """
     target = Path(path).resolve()  # workers may have another working folder
     if target.exists():
-        stored = _identity_at(target)
-        if stored is None:
-            raise UsageError(f"{target}: exists and is no map of pellicle; choose another `out`")
-        differs = difference(stored, identity)
-        if overwrite:
+        with held(target):
+            if not overwrite:
+                return _continued(target, cube, parameters, identity, resume=resume)
+            _check_map(target)
             _remove(target)
-        elif differs:
-            raise UsageError(
-                f"{target}: {differs}, and cannot be continued; replace it with `overwrite=True`, or choose"
-                " another `out`"
-            )
-        elif not resume:
-            raise UsageError(
-                f"{target}: exists; leave `resume=False` out to continue it, replace it with"
-                " `overwrite=True`, or choose another `out`"
-            )
-        else:
-            for stray in target.rglob("*.partial"):  # of a process that was killed while it wrote
-                stray.unlink(missing_ok=True)
-            size = tuple(zarr_package().open_group(target, mode="r", use_consolidated=False)["status"].chunks)  # pyright: ignore
-            return MapStore(target, Blocks(cube.shape, size), tuple(parameters))
     store = MapStore(target, blocks_of(cube), tuple(parameters))
     draft = _draft(target)
     try:
@@ -141,14 +200,62 @@ def begin(
     return store
 
 
+def _continued(
+    target: Path, cube: Cube, parameters: Sequence[Parameter], identity: Mapping[str, str], *, resume: bool
+) -> MapStore:
+    """Open the store of the same map. Raises UsageError for another one, and without `resume`."""
+    stored = _check_map(target)
+    differs = next((words for key, words in _OTHERWISE.items() if stored.get(key) != identity[key]), "")
+    if differs:
+        raise UsageError(
+            f"{target}: {differs}, and cannot be continued; replace it with `overwrite=True`, or choose"
+            " another `out`"
+        )
+    if not resume:
+        raise UsageError(
+            f"{target}: exists; leave `resume=False` out to continue it, replace it with"
+            " `overwrite=True`, or choose another `out`"
+        )
+    for stray in target.rglob("*.partial"):  # of a process that was killed while it wrote
+        stray.unlink(missing_ok=True)
+    status: Any = zarr_package().open_group(target, mode="r", use_consolidated=False)[STATUS]
+    return MapStore(target, Blocks(cube.shape, tuple(status.chunks)), tuple(parameters))
+
+
+@contextmanager
+def held(path: Path) -> Iterator[None]:
+    """Hold the folder of a store for this process, until the block or the process ends.
+
+    **Raises:** UsageError where another run holds it.
+    """
+    if os.name == "nt":  # folders cannot be locked there
+        yield
+        return
+    import fcntl
+
+    folder = os.open(path, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise UsageError(
+                f"{path}: another run is writing this map; wait for it, or choose another `out`"
+            ) from None
+        except OSError:  # a file system without locks
+            pass
+        yield
+    finally:
+        os.close(folder)
+
+
 def write_dataset(path: str | os.PathLike[str], dataset: Dataset) -> None:
     """Write a changed dataset of a map as a store of its own, whole or not at all.
 
     **Raises:** UsageError where something else than a map is at `path`.
     """
     target = Path(path).resolve()
-    if target.exists() and _identity_at(target) is None:
-        raise UsageError(f"{target}: exists and is no map of pellicle; choose another `out`")
+    if target.exists():
+        _check_map(target)
     draft = _draft(target)
     with _quietly():
         dataset.to_zarr(draft)
@@ -171,21 +278,24 @@ def _remove(target: Path) -> None:
     shutil.rmtree(draft)
 
 
-def _identity_at(path: Path) -> dict[str, str] | None:
-    """The identity of the map stored at `path`, None where there is none."""
+def _check_map(path: Path) -> dict[str, str]:
+    """Return the identity of the map stored at `path`. Raises UsageError where there is none."""
     zarr = zarr_package()
-    try:
-        found: Any = zarr.open_group(path, mode="r", use_consolidated=False).attrs.get(IDENTITY)
-    except (OSError, ValueError, KeyError):
-        return None
-    return dict(found) if isinstance(found, Mapping) else None
+    identity: Any = None
+    with suppress(OSError, ValueError, KeyError):
+        identity = zarr.open_group(path, mode="r", use_consolidated=False).attrs.get(IDENTITY)
+    if not isinstance(identity, Mapping):
+        raise UsageError(f"{path}: exists and is no map of pellicle; choose another `out`")
+    return dict(identity)
 
 
 def _make(path: Path, store: MapStore, cube: Cube, attributes: Mapping[str, Any], orders: int) -> None:
     """Make all arrays of a store, without the values of pixels."""
-    group = zarr_package().create_group(path, attributes=_attributes(cube, attributes))
+    others = " ".join(name for name in cube.coords if name not in cube.dims)
+    known = {"Conventions": "CF-1.11", **attributes, **({"coordinates": others} if others else {})}
+    group = zarr_package().create_group(path, attributes=known)
     blocks = store.blocks
-    for variable in store._variables:
+    for variable in store.variables:
         axes = (orders,) * variable.orders
         group.create_array(
             variable.name,
@@ -202,7 +312,7 @@ def _make(path: Path, store: MapStore, cube: Cube, attributes: Mapping[str, Any]
             name,
             # zarr 3 specifies texts of any length, and none of a fixed one
             data=values.astype(np.dtypes.StringDType()) if values.dtype.kind == "U" else values,
-            dimension_names=coordinate_dims(cube, name),
+            dimension_names=_coordinate_dims(cube, name, values),
             attributes={"units": units} if units else {},
         )
     group.create_array(DONE, shape=blocks.grid, chunks=(1,) * len(blocks.grid), dtype="uint8", fill_value=0)
@@ -210,19 +320,13 @@ def _make(path: Path, store: MapStore, cube: Cube, attributes: Mapping[str, Any]
         zarr_package().consolidate_metadata(path)
 
 
-def coordinate_dims(cube: Cube, name: str) -> tuple[str, ...]:
+def _coordinate_dims(cube: Cube, name: str, values: np.ndarray) -> tuple[str, ...]:
     """The axes of a coordinate: the one of its name, else the first of its length."""
-    values = np.asarray(cube.coords[name])
-    if name in cube.dims or values.ndim != 1:
-        return (name,) if values.ndim == 1 else cube.dims[: values.ndim]
-    lengths = zip(cube.dims, cube.shape, strict=True)
-    return (next(dim for dim, n in lengths if n == len(values)),)
-
-
-def _attributes(cube: Cube, attributes: Mapping[str, Any]) -> dict[str, Any]:
-    others = [name for name in cube.coords if name not in cube.dims]
-    known = {"coordinates": " ".join(others)} if others else {}
-    return {"Conventions": "CF-1.11", **attributes, **known}
+    if values.ndim != 1:
+        return cube.dims[: values.ndim]
+    if name in cube.dims:
+        return (name,)
+    return (cube.dims[cube.shape.index(len(values))],)
 
 
 @contextmanager

@@ -12,8 +12,8 @@ import numpy as np
 from pellicle.fitting.result import Status
 from pellicle.mapping.continuity import evidence, row
 from pellicle.mapping.map_result import Map, Run
-from pellicle.mapping.map_variables import variable_name
 from pellicle.mapping.pixels.results import BY_NEIGHBOURS, CODES, NO_DATA, STATUSES
+from pellicle.mapping.store import variable_name
 from pellicle.reporting.map_axes import MapAxes, map_axes
 from pellicle.reporting.map_places import place
 from pellicle.reporting.map_rates import RateSummary, summarise_rates

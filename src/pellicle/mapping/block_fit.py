@@ -1,0 +1,67 @@
+"""Fit of one block of pixels of a map: read from the cube, fitted, and written into the store."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, NamedTuple
+
+from pellicle.data.cube import Cube
+from pellicle.mapping.blocks import Where
+from pellicle.mapping.pixels.fit import PixelModel
+from pellicle.mapping.pixels.results import PixelFits
+from pellicle.mapping.store import MapStore
+
+Fitter = Callable[[PixelModel, Cube, Where], PixelFits]
+
+
+class Job(NamedTuple):
+    """Objects that every block of a map needs: model, cube, store, and the function that fits a block."""
+
+    model: PixelModel
+    cube: Cube
+    store: MapStore
+    fit: Fitter
+
+
+class Fitted(NamedTuple):
+    """A block that is in the store: its number of pixels, seconds of its fits, and of compilation."""
+
+    pixels: int
+    seconds: float
+    compiling: float
+
+
+def fit_block(job: Job, place: tuple[int, ...], block: Cube | None = None) -> Fitted:
+    """Fit the block at a place of the grid, and write it into the store.
+
+    `block` is the part of the cube, read by another process; None where this one reads it.
+    """
+    where, began = job.store.blocks.where(place), time.monotonic()
+    with _compilation() as seconds:
+        if block is None:
+            fits = job.fit(job.model, job.cube, where)
+        else:
+            fits = job.fit(job.model, block, tuple(slice(0, n) for n in block.shape))
+    job.store.write(place, fits)
+    compiling = sum(seconds)
+    return Fitted(job.store.blocks.count(place), time.monotonic() - began - compiling, compiling)
+
+
+@contextmanager
+def _compilation() -> Iterator[list[float]]:
+    """Collect the seconds of every compilation in the block."""
+    import jax.monitoring as monitoring
+
+    seconds: list[float] = []
+
+    def listen(event: str, duration_secs: float, **_: Any) -> None:
+        if event.startswith("/jax/core/compile/"):
+            seconds.append(duration_secs)
+
+    monitoring.register_event_duration_secs_listener(listen)
+    try:
+        yield seconds
+    finally:
+        monitoring.unregister_event_duration_listener(listen)
