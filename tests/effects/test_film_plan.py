@@ -78,8 +78,7 @@ def test_savings_are_measured():
     found = savings(thing, pl.plan(thing))
     assert set(found.effects) >= {"coherence", "precision"}
     assert found.effects["coherence"].error > 0.01
-    assert all(saving.seconds < found.exact for saving in found.effects.values())
-    assert min(found.exact, found.planned) > 0
+    assert min(found.exact, found.planned, *(saving.seconds for saving in found.effects.values())) > 0
 
 
 @pytest.mark.parametrize("name", NAMES)
