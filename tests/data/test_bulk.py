@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pellicle.data.read_spectrum import read_spectrum
-from pellicle.data.tabular import bulk
+from pellicle.data.tabular import table as bulk
 from pellicle.errors import DataError
 
 NM = np.round(np.linspace(200, 2000, 500), 3)

@@ -14,9 +14,8 @@ from pellicle.data.read_ellipsometry import (
 )
 from pellicle.data.read_generalised import GeneralisedColumns, generalised_columns, has_generalised
 from pellicle.data.read_mueller import MuellerColumns, has_mueller, mueller_columns
-from pellicle.data.tabular.column_selection import SpectrumColumns, signal_columns
+from pellicle.data.tabular.column_selection import SpectrumColumns, named_columns, signal_columns
 from pellicle.data.tabular.columns import DIRECTIONS, SIGNALS, listed
-from pellicle.data.tabular.named_columns import named_columns
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError, UsageError
 

@@ -13,10 +13,9 @@ from pellicle.data.formats import alta
 from pellicle.data.formats.merl import is_merl, read_merl
 from pellicle.data.formats.rgl import read_rgl
 from pellicle.data.formats.tensor_file import is_tensor_file
-from pellicle.data.tabular.column_selection import only
+from pellicle.data.tabular.column_selection import named_columns, only
 from pellicle.data.tabular.columns import DIRECTIONS, Column, listed
 from pellicle.data.tabular.layout import find_layout
-from pellicle.data.tabular.named_columns import named_columns
 from pellicle.data.tabular.table import Table
 from pellicle.data.tabular.text import read_bytes, text_file
 from pellicle.data.tabular.units import brdf_unit

@@ -12,13 +12,13 @@ from pellicle.data.formats.detect import read_tables
 from pellicle.data.repeated_sweeps import of_rows, sweep_numbers
 from pellicle.data.signal_checks import check_noise, check_power
 from pellicle.data.spectrum import Spectrum
+from pellicle.data.tabular.axis_and_signal import axis_note, axis_unit, read_columns
 from pellicle.data.tabular.column_selection import (
     SpectrumColumns,
     counts_columns,
     counts_columns_beside,
 )
 from pellicle.data.tabular.table import Table
-from pellicle.data.tabular.wavelength_axis import axis_note, axis_unit, read_columns
 from pellicle.errors import DataError, UsageError
 
 

@@ -11,11 +11,11 @@ from pellicle.data.mueller import ELEMENTS, HIGHEST, SIGNAL, check_elements, che
 from pellicle.data.repeated_sweeps import of_rows, sweep_numbers
 from pellicle.data.signal_checks import refuse_first
 from pellicle.data.spectrum import Spectrum, inside_range
+from pellicle.data.tabular.axis_and_signal import axis_note, axis_unit, read_axis
 from pellicle.data.tabular.column_names import MUELLER
 from pellicle.data.tabular.column_selection import AxisColumns, axis_columns, only
 from pellicle.data.tabular.columns import Column, listed
 from pellicle.data.tabular.table import Table
-from pellicle.data.tabular.wavelength_axis import axis_note, axis_unit, read_axis
 from pellicle.errors import DataError, UsageError
 
 _REMEDY = "correct or delete that row"

@@ -7,10 +7,9 @@ import numpy as np
 from pellicle.data.repeated_sweeps import of_rows, sweep_numbers
 from pellicle.data.signal_checks import check_power, refuse_first
 from pellicle.data.spectrum import Spectrum, inside_range
+from pellicle.data.tabular.axis_and_signal import axis_note, axis_unit, read_columns, signal_scale
 from pellicle.data.tabular.column_selection import SpectrumColumns
-from pellicle.data.tabular.signal_scale import signal_scale
 from pellicle.data.tabular.table import Table
-from pellicle.data.tabular.wavelength_axis import axis_note, axis_unit, read_columns
 from pellicle.errors import DataError
 
 

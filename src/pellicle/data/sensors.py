@@ -10,11 +10,10 @@ import numpy as np
 from pellicle.colour.cameras import camera_sensor, illuminant_spectrum, observer_sensor, srgb_sensor
 from pellicle.colour.observers import OBSERVERS, Sensor, sensor
 from pellicle.data.signal_checks import refuse_first
-from pellicle.data.tabular.column_selection import AxisColumns
+from pellicle.data.tabular.axis_and_signal import axis_unit, read_axis
+from pellicle.data.tabular.column_selection import AxisColumns, first_column
 from pellicle.data.tabular.columns import Column, listed, recognise_all
-from pellicle.data.tabular.named_columns import first_column
 from pellicle.data.tabular.table import Table, read_table
-from pellicle.data.tabular.wavelength_axis import axis_unit, read_axis
 from pellicle.errors import DataError, UsageError
 
 SRGB = "srgb"

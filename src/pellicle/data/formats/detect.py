@@ -15,9 +15,8 @@ from pellicle.data.formats.bench_spectrometers import bruker_dpt, jasco, perkin_
 from pellicle.data.formats.ellipsometers import film_sense, horiba, regress_pro, spectraray
 from pellicle.data.formats.fibre_spectrometers import avantes, ocean_optics, stellarnet
 from pellicle.data.formats.several_tables import scans_side_by_side, stacked_tables
-from pellicle.data.tabular.bulk import bulk_layout
 from pellicle.data.tabular.layout import Layout, find_layout
-from pellicle.data.tabular.table import Table
+from pellicle.data.tabular.table import Table, bulk_layout
 from pellicle.data.tabular.text import TextFile, read_bytes, text_file
 from pellicle.errors import UsageError
 

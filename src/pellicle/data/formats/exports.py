@@ -13,8 +13,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from pellicle.data.tabular.columns import Column, recognise
-from pellicle.data.tabular.declarations import Statement, declarations
+from pellicle.data.tabular.columns import Column, Statement, declarations, recognise
 from pellicle.data.tabular.layout import Layout, plain_columns
 from pellicle.data.tabular.text import Line, is_number
 from pellicle.data.tabular.units import wavelength_unit

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from pathlib import PurePath
 
 from pellicle.data.formats.exports import Rows, all_cells, counted, delimiter_of, export, facts, keyword
-from pellicle.data.tabular.columns import UNSTATED, recognise
-from pellicle.data.tabular.declarations import declarations
+from pellicle.data.tabular.columns import UNSTATED, declarations, recognise
 from pellicle.data.tabular.layout import Layout
 from pellicle.data.tabular.text import Line, TextFile, is_number
 from pellicle.errors import DataError

@@ -14,8 +14,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from pellicle.data.formats.exports import Rows, all_cells, decimal_mark, facts, told_apart
-from pellicle.data.tabular.columns import Column, is_header, recognise
-from pellicle.data.tabular.declarations import declarations
+from pellicle.data.tabular.columns import Column, declarations, is_header, recognise
 from pellicle.data.tabular.layout import Layout, find_layout, plain_columns
 from pellicle.data.tabular.text import Line, TextFile, is_number
 

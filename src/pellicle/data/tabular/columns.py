@@ -1,7 +1,8 @@
-"""Column names: the role, unit and polarisation that they state.
+"""Columns of a table by their names, and what the lines above its rows declare.
 
 Names are matched without regard to case, with the unit in brackets (`R (%)`, `Wavelength [um]`),
-after a separator (`wavelength_nm`, `R_percent`, `lambda / nm`) or as a sign (`%R`).
+after a separator (`wavelength_nm`, `R_percent`, `lambda / nm`) or as a sign (`%R`). Of the lines above the
+rows only those of a keyword and a value count, as `Y-axis mode: %T` or `##XUNITS=1/CM`; free text does not.
 """
 
 from __future__ import annotations
@@ -10,8 +11,9 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from pellicle.data.tabular import units
 from pellicle.data.tabular.column_names import FOREIGN, NAMES, RATIO_COLUMNS
+from pellicle.data.tabular.text import Line
+from pellicle.data.tabular.units import angle_unit, signal_unit, wavelength_unit
 from pellicle.errors import UsageError
 
 SIGNALS = ("R", "T")
@@ -30,17 +32,17 @@ _MODELLED = ("calculated", "calc", "calc.", "modelled", "modeled", "simulated", 
 """Words that some programs write in the place of a unit, for the measurement and for their fit to it."""
 _OTHER_UNITS = ("a.u.", "abs", "abs.", "a", "counts", "deg", "°")
 _UNIT_OF = {
-    "wavelength": units.wavelength_unit,
-    "angle": units.angle_unit,
-    "azimuth": units.angle_unit,
-    "psi": units.angle_unit,
-    "delta": units.angle_unit,
-    "analyser": units.angle_unit,
-    "sigma_psi": units.angle_unit,
-    "sigma_delta": units.angle_unit,
-    **dict.fromkeys(DIRECTIONS, units.angle_unit),
-    **dict.fromkeys(RATIO_COLUMNS, units.angle_unit),
-    **dict.fromkeys((f"sigma_{role}" for role in RATIO_COLUMNS), units.angle_unit),
+    "wavelength": wavelength_unit,
+    "angle": angle_unit,
+    "azimuth": angle_unit,
+    "psi": angle_unit,
+    "delta": angle_unit,
+    "analyser": angle_unit,
+    "sigma_psi": angle_unit,
+    "sigma_delta": angle_unit,
+    **dict.fromkeys(DIRECTIONS, angle_unit),
+    **dict.fromkeys(RATIO_COLUMNS, angle_unit),
+    **dict.fromkeys((f"sigma_{role}" for role in RATIO_COLUMNS), angle_unit),
     "counts": lambda text: None,
     "intensity": lambda text: None,
 }
@@ -60,6 +62,49 @@ _PERCENT_INSIDE = re.compile(r"[(\[]\s*%\s*[)\]]")
 SKIP = "_"
 UNSTATED = "unit not stated"
 """Unit in the name of a column whose unit must be asked for."""
+
+_ENTRY = re.compile(r"[#\s\"']*(?P<key>[^=:;,\t]{1,40}?)[\"']?\s*(?:[=:]|[\t;,])\s*(?P<value>.*?)[\s\"';,]*")
+_AXIS = re.compile(
+    r"(x[ _-]?(axis|unit|label|title)s?([ _-]?(mode|unit|label|title|type)s?)?"
+    r"|(wavelength|axis|abscissa|spectral)[ _-]?(unit|type|mode|scale)s?)"
+)
+_SIGNAL = re.compile(
+    r"(y[ _-]?(axis|unit|label|title)s?([ _-]?(mode|unit|label|title|type)s?)?"
+    r"|(data|measurement|measuring|photometric|ordinate|display|acquisition)[ _-]?(mode|type|unit|scale)s?"
+    r"|ordinate|quantity|technique|signal([ _-](type|unit))?|(spectrum|spectral)[ _-]type|measured quantity)"
+)
+_ANGLE = re.compile(
+    r"(angle|(angle of|incidence|incident) (incidence|angle)|aoi|einfallswinkel)"
+    r"( ?[(\[]?(deg(rees?)?|°)[)\]]?)?"
+)
+_DEGREES = re.compile(r"(\d+(?:[.,]\d+)?)\s*(?:°|deg(?:rees?)?\.?)?")
+_POLARISATION = re.compile(r"polari[sz](ation|er)( (state|mode|position))?")
+_POLARISED = {
+    "s": re.compile(r"(s|te)([ -]?(pol.*|wave|light))?"),
+    "p": re.compile(r"(p|tm)([ -]?(pol.*|wave|light))?"),
+    "unpolarised": re.compile(r"none|random|un-?polari[sz]ed|non-?polari[sz]ed"),
+}
+_FACTS = {
+    "instrument": r"instrument( (name|model|type|serial.*))?|spectrometers?( (name|model|type))?|model"
+    r"|origin|spectrometer/data system",
+    "date": r"date( (and|/) ?time)?|(acquired|measured|created)( (on|at))?|(measurement|acquisition) date"
+    r"|time ?stamp|longdate|date of measurement",
+    "delta": r"delta",  # "folded into 0 to 180 degrees"
+    "sample": r"sample( (name|id|description))?|title|spectrum name",
+}
+_FOREIGN = re.compile(
+    r"(kubelka|k/s\b|f\(r\)|irradiance|radiance|raman|fluorescence|emission|phosphorescence|power|"
+    r"counts?\b|scope|raw|single beam|interferogram|intensity)",
+    re.IGNORECASE,
+)
+"""Quantities that are neither a reflectance nor a transmittance."""
+
+
+_NO_WAVELENGTH = re.compile(
+    r"(raman|pixel|channel|points?\b|index|time|temperature|position|angle|seconds?\b)",
+    re.IGNORECASE,
+)
+"""Axes that are no wavelength, energy or wavenumber."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +128,7 @@ class Column:
 def recognise(name: str, position: int = 0) -> Column:
     """Return the column that `name` describes; role "other" for an unknown name."""
     plain = name.strip().strip("\"'").strip().lower()
-    unit_alone = units.wavelength_unit(plain)
+    unit_alone = wavelength_unit(plain)
     if unit_alone and plain != "a":
         return Column(position, name, "wavelength", unit_alone)
     percent = plain.startswith(("%", "percent ")) or plain.endswith("%")
@@ -125,7 +170,7 @@ def _column(position: int, name: str, role: str, written: str | None, *, bracket
         return Column(position, name, base, unit, polarisation)
     if base in ("foreign", *COUNTS):
         return Column(position, name, base if bracketed else "other")
-    known = _UNIT_OF.get(base, units.signal_unit)(written)
+    known = _UNIT_OF.get(base, signal_unit)(written)
     if known:
         return Column(position, name, base, known, polarisation)
     if base in ("intensity", "counts"):  # arbitrary units are what these are for
@@ -160,7 +205,7 @@ def is_unit_row(names: Sequence[str]) -> bool:
     """Return True for a line of units only, as some programs write below the names (`nm,%`, `[nm];[%]`)."""
     plain = [name.strip("[]() ").lower() for name in names]
     return bool(plain) and all(
-        units.wavelength_unit(name) or units.signal_unit(name) or name in _OTHER_UNITS for name in plain
+        wavelength_unit(name) or signal_unit(name) or name in _OTHER_UNITS for name in plain
     )
 
 
@@ -197,3 +242,63 @@ def unknown_unit(column: Column) -> str:
 def listed(columns: Sequence[Column]) -> str:
     """Return the names of columns, for a message."""
     return ", ".join(repr(column.name) for column in columns)
+
+
+@dataclass(frozen=True)
+class Statement:
+    """A declared axis or quantity: the column that its words describe, and the line that declares it.
+
+    For a quantity that is neither R nor T the column has the role "foreign".
+    """
+
+    column: Column
+    line: int
+
+
+@dataclass(frozen=True)
+class Declared:
+    """Axis, signal, angle of incidence (degrees), polarisation and facts (pairs of a key and a value) that a
+    file declares; None where it does not."""
+
+    axis: Statement | None = None
+    signal: Statement | None = None
+    facts: tuple[tuple[str, str], ...] = ()
+    angle: float | None = None
+    polarisation: str | None = None
+
+
+NOTHING_DECLARED = Declared()
+
+
+def declarations(lines: Sequence[Line]) -> Declared:
+    """Return what the lines above the rows of a table declare; the first line of a kind counts.
+
+    >>> declarations([Line(1, "Y-axis mode: %T", "")]).signal.column.unit
+    'percent'
+    """
+    axis = signal = angle = polarisation = None
+    facts: dict[str, str] = {}
+    for line in lines:
+        entry = _ENTRY.fullmatch(line.text)
+        if entry is None or not entry["value"]:
+            continue
+        key, value = entry["key"].strip().lower(), entry["value"]
+        column = recognise(value)
+        if _AXIS.fullmatch(key) and column.role == "wavelength" and column.unit:
+            axis = axis or Statement(column, line.number)
+        elif _AXIS.fullmatch(key) and _NO_WAVELENGTH.match(value):
+            axis = axis or Statement(Column(0, value, "wavelength", unknown_unit=value), line.number)
+        elif _SIGNAL.fullmatch(key) and column.role in ("R", "T"):
+            signal = signal or Statement(column, line.number)
+        elif _SIGNAL.fullmatch(key) and (column.role == "foreign" or _FOREIGN.match(value)):
+            signal = signal or Statement(Column(0, value, "foreign"), line.number)
+        elif _ANGLE.fullmatch(key) and (degrees := _DEGREES.fullmatch(value)):
+            angle = float(degrees[1].replace(",", ".")) if angle is None else angle
+        elif _POLARISATION.fullmatch(key):
+            found = (name for name, words in _POLARISED.items() if words.fullmatch(value.lower()))
+            polarisation = polarisation or next(found, None)
+        else:
+            fact = next((name for name, words in _FACTS.items() if re.fullmatch(words, key)), None)
+            if fact:
+                facts.setdefault(fact, value)
+    return Declared(axis, signal, tuple(facts.items()), angle, polarisation)

@@ -13,8 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from pellicle.data.tabular.cells import DELIMITERS, SELECTED, ArrayCells, TextCells
-from pellicle.data.tabular.columns import is_header, is_unit_row, recognise_all
-from pellicle.data.tabular.declarations import NOTHING_DECLARED, Declared, declarations
+from pellicle.data.tabular.columns import (
+    NOTHING_DECLARED,
+    Declared,
+    declarations,
+    is_header,
+    is_unit_row,
+    recognise_all,
+)
 from pellicle.data.tabular.text import Line, TextFile, is_number, split
 from pellicle.errors import DataError
 
