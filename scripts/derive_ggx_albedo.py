@@ -1,4 +1,4 @@
-"""Fit the polynomial of `pellicle.brdf.multiple_scattering`: light that one reflection by GGX facets loses.
+"""Fit the polynomial of `pellicle.brdf.microfacet`: light that one reflection by GGX facets loses.
 
 Run `python scripts/derive_ggx_albedo.py`; it prints the coefficients and the largest error of the fit. The
 albedo is an average over visible normals (E. Heitz, JCGT 7(4), 2018) of mirror-like facets with Smith's

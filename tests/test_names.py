@@ -15,7 +15,7 @@ import pytest
 
 import pellicle as pl
 from pellicle.dispersion import effective_medium, empirical, oscillators, spline
-from pellicle.dispersion.cody_lorentz import CodyLorentz
+from pellicle.dispersion.oscillators import CodyLorentz
 
 NAMESPACES = ("dispersion", "fitting", "mixing", "priors", "profile")
 PAGES = (Path(__file__).parents[1] / "docs" / "reference").glob("*.md")

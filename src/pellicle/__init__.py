@@ -54,9 +54,9 @@ if TYPE_CHECKING:
     from pellicle.scene.layers import Layer as Layer
     from pellicle.scene.layers import Plate as Plate
     from pellicle.scene.layers import Substrate as Substrate
+    from pellicle.scene.layers import Uncertainty as Uncertainty
     from pellicle.scene.layers import medium as medium
     from pellicle.scene.surface import Surface as Surface
-    from pellicle.scene.uncertainty import Uncertainty as Uncertainty
     from pellicle.simulation.brdf import Directions as Directions
     from pellicle.simulation.depth import absorptance as absorptance
     from pellicle.simulation.depth import field as field
@@ -106,8 +106,7 @@ _NAMES = {
     "pellicle.scene.free": ("Free",),
     "pellicle.scene.graded": ("Graded",),
     "pellicle.scene.instrument": ("Instrument",),
-    "pellicle.scene.uncertainty": ("Uncertainty",),
-    "pellicle.scene.layers": ("Interface", "Layer", "Plate", "Substrate", "medium"),
+    "pellicle.scene.layers": ("Interface", "Layer", "Plate", "Substrate", "Uncertainty", "medium"),
     "pellicle.scene.surface": ("Surface",),
     "pellicle.simulation.depth": ("absorptance", "field"),
     "pellicle.simulation.functions": ("ellipsometry", "reflectance", "refractive_index", "transmittance"),

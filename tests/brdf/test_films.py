@@ -13,8 +13,7 @@ import tmm
 from pellicle.brdf import blinn_phong_film, film_colour, lobes
 from pellicle.brdf.albedo import directional_albedo
 from pellicle.brdf.directions import cosine_to_half, direction
-from pellicle.brdf.models import MODELS, RGB, model
-from pellicle.brdf.presets import PRESETS
+from pellicle.brdf.models import MODELS, PRESETS, RGB, model
 
 RNG = np.random.default_rng(2)
 N = 60

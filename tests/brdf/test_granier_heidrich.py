@@ -11,8 +11,7 @@ import pytest
 from pellicle.brdf import granier_heidrich as gh
 from pellicle.brdf.albedo import directional_albedo, energy_warning, max_albedo
 from pellicle.brdf.directions import direction
-from pellicle.brdf.models import model
-from pellicle.brdf.presets import PRESETS
+from pellicle.brdf.models import PRESETS, model
 
 RNG = np.random.default_rng(5)
 N = 40
@@ -87,11 +86,6 @@ def test_diffuse_reflectance_is_the_average_of_schlick(n):
     average = mpmath.quad(lambda c: 2 * c * (f + (1 - f) * (1 - c) ** 5), [0, 1])
     assert float(gh.diffuse_reflectance(n)) == pytest.approx(float(average), rel=1e-14)
     assert float(gh.diffuse_reflectance(n) + gh.diffuse_transmittance(n)) == pytest.approx(1, rel=1e-14)
-
-
-def test_mean_cosine_weights_all_solid_angles_equally():
-    mean = mpmath.quad(lambda c: mpmath.sqrt(1 - (1 - c * c) / 2.25), [0, 1])
-    assert float(gh.mean_cosine_inside(1.5)) == pytest.approx(float(mean), rel=1e-13)
 
 
 def test_diffuse_part_is_eq_16():

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pellicle.optics.lens import lens_rays
-from pellicle.optics.lens_quadrature import AZIMUTHS, RINGS, Film, chosen_rays
+from pellicle.optics.lens import AZIMUTHS, RINGS, Film, chosen_rays, lens_rays
 
 from .lens_reference import muellers, permittivity
 

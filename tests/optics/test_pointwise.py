@@ -7,8 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from pellicle.optics.hoisting import pointwise
 from pellicle.optics.pair import Pair
-from pellicle.optics.pointwise import pointwise
 
 AT = np.linspace(1.0, 2.0, 5)
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from pellicle.scene.uncertainty import Uncertainty
+from pellicle.scene.layers import Uncertainty
 
 LAYER = '[[scene.layer]]\nmaterial = "SiO2"\nthickness = { lower = 10, upper = 3000 }\n'
 BASE = f'[scene]\nsubstrate = "Si"\n{LAYER}'

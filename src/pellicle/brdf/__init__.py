@@ -7,6 +7,6 @@ pure function of its parameters and two directions.
 from pellicle.brdf.albedo import directional_albedo as directional_albedo
 from pellicle.brdf.directions import direction as direction
 from pellicle.brdf.models import MODELS as MODELS
+from pellicle.brdf.models import PRESETS as PRESETS
 from pellicle.brdf.models import Model as Model
 from pellicle.brdf.models import model as model
-from pellicle.brdf.presets import PRESETS as PRESETS

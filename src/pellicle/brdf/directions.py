@@ -13,8 +13,6 @@ from jaxtyping import Array, Float
 
 from pellicle.optics.pair import sqrt
 
-Vectors = Float[Array, "*shape 3"]
-
 
 def direction(theta: Any, phi: Any) -> Float[Array, "... 3"]:
     """Return the unit vector at polar angle `theta` from the normal and azimuth `phi`, both in degrees.
@@ -60,24 +58,8 @@ def reflect(v: Any, normal: Any) -> Float[Array, "... 3"]:
 
 def cosine_inside(cosine: Any, index: Any) -> Float[Array, "..."]:
     """Return cos θ₁ = √(1 − (1 − cos² θ₀)/n²) in a medium of relative index n; 0 in total reflection."""
-    return sqrt(jnp.maximum(_cosine_square_inside(cosine, index), 0.0))
-
-
-def _cosine_square_inside(cosine: Any, index: Any) -> Any:
     inverse = 1 / (index * index)
-    return 1 - inverse + inverse * cosine * cosine
-
-
-def refract(v: Any, normal: Any, index: Any) -> Float[Array, "... 3"]:
-    """Return the direction −(v − ⟨v, n⟩n)/n₁ − cos θ₁ n of light from `v`, refracted into the surface.
-
-    It points down. `index` is the relative index n₁/n₀. In total reflection there is no such direction,
-    and the vector is zero.
-    """
-    cosine = dot(v, normal)
-    inside = cosine_inside(cosine, index)
-    down = -(v - cosine[..., None] * normal) / jnp.asarray(index)[..., None] - inside[..., None] * normal
-    return jnp.where((_cosine_square_inside(cosine, index) >= 0)[..., None], down, 0.0)
+    return sqrt(jnp.maximum(1 - inverse + inverse * cosine * cosine, 0.0))
 
 
 def half_vector(i: Any, o: Any) -> Float[Array, "... 3"]:

@@ -148,14 +148,6 @@ def diffuse_transmittance(n: Any) -> Any:
     return 80 / 21 * n / (1 + n) ** 2
 
 
-def mean_cosine_inside(n: Any) -> Any:
-    """Return the mean of ⟨t_i, −n₀⟩ over the hemisphere, eq. 14, for n > 1; eq. 15 replaces it by 1.
-
-    It weights all solid angles equally, where eq. 12 weights by the cosine.
-    """
-    return 0.25 * (jnp.log((n + 1) / (n - 1)) * (n * n - 1) + 2 * n) / n
-
-
 def layered_diffuse(parameters: Parameters, combine: Combine = interfering) -> Any:
     """Return ρ_d of eqs. 11 and 16 per channel; 1 without interference."""
     n = parameters["n"]

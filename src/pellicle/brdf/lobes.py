@@ -10,7 +10,7 @@ from typing import Any
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from pellicle.brdf.directions import half_vector
+from pellicle.brdf.directions import cosine_to_half, half_vector
 from pellicle.optics.pair import sqrt
 
 
@@ -33,14 +33,6 @@ def phong(i: Any, o: Any, exponent: Any) -> Float[Array, "..."]:
 def blinn_phong(i: Any, o: Any, exponent: Any) -> Float[Array, "..."]:
     """Return ⟨n, h⟩₊^e, as published: 1 at the peak (J. F. Blinn, SIGGRAPH 1977)."""
     return power(half_vector(i, o)[..., 2], exponent)
-
-
-def normalisation(exponent: Any) -> Any:
-    """Return (e + 2)/2π, which makes ∫ cos^e θ cos θ dω over the hemisphere 1.
-
-    **Source:** E. Lafortune and Y. Willems 1994.
-    """
-    return (exponent + 2) / (2 * jnp.pi)
 
 
 def ggx(h: Any, alpha: Any) -> Float[Array, "..."]:
@@ -78,3 +70,19 @@ def smith(i: Any, o: Any, alpha: Any) -> Float[Array, "..."]:
 def microfacets(i: Any, o: Any, alpha: Any) -> Float[Array, "..."]:
     """Return D G₂/(4⟨i, n⟩⟨o, n⟩) in 1/sr, the BRDF of mirror-like GGX facets."""
     return ggx(half_vector(i, o), alpha) * smith(i, o, alpha)
+
+
+def two_lobes(parameters: Any, i: Any, o: Any) -> Any:
+    """BRDF (samples, channels) of a diffuse part and two lobes of GGX microfacets with Schlick's Fresnel.
+
+    Each part has its own colour: `lobe_1`, `lobe_2` and `diffuse` are (channels,); `roughness_1`,
+    `roughness_2` and `normal`, the reflectance at normal incidence, are numbers. `i` and `o` are unit vectors
+    (samples, 3).
+    """
+    edge = (1 - cosine_to_half(i, o)) ** 5
+    fresnel = parameters["normal"] + (1 - parameters["normal"]) * edge
+    rough, smooth = (
+        parameters[f"lobe_{k}"] * (microfacets(i, o, parameters[f"roughness_{k}"]) * fresnel)[:, None]
+        for k in (1, 2)
+    )
+    return rough + smooth + parameters["diffuse"] + jnp.zeros_like(i[:, :1])

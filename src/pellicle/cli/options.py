@@ -23,8 +23,7 @@ def scene_from_flags(flags: SceneFlags, reading: ReadingFlags) -> tuple[Scene, l
     from pellicle.scene.film import Scene
     from pellicle.scene.free import Free
     from pellicle.scene.instrument import Instrument
-    from pellicle.scene.layers import SCATTERING_BACKS, Layer, Substrate
-    from pellicle.scene.uncertainty import Uncertainty
+    from pellicle.scene.layers import SCATTERING_BACKS, Layer, Substrate, Uncertainty
 
     if flags.layer is None or flags.substrate is None:
         missing = "--layer" if flags.layer is None else "--substrate"

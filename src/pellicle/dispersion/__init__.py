@@ -7,7 +7,6 @@
 from pellicle.dispersion.anisotropic import Anisotropic as Anisotropic
 from pellicle.dispersion.base import HC as HC
 from pellicle.dispersion.base import AbstractDispersion as AbstractDispersion
-from pellicle.dispersion.cody_lorentz import CodyLorentz as CodyLorentz
 from pellicle.dispersion.effective_medium import Bruggeman as Bruggeman
 from pellicle.dispersion.effective_medium import Linear as Linear
 from pellicle.dispersion.effective_medium import Looyenga as Looyenga
@@ -20,6 +19,7 @@ from pellicle.dispersion.empirical import Shifted as Shifted
 from pellicle.dispersion.empirical import Table as Table
 from pellicle.dispersion.empirical import WithExtinction as WithExtinction
 from pellicle.dispersion.oscillators import AbstractOscillator as AbstractOscillator
+from pellicle.dispersion.oscillators import CodyLorentz as CodyLorentz
 from pellicle.dispersion.oscillators import Drude as Drude
 from pellicle.dispersion.oscillators import Gaussian as Gaussian
 from pellicle.dispersion.oscillators import Lorentz as Lorentz

@@ -12,8 +12,8 @@ from typing import Any, final
 import jax
 import numpy as np
 
+from pellicle.dispersion.anisotropic import require_isotropic
 from pellicle.dispersion.base import AbstractDispersion, bounds_of
-from pellicle.dispersion.principal_media import require_isotropic
 from pellicle.optics import pair
 from pellicle.optics.array_namespace import namespace
 from pellicle.optics.pair import Number, Pair, abs2, imag, is_real, real, times_i

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pellicle.dispersion.principal_media import mixes_polarisations
+from pellicle.dispersion.anisotropic import mixes_polarisations
 from pellicle.effects.anisotropy import scene_media
 from pellicle.effects.bounds import (
     largest_index,

@@ -8,9 +8,9 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
+from pellicle.dispersion.anisotropic import isotropic_in_plane, principal_media
 from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.dispersion.empirical import Tabulated
-from pellicle.dispersion.principal_media import isotropic_in_plane, principal_media
 from pellicle.optics import interface, orders
 from pellicle.optics.pair import Number, abs2, imag, real
 from pellicle.scene.film import Scene, groups

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pellicle.dispersion.anisotropic import Anisotropic
-from pellicle.dispersion.principal_media import mixes_polarisations, principal_media
+from pellicle.dispersion.anisotropic import Anisotropic, mixes_polarisations, principal_media
 from pellicle.effects.anisotropy import scene_media
 from pellicle.effects.bounds import (
     largest_index,
@@ -19,7 +18,7 @@ from pellicle.effects.bounds import (
 )
 from pellicle.forward_model.plan import GENERAL, Plan, Row
 from pellicle.optics import quadrature
-from pellicle.optics.lens_quadrature import Film, chosen_rays
+from pellicle.optics.lens import Film, chosen_rays
 from pellicle.scene.film import Scene, coherent_layers
 from pellicle.scene.free import Free
 

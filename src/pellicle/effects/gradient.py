@@ -16,8 +16,7 @@ from pellicle.dispersion.base import known_index
 from pellicle.dispersion.empirical import Scaled, Tabulated
 from pellicle.effects.bounds import least_ambient, normal_incidence, upper
 from pellicle.forward_model.plan import Row
-from pellicle.optics.graded_stack import stack_response
-from pellicle.optics.gradient import Gradient, gauss_points
+from pellicle.optics.gradient import Gradient, gauss_points, stack_response
 from pellicle.optics.pair import imag, real
 from pellicle.scene.film import Scene, groups, is_graded, with_wavelength
 from pellicle.scene.free import free_leaves, insert, is_free, start_values

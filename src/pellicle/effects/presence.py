@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from pellicle.dispersion.anisotropic import isotropic_in_plane, mixes_polarisations, principal_media
 from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.dispersion.empirical import Constant
-from pellicle.dispersion.principal_media import isotropic_in_plane, mixes_polarisations, principal_media
 from pellicle.effects.anisotropy import scene_media
 from pellicle.effects.bounds import normal_incidence, upper
 from pellicle.forward_model.plan import Row

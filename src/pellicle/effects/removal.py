@@ -16,10 +16,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.dispersion.anisotropic import Anisotropic
+from pellicle.dispersion.anisotropic import Anisotropic, mean_medium
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.empirical import Constant
-from pellicle.dispersion.principal_media import mean_medium
 from pellicle.optics.pair import parts, real
 from pellicle.scene.film import Scene
 from pellicle.scene.free import free_leaves, is_free

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from pellicle.dispersion.principal_media import principal_media
-from pellicle.optics.layout import stack_rows
+from pellicle.dispersion.anisotropic import principal_media
+from pellicle.optics.hoisting import stack_rows
 from pellicle.scene.film import Scene
 from pellicle.scene.free import free_leaves, insert
 from pellicle.scene.layers import Interface

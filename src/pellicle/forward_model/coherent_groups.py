@@ -11,10 +11,9 @@ import jax.numpy as jnp
 
 from pellicle.forward_model.plan import Plan
 from pellicle.optics import coherent, interface, orders, plate, response
-from pellicle.optics.anisotropy import Principal, mixes_polarisations
+from pellicle.optics.anisotropy import Principal, each_index, mixes_polarisations, seen_by
 from pellicle.optics.gradient import Gradient, gauss_points
 from pellicle.optics.pair import Number, imag, real
-from pellicle.optics.principal_axes import each_index, seen_by
 from pellicle.scene.film import Group, Scene, groups, thickness_spread
 from pellicle.scene.graded import Graded
 from pellicle.scene.layers import Layer, Plate

@@ -26,9 +26,8 @@ from pellicle.forward_model.instrument import Intensities
 from pellicle.forward_model.plan import GENERAL, Plan
 from pellicle.materials import Material, materials_in
 from pellicle.optics import ellipsometry, plate
-from pellicle.optics.layout import stack_rows
+from pellicle.optics.hoisting import pointwise, stack_rows
 from pellicle.optics.lens import Turn
-from pellicle.optics.pointwise import pointwise
 from pellicle.scene.film import ELLIPSOMETRY, Scene, media, thickness_spread, turned
 from pellicle.scene.free import free_leaves
 from pellicle.scene.layers import Layer

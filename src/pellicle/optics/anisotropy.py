@@ -6,10 +6,16 @@ symmetric: no magneto-optical effects and no optical activity.
 
 A medium of optics is one of four types, known when the program is traced: a number (isotropic), `Principal`
 (axes along the laboratory axes: s and p stay apart), `Uniaxial` and `Tensor` (any orientation: s and p mix).
+
+**Principal axes along those of the laboratory.** The electric field of s waves is along y: to them the medium
+is isotropic, of index n_y. p waves have q² = (n_x/n_z)² (n_z² − a²), and n_x² in place of n² in the boundary
+condition. So the formulas of isotropic media serve, one polarisation at a time; a = n₀ sin θ₀ (R. M. A. Azzam
+and N. M. Bashara, Ellipsometry and Polarized Light (North-Holland, 1977), section 4.7.3).
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple, TypeAlias
 
 from pellicle.optics.array_namespace import namespace
@@ -128,3 +134,26 @@ def birefringence(medium: Uniaxial) -> Number:
     """Return ε_e − ε_o, without cancellation where both are nearly equal."""
     o, e = medium.ordinary, medium.extraordinary
     return (e - o) * (e + o)
+
+
+def seen_by(index: Any, polarisation: str) -> Any:
+    """Return the medium in which waves of one polarisation ("s" or "p") propagate.
+
+    To s a `Principal` is an isotropic medium of index n_y; to p it stays what it is. Isotropic media are
+    returned unchanged.
+    """
+    return index.y if polarisation == "s" and isinstance(index, Principal) else index
+
+
+def tangential_permittivity(index: Any) -> Number:
+    """Return n², of a `Principal` n_x²: the permittivity along the surface in the plane of incidence."""
+    return index.x * index.x if isinstance(index, Principal) else index * index
+
+
+def each_index(function: Callable[[Number], Any], index: Any) -> Any:
+    """Return function(index); of an anisotropic medium, the medium with the function of each number."""
+    if isinstance(index, Uniaxial):
+        return Uniaxial(function(index.ordinary), function(index.extraordinary), index.axis)
+    if isinstance(index, Principal | Tensor):
+        return type(index)(*map(function, index))
+    return function(index)

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from pellicle.optics.anisotropy import Principal, mixes_polarisations
+from pellicle.optics.anisotropy import Principal, mixes_polarisations, seen_by
 from pellicle.optics.few_layers import FEW, few_layers
 from pellicle.optics.film import film
 from pellicle.optics.gradient import is_graded
 from pellicle.optics.pair import Number
-from pellicle.optics.principal_axes import seen_by
 from pellicle.optics.response import Response
 from pellicle.optics.stack import stack
 

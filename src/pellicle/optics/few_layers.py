@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from pellicle.optics.anisotropy import tangential_permittivity
 from pellicle.optics.characteristic import matrix_elements, propagating_elements
 from pellicle.optics.interface import (
     equal_media,
@@ -23,7 +24,6 @@ from pellicle.optics.interface import (
     zero_where,
 )
 from pellicle.optics.pair import Number, abs2, is_real, times_i
-from pellicle.optics.principal_axes import tangential_permittivity
 from pellicle.optics.response import Amplitudes, Response
 
 FEW = 3

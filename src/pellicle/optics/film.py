@@ -15,6 +15,7 @@ import jax
 import jax.numpy as jnp
 from jax.custom_derivatives import SymbolicZero
 
+from pellicle.optics.anisotropy import tangential_permittivity
 from pellicle.optics.characteristic import (
     element_slopes,
     half_expm1,
@@ -35,7 +36,6 @@ from pellicle.optics.interface import (
     zero_where,
 )
 from pellicle.optics.pair import Number, abs2, conj, is_real, real, times_i, where
-from pellicle.optics.principal_axes import tangential_permittivity
 from pellicle.optics.response import Amplitudes, Response
 
 

@@ -1,9 +1,14 @@
-"""Loop hoisting: compute coefficients once, outside the compiled loop over a grid."""
+"""Loop hoisting: compute coefficients, rows of an array and slopes once, outside a compiled loop.
+
+Forward mode carries a tangent for each parameter of a fit through all of the optics. But between the
+parameters and a signal stand a few numbers at each wavelength: the indices and phases of the layers. So
+`pointwise` computes the slopes in these once, and a tangent is a sum of products with them.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -87,3 +92,51 @@ def not_inlined(function: Callable[..., Any], *arguments: Any) -> Any:
 
     with set_xla_metadata(inlineable="false"):
         return jax.jit(inside)(*arguments)
+
+
+def stack_rows(rows: Sequence[Any]) -> Any:
+    """Stack arrays of one shape along a new first axis, as `jnp.stack` does, computing each once.
+
+    XLA's CPU backend fuses all that comes before a `stack` into one scalar loop and computes it again for
+    every row; rows that are whole simulations, nested over polarisations and Stokes sums, multiply. In a fit
+    of Ψ and Δ at five angles the scan of 1056 candidates took 61.8 s with `stack` and 1.35 s with this.
+    """
+    rows = jnp.broadcast_arrays(*rows)
+    return jnp.concatenate([row.reshape(-1) for row in rows]).reshape(len(rows), *rows[0].shape)
+
+
+@partial(jax.custom_jvp, nondiff_argnums=(0,))
+def pointwise(function: Callable[[Any], Any], numbers: Any) -> Any:
+    """Return function(numbers), differentiated by its slopes in those arrays of `numbers` that vary.
+
+    **Arguments:** `function` returns a pytree of arrays and acts along all common axes element by element;
+    `numbers` is a pytree of real arrays, which broadcast against each other.
+    """
+    return function(numbers)
+
+
+@partial(pointwise.defjvp, symbolic_zeros=True)
+def _pointwise_slope(function: Callable[[Any], Any], primal: Any, tangent: Any) -> tuple[Any, Any]:
+    leaves, structure = jax.tree.flatten(primal[0])
+    tangents = jax.tree.leaves(tangent[0], is_leaf=lambda x: isinstance(x, SymbolicZero))
+    varying = [i for i, t in enumerate(tangents) if not isinstance(t, SymbolicZero)]
+
+    if not varying:
+        value = function(primal[0])
+        return value, jax.tree.map(jnp.zeros_like, value)
+
+    def value_and_slopes(*leaves: Any) -> Any:
+        def along(i: int) -> Any:
+            of_one = lambda x: function(structure.unflatten([*leaves[:i], x, *leaves[i + 1 :]]))  # noqa: E731
+            return jax.jvp(of_one, (leaves[i],), (jnp.ones_like(leaves[i]),))
+
+        values, slopes = zip(*(along(i) for i in varying), strict=True)
+        return values[0], slopes
+
+    # compiled apart: else the slopes are computed again for each parameter
+    value, slopes = not_inlined(value_and_slopes, *leaves)
+
+    def change(*slopes: Any) -> Any:
+        return sum(slope * tangents[i] for i, slope in zip(varying, slopes, strict=True))
+
+    return value, jax.tree.map(change, *slopes)

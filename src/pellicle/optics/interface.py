@@ -18,9 +18,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 
-from pellicle.optics.anisotropy import Principal
+from pellicle.optics.anisotropy import Principal, each_index, tangential_permittivity
 from pellicle.optics.pair import Number, Pair, abs2, conj, is_real, real, sqrt, where
-from pellicle.optics.principal_axes import each_index, tangential_permittivity
 
 _NUMBERS = int | float | complex | np.ndarray | np.generic | jax.Array
 

@@ -17,10 +17,10 @@ from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
+from pellicle.optics.anisotropy import seen_by, tangential_permittivity
 from pellicle.optics.elementary import sincos
 from pellicle.optics.interface import fresnel, incident_factor, normal, normal_flux, transverse
 from pellicle.optics.pair import Number, Pair, abs2, conj, imag, real
-from pellicle.optics.principal_axes import seen_by, tangential_permittivity
 
 Window = Callable[[int], Any]
 """m → W_m, the factor by which order m is damped."""

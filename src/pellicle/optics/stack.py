@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from pellicle.optics.anisotropy import Principal
+from pellicle.optics.anisotropy import Principal, tangential_permittivity
 from pellicle.optics.characteristic import matrix_elements
 from pellicle.optics.gradient import Gradient, coefficients, faces, is_graded
 from pellicle.optics.interface import (
@@ -31,7 +31,6 @@ from pellicle.optics.interface import (
     zero_where,
 )
 from pellicle.optics.pair import Number, Pair, abs2, is_real, to_complex
-from pellicle.optics.principal_axes import tangential_permittivity
 from pellicle.optics.response import Amplitudes, Response
 
 

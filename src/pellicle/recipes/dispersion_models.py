@@ -8,10 +8,10 @@ from typing import Any, NamedTuple, TypeAlias, TypeVar
 import equinox as eqx
 
 from pellicle.dispersion.base import AbstractDispersion, require_nonnegative
-from pellicle.dispersion.cody_lorentz import CodyLorentz
 from pellicle.dispersion.empirical import Cauchy, CauchyUrbach, Constant, Sellmeier
 from pellicle.dispersion.oscillators import (
     AbstractOscillator,
+    CodyLorentz,
     Drude,
     Gaussian,
     Lorentz,

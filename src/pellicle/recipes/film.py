@@ -30,8 +30,7 @@ from pellicle.recipes.schema import (
 from pellicle.scene.film import Light, Scene
 from pellicle.scene.free import Free, check_free_count, free_leaves
 from pellicle.scene.instrument import Instrument
-from pellicle.scene.layers import SCATTERING_BACKS, Interface, Layer, Plate, Substrate
-from pellicle.scene.uncertainty import Uncertainty
+from pellicle.scene.layers import SCATTERING_BACKS, Interface, Layer, Plate, Substrate, Uncertainty
 
 TABLES: dict[str, type[BaseModel]] = {
     "": RecipeTable,

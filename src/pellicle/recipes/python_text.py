@@ -17,9 +17,8 @@ from pellicle.scene.film import Light, Scene
 from pellicle.scene.free import Free
 from pellicle.scene.graded import Graded
 from pellicle.scene.instrument import ONE_NUMBER, Drift, Instrument
-from pellicle.scene.layers import Interface, Layer, Plate, Substrate
+from pellicle.scene.layers import Interface, Layer, Plate, Substrate, Uncertainty
 from pellicle.scene.surface import Surface
-from pellicle.scene.uncertainty import Uncertainty
 
 _PLACES = {
     "pellicle.dispersion.effective_medium": "mixing",

@@ -25,10 +25,9 @@ from pellicle.scene.film import Light, Scene, with_wavelength
 from pellicle.scene.free import Free
 from pellicle.scene.instrument import ONE_NUMBER, SLOW_OFFSET, SLOW_SCALE, Drift
 from pellicle.scene.kinds import check_scene
-from pellicle.scene.layers import Interface, Layer, Plate, Substrate
+from pellicle.scene.layers import Interface, Layer, Plate, Substrate, Uncertainty
 from pellicle.scene.layers import medium as medium_of
 from pellicle.scene.surface import Surface
-from pellicle.scene.uncertainty import Uncertainty
 
 _OF_THE_SCENE = ("index", "dispersion", "roughness", "thickness_spread", "interlayer")
 """Uncertainties that stand in [scene]; the others stand in [instrument]."""

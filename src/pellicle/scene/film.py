@@ -16,9 +16,8 @@ import jax
 import numpy as np
 
 from pellicle.data import generalised
-from pellicle.dispersion.anisotropic import Anisotropic
+from pellicle.dispersion.anisotropic import Anisotropic, principal_media, require_isotropic
 from pellicle.dispersion.base import AbstractDispersion
-from pellicle.dispersion.principal_media import principal_media, require_isotropic
 from pellicle.errors import UsageError
 from pellicle.scene.free import Free
 from pellicle.scene.graded import AtDepth, Graded, face
@@ -29,11 +28,11 @@ from pellicle.scene.layers import (
     Plate,
     Quantity,
     Substrate,
+    Uncertainty,
     absorbs,
     ambient_medium,
     divided,
 )
-from pellicle.scene.uncertainty import Uncertainty
 
 SIGNALS = ("R", "T", "psi-delta", "mueller", generalised.SIGNAL)
 ELLIPSOMETRY = ("psi-delta", "mueller", generalised.SIGNAL)

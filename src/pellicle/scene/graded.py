@@ -10,9 +10,9 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
+from pellicle.dispersion.anisotropic import require_isotropic
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.effective_medium import MIXTURES
-from pellicle.dispersion.principal_media import require_isotropic
 from pellicle.dispersion.profiles import AbstractProfile, Linear
 from pellicle.errors import UsageError
 from pellicle.optics.array_namespace import namespace

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import re
+from dataclasses import dataclass, fields
 from typing import Any, TypeAlias, final
 
 import equinox as eqx
@@ -13,16 +14,77 @@ import jax.numpy as jnp
 import numpy as np
 
 import pellicle.dispersion
-from pellicle.dispersion.anisotropic import Anisotropic
+from pellicle.dispersion.anisotropic import Anisotropic, principal_media, require_isotropic
 from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.dispersion.effective_medium import MIXTURES
 from pellicle.dispersion.empirical import Constant
-from pellicle.dispersion.principal_media import principal_media, require_isotropic
 from pellicle.errors import UsageError
 from pellicle.materials import Material, UnknownMaterial, material
 from pellicle.optics.pair import is_real
 from pellicle.scene.free import Free, insert, is_free, start_values
-from pellicle.scene.uncertainty import check_uncertainty
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """Standard uncertainties of numbers that a scene states, and usual sizes of effects that it leaves out.
+
+    The defaults are those of ordinary instruments and samples. 0 is a number that is known, or an effect that
+    is known to be absent. What a scene has as a free parameter, or describes itself, does not count.
+
+    **Arguments:**
+
+    - `wavelength`: of the wavelength scale, in nm.
+    - `bandwidth`: full width at half maximum of the spectrometer's window, in nm.
+    - `angle`: of the angle of incidence, in degrees; at normal incidence its square counts.
+    - `angle_spread`: half angle of the cone of light, in degrees.
+    - `scale`: relative, of R and T, and of a slope over the spectrum; a curvature has half of it.
+    - `offset`: of R and T, as a fraction.
+    - `psi`, `delta`: of offsets of Ψ and Δ, in degrees; `depolarisation`: lost share of polarised light.
+    - `mueller`: of an offset of each normalised element of a Mueller matrix.
+    - `index`: relative, of every given index but that of a gas; a layer and the substrate may have their own.
+    - `dispersion`: relative, of the shape of a dispersion model whose numbers are free.
+    - `roughness`: root mean square height of the upper face, in nm.
+    - `thickness_spread`: standard deviation of the thickness over the spot, relative (at most 12 nm).
+    - `interlayer`: thickness of a native oxide on a substrate of an index above 2, in nm, and twice that of a
+      mixture of the media at its face.
+
+    **Raises:** ValueError for a negative or infinite number.
+
+    >>> Uncertainty(wavelength=0.1).index
+    0.005
+    """
+
+    wavelength: float = 0.5
+    bandwidth: float = 2.0
+    angle: float = 0.05
+    angle_spread: float = 2.0
+    scale: float = 0.01
+    offset: float = 0.005
+    psi: float = 0.05
+    delta: float = 0.15
+    depolarisation: float = 0.005
+    mueller: float = 0.002
+    index: float = 0.005
+    dispersion: float = 0.003
+    roughness: float = 1.5
+    thickness_spread: float = 0.01
+    interlayer: float = 1.0
+
+    def __post_init__(self):
+        for field in fields(self):
+            check_uncertainty(field.name, getattr(self, field.name))
+
+    @classmethod
+    def none(cls) -> Uncertainty:
+        """Everything stated is exact, and nothing else is there: errors are those of noise and residuals."""
+        return cls(**{field.name: 0.0 for field in fields(cls)})
+
+
+def check_uncertainty(name: str, value: float | None) -> None:
+    """Raise ValueError for a negative or infinite uncertainty."""
+    if value is not None and not 0 <= value < math.inf:
+        raise ValueError(f"the uncertainty of `{name}` must be finite and not negative, got {value:g}")
+
 
 SCATTERING_BACKS = ("rough", "taped")
 """Words of recipes and flags for a back face that returns no light to the detector."""

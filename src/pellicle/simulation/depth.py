@@ -60,7 +60,7 @@ def absorptance(
     is proportional to k and has all digits.
 
     **Source:** Byrnes, arXiv:1603.02720, section 4; Pettersson, Roman and Inganäs, J. Appl. Phys. 86, 487
-    (1999). The integrals over each layer are in closed form (`pellicle.optics.layer_integrals`).
+    (1999). The integrals over each layer are in closed form (`pellicle.optics.absorption`).
 
     ```python
     >>> pl.absorptance(550.0, [100.0, 30.0], [1.46, 0.4 + 2.5j], 1.52).round(4).tolist()

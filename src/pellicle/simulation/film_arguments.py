@@ -10,8 +10,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 
+from pellicle.dispersion.anisotropic import principal_media
 from pellicle.dispersion.base import AbstractDispersion
-from pellicle.dispersion.principal_media import principal_media
 from pellicle.errors import UsageError
 from pellicle.optics import interface
 from pellicle.optics.anisotropy import is_anisotropic

@@ -16,8 +16,7 @@ from pellicle.colour import FilmColourTable, integration_bands, sensor
 from pellicle.colour.observers import Sensor
 from pellicle.dispersion.empirical import Table
 from pellicle.scene.free import Free
-from pellicle.scene.surface import INDICES, Surface
-from pellicle.scene.surface_media import index_numbers
+from pellicle.scene.surface import INDICES, Surface, index_numbers
 from pellicle.simulation.colours import BANDS
 from pellicle.simulation.environment import EDGE, Environment, studio
 from pellicle.simulation.film_sphere import to_srgb

@@ -20,7 +20,7 @@ import pytest
 import pellicle as pl
 from pellicle.fitting.film.problem import make
 from pellicle.fitting.film.targets import measured
-from pellicle.optics.layout import stack_rows
+from pellicle.optics.hoisting import stack_rows
 
 CANDIDATES, POINTS = 16, 64
 FREE = {"parameter", "constant", "broadcast", "bitcast", "copy", "reshape", "slice", "transpose", "tuple"}

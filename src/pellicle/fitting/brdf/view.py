@@ -10,8 +10,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from pellicle.brdf.directions import direction
+from pellicle.brdf.lobes import two_lobes
 from pellicle.brdf.models import Evaluate, model
-from pellicle.brdf.two_lobes import two_lobes
 from pellicle.data.brdf_samples import DARKEST, BrdfSamples
 from pellicle.effects.surface_plan import evaluation, exact
 from pellicle.fitting.brdf.residuals import RESIDUALS, slope

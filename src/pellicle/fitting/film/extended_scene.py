@@ -10,9 +10,8 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
-from pellicle.dispersion.anisotropic import Anisotropic
+from pellicle.dispersion.anisotropic import Anisotropic, each_principal, ordinary_index
 from pellicle.dispersion.empirical import Constant, Scaled, Tabulated
-from pellicle.dispersion.principal_media import each_principal, ordinary_index
 from pellicle.effects.anisotropy import computes_roughness, scene_media
 from pellicle.effects.film_plan import exact
 from pellicle.fitting.film.colour_view import ColourForm, ColoursView

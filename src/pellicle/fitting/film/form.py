@@ -16,8 +16,7 @@ from pellicle.fitting.program_cache import kept
 from pellicle.fitting.reported_layer import linearised
 from pellicle.forward_model.film_signal import build, depolarises
 from pellicle.forward_model.plan import Plan
-from pellicle.optics.hoisting import compute_once
-from pellicle.optics.layout import stack_rows
+from pellicle.optics.hoisting import compute_once, stack_rows
 from pellicle.scene.film import Scene
 from pellicle.scene.free import insert
 

@@ -18,8 +18,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pellicle.dispersion.anisotropic import ordinary_index
 from pellicle.dispersion.base import known_index
-from pellicle.dispersion.principal_media import ordinary_index
 from pellicle.fitting.film.colour_view import ColoursView
 from pellicle.fitting.film.view import SpectrumView
 from pellicle.fitting.noise import local_noise

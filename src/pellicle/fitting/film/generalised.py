@@ -13,7 +13,7 @@ from jaxtyping import Float
 
 from pellicle.fitting.discrepancy import Effect
 from pellicle.fitting.problem import NoiseGroup
-from pellicle.scene.uncertainty import Uncertainty
+from pellicle.scene.layers import Uncertainty
 
 CHANNELS = 3
 """N, C and S."""

@@ -10,8 +10,14 @@ import jax
 import numpy as np
 
 from pellicle.dispersion.base import AbstractDispersion
-from pellicle.dispersion.cody_lorentz import CodyLorentz
-from pellicle.dispersion.oscillators import AbstractOscillator, Gaussian, Lorentz, Oscillators, TaucLorentz
+from pellicle.dispersion.oscillators import (
+    AbstractOscillator,
+    CodyLorentz,
+    Gaussian,
+    Lorentz,
+    Oscillators,
+    TaucLorentz,
+)
 from pellicle.dispersion.parameter_names import ParameterLocation, locate_parameter
 from pellicle.dispersion.profiles import Spline as FreeProfile
 from pellicle.dispersion.spline import Spline
@@ -20,8 +26,7 @@ from pellicle.fitting.parameter import Parameter
 from pellicle.scene.content import remembered
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free, free_leaves, insert, is_free
-from pellicle.scene.layers import Layer
-from pellicle.scene.uncertainty import Uncertainty
+from pellicle.scene.layers import Layer, Uncertainty
 
 _WIDTHS = {"bandwidth": "nm", "thickness_spread": "nm", "roughness": "nm", "angle_spread": "deg"}
 _UNITS = {

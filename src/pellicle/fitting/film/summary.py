@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pellicle.dispersion.anisotropic import ordinary_index
 from pellicle.dispersion.empirical import Shifted
-from pellicle.dispersion.principal_media import ordinary_index
 from pellicle.fitting.film import fringes
 from pellicle.fitting.film.parameters import fixed_numbers, thickness_name
 from pellicle.fitting.film.problem import shortest_wavelength

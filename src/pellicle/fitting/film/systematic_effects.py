@@ -20,8 +20,7 @@ from pellicle.optics.orders import FWHM
 from pellicle.scene.film import Scene
 from pellicle.scene.free import is_free
 from pellicle.scene.instrument import Drift
-from pellicle.scene.layers import Layer
-from pellicle.scene.uncertainty import Uncertainty
+from pellicle.scene.layers import Layer, Uncertainty
 
 _STEP = 1e-2
 """Finite step of a linear effect, in standard uncertainties: on a thick film a whole one is not linear."""

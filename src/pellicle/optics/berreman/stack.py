@@ -20,7 +20,7 @@ import jax.numpy as jnp
 
 from pellicle.optics.anisotropy import Medium, Tensor, Uniaxial, mixes_polarisations, tensor
 from pellicle.optics.berreman import aligned, biaxial, uniaxial
-from pellicle.optics.berreman.delta import delta, half_space
+from pellicle.optics.berreman.biaxial import delta, downward_pair, half_space
 from pellicle.optics.berreman.matrices import (
     Elements,
     elements,
@@ -33,7 +33,6 @@ from pellicle.optics.berreman.matrices import (
     unstacked,
 )
 from pellicle.optics.berreman.propagation import Propagation
-from pellicle.optics.berreman.quartic import downward_pair
 from pellicle.optics.berreman.slices import sliced
 from pellicle.optics.hoisting import stored
 from pellicle.optics.interface import Inside, transverse
