@@ -2,14 +2,14 @@
 
 import pytest
 
-from pellicle.cli.flags import ReadingFlags, SceneFlags
-from pellicle.cli.options import scene_from_flags
+from pellicle.cli.flags import SceneFlags
+from pellicle.data.options import FileOptions
 from pellicle.errors import UsageError
 
 
 def substrate(signal: str = "R", **flags):
     given = SceneFlags(layer="SiO2", substrate="BK7", **flags)
-    return scene_from_flags(given, ReadingFlags(signal=signal))[0].substrate
+    return given.scene(FileOptions(signal=signal)).substrate
 
 
 def test_a_share_and_a_number_of_reflections():

@@ -94,7 +94,7 @@ def test_regions_of_a_photo_are_read_as_films(pellicle, photo):
         (["read", "photo.png", "--region", "1,1,9,9", "--gamma", "2"], 3, "--gamma goes with --signal rgb"),
         (["read", "c.csv", "--out", "o", "--to", "netcdf"], 2, "colours are written as csv"),
         (["read", "c.csv", "--spectrum", "b"], 3, "its films are 'a'"),
-        (["read", "c.csv", "--signal-unit", "bit"], 3, "--signal-unit"),
+        (["read", "c.csv", "--signal-unit", "bit"], 2, "--signal-unit"),
         (
             ["read", "s.csv", "--illuminant", "A", "--gamma", "2"],
             2,
@@ -174,7 +174,6 @@ def test_colours_have_no_wavelengths_of_their_own(pellicle, recipe, tmp_path, co
 
 def test_films_and_spectra_of_one_recipe(pellicle, recipe, tmp_path):
     """Each file is read by its own signal, with a camera of its own."""
-    from pellicle.cli.flags import ReadingFlags, SceneFlags
     from pellicle.cli.inputs import inputs
 
     (tmp_path / "c.csv").write_text("R,G,B\n0.2,0.3,0.4\n")
@@ -189,7 +188,7 @@ path = "s.csv"
 signal = "R"
 """
     recipe.write_text(files + RECIPE.partition("[data]")[2].partition("noise = 0.006")[2])
-    found = inputs([], str(recipe), SceneFlags(), ReadingFlags(), joint=True)
+    found = inputs([], str(recipe), joint=True)
     [colours], [spectrum] = (file.read() for file in found.files)
     assert isinstance(colours, pl.Colours)
     assert "observer 1931 under D50" in colours.notes

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from pellicle.cli.flags import ReadingFlags, SceneFlags
 from pellicle.cli.inputs import inputs
 from pellicle.errors import DataError
 from pellicle.scene.instrument import Drift
@@ -159,5 +158,5 @@ def test_the_recipe_turns_a_sample_whose_file_states_no_azimuth(tmp_path):
         "thickness = { lower = 10, upper = 500 }\n"
         "material = { ordinary = 1.6, extraordinary = 1.7, axis = [90, 0] }\n"
     )
-    (file,) = inputs([], str(recipe), SceneFlags(), ReadingFlags(), joint=False).files
+    (file,) = inputs([], str(recipe)).files
     assert (file.scene.light.angle, file.scene.light.azimuth) == (60.0, 45.0)

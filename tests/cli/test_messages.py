@@ -4,18 +4,13 @@ from __future__ import annotations
 
 import json
 import logging
-from dataclasses import fields
 
 import pytest
 
-from pellicle.cli import main
-from pellicle.cli.cube_flags import CubeFlags
-from pellicle.cli.flags import ReadingFlags, SceneFlags
-from pellicle.cli.messages import FLAGS, as_flags
+from pellicle.cli import app, main
+from pellicle.cli.messages import as_flags, flag_names
 from pellicle.cli.session import say
 from pellicle.cli.verbose import log_to_stderr
-
-COMMANDS = ("fit", "sample", "simulate", "plan", "compare", "cost", "export", "chart", "map", "read")
 
 
 @pytest.mark.parametrize(
@@ -73,12 +68,13 @@ def test_several_arguments_in_one_sentence():
     assert as_flags('give `signal="R"` or `signal="T"`') == "give --signal R or --signal T"
 
 
-def test_every_flag_of_the_table_exists_and_no_flag_of_a_scene_or_a_file_is_missing(pellicle):
-    helps = "".join(pellicle(command, "--help").out for command in COMMANDS).replace("--", " --").split()
-    assert {flag for flag in FLAGS.values() if flag not in helps} == set()
-    assert {
-        field.name for kind in (SceneFlags, ReadingFlags, CubeFlags) for field in fields(kind)
-    } <= FLAGS.keys()
+def test_every_flag_of_a_command_can_be_named_and_every_name_is_a_flag():
+    commands = [name for name in app if not name.startswith("-")]
+    arguments = [argument for name in commands for argument in app[name].assemble_argument_collection()]
+    flags = {argument.name for argument in arguments if argument.name.startswith("--")}
+    assert set(flag_names().values()) <= flags
+    positional = {"--film", "--data", "--name"}
+    assert flags - set(flag_names().values()) == positional
 
 
 def test_messages_on_stderr(monkeypatch, capsys):

@@ -70,7 +70,6 @@ def test_wrong_usage(pellicle, write):
     path = write(WIDE)
     assert pellicle("read").code == 2
     assert "csv, netcdf, nexus" in pellicle("read", path, "--to", "xlsx").err
-    assert "--loss is for a fit" in pellicle("read", path, "--loss", "huber").err
     assert "--dark needs --reference" in pellicle("read", path, "--dark", "dark.csv").err
 
 

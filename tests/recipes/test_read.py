@@ -102,8 +102,8 @@ def test_the_base_of_a_surface_is_fixed(write):
     ("angle", "said"),
     [
         ('"x"', r"data\.angle: .* a valid number"),
-        ("95", r"data\.angle: .* less than or equal to 90, got 95"),
-        ("[10, 95]", r"data\.angle\.1: .* less than or equal to 90, got 95"),
+        ("95", r"data\.angle: .* 0 to 90 degrees, got 95"),
+        ("[10, 95]", r"data\.angle: .* 0 to 90 degrees, got 95"),
         ('[10, "x"]', r"data\.angle\.1: .* a valid number, .*got 'x'"),
         ("[]", r"data\.angle: .* at least 1 item"),
     ],

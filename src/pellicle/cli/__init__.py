@@ -15,14 +15,13 @@ from pellicle.cli.cost import cost
 from pellicle.cli.demo import demo
 from pellicle.cli.explore import explore
 from pellicle.cli.export import export
-from pellicle.cli.fit import fit
+from pellicle.cli.fit import fit, sample
 from pellicle.cli.interruption import interruptible
 from pellicle.cli.map import map
 from pellicle.cli.materials import materials
 from pellicle.cli.messages import as_flags
 from pellicle.cli.plan import plan
 from pellicle.cli.read import read
-from pellicle.cli.sample import sample
 from pellicle.cli.session import abandon_stdout, say
 from pellicle.cli.simulate import simulate
 from pellicle.cli.verbose import log_to_stderr
@@ -39,19 +38,9 @@ app = App(
     print_error=True,
     result_action="return_value",
 )
-app.command(fit)
-app.command(sample)
-app.command(read)
-app.command(simulate)
-app.command(plan)
-app.command(compare)
-app.command(cost)
-app.command(chart)
-app.command(export)
-app.command(explore)
-app.command(map)
-app.command(materials)
-app.command(demo)
+COMMANDS = (fit, sample, read, simulate, plan, compare, cost, chart, export, explore, map, materials, demo)
+for function in COMMANDS:
+    app.command(function)
 app.register_install_completion_command(help="Install completion of commands and flags for this shell.")
 
 command = app.meta

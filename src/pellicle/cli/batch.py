@@ -63,10 +63,9 @@ class Batch:
     """
 
     inputs: Inputs
-    tolerance: float = 0.0
     sampler: Sampler | None = None
     out: str | None = None
-    as_json: bool = False
+    json: bool = False
     jobs: int = 1
     refit: bool = False
     verbose: bool = field(default_factory=lambda: LOG.isEnabledFor(INFO))
@@ -152,10 +151,10 @@ class Batch:
             found = repeats(self.fits)
         except UsageError as error:
             say(f"pellicle: {error}")
-            if self.as_json:
+            if self.json:
                 print(one_line(failure([file.path for file in self.inputs.files], str(error))), flush=True)
             return None
-        show(one_line(to_json(found)) if self.as_json else report(found), self.out is not None)
+        show(one_line(to_json(found)) if self.json else report(found), self.out is not None)
         if self.out is not None:
             write_repeats(self.out, found)
         return found
@@ -203,7 +202,7 @@ class Batch:
         try:
             data, scene = measurement(files, self.inputs.joint)
             if folder is not None:
-                settings = self.tolerance, self.inputs.loss, self.inputs.residual, self.sampler
+                settings = self.inputs.tolerance, self.inputs.loss, self.inputs.residual, self.sampler
                 identity = fingerprint(data, scene, settings)
                 if not self.refit and (found := earlier(folder, identity)):
                     return self._repeat(found, folder)
@@ -213,14 +212,14 @@ class Batch:
             message = error_message(error, paths)
             say(f"pellicle: {message}")
             self.records.append(failure(paths if self.inputs.joint else paths[0], message))
-            if self.as_json:
+            if self.json:
                 print(one_line(self.records[-1]), flush=True)
             return FAILED  # also where the error is one of usage: the other files go on
         record = to_json(fit, posterior)
         self.records.append(record)
         if self.inputs.repeats:
             self.fits.append(fit)
-        self._print(record, "" if self.as_json else report(fit, posterior))
+        self._print(record, "" if self.json else report(fit, posterior))
         code = CONVERGED if fit.status == "converged" else UNCLEAR
         if posterior is not None and not posterior.trusted:
             code = TOO_SHORT
@@ -241,14 +240,14 @@ class Batch:
     def _print(self, record: dict[str, Any], report: str) -> None:
         from pellicle.reporting.json_record import one_line
 
-        show(one_line(record) if self.as_json else report, self.out is not None)
+        show(one_line(record) if self.json else report, self.out is not None)
 
     def _result(
         self, data: Any, scene: Any, folder: Path | None, progress: Progress
     ) -> tuple[Fit, Posterior | None]:
         from pellicle.api.fits import fit, sample
 
-        options: dict[str, Any] = {"tolerance": self.tolerance, "residual": self.inputs.residual}
+        options: dict[str, Any] = {"tolerance": self.inputs.tolerance, "residual": self.inputs.residual}
         if self.sampler is None:
             return with_flags(fit(data, scene, loss=self.inputs.loss, progress=progress, **options)), None
         posterior = sample(data, scene, progress=progress, **self.sampler.options(folder), **options)

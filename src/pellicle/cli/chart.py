@@ -150,7 +150,7 @@ def _surface(recipe: SurfaceRecipe, out: str, light: float, environment: str) ->
 
 
 def _range(flag: str, text: str, upper: float) -> tuple[float, float]:
-    from pellicle.recipes.number_words import parse_range
+    from pellicle.data.options import parse_range
 
     low, high = parse_range(text, flag)
     if low < 0 or high > upper:

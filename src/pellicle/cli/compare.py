@@ -9,7 +9,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from pellicle.cli.batch import CONVERGED, FAILED, UNCLEAR, error_message, measurement
-from pellicle.cli.flags import OUTPUT, SCENE, ReadingFlags, SceneFlags, flag, switch
+from pellicle.cli.flags import OUTPUT, SCENE, flag, switch
 from pellicle.cli.inputs import LEAST_SQUARES, Input, Inputs, inputs
 from pellicle.cli.messages import with_flags
 from pellicle.cli.progress import Progress
@@ -54,7 +54,7 @@ def compare(
 
 
 def _inputs(data: list[str], recipe: str) -> Inputs:
-    candidate = inputs(data, recipe, SceneFlags(), ReadingFlags(), joint=False)
+    candidate = inputs(data, recipe)
     if candidate.loss != LEAST_SQUARES:
         raise DataError(f"{recipe}: a comparison needs least squares: leave the loss out")
     return candidate

@@ -7,10 +7,11 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from pellicle.cli.colours import SPACES, recipe_angles
 from pellicle.cli.progress import Progress
+from pellicle.cli.reading import recipe_angles
 from pellicle.cli.session import check_folder, say, show, start
 from pellicle.cli.wavelengths import directions, measured_scene
+from pellicle.data.options import SPACES
 from pellicle.errors import UsageError
 
 USUAL_EYE = (("observer", "1931"), ("illuminant", "D65"))

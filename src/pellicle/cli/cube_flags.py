@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Group, Parameter
 
 from pellicle.cli.flags import READING, Flags, flag
+from pellicle.data.options import parse_range
 
 if TYPE_CHECKING:
     from pellicle.data.cube import Cube
@@ -97,12 +98,11 @@ def read(path: str, flags: CubeFlags, *, free_scale: bool = False) -> Cube:
 
     Raises DataError or UsageError.
     """
-    from pellicle.cli.options import wavelength_range
     from pellicle.data.read_cube import read_cube
 
     options: dict[str, Any] = {name: value for name, value in vars(flags).items() if value is not None}
-    if flags.range is not None:
-        options["range"] = wavelength_range(flags.range)
+    if isinstance(flags.range, str):
+        options["range"] = parse_range(flags.range, "`range`")
     if isinstance(flags.white_reflectance, str):
         options["white_reflectance"] = _reflectance(flags.white_reflectance, flags)
     return read_cube(path, calibrated=False if free_scale else None, **options)

@@ -8,7 +8,6 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from pellicle.cli.batch import Batch, Sampler
-from pellicle.cli.flags import ReadingFlags, SceneFlags
 from pellicle.cli.inputs import inputs
 from pellicle.cli.session import say, start
 from pellicle.errors import install_command
@@ -57,7 +56,7 @@ def demo(
     simulate(str(recipe), out=str(data), seed=1)
     sampler, command = (None, "fit") if missing() else (Sampler(), "sample")
     say("", f"$ pellicle {command} --recipe {recipe} --out {folder / 'result'}")
-    files = inputs([], str(recipe), SceneFlags(), ReadingFlags(), joint=False)
+    files = inputs([], str(recipe))
     start()
     code = Batch(files, sampler=sampler, out=str(folder / "result")).run()
     say("", f"$ pellicle chart {recipe} --out {image} --thickness 0:600")

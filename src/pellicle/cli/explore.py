@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from pellicle.cli.flags import ReadingFlags, SceneFlags, one_or_several_angles
-from pellicle.cli.options import scene_from_flags
+from pellicle.cli.flags import OptionFlags, SceneFlags, flags_of
 from pellicle.cli.session import say, start
+from pellicle.data.options import SPACES, FileOptions
 from pellicle.errors import DataError, UsageError
 
 if TYPE_CHECKING:
@@ -19,9 +19,13 @@ if TYPE_CHECKING:
 
 DEFAULT_LAYER, DEFAULT_SUBSTRATE, DEFAULT_THICKNESS = "SiO2", "Si", "0:1000"
 """Film that is shown without a recipe and without flags."""
-_READING = ("spectrum", "columns", "wavelength_unit", "signal_unit", "range", "noise", "loss")
-"""Options of a recipe by which its data are read, beside its light."""
-_OF_ELLIPSOMETRY = ("folded", "analyser", "spot", "elements")
+_OF_SCENE = ("signal", "angle", "polarisation")
+"""Options that the light of a scene has."""
+
+
+@flags_of(FileOptions, *_OF_SCENE)
+class LightFlags(OptionFlags[FileOptions]):
+    """Flags of the light of a film without data."""
 
 
 def explore(
@@ -31,18 +35,7 @@ def explore(
     /,
     *,
     scene: Annotated[SceneFlags, Parameter(name="*")] = SceneFlags(),  # noqa: B008
-    signal: Annotated[str | None, Parameter(help="R, T, psi-delta or mueller.")] = None,
-    angle: Annotated[
-        float | list[float] | None,
-        Parameter(
-            help="Angle of incidence in degrees (0), or several: 65,70,75.",
-            metavar="DEG",
-            converter=one_or_several_angles,
-            negative="",
-            n_tokens=1,
-        ),
-    ] = None,
-    polarisation: Annotated[str | None, Parameter(help="s, p or unpolarised.")] = None,
+    light: Annotated[LightFlags | None, Parameter(name="*")] = None,
     port: Annotated[int, Parameter(help="Port of this machine (0: a free one).")] = 0,
     no_browser: Annotated[
         bool, Parameter(help="Print the address of the page and do not open it.", negative="")
@@ -54,11 +47,9 @@ def explore(
 
     Example: pellicle explore film.toml
     """
-    stated = angle if isinstance(angle, list) else [angle or 0.0]
-    if not all(0 <= each <= 90 for each in stated):
-        raise UsageError("--angle must lie in 0 to 90 degrees")
-    reading = ReadingFlags(signal=signal, angle=angle, polarisation=polarisation)
-    given = [*scene.given(), *reading.given()]
+    light = light or LightFlags()
+    reading = light.options()
+    given = [*scene.given(), *light.given()]
     if recipe is not None and given:
         raise UsageError(
             f"{', '.join(given)} and a recipe exclude each other: describe the scene in the recipe"
@@ -87,8 +78,7 @@ def explore(
 
 def _of_recipe(path: str) -> Session:
     """The session of a film's recipe, with the data of its first file."""
-    from pellicle.cli.colours import SPACES
-    from pellicle.cli.options import merged, read
+    from pellicle.cli.reading import read
     from pellicle.cli.wavelengths import wavelengths
     from pellicle.explorer.session import Session
     from pellicle.recipes import read_recipe
@@ -104,20 +94,16 @@ def _of_recipe(path: str) -> Session:
     if recipe.files and data.signal not in SPACES:
         try:
             free_scale = isinstance(scene.instrument.scale, Drift)
-            spectra = read(recipe.files[0], merged(ReadingFlags(), own), free_scale=free_scale)
+            spectra = read(recipe.files[0], FileOptions(**own.reading), free_scale=free_scale)
         except DataError as error:
             say(f"{error} (the explorer starts without data)")
     given = None if data.wavelengths is None else wavelengths(own, scene)
-    reading = {
-        name: getattr(data, name)
-        for name in (*_READING, *_OF_ELLIPSOMETRY)
-        if getattr(data, name) is not None
-    }
+    reading = {name: x for name, x in data.given().items() if name not in _OF_SCENE}
     about = {"title": title, "spectra": spectra, "reading": reading}
     return Session(scene, Path(path).parent, wavelength=given, **about)
 
 
-def _of_flags(flags: SceneFlags, reading: ReadingFlags) -> Session:
+def _of_flags(flags: SceneFlags, reading: FileOptions) -> Session:
     from dataclasses import replace
 
     from pellicle.explorer.session import Session
@@ -128,7 +114,7 @@ def _of_flags(flags: SceneFlags, reading: ReadingFlags) -> Session:
         substrate=flags.substrate or DEFAULT_SUBSTRATE,
         thickness=flags.thickness or DEFAULT_THICKNESS,
     )
-    scene, _ = scene_from_flags(film, reading)
+    scene = film.scene(reading)
     if flags.thickness is None:
         say("thickness: 0 to 1000 nm, since no --thickness was given")
     return Session(scene, title=f"{film.layer} on {film.substrate}")

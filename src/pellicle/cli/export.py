@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import fields
+from json import loads
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from pellicle.cli.flags import ReadingFlags, SceneFlags
+from pellicle.cli.flags import SceneFlags
 from pellicle.cli.session import say, start
+from pellicle.data.options import FileOptions
 from pellicle.errors import DataError, UsageError
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ def export(
     recipe: Annotated[
         str | None, Parameter(help="Recipe of a fit, where its result.json does not lead to it.")
     ] = None,
-    as_json: Annotated[bool, Parameter(name="--json", help="Print one JSON object.", negative="")] = False,
+    json: Annotated[bool, Parameter(help="Print one JSON object.", negative="")] = False,
 ) -> int:
     """Write a film as a material of a renderer, with the error of the renderer's formula.
 
@@ -56,7 +57,7 @@ def export(
     written = export_scene(
         described, to=to, path=out, numbers=numbers, thickness_map=thickness_map, layer=layer
     )
-    print(one_line({"target": to} | written.material.record()) if as_json else text(written), flush=True)
+    print(one_line({"target": to} | written.material.record()) if json else text(written), flush=True)
     say(f"{', '.join(str(path) for path in written.files)} written")
     return 0
 
@@ -86,7 +87,7 @@ def _described(film: str, recipe: str | None) -> Scene | Surface:
 def _record(path: str) -> dict[str, Any]:
     """The JSON record of a fit. Raises DataError."""
     try:
-        record = json.loads(Path(path).read_text(encoding="utf-8"))
+        record = loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({error.strerror}); check its path") from None
     except ValueError:
@@ -97,14 +98,13 @@ def _record(path: str) -> dict[str, Any]:
 
 
 def _scene_of(path: str, source: dict[str, Any] | None, recipe: str | None) -> Scene | Surface:
-    from pellicle.cli.options import scene_from_flags
     from pellicle.recipes import read_recipe
 
     source = source or {}
     if recipe is None and "flags" in source:
         known = {field.name for field in fields(SceneFlags)}
         flags = {name: value for name, value in source["flags"].items() if name in known}
-        return scene_from_flags(SceneFlags(**flags), ReadingFlags())[0]
+        return SceneFlags(**flags).scene(FileOptions())
     recipe = recipe or source.get("recipe")
     if recipe is None:
         raise UsageError(f"{path}: names no scene that was fitted: give its recipe as --recipe")

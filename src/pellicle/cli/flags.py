@@ -1,12 +1,20 @@
-"""Flags that describe a scene and the reading of files, shared by the commands that fit."""
+"""Flags of the commands, by group; those of reading and fitting follow from `data/options.py`."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import Annotated, Any
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, make_dataclass
+from math import inf
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Generic, TypeVar, get_args
 
-from cyclopts import Group, Parameter, Token
+from cyclopts import Group, Parameter
+
+from pellicle.data.options import COLOURS as OF_COLOURS
+from pellicle.data.options import CameraOptions, FileOptions, FitOptions, Option, Options
+from pellicle.errors import UsageError
+
+if TYPE_CHECKING:
+    from pellicle.scene.film import Scene
 
 SCENE = Group("Scene", sort_key=1)
 INSTRUMENT = Group("Instrument", sort_key=2)
@@ -14,6 +22,10 @@ READING = Group("Reading", sort_key=3)
 SAMPLER = Group("Sampler", sort_key=4)
 OUTPUT = Group("Output", sort_key=5)
 COLOURS = Group("Colours", sort_key=6)
+DEFAULT_THICKNESS = "1:5000"
+
+Record = TypeVar("Record", bound=Options)
+Kind = TypeVar("Kind", bound="OptionFlags")
 
 
 def flag(group: Group, help: str) -> Parameter:
@@ -26,16 +38,7 @@ def switch(group: Group, help: str) -> Parameter:
     return Parameter(group=group, help=help, negative="")
 
 
-def one_or_several_angles(_: Any, tokens: Sequence[Token]) -> float | list[float]:
-    """Convert a number, or several with commas between them."""
-    try:
-        angles = [float(word) for word in tokens[0].value.split(",")]
-    except ValueError:
-        raise ValueError(f"expected degrees such as 70, or 0,30,60, got {tokens[0].value!r}") from None
-    return angles[0] if len(angles) == 1 else angles
-
-
-def given(names: Iterable[str]) -> list[str]:
+def named(names: Iterable[str]) -> list[str]:
     """The flags of arguments: `plate_mm` is --plate-mm."""
     return [f"--{name.replace('_', '-')}" for name in names]
 
@@ -45,7 +48,72 @@ class Flags:
 
     def given(self) -> list[str]:
         """The flags that the user gave."""
-        return given(name for name, value in vars(self).items() if value is not None)
+        return named(name for name, value in vars(self).items() if value is not None)
+
+
+class OptionFlags(Flags, Generic[Record]):
+    """Base of the flags of a record of options."""
+
+    record: ClassVar[type[Options]]
+
+    def options(self) -> Record:
+        """The options that the flags give. Raises UsageError for a wrong value."""
+        values = {}
+        for name, (_, option) in self.record.declared().items():
+            value = getattr(self, name, None)
+            if value is not None:
+                value = option.parse(value, f"`{name}`") if option.parse and isinstance(value, str) else value
+                try:
+                    values[name] = option.check(value)
+                except UsageError:
+                    raise
+                except ValueError as error:
+                    raise UsageError(f"`{name}` {error}") from None
+        made: Any = self.record(**values)
+        return made
+
+
+def flags_of(record: type[Options], *names: str) -> Callable[[type[Kind]], type[Kind]]:
+    """Return a decorator that gives a class a flag for each option of a record, or for `names` of them."""
+
+    def decorate(cls: type[Kind]) -> type[Kind]:
+        declared = {name: record.declared()[name] for name in names or record.declared()}
+        made = [(name, _flag_type(*about), field(default=None)) for name, about in declared.items()]
+        space = {"record": record, "__doc__": cls.__doc__, "__module__": cls.__module__}
+        found: Any = make_dataclass(
+            cls.__name__, made, bases=(cls,), namespace=space, frozen=True, kw_only=True
+        )
+        return found
+
+    return decorate
+
+
+def _flag_type(hint: Any, option: Option) -> Any:
+    """Type of a flag: text where the option parses it, else the first type of the option."""
+    group = COLOURS if option.kinds == (OF_COLOURS,) else READING
+    kind = str if option.parse is not None else get_args(hint)[0]
+    parameter = Parameter(
+        group=group,
+        help=option.help,
+        metavar=option.metavar or None,
+        negative=None if option.negative else "",
+    )
+    return Annotated[kind | None, parameter]
+
+
+@flags_of(CameraOptions)
+class CameraFlags(OptionFlags[CameraOptions]):
+    """Flags of what sees colours; a recipe's [camera] supplies what is not given."""
+
+
+@flags_of(FileOptions)
+class FileFlags(OptionFlags[FileOptions]):
+    """Flags for reading files; a recipe's [data] and [camera] supply what is not given."""
+
+
+@flags_of(FitOptions)
+class FitFlags(OptionFlags[FitOptions]):
+    """Flags of a fit; a recipe's [data] supplies what is not given."""
 
 
 @dataclass(frozen=True)
@@ -96,112 +164,78 @@ class SceneFlags(Flags):
         flag(INSTRUMENT, "usual: errors include those of ordinary instruments and samples; or none."),
     ] = None
 
+    @property
+    def assumed(self) -> list[str]:
+        """Sentences on what the flags leave open."""
+        return [] if self.thickness else ["thickness: 1 to 5000 nm, since no --thickness was given"]
+
+    def scene(self, reading: FileOptions) -> Scene:
+        """Build the scene that the flags describe, in the light of `reading`. Raises UsageError."""
+        from pellicle.cli.reading import light
+        from pellicle.recipes import media_words as w
+        from pellicle.scene.film import Scene
+        from pellicle.scene.free import Free
+        from pellicle.scene.instrument import Instrument
+        from pellicle.scene.layers import SCATTERING_BACKS, Layer, Substrate, Uncertainty
+
+        layer, substrate = self._checked()
+        free = [item.strip() for item in (self.free or "").split(",") if item.strip()]
+        film = Layer(w.medium(layer, free), w.thickness(self.thickness or DEFAULT_THICKNESS))
+        part, lit = self.back_collected, light(reading)
+        collected = None if part is None else w.free_or_number(part, "`back_collected`", Free(0.0, 1.0))
+        if self.back in SCATTERING_BACKS:
+            back, collected = w.scattering_back(self.back, lit.signal, (collected, self.back_reflections))
+        else:
+            back = None if self.back is None else w.medium(self.back, name="`back`")
+        material = w.medium(substrate, name="`substrate`")
+        plate = {"back_collected": collected, "back_reflections": self.back_reflections}
+        bandwidth, slit = self.bandwidth, Free(0.0, 20.0, start=2.0, limits=(0.0, 50.0))
+        return Scene(
+            film,
+            Substrate(material, back, self.plate_mm or 1.0, **plate),
+            ambient=w.medium(self.ambient or "air", name="`ambient`"),
+            light=lit,
+            instrument=Instrument(
+                w.drift(self.scale or "1", "`scale`"),
+                w.drift(self.offset or "0", "`offset`"),
+                None if bandwidth is None else w.free_or_number(bandwidth, "`bandwidth`", slit),
+            ),
+            uncertainty=Uncertainty() if self.uncertainty != "none" else Uncertainty.none(),
+        )
+
+    def _checked(self) -> tuple[str, str]:
+        """Layer and substrate. Raises UsageError where one is missing, or other flags are wrong."""
+        if self.layer is None or self.substrate is None:
+            missing = "--layer" if self.layer is None else "--substrate"
+            raise UsageError(
+                f"{missing} is missing: give layer and substrate, as in "
+                "--layer SiO2 --substrate Si, or give a --recipe"
+            )
+        if self.uncertainty not in (None, "usual", "none"):
+            raise UsageError(f"--uncertainty must be usual or none, not {self.uncertainty!r}")
+        if self.plate_mm is not None and self.back is None:
+            raise UsageError("--plate-mm needs --back: which medium lies behind the plate, as in --back air")
+        if self.plate_mm is not None and not 0 < self.plate_mm < inf:
+            raise UsageError(f"--plate-mm must be a finite number above zero, got {self.plate_mm:g}")
+        return self.layer, self.substrate
+
 
 @dataclass(frozen=True)
-class CameraFlags(Flags):
-    """Flags of what sees colours; a recipe's [camera] supplies what is None."""
+class BatchFlags(Flags):
+    """Flags of the results of several files."""
 
-    observer: Annotated[str | None, flag(COLOURS, "1931 (2 degrees) or 1964 (10 degrees).")] = None
-    illuminant: Annotated[str | None, flag(COLOURS, "E, A, D50, D55, D65 or D75 (D65).")] = None
-    lamp: Annotated[str | None, flag(COLOURS, "CSV of the lamp's spectrum, for --illuminant.")] = None
-    sensitivities: Annotated[
-        str | None, flag(COLOURS, "CSV of a camera's three sensitivities (signal rgb).")
-    ] = None
-    chart: Annotated[
-        str | None, flag(COLOURS, "CSV of a photographed chart: R, G, B and reference X, Y, Z (signal rgb).")
-    ] = None
-    gamma: Annotated[float | None, flag(COLOURS, "Coding of the signal rgb: linear^(1/GAMMA) (1).")] = None
-    white_balance: Annotated[
-        str | None, flag(COLOURS, "fixed, or free for an unknown factor of each channel.")
-    ] = None
-    white: Annotated[
-        str | None, flag(COLOURS, "X,Y,WIDTH,HEIGHT of a white in the photograph, in pixels.")
-    ] = None
-    transmitted: Annotated[
-        bool | None, Parameter(group=COLOURS, help="The light has passed the film.", negative="")
-    ] = None
-
-
-@dataclass(frozen=True)
-class ReadingFlags(CameraFlags):
-    """Flags for reading files; a recipe's [data] and [camera] supply what is None."""
-
-    spectrum: Annotated[
-        str | None, flag(READING, "Name of one of several spectra or films in a file, or all.")
-    ] = None
-    signal: Annotated[
+    out: Annotated[
         str | None,
-        flag(
-            READING,
-            "R, T, psi-delta, mueller, generalised-psi-delta, srgb, rgb, xyz or lab (that of the file).",
-        ),
+        flag(OUTPUT, "Folder for report, figures and tables; an interrupted chain in it is continued."),
     ] = None
-    region: Annotated[
-        str | None,
-        flag(COLOURS, "X,Y,WIDTH,HEIGHT of a film in a photograph, in pixels; ';' between several."),
-    ] = None
-    points: Annotated[str | None, flag(COLOURS, "X,Y of a film in a photograph; ';' between several.")] = None
-    angle: Annotated[
-        float | list[float] | None,
-        Parameter(
-            group=READING,
-            help="Angle of incidence in degrees (0); 0,30,60 where regions of a photograph show one film.",
-            metavar="DEG",
-            converter=one_or_several_angles,
-            negative="",
-            n_tokens=1,
-        ),
-    ] = None
-    polarisation: Annotated[str | None, flag(READING, "s, p or unpolarised.")] = None
-    range: Annotated[
-        str | tuple[float, float] | None,
-        Parameter(group=READING, help="Wavelengths to use in nm.", metavar="LO:HI", negative="", n_tokens=1),
-    ] = None
-    noise: Annotated[
-        float | str | None,
-        Parameter(
-            group=READING,
-            help='Standard deviation of every point (degrees for psi-delta), or "2 %" of the BRDF.',
-            metavar="SIGMA",
-            negative="",
-        ),
-    ] = None
-    loss: Annotated[
-        str | None, flag(READING, "least-squares, or huber or student-t to give outliers little weight.")
-    ] = None
-    columns: Annotated[
-        str | list[str] | None,
-        Parameter(
-            group=READING, help="Names of the columns in order, _ to skip.", metavar="NAME,...", negative=""
-        ),
-    ] = None
-    wavelength_unit: Annotated[str | None, flag(READING, "nm, um, A, eV, cm-1 or THz.")] = None
-    signal_unit: Annotated[
-        str | None, flag(READING, "fraction, percent or absorbance; 8-bit or 16-bit of colours.")
-    ] = None
-    reference: Annotated[
-        str | None, flag(READING, "Raw counts of a bare reference; DATA are then raw counts too.")
-    ] = None
-    reference_material: Annotated[str | None, flag(READING, "Material of the reference (Si).")] = None
-    dark: Annotated[str | None, flag(READING, "Raw counts without light.")] = None
-    folded: Annotated[
-        bool | None,
-        Parameter(
-            group=READING,
-            help="Δ is known in 0 to 180 degrees only: cos Δ (by default where it has kinks there).",
-        ),
-    ] = None
-    analyser: Annotated[
-        float | None, flag(READING, "Analyser angle in degrees (for alpha and beta columns).")
-    ] = None
-    spot: Annotated[int | None, flag(READING, "Spot of an Accurion file, counted from 1.")] = None
-    elements: Annotated[
-        str | list[str] | None,
-        Parameter(
-            group=READING,
-            help="Elements of a Mueller matrix, or ratios ane, aps, asp, to use (all).",
-            metavar="m12,...",
-            negative="",
-            n_tokens=1,
-        ),
-    ] = None
+    json: Annotated[bool, switch(OUTPUT, "Print one JSON object a line.")] = False
+    jobs: Annotated[int, flag(OUTPUT, "Number of processes that share several files (1).")] = 1
+    refit: Annotated[
+        bool, switch(OUTPUT, "Fit all files, also those whose results an earlier run left in --out.")
+    ] = False
+
+    def checked(self) -> BatchFlags:
+        """These flags. Raises UsageError for an impossible number of processes."""
+        if self.jobs < 1:
+            raise UsageError(f"--jobs must be at least 1, got {self.jobs}")
+        return self

@@ -8,10 +8,20 @@ from functools import partial
 from logging import getLogger
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from pellicle.cli.colours import check_camera, check_words, is_of_colours, read_films, refuse_camera
-from pellicle.cli.flags import ReadingFlags, SceneFlags, given
-from pellicle.cli.options import light, merged, read, scene_from_flags, sigma, wavelength_range
+from pellicle.cli.flags import FileFlags, FitFlags, SceneFlags, named
+from pellicle.cli.reading import (
+    check_camera,
+    check_words,
+    is_of_colours,
+    light,
+    of_kind,
+    read,
+    read_films,
+    refuse_camera,
+    sigma,
+)
 from pellicle.cli.session import say
+from pellicle.data.options import BRDF, FileOptions, FitOptions
 from pellicle.errors import DataError, UsageError
 
 if TYPE_CHECKING:
@@ -26,9 +36,6 @@ if TYPE_CHECKING:
 log = getLogger(__name__)
 
 LEAST_SQUARES = "least-squares"
-_SIGNALS = ("R", "T", "psi-delta", "mueller", "generalised-psi-delta", "srgb", "rgb", "xyz", "lab")
-_FOR_SURFACES = ("columns", "noise", "signal", "loss")
-"""Reading flags that BRDF samples can be given."""
 
 
 class Input(NamedTuple):
@@ -53,10 +60,20 @@ class Inputs(NamedTuple):
 
     files: list[Input]
     joint: bool
-    loss: str = LEAST_SQUARES
+    fitting: FitOptions = FitOptions()
     residual: str | None = None
     repeats: bool = False
     described: dict[str, Any] | None = None
+
+    @property
+    def loss(self) -> str:
+        """Loss of the fits."""
+        return self.fitting.loss or LEAST_SQUARES
+
+    @property
+    def tolerance(self) -> float:
+        """Largest error of the effects that the fits leave out."""
+        return self.fitting.tolerance or 0.0
 
     @property
     def groups(self) -> list[list[Input]]:
@@ -67,36 +84,28 @@ class Inputs(NamedTuple):
 def inputs(
     files: list[str],
     recipe: str | None,
-    scene_flags: SceneFlags,
-    reading: ReadingFlags,
-    joint: bool,
+    scene_flags: SceneFlags | None = None,
+    reading_flags: FileFlags | None = None,
+    fit_flags: FitFlags | None = None,
+    joint: bool = False,
     repeats: bool | None = None,
 ) -> Inputs:
     """Combine files, recipe and flags; with `repeats` None that of the recipe is ignored.
 
     Raises UsageError or DataError where something is missing or wrong.
     """
+    scene_flags = scene_flags or SceneFlags()
+    reading = FileOptions() if reading_flags is None else reading_flags.options()
+    fitting = FitOptions() if fit_flags is None else fit_flags.options()
     if recipe is None:
         result = _by_flags(files, scene_flags, reading)
+        described: dict[str, Any] = {"flags": {n: x for n, x in vars(scene_flags).items() if x is not None}}
     else:
-        from pellicle.recipes import read_recipe
-        from pellicle.recipes.surface import SurfaceRecipe
-
-        described = read_recipe(recipe)
-        if scene_flags.given():
-            flags = ", ".join(scene_flags.given())
-            raise UsageError(f"{flags} and --recipe exclude each other: describe the scene in the recipe")
-        if isinstance(described, SurfaceRecipe):
-            result = _by_surface_recipe(files, described, reading)
-        else:
-            result = _by_recipe(files, described, reading)
-    flags, how = (
-        {name: value for name, value in vars(given).items() if value is not None}
-        for given in (scene_flags, reading)
-    )
-    described_by = {"flags": flags} if recipe is None else {"recipe": recipe}
-    described_by |= {"reading": how} if how else {}
-    result = result._replace(joint=joint or result.joint, described=described_by)
+        result = _by_recipe(files, recipe, scene_flags, reading)
+        described = {"recipe": recipe}
+    described |= {"reading": how} if (how := reading.given() | fitting.given()) else {}
+    options = fitting.over(result.fitting.given())
+    result = result._replace(joint=joint or result.joint, fitting=options, described=described)
     return result if repeats is None else _as_repeats(result, repeats or result.repeats)
 
 
@@ -130,60 +139,70 @@ def _sweep(read_file: Callable[[], Any], number: int) -> list[Spectrum]:
     return [replace(one.sweeps[number], notes=(*one.sweeps[number].notes, note))]
 
 
-def _by_flags(files: list[str], scene_flags: SceneFlags, reading: ReadingFlags) -> Inputs:
-    if reading.signal == "brdf":
-        raise UsageError("--signal brdf needs a --recipe that describes the surface under [scene.surface]")
-    _check_reading(reading, _SIGNALS)
+def _by_flags(files: list[str], scene_flags: SceneFlags, reading: FileOptions) -> Inputs:
+    _check_film(reading)
     if not files:
         raise UsageError(
             "no data: name the file, as in pellicle fit oxide.csv --layer SiO2 --substrate Si, or give a"
             " --recipe that does; pellicle demo is an example, --help lists every flag"
         )
-    reading = replace(reading, range=wavelength_range(reading.range))
-    scene, assumed = scene_from_flags(scene_flags, reading)
-    say(*assumed)
+    scene = scene_flags.scene(reading)
+    say(*scene_flags.assumed)
     _check_free(scene)
     check_camera(reading, [(file, reading) for file in files])
-    inputs = [one for file in files for one in _film_inputs(file, scene, reading)]
-    return Inputs(inputs, False, reading.loss or LEAST_SQUARES)
+    return Inputs([one for file in files for one in _film_inputs(file, scene, reading)], False)
 
 
-def _by_recipe(files: list[str], recipe: FilmRecipe, reading: ReadingFlags) -> Inputs:
+def _by_recipe(files: list[str], path: str, scene_flags: SceneFlags, reading: FileOptions) -> Inputs:
+    from pellicle.recipes import read_recipe
+    from pellicle.recipes.surface import SurfaceRecipe
+
+    recipe = read_recipe(path)
+    if scene_flags.given():
+        flags = ", ".join(scene_flags.given())
+        raise UsageError(f"{flags} and --recipe exclude each other: describe the scene in the recipe")
+    if isinstance(recipe, SurfaceRecipe):
+        return _by_surface_recipe(files, recipe, reading)
+    return _by_film_recipe(files, recipe, reading)
+
+
+def _by_film_recipe(files: list[str], recipe: FilmRecipe, reading: FileOptions) -> Inputs:
     import equinox as eqx
 
-    _check_reading(reading, _SIGNALS)
-    reading = replace(reading, range=wavelength_range(reading.range))
+    _check_film(reading)
     if recipe.each and files:
         raise UsageError(f"{recipe.path}: [[data.file]] and files on the command line exclude each other")
     files = _files(files, recipe)
     recipes = recipe.each or [recipe] * len(files)
-    each = [(file, merged(reading, own)) for file, own in zip(files, recipes, strict=True)]
+    each = [(file, reading.over(own.reading)) for file, own in zip(files, recipes, strict=True)]
     check_camera(reading, each)
     inputs = []
-    for (file, flags), own in zip(each, recipes, strict=True):
+    for (file, options), own in zip(each, recipes, strict=True):
         scene = own.scene()
-        scene = eqx.tree_at(lambda s: s.light, scene, light(flags, scene.light.azimuth))
+        scene = eqx.tree_at(lambda s: s.light, scene, light(options, scene.light.azimuth))
         _check_free(scene, recipe.path)
         own_scale = any(table.rescales for table in own.tables.data.file)
-        inputs += _film_inputs(file, scene, flags, own_scale)
+        inputs += _film_inputs(file, scene, options, own_scale)
     data = recipe.tables.data
-    loss = reading.loss or data.loss or LEAST_SQUARES
-    return Inputs(inputs, data.joint, loss, repeats=data.repeats)
+    return Inputs(inputs, data.joint, FitOptions().over(data.given()), repeats=data.repeats)
 
 
-def _by_surface_recipe(files: list[str], recipe: SurfaceRecipe, reading: ReadingFlags) -> Inputs:
-    if refused := [flag for flag in reading.given() if flag not in given(_FOR_SURFACES)]:
-        raise UsageError(f"{', '.join(refused)} cannot be used on a BRDF; the recipe describes the surface")
+def _by_surface_recipe(files: list[str], recipe: SurfaceRecipe, reading: FileOptions) -> Inputs:
+    if refused := [name for name in reading.given() if name not in of_kind(BRDF)]:
+        flags = ", ".join(named(refused))
+        raise UsageError(f"{flags} cannot be used on a BRDF; the recipe describes the surface")
     if reading.signal not in (None, "brdf"):
         raise UsageError(f"{recipe.path}: describes a surface, whose signal is brdf, not {reading.signal}")
-    _check_reading(reading, ("brdf",))
-    flags = {name: getattr(reading, name) for name in ("columns", "noise")}
-    recipe = recipe.with_data(**{name: value for name, value in flags.items() if value is not None})
+    if reading.noise is not None:
+        from pellicle.data.noise_level import noise_level
+
+        noise_level(reading.noise, "--noise")
+    recipe = recipe.with_data(**{name: x for name, x in reading.given().items() if name != "signal"})
     surface = recipe.scene()
     _check_free(surface, recipe.path)
     paths = _files(files, recipe)
     inputs = [Input(path, partial(_samples, recipe, surface, path), surface) for path in paths]
-    return Inputs(inputs, False, reading.loss or LEAST_SQUARES, recipe.tables.data.residual)
+    return Inputs(inputs, False, residual=recipe.tables.data.residual)
 
 
 def _files(files: list[str], recipe: FilmRecipe | SurfaceRecipe) -> list[str]:
@@ -194,7 +213,7 @@ def _files(files: list[str], recipe: FilmRecipe | SurfaceRecipe) -> list[str]:
     return files or recipe.files
 
 
-def _film_inputs(path: str, scene: Scene, reading: ReadingFlags, own_scale: bool = False) -> list[Input]:
+def _film_inputs(path: str, scene: Scene, reading: FileOptions, own_scale: bool = False) -> list[Input]:
     """One input for a file of a film; one for each film of a file of colours, and with --spectrum all for
     each of several spectra."""
     from pellicle.data.file_spectra import ALL
@@ -243,34 +262,9 @@ def _check_free(scene: Scene | Surface, recipe: str = "") -> None:
         raise
 
 
-def _check_reading(reading: ReadingFlags, signals: tuple[str, ...]) -> None:
-    if reading.signal not in (None, *signals):
-        names = f"{', '.join(signals[:-1])} or {signals[-1]}"
-        raise UsageError(f"--signal must be {names}, not {reading.signal!r}")
-    stated = reading.angle if isinstance(reading.angle, list) else [reading.angle]
-    if wrong := [angle for angle in stated if angle is not None and not 0 <= angle <= 90]:
-        raise UsageError(f"--angle must lie in 0 to 90 degrees, got {wrong[0]:g}")
-    if reading.polarisation not in (None, "s", "p", "unpolarised"):
-        raise UsageError(f"--polarisation must be s, p or unpolarised, not {reading.polarisation!r}")
+def _check_film(reading: FileOptions) -> None:
+    """Raise UsageError for options that are wrong for every file of a film."""
+    if reading.signal == "brdf":
+        raise UsageError("--signal brdf needs a --recipe that describes the surface under [scene.surface]")
     check_words(reading)
-    if reading.noise is not None:
-        from pellicle.data.noise_level import noise_level
-
-        if signals == ("brdf",):
-            noise_level(reading.noise, "--noise")
-        else:
-            sigma(reading.noise)
-    if reading.loss is not None:
-        from pellicle.fitting.robust_losses import check_loss
-
-        check_loss(reading.loss, "--loss")
-    if reading.dark is not None and reading.reference is None and reading.reference_material is None:
-        raise UsageError("--dark needs --reference: the counts of a sample of known reflectance")
-    from pellicle.data.tabular.units import BITS, SIGNAL_UNITS, WAVELENGTH_UNITS, colour_unit, wavelength_unit
-
-    for flag, value, known, find in (
-        ("--wavelength-unit", reading.wavelength_unit, WAVELENGTH_UNITS, wavelength_unit),
-        ("--signal-unit", reading.signal_unit, (*SIGNAL_UNITS, *BITS), colour_unit),
-    ):
-        if value is not None and find(value) is None:
-            raise UsageError(f"{flag} must be one of {', '.join(known)}, not {value!r}")
+    sigma(reading.noise)

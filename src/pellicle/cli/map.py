@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Group, Parameter
 
 from pellicle.cli.batch import CONVERGED, UNCLEAR
-from pellicle.cli.colours import SPACES
 from pellicle.cli.cube_flags import CubeFlags
-from pellicle.cli.flags import OUTPUT, CameraFlags, flag, given, switch
+from pellicle.cli.flags import OUTPUT, CameraFlags, flag, named, switch
 from pellicle.cli.map_cube import RunFlags, map_cube
 from pellicle.cli.session import check_folder, say, show, start
+from pellicle.data.options import SPACES
 from pellicle.errors import UsageError
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def map(
         raise UsageError(f"{recipe}: describes a surface, and a map needs the recipe of a film")
     run, cube, camera = run or RunFlags(), cube or CubeFlags(), camera or CameraFlags()
     photograph = {"strip": strip, "region": region, "layer": layer}
-    of_photograph = [*given(n for n, value in photograph.items() if value is not None), *camera.given()]
+    of_photograph = [*named(n for n, value in photograph.items() if value is not None), *camera.given()]
     of_cube = [*run.given(), *(name for name in cube.given() if name not in _OF_BOTH)]
     if is_photograph(Path(data)):
         _refuse(data, "photograph", "cubes", of_cube)
@@ -94,7 +94,7 @@ def _map_photograph(
     json: bool,
 ) -> int:
     """Map a photograph by `flags` strip, region, layer, signal and noise; print and write the result."""
-    stated: dict[str, Any] = {name: value for name, value in vars(camera).items() if value is not None}
+    stated: dict[str, Any] = camera.options().given()
     seen = described.camera | stated
     if seen.pop("white_balance", "fixed") == "free" or seen.pop("chart", None) is not None:
         raise UsageError(

@@ -12,9 +12,9 @@ from pellicle.cli.batch import CONVERGED, INTERRUPTED, UNCLEAR
 from pellicle.cli.cube_flags import CubeFlags, merged
 from pellicle.cli.flags import OUTPUT, Flags, flag
 from pellicle.cli.messages import as_flags
-from pellicle.cli.options import wavelength_range
 from pellicle.cli.progress import PixelProgress
 from pellicle.cli.session import check_folder, say, show, start
+from pellicle.data.options import parse_range
 from pellicle.errors import DataError, UsageError
 
 if TYPE_CHECKING:
@@ -97,8 +97,8 @@ def map_cube(
 
     flags = merged(cube, described)
     reading = {name: value for name, value in vars(flags).items() if value is not None}
-    if flags.range is not None:
-        reading["range"] = wavelength_range(flags.range)
+    if isinstance(flags.range, str):
+        reading["range"] = parse_range(flags.range, "`range`")
     remains = set() if folder is None or not folder.exists() else {folder, *folder.iterdir()}
     if folder is not None:
         _mark(folder)

@@ -10,89 +10,35 @@ import ast
 import re
 import shlex
 from dataclasses import replace
+from functools import cache
+from inspect import signature
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from pellicle.fitting.result import Fit
 
-FLAGS = {
-    "ambient": "--ambient",
-    "analyser": "--analyser",
-    "angle": "--angle",
-    "back": "--back",
-    "bandwidth": "--bandwidth",
-    "chart": "--chart",
-    "columns": "--columns",
-    "dark": "--dark",
-    "dark_frame": "--dark-frame",
-    "datasets": "--datasets",
-    "elements": "--elements",
-    "folded": "--folded",
-    "folder": "--out",
-    "free": "--free",
-    "gamma": "--gamma",
-    "illuminant": "--illuminant",
-    "joint": "--joint",
-    "lamp": "--lamp",
-    "lamp_curve": "--lamp-curve",
-    "lamp_reference": "--lamp-reference",
-    "layer": "--layer",
-    "light": "--light",
-    "loss": "--loss",
-    "mask": "--mask",
-    "neighbours": "--neighbours",
-    "noise": "--noise",
-    "numbers": "--numbers",
-    "observer": "--observer",
-    "offset": "--offset",
-    "out": "--out",
-    "overwrite": "--overwrite",
-    "path": "--out",
-    "plate_mm": "--plate-mm",
-    "back_collected": "--back-collected",
-    "back_reflections": "--back-reflections",
-    "points": "--points",
-    "polarisation": "--polarisation",
-    "preview": "--preview",
-    "range": "--range",
-    "recipe": "--recipe",
-    "reference": "--reference",
-    "reference_material": "--reference-material",
-    "region": "--region",
-    "resume": "--resume",
-    "saturation": "--saturation",
-    "scale": "--scale",
-    "scheduler": "--scheduler",
-    "seed": "--seed",
-    "sensitivities": "--sensitivities",
-    "signal": "--signal",
-    "signal_unit": "--signal-unit",
-    "space": "--signal",
-    "spectrum": "--spectrum",
-    "spot": "--spot",
-    "steps": "--steps",
-    "strip": "--strip",
-    "substrate": "--substrate",
-    "thickness": "--thickness",
-    "thickness_map": "--thickness-map",
-    "tolerance": "--tolerance",
-    "transmitted": "--transmitted",
-    "uncertainty": "--uncertainty",
-    "variable": "--variable",
-    "walkers": "--walkers",
-    "wavelength_unit": "--wavelength-unit",
-    "wavelengths": "--wavelengths",
-    "white": "--white",
-    "white_balance": "--white-balance",
-    "white_frame": "--white-frame",
-    "white_reflectance": "--white-reflectance",
-    "without_bands": "--without-bands",
-    "workers": "--workers",
-}
-"""The flag of each argument that a message may name."""
+_OTHER_NAMES = {"folder": "--out", "path": "--out", "space": "--signal"}
+"""Flags of arguments that have another name."""
 _NEGATIVES = {"folded=False": "--no-folded", "resume=False": "--no-resume"}
 
 _QUOTED = re.compile(r"`([^`]+)`")
+
+
+@cache
+def flag_names() -> dict[str, str]:
+    """The flag of each argument that a message may name: that of a command, of the same name."""
+    from pellicle.cli import COMMANDS
+    from pellicle.cli.flags import Flags
+
+    groups = [Flags]
+    for group in groups:
+        groups += group.__subclasses__()
+    names = {name for group in groups for name in getattr(group, "__dataclass_fields__", ())}
+    for command in COMMANDS:
+        for name, about in signature(command).parameters.items():
+            if about.kind is about.KEYWORD_ONLY and "name='*'" not in about.annotation:
+                names.add(name)
+    return {name: f"--{name.replace('_', '-')}" for name in names} | _OTHER_NAMES
 
 
 def as_flags(text: str) -> str:
@@ -116,18 +62,18 @@ def _flags(code: str) -> str | None:
         return None
     words = []
     for name in parsed.args:
-        if not isinstance(name, ast.Name) or name.id not in FLAGS:
+        if not isinstance(name, ast.Name) or name.id not in flag_names():
             return None
-        words.append(FLAGS[name.id])
+        words.append(flag_names()[name.id])
     for keyword in parsed.keywords:
         negative = _NEGATIVES.get(f"{keyword.arg}={ast.unparse(keyword.value)}")
         if negative:
             words.append(negative)
             continue
         value = _word(keyword.value, call)
-        if keyword.arg not in FLAGS or value is None:
+        if keyword.arg not in flag_names() or value is None:
             return None
-        words.append(f"{FLAGS[keyword.arg]} {value}".rstrip())
+        words.append(f"{flag_names()[keyword.arg]} {value}".rstrip())
     return " ".join(words)
 
 

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from pellicle.cli.colours import check_camera, check_words, is_of_colours, read_films, refuse_camera
 from pellicle.cli.cube_flags import CubeOnlyFlags
-from pellicle.cli.flags import OUTPUT, ReadingFlags, flag, given, switch
+from pellicle.cli.flags import OUTPUT, FileFlags, flag, named, switch
 from pellicle.cli.messages import as_flags
+from pellicle.cli.reading import check_camera, check_words, is_of_colours, read_films, refuse_camera
+from pellicle.cli.reading import read as read_file
 from pellicle.cli.session import say, start
+from pellicle.data.options import FileOptions
 from pellicle.errors import DataError, UsageError
 
 if TYPE_CHECKING:
@@ -26,7 +28,7 @@ GOOD, BAD_DATA = 0, 3
 
 def read(
     *data: Annotated[str, Parameter(help="Files of measurements, or cubes of spectra.")],
-    reading: Annotated[ReadingFlags | None, Parameter(name="*")] = None,
+    reading: Annotated[FileFlags | None, Parameter(name="*")] = None,
     cubes: Annotated[CubeOnlyFlags | None, Parameter(name="*")] = None,
     out: Annotated[
         str | None, flag(OUTPUT, "Folder for the spectra and their figures; existing files stay.")
@@ -44,22 +46,20 @@ def read(
 
     Example: pellicle read stack.tif --wavelengths 400:900:5 --white-frame white.tif
     """
-    flags = reading or ReadingFlags()
+    options = (reading or FileFlags()).options()
     if not data:
         raise UsageError("no data: name the files, as in pellicle read oxide.csv")
-    if flags.loss is not None:
-        raise UsageError("--loss is for a fit; leave it out")
-    check_words(flags)
-    check_camera(flags, [(path, flags) for path in data])
+    check_words(options)
+    check_camera(options, [(path, options) for path in data])
     formats = [word.strip() for word in to.split(",")]
     if unknown := [word for word in formats if word not in SUFFIXES]:
         raise UsageError(f"--to must be of {', '.join(SUFFIXES)}, not {unknown[0]!r}")
-    if flags.reference or flags.reference_material:
+    if options.reference or options.reference_material:
         start()  # the reflectance of the reference is computed
     worst, found = GOOD, []
     for path in data:
         try:
-            found += _measurements(path, flags, cubes or CubeOnlyFlags())
+            found += _measurements(path, options, cubes or CubeOnlyFlags())
         except ValueError as error:
             worst = BAD_DATA
             _report_error(path, as_flags(str(error)), json)
@@ -81,23 +81,23 @@ def read(
 
 
 def _measurements(
-    path: str, flags: ReadingFlags, of_cube: CubeOnlyFlags
+    path: str, options: FileOptions, of_cube: CubeOnlyFlags
 ) -> list[Spectrum] | list[Colours] | list[Cube]:
     """Every spectrum of a file, the colours of every film in it, or its cube."""
     from pellicle.data.cubes.detect import is_cube
 
     if of_cube.given() or is_cube(Path(path)) or Path(path).is_dir():
-        return [_cube(path, flags, of_cube)]
-    if is_of_colours(path, flags):
-        return read_films(path, flags, angle=flags.angle)
-    refuse_camera(path, flags)
+        return [_cube(path, options, of_cube)]
+    if is_of_colours(path, options):
+        return read_films(path, options, angle=options.angle)
+    refuse_camera(path, options)
     try:
-        return _spectra(path, flags)
+        return _spectra(path, options)
     except DataError:
         if not _is_hdf5(path):
             raise
         try:  # a NetCDF file that is no spectrum may be a cube
-            return [_cube(path, flags, of_cube)]
+            return [_cube(path, options, of_cube)]
         except ValueError as error:
             reason = error
         if "no axis" in str(reason):
@@ -111,37 +111,35 @@ def _is_hdf5(path: str) -> bool:
     return is_netcdf(Path(path))
 
 
-def _cube(path: str, flags: ReadingFlags, of_cube: CubeOnlyFlags) -> Cube:
+def _cube(path: str, options: FileOptions, of_cube: CubeOnlyFlags) -> Cube:
     """The cube of a file; flags of other files are refused."""
     from pellicle.cli.cube_flags import CubeFlags, read
 
-    shared = {name: value for name, value in vars(flags).items() if value is not None}
+    shared = options.given()
     known = {field.name for field in fields(CubeFlags)}
     if wrong := sorted(set(shared) - known):
         raise UsageError(
-            f"{path}: is a cube of spectra, which {given(wrong[:1])[0]} does not apply to: leave it out"
+            f"{path}: is a cube of spectra, which {named(wrong[:1])[0]} does not apply to: leave it out"
         )
     return read(path, CubeFlags(**{**vars(of_cube), **shared}))
 
 
-def _spectra(path: str, flags: ReadingFlags) -> list[Spectrum]:
+def _spectra(path: str, options: FileOptions) -> list[Spectrum]:
     """Every spectrum of a file, unless one is chosen, with the angle of the flag where the file has none."""
     from dataclasses import replace
 
     import numpy as np
 
-    from pellicle.cli.options import read as read_file
-    from pellicle.cli.options import wavelength_range
-
-    every = replace(flags, spectrum=flags.spectrum or "all", range=wavelength_range(flags.range))
+    every = replace(options, spectrum=options.spectrum or "all")
     found = read_file(path, every, free_scale=False)
-    if flags.angle is None:
+    if options.angle is None:
         return found
-    if isinstance(flags.angle, list):
+    if isinstance(options.angle, list):
         raise UsageError(f"{path}: --angle lists several: of spectra give one, or a column angle_deg")
-    if stated := [one.source for one in found if one.angle is not None and np.any(one.angle != flags.angle)]:
+    stated = [one.source for one in found if one.angle is not None and np.any(one.angle != options.angle)]
+    if stated:
         raise UsageError(f"{stated[0]}: states its own angles; leave --angle out")
-    return [replace(one, angle=np.full(len(one), float(flags.angle))) for one in found]
+    return [replace(one, angle=np.full(len(one), float(options.angle))) for one in found]
 
 
 def _report_error(path: str, message: str, as_json: bool) -> None:

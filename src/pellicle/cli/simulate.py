@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from pellicle.cli.colours import SPACES, recipe_angles
+from pellicle.cli.reading import recipe_angles
 from pellicle.cli.session import check_folder, not_negative, say, start
 from pellicle.cli.wavelengths import directions, each_setting, wavelengths
+from pellicle.data.options import SPACES
 from pellicle.errors import DataError, UsageError
 
 if TYPE_CHECKING:
@@ -196,7 +197,7 @@ def _write_colours(
         seen.sensor,
         table.data.signal or "srgb",
         recipe_angles(recipe),
-        gamma=table.camera.gamma,
+        gamma=table.camera.gamma or 1.0,
         camera=seen.matrix,
         noise=noise,
         seed=seed,

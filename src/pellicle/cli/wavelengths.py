@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from pellicle.cli.colours import SPACES, recipe_angles
+from pellicle.cli.reading import recipe_angles
 from pellicle.cli.session import say
+from pellicle.data.options import SPACES, FileOptions
 from pellicle.errors import DataError
 
 if TYPE_CHECKING:
@@ -60,17 +61,16 @@ def _as_measured(recipe: FilmRecipe) -> tuple[Scene, np.ndarray]:
     import equinox as eqx
     import numpy as np
 
-    from pellicle.cli.flags import ReadingFlags
-    from pellicle.cli.options import light, merged, read
+    from pellicle.cli.reading import light, read
     from pellicle.scene.film import Light
     from pellicle.scene.instrument import Drift
 
     path = recipe.files[0]
     own = recipe if recipe.tables.data.files else recipe.each[0]  # the first [[data.file]] has its own keys
-    scene, flags = own.scene(), merged(ReadingFlags(), own)
-    spectrum = read(path, flags, free_scale=isinstance(scene.instrument.scale, Drift))[0]
+    scene, options = own.scene(), FileOptions(**own.reading)
+    spectrum = read(path, options, free_scale=isinstance(scene.instrument.scale, Drift))[0]
     say(f"wavelengths: those of {path} (the recipe gives none)")
-    stated, first = light(flags), spectrum.settings[0]
+    stated, first = light(options), spectrum.settings[0]
     angle = stated.angle if spectrum.angle is None else first.angle
     azimuth = scene.light.azimuth if first.azimuth is None else first.azimuth or None
     polarised = spectrum.polarisation if spectrum.polarisation != "unpolarised" else stated.polarisation

@@ -13,6 +13,7 @@ import numpy as np
 from pellicle.data import generalised, mueller
 from pellicle.data.file_spectra import ALL, Candidate, chosen, file_candidates
 from pellicle.data.formats.detect import read_tables
+from pellicle.data.options import SpectrumOptions
 from pellicle.data.read_ellipsometry import SIGNAL, read_ellipsometry
 from pellicle.data.read_generalised import GeneralisedColumns, read_generalised
 from pellicle.data.read_mueller import MuellerColumns, read_mueller
@@ -114,21 +115,11 @@ def read_spectra(
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Reading:
+class _Reading(SpectrumOptions):
     """Arguments of `read_spectrum`, and reading with them. Raises UsageError for an unknown word."""
 
-    signal: str | None = None
-    columns: str | Sequence[str] | None = None
-    wavelength_unit: str | None = None
-    signal_unit: str | None = None
-    range: tuple[float | int, float | int] | None = None
     noise: float | int | None = None
-    polarisation: str | None = None
     calibrated: bool | None = None
-    folded: bool | None = None
-    analyser: float | int | None = None
-    spot: int | None = None
-    elements: Sequence[str] | None = None
 
     def __post_init__(self) -> None:
         for name, known in (

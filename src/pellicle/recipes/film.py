@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import BaseModel
 
 from pellicle.data.cameras import Camera, Sight, sight
-from pellicle.data.colours import SPACES
+from pellicle.data.options import SPACES, Options, ReadingOptions
 from pellicle.errors import DataError, UsageError
 from pellicle.recipes import media_words
 from pellicle.recipes.media import FreeTable, Medium, Number, PriorTable, medium, number
@@ -79,12 +79,21 @@ class FilmRecipe:
 
     @property
     def camera(self) -> dict[str, Any]:
-        """The keys of `[camera]` that the recipe gives; files are relative to it."""
-        table = self.tables.camera
-        folder = Path(self.path).parent
-        found = {name: getattr(table, name) for name in table.model_fields_set}
-        files = {"lamp", "sensitivities", "chart"} & found.keys()
-        return found | {name: os.path.normpath(folder / found[name]) for name in files}
+        """The keys of `[camera]` that the recipe gives, with paths of files."""
+        return self._with_paths(self.tables.camera)
+
+    @property
+    def reading(self) -> dict[str, Any]:
+        """The options of `[data]` and `[camera]` for reading files that the recipe gives."""
+        given = self._with_paths(self.tables.data)
+        return {name: x for name, x in given.items() if name in ReadingOptions.declared()} | self.camera
+
+    def _with_paths(self, table: Options) -> dict[str, Any]:
+        declared, folder = table.declared(), Path(self.path).parent
+        return {
+            name: os.path.normpath(folder / x) if declared[name][1].is_file else x
+            for name, x in table.given().items()
+        }
 
     def sight(self) -> Sight:
         """Sensor and coding of the colours by `[camera]`. Raises DataError, the recipe's path in front."""

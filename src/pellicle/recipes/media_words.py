@@ -8,6 +8,7 @@ from collections.abc import Iterable
 import jax
 import numpy as np
 
+from pellicle.data.options import parse_number, parse_range
 from pellicle.dispersion.anisotropic import Anisotropic
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.effective_medium import MIXTURES
@@ -23,7 +24,6 @@ from pellicle.recipes.dispersion_models import (
     free_by_default,
     free_model,
 )
-from pellicle.recipes.number_words import parse_number, parse_range
 from pellicle.scene.free import Free, is_free
 from pellicle.scene.graded import Graded
 

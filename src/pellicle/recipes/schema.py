@@ -2,28 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from pellicle.data.tabular.units import BITS, SIGNAL_UNITS, WAVELENGTH_UNITS, colour_unit, wavelength_unit
+from pellicle.data.options import CameraOptions, FitOptions, ReadingOptions
 from pellicle.recipes.media import FreeTable, Medium, Number
-
-
-def _unit(known: Sequence[str], find: Callable[[str], str | None]) -> AfterValidator:
-    """Refuses what is no unit, as the flags do."""
-
-    def check(given: str) -> str:
-        if find(given) is None:
-            raise ValueError(f"must be one of {', '.join(known)}, not {given!r}")
-        return given
-
-    return AfterValidator(check)
-
-
-WavelengthUnit = Annotated[str, _unit(WAVELENGTH_UNITS, wavelength_unit)]
-SignalUnit = Annotated[str, _unit((*SIGNAL_UNITS, *BITS), colour_unit)]
 
 
 class _Table(BaseModel):
@@ -126,53 +110,28 @@ class InstrumentTable(_Table):
     mueller_uncertainty: Uncertain = None
 
 
-Signal: TypeAlias = Literal[
-    "R", "T", "psi-delta", "mueller", "generalised-psi-delta", "srgb", "rgb", "xyz", "lab"
+_Angle = Annotated[
+    float | Annotated[list[float], Field(min_length=1)] | FreeTable | None,
+    ReadingOptions.declared()["angle"][1],
 ]
+_Noise = Annotated[float | None, Field(gt=0)]
 
 
-Degrees: TypeAlias = Annotated[float, Field(ge=0, le=90)]
-"""Angle of incidence."""
+class _Reading(_Table, ReadingOptions):  # pyright: ignore[reportGeneralTypeIssues]
+    """Options of reading data files, named as the flags of the command line."""
 
-
-class _Reading(_Table):
-    """Reading options of data files, named as the flags of the command line."""
-
-    spectrum: str | None = None
-    signal: Signal | None = None
-    angle: Degrees | Annotated[list[Degrees], Field(min_length=1)] | FreeTable | None = None
     azimuth: float | list[float] | None = None
-    polarisation: Literal["unpolarised", "s", "p"] | None = None
-    noise: float | None = Field(default=None, gt=0)
-    columns: str | list[str] | None = None
-    wavelength_unit: WavelengthUnit | None = None
-    signal_unit: SignalUnit | None = None
-    range: tuple[float, float] | None = None
-    folded: bool | None = None
-    analyser: float | None = Field(default=None, gt=0, lt=90)
-    spot: int | None = Field(default=None, ge=1)
-    elements: list[str] | None = None
-    region: str | list[int] | list[list[int]] | None = None
-    points: str | list[int] | list[list[int]] | None = None
 
 
-class CameraTable(_Table):
+class CameraTable(_Table, CameraOptions):  # pyright: ignore[reportGeneralTypeIssues]
     """`[camera]`: what sees the colours of a film, and under which light; files are CSV."""
-
-    observer: Literal["1931", "1964"] = "1931"
-    illuminant: Literal["E", "A", "D50", "D55", "D65", "D75"] = "D65"
-    lamp: str | None = None
-    sensitivities: str | None = None
-    chart: str | None = None
-    gamma: float = Field(default=1.0, ge=0.1, le=10)
-    white_balance: Literal["fixed", "free"] = "fixed"
-    white: str | list[int] | None = None
-    transmitted: bool = False
 
 
 class FileTable(_Reading):
     """One `[[data.file]]`: its keys override those of `[data]`, `[instrument]` and `[camera]`."""
 
+    angle: _Angle = None  # pyright: ignore[reportIncompatibleVariableOverride]
+    noise: _Noise = None  # pyright: ignore[reportIncompatibleVariableOverride]
     path: str
     instrument: InstrumentTable = InstrumentTable()
     camera: CameraTable = CameraTable()
@@ -191,15 +150,16 @@ class FileTable(_Reading):
         return given
 
 
-class DataTable(_Reading):
+class DataTable(_Reading, FitOptions):  # pyright: ignore[reportGeneralTypeIssues]
     """`[data]`."""
 
+    angle: _Angle = None  # pyright: ignore[reportIncompatibleVariableOverride]
+    noise: _Noise = None  # pyright: ignore[reportIncompatibleVariableOverride]
     files: list[str] = []
     file: list[FileTable] = []
     wavelengths: GridTable | list[float] | None = None
     joint: bool = False
     repeats: bool = False
-    loss: Literal["least-squares", "huber", "student-t"] | None = None
 
     @model_validator(mode="after")
     def _one_list(self):

@@ -1,0 +1,367 @@
+"""Options of reading and fitting data: each is declared here once, with its type, help, limits and words.
+
+From these records follow the flags of the command line (`cli/flags.py`), the keys of a recipe and its schema
+(`recipes/schema.py`), and the recipe of a result. None is an option that is not given. This module imports
+nothing heavy: `pellicle --help` loads it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Annotated, Any, TypeVar, get_type_hints
+
+from pellicle.errors import UsageError
+
+SPECTRA, COLOURS, BRDF = "spectra", "colours", "BRDF samples"
+"""Kinds of data to which an option applies."""
+SPACES = ("srgb", "rgb", "xyz", "lab")
+SIGNALS = ("R", "T", "psi-delta", "mueller", "generalised-psi-delta", *SPACES)
+"""Signals of films, beside "brdf" of a surface's recipe."""
+
+Record = TypeVar("Record", bound="Options")
+
+
+def parse_number(text: str, name: str, expected: str = "a number") -> float:
+    """Parse a finite number. Raises UsageError with the name of the argument and what was expected."""
+    try:
+        value = float(text)
+    except ValueError:
+        raise UsageError(f"{name} must be {expected}, not {text!r}") from None
+    if not math.isfinite(value):
+        raise UsageError(f"{name} must be a finite number, not {text!r}")
+    return value
+
+
+def parse_range(text: str, name: str) -> tuple[float, float]:
+    """Parse `LO:HI` as two rising numbers. Raises UsageError with the name of the argument."""
+    parts = text.split(":")
+    if len(parts) != 2:
+        raise UsageError(f"{name} must be LO:HI, as in 10:3000, not {text!r}")
+    low, high = parse_number(parts[0], name), parse_number(parts[1], name)
+    if not low < high:
+        raise UsageError(f"{name} is reversed or empty: {text!r}; write the smaller number first")
+    return low, high
+
+
+def parse_angles(text: str, name: str) -> float | list[float]:
+    """Parse one angle in degrees, or several with commas between them. Raises UsageError."""
+    angles = [parse_number(word, name, "degrees such as 70, or 0,30,60") for word in text.split(",")]
+    return angles[0] if len(angles) == 1 else angles
+
+
+def _names(text: str, name: str) -> list[str]:
+    return [word.strip() for word in text.split(",")]
+
+
+def _number_or_text(text: str, name: str) -> float | str:
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def _wavelength_unit(text: str) -> tuple[str | None, tuple[str, ...]]:
+    from pellicle.data.tabular.units import WAVELENGTH_UNITS, wavelength_unit
+
+    return wavelength_unit(text), WAVELENGTH_UNITS
+
+
+def _signal_unit(text: str) -> tuple[str | None, tuple[str, ...]]:
+    from pellicle.data.tabular.units import BITS, SIGNAL_UNITS, colour_unit
+
+    return colour_unit(text), (*SIGNAL_UNITS, *BITS)
+
+
+@dataclass(frozen=True)
+class Option:
+    """Declaration of an option, as metadata of its field's type.
+
+    - `help`: one sentence, with unit and default, for `--help` and for editors of recipes.
+    - `metavar`: form of the flag's value in `--help`.
+    - `kinds`: kinds of data to which it applies.
+    - `words`: its only values; or `find`, a function of a text to the value that it spells (None for none)
+      and to all values.
+    - `least`, `most`: limits, themselves allowed unless `exclusive`, in `unit`.
+    - `parse`: function of a flag's text and the option's name to its value, where that is no text or number.
+    - `is_file`: the value is a path, which a recipe gives relative to itself.
+    - `negative`: the flag of a truth value also has a --no- form.
+    - `flag`: False for an option that only recipes have.
+    """
+
+    help: str
+    metavar: str = ""
+    kinds: tuple[str, ...] = (SPECTRA, COLOURS)
+    words: tuple[str, ...] = ()
+    find: Callable[[str], tuple[str | None, tuple[str, ...]]] | None = None
+    least: float = -math.inf
+    most: float = math.inf
+    exclusive: bool = False
+    unit: str = ""
+    parse: Callable[[str, str], Any] | None = None
+    is_file: bool = False
+    negative: bool = False
+    flag: bool = True
+
+    def check(self, value: Any) -> Any:
+        """Return the value; raise ValueError, a sentence that lacks the option's name, for a wrong one."""
+        for one in value if isinstance(value, list | tuple) else [value]:
+            if isinstance(one, str):
+                found, known = (one in self.words, self.words) if self.find is None else self.find(one)
+                if known and not found:
+                    raise ValueError(f"must be one of {', '.join(known)}, not {one!r}")
+            elif isinstance(one, float | int):
+                inside = self.least < one < self.most if self.exclusive else self.least <= one <= self.most
+                if not inside or not math.isfinite(one):
+                    raise ValueError(f"must {self._limits()}{f' {self.unit}'.rstrip()}, got {one:g}")
+        return value
+
+    def _limits(self) -> str:
+        if self.most == math.inf:
+            return f"be {'above' if self.exclusive else 'at least'} {self.least:g}"
+        if self.exclusive:
+            return f"be above {self.least:g} and below {self.most:g}"
+        return f"lie in {self.least:g} to {self.most:g}"
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        """Check the value of a recipe's key."""
+        from pydantic_core import core_schema
+
+        return core_schema.no_info_after_validator_function(self.check, handler(source))
+
+    def __get_pydantic_json_schema__(self, source: Any, handler: Any) -> dict[str, Any]:
+        """Describe the key to editors of recipes."""
+        schema = {**handler(source), "description": self.help}
+        names = ("exclusiveMinimum", "exclusiveMaximum") if self.exclusive else ("minimum", "maximum")
+        limits = {
+            name: x for name, x in zip(names, (self.least, self.most), strict=True) if abs(x) < math.inf
+        }
+        for kind in schema["anyOf"]:
+            if kind.get("type") == "string" and self.words:
+                kind["enum"] = [*self.words]
+            elif kind.get("type") in ("number", "integer"):
+                kind |= limits
+        return schema
+
+
+class Options:
+    """Base of the records of options."""
+
+    @classmethod
+    def declared(cls) -> dict[str, tuple[Any, Option]]:
+        """Type and declaration of each option, by name."""
+        return _declared(cls)
+
+    def given(self) -> dict[str, Any]:
+        """The options that are given, by name."""
+        values = {name: getattr(self, name) for name in self.declared()}
+        return {name: value for name, value in values.items() if value is not None}
+
+    def over(self: Record, other: Mapping[str, Any]) -> Record:
+        """A copy in which options that are not given are those of another record, by name."""
+        record: Any = self
+        absent = self.declared().keys() - self.given().keys()
+        return replace(record, **{name: x for name, x in other.items() if name in absent})
+
+
+@cache
+def _declared(record: type[Options]) -> dict[str, tuple[Any, Option]]:
+    found = {}
+    for base in reversed(record.__mro__):
+        if "__dataclass_fields__" in vars(base):  # of a table of pydantic, the records that it extends
+            for name, hint in get_type_hints(base, include_extras=True).items():
+                found[name] = hint.__origin__, next(x for x in hint.__metadata__ if isinstance(x, Option))
+    return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraOptions(Options):
+    """What sees the colours of a film, and under which light; `[camera]` of a recipe. Files are CSV."""
+
+    observer: Annotated[
+        str | None, Option("1931 (2 degrees) or 1964 (10 degrees).", kinds=(COLOURS,), words=("1931", "1964"))
+    ] = None
+    illuminant: Annotated[
+        str | None,
+        Option(
+            "E, A, D50, D55, D65 or D75 (D65).",
+            kinds=(COLOURS,),
+            words=("E", "A", "D50", "D55", "D65", "D75"),
+        ),
+    ] = None
+    lamp: Annotated[
+        str | None,
+        Option("CSV of the lamp's spectrum, for --illuminant.", kinds=(COLOURS,), is_file=True),
+    ] = None
+    sensitivities: Annotated[
+        str | None,
+        Option("CSV of a camera's three sensitivities (signal rgb).", kinds=(COLOURS,), is_file=True),
+    ] = None
+    chart: Annotated[
+        str | None,
+        Option(
+            "CSV of a photographed chart: R, G, B and reference X, Y, Z (signal rgb).",
+            kinds=(COLOURS,),
+            is_file=True,
+        ),
+    ] = None
+    gamma: Annotated[
+        float | None,
+        Option("Coding of the signal rgb: linear^(1/GAMMA) (1).", kinds=(COLOURS,), least=0.1, most=10),
+    ] = None
+    white_balance: Annotated[
+        str | None,
+        Option(
+            "fixed, or free for an unknown factor of each channel.", kinds=(COLOURS,), words=("fixed", "free")
+        ),
+    ] = None
+    white: Annotated[
+        str | list[int] | None,
+        Option("X,Y,WIDTH,HEIGHT of a white in the photograph, in pixels.", kinds=(COLOURS,)),
+    ] = None
+    transmitted: Annotated[bool | None, Option("The light has passed the film.", kinds=(COLOURS,))] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpectrumOptions(Options):
+    """How a spectrum is read: arguments of `pellicle.read_spectrum`."""
+
+    spectrum: Annotated[str | None, Option("Name of one of several spectra or films in a file, or all.")] = (
+        None
+    )
+    signal: Annotated[
+        str | None,
+        Option(
+            "R, T, psi-delta, mueller, generalised-psi-delta, srgb, rgb, xyz or lab (that of the file).",
+            kinds=(SPECTRA, COLOURS, BRDF),
+            words=(*SIGNALS, "brdf"),
+        ),
+    ] = None
+    polarisation: Annotated[str | None, Option("s, p or unpolarised.", words=("s", "p", "unpolarised"))] = (
+        None
+    )
+    range: Annotated[
+        tuple[float, float] | None,
+        Option("Wavelengths to use in nm.", metavar="LO:HI", kinds=(SPECTRA,), parse=parse_range),
+    ] = None
+    columns: Annotated[
+        str | Sequence[str] | None,
+        Option(
+            "Names of the columns in order, _ to skip.",
+            metavar="NAME,...",
+            kinds=(SPECTRA, COLOURS, BRDF),
+        ),
+    ] = None
+    wavelength_unit: Annotated[
+        str | None, Option("nm, um, A, eV, cm-1 or THz.", kinds=(SPECTRA,), find=_wavelength_unit)
+    ] = None
+    signal_unit: Annotated[
+        str | None, Option("fraction, percent or absorbance; 8-bit or 16-bit of colours.", find=_signal_unit)
+    ] = None
+    folded: Annotated[
+        bool | None,
+        Option(
+            "Δ is known in 0 to 180 degrees only: cos Δ (by default where it has kinks there).",
+            kinds=(SPECTRA,),
+            negative=True,
+        ),
+    ] = None
+    analyser: Annotated[
+        float | None,
+        Option(
+            "Analyser angle in degrees (for alpha and beta columns).",
+            kinds=(SPECTRA,),
+            least=0,
+            most=90,
+            exclusive=True,
+            unit="degrees",
+        ),
+    ] = None
+    spot: Annotated[
+        int | None,
+        Option("Spot of an Accurion file, counted from 1.", kinds=(SPECTRA,), least=1),
+    ] = None
+    elements: Annotated[
+        Sequence[str] | None,
+        Option(
+            "Elements of a Mueller matrix, or ratios ane, aps, asp, to use (all).",
+            metavar="m12,...",
+            parse=_names,
+            kinds=(SPECTRA,),
+        ),
+    ] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReadingOptions(SpectrumOptions):
+    """How files of data are read; `[data]` and `[[data.file]]` of a recipe."""
+
+    noise: Annotated[
+        float | str | None,
+        Option(
+            'Standard deviation of every point (degrees for psi-delta), or "2 %" of the BRDF.',
+            metavar="SIGMA",
+            kinds=(SPECTRA, COLOURS, BRDF),
+            parse=_number_or_text,
+        ),
+    ] = None
+    region: Annotated[
+        str | list[int] | list[list[int]] | None,
+        Option(
+            "X,Y,WIDTH,HEIGHT of a film in a photograph, in pixels; ';' between several.", kinds=(COLOURS,)
+        ),
+    ] = None
+    points: Annotated[
+        str | list[int] | list[list[int]] | None,
+        Option("X,Y of a film in a photograph; ';' between several.", kinds=(COLOURS,)),
+    ] = None
+    angle: Annotated[
+        float | list[float] | None,
+        Option(
+            "Angle of incidence in degrees (0); 0,30,60 where regions of a photograph show one film.",
+            metavar="DEG",
+            parse=parse_angles,
+            least=0,
+            most=90,
+            unit="degrees",
+        ),
+    ] = None
+    reference: Annotated[
+        str | None,
+        Option(
+            "Raw counts of a bare reference; DATA are then raw counts too.", kinds=(SPECTRA,), is_file=True
+        ),
+    ] = None
+    reference_material: Annotated[str | None, Option("Material of the reference (Si).", kinds=(SPECTRA,))] = (
+        None
+    )
+    dark: Annotated[str | None, Option("Raw counts without light.", kinds=(SPECTRA,), is_file=True)] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class FitOptions(Options):
+    """How data are fitted; keys of `[data]` of a recipe."""
+
+    loss: Annotated[
+        str | None,
+        Option(
+            "least-squares, or huber or student-t to give outliers little weight.",
+            kinds=(SPECTRA, COLOURS, BRDF),
+            words=("least-squares", "huber", "student-t"),
+        ),
+    ] = None
+    tolerance: Annotated[
+        float | None,
+        Option(
+            "Leave out effects that change the signal by less than this (0: none).",
+            kinds=(SPECTRA, COLOURS, BRDF),
+            least=0,
+        ),
+    ] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class FileOptions(ReadingOptions, CameraOptions):
+    """Every option of reading a file of spectra or colours."""
