@@ -28,7 +28,7 @@ import numpy as np
 
 import pellicle as pl
 from pellicle.colour import delta_e2000, lab, sensor, srgb
-from pellicle.rendering import gltf_formula
+from pellicle.rendering import gltf as gltf_formula
 from pellicle.rendering.appearance import ANGLES, appearance
 
 jax.config.update("jax_enable_x64", True)  # double precision; JAX's default is single

@@ -23,7 +23,8 @@ import numpy as np
 
 import pellicle as pl
 from pellicle.colour import srgb
-from pellicle.rendering import gltf_formula, mitsuba_plugin
+from pellicle.rendering import gltf as gltf_formula
+from pellicle.rendering import mitsuba_plugin
 from pellicle.rendering.appearance import appearance
 from pellicle.rendering.mitsuba_tables import lookup
 

@@ -8,7 +8,7 @@ import pellicle as pl
 from pellicle.colour.observers import columns
 from pellicle.optics.pair import Pair
 from pellicle.rendering.appearance import appearance
-from pellicle.rendering.cycles_formula import DIELECTRIC, METAL, cycles_formula, film
+from pellicle.rendering.blender import DIELECTRIC, METAL, cycles_formula, film
 from pellicle.rendering.effective import effective, physical
 
 COMPILED = jax.jit(film)

@@ -8,7 +8,7 @@ import pytest
 
 import pellicle as pl
 from pellicle.errors import DataError, UsageError
-from pellicle.rendering.sphere_mesh import sphere_mesh
+from pellicle.rendering.gltf import sphere_mesh
 
 pygltflib = pytest.importorskip("pygltflib")
 

@@ -7,10 +7,10 @@ import pytest
 
 import pellicle as pl
 from pellicle.colour import film_colour
-from pellicle.rendering import gltf_formula
+from pellicle.rendering import gltf
 from pellicle.rendering.appearance import ANGLES, appearance
 from pellicle.rendering.effective import effective, error, physical
-from pellicle.rendering.gltf_formula import GLTF
+from pellicle.rendering.gltf import GLTF
 
 TO_REC709 = [
     [3.2404542, -1.5371385, -0.4985314],
@@ -63,7 +63,7 @@ def published(index, thickness, cosine, base_f0):
 def test_the_formula_is_the_published_one(index, thickness, base):
     """Also where the base is below the film in index in one channel, above in another."""
     cosine = np.cos(np.deg2rad([0.0, 35.0, 79.0]))
-    found = gltf_formula.film(index, np.array(base), np.array(thickness), cosine)
+    found = gltf.film(index, np.array(base), np.array(thickness), cosine)
     expected = [published(index, thickness, x, base) for x in cosine]
     np.testing.assert_allclose(found, expected, atol=1e-12)
 
@@ -72,9 +72,9 @@ def test_the_formula_is_the_published_one(index, thickness, base):
 def test_without_a_film_the_base_is_left():
     """At thickness 0 and normal incidence a base of F0 reflects F0."""
     base = np.array([0.3, 0.5, 0.7])
-    bare = gltf_formula.film(1.8, base, np.array([0.0]), np.array([1.0]))
+    bare = gltf.film(1.8, base, np.array([0.0]), np.array([1.0]))
     np.testing.assert_allclose(bare[0], base, atol=0.006)  # the code's least product 1e-5 leaves a ripple
-    half = gltf_formula.colour({"ior": 1.8, "base": base, "factor": 0.0}, np.array([90.0]), np.array([1.0]))
+    half = gltf.colour({"ior": 1.8, "base": base, "factor": 0.0}, np.array([90.0]), np.array([1.0]))
     np.testing.assert_allclose(half[0], base, atol=1e-12)
 
 

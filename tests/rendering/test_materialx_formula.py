@@ -8,13 +8,13 @@ import pytest
 
 from pellicle.colour.bands import published_gaussians
 from pellicle.colour.film import reflectance
-from pellicle.rendering import materialx_formula
+from pellicle.rendering import materialx
 from pellicle.rendering.materialx import artistic_colours, artistic_index
 
 ANGLES = np.array([0.0, 30.0, 50.0, 60.0, 75.0, 80.0])
 COSINES = np.cos(np.deg2rad(ANGLES))
-conductor = jax.jit(materialx_formula.conductor)
-schlick = jax.jit(materialx_formula.schlick)
+conductor = jax.jit(materialx.conductor)
+schlick = jax.jit(materialx.schlick)
 
 
 @pytest.mark.slow  # compiles for 3 s
@@ -31,14 +31,14 @@ def test_a_grey_base_is_exact(ior, base, thickness):
     exact = np.asarray(reflectance(thickness, ior, base, bands, angle=ANGLES)) @ bands.weights
     n, k = np.full(3, np.real(base)), np.full(3, np.imag(base))
     found = conductor({"ior": ior, "n": n, "k": k}, np.array(thickness), COSINES)
-    np.testing.assert_allclose(found, np.clip(exact @ materialx_formula.XYZ_TO_RGB.T, 0, 1), atol=1.2e-3)
+    np.testing.assert_allclose(found, np.clip(exact @ materialx.XYZ_TO_RGB.T, 0, 1), atol=1.2e-3)
 
 
 def test_a_tint_multiplies_the_dielectric():
     grey = {"ior": 1.5, "n": np.full(3, 1.33), "k": np.zeros(3)}
     white = conductor(grey, np.array(400.0), COSINES)
     tint = np.array([0.2, 0.5, 1.0])
-    found = materialx_formula.dielectric({"ior": 1.5, "base": 1.33, "tint": tint}, np.array(400.0), COSINES)
+    found = materialx.dielectric({"ior": 1.5, "base": 1.33, "tint": tint}, np.array(400.0), COSINES)
     np.testing.assert_allclose(found, white * tint, atol=1e-12)
 
 

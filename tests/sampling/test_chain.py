@@ -18,9 +18,9 @@ from pellicle.errors import DataError, UsageError
 from pellicle.fitting.progress import quiet
 from pellicle.reporting.netcdf import write_netcdf
 from pellicle.sampling.chain import empty
+from pellicle.sampling.density import Target
+from pellicle.sampling.ensemble import run
 from pellicle.sampling.modes import Modes
-from pellicle.sampling.run import run
-from pellicle.sampling.target import Target
 
 HERE = Path(__file__).parent
 RUN = """

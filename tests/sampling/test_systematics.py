@@ -13,7 +13,7 @@ import tmm
 import pellicle as pl
 from pellicle.fitting.discrepancy import Effect, Evidence
 from pellicle.fitting.problem import Explained
-from pellicle.sampling.systematics import systematics
+from pellicle.sampling.density import systematics
 
 ROWS = 30
 X = np.linspace(-1.0, 1.0, ROWS)

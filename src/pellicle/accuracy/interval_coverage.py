@@ -21,10 +21,9 @@ from pellicle.fitting.progress import Progress, quiet
 from pellicle.fitting.reweighting import RankedMinima, rank
 from pellicle.sampling.chain import empty
 from pellicle.sampling.checks import missing
-from pellicle.sampling.density import log_density
+from pellicle.sampling.density import Target, log_density
+from pellicle.sampling.ensemble import run
 from pellicle.sampling.modes import modes
-from pellicle.sampling.run import run
-from pellicle.sampling.target import Target
 
 NOMINAL = 0.95
 _WIDE = 1.959964

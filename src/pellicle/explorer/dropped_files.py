@@ -15,8 +15,7 @@ from pellicle.data.mueller import SIGNAL as MUELLER
 from pellicle.data.read_spectrum import read_spectra
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import DataError, UsageError
-from pellicle.explorer.incidence import MOST, measured_angles, named, thinned
-from pellicle.explorer.programs import Curve
+from pellicle.explorer.programs import MOST, Curve, measured_angles, named, thinned
 
 LARGEST_FILE = 20_000_000
 """Bytes of the largest data file."""

@@ -14,11 +14,30 @@ from pellicle.data import generalised
 from pellicle.data.spectrum import Spectrum
 from pellicle.effects.film_plan import exact
 from pellicle.errors import DataError, UsageError
-from pellicle.explorer.controls import Control, film_controls, scene_with, template, with_value
-from pellicle.explorer.incidence import abscissa, light_angles, measured_angles, named, thinned
-from pellicle.explorer.programs import ANGLE, angle_program, colour_program, spectrum_program
-from pellicle.explorer.sphere import ball_rendering
-from pellicle.explorer.structure import CONES, Structure, bucket, key_of, oblique_cone
+from pellicle.explorer.answers import ball_rendering
+from pellicle.explorer.controls import (
+    CONES,
+    Control,
+    Structure,
+    bucket,
+    film_controls,
+    key_of,
+    oblique_cone,
+    scene_with,
+    template,
+    with_value,
+)
+from pellicle.explorer.programs import (
+    ANGLE,
+    abscissa,
+    angle_program,
+    colour_program,
+    light_angles,
+    measured_angles,
+    named,
+    spectrum_program,
+    thinned,
+)
 from pellicle.forward_model.plan import Plan
 from pellicle.scene.film import Light, Scene, with_wavelength
 from pellicle.scene.free import Free, insert

@@ -13,8 +13,7 @@ from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
 from pellicle.explorer.controls import Control
 from pellicle.explorer.dropped_files import lines
-from pellicle.explorer.incidence import measured_angles
-from pellicle.explorer.programs import Curve
+from pellicle.explorer.programs import Curve, measured_angles
 from pellicle.fitting.curves import Curve as FittedCurve
 from pellicle.fitting.film.fit import fit
 from pellicle.fitting.result import Fit

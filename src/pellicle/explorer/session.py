@@ -25,8 +25,7 @@ from pellicle.explorer.controls import scene_with, with_value
 from pellicle.explorer.dropped_files import LARGEST_FILE, data_curves, data_text, measured_spectra
 from pellicle.explorer.film_view import FilmView
 from pellicle.explorer.fit_run import FitRun, fitted_curves, fitted_names, to_json
-from pellicle.explorer.incidence import asked_angles, measured_angles
-from pellicle.explorer.programs import ANGLE
+from pellicle.explorer.programs import ANGLE, asked_angles, measured_angles
 from pellicle.explorer.surface_view import SurfaceExplorerView
 from pellicle.recipes.python_text import python_program
 from pellicle.recipes.write import recipe_text

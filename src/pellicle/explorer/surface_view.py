@@ -12,10 +12,9 @@ import numpy as np
 from pellicle.data.spectrum import Spectrum
 from pellicle.effects.surface_plan import plan
 from pellicle.errors import UsageError
-from pellicle.explorer.controls import Control
+from pellicle.explorer.answers import png
+from pellicle.explorer.controls import Control, Structure
 from pellicle.explorer.programs import Curve
-from pellicle.explorer.sphere import png
-from pellicle.explorer.structure import Structure
 from pellicle.forward_model.plan import Plan
 from pellicle.reporting.rendering_display import display
 from pellicle.scene.free import Free

@@ -3,25 +3,135 @@
 A metal or semiconductor is a Metallic BSDF with n + ik per channel, whose film needs Blender 5.0; a
 transparent base is a Principled BSDF that transmits, with a film since Blender 4.2. Thicknesses are in nm; a
 map of them is a grey image of 16 bits. The film is drawn by Cycles; EEVEE leaves it out.
+
+`cycles_formula` is the film colour of Cycles 5: Airy's series with the Fourier transforms of red, green and
+blue. Interference of Belcour and Barla with three orders, Fresnel's equations for s and p, and one index n +
+ik of the base per channel. The film is transparent and without dispersion. Light is white of equal energy,
+whose colour is taken for that of D65. Blender 4.2 has films on dielectrics only, with the Gaussians of glTF
+in place of the transforms.
+
+Source: Blender 5.0.1, `intern/cycles/kernel/closure/bsdf_util.h` (`fresnel_iridescence`) and
+`intern/cycles/doc/precompute/thin_film_table.py`; renders agree with this module to 1e-6.
 """
 
 from __future__ import annotations
 
 import subprocess
 import sys
+from functools import cache
 from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
 from pprint import pformat
 from textwrap import fill
+from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Complex, Float
 
+from pellicle.colour.observers import columns
 from pellicle.errors import UsageError
 from pellicle.files import replacing, write_text
-from pellicle.rendering.cycles_formula import cycles_formula
+from pellicle.optics.orders import airy_series
+from pellicle.optics.pair import Pair, abs2, real
+from pellicle.rendering.appearance import Appearance
+from pellicle.rendering.formula import Formula, Key, Numbers
+from pellicle.rendering.gltf import XYZ_TO_REC709
 from pellicle.rendering.material import Material
 from pellicle.rendering.targets import Target
+
+ORDERS = 3
+_POINTS = 1022
+_LONGEST = 60_000 / (2 * np.pi)
+"""Optical path (nm) at the end of the table; longer paths take its last entry."""
+
+
+@cache
+def _transforms() -> Complex[np.ndarray, "512 3"]:
+    """Transforms of red, green and blue at equal steps of the optical path from 0; 1 at path 0."""
+    from scipy.interpolate import CubicSpline  # slow to import
+
+    table = columns("observers.csv")
+    nm = table["wavelength_nm"]
+    observer = np.stack([table[f"{axis}_1931"] for axis in "xyz"], axis=1)
+    ended = np.pad(observer, ((1, 1), (0, 0)))
+    spline = CubicSpline(np.concatenate([[nm[0] - 1], nm, [nm[-1] + 1]]), ended, extrapolate=False)
+    wavenumber = np.linspace(0.0, np.pi * (_POINTS - 1) / 60, _POINTS)[1:]  # 1/µm
+    resampled = np.nan_to_num(spline(1000 / wavenumber)) / wavenumber[:, None] ** 2
+    rgb = np.conj(np.fft.rfft(np.pad(resampled, ((1, 0), (0, 0))), axis=0)) @ XYZ_TO_REC709.T
+    return rgb / rgb[0].real
+
+
+def sensitivity(path: Any) -> Pair:
+    """Transforms (..., 3) of red, green and blue at optical paths (...) in nm, interpolated as in Cycles."""
+    table = _transforms()
+    last = len(table) - 1
+    at = jnp.clip(path * (last / _LONGEST), 0.0, last)
+    row = jnp.minimum(at.astype(int), last - 1)
+    step = (at - row)[..., None]
+    both = [
+        jnp.asarray(part)[row] * (1 - step) + jnp.asarray(part)[row + 1] * step
+        for part in (np.real(table), np.imag(table))
+    ]
+    return Pair(*both)
+
+
+def film(index: Any, base: Pair, thickness: Any, cosine: Any) -> Float[Array, "... 3"]:
+    """Linear sRGB (..., 3) of a film of one `index` in air on a base of three indices n + ik."""
+    ratio = jnp.clip(thickness, 0.0, 1.0)  # below 1 nm the film becomes air
+    index = 1 + (index - 1) * ratio**2 * (3 - 2 * ratio)
+    path = 2 * thickness * jnp.sqrt(index**2 - (1 - cosine**2))
+    waves = sensitivity(path * np.arange(1, ORDERS + 1).reshape(-1, *[1] * jnp.ndim(path)))
+    angle, total = jnp.arccos(cosine)[..., None], 0.0
+    for letter in "sp":
+        series = airy_series(1.0, index[..., None], base, 0.0, angle, letter)
+        into = 1 - series.upper**2
+        returned = into**2 * abs2(series.lower) / (1 - series.upper**2 * abs2(series.lower))
+        seen = series.upper**2 + returned
+        term, step = series.lower * (series.upper * (into - returned)), -(series.lower * series.upper)
+        for re, im in zip(waves.re, waves.im, strict=True):
+            seen = seen + 2 * real(term * Pair(re, im))
+            term = term * step
+        total = total + 0.5 * seen
+    return jnp.clip(total, 0.0, 1.0)
+
+
+def _on_metal(numbers: Numbers, thickness: Any, cosine: Any) -> Any:
+    base = Pair(jnp.asarray(numbers["base_ior"]), jnp.asarray(numbers["base_extinction"]))
+    return film(jnp.asarray(numbers["ior"]), base, *jnp.broadcast_arrays(thickness, cosine))
+
+
+def _on_dielectric(numbers: Numbers, thickness: Any, cosine: Any) -> Any:
+    base = jnp.full(3, 1.0) * jnp.asarray(numbers["base_ior"])
+    return film(
+        jnp.asarray(numbers["ior"]), Pair(base, jnp.zeros(3)), *jnp.broadcast_arrays(thickness, cosine)
+    )
+
+
+def _metal(look: Appearance) -> Numbers:
+    return {"ior": look.index, "base_ior": np.real(look.base), "base_extinction": np.imag(look.base)}
+
+
+def _dielectric(look: Appearance) -> Numbers:
+    return {"ior": look.index, "base_ior": look.base[1].real}
+
+
+_FILM = Key("ior", 1.0, 4.0)
+METAL = Formula(
+    "film of Cycles 5 on a metal",
+    (_FILM, Key("base_ior", 0.05, 8.0, 3), Key("base_extinction", 0.0, 10.0, 3)),
+    _on_metal,
+    _metal,
+)
+DIELECTRIC = Formula(
+    "film of Cycles 5 on a dielectric", (_FILM, Key("base_ior", 1.0, 4.0)), _on_dielectric, _dielectric
+)
+
+
+def cycles_formula(look: Appearance) -> Formula:
+    """Return the formula for the base of a film."""
+    return METAL if look.metallic else DIELECTRIC
 
 
 def write(path: Path, material: Material) -> tuple[Path, ...]:

@@ -3,6 +3,12 @@
 A metal or semiconductor is a metallic material whose base colour is the base's reflectance; a transparent
 base is a transmitting dielectric with `KHR_materials_ior` and `KHR_materials_specular`. Thicknesses are in
 nm; a map of them is in the green channel of a texture. Both sets of numbers are in the material's `extras`.
+
+The film colour is the approximation of Belcour and Barla that the extension publishes. Fresnel's equations
+are replaced by Schlick's at both faces, polarisation and the base's extinction are left out. three.js,
+Babylon.js and others use the same code.
+
+Source: Khronos, KHR_materials_iridescence, "Implementation Notes" (2022).
 """
 
 from __future__ import annotations
@@ -10,16 +16,107 @@ from __future__ import annotations
 from importlib.metadata import version
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+import jax.numpy as jnp
 import numpy as np
 
 from pellicle.files import replacing
 from pellicle.rendering.appearance import Appearance
-from pellicle.rendering.gltf_formula import GLTF, base_index
+from pellicle.rendering.formula import Formula, Key, Numbers, series
 from pellicle.rendering.material import Material
-from pellicle.rendering.sphere_mesh import sphere_mesh
 from pellicle.rendering.targets import Target
+
+XYZ_TO_REC709 = np.array(
+    [
+        [3.2404542, -1.5371385, -0.4985314],
+        [-0.9692660, 1.8760108, 0.0415560],
+        [0.0556434, -0.2040259, 1.0572252],
+    ]
+)
+
+
+def schlick(normal: Any, cosine: Any) -> Any:
+    """Reflectance of a face by Schlick's approximation, of that at normal incidence."""
+    return normal + (1 - normal) * (1 - cosine) ** 5
+
+
+def base_index(normal: Any) -> Any:
+    """Index of a base in air, of its reflectance at normal incidence."""
+    normal = jnp.clip(normal, 0.0, 0.9999)
+    lit = normal > 0  # the root of 0 has no slope
+    root = jnp.where(lit, jnp.sqrt(jnp.where(lit, normal, 1.0)), 0.0)
+    return (1 + root) / (1 - root)
+
+
+_PRODUCT = (1e-5, 0.9999)
+"""Bounds of the product of both reflectances in the published code."""
+
+
+def film(index: Any, base: Any, thickness: Any, cosine: Any) -> Any:
+    """Reflectance (..., 3) of a film of one `index` on a base of reflectances (3,) in air, linear sRGB."""
+    # without a film its index becomes that of air
+    ratio = jnp.clip(thickness / 0.03, 0.0, 1.0)
+    index = 1 + (index - 1) * ratio**2 * (3 - 2 * ratio)
+    inside = jnp.sqrt(1 - (1 - cosine**2) / index**2)
+    below = base_index(base)
+    first = schlick(((index - 1) / (index + 1)) ** 2, cosine)[..., None]
+    index = jnp.asarray(index)[..., None]
+    second = schlick(((below - index) / (below + index)) ** 2, inside[..., None])
+    shift = jnp.pi + jnp.where(below < index, jnp.pi, 0.0)
+    path = 2 * index[..., 0] * thickness * inside
+    shift = jnp.broadcast_to(shift, (*path.shape, 3))
+    total = series(first, second, path, shift, lambda xyz: xyz @ jnp.asarray(XYZ_TO_REC709.T), _PRODUCT)
+    return jnp.maximum(total, 0.0)
+
+
+def colour(numbers: Numbers, thickness: Any, cosine: Any) -> Any:
+    """Linear sRGB (..., 3): the film's, mixed with the base's own where `factor` is below 1."""
+    base = jnp.asarray(numbers["base"])
+    with_film = film(jnp.asarray(numbers["ior"]), base, jnp.asarray(thickness), jnp.asarray(cosine))
+    bare = schlick(base, jnp.asarray(cosine)[..., None])
+    return bare + numbers["factor"] * (with_film - bare)
+
+
+def physical(look: Appearance) -> Numbers:
+    """Index of the layer at 550 nm, and the reflectance of the base at normal incidence."""
+    base = look.bare
+    if not look.metallic:
+        base = np.full(3, ((look.base[1].real - 1) / (look.base[1].real + 1)) ** 2)
+    return {"ior": look.index, "base": base, "factor": 1.0}
+
+
+GLTF = Formula(
+    "glTF's approximation of Belcour and Barla",
+    (Key("ior", 1.0, 4.0), Key("base", 1e-6, 1.0, 3), Key("factor", 0.25, 1.0)),
+    colour,
+    physical,
+)
+
+
+class Mesh(NamedTuple):
+    """Unit sphere: `positions` (vertices, 3), which are the normals too, `texture` coordinates (vertices, 2)
+    from the upper left of an image, and `triangles` (triangles, 3), counterclockwise from outside."""
+
+    positions: np.ndarray
+    texture: np.ndarray
+    triangles: np.ndarray
+
+
+def sphere_mesh(rows: int = 48, columns: int = 96) -> Mesh:
+    """Return a sphere of `rows` from the upper pole (+y) to the lower one, and `columns` around it."""
+    v, u = np.meshgrid(np.linspace(0, 1, rows + 1), np.linspace(0, 1, columns + 1), indexing="ij")
+    theta, phi = np.pi * v, 2 * np.pi * u
+    positions = np.stack(
+        [-np.sin(theta) * np.cos(phi), np.cos(theta), np.sin(theta) * np.sin(phi)], axis=-1
+    ).reshape(-1, 3)
+    texture = np.stack([u, v], axis=-1).reshape(-1, 2)
+    upper_left = (np.arange(rows)[:, None] * (columns + 1) + np.arange(columns)).reshape(-1)
+    right, below = upper_left + 1, upper_left + columns + 1
+    first = np.stack([upper_left, below, right], axis=-1)[columns:]  # at the upper pole it has no area
+    second = np.stack([right, below, below + 1], axis=-1)[:-columns]
+    return Mesh(positions, texture, np.concatenate([first, second]))
+
 
 _FLOAT, _INDEX = 5126, 5123
 _VERTICES, _ELEMENTS = 34962, 34963

@@ -3,6 +3,13 @@
 Thicknesses are in nm. A metal has its n and k per channel, which Standard Surface writes as the colours of
 O. Gulbrandsen (2014, JCGT 3(4), 64), of which MaterialX computes n and k again. Both sets of numbers are in
 the attribute `pellicle` of the material.
+
+The film colour is Belcour and Barla's formula, with polarisation and a complex base per channel. It is
+`mx_fresnel_airy` of MaterialX 1.39's hardware shaders, which OpenPBR and Standard Surface share. The wave of
+a channel of the base is multiplied by the sensitivity of X, Y or Z, not of red, green or blue, and XYZ
+becomes RGB by a matrix of CIE RGB; renderers take the result as their linear working space.
+
+Source: MaterialX 1.39.5, libraries/pbrlib/genglsl/lib/mx_microfacet_specular.glsl.
 """
 
 from __future__ import annotations
@@ -13,14 +20,169 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 
 from pellicle.files import replacing
+from pellicle.rendering.appearance import Appearance
 from pellicle.rendering.effective import ColourError
 from pellicle.rendering.effective import error as colour_error
+from pellicle.rendering.formula import Formula, Key, Numbers, series
 from pellicle.rendering.material import Material
-from pellicle.rendering.materialx_formula import formula
 from pellicle.rendering.targets import Target
+
+XYZ_TO_RGB = np.array(
+    [
+        [2.3706743, -0.9000405, -0.4706338],
+        [-0.5138850, 1.4253036, 0.0885814],
+        [0.0052982, -0.0146949, 1.0093968],
+    ]
+)
+"""Their matrix to CIE RGB, whose white is E."""
+_PRODUCT = (1e-12, 1.0)
+"""Bounds of the product of both reflectances: the root of 0 has no slope."""
+
+
+def _root(x: Any) -> Any:
+    """Root of numbers that may be 0, with slope 0 there."""
+    positive = x > 0
+    return jnp.where(positive, jnp.sqrt(jnp.where(positive, x, 1.0)), 0.0)
+
+
+def conductor_reflectances(cosine: Any, n: Any, k: Any) -> tuple[Any, Any]:
+    """Reflectances for p and s of a face between media of relative index n + ik."""
+    sine2 = 1 - cosine**2
+    difference = n**2 - k**2 - sine2
+    both = jnp.sqrt(difference**2 + 4 * n**2 * k**2)
+    double = 2 * _root(0.5 * (both + difference)) * cosine
+    total = both + cosine**2
+    s = (total - double) / (total + double)
+    of_p, part = cosine**2 * both + sine2**2, double * sine2
+    return s * (of_p - part) / (of_p + part), s
+
+
+def conductor_phases(cosine: Any, above: Any, n: Any, k: Any) -> tuple[Any, Any]:
+    """Phases for p and s on reflection in a medium of index `above` at a base of n + ik."""
+    ratio = k / n
+    a = n**2 * (1 - ratio**2) - above**2 * (1 - cosine**2)
+    b = _root(a**2 + (2 * n**2 * ratio) ** 2)
+    u, v = _root((a + b) / 2), _root((b - a) / 2)
+    square = u**2 + v**2
+    s = jnp.arctan2(2 * above * v * cosine, square - (above * cosine) ** 2)
+    p = jnp.arctan2(
+        2 * above * n**2 * cosine * (2 * ratio * u - (1 - ratio**2) * v),
+        (n**2 * (1 + ratio**2) * cosine) ** 2 - above**2 * square,
+    )
+    return p, s
+
+
+def hoffman_schlick(cosine: Any, normal: Any, edge: Any) -> Any:
+    """Schlick's approximation of a reflectance at normal incidence, times `edge` near 82 degrees."""
+    at = 1 / 7
+    white = (1 - at) ** 5
+    slope = (normal + (1 - normal) * white) * (1 - edge) / (at * (1 - at) ** 6)
+    return normal + (1 - normal) * (1 - cosine) ** 5 - slope * cosine * (1 - cosine) ** 6
+
+
+def film(index: Any, base: Any, thickness: Any, cosine: Any) -> Any:
+    """Linear RGB (..., 3) of a film on a base; `base(inside, index)` gives its reflectances and phases.
+
+    These are pairs for p and s, (..., 3), at the cosine `inside` the film.
+    """
+    index = jnp.maximum(index, 1.0)
+    inside = jnp.sqrt(1 - (1 - cosine**2) / index**2)
+    first = conductor_reflectances(cosine, index, 0.0)
+    below, phases = base(inside[..., None], index)
+    # the upper face from below: no turn for p beyond Brewster's angle
+    from_below = (jnp.where(cosine < jnp.cos(jnp.arctan(index)), 0.0, jnp.pi), jnp.pi)
+    path = 2 * index * inside * thickness
+    total: Any = 0.0
+    for upper, lower, turn, phase in zip(first, below, from_below, phases, strict=True):
+        shift = jnp.broadcast_to(phase + jnp.asarray(turn)[..., None], (*path.shape, 3))
+        total = total + series(upper[..., None], lower, path, shift, lambda xyz: xyz, _PRODUCT)
+    return jnp.clip((0.5 * total) @ jnp.asarray(XYZ_TO_RGB.T), 0.0, 1.0)
+
+
+def conductor(numbers: Numbers, thickness: Any, cosine: Any) -> Any:
+    """Linear RGB of `conductor_bsdf` with a film."""
+    n, k = (jnp.asarray(numbers[key]) for key in ("n", "k"))
+
+    def base(inside: Any, index: Any) -> tuple[Any, Any]:
+        return conductor_reflectances(inside, n / index, k / index), conductor_phases(inside, index, n, k)
+
+    return film(jnp.asarray(numbers["ior"]), base, jnp.asarray(thickness), jnp.asarray(cosine))
+
+
+def dielectric(numbers: Numbers, thickness: Any, cosine: Any) -> Any:
+    """Linear RGB of `dielectric_bsdf` with a film, times its `tint`."""
+    n = jnp.broadcast_to(jnp.asarray(numbers["base"]), 3)
+    colour = conductor({"ior": numbers["ior"], "n": n, "k": jnp.zeros(3)}, thickness, cosine)
+    return colour * jnp.asarray(numbers["tint"])
+
+
+def schlick(numbers: Numbers, thickness: Any, cosine: Any) -> Any:
+    """Linear RGB of `generalized_schlick_bsdf` with a film of a `weight`, as of OpenPBR's metals."""
+    normal, edge = (jnp.asarray(numbers[key]) for key in ("base", "edge"))
+    root = jnp.sqrt(jnp.clip(normal, 0.01, 0.99))
+    n = (1 + root) / (1 - root)
+
+    def base(inside: Any, index: Any) -> tuple[Any, Any]:
+        half = 0.5 * hoffman_schlick(inside, normal, edge)
+        turn = jnp.where(n < index, jnp.pi, 0.0)
+        return (half, half), (turn, turn)
+
+    with_film = film(jnp.asarray(numbers["ior"]), base, jnp.asarray(thickness), jnp.asarray(cosine))
+    bare = hoffman_schlick(jnp.asarray(cosine)[..., None], normal, edge)
+    return bare + numbers["weight"] * (with_film - bare)
+
+
+def _physical_conductor(look: Appearance) -> Numbers:
+    return {"ior": look.index, "n": np.real(look.base), "k": np.imag(look.base)}
+
+
+def _physical_dielectric(look: Appearance) -> Numbers:
+    return {"ior": look.index, "base": float(np.real(look.base)[1]), "tint": np.ones(3)}
+
+
+def _physical_metal(look: Appearance) -> Numbers:
+    """F0, and F82 relative to Schlick's, of the bare base."""
+    at = 1 / 7
+    p, s = conductor_reflectances(at, np.real(look.base), np.imag(look.base))
+    white = look.bare + (1 - look.bare) * (1 - at) ** 5
+    edge = np.clip(np.asarray(0.5 * (p + s)) / white, 0.0, 1.0)
+    return {"ior": look.index, "base": look.bare, "edge": edge, "weight": 1.0}
+
+
+_FILM = Key("ior", 1.0, 4.0)
+CONDUCTOR = Formula(
+    "MaterialX's conductor with a film",
+    (_FILM, Key("n", 0.05, 8.0, 3), Key("k", 0.0, 8.0, 3)),
+    conductor,
+    _physical_conductor,
+)
+DIELECTRIC = Formula(
+    "MaterialX's dielectric with a film",
+    (_FILM, Key("base", 1.0, 4.0), Key("tint", 0.0, 1.0, 3)),
+    dielectric,
+    _physical_dielectric,
+)
+METAL = Formula(
+    "OpenPBR's metal with a film",
+    (_FILM, Key("base", 0.0, 1.0, 3), Key("edge", 0.0, 1.0, 3), Key("weight", 0.25, 1.0)),
+    schlick,
+    _physical_metal,
+)
+
+
+def formula(look: Appearance) -> Formula:
+    """The formula of MaterialX's own nodes, and of Standard Surface, for a base."""
+    return CONDUCTOR if look.metallic else DIELECTRIC
+
+
+def open_pbr_formula(look: Appearance) -> Formula:
+    """The formula of OpenPBR for a base."""
+    return METAL if look.metallic else DIELECTRIC
+
 
 _BRIGHTEST = 0.99
 """Largest reflectance of MaterialX's `artistic_ior`."""

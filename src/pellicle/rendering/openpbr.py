@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from pellicle.rendering.material import Material
-from pellicle.rendering.materialx import add_material, new_document, save, set_inputs
-from pellicle.rendering.materialx_formula import open_pbr_formula
+from pellicle.rendering.materialx import add_material, new_document, open_pbr_formula, save, set_inputs
 from pellicle.rendering.targets import Target
 
 

@@ -18,8 +18,7 @@ from pellicle.colour import linear_srgb, sensor
 from pellicle.files import replacing
 from pellicle.rendering.appearance import Appearance
 from pellicle.rendering.material import Material
-from pellicle.rendering.materialx import bsdf_of
-from pellicle.rendering.materialx_formula import formula
+from pellicle.rendering.materialx import bsdf_of, formula
 from pellicle.rendering.targets import Target
 
 

@@ -25,13 +25,11 @@ from pellicle.fitting.film.colour_targets import arrays
 from pellicle.fitting.film.evidence import evidence as spectrum_evidence
 from pellicle.fitting.progress import Progress, quiet
 from pellicle.fitting.result import Status
-from pellicle.sampling.density import fingerprint, log_density
+from pellicle.sampling.density import fingerprint, log_density, systematics
 from pellicle.sampling.ensemble import STEPS, Subject, installed, sampled
-from pellicle.sampling.modes import modes
+from pellicle.sampling.modes import modes, sandwich_stretch
 from pellicle.sampling.predict import predictions
 from pellicle.sampling.result import Posterior
-from pellicle.sampling.sandwich import sandwich_stretch
-from pellicle.sampling.systematics import systematics
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface
 
