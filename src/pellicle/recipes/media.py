@@ -12,7 +12,7 @@ from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.effective_medium import MIXTURES
 from pellicle.dispersion.oscillators import AbstractOscillator
 from pellicle.errors import UsageError, did_you_mean
-from pellicle.materials.files import SUFFIXES as MATERIAL_SUFFIXES
+from pellicle.materials.formats.detect import SUFFIXES as MATERIAL_SUFFIXES
 from pellicle.recipes import media_words
 from pellicle.recipes.anisotropic_media import AnisotropicTable, anisotropic_medium
 from pellicle.recipes.dispersion_models import (

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pellicle.materials import Material, contents, material
-from pellicle.materials.files import read_material_file
+from pellicle.materials.formats.detect import read_material_file
 from pellicle.reporting.drawing import figure_path, new_figure, save_figure
 
 if TYPE_CHECKING:

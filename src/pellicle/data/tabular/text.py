@@ -76,17 +76,25 @@ def text_file(content: bytes, sha256: str, path: str | os.PathLike[str]) -> Text
 
     Raises DataError for an empty file and for one that is not a table.
     """
+    lines, comments = content_lines(text_of(content, path))
+    if not lines:
+        raise DataError(f"{path}: has only comments; expected rows of numbers")
+    return TextFile(str(path), sha256, lines, comments)
+
+
+def text_of(content: bytes, path: str | os.PathLike[str]) -> str:
+    """Decode the content of a text file, whose lines then end in `\\n`.
+
+    Raises DataError for an empty file, for a binary one, and for a text of another kind than a table.
+    """
     if advice := foreign_format(content):
         raise DataError(f"{path}: is {advice}")
-    text = decoded(content)
+    text = decoded(content).replace("\r\n", "\n").replace("\r", "\n").rstrip("\x1a")
     if _CONTROL.search(text):
         raise DataError(f"{path}: is a binary file of an unknown format; export it as text (CSV) first")
     if not text.strip():
         raise DataError(f"{path}: is empty; expected rows of numbers")
-    lines, comments = content_lines(text)
-    if not lines:
-        raise DataError(f"{path}: has only comments; expected rows of numbers")
-    return TextFile(str(path), sha256, lines, comments)
+    return text
 
 
 def decoded(content: bytes) -> str:
@@ -115,8 +123,7 @@ def decoded(content: bytes) -> str:
 def content_lines(text: str) -> tuple[list[Line], list[Line]]:
     """Return the lines that are not blank, and the comments (without their `#`), both in file order."""
     lines, comments = [], []
-    plain_text = text.replace("\r\n", "\n").replace("\r", "\n").rstrip("\x1a")
-    for number, raw in enumerate(plain_text.split("\n"), start=1):
+    for number, raw in enumerate(text.split("\n"), start=1):
         plain = raw.strip(" ")
         if plain.startswith("#"):
             comments.append(Line(number, plain.lstrip("# "), ""))
@@ -147,6 +154,7 @@ _FOREIGN = {
     rb"%PDF": "a PDF; give the numbers in it as a CSV",
     rb"\xd0\xcf\x11\xe0|PK\x03\x04.*(\[Content_Types|spreadsheet)": "an office file; save its sheet as CSV",
     rb"PK\x03\x04|\x1f\x8b|BZh|7z\xbc\xaf|Rar!": "packed; unpack it and give the file inside",
+    rb"MATLAB ": "a MATLAB file; save its table as text with a header such as wavelength_nm,n,k",
     rb"AVS8\d": "a binary file of Avantes AvaSoft 8; export it as text in AvaSoft",
     rb"Spectral Data File": "a binary file of Thermo OMNIC; save it as JCAMP-DX or CSV in OMNIC",
     rb"tensor_file\0": "a tensor file of a BRDF; fit it with a `recipe` of the surface",

@@ -1,17 +1,25 @@
-"""Columns of a material file, checked and converted to n + ik against wavelength in nm."""
+"""Optical constants of a material file: lines and rows of its text, checks, and n + ik against nm."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
+from pellicle.data.tabular.layout import plain_columns
+from pellicle.data.tabular.table import Table
+from pellicle.data.tabular.text import Line, content_lines, is_number, open_binary, text_of
 from pellicle.data.tabular.units import to_nm
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.errors import DataError
 from pellicle.materials.page import NOISE_IN_K, table
 
+LARGEST_FILE = 64 * 2**20
+"""Largest material file, in bytes: a million rows."""
 LONGEST_NM = 1e11
 LARGEST = 1e10
 """Bounds of wavelengths and of n, k, ε₁ and ε₂, beyond all data: refractiveindex.info has water up to 10 m,
@@ -19,6 +27,73 @@ and metals in the far infrared have |ε| of 1e6."""
 
 _ROW = "correct or delete that row"
 _SIGN = "absorption is n + ik with k ≥ 0 here, so turn its sign"
+
+
+@dataclass(frozen=True)
+class MaterialText:
+    """Text of a material file, and its lines up to any `#`, without blank ones."""
+
+    path: str
+    text: str
+    lines: tuple[Line, ...]
+
+    @property
+    def suffix(self) -> str:
+        """Suffix of the file in lower case, as `.mat`."""
+        return Path(self.path).suffix.lower()
+
+
+def read_text(path: str | Path) -> MaterialText:
+    """Read a text file: UTF-8, UTF-16 or Latin-1.
+
+    Raises DataError for a file that is missing, empty, too large or not a text.
+    """
+    with open_binary(path) as file:
+        content = file.read(LARGEST_FILE + 1)
+    if len(content) > LARGEST_FILE:
+        raise DataError(
+            f"{path}: is larger than {LARGEST_FILE >> 20} MB, which is no table of optical constants"
+        )
+    text = text_of(content, path)
+    bare = ((line.number, line.bare.strip()) for line in content_lines(text)[0])
+    return MaterialText(str(path), text, tuple(Line(number, line, line) for number, line in bare if line))
+
+
+def cells(text: str) -> list[str]:
+    """Split a row at blanks, tabs and semicolons, else at commas; a decimal comma becomes a point."""
+    separated = re.split(r"[\s;]+", text.strip().strip(";").strip())
+    if len(separated) == 1:
+        return [cell.strip() for cell in text.rstrip(",").split(",")]
+    return [cell.removesuffix(",").replace(",", ".") for cell in separated]
+
+
+def is_row(text: str) -> bool:
+    """Return True for a line of two or more numbers and nothing else."""
+    numbers = cells(text)
+    return len(numbers) >= 2 and all(map(is_number, numbers))
+
+
+def read_rows(path: str, lines: Sequence[Line], names: Sequence[str], optional: int = 0) -> Table:
+    """Return a table of lines with the columns `names`, of which all rows may lack the last `optional`.
+
+    Raises DataError for no rows, and for a row of another length.
+    """
+    if not lines:
+        raise DataError(f"{path}: ends without a row of {', '.join(names)}; export it again")
+    rows = [(line, cells(line.text)) for line in lines]
+    width = len(rows[0][1])
+    if not len(names) - optional <= width <= len(names):
+        raise DataError(
+            f"{path}: line {lines[0].number} has {width} values where {', '.join(names)} are expected; "
+            "correct that line"
+        )
+    for line, row in rows:
+        if len(row) != width:
+            raise DataError(
+                f"{path}: line {line.number} has {len(row)} value{'s' * (len(row) != 1)} where {width} are "
+                "expected; correct or delete that line"
+            )
+    return Table(path, "", plain_columns(names[:width], rows, []))
 
 
 class MaterialFile(NamedTuple):
@@ -54,6 +129,29 @@ class OpticalConstants(NamedTuple):
     dielectric: bool
     names: tuple[str, str, str]
     where: Callable[[int, str], str]
+
+
+def constants_of(
+    rows: Table, unit: str, dielectric: bool = False, axis: np.ndarray | None = None
+) -> OpticalConstants:
+    """Return the columns of rows of axis, n and k, or eps1 and eps2; of rows of n and k with their `axis`.
+
+    Raises DataError for a cell that is no finite number.
+    """
+    values = rows.numbers(range(rows.layout.width))
+    first, second = ("eps1", "eps2") if dielectric else ("n", "k")
+    named = "axis" if axis is not None else rows.layout.names[0] if rows.layout.names else "wavelength"
+    values = values if axis is None else [axis, *values]
+    return OpticalConstants(
+        rows.path,
+        values[0],
+        unit,
+        values[1],
+        values[2] if len(values) > 2 else None,
+        dielectric,
+        (named, first, second),
+        lambda row, name: f"{rows.path}: {rows.place(row)}, column {name!r}",
+    )
 
 
 def nk_from_dielectric(eps1: np.ndarray, eps2: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -5,21 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from pellicle.materials.files import imd, plain_table, refractiveindex_info, sopra, spectraray, woollam
-from pellicle.materials.files.optical_constants import MaterialFile
-from pellicle.materials.files.text import MaterialText, read_lines
+from pellicle.materials.formats import instruments, plain_table, refractiveindex_info
+from pellicle.materials.formats.optical_constants import MaterialFile, MaterialText, read_text
 
 SUFFIXES = {".csv", ".txt", ".tsv", ".dat", ".nk", ".mat", ".yml", ".yaml"}
 """Suffixes of files of optical constants: a name with one of them is a path."""
 
-_READERS: tuple[Callable[[MaterialText], MaterialFile | None], ...] = (
+READERS: tuple[Callable[[MaterialText], MaterialFile | None], ...] = (
     refractiveindex_info.read_yaml,
     refractiveindex_info.read_table,
-    spectraray.read,
-    sopra.read_records,
-    sopra.read_grid,
-    imd.read,
-    woollam.read,
+    instruments.spectraray,
+    instruments.sopra_records,
+    instruments.sopra_grid,
+    instruments.imd,
+    instruments.woollam,
 )
 
 
@@ -33,6 +32,5 @@ def read_material_file(path: str | Path) -> MaterialFile:
 
     **Raises** DataError, one sentence with file, line, column and remedy.
     """
-    text = read_lines(path)
-    found = (reader(text) for reader in _READERS)
-    return next((file for file in found if file is not None), None) or plain_table.read(text)
+    text = read_text(path)
+    return next((file for reader in READERS if (file := reader(text))), None) or plain_table.read(text)

@@ -17,8 +17,12 @@ from pellicle.data.tabular.table import Table, read_table
 from pellicle.data.tabular.text import split
 from pellicle.data.tabular.units import wavelength_unit
 from pellicle.errors import DataError
-from pellicle.materials.files.optical_constants import MaterialFile, OpticalConstants, material_file
-from pellicle.materials.files.text import MaterialText
+from pellicle.materials.formats.optical_constants import (
+    MaterialFile,
+    MaterialText,
+    OpticalConstants,
+    material_file,
+)
 
 SHORTEST_ASSUMED = 30.0
 """Wavelengths that all lie below this (nm), in a file that gives no unit, are more likely µm or eV."""

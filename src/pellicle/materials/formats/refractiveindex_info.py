@@ -11,9 +11,16 @@ from typing import Any
 
 import numpy as np
 
+from pellicle.data.tabular.text import Line
 from pellicle.errors import DataError
-from pellicle.materials.files.optical_constants import MaterialFile, OpticalConstants, material_file
-from pellicle.materials.files.text import Line, MaterialText, Rows, read_rows
+from pellicle.materials.formats.optical_constants import (
+    MaterialFile,
+    MaterialText,
+    OpticalConstants,
+    constants_of,
+    material_file,
+    read_rows,
+)
 from pellicle.materials.page import combine, contents, extinction, plain_text, table, to_nm
 
 _CSV = "refractiveindex.info table"
@@ -79,34 +86,30 @@ def read_table(text: MaterialText) -> MaterialFile | None:
     if [kind for _, kind in headers] not in (["n"], ["n", "k"]) or headers[0][0] != 0:
         return None
     ends = [*(i for i, _ in headers[1:]), len(text.lines)]
-    blocks = [
+    n, *others = (
         _block(text, text.lines[i + 1 : end], kind) for (i, kind), end in zip(headers, ends, strict=True)
-    ]
-    (wl, n), where = blocks[0][0], blocks[0][1]
-    if wl.min() >= LONGEST_UM:
-        if len(blocks) == 1:
+    )
+    if n.axis.min() >= LONGEST_UM:
+        if not others:
             return None
         raise DataError(
             f"{text.path}: has the layout of refractiveindex.info, which is in µm, but begins at "
-            f"{wl.min():g}; write the unit into both headers, as wavelength_nm,n,k in one table"
+            f"{n.axis.min():g}; write the unit into both headers, as wavelength_nm,n,k in one table"
         )
-    names = ("wl", "n", "k")
-    found = material_file(OpticalConstants(text.path, wl, "um", n, None, False, names, where), _CSV)
-    if len(blocks) == 1:
+    found = material_file(n, _CSV)
+    if not others:
         return found
-    (wl_k, k), where_k = blocks[1]
-    both = np.array_equal(wl, wl_k)
-    checked = OpticalConstants(
-        text.path, wl_k, "um", n if both else np.ones_like(k), k, False, names, where_k
-    )
-    with_k = material_file(checked, _CSV)
+    k = others[0]
+    both = np.array_equal(n.axis, k.axis)
+    index = n.first if both else np.ones_like(k.first)
+    with_k = material_file(k._replace(first=index, second=k.first, names=("wl", "n", "k")), _CSV)
     if both:
         return with_k
     try:
-        made = combine(table(to_nm(wl), n), extinction(to_nm(wl_k), np.maximum(k, 0.0)))
+        made = combine(table(to_nm(n.axis), n.first), extinction(to_nm(k.axis), np.maximum(k.first, 0.0)))
     except DataError as error:
         raise DataError(f"{text.path}: {error}") from None
-    columns = f"wl in um, n; {len(wl)} rows, then wl in um, k; {len(wl_k)} rows"
+    columns = f"wl in um, n; {len(n.axis)} rows, then wl in um, k; {len(k.axis)} rows"
     return MaterialFile(made.dispersion, made.wavelength_range, True, _CSV, columns)
 
 
@@ -116,6 +119,6 @@ def _header(text: str) -> str | None:
     return words[1] if len(words) == 2 and words[0] == "wl" and words[1] in ("n", "k") else None
 
 
-def _block(text: MaterialText, lines: tuple[Line, ...], kind: str):
-    rows: Rows = read_rows(text.path, lines, ("wl", kind))
-    return (rows.columns["wl"], rows.columns[kind]), rows.where
+def _block(text: MaterialText, lines: tuple[Line, ...], kind: str) -> OpticalConstants:
+    """The columns of the block `wl,n` or `wl,k`, the second as its first column."""
+    return constants_of(read_rows(text.path, lines, ("wl", kind)), "um")
