@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from pellicle.cli.interruption import interruptible
+from pellicle.cli.processes import interruptible
 
 
 class _Callback:

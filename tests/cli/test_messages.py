@@ -9,8 +9,8 @@ import pytest
 
 from pellicle.cli import app, main
 from pellicle.cli.messages import as_flags, flag_names
+from pellicle.cli.progress import log_to_stderr
 from pellicle.cli.session import say
-from pellicle.cli.verbose import log_to_stderr
 
 
 @pytest.mark.parametrize(

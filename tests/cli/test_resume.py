@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pellicle.api import fits
-from pellicle.cli.resume import fingerprint
+from pellicle.cli.batch import fingerprint
 from pellicle.dispersion import Cauchy
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free
@@ -106,7 +106,7 @@ def test_what_changed_is_fitted_again(batch, fitted, scene, tmp_path):
 
 def test_worker_processes_go_on_too(batch, fitted, monkeypatch, tmp_path):
     # in this process: test_jobs.py starts others
-    monkeypatch.setattr("pellicle.cli.workers.in_order", lambda function, tasks, jobs: map(function, tasks))
+    monkeypatch.setattr("pellicle.cli.processes.in_order", lambda function, tasks, jobs: map(function, tasks))
     fitted.stop["b"] = ValueError("b is bad")
     first = batch("--jobs", "2")
     assert (first.code, fitted()) == (3, ["a"])
@@ -192,5 +192,5 @@ def test_a_fingerprint_covers_bounds_tables_settings_and_version(monkeypatch):
     ]
     assert len(set(known)) == len(known)
     assert fingerprint(scene()) == known[0]
-    monkeypatch.setattr("pellicle.cli.resume.versions", lambda: {"pellicle": "9.9"})
+    monkeypatch.setattr("pellicle.reporting.json_record.versions", lambda: {"pellicle": "9.9"})
     assert fingerprint(scene()) not in known

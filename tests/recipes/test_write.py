@@ -12,10 +12,9 @@ import pellicle as pl
 from pellicle.cli.wavelengths import measured_scene
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.empirical import WithExtinction
-from pellicle.recipes import film, surface
 from pellicle.recipes.media_words import medium
 from pellicle.recipes.python_text import python_text
-from pellicle.recipes.validation import validated
+from pellicle.recipes.read import checked
 from pellicle.recipes.write import recipe_text
 from pellicle.scene.instrument import Drift
 
@@ -58,10 +57,7 @@ def test_recipe_reads_back_as_the_same_scene(path):
 
 
 def _parsed(text, path):
-    loaded = tomllib.loads(text)
-    if "surface" in loaded["scene"]:
-        return surface.SurfaceRecipe(str(path), validated(loaded, surface.TABLES)).scene()
-    return film.FilmRecipe(str(path), validated(loaded, film.TABLES)).scene()
+    return checked(tomllib.loads(text), str(path)).scene()
 
 
 @pytest.mark.parametrize("path", RECIPES[::3], ids=lambda path: str(path.relative_to(ROOT)))

@@ -11,20 +11,19 @@ from cyclopts import App, Parameter
 
 from pellicle.cli.chart import chart
 from pellicle.cli.compare import compare
-from pellicle.cli.cost import cost
+from pellicle.cli.cost import cost, plan
 from pellicle.cli.demo import demo
 from pellicle.cli.explore import explore
 from pellicle.cli.export import export
 from pellicle.cli.fit import fit, sample
-from pellicle.cli.interruption import interruptible
 from pellicle.cli.map import map
 from pellicle.cli.materials import materials
 from pellicle.cli.messages import as_flags
-from pellicle.cli.plan import plan
+from pellicle.cli.processes import interruptible
+from pellicle.cli.progress import log_to_stderr
 from pellicle.cli.read import read
 from pellicle.cli.session import abandon_stdout, say
 from pellicle.cli.simulate import simulate
-from pellicle.cli.verbose import log_to_stderr
 from pellicle.errors import UsageError
 
 WRONG_USAGE, BAD_DATA, INTERRUPTED = 2, 3, 130

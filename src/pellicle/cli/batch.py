@@ -8,19 +8,18 @@ from concurrent.futures import BrokenExecutor
 from contextlib import nullcontext, redirect_stderr, redirect_stdout, suppress
 from dataclasses import dataclass, field, replace
 from io import StringIO
+from json import loads
 from logging import INFO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pellicle.cli.inputs import LEAST_SQUARES, Input, Inputs
 from pellicle.cli.messages import as_flags, with_flags
-from pellicle.cli.progress import Progress, TimeLeft, duration
+from pellicle.cli.progress import LOG, Progress, TimeLeft, duration, log_to_stderr
 from pellicle.cli.session import check_folder, say, show
-from pellicle.cli.verbose import LOG, log_to_stderr
 from pellicle.errors import UsageError
 
 if TYPE_CHECKING:
-    from pellicle.cli.resume import Earlier
     from pellicle.data.brdf_samples import BrdfSamples
     from pellicle.data.spectrum import Spectrum
     from pellicle.fitting.repeated_measurements import Repeats
@@ -170,7 +169,7 @@ class Batch:
                 rest = duration(seconds)
                 yield self._fit(*task, f"{position}, {rest} left" if rest else position)
             return
-        from pellicle.cli.workers import in_order
+        from pellicle.cli.processes import in_order
 
         own = [
             replace(self, inputs=self.inputs._replace(files=files), records=[], fits=[]) for files in groups
@@ -193,7 +192,6 @@ class Batch:
 
         `position` in the batch is a part of the progress line.
         """
-        from pellicle.cli.resume import earlier, fingerprint
         from pellicle.reporting.fit_text import report
         from pellicle.reporting.json_record import failure, one_line, to_json
 
@@ -323,3 +321,40 @@ def error_message(error: Exception, paths: list[str]) -> str:
     """The message of an error with flags for arguments, and the data files in front unless it names one."""
     message = as_flags(str(error))
     return message if any(path in message for path in paths) else f"{', '.join(paths)}: {message}"
+
+
+class Earlier(NamedTuple):
+    """The JSON record of a fit that is in its folder, and its report."""
+
+    record: dict[str, Any]
+    report: str
+
+
+def fingerprint(*parts: Any) -> str:
+    """Hash of pellicle's version and of `parts`: data, scenes and settings of a fit."""
+    from pellicle.data.fingerprint import fingerprint as content_fingerprint
+    from pellicle.reporting.json_record import versions
+
+    return content_fingerprint(versions()["pellicle"], *parts)
+
+
+def earlier(folder: Path, identity: str) -> Earlier | None:
+    """The finished result of a fit with this fingerprint, None where the folder has none.
+
+    A chain that was too short goes on, so its result does not count.
+    """
+    from pellicle.files import MARKER
+    from pellicle.reporting.folders import FINGERPRINT, REPORT, SCENE
+    from pellicle.reporting.json_record import SCHEMA
+
+    try:
+        record = loads((folder / MARKER).read_text(encoding="utf-8"))
+        report = (folder / REPORT).read_text(encoding="utf-8")
+    except (OSError, ValueError):
+        return None
+    if not isinstance(record, dict) or record.get("schema") != SCHEMA or "data" not in record:
+        return None
+    record.pop(SCENE, None)  # printed by no fit
+    if record.pop(FINGERPRINT, None) != identity or not record.get("posterior", {}).get("trusted", True):
+        return None
+    return Earlier(record, report)

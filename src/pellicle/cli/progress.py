@@ -1,25 +1,80 @@
-"""Progress of long work as one line on stderr: stage, steps, time left, and whether JAX compiles."""
+"""Progress of long work on stderr: one line of stage, steps and time left, or the log of `--verbose`.
+
+Not by rich, whose bars have no place for whether JAX compiles, and whose rate would include the compilation.
+"""
 
 from __future__ import annotations
 
+import logging
 import sys
 import time
-from logging import INFO
+from collections.abc import Iterator
+from contextlib import contextmanager
 from shutil import get_terminal_size
 from typing import Any
 
-from pellicle.cli.verbose import LOG
+from pellicle.cli.messages import as_flags
 
+LOG = logging.getLogger("pellicle")
+_COMPILE, _COMPILED = "/jax/core/compile/", "/jax/core/compile/backend_compile_duration"
+"""JAX's prefix of the durations of tracing, lowering and compiling, and its name of the last one."""
 COMPILING = "compiling (only in the first run of a kind of scene)"
-_LOWERED, _COMPILED = (
-    "/jax/core/compile/jaxpr_to_mlir_module_duration",
-    "/jax/core/compile/backend_compile_duration",
-)
-"""JAX's names of the durations that end right before it compiles a program, and right after."""
+_LOWERED = "/jax/core/compile/jaxpr_to_mlir_module_duration"
+"""JAX's name of the duration that ends right before it compiles a program; `_COMPILED` ends right after."""
 _SHORTEST = 5.0
 """Seconds left that are worth a word."""
 _AT_MOST = ("sample",)
 """Stages that often end before their last step."""
+
+
+@contextmanager
+def log_to_stderr() -> Iterator[None]:
+    """Write the library's log messages to stderr, with the seconds since the start of the block."""
+    import jax.monitoring as monitoring
+
+    clock, compilation, level = _Clock(), _Compilation(), LOG.level
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(clock)
+    monitoring.register_event_duration_secs_listener(compilation)
+    LOG.addHandler(handler)
+    LOG.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        LOG.info("time: %.2f s, %s", clock.seconds, compilation)
+        LOG.setLevel(level)
+        LOG.removeHandler(handler)
+        monitoring.unregister_event_duration_listener(compilation)
+
+
+class _Clock(logging.Formatter):
+    """Formats a record as one line: the seconds since the start, then the message."""
+
+    def __init__(self):
+        super().__init__()
+        self.began = time.perf_counter()
+
+    @property
+    def seconds(self) -> float:
+        return time.perf_counter() - self.began
+
+    def format(self, record: logging.LogRecord) -> str:
+        return f"{self.seconds:6.2f} s  {as_flags(record.getMessage())}"
+
+
+class _Compilation:
+    """Counts the programs that JAX compiles or loads, and the seconds that it takes."""
+
+    def __init__(self):
+        self.seconds, self.programs = 0.0, 0
+
+    def __call__(self, event: str, duration_secs: float, **_: Any) -> None:
+        if event.startswith(_COMPILE):
+            self.seconds += duration_secs
+            self.programs += event == _COMPILED
+
+    def __str__(self) -> str:
+        return f"{self.seconds:.2f} s of them to compile or load {self.programs} programs"
 
 
 class TimeLeft:
@@ -46,7 +101,7 @@ class Progress:
     def __init__(self, label: str):
         self.label, self.steps, self.shown, self.compiling = label, "", False, False
         self.left = TimeLeft()
-        self.visible = sys.stderr.isatty() and not LOG.isEnabledFor(INFO)
+        self.visible = sys.stderr.isatty() and not LOG.isEnabledFor(logging.INFO)
         if self.visible:
             import jax.monitoring as monitoring
 

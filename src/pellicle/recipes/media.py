@@ -14,7 +14,6 @@ from pellicle.dispersion.oscillators import AbstractOscillator
 from pellicle.errors import UsageError, did_you_mean
 from pellicle.materials.formats.detect import SUFFIXES as MATERIAL_SUFFIXES
 from pellicle.recipes import media_words
-from pellicle.recipes.anisotropic_media import AnisotropicTable, anisotropic_medium
 from pellicle.recipes.dispersion_models import (
     MODELS,
     SPLINES,
@@ -24,7 +23,7 @@ from pellicle.recipes.dispersion_models import (
     build_oscillator,
     sum_of_oscillators,
 )
-from pellicle.recipes.graded_media import GradedTable, graded_medium
+from pellicle.recipes.structured_media import AnisotropicTable, GradedTable, anisotropic_medium, graded_medium
 from pellicle.scene.free import Free
 from pellicle.scene.priors import HalfNormal, LogUniform, Normal, Prior
 

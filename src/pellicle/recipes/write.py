@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import os
+import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from types import MappingProxyType
@@ -16,10 +18,7 @@ from pellicle.colour.observers import ILLUMINANTS, OBSERVERS
 from pellicle.data.sensors import SRGB, band_sensor
 from pellicle.errors import UsageError
 from pellicle.files import write_text
-from pellicle.recipes import film, surface, toml_text
-from pellicle.recipes.film import FilmRecipe
-from pellicle.recipes.surface import SurfaceRecipe
-from pellicle.recipes.validation import validated
+from pellicle.recipes.read import checked
 from pellicle.recipes.written_media import layer_medium, medium, number, same
 from pellicle.scene.film import Light, Scene, with_wavelength
 from pellicle.scene.free import Free
@@ -31,6 +30,9 @@ from pellicle.scene.surface import Surface
 
 _OF_THE_SCENE = ("index", "dispersion", "roughness", "thickness_spread", "interlayer")
 """Uncertainties that stand in [scene]; the others stand in [instrument]."""
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
+_WHOLE = 1e15
+"""Whole numbers below this are written without a fraction."""
 
 
 def write_recipe(
@@ -77,12 +79,12 @@ def recipe_text(
     data = {"files": [Path(os.path.relpath(file, at)).as_posix() for file in files]}
     data = {key: names for key, names in data.items() if names}
     if isinstance(scene, Surface):
-        text = toml_text.document({"data": {"signal": "brdf", **data}, "scene.surface": _surface(scene, at)})
-        again: Any = SurfaceRecipe(str(at / "recipe"), validated(tomllib.loads(text), surface.TABLES)).scene()
+        text = _document({"data": {"signal": "brdf", **data}, "scene.surface": _surface(scene, at)})
+        again: Any = checked(tomllib.loads(text), str(at / "recipe")).scene()
         _check_surface(scene, again)
         return text
     sampled = {} if wavelength is None else {"wavelengths": _wavelengths(wavelength)}
-    text = toml_text.document(
+    text = _document(
         {
             "data": _data(scene) | sampled | data | dict(reading),
             "scene": _scene(scene, at),
@@ -90,7 +92,7 @@ def recipe_text(
             "instrument": _instrument(scene),
         }
     )
-    again = FilmRecipe(str(at / "recipe"), validated(tomllib.loads(text), film.TABLES)).scene()
+    again: Any = checked(tomllib.loads(text), str(at / "recipe")).scene()
     _check_film(with_wavelength(scene, None), again)
     return text
 
@@ -260,3 +262,37 @@ def _check_surface(scene: Surface, again: Surface) -> None:
     for name, one, other in pairs:
         if not same(one, other):
             raise UsageError(f"a recipe cannot express {name} of this surface")
+
+
+def _document(tables: Mapping[str, Mapping[str, Any] | Sequence[Mapping[str, Any]]]) -> str:
+    """Format tables by their names; a list of tables is an array of tables. Empty ones are left out."""
+    parts = []
+    for name, content in tables.items():
+        several = not isinstance(content, Mapping)
+        head = f"[[{name}]]" if several else f"[{name}]"
+        for table in content if several else [content]:
+            if table:
+                parts.append("\n".join([head, *(f"{_key(k)} = {_toml(v)}" for k, v in table.items())]))
+    return "\n\n".join(parts) + "\n"
+
+
+def _toml(thing: Any) -> str:
+    """Format a string, number, truth value, list or table on one line. Raises TypeError for anything else."""
+    if isinstance(thing, bool):
+        return "true" if thing else "false"
+    if isinstance(thing, str):
+        # JSON's escapes are TOML's, except that JSON leaves DEL as it is
+        return json.dumps(thing, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(thing, int):
+        return str(thing)
+    if isinstance(thing, float):
+        return str(int(thing)) if thing.is_integer() and abs(thing) < _WHOLE else repr(thing)
+    if isinstance(thing, Mapping):
+        return "{ " + ", ".join(f"{_key(k)} = {_toml(v)}" for k, v in thing.items()) + " }"
+    if isinstance(thing, list | tuple):
+        return "[" + ", ".join(map(_toml, thing)) + "]"
+    raise TypeError(f"{type(thing).__name__} has no form in TOML")
+
+
+def _key(key: str) -> str:
+    return key if _BARE.fullmatch(key) else _toml(key)

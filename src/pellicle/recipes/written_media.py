@@ -22,9 +22,9 @@ from pellicle.dispersion.profiles import PROFILES
 from pellicle.dispersion.spline import KramersKronigSpline, Spline
 from pellicle.errors import UsageError
 from pellicle.materials import Material, UnknownMaterial, material
-from pellicle.recipes.anisotropic_media import BIAXIAL, UNIAXIAL
 from pellicle.recipes.dispersion_models import MODELS, SPLINES, TERMS, fixed_model, free_model
 from pellicle.recipes.media_words import free_numbers
+from pellicle.recipes.structured_media import BIAXIAL, UNIAXIAL
 from pellicle.scene.free import Free, free_leaves, is_free
 from pellicle.scene.graded import Graded
 from pellicle.scene.priors import HalfNormal, Normal

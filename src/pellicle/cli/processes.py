@@ -1,18 +1,19 @@
-"""Worker processes for the fits of many files."""
+"""Processes: worker processes for many files, Ctrl-C and SIGTERM, also where JAX would lose them."""
 
 from __future__ import annotations
 
+import _thread
 import os
 import signal
 import sys
+import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
 from contextlib import contextmanager, redirect_stderr
 from io import StringIO
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from typing import TypeVar
 
-from pellicle.cli.interruption import end_with_parent, send_again
 from pellicle.cli.session import start
 
 Task = TypeVar("Task")
@@ -21,6 +22,52 @@ Result = TypeVar("Result")
 _THREADS = ("NPROC", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """Numbers of threads. XLA takes its own from NPROC, which, unlike XLA_FLAGS, does not enter the key of a
 compiled program: workers share their programs with all other runs."""
+
+_PAUSE = 0.05
+"""Seconds after which a lost Ctrl-C is sent again."""
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """In this block SIGTERM raises KeyboardInterrupt as Ctrl-C does, and neither is lost in a callback."""
+    hook, sys.unraisablehook = sys.unraisablehook, send_again
+    in_main_thread = threading.current_thread() is threading.main_thread()
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler) if in_main_thread else None
+    try:
+        yield
+    finally:
+        sys.unraisablehook = hook
+        if in_main_thread:
+            signal.signal(signal.SIGTERM, before)
+
+
+def send_again(raised: sys.UnraisableHookArgs) -> None:
+    """Report an exception that Python ignores; send Ctrl-C again.
+
+    JAX runs a callback in every garbage collection, and Python ignores what is raised in one.
+    """
+    if issubclass(raised.exc_type, KeyboardInterrupt):
+        # not at once: it would be raised in this hook, and ignored
+        timer = threading.Timer(_PAUSE, _interrupt_main_thread)
+        timer.daemon = True
+        timer.start()
+    else:
+        sys.__unraisablehook__(raised)
+
+
+def _interrupt_main_thread() -> None:
+    main = threading.main_thread().ident
+    if hasattr(signal, "pthread_kill") and main is not None:  # it wakes a thread that waits, too
+        signal.pthread_kill(main, signal.SIGINT)
+    else:
+        _thread.interrupt_main()
+
+
+def end_with_parent() -> None:
+    """End this process when the one that started it has ended, even by a signal that it cannot catch."""
+    parent = parent_process()
+    if parent is not None:
+        threading.Thread(target=lambda: (parent.join(), os._exit(1)), daemon=True).start()
 
 
 def in_order(function: Callable[[Task], Result], tasks: Iterable[Task], workers: int) -> Iterator[Result]:
