@@ -15,8 +15,7 @@ from collections.abc import Callable
 import numpy as np
 
 import pellicle as pl
-from pellicle.colour.cameras import camera_sensor, illuminant_spectrum
-from pellicle.colour.observers import Sensor
+from pellicle.colour.observers import Sensor, camera_sensor, illuminant_spectrum
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.materials import material
 from pellicle.scene.free import Free

@@ -16,7 +16,7 @@ import argparse
 import numpy as np
 
 import pellicle as pl
-from pellicle.colour.cameras import camera_sensor, illuminant_spectrum
+from pellicle.colour.observers import camera_sensor, illuminant_spectrum
 from pellicle.data.colours import Colours
 
 ANGLES = (0.0, 20.0, 40.0, 55.0, 65.0)

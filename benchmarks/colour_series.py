@@ -27,8 +27,8 @@ import tmm
 import pellicle as pl
 from pellicle.colour import FilmColourTable, invert, lab
 from pellicle.colour.bands import Bands
-from pellicle.colour.cameras import observer_sensor
 from pellicle.colour.film import reflectance
+from pellicle.colour.observers import observer_sensor
 from pellicle.dispersion.base import known_index
 from pellicle.optics.pair import to_complex
 

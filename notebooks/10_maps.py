@@ -23,7 +23,7 @@ import xarray as xr
 
 import pellicle as pl
 from pellicle.colour import film_colour, srgb
-from pellicle.colour.gamut import into_srgb
+from pellicle.colour.spaces import into_srgb
 from pellicle.mapping.pixels.results import CODES
 
 jax.config.update("jax_enable_x64", True)  # double precision; JAX's default is single

@@ -16,7 +16,7 @@ import numpy as np
 
 import pellicle as pl
 from pellicle.colour import film_colour, srgb
-from pellicle.colour.gamut import into_srgb
+from pellicle.colour.spaces import into_srgb
 
 matplotlib.use("Agg")
 from matplotlib.figure import Figure

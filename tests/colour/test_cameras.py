@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pellicle.colour import sensor
-from pellicle.colour.cameras import camera_sensor, illuminant_spectrum, observer_sensor, srgb_sensor
+from pellicle.colour.observers import camera_sensor, illuminant_spectrum, observer_sensor, srgb_sensor
 from pellicle.colour.spaces import linear_srgb
 
 NM = np.arange(380.0, 731.0, 5.0)

@@ -7,7 +7,7 @@ import tmm
 
 import pellicle as pl
 from pellicle.colour import sensor
-from pellicle.colour.cameras import camera_sensor
+from pellicle.colour.observers import camera_sensor
 from pellicle.data.colours import CameraMatrix
 
 NM = sensor("1931", "A").wavelength

@@ -9,9 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from pellicle.colour import delta_e76, delta_e2000, lab
-from pellicle.colour.cameras import srgb_sensor
 from pellicle.colour.encoding import Encoding, camera_encoding, encoding
-from pellicle.colour.observers import Sensor
+from pellicle.colour.observers import Sensor, srgb_sensor
 from pellicle.data.colour_rows import bare_name, channel_sets, colour_table, named_cells, scaled
 from pellicle.data.colours import CameraMatrix
 from pellicle.data.sensors import of_camera, of_observer

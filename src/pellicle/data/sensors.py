@@ -7,8 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
-from pellicle.colour.cameras import camera_sensor, illuminant_spectrum, observer_sensor, srgb_sensor
-from pellicle.colour.observers import OBSERVERS, Sensor, sensor
+from pellicle.colour.observers import (
+    OBSERVERS,
+    Sensor,
+    camera_sensor,
+    illuminant_spectrum,
+    observer_sensor,
+    sensor,
+    srgb_sensor,
+)
 from pellicle.data.signal_checks import refuse_first
 from pellicle.data.tabular.axis_and_signal import axis_unit, read_axis
 from pellicle.data.tabular.column_selection import AxisColumns, first_column

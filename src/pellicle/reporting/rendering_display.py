@@ -6,7 +6,7 @@ import jax
 import numpy as np
 
 from pellicle.colour import srgb
-from pellicle.colour.gamut import LUMINANCE, into_srgb
+from pellicle.colour.spaces import LUMINANCE, into_srgb
 from pellicle.simulation.sphere import Rendering
 
 _srgb = jax.jit(srgb)  # compiled one by one its operations take 0.3 s

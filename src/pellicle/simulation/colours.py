@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pellicle.colour import integration_bands, sensor
-from pellicle.colour.cameras import srgb_sensor
 from pellicle.colour.encoding import camera_encoding, encoding
 from pellicle.colour.film import Colour
-from pellicle.colour.observers import Sensor
+from pellicle.colour.observers import Sensor, srgb_sensor
 from pellicle.colour.observers import sensor as observer
 from pellicle.colour.table import REFERENCE, TOLERANCE, FilmColourTable
 from pellicle.data.colours import SPACES, CameraMatrix, Colours

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pellicle.colour.difference import delta_e76
-from pellicle.colour.spaces import lab
+from pellicle.colour.spaces import delta_e76, lab
 from pellicle.data.colours import Colours
 from pellicle.fitting.curves import ColourCurve
 from pellicle.fitting.film.colour_view import ColoursView, Local

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pellicle.colour.gamut import into_srgb, outside
+from pellicle.colour.spaces import into_srgb, outside
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # IEC 61966-2-1
 
