@@ -13,10 +13,10 @@ import pellicle as pl
 from pellicle.fitting.curves import Index
 from pellicle.fitting.film.layer_errors import principal_indices
 from pellicle.materials import material
-from pellicle.reporting.csv_tables import nk_csvs
-from pellicle.reporting.fit_figure import draw
+from pellicle.reporting.figures import draw_fit as draw
+from pellicle.reporting.fit_tables import nk_csvs
 from pellicle.reporting.fit_text import report
-from pellicle.reporting.page.index_figure import of_index
+from pellicle.reporting.page.figures import of_index
 
 NM = np.linspace(400.0, 800.0, 41)
 

@@ -18,7 +18,7 @@ from pellicle.fitting.curves import Curve
 from pellicle.fitting.result import Estimate, Fit, Part, Profile, Rival, Status
 from pellicle.forward_model.plan import Plan, Row
 from pellicle.materials import material
-from pellicle.reporting.csv_tables import fit_csv, nk_csvs
+from pellicle.reporting.fit_tables import fit_csv, nk_csvs
 from pellicle.reporting.folders import folder_per_file, write_fit, write_summary
 from pellicle.reporting.json_record import failure, one_line, to_json
 

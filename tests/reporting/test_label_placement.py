@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from pellicle.reporting.drawing import new_figure
 from pellicle.reporting.label_placement import Label, place_labels
+from pellicle.reporting.matplotlib_figure import new_figure
 
 
 def boxes(notes, scale=1.0):

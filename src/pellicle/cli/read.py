@@ -170,9 +170,9 @@ def _show(measured: Spectrum | Colours | Cube, as_json: bool) -> None:
 def _write(folder: Path, found: list[Any], suffixes: list[str]) -> None:
     from pellicle.data.colours import Colours, write_colours
     from pellicle.data.write_spectrum import write_spectrum
-    from pellicle.reporting.drawing import save_figure
+    from pellicle.reporting.figures import draw_spectrum as draw
     from pellicle.reporting.folders import distinct_stems
-    from pellicle.reporting.spectrum_figure import draw
+    from pellicle.reporting.matplotlib_figure import save_figure
 
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pellicle.colour.spaces import outside
-from pellicle.reporting.drawing import figure_path, new_figure, save_figure
+from pellicle.reporting.matplotlib_figure import figure_path, new_figure, save_figure
 from pellicle.scene.film import Scene
 from pellicle.simulation.colours import interference_colours
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pellicle.reporting.cost_text import error_label, time_unit
-from pellicle.reporting.drawing import ABOVE, BLUE, GREY, ORANGE, new_figure
 from pellicle.reporting.label_placement import Label, place_labels
+from pellicle.reporting.matplotlib_figure import ABOVE, BLUE, GREY, ORANGE, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -102,7 +102,7 @@ def write_cost(folder: str | os.PathLike[str], cost: Cost | SurfaceCost, recipe:
     """
     from pellicle.reporting.cost_figure import draw
     from pellicle.reporting.cost_text import text
-    from pellicle.reporting.drawing import save_figure
+    from pellicle.reporting.matplotlib_figure import save_figure
 
     name, record = Path(recipe).name, to_json(cost, recipe)
     target = new_folder(folder)

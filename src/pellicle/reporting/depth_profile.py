@@ -9,8 +9,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pellicle.files import MARKER, new_folder, write_text
-from pellicle.reporting.drawing import ABOVE, BLACK, BLUE, GREEN, GREY, ORANGE, new_figure, save_figure
 from pellicle.reporting.json_record import indented, number, versions
+from pellicle.reporting.matplotlib_figure import (
+    ABOVE,
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    new_figure,
+    save_figure,
+)
 from pellicle.simulation.depth_profile import DepthProfile, Section
 
 if TYPE_CHECKING:

@@ -11,9 +11,9 @@ from pellicle.fitting.lack_of_fit import lack_of_fit
 from pellicle.fitting.result import Status
 from pellicle.fitting.status import RIVAL
 from pellicle.reporting import budget_text, fitted_colours, parameter_text
-from pellicle.reporting.generalised_figure import weighted_delta
 from pellicle.reporting.parameter_text import LEAST_CORRELATION
 from pellicle.reporting.plain_text import COLUMNS, INDENT, block, facts, wrapped
+from pellicle.reporting.quantities import weighted_delta
 
 if TYPE_CHECKING:
     from pellicle.fitting.result import Fit, Part
@@ -181,7 +181,7 @@ def _residuals(part: Part) -> list[tuple[str, str]]:
     if isinstance(curve, ColourCurve) and (apart := fitted_colours.differences(part)):
         rows.append((f"colour difference{of}", apart))
     if isinstance(curve, Curve) and part.spectrum.ratios:
-        square = curve.residual**2 + weighted_delta(part) ** 2
+        square = curve.residual**2 + weighted_delta(curve) ** 2
         each = ", ".join(f"{size:.4g}" for size in np.sqrt(np.mean(square, axis=0) / 2))
         rows.append((f"of {', '.join(part.spectrum.ratios)}", f"{each} degrees of psi"))
     elif isinstance(curve, Curve) and curve.delta_data is not None:

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pellicle.files import MARKER, new_folder, write_text
-from pellicle.reporting.csv_tables import fit_csv, nk_csvs, profile_csv
 from pellicle.reporting.json_record import indented, to_json, versions
 from pellicle.reporting.repeats import FILES as REPEATS
 
@@ -53,9 +52,10 @@ def write_fit(
     **Raises:** UsageError where the folder holds files that pellicle did not write, or cannot be written;
     DataError for a full disk.
     """
-    from pellicle.reporting.drawing import save_figure
-    from pellicle.reporting.fit_figure import draw
+    from pellicle.reporting.figures import draw_fit, draw_predictions
+    from pellicle.reporting.fit_tables import fit_csv, nk_csvs, profile_csv
     from pellicle.reporting.fit_text import report
+    from pellicle.reporting.matplotlib_figure import save_figure
     from pellicle.reporting.page.fit_page import fit_page
     from pellicle.reporting.page.repetition import repetition
 
@@ -73,16 +73,16 @@ def write_fit(
 
     if profiles := fitted_profiles(fit):
         write_text(target / "profile.csv", profile_csv(fit, profiles), overwrite=True)
-    save_figure(draw(fit), target / "figure.png", overwrite=True)
+    save_figure(draw_fit(fit), target / "figure.png", overwrite=True)
     pictures = {}
     if posterior is not None:
         from pellicle.reporting.netcdf import write_netcdf
-        from pellicle.reporting.posterior import corner_figure, predictive_figure
+        from pellicle.reporting.posterior import corner_figure
 
         predictions = posterior.predictions()
         write_netcdf(target / "posterior.nc", posterior, predictions, overwrite=True)
         save_figure(corner_figure(posterior), target / "corner.png", overwrite=True, bbox_inches="tight")
-        save_figure(predictive_figure(predictions), target / "predictive.png", overwrite=True)
+        save_figure(draw_predictions(predictions), target / "predictive.png", overwrite=True)
         pictures = {name: (target / f"{name}.png").read_bytes() for name in ("corner", "predictive")}
     image = (target / "figure.png").read_bytes()
     text = fit_page(fit, image, posterior, pictures, repetition(fit, described))

@@ -14,7 +14,6 @@ import numpy as np
 from pellicle.mapping.map_result import Map
 from pellicle.mapping.pixels.results import CODES, NO_DATA
 from pellicle.reporting import map_blocks
-from pellicle.reporting.drawing import ABOVE, BLUE, ORANGE, marker_size, new_figure
 from pellicle.reporting.map_axes import MapAxes
 from pellicle.reporting.map_panels import (
     COLOURS,
@@ -40,6 +39,7 @@ from pellicle.reporting.map_summary import (
     thinned,
 )
 from pellicle.reporting.map_text import in_words, ordinal
+from pellicle.reporting.matplotlib_figure import ABOVE, BLUE, ORANGE, marker_size, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 from pellicle.files import MARKER, new_folder, write_text
 from pellicle.mapping.map_result import Map
-from pellicle.reporting.drawing import save_figure
 from pellicle.reporting.folders import PAGE, REPORT
 from pellicle.reporting.json_record import indented
 from pellicle.reporting.map_summary import summarise
 from pellicle.reporting.map_text import cube_json, cube_report
+from pellicle.reporting.matplotlib_figure import save_figure
 from pellicle.reporting.page.map_page import map_page
 
 if TYPE_CHECKING:

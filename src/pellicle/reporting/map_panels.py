@@ -10,10 +10,10 @@ import numpy as np
 
 from pellicle.mapping.pixels.results import CODES, NO_DATA, STATUSES
 from pellicle.reporting import map_blocks
-from pellicle.reporting.drawing import BLACK, BLUE, GREY
 from pellicle.reporting.map_axes import MapAxes
 from pellicle.reporting.map_summary import DECIDED, MapSummary, is_decided, parameter_name, thinned, unit_of
 from pellicle.reporting.map_text import share
+from pellicle.reporting.matplotlib_figure import BLACK, BLUE, GREY
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

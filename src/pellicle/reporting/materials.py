@@ -12,7 +12,7 @@ import numpy as np
 
 from pellicle.materials import Material, contents, material
 from pellicle.materials.formats.detect import read_material_file
-from pellicle.reporting.drawing import figure_path, new_figure, save_figure
+from pellicle.reporting.matplotlib_figure import figure_path, new_figure, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -10,7 +10,7 @@ import numpy as np
 from pellicle.accuracy.colour_maps import EXACT, ColourMap, colour_maps
 from pellicle.accuracy.colour_methods import EYE
 from pellicle.colour import linear_srgb, sensor
-from pellicle.reporting.drawing import figure_path, new_figure, save_figure
+from pellicle.reporting.matplotlib_figure import figure_path, new_figure, save_figure
 from pellicle.reporting.rendering_display import display
 from pellicle.reporting.sphere_figures import DARK, DPI
 from pellicle.scene.film import Scene

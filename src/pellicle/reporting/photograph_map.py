@@ -12,8 +12,8 @@ import numpy as np
 
 from pellicle.files import MARKER, new_folder, replacing, write_text
 from pellicle.mapping.photograph import ThicknessMap
-from pellicle.reporting.drawing import BLUE, GREY, ORANGE, new_figure, save_figure
 from pellicle.reporting.json_record import indented, number, versions
+from pellicle.reporting.matplotlib_figure import BLUE, GREY, ORANGE, new_figure, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

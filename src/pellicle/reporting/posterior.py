@@ -1,4 +1,4 @@
-"""Report and figures of a posterior: marginals, minima, checks; corner plot and predictive band."""
+"""Report and figure of a posterior: marginals, minima, checks; corner plot."""
 
 from __future__ import annotations
 
@@ -7,13 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pellicle.reporting.drawing import BLACK, BLUE, ORANGE, marker_size, new_figure
+from pellicle.reporting.matplotlib_figure import BLUE, new_figure
 from pellicle.reporting.plain_text import block, table, wrapped
-from pellicle.sampling.predict import Prediction
 from pellicle.sampling.result import Marginal, Posterior, verdict
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _LEAST_MASS = 0.005
@@ -89,28 +87,3 @@ def corner_figure(posterior: Posterior) -> Figure:
         label_kwargs={"fontsize": 9},
     )
     return figure
-
-
-def predictive_figure(predictions: tuple[Prediction, ...]) -> Figure:
-    """Draw each data set over the bands of 95 % of the model's curves and of repeated measurements."""
-    figure = new_figure(8.0, 0.6 + 3.0 * len(predictions))
-    panels = np.ravel(figure.subplots(len(predictions), squeeze=False))
-    for axes, prediction in zip(panels, predictions, strict=True):
-        _band(axes, prediction)
-    return figure
-
-
-def _band(axes: Axes, prediction: Prediction) -> None:
-    order = np.argsort(prediction.axis.values, kind="stable")
-    at = prediction.axis.values[order]
-    for draws, alpha, name in (
-        (prediction.noisy, 0.25, "repeated measurements"),
-        (prediction.model, 0.8, "model"),
-    ):
-        low, high = np.quantile(draws, [0.025, 0.975], axis=0)[:, order]
-        axes.fill_between(at, low, high, color=ORANGE, alpha=alpha, linewidth=0, label=f"{name}, 95 %")
-    axes.plot(at, prediction.data[order], ".", color=BLACK, markersize=marker_size(len(at)), label="data")
-    axes.set_xlabel(prediction.axis.label)
-    axes.set_ylabel(prediction.label)
-    axes.set_yscale("log" if prediction.decades else "linear")
-    axes.legend(frameon=False, fontsize="small")

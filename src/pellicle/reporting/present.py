@@ -20,7 +20,7 @@ from pellicle.reporting import (
     cost_figure,
     cost_files,
     cost_text,
-    fit_figure,
+    figures,
     fit_text,
     folders,
     photograph_map,
@@ -96,7 +96,7 @@ def plot(result: Fit | Posterior | AnyCost | Map | ThicknessMap) -> Figure:
     """
     match result:
         case Fit():
-            return fit_figure.draw(result)
+            return figures.draw_fit(result)
         case Posterior():
             return posterior.corner_figure(result)
         case Cost() | SurfaceCost():
@@ -104,9 +104,9 @@ def plot(result: Fit | Posterior | AnyCost | Map | ThicknessMap) -> Figure:
         case ThicknessMap():
             return photograph_map.draw(result)
     if _is_map(result):
-        from pellicle.reporting.map_figures import figures
+        from pellicle.reporting import map_figures
 
-        return next(figures(result))[1]
+        return next(map_figures.figures(result))[1]
     raise TypeError(f"a {type(result).__name__} has no figure; fits, posteriors and costs have")
 
 

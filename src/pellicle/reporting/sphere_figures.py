@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import jax
 import numpy as np
 
-from pellicle.reporting.drawing import figure_path, new_figure, save_figure
+from pellicle.reporting.matplotlib_figure import figure_path, new_figure, save_figure
 from pellicle.reporting.rendering_display import display, encode, exposure
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface

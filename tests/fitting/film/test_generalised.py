@@ -17,12 +17,12 @@ from pellicle.fitting.comparison import compare
 from pellicle.fitting.film import generalised
 from pellicle.fitting.film.sweeps import sweeps
 from pellicle.fitting.film.targets import measured, seen_as, sphere_frame
-from pellicle.reporting.csv_tables import fit_csv
-from pellicle.reporting.fit_figure import draw
+from pellicle.reporting.figures import draw_fit as draw
+from pellicle.reporting.figures import draw_spectrum as draw_data
+from pellicle.reporting.fit_tables import fit_csv
 from pellicle.reporting.fit_text import report
 from pellicle.reporting.json_record import to_json
-from pellicle.reporting.page import data_figures
-from pellicle.reporting.spectrum_figure import draw as draw_data
+from pellicle.reporting.page import figures
 from pellicle.reporting.spectrum_text import describe
 
 NM = np.linspace(400.0, 800.0, 64)
@@ -105,12 +105,12 @@ def test_records(fit, tmp_path):
 
 @SLOW
 def test_figures_have_psi_and_delta_of_each_ratio(fit):
-    cells = draw(fit).axes[0].child_axes
-    assert len(cells) == 6
-    np.testing.assert_allclose(cells[1].lines[0].get_ydata(), fit.parts[0].data.delta[:, 0])
-    panels = data_figures.of_candidates(fit, [], 0)
+    cells = draw(fit).axes[:6]
+    assert cells[3].get_title(loc="left") == "Δ of AnE (degrees)"
+    np.testing.assert_allclose(cells[3].lines[0].get_ydata(), fit.parts[0].data.delta[:, 0])
+    panels = figures.of_candidates(fit, [], 0)
     assert "Ψ Aps (degrees)" in str(panels)
-    assert len(draw_data(fit.parts[0].data).axes[0].child_axes) == 6
+    assert len(draw_data(fit.parts[0].data).axes) == 6
 
 
 @pytest.mark.slow(reason="two more fits")

@@ -12,7 +12,7 @@ import pytest
 import pellicle as pl
 from pellicle.fitting.depth_profiles import fitted_profiles
 from pellicle.fitting.result import Fit
-from pellicle.reporting.fit_figure import draw
+from pellicle.reporting.figures import draw_fit as draw
 from pellicle.reporting.folders import write_fit
 
 NM = np.linspace(400.0, 900.0, 51)

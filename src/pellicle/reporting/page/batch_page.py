@@ -13,10 +13,11 @@ import numpy as np
 
 from pellicle.fitting.result import Status
 from pellicle.reporting import repeats as repeats_text
+from pellicle.reporting.drawable import Line, Panel, Section, Style, Table
 from pellicle.reporting.page.document import page
-from pellicle.reporting.page.figure import Column, Panel, Trace, figure, numbers
 from pellicle.reporting.page.fit_page import TONES
 from pellicle.reporting.parameter_text import NUISANCE
+from pellicle.reporting.plotly_figure import figure
 
 if TYPE_CHECKING:
     from pellicle.fitting.repeated_measurements import Repeats
@@ -24,10 +25,10 @@ if TYPE_CHECKING:
 Record = Mapping[str, Any]
 _MOST_PARAMETERS = 8
 """Columns of free parameters, the first of each file."""
-_STYLES = {
-    "good": ("circle", "var(--green)"),
-    "warn": ("diamond", "var(--fit)"),
-    "bad": ("x", "var(--red)"),
+_STYLES: Mapping[str, tuple[Style, str]] = {
+    "good": ("circle", "green"),
+    "warn": ("diamond", "fit"),
+    "bad": ("cross", "red"),
 }
 """Symbol and colour of the results of a tone: both differ."""
 
@@ -116,47 +117,30 @@ def _name(record: Record) -> str:
 
 def _figure(records: Sequence[Record], links: Sequence[str | None], name: str, unit: str) -> dict[str, Any]:
     """The leading parameter of each file with its standard error, in the order of the files."""
-    traces: list[Trace] = []
-    of_tone = {tone: [status for status, own in TONES.items() if own == tone] for tone in _STYLES}
-    for tone, statuses in of_tone.items():
-        found = [
-            (i, record, record["parameters"][name])
-            for i, record in enumerate(records)
-            if record["status"] in statuses and name in record["parameters"]
-        ]
-        found = [(i, record, p) for i, record, p in found if p["free"] and p["value"] is not None]
-        if not found:
-            continue
-        symbol, colour = _STYLES[tone]
-        traces.append(
-            {
-                "type": "scatter",
-                "mode": "markers",
-                "name": ", ".join(sorted({str(record["status"]) for _, record, _ in found})),
-                "x": [i + 1 for i, _, _ in found],
-                "y": numbers(p["value"] for _, _, p in found),
-                "error_y": {
-                    "array": numbers(np.nan if p["stderr"] is None else p["stderr"] for _, _, p in found),
-                    "color": colour,
-                    "thickness": 1,
-                },
-                "marker": {"symbol": symbol, "color": colour, "size": 8},
-                "text": [escape(_name(record)) for _, record, _ in found],
-                "hovertemplate": "%{text}: %{y:.6g}<extra></extra>",
-                "customdata": [{"link": links[i]} if links[i] else {} for i, _, _ in found],
-            }
-        )
+    estimates = [(i, record, record["parameters"].get(name)) for i, record in enumerate(records)]
+    known = [(i, record, p) for i, record, p in estimates if p and p["free"] and p["value"] is not None]
+    lines = []
+    for tone, (style, colour) in _STYLES.items():
+        rows = [(i, record, p) for i, record, p in known if TONES[Status(record["status"])] == tone]
+        if rows:
+            lines.append(
+                Line(
+                    np.array([i + 1.0 for i, _, _ in rows]),
+                    np.array([p["value"] for _, _, p in rows]),
+                    ", ".join(sorted({str(record["status"]) for _, record, _ in rows})),
+                    colour,
+                    style,
+                    errors=np.array([np.nan if p["stderr"] is None else p["stderr"] for _, _, p in rows]),
+                    hints=[escape(f"{_name(record)}: {p['value']:.6g}") for _, record, p in rows],
+                    links=[{"link": links[i]} if links[i] else {} for i, _, _ in rows],
+                )
+            )
     label = f"{name} ({unit})" if unit else name
     caption = (
         f"Fitted {label} of each file with its standard error. A click on a point opens the page of its fit."
     )
     values = [record["parameters"].get(name, {}).get("value") for record in records]
-    columns = [
-        Column("file", np.arange(1.0, len(records) + 1)),
-        Column(label, [np.nan if value is None else value for value in values]),
-    ]
-    panel = Panel(escape(label), 300, traces, [])
-    whole = {"tickformat": "d", **({"dtick": 1} if len(records) < 12 else {})}
-    drawn = figure("results", caption, "number of the file", [panel], columns, axis=whole)
-    drawn["layout"]["hovermode"] = "closest"
-    return drawn
+    table = Table({"file": np.arange(1.0, len(records) + 1), label: values})
+    section = Section("number of the file", [[Panel(label, lines, height=3.0)]], table=table)
+    axis = {"tickformat": "d", **({"dtick": 1} if len(records) < 12 else {})}
+    return figure("results", caption, section, axis=axis)

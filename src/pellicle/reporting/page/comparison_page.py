@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from pellicle.fitting.status import describe
-from pellicle.reporting.page import data_figures
+from pellicle.reporting.page import figures
 from pellicle.reporting.page.document import page
 from pellicle.reporting.page.fit_page import MOST_FIGURES, TONES
 
@@ -28,7 +28,7 @@ def comparison_page(comparison: Comparison, pages: Sequence[str | None]) -> str:
     others = [c for c in comparison.candidates if c is not best]
     curves = [(c.name, c.fit) for c in others]
     parts = range(min(len(best.fit.parts), MOST_FIGURES))
-    figures = [data_figures.of_candidates(best.fit, curves, i) for i in parts]
+    drawn = [figures.of_candidates(best.fit, curves, i) for i in parts]
     rows = [
         _row(c, best, None if c is best else others.index(c), link)
         for c, link in zip(comparison.candidates, pages, strict=True)
@@ -36,8 +36,8 @@ def comparison_page(comparison: Comparison, pages: Sequence[str | None]) -> str:
     return page(
         "comparison.html",
         f"{len(rows)} recipes compared",
-        figures,
-        data_figures=figures,
+        drawn,
+        data_figures=drawn,
         tone=TONES[best.fit.status],
         best=best.name,
         verdict=comparison.verdict,

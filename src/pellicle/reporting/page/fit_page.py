@@ -10,8 +10,8 @@ from pellicle.fitting.curves import ColourCurve
 from pellicle.fitting.result import Status
 from pellicle.fitting.status import RIVAL
 from pellicle.reporting import budget_text, fit_text, fitted_colours, parameter_text
-from pellicle.reporting.fit_figure import file_names
-from pellicle.reporting.page import citations, data_figures, index_figure, misfit_figure
+from pellicle.reporting.fit_panels import file_names
+from pellicle.reporting.page import citations, figures
 from pellicle.reporting.page.document import Table, page, picture
 
 if TYPE_CHECKING:
@@ -46,9 +46,9 @@ def fit_page(
     **Arguments:** `image`, the PNG of the fit's figure; `pictures`, other PNG images by name ("corner",
     "predictive"); `again`, what repeats the fit: descriptions and texts to copy.
     """
-    figures = [data_figures.of_part(fit, i) for i in range(min(len(fit.parts), MOST_FIGURES))]
-    misfit, index = misfit_figure.of_misfit(fit), index_figure.of_index(fit)
-    shown = [*figures, *(each for each in (misfit, index) if each)]
+    of_data = [figures.of_part(fit, i) for i in range(min(len(fit.parts), MOST_FIGURES))]
+    misfit, index = figures.of_misfit(fit), figures.of_index(fit)
+    shown = [*of_data, *(each for each in (misfit, index) if each)]
     about = None
     if posterior is not None:
         from pellicle.reporting.page.posterior_section import section
@@ -57,7 +57,7 @@ def fit_page(
         shown.append(about["trace"])
     surface = None
     if fit.layer_test is not None:
-        from pellicle.reporting.page.surface_section import section as surface_section
+        from pellicle.reporting.page.surface_section import surface_section
 
         surface = surface_section(fit)
         shown.append(surface["lobes"])
@@ -68,7 +68,7 @@ def fit_page(
         "verdict": fit.verdict,
         "advice": fit_text.ADVICE[fit.status],
         "warnings": fit.warnings,
-        "data_figures": figures,
+        "data_figures": of_data,
         "swatches": [_swatches(part) for part in fit.parts if isinstance(part.curve, ColourCurve)],
         "image": picture(image, f"Figure of the fit: {fit.verdict}"),
         "misfit": misfit,
@@ -111,7 +111,7 @@ def _sections(content: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 def _rivals(fit: Fit) -> Table:
-    """Rows of rivals in the order of the fit, by whose numbers the figures know them."""
+    """One row for each rival, numbered as in the figures."""
     names = list(dict.fromkeys(name for rival in fit.rivals for name in rival.parameters))
     known = any(rival.probability is not None for rival in fit.rivals)
     rows: list[Any] = []
@@ -123,7 +123,7 @@ def _rivals(fit: Fit) -> Table:
             value = f"{rival.parameters[name]:.5g}" if name in rival.parameters else ""
             error = "" if rival.stderr is None or name not in rival.stderr else f" ± {rival.stderr[name]:.2g}"
             cells.append(value + error)
-        about = data_figures.label(rival, fit)
+        about = figures.label(rival, fit)
         rows.append({"number": number, "about": about, "cells": cells, "shown": bool(rival.curves)})
     units = {name: fit.parameters[name].unit for name in names if name in fit.parameters}
     heads = [f"{name} ({units[name]})" if units.get(name) else name for name in names]

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pellicle.reporting.drawable import Line, Panel, Section
 from pellicle.reporting.page.document import Table, picture
-from pellicle.reporting.page.figure import Panel, figure, line
+from pellicle.reporting.plotly_figure import figure
 from pellicle.sampling.result import verdict
 
 if TYPE_CHECKING:
@@ -57,16 +57,14 @@ def _trace(posterior: Posterior) -> dict[str, Any]:
     """Steps of some walkers, one panel for each parameter."""
     draws = posterior.draws[:: -(-len(posterior.draws) // _STEPS) or 1, :_WALKERS]
     steps, walkers, _ = draws.shape
-    at = np.tile(np.arange(steps) * (len(posterior.draws) / max(steps, 1)), walkers)
-    strokes = np.split(np.arange(steps * walkers), walkers)
+    step = np.tile([*np.arange(steps) * (len(posterior.draws) / max(steps, 1)), np.nan], walkers)
     panels = []
     for i, name in enumerate(posterior.names[:_PARAMETERS]):
         unit = posterior.fit.parameters[name].unit
-        title = escape(f"{name} ({unit})" if unit else name)
-        trace = line(at, draws[:, :, i].T.ravel(), strokes, title, "var(--index-n)")
-        panels.append(Panel(title, 130, [trace | {"showlegend": False}], []))
-        panels[-1].data[0]["line"] = {"color": "var(--index-n)", "width": 1}
+        title = f"{name} ({unit})" if unit else name
+        values = np.pad(draws[:, :, i], ((0, 1), (0, 0)), constant_values=np.nan).T.ravel()
+        panels.append([Panel(title, [Line(step, values, title, "index-n", width=0.8, listed=False)])])
     caption = f"Trace of {walkers} of {posterior.draws.shape[1]} walkers after the burn-in."
-    drawn = figure("trace", caption, "step after the burn-in", panels, [])
+    drawn = figure("trace", caption, Section("step after the burn-in", panels))
     drawn["layout"]["hovermode"] = False
     return drawn

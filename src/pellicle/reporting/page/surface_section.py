@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from html import escape
 from io import BytesIO
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -14,9 +13,10 @@ from pellicle.brdf.directions import direction, frame
 from pellicle.brdf.models import model
 from pellicle.fitting.program_cache import kept
 from pellicle.rendering.films import with_values
-from pellicle.reporting.page.data_figures import CHANNELS, label
+from pellicle.reporting.drawable import CHANNELS, Line, Panel, Section, Table
 from pellicle.reporting.page.document import picture
-from pellicle.reporting.page.figure import Column, Panel, Trace, figure, line
+from pellicle.reporting.page.figures import label
+from pellicle.reporting.plotly_figure import figure
 from pellicle.reporting.rendering_display import display
 from pellicle.scene.surface import Surface
 from pellicle.simulation.sphere import EYE, sphere
@@ -57,30 +57,39 @@ def _views(name: str, numbers: Any, normals: Any) -> Views:
     return Views(brdf(numbers, i, jnp.broadcast_to(o, i.shape)), pixels)
 
 
-def section(fit: Fit) -> dict[str, Any]:
+def surface_section(fit: Fit) -> dict[str, Any]:
     """The figure of lobes, with those of rivals, and the rendering of a sphere."""
     best, *rivals = (_at(fit, changed) for changed in ({}, *(rival.parameters for rival in fit.rivals)))
     names = _names(fit.surface)
     with jax.enable_x64(True):
         lobes, pixels = _seen(best)
         of_rivals = [_seen(own).lobes for own in rivals]
-    panels = [_panel(angle, values, names) for angle, values in zip(_INCIDENCES, lobes, strict=True)]
-    others = [
-        (
-            f"rival: {escape(label(rival, fit))}",
-            [_panel(angle, values, names) for angle, values in zip(_INCIDENCES, own, strict=True)],
-        )
-        for rival, own in zip(fit.rivals, of_rivals, strict=True)
-    ]
-    columns = [Column("angle to the eye (degrees)", _LEAVING)]
+    columns = {"angle to the eye (degrees)": _LEAVING}
     for angle, values in zip(_INCIDENCES, lobes, strict=True):
-        columns += [Column(f"{n}, light at {angle:g}°", x) for n, x in zip(names, values.T, strict=True)]
+        columns |= {f"{n}, light at {angle:g}°": x for n, x in zip(names, values.T, strict=True)}
     caption = (
         "BRDF of the fitted surface in the plane of incidence, for light at 15, 45 and 70 degrees. Positive"
         " angles to the eye are on the side of the mirror direction."
     )
-    drawn = figure("lobes", caption, "angle to the eye (degrees)", panels, columns, others)
-    return {"lobes": drawn, "sphere": _sphere(pixels)}
+    others = [
+        (f"rival: {label(rival, fit)}", _panels(own, names))
+        for rival, own in zip(fit.rivals, of_rivals, strict=True)
+    ]
+    rows = [[panel] for panel in _panels(lobes, names)]
+    section = Section("angle to the eye (degrees)", rows, table=Table(columns))
+    return {"lobes": figure("lobes", caption, section, others), "sphere": _sphere(pixels)}
+
+
+def _panels(lobes: np.ndarray, names: list[str]) -> list[Panel]:
+    """A panel for each angle of the light, of `lobes` (incidences, angles, channels)."""
+    panels = []
+    for angle, values in zip(_INCIDENCES, lobes, strict=True):
+        lines = [
+            Line(_LEAVING, own, name, CHANNELS[c % len(CHANNELS)], model=True)
+            for c, (name, own) in enumerate(zip(names, values.T, strict=True))
+        ]
+        panels.append(Panel(f"light at {angle:g}°", lines, height=1.5))
+    return panels
 
 
 def _at(fit: Fit, changed: dict[str, float]) -> Surface:
@@ -100,16 +109,6 @@ def _seen(surface: Surface) -> Views:
     numbers = {key: np.asarray(value, dtype=float) for key, value in surface.start_numbers().items()}
     found = _views(surface.model, numbers, sphere(_SIZE).normal)
     return Views(*map(np.asarray, found))
-
-
-def _panel(angle: float, values: np.ndarray, names: list[str]) -> Panel:
-    whole = [np.arange(len(_LEAVING))]
-    traces: list[Trace] = [
-        line(_LEAVING, values[:, c], whole, name, CHANNELS[c % len(CHANNELS)])
-        | {"showlegend": angle == _INCIDENCES[0]}
-        for c, name in enumerate(names)
-    ]
-    return Panel(f"light at {angle:g}°", 150, [], traces)
 
 
 def _sphere(radiance: np.ndarray) -> dict[str, str]:

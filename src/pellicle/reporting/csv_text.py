@@ -1,0 +1,34 @@
+"""Rendering of tables as CSV."""
+
+from __future__ import annotations
+
+import csv
+import math
+from importlib.metadata import version
+from io import StringIO
+from typing import Any
+
+from pellicle.reporting.drawable import Table
+
+
+def csv_text(table: Table) -> str:
+    """Format a table below its comments; numbers have ten digits, and those that are not finite are empty."""
+    text = StringIO()
+    for line in table.comments:
+        text.write(f"# {line}\n")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(table.columns)
+    for row in zip(*table.columns.values(), strict=True):
+        writer.writerow([_cell(value) for value in row])
+    return text.getvalue()
+
+
+def written_by() -> str:
+    """The comment that names this program."""
+    return f"written by pellicle {version('pellicle')}"
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, str):
+        return value
+    return f"{float(value):.10g}" if value is not None and math.isfinite(value) else ""

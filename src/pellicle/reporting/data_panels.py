@@ -1,0 +1,184 @@
+"""Panels of measured data, and of data, fit and residuals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pellicle.data.brdf_samples import BrdfSamples
+from pellicle.data.colours import Colours
+from pellicle.data.spectrum import Spectrum
+from pellicle.reporting import fitted_colours
+from pellicle.reporting.drawable import SERIES, Band, Line, Panel, Place, Section, Table, stroke
+from pellicle.reporting.quantities import Quantity, abscissa, lines_of, quantities
+
+if TYPE_CHECKING:
+    from pellicle.fitting.result import Part
+
+MOST_NAMED = 8
+"""Most lines, one for each angle and azimuth, that get a label."""
+_SHIFT = 0.12
+"""Distance of the markers of two channels of one colour."""
+
+
+def fitted(part: Part) -> Section:
+    """Data, fit and residuals of one part of a fit, with the table of their numbers."""
+    columns = quantities(part.data, part.curve)
+    x, label = abscissa(part.data)
+    if isinstance(part.data, Spectrum):
+        rows = _spectrum(part.data, columns, x)
+    elif isinstance(part.data, Colours):
+        rows = _colours(part, columns, x)
+    else:
+        rows = _samples(part.data, columns, x)
+    return Section(label, rows, part.name, _table(part, columns, x, label))
+
+
+def _table(part: Part, columns: Sequence[Quantity], x: np.ndarray, label: str) -> Table:
+    """Abscissa, angles, data and fit in the order of the abscissa; of a single quantity residual and σ."""
+    order = np.argsort(x, kind="stable")
+    table = {label: x[order]}
+    for name in ("angle", "azimuth"):
+        setting = getattr(part.data, name, None)
+        if setting is not None and not label.startswith(name):
+            table[f"{name} (degrees)"] = setting[order]
+    for q in columns:
+        assert q.model is not None
+        table |= {q.label: q.data[order], f"fit of {q.label}": q.model[order]}
+    if isinstance(part.data, Spectrum) and len(columns) == 1:
+        known = {"residual": columns[0].residual, "sigma": columns[0].sigma}
+        table |= {name: values[order] for name, values in known.items() if values is not None}
+    return Table(table)
+
+
+def measured(spectrum: Spectrum) -> Section:
+    """Measured values with their errors, a line for each angle of incidence and azimuth."""
+    columns = quantities(spectrum)
+    x, label = abscissa(spectrum)
+    settings, panels = lines_of(spectrum), []
+    for q in columns:
+        lines, bands = [], []
+        for j, (rows, name) in enumerate(settings):
+            colour = "residual" if name is None else SERIES[j % len(SERIES)]
+            drawn, named = stroke(x, q.data, rows, q.turns), name or ""
+            lines += [
+                Line(*drawn, "", colour, width=0.6),
+                Line(*drawn, named, colour, "point", listed=j < MOST_NAMED),
+            ]
+            if q.sigma is not None:
+                at, low = stroke(x, q.data - q.sigma, rows)
+                bands.append(Band(at, low, stroke(x, q.data + q.sigma, rows)[1], "±σ", colour, listed=False))
+        panels.append(_values(q, lines, bands, "above" if q is columns[0] else ""))
+    return Section(label, _in_rows(spectrum, columns, panels))
+
+
+def _spectrum(spectrum: Spectrum, columns: Sequence[Quantity], x: np.ndarray) -> list[list[Panel]]:
+    """A panel for each quantity, and one for the residuals of all."""
+    settings, panels = lines_of(spectrum), []
+    for q in columns:
+        assert q.model is not None
+        lines = [Line(x, q.data, "data", "points", "point")]
+        for j, (rows, setting) in enumerate(settings):
+            lines.append(
+                Line(
+                    *stroke(x, q.model, rows, q.turns),
+                    "fit" if setting is None else f"fit, {setting}",
+                    SERIES[j % len(SERIES)],
+                    "dashed" if j // len(SERIES) % 2 else "solid",
+                    0.9 if q.place else 1.4,
+                    listed=len(settings) <= MOST_NAMED,
+                    model=True,
+                )
+            )
+        panels.append(_values(q, lines, [], "inside" if q is columns[0] else ""))
+    return [*_in_rows(spectrum, columns, panels), [_residuals(spectrum, columns, x)]]
+
+
+def _values(q: Quantity, lines: list[Line], bands: list[Band], legend: Place) -> Panel:
+    """A panel of data; in a grid it has a title, and at least the least range of its quantity."""
+    if q.place is None:
+        height = {"psi": 2.2, "delta": 2.2, "depolarisation": 1.5}.get(q.name, 3.0)
+        return Panel(q.label, lines, bands, height, legend=legend)
+    shown = np.concatenate([q.data, *([] if q.model is None else [q.model])])
+    low, high = float(np.min(shown)), float(np.max(shown))
+    room = 0.56 * max(high - low, q.smallest)
+    bottom, top = (low + high) / 2 - room, (low + high) / 2 + room
+    if q.name.startswith("psi"):  # never negative
+        bottom = max(bottom, -0.04 * (high + q.smallest))
+    height = 1.1 if q.title == q.label else 2.0
+    return Panel(q.label, lines, bands, height, q.title, "above" if legend else "", limits=(bottom, top))
+
+
+def _in_rows(spectrum: Spectrum, columns: Sequence[Quantity], panels: Sequence[Panel]) -> list[list[Panel]]:
+    """The panels in rows: one below the other; Ψ above Δ of each ratio; Mueller elements at their places of
+    the matrix, where those that were not measured stay empty."""
+    if columns[0].place is None:
+        return [[panel] for panel in panels]
+    shape = (4, 4) if spectrum.elements else (2, len(spectrum.ratios))
+    at = {q.place: panel for q, panel in zip(columns, panels, strict=True)}
+    empty = {(i, j): Panel("", height=1.1, title=f"m{i + 1}{j + 1}") for i in range(4) for j in range(4)}
+    empty[0, 0] = Panel("", height=1.1, title="m11 = 1")
+    return [[at.get((i, j), empty[i, j]) for j in range(shape[1])] for i in range(shape[0])]
+
+
+def _residuals(spectrum: Spectrum, columns: Sequence[Quantity], x: np.ndarray) -> Panel:
+    """Data − fit of all quantities; of a single one beside ±σ."""
+    shown = [q for q in columns if q.missed is not None]
+    lines, bands = [], []
+    for q in shown:
+        assert q.missed is not None
+        name, colour, style = q.drawn
+        for rows, _ in lines_of(spectrum):
+            drawn = stroke(x, q.missed, rows)
+            lines.append(Line(*drawn, name, colour, style, 0.8, listed=len(shown) > 1, model=True))
+            if len(shown) == 1 and q.sigma is not None:
+                at, low = stroke(x, -q.sigma, rows)
+                bands.append(Band(at, low, -low, "±σ"))
+    degrees = " (degrees)" if "degrees" in columns[0].label else ""
+    height = 1.3 if len(shown) == 1 else 1.5
+    return Panel(f"data − fit{degrees}", lines, bands, height, legend="above", zero=True)
+
+
+def _colours(part: Part, columns: Sequence[Quantity], x: np.ndarray) -> list[list[Panel]]:
+    """Patches of data above those of the fit, the values of each channel, and residuals in σ."""
+    colours, curve = fitted_colours.colours_of(part)
+    angle = colours.angle
+    values, residuals = [], []
+    for c, q in enumerate(columns):
+        assert q.model is not None
+        assert q.missed is not None
+        at, (name, colour, _) = x + _SHIFT * (c - 1), q.drawn
+        values.append(Line(at, q.data, f"data {name}", colour, "circle"))
+        values.append(Line(at, q.model, f"fit {name}", colour, "cross", model=True))
+        residuals.append(Line(at, q.missed, name, colour, "circle", listed=False, model=True))
+    differences = () if curve.difference is None else curve.difference
+    ticks = [f"{i:g}" for i in x] if angle is None else [f"{degrees:g}°" for degrees in angle]
+    axis = {"span": (0.5, len(x) + 0.5), "ticks": ticks}
+    image = np.stack([fitted_colours.display(colours, own) for own in (curve.data, curve.model)])
+    sigma = [Band(np.array(axis["span"]), np.full(2, -1.0), np.ones(2), "±σ")]
+    return [
+        [Panel("", height=1.6, image=image, captions=[f"ΔE {own:.2g}" for own in differences], **axis)],
+        [Panel(f"{colours.space}", values, height=2.0, legend="above", **axis)],
+        [Panel("(data − fit) / σ", residuals, sigma, legend="above", zero=True, **axis)],
+    ]
+
+
+def _samples(samples: BrdfSamples, columns: Sequence[Quantity], x: np.ndarray) -> list[list[Panel]]:
+    """Samples and model, on a logarithmic axis if all are positive: a lobe spans decades; and residuals."""
+    measured, model, residuals = [], [], []
+    for q in columns:
+        assert q.model is not None
+        assert q.missed is not None
+        name, colour, _ = q.drawn
+        measured.append(Line(x, q.data, f"data {name}", colour, "ring"))
+        model.append(Line(x, q.model, f"fit {name}", colour, "cross", model=True))
+        residuals.append(Line(x, q.missed, name, colour, "point", listed=False, model=True))
+    positive = min(min(line.y.min() for line in lines) for lines in (measured, model)) > 0
+    label = "residual (1/sr)" if samples.sigma is None else "residual / σ"
+    scale = "log" if positive else "linear"
+    return [
+        [Panel("BRDF (1/sr)", [*measured, *model], height=3.0, legend="inside", scale=scale)],
+        [Panel(label, residuals, zero=True)],
+    ]

@@ -1,0 +1,187 @@
+"""Tables of a fit: data, model and residuals; n and k; profiles of graded layers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pellicle.data.brdf_samples import BrdfSamples
+from pellicle.data.colours import Colours
+from pellicle.data.spectrum import Spectrum
+from pellicle.data.tabular.columns import DIRECTIONS
+from pellicle.fitting.curves import BIREFRINGENCE
+from pellicle.reporting.csv_text import csv_text, written_by
+from pellicle.reporting.drawable import Table
+
+if TYPE_CHECKING:
+    from pellicle.fitting.depth_profiles import FittedProfile
+    from pellicle.fitting.result import Fit, Part
+
+_JOINT = ("file", "signal", "wavelength_nm", "angle_deg", "data", "model", "residual", "sigma", "azimuth_deg")
+_KINDS = {
+    "psi": "fit of psi and delta in degrees: data, model, residual = data - model (of delta: -180 to 180)",
+    "ratios": "fit of generalised psi and delta in degrees: data, model, residual = data - model"
+    " (of delta: -180 to 180)",
+    "elements": "fit of normalised Mueller elements: data, model, sigma = standard deviation assumed",
+}
+
+
+def fit_csv(fit: Fit) -> str:
+    """Format data, model and residuals of a fit as CSV that pellicle can read again.
+
+    A spectrum has a row for each wavelength, angle and azimuth, with σ; BRDF samples have one for each pair
+    of directions. Rows of a joint fit begin with the name of the file, and have one value of a spectrum each.
+    """
+    if fit.layer_test is not None:
+        return _samples(fit)
+    if fit.joint:
+        return _joint(fit)
+    [part] = fit.parts
+    if isinstance(part.data, Colours):
+        return _colours(fit, part)
+    return (
+        _power(fit, part)
+        if part.spectral.delta_data is None and not part.spectrum.elements
+        else _columns(fit, part)
+    )
+
+
+def nk_csvs(fit: Fit) -> dict[str, str]:
+    """Format n and k of the layer with their standard errors, each wavelength once, by the name of the file.
+
+    pellicle reads the tables as materials. Infinite errors are empty cells. A birefringent layer has a table
+    for each principal index; the one of the extraordinary index also contains the birefringence.
+    """
+    principal = dict(fit.principal_indices)
+    difference = principal.pop(BIREFRINGENCE, None)
+    texts = {}
+    for name, index in (principal or {"": fit.index}).items():
+        columns = {("wavelength_nm" if key == "wavelength" else key): x for key, x in vars(index).items()}
+        if difference is not None and name == "extraordinary":
+            columns |= {BIREFRINGENCE: difference.n, f"{BIREFRINGENCE}_stderr": difference.n_stderr}
+        which = f" ({name})" if name else ""
+        about = [f"n and k of the fitted layer{which}, a material that pellicle takes by its path"]
+        texts[f"nk_{name}.csv" if name else "nk.csv"] = _text(fit, about, columns)
+    return texts
+
+
+def profile_csv(fit: Fit, profiles: Sequence[FittedProfile]) -> str:
+    """Format the fitted profiles of graded layers; infinite errors are empty cells."""
+    about = [f"profiles at {profiles[0].wavelength:g} nm against depth from the upper face of each layer"]
+    columns: dict[str, Any] = {
+        "layer": [p.layer for p in profiles for _ in p.depth],
+        "depth_nm": np.concatenate([p.depth for p in profiles]),
+    }
+    for name in ("fraction", "fraction_stderr", "n", "n_stderr", "k", "k_stderr"):
+        columns[name] = np.concatenate([getattr(p, name) for p in profiles])
+    return _text(fit, about, columns)
+
+
+def _power(fit: Fit, part: Part) -> str:
+    data, curve = part.spectrum, part.spectral
+    settings = _settings(data)
+    names = ["wavelength", data.signal if data.calibrated else "intensity", "_", "_", "sigma"]
+    names += [name.removesuffix("_deg") for name in settings]
+    about = [
+        f"fit of {data.signal}: data, model, residual = data - model, sigma = standard deviation assumed",
+        f"pellicle reads the data again with --columns {','.join(names)}",
+    ]
+    columns = {name: getattr(curve, name) for name in ("data", "model", "residual", "sigma")}
+    return _text(fit, about, {"wavelength_nm": curve.wavelength, **columns, **settings})
+
+
+def _settings(data: Spectrum) -> dict[str, np.ndarray]:
+    """The angle of incidence and the azimuth of the sample, as far as the data have them."""
+    known = {"angle_deg": data.angle, "azimuth_deg": data.azimuth}
+    return {name: values for name, values in known.items() if values is not None}
+
+
+def _columns(fit: Fit, part: Part) -> str:
+    """Data, model, residual and known σ of each quantity; those of Ψ and Δ follow both."""
+    from pellicle.reporting.quantities import quantities
+
+    data = part.spectrum
+    known = quantities(data, part.curve)
+    groups = [[q] for q in known] if data.elements or data.ratios else [known[:2], known[2:]]
+    columns: dict[str, Any] = {"wavelength_nm": part.spectral.wavelength, **_settings(data)}
+    for group in groups:
+        for q in group:
+            assert q.residual is not None
+            columns |= {f"{q.name}{'_deg' * ('degrees' in q.label)}": q.data, f"{q.name}_model": q.model}
+            columns |= {} if data.elements else {f"{q.name}_residual": q.residual}
+        # σ of Ψ as stated: that of the fit may be the scatter of sweeps
+        sigmas = {q.name: data.sigma if q.name == "psi" else q.sigma for q in group}
+        stated = data.elements or data.sigma is not None or "depolarisation" in sigmas
+        if stated and all(sigma is not None for sigma in sigmas.values()):
+            columns |= {f"sigma_{name}{'_deg' * bool(data.ratios)}": x for name, x in sigmas.items()}
+    kind = "elements" if data.elements else "ratios" if data.ratios else "psi"
+    return _text(fit, [_KINDS[kind]], columns)
+
+
+def _colours(fit: Fit, part: Part) -> str:
+    from pellicle.reporting import fitted_colours  # imports JAX
+
+    data, curve = fitted_colours.colours_of(part)
+    light = "transmitted" if data.signal == "T" else "reflected"
+    about = [f"signal {data.space}, {light}, {data.polarisation}"]
+    about += [note for note in data.notes if note.startswith("observer ")]
+    about += [f"fit of {fitted_colours.summary(part)}: data, model_, sigma_ = standard deviation assumed"]
+    columns = {} if data.angle is None else {"angle_deg": data.angle}
+    for kind, values in (("", curve.data), ("model_", curve.model), ("sigma_", curve.sigma)):
+        columns |= {f"{kind}{name}": column for name, column in zip(data.channels, values.T, strict=True)}
+    return _text(fit, about, columns | ({} if curve.difference is None else {"delta_e": curve.difference}))
+
+
+def _samples(fit: Fit) -> str:
+    channels = fit.parts[0].samples.channels
+    about = [
+        f"BRDF in 1/sr, directions in degrees; model_{channels[0]} and so on: {fit.surface.model} as fitted"
+    ]
+    names = [part.name for part in fit.parts for _ in range(len(part.samples))]
+    columns: dict[str, Any] = {"file": names} if fit.joint else {}
+    for name in DIRECTIONS:
+        columns[name] = np.concatenate([getattr(part.samples, name) for part in fit.parts])
+    for c, name in enumerate(channels):
+        columns[name] = np.concatenate([part.samples.values[:, c] for part in fit.parts])
+    for c, name in enumerate(channels):
+        columns[f"model_{name}"] = np.concatenate([part.curve.model[:, c] for part in fit.parts])
+    return _text(fit, about, columns)
+
+
+def _joint(fit: Fit) -> str:
+    about = ["joint fit: data, model, residual = data - model, sigma = standard deviation assumed"]
+    azimuths = any(isinstance(part.data, Spectrum) and part.data.azimuth is not None for part in fit.parts)
+    rows = [row for part in fit.parts for row in _joint_rows(part)]
+    columns = dict(zip(_JOINT, zip(*rows, strict=True), strict=True))
+    return _text(fit, about, {name: columns[name] for name in _JOINT[: None if azimuths else -1]})
+
+
+def _joint_rows(part: Part) -> Iterable[tuple[str | float, ...]]:
+    """A row for each value; Ψ, Δ and depolarisation are three, and so is a colour; Mueller elements one each.
+
+    The angle of a BRDF sample is that of the light.
+    """
+    from pellicle.reporting.quantities import quantities
+
+    data = part.data
+    unknown = np.full(len(part.curve.model), math.nan)
+    nm = part.spectral.wavelength if isinstance(data, Spectrum) else unknown
+    angle = data.theta_i if isinstance(data, BrdfSamples) else data.angle
+    azimuth = data.azimuth if isinstance(data, Spectrum) else None
+    for q in quantities(data, part.curve):
+        numbers = (nm, angle, q.data, q.model, q.residual, q.sigma, azimuth)
+        for row in zip(*(unknown if x is None else x for x in numbers), strict=True):
+            yield part.name, q.name, *row
+
+
+def _text(fit: Fit, about: Sequence[str], columns: dict[str, Any]) -> str:
+    """The table below its comments: what it is, the path (on one line) and hash of each source."""
+    sources = [
+        f"from {' '.join(getattr(part.data, 'source', part.data.path).split()) or 'no file'},"
+        f" sha256 {part.data.sha256 or 'unknown'}"
+        for part in fit.parts
+    ]
+    return csv_text(Table(columns, (*about, *sources, written_by())))
