@@ -106,7 +106,7 @@ def _measurements(
 
 
 def _is_hdf5(path: str) -> bool:
-    from pellicle.data.cubes.stores import is_netcdf
+    from pellicle.data.cubes.xarray_cubes import is_netcdf
 
     return is_netcdf(Path(path))
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import hashlib
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from pellicle.data.cubes.pixel_array import PartOfArray
+from pellicle.data.cubes.pixel_array import Gain, lazy
+from pellicle.data.fingerprint import fingerprint
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -63,7 +64,7 @@ class Cube:
         low, high = self.wavelength[0], self.wavelength[-1]
         return (
             f"{self.path or 'cube'}: {pixels} pixels of {self.signal}, {self.wavelength.size} bands from"
-            + (f" {low:g} to {high:g} nm")
+            f" {low:g} to {high:g} nm"
         )
 
     __repr__ = __str__
@@ -73,32 +74,43 @@ class Cube:
 
         "sigma" is left out where the cube has none. Pixels outside the mask are NaN.
         """
+        count = math.prod(len(range(n)[part]) for part, n in zip(where, self.shape, strict=True))
         block: dict[str, np.ndarray] = {}
         for name, array in self.arrays.items():
-            common = np.ndim(array) == 1
-            read = np.asarray(array if common else array[where], dtype=float)
-            if common:
-                count = int(
-                    np.prod([len(range(*s.indices(n))) for s, n in zip(where, self.shape, strict=True)])
-                )
-                read = np.broadcast_to(np.repeat(read, self.points // read.size), (count, self.points))
-            block[name] = read.reshape(-1, self.points)
+            if len(array.shape) > 1:
+                block[name] = np.asarray(array[where], dtype=float).reshape(count, self.points)
+            else:
+                bands = np.asarray(array, dtype=float)
+                block[name] = np.broadcast_to(bands.repeat(self.points // bands.size), (count, self.points))
         if self.mask is not None:
             block["values"] = np.where(self.mask[where].reshape(-1, 1), block["values"], np.nan)
         return block
 
     def part(self, where: tuple[slice, ...]) -> Cube:
         """The cube of some of the pixels, a slice along each of the `dims`; values stay in their file."""
-        arrays = {n: a if np.ndim(a) == 1 else PartOfArray(a, where) for n, a in self.arrays.items()}
+        arrays = {
+            name: array if len(array.shape) == 1 else lazy(array, self.dims).part(where)
+            for name, array in self.arrays.items()
+        }
         along = dict(zip(self.dims, where, strict=True))
         if len(self.dims) == 1:  # coordinates of sites have names of their own
             along = dict.fromkeys(self.coords, where[0])
         coords = {name: values[along[name]] for name, values in self.coords.items() if name in along}
         mask = None if self.mask is None else self.mask[where]
-        digest = hashlib.sha256(f"{self.fingerprint}{where}".encode()).hexdigest()
+        digest = fingerprint(self.fingerprint, str(where)) if self.fingerprint else ""
         return replace(self, arrays=arrays, coords=coords, mask=mask, fingerprint=digest)
 
     def coarse(self, factor: int) -> Cube:
         """The cube of every `factor`-th pixel along each axis but that of time."""
         steps = [1 if dim == "time" else min(factor, n) for dim, n in zip(self.dims, self.shape, strict=True)]
         return self.part(tuple(slice(step // 2, None, step) for step in steps))
+
+    def divided(self, gain: np.ndarray, note: str) -> Cube:
+        """The cube divided by a gain (bands,), block by block as it is read, with a note on it."""
+        step = Gain(gain if self.angle is None else gain[:, None])
+        arrays = {
+            name: array / gain if len(array.shape) == 1 else lazy(array, self.dims).then(step)
+            for name, array in self.arrays.items()
+        }
+        digest = fingerprint(self.fingerprint, "divided", gain) if self.fingerprint else ""
+        return replace(self, arrays=arrays, notes=(*self.notes, note), fingerprint=digest)

@@ -7,23 +7,30 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from logging import getLogger
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from pellicle.data.cube import Cube
+from pellicle.data.cubes import detect, xarray_cubes
 from pellicle.data.cubes.bands import chosen_bands, in_nm, parse_wavelengths
-from pellicle.data.cubes.calibration import Frames, camera_frames
-from pellicle.data.cubes.fingerprint import fingerprint
-from pellicle.data.cubes.masks import read_mask
-from pellicle.data.cubes.pixel_array import Conversion, PixelArray, Scale, ShareOfSignal
-from pellicle.data.cubes.raw_cube import Asked, RawCube
-from pellicle.data.cubes.sampled_checks import check_angles, check_level, check_type, live_bands, sample
-from pellicle.data.cubes.stored_arrays import ANGLE, Stored
-from pellicle.data.cubes.value_scale import value_scale
+from pellicle.data.cubes.camera_frames import CameraFrames, camera_frames
+from pellicle.data.cubes.numpy_files import arrays_to_raw
+from pellicle.data.cubes.pixel_array import PixelArray, Scale, Share, Step, value_scale
+from pellicle.data.cubes.raw_cube import ANGLE, Asked, RawCube, Stored
+from pellicle.data.cubes.sampled_checks import (
+    check_angles,
+    check_level,
+    check_type,
+    live_bands,
+    sample,
+    sample_blocks,
+)
+from pellicle.data.fingerprint import WHOLE, file_fingerprint, fingerprint
 from pellicle.data.noise_level import noise_level
+from pellicle.data.photographs import image_format
 from pellicle.data.spectrum import POLARISATIONS
-from pellicle.errors import UsageError
+from pellicle.errors import DataError, UsageError, install_command
 
 log = getLogger(__name__)
 SIGNALS = ("R", "T", "psi-delta")
@@ -83,141 +90,192 @@ def read_cube(
     """
     if isinstance(source, Cube):
         return source
+    frames = _Frames(white_frame, dark_frame, white_reflectance, saturation)
+    _check(signal, polarisation, frames)
+    given, unit = (None, "") if wavelengths is None else parse_wavelengths(wavelengths)
+    raw = _raw(source, Asked(given, wavelength_unit or unit or None, variable, signal))
+    nm, notes = in_nm(raw.wavelength, raw.unit, wavelength_unit, raw.path)
+    bands, told = chosen_bands(nm, range, without_bands, raw.good, raw.path)
+    values = _values(raw, nm, signal, signal_unit, frames, calibrated)
+    used = None if mask is None else read_mask(mask, raw)
+    bands, dead = _checked(values, bands, used)
+    cube = Cube(
+        values.arrays(bands, noise),
+        nm[bands],
+        values.signal,
+        raw.dims,
+        angle=raw.angle if angle is None else _stated_angle(raw, float(angle)),
+        polarisation=polarisation or raw.polarisation or "unpolarised",
+        coords=raw.coords,
+        units=raw.units,
+        mask=used,
+        calibrated=values.calibrated,
+        path=raw.path,
+        notes=_once([*raw.notes, *notes, *told, *values.notes, *dead]),
+    )
+    calibration = values.frames and (values.frames.reflectance, values.frames.saturation)
+    facts = (noise, variable, polarisation, cube.signal, values.scale, calibration, cube.angle, used)
+    cube = _with_fingerprint(cube, raw, frames, (*facts, nm[bands], bands))
+    log.info("%s", cube)
+    return cube
+
+
+class _Frames(NamedTuple):
+    """Frames of a camera as they are given."""
+
+    white: Any
+    dark: Any
+    reflectance: Any
+    saturation: float | None
+
+
+def _check(signal: str | None, polarisation: str | None, frames: _Frames) -> None:
+    """Refuse wrong arguments. Raises UsageError."""
     if signal is not None and signal not in SIGNALS:
         raise UsageError(f"`signal` of a cube must be one of {', '.join(SIGNALS)}, not {signal!r}")
     if polarisation is not None and polarisation not in POLARISATIONS:
         raise UsageError(f"`polarisation` must be one of {', '.join(POLARISATIONS)}, not {polarisation!r}")
-    of_frames = (dark_frame, white_reflectance, saturation)
-    if white_frame is None and any(one is not None for one in of_frames):
+    if frames.white is None and any(given is not None for given in frames[1:]):
         raise UsageError(
             "`dark_frame`, `white_reflectance` and `saturation` need `white_frame`: the counts of white"
         )
-    given, unit = (None, "") if wavelengths is None else parse_wavelengths(wavelengths)
-    raw = _raw(source, Asked(given, wavelength_unit or unit or None, variable, signal))
-    path = raw.path
+
+
+def _raw(source: Any, asked: Asked) -> RawCube:
+    """The content of a file, an xarray object or an array. Raises DataError or UsageError."""
+    if xarray_cubes.is_xarray(source):
+        path = str(source.encoding.get("source", "")) or f"the {type(source).__name__}"
+        raw = xarray_cubes.xarray_to_raw(source, path, asked)
+    elif isinstance(source, np.ndarray):
+        raw = arrays_to_raw({"": source}, "the array", asked, ())
+    elif isinstance(source, str | os.PathLike):
+        raw = detect.read_raw(Path(source), asked)
+    else:
+        raise UsageError(f"a cube must be a path, an xarray object or an array, not {type(source).__name__}")
     for stored in raw.arrays.values():
-        check_type(stored.data.dtype, path)
-    nm, notes = in_nm(raw.wavelength, raw.unit, wavelength_unit, path)
-    bands, told = chosen_bands(nm, range, without_bands, raw.good, path)
-    notes = [*raw.notes, *notes, *told]
+        check_type(stored.data.dtype, raw.path)
+    if not np.prod(raw.arrays["values"].data.shape):
+        sizes = ", ".join(f"{axis} {n}" for axis, n in raw.arrays["values"].sizes.items())
+        raise DataError(f"{raw.path}: has no pixels or no bands ({sizes}): check how it was written")
+    return raw
+
+
+@dataclass(frozen=True, eq=False)
+class _Values:
+    """Measured values as they are converted when a block is read, and notes on their conversion."""
+
+    raw: RawCube
+    signal: str
+    calibrated: bool
+    scale: Scale
+    frames: CameraFrames | None
+    notes: tuple[str, ...]
+
+    def measured(self, bands: np.ndarray) -> dict[str, PixelArray]:
+        """Measured values by name, at some bands."""
+        steps = (self.scale,) if self.frames is None else (self.scale, self.frames)
+        stored = {name: self.raw.arrays[name] for name in ("values", "delta") if name in self.raw.arrays}
+        return {name: self._lazy(array, bands, *steps) for name, array in stored.items()}
+
+    def arrays(self, bands: np.ndarray, noise: float | str | None) -> dict[str, Any]:
+        """Measured values and standard deviations by name: those given, or those of the file.
+
+        Raises UsageError.
+        """
+        measured, names = self.measured(bands), {"values": "sigma", "delta": "delta_sigma"}
+        stored = {name: self.raw.arrays[name] for name in names.values() if name in self.raw.arrays}
+        if isinstance(noise, str) and noise in self.raw.others:
+            stored = {"sigma": self.raw.others[noise]}
+        elif noise is not None:
+            return measured | _stated_errors(noise, measured, bands.size)
+        elif self.frames is not None or self.scale.absorbance:
+            return dict(measured)  # errors of counts or absorbances are not converted
+        step = replace(self.scale, absorbance=False)
+        return measured | {name: self._lazy(one, bands, step) for name, one in stored.items()}
+
+    def _lazy(self, stored: Stored, bands: np.ndarray, *steps: Step) -> PixelArray:
+        return PixelArray(stored, self.raw.pixels, bands, self.raw.arrays["values"].sizes.get(ANGLE), steps)
+
+
+def _stated_errors(noise: float | str, measured: Mapping[str, PixelArray], bands: int) -> dict[str, Any]:
+    """Standard deviations by name, as `noise` states them. Raises UsageError."""
+    level = noise_level(noise)
+    if not level.relative:
+        names = {"values": "sigma", "delta": "delta_sigma"}
+        return {names[name]: np.full(bands, level.value) for name in measured}
+    if "delta" in measured:
+        raise UsageError(f"`noise` {level} is a share of the signal: give that of psi and delta in degrees")
+    return {"sigma": measured["values"].then(Share(level.value))}
+
+
+def _values(
+    raw: RawCube,
+    nm: np.ndarray,
+    signal: str | None,
+    unit: str | float | None,
+    frames: _Frames,
+    calibrated: bool | None,
+) -> _Values:
+    """The kind of the values and their conversion to fractions or degrees. Raises DataError or UsageError."""
+    notes = []
     kind = signal or raw.signal
     if kind is None:
         kind = "R"
         notes.append('signal: R, assumed; give `signal="T"` for transmittance')
     if (kind == "psi-delta") != ("delta" in raw.arrays):
-        raise UsageError(f"{path}: psi-delta needs variables named psi and delta: name both in the file")
-    frames = None
-    if white_frame is not None:
-        given_frames = (white_frame, dark_frame, white_reflectance, saturation)
-        frames, told = camera_frames(raw, nm, *given_frames)
+        raise UsageError(f"{raw.path}: psi-delta needs variables named psi and delta: name both in the file")
+    calibration = None
+    if frames.white is not None:
+        calibration, told = camera_frames(raw, nm, *frames)
         notes += told
     calibrated = raw.calibrated if calibrated is None else calibrated
-    scale, told = value_scale(raw, kind, signal_unit, calibrated=calibrated, framed=frames is not None)
-    notes += [told] if told else []
-    used = None if mask is None else read_mask(mask, raw, raw.sizes)
-    converted = _Converted(raw, scale, frames)
-    names = [name for name in ("values", "delta") if name in raw.arrays]
-    seen = sample({name: converted.array(name, bands) for name in names}, len(raw.dims), used)
-    live, told = live_bands(seen["values"], int(np.prod(raw.sizes)), path)
-    notes += told
-    bands, seen = bands[live], {name: values[:, live] for name, values in seen.items()}
-    if kind == "psi-delta":
-        check_angles(seen["values"], seen["delta"], path)
-    elif calibrated:
-        check_level(seen["values"], kind, path)
-    arrays: dict[str, Any] = {name: converted.array(name, bands) for name in names}
-    arrays |= converted.errors(arrays, bands, noise)
-    angles = raw.angle if angle is None else _stated_angle(raw, float(angle))
-    facts = {
-        "scale": scale,
-        "signal": kind,
-        "noise": noise,
-        "mask": used,
-        "white": None if frames is None else frames.reflectance,
-        "saturation": None if frames is None else frames.saturation,
-        "variable": variable,
-        "polarisation": polarisation,
-    }
-    beside = [Path(f) for f in (white_frame, dark_frame) if isinstance(f, str | os.PathLike)]
-    facts |= {f"frame {i}": f for i, f in enumerate((white_frame, dark_frame)) if isinstance(f, np.ndarray)}
-    axes = [nm[bands], bands, np.zeros(0) if angles is None else angles]
-    digest, told = fingerprint(raw, beside, facts, axes)
-    cube = Cube(
-        arrays,
-        nm[bands],
-        kind,
-        raw.dims,
-        angle=angles,
-        polarisation=polarisation or raw.polarisation or "unpolarised",
-        coords=raw.coords,
-        units=raw.units,
-        mask=used,
-        calibrated=calibrated,
-        path=path,
-        fingerprint=digest,
-        notes=_once([*notes, *([told] if told else [])]),
-    )
-    log.info("%s", cube)
-    return cube
+    scale, told = value_scale(raw, kind, unit, calibrated=calibrated, framed=calibration is not None)
+    return _Values(raw, kind, calibrated, scale, calibration, (*notes, *([told] if told else [])))
 
 
-@dataclass(frozen=True, eq=False)
-class _Converted:
-    """The arrays of a cube as they are converted when a block is read."""
-
-    raw: RawCube
-    scale: Scale
-    frames: Frames | None
-
-    def array(self, name: str, bands: np.ndarray) -> PixelArray:
-        """Measured values at some bands."""
-        steps: list[Conversion] = [self.scale]
-        if self.frames is not None:
-            steps.append(self.frames.at(bands))
-        return self._pixels(self.raw.arrays[name], bands, steps)
-
-    def errors(
-        self, arrays: Mapping[str, PixelArray], bands: np.ndarray, noise: float | str | None
-    ) -> dict[str, Any]:
-        """Standard deviations by name: those given, or those of the file. Raises UsageError."""
-        raw, names = self.raw, {"values": "sigma", "delta": "delta_sigma"}
-        named = isinstance(noise, str) and noise in raw.others
-        if named or noise is None:
-            stored = {n: raw.arrays[n] for n in names.values() if n in raw.arrays}
-            if named:
-                stored = {"sigma": raw.others[str(noise)]}
-            elif self.frames is not None or self.scale.absorbance:
-                return {}  # of counts or absorbances, which are not converted
-            scale = replace(self.scale, absorbance=False)
-            return {name: self._pixels(one, bands, [scale]) for name, one in stored.items()}
-        level = noise_level(noise)
-        if level.relative and "delta" in arrays:
-            raise UsageError(
-                f"`noise` {level} is a share of the signal: give that of psi and delta in degrees"
-            )
-        if level.relative:
-            return {"sigma": ShareOfSignal(arrays["values"], level.value)}
-        return {names[name]: np.full(bands.size, level.value) for name in arrays}
-
-    def _pixels(self, stored: Stored, bands: np.ndarray, steps: list[Conversion]) -> PixelArray:
-        values = self.raw.arrays["values"]
-        angles = np.arange(values.size(ANGLE)) if ANGLE in values.axes else None
-        return PixelArray(stored, self.raw.dims, self.raw.sizes, bands, angles, steps)
+def _checked(values: _Values, bands: np.ndarray, used: np.ndarray | None) -> tuple[np.ndarray, list[str]]:
+    """Check a sample of the values; returns the bands that have some, and a note. Raises DataError."""
+    raw = values.raw
+    seen = sample(values.measured(bands), len(raw.dims), used)
+    live, notes = live_bands(seen["values"], int(np.prod(raw.shape)), raw.path)
+    seen = {name: array[:, live] for name, array in seen.items()}
+    if values.signal == "psi-delta":
+        check_angles(seen["values"], seen["delta"], raw.path)
+    elif values.calibrated:
+        check_level(seen["values"], values.signal, raw.path)
+    return bands[live], notes
 
 
-def _raw(source: Any, asked: Asked) -> RawCube:
-    from pellicle.data.cubes import detect, xarray_cubes
+def _with_fingerprint(cube: Cube, raw: RawCube, frames: _Frames, facts: tuple[Any, ...]) -> Cube:
+    """The cube with a digest of its content and of how it was read, and a note where that is of a sample.
 
-    if xarray_cubes.is_xarray(source):
-        path = str(source.encoding.get("source", "")) or f"the {type(source).__name__}"
-        return xarray_cubes.xarray_to_raw(source, path, asked)
-    if isinstance(source, np.ndarray):
-        from pellicle.data.cubes.numpy_files import arrays_to_raw
+    Of files, and of arrays in memory, of more than 64 MB some samples are read.
+    """
+    given = [frame for frame in (frames.white, frames.dark) if frame is not None]
+    beside = [Path(frame) for frame in given if not isinstance(frame, np.ndarray)]
+    arrays = [frame for frame in given if isinstance(frame, np.ndarray)]
+    form = [(n, s.axes, s.data.shape, str(s.data.dtype)) for n, s in sorted(raw.arrays.items())]
+    content, total = file_fingerprint((*raw.files, *beside))
+    how, parts = "size, date and samples of its files", []
+    if not raw.files:
+        how = "some blocks of pixels"
+        total = sum(int(np.prod(s.data.shape)) * np.dtype(s.data.dtype).itemsize for s in raw.arrays.values())
+        parts = [_sampled(raw, stored, total > WHOLE) for _, stored in sorted(raw.arrays.items())]
+    digest = fingerprint(facts, arrays, form, content, parts)
+    note = f"{total / 1e9:.2g} GB: a change of the content is recognised by {how}"
+    return replace(cube, fingerprint=digest, notes=(*cube.notes, *([note] if total > WHOLE else [])))
 
-        return arrays_to_raw({"": source}, "the array", asked, ())
-    if not isinstance(source, str | os.PathLike):
-        raise UsageError(f"a cube must be a path, an xarray object or an array, not {type(source).__name__}")
-    return detect.read_raw(Path(source), asked)
+
+def _sampled(raw: RawCube, stored: Stored, part: bool) -> list[Any]:
+    """The content of an array, or some blocks of it, and the name of a dask array: a digest of its graph."""
+    graph = ""
+    if getattr(stored.data, "chunks", None) is not None:
+        graph = str(getattr(getattr(stored.data, "data", stored.data), "name", ""))
+    if not (part or graph):
+        return [stored.read()]
+    dims = [axis for axis in stored.axes if axis in raw.dims]
+    blocks = sample_blocks(tuple(stored.sizes[axis] for axis in dims), 10**9)
+    return [graph, *(stored.read(dict(zip(dims, where, strict=True))) for where in blocks)]
 
 
 def _once(notes: Sequence[str]) -> tuple[str, ...]:
@@ -233,3 +291,61 @@ def _stated_angle(raw: RawCube, angle: float) -> np.ndarray:
     if not 0 <= angle < 90:
         raise UsageError(f"`angle` must be from 0 to below 90 degrees, not {angle:g}")
     return np.array([angle])
+
+
+def read_mask(mask: PathLike | np.ndarray, raw: RawCube) -> np.ndarray:
+    """Return True for the pixels to use (*pixels), where the mask is not zero and not NaN.
+
+    A mask of the last axes, as y and x of a series in time, applies to all of the first. Raises DataError for
+    another size, UsageError for what is no mask.
+    """
+    if isinstance(mask, np.ndarray):
+        values, name = mask, "the mask"
+    else:
+        name = os.fspath(mask)
+        if name in raw.others:
+            stored = raw.others[name]
+            order = [stored.axes.index(axis) for axis in raw.dims if axis in stored.axes]
+            values = np.transpose(stored.read(), order)
+        else:
+            values = _mask_file(Path(name), raw)
+    used = values != 0
+    if values.dtype.kind == "f":
+        used &= ~np.isnan(values)
+    if used.shape != raw.shape[-used.ndim :]:
+        raise DataError(
+            f"{name}: has {' x '.join(map(str, used.shape))} pixels and {raw.path} has "
+            f"{' x '.join(map(str, raw.shape))}: the mask must have the same"
+        )
+    if not used.any():
+        raise DataError(f"{name}: masks every pixel: what is not zero is used")
+    return np.broadcast_to(used, raw.shape)
+
+
+def _mask_file(path: Path, raw: RawCube) -> np.ndarray:
+    if not path.is_file():
+        known = f" or one of its variables {', '.join(map(repr, raw.others))}" if raw.others else ""
+        raise UsageError(f"`mask` {str(path)!r} is no file{known}: name a PNG, a TIFF or a .npy file")
+    if path.suffix.lower() == ".npy":
+        return np.load(path)
+    kind = image_format(path)
+    if kind is None:
+        raise UsageError(f"`mask` {str(path)!r} is no PNG, TIFF or .npy file: save it as one of these")
+    try:
+        values = _pixels(path, kind)
+    except ImportError as error:
+        raise UsageError(f"{path}: images need {error.name}: {install_command('images')}") from None
+    except Exception as error:  # decoders raise errors of every kind on damaged files
+        raise DataError(f"{path}: the {kind} cannot be read ({error}); save it again") from None
+    return values if values.ndim == 2 else np.any(values[..., :3] != 0, axis=-1)
+
+
+def _pixels(path: Path, kind: str) -> Any:
+    if kind == "TIFF":
+        import tifffile
+
+        return tifffile.imread(path)
+    from PIL import Image
+
+    with Image.open(path) as image:
+        return np.asarray(image.convert("RGB") if image.mode == "P" else image)

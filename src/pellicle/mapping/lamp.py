@@ -6,10 +6,8 @@ jointly with the films of some pixels (`pellicle.mapping.joint_lamp`).
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
 import equinox as eqx
 import numpy as np
@@ -59,50 +57,7 @@ class LampCurve:
 
     def correct(self, cube: Cube) -> Cube:
         """The cube divided by the gain, block by block as it is read."""
-        gain = self.gain if cube.angle is None else self.gain[:, None]
-        arrays = {
-            name: array / self.gain if np.ndim(array) == 1 else _Divided(array, gain)
-            for name, array in cube.arrays.items()
-        }
-        digest = hashlib.sha256(np.ascontiguousarray(self.gain).tobytes()).hexdigest()[:16]
-        return replace(
-            cube,
-            arrays=arrays,
-            notes=(*cube.notes, str(self)),
-            fingerprint=f"{cube.fingerprint} lamp {digest}",
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class _Divided:
-    """An array (*pixels, bands[, angles]) over a gain, read by slicing."""
-
-    array: Any
-    gain: np.ndarray
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        return tuple(self.array.shape)
-
-    @property
-    def ndim(self) -> int:
-        return len(self.array.shape)
-
-    @property
-    def dtype(self) -> np.dtype[Any]:
-        return np.dtype(float)
-
-    @property
-    def chunks(self) -> Any:
-        return getattr(self.array, "chunks", None)
-
-    def __getitem__(self, key: Any) -> np.ndarray:
-        keys = key if isinstance(key, tuple) else (key,)
-        return np.asarray(self.array[key], dtype=float) / self.gain[keys[self.ndim - self.gain.ndim :]]
-
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
-        del copy
-        return np.asarray(self[()], dtype=dtype)
+        return cube.divided(self.gain, str(self))
 
 
 def lamp_curve(

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pellicle.data.cubes import fingerprint as module
 from pellicle.data.read_cube import read_cube
 
 NM = np.linspace(400.0, 800.0, 9)
@@ -67,7 +66,8 @@ def test_a_pixel_of_dask_outside_the_sample():
 
 
 def test_a_large_file_by_size_date_and_samples(path, monkeypatch):
-    monkeypatch.setattr(module, "WHOLE", 100)
+    monkeypatch.setattr("pellicle.data.fingerprint.WHOLE", 100)
+    monkeypatch.setattr("pellicle.data.read_cube.WHOLE", 100)
     cube = read_cube(path, wavelengths=NM)
     assert any("size, date and samples" in note for note in cube.notes)
     assert read_cube(path, wavelengths=NM).fingerprint == cube.fingerprint

@@ -6,15 +6,22 @@ a line of a pushbroom camera (x, bands), the mean of several such lines, or one 
 
 from __future__ import annotations
 
+import os
+from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pellicle.data.cubes.raw_cube import RawCube
-from pellicle.data.cubes.stored_arrays import WAVELENGTH, Stored
-from pellicle.errors import DataError
+from pellicle.data.cubes.detect import read_raw
+from pellicle.data.cubes.numpy_files import is_numpy, mapped_array
+from pellicle.data.cubes.raw_cube import ANGLE, WAVELENGTH, Asked, RawCube, Stored
+from pellicle.data.read_spectrum import read_spectrum
+from pellicle.data.signal_checks import HIGHEST
+from pellicle.errors import DataError, UsageError
 
+_AXES = {1: (WAVELENGTH,), 2: ("x", WAVELENGTH), 3: ("y", "x", WAVELENGTH)}
 _BLOCK = 64
 """Lines that are averaged at a time."""
 _DEPTHS = (8, 10, 12, 14, 16)
@@ -22,99 +29,129 @@ _DEPTHS = (8, 10, 12, 14, 16)
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
-    """Counts of a frame: an image that stays in its file, or a line or spectrum in memory.
+class CameraFrames:
+    """Step from counts to reflectance; NaN where white is not above dark, or saturated.
 
-    `axes` are those of the cube that it has, bands last as stored.
+    The frames have those axes of the cube along which they differ; `reflectance` of the white is that at all
+    bands of the cube.
     """
 
-    stored: Stored
-    axes: tuple[str, ...]
-
-    def block(self, where: tuple[slice, ...], dims: tuple[str, ...], bands: np.ndarray) -> np.ndarray:
-        """Counts for a block of pixels, with axes of length one where the frame has none."""
-        read = self.stored.read(dict(zip(dims, where, strict=True)))
-        order = [self.stored.axes.index(axis) for axis in (*dims, WAVELENGTH) if axis in self.stored.axes]
-        read = np.transpose(read, order)[..., bands]
-        sizes = iter(read.shape[:-1])
-        return read.reshape([*(next(sizes) if axis in self.axes else 1 for axis in dims), bands.size])
-
-
-@dataclass(frozen=True, eq=False)
-class Calibration:
-    """Counts of a block to reflectance; NaN where white is not above dark, or saturated."""
-
-    white: Frame
-    dark: Frame | None
+    white: Stored
+    dark: Stored | None
     reflectance: np.ndarray
-    bands: np.ndarray
     saturation: float | None
 
-    def __call__(self, block: np.ndarray, where: tuple[slice, ...], dims: tuple[str, ...]) -> np.ndarray:
-        """Return the reflectances."""
-        white = self.white.block(where, dims, self.bands)
-        dark = 0.0 if self.dark is None else self.dark.block(where, dims, self.bands).astype(float)
+    def __call__(self, block: np.ndarray, pixels: Mapping[str, range], bands: np.ndarray) -> np.ndarray:
+        """Return the reflectances of a block of counts."""
+        white = self.white.block(pixels, bands)
+        dark = 0.0 if self.dark is None else self.dark.block(pixels, bands).astype(float)
         good = np.isfinite(block)
         if self.saturation is not None:
             good = good & (block < self.saturation) & (white < self.saturation)
         span = white - dark
         with np.errstate(divide="ignore", invalid="ignore"):
-            values = (block - dark) / span * self.reflectance
+            values = (block - dark) / span * self.reflectance[bands]
         return np.where(good & (span > 0), values, np.nan)
 
 
-def frame_of(raw: RawCube, cube: RawCube, name: str) -> tuple[Frame, str]:
-    """Return a frame for the pixels of a cube, and a note on its form. Raises DataError for another size."""
-    values, own = raw.arrays["values"], cube.arrays["values"]
-    bands = own.size(WAVELENGTH)
-    if values.size(WAVELENGTH) != bands:
+def camera_frames(
+    raw: RawCube, nm: np.ndarray, white: Any, dark: Any, reflectance: Any, saturation: float | None
+) -> tuple[CameraFrames, list[str]]:
+    """Return the frames of a cube whose bands are at `nm`, and notes on them.
+
+    `white` and `dark` are files or arrays, `reflectance` of the white a number, a CSV or a function of the
+    wavelength. Raises DataError or UsageError.
+    """
+    if ANGLE in raw.arrays["values"].axes or "delta" in raw.arrays:
+        raise UsageError(
+            f"{raw.path}: `white_frame` is for a cube of counts against wavelength only: leave it out"
+        )
+    bright, note = _frame(read_frame(white, raw), raw, "white")
+    notes, black = [note], None
+    if dark is None:
+        notes.append("no dark frame: the counts without light are taken as zero")
+    else:
+        black, note = _frame(read_frame(dark, raw), raw, "dark")
+        notes.append(note)
+    level, note = _saturation(raw, bright, saturation)
+    known = _white_reflectance(reflectance, nm, raw.path)
+    return CameraFrames(bright, black, known, level), [*notes, *([note] if note else [])]
+
+
+def read_frame(frame: str | os.PathLike[str] | np.ndarray, cube: RawCube) -> RawCube:
+    """Read a frame for a cube. Raises DataError, or UsageError of a reader.
+
+    An array has the axes (bands), (x, bands) or (y, x, bands).
+    """
+    if isinstance(frame, np.ndarray):
+        return _of_array(frame, "the frame", cube)
+    path = Path(frame)
+    if path.is_file() and is_numpy(path) and path.suffix.lower() != ".npz":
+        return _of_array(mapped_array(path), str(path), cube)
+    try:
+        raw = read_raw(path, Asked())
+    except UsageError:  # it has no wavelengths of its own, or several variables
+        raw = read_raw(path, Asked(cube.wavelength, cube.unit))
+    comparable = raw.unit == cube.unit and raw.wavelength.shape == cube.wavelength.shape
+    if comparable and not np.allclose(raw.wavelength, cube.wavelength, 1e-4):
         raise DataError(
-            f"{raw.path}: the {name} frame has {values.size(WAVELENGTH)} bands and {cube.path} has "
+            f"{path}: the wavelengths of the frame differ from those of {cube.path}: record both with the "
+            "same settings of the camera"
+        )
+    return raw
+
+
+def _of_array(values: Any, path: str, cube: RawCube) -> RawCube:
+    rank = len(values.shape)
+    if rank not in _AXES:
+        raise DataError(
+            f"{path}: a frame has the axes bands, x and bands, or y, x and bands, not {rank} axes"
+        )
+    axes, bands = _AXES[rank], cube.wavelength.size
+    if rank == 3 and values.shape[0] == bands != values.shape[-1]:
+        axes = (WAVELENGTH, "y", "x")
+    dims = tuple(axis for axis in axes if axis != WAVELENGTH)
+    return RawCube(path, {"values": Stored(values, axes)}, dims, cube.wavelength)
+
+
+def _frame(raw: RawCube, cube: RawCube, name: str) -> tuple[Stored, str]:
+    """A frame for the pixels of a cube, and a note on its form. Raises DataError for another size."""
+    frame, whole = raw.arrays["values"], cube.arrays["values"].sizes
+    sizes, bands = frame.sizes, whole.pop(WAVELENGTH)
+    if sizes[WAVELENGTH] != bands:
+        raise DataError(
+            f"{raw.path}: the {name} frame has {sizes[WAVELENGTH]} bands and {cube.path} has "
             f"{bands}: record both with the same settings of the camera"
         )
-    sizes = {axis: values.size(axis) for axis in values.axes if axis != WAVELENGTH}
-    whole = {axis: own.size(axis) for axis in cube.dims}
-    seen = {axis: n for axis, n in sizes.items() if n > 1}
-    if all(whole.get(axis) == n for axis, n in seen.items()):
-        axes = tuple(axis for axis in cube.dims if axis in seen)
-        drop = {axis: slice(0, 1) for axis in sizes if axis not in seen}
-        if drop:
-            values = _loaded(values, drop, axes)
-        form = {0: "one spectrum", 1: "a line of pixels"}.get(len(axes), "an image")
-        return Frame(values, axes), f"{name} frame {raw.path}: {form}"
+    others = [axis for axis in frame.axes if axis not in ("x", WAVELENGTH)]
+    long = [axis for axis, n in sizes.items() if n > 1 and axis != WAVELENGTH]
+    if all(whole.get(axis) == sizes[axis] for axis in long):
+        kept = tuple(axis for axis in frame.axes if axis in (*long, WAVELENGTH))
+        if kept != frame.axes:
+            frame = Stored(frame.read().reshape([sizes[axis] for axis in kept]), kept)
+        form = {0: "one spectrum", 1: "a line of pixels"}.get(len(long), "an image")
+        return frame, f"{name} frame {raw.path}: {form}"
     if "x" in whole and sizes.get("x") == whole["x"]:
-        others = [axis for axis in values.axes if axis not in ("x", WAVELENGTH)]
         count = int(np.prod([sizes[axis] for axis in others]))
-        return Frame(_mean_line(values, others), ("x",)), f"{name} frame {raw.path}: mean of {count} lines"
-    shown = " x ".join(map(str, sizes.values()))
+        return _mean_line(frame, others, count), f"{name} frame {raw.path}: mean of {count} lines"
+    shown = " x ".join(str(sizes[axis]) for axis in raw.dims)
     raise DataError(
         f"{raw.path}: the {name} frame has {shown} pixels and {cube.path} has "
-        f"{' x '.join(map(str, whole.values()))}: it must be an image of the same size, a line of as many "
-        "x, or one spectrum"
+        f"{' x '.join(map(str, cube.shape))}: it must be an image of the same size, a line of as many x, or "
+        "one spectrum"
     )
 
 
-def _loaded(values: Stored, drop: dict[str, slice], axes: tuple[str, ...]) -> Stored:
-    """A frame without its axes of length one, in memory."""
-    read = values.read(drop)
-    kept = tuple(axis for axis in values.axes if axis in (*axes, WAVELENGTH))
-    return Stored(read.reshape([values.size(axis) for axis in kept]), kept)
+def _mean_line(frame: Stored, others: list[str], count: int) -> Stored:
+    """The mean over the `others`, all axes but x and wavelength, some lines at a time."""
+    first = max(others, key=lambda axis: frame.sizes[axis])
+    summed = tuple(frame.axes.index(axis) for axis in others)
+    blocks = (slice(start, start + _BLOCK) for start in range(0, frame.sizes[first], _BLOCK))
+    total = sum(frame.read({first: block}).astype(float).sum(axis=summed) for block in blocks)
+    return Stored(np.asarray(total) / count, tuple(axis for axis in frame.axes if axis not in others))
 
 
-def _mean_line(values: Stored, others: list[str]) -> Stored:
-    """The mean over all axes but x and wavelength, some lines at a time."""
-    first = max(others, key=values.size)
-    total: Any = 0.0
-    order = [values.axes.index(axis) for axis in ("x", WAVELENGTH)]
-    for start in range(0, values.size(first), _BLOCK):
-        block = values.read({first: slice(start, start + _BLOCK)}).astype(float)
-        total = total + np.transpose(
-            block, [*order, *[i for i in range(block.ndim) if i not in order]]
-        ).reshape(block.shape[order[0]], block.shape[order[1]], -1).sum(-1)
-    return Stored(total / np.prod([values.size(axis) for axis in others]), ("x", WAVELENGTH))
-
-
-def saturation_level(raw: RawCube, white: Frame, given: float | None) -> tuple[float | None, str]:
+def _saturation(raw: RawCube, white: Stored, given: float | None) -> tuple[float | None, str]:
     """Counts from which a pixel is saturated, and a note; None for a camera whose limit is not known."""
     if given is not None:
         return given, f"counts from {given:g} are saturated, as given"
@@ -122,15 +159,35 @@ def saturation_level(raw: RawCube, white: Frame, given: float | None) -> tuple[f
     if kind.kind not in "ui":
         return None, ""
     top = float(np.iinfo(kind).max)
-    largest = _largest(white.stored)
-    tops = [2.0**bits - 1 for bits in _DEPTHS if 2.0**bits - 1 < top]
-    if largest in tops:
+    largest = _largest(white)
+    if largest < top and largest in (2.0**bits - 1 for bits in _DEPTHS):
         top = largest
     return top, f"counts from {top:g} are saturated"
 
 
-def _largest(stored: Stored) -> float:
+def _largest(frame: Stored) -> float:
     """The largest count in a sample of the frame."""
-    first = max((axis for axis in stored.axes if axis != WAVELENGTH), key=stored.size, default=WAVELENGTH)
-    lines = np.unique(np.linspace(0, stored.size(first) - 1, _BLOCK).astype(int))
-    return max(float(np.max(stored.read({first: slice(i, i + 1)}))) for i in lines)
+    sizes = frame.sizes
+    first = max((axis for axis in sizes if axis != WAVELENGTH), key=sizes.__getitem__, default=WAVELENGTH)
+    lines = np.unique(np.linspace(0, sizes[first] - 1, _BLOCK).astype(int))
+    return max(float(np.max(frame.read({first: slice(i, i + 1)}))) for i in lines)
+
+
+def _white_reflectance(reflectance: Any, nm: np.ndarray, path: str) -> np.ndarray:
+    """Reflectance of the white reference at all bands, NaN beyond its table. Raises UsageError."""
+    if callable(reflectance):
+        values = np.asarray(reflectance(nm), dtype=float)
+    else:
+        reflectance = 1.0 if reflectance is None else reflectance
+        try:
+            values = np.full(nm.size, float(reflectance))
+        except (TypeError, ValueError):
+            known = read_spectrum(reflectance)
+            values = np.interp(nm, known.wavelength, known.values, left=np.nan, right=np.nan)
+    values = np.broadcast_to(values, nm.shape)
+    if np.any(values <= 0) or np.any(values > HIGHEST) or not np.any(np.isfinite(values)):
+        raise UsageError(
+            f"{path}: `white_reflectance` must be above 0 and a fraction at the wavelengths of the bands, "
+            "as in 0.99"
+        )
+    return values

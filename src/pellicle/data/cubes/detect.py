@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pellicle.data.cubes import envi, numpy_files, spectra_folder, stores, tiff_stacks
+from pellicle.data.cubes import envi, numpy_files, spectra_folder, tiff_stacks, xarray_cubes
 from pellicle.data.cubes.raw_cube import Asked, RawCube
 from pellicle.data.photographs import image_format
 from pellicle.errors import DataError
@@ -19,11 +19,11 @@ def read_raw(path: Path, asked: Asked) -> RawCube:
     if not path.exists():
         raise DataError(f"{path}: no such file or folder; check its name")
     if path.is_dir():
-        if stores.is_zarr(path):
-            return stores.read_zarr(path, asked)
+        if xarray_cubes.is_zarr(path):
+            return xarray_cubes.read_zarr(path, asked)
         return spectra_folder.read_folder(path, asked)
-    if stores.is_netcdf(path):
-        return stores.read_netcdf(path, asked)
+    if xarray_cubes.is_netcdf(path):
+        return xarray_cubes.read_netcdf(path, asked)
     if numpy_files.is_numpy(path):
         return numpy_files.read_numpy(path, asked)
     if tiff_stacks.is_tiff(path):
@@ -40,13 +40,13 @@ def is_cube(path: Path) -> bool:
     if not path.exists():
         return False
     if path.is_dir():
-        return stores.is_zarr(path) or spectra_folder.table_of(path) is not None
+        return xarray_cubes.is_zarr(path) or spectra_folder.table_of(path) is not None
     if numpy_files.is_numpy(path) or envi.header_of(path) is not None:
         return True
     if tiff_stacks.is_tiff(path):
         return not tiff_stacks.is_colour_image(path)
-    if stores.is_netcdf(path):
-        return stores.is_classic(path) or path.stat().st_size > LARGEST_SPECTRUM
+    if xarray_cubes.is_netcdf(path):
+        return xarray_cubes.is_classic(path) or path.stat().st_size > LARGEST_SPECTRUM
     return image_format(path) is None and spectra_folder.table_of(path) is not None
 
 

@@ -10,9 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from pellicle.data.cubes.array_axes import need_wavelengths
-from pellicle.data.cubes.raw_cube import COUNTS, Asked, RawCube
-from pellicle.data.cubes.stored_arrays import MappedFile, Stored
+from pellicle.data.cubes.numpy_files import need_wavelengths
+from pellicle.data.cubes.raw_cube import COUNTS, Asked, MappedFile, RawCube, Stored
 from pellicle.data.tabular.text import open_binary
 from pellicle.data.tabular.units import to_nm, wavelength_unit
 from pellicle.errors import DataError
@@ -46,7 +45,45 @@ def read_envi(path: Path, asked: Asked) -> RawCube:
     header = header_of(path)
     assert header is not None, "the file was recognised by it"
     fields = _fields(header)
-    lines, samples, bands = (_integer(fields, name, header) for name in ("lines", "samples", "bands"))
+    stored = _stored(fields, header, path if path != header else _data_file(header))
+    mapped, bands = stored.data, stored.sizes["wavelength"]
+    wavelength, unit = asked.wavelength, asked.unit
+    if wavelength is None and "wavelength" in fields:
+        wavelength, unit = _numbers(fields, "wavelength", header), fields.get("wavelength units")
+    if wavelength is None:
+        raise need_wavelengths(mapped.shape, str(header))
+    if wavelength.size != bands:
+        raise DataError(
+            f"{header}: has {wavelength.size} wavelengths for {bands} bands: give one for each with "
+            "`wavelengths`"
+        )
+    scaled = "reflectance scale factor" in fields
+    divisor = _number(fields, "reflectance scale factor", header, 1.0) or 1.0
+    notes = [
+        f"ENVI, {fields.get('interleave', 'bsq').lower()}, {mapped.dtype.name}, {Path(mapped.path).name}"
+    ]
+    if "fwhm" in fields:
+        notes.append(_width_note(_numbers(fields, "fwhm", header), unit))
+    if divisor != 1.0:
+        notes.append(f"values divided by {divisor:g}, the reflectance scale factor")
+    return RawCube(
+        str(path),
+        {"values": stored},
+        ("y", "x"),
+        wavelength,
+        unit,
+        files=(header, Path(mapped.path)),
+        signal="R" if scaled else None,
+        signal_unit="fraction" if scaled else COUNTS if mapped.dtype.kind in "iu" else None,
+        divisor=divisor,
+        missing=_number(fields, "data ignore value", header, None),
+        good=_good_bands(fields, header, bands),
+        notes=tuple(notes),
+    )
+
+
+def _stored(fields: dict[str, str], header: Path, data: Path) -> Stored:
+    """The numbers that a header describes. Raises DataError for what ENVI does not define."""
     interleave = fields.get("interleave", "bsq").lower()
     if interleave not in _AXES:
         raise DataError(f"{header}: `interleave` is {interleave!r}, not bsq, bil or bip: correct the header")
@@ -59,63 +96,35 @@ def read_envi(path: Path, asked: Asked) -> RawCube:
         raise DataError(
             f"{header}: is a spectral library and no image: export its spectra as CSV and fit them"
         )
-    byte_order = ">" if fields.get("byte order", "0") == "1" else "<"
-    dtype = np.dtype(byte_order + _TYPES[code])
-    axes = _AXES[interleave]
-    sizes = {"y": lines, "x": samples, "wavelength": bands}
-    shape = tuple(sizes[axis] for axis in axes)
+    dtype = np.dtype((">" if fields.get("byte order", "0") == "1" else "<") + _TYPES[code])
+    names = {"y": "lines", "x": "samples", "wavelength": "bands"}
+    shape = tuple(_integer(fields, names[axis], header) for axis in _AXES[interleave])
     offset = _integer(fields, "header offset", header, 0)
-    data = path if path != header else _data_file(header)
     needed = offset + int(np.prod(shape)) * dtype.itemsize
     if data.stat().st_size < needed:
         raise DataError(
             f"{data}: has {data.stat().st_size:,} bytes and its header {header.name} describes {needed:,}: "
             "the copy is incomplete, or `lines`, `bands` or `data type` of the header are wrong"
         )
-    wavelength, unit = asked.wavelength, asked.unit
-    if wavelength is None and "wavelength" in fields:
-        wavelength, unit = _numbers(fields, "wavelength", header), fields.get("wavelength units")
-    if wavelength is None:
-        raise need_wavelengths(shape, str(header))
-    if wavelength.size != bands:
-        raise DataError(
-            f"{header}: has {wavelength.size} wavelengths for {bands} bands: give one for each with "
-            "`wavelengths`"
-        )
-    good, notes = None, [f"ENVI, {interleave}, {dtype.name}, {data.name}"]
-    if "bbl" in fields:
-        good = _numbers(fields, "bbl", header) != 0
-        if good.size != bands:
-            raise DataError(
-                f"{header}: `bbl` has {good.size} numbers for {bands} bands: correct or delete it"
-            )
-    if "fwhm" in fields:
-        width, of = float(np.median(_numbers(fields, "fwhm", header))), wavelength_unit(unit or "nm")
-        if of in ("um", "A"):
-            width, of = float(to_nm(np.array([width]), of)[0]), "nm"
-        notes.append(
-            f"bands are {width:g} {of or unit} wide (fwhm of the header), which is not used: state it as "
-            "bandwidth in the recipe's [instrument] where fringes are narrow"
-        )
-    divisor = _number(fields, "reflectance scale factor", header, 1.0) or 1.0
-    if divisor != 1.0:
-        notes.append(f"values divided by {divisor:g}, the reflectance scale factor")
-    stated = "fraction" if "reflectance scale factor" in fields else None
-    if stated is None and dtype.kind in "iu":
-        stated = COUNTS
-    return RawCube(
-        str(path),
-        {"values": Stored(MappedFile(str(data), dtype, shape, offset), axes)},
-        ("y", "x"),
-        wavelength,
-        unit,
-        files=(header, data),
-        signal="R" if "reflectance scale factor" in fields else None,
-        signal_unit=stated,
-        divisor=divisor,
-        missing=_number(fields, "data ignore value", header, None),
-        good=good,
-        notes=tuple(notes),
+    return Stored(MappedFile(str(data), dtype, shape, offset), _AXES[interleave])
+
+
+def _good_bands(fields: dict[str, str], header: Path, bands: int) -> np.ndarray | None:
+    if "bbl" not in fields:
+        return None
+    good = _numbers(fields, "bbl", header) != 0
+    if good.size != bands:
+        raise DataError(f"{header}: `bbl` has {good.size} numbers for {bands} bands: correct or delete it")
+    return good
+
+
+def _width_note(widths: np.ndarray, unit: str | None) -> str:
+    width, shown = float(np.median(widths)), wavelength_unit(unit or "nm")
+    if shown in ("um", "A"):
+        width, shown = float(to_nm(np.array([width]), shown)[0]), "nm"
+    return (
+        f"bands are {width:g} {shown or unit} wide (fwhm of the header), which is not used: state it as "
+        "bandwidth in the recipe's [instrument] where fringes are narrow"
     )
 
 
@@ -125,11 +134,11 @@ def _fields(header: Path) -> dict[str, str]:
         text = (
             file.read(_MOST_HEADER).decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\r", "\n")
         )
-    found = {}
+    fields = {}
     for name, value in _FIELD.findall(text):
         plain = " ".join(name.lower().replace("_", " ").split())
-        found[plain] = " ".join(value.strip("{} \t\n").split())
-    return found
+        fields[plain] = " ".join(value.strip("{} \t\n").split())
+    return fields
 
 
 def _data_file(header: Path) -> Path:
@@ -139,8 +148,8 @@ def _data_file(header: Path) -> Path:
         file.name.lower(): file for file in header.parent.iterdir() if file.is_file() and file != header
     }
     for suffix in _SUFFIXES:
-        if found := beside.get((stem + suffix).lower()):
-            return found
+        if data := beside.get((stem + suffix).lower()):
+            return data
     raise DataError(
         f"{header}: the file with its numbers is not beside it: looked for {stem} and "
         f"{', '.join(stem + suffix for suffix in _SUFFIXES[1:5])} and others; put it there"

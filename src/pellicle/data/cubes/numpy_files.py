@@ -1,6 +1,6 @@
-"""Cubes in NumPy files: `.npy`, and `.npz` with the wavelengths beside them.
+"""Cubes of arrays without names of axes: in memory, `.npy`, and `.npz` with the wavelengths beside them.
 
-Both are read block by block from the file, but for compressed `.npz`, which are unpacked into memory.
+Files are read block by block, but for compressed `.npz`, which are unpacked into memory.
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from pellicle.data.cubes.array_axes import array_axes, need_wavelengths
-from pellicle.data.cubes.raw_cube import Asked, RawCube
-from pellicle.data.cubes.stored_arrays import ANGLE, MappedFile, Stored
-from pellicle.data.cubes.variable_names import Chosen, choose_variables
+from pellicle.data.cubes.raw_cube import ANGLE, WAVELENGTH, Asked, MappedFile, RawCube, Stored
+from pellicle.data.cubes.variable_names import choose_variables
 from pellicle.data.tabular.columns import recognise
 from pellicle.data.tabular.text import open_binary
-from pellicle.errors import DataError
+from pellicle.errors import DataError, UsageError
 
 _NPY, _ZIP = b"\x93NUMPY", b"PK\x03\x04"
+_PIXELS = {1: ("site",), 2: ("y", "x"), 3: ("time", "y", "x")}
+"""Axes of pixels of an array, by their number."""
 
 
 def is_numpy(path: Path) -> bool:
@@ -32,24 +32,58 @@ def is_numpy(path: Path) -> bool:
 
 def read_numpy(path: Path, asked: Asked) -> RawCube:
     """Read a `.npy` or `.npz` file. Raises DataError for a damaged one, UsageError without wavelengths."""
-    try:
-        if zipfile.is_zipfile(path):
-            arrays: Mapping[str, Any] = _members(path)
-        else:
-            with path.open("rb") as file:
-                arrays = {"": mapped_array(path, file)}
-    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
-        raise DataError(f"{path}: is a damaged NumPy file ({error}); save it again") from None
+    arrays = _members(path) if zipfile.is_zipfile(path) else {"": mapped_array(path)}
     return arrays_to_raw(arrays, str(path), asked, (path,))
 
 
-def arrays_to_raw(
-    arrays: Mapping[str, Any], path: str, asked: Asked, files: tuple[Path, ...], notes: tuple[str, ...] = ()
-) -> RawCube:
-    """Return the cube of arrays by name, one of which may be the wavelengths."""
+def mapped_array(path: Path, start: int = 0) -> MappedFile:
+    """The array whose header begins at a place of a file. Raises DataError for a damaged one."""
+    try:
+        with path.open("rb") as file:
+            file.seek(start)
+            version = np.lib.format.read_magic(file)
+            v1, v2 = np.lib.format.read_array_header_1_0, np.lib.format.read_array_header_2_0
+            shape, fortran, dtype = (v1 if version == (1, 0) else v2)(file)
+            offset = file.tell()
+        if dtype.hasobject:
+            raise ValueError("it has Python objects in it, not numbers")
+        if offset + int(np.prod(shape)) * dtype.itemsize > path.stat().st_size:
+            raise ValueError("it ends before its last number")
+    except (OSError, ValueError) as error:
+        raise _damaged(path, error) from None
+    return MappedFile(str(path), dtype, shape, offset, "F" if fortran else "C")
+
+
+def _members(path: Path) -> dict[str, Any]:
+    """Arrays of an `.npz`: maps of the file where they are stored without compression."""
+    arrays: dict[str, Any] = {}
+    try:
+        with zipfile.ZipFile(path) as archive, path.open("rb") as whole:
+            for info in archive.infolist():
+                name = info.filename.removesuffix(".npy")
+                if info.compress_type != zipfile.ZIP_STORED:
+                    with archive.open(info) as member:
+                        arrays[name] = np.lib.format.read_array(member, allow_pickle=False)
+                    continue
+                whole.seek(info.header_offset + 26)  # lengths of the name and of the extra field
+                lengths = np.frombuffer(whole.read(4), "<u2")
+                arrays[name] = mapped_array(path, info.header_offset + 30 + int(lengths.sum()))
+    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+        raise error if isinstance(error, DataError) else _damaged(path, error) from None
+    return arrays
+
+
+def _damaged(path: Path, error: Exception) -> DataError:
+    return DataError(f"{path}: is a damaged NumPy file ({error}); save it again")
+
+
+def arrays_to_raw(arrays: Mapping[str, Any], path: str, asked: Asked, files: tuple[Path, ...]) -> RawCube:
+    """Return the cube of arrays by name, one of which may be the wavelengths.
+
+    Raises DataError or UsageError.
+    """
     roles = {name: recognise(name) for name in arrays if name}
-    wavelength, unit = asked.wavelength, asked.unit
-    angle = None
+    wavelength, unit, angle = asked.wavelength, asked.unit, None
     for name, column in roles.items():
         if column.role == "wavelength" and wavelength is None:
             wavelength, unit = np.asarray(arrays[name][...], dtype=float).reshape(-1), column.unit
@@ -61,51 +95,27 @@ def arrays_to_raw(
         if len(array.shape) >= 2 and (not name or roles[name].role not in ("wavelength", "angle"))
     }
     if not measured:
-        raise DataError(f"{path}: has no array of pixels and bands, only {_shapes(arrays) or 'none'}")
+        shapes = ", ".join(f"{name or 'one'} ({_text(array.shape)})" for name, array in arrays.items())
+        raise DataError(f"{path}: has no array of pixels and bands, only {shapes or 'none'}")
     chosen = choose_variables(dict.fromkeys(measured), asked.variable, asked.signal, path)
     shape = tuple(measured[chosen.arrays["values"]].shape)
     if wavelength is None:
         raise need_wavelengths(shape, path)
-    axes, told = _axes(shape, wavelength.size, angle, path)
-    dims = tuple(axis for axis in axes if axis not in ("wavelength", ANGLE))
-    others = {name: array for name, array in arrays.items() if name not in chosen.arrays.values()}
-    return _raw(chosen, measured, others, axes, dims, path, wavelength, unit, angle, files, (*notes, *told))
-
-
-def _raw(
-    chosen: Chosen,
-    measured: Mapping[str, Any],
-    others: Mapping[str, Any],
-    axes: tuple[str, ...],
-    dims: tuple[str, ...],
-    path: str,
-    wavelength: np.ndarray,
-    unit: str | None,
-    angle: np.ndarray | None,
-    files: tuple[Path, ...],
-    notes: tuple[str, ...],
-) -> RawCube:
-    arrays = {role: Stored(measured[name], axes) for role, name in chosen.arrays.items()}
-    by_rank = {len(axes): axes, len(dims): dims, 1: ("wavelength",)}
-    stored = {
-        name: Stored(array, by_rank[len(array.shape)])
-        for name, array in others.items()
-        if len(array.shape) in by_rank
-    }
+    axes, notes = _axes(shape, wavelength.size, angle, path)
+    dims = tuple(axis for axis in axes if axis not in (WAVELENGTH, ANGLE))
+    by_rank = {len(axes): axes, len(dims): dims, 1: (WAVELENGTH,)}
+    others = {name: a for name, a in arrays.items() if name not in chosen.arrays.values()}
     return RawCube(
         path,
-        arrays,
+        {role: Stored(measured[name], axes) for role, name in chosen.arrays.items()},
         dims,
         wavelength,
         unit,
         files=files,
-        signal=chosen.signal,
-        polarisation=chosen.polarisation,
-        signal_unit=chosen.unit,
-        calibrated=chosen.calibrated,
         angle=angle,
-        others=stored,
-        notes=notes,
+        others={n: Stored(a, by_rank[len(a.shape)]) for n, a in others.items() if len(a.shape) in by_rank},
+        notes=tuple(notes),
+        **chosen.stated,
     )
 
 
@@ -124,40 +134,41 @@ def _axes(
     return (*axes, ANGLE), notes
 
 
-def _shapes(arrays: Mapping[str, Any]) -> str:
-    return ", ".join(f"{name or 'one'} ({_text(array.shape)})" for name, array in arrays.items())
+def array_axes(shape: tuple[int, ...], bands: int, path: str) -> tuple[tuple[str, ...], list[str]]:
+    """Return the names of the axes of an array of pixels with `bands` bands, and notes.
+
+    The axis of the bands is the last, or else the only one of that length. Raises DataError where no axis has
+    it.
+    """
+    pixels = _PIXELS.get(len(shape) - 1)
+    if pixels is None:
+        raise DataError(
+            f"{path}: has {len(shape)} axes ({_text(shape)}), and a cube has y, x and wavelength, perhaps "
+            "after a time: give it as an xarray Dataset, which names its axes"
+        )
+    if bands not in shape:
+        raise DataError(
+            f"{path}: {bands} wavelengths are given, and none of its axes ({_text(shape)}) has that length: "
+            "give one for each band with `wavelengths`"
+        )
+    last = len(shape) - 1
+    place = last if shape[last] == bands else shape.index(bands)
+    axes = (*pixels[:place], WAVELENGTH, *pixels[place:])
+    return axes, [f"axes: {', '.join(axes)}, since that of the wavelengths has {bands} bands"]
+
+
+def need_wavelengths(shape: tuple[int, ...], path: str) -> UsageError:
+    """The error for an array whose wavelengths nobody states."""
+    if 3 in (shape[0], shape[-1]) and len(shape) == 3:
+        return UsageError(
+            f"{path}: has three channels ({_text(shape)}) and no wavelengths: the map of colours reads a "
+            'photograph as PNG or TIFF in R, G, B (`signal="srgb"`); give `wavelengths` if it has three bands'
+        )
+    return UsageError(
+        f"{path}: has no wavelengths for its bands ({_text(shape)}): give them with "
+        '`wavelengths="400:900:5"`, numbers or a file'
+    )
 
 
 def _text(shape: tuple[int, ...]) -> str:
     return " x ".join(map(str, shape))
-
-
-def _members(path: Path) -> dict[str, Any]:
-    """Arrays of an `.npz`: maps of the file where they are stored without compression."""
-    found: dict[str, Any] = {}
-    with zipfile.ZipFile(path) as archive, path.open("rb") as whole:
-        for info in archive.infolist():
-            name = info.filename.removesuffix(".npy")
-            if info.compress_type != zipfile.ZIP_STORED:
-                with archive.open(info) as member:
-                    found[name] = np.lib.format.read_array(member, allow_pickle=False)
-                continue
-            whole.seek(info.header_offset + 26)  # lengths of the name and of the extra field
-            lengths = np.frombuffer(whole.read(4), "<u2")
-            start = info.header_offset + 30 + int(lengths.sum())
-            found[name] = mapped_array(path, whole, start)
-    return found
-
-
-def mapped_array(path: Path, file: Any, start: int = 0) -> MappedFile:
-    """The array whose header begins at a place of an open file. Raises ValueError for a damaged one."""
-    file.seek(start)
-    version = np.lib.format.read_magic(file)
-    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-    shape, fortran, dtype = read(file)
-    if dtype.hasobject:
-        raise ValueError("it has Python objects in it, not numbers")
-    size = int(np.prod(shape)) * dtype.itemsize
-    if file.tell() + size > path.stat().st_size:
-        raise ValueError("it ends before its last number")
-    return MappedFile(str(path), dtype, shape, file.tell(), "F" if fortran else "C")

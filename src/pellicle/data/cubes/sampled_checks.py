@@ -47,19 +47,18 @@ def sample(arrays: Mapping[str, Any], rank: int, mask: np.ndarray | None = None)
     """
     shape = tuple(next(iter(arrays.values())).shape)
     sizes, points = shape[:rank], int(np.prod(shape[rank:]))
-    found = _read(arrays, mask, list(sample_blocks(sizes, points)), shape[rank:])
-    if _measured(next(iter(found.values()))) or int(np.prod(sizes)) * points <= WHOLE:
-        return found
+    seen = _read(arrays, mask, list(sample_blocks(sizes, points)), shape[rank:])
+    if int(np.prod(sizes)) * points <= WHOLE:
+        return seen
     lines = itertools.product(*(range(n) for n in sizes[:-1]))
-    for line in lines:
+    while not _measured(seen) and (line := next(lines, None)):
         where = (*(slice(i, i + 1) for i in line), slice(None))
-        found = _read(arrays, mask, [where], shape[rank:])
-        if _measured(next(iter(found.values()))):
-            break
-    return found
+        seen = _read(arrays, mask, [where], shape[rank:])
+    return seen
 
 
-def _measured(values: np.ndarray) -> bool:
+def _measured(seen: Mapping[str, np.ndarray]) -> bool:
+    values = next(iter(seen.values()))
     return bool(np.any(np.isfinite(values) & (values != 0)))
 
 
@@ -70,14 +69,14 @@ def _read(
     points: tuple[int, ...],
 ) -> dict[str, np.ndarray]:
     """Values of some blocks."""
-    found = {}
-    for name, array in arrays.items():
-        read = [np.asarray(array[where], dtype=float).reshape(-1, *points) for where in blocks]
-        found[name] = np.concatenate(read)
-    if mask is not None:
-        used = np.concatenate([mask[where].reshape(-1) for where in blocks])
-        found = {name: np.where(used.reshape(-1, *[1] * len(points)), v, np.nan) for name, v in found.items()}
-    return found
+    values = {
+        name: np.concatenate([np.asarray(array[w], dtype=float).reshape(-1, *points) for w in blocks])
+        for name, array in arrays.items()
+    }
+    if mask is None:
+        return values
+    used = np.concatenate([mask[where].reshape(-1, *[1] * len(points)) for where in blocks])
+    return {name: np.where(used, array, np.nan) for name, array in values.items()}
 
 
 def check_type(dtype: Any, path: str) -> None:

@@ -10,8 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pellicle.data.cubes.raw_cube import Asked, RawCube
-from pellicle.data.cubes.stored_arrays import ANGLE, WAVELENGTH, Stored
+from pellicle.data.cubes.raw_cube import ANGLE, WAVELENGTH, Asked, RawCube, Stored
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.data.spectrum import Spectrum
 from pellicle.data.tabular.text import decoded, open_binary
@@ -29,13 +28,13 @@ def table_of(path: Path) -> Path | None:
     """The table of positions: `path` itself, or the only one in a folder; None where there is none."""
     if path.is_file():
         return path if _columns(path) else None
-    found = [file for pattern in _TABLES for file in sorted(path.glob(pattern)) if _columns(file)]
-    if len(found) > 1:
+    tables = [file for pattern in _TABLES for file in sorted(path.glob(pattern)) if _columns(file)]
+    if len(tables) > 1:
         raise UsageError(
-            f"{path}: has several tables of positions, {', '.join(file.name for file in found)}: name one "
+            f"{path}: has several tables of positions, {', '.join(file.name for file in tables)}: name one "
             "of them instead of the folder"
         )
-    return found[0] if found else None
+    return tables[0] if tables else None
 
 
 def read_folder(path: Path, asked: Asked) -> RawCube:
@@ -109,14 +108,14 @@ def _columns(file: Path) -> dict[str, tuple[int, str]]:
     with open_binary(file) as opened:
         head = opened.read(_MOST_HEADER)
     line = next((x for x in decoded(head).splitlines() if x.strip() and not x.startswith("#")), "")
-    found: dict[str, tuple[int, str]] = {}
+    columns: dict[str, tuple[int, str]] = {}
     for i, cell in enumerate(_cells(line)):
         plain = cell.strip().strip('"').lower()
         if plain in _FILES:
-            found.setdefault("file", (i, ""))
+            columns.setdefault("file", (i, ""))
         elif (match := _HEADER.fullmatch(plain)) and match[1] in ("x", "y", "name", "site"):
-            found.setdefault(match[1], (i, match[2].strip()))
-    return found if {"file", "x", "y"} <= set(found) else {}
+            columns.setdefault(match[1], (i, match[2].strip()))
+    return columns if {"file", "x", "y"} <= set(columns) else {}
 
 
 def _cells(line: str) -> Sequence[str]:
@@ -186,10 +185,10 @@ def _arrays(
         axes, shape = (*axes, ANGLE), (len(first) // angle.size, angle.size)
         if not np.array_equal(first.angle, np.tile(angle, shape[0])):
             raise DataError(f"{table}: its spectra have other wavelengths at each angle: export one grid")
-    found = {}
+    arrays = {}
     for name in ("values", "delta", "sigma", "delta_sigma"):
         read = [getattr(one, name) for one in spectra]
         if all(values is not None for values in read):
-            found[name] = Stored(np.full((sites, *shape), np.nan), axes)
-            found[name].data[at] = np.reshape(read, (len(spectra), *shape))
-    return found, angle
+            arrays[name] = Stored(np.full((sites, *shape), np.nan), axes)
+            arrays[name].data[at] = np.reshape(read, (len(spectra), *shape))
+    return arrays, angle

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pellicle.data.cubes.array_axes import array_axes, need_wavelengths
-from pellicle.data.cubes.raw_cube import COUNTS, Asked, RawCube
-from pellicle.data.cubes.stored_arrays import MappedFile, Stored, TiffPages
+from pellicle.data.cubes.numpy_files import array_axes, need_wavelengths
+from pellicle.data.cubes.raw_cube import COUNTS, Asked, MappedFile, RawCube, Stored
 from pellicle.data.tabular.text import open_binary
 from pellicle.errors import DataError, UsageError, install_command
 
@@ -40,7 +40,7 @@ def read_tiff(path: Path, asked: Asked) -> RawCube:
             if wavelength is None:
                 wavelength, told = _channel_wavelengths(file)
                 unit, notes = "nm", [told] if told else []
-    except DataError:
+    except (DataError, UsageError):
         raise
     except Exception as error:  # tifffile raises errors of every kind on damaged files
         reason = str(error).split("\n")[0].rstrip(".")
@@ -60,35 +60,62 @@ def read_tiff(path: Path, asked: Asked) -> RawCube:
     )
 
 
-def _stack(path: Path, file: Any) -> tuple[MappedFile | TiffPages, str]:
+@dataclass(frozen=True)
+class CompressedPages:
+    """Pages of a TIFF, compressed or scattered over the file; only strips or tiles of a block are decoded.
+
+    `shaped`: pages are one stack as tifffile states it in their description.
+    """
+
+    path: str
+    shaped: bool
+    dtype: np.dtype[Any]
+    shape: tuple[int, ...]
+
+    def __getitem__(self, where: Any) -> np.ndarray:
+        import tifffile
+        import zarr
+
+        try:
+            with tifffile.TiffFile(self.path, is_shaped=None if self.shaped else False) as file:
+                pages: Any = zarr.open_array(file.series[0].aszarr(), mode="r")
+                return np.asarray(pages[where])
+        except Exception as error:  # decoders raise errors of every kind on damaged files
+            reason = str(error.args[0] if error.args else error).split("\n")[0]
+            raise DataError(
+                f"{self.path}: cannot be decoded ({reason}); save it without compression"
+            ) from None
+
+
+def _stack(path: Path, file: Any) -> tuple[MappedFile | CompressedPages, str]:
     """The numbers of a stack, and a letter for each axis as tifffile names them."""
-    series = file.series
+    series, shaped = file.series, True
+    if len(series) > 1:  # pages that were written one by one
+        file.is_shaped, shaped = False, False
+        file.__dict__.pop("series", None)
+        series = file.series
     first = series[0]
-    alike = len(series) > 1 and all(s.shape == first.shape and s.dtype == first.dtype for s in series)
-    if len(series) > 1 and not alike:
+    if len(series) > 1:
         shapes = ", ".join(sorted({" x ".join(map(str, s.shape)) for s in series}))
         raise DataError(
             f"{path}: its pages have different sizes ({shapes}): save one stack of pages of one size"
         )
-    shape, letters = tuple(first.shape), first.axes
-    if alike:
-        shape, letters = (len(series), *shape), "Q" + letters
-    elif first.dataoffset is not None and first.keyframe.fillorder == 1:
-        dtype = np.dtype(first.dtype).newbyteorder(file.byteorder)
-        kept = [i for i, n in enumerate(shape) if n > 1 or letters[i] in "YX"]
-        mapped = MappedFile(str(path), dtype, tuple(shape[i] for i in kept), int(first.dataoffset))
-        return mapped, "".join(letters[i] for i in kept)
-    numbers = tuple(int(page.index) for one in series for page in one.pages)
-    rank = len(first.keyframe.shape)
-    leading = len(shape) - rank
-    if int(np.prod(shape[:leading])) != len(numbers):
-        raise DataError(f"{path}: its pages make no stack ({len(numbers)} pages, {shape}): save it as one")
-    return TiffPages(str(path), numbers, np.dtype(first.dtype), shape, leading), letters
+    dtype, shape, letters = np.dtype(first.dtype), tuple(first.shape), first.axes
+    if first.dataoffset is None or first.keyframe.fillorder != 1:
+        try:
+            import zarr  # noqa: F401
+        except ImportError:
+            raise UsageError(f"{path}: compressed TIFF stacks need zarr: {install_command('maps')}") from None
+        return CompressedPages(str(path), shaped, dtype, shape), letters
+    kept = [i for i, n in enumerate(shape) if n > 1 or letters[i] in "YX"]
+    dtype = dtype.newbyteorder(file.byteorder)
+    mapped = MappedFile(str(path), dtype, tuple(shape[i] for i in kept), int(first.dataoffset))
+    return mapped, "".join(letters[i] for i in kept)
 
 
 def _axes(shape: tuple[int, ...], letters: str, bands: int, path: str) -> tuple[tuple[str, ...], list[str]]:
     """Names of the axes: rows, columns and time as the file states them, that of the bands by its length."""
-    if not {"Y", "X"} <= set(letters) or (letters.startswith("Q") and len(shape) == 3 and bands != shape[0]):
+    if not {"Y", "X"} <= set(letters) or (letters[0] in "QI" and len(shape) == 3 and bands != shape[0]):
         return array_axes(shape, bands, path)
     rest = [i for i, letter in enumerate(letters) if letter not in _NAMES]
     if len(rest) == 1 and shape[rest[0]] == bands:
@@ -101,13 +128,13 @@ def _channel_wavelengths(file: Any) -> tuple[np.ndarray | None, str]:
     """Wavelengths in nm that OME metadata or ImageJ labels (`450 nm`) state for every page, and a note."""
     if file.is_ome and (text := file.ome_metadata):
         units = set(_OME_UNIT.findall(text)) or {"nm"}
-        found = [float(value) for value in _OME_CHANNEL.findall(text)]
-        if found and units == {"nm"}:
-            return np.array(found), "wavelengths of the channels, from the OME metadata"
+        channels = [float(value) for value in _OME_CHANNEL.findall(text)]
+        if channels and units == {"nm"}:
+            return np.array(channels), "wavelengths of the channels, from the OME metadata"
     labels = (file.imagej_metadata or {}).get("Labels", []) if file.is_imagej else []
-    found = [_LABEL.findall(str(label)) for label in labels]
-    if found and all(len(one) == 1 for one in found):
-        return np.array([float(one[0]) for one in found]), "wavelengths from the labels of the pages"
+    numbers = [_LABEL.findall(str(label)) for label in labels]
+    if numbers and all(len(one) == 1 for one in numbers):
+        return np.array([float(one[0]) for one in numbers]), "wavelengths from the labels of the pages"
     return None, ""
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from pellicle.data.cubes.raw_cube import COUNTS
 from pellicle.data.tabular.columns import Column, recognise
@@ -25,6 +26,12 @@ class Chosen:
     polarisation: str | None
     unit: str | None
     calibrated: bool
+
+    @property
+    def stated(self) -> dict[str, Any]:
+        """What the names state, as arguments of a `RawCube`."""
+        about = {"signal": self.signal, "polarisation": self.polarisation}
+        return {**about, "signal_unit": self.unit, "calibrated": self.calibrated}
 
 
 def choose_variables(

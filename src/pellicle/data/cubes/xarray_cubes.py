@@ -1,20 +1,23 @@
-"""Cubes in xarray objects: their axes, coordinates and variables; nothing else is loaded."""
+"""Cubes in xarray objects, zarr stores and NetCDF files: only axes, coordinates and names are read."""
 
 from __future__ import annotations
 
+import json
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pellicle.data.cubes.raw_cube import Asked, RawCube
-from pellicle.data.cubes.stored_arrays import ANGLE, WAVELENGTH, Stored, XarrayVariable
+from pellicle.data.cubes.numpy_files import arrays_to_raw
+from pellicle.data.cubes.raw_cube import ANGLE, WAVELENGTH, Asked, RawCube, Stored
 from pellicle.data.cubes.variable_names import choose_variables
 from pellicle.data.spectrum import POLARISATIONS
 from pellicle.data.tabular.columns import recognise
+from pellicle.data.tabular.text import open_binary
 from pellicle.data.tabular.units import wavelength_unit
-from pellicle.errors import DataError, UsageError
+from pellicle.errors import DataError, UsageError, install_command
 
 _PIXELS = {
     "time": ("time", "t", "frame", "frames"),
@@ -24,6 +27,8 @@ _PIXELS = {
 }
 _BANDS = ("band", "bands", "channel", "channels", "spectral", "wvl", "wave")
 _SIGNALS = ("signal", "signals", "quantity")
+_HDF5, _CLASSIC = b"\x89HDF\r\n\x1a\n", b"CDF"
+_STORES = ("zarr.json", ".zgroup", ".zarray", ".zmetadata")
 
 
 def is_xarray(source: Any) -> bool:
@@ -36,38 +41,31 @@ def xarray_to_raw(source: Any, path: str, asked: Asked, files: tuple[Path, ...] 
     """Return the cube of a DataArray or Dataset. Raises DataError or UsageError, one sentence."""
     if type(source).__name__ == "DataArray":
         source = source.to_dataset(name=source.name or "values")
-    dataset, notes = _without_signal_axis(source, asked.signal), []
+    dataset = _without_signal_axis(source)
     roles = _roles(dataset)
     band = next((dim for dim, role in roles.items() if role == WAVELENGTH), None)
     measured = {str(name): v for name, v in dataset.data_vars.items() if band is not None and band in v.dims}
     if band is None or not measured:
         raise _no_axis(dataset, "wavelength", path)
-    written = {name: v.attrs.get("units") for name, v in measured.items()}
-    chosen = choose_variables(_pixels_only(measured, written), asked.variable, asked.signal, path)
+    # a curve along the wavelength is no cube, but may be its errors
+    written = {
+        n: v.attrs.get("units") for n, v in measured.items() if v.ndim > 1 or n.lower() != "wavelength"
+    }
+    chosen = choose_variables(written, asked.variable, asked.signal, path)
     main = measured[chosen.arrays["values"]]
-    lengths = {str(dim): int(n) for dim, n in main.sizes.items()}
-    for dim in [dim for dim, role in roles.items() if role is None and lengths.get(dim) == 1]:
-        dataset, lengths = dataset.isel({dim: 0}), {d: n for d, n in lengths.items() if d != dim}
-        notes.append(f"axis {dim!r} of length one left out")
-    unknown = [dim for dim in lengths if roles[dim] is None]
-    if unknown:
-        raise DataError(
-            f"{path}: the axis {unknown[0]!r} of {chosen.arrays['values']!r} ({_listed(lengths)}) is none "
-            "of y, x, wavelength, angle, time and site: rename or select it in xarray"
-        )
-    dims = tuple(axis for axis in _PIXELS if axis in {roles[dim] for dim in lengths})
-    if not dims:
-        raise _no_axis(dataset, "pixels (y and x, or site)", path)
+    dataset, lengths, notes = _without_single(dataset, main, roles)
+    dims = _pixel_dims(dataset, chosen.arrays["values"], lengths, roles, path)
     renamed = {dim: role for dim, role in roles.items() if role is not None}
     stored = {
-        str(name): Stored(
-            XarrayVariable(variable.variable), tuple(renamed.get(str(d), str(d)) for d in variable.dims)
-        )
+        str(name): Stored(variable.variable, tuple(renamed.get(str(d), str(d)) for d in variable.dims))
         for name, variable in dataset.data_vars.items()
     }
     wavelength, unit = _band_axis(dataset, band, asked, path)
     angle, polarisation = _light(dataset, main, roles, path)
     coords, units, told = _coordinates(dataset, renamed, dims)
+    delta = f", {chosen.arrays['delta']!r}" if "delta" in chosen.arrays else ""
+    errors = [name for role, name in chosen.arrays.items() if role in ("sigma", "delta_sigma")]
+    stated: Any = chosen.stated | {"polarisation": chosen.polarisation or polarisation}
     return RawCube(
         path,
         {role: stored[name] for role, name in chosen.arrays.items()},
@@ -75,38 +73,51 @@ def xarray_to_raw(source: Any, path: str, asked: Asked, files: tuple[Path, ...] 
         wavelength,
         unit,
         files=files,
-        signal=chosen.signal,
-        polarisation=chosen.polarisation or polarisation,
-        signal_unit=chosen.unit,
-        calibrated=chosen.calibrated,
         angle=angle,
         coords=coords,
         units=units,
         others={name: one for name, one in stored.items() if name not in chosen.arrays.values()},
         notes=(
-            f"variable {chosen.arrays['values']!r} ({_listed(lengths)})"
-            + "".join(f", {name!r}" for role, name in chosen.arrays.items() if role == "delta"),
-            *(
-                f"standard deviations: {name!r}"
-                for role, name in chosen.arrays.items()
-                if role in ("sigma", "delta_sigma")
-            ),
+            f"variable {chosen.arrays['values']!r} ({_listed(lengths)}){delta}",
+            *(f"standard deviations: {name!r}" for name in errors),
             *notes,
             *told,
         ),
+        **stated,
     )
 
 
-def _pixels_only(measured: Mapping[str, Any], written: dict[str, str | None]) -> dict[str, str | None]:
-    """Variables with pixels; a curve along the wavelength is no cube, but may be its errors."""
-    return {
-        name: unit
-        for name, unit in written.items()
-        if measured[name].ndim > 1 or name.lower() != "wavelength"
-    }
+def _without_single(
+    dataset: Any, main: Any, roles: Mapping[str, str | None]
+) -> tuple[Any, dict[str, int], list[str]]:
+    """The dataset without axes of length one and of no role, the lengths of the others, and notes."""
+    lengths = {str(dim): int(n) for dim, n in main.sizes.items()}
+    single = [dim for dim, role in roles.items() if role is None and lengths.get(dim) == 1]
+    kept = {dim: n for dim, n in lengths.items() if dim not in single}
+    return (
+        dataset.isel(dict.fromkeys(single, 0)),
+        kept,
+        [f"axis {dim!r} of length one left out" for dim in single],
+    )
 
 
-def _without_signal_axis(dataset: Any, signal: str | None) -> Any:
+def _pixel_dims(
+    dataset: Any, name: str, lengths: Mapping[str, int], roles: Mapping[str, str | None], path: str
+) -> tuple[str, ...]:
+    """Axes of pixels of a variable, in the order of the result. Raises DataError for an unknown axis."""
+    unknown = [dim for dim in lengths if roles[dim] is None]
+    if unknown:
+        raise DataError(
+            f"{path}: the axis {unknown[0]!r} of {name!r} ({_listed(lengths)}) is none of y, x, wavelength, "
+            "angle, time and site: rename or select it in xarray"
+        )
+    dims = tuple(axis for axis in _PIXELS if axis in {roles[dim] for dim in lengths})
+    if not dims:
+        raise _no_axis(dataset, "pixels (y and x, or site)", path)
+    return dims
+
+
+def _without_signal_axis(dataset: Any) -> Any:
     """The dataset with one variable for each entry of an axis `signal`, whose coordinate names them."""
     for dim in dataset.dims:
         if str(dim).lower() in _SIGNALS and dim in dataset.coords:
@@ -120,7 +131,6 @@ def _without_signal_axis(dataset: Any, signal: str | None) -> Any:
                 for i, entry in enumerate(names):
                     one = variable.isel({dim: i}, drop=True)
                     parts[f"{entry}_{name}" if many and name not in ("values", "R", "T") else entry] = one
-            del signal
             return type(dataset)(parts, attrs=dataset.attrs)
     return dataset
 
@@ -216,7 +226,85 @@ def _listed(lengths: Mapping[str, int]) -> str:
 
 
 def _no_axis(dataset: Any, wanted: str, path: str) -> DataError:
-    found = _listed({str(dim): n for dim, n in dataset.sizes.items()}) or "none"
+    axes = _listed({str(dim): n for dim, n in dataset.sizes.items()}) or "none"
     return DataError(
-        f"{path}: has no axis of {wanted}, only {found}: rename the axes to y, x and wavelength in xarray"
+        f"{path}: has no axis of {wanted}, only {axes}: rename the axes to y, x and wavelength in xarray"
     )
+
+
+def is_netcdf(path: Path) -> bool:
+    """True for a NetCDF or HDF5 file, by its first bytes."""
+    with open_binary(path) as file:
+        head = file.read(8)
+    return head == _HDF5 or head.startswith(_CLASSIC)
+
+
+def is_classic(path: Path) -> bool:
+    """True for NetCDF 3, which has its own format."""
+    with open_binary(path) as file:
+        return file.read(3) == _CLASSIC
+
+
+def is_zarr(path: Path) -> bool:
+    """True for the folder of a zarr store."""
+    return any((path / name).exists() for name in _STORES)
+
+
+def read_netcdf(path: Path, asked: Asked) -> RawCube:
+    """Read a NetCDF file. Raises DataError for a damaged one, UsageError without the packages."""
+    engine = "scipy" if is_classic(path) else "h5netcdf"
+    dataset = _opened(path, lambda xarray: xarray.open_dataset(path, engine=engine, chunks=None, cache=False))
+    return xarray_to_raw(dataset, str(path), asked, (path,))
+
+
+def read_zarr(path: Path, asked: Asked) -> RawCube:
+    """Read a zarr store: a group as xarray writes it, or one array. Raises DataError or UsageError."""
+
+    def group(xarray: Any) -> Any:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # metadata that are not consolidated take longer to read
+            return xarray.open_zarr(path, chunks=None, decode_timedelta=True)
+
+    if (path / ".zarray").exists() or _node_type(path / "zarr.json") == "array":
+        return _zarr_array(path, asked)
+    return xarray_to_raw(_opened(path, group), str(path), asked, (path,))
+
+
+def _node_type(path: Path) -> str:
+    """Type of a store of zarr 3, array or group; its text may also contain the types of its arrays."""
+    try:
+        return str(json.loads(path.read_bytes())["node_type"]) if path.is_file() else ""
+    except (ValueError, KeyError, TypeError):
+        raise DataError(f"{path}: is damaged: it states no node_type; write the store again") from None
+
+
+def _opened(path: Path, opening: Any) -> Any:
+    try:
+        import xarray
+
+        return opening(xarray)
+    except ImportError as error:
+        raise UsageError(
+            f"{path}: cubes in zarr and NetCDF need {error.name}: {install_command('maps')}"
+        ) from None
+    except Exception as error:  # xarray and its engines raise errors of every kind on damaged files
+        reason = " ".join(str(error).split())[:200].rstrip(".")
+        raise DataError(f"{path}: cannot be opened as a cube ({reason}); write it again") from None
+
+
+def _zarr_array(path: Path, asked: Asked) -> RawCube:
+    """The only array of a store, whose axes may have names (zarr 3)."""
+
+    def opening(_: Any) -> Any:
+        import zarr
+
+        return zarr.open_array(path, mode="r")
+
+    array = _opened(path, opening)
+    names = getattr(array.metadata, "dimension_names", None)
+    if names and all(names):
+        import xarray
+
+        variable = _opened(path, lambda _: xarray.Variable(tuple(names), array))
+        return xarray_to_raw(xarray.DataArray(variable), str(path), asked, (path,))
+    return arrays_to_raw({"": array}, str(path), asked, (path,))
