@@ -66,7 +66,7 @@ def test_a_prior_that_pulls_the_fit_is_no_discrepancy():
     found = discrepancy([one], scaled, np.full(2, 0.5))
     assert abs(best[0] - np.mean(measured)) > 1e-3
     np.testing.assert_allclose(found.shift, 0.0, atol=1e-12)
-    np.testing.assert_allclose(found.errors.covariance, np.linalg.inv(normal), rtol=1e-6)
+    np.testing.assert_allclose(found.errors.covariance, np.linalg.inv(normal), rtol=1e-6, atol=1e-20)
 
 
 def test_an_effect_that_nobody_allows_for_moves_the_parameters():

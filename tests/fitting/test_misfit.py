@@ -31,7 +31,7 @@ def found(explains=0.0, alone=0.0, implausible=False):
     ],
 )
 def test_what_is_left(ratio, typical, span, expected):
-    assert misfit(found(), Remaining(ratio, typical, 1.0, 1.0), Accuracy(0.02, span)) is expected
+    assert bool(misfit(found(), Remaining(ratio, typical, 1.0, 1.0), Accuracy(0.02, span))) is expected
 
 
 def test_implausible_effects():
@@ -50,7 +50,10 @@ def test_implausible_effects():
     ],
 )
 def test_an_effect_beyond_its_size(explains, alone, ratio, expected):
-    assert misfit(found(explains, alone), Remaining(ratio, 1e-4, 1.0, 1.0), Accuracy(0.02, 1.0)) is expected
+    assert (
+        bool(misfit(found(explains, alone), Remaining(ratio, 1e-4, 1.0, 1.0), Accuracy(0.02, 1.0)))
+        is expected
+    )
 
 
 def test_a_scale_that_explains_as_much_is_no_wrong_material():
@@ -68,4 +71,4 @@ def test_a_slit_of_any_size_is_no_wrong_material():
 
 @pytest.mark.parametrize(("weighted", "expected"), [(0.5, False), (0.7, True)])
 def test_a_drifting_lamp_is_judged_by_the_error_that_it_is_allowed(weighted, expected):
-    assert misfit(found(), Remaining(20.0, 1.0, weighted, 1.0), Accuracy(weighted=0.6)) is expected
+    assert bool(misfit(found(), Remaining(20.0, 1.0, weighted, 1.0), Accuracy(weighted=0.6))) is expected

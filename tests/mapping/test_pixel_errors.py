@@ -8,7 +8,6 @@ import pytest
 
 import pellicle as pl
 from pellicle.data.cube import Cube
-from pellicle.fitting.discrepancy import _least_squares
 from pellicle.fitting.film.extended_scene import Number, Program
 from pellicle.fitting.film.fit import fitted, measurements
 from pellicle.fitting.film.problem import make
@@ -16,7 +15,6 @@ from pellicle.fitting.film.search import search
 from pellicle.fitting.film.systematic_effects import SimulatedEffect
 from pellicle.fitting.progress import quiet
 from pellicle.fitting.result import Fit
-from pellicle.mapping.pixels.covariance import held_within, inverse
 from pellicle.mapping.pixels.effects import _simulation
 from pellicle.mapping.pixels.fit import PixelModel, prepare, spectrum
 from pellicle.mapping.pixels.minima import ORDERS, PixelData, PixelMinima
@@ -190,27 +188,6 @@ def test_psi_and_delta_at_two_angles(given):
     if given:
         arrays |= {"sigma": np.full(psi.shape, 0.05), "delta_sigma": np.full(psi.shape, 0.1)}
     check(Cube(arrays, nm, "psi-delta", ("site",), angles), pl.Scene(pl.Layer(1.46, pl.Free(0, 1000)), "Si"))
-
-
-def test_solutions_stay_on_bounds():
-    # without bounds (1, -1); with the second held at 0 the first solves 2 x = 1
-    covariance = inverse(np.array([[[2.0, 1.0], [1.0, 2.0]]]))
-    lower, upper = np.array([[-9.0, 0.0]]), np.full((1, 2), 9.0)
-    found = held_within(np.array([[1.0, -1.0]]), covariance, lower, upper)
-    assert found == pytest.approx(np.array([[0.5, 0.0]]))
-
-
-def test_solutions_within_bounds_are_those_of_a_fit_of_each_pixel():
-    rng = np.random.default_rng(0)
-    rows, data = rng.normal(size=(50, 20, 6)) + rng.normal(size=(50, 20, 1)), rng.normal(size=(50, 20))
-    lower = np.tile([-np.inf, -0.1, 0.0, 0.0, 0.0, -np.inf], (50, 1))
-    upper = np.tile([np.inf, 0.1, np.inf, np.inf, np.inf, 0.2], (50, 1))
-    covariance = inverse(np.swapaxes(rows, 1, 2) @ rows + np.eye(6))
-    free = np.einsum("pij,pnj,pn->pi", covariance, rows, data)
-    found = held_within(free, covariance, lower, upper)
-    ends = lower[0], upper[0]
-    expected = [_least_squares(*one, np.eye(6), ends) for one in zip(rows, data, strict=True)]
-    assert found == pytest.approx(np.array(expected), abs=1e-12)
 
 
 def test_effects_share_the_unchanged_signal():

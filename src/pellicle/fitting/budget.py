@@ -54,7 +54,8 @@ def likely_cause(found: Discrepancy, parameters: Sequence[Parameter]) -> list[st
     rows, lead = found.contributions, parameters[at]
     usual = [c for c in rows if abs(c.alone) <= _USUAL * c.effect.size and c.explains > _STRUCTURE]
     best = max(usual, key=lambda c: c.explains, default=None)
-    other = other_material(found)
+    position = other_material(rows)
+    other = rows[position] if position >= 0 else None
     level = max(
         (c for c in rows if c.effect.name.startswith("scale")), key=lambda c: c.explains, default=None
     )

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pellicle.fitting.noise import student
+from pellicle.fitting.normal_equations import above_rounding, covariances
 from pellicle.fitting.problem import Problem
 
 UNSEEN = 0.5
@@ -23,15 +24,19 @@ UNSEEN = 0.5
 
 
 def correlation(covariance: np.ndarray) -> np.ndarray:
-    """The correlation matrix of a covariance; zero for a parameter without one."""
-    deviation = np.sqrt(np.diag(covariance))
+    """The correlation matrix of a covariance (..., n, n); zero for a parameter without one."""
+    deviation = np.sqrt(_diagonal(covariance))
     sd = np.where(deviation > 0, deviation, 1.0)
-    return covariance / np.outer(sd, sd)
+    return covariance / (sd[..., :, None] * sd[..., None, :])
+
+
+def _diagonal(matrix: np.ndarray) -> np.ndarray:
+    return np.einsum("...ii->...i", matrix)
 
 
 @dataclass(frozen=True)
 class Errors:
-    """Covariance of parameters, then of nuisances, in their own units; `names` in the same order.
+    """Covariance (..., n, n) of parameters, then of nuisances, in their own units; `names` in the same order.
 
     `curvature` is the covariance that the weights alone would give, None where it is the same.
     """
@@ -41,8 +46,12 @@ class Errors:
     curvature: np.ndarray | None = None
 
     @property
+    def variance(self) -> np.ndarray:
+        return _diagonal(self.covariance)
+
+    @property
     def stderr(self) -> np.ndarray:
-        return np.sqrt(np.diag(self.covariance))
+        return np.sqrt(self.variance)
 
     @property
     def by_curvature(self) -> np.ndarray:
@@ -52,7 +61,7 @@ class Errors:
     @property
     def widening(self) -> np.ndarray:
         """Standard errors over those by the curvature of the misfit (parameters and nuisances,)."""
-        return self.stderr / np.maximum(np.sqrt(np.diag(self.by_curvature)), 1e-300)
+        return self.stderr / np.maximum(np.sqrt(_diagonal(self.by_curvature)), 1e-300)
 
     @property
     def correlation(self) -> np.ndarray:
@@ -62,16 +71,22 @@ class Errors:
 class Scaled(NamedTuple):
     """The weighted Jacobian of all data and priors, each column in the `unit` of its parameter.
 
-    `jacobian` (points and priors, parameters and nuisances): parameters by the unit interval of their
+    `jacobian` (..., points and priors, parameters and nuisances): parameters by the unit interval of their
     coordinate, nuisances by the standard deviation of their prior; the last rows are those of the priors.
     `stretch` takes steps in these units to steps in the parameters' own units. `pull` is the distance from
-    the means of the priors (parameters and nuisances,), in their standard deviations.
+    the means of the priors (..., parameters and nuisances), in their standard deviations. Leading axes are
+    those of many fits.
     """
 
     jacobian: np.ndarray
     stretch: np.ndarray
     names: tuple[str, ...]
     pull: np.ndarray | float = 0.0
+
+    def of(self, which: np.ndarray) -> Scaled:
+        """Those of some of many fits, by their positions."""
+        pull = np.broadcast_to(self.pull, self.stretch.shape[:-1])
+        return Scaled(self.jacobian[which], self.stretch[which], self.names, pull[which])
 
     def blocks(self, sizes: Sequence[int], variance: Sequence[float]) -> list[np.ndarray]:
         """Rows of each view, of so many data values, by the σ of its weights: without its `variance`."""
@@ -112,28 +127,32 @@ def scaled(problem: Problem, unit: np.ndarray, at: Sequence[Any], variance: Sequ
 
 
 def errors(scaled: Scaled, uneven: Mapping[int, np.ndarray] = MappingProxyType({})) -> Errors:
-    """Covariance by a singular value decomposition of the scaled Jacobian.
+    """Covariance by the scaled Jacobian, of one fit or of many.
 
-    `uneven` are the weighted residuals (rows, channels) of views whose residuals stand for the noise of their
-    points, each by the first of the view's rows in the Jacobian; channels of one point may be correlated.
-
-    Nothing is inverted that is not there: a direction that the data do not see keeps its huge variance (a
-    pseudo-inverse would call it 0, and an opaque gold film known to ± 0.00 nm).
+    `uneven` are the weighted residuals (rows, channels) of views of one fit whose residuals stand for the
+    noise of their points, each by the first of the view's rows in the Jacobian; channels of one point may be
+    correlated.
     """
+    if uneven:
+        return _by_scores(scaled, uneven)
+    shape = scaled.jacobian.shape
+    covariance = covariances(scaled.jacobian.reshape(-1, *shape[-2:])).reshape(scaled.stretch.shape)
+    return Errors(scaled.names, scaled.stretch @ covariance @ np.swapaxes(scaled.stretch, -1, -2))
+
+
+def _by_scores(scaled: Scaled, uneven: Mapping[int, np.ndarray]) -> Errors:
+    """The sandwich estimator: see the module's docstring."""
     left, values, rows = np.linalg.svd(scaled.jacobian, full_matrices=False)
-    points = len(scaled.jacobian) - len(scaled.names)
-    floor = np.finfo(float).eps * points * max(values.max(initial=0.0), 1e-100)
-    spread = scaled.stretch @ (rows.T / np.maximum(values, floor))
+    values = above_rounding(values, len(scaled.jacobian) - len(scaled.names))
+    spread = scaled.stretch @ (rows.T / values)
     plain = spread @ spread.T
-    if not uneven:
-        return Errors(scaled.names, plain)
     middle, shares = np.eye(len(values)), np.zeros(len(spread))
     for first, residuals in uneven.items():
         block = left[first : first + residuals.size].reshape(*residuals.shape, -1)
         middle += _sum_of_squares(block, residuals) - np.einsum("rci,rcj->ij", block, block)
         shares += np.sum(np.sum((block @ spread.T) ** 2, axis=1) ** 2, axis=0)
     # a parameter that few points determine has an error of as few degrees of freedom
-    wider = [student(own, 1.0) for own in np.diag(plain) ** 2 / np.maximum(shares, 1e-300)]
+    wider = student(np.diag(plain) ** 2 / np.maximum(shares, 1e-300), 1.0)
     return Errors(scaled.names, spread @ middle @ spread.T * np.outer(wider, wider), plain)
 
 

@@ -6,23 +6,33 @@ fit, with a normal prior. Generalised least squares with these columns, and with
 remains (R. Birge, 1932, Phys. Rev. 40, 207) times its correlation length, give the parameters that the data
 would have with the effects allowed for, and their covariance. The fit keeps its own values: their error
 includes the distance to those.
+
+`discrepancy` takes one fit, or arrays with leading axes (...) for many fits of the same kind.
 """
 
 from __future__ import annotations
 
+import copy
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from pellicle.fitting.covariance import Errors, Scaled
-from pellicle.fitting.robust_losses import spread
+from pellicle.fitting.noise import WINDOW
+from pellicle.fitting.normal_equations import Normal, held_within, times
+from pellicle.fitting.robust_losses import median, spread
 
 HALF_NORMAL = math.sqrt(3)
 """Root mean square of σ² where σ has a half-normal prior, in units of the square of its scale: 3^½."""
-_ROUNDS = 4
+DOUBTFUL = 1.5
+"""Ratio of unexplained residuals to noise above which an index far from the given one is looked for."""
+_ROUNDS, _SETTLED = 4, 1e-9
+"""Rounds of the factors on σ² and the robust weights, and the relative change that ends them."""
+_WHATEVER = 1e-6
+"""Prior of an effect that is looked for whatever its size, in its standard uncertainties."""
 OUTLIER = 4.0
 """Residuals beyond this many standard deviations of their bulk count less (Huber's loss)."""
 _APART = 10.0
@@ -31,8 +41,6 @@ _SMOOTH = 2.5
 """Ratio to the noise of neighbouring points above which its residuals are no noise, as in `misfit`."""
 _SCATTER = 2.0
 """Standard deviations within which the size and correlation of residuals are those of noise."""
-_WINDOW = 5.0
-"""Points over which the correlation of noise is summed (A. Sokal, 1997: see `noise.integrated_time`)."""
 _CHANCE_QUANTILE = 3.0902
 """Normal quantile of the probability, 1e-3, of effects as large together as those that are implausible."""
 
@@ -41,9 +49,10 @@ _CHANCE_QUANTILE = 3.0902
 class Effect:
     """A systematic effect: its standard uncertainty, and the change of the data values by it.
 
-    `change` is (rows, channels), in the unit of the data. With `power` 2 the signal depends on the square of
-    the size, as on a width: `change` is that by `HALF_NORMAL` times the square of `size`. Such effects, and
-    those with `positive`, cannot be below zero. Effects of the sample are `shared` by all its data.
+    `change` is (..., rows, channels), in the unit of the data. With `power` 2 the signal depends on the
+    square of the size, as on a width: `change` is that by `HALF_NORMAL` times the square of `size`. Such
+    effects, and those with `positive`, cannot be below zero. Effects of the sample are `shared` by all its
+    data.
     `material` marks the index of a medium, which another material changes by far more than its uncertainty.
     """
 
@@ -56,35 +65,54 @@ class Effect:
     shared: bool = True
     material: bool = False
 
-    def amount(self, coefficient: float) -> float:
-        """The size of the effect at a coefficient of its change."""
+    def amount(self, coefficient: Any) -> Any:
+        """The size of the effect at coefficients (...) of its change."""
         if self.power == 1:
             return self.size * coefficient
-        return self.size * math.copysign(math.sqrt(HALF_NORMAL * abs(coefficient)), coefficient)
+        return self.size * np.copysign(np.sqrt(HALF_NORMAL * np.abs(coefficient)), coefficient)
+
+    @property
+    def not_negative(self) -> bool:
+        return self.positive or self.power == 2
 
 
 class Evidence(NamedTuple):
     """Residuals of one view at the best fit, and what may explain them.
 
-    `residual` (rows, channels), the changes of the `effects` and `jacobian` (rows, channels, columns) are in
-    the unit of the data. The columns are the problem's parameters and nuisances, in the steps of `Scaled`.
-    `sigma` (rows, channels) is the σ of the points, `noise` what neighbouring points show of it; `weights`
-    (rows, channels) are those of the residuals in the likelihood of the fit. `correlation` returns the number
-    of points that count as one; `least` is the least factor on σ² that stands for it. `uncertain` is the
-    relative standard error of σ² where it is estimated. `signals` are the channels of each signal that is
-    judged by itself, empty where all are one.
+    `residual` (..., rows, channels), the changes of the `effects` and `jacobian` (..., rows, channels,
+    columns) are in the unit of the data. The columns are the problem's parameters and nuisances, in the steps
+    of `Scaled`. `sigma` (..., rows, channels) is the σ of the points, `noise` (...) what neighbouring points
+    show of it; `weights` (..., rows, channels) are those of the residuals in the likelihood of the fit.
+    `correlation` returns the number of points that count as one; `least` is the least factor on σ² that
+    stands for it. `uncertain` is the relative standard error of σ² where it is estimated. `signals` are the
+    channels of each signal that is judged by itself, empty where all are one. With `exact_noise` the noise is
+    at least `noise`, and `exact_noise(which)` is that of the fits at some positions.
     """
 
     residual: np.ndarray
     jacobian: np.ndarray
     sigma: np.ndarray
-    noise: float
+    noise: Any
     weights: np.ndarray
     effects: Sequence[Effect]
-    correlation: Callable[[np.ndarray], float]
+    correlation: Callable[[np.ndarray], Any]
     least: float = 1.0
     uncertain: float = 0.0
     signals: tuple[tuple[int, ...], ...] = ()
+    exact_noise: Callable[[np.ndarray], np.ndarray] | None = None
+
+    def of(self, which: np.ndarray) -> Evidence:
+        """The evidence of some of many fits, by their positions."""
+        exact = self.exact_noise
+        return self._replace(
+            residual=self.residual[which],
+            jacobian=self.jacobian[which],
+            sigma=self.sigma[which],
+            noise=self.noise[which],
+            weights=self.weights[which],
+            effects=[replace(effect, change=effect.change[which]) for effect in self.effects],
+            exact_noise=None if exact is None else lambda some: exact(which[some]),
+        )
 
 
 class Remaining(NamedTuple):
@@ -104,17 +132,17 @@ class Remaining(NamedTuple):
 class Contribution(NamedTuple):
     """One effect of a discrepancy.
 
-    `changes` are those of the fitted parameters by one standard uncertainty. `amount` is the size at which
-    the effect explains the residuals best, with the others at their own. `explains` is the share of the sum
-    of squares that the effect alone takes from the residuals, whatever its size, `alone` the size that it
-    then has, and `shift` what that adds to the parameters.
+    `changes` (..., parameters and nuisances) are those of the fitted parameters by one standard uncertainty.
+    `amount` (...) is the size at which the effect explains the residuals best, with the others at their own.
+    `explains` is the share of the sum of squares that the effect alone takes from the residuals, whatever its
+    size, `alone` the size that it then has, and `shift` what that adds to the parameters.
     """
 
     effect: Effect
     changes: np.ndarray
-    amount: float
-    explains: float
-    alone: float
+    amount: Any
+    explains: Any
+    alone: Any
     shift: np.ndarray
 
 
@@ -123,94 +151,54 @@ class Discrepancy:
     """Errors with the effects allowed for.
 
     `errors` are those of parameters and nuisances about the values that the effects would give, which are
-    `shift` away from those of the fit. `implausible` is true where the effects would have to be larger
-    together than they are. `evidence_shares` are the shares of a difference in χ² of each view, as the fit
-    counts points, that are left when residuals count as what they are; `evidence_share` is their mean.
+    `shift` (..., parameters and nuisances) away from those of the fit. `implausible` (...) is true where the
+    effects would have to be larger together than they are. `evidence_shares` are the shares of a difference
+    in χ² of each view, as the fit counts points, that are left when residuals count as what they are;
+    `evidence_share` is their mean.
     """
 
     errors: Errors
     shift: np.ndarray
     remaining: tuple[Remaining, ...]
     contributions: tuple[Contribution, ...]
-    implausible: bool
-    evidence_shares: tuple[float, ...]
-    evidence_share: float
+    implausible: Any
+    evidence_shares: tuple[Any, ...]
+    evidence_share: Any
 
     @property
     def variance(self) -> np.ndarray:
         """Mean square error of the fit's own parameters and nuisances."""
-        return np.diag(self.errors.covariance) + self.shift**2
+        return self.errors.variance + self.shift**2
 
 
-def discrepancy(evidence: Sequence[Evidence], scaled: Scaled, unit: np.ndarray) -> Discrepancy:
-    """The discrepancy of a fit at `unit` (parameters,) of the unit cube, which no parameter leaves.
+def discrepancy(
+    evidence: Sequence[Evidence], scaled: Scaled, unit: np.ndarray, *, contributions: bool = True
+) -> Discrepancy:
+    """The discrepancy of a fit at `unit` (..., parameters) of the unit cube, which no parameter leaves.
 
-    `scaled` has the units of the columns and their priors.
+    `scaled` has the units of the columns and their priors. Without `contributions` those are left out.
     """
     system = _System(evidence, scaled, unit)
-    state = _balanced(system, evidence)
-    covariance = system.covariance(state.reduced)
-    known, stretch, solution = len(scaled.names), scaled.stretch, system.solved(state.reduced)
-    remaining = []
-    for view, own, size in zip(evidence, system.residuals(solution), state.variance, strict=True):
-        # a signal of its own, such as one ratio, is not diluted by others that the scene has right
-        each = [own[:, list(group)] for group in view.signals] or [own]
-        sigmas = [view.sigma[:, list(group)] for group in view.signals] or [view.sigma]
-        typical = max(float(bulk(x * sigma, view.noise)) for x, sigma in zip(each, sigmas, strict=True))
-        weighted = max(math.sqrt(np.mean((_weights(x) * x) ** 2)) for x in each)
-        remaining.append(Remaining(typical / view.noise, typical, weighted, size))
-    sizes, shares = solution[known:], _evidence_shares(evidence, state.variance)
-    # the σ of a drifting lamp would hide what an effect explains
-    judged = [view._replace(sigma=np.full(view.sigma.shape, view.noise), least=1.0) for view in evidence]
-    other = _System(judged, scaled, unit)
-    by_noise = _balanced(other, judged)
-
-    def row(which: int, effect: Effect, size: float) -> Contribution:
-        changes = stretch @ system.response(which, state.reduced)
-        return Contribution(effect, changes, effect.amount(size), *other.alone(which, by_noise.reduced))
-
+    balance, known, led = _Balance(system), system.known, system.led
+    views = list(zip(system.views, balance.views, strict=True))
+    remaining, noises = zip(*(_remaining(*view) for view in views), strict=True)
+    shares = [_evidence_share(*view) for view in views]
+    sizes = balance.solution[:, known:]
+    # terms of a lamp that a spectrum has too few fringes for are zero
+    grams = sum(np.einsum("pii->pi", view.gram)[:, known:] for view in balance.views)
+    count = np.sum(np.asarray(grams) > 0, axis=1)
+    stretch = scaled.stretch
+    covariance = stretch @ led(balance.covariance[:, :known, :known]) @ np.swapaxes(stretch, -1, -2)
+    weights = [view.data.shape[1] for view in balance.views]
     return Discrepancy(
-        errors=Errors(scaled.names, stretch @ covariance[:known, :known] @ stretch.T),
-        shift=stretch @ solution[:known],
-        remaining=tuple(remaining),
-        contributions=tuple(
-            row(i, effect, size)
-            for i, (effect, size) in enumerate(zip(system.effects, sizes.tolist(), strict=True))
-        ),
-        implausible=bool(len(sizes) and np.sum(sizes**2) > improbable(len(sizes))),
-        evidence_shares=shares,
-        evidence_share=float(np.average(shares, weights=[view.residual.size for view in evidence])),
+        errors=Errors(scaled.names, covariance),
+        shift=times(stretch, led(balance.solution[:, :known])),
+        remaining=tuple(Remaining(*(led(x) for x in left)) for left in remaining),
+        contributions=tuple(_contributions(system, balance, noises)) if contributions else (),
+        implausible=led((count > 0) & (np.sum(sizes**2, axis=1) > improbable(count))),
+        evidence_shares=tuple(led(share) for share in shares),
+        evidence_share=led(np.average(shares, axis=0, weights=weights)),
     )
-
-
-class _Reduced(NamedTuple):
-    """Weighted rows and data of all views as a triangle of the same sums of squares, of as few rows as
-    columns."""
-
-    rows: np.ndarray
-    data: np.ndarray
-
-
-class _Balance(NamedTuple):
-    """Factors on the σ² of each view, square roots of the weights of its points, and the rows with them."""
-
-    variance: list[float]
-    robust: list[np.ndarray]
-    reduced: _Reduced
-
-
-def _balanced(system: _System, evidence: Sequence[Evidence]) -> _Balance:
-    """Factors and weights that stand for the residuals which they leave."""
-    variance = [max(1.0, view.least) for view in evidence]
-    robust = [np.ones(view.residual.shape) for view in evidence]
-    reduced = system.reduced(variance, robust)
-    for _ in range(_ROUNDS):
-        rest = system.residuals(system.solved(reduced))
-        robust = [_weights(view) for view in rest]
-        used = system.used(reduced, variance, robust)
-        variance = [_variance(*row) for row in zip(evidence, rest, robust, used, strict=True)]
-        reduced = system.reduced(variance, robust)
-    return _Balance(variance, robust, reduced)
 
 
 def bulk(residual: np.ndarray, noise: Any) -> Any:
@@ -227,165 +215,274 @@ def bulk(residual: np.ndarray, noise: Any) -> Any:
     return np.maximum(size, np.max(np.where(each > least, each, 0.0), axis=-1))
 
 
-def _evidence_shares(evidence: Sequence[Evidence], variance: Sequence[float]) -> tuple[float, ...]:
-    """Variance of a point by which the fit counted it, over that which stands for it now; at most 1."""
-    now = [own * np.median(view.sigma) ** 2 for view, own in zip(evidence, variance, strict=True)]
-    counted = [np.median(1 / view.weights) ** 2 for view in evidence]
-    return tuple(float(min(1.0, one / own)) for one, own in zip(counted, now, strict=True))
+def huber_roots(residual: np.ndarray) -> np.ndarray:
+    """Square roots of Huber's weights of residuals (fits, rows, channels), in units of their bulk; most fits
+    have no residual that counts less."""
+    roots = np.ones(residual.shape)
+    far = np.flatnonzero(np.max(np.abs(residual), axis=(1, 2)) > OUTLIER)
+    if len(far):
+        reach = OUTLIER * np.maximum(spread(residual[far], (1, 2)), 1.0)[:, None, None]
+        roots[far] = np.sqrt(np.minimum(1.0, reach / np.maximum(np.abs(residual[far]), 1e-300)))
+    return roots
 
 
-def huber_roots(residual: np.ndarray, size: Any) -> np.ndarray:
-    """Square roots of Huber's weights of residuals (..., rows, channels), of a bulk of this `size` (...)."""
-    far = (OUTLIER * np.maximum(size, 1.0))[..., None, None]
-    return np.sqrt(np.minimum(1.0, far / np.maximum(np.abs(residual), 1e-300)))
-
-
-def _weights(residual: np.ndarray) -> np.ndarray:
-    """Square roots of Huber's weights."""
-    return huber_roots(residual, spread(residual))
-
-
-def _variance(view: Evidence, residual: np.ndarray, weight: np.ndarray, used: float) -> float:
-    """Factor on σ² of one view for what remains."""
-    return float(reduced_variance(weight * residual, used, view.correlation, view.least, view.uncertain))
-
-
-def reduced_variance(
-    rest: np.ndarray, used: Any, correlation: Callable[[np.ndarray], Any], least: float, uncertain: float
-) -> Any:
-    """Factor on σ² (...) for the size and correlation of what remains (..., rows, channels), where that is no
-    noise by chance; `used` degrees of freedom are those of the fit."""
+def reduced_variance(rest: np.ndarray, used: Any, length: Any, least: float, uncertain: float) -> Any:
+    """Factor on σ² (...) for the size of what remains (..., rows, channels) and for its correlation over
+    `length` (...) points, where that is no noise by chance. The fit takes `used` degrees of freedom."""
     freedom = np.maximum(rest.shape[-2] * rest.shape[-1] - used, 1.0)
     reduced = np.sum(rest**2, axis=(-2, -1)) / freedom
     # only what remains is correlated: of a σ that allows for a lamp it may be a tenth
-    factor = np.maximum(reduced * correlation(rest), np.maximum(1.0, reduced) * least)
-    of_length = np.sqrt(2 * (2 * _WINDOW + 1) / freedom)  # standard error of the correlation length: ibid.
+    factor = np.maximum(reduced * length, np.maximum(1.0, reduced) * least)
+    of_length = np.sqrt(2 * (2 * WINDOW + 1) / freedom)  # standard error of the correlation length: ibid.
     by_chance = 1 + _SCATTER * np.sqrt(2 / freedom + of_length**2 + uncertain**2)
     return np.where(factor > by_chance, factor, 1.0)
 
 
+def improbable(count: Any) -> Any:
+    """χ² of `count` (...) degrees of freedom that is exceeded with a probability of 1e-3 (E. Wilson and M.
+    Hilferty, 1931, Proc. Natl. Acad. Sci. 17, 684)."""
+    spread_of_cube_root = 2 / (9 * np.maximum(count, 1))
+    return count * (1 - spread_of_cube_root + _CHANCE_QUANTILE * np.sqrt(spread_of_cube_root)) ** 3
+
+
 class _System:
-    """The linearised fit with its effects: columns of parameters, nuisances and effects, rows of all views
-    and of the priors, in units of the noise."""
+    """Linearised fits with their effects: columns of parameters, nuisances and effects, rows of all views, in
+    units of the noise, and of the priors. All arrays have one leading axis, of `fits`."""
 
     def __init__(self, evidence: Sequence[Evidence], scaled: Scaled, unit: np.ndarray):
-        self.names = dict.fromkeys(
-            (effect.name, None if effect.shared else i)
-            for i, view in enumerate(evidence)
-            for effect in view.effects
-        )
-        order = {name: len(scaled.names) + i for i, name in enumerate(self.names)}
-        self.effects: list[Effect] = [None] * len(order)  # type: ignore[list-item]
-        self.known, self.stretch = len(scaled.names), scaled.stretch
-        # a drift stays where the fit has it: its prior would pull it as soon as residuals count less
-        self.pull = np.where(np.arange(self.known) < len(unit), scaled.pull, 0.0)
-        self.blocks, self.data, self.shapes = [], [], []
-        for i, view in enumerate(evidence):
-            block = np.zeros((view.residual.size, self.known + len(order)))
-            inverse = 1 / view.sigma.ravel()
-            block[:, : self.known] = view.jacobian.reshape(-1, self.known) * inverse[:, None]
-            for effect in view.effects:
-                column = order[effect.name, None if effect.shared else i]
-                block[:, column] = effect.change.ravel() * inverse
-                self.effects[column - self.known] = effect
-            self.blocks.append(block)
-            self.data.append(view.residual.ravel() * inverse)
-            self.shapes.append(view.residual.shape)
-        self.priors = np.zeros((self.known + len(order),) * 2)
-        rows = scaled.jacobian[-self.known :]
-        self.priors[: self.known, : self.known] = rows
-        self.priors[self.known :, self.known :] = np.eye(len(order))
-        self.lower, self.upper = np.full((2, len(self.priors)), [[-np.inf], [np.inf]])
-        self.lower[: len(unit)], self.upper[: len(unit)] = -unit, 1 - unit
-        for i, effect in enumerate(self.effects):
-            if effect.positive or effect.power == 2:
-                self.lower[self.known + i] = 0.0
-
-    def reduced(self, variance: Sequence[float], robust: Sequence[np.ndarray]) -> _Reduced:
-        """Rows and data with these factors on σ² and weights."""
-        scale = [weight.ravel() / math.sqrt(own) for weight, own in zip(robust, variance, strict=True)]
-        pairs = zip(self.blocks, self.data, scale, strict=True)
-        every = np.vstack([np.column_stack([block, data]) * own[:, None] for block, data, own in pairs])
-        triangle: Any = np.linalg.qr(every, mode="r")
-        return _Reduced(triangle[:, :-1], triangle[:, -1])
-
-    def solved(self, reduced: _Reduced) -> np.ndarray:
-        """Least-squares coefficients, those of positive effects not below zero."""
-        prior_data = np.zeros(len(self.priors))
-        prior_data[: self.known] -= self.pull
-        return _least_squares(*reduced, self.priors, (self.lower, self.upper), prior_data)
-
-    def residuals(self, solution: np.ndarray) -> list[np.ndarray]:
-        """Residuals of each view after a solution, in units of its noise."""
-        pairs = zip(self.blocks, self.data, self.shapes, strict=True)
-        return [(data - block @ solution).reshape(shape) for block, data, shape in pairs]
-
-    def covariance(self, reduced: _Reduced) -> np.ndarray:
-        """Covariance of all coefficients, by singular values: see `covariance.errors`."""
-        _, values, directions = np.linalg.svd(np.vstack([reduced.rows, self.priors]), full_matrices=False)
-        points = sum(len(data) for data in self.data)
-        floor = np.finfo(float).eps * points * max(values.max(initial=0.0), 1e-100)
-        half = directions.T / np.maximum(values, floor)
-        return half @ half.T
-
-    def used(self, reduced: _Reduced, variance: Sequence[float], robust: Sequence[np.ndarray]) -> list[float]:
-        """Degrees of freedom that the coefficients take from each view: the trace of its hat matrix."""
-        covariance = self.covariance(reduced)
-        return [
-            float(np.sum((block @ covariance) * block * (weight.ravel() ** 2)[:, None])) / own
-            for block, weight, own in zip(self.blocks, robust, variance, strict=True)
+        self.lead, self.known, self.stretch = np.shape(unit)[:-1], len(scaled.names), scaled.stretch
+        self.fits = math.prod(self.lead)
+        self.views = [self._flat(view) for view in evidence]
+        keys = [
+            [(effect.name, None if effect.shared else i) for effect in view.effects]
+            for i, view in enumerate(self.views)
         ]
+        names = dict.fromkeys(key for own in keys for key in own)
+        columns = {name: self.known + i for i, name in enumerate(names)}
+        self.positions = [[columns[key] for key in own] for own in keys]
+        pairs = zip(self.positions, self.views, strict=True)
+        by_column = {at: effect for own, view in pairs for at, effect in zip(own, view.effects, strict=True)}
+        self.effects = [by_column[at] for at in columns.values()]
+        size, count = self.known + len(names), np.shape(unit)[-1]
+        self.priors = scaled.jacobian[..., -self.known :, :].reshape(self.fits, self.known, self.known)
+        # a drift stays where the fit has it: its prior would pull it as soon as residuals count less
+        pull = np.array(np.broadcast_to(scaled.pull, (*self.lead, self.known))).reshape(self.fits, -1)
+        pull[:, count:] = 0.0
+        self.pull, transposed = pull, np.swapaxes(self.priors, 1, 2)
+        self.precision, self.pulled = np.zeros((self.fits, size, size)), np.zeros((self.fits, size))
+        self.precision[:, : self.known, : self.known] = transposed @ self.priors
+        self.precision[:, range(self.known, size), range(self.known, size)] = 1.0
+        self.pulled[:, : self.known] = -times(transposed, pull)
+        self.lower, self.upper = np.full((2, self.fits, size), [[[-np.inf]], [[np.inf]]])
+        self.lower[:, :count] = -np.reshape(unit, (self.fits, count))
+        self.upper[:, :count] = 1 + self.lower[:, :count]
+        self.lower[:, self.known :][:, [effect.not_negative for effect in self.effects]] = 0.0
 
-    def response(self, which: int, reduced: _Reduced) -> np.ndarray:
-        """Change of the parameters by one standard uncertainty of an effect that nobody allows for."""
-        own, rows = np.arange(self.known), reduced.rows
-        return _least_squares(rows[:, own], -rows[:, self.known + which], self.priors[np.ix_(own, own)])
+    def _flat(self, view: Evidence) -> Evidence:
+        """The evidence with one leading axis."""
+        if len(self.lead) == 1:
+            return view
 
-    def alone(self, which: int, reduced: _Reduced) -> tuple[float, float, np.ndarray]:
-        """Share of the residuals that one effect explains without the others, its size, and the shift of the
-        parameters by it."""
-        rows, data = reduced
-        own, both = np.arange(self.known), np.append(np.arange(self.known), self.known + which)
-        prior_data = np.append(np.zeros(self.known) - self.pull, 0.0)
-        best = _least_squares(rows[:, own], data, self.priors[np.ix_(own, own)], None, prior_data[:-1])
-        before = float(np.sum((data - rows[:, own] @ best) ** 2))
-        free = self.priors[np.ix_(both, both)].copy()
-        free[-1, -1] = 1e-6  # whatever its size
-        bounds = self.lower[both], self.upper[both]
-        solution = _least_squares(rows[:, both], data, free, bounds, prior_data)
-        after = float(np.sum((data - rows[:, both] @ solution) ** 2))
-        size = self.effects[which].amount(float(solution[-1]))
-        return 1 - after / max(before, 1e-300), size, self.stretch @ (solution[:-1] - best)
+        def flat(x: Any, kept: int) -> np.ndarray:
+            return np.reshape(x, (self.fits, *np.shape(x)[len(self.lead) :][:kept]))
 
+        effects = [replace(effect, change=flat(effect.change, 2)) for effect in view.effects]
+        arrays = {name: flat(getattr(view, name), 2) for name in ("residual", "sigma", "weights")}
+        return view._replace(
+            **arrays, effects=effects, jacobian=flat(view.jacobian, 3), noise=flat(view.noise, 0)
+        )
 
-def _least_squares(
-    rows: np.ndarray,
-    data: np.ndarray,
-    priors: np.ndarray,
-    bounds: tuple[np.ndarray, np.ndarray] | None = None,
-    prior_data: np.ndarray | None = None,
-) -> np.ndarray:
-    """Coefficients of least squares with prior rows, zeros or `prior_data`; those that would leave their
-    bounds stay on them.
+    def prior_rows(self, fit: int) -> tuple[np.ndarray, np.ndarray]:
+        """Rows (columns, columns) and data (columns,) of the priors of one fit."""
+        rows, data = np.eye(self.lower.shape[1]), np.zeros(self.lower.shape[1])
+        rows[: self.known, : self.known], data[: self.known] = self.priors[fit], -self.pull[fit]
+        return rows, data
 
-    None of these is let go again, which a solver such as SciPy's would do: it takes 0.25 s to import.
-    """
-    matrix = np.vstack([rows, priors])
-    right = np.concatenate([data, np.zeros(len(priors)) if prior_data is None else prior_data])
-    solution: np.ndarray = np.linalg.lstsq(matrix, right, rcond=None)[0]
-    if bounds is None:
-        return solution
-    free = np.ones(len(solution), bool)
-    while np.any(outside := free & ((solution < bounds[0]) | (solution > bounds[1]))):
-        free &= ~outside
-        solution = np.clip(solution, *bounds)
-        rest = right - matrix[:, ~free] @ solution[~free]
-        solution[free] = np.linalg.lstsq(matrix[:, free], rest, rcond=None)[0]
-    return solution
+    def led(self, x: np.ndarray) -> Any:
+        """An array (fits, ...) with the leading axes of the fits."""
+        return x.reshape((*self.lead, *x.shape[1:]))[()]
+
+    def by_noise(self, noises: Sequence[np.ndarray]) -> _System:
+        """The system with the noise of neighbouring points (fits,) of each view for the σ of its points: that
+        of a drifting lamp would hide what an effect explains."""
+        result = copy.copy(self)
+        result.views = [
+            view._replace(sigma=np.broadcast_to(noise[:, None, None], view.sigma.shape), least=1.0)
+            for view, noise in zip(self.views, noises, strict=True)
+        ]
+        return result
+
+    def rows(self, which: int) -> np.ndarray:
+        """Rows (fits, columns, data values) of a view, in units of its noise."""
+        view, positions = self.views[which], self.positions[which]
+        inverse = (1 / view.sigma).reshape(self.fits, -1)
+        rows = np.zeros((self.fits, self.lower.shape[1], inverse.shape[1]))
+        jacobian = view.jacobian.reshape(*inverse.shape, self.known)
+        np.multiply(np.swapaxes(jacobian, 1, 2), inverse[:, None], out=rows[:, : self.known])
+        for column, effect in zip(positions, view.effects, strict=True):
+            np.multiply(effect.change.reshape(inverse.shape), inverse, out=rows[:, column])
+        return rows
 
 
-def improbable(count: int) -> float:
-    """χ² of `count` degrees of freedom that is exceeded with a probability of 1e-3 (E. Wilson and M.
-    Hilferty, 1931, Proc. Natl. Acad. Sci. 17, 684)."""
-    spread_of_cube_root = 2 / (9 * max(count, 1))
-    return count * (1 - spread_of_cube_root + _CHANCE_QUANTILE * math.sqrt(spread_of_cube_root)) ** 3
+class _ViewBalance:
+    """Rows and data of one view, factors on its σ² (fits,), square roots of the weights of its points, sums
+    of squares with these weights, and the residuals `rest` (fits, rows, channels) in units of the noise."""
+
+    def __init__(self, view: Evidence, rows: np.ndarray):
+        self.view, self.rows, fits = view, rows, len(rows)
+        self.data = view.residual.reshape(fits, -1) / view.sigma.reshape(fits, -1)
+        self.variance = np.full(fits, max(1.0, view.least))
+        self.roots = np.ones(self.data.shape)
+        self.gram, self.against = rows @ np.swapaxes(rows, 1, 2), times(rows, self.data)
+        self.rest = np.empty(view.residual.shape)
+
+    def leave(self, solution: np.ndarray, todo: np.ndarray | slice) -> None:
+        """Take the residuals that solutions leave."""
+        rest = self.data[todo] - times(np.swapaxes(self.rows[todo], 1, 2), solution[todo])
+        self.rest[todo] = rest.reshape(-1, *self.rest.shape[1:])
+
+    def reweigh(self, covariance: np.ndarray, todo: np.ndarray, single: bool) -> np.ndarray:
+        """Take factors and weights by the residuals; returns which of the fits `todo` change by that."""
+        view, left = self.view, self.rest[todo]
+        now = huber_roots(left)
+        flat, before = now.reshape(len(todo), -1), self.roots[todo]
+        robust = (flat < 1).any(axis=1) | (before < 1).any(axis=1)
+        some = todo[robust]
+        changed = np.zeros(len(todo), bool)
+        if len(some):
+            changed[robust] = np.abs(flat[robust] - before[robust]).max(axis=1) > _SETTLED
+            self.roots[some] = flat[robust]
+            weighted = self.rows[some] * (self.roots[some] ** 2)[:, None]
+            self.gram[some] = weighted @ np.swapaxes(self.rows[some], 1, 2)
+            self.against[some] = times(weighted, self.data[some])
+        used = np.einsum("pij,pij->p", covariance[todo], self.gram[todo]) / self.variance[todo]
+        counted = now * left
+        length = view.correlation(counted[0] if single else counted)
+        factor = reduced_variance(counted, used, length, view.least, view.uncertain)
+        changed |= np.abs(factor / self.variance[todo] - 1) > _SETTLED
+        self.variance[todo] = factor
+        return changed
+
+    def weighted(self, fit: int) -> tuple[np.ndarray, np.ndarray]:
+        """Rows (data values, columns) and data of one fit with their weights."""
+        scale = self.roots[fit] / math.sqrt(self.variance[fit])
+        return (self.rows[fit] * scale).T, self.data[fit] * scale
+
+
+class _Balance:
+    """Noise factors and robust weights, iterated until they agree with the residuals that they leave."""
+
+    def __init__(self, system: _System):
+        self.system = system
+        self.views = [_ViewBalance(view, system.rows(i)) for i, view in enumerate(system.views)]
+        every = slice(None)
+        self.solution, self.covariance = self._solved(every)
+        for view in self.views:
+            view.leave(self.solution, every)
+        todo = np.arange(system.fits)
+        for _ in range(_ROUNDS):
+            changed = [view.reweigh(self.covariance, todo, not system.lead) for view in self.views]
+            todo = todo[np.any(changed, axis=0)]
+            if not len(todo):
+                break
+            self.solution[todo], self.covariance[todo] = self._solved(todo)
+            for view in self.views:
+                view.leave(self.solution, todo)
+
+    def normal(self, todo: np.ndarray | slice = slice(None)) -> Normal:
+        """Normal equations of some of the fits."""
+        system = self.system
+        matrix, right = system.precision[todo].copy(), system.pulled[todo].copy()
+        for view in self.views:
+            matrix += view.gram[todo] / view.variance[todo][:, None, None]
+            right += view.against[todo] / view.variance[todo][:, None]
+
+        def rows(position: int) -> tuple[np.ndarray, np.ndarray]:
+            fit = int(np.arange(system.fits)[todo][position])
+            pairs = [*(view.weighted(fit) for view in self.views), system.prior_rows(fit)]
+            return np.vstack([row for row, _ in pairs]), np.concatenate([data for _, data in pairs])
+
+        return Normal(matrix, right, rows)
+
+    def _solved(self, todo: np.ndarray | slice) -> tuple[np.ndarray, np.ndarray]:
+        """Least-squares coefficients, those of positive effects not below zero, and their covariance."""
+        free, covariance = self.normal(todo).solved()
+        return held_within(free, covariance, self.system.lower[todo], self.system.upper[todo]), covariance
+
+    def one_by_one(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Explain the residuals by each effect without the others, whatever its size.
+
+        Returns the share of the residuals that it explains and its coefficient, (fits, effects), and the
+        shift of the parameters by it, (fits, effects, known), in the steps of their columns.
+        """
+        system, normal = self.system, self.normal()
+        known, (fits, size) = system.known, system.lower.shape
+        effects = size - known
+        powers = [np.sum((v.data * v.roots) ** 2, axis=1) / v.variance for v in self.views]
+        power = np.sum(powers, axis=0)
+        gram, right = normal.matrix - system.precision, normal.right - system.pulled
+
+        def left(x: np.ndarray, gram: np.ndarray, right: np.ndarray) -> np.ndarray:
+            return np.sum(x * times(gram, x), axis=-1) - 2 * np.sum(x * right, axis=-1)
+
+        best, _ = normal.of(np.arange(known)).solved()
+        before = power + left(best, gram[:, :known, :known], right[:, :known])
+        both = np.stack([np.append(np.arange(known), known + i) for i in range(effects)])
+        square = both[:, :, None], both[:, None, :]
+        matrix = normal.matrix[:, *square]
+        matrix[..., -1, -1] += _WHATEVER**2 - 1
+
+        def rows(position: int) -> tuple[np.ndarray, np.ndarray]:
+            fit, effect = divmod(position, effects)
+            every, data = normal.rows(fit)
+            every[effect - effects, known + effect] = _WHATEVER
+            return every[:, both[effect]], data
+
+        flat = matrix.reshape(-1, known + 1, known + 1), normal.right[:, both].reshape(-1, known + 1)
+        free, covariance = Normal(*flat, rows).solved()
+        bounds = (x[:, both].reshape(free.shape) for x in (system.lower, system.upper))
+        found = held_within(free, covariance, *bounds).reshape(fits, effects, known + 1)
+        after = power[:, None] + left(found, gram[:, *square], right[:, both])
+        explains = 1 - after / np.maximum(before, 1e-300)[:, None]
+        return explains, found[..., -1], found[..., :-1] - best[:, None]
+
+
+def _remaining(view: Evidence, balance: _ViewBalance) -> tuple[Remaining, np.ndarray]:
+    """What remains of the residuals of a view, with numbers (fits,), and the noise (fits,) of its points."""
+    noise, left = np.array(view.noise, float), balance.rest * view.sigma
+    # a signal of its own, such as one ratio, is not diluted by others that the scene has right
+    signals = [list(group) for group in view.signals] or [slice(None)]
+    typical = np.max([bulk(left[..., own], noise) for own in signals], axis=0)
+    large = np.flatnonzero(typical > DOUBTFUL * noise)
+    if view.exact_noise is not None and len(large):
+        noise[large] = np.maximum(noise[large], view.exact_noise(large))
+    rests = [balance.rest[..., own] for own in signals]
+    weighted = np.max([np.sqrt(np.mean((huber_roots(x) * x) ** 2, axis=(1, 2))) for x in rests], axis=0)
+    return Remaining(typical / noise, typical, weighted, balance.variance), noise
+
+
+def _evidence_share(view: Evidence, balance: _ViewBalance) -> np.ndarray:
+    """Variance (fits,) of a point in the ranking over that which stands for it now; at most 1."""
+    counted, now = median(1 / view.weights, (1, 2)), median(view.sigma, (1, 2))
+    return np.minimum(1.0, counted**2 / (balance.variance * now**2))
+
+
+def _contributions(
+    system: _System, balance: _Balance, noises: Sequence[np.ndarray]
+) -> Iterator[Contribution]:
+    """Each effect of a system, of these noises of its views."""
+    if not system.effects:
+        return
+    known, normal, stretch = system.known, balance.normal(), system.stretch
+    _, covariance = normal.of(np.arange(known)).solved()
+    changes = -covariance @ normal.matrix[:, :known, known:]
+    explains, alone, shift = _Balance(system.by_noise(noises)).one_by_one()
+    for i, effect in enumerate(system.effects):
+        yield Contribution(
+            effect,
+            times(stretch, system.led(changes[:, :, i])),
+            system.led(effect.amount(balance.solution[:, known + i])),
+            system.led(explains[:, i]),
+            system.led(effect.amount(alone[:, i])),
+            times(stretch, system.led(shift[:, i])),
+        )

@@ -8,11 +8,12 @@ they do not have.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from pellicle.fitting.discrepancy import Contribution, Discrepancy, Remaining
+from pellicle.fitting.discrepancy import DOUBTFUL, Contribution, Discrepancy, Remaining
 
 STRUCTURED = 2.5
 """Ratio of unexplained residuals to the noise of neighbouring points, above which they have structure."""
@@ -27,8 +28,6 @@ EXPLAINS = 0.6
 """Share of the residuals' sum of squares that such an index explains alone where the scene has it wrong."""
 BETTER = 0.1
 """Share that it explains more than any effect of ordinary size does."""
-DOUBTFUL = 1.5
-"""Ratio of unexplained residuals to noise above which such an index is looked for."""
 
 
 class Accuracy(NamedTuple):
@@ -43,24 +42,28 @@ class Accuracy(NamedTuple):
     weighted: float = math.inf
 
 
-def misfit(discrepancy: Discrepancy, remaining: Remaining, accuracy: Accuracy) -> bool:
-    """True where the scene does not explain the data of one view."""
-    if discrepancy.implausible or beyond_accuracy(remaining, accuracy):
-        return True
-    return remaining.ratio > DOUBTFUL and other_material(discrepancy) is not None
+def misfit(discrepancy: Discrepancy, remaining: Remaining, accuracy: Accuracy) -> Any:
+    """True (...) where the scene does not explain the data of one view."""
+    wrong = discrepancy.implausible | beyond_accuracy(remaining, accuracy)
+    return wrong | ((remaining.ratio > DOUBTFUL) & (other_material(discrepancy.contributions) >= 0))
 
 
 def beyond_accuracy(remaining: Remaining, accuracy: Accuracy) -> Any:
-    """True where residuals that no effect explains are larger than instruments make; numbers or arrays."""
+    """True (...) where residuals that no effect explains are larger than instruments make."""
     large = remaining.typical > np.minimum(accuracy.largest, SPAN * accuracy.span)
     structured = (remaining.ratio > STRUCTURED) & (large | (remaining.weighted > accuracy.weighted))
     return structured | (large & (remaining.weighted > CONTRADICTED))
 
 
-def other_material(discrepancy: Discrepancy) -> Contribution | None:
-    """The index far from the given one that explains the residuals as no effect of ordinary size does."""
-    rows = discrepancy.contributions
-    usual = max((c.explains for c in rows if abs(c.alone) <= BEYOND * c.effect.size), default=0.0)
-    far = [c for c in rows if c.effect.material and abs(c.alone) > BEYOND * c.effect.size]
-    best = max(far, key=lambda c: c.explains, default=None)
-    return best if best is not None and best.explains > max(EXPLAINS, usual + BETTER) else None
+def other_material(contributions: Sequence[Contribution]) -> Any:
+    """Position (...) of the index far from the given one that explains the residuals as no effect of ordinary
+    size does, −1 where there is none."""
+    if not contributions:
+        return -1
+    explains = np.stack([c.explains for c in contributions])
+    far = np.stack([np.abs(c.alone) > BEYOND * c.effect.size for c in contributions])
+    material = np.reshape([c.effect.material for c in contributions], (-1, *[1] * (far.ndim - 1)))
+    usual = np.max(np.where(far, 0.0, explains), axis=0, initial=0.0)
+    least = np.maximum(EXPLAINS, usual + BETTER)
+    explains = np.where(far & material, explains, -np.inf)
+    return np.where(np.max(explains, axis=0) > least, np.argmax(explains, axis=0), -1)[()]

@@ -18,6 +18,7 @@ from pellicle.data.colours import Colours
 from pellicle.data.repeated_sweeps import deviations
 from pellicle.data.spectrum import Spectrum
 from pellicle.fitting.covariance import Scaled
+from pellicle.fitting.normal_equations import by_singular_values
 from pellicle.fitting.repeated_measurements import Agreement, RepeatedParameter, short
 from pellicle.fitting.result import Estimate
 from pellicle.fitting.reweighting import RankedMinima
@@ -66,9 +67,7 @@ def _steps(
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """For each spectrum the steps (sweeps, columns) of all parameters and nuisances that its sweeps make, and
     the standard error (columns,) that its noise contributes, in their own units."""
-    _, values, rows = np.linalg.svd(jacobian.jacobian, full_matrices=False)
-    values = np.maximum(values, np.finfo(float).eps * len(jacobian.jacobian) * max(values.max(), 1e-100))
-    inverse = jacobian.stretch @ (rows.T / values**2) @ rows  # of the normal equations
+    inverse = jacobian.stretch @ by_singular_values(jacobian.jacobian)
     result, first = [], 0
     for spectrum, view, fit in zip(data, ranked.problem.views, ranked.fits, strict=True):
         gain = inverse @ jacobian.jacobian[first : first + view.points].T

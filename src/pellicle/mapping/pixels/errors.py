@@ -8,19 +8,19 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
+from pellicle.fitting.covariance import Scaled, errors
+from pellicle.fitting.discrepancy import DOUBTFUL, Evidence, discrepancy
 from pellicle.fitting.film.evidence import LEAST_NOISE, SCATTER_OF_NOISE
 from pellicle.fitting.film.form import Local
 from pellicle.fitting.film.parts import LARGEST_ANGLES, LARGEST_DRIFT, LARGEST_POWER
 from pellicle.fitting.film.problem import shortest_wavelength
 from pellicle.fitting.film.sweeps import correlation_in_sweeps
 from pellicle.fitting.film.targets import Measured
-from pellicle.fitting.misfit import DOUBTFUL, Accuracy, beyond_accuracy
+from pellicle.fitting.misfit import Accuracy, misfit, other_material
 from pellicle.fitting.noise import DRIFT_CORRELATION, NoiseEstimate, noise_of, short_range_noise, student
 from pellicle.fitting.problem import NoiseGroup, Problem
 from pellicle.fitting.robust_losses import median
 from pellicle.fitting.status import RIVAL
-from pellicle.mapping.pixels.covariance import noise_covariance
-from pellicle.mapping.pixels.discrepancy import PixelEvidence, discrepancy, other_material
 from pellicle.mapping.pixels.effects import PixelEffects, nodes, of_pixels
 from pellicle.mapping.pixels.groups import BLOCK, Group, Taken, groups
 from pellicle.mapping.pixels.limits import PixelLimits, evidence_factor
@@ -114,56 +114,59 @@ class PixelErrors:
         return PixelFits(values, stderr, noise_sd, status, minima.values[who], delta, chi2, judged.rms)
 
     def _judged(self, data: PixelData, minima: PixelMinima, group: Group) -> _Judged:
-        view, kind, who = self.view, self.view.noise, group.pixels
+        view, who = self.view, group.pixels
         values, count = minima.values[who, 0], len(self.parameters)
         taken = Taken(group, view)
-        weight, residual = data.weight[who], data.values[who] - minima.model[who]
-        noise = self._noise(group, taken(weight * residual))
-        weight = weight * noise.scale
-        empty = np.zeros(0)
+        residual, empty = data.values[who] - minima.model[who], np.zeros(0)
+        noise = self._noise(group, taken(data.weight[who] * residual))
+        pixels = data.of(who)._replace(weight=data.weight[who] * noise.scale)
         at = Local(
             *(minima.signal[who], minima.slope[who], minima.model[who]),
             *(minima.gain[who], minima.offset[who], empty, empty),
         )
-        # the scaled Jacobian
-        flat, prior_sd = self.nuisances.columns(at, data.level[who])
-        steep = at.gain[:, : view.points, None] * at.slope[:, : view.points] * (self.upper - self.lower)
-        jacobian = np.concatenate([steep, flat], axis=2)
-        span = np.broadcast_to(self.upper - self.lower, values.shape)
-        stretch = np.concatenate([span, prior_sd], axis=1)
-        prior = np.concatenate([self.prior_weight * span, np.ones(prior_sd.shape)], axis=1)
-        own, _ = noise_covariance(jacobian * weight[..., None], noise.variance(kind), prior)
-        own = own * stretch[:, :, None] * stretch[:, None, :]
-        # systematic effects
-        frame, level = None if data.frame is None else data.frame[who], data.level[who]
-        units = minima.units[who, 0]
-        evidence, effects = self._evidence(
-            group,
-            taken,
-            at,
-            level,
-            frame,
-            residual,
-            jacobian,
-            weight,
-            noise,
-            prior,
-            values,
-            units,
+        jacobian, scaled = self._scaled(pixels, at, values, noise)
+        noise_errors = errors(scaled)
+        effects = self.effects.changes(of_pixels(view, pixels.frame), at, values)
+        effects = [replace(e, change=taken(e.change.reshape(len(who), -1))) for e in effects]
+        columns = taken(jacobian)[:, :, : view.measured_channels]
+        evidence = self._evidence(group, taken, pixels, residual, noise)._replace(
+            jacobian=columns, effects=effects
         )
-        found = discrepancy(evidence)
-        misfit = self._misfit(evidence, effects, found, taken(data.values[who])[..., 0], kind.drifting)
-        variance = np.einsum("pii->pi", found.covariance) + found.shift**2
-        more = np.maximum(variance * stretch**2 - np.einsum("pii->pi", own), 0.0)
+        found = discrepancy([evidence], scaled, minima.units[who, 0], contributions=False)
+        wrong = misfit(found, found.remaining[0], self._accuracy(taken(pixels.values)[..., 0]))
+        doubtful = np.flatnonzero((found.remaining[0].ratio > DOUBTFUL) & ~wrong)
+        if len(doubtful):
+            units = minima.units[who, 0][doubtful]
+            again = discrepancy([evidence.of(doubtful)], scaled.of(doubtful), units)
+            wrong[doubtful] = other_material(again.contributions) >= 0
         return _Judged(
             noise=noise,
-            covariance=own[:, :count, :count],
-            systematic=more[:, :count],
-            flat=self.limits.flat_sides(data, minima, who, noise, ~misfit),
-            misfit=misfit,
+            covariance=noise_errors.covariance[:, :count, :count],
+            systematic=np.maximum(found.variance - noise_errors.variance, 0.0)[:, :count],
+            flat=self.limits.flat_sides(data, minima, who, noise, ~wrong),
+            misfit=wrong,
             evidence_share=found.evidence_share,
             rms=_rms(taken(residual)),
         )
+
+    def _scaled(
+        self, pixels: PixelData, at: Local, values: np.ndarray, noise: NoiseEstimate
+    ) -> tuple[np.ndarray, Scaled]:
+        """The Jacobian (pixels, points, columns) in the unit of the data, and the scaled one."""
+        view, span = self.view, self.upper - self.lower
+        flat, prior_sd = self.nuisances.columns(at, pixels.level)
+        steep = at.gain[:, : view.points, None] * at.slope[:, : view.points] * span
+        jacobian = np.concatenate([steep, flat], axis=2)
+        stretch = np.concatenate([np.broadcast_to(span, values.shape), prior_sd], axis=1)
+        known = stretch.shape[1]
+        own = pixels.weight / np.sqrt(noise.variance(view.noise))[:, None]
+        priors = np.diag(np.concatenate([self.prior_weight * span, np.ones(flat.shape[2])]))
+        priors = np.broadcast_to(priors, (len(values), known, known))
+        pull = np.zeros(stretch.shape)
+        pull[:, : len(span)] = (values - self.prior_mean) * self.prior_weight
+        rows = np.concatenate([jacobian * own[..., None], priors], axis=1)
+        names = tuple(p.name for p in self.parameters) + ("",) * prior_sd.shape[1]
+        return jacobian, Scaled(rows, stretch[..., None] * np.eye(known), names, pull)
 
     def _noise(self, group: Group, residual: np.ndarray) -> NoiseEstimate:
         """Noise by the weighted residuals (pixels, rows, channels). Of three channels of ellipsometry two
@@ -183,71 +186,42 @@ class PixelErrors:
             return np.where(np.isfinite(deviance), deviance + (factor[:, None] - 1) * misfit, np.inf)
 
     def _evidence(
-        self, group, taken, at, level, frame, residual, jacobian, weight, noise, prior, values, units
-    ):
-        view, kind, keep = self.view, self.view.noise, self.view.measured_channels
-        pixels, known = len(values), jacobian.shape[2]
-        left = taken(residual)[..., :keep]
-        sigma = 1 / taken(weight)[..., :keep]
-        middle = typical = median(sigma, (1, 2))
-        counted = typical**2 / noise.fraction(kind)
-        least = LEAST_NOISE * level
+        self, group: Group, taken: Taken, pixels: PixelData, residual: np.ndarray, noise: NoiseEstimate
+    ) -> Evidence:
+        """Residuals and their noise: see `fitting.film.evidence`."""
+        kind, keep = self.view.noise, self.view.measured_channels
+        left, sigma = taken(residual)[..., :keep], 1 / taken(pixels.weight)[..., :keep]
+        weights = np.sqrt(noise.fraction(kind))[:, None, None] / sigma
+        least, typical = LEAST_NOISE * pixels.level, median(sigma, (1, 2))
 
         def short(which: np.ndarray) -> np.ndarray:
             return short_range_noise(left[which], group.parts, least[which])
 
         given = kind.known and not kind.drifting
-        own = typical if given else short(np.arange(pixels))
+        own = typical if given else short(np.arange(len(left)))
         if not kind.known:
-            own = middle = np.minimum(own, typical)
+            own = np.minimum(own, typical)
             sigma = np.broadcast_to(own[:, None, None], sigma.shape)
-        effects = self.effects.changes(of_pixels(view, frame), at, values)
-        extra = len(effects)
-        columns = np.empty((pixels, known + extra, left[0].size))
-        own_columns = taken(jacobian)[:, :, :keep].reshape(pixels, -1, known)
-        columns[:, :known] = np.swapaxes(own_columns, 1, 2)
-        for i, effect in enumerate(effects):
-            columns[:, known + i] = taken(effect.change.reshape(pixels, -1)).reshape(pixels, -1)
-        pull = np.zeros((pixels, known + extra))
-        pull[:, : values.shape[1]] = (values - self.prior_mean) * self.prior_weight
-        lower, upper = np.full((2, pixels, known + extra), [[[-np.inf]], [[np.inf]]])
-        lower[:, : values.shape[1]], upper[:, : values.shape[1]] = -units, 1 - units
-        for i, effect in enumerate(effects):
-            if effect.positive or effect.power == 2:
-                lower[:, known + i] = 0.0
-        evidence = PixelEvidence(
+        return Evidence(
             residual=left,
-            columns=columns,
+            jacobian=left[..., None],
             sigma=sigma,
             noise=own,
-            counted=counted,
-            prior=np.concatenate([prior, np.ones((pixels, extra))], axis=1),
-            pull=pull,
-            lower=lower,
-            upper=upper,
-            known=known,
+            weights=weights,
+            effects=[],
             correlation=lambda rest: correlation_in_sweeps(rest, group.parts),
             least=DRIFT_CORRELATION if kind.drifting else 1.0,
             uncertain=0.0 if kind.known else SCATTER_OF_NOISE / left.shape[1] ** 0.5,
-            middle=middle,
-            short=short if given else None,
+            exact_noise=short if given else None,
         )
-        return evidence, effects
 
-    def _misfit(self, evidence, effects, found, values, drifting) -> np.ndarray:
-        """Pixels that the scene does not explain: see `fitting.misfit`."""
+    def _accuracy(self, values: np.ndarray) -> Accuracy:
+        """The structure that no instrument makes in residuals of `values` (pixels, rows)."""
         if self.view.channels > 1:
-            accuracy = Accuracy(largest=LARGEST_ANGLES)
-        elif drifting:
-            accuracy = Accuracy(weighted=LARGEST_DRIFT)
-        else:
-            largest = LARGEST_POWER if self.calibrated else np.inf
-            accuracy = Accuracy(largest, np.ptp(values, axis=1))
-        misfit = found.implausible | beyond_accuracy(found.remaining, accuracy)
-        doubtful = np.flatnonzero((found.remaining.ratio > DOUBTFUL) & ~misfit)
-        if len(doubtful) and effects:
-            misfit[doubtful] = other_material(replace(evidence, noise=found.noise).of(doubtful), effects)
-        return misfit
+            return Accuracy(largest=LARGEST_ANGLES)
+        if self.view.noise.drifting:
+            return Accuracy(weighted=LARGEST_DRIFT)
+        return Accuracy(LARGEST_POWER if self.calibrated else np.inf, np.ptp(values, axis=1))
 
 
 def _joined(*pieces: Any) -> Any:

@@ -9,10 +9,10 @@ from pellicle.fitting.film.summary import FEWEST_FRINGES
 from pellicle.fitting.film.targets import drifts
 from pellicle.fitting.film.view import SpectrumView
 from pellicle.fitting.noise import NoiseEstimate, student
+from pellicle.fitting.normal_equations import solve
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.status import RIVAL
 from pellicle.mapping.pixels import profiles
-from pellicle.mapping.pixels.covariance import solve
 from pellicle.mapping.pixels.local_models import PixelArrays, deviances, in_lanes, locals_of, padded
 from pellicle.mapping.pixels.minima import PixelData, PixelMinima
 from pellicle.mapping.pixels.nuisances import Nuisances
