@@ -103,7 +103,7 @@ def test_the_assumed_thickness_is_said(pellicle, spectrum_file):
     assert ran.objects[0]["parameters"]["thickness"]["upper"] == 5000
 
 
-FILES = {"report.html", "report.txt", "result.json", "figure.png", "fit.csv", "nk.csv"}
+FILES = {"recipe.toml", "report.html", "report.txt", "result.json", "figure.png", "fit.csv", "nk.csv"}
 
 
 def test_out_writes_the_five_files(pellicle, spectrum_file, scene, tmp_path):

@@ -186,10 +186,6 @@ class _Own(AbstractDispersion):
         (pl.Scene(pl.Layer(1.5, 9.0), WithExtinction(pl.medium(1.5), pl.medium(0.1))), "the substrate"),
         (pl.Scene(pl.Layer(1.5, 9.0), "Si", instrument=pl.Instrument(scale=Drift(1))), "scale"),
         (
-            pl.Scene(pl.Layer(1.5, pl.Free(1.0, 9.0, limits=(0.0, 99.0))), "Si"),
-            "thickness has default",
-        ),
-        (
             pl.Scene(pl.Layer(1.5, 9.0), "Si", light=pl.Light([500.0, 600.0], [0.0, 9.0])),
             "angle",
         ),

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from concurrent.futures import BrokenExecutor
 from contextlib import nullcontext, redirect_stderr, redirect_stdout, suppress
 from dataclasses import dataclass, field, replace
+from functools import partial
 from io import StringIO
 from json import loads
 from logging import INFO
@@ -172,7 +173,7 @@ class Batch:
         from pellicle.cli.processes import in_order
 
         own = [
-            replace(self, inputs=self.inputs._replace(files=files), records=[], fits=[]) for files in groups
+            replace(self, inputs=replace(self.inputs, files=files), records=[], fits=[]) for files in groups
         ]
         with Progress(f"{len(tasks)} files") as progress:
             progress("fit", 0, len(tasks))
@@ -221,11 +222,7 @@ class Batch:
         code = CONVERGED if fit.status == "converged" else UNCLEAR
         if posterior is not None and not posterior.trusted:
             code = TOO_SHORT
-        return (
-            code
-            if folder is None
-            else max(code, _write(folder, fit, posterior, identity, self.inputs.described))
-        )
+        return code if folder is None else max(code, self._write(folder, files, fit, posterior, identity))
 
     def _repeat(self, found: Earlier, folder: Path) -> int:
         """Print the result of an earlier run, and return its exit code."""
@@ -252,20 +249,20 @@ class Batch:
         posterior = replace(posterior, fit=with_flags(posterior.fit))
         return posterior.fit, posterior
 
+    def _write(
+        self, folder: Path, files: list[Input], fit: Fit, posterior: Posterior | None, identity: str
+    ) -> int:
+        """Write the folder of a result, and return FAILED where it cannot be written."""
+        from pellicle.reporting.folders import write_fit
 
-def _write(
-    folder: Path, fit: Fit, posterior: Posterior | None, identity: str, described: dict[str, Any] | None
-) -> int:
-    """Write the folder of a result, and return FAILED where it cannot be written."""
-    from pellicle.reporting.folders import write_fit
-
-    try:
-        write_fit(folder, fit, posterior, identity, described)
-    except ValueError as error:  # the result is printed, and the other files go on
-        say(f"pellicle: {error}; the result is printed, and the same command writes its files")
-        return FAILED
-    say(f"{folder}: report, figures and tables written")
-    return CONVERGED
+        recipe = partial(self.inputs.recipe, files)
+        try:
+            write_fit(folder, fit, posterior, identity, self.inputs.described, recipe)
+        except ValueError as error:  # the result is printed, and the other files go on
+            say(f"pellicle: {error}; the result is printed, and the same command writes its files")
+            return FAILED
+        say(f"{folder}: report, figures and tables written")
+        return CONVERGED
 
 
 class _Captured(NamedTuple):

@@ -98,7 +98,7 @@ def _of_recipe(path: str) -> Session:
         except DataError as error:
             say(f"{error} (the explorer starts without data)")
     given = None if data.wavelengths is None else wavelengths(own, scene)
-    reading = {name: x for name, x in data.given().items() if name not in _OF_SCENE}
+    reading = {name: x for name, x in own.options.items() if name not in ("angle", "polarisation")}
     about = {"title": title, "spectra": spectra, "reading": reading}
     return Session(scene, Path(path).parent, wavelength=given, **about)
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from logging import getLogger
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pellicle.cli.flags import FileFlags, FitFlags, SceneFlags, named
@@ -42,28 +43,36 @@ class Input(NamedTuple):
     """A data file, the function that reads it, and the scene or surface that is fitted to it.
 
     Several spectra of one film in one file are fitted together; films of a file of colours one by one.
-    `own_scale` is true where the recipe gives this file a scale or an offset of its own.
+    `own_scale` is true where the recipe gives this file a scale or an offset of its own. `file` is the path
+    without the `name` of one of several spectra or films in it; empty for a sweep, which no recipe can name.
     """
 
     path: str
     read: Callable[[], list[Spectrum] | list[Colours] | list[BrdfSamples]]
     scene: Scene | Surface
     own_scale: bool = False
+    file: str = ""
+    name: str = ""
 
 
-class Inputs(NamedTuple):
+@dataclass(frozen=True)
+class Inputs:
     """Data files, fitted together (`joint`) or one by one, and the options of their fits.
 
     `repeats` is true where the files are repeated measurements of one spot. `described` is what the scene was
-    built from, for the record: the recipe, or the flags.
+    built from, for the record: the recipe, or the flags. `written` are the options of a recipe that repeats
+    the fits; `base` is its scene and `tables` are those of its `[[data.file]]`, where the recipe has them.
     """
 
     files: list[Input]
     joint: bool
-    fitting: FitOptions = FitOptions()
+    fitting: FitOptions = field(default_factory=FitOptions)
     residual: str | None = None
     repeats: bool = False
     described: dict[str, Any] | None = None
+    written: dict[str, Any] = field(default_factory=dict)
+    base: Scene | None = None
+    tables: list[dict[str, Any]] = field(default_factory=list)
 
     @property
     def loss(self) -> str:
@@ -79,6 +88,21 @@ class Inputs(NamedTuple):
     def groups(self) -> list[list[Input]]:
         """Files of each fit."""
         return [self.files] if self.joint else [[file] for file in self.files]
+
+    def recipe(self, files: list[Input], folder: Path) -> str:
+        """Text of a recipe in `folder` that repeats the fit of a group. Raises UsageError where none can."""
+        from pellicle.recipes.write import recipe_text
+
+        if not all(file.file for file in files):
+            raise UsageError("a recipe cannot name one of several sweeps")
+        paths = list(dict.fromkeys(file.file for file in files))
+        options = self.written | ({"joint": True} if self.joint else {})
+        if not self.joint and files[0].name:
+            options["spectrum"] = files[0].name
+        if self.base is None:
+            return recipe_text(files[0].scene, folder, files=paths, reading=options)
+        tables = [table for table in self.tables if table["path"] in paths]
+        return recipe_text(self.base, folder, reading=options, tables=tables)
 
 
 def inputs(
@@ -105,7 +129,10 @@ def inputs(
         described = {"recipe": recipe}
     described |= {"reading": how} if (how := reading.given() | fitting.given()) else {}
     options = fitting.over(result.fitting.given())
-    result = result._replace(joint=joint or result.joint, fitting=options, described=described)
+    written = result.written | options.given()
+    result = replace(
+        result, joint=joint or result.joint, fitting=options, described=described, written=written
+    )
     return result if repeats is None else _as_repeats(result, repeats or result.repeats)
 
 
@@ -120,7 +147,7 @@ def _as_repeats(files: Inputs, repeats: bool) -> Inputs:
     each = [sweep for file in files.files for sweep in _sweeps(file)]
     if len(each) < 2:
         raise UsageError("repeats are two files or more, or several sweeps in one; leave --repeats out")
-    return files._replace(files=each, repeats=True)
+    return replace(files, files=each, repeats=True)
 
 
 def _sweeps(file: Input) -> list[Input]:
@@ -130,7 +157,8 @@ def _sweeps(file: Input) -> list[Input]:
         count = len(getattr(one, "sweeps", ()))
     except ValueError:  # more than one, or an error that is reported when it is fitted
         return [file]
-    return [file._replace(read=partial(_sweep, file.read, i)) for i in range(count)] or [file]
+    sweeps = [file._replace(read=partial(_sweep, file.read, i), file="") for i in range(count)]
+    return sweeps or [file]
 
 
 def _sweep(read_file: Callable[[], Any], number: int) -> list[Spectrum]:
@@ -150,7 +178,8 @@ def _by_flags(files: list[str], scene_flags: SceneFlags, reading: FileOptions) -
     say(*scene_flags.assumed)
     _check_free(scene)
     check_camera(reading, [(file, reading) for file in files])
-    return Inputs([one for file in files for one in _film_inputs(file, scene, reading)], False)
+    inputs = [one for file in files for one in _film_inputs(file, scene, reading)]
+    return Inputs(inputs, False, written=_without_light(reading.given()))
 
 
 def _by_recipe(files: list[str], path: str, scene_flags: SceneFlags, reading: FileOptions) -> Inputs:
@@ -184,7 +213,19 @@ def _by_film_recipe(files: list[str], recipe: FilmRecipe, reading: FileOptions) 
         own_scale = any(table.rescales for table in own.tables.data.file)
         inputs += _film_inputs(file, scene, options, own_scale)
     data = recipe.tables.data
-    return Inputs(inputs, data.joint, FitOptions().over(data.given()), repeats=data.repeats)
+    result = Inputs(inputs, data.joint, FitOptions().over(data.given()), repeats=data.repeats)
+    if not recipe.each:
+        return replace(result, written=_without_light(reading.over(recipe.reading).given()))
+    tables = [
+        table.model_dump(exclude_unset=True) | recipe.with_files(table) | {"path": file} | reading.given()
+        for file, table in zip(files, data.file, strict=True)
+    ]
+    return replace(result, written=_without_light(recipe.reading), base=recipe.scene(), tables=tables)
+
+
+def _without_light(options: dict[str, Any]) -> dict[str, Any]:
+    """The options that the light of a scene does not state."""
+    return {name: x for name, x in options.items() if name not in ("angle", "polarisation")}
 
 
 def _by_surface_recipe(files: list[str], recipe: SurfaceRecipe, reading: FileOptions) -> Inputs:
@@ -201,8 +242,10 @@ def _by_surface_recipe(files: list[str], recipe: SurfaceRecipe, reading: FileOpt
     surface = recipe.scene()
     _check_free(surface, recipe.path)
     paths = _files(files, recipe)
-    inputs = [Input(path, partial(_samples, recipe, surface, path), surface) for path in paths]
-    return Inputs(inputs, False, residual=recipe.tables.data.residual)
+    inputs = [Input(path, partial(_samples, recipe, surface, path), surface, file=path) for path in paths]
+    data = recipe.tables.data
+    written = data.model_dump(exclude_none=True, exclude={"signal", "files"})
+    return Inputs(inputs, False, FitOptions().over(data.given()), residual=data.residual, written=written)
 
 
 def _files(files: list[str], recipe: FilmRecipe | SurfaceRecipe) -> list[str]:
@@ -223,10 +266,12 @@ def _film_inputs(path: str, scene: Scene, reading: FileOptions, own_scale: bool 
         try:
             films = read_films(path, reading)
         except ValueError:
-            return [Input(path, partial(read_films, path, reading), scene, own_scale)]
-        labels = [film.source if len(films) > 1 else path for film in films]
-        each = zip(labels, films, strict=True)
-        return [Input(label, partial(list, [film]), scene, own_scale) for label, film in each]
+            return [Input(path, partial(read_films, path, reading), scene, own_scale, path)]
+        if len(films) == 1:
+            return [Input(path, partial(list, films), scene, own_scale, path)]
+        return [
+            Input(film.source, partial(list, [film]), scene, own_scale, path, film.name) for film in films
+        ]
     refuse_camera(path, reading)
     read_file = partial(read, path, reading, free_scale=isinstance(scene.instrument.scale, Drift))
     if reading.spectrum == ALL:
@@ -235,8 +280,11 @@ def _film_inputs(path: str, scene: Scene, reading: FileOptions, own_scale: bool 
         except ValueError:
             found = []  # reported when it is fitted
         if len(found) > 1:
-            return [Input(f"{path} [{one.name}]", partial(list, [one]), scene, own_scale) for one in found]
-    return [Input(path, read_file, scene, own_scale)]
+            return [
+                Input(f"{path} [{one.name}]", partial(list, [one]), scene, own_scale, path, one.name)
+                for one in found
+            ]
+    return [Input(path, read_file, scene, own_scale, path)]
 
 
 def _samples(recipe: SurfaceRecipe, surface: Surface, path: str) -> list[BrdfSamples]:

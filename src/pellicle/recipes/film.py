@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import BaseModel
 
 from pellicle.data.cameras import Camera, Sight, sight
-from pellicle.data.options import SPACES, Options, ReadingOptions
+from pellicle.data.options import SPACES, FitOptions, Options, ReadingOptions
 from pellicle.errors import DataError, UsageError
 from pellicle.recipes import media_words
 from pellicle.recipes.media import FreeTable, Medium, Number, PriorTable, medium, number
@@ -80,15 +80,27 @@ class FilmRecipe:
     @property
     def camera(self) -> dict[str, Any]:
         """The keys of `[camera]` that the recipe gives, with paths of files."""
-        return self._with_paths(self.tables.camera)
+        return self.with_paths(self.tables.camera)
 
     @property
     def reading(self) -> dict[str, Any]:
         """The options of `[data]` and `[camera]` for reading files that the recipe gives."""
-        given = self._with_paths(self.tables.data)
+        given = self.with_paths(self.tables.data)
         return {name: x for name, x in given.items() if name in ReadingOptions.declared()} | self.camera
 
-    def _with_paths(self, table: Options) -> dict[str, Any]:
+    @property
+    def options(self) -> dict[str, Any]:
+        """The options of reading and fitting that the recipe gives."""
+        return self.reading | FitOptions().over(self.tables.data.given()).given()
+
+    def with_files(self, table: FileTable) -> dict[str, Any]:
+        """The files that a table of `[[data.file]]` names, from the working folder."""
+        files = {name for name, (_, option) in table.declared().items() if option.is_file}
+        found = {name: x for name, x in self.with_paths(table).items() if name in files}
+        return found | ({"camera": camera} if (camera := self.with_paths(table.camera)) else {})
+
+    def with_paths(self, table: Options) -> dict[str, Any]:
+        """The options that a table gives, with paths of files from the working folder."""
         declared, folder = table.declared(), Path(self.path).parent
         return {
             name: os.path.normpath(folder / x) if declared[name][1].is_file else x

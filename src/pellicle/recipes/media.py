@@ -57,12 +57,16 @@ class PriorTable(BaseModel):
 
 
 class FreeTable(BaseModel):
-    """A free number by its bounds, with optional start value and prior; or a fixed one by its value."""
+    """A free number by its bounds, with optional start value and prior; or a fixed one by its value.
+
+    `limits` mark default bounds, which a fit of spectra may widen up to them.
+    """
 
     model_config = ConfigDict(extra="forbid")
     value: float | None = None
     lower: float | None = None
     upper: float | None = None
+    limits: tuple[float, float] | None = None
     prior: PriorTable | None = None
 
 
@@ -133,7 +137,7 @@ def number(value: Number, name: str, minimum: float | None = None) -> float | Fr
     else:
         try:
             prior = None if value.prior is None else value.prior.prior()
-            result = Free(value.lower, value.upper, start=value.value, prior=prior)
+            result = Free(value.lower, value.upper, start=value.value, prior=prior, limits=value.limits)
         except ValueError as error:
             raise UsageError(f"{name}: {error}") from None
         lowest = value.lower

@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from pellicle.brdf.models import MODELS as BRDF_MODELS
 from pellicle.data.brdf_samples import BrdfSamples
+from pellicle.data.options import FitOptions
 from pellicle.data.read_brdf import read_brdf_samples
 from pellicle.data.sensors import band_sensor
 from pellicle.errors import DataError, UsageError
@@ -25,7 +26,7 @@ class _Table(BaseModel):
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
 
-class SurfaceDataTable(_Table):
+class SurfaceDataTable(_Table, FitOptions):  # pyright: ignore[reportGeneralTypeIssues]
     """`[data]`: `noise` is a standard deviation (1/sr) or a share of the signal ("2 %"), for all channels or
     for each; `residual` is the scale of the comparison, `samples` the most to keep of a file, `max_theta` the
     largest angle from the normal (degrees) of samples to keep."""

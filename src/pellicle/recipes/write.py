@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from pellicle.colour.observers import ILLUMINANTS, OBSERVERS
+from pellicle.data.options import CameraOptions, FileOptions
 from pellicle.data.sensors import SRGB, band_sensor
 from pellicle.errors import UsageError
 from pellicle.files import write_text
@@ -68,16 +69,19 @@ def recipe_text(
     files: Iterable[str | os.PathLike[str]] = (),
     wavelength: np.ndarray | None = None,
     reading: Mapping[str, Any] = MappingProxyType({}),
+    tables: Sequence[Mapping[str, Any]] = (),
 ) -> str:
     """Return the text of a recipe that lies in `folder`; the rest as for `write_recipe`.
 
     `wavelength` in nm, (wavelengths,), is that of a light which has none: each of its angles and azimuths is
-    seen at all of them. `reading` has the options of `[data]` by which the files are read.
+    seen at all of them. `reading` has the options of `[data]` and `[camera]` by which the files are read and
+    fitted; `tables` are those of `[[data.file]]`. Paths in both are relative to the working folder.
     """
     check_scene(scene)
     at = Path(folder)
-    data = {"files": [Path(os.path.relpath(file, at)).as_posix() for file in files]}
-    data = {key: names for key, names in data.items() if names}
+    names = [_relative(file, at) for file in files]
+    data, camera = _options(reading, at)
+    data = ({"files": names} if names else {}) | data
     if isinstance(scene, Surface):
         text = _document({"data": {"signal": "brdf", **data}, "scene.surface": _surface(scene, at)})
         again: Any = checked(tomllib.loads(text), str(at / "recipe")).scene()
@@ -86,15 +90,36 @@ def recipe_text(
     sampled = {} if wavelength is None else {"wavelengths": _wavelengths(wavelength)}
     text = _document(
         {
-            "data": _data(scene) | sampled | data | dict(reading),
+            "data": _data(scene) | sampled | data,
+            "data.file": [_file(table, at) for table in tables],
             "scene": _scene(scene, at),
             "scene.layer": [_layer(layer, i, scene, at) for i, layer in enumerate(scene.layers)],
             "instrument": _instrument(scene),
+            "camera": camera,
         }
     )
     again: Any = checked(tomllib.loads(text), str(at / "recipe")).scene()
     _check_film(with_wavelength(scene, None), again)
     return text
+
+
+def _relative(path: str | os.PathLike[str], folder: Path) -> str:
+    return Path(os.path.relpath(path, folder)).as_posix()
+
+
+def _options(reading: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Keys of `[data]` and of `[camera]`, with paths relative to `folder`."""
+    files = {name for name, (_, option) in FileOptions.declared().items() if option.is_file}
+    keys = {name: _relative(x, folder) if name in files else x for name, x in reading.items()}
+    camera = CameraOptions.declared().keys() & keys.keys()
+    return {name: x for name, x in keys.items() if name not in camera}, {name: keys[name] for name in camera}
+
+
+def _file(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """A table of `[[data.file]]`, with paths relative to `folder`."""
+    keys, camera = _options({**table, **table.get("camera", {})}, folder)
+    keys.pop("camera", None)
+    return keys | {"path": _relative(table["path"], folder)} | ({"camera": camera} if camera else {})
 
 
 def _data(scene: Scene) -> dict[str, Any]:

@@ -39,13 +39,9 @@ _SPLINE: dict[type, str] = {Spline: "spline", KramersKronigSpline: "spline-kk"}
 def number(thing: Any, name: str) -> float | dict[str, Any]:
     """Return a number as a float, a `Free` as a table of its bounds. Raises UsageError for anything else."""
     if isinstance(thing, Free):
-        if thing.limits is not None:
-            raise UsageError(
-                f"{name} has default bounds that a fit may widen, which a recipe cannot state: give it bounds"
-                " of your own"
-            )
+        limits = {} if thing.limits is None else {"limits": [*thing.limits]}
         start = {} if thing.start == 0.5 * (thing.lower + thing.upper) else {"value": thing.start}
-        return {**start, "lower": thing.lower, "upper": thing.upper, **_prior(thing)}
+        return {**start, "lower": thing.lower, "upper": thing.upper, **limits, **_prior(thing)}
     if isinstance(thing, bool) or np.ndim(thing) != 0 or not hasattr(thing, "__float__"):
         raise UsageError(f"{name} must be a number or pl.Free(lower, upper) in a recipe, not {thing!r}")
     return float(thing)

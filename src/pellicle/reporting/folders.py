@@ -5,12 +5,14 @@ from __future__ import annotations
 import csv
 import os
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from importlib.metadata import version
 from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pellicle.errors import UsageError
 from pellicle.files import MARKER, new_folder, write_text
 from pellicle.reporting.json_record import indented, to_json, versions
 from pellicle.reporting.repeats import FILES as REPEATS
@@ -38,6 +40,7 @@ def write_fit(
     posterior: Posterior | None = None,
     fingerprint: str = "",
     described: Mapping[str, Any] | None = None,
+    recipe: Callable[[Path], str] | None = None,
 ) -> Path:
     """Write a fit, and its posterior if there is one, into a folder.
 
@@ -45,7 +48,8 @@ def write_fit(
     principal index of a birefringent layer; a posterior
     adds posterior.nc, corner.png and predictive.png. Each file appears complete or not at all; files of an
     earlier result are replaced. A `fingerprint` of what was fitted is added to result.json when all files are
-    written. `described` is what the scene was built from, a recipe or flags.
+    written. `described` is what the scene was built from, a recipe or flags. `recipe` gives the text of
+    recipe.toml, a recipe in a folder that repeats the fit.
 
     **Returns:** the folder.
 
@@ -66,6 +70,9 @@ def write_fit(
     write_text(target / MARKER, indented(record), overwrite=True)  # first: it marks the folder as ours
     write_text(target / REPORT, report(fit, posterior), overwrite=True)
     write_text(target / "fit.csv", fit_csv(fit), overwrite=True)
+    if recipe is not None:
+        with suppress(UsageError):  # of a scene that no recipe can express
+            write_text(target / "recipe.toml", recipe(target), overwrite=True)
     if fit.layer_test is None:
         for name, table in nk_csvs(fit).items():
             write_text(target / name, table, overwrite=True)
@@ -85,7 +92,7 @@ def write_fit(
         save_figure(draw_predictions(predictions), target / "predictive.png", overwrite=True)
         pictures = {name: (target / f"{name}.png").read_bytes() for name in ("corner", "predictive")}
     image = (target / "figure.png").read_bytes()
-    text = fit_page(fit, image, posterior, pictures, repetition(fit, described))
+    text = fit_page(fit, image, posterior, pictures, repetition(fit, described, recipe))
     write_text(target / PAGE, text, overwrite=True)
     if fingerprint:
         write_text(target / MARKER, indented(record | {FINGERPRINT: fingerprint}), overwrite=True)

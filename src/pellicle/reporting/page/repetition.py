@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,10 +18,13 @@ _LONGEST = 200_000
 """Bytes of a recipe above which it is not copied into the page."""
 
 
-def repetition(fit: Fit, described: Mapping[str, Any] | None) -> list[tuple[str, str]]:
+def repetition(
+    fit: Fit, described: Mapping[str, Any] | None, recipe_in: Callable[[Path], str] | None = None
+) -> list[tuple[str, str]]:
     """Descriptions and texts of the command and the recipe of a fit; only the recipe for a fit in Python.
 
-    `described` is what the scene was built from: a recipe's path, or flags.
+    `described` is what the scene was built from: a recipe's path, or flags. `recipe_in` gives the text of a
+    recipe in a folder that repeats a fit by flags.
     """
     if described is None:
         return _written(fit)
@@ -35,7 +38,10 @@ def repetition(fit: Fit, described: Mapping[str, Any] | None) -> list[tuple[str,
     joint = ["--joint"] if len(files) > 1 and recipe is None else []
     result = [("Command", shlex.join([*words, *joint]))]
     if recipe is None:
-        return [*result, *_written(fit)]
+        try:
+            return [*result, *([("Recipe", recipe_in(Path()))] if recipe_in else _written(fit))]
+        except UsageError:
+            return result
     text = _text(Path(recipe))
     return result if text is None else [*result, (f"Recipe {Path(recipe).name}", text)]
 
