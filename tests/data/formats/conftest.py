@@ -1,20 +1,9 @@
-"""What the tests of all readers share: writing files, encodings of them, and refusals."""
+"""What the tests of all readers share: writing files, and refusals."""
 
-import numpy as np
 import pytest
 
 from pellicle.data.read_spectrum import read_spectra
 from pellicle.errors import DataError, UsageError
-
-ENCODINGS = {
-    "CRLF": lambda text: text.replace("\n", "\r\n").encode(),
-    "CR": lambda text: text.replace("\n", "\r").encode(),
-    "BOM": lambda text: b"\xef\xbb\xbf" + text.encode(),
-    "UTF-16": lambda text: text.encode("utf-16"),
-    "UTF-16 without a mark": lambda text: text.encode("utf-16-le"),
-    "Latin-1": lambda text: text.encode("latin-1"),
-    "no line end": lambda text: text.rstrip("\n").encode(),
-}
 
 
 @pytest.fixture
@@ -27,25 +16,6 @@ def write(tmp_path):
         return path
 
     return write
-
-
-@pytest.fixture
-def same_in_every_encoding(write):
-    """Check that a text is read to the same spectra however it is encoded."""
-
-    def check(text, **reading):
-        def read(content):
-            return read_spectra(write(content), **({"spectrum": "all"} | reading))
-
-        expected = read(text)
-        for name, encode in ENCODINGS.items():
-            found = read(encode(text))
-            assert [one.name for one in found] == [one.name for one in expected], name
-            for one, other in zip(found, expected, strict=True):
-                np.testing.assert_array_equal(one.wavelength, other.wavelength, err_msg=name)
-                np.testing.assert_array_equal(one.values, other.values, err_msg=name)
-
-    return check
 
 
 @pytest.fixture

@@ -8,29 +8,12 @@ import pytest
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.errors import UsageError
 
+SAMPLES = Path(__file__).with_name("samples")
+
 REAL = Path(__file__).resolve().parents[3] / "measurements" / "ellipsometry"
 
-ACCURION = """\
-#Lambda\tBandwidth\tAOI\tDelta\tPsi\tZone\tROIidx\tX_pos
-#nm\tnm\tdeg\tdeg\tdeg\t-\t-\tmm
-658.0\t2.0\t50.000\t170.0\t31.0\t1\t000\t-6.980
-658.0\t2.0\t50.000\t171.0\t31.2\t2\t000\t-6.980
-658.0\t2.0\t60.000\t160.0\t23.0\t1\t000\t-6.978
-658.0\t2.0\t60.000\tNaN\tNaN\t2\t000\t-6.978
-658.0\t2.0\t50.000\t170.5\t31.1\t0\t000\t-6.980
-658.0\t2.0\t60.000\tNaN\tNaN\t0\t000\t-6.978
-658.0\t2.0\t70.000\t140.5\t11.1\t0\t000\t-6.973
-658.0\t2.0\t50.000\t1.0\t0.2\t5\t000\t-6.980
-658.0\t2.0\t60.000\tNaN\tNaN\t5\t000\t-6.978
-658.0\t2.0\t70.000\t1.5\t0.3\t5\t000\t-6.973
-"""
-IMAGE = """\
-#ROIidx\tAOI\tLambda\tROI_x\tDelta\tPsi
-#-\tdeg\tnm\tµm\tdeg\tdeg
-0\t40.000\t365.0\t417.6\t179.75\t32.5
-0\t40.000\t370.0\t417.6\t180.25\t33.5
-0\t50.000\t365.0\t417.6\t178.75\t24.5
-"""
+ACCURION = (SAMPLES / "accurion/zones.txt").read_text(encoding="utf-8")
+IMAGE = (SAMPLES / "accurion/regions.txt").read_text(encoding="utf-8")
 
 
 def assert_read(spectrum, **expected):
@@ -173,8 +156,3 @@ def test_the_first_spot_is_a_part_of_the_whole():
     assert len(part) == 2 + 5 * 6
     assert part == [line for line in whole if line in set(part)]
     assert len({tuple(line.split("\t")[11:13]) for line in part[2:]}) == 1
-
-
-@pytest.mark.parametrize("text", [ACCURION, IMAGE])
-def test_encodings(same_in_every_encoding, text):
-    same_in_every_encoding(text)

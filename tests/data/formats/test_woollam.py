@@ -1,72 +1,22 @@
 """Woollam's text files: static, dynamic, with depolarisation, reflectance and transmittance."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from pellicle.data.read_spectrum import read_spectra, read_spectrum
 
-WVASE = """\
-oxide on silicon, 3 zones
-VASEmethod[EllipsometerType=5, Isotropic, WVASE=3.688, HardVer=6.256, Mon Jul 10 14:15:02 2023]
-Original[oxide.dat]
-nm
-400.000000\t65.000000\t20.5\t170.25\t0.05\t0.4
-410.000000\t65.000000\t21.5\t-10.5\t0.06\t0.5
-400.000000\t75.000000\t12.5\t120.25\t0.07\t0.6
-"""
-COMPLETE_EASE = """\
-oxide on silicon
-VASEmethod[EllipsometerType=7, Isotropic+Depolarization]
-Original[oxide.SE]
-eV
-E\t3.0\t65.0\t20.5\t170.25\t0.05\t0.4
-E\t2.0\t65.0\t21.5\t265.5\t0.06\t0.5
-dpolE\t3.0\t65.0\t1.5\t0.1
-dpolE\t2.0\t65.0\t-0.25\t0.2
-"""
-IN_SITU = """\
+SAMPLES = Path(__file__).with_name("samples")
 
-VASEmethod[EllipsometerType=4, CompleteEASE=3.65, AcqTime=30.0]
-nm
-400.5\t70.000\t21.5\t145.5\t0.0140\t0.0318\t
-dPolE\t400.5\t0.000\t-5.25\t1.0000
-uR\t400.5\t0.000\t0.6504\t1.0000
-401.5\t70.000\t21.0\t147.5\t0.0130\t0.0295\t
-dPolE\t401.5\t0.000\t-4.50\t1.0000
-uR\t401.5\t0.000\t0.7099\t1.0000
-"""
-DYNAMIC = """\
-
-VASEmethod[EllipsometerType=4, CompleteEASE=3.65, AcqTime=0.978]
-Dynamic
-nm
-400.5\t70.000\t30.5\t121.5\t0.05\t0.22\t\t0.0232
-402.5\t70.000\t29.5\t122.5\t0.06\t0.20\t\t0.0232
-400.5\t70.000\t30.25\t121.25\t0.07\t0.22\t\t0.1071
-402.5\t70.000\t29.25\t122.25\t0.08\t0.20\t\t0.1071
-"""
-JOINT = """\
-oxide on silicon
-VASEmethod[EllipsometerType=5, Isotropic, WVASE=3.688]
-Original[oxide.dat]
-nm
-E\t400\t65\t20.5\t170.25\t0.05\t0.4
-E\t410\t65\t21.5\t169.5\t0.06\t0.5
-pR\t400\t25\t0.45\t0.002
-pR\t410\t25\t0.44\t0.003
-sR\t400\t25\t0.55\t0.004
-sR\t410\t25\t0.54\t0.005
-uT\t400\t0\t0.12\t0.001
-"""
-REFLECTANCE = """\
-Measured data written by ADAP
-nm
-uR  418.2788  0.000000  0.443593  0.010000
-uR  421.5761  0.000000  0.439625  0.020000
-"""
-TRIGONOMETRIC = "nm  TRIG\n300 70  1.0    0.5\n400 70  .5    -.5\n"
+WVASE = (SAMPLES / "woollam/wvase.txt").read_text(encoding="utf-8")
+COMPLETE_EASE = (SAMPLES / "woollam/complete_ease.txt").read_text(encoding="utf-8")
+IN_SITU = (SAMPLES / "woollam/in_situ.txt").read_text(encoding="utf-8")
+DYNAMIC = (SAMPLES / "woollam/dynamic.txt").read_text(encoding="utf-8")
+JOINT = (SAMPLES / "woollam/joint.txt").read_text(encoding="utf-8")
+REFLECTANCE = (SAMPLES / "woollam/reflectance.txt").read_text(encoding="utf-8")
+TRIGONOMETRIC = (SAMPLES / "woollam/trigonometric.txt").read_text(encoding="utf-8")
 
 
 def test_static(write):
@@ -358,14 +308,3 @@ def test_refused(refused):
     refused(WVASE.replace("\nnm\n", "\nfurlongs\n"))
     refused(heading)
     refused(WVASE[:-20], "line 7 is not")
-
-
-@pytest.mark.parametrize("text", [WVASE, COMPLETE_EASE, IN_SITU, DYNAMIC, JOINT, REFLECTANCE, TRIGONOMETRIC])
-def test_encodings(same_in_every_encoding, text):
-    same_in_every_encoding(text)
-
-
-def test_decimal_commas(write):
-    heading, rows = WVASE.split("nm\n")
-    comma = read_spectrum(write(heading + "nm\n" + rows.replace(".", ",")))
-    np.testing.assert_array_equal(comma.delta, [170.25, 120.25, 349.5])

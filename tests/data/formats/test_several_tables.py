@@ -2,61 +2,19 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
-import pytest
 
 from pellicle.data.read_spectrum import read_spectra, read_spectrum
 
-CARY = """\
-Baseline 100%T,,film 1,,film 2,,
-Wavelength (nm),%T,Wavelength (nm),%T,Wavelength (nm),%T,
-800,50.1,800,90,800,80,
-799,50.2,799,91,799,81,
-798,50.3,798,92,,,
+SAMPLES = Path(__file__).with_name("samples")
 
-Baseline 100%T
-Collection Time: 3/5/2024 10:12:52 AM
-Operator Name :
-Scan Software Version: 3.00(182)
-Parameter List :
-  Instrument                        Cary 5000
-  Start (nm)                        800.0
-
-film 1
-Collection Time: 3/5/2024 10:13:52 AM
-
-film 2
-Collection Time: 3/5/2024 10:14:52 AM
-<Wavelength> 800, 3.0
-"""
-ONE_SCAN = """\
-film 1,
-Wavelength (nm),Abs,
-800,1,
-799,0.5,
-
-film 1
-Collection Time: 3/5/2024 10:13:52 AM
-"""
-UVPROBE = """\
-"film, 3 - RawData","","film 4 - RawData",""
-"Wavelength nm.","R%","Wavelength nm.","R%"
-300.00,10.0,300.00,20.0
-301.00,11.0,301.00,21.0
-"""
-UVPROBE_ONE = '"film 3 - RawData"\n"Wavelength nm.","T%"\n300.00,10.0\n301.00,11.0\n'
-STACKED = """\
-1,4TZ 1
-7/9/2024 3:33:26 PM
-Wavelength (nm),Absorbance
-400.00,0.1
-399.00,0.2
-second
-7/9/2024 3:35:26 PM
-Wavelength (nm),Absorbance
-400.00,0.3
-399.00,0.4
-"""
+CARY = (SAMPLES / "scans_side_by_side/cary.txt").read_text(encoding="utf-8")
+ONE_SCAN = (SAMPLES / "scans_side_by_side/one_scan.txt").read_text(encoding="utf-8")
+UVPROBE = (SAMPLES / "scans_side_by_side/uvprobe.txt").read_text(encoding="utf-8")
+UVPROBE_ONE = (SAMPLES / "scans_side_by_side/uvprobe_one.txt").read_text(encoding="utf-8")
+STACKED = (SAMPLES / "stacked_tables/two.txt").read_text(encoding="utf-8")
 
 
 def by_name(path, **reading):
@@ -124,11 +82,6 @@ def test_stacked_tables(write, refused):
     np.testing.assert_allclose(found["second"].values, 10.0 ** -np.array([0.4, 0.3]))
     np.testing.assert_array_equal(found["second"].lines, [10, 9])
     refused(STACKED, "2 spectra", "'second'")
-
-
-@pytest.mark.parametrize("text", [CARY, UVPROBE, UVPROBE_ONE, STACKED])
-def test_every_encoding(same_in_every_encoding, text):
-    same_in_every_encoding(text)
 
 
 def test_what_cannot_be_read(refused):
