@@ -24,7 +24,7 @@ def test_the_reference_is_the_simulation_of_the_scene():
 def test_a_table_of_films_at_normal_incidence():
     films = films_of_scene(pl.Scene(pl.Layer(1.4, pl.Free(50, 80)), 3.9), np.array([0.0]))
     table = next(method for method in COLOUR_METHODS if method.name == "table of the film")
-    np.testing.assert_allclose(table.program(films).run(), reference_colours(films), atol=1e-3)
+    np.testing.assert_allclose(table.apply(films).run(), reference_colours(films), atol=1e-3)
 
 
 @pytest.mark.parametrize(

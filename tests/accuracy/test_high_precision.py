@@ -7,8 +7,8 @@ import pytest
 import tmm
 
 import pellicle as pl
+from pellicle.accuracy.film_methods import reference_signal
 from pellicle.accuracy.high_precision import signal
-from pellicle.accuracy.reference import reference_signal
 from pellicle.errors import UsageError
 from pellicle.scene.instrument import Instrument
 

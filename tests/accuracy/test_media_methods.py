@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.accuracy.compiled import compiled
-from pellicle.accuracy.methods import METHODS
-from pellicle.accuracy.reference import reference_signal
+from pellicle.accuracy.case import compiled
+from pellicle.accuracy.film_methods import METHODS, reference_signal
 from pellicle.effects.film_plan import alternatives
 from pellicle.errors import UsageError
 
@@ -26,7 +25,7 @@ def film(material):
 
 def answer(case, name):
     """Signal of a method, (draws, wavelengths)."""
-    return compiled(case, BY_NAME[name].variant(case)).run()
+    return compiled(case, BY_NAME[name].apply(case)).run()
 
 
 def aligned():
@@ -49,8 +48,8 @@ def test_aligned_axes_are_at_the_next_right_angles():
     reference = aligned()._replace(draws=tilted.draws[:, 1:])
     assert np.all(reference.draws >= 100)
     np.testing.assert_allclose(answer(tilted, "aligned axes"), answer(reference, "float64"), atol=1e-14)
-    assert "the full plan has them" in str(BY_NAME["4×4 matrices"].variant(tilted))
-    assert "no optic axis is tilted" in str(BY_NAME["aligned axes"].variant(aligned()))
+    assert "the full plan has them" in str(BY_NAME["4×4 matrices"].apply(tilted))
+    assert "no optic axis is tilted" in str(BY_NAME["aligned axes"].apply(aligned()))
 
 
 @pytest.mark.slow  # compiles the 4×4 method; tests/optics compares both methods

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.accuracy.compiled import compiled
-from pellicle.accuracy.methods import METHODS
+from pellicle.accuracy.case import compiled
+from pellicle.accuracy.film_methods import METHODS
 from pellicle.scene.instrument import Instrument
 
 from .conftest import NM, few
@@ -19,11 +19,12 @@ BY_NAME = {method.name: method for method in METHODS}
 
 def answer(case, name):
     """Signal of a method, (draws, wavelengths)."""
-    return compiled(case, BY_NAME[name].variant(case)).run()
+    method = BY_NAME[name]
+    return compiled(case, method.apply(case), method.double).run()
 
 
 def reason(case, name):
-    variant = BY_NAME[name].variant(case)
+    variant = BY_NAME[name].apply(case)
     assert isinstance(variant, str)
     return variant
 
@@ -63,7 +64,7 @@ def test_single_precision_is_single(oblique):
 def test_what_is_planned_is_within_the_tolerance():
     """A bandwidth that hardly blurs the fringes may go, and most of the cost with it."""
     case = few(pl.Scene(pl.Layer(2.2, 300.0), 1.5, instrument=Instrument(bandwidth=1.0)), draws=1)
-    full, planned = (compiled(case, BY_NAME[name].variant(case)) for name in ("float64", "planned"))
+    full, planned = (compiled(case, BY_NAME[name].apply(case)) for name in ("float64", "planned"))
     assert 0 < np.abs(planned.run() - full.run()).max() < case.tolerance
     assert planned.flops < full.flops / 3
 
@@ -111,7 +112,7 @@ def test_a_blur_a_cone_and_a_back_face_are_left_out():
 
 def test_methods_that_do_not_apply_say_why():
     case = few(pl.Scene(pl.Layer(2.2, 300.0), 1.5))
-    assert {name for name in BY_NAME if not isinstance(BY_NAME[name].variant(case), str)} == {
+    assert {name for name in BY_NAME if not isinstance(BY_NAME[name].apply(case), str)} == {
         *("float64", "float32", "planned", "incoherent", "twice the wavelengths", "every 2nd wavelength"),
         *("1 order", "2 orders", "3 orders", "5 orders", "8 orders"),
     }

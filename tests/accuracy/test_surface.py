@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from pellicle.accuracy import colour_methods
-from pellicle.accuracy.measure import MethodComparison, MethodResult
-from pellicle.accuracy.renderer_methods import RENDERER_METHODS
-from pellicle.accuracy.surface import BRDF_METHODS, COLOUR_METHODS, SurfaceCost, films_of, random_draws
+from pellicle.accuracy.colour_methods import COLOUR_METHODS
+from pellicle.accuracy.registry import Comparison, Result
+from pellicle.accuracy.surface import BRDF_METHODS, SurfaceCost, films_of, random_draws
 from pellicle.colour import delta_e2000, lab, sensor
 from pellicle.dispersion.empirical import along_the_spectrum
+from pellicle.rendering.renderer_methods import RENDERER_METHODS
 from pellicle.reporting.cost_files import to_json
 from pellicle.reporting.cost_text import text
 from pellicle.scene.free import Free
@@ -54,7 +55,7 @@ def test_the_error_of_a_method_is_true(films):
             ("uniform-16", 1e-3, 0.2),
             ("table of the film", 0.0, 0.02),
         ):
-            found = BY_NAME[name].program(films).run()
+            found = BY_NAME[name].apply(films).run()
             off = np.mean(
                 delta_e2000(*(np.asarray(lab(np.asarray(x, float), eye.white)) for x in (found, true)))
             )
@@ -67,7 +68,7 @@ def renderer_errors(films, *names):
     eye, rungs = sensor(), {method.name: method for method in RENDERER_METHODS}
     true = airy(eye.wavelength, films.numbers["thickness"], 2.9, 2.7 + 2.8j, films.angle) @ eye.weights
     with jax.enable_x64(True):
-        return [colour_methods.error(eye, true, rungs[name].program(films).run()) for name in names]
+        return [colour_methods.error(eye, true, rungs[name].apply(films).run()) for name in names]
 
 
 def test_renderers_are_rungs(films):
@@ -75,9 +76,7 @@ def test_renderers_are_rungs(films):
     gltf, materialx = renderer_errors(films, "glTF, as it is", "MaterialX, as it is")
     assert gltf > 15 > 4 > materialx > 0.5
     free = films._replace(numbers={**films.numbers, "n": np.linspace(2.0, 2.9, 8)})
-    assert {method.program(free) for method in RENDERER_METHODS} == {
-        "its indices are free: it is for one film"
-    }
+    assert {method.apply(free) for method in RENDERER_METHODS} == {"its indices are free: it is for one film"}
 
 
 @pytest.mark.slow
@@ -88,21 +87,19 @@ def test_solved_renderers_are_rungs(films):
 
 def test_angles_may_be_spared(films):
     with jax.enable_x64(True):
-        exact, few = (
-            BY_NAME[name].program(films).run() for name in ("uniform-64", "uniform-64 at 16 angles")
-        )
+        exact, few = (BY_NAME[name].apply(films).run() for name in ("uniform-64", "uniform-64 at 16 angles"))
     # 1.04e-4: `film_colour.node_count` asks for 32 angles where 1e-4 is to be kept
     np.testing.assert_allclose(few, exact, atol=2e-4)
 
 
 def test_what_makes_no_sense_says_why(films):
     absorbing = films._replace(numbers={**films.numbers, "k": np.full(8, 0.1)})
-    assert BY_NAME["belcour-barla"].program(absorbing) == "it has no absorbing layer"
+    assert BY_NAME["belcour-barla"].apply(absorbing) == "it has no absorbing layer"
     thick = films._replace(thickest=800.0)
-    assert BY_NAME["nodes-6-500"].program(thick) == "its wavelengths are for films up to 500 nm"
+    assert BY_NAME["nodes-6-500"].apply(thick) == "its wavelengths are for films up to 500 nm"
     free = films._replace(numbers={**films.numbers, "n": np.linspace(2.0, 2.9, 8)})
-    assert BY_NAME["table of the film"].program(free) == "its indices are free: it is for one film"
-    assert "too few angles" in BY_NAME["uniform-64 at 32 angles"].program(films)
+    assert BY_NAME["table of the film"].apply(free) == "its indices are free: it is for one film"
+    assert "too few angles" in BY_NAME["uniform-64 at 32 angles"].apply(films)
     assert "defined at three wavelengths only" in films_of(PAINT, random_draws(PAINT))
     each = surface_view(Surface("blinn-phong-film", {}), default_directions(), 8)
     free = dataclasses.replace(each, numbers={**each.numbers, "n": [Free(1.4, 1.5)] * 3})
@@ -118,7 +115,7 @@ def test_values_of_three_wavelengths_lie_on_a_line():
 
 
 def test_values_leave_out_what_is_there():
-    plans = {method.name: method.plan(PAINT, 1e-3) for method in BRDF_METHODS if method.name != "planned"}
+    plans = {method.name: method.apply(PAINT, 1e-3) for method in BRDF_METHODS if method.name != "planned"}
     missing = {name for name, plan in plans.items() if isinstance(plan, str)}
     assert missing == {
         *("8 angles", "16 angles", "32 angles", "normal incidence", "s alone", "transparent film"),
@@ -128,18 +125,12 @@ def test_values_leave_out_what_is_there():
 
 
 def test_record_and_report_say_the_same():
-    seen = MethodComparison(
-        "steps of 1 nm",
-        0.5,
-        "ΔE2000",
-        40,
-        64,
-        "colour",
-        [MethodResult("nodes-6-500", "x", 0.2, 1e-7, 1.0, 900.0)],
+    one, other = (
+        Result(name, "x", error, seconds, 1.0, {"flops": flops})
+        for name, error, seconds, flops in (("nodes-6-500", 0.2, 1e-7, 900.0), ("float64", 0.0, 9e-8, None))
     )
-    values = MethodComparison(
-        "float64", 1e-3, "relative", 40, 64, "sample", [MethodResult("float64", "y", 0.0, 9e-8, 1.0, None)]
-    )
+    seen = Comparison("colour", "steps of 1 nm", 0.5, "ΔE2000", 40, 64, results=[one])
+    values = Comparison("brdf", "float64", 1e-3, "relative", 40, 64, results=[other])
     record = to_json(SurfaceCost(seen, values), "steel.toml")
     assert (record["schema"], record["unit"], record["recommended"]) == (
         "pellicle.cost/1",

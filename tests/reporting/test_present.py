@@ -10,7 +10,7 @@ import pytest
 
 import pellicle as pl
 from pellicle.accuracy.cost import Cost
-from pellicle.accuracy.measure import MethodComparison, MethodResult
+from pellicle.accuracy.registry import Comparison, Result
 from pellicle.accuracy.surface import SurfaceCost
 from pellicle.errors import UsageError
 from pellicle.fitting.comparison import compare
@@ -122,10 +122,10 @@ def test_other_objects_have_no_report():
 
 
 def test_a_cost_reports_draws_and_saves_itself(tmp_path):
-    methods = MethodComparison("float64", 1e-3, "R", 61, 64)
+    methods = Comparison("forward", "float64", 1e-3, "R", 61, 64)
     methods.results = [
-        MethodResult("one order", "higher orders", 5e-4, 1e-6, 0.1, 1e3, True),
-        MethodResult("float64", "", 0.0, 2e-6, 0.2, 2e3, True),
+        Result("one order", "higher orders", 5e-4, 1e-6, 0.1, {"flops": 1e3}, True),
+        Result("float64", "", 0.0, 2e-6, 0.2, {"flops": 2e3}, True),
     ]
     film = Cost(methods, None, "nothing is free to fit")
     surface = SurfaceCost(None, methods, "the surface has no film")

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -16,17 +16,24 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.accuracy.compiled import Program, compiled_function
+from pellicle.accuracy.case import Program, compiled_function
+from pellicle.accuracy.registry import Comparison, Method, measure
 from pellicle.brdf import film_colour
 from pellicle.colour import FilmColourTable, delta_e2000, integration_bands, lab, sensor
 from pellicle.colour.bands import Bands
 from pellicle.colour.film import reflectance
 from pellicle.colour.observers import Sensor
 from pellicle.dispersion.empirical import Table
+from pellicle.errors import UsageError
+from pellicle.fitting.progress import Progress
 
 EYE = ("1931", "D65")
 FINE = "uniform-64"
 """Integration of practically exact colours, with which fewer angles are measured."""
+
+
+COLOUR_TOLERANCE = 0.5
+"""Default tolerance: mean ΔE2000."""
 
 
 class Films(NamedTuple):
@@ -44,15 +51,6 @@ class Films(NamedTuple):
     def absorbs(self) -> bool:
         """True where the film has an extinction."""
         return "k" in self.numbers
-
-
-@dataclass(frozen=True)
-class ColourMethod:
-    """A method of computing colours; `program` compiles it for films, or returns why it does not apply."""
-
-    name: str
-    leaves_out: str
-    program: Callable[[Films], Program | str]
 
 
 def xyz(bands: Bands, numbers: dict[str, Any], angle: Any) -> Any:
@@ -178,31 +176,43 @@ def reference_colours(films: Films) -> np.ndarray:
 _SAMPLES = "the spectrum between them"
 COLOUR_METHODS = (
     *(
-        ColourMethod(f"points-{rgb}", "all but three wavelengths", partial(_by_way, f"points-{rgb}"))
+        Method(f"points-{rgb}", "all but three wavelengths", partial(_by_way, f"points-{rgb}"))
         for rgb in ("650-510-475", "645-525-445")
     ),
-    ColourMethod("belcour-barla", "the sensors' shape: 4 Gaussians", partial(_by_way, "belcour-barla")),
+    Method("belcour-barla", "the sensors' shape: 4 Gaussians", partial(_by_way, "belcour-barla")),
     *(
-        ColourMethod(
-            f"gaussians-{n}", f"the sensors' shape: {n} Gaussians", partial(_by_way, f"gaussians-{n}")
-        )
+        Method(f"gaussians-{n}", f"the sensors' shape: {n} Gaussians", partial(_by_way, f"gaussians-{n}"))
         for n in (4, 5, 6, 8, 10)
     ),
-    ColourMethod("gaussians-8 in float64", "as gaussians-8", partial(_by_way, "gaussians-8", double=True)),
+    Method("gaussians-8 in float64", "as gaussians-8", partial(_by_way, "gaussians-8", double=True)),
     *(
-        ColourMethod(f"nodes-{n}-{d}", _SAMPLES, partial(_by_nodes, n, d))
+        Method(f"nodes-{n}-{d}", _SAMPLES, partial(_by_nodes, n, d))
         for d, counts in ((500, (3, 4, 6, 8, 12)), (1000, (8, 12, 16)))
         for n in counts
     ),
     *(
-        ColourMethod(f"{kind}-{n}", _SAMPLES, partial(_by_way, f"{kind}-{n}"))
+        Method(f"{kind}-{n}", _SAMPLES, partial(_by_way, f"{kind}-{n}"))
         for kind in ("uniform", "frequency")
         for n in (8, 16, 32, 64)
     ),
     *(
-        ColourMethod(f"{FINE} at {n} angles", "the angles between them", partial(_by_angles, n))
+        Method(f"{FINE} at {n} angles", "the angles between them", partial(_by_angles, n))
         for n in (8, 16, 32)
     ),
-    ColourMethod("table of the film", "the colours between its nodes", _by_table),
+    Method("table of the film", "the colours between its nodes", _by_table),
 )
-"""Every method of computing a colour, in the order of the table."""
+"""Methods of computing a colour by this package and by its predecessors, in the order of the table."""
+
+
+def compare_colours(
+    films: Films, tolerance: float, progress: Progress, methods: Sequence[Method] = COLOUR_METHODS
+) -> Comparison:
+    """Measure every method of computing the colours of films. Raises UsageError without colour-science."""
+    try:
+        reference = reference_colours(films)
+        error_of = partial(error, sensor(*EYE), reference)
+        error_of(reference)  # fails without colour-science
+    except ImportError as missing:
+        raise UsageError(str(missing)) from None
+    comparison = Comparison("colour", "steps of 1 nm", tolerance, "ΔE2000", films.angle.size, len(reference))
+    return measure(comparison, methods, lambda method: method.apply(films), error_of, progress)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import equinox as eqx
@@ -9,10 +10,11 @@ import jax
 import numpy as np
 
 from pellicle.accuracy.case import case
-from pellicle.accuracy.interval_coverage import IntervalComparison, compare_intervals
-from pellicle.accuracy.measure import MethodComparison, compare_methods
+from pellicle.accuracy.film_methods import compare_methods
+from pellicle.accuracy.intervals import INTERVAL_METHODS, compare_intervals
+from pellicle.accuracy.registry import Comparison, Method
 from pellicle.accuracy.simulated_data import data_sets
-from pellicle.accuracy.solver_comparison import SolverComparison, compare_solvers
+from pellicle.accuracy.solvers import compare_solvers
 from pellicle.errors import UsageError
 from pellicle.fitting.presentation import PlotMixin
 from pellicle.fitting.progress import Progress, quiet
@@ -32,10 +34,10 @@ class Cost(PlotMixin):
     nothing was fitted, and `no_solvers` says why.
     """
 
-    methods: MethodComparison
-    solvers: SolverComparison | None
+    methods: Comparison
+    solvers: Comparison | None
     no_solvers: str = ""
-    intervals: IntervalComparison | None = None
+    intervals: Comparison | None = None
 
     @property
     def interrupted(self) -> bool:
@@ -53,6 +55,7 @@ def cost(
     noise: float | None = None,
     datasets: int = 20,
     time_limit: float = 120.0,
+    interval_methods: Sequence[Method] = INTERVAL_METHODS,
     progress: Progress = quiet,
 ) -> Cost:
     """Measure every method of computing the signal of a scene at `wavelength` (nm), and of fitting it.
@@ -84,4 +87,6 @@ def cost(
         solvers = compare_solvers(data, noise, progress, time_limit=time_limit)
         if solvers.interrupted:
             return Cost(methods, solvers)
-        return Cost(methods, solvers, intervals=compare_intervals(data, progress, time_limit=time_limit))
+        return Cost(
+            methods, solvers, intervals=compare_intervals(data, progress, interval_methods, time_limit)
+        )

@@ -9,14 +9,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.accuracy.case import Case
-from pellicle.accuracy.compiled import compiled
-from pellicle.accuracy.variant import Variant
+from pellicle.accuracy.case import Case, Variant, compiled
 from pellicle.data.generalised import RATIOS, SIGNAL
 from pellicle.fitting.film.problem import make
 from pellicle.fitting.film.targets import Measured
 from pellicle.fitting.problem import Explained, Form, Problem
-from pellicle.scene.film import Scene
+from pellicle.scene.film import Scene, with_wavelength
 from pellicle.scene.free import free_leaves
 
 
@@ -41,6 +39,7 @@ def data_sets(case: Case, scene: Scene, noise: float, count: int, seed: int = 0)
     free. `noise` is the standard deviation of every point in the unit of the signal; for ellipsometry it is
     in degrees of Ψ, and that of N, C and S twice as large on their sphere.
     """
+    scene = with_wavelength(scene, case.wavelength)
     free = [leaf for _, leaf in free_leaves(case.scene)]
     low, high = np.array([f.lower for f in free]), np.array([f.upper for f in free])
     start = (np.array([f.start for f in free]) - low) / (high - low)

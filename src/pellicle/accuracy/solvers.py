@@ -1,12 +1,11 @@
-"""Solvers: methods of finding the free parameters of a scene from a spectrum."""
+"""Solvers: methods of finding the free parameters of a scene from a spectrum, and their comparison."""
 
 from __future__ import annotations
 
 import importlib
 import importlib.util
 import warnings
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -14,11 +13,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.accuracy.simulated_data import DataSet, deviance, deviance_and_slope, residual
+from pellicle.accuracy.registry import Comparison, Method, OnData, measure_on_data
+from pellicle.accuracy.simulated_data import DataSet, deviance, deviance_and_slope, deviances, residual
 from pellicle.fitting.film.search import search
 from pellicle.fitting.minima import solve
 from pellicle.fitting.problem import Form
-from pellicle.fitting.progress import quiet
+from pellicle.fitting.progress import Progress, quiet
+from pellicle.fitting.status import RIVAL
 
 STEPS = 100
 """Most steps of a solver of another package."""
@@ -26,17 +27,6 @@ CANDIDATES, SURVIVORS = 256, (64, 16, 4)
 """Successive halving: random starts, and how many of them continue after every few steps, the last ones to
 convergence."""
 FEW_STEPS = 4
-
-
-@dataclass(frozen=True)
-class Solver:
-    """A solver; `find` returns the best point of the unit cube. `missing` names a package that is not
-    installed."""
-
-    name: str
-    leaves_out: str
-    find: Callable[[DataSet], np.ndarray]
-    missing: str | None = None
 
 
 def _best(units: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
@@ -103,28 +93,58 @@ def _from_start(run: Callable[..., Any], data: DataSet) -> np.ndarray:
     return np.asarray(run(*data.program, jnp.asarray(data.start)))
 
 
-def _absent(package: str) -> str | None:
-    return None if importlib.util.find_spec(package) else package
-
-
-_NO_JACOBIAN = "the search, and the residuals' Jacobian"
 SOLVERS = (
-    Solver(
+    Method(
         "LM, start once",
         "the search: one descent from the recipe's start",
         lambda data: _from(data, data.start[None]),
     ),
-    Solver("scan + LM", "nothing: the search of `pl.fit`", lambda data: search(data.problem, quiet).units[0]),
-    Solver("successive halving", "the scan: most of 256 random starts, soon", _halving),
-    Solver("multistart, 16", "the scan: 16 random starts", partial(_multistart, 16)),
-    Solver("multistart, 64", "the scan: 64 random starts", partial(_multistart, 64)),
-    Solver("L-BFGS-B, scipy", "the search, and the residuals' Jacobian", _scipy_lbfgsb, _absent("scipy")),
-    Solver(
+    Method("scan + LM", "nothing: the search of `pl.fit`", lambda data: search(data.problem, quiet).units[0]),
+    Method("successive halving", "the scan: most of 256 random starts, soon", _halving),
+    Method("multistart, 16", "the scan: 16 random starts", partial(_multistart, 16)),
+    Method("multistart, 64", "the scan: 64 random starts", partial(_multistart, 64)),
+    Method("L-BFGS-B, scipy", "the search, and the residuals' Jacobian", _scipy_lbfgsb),
+    Method(
         "L-BFGS-B, jaxopt",
         "the search, and the residuals' Jacobian",
         partial(_from_start, _jaxopt_run),
-        _absent("jaxopt"),
+        missing=None if importlib.util.find_spec("jaxopt") else "jaxopt",
     ),
-    Solver("LM, Optimistix's own", "the search, and the bounds", partial(_from_start, _optimistix_run)),
+    Method("LM, Optimistix's own", "the search, and the bounds", partial(_from_start, _optimistix_run)),
 )
 """Every solver, in the order of the table."""
+
+
+def _deviance(data: DataSet, unit: np.ndarray) -> float:
+    value = float(deviances(*data.program, unit[None])[0])
+    return value if np.isfinite(value) else np.inf
+
+
+def compare_solvers(
+    data: Sequence[DataSet],
+    noise: float,
+    progress: Progress,
+    solvers: Sequence[Method] = SOLVERS,
+    *,
+    time_limit: float = np.inf,
+) -> Comparison:
+    """Fit every data set with every solver in turn; see `measure_on_data`."""
+    comparison = Comparison("inverse", noise=noise, requested=len(data))
+    how = OnData("data sets", lambda one: one, _score, _summary)
+    return measure_on_data(comparison, solvers, data, how, progress, time_limit)
+
+
+def _score(data: DataSet) -> Callable[[np.ndarray], tuple[float, bool]]:
+    """Score of a solver's answer: the largest error of any parameter, and whether it missed the minimum."""
+    least = _deviance(data, from_truth(data))
+
+    def score(unit: np.ndarray) -> tuple[float, bool]:
+        inside = np.clip(np.nan_to_num(unit, nan=0.5), 0.0, 1.0)
+        return float(np.max(np.abs(inside - data.truth))), bool(_deviance(data, inside) > least + RIVAL)
+
+    return score
+
+
+def _summary(scores: list[tuple[float, bool]]) -> tuple[float, dict[str, Any]]:
+    errors, failures = zip(*scores, strict=True)
+    return float(np.mean(errors)), {"median_error": float(np.median(errors)), "failures": sum(failures)}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -11,13 +11,10 @@ from typing import Any
 import jax
 import numpy as np
 
-from pellicle.accuracy import colour_methods
-from pellicle.accuracy.colour_methods import COLOUR_METHODS, Films
-from pellicle.accuracy.compiled import Program, compiled_function
-from pellicle.accuracy.measure import MethodComparison, measure
-from pellicle.accuracy.renderer_methods import RENDERER_METHODS
+from pellicle.accuracy.case import Program, compiled_function
+from pellicle.accuracy.colour_methods import COLOUR_METHODS, COLOUR_TOLERANCE, Films, compare_colours
+from pellicle.accuracy.registry import Comparison, Method, measure
 from pellicle.brdf.directions import angle_to_half
-from pellicle.colour import sensor
 from pellicle.dispersion.empirical import along_the_spectrum
 from pellicle.effects import surface_plan
 from pellicle.effects.surface_plan import FLOOR, SurfaceRemoval, exact
@@ -31,8 +28,8 @@ from pellicle.scene.surface import SurfaceView
 
 DRAWS = 64
 """Number of surfaces drawn between the bounds: enough to hide the cost of a call."""
-COLOUR_TOLERANCE, VALUE_TOLERANCE = 0.5, 1e-3
-"""Default tolerances: mean ΔE2000, and relative error of a BRDF."""
+VALUE_TOLERANCE = 1e-3
+"""Default tolerance: relative error of a BRDF."""
 
 
 @dataclass
@@ -42,8 +39,8 @@ class SurfaceCost(PlotMixin):
     `colours` is None where the surface has no film with a colour of its own, and `no_colours` says why.
     """
 
-    colours: MethodComparison | None
-    values: MethodComparison
+    colours: Comparison | None
+    values: Comparison
     no_colours: str = ""
 
     @property
@@ -52,11 +49,17 @@ class SurfaceCost(PlotMixin):
         return self.values.interrupted or (self.colours is not None and self.colours.interrupted)
 
 
-def cost(view: SurfaceView, *, tolerance: float | None = None, progress: Progress = quiet) -> SurfaceCost:
+def cost(
+    view: SurfaceView,
+    *,
+    tolerance: float | None = None,
+    colours: Sequence[Method] = COLOUR_METHODS,
+    progress: Progress = quiet,
+) -> SurfaceCost:
     """Measure every method of computing the colours of a surface, and its BRDF.
 
-    `tolerance` is in mean ΔE2000; where the surface has no film with a colour, it is relative, as in
-    `effects.surface_plan.plan`.
+    `colours` are the methods of computing a colour. `tolerance` is in mean ΔE2000; where the surface has no
+    film with a colour, it is relative, as in `effects.surface_plan.plan`.
 
     **Raises:** UsageError for a tolerance that is not above zero, and without colour-science.
     """
@@ -67,8 +70,8 @@ def cost(view: SurfaceView, *, tolerance: float | None = None, progress: Progres
         films = films_of(view, draws)
         if isinstance(films, str):
             return SurfaceCost(None, _values(view, draws, tolerance or VALUE_TOLERANCE, progress), films)
-        colours = compare_colours(films, tolerance or COLOUR_TOLERANCE, progress)
-        return SurfaceCost(colours, _values(view, draws, VALUE_TOLERANCE, progress))
+        compared = compare_colours(films, tolerance or COLOUR_TOLERANCE, progress, colours)
+        return SurfaceCost(compared, _values(view, draws, VALUE_TOLERANCE, progress))
 
 
 def random_draws(view: SurfaceView, count: int = DRAWS, seed: int = 0) -> np.ndarray:
@@ -101,36 +104,6 @@ def films_of(view: SurfaceView, draws: np.ndarray) -> Films | str:
     return Films(numbers, angle, float(np.max(numbers["thickness"])))
 
 
-def compare_colours(films: Films, tolerance: float, progress: Progress) -> MethodComparison:
-    """Measure every method of computing the colours of films. Raises UsageError without colour-science."""
-    try:
-        reference = colour_methods.reference_colours(films)
-        error = partial(colour_methods.error, sensor(*colour_methods.EYE), reference)
-        error(reference)  # fails without colour-science
-    except ImportError as missing:
-        raise UsageError(str(missing)) from None
-    comparison = MethodComparison(
-        "steps of 1 nm", tolerance, "ΔE2000", films.angle.size, len(reference), "colour"
-    )
-    return measure(
-        comparison,
-        (*COLOUR_METHODS, *RENDERER_METHODS),
-        lambda method: method.program(films),
-        error,
-        progress,
-    )
-
-
-@dataclass(frozen=True)
-class BrdfMethod:
-    """A method of computing a BRDF; `plan` is its plan for a surface, or why it does not apply."""
-
-    name: str
-    leaves_out: str
-    plan: Callable[[SurfaceView, float], Plan | str]
-    double: bool = True
-
-
 def _without(effect: str, absent: str, view: SurfaceView, tolerance: float) -> Plan | str:
     if not any(row.effect == effect and row.on for row in exact(view).rows):
         return absent
@@ -150,47 +123,42 @@ def _by_angles(count: int, view: SurfaceView, tolerance: float) -> Plan | str:
 
 
 BRDF_METHODS = (
-    BrdfMethod("float64", "nothing", lambda view, _: exact(view)),
-    BrdfMethod("float32", "nine digits of sixteen", lambda view, _: exact(view), double=False),
-    BrdfMethod("planned", "what its plan leaves out", surface_plan.plan),
-    *(
-        BrdfMethod(f"{n} angles", "the film's colour between them", partial(_by_angles, n))
-        for n in (8, 16, 32)
-    ),
-    BrdfMethod("mean wavelengths", "the bands", partial(_without, "bands", "it has no sensor")),
-    BrdfMethod("without interference", "interference", partial(_without, "coherence", "it has none")),
-    BrdfMethod("normal incidence", "the film's angle", partial(_without, "oblique", "no oblique film")),
-    BrdfMethod("s alone", "p", partial(_without, "polarisation", "s and p are equal")),
-    BrdfMethod("transparent film", "its absorption", partial(_without, "absorption", "no film absorbs")),
-    BrdfMethod(
+    Method("float64", "nothing", lambda view, _: exact(view)),
+    Method("float32", "nine digits of sixteen", lambda view, _: exact(view), double=False),
+    Method("planned", "what its plan leaves out", surface_plan.plan),
+    *(Method(f"{n} angles", "the film's colour between them", partial(_by_angles, n)) for n in (8, 16, 32)),
+    Method("mean wavelengths", "the bands", partial(_without, "bands", "it has no sensor")),
+    Method("without interference", "interference", partial(_without, "coherence", "it has none")),
+    Method("normal incidence", "the film's angle", partial(_without, "oblique", "no oblique film")),
+    Method("s alone", "p", partial(_without, "polarisation", "s and p are equal")),
+    Method("transparent film", "its absorption", partial(_without, "absorption", "no film absorbs")),
+    Method(
         "single scattering",
         "light reflected more than once",
         partial(_without, "multiple-scattering", "it is not asked for"),
     ),
-    BrdfMethod("parallel boundaries", "the deviation", partial(_without, "deviation", "they are parallel")),
-    BrdfMethod("no lobe of the coat", "the clear coat's lobe", partial(_without, "coat", "it has no coat")),
-    BrdfMethod("no diffuse part", "the diffuse part", partial(_without, "diffuse", "it has none")),
-    BrdfMethod("diffuse part alone", "the lobe", partial(_without, "roughness", "there is no lobe")),
-    BrdfMethod(
-        "one wavelength", "the other channels", partial(_without, "spectral-sampling", "it has only one")
-    ),
+    Method("parallel boundaries", "the deviation", partial(_without, "deviation", "they are parallel")),
+    Method("no lobe of the coat", "the clear coat's lobe", partial(_without, "coat", "it has no coat")),
+    Method("no diffuse part", "the diffuse part", partial(_without, "diffuse", "it has none")),
+    Method("diffuse part alone", "the lobe", partial(_without, "roughness", "there is no lobe")),
+    Method("one wavelength", "the other channels", partial(_without, "spectral-sampling", "it has only one")),
 )
 """Every method of computing a BRDF, in the order of the table."""
 
 
-def _values(view: SurfaceView, draws: np.ndarray, tolerance: float, progress: Progress) -> MethodComparison:
+def _values(view: SurfaceView, draws: np.ndarray, tolerance: float, progress: Progress) -> Comparison:
     truth = _program(view, draws, exact(view)).run()
     scale = np.maximum(np.abs(truth), FLOOR)
 
-    def prepare(method: BrdfMethod) -> Program | str:
-        plan = method.plan(view, tolerance)
+    def prepare(method: Method) -> Program | str:
+        plan = method.apply(view, tolerance)
         return plan if isinstance(plan, str) else _program(view, draws, plan.static_key, method.double)
 
     def error(values: np.ndarray) -> float:
         worst = float(np.max(np.abs(np.asarray(values, float) - truth) / scale))
         return worst if math.isfinite(worst) else math.inf
 
-    comparison = MethodComparison("float64", tolerance, "relative", len(view.i), len(draws), "sample")
+    comparison = Comparison("brdf", "float64", tolerance, "relative", len(view.i), len(draws))
     return measure(comparison, BRDF_METHODS, prepare, error, progress)
 
 

@@ -129,19 +129,24 @@ def cost(
     scene, for a scene whose signal is 0 everywhere, and for the colours of a surface without
     colour-science.
     """
+    from pellicle.accuracy.colour_methods import COLOUR_METHODS
     from pellicle.accuracy.cost import cost as film_cost  # solvers, a fifth of the time of importing this
     from pellicle.accuracy.film_colours import colour_cost
+    from pellicle.accuracy.intervals import INTERVAL_METHODS
     from pellicle.accuracy.surface import cost as surface_cost
+    from pellicle.rendering.renderer_methods import RENDERER_METHODS
+    from pellicle.sampling.sampled_intervals import SAMPLED_INTERVALS
 
     check_scene(scene)
+    colours = (*COLOUR_METHODS, *RENDERER_METHODS)
     if isinstance(scene, Surface):
         refuse("a Surface", wavelength=wavelength, noise=noise, space=space, angle=angle)
         view = viewed(scene, directions)
-        return surface_cost(view, tolerance=tolerance, progress=progress)
+        return surface_cost(view, tolerance=tolerance, colours=colours, progress=progress)
     refuse("a Scene", directions=directions)
     if space is not None:
         refuse("colours", wavelength=wavelength, noise=noise)
-        return colour_cost(scene, angle, tolerance=tolerance, progress=progress)
+        return colour_cost(scene, angle, tolerance=tolerance, methods=colours, progress=progress)
     refuse("spectra, whose angle is that of the scene's light", angle=angle)
     if wavelength is None:
         own = scene.light.wavelength
@@ -154,5 +159,6 @@ def cost(
         noise=noise,
         datasets=datasets,
         time_limit=time_limit,
+        interval_methods=(*INTERVAL_METHODS, *SAMPLED_INTERVALS),
         progress=progress,
     )

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from pellicle.accuracy.cost import Cost
-    from pellicle.accuracy.measure import MethodComparison
+    from pellicle.accuracy.registry import Comparison
     from pellicle.accuracy.surface import SurfaceCost
 
 FLOOR = 1e-17
@@ -46,7 +46,7 @@ def draw(cost: Cost | SurfaceCost, name: str = "scene") -> Figure:
     return figure
 
 
-def _methods(axes: Axes, methods: MethodComparison, name: str) -> list[Label]:
+def _methods(axes: Axes, methods: Comparison, name: str) -> list[Label]:
     """Draw methods of simulation, and return the labels of their points."""
     unit, scale = time_unit(methods)
     labels = _scatter(axes, methods.results, methods.recommended, scale)

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import csv
-import math
 import os
-from collections.abc import Iterable
-from dataclasses import asdict
 from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +13,7 @@ from pellicle.reporting.json_record import indented, versions
 
 if TYPE_CHECKING:
     from pellicle.accuracy.cost import Cost
-    from pellicle.accuracy.measure import MethodComparison
+    from pellicle.accuracy.registry import Comparison
     from pellicle.accuracy.surface import SurfaceCost
 
 SCHEMA = "pellicle.cost/1"
@@ -43,15 +40,12 @@ def to_json(cost: Cost | SurfaceCost, recipe: str) -> dict[str, Any]:
 
 def _film(cost: Cost) -> dict[str, Any]:
     methods, solvers, intervals = cost.methods, cost.solvers, cost.intervals
-    rungs = _rungs("colour" if methods.sample == "colour" else "forward", methods.results)
-    rungs += [] if solvers is None else _rungs("inverse", solvers.results)
-    rungs += [] if intervals is None else _rungs("interval", intervals.results)
     omitted = [part.left_out for part in (methods, solvers, intervals) if part is not None]
     return {
         **_summary(methods),
         "wavelengths": methods.wavelengths,
         "draws": methods.draws,
-        "rungs": rungs,
+        "rungs": _rungs(methods, solvers, intervals),
         "recommended_solver": None if solvers is None else solvers.recommended,
         "recommended_interval": None if intervals is None else intervals.recommended,
         "noise": None if solvers is None else solvers.noise,
@@ -61,26 +55,28 @@ def _film(cost: Cost) -> dict[str, Any]:
 
 
 def _surface(cost: SurfaceCost) -> dict[str, Any]:
-    kinds = {"brdf": cost.values} if cost.colours is None else {"colour": cost.colours, "brdf": cost.values}
-    first = next(iter(kinds.values()))
+    parts = [part for part in (cost.colours, cost.values) if part is not None]
+    first = parts[0]
     return {
         **_summary(first),
         "draws": first.draws,
-        "rungs": [method for kind, methods in kinds.items() for method in _rungs(kind, methods.results)],
+        "rungs": _rungs(*parts),
         "brdf": _summary(cost.values),
-        "left_out": {name: why for methods in kinds.values() for name, why in methods.left_out.items()},
+        "left_out": {name: why for methods in parts for name, why in methods.left_out.items()},
         "no_colours": cost.no_colours or None,
     }
 
 
-def _rungs(kind: str, items: Iterable[Any]) -> list[dict[str, Any]]:
+def _rungs(*comparisons: Comparison | None) -> list[dict[str, Any]]:
     return [
-        {"kind": kind, **asdict(item), "error": item.error if math.isfinite(item.error) else None}
-        for item in items
+        {"kind": part.kind, **result.record()}
+        for part in comparisons
+        if part is not None
+        for result in part.results
     ]
 
 
-def _summary(methods: MethodComparison) -> dict[str, Any]:
+def _summary(methods: Comparison) -> dict[str, Any]:
     names = ("reference", "tolerance", "unit", "recommended", "within")
     return {name: getattr(methods, name) for name in names}
 

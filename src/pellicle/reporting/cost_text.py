@@ -10,9 +10,7 @@ from pellicle.reporting.plain_text import COLUMNS
 
 if TYPE_CHECKING:
     from pellicle.accuracy.cost import Cost
-    from pellicle.accuracy.interval_coverage import IntervalComparison
-    from pellicle.accuracy.measure import MethodComparison
-    from pellicle.accuracy.solver_comparison import SolverComparison
+    from pellicle.accuracy.registry import Comparison
     from pellicle.accuracy.surface import SurfaceCost
 
 _Columns = Mapping[str, Callable[[Any], str]]
@@ -38,7 +36,7 @@ def text(cost: Cost | SurfaceCost, name: str = "scene") -> str:
     return "\n".join(blocks)
 
 
-def error_label(methods: MethodComparison, size: str = "") -> str:
+def error_label(methods: Comparison, size: str = "") -> str:
     """`error in R`, or of one size: `error of 0.1 degrees`."""
     of = f" of {size}" if size else ""
     if methods.unit == "relative":
@@ -48,12 +46,12 @@ def error_label(methods: MethodComparison, size: str = "") -> str:
     return f"error{of} in {'Mueller elements' if methods.unit == 'mueller' else methods.unit}"
 
 
-def time_unit(methods: MethodComparison) -> tuple[str, float]:
+def time_unit(methods: Comparison) -> tuple[str, float]:
     """The unit for the time of one sample, and the number of them in a second."""
     return ("µs", 1e6) if methods.sample == "spectrum" else ("ns", 1e9)
 
 
-def _methods(methods: MethodComparison, name: str) -> str:
+def _methods(methods: Comparison, name: str) -> str:
     unit, scale = time_unit(methods)
     few, more = (2, 1) if scale < 1e9 else (0, 2)
     columns: _Columns = {
@@ -62,7 +60,9 @@ def _methods(methods: MethodComparison, name: str) -> str:
         error_label(methods): lambda method: f"{method.error:.1e}",
         f"{unit}/{methods.sample}": lambda method: f"{method.seconds * scale:.{few}f}",
         "compile s": lambda method: f"{method.compile_seconds:.2f}",
-        "kflop": lambda method: "" if method.flops is None else f"{method.flops / 1e3:.{more}f}",
+        "kflop": lambda method: (
+            "" if method.details["flops"] is None else f"{method.details['flops'] / 1e3:.{more}f}"
+        ),
     }
     size = error_label(methods, f"{methods.tolerance:g}")
     within = f"{'a' if size.startswith('r') else 'an'} {size}"
@@ -78,7 +78,7 @@ def _methods(methods: MethodComparison, name: str) -> str:
     return _table(title, methods.results, methods.recommended, columns, notes)
 
 
-def _compared(methods: MethodComparison) -> str:
+def _compared(methods: Comparison) -> str:
     if methods.sample != "spectrum":
         each = f"{methods.wavelengths} {'angles' if methods.sample == 'colour' else 'pairs of directions'}"
         which = "mean" if methods.sample == "colour" else "largest"
@@ -88,17 +88,17 @@ def _compared(methods: MethodComparison) -> str:
     return f"{methods.wavelengths} wavelength{several}, the largest error of {methods.draws} {draws}"
 
 
-def _done(comparison: SolverComparison | IntervalComparison) -> int:
-    return max((result.datasets for result in comparison.results), default=0)
+def _done(comparison: Comparison) -> int:
+    return max((result.details["datasets"] for result in comparison.results), default=0)
 
 
-def _counted(comparison: SolverComparison | IntervalComparison) -> str:
+def _counted(comparison: Comparison) -> str:
     """Number of data sets, and of how many where the time limit or Ctrl-C ended them."""
     done, requested = _done(comparison), comparison.requested
     return f"{done}" if done == requested else f"{done} (of {requested})"
 
 
-def _solvers(solvers: SolverComparison) -> str:
+def _solvers(solvers: Comparison) -> str:
     title = (
         f"Fits of {_counted(solvers)} simulated spectra with noise {solvers.noise:g}, their true values"
         " anywhere between the bounds; errors as a share of the bounds"
@@ -106,9 +106,9 @@ def _solvers(solvers: SolverComparison) -> str:
     columns: _Columns = {
         "solver": lambda solver: solver.name,
         "leaves out": lambda solver: solver.leaves_out,
-        "failed": lambda solver: f"{solver.failures}/{solver.datasets}",
+        "failed": lambda solver: f"{solver.details['failures']}/{solver.details['datasets']}",
         "mean error": lambda solver: f"{solver.error:.1e}",
-        "median": lambda solver: f"{solver.median_error:.1e}",
+        "median": lambda solver: f"{solver.details['median_error']:.1e}",
         "ms/fit": lambda solver: f"{solver.seconds * 1e3:.1f}",
         "compile s": lambda solver: f"{solver.compile_seconds:.1f}",
     }
@@ -118,7 +118,7 @@ def _solvers(solvers: SolverComparison) -> str:
     )
 
 
-def _intervals(intervals: IntervalComparison) -> str:
+def _intervals(intervals: Comparison) -> str:
     title = (
         f"95 % intervals of {_counted(intervals)} of these data sets: share that contains the true value,"
         " width as a share of the bounds, and time after the fit"
@@ -126,8 +126,8 @@ def _intervals(intervals: IntervalComparison) -> str:
     columns: _Columns = {
         "interval": lambda way: way.name,
         "leaves out": lambda way: way.leaves_out,
-        "coverage": lambda way: f"{100 * way.coverage:.0f} ± {100 * way.doubt:.0f} %",
-        "width": lambda way: f"{way.width:.1e}",
+        "coverage": lambda way: f"{100 * way.details['coverage']:.0f} ± {100 * way.details['doubt']:.0f} %",
+        "width": lambda way: f"{way.details['width']:.1e}",
         "ms": lambda way: f"{way.seconds * 1e3:.1f}",
         "compile s": lambda way: f"{way.compile_seconds:.1f}",
     }

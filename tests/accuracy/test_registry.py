@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.accuracy.compiled import Program
+from pellicle.accuracy.case import Program
 from pellicle.accuracy.cost import cost
-from pellicle.accuracy.measure import MethodComparison, MethodResult, compare_methods, mark_pareto, measure
-from pellicle.accuracy.methods import METHODS, Method
+from pellicle.accuracy.film_methods import METHODS, compare_methods
+from pellicle.accuracy.registry import Comparison, Method, Result, mark_pareto, measure
 from pellicle.errors import UsageError
 from pellicle.fitting.progress import quiet
 
@@ -27,7 +27,7 @@ def film():
 
 
 def result(error, seconds):
-    return MethodResult("", "", error, seconds, 0.0, None)
+    return Result("", "", error, seconds, 0.0)
 
 
 def test_the_pareto_front_is_unbeaten():
@@ -52,7 +52,7 @@ def test_errors_and_costs(comparison):
     for r in comparison.results:
         assert r.seconds > 0
         assert r.compile_seconds > 0
-        assert r.flops > len(NM)
+        assert r.details["flops"] > len(NM)
 
 
 class Timed(Program):
@@ -71,7 +71,7 @@ def test_the_median_time_of_all_rounds_counts():
     times = {"steady": [3.0], "slow once": [9.0, 2.0], "slowest": [4.0, 5.0]}
     methods = [Method(name, "", lambda case: "unused") for name in times]
     compared = measure(
-        MethodComparison("float64", 1e-3, "R", 1, 1),
+        Comparison("forward", "float64", 1e-3, "R", 1, 1),
         methods,
         lambda method: Timed(None, None, (times[method.name],), True, 1, 7.0, 40.0),
         lambda signal: 1e-6,
@@ -81,7 +81,7 @@ def test_the_median_time_of_all_rounds_counts():
         *(("slow once", 2.0), ("steady", 3.0), ("slowest", 5.0))
     ]
     assert [r.pareto for r in compared.results] == [True, False, False]
-    assert {(r.error, r.compile_seconds, r.flops) for r in compared.results} == {(1e-6, 7.0, 40.0)}
+    assert {(r.error, r.compile_seconds, r.details["flops"]) for r in compared.results} == {(1e-6, 7.0, 40.0)}
 
 
 def test_the_fastest_within_the_tolerance_is_recommended(comparison):

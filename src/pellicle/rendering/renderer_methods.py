@@ -10,8 +10,9 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.accuracy.colour_methods import ColourMethod, Films, compiled, one_film
-from pellicle.accuracy.compiled import Program
+from pellicle.accuracy.case import Program
+from pellicle.accuracy.colour_methods import Films, compiled, one_film
+from pellicle.accuracy.registry import Method
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.rendering.appearance import appearance
 from pellicle.rendering.effective import effective, physical
@@ -57,9 +58,7 @@ def _medium(index: Any) -> Any:
 
 
 RENDERER_METHODS = tuple(
-    ColourMethod(
-        f"{target(name, package_check=False).title}, {words}", left_out, partial(_by_formula, name, solve)
-    )
+    Method(f"{target(name, package_check=False).title}, {words}", left_out, partial(_by_formula, name, solve))
     for name in RENDERERS
     for words, left_out, solve in (
         ("as it is", "what its formula lacks", physical),

@@ -7,9 +7,9 @@ import pytest
 
 import pellicle as pl
 from pellicle.accuracy.case import case
+from pellicle.accuracy.registry import Method
 from pellicle.accuracy.simulated_data import data_sets
-from pellicle.accuracy.solver_comparison import compare_solvers
-from pellicle.accuracy.solvers import SOLVERS, Solver, from_truth
+from pellicle.accuracy.solvers import SOLVERS, compare_solvers, from_truth
 from pellicle.fitting.progress import quiet
 
 NM = np.linspace(420.0, 740.0, 40)
@@ -44,14 +44,14 @@ def test_a_solver_that_misses_is_told(several):
         return np.full(1, np.nan)
 
     solvers = (
-        Solver("oracle", "", from_truth),
-        Solver("far", "", far),
-        Solver("lost", "", lost),
-        Solver("absent", "", far, missing="nosuchpackage"),
+        Method("oracle", "", from_truth),
+        Method("far", "", far),
+        Method("lost", "", lost),
+        Method("absent", "", far, missing="nosuchpackage"),
     )
     compared = compare_solvers(several, NOISE, quiet, solvers)
     by_name = {s.name: s for s in compared.results}
-    assert {name: s.failures for name, s in by_name.items()} == {"oracle": 0, "far": 3, "lost": 3}
+    assert {name: s.details["failures"] for name, s in by_name.items()} == {"oracle": 0, "far": 3, "lost": 3}
     assert by_name["oracle"].error < 1e-3
     assert by_name["far"].error == pytest.approx(0.2)
     assert compared.recommended == "oracle"
@@ -67,15 +67,15 @@ def test_an_interruption_keeps_whole_data_sets(several):
             raise KeyboardInterrupt
         return data.truth
 
-    compared = compare_solvers(several, NOISE, quiet, (Solver("impatient", "", impatient),))
+    compared = compare_solvers(several, NOISE, quiet, (Method("impatient", "", impatient),))
     assert compared.interrupted
-    assert compared.results[0].datasets == 1
+    assert compared.results[0].details["datasets"] == 1
 
 
 def test_the_time_limit_ends_after_a_whole_data_set(several):
-    compared = compare_solvers(several, NOISE, quiet, (Solver("oracle", "", from_truth),), time_limit=0.0)
+    compared = compare_solvers(several, NOISE, quiet, (Method("oracle", "", from_truth),), time_limit=0.0)
     assert not compared.interrupted
-    assert (compared.results[0].datasets, compared.requested) == (1, len(several))
+    assert (compared.results[0].details["datasets"], compared.requested) == (1, len(several))
 
 
 @pytest.mark.slow
@@ -84,12 +84,12 @@ def test_every_solver_finds_the_only_minimum():
     compared = compare_solvers(simulated(100.0, 140.0, 3), NOISE, quiet)
     assert {s.name for s in compared.results} | set(compared.left_out) == {s.name for s in SOLVERS}
     for solver in compared.results:
-        assert solver.failures == 0, solver.name
+        assert solver.details["failures"] == 0, solver.name
         assert solver.error < 0.01, solver.name
 
 
 @pytest.mark.slow
 def test_a_search_is_needed_among_many_minima():
     compared = {s.name: s for s in compare_solvers(simulated(50.0, 3000.0, 6), NOISE, quiet).results}
-    assert compared["scan + LM"].failures == 0
-    assert compared["LM, start once"].failures >= 4
+    assert compared["scan + LM"].details["failures"] == 0
+    assert compared["LM, start once"].details["failures"] >= 4

@@ -1,0 +1,276 @@
+"""Registry of methods: what each of them leaves out, and its error and time once measured.
+
+A method computes a signal, a colour, a BRDF, the fit of a simulated spectrum, or intervals of its numbers.
+The modules of a kind list their methods: `film_methods`, `colour_methods` (and `rendering.renderer_methods`),
+`surface`, `solvers`, `intervals` (and `sampling.sampled_intervals`). Every method is compiled, timed in turn
+with the others, and compared with a reference.
+"""
+
+from __future__ import annotations
+
+import math
+import statistics
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+
+from pellicle.accuracy.case import Program
+from pellicle.accuracy.simulated_data import DataSet
+from pellicle.fitting.progress import Progress
+
+ROUNDS, SECONDS = 40, 15.0
+"""Most rounds in which the methods are timed in turn, and about how long all of them may take together."""
+
+SAMPLES = {"forward": "spectrum", "colour": "colour", "brdf": "sample"}
+"""What one evaluation of a method of a kind computes."""
+
+
+@dataclass(frozen=True)
+class Method:
+    """A method by its name and by what it leaves out.
+
+    `apply` takes what methods of its kind are applied to, and returns its answer, or why it does not apply:
+
+    - "forward": a `Case` → its `Variant`;
+    - "colour": `Films` → a `Program`;
+    - "brdf": a view of a surface and a tolerance → a `Plan`;
+    - "inverse": a `DataSet` → the best point of the unit cube, (parameters,);
+    - "interval": the ranked minima of a fit → lower and upper ends in the unit cube, (parameters,) each.
+
+    `double` is False for single precision. `missing` names a package that the method needs and that is not
+    installed.
+    """
+
+    name: str
+    leaves_out: str
+    apply: Callable[..., Any]
+    double: bool = True
+    missing: str | None = None
+
+
+@dataclass
+class Result:
+    """Error and cost of one method.
+
+    `error` is in the unit of the signal; of a fit it is the mean over the data sets of the largest error of
+    any parameter relative to its bounds, of intervals the distance of their coverage from 95 %. `seconds` is
+    the median time of one spectrum, colour, sample, fit, or of the intervals after a fit, without
+    compilation. `pareto` is False where another method is both faster and more accurate.
+
+    `details`, by the kind of the method:
+
+    - a signal, colour or BRDF: `flops`, XLA's count for one sample, None if it has none;
+    - a fit: `median_error`; `failures`, the data sets in which the solver stopped more than Δχ² = 6 (a rival)
+    above the minimum reached from the true values; `datasets`; - intervals: `coverage`, the share of true
+    values inside them, and its binomial standard deviation `doubt`; `width`, their median width relative to
+    the bounds; `datasets`.
+    """
+
+    name: str
+    leaves_out: str
+    error: float
+    seconds: float
+    compile_seconds: float
+    details: dict[str, Any] = field(default_factory=dict)
+    pareto: bool = False
+
+    def record(self) -> dict[str, Any]:
+        """All numbers in one dictionary, an infinite error as None."""
+        numbers = asdict(self)
+        numbers |= numbers.pop("details")
+        return numbers | {"error": self.error if math.isfinite(self.error) else None}
+
+
+@dataclass
+class Comparison:
+    """Results of all methods of one kind, the fastest first, and the methods that do not apply, with why.
+
+    Of signals: the name of the `reference`, the `tolerance` in the `unit` of errors, and numbers of
+    `wavelengths` (or angles, or pairs of directions) and `draws` between the bounds. Of fits and intervals:
+    the `noise` of the simulated spectra and the number that was `requested`, of which the time limit may
+    allow fewer.
+    """
+
+    kind: str
+    reference: str = ""
+    tolerance: float = math.inf
+    unit: str = ""
+    wavelengths: int = 0
+    draws: int = 0
+    noise: float = math.nan
+    requested: int = 0
+    results: list[Result] = field(default_factory=list)
+    left_out: dict[str, str] = field(default_factory=dict)
+    interrupted: bool = False
+
+    @property
+    def sample(self) -> str:
+        """What one evaluation computes: a spectrum, a colour, a sample of a BRDF."""
+        return SAMPLES[self.kind]
+
+    @property
+    def within(self) -> bool:
+        """True where any method meets the tolerance."""
+        return any(result.error <= self.tolerance for result in self.results)
+
+    @property
+    def recommended(self) -> str | None:
+        """Name of the fastest method within the tolerance, or of the most accurate where none is.
+
+        Of solvers it is the fastest among those that failed least, of intervals the fastest whose coverage is
+        95 % within two of its standard deviations.
+        """
+        return min(self.results, key=self._rank).name if self.results else None
+
+    def _rank(self, result: Result) -> tuple[float, float]:
+        details = result.details
+        if self.kind == "inverse":
+            return details["failures"] / details["datasets"], result.seconds
+        if self.kind == "interval":
+            return result.error > 2 * details["doubt"], result.seconds
+        good = result.error <= self.tolerance
+        return not good, result.seconds if good else result.error
+
+    def finish(self, results: Iterable[Result]) -> Comparison:
+        """Add the results, sorted by their time, and mark those that no other one beats."""
+        self.results = sorted(results, key=lambda result: result.seconds)
+        mark_pareto(self.results)
+        return self
+
+
+def mark_pareto(results: Sequence[Result]) -> None:
+    """Mark the results that no other one beats in error or time without being worse in the other."""
+    for result in results:
+        beaten = (
+            other.error <= result.error
+            and other.seconds <= result.seconds
+            and (other.error < result.error or other.seconds < result.seconds)
+            for other in results
+        )
+        result.pareto = not any(beaten)
+
+
+@dataclass
+class _Run:
+    """A method while it is measured: its times, and its error or its scores on data sets."""
+
+    method: Method
+    compile_seconds: float
+    times: list[float] = field(default_factory=list)
+    error: float = math.nan
+    scores: list[Any] = field(default_factory=list)
+
+    def result(self, error: float, compile_seconds: float, details: dict[str, Any]) -> Result:
+        seconds = statistics.median(self.times)
+        return Result(
+            self.method.name, self.method.leaves_out, error, seconds, max(compile_seconds, 0.0), details
+        )
+
+
+def measure(
+    comparison: Comparison,
+    methods: Sequence[Method],
+    prepare: Callable[[Method], Program | str],
+    error: Callable[[np.ndarray], float],
+    progress: Progress,
+) -> Comparison:
+    """Fill a comparison of signals with the result of every method.
+
+    `prepare` compiles a method or returns why it does not apply, `error` compares its signal with the
+    reference. Ctrl-C ends the measurement and keeps its results so far.
+    """
+    runs: list[tuple[_Run, Program]] = []
+    try:
+        for done, method in enumerate(methods):
+            progress(f"compile {method.name}", done, len(methods))
+            program = prepare(method)
+            if isinstance(program, str):
+                comparison.left_out[method.name] = program
+                continue
+            runs.append((_Run(method, program.compile_seconds, error=error(program.run())), program))
+            runs[-1][0].times.append(program.seconds())
+        began = time.perf_counter()
+        for done in range(ROUNDS):  # in turns, so that noise of the machine affects all of them
+            if done > 4 and time.perf_counter() - began > SECONDS:
+                break
+            progress("rounds", done, ROUNDS)
+            for run, program in runs:
+                run.times.append(program.seconds())
+    except KeyboardInterrupt:
+        comparison.interrupted = True
+    return comparison.finish(
+        run.result(run.error, run.compile_seconds, {"flops": program.flops})
+        for run, program in runs
+        if run.times
+    )
+
+
+class OnData(NamedTuple):
+    """How methods of one kind are measured on simulated data sets.
+
+    `problem` is what a method is applied to, whose computation is not timed. `score` returns the score of an
+    answer on a data set. `summary` turns all scores of a method into its error and details.
+    """
+
+    stage: str
+    problem: Callable[[DataSet], Any]
+    score: Callable[[DataSet], Callable[[Any], Any]]
+    summary: Callable[[list[Any]], tuple[float, dict[str, Any]]]
+
+
+def measure_on_data(
+    comparison: Comparison,
+    methods: Sequence[Method],
+    data: Sequence[DataSet],
+    how: OnData,
+    progress: Progress,
+    time_limit: float = math.inf,
+) -> Comparison:
+    """Fill a comparison of solvers or intervals with the result of every method that is installed.
+
+    No data set begins later than `time_limit` seconds after the methods are compiled. Ctrl-C ends this and
+    keeps the results so far.
+    """
+    runs: list[_Run] = []
+    try:
+        first = how.problem(data[0])
+        for done, method in enumerate(methods):
+            progress(f"compile {method.name}", done, len(methods))
+            if method.missing:
+                comparison.left_out[method.name] = f"{method.missing} is not installed"
+                continue
+            began = time.perf_counter()
+            method.apply(first)
+            runs.append(_Run(method, time.perf_counter() - began))
+        for done, one in enumerate(within(data, time_limit)):
+            progress(how.stage, done, len(data))
+            problem, score = how.problem(one), how.score(one)
+            for run in runs:
+                began = time.perf_counter()
+                answer = run.method.apply(problem)
+                run.times.append(time.perf_counter() - began)
+                run.scores.append(score(answer))
+    except KeyboardInterrupt:
+        comparison.interrupted = True
+    results = []
+    for run in runs:
+        if run.scores:
+            error, details = how.summary(run.scores)
+            compiling = run.compile_seconds - statistics.median(run.times)
+            results.append(run.result(error, compiling, details | {"datasets": len(run.times)}))
+    return comparison.finish(results)
+
+
+Item = TypeVar("Item")
+
+
+def within(items: Iterable[Item], seconds: float) -> Iterator[Item]:
+    """Yield the first item, and further ones until `seconds` have passed since then."""
+    began = time.perf_counter()
+    for item in items:
+        yield item
+        if time.perf_counter() - began > seconds:
+            return
