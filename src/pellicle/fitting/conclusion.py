@@ -22,8 +22,6 @@ from pellicle.fitting.status import judge
 
 log = getLogger(__name__)
 
-_ON_BOUND = 1e-6
-
 
 def ranked_minima(
     make: Callable[[float], Problem],
@@ -99,13 +97,8 @@ def conclude(
             converged = any(p.key == "thickness" and math.isinf(limit.stderr) for p, limit in rows)
         bounded = profiled if converged else bounded
     parameters = estimates(ranked, covariance, discrepancy, list(amend(bounded)), fixed)
-    # parameters at a bound that physics sets; a thickness of 0 is none of them: no layer
-    natural = frozenset(
-        p.name
-        for p, value in zip(ranked.problem.parameters, ranked.values.tolist(), strict=True)
-        if (p.natural[0] and p.lower == 0 and p.key != "thickness" and value <= _ON_BOUND * p.upper)
-        or (p.natural[1] and p.upper == 1 and value >= 1 - _ON_BOUND * (1 - p.lower))
-    )
+    pairs = zip(ranked.problem.parameters, ranked.values.tolist(), strict=True)
+    natural = frozenset(p.name for p, value in pairs if p.on_natural_bound(value))
     status = judge(
         converged=converged,
         misfit=misfit,

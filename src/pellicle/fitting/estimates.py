@@ -17,7 +17,6 @@ from pellicle.fitting.reweighting import RankedMinima
 from pellicle.fitting.status import RIVAL
 
 _RULED_OUT = 1e8
-_ON_BOUND = 1e-6
 _MOST_RIVALS, _MOST_NEAR = 10, 3
 
 
@@ -95,9 +94,7 @@ def estimates(
         if linear_error > p.upper - p.lower:
             extra = 0.0  # only the bounds limit it: the difference of two huge variances is rounding
         limit = _widened(own, value, extra, ranked.freedom, (p.lower, p.upper))
-        margin = min(value - p.lower, p.upper - value)
-        at_bound = not p.periodic and margin <= _ON_BOUND * (p.upper - p.lower)
-        ends = p.lower, p.upper, True, at_bound, limit.lower, limit.upper, p.limits is not None
+        ends = p.lower, p.upper, True, bool(p.on_bound(value)), limit.lower, limit.upper, p.limits is not None
         noise = float(own.stderr), max(ranked.freedom, 1.0)
         free.append(Estimate(p.name, value, float(limit.stderr), p.unit, *ends, *noise))
     order = sorted(range(len(free)), key=lambda i: parameters[i].key != "thickness")

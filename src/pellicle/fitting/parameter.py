@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -10,6 +11,10 @@ from pellicle.scene.priors import Prior
 
 _SHARE, _RELATIVE = 0.02, 0.002
 """Two minima, not one: parameters differ by this share of their range, or by this share of their value."""
+
+
+ON_BOUND = 1e-6
+"""Distance from a bound, as a share of the range, within which a value rests on it."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +45,24 @@ class Parameter:
     searched: bool = True
     group: str = ""
     levels: int | None = None
+
+    def on_ends(self, values: Any) -> tuple[Any, Any]:
+        """Whether values (...) lie on the lower and on the upper bound."""
+        margin = ON_BOUND * (self.upper - self.lower)
+        return values - self.lower <= margin, self.upper - values <= margin
+
+    def on_bound(self, values: Any) -> Any:
+        """Whether values (...) rest on a bound."""
+        lower, upper = self.on_ends(values)
+        return (lower | upper) & (not self.periodic)
+
+    def on_natural_bound(self, values: Any) -> Any:
+        """Whether values (...) lie on a bound that physics sets, an absence or a whole. A thickness of 0 is
+        none of them: no layer."""
+        none = self.natural[0] and self.lower == 0 and self.key != "thickness"
+        whole = self.natural[1] and self.upper == 1
+        on_whole = values >= 1 - ON_BOUND * (1 - self.lower)
+        return (none & (values <= ON_BOUND * self.upper)) | (whole & on_whole)
 
     def resolution_at(self, unit: float) -> float:
         """Distance from a point of the unit interval within which minima are one."""

@@ -6,6 +6,9 @@ import math
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace
 from logging import getLogger
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from pellicle.fitting.result import LEVEL, Estimate, Rival, Status
 
@@ -15,6 +18,74 @@ RIVAL = 6.0
 """A distinct rival within this Δχ² on the effective points makes a fit ambiguous."""
 WELL_KNOWN = 0.1
 """Largest relative error of a thickness beside which a default bound is a remark."""
+
+
+ORDER = (
+    Status.NOT_CONVERGED,
+    Status.MISFIT,
+    Status.NOT_IDENTIFIABLE,
+    Status.AMBIGUOUS,
+    Status.AT_BOUND,
+    Status.CONVERGED,
+)
+"""The first status that holds is given."""
+
+
+class Judged(NamedTuple):
+    """Positions (...) of a status in `ORDER`, and the free parameters of the sample (..., parameters) that
+    have no finite error, and that rest on a bound that matters."""
+
+    position: Any
+    unseen: np.ndarray
+    at_bound: np.ndarray
+
+
+def judged(
+    names: Sequence[str],
+    default_bounds: Sequence[bool],
+    values: np.ndarray,
+    stderr: np.ndarray,
+    resting: np.ndarray,
+    *,
+    converged: Any,
+    misfit: Any,
+    ambiguous: Any,
+    binding: Container[str] = (),
+) -> Judged:
+    """The first status that holds of one fit, or of many with leading axes (...).
+
+    `values`, `stderr` and `resting` (..., parameters), whether a value lies on a bound that physics does not
+    set, are those of the free parameters by `names`, without those of instruments. A default bound counts
+    only if `binding` names it or the thickness is not well determined.
+    """
+    depth = np.array([name.split(".")[-1] == "thickness" for name in names], bool)
+    unseen = ~np.isfinite(stderr) & (depth | ~depth.any())
+    at_bound = np.array(resting)
+    for i, name in enumerate(names):
+        if default_bounds[i] and name not in binding:
+            at_bound[..., i] &= ~_well_known(i, names, depth, values, stderr)
+    hidden = unseen.any(axis=-1) if depth.any() else unseen.all(axis=-1) & bool(names)
+    holds = [~np.asarray(converged), np.asarray(misfit), hidden, np.asarray(ambiguous), at_bound.any(axis=-1)]
+    return Judged(np.select(holds, list(range(len(holds))), len(holds))[()], unseen, at_bound)
+
+
+def _well_known(
+    i: int, names: Sequence[str], depth: np.ndarray, values: np.ndarray, stderr: np.ndarray
+) -> Any:
+    """True (...) where the answer stands beside parameter `i` on a default bound: the thickness of its layer,
+    else every thickness, is well determined; without any, the leading number is another one."""
+    if depth[i] or not depth.any():
+        return np.full(values.shape[:-1], i != 0 and not depth.any())
+    depths = np.flatnonzero(depth).tolist()
+    own = [j for j in depths if names[i].startswith(names[j].removesuffix("thickness"))] or depths
+    return np.all(stderr[..., own] <= WELL_KNOWN * values[..., own], axis=-1)
+
+
+def outside(values: np.ndarray, stderr: np.ndarray, rivals: np.ndarray) -> np.ndarray:
+    """Numbers of rivals (..., rivals, parameters) that lie outside the errors of the answer (...,
+    parameters)."""
+    reach = np.where(np.isfinite(stderr), 3 * stderr, np.inf)
+    return np.abs(rivals - values[..., None, :]) > reach[..., None, :]
 
 
 def judge(
@@ -31,52 +102,49 @@ def judge(
     A default bound counts only if `binding` names it or the thickness is not well determined.
     """
     free = [p for p in parameters.values() if p.free and not p.name.startswith("instrument.")]
-    depths = [p for p in free if p.name.split(".")[-1] == "thickness"]
-    unseen = [p for p in (depths or free) if not math.isfinite(p.stderr)]
-    resting = [p for p in free if p.at_bound and p.name not in natural]
-    remarks = [p for p in resting if p.default_bounds and _well_known(p, depths, free[0])]
-    at_bound = [p for p in resting if p not in remarks or p.name in binding]
+    names, resting = (
+        [p.name for p in free],
+        np.array([p.at_bound and p.name not in natural for p in free], bool),
+    )
     close = distinct_rivals(parameters, rivals)
+    status = judged(
+        names,
+        [p.default_bounds for p in free],
+        np.array([p.value for p in free]),
+        np.array([p.stderr for p in free]),
+        resting,
+        converged=converged,
+        misfit=misfit,
+        ambiguous=bool(close),
+        binding=binding,
+    )
+
+    def named(which: np.ndarray) -> str:
+        return ", ".join(name for name, holds in zip(names, which, strict=True) if holds) or "none"
+
     for question, answer in (
         ("did the solver converge?", "yes" if converged else "no"),
         ("does the scene not explain the data?", "yes" if misfit else "no"),
-        ("which parameters of the sample have no finite error?", ", ".join(p.name for p in unseen) or "none"),
+        ("which parameters of the sample have no finite error?", named(status.unseen)),
         (f"how many rivals lie within Δχ² {RIVAL:g} and outside the errors?", len(close)),
-        ("which parameters lie on a bound?", ", ".join(p.name for p in resting) or "none"),
-        ("which of these bounds matter?", ", ".join(p.name for p in at_bound) or "none"),
+        ("which parameters lie on a bound?", named(resting)),
+        ("which of these bounds matter?", named(status.at_bound)),
     ):
         log.info("status: %s %s", question, answer)
-    if not converged:
-        return Status.NOT_CONVERGED
-    if misfit:
-        return Status.MISFIT
-    if unseen and (depths or len(unseen) == len(free)):
-        return Status.NOT_IDENTIFIABLE
-    if close:
-        return Status.AMBIGUOUS
-    return Status.AT_BOUND if at_bound else Status.CONVERGED
-
-
-def _well_known(resting: Estimate, depths: Sequence[Estimate], lead: Estimate) -> bool:
-    """True where the answer stands beside a number on a default bound: the thickness of its layer, else every
-    thickness, is well determined; without any, the leading number is another one."""
-    if not depths or resting in depths:
-        return resting is not lead and not depths
-    own = [d for d in depths if resting.name.startswith(d.name.removesuffix("thickness"))]
-    return all(d.stderr <= WELL_KNOWN * d.value for d in own or depths)
+    return ORDER[status.position]
 
 
 def distinct_rivals(parameters: Mapping[str, Estimate], rivals: tuple[Rival, ...]) -> list[Rival]:
     """Rivals that fit nearly as well and lie outside the errors of the answer."""
-    return [r for r in rivals if r.delta_chi2 < RIVAL and _outside(parameters, r)]
+    return [r for r in rivals if r.delta_chi2 < RIVAL and _apart(parameters, r)]
 
 
-def _outside(parameters: Mapping[str, Estimate], rival: Rival) -> bool:
-    return any(
-        abs(value - parameters[name].value) > 3 * parameters[name].stderr
-        for name, value in rival.parameters.items()
-        if math.isfinite(parameters[name].stderr)
-    )
+def _apart(parameters: Mapping[str, Estimate], rival: Rival) -> list[str]:
+    """Names of the numbers of a rival that lie outside the errors of the answer."""
+    own = [parameters[name] for name in rival.parameters]
+    about = np.array([p.value for p in own]), np.array([p.stderr for p in own])
+    [apart] = outside(*about, np.array([list(rival.parameters.values())]))
+    return [name for name, holds in zip(rival.parameters, apart, strict=True) if holds]
 
 
 def verdict(
@@ -132,9 +200,7 @@ def verdict(
 def _other(parameters: Mapping[str, Estimate], rivals: tuple[Rival, ...], lead: Estimate) -> str:
     """The best distinct rival, by its leading parameter, or by those that set it apart if that does not."""
     rival = distinct_rivals(parameters, rivals)[0]
-    apart = [
-        name for name in rival.parameters if _outside(parameters, Rival({name: rival.parameters[name]}, 0.0))
-    ]
+    apart = _apart(parameters, rival)
     value = rival.parameters.get(lead.name, math.nan)
     share = "" if rival.probability is None else f" (probability {100 * rival.probability:.2g} %)"
     if lead.name in apart or not apart:

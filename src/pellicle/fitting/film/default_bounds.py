@@ -32,7 +32,6 @@ _ROUNDS = 3
 """Times that bounds are moved outwards, each time by the width of the range."""
 _THIN = 0.05
 """Share of the range within which what was added needs no search of its own."""
-_ON_BOUND = 1e-6
 
 
 class Wider(NamedTuple):
@@ -100,7 +99,7 @@ def _moved(p: Parameter, value: float) -> Parameter:
     """
     if p.limits is None:
         return p
-    (low, high), (least, most), span = _rests(p, value), p.limits, p.upper - p.lower
+    (low, high), (least, most), span = p.on_ends(value), p.limits, p.upper - p.lower
     if not (low and p.lower > least) and not (high and p.upper < most):
         return p
     return replace(p, lower=max(p.lower - span, least), upper=min(p.upper + span, most))
@@ -108,7 +107,7 @@ def _moved(p: Parameter, value: float) -> Parameter:
 
 def _at_moved_bound(old: Parameter, new: Parameter, value: float) -> bool:
     """True where a value rests on a bound that is not the old one."""
-    low, high = _rests(new, value)
+    low, high = new.on_ends(value)
     return (low and new.lower < old.lower) or (high and new.upper > old.upper)
 
 
@@ -159,7 +158,7 @@ def remarks(ranked: RankedMinima, binding: Container[str]) -> list[str]:
     `binding` ones."""
     sentences = []
     for p, value in zip(ranked.problem.parameters, ranked.values.tolist(), strict=True):
-        low, high = _rests(p, value)
+        low, high = p.on_ends(value)
         if p.limits is None or p.name in binding or not (low or high) or (low and p.natural[0]):
             continue
         words = f"{p.name} rests on {_amount(value, p)}"
@@ -168,12 +167,6 @@ def remarks(ranked: RankedMinima, binding: Container[str]) -> list[str]:
         else:
             sentences.append(f"{words}, a default bound: wider ones explain the data no better")
     return sentences
-
-
-def _rests(p: Parameter, value: float) -> tuple[bool, bool]:
-    """True for the lower and the upper bound where a value lies on it."""
-    margin = _ON_BOUND * (p.upper - p.lower)
-    return value - p.lower <= margin, p.upper - value <= margin
 
 
 def _range(p: Parameter) -> str:

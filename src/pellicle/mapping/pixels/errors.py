@@ -20,14 +20,13 @@ from pellicle.fitting.misfit import Accuracy, misfit, other_material
 from pellicle.fitting.noise import DRIFT_CORRELATION, NoiseEstimate, noise_of, short_range_noise, student
 from pellicle.fitting.problem import NoiseGroup, Problem
 from pellicle.fitting.robust_losses import median
-from pellicle.fitting.status import RIVAL
+from pellicle.fitting.status import ORDER, RIVAL, judged, outside
 from pellicle.mapping.pixels.effects import PixelEffects, nodes, of_pixels
 from pellicle.mapping.pixels.groups import BLOCK, Group, Taken, groups
 from pellicle.mapping.pixels.limits import PixelLimits, evidence_factor
 from pellicle.mapping.pixels.minima import PixelData, PixelMinima
 from pellicle.mapping.pixels.nuisances import Nuisances
 from pellicle.mapping.pixels.results import CODES, NO_DATA, PixelFits
-from pellicle.mapping.pixels.status import judge
 
 _PROFILED = 4096
 """Pixels whose profiles are computed together: few of them need one, and programs take hundreds at a time."""
@@ -96,22 +95,41 @@ class PixelErrors:
     def _fits(self, data: PixelData, minima: PixelMinima, group: Group) -> PixelFits:
         who = group.pixels
         chunks = [self._judged(data, minima, chunk) for chunk in group.chunks(BLOCK)]
-        judged = jax.tree_util.tree_map(_joined, *chunks)
-        noise, values = judged.noise, minima.values[who, 0]
+        state = jax.tree_util.tree_map(_joined, *chunks)
+        noise, values = state.noise, minima.values[who, 0]
         counted = 1 / noise.variance(self.view.noise)
         arrays = self.limits.arrays(data, who, noise)._replace(independent_fraction=counted)
         noise_sd, converged = self.limits.stderr(
-            arrays, values, judged.covariance, judged.flat, ~judged.misfit, minima.converged[who, 0]
+            arrays, values, state.covariance, state.flat, ~state.misfit, minima.converged[who, 0]
         )
-        stderr = np.sqrt(noise_sd**2 + judged.systematic)
+        stderr = np.sqrt(noise_sd**2 + state.systematic)
         deviance = self._reweighted(minima, who, noise)
-        above = judged.evidence_share[:, None] * np.maximum(deviance - deviance[:, :1], 0.0)
+        above = state.evidence_share[:, None] * np.maximum(deviance - deviance[:, :1], 0.0)
         delta = above / student(noise.effective_freedom(self.view.noise), RIVAL)[:, None] ** 2
         delta = np.where(np.isfinite(deviance), delta, np.inf)
         rivals = minima.values[who, 1:]
-        status = judge(self.parameters, values, stderr, converged, judged.misfit, rivals, delta[:, 1:])
+        status = self._status(values, stderr, converged, state.misfit, rivals, delta[:, 1:])
         chi2 = noise.chi2 / noise.freedom
-        return PixelFits(values, stderr, noise_sd, status, minima.values[who], delta, chi2, judged.rms)
+        return PixelFits(values, stderr, noise_sd, status, minima.values[who], delta, chi2, state.rms)
+
+    def _status(self, values, stderr, converged, misfit, rivals, delta_chi2) -> np.ndarray:
+        """Codes of the status (pixels,); `rivals` (pixels, orders, parameters) are other minima, `delta_chi2`
+        (pixels, orders) how much worse they are, infinite where there are none."""
+        # the leading parameter first
+        order = sorted(range(len(self.parameters)), key=lambda i: self.parameters[i].key != "thickness")
+        own = [i for i in order if not self.parameters[i].name.startswith("instrument.")]
+        about = [(self.parameters[i], values[:, i]) for i in own]
+        resting = [p.on_bound(x) & ~p.on_natural_bound(x) for p, x in about]
+        close = (delta_chi2 < RIVAL) & outside(values, stderr, rivals).any(axis=2)
+        found = judged(
+            [p.name for p, _ in about],
+            [p.limits is not None for p, _ in about],
+            *(values[:, own], stderr[:, own], np.reshape(resting, (len(own), len(values))).T),
+            converged=converged,
+            misfit=misfit,
+            ambiguous=close.any(axis=1),
+        )
+        return np.array([CODES[str(status)] for status in ORDER], np.uint8)[found.position]
 
     def _judged(self, data: PixelData, minima: PixelMinima, group: Group) -> _Judged:
         view, who = self.view, group.pixels
