@@ -11,7 +11,7 @@ import pytest
 
 import pellicle as pl
 from pellicle.fitting.curves import Index
-from pellicle.fitting.film.layer_errors import principal_indices
+from pellicle.fitting.reported_layer import principal_indices
 from pellicle.materials import material
 from pellicle.reporting.figures import draw_fit as draw
 from pellicle.reporting.fit_tables import nk_csvs

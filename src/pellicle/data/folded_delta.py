@@ -20,7 +20,7 @@ _BETTER = 16.0
 Of simulated films (10 nm to 5 µm, on Si, glass and metals, steps of 1 to 10 nm, noise up to 0.3° of Ψ and
 0.6° of Δ) none of 1923 that were not folded was taken to be, and of smooth Δ that come close to 180 one of
 26 000 (in steps of a twelfth of its period). Half of the folded films were missed: most of those of several
-µm or in steps of 10 nm, and on glass, where S is small. `fitting.film.folded_reading` is for these."""
+µm or in steps of 10 nm, and on glass, where S is small. `fitting.film.other_readings` is for these."""
 _RISE = 0.03
 """Least |S| on both sides of a kink."""
 _SHARE = 0.7

@@ -19,21 +19,21 @@ from pellicle.data.colours import Colours
 from pellicle.data.measurement import Datum
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
+from pellicle.fitting.assembly import assemble
 from pellicle.fitting.brdf import fit as of_samples
-from pellicle.fitting.brdf import summary as samples_summary
+from pellicle.fitting.brdf.summary import BrdfMeasurements
 from pellicle.fitting.budget import budget
-from pellicle.fitting.conclusion import conclude, linearised
 from pellicle.fitting.coordinates import Box, Coordinates
 from pellicle.fitting.covariance import Scaled
-from pellicle.fitting.discrepancy import Evidence, discrepancy
+from pellicle.fitting.discrepancy import Discrepancy, Evidence
 from pellicle.fitting.film import fit as of_film
-from pellicle.fitting.film import fringes, parts, summary
-from pellicle.fitting.film.evidence import evidence as film_evidence
+from pellicle.fitting.film.summary import FilmMeasurements
 from pellicle.fitting.film.targets import Target
 from pellicle.fitting.minima import minima
 from pellicle.fitting.problem import Problem
+from pellicle.fitting.profile_likelihood import Limits
 from pellicle.fitting.progress import Progress, quiet
-from pellicle.fitting.result import Fit
+from pellicle.fitting.result import Estimate, Fit, Part
 from pellicle.fitting.reweighting import RankedMinima, rank
 from pellicle.fitting.robust_losses import LEAST_SQUARES
 from pellicle.fitting.status import verdict
@@ -108,7 +108,8 @@ def fitted(
         targets = of_film.measurements(own.films, own.scenes)
         problem, starts = _combined(film_ranked, brdf_ranked)
         ranked = rank(problem, minima(problem, starts, progress), loss)
-        return _concluded(own, targets, ranked, film, brdf, began)
+        both = together(own, targets, ranked)
+        return _concluded(both, own.scenes, film, brdf, began), ranked
 
 
 def _combined(film: RankedMinima, brdf: RankedMinima) -> tuple[Problem, np.ndarray]:
@@ -169,69 +170,63 @@ def _combined(film: RankedMinima, brdf: RankedMinima) -> tuple[Problem, np.ndarr
     return problem, np.array(starts)
 
 
-def evidence(targets: Sequence[Target], ranked: RankedMinima, jacobian: Scaled) -> list[Evidence]:
-    """Evidence of all data at the best of the ranked minima; `targets` are those of the film."""
-    of_films, of_surface = _split(ranked, len(targets))
-    before = sum(view.points for view in of_films.problem.views)
-    below = jacobian._replace(jacobian=jacobian.jacobian[before:])
-    return [*film_evidence(targets, of_films, jacobian), *samples_summary.evidence(of_surface, below)]
+class JointMeasurements(NamedTuple):
+    """Films and samples of one fit, of whose views the films' are the first."""
+
+    films: FilmMeasurements
+    samples: BrdfMeasurements
+    ranked: RankedMinima
+
+    def evidence(self, jacobian: Scaled) -> list[Evidence]:
+        """Residuals of all views and what may explain them."""
+        before = sum(view.points for view in self.films.ranked.problem.views)
+        below = jacobian._replace(jacobian=jacobian.jacobian[before:])
+        return [*self.films.evidence(jacobian), *self.samples.evidence(below)]
+
+    def parts(self, found: Discrepancy) -> tuple[Part, ...]:
+        """The parts of the films, then those of the samples."""
+        return (*self.films.parts(found), *self.samples.parts(found))
+
+    def missed(self, parts: tuple[Part, ...], found: Discrepancy) -> list[Part]:
+        """The parts that are not explained."""
+        count = len(self.films.targets)
+        of_films = replace(found, remaining=found.remaining[:count])
+        return [*self.films.missed(parts[:count], of_films), *self.samples.missed(parts[count:], found)]
+
+    def fixed(self) -> list[Estimate]:
+        """Fixed numbers of the scenes and of the surface."""
+        return [*self.films.fixed(), *self.samples.fixed()]
+
+    def amended(self, limits: list[Limits]) -> list[Limits]:
+        """Limits by what either kind cannot tell."""
+        return self.samples.amended(self.films.amended(limits))
 
 
-def _split(ranked: RankedMinima, count: int) -> tuple[RankedMinima, RankedMinima]:
-    """The minima as the first `count` views see them, and as the others do."""
-    views, fits = ranked.problem.views, ranked.fits
-    halves = [(views[:count], fits[:count]), (views[count:], fits[count:])]
-    one, other = (
-        replace(ranked, problem=ranked.problem._replace(views=own), fits=each) for own, each in halves
-    )
-    return one, other
-
-
-def _concluded(
-    own: Apart, targets: list[Target], ranked: RankedMinima, film: Fit, brdf: Fit, began: float
-) -> tuple[Fit, RankedMinima]:
-    """The joint fit at the best of the ranked minima."""
+def together(apart: Apart, targets: list[Target], ranked: RankedMinima) -> JointMeasurements:
+    """Both kinds of data with the views of the ranked minima that are theirs; `targets` are the films'."""
     count, problem = len(targets), ranked.problem
-    of_films, of_surface = _split(ranked, count)
-    jacobian, covariance = linearised(ranked)
-    found = discrepancy(evidence(targets, ranked, jacobian), jacobian, ranked.minima.units[0])
-    film_parts = parts.parts(own.films, of_films, found.errors)
-    every = (*film_parts, *samples_summary.parts(own.samples, of_surface))
-    silent = fringes.missed(of_films.problem, of_films.fits, of_films.values)
-    missed = parts.missed(film_parts, of_films, replace(found, remaining=found.remaining[:count]), silent)
-    pairs = zip(of_surface.problem.views, of_surface.fits, every[count:], strict=True)
-    wrong = [*missed, *(part for view, fit, part in pairs if samples_summary.misses(view, fit))]
-    conclusion = conclude(
+    one, other = (
+        replace(ranked, problem=problem._replace(views=problem.views[own]), fits=ranked.fits[own])
+        for own in (slice(count), slice(count, None))
+    )
+    return JointMeasurements(
+        FilmMeasurements(apart.films, targets, one),
+        BrdfMeasurements(apart.samples, apart.surface, other),
         ranked,
-        jacobian,
-        covariance,
-        found,
-        misfit=bool(wrong),
-        fixed=[*summary.fixed(targets), *samples_summary.fixed(own.surface)],
-        scans={},
-        amend=lambda limits: samples_summary.amended(problem, summary.amended(targets, of_films, limits)),
     )
-    worst = (wrong or every)[0]
-    result = Fit(
-        parts=every,
-        status=conclusion.status,
-        verdict=verdict(
-            conclusion.status, conclusion.parameters, conclusion.rivals, worst.rms, worst.name, trading=()
-        ),
-        parameters=conclusion.parameters,
-        rivals=conclusion.rivals,
-        chi2_reduced=ranked.chi2_reduced,
+
+
+def _concluded(both: JointMeasurements, scenes: list[Scene], film: Fit, brdf: Fit, began: float) -> Fit:
+    """The joint fit at the best of the ranked minima."""
+    judged = assemble(both, began)
+    worst, conclusion = judged.worst, judged.conclusion
+    return judged.fit(
+        verdict=verdict(conclusion.status, conclusion.parameters, conclusion.rivals, worst.rms, worst.name),
         rms=None,
-        effective_points=sum(part.effective_points for part in every),
-        correlation_names=covariance.names,
-        correlation=found.errors.correlation,
         warnings=tuple(dict.fromkeys([*_apart_warning(film, brdf), *film.warnings, *brdf.warnings])),
-        profile=None,
-        seconds=time.perf_counter() - began,
-        scene=(*own.scenes, own.surface),
-        budget=budget(found, problem.parameters),
+        scene=(*scenes, both.samples.surface),
+        budget=budget(judged.discrepancy, both.ranked.problem.parameters),
     )
-    return result, ranked
 
 
 def _apart_warning(film: Fit, brdf: Fit) -> list[str]:

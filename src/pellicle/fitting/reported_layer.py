@@ -1,4 +1,4 @@
-"""The layer of a scene whose n and k a fit reports, and its slopes beside those of the signal."""
+"""The layer of a scene whose n and k a fit reports: its slopes beside those of the signal, and its errors."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
-from pellicle.dispersion.anisotropic import principal_media
+from pellicle.dispersion.anisotropic import Anisotropic, principal_media
+from pellicle.fitting.curves import BIREFRINGENCE, Index
 from pellicle.optics.hoisting import stack_rows
 from pellicle.scene.film import Scene
 from pellicle.scene.free import free_leaves, insert
@@ -49,3 +51,41 @@ def linearised(form: Any, scene: Scene, data: Any, values: Any) -> Linearised:
 
     found, push = jax.linearize(both, values)
     return Linearised(*found, *jax.vmap(push, out_axes=-1)(jnp.eye(len(values))))
+
+
+def layer_errors(at: Any, covariance: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray]:
+    """Standard errors of the layer's n and k at each wavelength, from the covariance of the parameters.
+
+    `at` is the local model of a spectrum or of colours.
+    """
+    n, k = _errors(np.asarray(at.layer_slope)[:2, :points], covariance)
+    return n, k
+
+
+def principal_indices(
+    scene: Scene, at: Any, covariance: np.ndarray, wavelength: np.ndarray
+) -> dict[str, Index]:
+    """Each principal index of the reported layer by its name, with standard errors; empty if it has only one.
+
+    Of a uniaxial layer also its birefringence: n and k of the extraordinary medium less the ordinary ones.
+    """
+    medium = reported_medium(scene)
+    if not isinstance(medium, Anisotropic):
+        return {}
+    points = wavelength.size
+    values, slopes = np.asarray(at.layer)[:, :points], np.asarray(at.layer_slope)[:, :points]
+    own = [(values[i : i + 2], slopes[i : i + 2]) for i in range(0, len(values), 2)]
+    names = [medium.names[axis] for axis in (("x", "z") if medium.is_uniaxial else ("x", "y", "z"))]
+    if medium.is_uniaxial:
+        (ordinary, slope), (extraordinary, other) = own
+        own.append((extraordinary - ordinary, other - slope))
+        names.append(BIREFRINGENCE)
+    return {
+        name: Index(wavelength, *value, *_errors(slope, covariance))
+        for name, (value, slope) in zip(names, own, strict=True)
+    }
+
+
+def _errors(slope: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    """Standard errors (rows, wavelengths) by slopes (rows, wavelengths, parameters)."""
+    return np.sqrt(np.maximum(np.einsum("cip,pq,ciq->ci", slope, covariance, slope), 0.0))

@@ -10,8 +10,7 @@ import numpy as np
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.colours import Colours
 from pellicle.data.ellipsometry_angles import psi_delta
-from pellicle.fitting.brdf.residuals import INVERSES, RESIDUALS
-from pellicle.fitting.brdf.view import SamplesView
+from pellicle.fitting.brdf.view import INVERSES, RESIDUALS, SamplesView
 from pellicle.fitting.curves import BrdfCurve, ColourCurve, Curve
 from pellicle.fitting.evaluation import curves
 from pellicle.fitting.film.colour_view import ColoursView

@@ -17,12 +17,12 @@ from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
 from pellicle.fitting import joint
 from pellicle.fitting.brdf import fit as brdf
-from pellicle.fitting.brdf.summary import evidence as sample_evidence
+from pellicle.fitting.brdf.summary import BrdfMeasurements
 from pellicle.fitting.conclusion import linearised
 from pellicle.fitting.discrepancy import discrepancy
 from pellicle.fitting.film import fit as spectra
 from pellicle.fitting.film.colour_targets import arrays
-from pellicle.fitting.film.evidence import evidence as spectrum_evidence
+from pellicle.fitting.film.summary import FilmMeasurements
 from pellicle.fitting.progress import Progress, quiet
 from pellicle.fitting.result import Status
 from pellicle.sampling.density import fingerprint, log_density, systematics
@@ -72,12 +72,12 @@ def sample(
     if isinstance(scene, Surface):
         measurements = measured((BrdfSamples,), data)
         fit, ranked = brdf.fitted(measurements, scene, tolerance, progress, residual=residual)
-        found_in = sample_evidence
         unsure = fit.layer_test and not fit.layer_test.layered and fit.status is not Status.AMBIGUOUS
         assumption = "there is a layer" if unsure else ""
         rows = [measurements] if isinstance(measurements, BrdfSamples) else measurements
         columns = [(s.theta_i, s.phi_i, s.theta_o, s.phi_o, s.values, s.sigma) for s in rows]
         compared = fit.layer_test.residual if fit.layer_test else ""
+        of = partial(BrdfMeasurements, rows, scene)
         numbers = dict(scene.numbers), tuple(scene.bands), scene.media
         identity = fingerprint([*columns, numbers], scene.model, compared, tolerance)
     elif joint.of_both_kinds(scene):
@@ -90,18 +90,18 @@ def sample(
             targets = spectra.measurements(own.films, own.scenes)
             known = [*map(arrays, targets), *columns, surface]
             identity = fingerprint(known, own.surface.model, residual, tolerance)
-        found_in = partial(joint.evidence, targets)
+        of = partial(joint.together, own, targets)
     else:
         measurements, own_scene = measured(OF_A_FILM, data), cast(Any, scene)
         fit, ranked = spectra.fitted(measurements, own_scene, tolerance, progress)
         with jax.enable_x64(True):
             targets = spectra.measurements(measurements, own_scene)
             identity = fingerprint([arrays(target) for target in targets], tolerance)
-        found_in = partial(spectrum_evidence, targets)
+        of = partial(FilmMeasurements, spectra.listed(measurements), targets)
     with jax.enable_x64(True):
         ranked = ranked.counted
         jacobian, covariance = linearised(ranked)
-        residuals, problem = found_in(ranked, jacobian), ranked.problem.affine()
+        residuals, problem = of(ranked).evidence(jacobian), ranked.problem.affine()
         shares = discrepancy(residuals, jacobian, ranked.minima.units[0]).evidence_shares
         channels = [view.channels for view in problem.views]
         effects = systematics(residuals, shares, channels, len(problem.parameters))

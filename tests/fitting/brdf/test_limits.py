@@ -18,7 +18,7 @@ from pellicle.fitting import estimates as shared
 from pellicle.fitting.brdf import fit as module
 from pellicle.fitting.brdf.fit import fit
 from pellicle.fitting.brdf.problem import make
-from pellicle.fitting.brdf.summary import evidence
+from pellicle.fitting.brdf.summary import BrdfMeasurements
 from pellicle.fitting.conclusion import Conclusion, conclude, linearised
 from pellicle.fitting.discrepancy import discrepancy
 from pellicle.fitting.minima import Minima, minima
@@ -76,7 +76,9 @@ def judged(simulated) -> Judged:
     assert result.converged[0]
     ranked = rank(problem, result)
     jacobian, errors = linearised(ranked)
-    found = discrepancy(evidence(ranked, jacobian), jacobian, ranked.minima.units[0])
+    found = discrepancy(
+        BrdfMeasurements([samples], SURFACE, ranked).evidence(jacobian), jacobian, ranked.minima.units[0]
+    )
     return Judged(ranked, conclude(ranked, jacobian, errors, found, misfit=False, fixed=[], scans={}))
 
 

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from pellicle.fitting.brdf.residuals import INVERSES, RESIDUALS, slope
+from pellicle.fitting.brdf.view import INVERSES, RESIDUALS, slope
 
 RHO, COSINE, FLOOR = np.array([0.0, 0.3, 40.0]), np.array([1.0, 0.5, 0.2]), 1e-3
 EXPECTED = {

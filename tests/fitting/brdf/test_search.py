@@ -10,8 +10,7 @@ import pytest
 import pellicle as pl
 from pellicle.fitting.brdf import search as module
 from pellicle.fitting.brdf.problem import make
-from pellicle.fitting.brdf.search import SCAN_SAMPLES, Effort, candidates, search
-from pellicle.fitting.brdf.solve_weights import Candidates
+from pellicle.fitting.brdf.search import SCAN_SAMPLES, Candidates, Effort, candidates, search
 from pellicle.fitting.minima import Minima
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.progress import quiet

@@ -9,7 +9,7 @@ from scipy.optimize import nnls
 import pellicle as pl
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.fitting.brdf.problem import make, without_layer
-from pellicle.fitting.brdf.solve_weights import scan
+from pellicle.fitting.brdf.search import scan
 from pellicle.fitting.problem import Problem
 from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pellicle.fitting.brdf.warnings import directions, numbers, weights
+from pellicle.fitting.brdf.summary import direction_warnings, number_warnings, weight_warnings
 from pellicle.fitting.result import Estimate
 from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface
@@ -14,13 +14,13 @@ BASE = Surface("microfacet-film", {"base_n": Free(1, 3), "base_k": Free(0, 6)}, 
 
 
 def test_warnings_on_directions(ones, tilted):
-    messages = " ".join(directions(ones(30.0, 0.0, [10.0, 40.0], 180.0), tilted))
+    messages = " ".join(direction_warnings(ones(30.0, 0.0, [10.0, 40.0], 180.0), tilted))
     assert "all light comes at one angle" in messages
     assert "in one plane: they cannot see the sign" in messages
-    messages = " ".join(directions(ones([10.0, 30.0], 0.0, 40.0, [90.0, 180.0]), tilted))
+    messages = " ".join(direction_warnings(ones([10.0, 30.0], 0.0, 40.0, [90.0, 180.0]), tilted))
     assert "never turned" in messages
     assert "at one angle" not in messages
-    messages = " ".join(directions(ones([5.0, 12.0], 0.0, 10.0, 180.0, ("value",)), BASE))
+    messages = " ".join(direction_warnings(ones([5.0, 12.0], 0.0, 10.0, 180.0, ("value",)), BASE))
     assert "within 12 degrees of the normal" in messages
     assert "one channel near the normal" in messages
     assert "base_n and base_k are both free" in messages
@@ -28,7 +28,7 @@ def test_warnings_on_directions(ones, tilted):
 
 def test_directions_that_determine_everything_give_no_warning(ones, tilted):
     turned = ones([20.0, 50.0, 50.0], [0.0, 45.0, 90.0], 40.0, [180.0, 200.0, 270.0])
-    assert directions(turned, tilted) == []
+    assert direction_warnings(turned, tilted) == []
 
 
 @pytest.mark.parametrize(
@@ -43,20 +43,20 @@ def test_warnings_on_numbers(name, value, message):
     surface = Surface("microfacet-film", {})
     free = Estimate(name, value, 0.1, "", 0.0, 1000.0, True)
     fitted = {key: np.asarray(x) for key, x in surface.fixed_numbers().items()}
-    messages = numbers(surface, {name: free}, fitted)
+    messages = number_warnings(surface, {name: free}, fitted)
     assert len(messages) == bool(message)
     assert message in " ".join(messages)
 
 
 def test_lobes_that_are_not_normalised_are_named(tilted):
     fitted = {key: np.asarray(x) for key, x in tilted.start_numbers().items()}
-    assert any("specular is a weight and no albedo" in each for each in numbers(tilted, {}, fitted))
+    assert any("specular is a weight and no albedo" in each for each in number_warnings(tilted, {}, fitted))
 
 
 def test_weights_that_are_fixed_are_named():
     fixed = Estimate("specular", 1.0, 0.0, "", 1.0, 1.0, False)
     free = Estimate("diffuse", 0.3, 0.01, "1/sr", 0.0, 1.0, True)
-    [message] = weights({"specular": fixed, "diffuse": free, "base_n_r": fixed})
+    [message] = weight_warnings({"specular": fixed, "diffuse": free, "base_n_r": fixed})
     assert message.startswith("fixed: specular at 1; ")
     assert "specular = { lower = 0, upper = 10 }" in message
-    assert weights({"diffuse": free}) == []
+    assert weight_warnings({"diffuse": free}) == []

@@ -14,17 +14,18 @@ from pellicle.data.brdf_samples import BrdfSamples, spread
 from pellicle.effects.surface_plan import plan
 from pellicle.errors import UsageError
 from pellicle.fitting import identifiability
-from pellicle.fitting.brdf import summary, warnings
+from pellicle.fitting.assembly import Assembly, assemble
+from pellicle.fitting.brdf import summary
+from pellicle.fitting.brdf.layer_test import Evidence as LayerEvidence
 from pellicle.fitting.brdf.layer_test import evidence
 from pellicle.fitting.brdf.problem import incoherent, make, restricted, together, without_layer
-from pellicle.fitting.brdf.residuals import RESIDUALS
 from pellicle.fitting.brdf.search import FEW, SMOOTH, THOROUGH, Effort, search
-from pellicle.fitting.conclusion import common_rms, conclude, linearised, ranked_minima
-from pellicle.fitting.discrepancy import discrepancy
+from pellicle.fitting.brdf.view import RESIDUALS
+from pellicle.fitting.conclusion import common_rms, ranked_minima
 from pellicle.fitting.minima import Minima, deviance_at, minima
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.progress import Progress, quiet
-from pellicle.fitting.result import Baseline, Fit, LayerTest, Status
+from pellicle.fitting.result import Baseline, Estimate, Fit, LayerTest, Status
 from pellicle.fitting.reweighting import RankedMinima
 from pellicle.fitting.robust_losses import LEAST_SQUARES, check_loss
 from pellicle.fitting.robust_losses import spread as bulk_spread
@@ -164,58 +165,53 @@ def _fit(
         return minima(problem, result.units, progress, **kept)
 
     ranked, notes = ranked_minima(build, searched, tolerance, loss, **kept)
-    jacobian, covariance = linearised(ranked)
-    pairs = list(zip(ranked.problem.views, ranked.fits, strict=True))
-    found = discrepancy(summary.evidence(ranked, jacobian), jacobian, ranked.minima.units[0])
-    conclusion = conclude(
-        ranked,
-        jacobian,
-        covariance,
-        found,
-        misfit=any(summary.misses(view, fit) for view, fit in pairs),
-        fixed=summary.fixed(surface),
-        scans={},
-        near=True,
-        amend=lambda limits: summary.amended(ranked.problem, limits),
-    )
+    judged = assemble(summary.BrdfMeasurements(samples, surface, ranked), began, near=True)
     baselines = tuple(Baseline(name, errors[name]) for name in (_FLAT, _PLAIN))
-    status, parameters = conclusion.status, conclusion.parameters
-    layer = evidence(parameters, conclusion.rivals, errors["layer"], baselines)
+    status, parameters = judged.conclusion.status, judged.conclusion.parameters
+    layer = evidence(parameters, judged.conclusion.rivals, errors["layer"], baselines)
     if not layer.layered and not layer.several:
         parameters = summary.without_layer_error(parameters)
         status = status if status in (Status.NOT_CONVERGED, Status.MISFIT) else Status.NOT_IDENTIFIABLE
-    parts = summary.parts(samples, ranked)
-    rms = common_rms([view.independent for view, _ in pairs], [part.rms for part in parts])
-    of_lead = identifiability.naming(next(iter(parameters)), conclusion.correlated)
-    sentence = verdict(status, parameters, conclusion.rivals, rms, trading=of_lead)
-    if not layer.layered:
-        sentence = layer.verdict
-    elif status is Status.CONVERGED:
-        sentence = " ".join([layer.verdict, *(f"But {correlation}." for correlation in of_lead[:1])])
-    view = ranked.problem.views[0]
-    numbers = {k: np.asarray(x) for k, x in view.form.numbers(ranked.values, surface.fixed_numbers()).items()}
-    result = Fit(
-        parts=parts,
+    rms = common_rms([view.independent for view in ranked.problem.views], [part.rms for part in judged.parts])
+    result = judged.fit(
         status=status,
-        verdict=sentence,
+        verdict=_verdict(judged, layer, status, parameters, rms),
         parameters=parameters,
-        rivals=summary.with_curves(conclusion.rivals, ranked.problem),
-        chi2_reduced=ranked.chi2_reduced,
+        rivals=summary.with_curves(judged.conclusion.rivals, ranked.problem),
         rms=rms,
-        effective_points=sum(part.effective_points for part in parts),
-        correlation_names=covariance.names,
-        correlation=found.errors.correlation,
-        warnings=(
-            *notes,
-            *(warnings.weights(parameters) if status is Status.MISFIT else ()),
-            *warnings.directions(together(samples), surface),
-            *warnings.numbers(surface, parameters, numbers),
-            *identifiability.bounded(parameters, ()),
-            *conclusion.correlated,
-        ),
-        profile=None,
-        seconds=time.perf_counter() - began,
+        warnings=(*notes, *_warnings(samples, surface, judged, status, parameters)),
         scene=surface,
         layer_test=LayerTest(layer.layered, errors["layer"], baselines, residual),
     )
     return result, ranked
+
+
+def _verdict(
+    judged: Assembly, layer: LayerEvidence, status: Status, parameters: dict[str, Estimate], rms: float
+) -> str:
+    """The verdict on the surface, with the evidence of a layer in front."""
+    of_lead = identifiability.naming(next(iter(parameters)), judged.conclusion.correlated)
+    if not layer.layered:
+        return layer.verdict
+    if status is Status.CONVERGED:
+        return " ".join([layer.verdict, *(f"But {correlation}." for correlation in of_lead[:1])])
+    return verdict(status, parameters, judged.conclusion.rivals, rms, trading=of_lead)
+
+
+def _warnings(
+    samples: list[BrdfSamples],
+    surface: Surface,
+    judged: Assembly,
+    status: Status,
+    parameters: dict[str, Estimate],
+) -> list[str]:
+    """Warnings on weights, directions, numbers and what the data do not determine."""
+    view, values = judged.ranked.problem.views[0], judged.ranked.values
+    numbers = {k: np.asarray(x) for k, x in view.form.numbers(values, surface.fixed_numbers()).items()}
+    return [
+        *(summary.weight_warnings(parameters) if status is Status.MISFIT else ()),
+        *summary.direction_warnings(together(samples), surface),
+        *summary.number_warnings(surface, parameters, numbers),
+        *identifiability.bounded(parameters, ()),
+        *judged.conclusion.correlated,
+    ]

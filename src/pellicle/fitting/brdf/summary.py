@@ -1,23 +1,28 @@
-"""Summary of a fit of BRDF samples: parts, misfit, limits, fixed numbers."""
+"""Summary of a fit of BRDF samples: parts, misfit, limits, fixed numbers, warnings."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from pellicle.brdf.albedo import energy_warning
 from pellicle.data.brdf_samples import BrdfSamples
+from pellicle.fitting.brdf.problem import in_plane
 from pellicle.fitting.brdf.view import SamplesView
 from pellicle.fitting.covariance import Scaled
 from pellicle.fitting.curves import BrdfCurve, Deferred
-from pellicle.fitting.discrepancy import Evidence
+from pellicle.fitting.discrepancy import Discrepancy, Evidence
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.profile_likelihood import Limits
 from pellicle.fitting.result import Estimate, Part, Rival
 from pellicle.fitting.reweighting import RankedMinima, ViewFit
+from pellicle.materials import materials_in
+from pellicle.scene.layers import medium
 from pellicle.scene.surface import Surface
 
 _FAR = 4.0
@@ -28,22 +33,78 @@ _LARGE = 0.05
 """Share of the range of the compared data above which residuals are large: models of surfaces are rough."""
 
 
-def parts(samples: list[BrdfSamples], ranked: RankedMinima) -> tuple[Part, ...]:
-    """One part for each set of samples, in their order."""
-    views = zip(samples, ranked.problem.views, ranked.fits, strict=True)
-    return tuple(
-        Part(
-            name=view.name,
-            data=each,
-            curve=_curve(view, fit.at),
-            plan=view.plan,
-            rms=view.rms(fit.at),
-            chi2_reduced=fit.chi2 / fit.freedom,
-            effective_points=view.independent / fit.length,
-            sigma_from="given" if view.noise.given else "residuals",
+class BrdfMeasurements(NamedTuple):
+    """BRDF samples, the surface that is to explain them, and the ranked minima of their fit."""
+
+    samples: list[BrdfSamples]
+    surface: Surface
+    ranked: RankedMinima
+
+    def evidence(self, jacobian: Scaled) -> list[Evidence]:
+        """Residuals of each view in units of its noise, without effects: BRDF models have no systematic
+        effects."""
+        views, fits, result = self.ranked.problem.views, self.ranked.fits, []
+        blocks = jacobian.blocks([view.independent for view in views], [fit.variance for fit in fits])
+        for view, fit, block in zip(views, fits, blocks, strict=True):
+            residual = view.residuals(fit.at)
+            columns = block.reshape(*residual.shape, -1)
+            one = np.ones(residual.shape)
+            weights = math.sqrt(view.samples.independent_fraction) * one
+            result.append(Evidence(residual, columns, one, 1.0, weights, (), view.correlation_length))
+        return result
+
+    def parts(self, found: Discrepancy) -> tuple[Part, ...]:
+        """One part for each set of samples, in their order."""
+        views = zip(self.samples, self.ranked.problem.views, self.ranked.fits, strict=True)
+        return tuple(
+            Part(
+                name=view.name,
+                data=each,
+                curve=_curve(view, fit.at),
+                plan=view.plan,
+                rms=view.rms(fit.at),
+                chi2_reduced=fit.chi2 / fit.freedom,
+                effective_points=view.independent / fit.length,
+                sigma_from="given" if view.noise.given else "residuals",
+            )
+            for each, view, fit in views
         )
-        for each, view, fit in views
-    )
+
+    def missed(self, parts: tuple[Part, ...], found: Discrepancy) -> list[Part]:
+        """The parts that the surface does not explain: residuals are large, and not noise."""
+        views = zip(parts, self.ranked.problem.views, self.ranked.fits, strict=True)
+        return [part for part, view, fit in views if _misses(view, fit)]
+
+    def fixed(self) -> list[Estimate]:
+        """Every fixed number, one for each channel where they differ: the mean over its band with a
+        sensor."""
+        numbers, bands, result = self.surface.fixed_numbers(), self.surface.bands, []
+        for about in self.surface.brdf.parameters:
+            if about.key not in numbers:
+                continue
+            value = numbers[about.key]
+            value = value @ bands.weights if value.size > 1 else value
+            names = [about.key]
+            if value.ndim:
+                letters = ("r", "g", "b") if value.size == 3 else range(1, value.size + 1)
+                names = [f"{about.key}_{letter}" for letter in letters]
+            result += [
+                Estimate(name, x, 0.0, about.unit, x, x, False)
+                for name, x in zip(names, np.ravel(value).tolist(), strict=True)
+            ]
+        return result
+
+    def amended(self, limits: list[Limits]) -> list[Limits]:
+        """Limits without an azimuth where there is no tilt: an azimuth has no bounds to lie beside."""
+        coordinates = self.ranked.problem.coordinates
+        if coordinates.tilt is None:
+            return limits
+        deviation, azimuth = coordinates.tilt
+        tilt, turn = limits[deviation], limits[azimuth]
+        upright = tilt.upper is not None or not math.isfinite(tilt.stderr)
+        one_sided = (turn.lower is None) != (turn.upper is None)
+        unknown = upright or (one_sided and not coordinates.folded)
+        return [Limits(math.inf) if unknown and at == azimuth else each for at, each in enumerate(limits)]
 
 
 def _curve(view: SamplesView, at: Any) -> BrdfCurve:
@@ -63,54 +124,9 @@ def with_curves(rivals: tuple[Rival, ...], problem: Problem) -> tuple[Rival, ...
     )
 
 
-def misses(view: SamplesView, fit: ViewFit) -> bool:
-    """True where the surface does not explain the samples of a view: residuals are large, and not noise."""
+def _misses(view: SamplesView, fit: ViewFit) -> bool:
     structured = fit.chi2 / fit.freedom > _FAR if view.noise.given else 1 / fit.length < _STRUCTURED
     return bool(structured and view.rms(fit.at) > _LARGE * view.span())
-
-
-def evidence(ranked: RankedMinima, jacobian: Scaled) -> list[Evidence]:
-    """Residuals of each view in units of its noise, without effects: models of surfaces know none."""
-    views, fits, result = ranked.problem.views, ranked.fits, []
-    blocks = jacobian.blocks([view.independent for view in views], [fit.variance for fit in fits])
-    for view, fit, block in zip(views, fits, blocks, strict=True):
-        residual = view.residuals(fit.at)
-        columns = block.reshape(*residual.shape, -1)
-        one = np.ones(residual.shape)
-        weights = math.sqrt(view.samples.independent_fraction) * one
-        result.append(Evidence(residual, columns, one, 1.0, weights, (), view.correlation_length))
-    return result
-
-
-def amended(problem: Problem, limits: list[Limits]) -> list[Limits]:
-    """Limits without an azimuth where there is no tilt: an azimuth has no bounds to lie beside."""
-    if problem.coordinates.tilt is None:
-        return limits
-    deviation, azimuth = problem.coordinates.tilt
-    tilt, turn = limits[deviation], limits[azimuth]
-    upright = tilt.upper is not None or not math.isfinite(tilt.stderr)
-    one_sided = (turn.lower is None) != (turn.upper is None)
-    unknown = upright or (one_sided and not problem.coordinates.folded)
-    return [Limits(math.inf) if unknown and at == azimuth else each for at, each in enumerate(limits)]
-
-
-def fixed(surface: Surface) -> list[Estimate]:
-    """Every fixed number, one for each channel where they differ: the mean over its band with a sensor."""
-    numbers, result = surface.fixed_numbers(), []
-    for about in surface.brdf.parameters:
-        if about.key not in numbers:
-            continue
-        value = numbers[about.key]
-        value = value @ surface.bands.weights if value.size > 1 else value
-        names = [about.key]
-        if value.ndim:
-            letters = ("r", "g", "b") if value.size == 3 else range(1, value.size + 1)
-            names = [f"{about.key}_{letter}" for letter in letters]
-        result += [
-            Estimate(name, x, 0.0, about.unit, x, x, False)
-            for name, x in zip(names, np.ravel(value).tolist(), strict=True)
-        ]
-    return result
 
 
 def without_layer_error(parameters: dict[str, Estimate]) -> dict[str, Estimate]:
@@ -119,3 +135,75 @@ def without_layer_error(parameters: dict[str, Estimate]) -> dict[str, Estimate]:
     if depth is None or not depth.free:
         return parameters
     return {**parameters, "thickness": dataclasses.replace(depth, stderr=math.inf, lower_limit=None)}
+
+
+_STEEP, _TOLERANCE = 15.0, 0.5
+"""Degrees from the normal: directions below the first see little of n, and within the second are one."""
+_WEIGHTS = ("specular", "diffuse")
+_THIN = 5.0
+"""nm; n and k of a thinner film are not seen."""
+
+
+def direction_warnings(samples: BrdfSamples, surface: Surface) -> list[str]:
+    """Warnings on parameters that the directions of the samples cannot determine."""
+    free = {leaf.key for leaf in surface.free_numbers()}
+    incidences = np.unique(np.round(samples.theta_i / _TOLERANCE))
+    steepest = float(max(samples.theta_i.max(initial=0), samples.theta_o.max(initial=0)))
+    messages = []
+    if steepest < _STEEP:
+        messages.append(
+            f"all directions are within {steepest:.0f} degrees of the normal: n and thickness trade"
+        )
+        if len(samples.channels) == 1:
+            messages.append("one channel near the normal cannot tell one order of interference from the next")
+    if len(incidences) == 1:
+        messages.append("all light comes at one angle: other thicknesses may fit as well; measure at several")
+    tilted = {"deviation", "azimuth"} <= free
+    if tilted and in_plane(samples):
+        messages.append("the samples lie in one plane: they cannot see the sign of a deviation out of it")
+    elif tilted and np.ptp(samples.phi_i) < _TOLERANCE:
+        messages.append("the surface was never turned: a deviation holds for this orientation alone")
+    if {"base_n", "base_k"} <= free:
+        messages.append(
+            "base_n and base_k are both free and strongly correlated (0.95): fix them from a table"
+        )
+    return messages
+
+
+def weight_warnings(parameters: Mapping[str, Estimate]) -> list[str]:
+    """A sentence on weights of lobes that are fixed, for a fit that does not explain the samples."""
+    fixed = [name for name, p in parameters.items() if name.split("_")[0] in _WEIGHTS and not p.free]
+    if not fixed:
+        return []
+    each = " and ".join(f"{name} at {parameters[name].value:g}" for name in fixed)
+    return [
+        f"fixed: {each}; unless they are known, give them bounds, as in {fixed[0]} = {{ lower = 0, "
+        "upper = 10 }"
+    ]
+
+
+def number_warnings(
+    surface: Surface, parameters: Mapping[str, Estimate], fitted: Mapping[str, Any]
+) -> list[str]:
+    """Warnings on the fitted numbers themselves."""
+    messages = []
+    depth = parameters.get("thickness")
+    if depth is not None and depth.free and depth.value < _THIN:
+        messages.append(
+            f"thickness {depth.value:.2g} nm is next to none: n and k of so thin a film are not seen"
+        )
+    for name, p in parameters.items():
+        if p.free and name.startswith("exponent") and p.value < 2:
+            messages.append(f"{name} {p.value:.2f} is below 2: a second diffuse part rather than a lobe")
+    if surface.model.startswith("granier-heidrich"):
+        messages.append("the model's lobes are not normalised: specular is a weight and no albedo")
+    media = [medium(value) for value in (surface.film, surface.base) if value is not None]
+    messages += [sentence for material in materials_in(media) for sentence in material.warnings()]
+    # over bands the colour of every direction of the quadrature would be an integral of its own
+    brdf = (
+        surface.brdf
+        if surface.sensor is None
+        else surface.brdf.for_thickness_up_to(float(fitted["thickness"]))
+    )
+    energy = energy_warning(brdf, fitted)
+    return [*messages, energy] if energy else messages

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -14,7 +15,6 @@ from pellicle.brdf.lobes import two_lobes
 from pellicle.brdf.models import Evaluate, model
 from pellicle.data.brdf_samples import DARKEST, BrdfSamples
 from pellicle.effects.surface_plan import evaluation, exact
-from pellicle.fitting.brdf.residuals import RESIDUALS, slope
 from pellicle.fitting.noise import correlation_length
 from pellicle.fitting.problem import Explained, Noise, NoiseGroup
 from pellicle.fitting.program_cache import kept
@@ -264,3 +264,27 @@ def samples_view(
     takes = tuple(range(len(form.keys)))
     view = SamplesView(name, plan, form, numbers, fixed, takes, noise, size, weight)
     return replace(view, relative=samples.relative)
+
+
+Transform = Callable[[Any, Any, Any], Any]
+"""(ρ, cos θ_i, floor) → the number that is compared; `floor` (1/sr) keeps slopes finite at ρ = 0."""
+
+RESIDUALS: dict[str, Transform] = {
+    "linear": lambda rho, cosine, floor: rho,
+    "cosine": lambda rho, cosine, floor: rho * cosine,
+    "log": lambda rho, cosine, floor: jnp.log1p(rho * cosine),
+    "cube-root": lambda rho, cosine, floor: jnp.cbrt(rho + floor),
+}
+
+INVERSES: dict[str, Transform] = {
+    "linear": lambda compared, cosine, floor: compared,
+    "cosine": lambda compared, cosine, floor: compared / cosine,
+    "log": lambda compared, cosine, floor: jnp.expm1(compared) / cosine,
+    "cube-root": lambda compared, cosine, floor: compared**3 - floor,
+}
+"""(number that is compared, cos θ_i, floor) → ρ."""
+
+
+def slope(transform: Transform, rho: Any, cosine: Any, floor: Any) -> Any:
+    """d transform/dρ at each value."""
+    return jax.jvp(lambda x: transform(x, cosine, floor), (rho,), (jnp.ones_like(rho),))[1]

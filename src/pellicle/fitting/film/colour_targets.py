@@ -12,8 +12,7 @@ from pellicle.data.colours import Colours
 from pellicle.effects.bounds import largest_index
 from pellicle.effects.film_plan import plan
 from pellicle.errors import DataError, UsageError
-from pellicle.fitting.film.colour_response import ColourData, camera_response
-from pellicle.fitting.film.colour_view import ColoursView
+from pellicle.fitting.film.colour_view import ColourData, ColoursView, camera_response
 from pellicle.fitting.film.parameters import anonymous
 from pellicle.fitting.problem import Noise
 from pellicle.forward_model.film_signal import tabulated

@@ -15,35 +15,31 @@ from pellicle.data.colours import Colours
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
 from pellicle.fitting import identifiability
+from pellicle.fitting.assembly import Assembly, assemble
 from pellicle.fitting.budget import budget, likely_cause
-from pellicle.fitting.conclusion import conclude, linearised, ranked_minima
+from pellicle.fitting.conclusion import ranked_minima
 from pellicle.fitting.curves import Curve
-from pellicle.fitting.discrepancy import discrepancy
 from pellicle.fitting.film import (
     backface,
     default_bounds,
-    delta_conventions,
     depolarisation,
-    folded_reading,
-    fringes,
     messages,
-    mueller_signs,
+    other_readings,
     parts,
-    residual_structure,
     summary,
     sweep_scatter,
 )
-from pellicle.fitting.film.colour_orders import orders, with_orders
+from pellicle.fitting.film.colour_summary import with_probabilities
 from pellicle.fitting.film.colour_targets import measured_colours
 from pellicle.fitting.film.colour_view import ColoursView
-from pellicle.fitting.film.evidence import evidence
 from pellicle.fitting.film.problem import make
 from pellicle.fitting.film.search import search
+from pellicle.fitting.film.summary import FilmMeasurements
 from pellicle.fitting.film.targets import Target, measured, without_scale
 from pellicle.fitting.minima import Minima
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.progress import Progress, quiet
-from pellicle.fitting.result import Fit, Status
+from pellicle.fitting.result import Estimate, Fit, Rival, Status
 from pellicle.fitting.reweighting import RankedMinima
 from pellicle.fitting.robust_losses import LEAST_SQUARES, check_loss
 from pellicle.fitting.status import verdict
@@ -96,38 +92,27 @@ def fitted(
     check_loss(loss)
     with jax.enable_x64(True):
         targets = measurements(data, scene)
-        spectra = _listed(data)
+        spectra = listed(data)
         fit, ranked = _fit(spectra, targets, tolerance, loss, progress)
-        readings = (
-            (folded_reading.as_folded, folded_reading.remarks),
-            (mueller_signs.with_other_signs, mueller_signs.remarks),
-        )
         if fit.status is not Status.MISFIT:
             return fit, ranked
 
-        def read_as(again: list[Spectrum | Colours]) -> Fit:
-            read = again[0] if isinstance(data, Spectrum | Colours) else again
-            return _fit(again, measurements(read, scene), tolerance, loss, progress)[0]
+        def fitted_as(other: list[Spectrum | Colours]) -> Fit:
+            read = other[0] if isinstance(data, Spectrum | Colours) else other
+            return _fit(other, measurements(read, scene), tolerance, loss, progress)[0]
 
-        found: list[str] = []
-        for read_again, remarks in readings:
-            if (again := read_again(spectra)) is not None:
-                found += remarks(read_as(again))
-        for words, again in (
-            delta_conventions.readings(spectra, [part.rms for part in fit.parts]) if not found else ()
-        ):
-            if found := delta_conventions.remarks(words, read_as(again)):
-                break
-        return replace(fit, warnings=(*found, *fit.warnings)), ranked
+        remarks = other_readings.remarks(spectra, [part.rms for part in fit.parts], fitted_as)
+        return replace(fit, warnings=(*remarks, *fit.warnings)), ranked
 
 
-def _listed(data: Film) -> list[Spectrum | Colours]:
+def listed(data: Film) -> list[Spectrum | Colours]:
+    """The measurements as a list."""
     return [data] if isinstance(data, Spectrum | Colours) else list(data)
 
 
 def measurements(data: Film, scene: Scene | Sequence[Scene]) -> list[Target]:
     """The numbers and the scene of each spectrum and of colours. Raises UsageError as `fit` does."""
-    spectra = _listed(data)
+    spectra = listed(data)
     if not spectra:
         raise UsageError("there is no spectrum to fit: give one, or a list of some")
     scenes = [scene] * len(spectra) if isinstance(scene, Scene) else list(scene)
@@ -178,56 +163,85 @@ def labels(spectra: Sequence[Spectrum | Colours]) -> list[str]:
 
 
 def _fit(
-    data: list[Spectrum | Colours], spectra: list[Target], tolerance: float, loss: str, progress: Progress
+    data: list[Spectrum | Colours], targets: list[Target], tolerance: float, loss: str, progress: Progress
 ) -> tuple[Fit, RankedMinima]:
     began = time.perf_counter()
+    targets, ranked, wider = _searched(targets, tolerance, loss, progress)
+    progress("errors", 0, 1)
+    films, profile = FilmMeasurements(data, targets, ranked), summary.scan_profile(ranked)
+    depth = ranked.problem.thickness_axis
+    scans = {} if profile is None or depth is None else {depth: profile}
+    judged = assemble(films, began, scans=scans, binding=wider.binding)
+    parameters, drifts = sweep_scatter.with_sweeps(
+        data, ranked, judged.jacobian, judged.conclusion.parameters
+    )
+    rivals, probability = judged.conclusion.rivals, None
+    if any(isinstance(view, ColoursView) for view in ranked.problem.views):
+        rivals, probability = with_probabilities(rivals, ranked, judged.discrepancy)
+    dark = summary.opaque(targets, ranked)
+    unclear = [
+        *drifts,
+        *depolarisation.unexplained(data, targets, ranked.problem.views),
+        # the few residuals of colours have a cause in any case, where they are noise
+        *(
+            likely_cause(judged.discrepancy, ranked.problem.parameters)
+            if probability is None or judged.missed
+            else []
+        ),
+        *default_bounds.remarks(ranked, wider.binding),
+        *identifiability.bounded(parameters, dark),
+        *judged.conclusion.correlated,
+    ]
+    fit = judged.fit(
+        verdict=_verdict(films, judged, parameters, rivals, dark),
+        parameters=parameters,
+        rivals=parts.with_curves(rivals, judged.parts, ranked),
+        probability=probability,
+        rms=parts.together(judged.parts),
+        warnings=(*wider.warnings, *summary.warnings(films, unclear)),
+        profile=profile,
+        budget=budget(judged.discrepancy, ranked.problem.parameters),
+        scene=targets[0].scene if len(targets) == 1 else tuple(target.scene for target in targets),
+    )
+    return fit, ranked
+
+
+def _searched(
+    targets: list[Target], tolerance: float, loss: str, progress: Progress
+) -> tuple[list[Target], RankedMinima, default_bounds.Wider]:
+    """Ranked minima within bounds that are widened where the data want it: the targets with these bounds,
+    and what was done, with all warnings."""
 
     def build(allowed: float) -> Problem:
-        problem = make(*spectra, tolerance=allowed)
-        messages.log_problem(spectra, problem)
+        problem = make(*targets, tolerance=allowed)
+        messages.log_problem(targets, problem)
         return problem
 
     ranked, warnings = ranked_minima(build, lambda problem: search(problem, progress), tolerance, loss)
-    wider = default_bounds.wider(spectra, ranked, tolerance, loss, progress)
-    warnings += wider.warnings
+    wider = default_bounds.wider(targets, ranked, tolerance, loss, progress)
     if wider.parameters != ranked.problem.parameters:
-        spectra = default_bounds.measured_within(spectra, ranked, wider.parameters)
+        targets = default_bounds.measured_within(targets, ranked, wider.parameters)
 
         def again(problem: Problem) -> Minima:
             return default_bounds.joined(problem, search(problem, progress), wider.values)
 
         ranked, warnings = ranked_minima(build, again, tolerance, loss)
-        warnings += wider.warnings
-    progress("errors", 0, 1)
-    profile, depth = summary.scan_profile(ranked), ranked.problem.thickness_axis
-    jacobian, covariance = linearised(ranked)
-    found = discrepancy(evidence(spectra, ranked, jacobian), jacobian, ranked.minima.units[0])
-    each = parts.parts(data, ranked, found.errors)
-    silent = fringes.missed(ranked.problem, ranked.fits, ranked.values)
-    views = zip(ranked.problem.views, ranked.fits, strict=True)
-    structures = [residual_structure.missed(view, fit) for view, fit in views]
-    missed = parts.missed(each, ranked, found, silent)
-    conclusion = conclude(
-        ranked,
-        jacobian,
-        covariance,
-        found,
-        misfit=bool(missed),
-        binding=wider.binding,
-        fixed=summary.fixed(spectra),
-        scans={} if profile is None or depth is None else {depth: profile},
-        amend=lambda limits: summary.amended(spectra, ranked, limits),
-    )
-    parameters, drifts = sweep_scatter.with_sweeps(data, ranked, jacobian, conclusion.parameters)
-    dark = summary.opaque(spectra, ranked)
-    worst = (missed or each)[0]
-    structure = next(own for own, part in zip(structures, each, strict=True) if part is worst)
-    rivals, probability = conclusion.rivals, None
-    if any(isinstance(view, ColoursView) for view in ranked.problem.views):
-        every = orders(ranked, found)
-        rivals, probability = with_orders(rivals, every), float(every.probability[0])
+    return targets, ranked, wider._replace(warnings=(*warnings, *wider.warnings))
+
+
+def _verdict(
+    films: FilmMeasurements,
+    judged: Assembly,
+    parameters: dict[str, Estimate],
+    rivals: tuple[Rival, ...],
+    dark: frozenset[str],
+) -> str:
+    """The verdict, and what the back face does."""
+    worst = judged.worst
+    pairs = zip(films.structures, judged.parts, strict=True)
+    structure = next(structure for structure, part in pairs if part is worst)
     sentence = verdict(
-        conclusion.status,
+        judged.conclusion.status,
         parameters,
         rivals,
         worst.rms,
@@ -235,33 +249,6 @@ def _fit(
         " degrees" if isinstance(worst.curve, Curve) and worst.curve.delta_data is not None else "",
         structure.place if structure else "",
         dark,
-        identifiability.naming(next(iter(parameters)), conclusion.correlated),
+        identifiability.naming(next(iter(parameters)), judged.conclusion.correlated),
     )
-    unclear = [
-        *drifts,
-        *depolarisation.unexplained(data, spectra, ranked.problem.views),
-        # the few residuals of colours have a cause in any case, where they are noise
-        *(likely_cause(found, ranked.problem.parameters) if probability is None or missed else []),
-        *default_bounds.remarks(ranked, wider.binding),
-        *identifiability.bounded(parameters, dark),
-        *conclusion.correlated,
-    ]
-    fit = Fit(
-        parts=each,
-        status=conclusion.status,
-        verdict=sentence + backface.sentence(backface.comparison(spectra, ranked)),
-        parameters=parameters,
-        rivals=parts.with_curves(rivals, each, ranked),
-        probability=probability,
-        chi2_reduced=ranked.chi2_reduced,
-        rms=parts.together(each),
-        effective_points=sum(part.effective_points for part in each),
-        correlation_names=covariance.names,
-        correlation=found.errors.correlation,
-        warnings=(*warnings, *summary.warnings(spectra, ranked, silent, structures, unclear)),
-        profile=profile,
-        seconds=time.perf_counter() - began,
-        budget=budget(found, ranked.problem.parameters),
-        scene=spectra[0].scene if len(spectra) == 1 else tuple(m.scene for m in spectra),
-    )
-    return fit, ranked
+    return sentence + backface.sentence(backface.comparison(films.targets, films.ranked))

@@ -16,14 +16,14 @@ from pellicle.data.spectrum import Spectrum
 from pellicle.fitting.covariance import Errors
 from pellicle.fitting.curves import ColourCurve, Curve, Deferred
 from pellicle.fitting.discrepancy import Discrepancy
-from pellicle.fitting.film.colour_evidence import accuracy as colours_accuracy
-from pellicle.fitting.film.colour_parts import colour_curve, colours_part
+from pellicle.fitting.film.colour_summary import accuracy as colours_accuracy
+from pellicle.fitting.film.colour_summary import colour_curve, colours_part
 from pellicle.fitting.film.colour_view import ColoursView
 from pellicle.fitting.film.form import Local
 from pellicle.fitting.film.fringes import Fringes
-from pellicle.fitting.film.layer_errors import layer_errors, principal_indices
 from pellicle.fitting.film.view import SpectrumView
 from pellicle.fitting.misfit import Accuracy, misfit
+from pellicle.fitting.reported_layer import layer_errors, principal_indices
 from pellicle.fitting.result import Part, Rival
 from pellicle.fitting.reweighting import RankedMinima, ViewFit
 

@@ -4,20 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from pellicle.data.colours import Colours
+from pellicle.data.spectrum import Spectrum
 from pellicle.dispersion.anisotropic import ordinary_index
 from pellicle.dispersion.empirical import Shifted
-from pellicle.fitting.film import fringes
+from pellicle.fitting.covariance import Scaled
+from pellicle.fitting.discrepancy import Discrepancy, Evidence
+from pellicle.fitting.film import fringes, parts, residual_structure
+from pellicle.fitting.film.evidence import evidence
 from pellicle.fitting.film.parameters import fixed_numbers, thickness_name
 from pellicle.fitting.film.problem import shortest_wavelength
-from pellicle.fitting.film.residual_structure import Missed
 from pellicle.fitting.film.targets import Target, drifts
 from pellicle.fitting.film.view import SpectrumView
 from pellicle.fitting.noise import student
 from pellicle.fitting.profile_likelihood import Limits
-from pellicle.fitting.result import Estimate, Profile
+from pellicle.fitting.result import Estimate, Part, Profile
 from pellicle.fitting.reweighting import RankedMinima, ViewFit
 from pellicle.fitting.status import RIVAL
 from pellicle.materials import Material, materials_in
@@ -32,6 +38,60 @@ _ABSORBS = 1e-3
 FEWEST_FRINGES = 0.75
 """Fringes that a spectrum must span where scale and offset drift: with fewer, drift can imitate the film.
 On real soap films from 510 to 910 nm this is 330 nm, below which no single spectrum was decided."""
+
+
+@dataclass(frozen=True)
+class FilmMeasurements:
+    """Spectra and colours of one film, the targets of their fit, and its ranked minima."""
+
+    data: list[Spectrum | Colours]
+    targets: list[Target]
+    ranked: RankedMinima
+
+    @cached_property
+    def silent(self) -> list[fringes.Fringes | None]:
+        """Clear fringes of each view that the best fit misses."""
+        return fringes.missed(self.ranked.problem, self.ranked.fits, self.ranked.values)
+
+    @cached_property
+    def structures(self) -> list[residual_structure.Missed | None]:
+        """Structure in the residuals of each view."""
+        views = zip(self.ranked.problem.views, self.ranked.fits, strict=True)
+        return [residual_structure.missed(view, fit) for view, fit in views]
+
+    def evidence(self, jacobian: Scaled) -> list[Evidence]:
+        """Residuals of each view and what may explain them."""
+        return evidence(self.targets, self.ranked, jacobian)
+
+    def parts(self, found: Discrepancy) -> tuple[Part, ...]:
+        """One part for each measurement."""
+        return parts.parts(self.data, self.ranked, found.errors)
+
+    def missed(self, every: tuple[Part, ...], found: Discrepancy) -> tuple[Part, ...]:
+        """The parts that the scene does not explain."""
+        return parts.missed(every, self.ranked, found, self.silent)
+
+    def fixed(self) -> list[Estimate]:
+        """The fixed numbers of the layers and the instruments."""
+        return [
+            Estimate(name, value, 0.0, unit, value, value, False)
+            for target in self.targets
+            for name, value, unit in fixed_numbers(target.scene, target.name)
+        ]
+
+    def amended(self, limits: list[Limits]) -> list[Limits]:
+        """Limits with a thickness that drift of scale and offset could imitate bounded from above only."""
+        if not all(drifts(m.scene) and len(m.scene.layers) == 1 for m in self.targets):
+            return limits
+        ranked = self.ranked
+        least = min(thinnest(v, fit) for v, fit in zip(ranked.problem.views, ranked.fits, strict=True))
+        pairs = zip(ranked.problem.parameters, ranked.values.tolist(), limits, strict=True)
+        return [
+            Limits(math.inf, limit.lower, least)
+            if p.key == "thickness" and math.isfinite(limit.stderr) and value < least
+            else limit
+            for p, value, limit in pairs
+        ]
 
 
 def scan_profile(ranked: RankedMinima) -> Profile | None:
@@ -50,35 +110,11 @@ def scan_profile(ranked: RankedMinima) -> Profile | None:
     return Profile(scan.thickness, np.minimum(above - min(above.min(), 0.0), _RULED_OUT))
 
 
-def amended(spectra: Sequence[Target], ranked: RankedMinima, limits: list[Limits]) -> list[Limits]:
-    """Limits with a thickness that drift of scale and offset could imitate bounded from above only."""
-    if not all(drifts(m.scene) and len(m.scene.layers) == 1 for m in spectra):
-        return limits
-    views = zip(ranked.problem.views, ranked.fits, strict=True)
-    least = min(thinnest(view, fit) for view, fit in views)
-    pairs = zip(ranked.problem.parameters, ranked.values.tolist(), limits, strict=True)
-    return [
-        Limits(math.inf, limit.lower, least)
-        if p.key == "thickness" and math.isfinite(limit.stderr) and value < least
-        else limit
-        for p, value, limit in pairs
-    ]
-
-
 def thinnest(view: SpectrumView, fit: ViewFit) -> float:
     """The thickness (nm) of which the spectrum spans `FEWEST_FRINGES`."""
     rows = slice(view.rows)
     wavelength, n = np.asarray(view.scene.light.wavelength)[rows], np.asarray(fit.at.layer)[0, rows]
     return float(FEWEST_FRINGES / max(np.ptp(2 * n / wavelength), 1e-12))
-
-
-def fixed(spectra: Sequence[Target]) -> list[Estimate]:
-    """The fixed numbers of the layers and the instruments."""
-    return [
-        Estimate(name, value, 0.0, unit, value, value, False)
-        for spectrum in spectra
-        for name, value, unit in fixed_numbers(spectrum.scene, spectrum.name)
-    ]
 
 
 def opaque(spectra: Sequence[Target], ranked: RankedMinima) -> frozenset[str]:
@@ -93,18 +129,9 @@ def opaque(spectra: Sequence[Target], ranked: RankedMinima) -> frozenset[str]:
     )
 
 
-def warnings(
-    spectra: Sequence[Target],
-    ranked: RankedMinima,
-    silent: Sequence[fringes.Fringes | None],
-    structures: Sequence[Missed | None],
-    unclear: Sequence[str],
-) -> tuple[str, ...]:
-    """Warnings that a reader needs before using the numbers.
-
-    Of each view: `silent`, clear fringes that the fit misses, and `structures` of its residuals. `unclear` is
-    what the data do not determine.
-    """
+def warnings(films: FilmMeasurements, unclear: Sequence[str]) -> tuple[str, ...]:
+    """Warnings that a reader needs before using the numbers; `unclear` is what the data do not determine."""
+    spectra, ranked = films.targets, films.ranked
     messages = [w for m in spectra for material in materials_in(m.scene) for w in material.warnings()]
     scan, finest = ranked.minima.scan, shortest_wavelength(ranked.problem) / 8
     if scan is not None and scan.thickness[1] - scan.thickness[0] > 1.01 * finest:
@@ -113,8 +140,8 @@ def warnings(
             f" {scan.thickness[1] - scan.thickness[0]:.3g} nm, where fringes call for {finest:.3g}: minima"
             " may be missed; narrow the bounds"
         )
-    messages += fringes.disagreement(ranked.problem, silent, ranked.values)
-    views = zip(spectra, ranked.problem.views, ranked.fits, structures, strict=True)
+    messages += fringes.disagreement(ranked.problem, films.silent, ranked.values)
+    views = zip(spectra, ranked.problem.views, ranked.fits, films.structures, strict=True)
     for spectrum, view, fit, structure in views:
         scene, length, own = spectrum.scene, fit.length, f"{view.name}: " if view.name else ""
         orders = view.plan.row("orders")

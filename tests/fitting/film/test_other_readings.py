@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.fitting.film.delta_conventions import readings
+from pellicle.fitting.film.other_readings import conventions
 
 NM = np.linspace(400.0, 760.0, 64)
 PSI, DELTA = (np.asarray(x) for x in pl.ellipsometry(NM, 250.0, "SiO2", "Si", angle=70.0))
@@ -23,7 +23,7 @@ def spectrum(delta, **more):
 )
 def test_each_convention_is_undone(words, written):
     data = spectrum(written)
-    again = dict(readings([data], [20.0]))
+    again = dict(conventions([data], [20.0]))
     turned = {}
     for name, (read,) in again.items():
         assert isinstance(read, pl.Spectrum)
@@ -34,8 +34,8 @@ def test_each_convention_is_undone(words, written):
 def test_small_residuals_and_other_signals_are_not_read_again():
     data = spectrum(DELTA)
     reflectance = pl.Spectrum(NM, np.full(64, 0.3), "R")
-    assert list(readings([data], [1.0])) == []
-    assert list(readings([reflectance], [20.0])) == []
+    assert list(conventions([data], [1.0])) == []
+    assert list(conventions([reflectance], [20.0])) == []
 
 
 @pytest.mark.slow  # four fits
