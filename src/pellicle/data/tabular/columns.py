@@ -46,10 +46,13 @@ _UNIT_OF = {
     "counts": lambda text: None,
     "intensity": lambda text: None,
 }
-_ALIASES = sorted(
-    ((name, role) for role, names in (*NAMES.items(), ("foreign", FOREIGN)) for name in names),
-    key=lambda alias: -len(alias[0]),
-)
+_ALIASES: dict[str, list[tuple[str, str]]] = {}
+"""Names and their roles by their first letter, the longest first: each cell of a file is looked up."""
+for _role, _names in (*NAMES.items(), ("foreign", FOREIGN)):
+    for _name in _names:
+        _ALIASES.setdefault(_name[:1], []).append((_name, _role))
+for _of_letter in _ALIASES.values():
+    _of_letter.sort(key=lambda alias: -len(alias[0]))
 _TAIL = re.compile(
     r"\s*(?:(?P<open>[(\[])\s*(?P<inside>[^()\[\]]*?)\s*[)\]]|[_\s/,:-]+(?:in\s+)?(?P<after>.+?))\s*"
 )
@@ -135,7 +138,7 @@ def recognise(name: str, position: int = 0) -> Column:
     if percent:
         plain = plain.strip("% _/,:-").removesuffix(" in").removeprefix("percent ")
     plain = _QUALIFIER.sub("", plain)
-    for alias, role in _ALIASES:
+    for alias, role in _ALIASES.get(plain[:1], ()):
         if plain == alias:
             return _column(position, name, role, "%" if percent else None, bracketed=False)
         tail = _TAIL.fullmatch(plain[len(alias) :]) if plain.startswith(alias) else None
